@@ -1,0 +1,26 @@
+//! strapd: gyro samples in, attitude you can trust out.
+//!
+//! The folders are the data flow:
+//!
+//! ```text
+//! source -> decode -> condition -> propagate -> sink      wired by pipeline
+//!                          model: the mathematics beside it, pure
+//! ```
+//!
+//! Reading order: [`record`], [`propagate`], [`condition`], then the rims.
+//! Without the default feature `service` the crate is `model`, `record`, `condition` and
+//! `propagate` on nalgebra alone.
+
+pub mod condition;
+pub mod model;
+pub mod propagate;
+pub mod record;
+
+#[cfg(feature = "service")]
+pub mod decode;
+#[cfg(feature = "service")]
+pub mod error;
+#[cfg(feature = "service")]
+pub mod sink;
+#[cfg(feature = "service")]
+pub mod source;
