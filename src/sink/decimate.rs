@@ -7,7 +7,7 @@ use crate::record::{AttitudeSample, Nanos, Status};
 /// Thins a stream to about `--out-rate` samples a second.
 ///
 /// Output instants lie on a grid from the first sample on. Of the input samples the first one is
-/// taken that is no more than half an input step before the grid point: at equal rates jitter
+/// taken that is no more than half a mean input step before the grid point: at equal rates jitter
 /// loses none, at higher input rates the sample nearest to the grid point is taken. A stamp that goes
 /// backwards starts a new grid. What the samples left out had to say is added to the status of the
 /// next one kept.
@@ -17,6 +17,9 @@ pub struct Decimator {
     period: f64,
     /// First sample of the grid and the sample seen last.
     grid: Option<(Nanos, Nanos)>,
+    /// Sum of the input steps since, in ns, each cut to two periods so that a gap weighs little.
+    steps_sum: f64,
+    steps: f64,
     /// Grid point not yet served.
     next: f64,
     skipped: Status,
@@ -30,6 +33,8 @@ impl Decimator {
         (rate_hz > 0.0 && period.is_finite() && period > 0.0).then_some(Decimator {
             period,
             grid: None,
+            steps_sum: 0.0,
+            steps: 0.0,
             next: 0.0,
             skipped: Status::OK,
         })
@@ -41,7 +46,7 @@ impl Decimator {
         let (origin, previous) = match self.grid {
             Some((origin, previous)) if stamp >= previous => (origin, previous),
             _ => {
-                self.next = 0.0;
+                (self.next, self.steps_sum, self.steps) = (0.0, 0.0, 0.0);
                 (stamp, stamp)
             }
         };
@@ -49,7 +54,14 @@ impl Decimator {
         // Integers until subtracted; an f64 holds the difference exactly for 104 days and the
         // nearest few nanoseconds after that.
         let elapsed = stamp.since(origin) as f64;
-        let half_step = (stamp.since(previous) as f64).min(self.period) * 0.5;
+        let step = stamp.since(previous) as f64;
+        if step > 0.0 {
+            self.steps_sum += step.min(2.0 * self.period);
+            self.steps += 1.0;
+        }
+        // No step yet: the first sample, which lies on the grid.
+        let mean_step = self.steps_sum / self.steps.max(1.0);
+        let half_step = 0.5 * mean_step.min(self.period);
         let reached = ((elapsed + half_step) / self.period).floor();
         if reached < self.next {
             self.skipped = self.skipped.with(sample.status);
