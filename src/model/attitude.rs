@@ -138,10 +138,8 @@ impl<To, From> Quaternion<To, From> {
     /// At exactly half a turn apart both ways are shortest; one of them is taken.
     #[must_use]
     pub fn slerp(&self, other: &Self, t: f64) -> Self {
-        let d: Quaternion<From, From> = self.inverse() * *other;
-        let phi = d.rotation_vector();
-        let part = Quaternion::<From, From>::from_rotation_vector(&RotationVector(phi.0 * t));
-        (*self * part).normalised()
+        let phi = (self.inverse() * *other).rotation_vector();
+        self.turned(&(phi.0 * t)).normalised()
     }
 
     /// The chord instead of the arc: cheaper, same ends and path, rate not constant (for a step of
@@ -154,6 +152,12 @@ impl<To, From> Quaternion<To, From> {
             *o += (b - *o) * t;
         }
         Self::assume_unit(out).normalised()
+    }
+
+    /// `q exp(phi)`, phi in `From` axes.
+    fn turned(&self, phi: &Vector3<f64>) -> Self {
+        let [w, x, y, z] = exp_minus_one(phi);
+        Self::assume_unit(hamilton(self.wxyz, [1.0 + w, x, y, z]))
     }
 
     /// The matrix C with the same subscripts.
@@ -234,7 +238,7 @@ impl<To> Quaternion<To, Body> {
     /// ```
     #[must_use]
     pub fn advanced(&self, phi: &RotationVector) -> Self {
-        *self * Quaternion::<Body, Body>::from_rotation_vector(phi)
+        self.turned(&phi.0)
     }
 }
 
@@ -242,14 +246,7 @@ impl<A, B, C> Mul<Quaternion<B, C>> for Quaternion<A, B> {
     type Output = Quaternion<A, C>;
     /// Hamilton product; not renormalised.
     fn mul(self, right: Quaternion<B, C>) -> Quaternion<A, C> {
-        let [aw, ax, ay, az] = self.wxyz;
-        let [bw, bx, by, bz] = right.wxyz;
-        Quaternion::assume_unit([
-            aw * bw - ax * bx - ay * by - az * bz,
-            aw * bx + ax * bw + ay * bz - az * by,
-            aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw,
-        ])
+        Quaternion::assume_unit(hamilton(self.wxyz, right.wxyz))
     }
 }
 
@@ -263,16 +260,25 @@ impl<A, B> Mul<In<B>> for Quaternion<A, B> {
     }
 }
 
-pub(crate) fn dot4(a: [f64; 4], b: [f64; 4]) -> f64 {
+fn hamilton([aw, ax, ay, az]: [f64; 4], [bw, bx, by, bz]: [f64; 4]) -> [f64; 4] {
+    [
+        aw * bw - ax * bx - ay * by - az * bz,
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+    ]
+}
+
+fn dot4(a: [f64; 4], b: [f64; 4]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-pub(crate) fn norm4(q: [f64; 4]) -> f64 {
+fn norm4(q: [f64; 4]) -> f64 {
     dot4(q, q).sqrt()
 }
 
 /// Length of a vector, also where its square leaves the range of f64.
-pub(crate) fn norm3(v: &Vector3<f64>) -> f64 {
+fn norm3(v: &Vector3<f64>) -> f64 {
     let square = v.norm_squared();
     if (1e-280..1e280).contains(&square) {
         return square.sqrt();

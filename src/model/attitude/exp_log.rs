@@ -45,7 +45,7 @@ impl<To, From> Quaternion<To, From> {
     /// The rotation that turns by |phi| about phi: exp(phi), of unit norm to rounding.
     ///
     /// # Accuracy
-    /// 3e-16 + 1e-16 a, a = |phi| in rad.
+    /// 1e-15 rad up to half a turn.
     #[must_use]
     pub fn from_rotation_vector(phi: &RotationVector) -> Self {
         let [w, x, y, z] = exp_minus_one(&phi.0);

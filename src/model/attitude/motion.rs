@@ -4,7 +4,6 @@
 //! rotation only while the axis stands still, and adding delta angles of a moving axis loses the
 //! coning. Only a [`RotationVector`] can advance an attitude.
 
-use super::Quaternion;
 use nalgebra::Vector3;
 
 /// Angular rate of the body relative to n, resolved in body axes (w_nb_b), rad/s.
@@ -48,11 +47,5 @@ impl RotationVector {
     #[must_use]
     pub fn angle(&self) -> f64 {
         super::norm3(&self.0)
-    }
-
-    /// The quaternion of the turn, tagged by the caller; see [`Quaternion::from_rotation_vector`].
-    #[must_use]
-    pub fn exp<To, From>(&self) -> Quaternion<To, From> {
-        Quaternion::from_rotation_vector(self)
     }
 }

@@ -36,7 +36,7 @@ impl<To, From> Quaternion<To, From> {
     /// then 0 and yaw carries the turn.
     ///
     /// # Accuracy
-    /// Put together again they give the attitude to 2e-15 rad, gimbal lock included.
+    /// Put together again they give the attitude to 3e-15 rad, gimbal lock included.
     ///
     /// # Source
     /// Bernardes and Viollet, "Quaternion to Euler angles conversion", PLoS ONE 17(11), 2022: half
