@@ -1,0 +1,352 @@
+//! The first samples (or a pass over the log) -> clock, bias, initial attitude. Pure.
+//!
+//! Apart from the estimator because it is all about what is not known yet: when enough has been
+//! seen, and what to say when it can not be known.
+
+use crate::condition::stillness::{self, RestDetector, Rests};
+use crate::condition::{Clock, Conditioner, GyroUnit, Settings, choose_clock};
+use crate::config::{Bias, Initial, Plan};
+use crate::decode::{self, Stated};
+use crate::model::attitude::{Quaternion, YawPitchRoll};
+use crate::model::frames::{Body, BodyAxes, Convention, Nav, Sensor, World};
+use crate::record::{Nanos, RateSample, RawSample, SampleKind};
+use nalgebra::{Matrix3, Vector3};
+
+/// Samples that tell the clock and hold the first orientation.
+const FEW: usize = 512;
+/// Samples, and seconds of data, in which rest is sought when the log can not be read twice.
+const MANY: usize = 200_000;
+const REST_SECS: f64 = 60.0;
+/// Standard gravity, m/s^2.
+const STANDARD_GRAVITY: f64 = 9.806_65;
+
+/// The flags and what the format states, put together: a flag wins.
+#[derive(Clone, Debug)]
+pub struct Resolved {
+    /// What a sample means.
+    pub kind: SampleKind,
+    /// Unit of the rates.
+    pub unit: GyroUnit,
+    /// Axes of the input.
+    pub body: BodyAxes,
+    /// Multiplies the recorded acceleration.
+    pub accel_scale: f64,
+    /// The convention of recorded orientations.
+    pub recorded: Convention,
+    axes: Matrix3<f64>,
+    mount: Matrix3<f64>,
+}
+
+impl Resolved {
+    /// Puts `plan` and what the channel's format states together.
+    #[must_use]
+    pub fn new(plan: &Plan, stated: &Stated) -> Resolved {
+        let body = plan.body.unwrap_or(match stated.axes {
+            Some(decode::BodyAxes::Frd) => BodyAxes::Frd,
+            Some(decode::BodyAxes::Flu) | None => BodyAxes::Flu,
+        });
+        let unit = plan.unit.unwrap_or(match stated.gyro_unit {
+            Some(decode::GyroUnit::Deg) => GyroUnit::Deg,
+            Some(decode::GyroUnit::Mrad) => GyroUnit::Mrad,
+            Some(decode::GyroUnit::Rad) | None => GyroUnit::Rad,
+        });
+        let mount: Quaternion<Body, Sensor> =
+            plan.mount.map_or_else(Quaternion::identity, Quaternion::assume_unit);
+        Resolved {
+            kind: plan.kind.or(stated.sample_kind).unwrap_or_default(),
+            unit,
+            accel_scale: match stated.accel_unit {
+                Some(decode::AccelUnit::StandardGravity) => STANDARD_GRAVITY,
+                Some(decode::AccelUnit::MetresPerSecondSquared) | None => 1.0,
+            },
+            recorded: match stated.world {
+                Some(decode::WorldAxes::Ned) => Convention::NedFrd,
+                Some(decode::WorldAxes::Enu) | None => Convention::EnuFlu,
+            },
+            axes: body.c_bs().map_or_else(Matrix3::identity, |c| *c.as_matrix()),
+            mount: *mount.to_dcm().as_matrix(),
+            body,
+        }
+    }
+
+    /// The settings of the conditioning stage.
+    #[must_use]
+    pub fn conditioning(&self, plan: &Plan, clock: Clock, bias: Vector3<f64>) -> Settings {
+        Settings {
+            kind: self.kind,
+            unit: self.unit,
+            accel_scale: self.accel_scale,
+            axes: self.axes,
+            mount: self.mount,
+            clock,
+            max_gap_secs: plan.max_gap_secs,
+            on_gap: plan.on_gap,
+            bias,
+            gyro_range: plan.gyro_range,
+            start: plan.start,
+            until: plan.until,
+            ..Settings::default()
+        }
+    }
+
+    /// A recorded orientation (sensor to its world) as the attitude of our body: convention and
+    /// mounting undone. `None` when it is no rotation.
+    #[must_use]
+    pub fn recorded_attitude(&self, wxyz: [f64; 4]) -> Option<Quaternion<Nav, Body>> {
+        let q: Quaternion<Nav, Body> = Quaternion::try_from_wxyz(wxyz).ok()?;
+        let flu = self.recorded.convert(Convention::EnuFlu, q);
+        let c_bs: Quaternion<Body, Body> =
+            Quaternion::from_dcm(&crate::model::frames::Dcm::assume(self.mount));
+        Some((flu * c_bs.inverse()).normalised())
+    }
+}
+
+/// What was decided before the first sample was integrated.
+#[derive(Clone, Debug)]
+pub struct Prepared {
+    /// The clock.
+    pub clock: Clock,
+    /// Bias removed, rad/s, body axes.
+    pub bias: Vector3<f64>,
+    /// Its uncertainty, rad/s.
+    pub bias_sigma: f64,
+    /// Where it came from.
+    pub bias_origin: String,
+    /// q_nb at the first sample, ENU (or start) and FLU.
+    pub initial: Quaternion<Nav, Body>,
+    /// Where it came from.
+    pub initial_origin: String,
+    /// The world of the output.
+    pub world: World,
+    /// Things to know.
+    pub warnings: Vec<String>,
+}
+
+/// Decides when enough was seen, then decides.
+#[derive(Debug)]
+pub struct Preparation {
+    needs_rest: bool,
+    rests: Option<Rests>,
+}
+
+impl Preparation {
+    /// `rests` of the whole log, where known.
+    #[must_use]
+    pub fn new(plan: &Plan, rests: Option<Rests>) -> Preparation {
+        Preparation { needs_rest: needs_rest(plan), rests }
+    }
+
+    /// Whether more samples should be gathered first.
+    #[must_use]
+    pub fn wants_more(&self, gathered: &[RawSample]) -> bool {
+        if !self.needs_rest || self.rests.is_some() {
+            return gathered.len() < FEW;
+        }
+        let (Some(first), Some(last)) = (gathered.first(), gathered.last()) else {
+            return true;
+        };
+        let secs = |a: Option<Nanos>, b: Option<Nanos>| {
+            a.zip(b).map_or(0.0, |(a, b)| b.secs_since(a))
+        };
+        gathered.len() < MANY
+            && secs(first.header, last.header) < REST_SECS
+            && last.log.secs_since(first.log) < REST_SECS
+    }
+
+    /// Decides from what was gathered.
+    ///
+    /// # Errors
+    /// In words: no usable stamps, no rest, no orientation, and the flag that helps.
+    pub fn decide(
+        &self,
+        plan: &Plan,
+        resolved: &Resolved,
+        gathered: &[RawSample],
+    ) -> Result<Prepared, String> {
+        let (clock, warning) = choose_clock(gathered, plan.clock);
+        if let Some(fatal) = warning.as_ref().filter(|w| w.is_fatal()) {
+            return Err(fatal.to_string());
+        }
+        let mut warnings: Vec<String> = warning.iter().map(ToString::to_string).collect();
+        let rests = match &self.rests {
+            Some(rests) => rests.clone(),
+            None if self.needs_rest => {
+                let mut pass = RestPass::new(plan, resolved);
+                pass.push(gathered)?;
+                pass.finish()?
+            }
+            None => Rests::default(),
+        };
+        let (bias, bias_sigma, bias_origin) = decide_bias(plan, &rests)?;
+        let (initial, initial_origin, world) =
+            decide_initial(plan, resolved, gathered, &rests, &mut warnings)?;
+        Ok(Prepared {
+            clock,
+            bias,
+            bias_sigma,
+            bias_origin,
+            initial,
+            initial_origin,
+            world,
+            warnings,
+        })
+    }
+}
+
+/// Whether the plan asks for something only rest can tell.
+#[must_use]
+pub fn needs_rest(plan: &Plan) -> bool {
+    plan.bias == Bias::Auto || plan.initial == Initial::Gravity
+}
+
+fn decide_bias(plan: &Plan, rests: &Rests) -> Result<(Vector3<f64>, f64, String), String> {
+    match plan.bias {
+        Bias::None => Ok((Vector3::zeros(), plan.noise.bias_instability, "none".to_owned())),
+        Bias::Given(bias) => Ok((bias, plan.noise.bias_instability, "as given".to_owned())),
+        Bias::Auto => {
+            let estimate = stillness::estimate_bias(rests).map_err(|e| format!("--bias auto: {e}"))?;
+            let sigma = estimate.sigma.max();
+            Ok((
+                estimate.bias,
+                sigma.hypot(plan.noise.bias_instability),
+                format!("from {:.1} s of rest, +- {sigma:.1e} rad/s", estimate.rest_secs),
+            ))
+        }
+    }
+}
+
+fn decide_initial(
+    plan: &Plan,
+    resolved: &Resolved,
+    gathered: &[RawSample],
+    rests: &Rests,
+    warnings: &mut Vec<String>,
+) -> Result<(Quaternion<Nav, Body>, String, World), String> {
+    // What the user gives is in the convention of the world asked for.
+    let asked = plan.world.convention().unwrap_or(Convention::EnuFlu);
+    let inside = |q: Quaternion<Nav, Body>| asked.convert(Convention::EnuFlu, q);
+    match plan.initial {
+        Initial::Identity => {
+            if plan.world != World::Start {
+                warnings.push(format!(
+                    "the initial attitude was taken as identity in {}: --init gravity, first-orientation, q=.. or rpy=.. gives a real one",
+                    plan.world
+                ));
+            }
+            Ok((inside(Quaternion::identity()), "identity".to_owned(), plan.world))
+        }
+        Initial::Given(wxyz) => {
+            Ok((inside(Quaternion::assume_unit(wxyz)), "as given".to_owned(), plan.world))
+        }
+        Initial::Gravity => {
+            let level = stillness::level_at_start(rests).map_err(|e| format!("--init gravity: {e}"))?;
+            // Heading is unknown: zero in the convention that is shown.
+            let shown = Convention::EnuFlu.convert(asked, level);
+            let angles = shown.yaw_pitch_roll();
+            let q = Quaternion::from_yaw_pitch_roll(&YawPitchRoll { yaw: 0.0, ..angles });
+            Ok((inside(q), "level from gravity, heading 0".to_owned(), plan.world))
+        }
+        Initial::FirstOrientation => {
+            let found = gathered
+                .iter()
+                .filter_map(|s| s.orientation)
+                .find_map(|wxyz| resolved.recorded_attitude(wxyz));
+            let q = found.ok_or_else(|| {
+                "--init first-orientation: the first samples carry no orientation\n  help: --init gravity, identity, q=w,x,y,z or rpy=roll,pitch,yaw".to_owned()
+            })?;
+            let world = match (plan.world, resolved.recorded) {
+                (World::Start, Convention::NedFrd) => World::Ned,
+                (World::Start, _) => World::Enu,
+                (asked, _) => asked,
+            };
+            Ok((q, "first recorded orientation".to_owned(), world))
+        }
+    }
+}
+
+/// A pass over samples that only looks for rest.
+#[derive(Debug)]
+pub struct RestPass {
+    plan: Plan,
+    resolved: Resolved,
+    gathered: Vec<RawSample>,
+    running: Option<Conditioner>,
+    detector: RestDetector,
+    rates: Vec<RateSample>,
+}
+
+impl RestPass {
+    /// For samples understood as `resolved`.
+    #[must_use]
+    pub fn new(plan: &Plan, resolved: &Resolved) -> RestPass {
+        RestPass {
+            plan: plan.clone(),
+            resolved: resolved.clone(),
+            gathered: Vec::new(),
+            running: None,
+            detector: RestDetector::default(),
+            rates: Vec::new(),
+        }
+    }
+
+    /// Takes samples.
+    ///
+    /// # Errors
+    /// In words, when the settings do not fit.
+    pub fn push(&mut self, raw: &[RawSample]) -> Result<(), String> {
+        match &mut self.running {
+            Some(conditioner) => {
+                conditioner.push(raw, &mut self.rates);
+                self.detect();
+            }
+            None => {
+                self.gathered.extend_from_slice(raw);
+                if self.gathered.len() >= FEW {
+                    self.begin()?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// What was found.
+    ///
+    /// # Errors
+    /// As [`RestPass::push`].
+    pub fn finish(mut self) -> Result<Rests, String> {
+        if self.running.is_none() {
+            self.begin()?;
+        }
+        if let Some(conditioner) = &mut self.running {
+            conditioner.finish(&mut self.rates);
+        }
+        self.detect();
+        Ok(self.detector.finish())
+    }
+
+    fn begin(&mut self) -> Result<(), String> {
+        let gathered = std::mem::take(&mut self.gathered);
+        let (clock, _) = choose_clock(&gathered, self.plan.clock);
+        let settings = self.resolved.conditioning(&self.plan, clock, Vector3::zeros());
+        let mut conditioner = Conditioner::new(settings).map_err(|e| e.to_string())?;
+        conditioner.push(&gathered, &mut self.rates);
+        self.running = Some(conditioner);
+        self.detect();
+        Ok(())
+    }
+
+    fn detect(&mut self) {
+        for sample in self.rates.drain(..) {
+            let rate = match self.resolved.kind {
+                SampleKind::Rate => Some(sample.value),
+                SampleKind::Average | SampleKind::DeltaAngle => {
+                    let secs = sample.stamp.secs_since(sample.start);
+                    (secs > 0.0).then(|| sample.value / secs)
+                }
+            };
+            if let Some(rate) = rate {
+                self.detector.push(sample.stamp, rate, sample.accel);
+            }
+        }
+    }
+}
