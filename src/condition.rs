@@ -55,7 +55,7 @@ use order::Order;
 use timing::Timing;
 
 /// Entries from which the ordinary step is learnt before the first sample leaves (recordings).
-const PRIMING: usize = 16;
+const PRIMING: usize = 32;
 /// A stamp of zero is taken for a stamp only where the clock is within this of zero.
 const ZERO_IS_CLOSE_NANOS: i64 = 10_000_000_000;
 
@@ -316,7 +316,10 @@ impl Conditioner {
         for (i, entry) in sharing.iter().enumerate() {
             // Never an instant that has passed, whatever was put back in between.
             let at = placement.stamp(i).filter(|at| {
-                let placed = gate::Entry { stamp: *at, ..*entry };
+                let placed = gate::Entry {
+                    stamp: *at,
+                    ..*entry
+                };
                 !self.timing.has_passed(&placed)
             });
             let Some(at) = at else {

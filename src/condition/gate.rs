@@ -132,7 +132,11 @@ impl Gate {
         let rate = match self.kind {
             SampleKind::Rate | SampleKind::Average => largest,
             SampleKind::DeltaAngle => {
-                let nanos = if interval > 0 { Some(interval) } else { spacing };
+                let nanos = if interval > 0 {
+                    Some(interval)
+                } else {
+                    spacing
+                };
                 nanos.map_or(0.0, |n| largest / (n as f64 * 1e-9))
             }
         };

@@ -72,12 +72,7 @@ impl Order {
 
     /// Takes the next entry; `spacing` is the ordinary step.
     #[inline]
-    pub(super) fn arrive(
-        &mut self,
-        entry: Entry,
-        spacing: Option<i64>,
-        report: &mut Report,
-    ) {
+    pub(super) fn arrive(&mut self, entry: Entry, spacing: Option<i64>, report: &mut Report) {
         if self.suspects.is_empty() && self.high.is_none_or(|high| entry.stamp > high) {
             self.append(entry);
         } else {
@@ -104,12 +99,7 @@ impl Order {
     }
 
     #[cold]
-    fn arrive_unordered(
-        &mut self,
-        entry: Entry,
-        spacing: Option<i64>,
-        report: &mut Report,
-    ) {
+    fn arrive_unordered(&mut self, entry: Entry, spacing: Option<i64>, report: &mut Report) {
         let Some(high) = self.high else {
             return self.append(entry);
         };
@@ -141,11 +131,7 @@ impl Order {
     }
 
     /// No more entries will come.
-    pub(super) fn finish(
-        &mut self,
-        spacing: Option<i64>,
-        report: &mut Report,
-    ) {
+    pub(super) fn finish(&mut self, spacing: Option<i64>, report: &mut Report) {
         let misfits = self.misfits(spacing);
         if misfits >= MIN_RUN && misfits == self.suspects.len() {
             self.begin_epoch(spacing, report);
@@ -184,9 +170,10 @@ impl Order {
         let hole = spacing.map_or(i64::MAX, |s| s.saturating_add(s / 2));
         let fits = |s: &Entry| {
             let after = line.partition_point(|e| e.stamp <= s.stamp);
-            let (Some(before), Some(after)) =
-                (after.checked_sub(1).and_then(|i| line.get(i)), line.get(after))
-            else {
+            let (Some(before), Some(after)) = (
+                after.checked_sub(1).and_then(|i| line.get(i)),
+                line.get(after),
+            ) else {
                 return false;
             };
             before.stamp < s.stamp && after.stamp.since(before.stamp) >= hole
@@ -207,11 +194,7 @@ impl Order {
 
     /// So many suspects in a row that the line is not coming back: the clock was set back, or
     /// what led the line astray was a few stray stamps at its end.
-    fn resolve_long_run(
-        &mut self,
-        spacing: Option<i64>,
-        report: &mut Report,
-    ) {
+    fn resolve_long_run(&mut self, spacing: Option<i64>, report: &mut Report) {
         if let Some(strays) = self.strays_at_end() {
             for stray in self.line.split_off(self.line.len() - strays) {
                 report.note(Verdict::StrayStamp, stray.index, Some(stray.stamp));

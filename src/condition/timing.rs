@@ -12,8 +12,9 @@ use nalgebra::Vector3;
 
 /// Interval of a lone increment that says nothing of its own: only its mean rate depends on it.
 const LONE_INTERVAL_NANOS: i64 = 10_000_000;
-/// How far a late stamp may take to catch up; a longer look would cost more than it finds.
-const MAX_LOOK: usize = 64;
+/// How many steps a late stamp may take to catch up.
+/// Beyond a dozen steps a few percent of error in the ordinary step look like a sample.
+const MAX_LOOK: usize = 12;
 
 /// The sample before.
 #[derive(Clone, Copy, Debug)]
@@ -182,13 +183,7 @@ impl Timing {
 
     /// A step above the ordinary: missing samples, or a late stamp that its successors catch up with.
     #[cold]
-    fn judge_step(
-        &self,
-        entry: &Entry,
-        step: i64,
-        ahead: &[Entry],
-        report: &mut Report,
-    ) -> Join {
+    fn judge_step(&self, entry: &Entry, step: i64, ahead: &[Entry], report: &mut Report) -> Join {
         let Some(previous) = self.previous else {
             return Join::Start;
         };
@@ -240,7 +235,7 @@ impl Timing {
             // A sample that shares its stamp has none of its own: it proves nothing.
             let shares = next.stamp == stamp;
             stamp = next.stamp;
-            if !shares && stamp.since(before) <= covered.saturating_add(interval / 2) {
+            if !shares && stamp.since(before) <= covered.saturating_add(interval / 4) {
                 return true;
             }
         }
