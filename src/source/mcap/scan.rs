@@ -110,6 +110,10 @@ impl Scanner {
     /// The next block, or `None` at the end.
     pub(super) fn next(&mut self) -> io::Result<Option<Item>> {
         while !self.done {
+            if self.section == Section::Footer {
+                self.after_footer()?;
+                continue;
+            }
             let at = self.tape.position();
             let ahead = self.tape.available(HEAD, PEEK)?;
             let Some((opcode, length)) = head_at(ahead, 0) else {
@@ -117,10 +121,6 @@ impl Scanner {
                 self.end(at, have);
                 break;
             };
-            if self.section == Section::Footer {
-                self.after_footer()?;
-                continue;
-            }
             let total = length.saturating_add(HEAD as u64);
             let item = match opcode {
                 op::MESSAGE => self.run()?,
