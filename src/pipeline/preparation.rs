@@ -3,8 +3,8 @@
 //! Apart from the estimator because it is all about what is not known yet: when enough has been
 //! seen, and what to say when it can not be known.
 
-use crate::condition::stillness::{self, RestDetector, Rests};
-use crate::condition::{Clock, Conditioner, GyroUnit, Settings, choose_clock};
+use crate::condition::stillness::{self, Limits, Rests, Stillness};
+use crate::condition::{Clock, ClockWarning, Conditioner, GyroUnit, Settings, choose_clock};
 use crate::config::{Bias, Initial, Plan};
 use crate::decode::{self, Stated};
 use crate::model::attitude::{Quaternion, YawPitchRoll};
@@ -122,64 +122,96 @@ pub struct Prepared {
     pub warnings: Vec<String>,
 }
 
-/// Decides when enough was seen, then decides.
+/// How long rest is sought.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Patience {
+    /// To the end: the log can be read twice.
+    WholeLog,
+    /// In the first minute: what comes can not be read again, and waits meanwhile.
+    FirstMinute,
+}
+
+/// Takes the first samples (or all of them, when rest is sought), then decides.
 #[derive(Debug)]
 pub struct Preparation {
-    needs_rest: bool,
-    rests: Option<Rests>,
+    plan: Plan,
+    resolved: Resolved,
+    patience: Patience,
+    first: Vec<RawSample>,
+    taken: usize,
+    last: Option<RawSample>,
+    rest: Option<RestPass>,
 }
 
 impl Preparation {
-    /// `rests` of the whole log, where known.
+    /// For samples understood as `resolved`.
     #[must_use]
-    pub fn new(plan: &Plan, rests: Option<Rests>) -> Preparation {
-        Preparation { needs_rest: needs_rest(plan), rests }
+    pub fn new(plan: &Plan, resolved: &Resolved, patience: Patience) -> Preparation {
+        Preparation {
+            plan: plan.clone(),
+            resolved: resolved.clone(),
+            patience,
+            first: Vec::new(),
+            taken: 0,
+            last: None,
+            rest: needs_rest(plan).then(|| RestPass::new(plan, resolved)),
+        }
     }
 
-    /// Whether more samples should be gathered first.
-    #[must_use]
-    pub fn wants_more(&self, gathered: &[RawSample]) -> bool {
-        if !self.needs_rest || self.rests.is_some() {
-            return gathered.len() < FEW;
+    /// Takes the next sample.
+    ///
+    /// # Errors
+    /// In words, when the settings do not fit.
+    pub fn take(&mut self, raw: &RawSample) -> Result<(), String> {
+        if self.first.len() < FEW {
+            self.first.push(*raw);
         }
-        let (Some(first), Some(last)) = (gathered.first(), gathered.last()) else {
+        self.taken += 1;
+        self.last = Some(*raw);
+        match &mut self.rest {
+            Some(rest) => rest.push(std::slice::from_ref(raw)),
+            None => Ok(()),
+        }
+    }
+
+    /// Whether more samples would tell more.
+    #[must_use]
+    pub fn wants_more(&self) -> bool {
+        if self.first.len() < FEW {
+            return true;
+        }
+        let (Some(first), Some(last)) = (self.first.first(), &self.last) else {
             return true;
         };
         let secs = |a: Option<Nanos>, b: Option<Nanos>| {
             a.zip(b).map_or(0.0, |(a, b)| b.secs_since(a))
         };
-        gathered.len() < MANY
-            && secs(first.header, last.header) < REST_SECS
-            && last.log.secs_since(first.log) < REST_SECS
+        self.rest.is_some()
+            && match self.patience {
+                Patience::WholeLog => true,
+                Patience::FirstMinute => {
+                    self.taken < MANY
+                        && secs(first.header, last.header) < REST_SECS
+                        && last.log.secs_since(first.log) < REST_SECS
+                }
+            }
     }
 
-    /// Decides from what was gathered.
+    /// Decides from what was taken.
     ///
     /// # Errors
     /// In words: no usable stamps, no rest, no orientation, and the flag that helps.
-    pub fn decide(
-        &self,
-        plan: &Plan,
-        resolved: &Resolved,
-        gathered: &[RawSample],
-    ) -> Result<Prepared, String> {
-        let (clock, warning) = choose_clock(gathered, plan.clock);
-        if let Some(fatal) = warning.as_ref().filter(|w| w.is_fatal()) {
+    pub fn decide(self) -> Result<Prepared, String> {
+        let Preparation { plan, resolved, first, rest, .. } = self;
+        let (clock, warning) = choose_clock(&first, plan.clock);
+        if let Some(fatal @ ClockWarning::NoneMoves) = warning {
             return Err(fatal.to_string());
         }
         let mut warnings: Vec<String> = warning.iter().map(ToString::to_string).collect();
-        let rests = match &self.rests {
-            Some(rests) => rests.clone(),
-            None if self.needs_rest => {
-                let mut pass = RestPass::new(plan, resolved);
-                pass.push(gathered)?;
-                pass.finish()?
-            }
-            None => Rests::default(),
-        };
-        let (bias, bias_sigma, bias_origin) = decide_bias(plan, &rests)?;
+        let rests = rest.map_or_else(|| Ok(Rests::default()), RestPass::finish)?;
+        let (bias, bias_sigma, bias_origin) = decide_bias(&plan, &rests)?;
         let (initial, initial_origin, world) =
-            decide_initial(plan, resolved, gathered, &rests, &mut warnings)?;
+            decide_initial(&plan, &resolved, &first, &rests, &mut warnings)?;
         Ok(Prepared {
             clock,
             bias,
@@ -194,8 +226,7 @@ impl Preparation {
 }
 
 /// Whether the plan asks for something only rest can tell.
-#[must_use]
-pub fn needs_rest(plan: &Plan) -> bool {
+fn needs_rest(plan: &Plan) -> bool {
     plan.bias == Bias::Auto || plan.initial == Initial::Gravity
 }
 
@@ -204,12 +235,13 @@ fn decide_bias(plan: &Plan, rests: &Rests) -> Result<(Vector3<f64>, f64, String)
         Bias::None => Ok((Vector3::zeros(), plan.noise.bias_instability, "none".to_owned())),
         Bias::Given(bias) => Ok((bias, plan.noise.bias_instability, "as given".to_owned())),
         Bias::Auto => {
-            let estimate = stillness::estimate_bias(rests).map_err(|e| format!("--bias auto: {e}"))?;
+            let estimate = stillness::estimate_bias(rests, &Limits::default())
+                .map_err(|e| format!("--bias auto: {e}"))?;
             let sigma = estimate.sigma.max();
             Ok((
                 estimate.bias,
                 sigma.hypot(plan.noise.bias_instability),
-                format!("from {:.1} s of rest, +- {sigma:.1e} rad/s", estimate.rest_secs),
+                format!("from {:.1} s of rest, +- {sigma:.1e} rad/s", estimate.secs),
             ))
         }
     }
@@ -239,7 +271,10 @@ fn decide_initial(
             Ok((inside(Quaternion::assume_unit(wxyz)), "as given".to_owned(), plan.world))
         }
         Initial::Gravity => {
-            let level = stillness::level_at_start(rests).map_err(|e| format!("--init gravity: {e}"))?;
+            let level = stillness::accel_at_start(rests, &Limits::default())
+                .map_err(|e| format!("--init gravity: {e}"))?;
+            let level = stillness::level(&level)
+                .ok_or("--init gravity: the accelerometer reads zero at rest")?;
             // Heading is unknown: zero in the convention that is shown.
             let shown = Convention::EnuFlu.convert(asked, level);
             let angles = shown.yaw_pitch_roll();
@@ -266,34 +301,28 @@ fn decide_initial(
 
 /// A pass over samples that only looks for rest.
 #[derive(Debug)]
-pub struct RestPass {
+struct RestPass {
     plan: Plan,
     resolved: Resolved,
     gathered: Vec<RawSample>,
     running: Option<Conditioner>,
-    detector: RestDetector,
+    detector: Stillness,
     rates: Vec<RateSample>,
 }
 
 impl RestPass {
-    /// For samples understood as `resolved`.
-    #[must_use]
-    pub fn new(plan: &Plan, resolved: &Resolved) -> RestPass {
+    fn new(plan: &Plan, resolved: &Resolved) -> RestPass {
         RestPass {
             plan: plan.clone(),
             resolved: resolved.clone(),
             gathered: Vec::new(),
             running: None,
-            detector: RestDetector::default(),
+            detector: Stillness::new(resolved.kind, Limits::default()),
             rates: Vec::new(),
         }
     }
 
-    /// Takes samples.
-    ///
-    /// # Errors
-    /// In words, when the settings do not fit.
-    pub fn push(&mut self, raw: &[RawSample]) -> Result<(), String> {
+    fn push(&mut self, raw: &[RawSample]) -> Result<(), String> {
         match &mut self.running {
             Some(conditioner) => {
                 conditioner.push(raw, &mut self.rates);
@@ -309,11 +338,7 @@ impl RestPass {
         Ok(())
     }
 
-    /// What was found.
-    ///
-    /// # Errors
-    /// As [`RestPass::push`].
-    pub fn finish(mut self) -> Result<Rests, String> {
+    fn finish(mut self) -> Result<Rests, String> {
         if self.running.is_none() {
             self.begin()?;
         }
@@ -328,7 +353,7 @@ impl RestPass {
         let gathered = std::mem::take(&mut self.gathered);
         let (clock, _) = choose_clock(&gathered, self.plan.clock);
         let settings = self.resolved.conditioning(&self.plan, clock, Vector3::zeros());
-        let mut conditioner = Conditioner::new(settings).map_err(|e| e.to_string())?;
+        let mut conditioner = Conditioner::new(&settings).map_err(|e| e.to_string())?;
         conditioner.push(&gathered, &mut self.rates);
         self.running = Some(conditioner);
         self.detect();
@@ -337,16 +362,7 @@ impl RestPass {
 
     fn detect(&mut self) {
         for sample in self.rates.drain(..) {
-            let rate = match self.resolved.kind {
-                SampleKind::Rate => Some(sample.value),
-                SampleKind::Average | SampleKind::DeltaAngle => {
-                    let secs = sample.stamp.secs_since(sample.start);
-                    (secs > 0.0).then(|| sample.value / secs)
-                }
-            };
-            if let Some(rate) = rate {
-                self.detector.push(sample.stamp, rate, sample.accel);
-            }
+            self.detector.push(&sample);
         }
     }
 }
