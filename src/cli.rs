@@ -7,6 +7,8 @@ pub mod compare;
 pub mod estimation;
 pub mod info;
 pub mod manual;
+pub mod outputs;
+pub mod progress;
 pub mod replay;
 
 use crate::error::{Error, Result};

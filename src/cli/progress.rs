@@ -1,28 +1,13 @@
 //! Where a long run is: a bar on a terminal, or one JSON object a second. I/O.
 
 use super::{Global, Progress as Mode};
+use crate::pipeline::position::Position;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::time::{Duration, Instant};
 
-/// Where a run is.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Position {
-    /// Bytes of the input done.
-    pub bytes: u64,
-    /// Bytes of the input in all, where known.
-    pub total_bytes: Option<u64>,
-    /// Seconds of data since the first sample.
-    pub data_secs: f64,
-    /// Samples read.
-    pub samples: u64,
-    /// Attitudes written.
-    pub written: u64,
-    /// Gaps so far.
-    pub gaps: u64,
-    /// Samples lost so far.
-    pub lost: u64,
-}
+/// Steps of the bar.
+const TICKS: u64 = 1000;
 
 /// Shows positions; cheap to call often.
 #[derive(Debug)]
@@ -65,12 +50,10 @@ impl Reporter {
         self.show(position);
     }
 
-    /// Shows the end and leaves the terminal clean.
-    pub fn finish(&mut self, position: &Position) {
-        match &self.mode {
-            Show::Nothing => {}
-            Show::Bar(bar) => bar.finish_and_clear(),
-            Show::Json => self.show(position),
+    /// Leaves the terminal clean.
+    pub fn finish(&mut self) {
+        if let Show::Bar(bar) = &self.mode {
+            bar.finish_and_clear();
         }
     }
 
@@ -79,8 +62,10 @@ impl Reporter {
         match &self.mode {
             Show::Nothing => {}
             Show::Bar(bar) => {
-                bar.set_length(p.total_bytes.unwrap_or(p.bytes));
-                bar.set_position(p.bytes);
+                if let Some(fraction) = p.fraction {
+                    bar.set_length(TICKS);
+                    bar.set_position((fraction.clamp(0.0, 1.0) * TICKS as f64) as u64);
+                }
                 bar.set_message(format!(
                     "{:.1} s  {:.0}x  {} samples/s  gaps {}  lost {}",
                     p.data_secs,
@@ -92,7 +77,7 @@ impl Reporter {
             }
             Show::Json => {
                 let object = serde_json::json!({
-                    "class": "PROGRESS", "bytes": p.bytes, "total_bytes": p.total_bytes,
+                    "class": "PROGRESS", "fraction": p.fraction,
                     "data_s": p.data_secs, "samples": p.samples, "written": p.written,
                     "gaps": p.gaps, "lost": p.lost, "elapsed_s": wall,
                 });
@@ -105,7 +90,7 @@ impl Reporter {
 
 fn bar(name: &str) -> ProgressBar {
     let style = ProgressStyle::with_template(
-        "{prefix} {bar:24.cyan/blue} {bytes}/{total_bytes}  ETA {eta}  {msg}",
+        "{prefix} {bar:24.cyan/blue} {percent}%  ETA {eta}  {msg}",
     )
     .unwrap_or_else(|_| ProgressStyle::default_bar());
     let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());

@@ -4,10 +4,13 @@ use super::estimation::Estimation;
 use super::progress::Reporter;
 use super::{Global, Outcome, outputs, print};
 use crate::config::Shard;
+use crate::config::Plan;
 use crate::error::{Error, Result};
 use crate::pipeline::pool::Pool;
 use crate::pipeline::replay::{self, Replay as Run};
+use crate::pipeline::session::Source;
 use crate::report::summary::RunSummary;
+use crate::sink::{Compression, Encoding, Options, Target};
 use clap::{Args, ValueEnum};
 use std::io::Write;
 
@@ -90,16 +93,24 @@ pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
         .filter(|(i, _)| shard.is_none_or(|s| s.takes(*i)))
         .map(|(_, log)| log)
         .collect();
+    if global.json && writes_stdout(args) {
+        return Err(Error::Usage(
+            "--json and -o - would both write to stdout\n  help: give the attitude a file name"
+                .to_owned(),
+        ));
+    }
     let plan = args.estimation.plan()?;
     let pool = Pool::new(global.threads)?;
     let mut outcome = Outcome::Done;
     let mut summaries = Vec::new();
     for log in &logs {
         let result = outputs::resolve(&args.outputs, log, args.sources.len())
-            .and_then(|names| Run::new(log, &names, args, plan.clone()))
+            .and_then(|names| args.run(log, &names, plan.clone()))
             .and_then(|run| {
                 let mut reporter = Reporter::new(global, log);
-                replay::run(&run, &pool, &mut reporter)
+                let result = replay::run(&run, &pool, &mut |position| reporter.update(position));
+                reporter.finish();
+                result
             });
         match result {
             Ok(summary) => {
@@ -122,6 +133,53 @@ pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
     Ok(outcome)
 }
 
+impl Replay {
+    /// The run for one log.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a flag that can not be.
+    fn run(&self, log: &str, outputs: &[String], plan: Plan) -> Result<Run> {
+        let speed = match self.speed.as_str() {
+            "max" => None,
+            text => Some(
+                text.parse::<f64>()
+                    .ok()
+                    .filter(|factor| factor.is_finite() && *factor > 0.0)
+                    .ok_or_else(|| {
+                        Error::Usage(format!(
+                            "--speed {text}: expected max, or a factor above 0 such as 1 or 0.5"
+                        ))
+                    })?,
+            ),
+        };
+        if self.out_rate.is_some_and(|hz| !(hz.is_finite() && hz > 0.0)) {
+            return Err(Error::Usage("--out-rate: a rate above 0 Hz".to_owned()));
+        }
+        Ok(Run {
+            source: Source::parse(log),
+            targets: outputs.iter().map(|o| Target::parse(o)).collect::<Result<_>>()?,
+            plan,
+            options: Options {
+                force: self.force,
+                encoding: match self.encoding {
+                    EncodingArg::Cdr => Encoding::Cdr,
+                    EncodingArg::Json => Encoding::Json,
+                },
+                compression: match self.compression {
+                    CompressionArg::Zstd => Compression::Zstd,
+                    CompressionArg::Lz4 => Compression::Lz4,
+                    CompressionArg::None => Compression::None,
+                },
+            },
+            copy_input: self.copy_input,
+            out_rate: self.out_rate,
+            speed,
+            against: self.against_recorded.clone(),
+            command: std::env::args().collect::<Vec<_>>().join(" "),
+        })
+    }
+}
+
 /// The text summary: on stdout, or on stderr when the data or JSON is there.
 fn say(global: &Global, args: &Replay, summary: &RunSummary) -> Result<()> {
     if global.quiet {
@@ -137,11 +195,6 @@ fn say(global: &Global, args: &Replay, summary: &RunSummary) -> Result<()> {
 
 /// One object for one log, an array for several.
 fn say_json(args: &Replay, summaries: &[RunSummary]) -> Result<()> {
-    if writes_stdout(args) {
-        return Err(Error::Usage(
-            "--json and -o - would both write to stdout\n  help: give the attitude a file name".to_owned(),
-        ));
-    }
     let value = match summaries {
         [one] if args.sources.len() == 1 => one.json(),
         many => many.iter().map(RunSummary::json).collect(),

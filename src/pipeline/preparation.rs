@@ -59,10 +59,7 @@ impl Resolved {
                 Some(decode::AccelUnit::StandardGravity) => STANDARD_GRAVITY,
                 Some(decode::AccelUnit::MetresPerSecondSquared) | None => 1.0,
             },
-            recorded: match stated.world {
-                Some(decode::WorldAxes::Ned) => Convention::NedFrd,
-                Some(decode::WorldAxes::Enu) | None => Convention::EnuFlu,
-            },
+            recorded: orientation_convention(stated),
             axes: body.c_bs().map_or_else(Matrix3::identity, |c| *c.as_matrix()),
             mount: *mount.to_dcm().as_matrix(),
             body,
@@ -89,6 +86,24 @@ impl Resolved {
         }
     }
 
+    /// World and body of the output as labels. NED comes with FRD, everything else with FLU.
+    #[must_use]
+    pub fn labels(&self, world: World) -> (String, String) {
+        let body = if world == World::Ned { "frd" } else { "flu" };
+        (world.to_string(), body.to_owned())
+    }
+
+    /// Whether the output's body axes are other than the sensor's own.
+    #[must_use]
+    pub fn is_remapped(&self, plan: &Plan, world: World) -> bool {
+        let own = match self.body {
+            BodyAxes::Flu => "flu",
+            BodyAxes::Frd => "frd",
+            BodyAxes::Map(_) => "",
+        };
+        plan.mount.is_some() || self.labels(world).1 != own
+    }
+
     /// A recorded orientation (sensor to its world) as the attitude of our body: convention and
     /// mounting undone. `None` when it is no rotation.
     #[must_use]
@@ -98,6 +113,15 @@ impl Resolved {
         let c_bs: Quaternion<Body, Body> =
             Quaternion::from_dcm(&crate::model::frames::Dcm::assume(self.mount));
         Some((flu * c_bs.inverse()).normalised())
+    }
+}
+
+/// The convention of the orientations a format carries.
+#[must_use]
+pub fn orientation_convention(stated: &Stated) -> Convention {
+    match stated.world {
+        Some(decode::WorldAxes::Ned) => Convention::NedFrd,
+        Some(decode::WorldAxes::Enu) | None => Convention::EnuFlu,
     }
 }
 

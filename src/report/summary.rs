@@ -106,6 +106,8 @@ pub struct RunSummary {
     pub outputs: Vec<(String, u64, u64)>,
     /// What was wrong with the file itself.
     pub file_problems: Vec<String>,
+    /// How many of them lost data.
+    pub file_losses: u64,
     /// Wall seconds.
     pub elapsed_secs: f64,
 }
@@ -114,7 +116,7 @@ impl RunSummary {
     /// Whether anything was lost: exit code 3.
     #[must_use]
     pub fn is_lossy(&self) -> bool {
-        !self.file_problems.is_empty()
+        self.file_losses > 0
             || self
                 .topics
                 .iter()
@@ -163,6 +165,7 @@ impl RunSummary {
             "source": self.source,
             "topics": self.topics.iter().map(TopicSummary::json).collect::<Vec<_>>(),
             "file_problems": self.file_problems,
+            "file_losses": self.file_losses,
             "outputs": self.outputs.iter().map(|(name, bytes, messages)| json!({
                 "name": name, "bytes": bytes, "messages": messages,
             })).collect::<Vec<_>>(),
