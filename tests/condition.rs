@@ -1,6 +1,12 @@
 //! What conditioning promises, sample by sample and over whole streams.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
+#[cfg(feature = "service")]
+#[path = "condition/recordings.rs"]
+mod recordings;
+#[cfg(feature = "service")]
+mod shared_data;
+
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
