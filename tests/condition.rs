@@ -4,6 +4,8 @@
 #[cfg(feature = "service")]
 #[path = "condition/recordings.rs"]
 mod recordings;
+#[path = "condition/rules.rs"]
+mod rules;
 #[cfg(feature = "service")]
 mod shared_data;
 

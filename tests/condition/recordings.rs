@@ -210,7 +210,10 @@ fn print_what_is_known_of_the_recordings() {
             report.spacing_nanos
         );
         let rests = rests(kind, &out);
-        println!("   rests {} {:.1} s, first {:?}", rests.count, rests.secs, rests.first);
+        println!(
+            "   rests {} {:.1} s, first {:?}",
+            rests.count, rests.secs, rests.first
+        );
         for r in rests.kept.iter().take(5) {
             println!(
                 "     {:.2}..{:.2} rate {:?} sigma {:?} accel {:?}",
@@ -222,7 +225,11 @@ fn print_what_is_known_of_the_recordings() {
             );
         }
         match estimate_bias(&rests, &Limits::default()) {
-            Ok(b) => println!("   bias {:?} +- {:?}", b.bias.as_slice(), b.sigma.as_slice()),
+            Ok(b) => println!(
+                "   bias {:?} +- {:?}",
+                b.bias.as_slice(),
+                b.sigma.as_slice()
+            ),
             Err(e) => println!("   {e}"),
         }
         match accel_at_start(&rests, &Limits::default()) {
@@ -231,7 +238,10 @@ fn print_what_is_known_of_the_recordings() {
         }
         let mut q = quality(&raw, Clock::Header);
         let advice = std::mem::take(&mut q.advice);
-        println!("   {q:?}");
+        println!(
+            "   {:?} {:?} {:?} {:?}",
+            q.gyro_against_gravity, q.gravity, q.accel_at_rest, q.quietest_deviation
+        );
         for a in advice {
             println!("   -> {a}");
         }

@@ -11,6 +11,11 @@ use nalgebra::Vector3;
 /// Length of the windows that are compared, and fewest samples in one.
 const WINDOW_NANOS: i64 = 100_000_000;
 const WINDOW_SAMPLES: u32 = 3;
+/// How fast the running median follows, per window.
+const MEDIAN_STEP: f64 = 0.005;
+/// A window whose magnitude is off by more, or varies by more, reads more than gravity.
+const MAX_EXCESS: f64 = 0.05;
+const MAX_SPREAD: f64 = 0.1;
 
 #[derive(Clone, Copy, Debug, Default)]
 struct Mean {
@@ -20,12 +25,15 @@ struct Mean {
     time: f64,
     gyro: Vector3<f64>,
     accel: Vector3<f64>,
+    accel_squared: f64,
 }
 
 /// Streaming least squares of the turn of gravity against what the gyro predicts.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct GravityTrack {
     mean: Mean,
+    /// Running median of the windows' magnitudes: one g, in whatever unit.
+    gravity: f64,
     /// Middle (ns), mean rate, direction of the window before.
     before: Option<(f64, i64, Vector3<f64>, Vector3<f64>)>,
     seen_predicted: f64,
@@ -61,6 +69,7 @@ impl GravityTrack {
         self.mean.time += after as f64;
         self.mean.gyro += gyro;
         self.mean.accel += accel;
+        self.mean.accel_squared += accel.norm_squared();
         if after >= WINDOW_NANOS && self.mean.n >= WINDOW_SAMPLES {
             self.close();
         }
@@ -73,6 +82,23 @@ impl GravityTrack {
         let rate = mean.gyro / n;
         let norm = mean.accel.norm();
         if !(norm > 0.0 && norm.is_finite()) {
+            self.before = None;
+            return;
+        }
+        let magnitude = norm / n;
+        if self.gravity == 0.0 {
+            self.gravity = magnitude;
+        }
+        self.gravity *= if magnitude > self.gravity {
+            1.0 + MEDIAN_STEP
+        } else {
+            1.0 - MEDIAN_STEP
+        };
+        let spread = (mean.accel_squared / n - magnitude * magnitude)
+            .max(0.0)
+            .sqrt();
+        if (magnitude / self.gravity - 1.0).abs() > MAX_EXCESS || spread > MAX_SPREAD * self.gravity
+        {
             self.before = None;
             return;
         }

@@ -287,7 +287,7 @@ const STILL_DEVIATION: f64 = 0.025;
 const STUCK_SAMPLES: u64 = 100;
 const DRIFT_PPM: f64 = 200.0;
 /// Below this correlation the accelerometer reads too much besides gravity.
-const MIN_CORRELATION: f64 = 0.6;
+const MIN_CORRELATION: f64 = 0.7;
 /// Factors within 2.5 of a unit's belong to it; accelerations make them vary.
 const UNIT_FACTOR: f64 = 2.5;
 
