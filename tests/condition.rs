@@ -4,10 +4,14 @@
 #[cfg(feature = "service")]
 #[path = "condition/recordings.rs"]
 mod recordings;
+#[path = "condition/rest.rs"]
+mod rest;
 #[path = "condition/rules.rs"]
 mod rules;
 #[cfg(feature = "service")]
 mod shared_data;
+#[path = "condition/statistics.rs"]
+mod statistics;
 
 use nalgebra::Vector3;
 use proptest::prelude::*;

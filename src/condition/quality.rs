@@ -45,6 +45,8 @@ pub struct Quality {
     gaps: u64,
     missing: u64,
     longest_gap: i64,
+    /// The newest hole: between which stamps, and how many samples are still missing in it.
+    hole: Option<(Nanos, Nanos, u64)>,
     no_gyro: u64,
     not_finite: u64,
     zero_rows: u64,
@@ -190,6 +192,7 @@ impl Quality {
             gaps: 0,
             missing: 0,
             longest_gap: 0,
+            hole: None,
             no_gyro: 0,
             not_finite: 0,
             zero_rows: 0,
@@ -249,36 +252,56 @@ impl Quality {
             Some(high) if stamp > high => {
                 self.high = Some(stamp);
                 // n samples on one stamp and then a step are n samples in that step.
-                let step = stamp.since(high) / std::mem::replace(&mut self.sharing, 1);
-                self.push_step(step);
+                let sharing = std::mem::replace(&mut self.sharing, 1);
+                let step = stamp.since(high) / sharing;
+                let missing = self.push_step(step);
+                if missing > 0 {
+                    self.hole = Some((high, stamp, missing));
+                }
             }
-            Some(high) if stamp < high => self.disorder += 1,
+            Some(high) if stamp < high => {
+                self.disorder += 1;
+                self.fill_hole(stamp);
+            }
             Some(_) => {}
             None => self.high = Some(stamp),
         }
     }
 
-    fn push_step(&mut self, step: i64) {
+    /// A sample that was overtaken was not missing.
+    fn fill_hole(&mut self, stamp: Nanos) {
+        if let Some((from, to, missing)) = &mut self.hole
+            && (*from..=*to).contains(&stamp)
+            && *missing > 0
+        {
+            *missing -= 1;
+            self.missing = self.missing.saturating_sub(1);
+            self.gaps -= u64::from(*missing == 0).min(self.gaps);
+        }
+    }
+
+    /// How many samples are missing in this step, as far as is known.
+    fn push_step(&mut self, step: i64) -> u64 {
         if self.nominal.is_some() {
             return self.measure_step(step);
         }
         self.primer.push(step);
         if self.primer.len() == PRIMING {
-            self.prime();
+            return self.prime();
         }
+        0
     }
 
-    fn prime(&mut self) {
+    fn prime(&mut self) -> u64 {
         let mut steps = std::mem::take(&mut self.primer);
         let in_order = steps.clone();
         steps.sort_unstable();
         self.nominal = steps.get(steps.len() / 2).copied();
-        for step in in_order {
-            self.measure_step(step);
-        }
+        let missing = in_order.into_iter().map(|step| self.measure_step(step));
+        missing.last().unwrap_or(0)
     }
 
-    fn measure_step(&mut self, step: i64) {
+    fn measure_step(&mut self, step: i64) -> u64 {
         let nominal = self.nominal.unwrap_or(step).max(1);
         self.spacing.add(step);
         if step > nominal.saturating_add(nominal / 2) {

@@ -182,6 +182,244 @@ const REAL: [(&str, &str); 7] = [
     ("real/broad07_60s_ros2_zstd.mcap", "/imu"),
 ];
 
+fn settings(kind: SampleKind) -> Settings {
+    Settings {
+        kind,
+        ..Settings::default()
+    }
+}
+
+#[test]
+fn colliding_stamps_of_hostile_08_come_out_as_the_recording_they_were_made_from() {
+    let (Some(spoilt), Some(good)) = (
+        read("hostile/08_duplicate_stamps.mcap", "/imu"),
+        read("real/xsens_mti_ros2_none.mcap", "/imu"),
+    ) else {
+        return;
+    };
+    for kind in [SampleKind::Rate, SampleKind::Average] {
+        let (out, report) = run(&settings(kind), &spoilt);
+        let (expected, _) = run(&settings(kind), &good);
+        assert_eq!(report.counts.get(Verdict::Restamped), 136);
+        assert_eq!(report.duplicates(), 136);
+        assert_eq!(report.gaps.count, 0);
+        assert_eq!(out.len(), 953);
+        for (a, b) in out.iter().zip(&expected) {
+            assert_eq!((a.stamp, a.start, a.value), (b.stamp, b.start, b.value));
+        }
+    }
+}
+
+#[test]
+fn the_gap_of_hostile_09_is_found_with_its_length_and_the_policy_applied() {
+    let Some(raw) = read("hostile/09_gap_2s.mcap", "/imu") else {
+        return;
+    };
+    for (on_gap, join) in [
+        (OnGap::Hold, Join::Hold),
+        (OnGap::Bridge, Join::Bridge),
+        (OnGap::Reset, Join::Reset),
+    ] {
+        let (out, report) = run(
+            &Settings {
+                on_gap,
+                ..Settings::default()
+            },
+            &raw,
+        );
+        assert_eq!(out.len(), 853);
+        assert_eq!(report.gaps.count, 1);
+        let gap = report.gaps.kept[0];
+        assert_eq!(
+            (gap.length_nanos, gap.missing, gap.join),
+            (2_020_000_000, 100, join)
+        );
+        assert_eq!(out.iter().filter(|s| s.join == join).count(), 1);
+    }
+}
+
+#[test]
+fn the_bad_values_of_hostile_10_are_rejected_and_nothing_else() {
+    let Some(raw) = read("hostile/10_nan_inf.mcap", "/imu") else {
+        return;
+    };
+    let (out, report) = run(&Settings::default(), &raw);
+    assert_eq!(report.counts.get(Verdict::NotFinite), 5);
+    assert_eq!(report.first_bad(Verdict::NotFinite).unwrap().index, 100);
+    assert_eq!(out.len(), 948);
+    assert!(out.iter().all(|s| s.value.iter().all(|v| v.is_finite())));
+    // 100, 200, and 300 to 302: three places.
+    assert_eq!((report.gaps.count, report.gaps.missing), (3, 5));
+}
+
+#[test]
+fn the_zero_stamps_of_hostile_07_fall_back_to_log_time() {
+    let (Some(raw), Some(good)) = (
+        read("hostile/07_zero_header_stamps.mcap", "/imu"),
+        read("real/xsens_mti_ros2_none.mcap", "/imu"),
+    ) else {
+        return;
+    };
+    let (clock, warning) = choose_clock(&raw[..100], Clock::Header);
+    assert_eq!(clock, Clock::Log);
+    assert!(
+        warning
+            .unwrap()
+            .to_string()
+            .contains("100 of 100 header stamps are 0")
+    );
+    let (out, report) = run(
+        &Settings {
+            clock,
+            ..Settings::default()
+        },
+        &raw,
+    );
+    assert_eq!((out.len(), report.counts.lost()), (953, 0));
+    let (expected, _) = run(&Settings::default(), &good);
+    assert!(out.iter().zip(&expected).all(|(a, b)| a.stamp == b.stamp));
+    assert!(
+        quality(&raw, Clock::Header)
+            .advice
+            .contains(&Advice::StampsStandStill)
+    );
+}
+
+#[test]
+fn the_repeats_and_losses_of_the_gait_recording_are_told_apart() {
+    let Some(raw) = read("real/xio_gait_short_walk_protobuf_batch.mcap", "/imu") else {
+        return;
+    };
+    assert_eq!(raw.len(), 16_539);
+    for kind in [SampleKind::Rate, SampleKind::Average] {
+        let (out, report) = run(&settings(kind), &raw);
+        assert_eq!(report.counts.get(Verdict::Repeated), 205);
+        assert_eq!(report.counts.lost(), 0);
+        assert_eq!(out.len(), 16_334);
+        // Counted with numpy from the steps: 112 double, 28 triple, 24 fourfold, 1 fivefold.
+        assert_eq!((report.gaps.count, report.gaps.missing), (165, 244));
+        assert!(out.windows(2).all(|w| w[0].stamp < w[1].stamp));
+        // Time covered and time not covered add up.
+        if kind == SampleKind::Average {
+            let covered: i64 = out.iter().skip(1).map(|s| s.stamp.since(s.start)).sum();
+            let all = out.last().unwrap().stamp.since(out[0].stamp);
+            assert_eq!(covered + report.gaps.total_nanos, all);
+        }
+    }
+    let quality = quality(&raw, Clock::Header);
+    assert_eq!((quality.duplicates, quality.collisions), (205, 0));
+    assert_eq!(quality.missing, 244);
+}
+
+#[test]
+fn sound_recordings_pass_whole_and_contiguous() {
+    for (file, topic) in REAL {
+        if file.contains("gait") || file.contains("fusion") {
+            continue;
+        }
+        let Some(raw) = read(file, topic) else { return };
+        let (out, report) = run(&settings(SampleKind::Average), &raw);
+        assert_eq!(out.len(), raw.len(), "{file}");
+        assert_eq!(report.counts.get(Verdict::Accepted), raw.len() as u64);
+        assert_eq!(report.gaps.count, 0, "{file}");
+        assert!(out.windows(2).all(|w| w[1].start == w[0].stamp), "{file}");
+    }
+}
+
+#[test]
+fn the_means_of_px4_keep_their_own_intervals() {
+    let Some(raw) = read("real/px4_fmuv6c_json_zstd.mcap", "/sensor_combined") else {
+        return;
+    };
+    let (out, _) = run(&settings(SampleKind::Average), &raw);
+    for (r, s) in raw.iter().zip(&out) {
+        let secs = r.interval_nanos.unwrap() as f64 * 1e-9;
+        assert_eq!(s.value, Vector3::from(r.gyro.unwrap()) * secs);
+    }
+    let quality = quality(&raw, Clock::Header);
+    assert_eq!(quality.with_interval, 1297);
+    // In flight the quietest half second is not a rest, so nothing is said about axes.
+    assert!(quality.advice.contains(&Advice::NeverStill));
+}
+
+#[test]
+fn the_recordings_rest_where_they_rest_and_nowhere_else() {
+    let limits = Limits::default();
+    for (file, topic) in REAL {
+        let Some(raw) = read(file, topic) else { return };
+        let (out, _) = run(&settings(SampleKind::Average), &raw);
+        let rests = rests(SampleKind::Average, &out);
+        let bias = estimate_bias(&rests, &limits);
+        let level_force = accel_at_start(&rests, &limits);
+        let name = file.trim_start_matches("real/");
+        match name.split('_').next().unwrap() {
+            // Moving from the first sample to the last.
+            "broad07" | "xsens" | "px4" => {
+                assert!(matches!(bias, Err(NoRest::Moving { .. })), "{name}");
+                assert!(bias.unwrap_err().to_string().contains("--bias"));
+                assert!(matches!(level_force, Err(NoRest::Moving { .. })), "{name}");
+            }
+            // Still for the first second alone.
+            "ximu3" => {
+                assert_eq!(rests.count, 1);
+                assert!(bias.unwrap().bias.amax() < 1e-3);
+                let force = level_force.unwrap();
+                assert!((force.norm() - 9.785).abs() < 0.01);
+                // The sensor lies flat: tilted by less than half a degree.
+                let q = level(&force).unwrap().wxyz();
+                assert!(2.0 * q[0].acos() < 0.5_f64.to_radians());
+            }
+            "husky" => {
+                assert!(matches!(level_force, Err(NoRest::NotAtStart { .. })));
+                // The longest stop, seen by eye in the rates, is at 236 to 246 s.
+                let first = rests.kept[0].start.secs_since(out[0].stamp);
+                assert!((235.0..237.0).contains(&first), "{first}");
+            }
+            "xio" => {
+                // The walker stands before and after the walk; the other one lies on a table between moves.
+                let bias = bias.unwrap();
+                assert!(
+                    bias.bias.amax() < 4e-3 && bias.sigma.amax() < 2e-3,
+                    "{name}: {bias:?}"
+                );
+                assert!(rests.secs > 10.0);
+            }
+            other => panic!("{other}"),
+        }
+    }
+}
+
+#[test]
+fn a_recording_in_degrees_is_found_out_by_gravity() {
+    let Some(raw) = read("real/xio_fusion_ros2_lz4.mcap", "/imu") else {
+        return;
+    };
+    let found = |raw: &[RawSample]| {
+        quality(raw, Clock::Header)
+            .advice
+            .into_iter()
+            .find_map(|a| match a {
+                Advice::GravityTurnsOtherwise { unit, .. } => Some(unit),
+                _ => None,
+            })
+    };
+    let scaled = |factor: f64| -> Vec<RawSample> {
+        raw.iter()
+            .map(|r| RawSample {
+                gyro: r.gyro.map(|g| g.map(|v| v * factor)),
+                ..*r
+            })
+            .collect()
+    };
+    assert_eq!(found(&raw), None);
+    assert_eq!(
+        found(&scaled(180.0 / std::f64::consts::PI)),
+        Some(Some("deg"))
+    );
+    assert_eq!(found(&scaled(1000.0)), Some(Some("mrad")));
+    assert_eq!(found(&scaled(-1.0)), Some(None));
+}
+
 #[test]
 #[ignore = "prints"]
 fn print_what_is_known_of_the_recordings() {

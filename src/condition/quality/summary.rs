@@ -453,6 +453,8 @@ fn advice(summary: &QualitySummary, quietest: Option<&Quiet>, fast_rows: u64) ->
                 at,
                 samples: stats.at_peak,
             });
+            // A clipped axis repeats one value too, for another reason.
+            continue;
         }
         let others_move = summary
             .axes
