@@ -310,10 +310,12 @@ impl Quality {
             let missing = u64::try_from(whole - 1).unwrap_or(0);
             self.missing = self.missing.saturating_add(missing);
             self.longest_gap = self.longest_gap.max(step);
+            missing
         } else {
             // A gap is not jitter.
-            self.jitter
-                .add(step.saturating_sub(nominal).saturating_abs());
+            let off = step.saturating_sub(nominal).saturating_abs();
+            self.jitter.add(off);
+            0
         }
     }
 
