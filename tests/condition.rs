@@ -1,6 +1,18 @@
 //! What conditioning promises, sample by sample and over whole streams.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
+#[cfg(feature = "service")]
+#[path = "condition/recordings.rs"]
+mod recordings;
+#[path = "condition/rest.rs"]
+mod rest;
+#[path = "condition/rules.rs"]
+mod rules;
+#[cfg(feature = "service")]
+mod shared_data;
+#[path = "condition/statistics.rs"]
+mod statistics;
+
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};

@@ -103,7 +103,6 @@ impl Timing {
                 if step > ordinary {
                     join = self.judge_step(entry, step, ahead, report);
                 }
-                self.spacing.push(step);
             }
             Some(_) => join = self.jump_back(stamp, report),
             None => {
@@ -112,6 +111,10 @@ impl Timing {
             }
         }
         let (start, value) = self.integrate(entry, stamp, join, before);
+        if let Some(before) = before {
+            // Only now: the gap and the interval after it must be judged by the same spacing.
+            self.spacing.push(stamp.since(before));
+        }
         let mut status = entry.status;
         match join {
             Join::Start | Join::Continuous => {}
