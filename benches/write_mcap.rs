@@ -54,7 +54,12 @@ fn bench(c: &mut Criterion) {
             ("mcap-none", "a.mcap", Encoding::Cdr, Compression::None),
             ("mcap-lz4", "b.mcap", Encoding::Cdr, Compression::Lz4),
             ("mcap-zstd", "c.mcap", Encoding::Cdr, Compression::Zstd),
-            ("mcap-json-zstd", "d.mcap", Encoding::Json, Compression::Zstd),
+            (
+                "mcap-json-zstd",
+                "d.mcap",
+                Encoding::Json,
+                Compression::Zstd,
+            ),
             ("ndjson", "e.ndjson", Encoding::Cdr, Compression::None),
             ("csv", "f.csv", Encoding::Cdr, Compression::None),
         ] {
@@ -77,7 +82,10 @@ fn bench(c: &mut Criterion) {
                     bytes = sink.finish().unwrap().bytes;
                 });
             });
-            println!("{name}: {:.1} bytes a sample", bytes as f64 / samples.len() as f64);
+            println!(
+                "{name}: {:.1} bytes a sample",
+                bytes as f64 / samples.len() as f64
+            );
         }
     }
     group.finish();

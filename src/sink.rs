@@ -6,6 +6,7 @@
 //! filled. The bytes depend on the samples and the order of the calls alone: not on the number of
 //! threads and not (within a stream) on how the samples were cut into calls.
 
+mod batch;
 mod csv;
 mod decimate;
 mod json;
@@ -25,10 +26,11 @@ pub use target::{Format, Target};
 
 use crate::error::{Error, Result};
 use crate::record::{AttitudeSample, Nanos};
+use batch::{Batch, Form, Slot};
+use mcap::Layout;
 use mcap::chunk::Chunk;
 use mcap::file::McapFile;
-use mcap::{Batch, Layout};
-use output::Output;
+use output::{Output, STDOUT_NAME};
 use rayon::ThreadPool;
 use rayon::iter::{IntoParallelRefMutIterator, ParallelIterator};
 use std::path::PathBuf;
@@ -99,33 +101,11 @@ enum State {
     Failed,
 }
 
-/// How a batch becomes bytes.
-#[derive(Debug)]
-enum Form {
-    Mcap {
-        layout: Layout,
-        compression: Compression,
-    },
-    Ndjson(Vec<json::AttObject>),
-    Csv,
-    Null,
-}
-
 /// What a stream has pending.
 #[derive(Debug, Default)]
 struct Lane {
     batch: Batch,
     last: Option<Nanos>,
-}
-
-/// One batch on its way into bytes.
-#[derive(Debug, Default)]
-struct Slot {
-    /// Empty when the chunk holds copied messages already.
-    batch: Batch,
-    chunk: Chunk,
-    text: Vec<u8>,
-    outcome: Option<std::io::Error>,
 }
 
 impl Sink {
@@ -306,10 +286,10 @@ impl Sink {
                 let closing = self.file.closing();
                 let _ = self.put(&closing)?;
             }
-            if let State::Open(output) = std::mem::replace(&mut self.state, State::Closed) {
-                if output.finish()? == Flow::Continue {
-                    return Ok(self.written(false));
-                }
+            if let State::Open(output) = std::mem::replace(&mut self.state, State::Closed)
+                && output.finish()? == Flow::Continue
+            {
+                return Ok(self.written(false));
             }
         }
         Ok(self.written(true))
@@ -329,13 +309,18 @@ impl Sink {
         }
     }
 
+    /// The output's name in messages.
+    fn named(&self) -> PathBuf {
+        self.path.clone().unwrap_or_else(|| STDOUT_NAME.into())
+    }
+
     /// `false` when the reader hung up; an error when one has been returned before.
     fn is_open(&self) -> Result<bool> {
         match self.state {
             State::Open(_) => Ok(true),
             State::Closed => Ok(false),
             State::Failed => Err(Error::Write {
-                path: self.path.clone().unwrap_or_default(),
+                path: self.named(),
                 source: std::io::Error::other("an earlier write failed"),
             }),
         }
@@ -459,7 +444,7 @@ impl Sink {
 
     fn emit(&mut self, slot: &mut Slot) -> Result<Flow> {
         if let Some(source) = slot.outcome.take() {
-            let path = self.path.clone().unwrap_or_default();
+            let path = self.named();
             return self.note(Err(Error::Write { path, source }));
         }
         if let Form::Mcap { compression, .. } = self.form {
@@ -475,39 +460,6 @@ impl Sink {
         } else {
             self.messages += slot.batch.samples.len() as u64;
             self.put(&slot.text)
-        }
-    }
-}
-
-impl Slot {
-    /// The parallel part: nothing here depends on any other batch.
-    fn encode(&mut self, form: &Form) {
-        self.text.clear();
-        match form {
-            Form::Mcap {
-                layout,
-                compression,
-            } => {
-                // Without samples the chunk holds copied messages.
-                if !self.batch.samples.is_empty() {
-                    layout.fill(&mut self.chunk, &self.batch);
-                }
-                self.outcome = self.chunk.seal(*compression).err();
-            }
-            Form::Ndjson(objects) => {
-                if let Some(object) = objects.get(self.batch.stream) {
-                    for (seq, sample) in (self.batch.first..).zip(&self.batch.samples) {
-                        object.push(&mut self.text, seq, sample);
-                        self.text.push(b'\n');
-                    }
-                }
-            }
-            Form::Csv => {
-                for sample in &self.batch.samples {
-                    csv::push_row(&mut self.text, sample);
-                }
-            }
-            Form::Null => {}
         }
     }
 }
