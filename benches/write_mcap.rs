@@ -3,7 +3,7 @@
 //! `cargo bench --bench write_mcap`; the time shown is for one sample. Files go to a temporary
 //! directory, and the sync at the end is part of the time, as it is in a run.
 
-#![allow(clippy::unwrap_used, clippy::expect_used, missing_docs)]
+#![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs)]
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use nalgebra::Vector3;

@@ -2,7 +2,7 @@
 //!
 //! A stage of its own because it is the only one that may block on a disk or a pipe, and the only
 //! one that knows what output looks like. Samples collect per stream; full batches of
-//! [`BATCH_SAMPLES`] are formatted and compressed in parallel and written in the order in which they
+//! 2048 are formatted and compressed in parallel and written in the order in which they
 //! filled. The bytes depend on the samples and the order of the calls alone: not on the number of
 //! threads and not (within a stream) on how the samples were cut into calls.
 

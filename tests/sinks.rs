@@ -11,6 +11,7 @@ use std::process::Command;
 use mcap::records::{MessageHeader, Record};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use nalgebra::Vector3;
+use proptest::prelude::*;
 use strapd::model::attitude::Quaternion;
 use strapd::record::{AttitudeSample, Nanos, Status};
 use strapd::sink::{
@@ -89,13 +90,11 @@ fn write(
     sink.finish().unwrap()
 }
 
+type Messages = Vec<(MessageHeader, Vec<u8>)>;
+type Metadata = BTreeMap<String, BTreeMap<String, String>>;
+
 /// Reads every record with the `mcap` crate, all three checksums checked; the messages in file order.
-fn read_checked(
-    bytes: &[u8],
-) -> (
-    Vec<(MessageHeader, Vec<u8>)>,
-    BTreeMap<String, BTreeMap<String, String>>,
-) {
+fn read_checked(bytes: &[u8]) -> (Messages, Metadata) {
     let mut reader = LinearReader::new_with_options(
         LinearReaderOptions::default()
             .with_validate_chunk_crcs(true)
@@ -503,6 +502,85 @@ fn flush_brings_the_pending_samples_out() {
     assert_eq!(sink.write(0, &more, &pool).unwrap(), Flow::Closed);
     assert!(sink.finish().unwrap().closed);
     assert!(fifo.exists(), "a named pipe is written into, not replaced");
+}
+
+fn any_sample() -> impl Strategy<Value = AttitudeSample> {
+    let f = || any::<u64>().prop_map(f64::from_bits);
+    let v = move || (f(), f(), f()).prop_map(|(x, y, z)| Vector3::new(x, y, z));
+    let q = (f(), f(), f(), f()).prop_map(|(w, x, y, z)| [w, x, y, z]);
+    let numbers = (q, v(), proptest::option::of(v()), v());
+    let rest = (any::<i64>(), any::<i64>(), any::<u16>(), any::<u32>());
+    (numbers, rest).prop_map(
+        |((q, rate, accel, sigma), (stamp, log, status, reset_count))| AttitudeSample {
+            stamp: Nanos(stamp),
+            q_nb: Quaternion::assume_unit(q),
+            rate,
+            accel,
+            sigma,
+            status: Status(status),
+            reset_count,
+            log: Nanos(log),
+        },
+    )
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
+
+    /// Bits from anywhere: NaN, infinities, stamps at the ends of i64, names with anything in them.
+    #[test]
+    fn whatever_the_samples_and_names_hold_the_output_is_well_formed(
+        samples in proptest::collection::vec(any_sample(), 0..40),
+        topic in any::<String>(),
+        frame in any::<String>(),
+    ) {
+        let dir = tempfile::tempdir().unwrap();
+        let streams = [Stream::new(&topic, &frame)];
+        let pool = pool(1);
+        for (name, encoding) in [
+            ("c.mcap", Encoding::Cdr),
+            ("j.mcap", Encoding::Json),
+            ("a.ndjson", Encoding::Cdr),
+            ("a.csv", Encoding::Cdr),
+        ] {
+            let path = dir.path().join(name);
+            let options = Options { encoding, ..Options::default() };
+            let mut sink =
+                Sink::create(&target(&path), &[], options, &streams, &provenance()).unwrap();
+            prop_assert_eq!(sink.write(0, &samples, &pool).unwrap(), Flow::Continue);
+            sink.finish().unwrap();
+            let bytes = fs::read(&path).unwrap();
+            if name == "a.csv" {
+                let mut reader = csv::Reader::from_reader(bytes.as_slice());
+                let rows: Vec<_> = reader.records().map(Result::unwrap).collect();
+                prop_assert_eq!(rows.len(), samples.len());
+                for (row, s) in rows.iter().zip(&samples) {
+                    prop_assert_eq!(row[0].parse::<i64>().unwrap(), s.stamp.0);
+                    for text in row.iter().skip(1).take(13) {
+                        prop_assert!(text.parse::<f64>().is_ok(), "{}", text);
+                    }
+                }
+            } else if name == "a.ndjson" {
+                let text = String::from_utf8(bytes).unwrap();
+                prop_assert_eq!(text.lines().count(), samples.len());
+                for line in text.lines() {
+                    let v: serde_json::Value = serde_json::from_str(line).unwrap();
+                    prop_assert_eq!(v["class"].as_str(), Some("ATT"));
+                }
+            } else {
+                let (messages, _) = read_checked(&bytes);
+                let attitudes: Vec<_> =
+                    messages.iter().filter(|(h, _)| h.channel_id == 1).collect();
+                prop_assert_eq!(attitudes.len(), samples.len());
+                for ((header, data), s) in attitudes.iter().zip(&samples) {
+                    prop_assert_eq!(header.log_time, s.log.0.max(0) as u64);
+                    if encoding == Encoding::Json {
+                        prop_assert!(serde_json::from_slice::<serde_json::Value>(data).is_ok());
+                    }
+                }
+            }
+        }
+    }
 }
 
 // Other people's readers
