@@ -1,6 +1,7 @@
 //! What leaves strapd: whole files, the same bytes every time, readable by others, and nothing at
 //! all where there should be nothing.
 
+#![cfg(feature = "service")]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 use std::collections::BTreeMap;
