@@ -44,6 +44,9 @@ const COPY_CHUNK_BYTES: usize = 1 << 20;
 /// Batches in flight: enough to keep every thread busy, few enough to bound memory (about 3 MB each).
 const MAX_BATCHES: usize = 16;
 
+/// Copied messages can be large; so many bytes of them are written without waiting for more.
+const MAX_QUEUED_COPIES: usize = MAX_BATCHES * COPY_CHUNK_BYTES;
+
 /// How the output is made.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Options {
@@ -67,7 +70,7 @@ pub struct Written {
     /// Messages (MCAP), lines or rows.
     pub messages: u64,
     /// Stamps that do not fit into the 32-bit seconds of a ROS message (before 1901, after 2038) and
-    /// were written as the nearest one that does. Their log times are exact.
+    /// were written as the nearest one that does.
     pub stamps_out_of_range: u64,
     /// Whether the reader hung up before the end.
     pub closed: bool,
@@ -85,6 +88,8 @@ pub struct Sink {
     /// Full batches, and how many of them are in use.
     slots: Vec<Slot>,
     used: usize,
+    /// Uncompressed bytes of copied messages among them.
+    queued_copies: usize,
     path: Option<PathBuf>,
     samples: u64,
     messages: u64,
@@ -169,6 +174,7 @@ impl Sink {
             copies: Chunk::default(),
             slots: Vec::new(),
             used: 0,
+            queued_copies: 0,
             samples: 0,
             messages: 0,
             bytes: 0,
@@ -386,6 +392,7 @@ impl Sink {
     /// Moves the copied messages into the queue.
     fn queue_copies(&mut self) {
         let full = std::mem::take(&mut self.copies);
+        self.queued_copies += full.plain_len();
         let slot = self.next_slot();
         slot.batch.samples.clear();
         let mut empty = std::mem::replace(&mut slot.chunk, full);
@@ -411,7 +418,7 @@ impl Sink {
     /// Drains the queue when it is long enough for this pool.
     fn make_room(&mut self, pool: &ThreadPool) -> Result<Flow> {
         let limit = (2 * pool.current_num_threads()).clamp(2, MAX_BATCHES);
-        if self.used >= limit {
+        if self.used >= limit || self.queued_copies >= MAX_QUEUED_COPIES {
             self.drain(Some(pool))
         } else {
             Ok(Flow::Continue)
@@ -421,6 +428,7 @@ impl Sink {
     /// Turns every queued batch into bytes, in parallel, and writes them in order.
     fn drain(&mut self, pool: Option<&ThreadPool>) -> Result<Flow> {
         let used = std::mem::take(&mut self.used);
+        self.queued_copies = 0;
         let mut slots = std::mem::take(&mut self.slots);
         let form = &self.form;
         match pool {
