@@ -188,6 +188,7 @@ impl Estimation {
                     .map(|f| f.parse().map_err(|e| usage("--field", &e)))
                     .collect::<Result<_>>()?,
                 ignore_covariance_flag: self.ignore_covariance_flag,
+                child_frame: None,
             },
             method: self.method()?,
             kind: self.sample_kind.map(SampleKind::from),

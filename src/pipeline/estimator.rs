@@ -31,7 +31,11 @@ impl Estimator {
             method: plan.method,
             kind: resolved.kind,
             initial: prepared.initial,
-            noise: propagate::Noise { arw: plan.noise.arw, bias_sigma: prepared.bias_sigma },
+            noise: propagate::Noise {
+                arw: plan.noise.arw,
+                bias: prepared.bias_sigma,
+                ..propagate::Noise::default()
+            },
         })
         .map_err(|e| e.to_string())?;
         Ok(Estimator {

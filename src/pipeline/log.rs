@@ -93,7 +93,7 @@ impl Known {
     ///
     /// # Errors
     /// The channel can not be decoded: which, why, and the flag that helps.
-    pub fn decoder(&self, options: &decode::Options) -> Result<Decoder, Unsupported> {
+    pub fn decoder(&self, options: &decode::Options) -> std::result::Result<Decoder, Unsupported> {
         let mut decoder = Decoder::compile(&plain(&self.channel), options)?;
         if let Some((log, payload)) = &self.first {
             decoder.settle(payload, *log)?;

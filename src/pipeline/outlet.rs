@@ -12,6 +12,15 @@ use crate::sink::{
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+/// What a target is called in the summary.
+fn name(target: &Target) -> String {
+    match target {
+        Target::File { path, .. } => path.display().to_string(),
+        Target::Stdout => "standard output".to_owned(),
+        Target::Null => "null:".to_owned(),
+    }
+}
+
 /// The sinks of a run.
 #[derive(Debug)]
 pub struct Outlet {
@@ -41,7 +50,7 @@ impl Outlet {
             .iter()
             .map(|target| {
                 let sink = Sink::create(target, inputs, options, streams, provenance)?;
-                Ok((target.to_string(), sink))
+                Ok((name(target), sink))
             })
             .collect::<Result<Vec<_>>>()?;
         Ok(Outlet {

@@ -44,6 +44,6 @@ impl Executor for Pool {
         if n <= 1 || self.threads() == 1 {
             return (0..n).map(f).collect();
         }
-        self.pool.install(|| (0..n).into_par_iter().map(f).collect())
+        self.pool.install(|| (0..n).into_par_iter().map(&f).collect())
     }
 }
