@@ -118,7 +118,9 @@ fn theirs(path: &Path, check: bool) -> f64 {
 
 fn ours(path: &Path, threads: usize, messages: u64) -> f64 {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    let options = WalkOptions { pool: Some(&pool), ..WalkOptions::default() };
+    let mut options = WalkOptions { pool: Some(&pool), ..WalkOptions::default() };
+    if let Some(n) = std::env::var("INF").ok().and_then(|n| n.parse().ok()) { options.in_flight = n; }
+    if let Some(n) = std::env::var("LOOK").ok().and_then(|n| n.parse().ok()) { options.lookahead.bytes = n; }
     let (time, sum) = best(|| {
         let mut sum = 0.0;
         let report = walk(

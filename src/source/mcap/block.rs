@@ -96,6 +96,11 @@ impl Block {
     }
 }
 
+/// Whether the CRC is over the bytes as they lie in the file.
+fn plain_crc(kind: &Kind) -> bool {
+    matches!(kind, Kind::Chunk { compression: Compression::None, crc, .. } if *crc != 0)
+}
+
 /// The buffers of one worker.
 #[derive(Default)]
 pub(super) struct Buffers {
@@ -109,6 +114,9 @@ impl std::fmt::Debug for Buffers {
         write!(f, "Buffers({}, {})", self.raw.capacity(), self.plain.capacity())
     }
 }
+
+/// What is read at a time: its CRC is taken while it is still in the cache.
+const PIECE: usize = 128 << 10;
 
 /// A slice of exactly `n` bytes of `buf`, which grows but is not shrunk or zeroed again.
 fn room(buf: &mut Vec<u8>, n: usize) -> &mut [u8] {
@@ -128,15 +136,29 @@ impl Buffers {
     /// # Errors
     /// Only when the file itself can not be read.
     pub(super) fn open<'a>(&'a mut self, block: &'a Block) -> io::Result<Opened<'a>> {
+        let mut seen = crc32fast::Hasher::new();
         let packed = match &block.payload {
-            Payload::Held(held) => held.as_slice(),
+            Payload::Held(held) => {
+                let packed = held.as_slice();
+                if plain_crc(&block.kind) {
+                    seen.update(packed);
+                }
+                packed
+            }
             Payload::At { file, offset, len } => {
                 let raw = room(&mut self.raw, *len);
-                let got = file.read_at(raw, *offset)?;
-                if got < *len {
-                    // The file was cut after the walk had seen its length.
-                    let (need, have) = (*len as u64, got as u64);
-                    return Ok(Err(ProblemKind::Truncated { need, have }));
+                let mut got = 0;
+                for piece in raw.chunks_mut(PIECE) {
+                    let n = file.read_at(piece, *offset + got as u64)?;
+                    got += n;
+                    if n < piece.len() {
+                        // The file was cut after the walk had seen its length.
+                        let (need, have) = (*len as u64, got as u64);
+                        return Ok(Err(ProblemKind::Truncated { need, have }));
+                    }
+                    if plain_crc(&block.kind) {
+                        seen.update(piece);
+                    }
                 }
                 raw
             }
@@ -167,7 +189,10 @@ impl Buffers {
             }
         };
         if crc != 0 {
-            let computed = crc32fast::hash(plain);
+            let computed = match compression {
+                Compression::None => seen.finalize(),
+                _ => crc32fast::hash(plain),
+            };
             if computed != crc {
                 return Ok(Err(ProblemKind::ChunkCrc { stored: crc, computed }));
             }

@@ -134,6 +134,14 @@ pub enum ProblemKind {
         /// The channel's topic.
         topic: String,
     },
+    /// The statistics count more messages than were found: a record with messages in it was passed over
+    /// as something else.
+    Missing {
+        /// Messages by the statistics.
+        claimed: u64,
+        /// Messages found.
+        found: u64,
+    },
     /// The summary at the end can not be used; nothing is lost by that.
     BadSummary {
         /// Why.
@@ -214,6 +222,9 @@ impl fmt::Display for ProblemKind {
             }
             ProblemKind::DefinedBySummary { topic } => {
                 write!(f, "{topic:?} is defined by the summary alone; its own definition is lost")
+            }
+            ProblemKind::Missing { claimed, found } => {
+                write!(f, "the statistics count {claimed} messages, {found} were found")
             }
             ProblemKind::BadSummary { why } => write!(f, "the summary can not be used: {why}"),
         }

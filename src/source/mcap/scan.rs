@@ -72,6 +72,12 @@ pub(super) struct Scanner {
     /// CRC of everything so far, while every byte has been seen (no chunk yet).
     crc: Option<crc32fast::Hasher>,
     done: bool,
+    /// The end was reached, magic and all.
+    complete: bool,
+    /// Messages by the statistics of this log's summary.
+    claimed: Option<u64>,
+    /// The same of all logs joined in this input; `None` once one says nothing.
+    claimed_in_all: Option<u64>,
     pub(super) facts: Facts,
     pub(super) problems: Problems,
 }
@@ -92,6 +98,9 @@ impl Scanner {
             trusted: None,
             crc: Some(crc),
             done: false,
+            complete: false,
+            claimed: None,
+            claimed_in_all: Some(0),
             facts: Facts::default(),
             problems: Problems::default(),
         }
@@ -143,6 +152,11 @@ impl Scanner {
         Ok(None)
     }
 
+    /// Messages there should be, by the statistics; known only after a complete end.
+    pub(super) fn claimed(&self) -> Option<u64> {
+        self.claimed_in_all.filter(|_| self.done && self.complete)
+    }
+
     /// Whether a record of this length can be stepped over. A stream can not be asked how long it
     /// is, so there only an attachment may be longer than the limit.
     fn may_skip(&self, opcode: u8, length: u64) -> bool {
@@ -175,6 +189,9 @@ impl Scanner {
         };
         let again = rest.starts_with(&MAGIC);
         self.done = !again;
+        self.complete = !again;
+        let sum = self.claimed_in_all.zip(self.claimed.take()).map(|(a, b)| a.saturating_add(b));
+        self.claimed_in_all = sum;
         self.section = Section::Data;
         self.crc = None;
         self.trusted = None;
@@ -350,7 +367,8 @@ impl Scanner {
             op::FOOTER => self.section = Section::Footer,
             _ => {}
         }
-        let wanted = self.everything || matches!(opcode, op::HEADER | op::DATA_END);
+        let wanted = self.everything
+            || matches!(opcode, op::HEADER | op::DATA_END | op::STATISTICS);
         if !wanted || length > self.limits.record {
             self.pass_over(total)?;
             return Ok(None);
@@ -366,6 +384,7 @@ impl Scanner {
                 self.facts.profile = profile.to_owned();
                 self.facts.library = library.to_owned();
             }
+            Some(Record::Statistics(s)) => self.claimed = Some(s.message_count),
             Some(Record::DataEnd { data_section_crc: stored }) if stored != 0 => {
                 if let Some(computed) = self.crc.take().map(crc32fast::Hasher::finalize)
                     && computed != stored

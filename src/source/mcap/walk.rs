@@ -362,6 +362,7 @@ where
         if let Some((offset, n)) = self.short {
             self.problems.add(offset, ProblemKind::ShortMessages, Some(n));
         }
+        let (claimed, end) = (self.scanner.claimed(), self.scanner.tape().position());
         self.problems.merge(self.scanner.problems);
         let mut survey =
             Survey { facts: self.scanner.facts, problems: self.problems, ..Survey::default() };
@@ -369,6 +370,15 @@ where
             self.tallies.resize(table.len(), Tally::default());
             survey.add_up(table.channels().zip(self.tallies.iter().copied()));
         });
+        // Messages without a channel or a head are among those counted as lost.
+        let found = survey.messages.saturating_add(survey.problems.messages_lost());
+        if let Some(claimed) = claimed.filter(|claimed| *claimed != found && !stopped) {
+            let (kind, lost) = match claimed.checked_sub(found) {
+                Some(lost) => (ProblemKind::Missing { claimed, found: survey.messages }, Some(lost)),
+                None => (ProblemKind::BadSummary { why: "it counts fewer messages" }, None),
+            };
+            survey.problems.add(end, kind, lost);
+        }
         WalkReport {
             survey,
             items: self.items,
