@@ -31,7 +31,7 @@ pub fn messages(n: u32, jitter: u64) -> Vec<Read> {
     (0..n)
         .map(|i| {
             let topic = if i % 3 == 1 { "/other" } else { "/imu" };
-            let time = 1_000_000 + u64::from(i) * 1000;
+            let time = 10_000_000 + u64::from(i) * 1000;
             let time = time - if jitter > 0 { random(&mut state) % jitter } else { 0 };
             let data = (0..40 + i % 7).map(|_| random(&mut state) as u8 & 31).collect();
             (topic.to_owned(), time, i, data)

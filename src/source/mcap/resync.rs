@@ -59,5 +59,5 @@ fn length(data: &[u8], limit: u64) -> Option<u64> {
     let agrees = sizes
         && head.compressed_size.max(head.uncompressed_size) <= limit
         && length == head.len().checked_add(head.compressed_size)?;
-    agrees.then_some(length + HEAD as u64)
+    agrees.then(|| length + HEAD as u64)
 }

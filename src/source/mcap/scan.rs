@@ -132,17 +132,14 @@ impl Scanner {
             };
             let total = length.saturating_add(HEAD as u64);
             let item = match opcode {
-                op::MESSAGE => self.run()?,
-                op::SCHEMA | op::CHANNEL if self.section == Section::Data => self.run()?,
+                op::MESSAGE | op::SCHEMA | op::CHANNEL if self.section == Section::Data => {
+                    self.run()?
+                }
                 op::CHUNK => self.chunk(at, length)?,
-                0 => {
-                    self.lost(at, total)?;
-                    None
-                }
-                _ if !self.may_skip(opcode, length) => {
-                    self.lost(at, total)?;
-                    None
-                }
+                // A message has no business in the summary: a changed byte made it one.
+                0 | op::MESSAGE => self.lost(at, total)?,
+                op::DATA_END | op::FOOTER if length > SLACK => self.lost(at, total)?,
+                _ if !self.may_skip(opcode, length) => self.lost(at, total)?,
                 _ => self.other(at, opcode, length)?,
             };
             if item.is_some() {
@@ -202,7 +199,6 @@ impl Scanner {
     /// Unchunked schemas, channels and messages: as many whole ones as make about [`RUN`] bytes.
     fn run(&mut self) -> io::Result<Option<Item>> {
         let at = self.tape.position();
-        self.section = Section::Data;
         let mut want = RUN;
         loop {
             let ahead = self.tape.available(want, want)?;
@@ -235,8 +231,7 @@ impl Scanner {
             let have = ahead.len();
             let stream = self.tape.remaining().is_none();
             if !self.tape.may_have(total) || have < want || (stream && length > limit) {
-                self.lost(at, total)?;
-                return Ok(None);
+                return self.lost(at, total);
             }
             if length > limit {
                 self.problems.add(at, ProblemKind::RecordTooLong { opcode, length, limit }, None);
@@ -257,21 +252,19 @@ impl Scanner {
         });
         let total = length.saturating_add(HEAD as u64);
         let Some(head) = head else {
-            self.lost(at, total)?;
-            return Ok(None);
+            return self.lost(at, total);
         };
         let start = HEAD as u64 + head.len();
         let (packed, size, crc) =
             (head.compressed_size, head.uncompressed_size, head.uncompressed_crc);
         let compression = Compression::named(head.compression);
-        if length == u64::MAX {
+        if length == u64::MAX && packed == u64::MAX && compression.is_some() {
             return self.unfinished(at, start, compression);
         }
         let fields = head.len().saturating_add(packed);
         let name = head.compression.to_owned();
         if !self.tape.may_have(total) || fields > length || length - fields > SLACK {
-            self.lost(at, total)?;
-            return Ok(None);
+            return self.lost(at, total);
         }
         self.crc = None;
         let limit = self.limits.record;
@@ -301,8 +294,7 @@ impl Scanner {
                 let all = usize::try_from(total).unwrap_or(usize::MAX);
                 let have = self.tape.available(all, all)?.len();
                 if have < all {
-                    self.lost(at, total)?;
-                    return Ok(None);
+                    return self.lost(at, total);
                 }
                 let mut held = self.tape.hand_out(all);
                 let from = held.range.start.saturating_add(usize::try_from(start).unwrap_or(0));
@@ -376,8 +368,7 @@ impl Scanner {
         let all = usize::try_from(total).unwrap_or(usize::MAX);
         let ahead = self.tape.available(all, all)?;
         if ahead.len() < all {
-            self.lost(at, total)?;
-            return Ok(None);
+            return self.lost(at, total);
         }
         match ahead.get(HEAD..all).and_then(|body| Record::parse(opcode, body)) {
             Some(Record::Header { profile, library }) if self.facts.profile.is_empty() => {
@@ -433,7 +424,7 @@ impl Scanner {
     }
 
     /// What stands at `at` can not be a record of `total` bytes: find the next chunk, or end.
-    fn lost(&mut self, at: u64, total: u64) -> io::Result<()> {
+    fn lost(&mut self, at: u64, total: u64) -> io::Result<Option<Item>> {
         let left = self.tape.remaining().unwrap_or(self.tape.available(1, 1)?.len() as u64);
         let from = self.trusted.take().unwrap_or(at);
         self.crc = None;
@@ -446,7 +437,7 @@ impl Scanner {
             };
             self.problems.add(at, kind, None);
             self.done = true;
-            return Ok(());
+            return Ok(None);
         }
         if resync::next_chunk(&mut self.tape, from + 1, self.limits.record)? {
             let skipped = self.tape.position().saturating_sub(from);
@@ -455,6 +446,6 @@ impl Scanner {
             self.problems.add(at, ProblemKind::Truncated { need: total, have: left }, None);
             self.done = true;
         }
-        Ok(())
+        Ok(None)
     }
 }
