@@ -149,7 +149,8 @@ fn threads_and_source_change_nothing() {
                 if state == "whole" {
                     assert_eq!(report.survey.messages, 2_000, "{label}");
                     assert!(report.survey.problems.is_empty(), "{label}");
-                    let reach = jitter < 2_000_000;
+                    // Unchunked, this log is one run of records, which is sorted as a whole.
+                    let reach = jitter < 2_000_000 || packing.is_none();
                     assert_eq!(report.late == 0, reach, "{label}: {}", report.late);
                     assert_eq!(report.steps_back > 0, jitter > 0, "{label}");
                     if reach {
