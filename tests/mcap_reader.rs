@@ -5,7 +5,9 @@
 mod mcap_logs;
 mod shared_data;
 
-use mcap_logs::{PACKINGS, Read, from_bytes, in_order, log, messages, on_disk, pool, read, read_some};
+use mcap_logs::{
+    PACKINGS, Read, from_bytes, in_order, log, messages, on_disk, pool, read, read_some,
+};
 use mcap_logs::{random, stretches};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -13,8 +15,13 @@ use strapd::error::Error;
 use strapd::source::mcap::{ProblemKind, Reader, WalkOptions, op, survey};
 
 fn logs_in(folder: &str) -> Vec<PathBuf> {
-    let Some(root) = shared_data::shared(folder) else { return Vec::new() };
-    let mut paths: Vec<_> = std::fs::read_dir(root).unwrap().map(|e| e.unwrap().path()).collect();
+    let Some(root) = shared_data::shared(folder) else {
+        return Vec::new();
+    };
+    let mut paths: Vec<_> = std::fs::read_dir(root)
+        .unwrap()
+        .map(|e| e.unwrap().path())
+        .collect();
     paths.sort();
     paths
 }
@@ -25,14 +32,24 @@ fn oracle(path: &Path) -> Vec<Read> {
     let stream = mcap::MessageStream::new(&bytes).unwrap();
     stream
         .map(|m| m.unwrap())
-        .map(|m| (m.channel.topic.clone(), m.log_time, m.sequence, m.data.to_vec()))
+        .map(|m| {
+            (
+                m.channel.topic.clone(),
+                m.log_time,
+                m.sequence,
+                m.data.to_vec(),
+            )
+        })
         .collect()
 }
 
 #[test]
 fn recordings_hold_what_the_mcap_crate_reads_in_order_of_log_time() {
     let mut files = 0;
-    for path in ["logs/real", "logs/native", "logs/hostile"].into_iter().flat_map(logs_in) {
+    for path in ["logs/real", "logs/native", "logs/hostile"]
+        .into_iter()
+        .flat_map(logs_in)
+    {
         let name = path.file_name().unwrap().to_str().unwrap().to_owned();
         if name.contains("truncated") || name.contains("hang") {
             continue;
@@ -40,8 +57,15 @@ fn recordings_hold_what_the_mcap_crate_reads_in_order_of_log_time() {
         let (ours, report) = read(Reader::open(&path).unwrap());
         let expected = in_order(oracle(&path));
         assert_eq!(ours.len(), expected.len(), "{name}");
-        assert!(ours == expected, "{name}: same number, other messages or another order");
-        assert!(report.survey.problems.is_empty(), "{name}: {:?}", report.survey.problems);
+        assert!(
+            ours == expected,
+            "{name}: same number, other messages or another order"
+        );
+        assert!(
+            report.survey.problems.is_empty(),
+            "{name}: {:?}",
+            report.survey.problems
+        );
         assert_eq!(report.late, 0, "{name}");
         files += 1;
     }
@@ -51,15 +75,23 @@ fn recordings_hold_what_the_mcap_crate_reads_in_order_of_log_time() {
 
 #[test]
 fn a_recording_cut_in_a_chunk_gives_every_chunk_before_the_cut() {
-    let Some(path) = shared_data::shared("logs/hostile/02_truncated_mid_chunk.mcap") else { return };
+    let Some(path) = shared_data::shared("logs/hostile/02_truncated_mid_chunk.mcap") else {
+        return;
+    };
     let (ours, report) = read(Reader::open(&path).unwrap());
     // The crate's stream gives whole chunks up to its first error.
     let bytes = std::fs::read(&path).unwrap();
-    let expected = mcap::MessageStream::new(&bytes).unwrap().take_while(|m| m.is_ok()).count();
+    let expected = mcap::MessageStream::new(&bytes)
+        .unwrap()
+        .take_while(|m| m.is_ok())
+        .count();
     assert_eq!(ours.len(), expected);
     assert!(!ours.is_empty());
     let problems = report.survey.problems;
-    assert!(matches!(problems.first()[0].kind, ProblemKind::Truncated { .. }), "{problems:?}");
+    assert!(
+        matches!(problems.first()[0].kind, ProblemKind::Truncated { .. }),
+        "{problems:?}"
+    );
     assert_eq!((problems.total(), problems.losses()), (1, 1));
 }
 
@@ -74,7 +106,9 @@ fn the_truncated_native_file_ends_with_a_problem() {
 
 #[test]
 fn the_file_that_hangs_the_mcap_crate_ends_at_once() {
-    let Some(path) = shared_data::shared("logs/hostile/mcap-0.25.0-hang.mcap") else { return };
+    let Some(path) = shared_data::shared("logs/hostile/mcap-0.25.0-hang.mcap") else {
+        return;
+    };
     // The promise is 100 ms; the least of five, since other work on the machine is not its fault.
     let least = (0..5)
         .map(|_| {
@@ -98,10 +132,11 @@ fn hostile_recordings_hold_as_many_messages_as_their_table_says() {
         ("25_header_only", 0),
     ];
     for (name, expected) in table {
-        let Some(path) = shared_data::shared(&format!("logs/hostile/{name}.mcap")) else { return };
+        let Some(path) = shared_data::shared(&format!("logs/hostile/{name}.mcap")) else {
+            return;
+        };
         let reader = Reader::open(&path).unwrap();
-        let (ours, report) =
-            read_some(reader, &WalkOptions::default(), |topic| topic == "/imu");
+        let (ours, report) = read_some(reader, &WalkOptions::default(), |topic| topic == "/imu");
         assert_eq!(ours.len(), expected, "{name}: {:?}", report.survey);
     }
 }
@@ -131,13 +166,31 @@ fn threads_and_source_change_nothing() {
                 let file = on_disk(&bytes, dir.path(), "a.mcap");
                 let (expected, report) = read_some(file, &near, |_| true);
                 for pool in &pools {
-                    let options = WalkOptions { pool: Some(pool), ..near };
+                    let options = WalkOptions {
+                        pool: Some(pool),
+                        ..near
+                    };
                     let file = on_disk(&bytes, dir.path(), "a.mcap");
                     let (items, again) = read_some(file, &options, |_| true);
-                    assert!(items == expected, "{label}, {} threads", pool.current_num_threads());
-                    assert_eq!(again, report, "{label}, {} threads", pool.current_num_threads());
+                    assert!(
+                        items == expected,
+                        "{label}, {} threads",
+                        pool.current_num_threads()
+                    );
+                    assert_eq!(
+                        again,
+                        report,
+                        "{label}, {} threads",
+                        pool.current_num_threads()
+                    );
                 }
-                for options in [near, WalkOptions { pool: Some(&pools[0]), ..near }] {
+                for options in [
+                    near,
+                    WalkOptions {
+                        pool: Some(&pools[0]),
+                        ..near
+                    },
+                ] {
                     let (items, mut stream) =
                         read_some(from_bytes(&bytes).unwrap(), &options, |_| true);
                     assert!(items == expected, "{label}, stream");
@@ -240,8 +293,14 @@ fn change_one_byte(every: usize) {
                 // Nothing may be made up. Unchunked messages have no CRC of their own: there the
                 // damage is noticed at the end of the data, after they were used.
                 if name != "unchunked" {
-                    assert!(items.iter().all(|m| written.contains(m)), "{name}: byte {at}");
-                    assert!(items.len() + 15 >= written.len(), "{name}: byte {at}: more than a chunk");
+                    assert!(
+                        items.iter().all(|m| written.contains(m)),
+                        "{name}: byte {at}"
+                    );
+                    assert!(
+                        items.len() + 15 >= written.len(),
+                        "{name}: byte {at}: more than a chunk"
+                    );
                 }
                 cases += 1;
             }
@@ -264,7 +323,10 @@ fn every_changed_byte_is_noticed_or_harmless() {
 /// Random damage of several kinds at once: no panic, no hang, nothing made up in a chunk.
 #[test]
 fn mutated_logs_end() {
-    let cases = std::env::var("STRAPD_MUTATIONS").ok().and_then(|n| n.parse().ok()).unwrap_or(400);
+    let cases = std::env::var("STRAPD_MUTATIONS")
+        .ok()
+        .and_then(|n| n.parse().ok())
+        .unwrap_or(400);
     let dir = tempfile::tempdir().unwrap();
     let pool = pool(2);
     let mut state = 99;
@@ -302,7 +364,10 @@ fn mutated_logs_end() {
             read_both(&broken, dir.path(), &pool);
             // service.md I1: 200 ms per 100 kB; these logs have 10 kB and are read twice. A busy
             // machine may stall a thread, so the bound here only tells a hang from a delay.
-            assert!(start.elapsed() < Duration::from_secs(5), "{name}, case {case}");
+            assert!(
+                start.elapsed() < Duration::from_secs(5),
+                "{name}, case {case}"
+            );
         }
     }
 }
@@ -314,18 +379,28 @@ fn a_bad_chunk_is_skipped_and_counted_and_the_rest_is_read() {
         let bytes = log(packing, 1_024, &written);
         let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
         let third = &summary.chunk_indexes[2];
-        let lost: Vec<u32> =
-            summary.stream_chunk(&bytes, third).unwrap().map(|m| m.unwrap().sequence).collect();
+        let lost: Vec<u32> = summary
+            .stream_chunk(&bytes, third)
+            .unwrap()
+            .map(|m| m.unwrap().sequence)
+            .collect();
         let mut broken = bytes.clone();
         let inside = third.compressed_data_offset().unwrap() + third.compressed_size / 2;
         broken[inside as usize] ^= 4;
         let (items, report) = read(from_bytes(&broken).unwrap());
-        let kept: Vec<_> =
-            written.iter().filter(|m| !lost.contains(&m.2)).cloned().collect();
+        let kept: Vec<_> = written
+            .iter()
+            .filter(|m| !lost.contains(&m.2))
+            .cloned()
+            .collect();
         assert!(items == kept, "{name}");
         let problems = report.survey.problems;
         assert_eq!(problems.total(), 1, "{name}: {problems:?}");
-        assert_eq!(problems.first()[0].offset, third.chunk_start_offset, "{name}");
+        assert_eq!(
+            problems.first()[0].offset,
+            third.chunk_start_offset,
+            "{name}"
+        );
         assert_eq!(problems.messages_lost(), lost.len() as u64, "{name}");
     }
 }
@@ -342,8 +417,17 @@ fn when_the_chunk_with_the_definitions_is_lost_the_summary_defines() {
     let dir = tempfile::tempdir().unwrap();
     let (items, report) = read(on_disk(&broken, dir.path(), "a.mcap"));
     assert!(items == written[inside..]);
-    let kinds: Vec<_> = report.survey.problems.first().iter().map(|p| &p.kind).collect();
-    assert!(matches!(kinds[0], ProblemKind::ChunkCrc { .. }), "{kinds:?}");
+    let kinds: Vec<_> = report
+        .survey
+        .problems
+        .first()
+        .iter()
+        .map(|p| &p.kind)
+        .collect();
+    assert!(
+        matches!(kinds[0], ProblemKind::ChunkCrc { .. }),
+        "{kinds:?}"
+    );
     let topics: Vec<_> = kinds[1..]
         .iter()
         .map(|k| match k {
@@ -368,7 +452,9 @@ fn an_id_with_a_second_meaning_never_mixes_two_topics() {
     // Two logs joined, whose channel 0 is another topic each time.
     let first = log(Some(None), 1_024, &messages(50, 0));
     let mut writer = mcap::Writer::new(std::io::Cursor::new(Vec::new())).unwrap();
-    let id = writer.add_channel(0, "/gps", "json", &Default::default()).unwrap();
+    let id = writer
+        .add_channel(0, "/gps", "json", &Default::default())
+        .unwrap();
     for i in 0..40u32 {
         let log_time = 20_000_000 + u64::from(i);
         let header = mcap::records::MessageHeader {
@@ -384,11 +470,17 @@ fn an_id_with_a_second_meaning_never_mixes_two_topics() {
     let dir = tempfile::tempdir().unwrap();
     for threads in [1, 2] {
         let pool = pool(threads);
-        let options = WalkOptions { pool: Some(&pool), ..WalkOptions::default() };
+        let options = WalkOptions {
+            pool: Some(&pool),
+            ..WalkOptions::default()
+        };
         let file = on_disk(&joined, dir.path(), "a.mcap");
         let (items, report) = read_some(file, &options, |topic| topic != "/other");
         let imu = items.iter().filter(|m| m.0 == "/imu").count();
-        let gps = items.iter().filter(|m| m.0 == "/gps" && m.3 == b"{}").count();
+        let gps = items
+            .iter()
+            .filter(|m| m.0 == "/gps" && m.3 == b"{}")
+            .count();
         // 50 messages, every third from the second on "/other": 17 of them.
         assert_eq!((imu, gps, items.len()), (33, 40, 73));
         let problems = report.survey.problems;
@@ -433,14 +525,35 @@ fn lengths_that_can_not_be_are_refused_and_reading_goes_on_at_the_next_chunk() {
     let (data, rest) = split_at_data_end(&bytes);
     // After the header, before the first chunk.
     let start = 8 + 9 + u64::from_le_bytes(bytes[9..17].try_into().unwrap()) as usize;
-    for length in [u64::MAX, u64::MAX - 8, 1 << 62, bytes.len() as u64 * 2, 1 << 26] {
-        for opcode in [0, op::SCHEMA, op::MESSAGE, op::CHUNK, op::METADATA, 0x7F, 0xFE] {
+    for length in [
+        u64::MAX,
+        u64::MAX - 8,
+        1 << 62,
+        bytes.len() as u64 * 2,
+        1 << 26,
+    ] {
+        for opcode in [
+            0,
+            op::SCHEMA,
+            op::MESSAGE,
+            op::CHUNK,
+            op::METADATA,
+            0x7F,
+            0xFE,
+        ] {
             let head = [&[opcode][..], &length.to_le_bytes()].concat();
             let broken = [&data[..start], &head, &data[start..], rest].concat();
             let dir = tempfile::tempdir().unwrap();
             let (items, report) = read(on_disk(&broken, dir.path(), "a.mcap"));
-            assert!(items == whole, "opcode {opcode} of {length}: {} messages", items.len());
-            assert!(report.survey.problems.losses() > 0, "opcode {opcode} of {length}");
+            assert!(
+                items == whole,
+                "opcode {opcode} of {length}: {} messages",
+                items.len()
+            );
+            assert!(
+                report.survey.problems.losses() > 0,
+                "opcode {opcode} of {length}"
+            );
         }
     }
 }
@@ -456,13 +569,26 @@ fn a_chunk_its_writer_never_finished_is_told_and_read_where_it_is_not_compressed
     let end = inner + last.compressed_size as usize;
     let unfinished = |compression: &str, cut: usize| {
         let head = chunk_head(u64::MAX, u32::MAX, compression, u64::MAX);
-        [&bytes[..at], &[op::CHUNK], &u64::MAX.to_le_bytes(), &head, &bytes[inner..cut]].concat()
+        [
+            &bytes[..at],
+            &[op::CHUNK],
+            &u64::MAX.to_le_bytes(),
+            &head,
+            &bytes[inner..cut],
+        ]
+        .concat()
     };
     let before = 50 - summary.stream_chunk(&bytes, last).unwrap().count();
     assert!(before > 0);
     let (items, report) = read(from_bytes(&unfinished("", end)).unwrap());
     assert!(items == written);
-    let kinds: Vec<_> = report.survey.problems.first().iter().map(|p| p.kind.clone()).collect();
+    let kinds: Vec<_> = report
+        .survey
+        .problems
+        .first()
+        .iter()
+        .map(|p| p.kind.clone())
+        .collect();
     assert_eq!(kinds[0], ProblemKind::UnfinishedChunk { read_on: true });
     assert_eq!(kinds[1], ProblemKind::NoFooter);
     // One byte less: one message less.
@@ -489,32 +615,47 @@ fn every_fault_of_a_chunk_is_named() {
         (chunk(chunk_head(1000, 1, "zstd", n), &packed), |k| {
             matches!(k, ProblemKind::ChunkCrc { stored: 1, .. })
         }),
-        (chunk(chunk_head(999, 0, "zstd", n), &packed), |k| matches!(k, ProblemKind::Unpack { .. })),
+        (chunk(chunk_head(999, 0, "zstd", n), &packed), |k| {
+            matches!(k, ProblemKind::Unpack { .. })
+        }),
         (chunk(chunk_head(1001, 0, "zstd", n), &packed), |k| {
-            *k == ProblemKind::ChunkSize { declared: 1001, actual: 1000 }
+            *k == ProblemKind::ChunkSize {
+                declared: 1001,
+                actual: 1000,
+            }
         }),
         (chunk(chunk_head(over, 0, "zstd", n), &packed), |k| {
-            *k == ProblemKind::ChunkTooBig { size: 65 << 20, limit: 64 << 20 }
+            *k == ProblemKind::ChunkTooBig {
+                size: 65 << 20,
+                limit: 64 << 20,
+            }
         }),
         (chunk(chunk_head(n + 1, 0, "", n), &packed), |k| {
             matches!(k, ProblemKind::ChunkSize { .. })
         }),
         (chunk(chunk_head(1000, 0, "xz", n), &packed), |k| {
-            *k == ProblemKind::UnknownCompression { name: "xz".to_owned() }
+            *k == ProblemKind::UnknownCompression {
+                name: "xz".to_owned(),
+            }
         }),
-        (chunk(chunk_head(1000, 0, "lz4", lz4.len() as u64), &lz4), |k| {
-            matches!(k, ProblemKind::Unpack { .. })
-        }),
-        (chunk(chunk_head(12, 0, "", 12), &record(op::MESSAGE, &[0; 3])), |k| {
-            *k == ProblemKind::ShortMessages
-        }),
+        (
+            chunk(chunk_head(1000, 0, "lz4", lz4.len() as u64), &lz4),
+            |k| matches!(k, ProblemKind::Unpack { .. }),
+        ),
+        (
+            chunk(chunk_head(12, 0, "", 12), &record(op::MESSAGE, &[0; 3])),
+            |k| *k == ProblemKind::ShortMessages,
+        ),
     ];
     for (i, (chunk, expected)) in cases.into_iter().enumerate() {
         let broken = [data, &chunk, rest].concat();
         let (items, report) = read(from_bytes(&broken).unwrap());
         assert_eq!(items.len(), 3, "case {i}");
         let problems = report.survey.problems;
-        assert!(expected(&problems.first()[0].kind), "case {i}: {problems:?}");
+        assert!(
+            expected(&problems.first()[0].kind),
+            "case {i}: {problems:?}"
+        );
         assert!(problems.losses() > 0, "case {i}");
     }
 }
@@ -527,11 +668,24 @@ fn a_survey_by_summary_and_a_survey_by_walking_agree() {
         let reader = on_disk(&bytes, dir.path(), "a.mcap");
         let quick = survey(&reader, &WalkOptions::default()).unwrap();
         let slow = read(reader).1.survey;
-        assert!(quick.from_summary && quick.has_summary && !slow.from_summary, "{name}");
+        assert!(
+            quick.from_summary && quick.has_summary && !slow.from_summary,
+            "{name}"
+        );
         assert_eq!(quick.facts.profile, "ros2", "{name}");
         assert_eq!(
-            (quick.messages, quick.times, quick.file_size, &quick.facts.chunks),
-            (slow.messages, slow.times, slow.file_size, &slow.facts.chunks),
+            (
+                quick.messages,
+                quick.times,
+                quick.file_size,
+                &quick.facts.chunks
+            ),
+            (
+                slow.messages,
+                slow.times,
+                slow.file_size,
+                &slow.facts.chunks
+            ),
             "{name}"
         );
         assert_eq!(quick.facts.library, slow.facts.library, "{name}");
@@ -539,7 +693,14 @@ fn a_survey_by_summary_and_a_survey_by_walking_agree() {
             let mut all: Vec<_> = s
                 .channels
                 .iter()
-                .map(|c| (c.channel.id, c.channel.topic.clone(), c.channel.schema.clone(), c.messages))
+                .map(|c| {
+                    (
+                        c.channel.id,
+                        c.channel.topic.clone(),
+                        c.channel.schema.clone(),
+                        c.messages,
+                    )
+                })
                 .collect();
             all.sort_by_key(|c| c.0);
             all
@@ -549,11 +710,20 @@ fn a_survey_by_summary_and_a_survey_by_walking_agree() {
         let mut broken = bytes.clone();
         let at = broken.len() - 60;
         broken[at] ^= 1;
-        let survey = survey(&on_disk(&broken, dir.path(), "b.mcap"), &WalkOptions::default()).unwrap();
+        let survey = survey(
+            &on_disk(&broken, dir.path(), "b.mcap"),
+            &WalkOptions::default(),
+        )
+        .unwrap();
         assert!(!survey.from_summary && !survey.has_summary, "{name}");
         assert_eq!(survey.messages, 200, "{name}");
         let kinds = survey.problems.first();
-        assert!(kinds.iter().any(|p| matches!(p.kind, ProblemKind::BadSummary { .. })), "{kinds:?}");
+        assert!(
+            kinds
+                .iter()
+                .any(|p| matches!(p.kind, ProblemKind::BadSummary { .. })),
+            "{kinds:?}"
+        );
     }
 }
 
@@ -562,7 +732,10 @@ fn a_consumer_can_stop_a_walk() {
     let bytes = log(Some(None), 512, &messages(500, 0));
     let pool = pool(2);
     for pool in [None, Some(&pool)] {
-        let mut options = WalkOptions { pool, ..WalkOptions::default() };
+        let mut options = WalkOptions {
+            pool,
+            ..WalkOptions::default()
+        };
         options.lookahead.blocks = 1;
         let mut seen = 0;
         let report = strapd::source::mcap::walk(
@@ -587,7 +760,10 @@ fn a_consumer_can_stop_a_walk() {
 fn a_panic_of_the_callers_map_is_passed_on_not_waited_for() {
     let bytes = log(Some(None), 512, &messages(500, 0));
     let pool = pool(2);
-    let options = WalkOptions { pool: Some(&pool), ..WalkOptions::default() };
+    let options = WalkOptions {
+        pool: Some(&pool),
+        ..WalkOptions::default()
+    };
     let _ = strapd::source::mcap::walk(
         from_bytes(&bytes).unwrap(),
         &options,
@@ -602,7 +778,10 @@ fn what_is_no_log_is_said_in_one_error() {
     let dir = tempfile::tempdir().unwrap();
     let missing = dir.path().join("missing.mcap");
     assert!(matches!(Reader::open(&missing), Err(Error::Open { path, .. }) if path == missing));
-    assert!(matches!(Reader::open(dir.path()), Err(Error::IsDirectory { .. })));
+    assert!(matches!(
+        Reader::open(dir.path()),
+        Err(Error::IsDirectory { .. })
+    ));
     let file = dir.path().join("f");
     std::fs::write(&file, b"").unwrap();
     assert!(matches!(Reader::open(&file), Err(Error::Empty { .. })));

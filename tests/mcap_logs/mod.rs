@@ -21,7 +21,9 @@ pub const PACKINGS: [(&str, Packing); 4] = [
 
 /// A fixed linear congruential sequence.
 pub fn random(state: &mut u64) -> u64 {
-    *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+    *state = state
+        .wrapping_mul(6_364_136_223_846_793_005)
+        .wrapping_add(1_442_695_040_888_963_407);
     *state >> 33
 }
 
@@ -32,8 +34,15 @@ pub fn messages(n: u32, jitter: u64) -> Vec<Read> {
         .map(|i| {
             let topic = if i % 3 == 1 { "/other" } else { "/imu" };
             let time = 10_000_000 + u64::from(i) * 1000;
-            let time = time - if jitter > 0 { random(&mut state) % jitter } else { 0 };
-            let data = (0..40 + i % 7).map(|_| random(&mut state) as u8 & 31).collect();
+            let time = time
+                - if jitter > 0 {
+                    random(&mut state) % jitter
+                } else {
+                    0
+                };
+            let data = (0..40 + i % 7)
+                .map(|_| random(&mut state) as u8 & 31)
+                .collect();
             (topic.to_owned(), time, i, data)
         })
         .collect()
@@ -48,15 +57,26 @@ pub fn log(packing: Packing, chunk: u64, messages: &[Read]) -> Vec<u8> {
         .chunk_size(Some(chunk))
         .profile("ros2");
     let mut writer = options.create(Cursor::new(Vec::new())).unwrap();
-    let schema = writer.add_schema("sensor_msgs/msg/Imu", "ros2msg", b"# text").unwrap();
+    let schema = writer
+        .add_schema("sensor_msgs/msg/Imu", "ros2msg", b"# text")
+        .unwrap();
     let metadata = [("k".to_owned(), "v".to_owned())].into();
-    let imu = writer.add_channel(schema, "/imu", "cdr", &metadata).unwrap();
-    let other = writer.add_channel(0, "/other", "json", &Default::default()).unwrap();
+    let imu = writer
+        .add_channel(schema, "/imu", "cdr", &metadata)
+        .unwrap();
+    let other = writer
+        .add_channel(0, "/other", "json", &Default::default())
+        .unwrap();
     for (topic, log_time, sequence, data) in messages {
         let channel_id = if topic == "/imu" { imu } else { other };
         let (log_time, sequence) = (*log_time, *sequence);
         let publish_time = log_time - 1;
-        let header = mcap::records::MessageHeader { channel_id, sequence, log_time, publish_time };
+        let header = mcap::records::MessageHeader {
+            channel_id,
+            sequence,
+            log_time,
+            publish_time,
+        };
         writer.write_to_known_channel(&header, data).unwrap();
     }
     writer.finish().unwrap();
@@ -85,7 +105,12 @@ pub fn read_some(
         options,
         |channel| wanted(&channel.topic).then_some(()),
         |(), m: &Message<'_>, out: &mut Vec<Read>| {
-            out.push((m.channel.topic.clone(), m.log_time, m.sequence, m.data.to_vec()));
+            out.push((
+                m.channel.topic.clone(),
+                m.log_time,
+                m.sequence,
+                m.data.to_vec(),
+            ));
         },
         |batch| {
             all.append(batch);
@@ -102,7 +127,10 @@ pub fn read(reader: Reader) -> (Vec<Read>, WalkReport) {
 }
 
 pub fn pool(threads: usize) -> rayon::ThreadPool {
-    rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap()
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .unwrap()
 }
 
 /// The file written to a temporary place, so that it is read by position.
@@ -117,7 +145,12 @@ pub fn on_disk(bytes: &[u8], dir: &Path, name: &str) -> Reader {
 pub fn stretches(bytes: &[u8]) -> Vec<(usize, Vec<Read>)> {
     let summary = mcap::Summary::read(bytes).unwrap().unwrap();
     let read = |m: mcap::Message<'_>| {
-        (m.channel.topic.clone(), m.log_time, m.sequence, m.data.to_vec())
+        (
+            m.channel.topic.clone(),
+            m.log_time,
+            m.sequence,
+            m.data.to_vec(),
+        )
     };
     let mut chunks: Vec<_> = summary
         .chunk_indexes
@@ -133,7 +166,10 @@ pub fn stretches(bytes: &[u8]) -> Vec<(usize, Vec<Read>)> {
         let mut from = 0;
         for message in mcap::MessageStream::new(bytes).unwrap() {
             let message = read(message.unwrap());
-            let at = bytes[from..].windows(message.3.len()).position(|w| w == message.3).unwrap();
+            let at = bytes[from..]
+                .windows(message.3.len())
+                .position(|w| w == message.3)
+                .unwrap();
             from += at + message.3.len();
             chunks.push((from, vec![message]));
         }

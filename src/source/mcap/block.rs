@@ -69,7 +69,11 @@ pub(super) enum Kind {
 #[derive(Debug)]
 pub(super) enum Payload {
     /// In the file; read by whoever works on it.
-    At { file: Arc<LogFile>, offset: u64, len: usize },
+    At {
+        file: Arc<LogFile>,
+        offset: u64,
+        len: usize,
+    },
     Held(Held),
 }
 
@@ -81,9 +85,9 @@ impl Block {
             Payload::Held(held) => held.bytes.capacity(),
         };
         match self.kind {
-            Kind::Chunk { compression, size, .. } if compression != Compression::None => {
-                packed + size
-            }
+            Kind::Chunk {
+                compression, size, ..
+            } if compression != Compression::None => packed + size,
             _ => packed,
         }
     }
@@ -111,7 +115,12 @@ pub(super) struct Buffers {
 
 impl std::fmt::Debug for Buffers {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "Buffers({}, {})", self.raw.capacity(), self.plain.capacity())
+        write!(
+            f,
+            "Buffers({}, {})",
+            self.raw.capacity(),
+            self.plain.capacity()
+        )
     }
 }
 
@@ -163,7 +172,13 @@ impl Buffers {
                 raw
             }
         };
-        let Kind::Chunk { compression, size, crc, .. } = block.kind else {
+        let Kind::Chunk {
+            compression,
+            size,
+            crc,
+            ..
+        } = block.kind
+        else {
             return Ok(Ok(packed));
         };
         let plain = match compression {
@@ -194,7 +209,10 @@ impl Buffers {
                 _ => crc32fast::hash(plain),
             };
             if computed != crc {
-                return Ok(Err(ProblemKind::ChunkCrc { stored: crc, computed }));
+                return Ok(Err(ProblemKind::ChunkCrc {
+                    stored: crc,
+                    computed,
+                }));
             }
         }
         Ok(Ok(plain))

@@ -46,7 +46,11 @@ pub struct Facts {
 pub(super) enum Item {
     Block(Block),
     /// A record that is neither chunk, message nor definition; only when asked for.
-    Other { opcode: u8, offset: u64, body: Held },
+    Other {
+        opcode: u8,
+        offset: u64,
+        body: Held,
+    },
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -168,7 +172,8 @@ impl Scanner {
         self.done = true;
         if have > 0 {
             let need = HEAD as u64;
-            self.problems.add(at, ProblemKind::Truncated { need, have }, None);
+            self.problems
+                .add(at, ProblemKind::Truncated { need, have }, None);
         } else {
             self.problems.add(at, ProblemKind::NoFooter, None);
         }
@@ -180,14 +185,24 @@ impl Scanner {
         let ahead = self.tape.available(2 * MAGIC.len(), PEEK)?;
         let Some(rest) = ahead.strip_prefix(&MAGIC) else {
             let have = ahead.len() as u64;
-            self.problems.add(at, ProblemKind::Truncated { need: MAGIC.len() as u64, have }, None);
+            self.problems.add(
+                at,
+                ProblemKind::Truncated {
+                    need: MAGIC.len() as u64,
+                    have,
+                },
+                None,
+            );
             self.done = true;
             return Ok(());
         };
         let again = rest.starts_with(&MAGIC);
         self.done = !again;
         self.complete = !again;
-        let sum = self.claimed_in_all.zip(self.claimed.take()).map(|(a, b)| a.saturating_add(b));
+        let sum = self
+            .claimed_in_all
+            .zip(self.claimed.take())
+            .map(|(a, b)| a.saturating_add(b));
         self.claimed_in_all = sum;
         self.section = Section::Data;
         self.crc = None;
@@ -223,10 +238,16 @@ impl Scanner {
                 }
                 self.trusted = None;
                 let payload = Payload::Held(self.tape.hand_out(n));
-                return Ok(Some(Item::Block(Block { offset: at, kind: Kind::Run, payload })));
+                return Ok(Some(Item::Block(Block {
+                    offset: at,
+                    kind: Kind::Run,
+                    payload,
+                })));
             }
             // The very first record does not fit into what was read.
-            let Some((opcode, length, total)) = next else { return Ok(None) };
+            let Some((opcode, length, total)) = next else {
+                return Ok(None);
+            };
             let limit = self.limits.record;
             let have = ahead.len();
             let stream = self.tape.remaining().is_none();
@@ -234,7 +255,15 @@ impl Scanner {
                 return self.lost(at, total);
             }
             if length > limit {
-                self.problems.add(at, ProblemKind::RecordTooLong { opcode, length, limit }, None);
+                self.problems.add(
+                    at,
+                    ProblemKind::RecordTooLong {
+                        opcode,
+                        length,
+                        limit,
+                    },
+                    None,
+                );
                 self.pass_over(total)?;
                 return Ok(None);
             }
@@ -255,8 +284,11 @@ impl Scanner {
             return self.lost(at, total);
         };
         let start = HEAD as u64 + head.len();
-        let (packed, size, crc) =
-            (head.compressed_size, head.uncompressed_size, head.uncompressed_crc);
+        let (packed, size, crc) = (
+            head.compressed_size,
+            head.uncompressed_size,
+            head.uncompressed_crc,
+        );
         let compression = Compression::named(head.compression);
         if length == u64::MAX && packed == u64::MAX && compression.is_some() {
             return self.unfinished(at, start, compression);
@@ -269,18 +301,27 @@ impl Scanner {
         self.crc = None;
         let limit = self.limits.record;
         let fault = if packed.max(size) > limit {
-            Some(ProblemKind::ChunkTooBig { size: packed.max(size), limit })
+            Some(ProblemKind::ChunkTooBig {
+                size: packed.max(size),
+                limit,
+            })
         } else if compression.is_none() {
             Some(ProblemKind::UnknownCompression { name })
         } else {
             None
         };
-        let (Some(compression), None, Ok(size), Ok(packed)) =
-            (compression, &fault, usize::try_from(size), usize::try_from(packed))
-        else {
+        let (Some(compression), None, Ok(size), Ok(packed)) = (
+            compression,
+            &fault,
+            usize::try_from(size),
+            usize::try_from(packed),
+        ) else {
             self.pass_over(total)?;
             let messages = self.indexed()?;
-            let kind = fault.unwrap_or(ProblemKind::ChunkTooBig { size: length, limit });
+            let kind = fault.unwrap_or(ProblemKind::ChunkTooBig {
+                size: length,
+                limit,
+            });
             self.problems.add(at, kind, messages);
             return Ok(None);
         };
@@ -288,7 +329,11 @@ impl Scanner {
             Input::File(file) => {
                 let (file, offset) = (Arc::clone(file), at + start);
                 self.tape.skip(total)?;
-                Payload::At { file, offset, len: packed }
+                Payload::At {
+                    file,
+                    offset,
+                    len: packed,
+                }
             }
             Input::Stream { .. } => {
                 let all = usize::try_from(total).unwrap_or(usize::MAX);
@@ -297,7 +342,10 @@ impl Scanner {
                     return self.lost(at, total);
                 }
                 let mut held = self.tape.hand_out(all);
-                let from = held.range.start.saturating_add(usize::try_from(start).unwrap_or(0));
+                let from = held
+                    .range
+                    .start
+                    .saturating_add(usize::try_from(start).unwrap_or(0));
                 held.range = from..from.saturating_add(packed);
                 Payload::Held(held)
             }
@@ -306,8 +354,17 @@ impl Scanner {
         let indexed = self.indexed()?;
         *self.facts.chunks.entry(compression).or_default() += 1;
         self.facts.unverified_chunks += u64::from(crc == 0);
-        let kind = Kind::Chunk { compression, size, crc, indexed };
-        Ok(Some(Item::Block(Block { offset: at, kind, payload })))
+        let kind = Kind::Chunk {
+            compression,
+            size,
+            crc,
+            indexed,
+        };
+        Ok(Some(Item::Block(Block {
+            offset: at,
+            kind,
+            payload,
+        })))
     }
 
     /// A chunk whose length was never filled in: what is uncompressed is read as if unchunked.
@@ -318,7 +375,8 @@ impl Scanner {
         compression: Option<Compression>,
     ) -> io::Result<Option<Item>> {
         let read_on = compression == Some(Compression::None);
-        self.problems.add(at, ProblemKind::UnfinishedChunk { read_on }, None);
+        self.problems
+            .add(at, ProblemKind::UnfinishedChunk { read_on }, None);
         self.crc = None;
         self.trusted = None;
         if read_on {
@@ -336,12 +394,18 @@ impl Scanner {
         loop {
             let at = self.tape.position();
             let head = head_at(self.tape.available(HEAD, PEEK)?, 0);
-            let Some((op::MESSAGE_INDEX, length)) = head else { return Ok(messages) };
+            let Some((op::MESSAGE_INDEX, length)) = head else {
+                return Ok(messages);
+            };
             let total = length.saturating_add(HEAD as u64);
             if self.everything || !self.tape.may_have(total) {
                 return Ok(messages);
             }
-            messages = Some(messages.unwrap_or(0).saturating_add(length.saturating_sub(6) / 16));
+            messages = Some(
+                messages
+                    .unwrap_or(0)
+                    .saturating_add(length.saturating_sub(6) / 16),
+            );
             self.trusted = Some(at);
             if self.tape.skip(total)? < total {
                 return Ok(messages);
@@ -359,8 +423,8 @@ impl Scanner {
             op::FOOTER => self.section = Section::Footer,
             _ => {}
         }
-        let wanted = self.everything
-            || matches!(opcode, op::HEADER | op::DATA_END | op::STATISTICS);
+        let wanted =
+            self.everything || matches!(opcode, op::HEADER | op::DATA_END | op::STATISTICS);
         if !wanted || length > self.limits.record {
             self.pass_over(total)?;
             return Ok(None);
@@ -370,17 +434,23 @@ impl Scanner {
         if ahead.len() < all {
             return self.lost(at, total);
         }
-        match ahead.get(HEAD..all).and_then(|body| Record::parse(opcode, body)) {
+        match ahead
+            .get(HEAD..all)
+            .and_then(|body| Record::parse(opcode, body))
+        {
             Some(Record::Header { profile, library }) if self.facts.profile.is_empty() => {
                 self.facts.profile = profile.to_owned();
                 self.facts.library = library.to_owned();
             }
             Some(Record::Statistics(s)) => self.claimed = Some(s.message_count),
-            Some(Record::DataEnd { data_section_crc: stored }) if stored != 0 => {
+            Some(Record::DataEnd {
+                data_section_crc: stored,
+            }) if stored != 0 => {
                 if let Some(computed) = self.crc.take().map(crc32fast::Hasher::finalize)
                     && computed != stored
                 {
-                    self.problems.add(at, ProblemKind::DataCrc { stored, computed }, None);
+                    self.problems
+                        .add(at, ProblemKind::DataCrc { stored, computed }, None);
                 }
             }
             _ => {}
@@ -393,7 +463,11 @@ impl Scanner {
         self.trusted = Some(at);
         let mut body = self.tape.hand_out(all);
         body.range.start += HEAD;
-        Ok(Some(Item::Other { opcode, offset: at, body }))
+        Ok(Some(Item::Other {
+            opcode,
+            offset: at,
+            body,
+        }))
     }
 
     fn count(&mut self, n: usize) {
@@ -417,7 +491,8 @@ impl Scanner {
         self.trusted = Some(at);
         let have = self.tape.skip(total)?;
         if have < total {
-            self.problems.add(at, ProblemKind::Truncated { need: total, have }, None);
+            self.problems
+                .add(at, ProblemKind::Truncated { need: total, have }, None);
             self.done = true;
         }
         Ok(())
@@ -425,15 +500,23 @@ impl Scanner {
 
     /// What stands at `at` can not be a record of `total` bytes: find the next chunk, or end.
     fn lost(&mut self, at: u64, total: u64) -> io::Result<Option<Item>> {
-        let left = self.tape.remaining().unwrap_or(self.tape.available(1, 1)?.len() as u64);
+        let left = self
+            .tape
+            .remaining()
+            .unwrap_or(self.tape.available(1, 1)?.len() as u64);
         let from = self.trusted.take().unwrap_or(at);
         self.crc = None;
         if self.section != Section::Data {
             // Nothing but repetition follows the end of data.
             let kind = if self.tape.may_have(total) {
-                ProblemKind::BadSummary { why: "it holds bytes that are no record" }
+                ProblemKind::BadSummary {
+                    why: "it holds bytes that are no record",
+                }
             } else {
-                ProblemKind::Truncated { need: total, have: left }
+                ProblemKind::Truncated {
+                    need: total,
+                    have: left,
+                }
             };
             self.problems.add(at, kind, None);
             self.done = true;
@@ -441,9 +524,17 @@ impl Scanner {
         }
         if resync::next_chunk(&mut self.tape, from + 1, self.limits.record)? {
             let skipped = self.tape.position().saturating_sub(from);
-            self.problems.add(from, ProblemKind::Garbage { skipped }, None);
+            self.problems
+                .add(from, ProblemKind::Garbage { skipped }, None);
         } else {
-            self.problems.add(at, ProblemKind::Truncated { need: total, have: left }, None);
+            self.problems.add(
+                at,
+                ProblemKind::Truncated {
+                    need: total,
+                    have: left,
+                },
+                None,
+            );
             self.done = true;
         }
         Ok(None)
