@@ -14,11 +14,18 @@ fn notation(record: &Record<'_>) -> (&'static str, Value) {
     let n = |n: u64| json!(n.to_string());
     let bytes = |b: &[u8]| json!(b.iter().map(u8::to_string).collect::<Vec<_>>());
     let texts = |pairs: &[(&str, &str)]| {
-        Value::Object(pairs.iter().map(|(k, v)| ((*k).to_owned(), json!(v))).collect::<Map<_, _>>())
+        Value::Object(
+            pairs
+                .iter()
+                .map(|(k, v)| ((*k).to_owned(), json!(v)))
+                .collect::<Map<_, _>>(),
+        )
     };
     let numbers = |pairs: &[(u16, u64)]| {
-        let map: Map<_, _> =
-            pairs.iter().map(|(k, v)| (k.to_string(), json!(v.to_string()))).collect();
+        let map: Map<_, _> = pairs
+            .iter()
+            .map(|(k, v)| (k.to_string(), json!(v.to_string())))
+            .collect();
         Value::Object(map)
     };
     match record {
@@ -59,8 +66,11 @@ fn notation(record: &Record<'_>) -> (&'static str, Value) {
         ),
         Record::Attachment(a) => {
             // The suite leaves the CRC out; it covers everything before itself.
-            ("Attachment", json!({"log_time": n(a.log_time), "create_time": n(a.create_time),
-                "name": a.name, "media_type": a.media_type, "data": bytes(a.data)}))
+            (
+                "Attachment",
+                json!({"log_time": n(a.log_time), "create_time": n(a.create_time),
+                "name": a.name, "media_type": a.media_type, "data": bytes(a.data)}),
+            )
         }
         Record::AttachmentIndex(a) => (
             "AttachmentIndex",
@@ -79,20 +89,31 @@ fn notation(record: &Record<'_>) -> (&'static str, Value) {
                 "message_end_time": n(s.message_end_time),
                 "channel_message_counts": numbers(&s.channel_message_counts)}),
         ),
-        Record::Metadata { name, metadata } => {
-            ("Metadata", json!({"name": name, "metadata": texts(metadata)}))
-        }
-        Record::MetadataIndex { offset, length, name } => {
-            ("MetadataIndex", json!({"offset": n(*offset), "length": n(*length), "name": name}))
-        }
-        Record::SummaryOffset { group_opcode, group_start, group_length } => (
+        Record::Metadata { name, metadata } => (
+            "Metadata",
+            json!({"name": name, "metadata": texts(metadata)}),
+        ),
+        Record::MetadataIndex {
+            offset,
+            length,
+            name,
+        } => (
+            "MetadataIndex",
+            json!({"offset": n(*offset), "length": n(*length), "name": name}),
+        ),
+        Record::SummaryOffset {
+            group_opcode,
+            group_start,
+            group_length,
+        } => (
             "SummaryOffset",
             json!({"group_opcode": n((*group_opcode).into()), "group_start": n(*group_start),
                 "group_length": n(*group_length)}),
         ),
-        Record::DataEnd { data_section_crc } => {
-            ("DataEnd", json!({"data_section_crc": n((*data_section_crc).into())}))
-        }
+        Record::DataEnd { data_section_crc } => (
+            "DataEnd",
+            json!({"data_section_crc": n((*data_section_crc).into())}),
+        ),
         other => panic!("{other:?} is not in the suite's listings"),
     }
 }
@@ -102,18 +123,30 @@ fn expected(path: &Path) -> Vec<(String, Value)> {
     let listing: Value = serde_json::from_str(&text).unwrap();
     let record = |r: &Value| {
         let fields = r["fields"].as_array().unwrap().iter();
-        let fields: Map<_, _> =
-            fields.map(|f| (f[0].as_str().unwrap().to_owned(), f[1].clone())).collect();
-        (r["type"].as_str().unwrap().to_owned(), Value::Object(fields))
+        let fields: Map<_, _> = fields
+            .map(|f| (f[0].as_str().unwrap().to_owned(), f[1].clone()))
+            .collect();
+        (
+            r["type"].as_str().unwrap().to_owned(),
+            Value::Object(fields),
+        )
     };
-    listing["records"].as_array().unwrap().iter().map(record).collect()
+    listing["records"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(record)
+        .collect()
 }
 
 fn ours(reader: Reader) -> Vec<(String, Value)> {
     let mut records = Vec::new();
     let (_, problems) = list(reader, |listed| {
         // Message indexes are part of the file, not of the suite's listings.
-        if !matches!(listed.record, Record::MessageIndex { .. } | Record::Unknown { .. }) {
+        if !matches!(
+            listed.record,
+            Record::MessageIndex { .. } | Record::Unknown { .. }
+        ) {
             let (name, fields) = notation(&listed.record);
             records.push((name.to_owned(), fields));
         }
@@ -126,7 +159,9 @@ fn ours(reader: Reader) -> Vec<(String, Value)> {
 
 #[test]
 fn every_conformance_file_lists_as_its_authors_say() {
-    let Some(root) = shared_data::shared("logs/conformance") else { return };
+    let Some(root) = shared_data::shared("logs/conformance") else {
+        return;
+    };
     let mut files = 0;
     let mut records = 0;
     for group in std::fs::read_dir(root.join("mcap")).unwrap() {
@@ -142,7 +177,11 @@ fn every_conformance_file_lists_as_its_authors_say() {
             let from_file = ours(Reader::open(&path).unwrap());
             assert_eq!(from_file, expected, "{name}");
             let bytes = std::io::Cursor::new(std::fs::read(&path).unwrap());
-            assert_eq!(ours(Reader::from_stream(&name, Box::new(bytes)).unwrap()), expected, "{name}");
+            assert_eq!(
+                ours(Reader::from_stream(&name, Box::new(bytes)).unwrap()),
+                expected,
+                "{name}"
+            );
             files += 1;
             records += expected.len();
         }
@@ -153,7 +192,9 @@ fn every_conformance_file_lists_as_its_authors_say() {
 
 #[test]
 fn every_attachment_of_the_suite_has_the_crc_it_carries() {
-    let Some(root) = shared_data::shared("logs/conformance/mcap/OneAttachment") else { return };
+    let Some(root) = shared_data::shared("logs/conformance/mcap/OneAttachment") else {
+        return;
+    };
     let mut seen = 0;
     for file in std::fs::read_dir(root).unwrap() {
         let reader = Reader::open(&file.unwrap().path()).unwrap();
@@ -176,6 +217,8 @@ fn every_attachment_of_the_suite_has_the_crc_it_carries() {
 /// CRC-32 (IEEE 802.3), bit by bit: independent of the crate the reader uses.
 fn crc32(data: &[u8]) -> u32 {
     !data.iter().fold(!0u32, |crc, byte| {
-        (0..8).fold(crc ^ u32::from(*byte), |c, _| (c >> 1) ^ (0xEDB8_8320 & (c & 1).wrapping_neg()))
+        (0..8).fold(crc ^ u32::from(*byte), |c, _| {
+            (c >> 1) ^ (0xEDB8_8320 & (c & 1).wrapping_neg())
+        })
     })
 }

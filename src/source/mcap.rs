@@ -65,7 +65,10 @@ pub struct Limits {
 
 impl Default for Limits {
     fn default() -> Self {
-        Limits { record: 64 << 20, definitions: 64 << 20 }
+        Limits {
+            record: 64 << 20,
+            definitions: 64 << 20,
+        }
     }
 }
 
@@ -82,20 +85,30 @@ impl Reader {
     /// # Errors
     /// [`Error::Open`], [`Error::IsDirectory`], [`Error::Empty`], [`Error::NotMcap`], [`Error::Read`].
     pub fn open(path: &Path) -> Result<Reader> {
-        let open = |source| Error::Open { path: path.to_owned(), source };
+        let open = |source| Error::Open {
+            path: path.to_owned(),
+            source,
+        };
         let file = File::open(path).map_err(open)?;
         let meta = file.metadata().map_err(open)?;
         if meta.is_dir() {
-            return Err(Error::IsDirectory { path: path.to_owned() });
+            return Err(Error::IsDirectory {
+                path: path.to_owned(),
+            });
         }
         if !meta.is_file() {
             return Reader::from_stream(path, Box::new(file));
         }
         let file = LogFile::new(path, file, meta.len());
         let mut magic = [0; MAGIC.len()];
-        let have = file.read_at(&mut magic, 0).map_err(|e| read_error(path, 0, e))?;
+        let have = file
+            .read_at(&mut magic, 0)
+            .map_err(|e| read_error(path, 0, e))?;
         check_magic(path, magic.get(..have).unwrap_or(&[]))?;
-        Ok(Reader { input: Input::File(Arc::new(file)), limits: Limits::default() })
+        Ok(Reader {
+            input: Input::File(Arc::new(file)),
+            limits: Limits::default(),
+        })
     }
 
     /// Reads a log from a stream; `name` is what errors call it.
@@ -110,7 +123,10 @@ impl Reader {
             .read_to_end(&mut magic)
             .map_err(|e| read_error(&name, 0, e))?;
         check_magic(&name, &magic)?;
-        Ok(Reader { input: Input::Stream { name, from }, limits: Limits::default() })
+        Ok(Reader {
+            input: Input::Stream { name, from },
+            limits: Limits::default(),
+        })
     }
 
     /// The same log with other limits.
@@ -138,16 +154,21 @@ impl Reader {
     #[must_use]
     pub fn again(&self) -> Option<Reader> {
         match &self.input {
-            Input::File(file) => {
-                Some(Reader { input: Input::File(Arc::clone(file)), limits: self.limits })
-            }
+            Input::File(file) => Some(Reader {
+                input: Input::File(Arc::clone(file)),
+                limits: self.limits,
+            }),
             Input::Stream { .. } => None,
         }
     }
 }
 
 fn read_error(path: &Path, offset: u64, source: std::io::Error) -> Error {
-    Error::Read { path: path.to_owned(), offset, source }
+    Error::Read {
+        path: path.to_owned(),
+        offset,
+        source,
+    }
 }
 
 fn check_magic(path: &Path, found: &[u8]) -> Result<()> {
@@ -157,7 +178,10 @@ fn check_magic(path: &Path, found: &[u8]) -> Result<()> {
     }
     if found != MAGIC {
         let found = found.escape_ascii().to_string();
-        return Err(Error::NotMcap { path: path(), found });
+        return Err(Error::NotMcap {
+            path: path(),
+            found,
+        });
     }
     Ok(())
 }

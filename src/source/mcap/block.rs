@@ -69,7 +69,11 @@ pub(super) enum Kind {
 #[derive(Debug)]
 pub(super) enum Payload {
     /// In the file; read by whoever works on it.
-    At { file: Arc<LogFile>, offset: u64, len: usize },
+    At {
+        file: Arc<LogFile>,
+        offset: u64,
+        len: usize,
+    },
     Held(Held),
 }
 
@@ -81,9 +85,9 @@ impl Block {
             Payload::Held(held) => held.bytes.capacity(),
         };
         match self.kind {
-            Kind::Chunk { compression, size, .. } if compression != Compression::None => {
-                packed + size
-            }
+            Kind::Chunk {
+                compression, size, ..
+            } if compression != Compression::None => packed + size,
             _ => packed,
         }
     }
@@ -96,6 +100,11 @@ impl Block {
     }
 }
 
+/// Whether the CRC is over the bytes as they lie in the file.
+fn plain_crc(kind: &Kind) -> bool {
+    matches!(kind, Kind::Chunk { compression: Compression::None, crc, .. } if *crc != 0)
+}
+
 /// The buffers of one worker.
 #[derive(Default)]
 pub(super) struct Buffers {
@@ -106,9 +115,17 @@ pub(super) struct Buffers {
 
 impl std::fmt::Debug for Buffers {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "Buffers({}, {})", self.raw.capacity(), self.plain.capacity())
+        write!(
+            f,
+            "Buffers({}, {})",
+            self.raw.capacity(),
+            self.plain.capacity()
+        )
     }
 }
+
+/// What is read at a time: its CRC is taken while it is still in the cache.
+const PIECE: usize = 128 << 10;
 
 /// A slice of exactly `n` bytes of `buf`, which grows but is not shrunk or zeroed again.
 fn room(buf: &mut Vec<u8>, n: usize) -> &mut [u8] {
@@ -128,20 +145,40 @@ impl Buffers {
     /// # Errors
     /// Only when the file itself can not be read.
     pub(super) fn open<'a>(&'a mut self, block: &'a Block) -> io::Result<Opened<'a>> {
+        let mut seen = crc32fast::Hasher::new();
         let packed = match &block.payload {
-            Payload::Held(held) => held.as_slice(),
+            Payload::Held(held) => {
+                let packed = held.as_slice();
+                if plain_crc(&block.kind) {
+                    seen.update(packed);
+                }
+                packed
+            }
             Payload::At { file, offset, len } => {
                 let raw = room(&mut self.raw, *len);
-                let got = file.read_at(raw, *offset)?;
-                if got < *len {
-                    // The file was cut after the walk had seen its length.
-                    let (need, have) = (*len as u64, got as u64);
-                    return Ok(Err(ProblemKind::Truncated { need, have }));
+                let mut got = 0;
+                for piece in raw.chunks_mut(PIECE) {
+                    let n = file.read_at(piece, *offset + got as u64)?;
+                    got += n;
+                    if n < piece.len() {
+                        // The file was cut after the walk had seen its length.
+                        let (need, have) = (*len as u64, got as u64);
+                        return Ok(Err(ProblemKind::Truncated { need, have }));
+                    }
+                    if plain_crc(&block.kind) {
+                        seen.update(piece);
+                    }
                 }
                 raw
             }
         };
-        let Kind::Chunk { compression, size, crc, .. } = block.kind else {
+        let Kind::Chunk {
+            compression,
+            size,
+            crc,
+            ..
+        } = block.kind
+        else {
             return Ok(Ok(packed));
         };
         let plain = match compression {
@@ -167,9 +204,15 @@ impl Buffers {
             }
         };
         if crc != 0 {
-            let computed = crc32fast::hash(plain);
+            let computed = match compression {
+                Compression::None => seen.finalize(),
+                _ => crc32fast::hash(plain),
+            };
             if computed != crc {
-                return Ok(Err(ProblemKind::ChunkCrc { stored: crc, computed }));
+                return Ok(Err(ProblemKind::ChunkCrc {
+                    stored: crc,
+                    computed,
+                }));
             }
         }
         Ok(Ok(plain))

@@ -68,7 +68,10 @@ impl Channel {
 }
 
 fn text_map(pairs: &[(&str, &str)]) -> BTreeMap<String, String> {
-    pairs.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect()
+    pairs
+        .iter()
+        .map(|(k, v)| ((*k).to_owned(), (*v).to_owned()))
+        .collect()
 }
 
 /// Definitions found in a summary section: used for ids the data section leaves undefined
@@ -176,7 +179,12 @@ impl<D> Table<D> {
             };
             if let Some(old) = self.schemas.insert(r.id, Arc::new(Schema::new(&r))) {
                 let (was, now) = (old.name.clone(), r.name.to_owned());
-                let kind = ProblemKind::Redefined { what: "schema", id: r.id, was, now };
+                let kind = ProblemKind::Redefined {
+                    what: "schema",
+                    id: r.id,
+                    was,
+                    now,
+                };
                 problems.add(offset, kind, None);
             }
         } else {
@@ -196,8 +204,12 @@ impl<D> Table<D> {
         select: &mut dyn FnMut(&Arc<Channel>) -> Option<D>,
         problems: &mut Problems,
     ) {
-        let Some(body) = self.fallback.channels.remove(&id) else { return };
-        let Some(r) = ChannelRecord::parse(&body) else { return };
+        let Some(body) = self.fallback.channels.remove(&id) else {
+            return;
+        };
+        let Some(r) = ChannelRecord::parse(&body) else {
+            return;
+        };
         let topic = r.topic.to_owned();
         problems.add(offset, ProblemKind::DefinedBySummary { topic }, None);
         self.add_channel(&r, offset, select, problems);
@@ -212,13 +224,22 @@ impl<D> Table<D> {
     ) {
         if let Some(old) = self.entry(self.lookup(r.id)) {
             let (was, now) = (old.channel.topic.clone(), r.topic.to_owned());
-            let kind = ProblemKind::Redefined { what: "channel", id: r.id, was, now };
+            let kind = ProblemKind::Redefined {
+                what: "channel",
+                id: r.id,
+                was,
+                now,
+            };
             problems.add(offset, kind, None);
         }
         let schema = self.schema(r.schema_id);
         if r.schema_id != 0 && schema.is_none() {
             let (topic, schema_id) = (r.topic.to_owned(), r.schema_id);
-            problems.add(offset, ProblemKind::MissingSchema { topic, schema_id }, None);
+            problems.add(
+                offset,
+                ProblemKind::MissingSchema { topic, schema_id },
+                None,
+            );
         }
         let index = self.entries.len();
         let channel = Arc::new(Channel {

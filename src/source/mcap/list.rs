@@ -44,10 +44,19 @@ pub fn list(
         let item = item.map_err(|e| read_error(&name, scanner.tape().position(), e))?;
         let flow = match item {
             None => break,
-            Some(Item::Other { opcode, offset, body }) => {
+            Some(Item::Other {
+                opcode,
+                offset,
+                body,
+            }) => {
                 let body = body.as_slice();
                 match Record::parse(opcode, body) {
-                    Some(record) => visit(Listed { offset, inner: None, record, body }),
+                    Some(record) => visit(Listed {
+                        offset,
+                        inner: None,
+                        record,
+                        body,
+                    }),
                     None => {
                         let length = body.len() as u64;
                         problems.add(offset, ProblemKind::InnerRecord { at: 0, length }, None);
@@ -57,7 +66,9 @@ pub fn list(
             }
             Some(Item::Block(block)) => {
                 let place = place(&block);
-                let opened = buffers.open(&block).map_err(|e| read_error(&name, place.offset, e))?;
+                let opened = buffers
+                    .open(&block)
+                    .map_err(|e| read_error(&name, place.offset, e))?;
                 let flow = match opened {
                     Ok(records) => each(records, |at, opcode, body| {
                         let (offset, inner) = match place.chunked {
@@ -65,7 +76,12 @@ pub fn list(
                             false => (place.offset + at as u64, None),
                         };
                         match body.and_then(|body| Some((Record::parse(opcode, body)?, body))) {
-                            Some((record, body)) => visit(Listed { offset, inner, record, body }),
+                            Some((record, body)) => visit(Listed {
+                                offset,
+                                inner,
+                                record,
+                                body,
+                            }),
                             None => {
                                 let kind = ProblemKind::InnerRecord {
                                     at: at as u64,
@@ -100,8 +116,12 @@ fn each(
 ) -> ControlFlow<()> {
     let mut at = 0;
     while at < records.len() {
-        let Some((opcode, length)) = head_at(records, at) else { return see(at, 0, None) };
-        let end = usize::try_from(length).ok().and_then(|n| (at + HEAD).checked_add(n));
+        let Some((opcode, length)) = head_at(records, at) else {
+            return see(at, 0, None);
+        };
+        let end = usize::try_from(length)
+            .ok()
+            .and_then(|n| (at + HEAD).checked_add(n));
         let body = end.and_then(|end| records.get(at + HEAD..end));
         see(at, opcode, body)?;
         let Some(body) = body else { break };

@@ -83,7 +83,14 @@ impl Met {
     /// Ids that were looked up and what they were taken for, with the channel's tally.
     pub(super) fn channels(&self) -> impl Iterator<Item = (u16, u32, Tally)> {
         self.touched.iter().map(|&(id, index)| {
-            (id, index, self.tallies.get(index as usize).copied().unwrap_or_default())
+            (
+                id,
+                index,
+                self.tallies
+                    .get(index as usize)
+                    .copied()
+                    .unwrap_or_default(),
+            )
         })
     }
 
@@ -104,11 +111,19 @@ impl Met {
 pub(super) enum Stop {
     End,
     /// A schema or channel record the table does not hold, at this offset in the block.
-    Definition { at: usize },
+    Definition {
+        at: usize,
+    },
     /// A message, at this offset, on a channel only the summary defines.
-    Adopt { at: usize, id: u16 },
+    Adopt {
+        at: usize,
+        id: u16,
+    },
     /// A record that runs over the end of the block.
-    Broken { at: usize, length: u64 },
+    Broken {
+        at: usize,
+        length: u64,
+    },
 }
 
 /// Where a block lies: what its messages report as their place.
@@ -144,7 +159,9 @@ pub(super) fn pass<T, D>(
         let body = usize::try_from(length)
             .ok()
             .and_then(|n| records.get(body_at..body_at.checked_add(n)?));
-        let Some(body) = body else { return Stop::Broken { at, length } };
+        let Some(body) = body else {
+            return Stop::Broken { at, length };
+        };
         match opcode {
             op::MESSAGE => match MessageRecord::parse(body) {
                 Some(m) => {
@@ -175,7 +192,10 @@ pub(super) fn pass<T, D>(
                             batch.stamp(m.log_time);
                         }
                     } else if table.can_adopt(m.channel_id) {
-                        return Stop::Adopt { at, id: m.channel_id };
+                        return Stop::Adopt {
+                            at,
+                            id: m.channel_id,
+                        };
                     } else {
                         debug_assert_eq!(index, NONE);
                         *met.unknown.entry(m.channel_id).or_default() += 1;

@@ -20,7 +20,11 @@ pub struct Lookahead {
 
 impl Default for Lookahead {
     fn default() -> Self {
-        Lookahead { blocks: 32, bytes: 4 << 20, held_bytes: 8 << 20 }
+        Lookahead {
+            blocks: 32,
+            bytes: 4 << 20,
+            held_bytes: 8 << 20,
+        }
     }
 }
 
@@ -35,7 +39,11 @@ pub(super) struct Batch<T> {
 
 impl<T> Default for Batch<T> {
     fn default() -> Self {
-        Batch { items: Vec::new(), times: Vec::new(), steps_back: 0 }
+        Batch {
+            items: Vec::new(),
+            times: Vec::new(),
+            steps_back: 0,
+        }
     }
 }
 
@@ -172,7 +180,11 @@ impl<T> Merger<T> {
             self.blocks += 1;
             self.bytes += bytes;
         }
-        self.window.push_back(Waiting { batch, blocks: 1, bytes });
+        self.window.push_back(Waiting {
+            batch,
+            blocks: 1,
+            bytes,
+        });
     }
 
     fn pop_front(&mut self) -> Option<Batch<T>> {
@@ -185,7 +197,11 @@ impl<T> Merger<T> {
     }
 
     /// The next batch that may be let go; `last` when no block follows. `spare` lends memory.
-    pub(super) fn pop(&mut self, last: bool, spare: &mut dyn FnMut() -> Batch<T>) -> Option<Batch<T>> {
+    pub(super) fn pop(
+        &mut self,
+        last: bool,
+        spare: &mut dyn FnMut() -> Batch<T>,
+    ) -> Option<Batch<T>> {
         loop {
             let front = self.window.front_mut()?;
             let (Some(first), Some(end)) = (front.batch.first(), front.batch.last()) else {
@@ -202,9 +218,14 @@ impl<T> Merger<T> {
                 return None;
             }
             // Nothing that follows is earlier than this; on equal times the front is earlier in the file.
-            let follows = self.window.iter().skip(1).filter_map(|w| w.batch.first()).min();
+            let follows = self
+                .window
+                .iter()
+                .skip(1)
+                .filter_map(|w| w.batch.first())
+                .min();
             let follows = follows.filter(|f| *f < end);
-            let Some(front) = self.window.front_mut() else { return None };
+            let front = self.window.front_mut()?;
             let ready = match follows {
                 _ if overflow && !full && !last => front.batch.times.len() / 2,
                 None => {

@@ -134,6 +134,14 @@ pub enum ProblemKind {
         /// The channel's topic.
         topic: String,
     },
+    /// The statistics count more messages than were found: a record with messages in it was passed over
+    /// as something else.
+    Missing {
+        /// Messages by the statistics.
+        claimed: u64,
+        /// Messages found.
+        found: u64,
+    },
     /// The summary at the end can not be used; nothing is lost by that.
     BadSummary {
         /// Why.
@@ -163,29 +171,54 @@ impl fmt::Display for ProblemKind {
             }
             ProblemKind::NoFooter => write!(f, "the file is cut: it ends without a footer"),
             ProblemKind::UnfinishedChunk { read_on: true } => {
-                write!(f, "the writer stopped inside this chunk; its records are read unverified")
+                write!(
+                    f,
+                    "the writer stopped inside this chunk; its records are read unverified"
+                )
             }
             ProblemKind::UnfinishedChunk { read_on: false } => {
-                write!(f, "the writer stopped inside this chunk; it can not be read")
+                write!(
+                    f,
+                    "the writer stopped inside this chunk; it can not be read"
+                )
             }
             ProblemKind::Garbage { skipped } => {
-                write!(f, "no record here; {skipped} bytes skipped up to the next chunk")
+                write!(
+                    f,
+                    "no record here; {skipped} bytes skipped up to the next chunk"
+                )
             }
-            ProblemKind::RecordTooLong { opcode, length, limit } => {
-                write!(f, "record 0x{opcode:02x} of {length} bytes, limit {limit}; skipped")
+            ProblemKind::RecordTooLong {
+                opcode,
+                length,
+                limit,
+            } => {
+                write!(
+                    f,
+                    "record 0x{opcode:02x} of {length} bytes, limit {limit}; skipped"
+                )
             }
             ProblemKind::ChunkTooBig { size, limit } => {
                 write!(f, "chunk of {size} bytes, limit {limit}; skipped")
             }
             ProblemKind::UnknownCompression { name } => {
-                write!(f, "chunk packed with {name:?}, not none, lz4 or zstd; skipped")
+                write!(
+                    f,
+                    "chunk packed with {name:?}, not none, lz4 or zstd; skipped"
+                )
             }
             ProblemKind::Unpack { why } => write!(f, "chunk does not unpack ({why}); skipped"),
             ProblemKind::ChunkSize { declared, actual } => {
-                write!(f, "chunk declares {declared} bytes and holds {actual}; skipped")
+                write!(
+                    f,
+                    "chunk declares {declared} bytes and holds {actual}; skipped"
+                )
             }
             ProblemKind::ChunkCrc { stored, computed } => {
-                write!(f, "chunk CRC is {computed:08x}, not {stored:08x} as written; skipped")
+                write!(
+                    f,
+                    "chunk CRC is {computed:08x}, not {stored:08x} as written; skipped"
+                )
             }
             ProblemKind::DataCrc { stored, computed } => write!(
                 f,
@@ -200,20 +233,36 @@ impl fmt::Display for ProblemKind {
                 write!(f, "messages on channel {id}, which is not defined")
             }
             ProblemKind::BadDefinition { opcode } => {
-                let what = if *opcode == super::record::op::SCHEMA { "schema" } else { "channel" };
+                let what = if *opcode == super::record::op::SCHEMA {
+                    "schema"
+                } else {
+                    "channel"
+                };
                 write!(f, "{what} record that can not be read")
             }
             ProblemKind::TooManyDefinitions => {
                 write!(f, "more schemas and channels than fit the limit; ignored")
             }
             ProblemKind::MissingSchema { topic, schema_id } => {
-                write!(f, "{topic:?} names schema {schema_id}, which is not in the file")
+                write!(
+                    f,
+                    "{topic:?} names schema {schema_id}, which is not in the file"
+                )
             }
             ProblemKind::Redefined { what, id, was, now } => {
                 write!(f, "{what} {id} was {was:?} and is {now:?} from here on")
             }
             ProblemKind::DefinedBySummary { topic } => {
-                write!(f, "{topic:?} is defined by the summary alone; its own definition is lost")
+                write!(
+                    f,
+                    "{topic:?} is defined by the summary alone; its own definition is lost"
+                )
+            }
+            ProblemKind::Missing { claimed, found } => {
+                write!(
+                    f,
+                    "the statistics count {claimed} messages, {found} were found"
+                )
             }
             ProblemKind::BadSummary { why } => write!(f, "the summary can not be used: {why}"),
         }
@@ -246,7 +295,11 @@ impl Problems {
         self.losses += u64::from(kind.is_loss());
         self.messages = self.messages.saturating_add(messages.unwrap_or(0));
         if self.first.len() < KEPT {
-            self.first.push(Problem { offset, kind, messages });
+            self.first.push(Problem {
+                offset,
+                kind,
+                messages,
+            });
         }
     }
 

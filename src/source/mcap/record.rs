@@ -34,22 +34,44 @@ pub mod op {
 #[derive(Clone, PartialEq, Debug)]
 #[allow(missing_docs)]
 pub enum Record<'a> {
-    Header { profile: &'a str, library: &'a str },
+    Header {
+        profile: &'a str,
+        library: &'a str,
+    },
     Footer(Footer),
     Schema(SchemaRecord<'a>),
     Channel(ChannelRecord<'a>),
     Message(MessageRecord<'a>),
     Chunk(ChunkHead<'a>),
-    MessageIndex { channel_id: u16, entries: Vec<(u64, u64)> },
+    MessageIndex {
+        channel_id: u16,
+        entries: Vec<(u64, u64)>,
+    },
     ChunkIndex(ChunkIndex<'a>),
     Attachment(AttachmentRecord<'a>),
     AttachmentIndex(AttachmentIndex<'a>),
     Statistics(Statistics),
-    Metadata { name: &'a str, metadata: Vec<(&'a str, &'a str)> },
-    MetadataIndex { offset: u64, length: u64, name: &'a str },
-    SummaryOffset { group_opcode: u8, group_start: u64, group_length: u64 },
-    DataEnd { data_section_crc: u32 },
-    Unknown { opcode: u8, data: &'a [u8] },
+    Metadata {
+        name: &'a str,
+        metadata: Vec<(&'a str, &'a str)>,
+    },
+    MetadataIndex {
+        offset: u64,
+        length: u64,
+        name: &'a str,
+    },
+    SummaryOffset {
+        group_opcode: u8,
+        group_start: u64,
+        group_length: u64,
+    },
+    DataEnd {
+        data_section_crc: u32,
+    },
+    Unknown {
+        opcode: u8,
+        data: &'a [u8],
+    },
 }
 
 /// Where the summary lies.
@@ -167,7 +189,10 @@ impl<'a> Record<'a> {
     pub fn parse(opcode: u8, body: &'a [u8]) -> Option<Record<'a>> {
         let mut b = Bytes::new(body);
         Some(match opcode {
-            op::HEADER => Record::Header { profile: b.text()?, library: b.text()? },
+            op::HEADER => Record::Header {
+                profile: b.text()?,
+                library: b.text()?,
+            },
             op::FOOTER => Record::Footer(Footer::parse(body)?),
             op::SCHEMA => Record::Schema(SchemaRecord::parse(body)?),
             op::CHANNEL => Record::Channel(ChannelRecord::parse(body)?),
@@ -216,7 +241,10 @@ impl<'a> Record<'a> {
                 message_end_time: b.u64()?,
                 channel_message_counts: b.entries(|e| Some((e.u16()?, e.u64()?)))?,
             }),
-            op::METADATA => Record::Metadata { name: b.text()?, metadata: pairs(&mut b)? },
+            op::METADATA => Record::Metadata {
+                name: b.text()?,
+                metadata: pairs(&mut b)?,
+            },
             op::METADATA_INDEX => Record::MetadataIndex {
                 offset: b.u64()?,
                 length: b.u64()?,
@@ -227,7 +255,9 @@ impl<'a> Record<'a> {
                 group_start: b.u64()?,
                 group_length: b.u64()?,
             },
-            op::DATA_END => Record::DataEnd { data_section_crc: b.u32()? },
+            op::DATA_END => Record::DataEnd {
+                data_section_crc: b.u32()?,
+            },
             _ => Record::Unknown { opcode, data: body },
         })
     }
@@ -254,7 +284,12 @@ impl Footer {
 impl<'a> SchemaRecord<'a> {
     pub(super) fn parse(body: &'a [u8]) -> Option<Self> {
         let mut b = Bytes::new(body);
-        Some(SchemaRecord { id: b.u16()?, name: b.text()?, encoding: b.text()?, data: b.blob()? })
+        Some(SchemaRecord {
+            id: b.u16()?,
+            name: b.text()?,
+            encoding: b.text()?,
+            data: b.blob()?,
+        })
     }
 }
 

@@ -28,9 +28,12 @@ pub(super) fn next_chunk(tape: &mut Tape, from: u64, limit: u64) -> io::Result<b
         let ahead = tape.available(WINDOW, WINDOW)?;
         let found = (0..ahead.len()).find(|&i| {
             ahead.get(i) == Some(&op::CHUNK)
-                && ahead.get(i..).and_then(|b| length(b, limit)).is_some_and(|total| {
-                    left.is_none_or(|left| total <= left.saturating_sub(i as u64))
-                })
+                && ahead
+                    .get(i..)
+                    .and_then(|b| length(b, limit))
+                    .is_some_and(|total| {
+                        left.is_none_or(|left| total <= left.saturating_sub(i as u64))
+                    })
         });
         let have = ahead.len();
         if let Some(i) = found {
@@ -59,5 +62,5 @@ fn length(data: &[u8], limit: u64) -> Option<u64> {
     let agrees = sizes
         && head.compressed_size.max(head.uncompressed_size) <= limit
         && length == head.len().checked_add(head.compressed_size)?;
-    agrees.then_some(length + HEAD as u64)
+    agrees.then(|| length + HEAD as u64)
 }

@@ -46,7 +46,11 @@ pub struct Facts {
 pub(super) enum Item {
     Block(Block),
     /// A record that is neither chunk, message nor definition; only when asked for.
-    Other { opcode: u8, offset: u64, body: Held },
+    Other {
+        opcode: u8,
+        offset: u64,
+        body: Held,
+    },
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -72,6 +76,12 @@ pub(super) struct Scanner {
     /// CRC of everything so far, while every byte has been seen (no chunk yet).
     crc: Option<crc32fast::Hasher>,
     done: bool,
+    /// The end was reached, magic and all.
+    complete: bool,
+    /// Messages by the statistics of this log's summary.
+    claimed: Option<u64>,
+    /// The same of all logs joined in this input; `None` once one says nothing.
+    claimed_in_all: Option<u64>,
     pub(super) facts: Facts,
     pub(super) problems: Problems,
 }
@@ -92,6 +102,9 @@ impl Scanner {
             trusted: None,
             crc: Some(crc),
             done: false,
+            complete: false,
+            claimed: None,
+            claimed_in_all: Some(0),
             facts: Facts::default(),
             problems: Problems::default(),
         }
@@ -123,17 +136,14 @@ impl Scanner {
             };
             let total = length.saturating_add(HEAD as u64);
             let item = match opcode {
-                op::MESSAGE => self.run()?,
-                op::SCHEMA | op::CHANNEL if self.section == Section::Data => self.run()?,
+                op::MESSAGE | op::SCHEMA | op::CHANNEL if self.section == Section::Data => {
+                    self.run()?
+                }
                 op::CHUNK => self.chunk(at, length)?,
-                0 => {
-                    self.lost(at, total)?;
-                    None
-                }
-                _ if !self.may_skip(opcode, length) => {
-                    self.lost(at, total)?;
-                    None
-                }
+                // A message has no business in the summary: a changed byte made it one.
+                0 | op::MESSAGE => self.lost(at, total)?,
+                op::DATA_END | op::FOOTER if length > SLACK => self.lost(at, total)?,
+                _ if !self.may_skip(opcode, length) => self.lost(at, total)?,
                 _ => self.other(at, opcode, length)?,
             };
             if item.is_some() {
@@ -141,6 +151,11 @@ impl Scanner {
             }
         }
         Ok(None)
+    }
+
+    /// Messages there should be, by the statistics; known only after a complete end.
+    pub(super) fn claimed(&self) -> Option<u64> {
+        self.claimed_in_all.filter(|_| self.done && self.complete)
     }
 
     /// Whether a record of this length can be stepped over. A stream can not be asked how long it
@@ -157,7 +172,8 @@ impl Scanner {
         self.done = true;
         if have > 0 {
             let need = HEAD as u64;
-            self.problems.add(at, ProblemKind::Truncated { need, have }, None);
+            self.problems
+                .add(at, ProblemKind::Truncated { need, have }, None);
         } else {
             self.problems.add(at, ProblemKind::NoFooter, None);
         }
@@ -169,12 +185,25 @@ impl Scanner {
         let ahead = self.tape.available(2 * MAGIC.len(), PEEK)?;
         let Some(rest) = ahead.strip_prefix(&MAGIC) else {
             let have = ahead.len() as u64;
-            self.problems.add(at, ProblemKind::Truncated { need: MAGIC.len() as u64, have }, None);
+            self.problems.add(
+                at,
+                ProblemKind::Truncated {
+                    need: MAGIC.len() as u64,
+                    have,
+                },
+                None,
+            );
             self.done = true;
             return Ok(());
         };
         let again = rest.starts_with(&MAGIC);
         self.done = !again;
+        self.complete = !again;
+        let sum = self
+            .claimed_in_all
+            .zip(self.claimed.take())
+            .map(|(a, b)| a.saturating_add(b));
+        self.claimed_in_all = sum;
         self.section = Section::Data;
         self.crc = None;
         self.trusted = None;
@@ -185,7 +214,6 @@ impl Scanner {
     /// Unchunked schemas, channels and messages: as many whole ones as make about [`RUN`] bytes.
     fn run(&mut self) -> io::Result<Option<Item>> {
         let at = self.tape.position();
-        self.section = Section::Data;
         let mut want = RUN;
         loop {
             let ahead = self.tape.available(want, want)?;
@@ -210,19 +238,32 @@ impl Scanner {
                 }
                 self.trusted = None;
                 let payload = Payload::Held(self.tape.hand_out(n));
-                return Ok(Some(Item::Block(Block { offset: at, kind: Kind::Run, payload })));
+                return Ok(Some(Item::Block(Block {
+                    offset: at,
+                    kind: Kind::Run,
+                    payload,
+                })));
             }
             // The very first record does not fit into what was read.
-            let Some((opcode, length, total)) = next else { return Ok(None) };
+            let Some((opcode, length, total)) = next else {
+                return Ok(None);
+            };
             let limit = self.limits.record;
             let have = ahead.len();
             let stream = self.tape.remaining().is_none();
             if !self.tape.may_have(total) || have < want || (stream && length > limit) {
-                self.lost(at, total)?;
-                return Ok(None);
+                return self.lost(at, total);
             }
             if length > limit {
-                self.problems.add(at, ProblemKind::RecordTooLong { opcode, length, limit }, None);
+                self.problems.add(
+                    at,
+                    ProblemKind::RecordTooLong {
+                        opcode,
+                        length,
+                        limit,
+                    },
+                    None,
+                );
                 self.pass_over(total)?;
                 return Ok(None);
             }
@@ -240,37 +281,47 @@ impl Scanner {
         });
         let total = length.saturating_add(HEAD as u64);
         let Some(head) = head else {
-            self.lost(at, total)?;
-            return Ok(None);
+            return self.lost(at, total);
         };
         let start = HEAD as u64 + head.len();
-        let (packed, size, crc) =
-            (head.compressed_size, head.uncompressed_size, head.uncompressed_crc);
+        let (packed, size, crc) = (
+            head.compressed_size,
+            head.uncompressed_size,
+            head.uncompressed_crc,
+        );
         let compression = Compression::named(head.compression);
-        if length == u64::MAX {
+        if length == u64::MAX && packed == u64::MAX && compression.is_some() {
             return self.unfinished(at, start, compression);
         }
         let fields = head.len().saturating_add(packed);
         let name = head.compression.to_owned();
         if !self.tape.may_have(total) || fields > length || length - fields > SLACK {
-            self.lost(at, total)?;
-            return Ok(None);
+            return self.lost(at, total);
         }
         self.crc = None;
         let limit = self.limits.record;
         let fault = if packed.max(size) > limit {
-            Some(ProblemKind::ChunkTooBig { size: packed.max(size), limit })
+            Some(ProblemKind::ChunkTooBig {
+                size: packed.max(size),
+                limit,
+            })
         } else if compression.is_none() {
             Some(ProblemKind::UnknownCompression { name })
         } else {
             None
         };
-        let (Some(compression), None, Ok(size), Ok(packed)) =
-            (compression, &fault, usize::try_from(size), usize::try_from(packed))
-        else {
+        let (Some(compression), None, Ok(size), Ok(packed)) = (
+            compression,
+            &fault,
+            usize::try_from(size),
+            usize::try_from(packed),
+        ) else {
             self.pass_over(total)?;
             let messages = self.indexed()?;
-            let kind = fault.unwrap_or(ProblemKind::ChunkTooBig { size: length, limit });
+            let kind = fault.unwrap_or(ProblemKind::ChunkTooBig {
+                size: length,
+                limit,
+            });
             self.problems.add(at, kind, messages);
             return Ok(None);
         };
@@ -278,17 +329,23 @@ impl Scanner {
             Input::File(file) => {
                 let (file, offset) = (Arc::clone(file), at + start);
                 self.tape.skip(total)?;
-                Payload::At { file, offset, len: packed }
+                Payload::At {
+                    file,
+                    offset,
+                    len: packed,
+                }
             }
             Input::Stream { .. } => {
                 let all = usize::try_from(total).unwrap_or(usize::MAX);
                 let have = self.tape.available(all, all)?.len();
                 if have < all {
-                    self.lost(at, total)?;
-                    return Ok(None);
+                    return self.lost(at, total);
                 }
                 let mut held = self.tape.hand_out(all);
-                let from = held.range.start.saturating_add(usize::try_from(start).unwrap_or(0));
+                let from = held
+                    .range
+                    .start
+                    .saturating_add(usize::try_from(start).unwrap_or(0));
                 held.range = from..from.saturating_add(packed);
                 Payload::Held(held)
             }
@@ -297,8 +354,17 @@ impl Scanner {
         let indexed = self.indexed()?;
         *self.facts.chunks.entry(compression).or_default() += 1;
         self.facts.unverified_chunks += u64::from(crc == 0);
-        let kind = Kind::Chunk { compression, size, crc, indexed };
-        Ok(Some(Item::Block(Block { offset: at, kind, payload })))
+        let kind = Kind::Chunk {
+            compression,
+            size,
+            crc,
+            indexed,
+        };
+        Ok(Some(Item::Block(Block {
+            offset: at,
+            kind,
+            payload,
+        })))
     }
 
     /// A chunk whose length was never filled in: what is uncompressed is read as if unchunked.
@@ -309,7 +375,8 @@ impl Scanner {
         compression: Option<Compression>,
     ) -> io::Result<Option<Item>> {
         let read_on = compression == Some(Compression::None);
-        self.problems.add(at, ProblemKind::UnfinishedChunk { read_on }, None);
+        self.problems
+            .add(at, ProblemKind::UnfinishedChunk { read_on }, None);
         self.crc = None;
         self.trusted = None;
         if read_on {
@@ -327,12 +394,18 @@ impl Scanner {
         loop {
             let at = self.tape.position();
             let head = head_at(self.tape.available(HEAD, PEEK)?, 0);
-            let Some((op::MESSAGE_INDEX, length)) = head else { return Ok(messages) };
+            let Some((op::MESSAGE_INDEX, length)) = head else {
+                return Ok(messages);
+            };
             let total = length.saturating_add(HEAD as u64);
             if self.everything || !self.tape.may_have(total) {
                 return Ok(messages);
             }
-            messages = Some(messages.unwrap_or(0).saturating_add(length.saturating_sub(6) / 16));
+            messages = Some(
+                messages
+                    .unwrap_or(0)
+                    .saturating_add(length.saturating_sub(6) / 16),
+            );
             self.trusted = Some(at);
             if self.tape.skip(total)? < total {
                 return Ok(messages);
@@ -350,7 +423,8 @@ impl Scanner {
             op::FOOTER => self.section = Section::Footer,
             _ => {}
         }
-        let wanted = self.everything || matches!(opcode, op::HEADER | op::DATA_END);
+        let wanted =
+            self.everything || matches!(opcode, op::HEADER | op::DATA_END | op::STATISTICS);
         if !wanted || length > self.limits.record {
             self.pass_over(total)?;
             return Ok(None);
@@ -358,19 +432,25 @@ impl Scanner {
         let all = usize::try_from(total).unwrap_or(usize::MAX);
         let ahead = self.tape.available(all, all)?;
         if ahead.len() < all {
-            self.lost(at, total)?;
-            return Ok(None);
+            return self.lost(at, total);
         }
-        match ahead.get(HEAD..all).and_then(|body| Record::parse(opcode, body)) {
+        match ahead
+            .get(HEAD..all)
+            .and_then(|body| Record::parse(opcode, body))
+        {
             Some(Record::Header { profile, library }) if self.facts.profile.is_empty() => {
                 self.facts.profile = profile.to_owned();
                 self.facts.library = library.to_owned();
             }
-            Some(Record::DataEnd { data_section_crc: stored }) if stored != 0 => {
+            Some(Record::Statistics(s)) => self.claimed = Some(s.message_count),
+            Some(Record::DataEnd {
+                data_section_crc: stored,
+            }) if stored != 0 => {
                 if let Some(computed) = self.crc.take().map(crc32fast::Hasher::finalize)
                     && computed != stored
                 {
-                    self.problems.add(at, ProblemKind::DataCrc { stored, computed }, None);
+                    self.problems
+                        .add(at, ProblemKind::DataCrc { stored, computed }, None);
                 }
             }
             _ => {}
@@ -383,7 +463,11 @@ impl Scanner {
         self.trusted = Some(at);
         let mut body = self.tape.hand_out(all);
         body.range.start += HEAD;
-        Ok(Some(Item::Other { opcode, offset: at, body }))
+        Ok(Some(Item::Other {
+            opcode,
+            offset: at,
+            body,
+        }))
     }
 
     fn count(&mut self, n: usize) {
@@ -407,35 +491,52 @@ impl Scanner {
         self.trusted = Some(at);
         let have = self.tape.skip(total)?;
         if have < total {
-            self.problems.add(at, ProblemKind::Truncated { need: total, have }, None);
+            self.problems
+                .add(at, ProblemKind::Truncated { need: total, have }, None);
             self.done = true;
         }
         Ok(())
     }
 
     /// What stands at `at` can not be a record of `total` bytes: find the next chunk, or end.
-    fn lost(&mut self, at: u64, total: u64) -> io::Result<()> {
-        let left = self.tape.remaining().unwrap_or(self.tape.available(1, 1)?.len() as u64);
+    fn lost(&mut self, at: u64, total: u64) -> io::Result<Option<Item>> {
+        let left = self
+            .tape
+            .remaining()
+            .unwrap_or(self.tape.available(1, 1)?.len() as u64);
         let from = self.trusted.take().unwrap_or(at);
         self.crc = None;
         if self.section != Section::Data {
             // Nothing but repetition follows the end of data.
             let kind = if self.tape.may_have(total) {
-                ProblemKind::BadSummary { why: "it holds bytes that are no record" }
+                ProblemKind::BadSummary {
+                    why: "it holds bytes that are no record",
+                }
             } else {
-                ProblemKind::Truncated { need: total, have: left }
+                ProblemKind::Truncated {
+                    need: total,
+                    have: left,
+                }
             };
             self.problems.add(at, kind, None);
             self.done = true;
-            return Ok(());
+            return Ok(None);
         }
         if resync::next_chunk(&mut self.tape, from + 1, self.limits.record)? {
             let skipped = self.tape.position().saturating_sub(from);
-            self.problems.add(from, ProblemKind::Garbage { skipped }, None);
+            self.problems
+                .add(from, ProblemKind::Garbage { skipped }, None);
         } else {
-            self.problems.add(at, ProblemKind::Truncated { need: total, have: left }, None);
+            self.problems.add(
+                at,
+                ProblemKind::Truncated {
+                    need: total,
+                    have: left,
+                },
+                None,
+            );
             self.done = true;
         }
-        Ok(())
+        Ok(None)
     }
 }

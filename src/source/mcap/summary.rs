@@ -29,7 +29,10 @@ pub(super) type Found = Result<Option<Summary>, &'static str>;
 /// Only when the file itself can not be read.
 pub(super) fn read(file: &LogFile, limits: Limits) -> io::Result<Found> {
     const END: usize = HEAD + Footer::LEN as usize + MAGIC.len();
-    let Some(footer_at) = file.len.checked_sub(END as u64).filter(|at| *at >= MAGIC.len() as u64)
+    let Some(footer_at) = file
+        .len
+        .checked_sub(END as u64)
+        .filter(|at| *at >= MAGIC.len() as u64)
     else {
         return Ok(Ok(None));
     };
@@ -41,7 +44,9 @@ pub(super) fn read(file: &LogFile, limits: Limits) -> io::Result<Found> {
         Some((op::FOOTER, Footer::LEN)) => end.get(HEAD..).and_then(Footer::parse),
         _ => None,
     };
-    let Some(footer) = footer else { return Ok(Err("the footer is not where it should be")) };
+    let Some(footer) = footer else {
+        return Ok(Err("the footer is not where it should be"));
+    };
     let start = footer.summary_start;
     if start == 0 {
         return Ok(Ok(None));
@@ -75,7 +80,10 @@ fn parse(section: &[u8], start: u64) -> Found {
     let mut rest = section;
     while !rest.is_empty() {
         let (opcode, length) = head_at(rest, 0).ok_or(BROKEN)?;
-        let end = usize::try_from(length).ok().and_then(|n| n.checked_add(HEAD)).ok_or(BROKEN)?;
+        let end = usize::try_from(length)
+            .ok()
+            .and_then(|n| n.checked_add(HEAD))
+            .ok_or(BROKEN)?;
         let body = rest.get(HEAD..end).ok_or(BROKEN)?;
         rest = rest.get(end..).ok_or(BROKEN)?;
         match Record::parse(opcode, body).ok_or(BROKEN)? {

@@ -53,10 +53,7 @@ pub struct Survey {
 }
 
 impl Survey {
-    pub(super) fn add_up<'a>(
-        &mut self,
-        channels: impl Iterator<Item = (&'a Arc<Channel>, Tally)>,
-    ) {
+    pub(super) fn add_up<'a>(&mut self, channels: impl Iterator<Item = (&'a Arc<Channel>, Tally)>) {
         let mut all = Tally::default();
         for (channel, tally) in channels {
             all.merge(&tally);
@@ -80,7 +77,9 @@ impl Survey {
 pub fn survey(reader: &Reader, options: &WalkOptions<'_>) -> Result<Survey> {
     let (Input::File(file), Some(again)) = (&reader.input, reader.again()) else {
         let name = reader.name().display();
-        return Err(Error::Usage(format!("{name}: a stream can not be surveyed before it is read")));
+        return Err(Error::Usage(format!(
+            "{name}: a stream can not be surveyed before it is read"
+        )));
     };
     let found = summary::read(file, reader.limits).map_err(|e| read_error(&file.path, 0, e))?;
     if let Ok(Some(summary)) = found
@@ -89,17 +88,28 @@ pub fn survey(reader: &Reader, options: &WalkOptions<'_>) -> Result<Survey> {
         return Ok(survey);
     }
     let nothing = |_: &(), _: &super::Message<'_>, _: &mut Vec<()>| {};
-    let report = walk(again, options, |_| None::<()>, nothing, |_| ControlFlow::Continue(()))?;
+    let report = walk(
+        again,
+        options,
+        |_| None::<()>,
+        nothing,
+        |_| ControlFlow::Continue(()),
+    )?;
     Ok(report.survey)
 }
 
 fn from_summary(reader: &Reader, summary: Summary) -> Result<Option<Survey>> {
-    let Some(statistics) = summary.statistics else { return Ok(None) };
+    let Some(statistics) = summary.statistics else {
+        return Ok(None);
+    };
     let mut problems = Problems::default();
     let mut table = Table::<()>::new(Default::default(), reader.limits.definitions);
     let definitions = &summary.definitions;
     let schemas = definitions.schemas.values().map(|body| (op::SCHEMA, body));
-    let channels = definitions.channels.values().map(|body| (op::CHANNEL, body));
+    let channels = definitions
+        .channels
+        .values()
+        .map(|body| (op::CHANNEL, body));
     for (opcode, body) in schemas.chain(channels) {
         table.define(opcode, body, 0, &mut |_| None, &mut problems);
     }
@@ -128,7 +138,9 @@ fn from_summary(reader: &Reader, summary: Summary) -> Result<Option<Survey>> {
     survey.facts.attachments = u64::from(statistics.attachment_count);
     let mut chunks = 0;
     for (name, n) in &summary.chunks {
-        let Some(compression) = Compression::named(name) else { return Ok(None) };
+        let Some(compression) = Compression::named(name) else {
+            return Ok(None);
+        };
         survey.facts.chunks.insert(compression, *n);
         chunks += n;
     }
@@ -149,7 +161,9 @@ fn from_summary(reader: &Reader, summary: Summary) -> Result<Option<Survey>> {
 
 /// The facts known from the header alone.
 fn header(reader: &Reader) -> Result<Facts> {
-    let Some(again) = reader.again() else { return Ok(Facts::default()) };
+    let Some(again) = reader.again() else {
+        return Ok(Facts::default());
+    };
     let name = again.name().to_owned();
     let mut scanner = Scanner::new(again.input, again.limits, true);
     scanner.next().map_err(|e| read_error(&name, 0, e))?;
@@ -166,7 +180,9 @@ pub(super) fn fallback(
     limits: super::Limits,
     problems: &mut Problems,
 ) -> std::io::Result<(bool, super::channels::Fallback)> {
-    let Input::File(file) = input else { return Ok(Default::default()) };
+    let Input::File(file) = input else {
+        return Ok(Default::default());
+    };
     match summary::read(file, limits)? {
         Ok(Some(summary)) => Ok((true, summary.definitions)),
         Ok(None) => Ok(Default::default()),

@@ -69,7 +69,10 @@ impl LogFile {
 /// Where the bytes come from.
 pub(super) enum Input {
     File(Arc<LogFile>),
-    Stream { name: PathBuf, from: Box<dyn Read + Send> },
+    Stream {
+        name: PathBuf,
+        from: Box<dyn Read + Send>,
+    },
 }
 
 impl std::fmt::Debug for Input {
@@ -180,7 +183,9 @@ impl Tape {
             if self.buf.len() < goal {
                 self.buf.resize(goal, 0);
             }
-            let Some(room) = self.buf.get_mut(self.end..goal) else { break };
+            let Some(room) = self.buf.get_mut(self.end..goal) else {
+                break;
+            };
             let got = match &mut self.input {
                 Input::File(file) => file.read_at(room, self.position + self.end as u64)?,
                 Input::Stream { from, .. } => loop {
@@ -248,7 +253,10 @@ impl Tape {
             room.copy_from_slice(tail);
         }
         let tail = tail.len();
-        let held = Held { bytes: std::mem::replace(&mut self.buf, next), range: self.start..cut };
+        let held = Held {
+            bytes: std::mem::replace(&mut self.buf, next),
+            range: self.start..cut,
+        };
         self.start = 0;
         self.end = tail;
         self.position += n as u64;

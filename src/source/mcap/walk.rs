@@ -43,7 +43,11 @@ pub struct WalkOptions<'p> {
 
 impl Default for WalkOptions<'_> {
     fn default() -> Self {
-        WalkOptions { pool: None, in_flight: 24 << 20, lookahead: Lookahead::default() }
+        WalkOptions {
+            pool: None,
+            in_flight: 24 << 20,
+            lookahead: Lookahead::default(),
+        }
     }
 }
 
@@ -219,9 +223,18 @@ where
                 let Ok(outcome) = from.recv() else { break };
                 put(&mut queue, first, outcome);
             }
-            let Some(outcome) = queue.pop_front() else { break };
+            let Some(outcome) = queue.pop_front() else {
+                break;
+            };
             first += 1;
-            let Some(Outcome { block: Some(block), done, .. }) = outcome else { continue };
+            let Some(Outcome {
+                block: Some(block),
+                done,
+                ..
+            }) = outcome
+            else {
+                continue;
+            };
             cost = cost.saturating_sub(block.cost());
             let batch = match done {
                 Done::Panicked => return Ok(ControlFlow::Break(())),
@@ -230,9 +243,11 @@ where
                     self.problems.add(block.offset, kind, block.indexed());
                     Batch::default()
                 }
-                Done::Walked { batch, findings, fault }
-                    if self.shared.with_table(|table| findings.hold(table)) =>
-                {
+                Done::Walked {
+                    batch,
+                    findings,
+                    fault,
+                } if self.shared.with_table(|table| findings.hold(table)) => {
                     if let Some(kind) = fault {
                         self.problems.add(block.offset, kind, None);
                     }
@@ -283,14 +298,21 @@ where
                     match stop {
                         Stop::End => break,
                         Stop::Broken { at, length } => {
-                            let kind = ProblemKind::InnerRecord { at: at as u64, length };
+                            let kind = ProblemKind::InnerRecord {
+                                at: at as u64,
+                                length,
+                            };
                             problems.add(offset, kind, None);
                             break;
                         }
                         Stop::Definition { at } => {
-                            let Some((opcode, length)) = head_at(records, at) else { break };
+                            let Some((opcode, length)) = head_at(records, at) else {
+                                break;
+                            };
                             let end = (at + HEAD).saturating_add(length as usize);
-                            let Some(body) = records.get(at + HEAD..end) else { break };
+                            let Some(body) = records.get(at + HEAD..end) else {
+                                break;
+                            };
                             self.shared.change_table(|table| {
                                 table.define(opcode, body, offset, select, problems);
                             });
@@ -357,18 +379,46 @@ where
 
     fn report(mut self, stopped: bool) -> WalkReport {
         for (id, (offset, n)) in std::mem::take(&mut self.unknown) {
-            self.problems.add(offset, ProblemKind::UnknownChannel { id }, Some(n));
+            self.problems
+                .add(offset, ProblemKind::UnknownChannel { id }, Some(n));
         }
         if let Some((offset, n)) = self.short {
-            self.problems.add(offset, ProblemKind::ShortMessages, Some(n));
+            self.problems
+                .add(offset, ProblemKind::ShortMessages, Some(n));
         }
+        let (claimed, end) = (self.scanner.claimed(), self.scanner.tape().position());
         self.problems.merge(self.scanner.problems);
-        let mut survey =
-            Survey { facts: self.scanner.facts, problems: self.problems, ..Survey::default() };
+        let mut survey = Survey {
+            facts: self.scanner.facts,
+            problems: self.problems,
+            ..Survey::default()
+        };
         self.shared.with_table(|table| {
             self.tallies.resize(table.len(), Tally::default());
             survey.add_up(table.channels().zip(self.tallies.iter().copied()));
         });
+        // Messages without a channel or a head are among those counted as lost.
+        let found = survey
+            .messages
+            .saturating_add(survey.problems.messages_lost());
+        if let Some(claimed) = claimed.filter(|claimed| *claimed != found && !stopped) {
+            let (kind, lost) = match claimed.checked_sub(found) {
+                Some(lost) => (
+                    ProblemKind::Missing {
+                        claimed,
+                        found: survey.messages,
+                    },
+                    Some(lost),
+                ),
+                None => (
+                    ProblemKind::BadSummary {
+                        why: "it counts fewer messages",
+                    },
+                    None,
+                ),
+            };
+            survey.problems.add(end, kind, lost);
+        }
         WalkReport {
             survey,
             items: self.items,
@@ -381,7 +431,10 @@ where
 
 /// Puts an outcome where its block stands in the queue, whose front is number `first`.
 fn put<T>(queue: &mut VecDeque<Option<Outcome<T>>>, first: u64, outcome: Outcome<T>) {
-    let place = outcome.number.checked_sub(first).and_then(|n| usize::try_from(n).ok());
+    let place = outcome
+        .number
+        .checked_sub(first)
+        .and_then(|n| usize::try_from(n).ok());
     if let Some(slot) = place.and_then(|n| queue.get_mut(n)) {
         *slot = Some(outcome);
     }

@@ -105,15 +105,24 @@ impl Findings {
 
     /// Whether every id still means what it was taken for.
     pub(super) fn hold<D>(&self, table: &Table<D>) -> bool {
-        self.channels.iter().all(|(id, index, _)| table.lookup(*id) == *index)
-            && self.unknown.keys().all(|id| table.lookup(*id) == NONE && !table.can_adopt(*id))
+        self.channels
+            .iter()
+            .all(|(id, index, _)| table.lookup(*id) == *index)
+            && self
+                .unknown
+                .keys()
+                .all(|id| table.lookup(*id) == NONE && !table.can_adopt(*id))
     }
 }
 
 /// What became of a block.
 #[derive(Debug)]
 pub(super) enum Done<T> {
-    Walked { batch: Batch<T>, findings: Findings, fault: Option<ProblemKind> },
+    Walked {
+        batch: Batch<T>,
+        findings: Findings,
+        fault: Option<ProblemKind>,
+    },
     /// The block can not be used.
     Bad(ProblemKind),
     /// It changes the table, so it has to be done in file order.
@@ -125,7 +134,10 @@ pub(super) enum Done<T> {
 }
 
 pub(super) fn place(block: &Block) -> Place {
-    Place { offset: block.offset, chunked: matches!(block.kind, Kind::Chunk { .. }) }
+    Place {
+        offset: block.offset,
+        chunked: matches!(block.kind, Kind::Chunk { .. }),
+    }
 }
 
 impl<T, D, M> Shared<T, D, M>
@@ -144,18 +156,31 @@ where
             Ok(Ok(records)) => {
                 let mut batch = self.batch();
                 let stop = self.with_table(|table| {
-                    pass(records, 0, place(block), table, &self.map, &mut bench.met, &mut batch)
+                    pass(
+                        records,
+                        0,
+                        place(block),
+                        table,
+                        &self.map,
+                        &mut bench.met,
+                        &mut batch,
+                    )
                 });
                 let fault = match stop {
-                    Stop::Broken { at, length } => {
-                        Some(ProblemKind::InnerRecord { at: at as u64, length })
-                    }
+                    Stop::Broken { at, length } => Some(ProblemKind::InnerRecord {
+                        at: at as u64,
+                        length,
+                    }),
                     _ => None,
                 };
                 match stop {
                     Stop::End | Stop::Broken { .. } => {
                         batch.sort();
-                        Done::Walked { batch, findings: Findings::of(&mut bench.met), fault }
+                        Done::Walked {
+                            batch,
+                            findings: Findings::of(&mut bench.met),
+                            fault,
+                        }
                     }
                     Stop::Definition { .. } | Stop::Adopt { .. } => {
                         self.put_batch(batch);
@@ -187,7 +212,11 @@ pub(super) struct Outcome<T> {
 
 impl<T> Ticket<T> {
     pub(super) fn new(number: u64, block: Block, to: Sender<Outcome<T>>) -> Self {
-        Ticket { number, block: Some(block), to }
+        Ticket {
+            number,
+            block: Some(block),
+            to,
+        }
     }
 
     pub(super) fn redeem<D, M>(mut self, shared: &Shared<T, D, M>)
@@ -198,7 +227,11 @@ impl<T> Ticket<T> {
         let done = shared.work(block);
         let block = self.block.take();
         // The walk may have ended early; then nobody waits for this.
-        let _ = self.to.send(Outcome { number: self.number, block, done });
+        let _ = self.to.send(Outcome {
+            number: self.number,
+            block,
+            done,
+        });
     }
 }
 
@@ -206,7 +239,11 @@ impl<T> Drop for Ticket<T> {
     fn drop(&mut self) {
         if let Some(block) = self.block.take() {
             let done = Done::Panicked;
-            let _ = self.to.send(Outcome { number: self.number, block: Some(block), done });
+            let _ = self.to.send(Outcome {
+                number: self.number,
+                block: Some(block),
+                done,
+            });
         }
     }
 }
