@@ -430,9 +430,8 @@ proptest! {
     }
 
     #[test]
-    fn log_undoes_exp_up_to_half_a_turn(v in any_vector(), exponent in -20..1i32) {
-        let v = v * 10f64.powi(exponent);
-        prop_assume!(v.norm() < PI);
+    fn log_undoes_exp_up_to_half_a_turn(v in any_vector(), exponent in -20..=0i32) {
+        let v = v / 7.0 * PI * 10f64.powi(exponent); // 4 sqrt(3) < 7
         let again = Q::from_rotation_vector(&RotationVector(v)).rotation_vector().0;
         // 4 ulp of the vector itself, however short it is; near pi the rounding of w is
         // 1e-16 rad of angle and no more.
@@ -448,7 +447,7 @@ proptest! {
     #[test]
     fn matrices_of_unit_quaternions_are_rotations_and_come_back(q in any_attitude()) {
         let c = q.to_dcm();
-        prop_assert!(c.orthonormality_defect() < ROUNDING);
+        prop_assert!(c.orthonormality_defect() < 2.0 * ROUNDING);
         prop_assert!(Attitude::try_from_matrix(*c.as_matrix()).is_ok());
         prop_assert!(Q::from_dcm(&c).angle_to(&q) < ROUNDING);
     }

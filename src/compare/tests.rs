@@ -140,6 +140,19 @@ fn heading_and_inclination_are_about_the_worlds_vertical_not_the_bodys() {
         // Sign: the estimate is ahead. Roundings.
         assert!((e.heading - 0.05).abs() < 2e-15 && e.inclination < 2e-15);
     }
+    let behind: Vec<Stamped> = track(200, 100.0, |_, q| world(0.0, 0.0, -0.05) * q);
+    let heading = compare(&behind, &reference, Align::None)
+        .errors
+        .unwrap()
+        .heading;
+    assert!((heading.mean - 0.05).abs() < 2e-15 && (heading.max - 0.05).abs() < 2e-15);
+    // q and -q are one attitude.
+    let minus = |(t, q): &Stamped| (*t, Q::assume_unit(q.wxyz().map(|c| -c)));
+    let negated: Vec<Stamped> = reference.iter().map(minus).collect();
+    assert_eq!(
+        error_series(&behind, &negated, Align::None),
+        error_series(&behind, &reference, Align::None)
+    );
     let leaning = track(200, 100.0, |_, q| world(0.03, -0.04, 0.0) * q);
     for e in error_series(&leaning, &reference, Align::None) {
         assert!((e.inclination - 0.05).abs() < 2e-15 && e.heading.abs() < 2e-15);
