@@ -420,6 +420,11 @@ prop_compose! {
     }
 }
 
+/// nalgebra as an independent witness, by component name: its storage is i, j, k, w.
+fn of_nalgebra(q: &nalgebra::UnitQuaternion<f64>) -> Q {
+    Q::assume_unit([q.w, q.i, q.j, q.k])
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
 
@@ -460,6 +465,20 @@ proptest! {
         let by_quaternion = (q * r_bs) * v;
         // Components up to 7, some ten roundings.
         prop_assert!((by_matrix.as_vector() - by_quaternion.as_vector()).amax() < 1e-14);
+    }
+
+    #[test]
+    fn nalgebra_means_the_same_by_every_operation(a in any_vector(), b in any_vector(), v in any_vector()) {
+        use nalgebra::UnitQuaternion;
+        let (qa, qb) = (UnitQuaternion::from_scaled_axis(a), UnitQuaternion::from_scaled_axis(b));
+        let ours = Q::from_rotation_vector(&RotationVector(a));
+        prop_assert!(ours.angle_to(&of_nalgebra(&qa)) < ROUNDING);
+        prop_assert!(ours.advanced(&RotationVector(b)).angle_to(&of_nalgebra(&(qa * qb))) < 2.0 * ROUNDING);
+        prop_assert!((ours.to_dcm().as_matrix() - qa.to_rotation_matrix().matrix()).amax() < ROUNDING);
+        prop_assert!(((ours * In::<Body>::assume(v)).as_vector() - qa * v).amax() < 1e-14);
+        let angles = YawPitchRoll { yaw: a.x, pitch: a.y, roll: a.z };
+        let euler = UnitQuaternion::from_euler_angles(angles.roll, angles.pitch, angles.yaw);
+        prop_assert!(Q::from_yaw_pitch_roll(&angles).angle_to(&of_nalgebra(&euler)) < 2.0 * ROUNDING);
     }
 
     #[test]
