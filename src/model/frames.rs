@@ -207,9 +207,17 @@ impl<To, From> Dcm<To, From> {
     }
 
     /// Largest entry of `C C^T - I`: how far rounding (or an attacker) has taken it from a rotation.
+    /// NaN when an entry is not finite.
     #[must_use]
     pub fn orthonormality_defect(&self) -> f64 {
-        (self.m * self.m.transpose() - Matrix3::identity()).amax()
+        // Not `amax()`, which passes over NaN.
+        (self.m * self.m.transpose() - Matrix3::identity())
+            .iter()
+            .map(|entry| entry.abs())
+            .fold(
+                0.0,
+                |worst, e| if e > worst || e.is_nan() { e } else { worst },
+            )
     }
 }
 
