@@ -83,7 +83,8 @@ impl AgainstRecorded {
             .iter()
             .map(|(_, _, kind, method)| {
                 let plan = Plan { method: method.unwrap_or(plan.method), ..plan.clone() };
-                let resolved = Resolved { kind: *kind, ..resolved.clone() };
+                let mut resolved = resolved.clone();
+                resolved.kind = *kind;
                 Estimator::new(&plan, &resolved, &prepared)
             })
             .collect::<Result<Vec<_>, _>>()?;

@@ -136,10 +136,10 @@ impl Outlet {
     ///
     /// # Errors
     /// As [`Sink::finish`].
-    pub fn finish(self, pool: &Pool) -> Result<Vec<(String, Written)>> {
+    pub fn finish(self) -> Result<Vec<(String, Written)>> {
         self.sinks
             .into_iter()
-            .map(|(name, sink)| Ok((name, sink.finish(pool.rayon())?)))
+            .map(|(name, sink)| Ok((name, sink.finish()?)))
             .collect()
     }
 }

@@ -216,7 +216,7 @@ impl Session {
                 against.finish(pool);
             }
         }
-        Ok((self.topics, self.outlet.finish(pool)?))
+        Ok((self.topics, self.outlet.finish()?))
     }
 }
 
