@@ -183,7 +183,7 @@ impl std::error::Error for AxisMapError {}
 /// Which axes the gyro's numbers are in (`--body`).
 ///
 /// # Convention
-/// strapd integrates in [`Flu`] body axes; this is the rotation from the numbers to those.
+/// strapd integrates in [`Flu`](super::Flu) body axes; this is the rotation from the numbers to those.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Hash)]
 pub enum BodyAxes {
     /// x forward, y left, z up: taken as they are.
