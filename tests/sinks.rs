@@ -454,6 +454,10 @@ fn copied_messages_arrive_unchanged_beside_the_attitude() {
     assert_eq!(summary.channels[&3].schema, summary.channels[&4].schema);
     assert_eq!(summary.channels[&5].schema, None);
     assert_eq!(stats.message_start_time, 7);
+    for chunk in &summary.chunk_indexes {
+        let indexes = summary.read_message_indexes(&bytes, chunk).unwrap();
+        assert!(indexes.values().all(|entries| !entries.is_empty()));
+    }
     let (messages, _) = read_checked(&bytes);
     let copied: Vec<_> = messages.iter().filter(|(h, _)| h.channel_id > 2).collect();
     assert_eq!(copied.len(), 30);
@@ -570,6 +574,14 @@ proptest! {
                 }
             } else {
                 let (messages, _) = read_checked(&bytes);
+                let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+                let logs = || samples.iter().map(|s| s.log.0.max(0) as u64);
+                let times = (logs().min().unwrap_or(0), logs().max().unwrap_or(0));
+                let stats = summary.stats.unwrap();
+                prop_assert_eq!((stats.message_start_time, stats.message_end_time), times);
+                for chunk in &summary.chunk_indexes {
+                    prop_assert_eq!((chunk.message_start_time, chunk.message_end_time), times);
+                }
                 let attitudes: Vec<_> =
                     messages.iter().filter(|(h, _)| h.channel_id == 1).collect();
                 prop_assert_eq!(attitudes.len(), samples.len());

@@ -5,7 +5,7 @@
 
 use super::schema::last_name;
 use super::select::Found;
-use super::{Channel, Decoder, Options};
+use super::{Channel, Decoder, Options, Stated};
 use crate::record::Nanos;
 
 /// How good a source of body rates a channel is; the best rank in a log is taken, and when two
@@ -63,11 +63,11 @@ pub fn role(channel: &Channel<'_>, first: Option<(&[u8], Nanos)>) -> Role {
     Role {
         has_rate: stated.has_gyro,
         has_orientation: stated.has_orientation,
-        rank: rank(channel, decoder.found(), stated.has_stamp),
+        rank: rank(channel, decoder.found(), stated),
     }
 }
 
-fn rank(channel: &Channel<'_>, found: Found, has_stamp: bool) -> Rank {
+fn rank(channel: &Channel<'_>, found: Found, stated: &Stated) -> Rank {
     let name = last_name(channel.schema_name)
         .to_ascii_lowercase()
         .replace('_', "");
@@ -76,7 +76,7 @@ fn rank(channel: &Channel<'_>, found: Found, has_stamp: bool) -> Rank {
     let is_command = ["target", "setpoint", "command", "cmd"]
         .iter()
         .any(|w| name.contains(w));
-    if !has_stamp || name == "odometry" || is_command {
+    if !stated.has_stamp || name == "odometry" || is_command {
         return Rank::ByNameOnly;
     }
     match found {
@@ -86,6 +86,8 @@ fn rank(channel: &Channel<'_>, found: Found, has_stamp: bool) -> Rank {
             "vehicleimu" | "vehicleangularvelocity" | "vehicleodometry" => Rank::Processed,
             _ => Rank::Imu,
         },
+        // Several twists in a message are several bodies.
+        Found::Twist if stated.batched => Rank::ByNameOnly,
         Found::Twist => Rank::Weak,
         Found::Vector => {
             let rate = has(&[

@@ -121,11 +121,6 @@ impl Number {
 }
 
 impl Schema {
-    /// The message itself.
-    pub(crate) fn root(&self) -> Option<&Struct> {
-        self.structs.get(self.root)
-    }
-
     /// A struct by index.
     pub(crate) fn get(&self, index: usize) -> Option<&Struct> {
         self.structs.get(index)

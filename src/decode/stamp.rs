@@ -224,7 +224,7 @@ mod tests {
 
     #[test]
     fn decimals_take_signs_exponents_and_absurd_lengths() {
-        let ns = |text| from_decimal(text, TimeUnit::Second).map(|n| n.0);
+        let ns = |text: &str| from_decimal(text, TimeUnit::Second).map(|n| n.0);
         assert_eq!(ns("-3.5"), Some(-3_500_000_000));
         assert_eq!(ns("1.7e9"), Some(1_700_000_000_000_000_000));
         assert_eq!(ns("15e-1"), Some(1_500_000_000));

@@ -260,7 +260,7 @@ mod tests {
                     string<=10[] c\nuint8[3] d\nfoo/msg/Bar e\nBaz f\nwstring g\n\
                     ====================\nMSG: foo/Bar\nBaz z\n=====\nMSG: my/Baz\nbyte q\n";
         let schema = parse(text, "my/msg/Type", Dialect::Ros2).unwrap();
-        let root = schema.root().unwrap();
+        let root = schema.get(schema.root).unwrap();
         let shape: Vec<_> = root
             .fields
             .iter()

@@ -263,8 +263,9 @@ fn gyros_in(schema: &Schema, site: &Site, structure: &Struct, px4: Option<Px4>) 
 
 /// What stands in the same struct as the body rate.
 fn beside_gyro(schema: &Schema, gyro: &[Step], given: bool, selection: &mut Selection) {
-    // The struct that names the body rate: of `imu.gyro.vec.x` the struct `imu`.
-    let site = structs_on(schema, gyro).into_iter().find(|path| {
+    // The struct that names the body rate: of `imu.gyro.vec.x` the struct `imu`, the outermost in
+    // which the rest of the path is still a vector.
+    let named_in = |path: &Vec<Step>| {
         let Some(Step::Field(next)) = gyro.get(path.len()) else {
             return false;
         };
@@ -277,7 +278,8 @@ fn beside_gyro(schema: &Schema, gyro: &[Step], given: bool, selection: &mut Sele
         let is_vector =
             vector(schema, &with(path, Step::Field(*next)), End::from(field), 2).is_some();
         own_axis || is_vector
-    });
+    };
+    let site = structs_on(schema, gyro).into_iter().filter(named_in).last();
     let Some(site) = site else { return };
     let Some(structure) = end_of(schema, &site).and_then(|e| e.structure(schema)) else {
         return;
@@ -405,7 +407,7 @@ fn find_orientation(
             ) {
                 continue;
             }
-            let path = with(&site.path, Step::Field(index));
+            let mut path = with(&site.path, Step::Field(index));
             let paths = if px4 == Some(Px4::VehicleAttitude) && field.many == Many::Array(4) {
                 Some((0..4).map(|n| with(&path, Step::At(n))).collect())
             } else {
@@ -413,7 +415,8 @@ fn find_orientation(
             };
             let Some(mut paths) = paths else { continue };
             if site.each && !by_child {
-                for step in paths.iter_mut().flatten().filter(|s| **s == Step::Each) {
+                let steps = paths.iter_mut().flatten().chain(&mut path);
+                for step in steps.filter(|s| **s == Step::Each) {
                     *step = Step::At(0);
                 }
             }
@@ -487,12 +490,13 @@ fn numbers(structure: &Struct, path: &[Step], names: &[&str]) -> Option<Vec<Vec<
         .collect()
 }
 
-/// The stamp that `end` is or, for a header, holds.
+/// The stamp that `end` is or, for a header, holds; `depth` is how far structs are looked into.
 pub(super) fn stamp_at(
     schema: &Schema,
     path: &[Step],
     end: End,
     unit: TimeUnit,
+    depth: u8,
 ) -> Option<StampFields> {
     if let Some(number) = end.number() {
         let (form, slot) = if number.is_float() {
@@ -515,7 +519,8 @@ pub(super) fn stamp_at(
             paths: vec![(sec, Slot::STAMP), (nanos, Slot::STAMP_NANOS)],
         });
     }
-    stamp_in(schema, path, structure, 1).map(|(_, stamp)| stamp)
+    let depth = depth.checked_sub(1)?;
+    stamp_in(schema, path, structure, depth).map(|(_, stamp)| stamp)
 }
 
 /// The best stamp among a struct's fields and its header's.
@@ -531,11 +536,11 @@ fn stamp_in(
         let end = End::from(field);
         let found = match names::meaning(&field.name) {
             Some(Meaning::Stamp { rank, unit }) => {
-                stamp_at(schema, &path, end, unit).map(|stamp| (rank, stamp))
+                stamp_at(schema, &path, end, unit, depth).map(|stamp| (rank, stamp))
             }
-            Some(Meaning::Header) if depth > 0 => end
-                .structure(schema)
-                .and_then(|inner| stamp_in(schema, &path, inner, depth - 1)),
+            Some(Meaning::Header) => depth.checked_sub(1).and_then(|depth| {
+                stamp_in(schema, &path, end.structure(schema)?, depth)
+            }),
             _ => None,
         };
         if let Some(found) = found
@@ -615,7 +620,7 @@ pub(super) fn available(schema: &Schema, role: FieldRole) -> Vec<String> {
                 FieldRole::Gyro | FieldRole::Accel => vector(schema, &path, end, 0).is_some(),
                 FieldRole::Orientation => quaternion(schema, &path, end).is_some(),
                 FieldRole::Stamp => {
-                    stamp_at(schema, &path, end, TimeUnit::ByMagnitude).is_some()
+                    stamp_at(schema, &path, end, TimeUnit::ByMagnitude, 2).is_some()
                         && (end.number().is_none() || names::meaning(&field.name).is_some())
                 }
                 FieldRole::Interval => end.number().is_some(),
