@@ -54,7 +54,13 @@ pub struct Global {
     #[arg(long, global = true, value_enum, default_value = "auto")]
     pub color: When,
     /// Form of the diagnostics on stderr
-    #[arg(long, global = true, value_enum, default_value = "text", env = "STRAPD_LOG_FORMAT")]
+    #[arg(
+        long,
+        global = true,
+        value_enum,
+        default_value = "text",
+        env = "STRAPD_LOG_FORMAT"
+    )]
     pub log_format: LogFormat,
     /// Progress on stderr: a bar on a terminal, nothing, or one JSON object a second
     #[arg(long, global = true, value_enum, default_value = "auto")]

@@ -4,7 +4,7 @@ use crate::condition::{self, Clock, GyroUnit, OnGap};
 use crate::decode;
 use crate::error::{Error, Result};
 use crate::model::attitude::{Quaternion, YawPitchRoll};
-use crate::model::frames::{BodyAxes, Body, Nav, World};
+use crate::model::frames::{Body, BodyAxes, Nav, World};
 use crate::propagate::Method;
 use crate::record::SampleKind;
 use nalgebra::Vector3;
@@ -49,6 +49,36 @@ pub struct Plan {
     pub until: Option<f64>,
 }
 
+impl Default for Plan {
+    /// What the command line's defaults say.
+    fn default() -> Plan {
+        let arw_deg_per_sqrt_h = NOISE_PRESETS[0].1;
+        Plan {
+            topic: None,
+            decode: decode::Options::default(),
+            method: Method::Auto,
+            kind: None,
+            unit: None,
+            body: None,
+            world: World::Start,
+            mount: None,
+            clock: Clock::Header,
+            initial: Initial::Identity,
+            bias: Bias::None,
+            max_gap_secs: 0.5,
+            on_gap: OnGap::Hold,
+            gyro_range: None,
+            noise: Noise {
+                name: NOISE_PRESETS[0].0.to_owned(),
+                arw: arw_deg_per_sqrt_h * DEG / 60.0,
+                bias_instability: NOISE_PRESETS[0].2 * DEG / 3600.0,
+            },
+            start: None,
+            until: None,
+        }
+    }
+}
+
 impl Plan {
     /// Checks what can be judged without the data.
     ///
@@ -68,7 +98,9 @@ impl Plan {
             until: self.until,
             ..condition::Settings::default()
         };
-        conditioning.validate().map_err(|e| Error::Usage(e.to_string()))
+        conditioning
+            .validate()
+            .map_err(|e| Error::Usage(e.to_string()))
     }
 }
 
@@ -138,7 +170,10 @@ impl Noise {
         };
         for part in text.split(',') {
             let (key, value) = part.split_once('=').unwrap_or((part, ""));
-            let number = value.parse::<f64>().ok().filter(|v| v.is_finite() && *v >= 0.0);
+            let number = value
+                .parse::<f64>()
+                .ok()
+                .filter(|v| v.is_finite() && *v >= 0.0);
             match (key.trim(), number) {
                 ("arw", Some(v)) => noise.arw = v,
                 ("bias-instability", Some(v)) => noise.bias_instability = v,
@@ -289,15 +324,29 @@ mod tests {
 
     #[test]
     fn given_noise_needs_its_angle_random_walk() {
-        assert_eq!(Noise::parse("arw=1e-4,bias-instability=2e-5").unwrap().bias_instability, 2e-5);
-        for bad in ["", "bias-instability=1e-5", "arw=-1", "arw=NaN", "arw=1e-4,x=2"] {
+        assert_eq!(
+            Noise::parse("arw=1e-4,bias-instability=2e-5")
+                .unwrap()
+                .bias_instability,
+            2e-5
+        );
+        for bad in [
+            "",
+            "bias-instability=1e-5",
+            "arw=-1",
+            "arw=NaN",
+            "arw=1e-4,x=2",
+        ] {
             assert!(Noise::parse(bad).is_err(), "{bad}");
         }
     }
 
     #[test]
     fn a_quaternion_that_is_no_rotation_is_refused() {
-        assert!(matches!(Initial::parse("q=1,0,0,0"), Ok(Initial::Given([1.0, 0.0, 0.0, 0.0]))));
+        assert!(matches!(
+            Initial::parse("q=1,0,0,0"),
+            Ok(Initial::Given([1.0, 0.0, 0.0, 0.0]))
+        ));
         for bad in ["q=1,1,1,1", "q=0,0,0,0", "q=1,0,0", "q=NaN,0,0,1", "qq", ""] {
             assert!(Initial::parse(bad).is_err(), "{bad}");
         }
@@ -305,7 +354,9 @@ mod tests {
 
     #[test]
     fn shards_share_the_list_without_overlap() {
-        let shards: Vec<Shard> = (0..3).map(|i| Shard::parse(&format!("{i}/3")).unwrap()).collect();
+        let shards: Vec<Shard> = (0..3)
+            .map(|i| Shard::parse(&format!("{i}/3")).unwrap())
+            .collect();
         for position in 0..20 {
             assert_eq!(shards.iter().filter(|s| s.takes(position)).count(), 1);
         }

@@ -4,6 +4,7 @@ pub mod against;
 pub mod estimator;
 pub mod lines;
 pub mod log;
+pub mod look;
 pub mod outlet;
 pub mod pace;
 pub mod pool;

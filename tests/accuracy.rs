@@ -66,8 +66,22 @@ fn print_table() {
         ("causal4", causal(4, Order::M6)),
         ("causal5", causal(5, Order::M6)),
         ("causal6", causal(6, Order::M6)),
-        ("commit6", Method::CommitProvisional { window: 6, order: Order::M8, finals: false }),
-        ("commit8", Method::CommitProvisional { window: 8, order: Order::M8, finals: false }),
+        (
+            "commit6",
+            Method::CommitProvisional {
+                window: 6,
+                order: Order::M8,
+                finals: false,
+            },
+        ),
+        (
+            "commit8",
+            Method::CommitProvisional {
+                window: 8,
+                order: Order::M8,
+                finals: false,
+            },
+        ),
         ("c4", centred(4, Order::M8)),
         ("c6", centred(6, Order::M8)),
         ("c8", centred(8, Order::M8)),
@@ -78,8 +92,14 @@ fn print_table() {
         ("c6 ex", centred(6, Order::Exact)),
         ("auto", Method::Auto),
     ] {
-        let e: Vec<String> = [500, 1000, 2000, 4000].iter().map(|&r| format!("{:.2e}", top_error(&top, r, method, SampleKind::Rate))).collect();
-        let d: Vec<String> = [500, 1000, 2000, 4000].iter().map(|&r| format!("{:.2e}", top_error(&top, r, method, SampleKind::DeltaAngle))).collect();
+        let e: Vec<String> = [500, 1000, 2000, 4000]
+            .iter()
+            .map(|&r| format!("{:.2e}", top_error(&top, r, method, SampleKind::Rate)))
+            .collect();
+        let d: Vec<String> = [500, 1000, 2000, 4000]
+            .iter()
+            .map(|&r| format!("{:.2e}", top_error(&top, r, method, SampleKind::DeltaAngle)))
+            .collect();
         eprintln!("{name:10} {} | {}", e.join(" "), d.join(" "));
     }
 }

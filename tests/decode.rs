@@ -52,7 +52,10 @@ fn options(fields: &[&str]) -> Options {
 fn decode(decoder: &Decoder, payload: &[u8]) -> Result<Vec<RawSample>, Undecodable> {
     let mut out = Vec::new();
     let outcome = decoder.decode(payload, LOG, PUBLISH, &mut out);
-    assert!(outcome.is_ok() || out.is_empty(), "a failure pushes nothing");
+    assert!(
+        outcome.is_ok() || out.is_empty(),
+        "a failure pushes nothing"
+    );
     let outcome = outcome?;
     assert_eq!(outcome.samples, out.len());
     assert!(out.iter().all(|s| s.log == LOG && s.publish == PUBLISH));

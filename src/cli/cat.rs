@@ -64,7 +64,10 @@ pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
         fields: args
             .fields
             .iter()
-            .map(|f| f.parse::<FieldPath>().map_err(|e| Error::Usage(format!("--field: {e}"))))
+            .map(|f| {
+                f.parse::<FieldPath>()
+                    .map_err(|e| Error::Usage(format!("--field: {e}")))
+            })
             .collect::<Result<_>>()?,
         ignore_covariance_flag: true,
         ..Options::default()
@@ -96,10 +99,15 @@ pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
     let mut printer = Printer::new(args.format, &topic, args.count)?;
     let mut failure = None;
     let mut undecodable = 0u64;
-    let reader = log.reader().map_or_else(|| mcap::Reader::open(&args.source), Ok)?;
+    let reader = log
+        .reader()
+        .map_or_else(|| mcap::Reader::open(&args.source), Ok)?;
     let report = mcap::walk(
         reader,
-        &WalkOptions { pool: Some(pool.rayon()), ..WalkOptions::default() },
+        &WalkOptions {
+            pool: Some(pool.rayon()),
+            ..WalkOptions::default()
+        },
         |channel| {
             let (_, decoder) = decoders
                 .iter()
@@ -126,7 +134,11 @@ pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
                     },
                     Item::Undecodable(_, why) => {
                         if undecodable == 0 {
-                            tracing::warn!("first undecodable payload, logged at {} ns: {}", why.0.0, why.1);
+                            tracing::warn!(
+                                "first undecodable payload, logged at {} ns: {}",
+                                why.0.0,
+                                why.1
+                            );
                         }
                         undecodable += 1;
                     }
@@ -139,7 +151,10 @@ pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
     if let Some(e) = failure {
         return Err(Error::writing("stdout", e));
     }
-    printer.out.flush().map_err(|e| Error::writing("stdout", e))?;
+    printer
+        .out
+        .flush()
+        .map_err(|e| Error::writing("stdout", e))?;
     for problem in problems(&report.survey) {
         tracing::warn!("{}: {problem}", args.source.display());
     }
@@ -168,7 +183,8 @@ impl Printer {
                 "               stamp s            gyro x            y            z      accel x            y            z           qw       qx       qy       qz\n"
             }
         };
-        out.write_all(head.as_bytes()).map_err(|e| Error::writing("stdout", e))?;
+        out.write_all(head.as_bytes())
+            .map_err(|e| Error::writing("stdout", e))?;
         Ok(Printer {
             out,
             format,
@@ -219,7 +235,12 @@ impl Printer {
     }
 
     fn csv(&mut self, raw: &RawSample) -> std::io::Result<()> {
-        write!(self.out, "{},{}", raw.header.unwrap_or(raw.log).0, raw.log.0)?;
+        write!(
+            self.out,
+            "{},{}",
+            raw.header.unwrap_or(raw.log).0,
+            raw.log.0
+        )?;
         for vector in [raw.gyro, raw.accel] {
             match vector {
                 Some([x, y, z]) => write!(self.out, ",{x},{y},{z}")?,

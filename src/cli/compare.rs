@@ -46,10 +46,14 @@ pub struct Compare {
 /// # Errors
 /// A file can not be read, holds no attitude or several, or the two share no instant.
 pub fn run(global: &Global, args: &Compare) -> Result<Outcome> {
-    let align: Align =
-        args.align.parse().map_err(|e| Error::Usage(format!("--align {}: {e}", args.align)))?;
+    let align: Align = args
+        .align
+        .parse()
+        .map_err(|e| Error::Usage(format!("--align {}: {e}", args.align)))?;
     if args.max_angle.is_some_and(|limit| !(limit >= 0.0)) {
-        return Err(Error::Usage("--max-angle: an angle of 0 degrees or more".to_owned()));
+        return Err(Error::Usage(
+            "--max-angle: an angle of 0 degrees or more".to_owned(),
+        ));
     }
     let pool = Pool::new(global.threads)?;
     let estimate = track::read(&args.estimate, args.topic.as_deref(), &pool)?;
@@ -61,9 +65,14 @@ pub fn run(global: &Global, args: &Compare) -> Result<Outcome> {
     let Some(errors) = &result.errors else {
         return Err(no_match(args, &estimate, &reference));
     };
-    let exceeded = args.max_angle.is_some_and(|limit| !(errors.total.max.to_degrees() <= limit));
+    let exceeded = args
+        .max_angle
+        .is_some_and(|limit| !(errors.total.max.to_degrees() <= limit));
     if global.json {
-        print(&format!("{}\n", as_json(&result, align, args.max_angle, exceeded)))?;
+        print(&format!(
+            "{}\n",
+            as_json(&result, align, args.max_angle, exceeded)
+        ))?;
     } else if !global.quiet {
         print(&as_text(&result, align, &estimate.name, &reference.name))?;
     }
@@ -83,14 +92,25 @@ fn attitudes(track: &track::Track) -> Vec<Stamped> {
     track
         .entries
         .iter()
-        .map(|(stamp, wxyz)| (*stamp, crate::model::attitude::Quaternion::assume_unit(*wxyz)))
+        .map(|(stamp, wxyz)| {
+            (
+                *stamp,
+                crate::model::attitude::Quaternion::assume_unit(*wxyz),
+            )
+        })
         .collect()
 }
 
 fn no_match(args: &Compare, estimate: &track::Track, reference: &track::Track) -> Error {
     let span = |t: &track::Track| match (t.entries.first(), t.entries.last()) {
         (Some((a, _)), Some((b, _))) => {
-            format!("{}: {} attitudes, {} to {} ns", t.name, t.entries.len(), a.0, b.0)
+            format!(
+                "{}: {} attitudes, {} to {} ns",
+                t.name,
+                t.entries.len(),
+                a.0,
+                b.0
+            )
         }
         _ => format!("{}: no attitudes", t.name),
     };
@@ -107,10 +127,17 @@ fn no_match(args: &Compare, estimate: &track::Track, reference: &track::Track) -
 fn as_text(result: &Comparison, align: Align, estimate: &str, reference: &str) -> String {
     let mut out = format!("{estimate}\n  against {reference}, world aligned: {align}\n");
     let secs = result.span.map_or(0.0, |(a, b)| b.secs_since(a));
-    let _ = writeln!(out, "  matched  {} reference samples over {secs:.3} s", result.samples);
+    let _ = writeln!(
+        out,
+        "  matched  {} reference samples over {secs:.3} s",
+        result.samples
+    );
     let left = &result.left_out;
     for (count, what) in [
-        (left.bad_references, "reference rows are no attitude (NaN, wrong norm)"),
+        (
+            left.bad_references,
+            "reference rows are no attitude (NaN, wrong norm)",
+        ),
         (left.bad_estimates, "estimates are no attitude"),
         (left.outside, "reference rows outside the estimate's time"),
         (left.in_gap, "reference rows in gaps of the estimate"),

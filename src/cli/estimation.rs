@@ -45,17 +45,32 @@ pub struct Estimation {
     #[arg(long, value_name = "AXES", env = "STRAPD_BODY")]
     pub body: Option<String>,
     /// World of the output: start (the attitude at the first sample), enu, ned, nwu
-    #[arg(long, value_name = "WORLD", default_value = "start", env = "STRAPD_WORLD")]
+    #[arg(
+        long,
+        value_name = "WORLD",
+        default_value = "start",
+        env = "STRAPD_WORLD"
+    )]
     pub world: String,
     /// Rotation from sensor to body axes, C_bs, as a quaternion: q=w,x,y,z
     #[arg(long, value_name = "q=W,X,Y,Z")]
     pub mount: Option<String>,
     /// Initial attitude: identity, gravity (level from the accelerometer at rest),
     /// first-orientation, q=w,x,y,z, or rpy=roll,pitch,yaw in degrees
-    #[arg(long, value_name = "INIT", default_value = "identity", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "INIT",
+        default_value = "identity",
+        allow_hyphen_values = true
+    )]
     pub init: String,
     /// Gyro bias in rad/s, body axes: none, auto (from detected rest), or x,y,z
-    #[arg(long, value_name = "BIAS", default_value = "none", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "BIAS",
+        default_value = "none",
+        allow_hyphen_values = true
+    )]
     pub bias: String,
     /// Longest gap that is bridged, in seconds
     #[arg(long, value_name = "SECS", default_value_t = 0.5)]
@@ -176,7 +191,8 @@ impl Estimation {
         };
         if self.rate_hz.is_some() && self.time != TimeArg::Index {
             return Err(Error::Usage(
-                "--rate-hz: only --time index uses it\n  help: --time index --rate-hz HZ".to_owned(),
+                "--rate-hz: only --time index uses it\n  help: --time index --rate-hz HZ"
+                    .to_owned(),
             ));
         }
         let plan = Plan {
@@ -216,8 +232,14 @@ impl Estimation {
 
     fn method(&self) -> Result<Method> {
         let named: Method = match self.method.as_str() {
-            "causal" => Method::Magnus { window: 5, order: Order::M6, placement: Placement::Causal },
-            name => name.parse().map_err(|e| Error::Usage(format!("--method: {e}")))?,
+            "causal" => Method::Magnus {
+                window: 5,
+                order: Order::M6,
+                placement: Placement::Causal,
+            },
+            name => name
+                .parse()
+                .map_err(|e| Error::Usage(format!("--method: {e}")))?,
         };
         let asked_order: Option<Order> = self
             .order
@@ -225,12 +247,20 @@ impl Estimation {
             .map(|o| o.parse().map_err(|e| Error::Usage(format!("--order: {e}"))))
             .transpose()?;
         Ok(match named {
-            Method::Magnus { window, order, placement } => Method::Magnus {
+            Method::Magnus {
+                window,
+                order,
+                placement,
+            } => Method::Magnus {
                 window: self.window.unwrap_or(window),
                 order: asked_order.unwrap_or(order),
                 placement,
             },
-            Method::CommitProvisional { window, order, finals } => Method::CommitProvisional {
+            Method::CommitProvisional {
+                window,
+                order,
+                finals,
+            } => Method::CommitProvisional {
                 window: self.window.unwrap_or(window),
                 order: asked_order.unwrap_or(order),
                 finals,

@@ -1,20 +1,71 @@
-//! `strapd info FILE`.
+//! `strapd info FILE`: what a log holds, how good it is, and what to do next. I/O.
 
-use super::{Global, Outcome};
-use crate::error::Result;
+use super::{Global, Outcome, print};
+use crate::decode::Options;
+use crate::error::{Error, Result};
+use crate::pipeline::log::Log;
+use crate::pipeline::look::look;
+use crate::pipeline::pool::Pool;
+use crate::pipeline::summarise::problems;
+use crate::pipeline::topics;
+use crate::report::info as words;
 use clap::Args;
+use std::path::PathBuf;
 
-/// What a log holds.
+/// What a log holds: topics, rates, clocks, frames, and what to do next.
 #[derive(Args, Debug)]
+#[command(after_help = "Examples:
+  strapd info flight.mcap
+  strapd info flight.mcap --json | jq '.imu[0].rate_hz'")]
 pub struct Info {
-    /// file
-    pub file: std::path::PathBuf,
+    /// An MCAP file
+    #[arg(value_name = "FILE")]
+    pub file: PathBuf,
+    /// Look at this topic too, though it is not obviously an IMU's
+    #[arg(long, value_name = "NAME")]
+    pub topic: Option<String>,
+    /// Where a value lies in the message: ROLE=PATH, as in replay
+    #[arg(long = "field", value_name = "ROLE=PATH")]
+    pub fields: Vec<String>,
 }
 
 /// Runs it.
 ///
 /// # Errors
-/// x
-pub fn run(_: &Global, _: &Info) -> Result<Outcome> {
-    Ok(Outcome::Done)
+/// The log can not be read, or the topic named is not in it.
+pub fn run(global: &Global, args: &Info) -> Result<Outcome> {
+    let pool = Pool::new(global.threads)?;
+    let log = Log::open(&args.file, &pool)?;
+    let options = Options {
+        fields: args
+            .fields
+            .iter()
+            .map(|f| f.parse().map_err(|e| Error::Usage(format!("--field: {e}"))))
+            .collect::<Result<_>>()?,
+        ..Options::default()
+    };
+    if let Some(topic) = &args.topic
+        && !log.channels.iter().any(|k| k.channel.topic == *topic)
+    {
+        return Err(Error::NoSuchTopic {
+            path: args.file.clone(),
+            topic: topic.clone(),
+            topics: topics::listing(&log.candidates()),
+        });
+    }
+    let (looked, survey) = look(&args.file, &log, args.topic.as_deref(), &options, &pool)?;
+    let lossy = survey.problems.losses() > 0;
+    let report = words::Report {
+        path: &args.file,
+        survey: &survey,
+        problems: problems(&survey),
+        channels: &log.channels,
+        looked: &looked,
+    };
+    if global.json {
+        print(&format!("{}\n", report.json()))?;
+    } else {
+        print(&report.text())?;
+    }
+    Ok(if lossy { Outcome::Lossy } else { Outcome::Done })
 }

@@ -12,7 +12,10 @@ use std::path::Path;
 /// # Errors
 /// [`Error::Usage`] for a plain name with several logs.
 pub fn resolve(outputs: &[String], log: &str, logs: usize) -> Result<Vec<String>> {
-    outputs.iter().map(|output| resolve_one(output, log, logs)).collect()
+    outputs
+        .iter()
+        .map(|output| resolve_one(output, log, logs))
+        .collect()
 }
 
 fn resolve_one(output: &str, log: &str, logs: usize) -> Result<String> {

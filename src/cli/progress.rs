@@ -33,7 +33,11 @@ impl Reporter {
             Mode::Auto if !global.quiet && std::io::stderr().is_terminal() => Show::Bar(bar(name)),
             Mode::Auto | Mode::None => Show::Nothing,
         };
-        Reporter { mode, begun: Instant::now(), shown: None }
+        Reporter {
+            mode,
+            begun: Instant::now(),
+            shown: None,
+        }
     }
 
     /// Shows `position` if the last one is old enough.
@@ -89,10 +93,9 @@ impl Reporter {
 }
 
 fn bar(name: &str) -> ProgressBar {
-    let style = ProgressStyle::with_template(
-        "{prefix} {bar:24.cyan/blue} {percent}%  ETA {eta}  {msg}",
-    )
-    .unwrap_or_else(|_| ProgressStyle::default_bar());
+    let style =
+        ProgressStyle::with_template("{prefix} {bar:24.cyan/blue} {percent}%  ETA {eta}  {msg}")
+            .unwrap_or_else(|_| ProgressStyle::default_bar());
     let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
     bar.set_style(style);
     bar.set_prefix(name.to_owned());

@@ -3,8 +3,8 @@
 use super::estimation::Estimation;
 use super::progress::Reporter;
 use super::{Global, Outcome, outputs, print};
-use crate::config::Shard;
 use crate::config::Plan;
+use crate::config::Shard;
 use crate::error::{Error, Result};
 use crate::pipeline::pool::Pool;
 use crate::pipeline::replay::{self, Replay as Run};
@@ -49,7 +49,12 @@ pub struct Replay {
     #[arg(long, value_name = "HZ", help_heading = "Output")]
     pub out_rate: Option<f64>,
     /// How fast: max, or a factor of data time such as 1 or 0.5
-    #[arg(long, value_name = "FACTOR", default_value = "max", help_heading = "Output")]
+    #[arg(
+        long,
+        value_name = "FACTOR",
+        default_value = "max",
+        help_heading = "Output"
+    )]
     pub speed: String,
     /// Print the error against the orientation recorded in the log (on TOPIC, or found) for each
     /// meaning a sample can have
@@ -152,12 +157,18 @@ impl Replay {
                     })?,
             ),
         };
-        if self.out_rate.is_some_and(|hz| !(hz.is_finite() && hz > 0.0)) {
+        if self
+            .out_rate
+            .is_some_and(|hz| !(hz.is_finite() && hz > 0.0))
+        {
             return Err(Error::Usage("--out-rate: a rate above 0 Hz".to_owned()));
         }
         Ok(Run {
             source: Source::parse(log),
-            targets: outputs.iter().map(|o| Target::parse(o)).collect::<Result<_>>()?,
+            targets: outputs
+                .iter()
+                .map(|o| Target::parse(o))
+                .collect::<Result<_>>()?,
             plan,
             options: Options {
                 force: self.force,

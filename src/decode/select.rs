@@ -182,7 +182,8 @@ fn take_stamp(
 ) -> Result<(), String> {
     let (path, end) = ends.first().ok_or_else(|| nowhere(&field.text))?;
     let unit = field.unit.unwrap_or_default();
-    let stamp = search::stamp_at(schema, path, *end, unit, 2).ok_or_else(|| nowhere(&field.text))?;
+    let stamp =
+        search::stamp_at(schema, path, *end, unit, 2).ok_or_else(|| nowhere(&field.text))?;
     selection.describe(field.role, schema, path);
     search::take_stamp(selection, stamp);
     Ok(())

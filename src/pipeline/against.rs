@@ -19,7 +19,12 @@ const MOST: usize = 1 << 20;
 /// The meanings tried: name, words, kind, and the method where it is not the run's own.
 const MEANINGS: [(&str, &str, SampleKind, Option<Method>); 3] = [
     ("rate", "the rate at its stamp", SampleKind::Rate, None),
-    ("average", "the mean over the interval ending at its stamp", SampleKind::Average, None),
+    (
+        "average",
+        "the mean over the interval ending at its stamp",
+        SampleKind::Average,
+        None,
+    ),
     (
         "held",
         "held over the interval after its stamp (--method dcm-left)",
@@ -49,7 +54,11 @@ struct Thinned {
 
 impl Thinned {
     fn new() -> Thinned {
-        Thinned { entries: Vec::new(), stride: 1, seen: 0 }
+        Thinned {
+            entries: Vec::new(),
+            stride: 1,
+            seen: 0,
+        }
     }
 
     fn push(&mut self, entry: Stamped) {
@@ -82,7 +91,10 @@ impl AgainstRecorded {
         let estimators = MEANINGS
             .iter()
             .map(|(_, _, kind, method)| {
-                let plan = Plan { method: method.unwrap_or(plan.method), ..plan.clone() };
+                let plan = Plan {
+                    method: method.unwrap_or(plan.method),
+                    ..plan.clone()
+                };
                 let mut resolved = resolved.clone();
                 resolved.kind = *kind;
                 Estimator::new(&plan, &resolved, &prepared)
@@ -122,7 +134,9 @@ impl AgainstRecorded {
             Clock::Log | Clock::Index { .. } => Some(raw.log),
             Clock::Publish => Some(raw.publish),
         };
-        let attitude = raw.orientation.and_then(|wxyz| self.resolved.recorded_attitude(wxyz));
+        let attitude = raw
+            .orientation
+            .and_then(|wxyz| self.resolved.recorded_attitude(wxyz));
         if let (Some(stamp), Some(attitude)) = (stamp, attitude) {
             self.reference.push((stamp, attitude));
         }

@@ -50,7 +50,8 @@ impl Estimator {
     /// Takes the next sample.
     #[inline]
     pub fn take(&mut self, raw: &RawSample) {
-        self.conditioner.push(std::slice::from_ref(raw), &mut self.rates);
+        self.conditioner
+            .push(std::slice::from_ref(raw), &mut self.rates);
     }
 
     /// A payload that could not be decoded stood here in the stream.

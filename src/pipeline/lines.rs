@@ -1,11 +1,11 @@
 //! NDJSON samples -> the same run as from a log. I/O.
 
-use super::position::Position;
 use super::pool::Pool;
+use super::position::Position;
+use super::preparation::Resolved;
 use super::replay::{Replay, Waiting, end, refused};
 use super::route::Item;
 use super::session::{Found, Source};
-use super::preparation::Resolved;
 use crate::decode::{LineDecoder, MAX_LINE, Stated};
 use crate::error::{Error, Result};
 use crate::record::Nanos;
@@ -28,14 +28,21 @@ const PATIENCE: u64 = 1000;
 /// # Errors
 /// It is missing, a directory, or empty.
 pub fn open(path: &Path) -> Result<File> {
-    let fail = |source| Error::Open { path: path.to_owned(), source };
+    let fail = |source| Error::Open {
+        path: path.to_owned(),
+        source,
+    };
     let file = File::open(path).map_err(fail)?;
     let metadata = file.metadata().map_err(fail)?;
     if metadata.is_dir() {
-        return Err(Error::IsDirectory { path: path.to_owned() });
+        return Err(Error::IsDirectory {
+            path: path.to_owned(),
+        });
     }
     if metadata.is_file() && metadata.len() == 0 {
-        return Err(Error::Empty { path: path.to_owned() });
+        return Err(Error::Empty {
+            path: path.to_owned(),
+        });
     }
     Ok(file)
 }
@@ -53,7 +60,11 @@ pub fn replay(
     let path = run.source.name();
     let decoder = LineDecoder::new(&run.plan.decode);
     let mut waiting = Waiting::new(run, &path);
-    let mut lines = Lines { number: 0, offset: 0, line: Vec::new() };
+    let mut lines = Lines {
+        number: 0,
+        offset: 0,
+        line: Vec::new(),
+    };
     let mut sensor: Option<String> = None;
     let mut samples = Vec::new();
     let mut items = Vec::with_capacity(BATCH);
@@ -86,7 +97,12 @@ pub fn replay(
                     continue;
                 }
                 let id = line.id.unwrap_or_default();
-                if run.plan.topic.as_deref().is_some_and(|t| t != "all" && t != id) {
+                if run
+                    .plan
+                    .topic
+                    .as_deref()
+                    .is_some_and(|t| t != "all" && t != id)
+                {
                     samples.clear();
                     continue;
                 }
@@ -104,7 +120,10 @@ pub fn replay(
                         return Err(refused(
                             &path,
                             first,
-                            format!("line {}: samples of another sensor, `{id}`\n  help: --topic ID takes one of them", lines.number),
+                            format!(
+                                "line {}: samples of another sensor, `{id}`\n  help: --topic ID takes one of them",
+                                lines.number
+                            ),
                         ));
                     }
                     Some(_) => {}
@@ -160,7 +179,13 @@ impl Lines {
     /// skipped.
     fn next(&mut self, input: &mut dyn BufRead, path: &Path) -> Result<bool> {
         self.line.clear();
-        let fail = |offset| move |source| Error::Read { path: path.to_owned(), offset, source };
+        let fail = |offset| {
+            move |source| Error::Read {
+                path: path.to_owned(),
+                offset,
+                source,
+            }
+        };
         let limit = MAX_LINE as u64 + 1;
         let read = Read::take(&mut *input, limit)
             .read_until(b'\n', &mut self.line)

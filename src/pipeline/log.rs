@@ -44,7 +44,10 @@ impl Log {
     /// It can not be opened or read, or is no MCAP.
     pub fn open(path: &Path, pool: &Pool) -> Result<Log> {
         let reader = Reader::open(path)?;
-        let options = WalkOptions { pool: Some(pool.rayon()), ..WalkOptions::default() };
+        let options = WalkOptions {
+            pool: Some(pool.rayon()),
+            ..WalkOptions::default()
+        };
         let survey = mcap::survey(&reader, &options)?;
         let firsts = match reader.again() {
             Some(again) => first_messages(again, &survey)?,
@@ -61,7 +64,11 @@ impl Log {
                 known(&found.channel, found.messages, first)
             })
             .collect();
-        Ok(Log { reader, survey, channels })
+        Ok(Log {
+            reader,
+            survey,
+            channels,
+        })
     }
 
     /// The file once more, from its beginning.
@@ -118,7 +125,10 @@ pub fn plain(channel: &Channel) -> decode::Channel<'_> {
 /// `sensor_msgs/msg/Imu [cdr]`, fit for a terminal.
 #[must_use]
 pub fn described(channel: &Channel) -> String {
-    let name = channel.schema.as_deref().map_or("(no type)", |s| s.name.as_str());
+    let name = channel
+        .schema
+        .as_deref()
+        .map_or("(no type)", |s| s.name.as_str());
     decode::printable(&format!("{name} [{}]", channel.message_encoding))
 }
 
@@ -140,8 +150,16 @@ pub fn rank(role: &Role) -> u8 {
 /// A channel with what it can serve as.
 #[must_use]
 pub fn known(channel: &Arc<Channel>, messages: u64, first: Option<(Nanos, Vec<u8>)>) -> Known {
-    let role = role(&plain(channel), first.as_ref().map(|(log, data)| (data.as_slice(), *log)));
-    Known { channel: channel.clone(), messages, first, role }
+    let role = role(
+        &plain(channel),
+        first.as_ref().map(|(log, data)| (data.as_slice(), *log)),
+    );
+    Known {
+        channel: channel.clone(),
+        messages,
+        first,
+        role,
+    }
 }
 
 /// A log time as a stamp; beyond 2262 it saturates.
@@ -178,10 +196,10 @@ fn first_messages(reader: Reader, survey: &Survey) -> Result<Vec<First>> {
                     id: message.channel.id,
                     topic: message.channel.topic.clone(),
                     log: nanos(message.log_time),
-                    data: message.data.get(..FIRST_LIMIT.min(message.data.len())).map_or_else(
-                        Vec::new,
-                        <[u8]>::to_vec,
-                    ),
+                    data: message
+                        .data
+                        .get(..FIRST_LIMIT.min(message.data.len()))
+                        .map_or_else(Vec::new, <[u8]>::to_vec),
                 });
             }
         },

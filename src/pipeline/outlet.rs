@@ -56,7 +56,10 @@ impl Outlet {
         Ok(Outlet {
             copied: sinks.iter().map(|_| BTreeMap::new()).collect(),
             sinks,
-            decimators: streams.iter().map(|_| out_rate.and_then(Decimator::new)).collect(),
+            decimators: streams
+                .iter()
+                .map(|_| out_rate.and_then(Decimator::new))
+                .collect(),
             kept: Vec::new(),
             pace: Pace::new(speed),
             closed: false,
@@ -67,7 +70,12 @@ impl Outlet {
     ///
     /// # Errors
     /// As [`Sink::write`].
-    pub fn write(&mut self, stream: usize, samples: &[AttitudeSample], pool: &Pool) -> Result<Flow> {
+    pub fn write(
+        &mut self,
+        stream: usize,
+        samples: &[AttitudeSample],
+        pool: &Pool,
+    ) -> Result<Flow> {
         self.kept.clear();
         let mut rest = match self.decimators.get_mut(stream).and_then(Option::as_mut) {
             Some(decimator) => {
@@ -94,7 +102,11 @@ impl Outlet {
                 self.closed |= flow == Flow::Closed;
             }
         }
-        Ok(if self.closed { Flow::Closed } else { Flow::Continue })
+        Ok(if self.closed {
+            Flow::Closed
+        } else {
+            Flow::Continue
+        })
     }
 
     /// Copies a message of the input to every sink that has room for it.

@@ -20,7 +20,10 @@ impl Pace {
     /// `None` = as fast as possible.
     #[must_use]
     pub fn new(speed: Option<f64>) -> Option<Pace> {
-        speed.map(|speed| Pace { speed, origin: None })
+        speed.map(|speed| Pace {
+            speed,
+            origin: None,
+        })
     }
 
     /// How many of the samples with these stamps may go together now: at least one.
@@ -56,7 +59,9 @@ mod tests {
 
     #[test]
     fn at_least_one_sample_goes_and_no_more_than_a_slice() {
-        let Some(pace) = Pace::new(Some(1.0)) else { return };
+        let Some(pace) = Pace::new(Some(1.0)) else {
+            return;
+        };
         let stamps = |n: i64, step: i64| (0..n).map(move |i| Nanos(i * step));
         assert_eq!(pace.take(stamps(10, 100_000_000)), 1);
         assert_eq!(pace.take(stamps(100, 1_000_000)), 6);
@@ -64,7 +69,9 @@ mod tests {
 
     #[test]
     fn a_clock_jump_is_not_waited_for() {
-        let Some(mut pace) = Pace::new(Some(1.0)) else { return };
+        let Some(mut pace) = Pace::new(Some(1.0)) else {
+            return;
+        };
         let begun = Instant::now();
         pace.wait(Nanos(0));
         pace.wait(Nanos(3_600_000_000_000));

@@ -22,7 +22,9 @@ impl Pool {
             .num_threads(threads)
             .thread_name(|i| format!("strapd-{i}"))
             .build()
-            .map(|pool| Pool { pool: Arc::new(pool) })
+            .map(|pool| Pool {
+                pool: Arc::new(pool),
+            })
             .map_err(|e| Error::Usage(format!("--threads {threads}: {e}")))
     }
 
@@ -44,6 +46,7 @@ impl Executor for Pool {
         if n <= 1 || self.threads() == 1 {
             return (0..n).map(f).collect();
         }
-        self.pool.install(|| (0..n).into_par_iter().map(&f).collect())
+        self.pool
+            .install(|| (0..n).into_par_iter().map(&f).collect())
     }
 }

@@ -50,8 +50,9 @@ impl Resolved {
             Some(decode::GyroUnit::Mrad) => GyroUnit::Mrad,
             Some(decode::GyroUnit::Rad) | None => GyroUnit::Rad,
         });
-        let mount: Quaternion<Body, Sensor> =
-            plan.mount.map_or_else(Quaternion::identity, Quaternion::assume_unit);
+        let mount: Quaternion<Body, Sensor> = plan
+            .mount
+            .map_or_else(Quaternion::identity, Quaternion::assume_unit);
         Resolved {
             kind: plan.kind.or(stated.sample_kind).unwrap_or_default(),
             unit,
@@ -60,7 +61,9 @@ impl Resolved {
                 Some(decode::AccelUnit::MetresPerSecondSquared) | None => 1.0,
             },
             recorded: orientation_convention(stated),
-            axes: body.c_bs().map_or_else(Matrix3::identity, |c| *c.as_matrix()),
+            axes: body
+                .c_bs()
+                .map_or_else(Matrix3::identity, |c| *c.as_matrix()),
             mount: *mount.to_dcm().as_matrix(),
             body,
         }
@@ -207,9 +210,8 @@ impl Preparation {
         let (Some(first), Some(last)) = (self.first.first(), &self.last) else {
             return true;
         };
-        let secs = |a: Option<Nanos>, b: Option<Nanos>| {
-            a.zip(b).map_or(0.0, |(a, b)| b.secs_since(a))
-        };
+        let secs =
+            |a: Option<Nanos>, b: Option<Nanos>| a.zip(b).map_or(0.0, |(a, b)| b.secs_since(a));
         self.rest.is_some()
             && match self.patience {
                 Patience::WholeLog => true,
@@ -226,7 +228,13 @@ impl Preparation {
     /// # Errors
     /// In words: no usable stamps, no rest, no orientation, and the flag that helps.
     pub fn decide(self) -> Result<Prepared, String> {
-        let Preparation { plan, resolved, first, rest, .. } = self;
+        let Preparation {
+            plan,
+            resolved,
+            first,
+            rest,
+            ..
+        } = self;
         let (clock, warning) = choose_clock(&first, plan.clock);
         if let Some(fatal @ ClockWarning::NoneMoves) = warning {
             return Err(fatal.to_string());
@@ -256,7 +264,11 @@ fn needs_rest(plan: &Plan) -> bool {
 
 fn decide_bias(plan: &Plan, rests: &Rests) -> Result<(Vector3<f64>, f64, String), String> {
     match plan.bias {
-        Bias::None => Ok((Vector3::zeros(), plan.noise.bias_instability, "none".to_owned())),
+        Bias::None => Ok((
+            Vector3::zeros(),
+            plan.noise.bias_instability,
+            "none".to_owned(),
+        )),
         Bias::Given(bias) => Ok((bias, plan.noise.bias_instability, "as given".to_owned())),
         Bias::Auto => {
             let estimate = stillness::estimate_bias(rests, &Limits::default())
@@ -289,11 +301,17 @@ fn decide_initial(
                     plan.world
                 ));
             }
-            Ok((inside(Quaternion::identity()), "identity".to_owned(), plan.world))
+            Ok((
+                inside(Quaternion::identity()),
+                "identity".to_owned(),
+                plan.world,
+            ))
         }
-        Initial::Given(wxyz) => {
-            Ok((inside(Quaternion::assume_unit(wxyz)), "as given".to_owned(), plan.world))
-        }
+        Initial::Given(wxyz) => Ok((
+            inside(Quaternion::assume_unit(wxyz)),
+            "as given".to_owned(),
+            plan.world,
+        )),
         Initial::Gravity => {
             let level = stillness::accel_at_start(rests, &Limits::default())
                 .map_err(|e| format!("--init gravity: {e}"))?;
@@ -303,7 +321,11 @@ fn decide_initial(
             let shown = Convention::EnuFlu.convert(asked, level);
             let angles = shown.yaw_pitch_roll();
             let q = Quaternion::from_yaw_pitch_roll(&YawPitchRoll { yaw: 0.0, ..angles });
-            Ok((inside(q), "level from gravity, heading 0".to_owned(), plan.world))
+            Ok((
+                inside(q),
+                "level from gravity, heading 0".to_owned(),
+                plan.world,
+            ))
         }
         Initial::FirstOrientation => {
             let found = gathered
@@ -325,7 +347,7 @@ fn decide_initial(
 
 /// A pass over samples that only looks for rest.
 #[derive(Debug)]
-struct RestPass {
+pub struct RestPass {
     plan: Plan,
     resolved: Resolved,
     gathered: Vec<RawSample>,
@@ -335,7 +357,9 @@ struct RestPass {
 }
 
 impl RestPass {
-    fn new(plan: &Plan, resolved: &Resolved) -> RestPass {
+    /// For samples understood as `resolved`.
+    #[must_use]
+    pub fn new(plan: &Plan, resolved: &Resolved) -> RestPass {
         RestPass {
             plan: plan.clone(),
             resolved: resolved.clone(),
@@ -346,7 +370,11 @@ impl RestPass {
         }
     }
 
-    fn push(&mut self, raw: &[RawSample]) -> Result<(), String> {
+    /// Takes samples.
+    ///
+    /// # Errors
+    /// In words, when the settings do not fit.
+    pub fn push(&mut self, raw: &[RawSample]) -> Result<(), String> {
         match &mut self.running {
             Some(conditioner) => {
                 conditioner.push(raw, &mut self.rates);
@@ -362,7 +390,11 @@ impl RestPass {
         Ok(())
     }
 
-    fn finish(mut self) -> Result<Rests, String> {
+    /// What was found.
+    ///
+    /// # Errors
+    /// As [`RestPass::push`].
+    pub fn finish(mut self) -> Result<Rests, String> {
         if self.running.is_none() {
             self.begin()?;
         }
@@ -376,7 +408,9 @@ impl RestPass {
     fn begin(&mut self) -> Result<(), String> {
         let gathered = std::mem::take(&mut self.gathered);
         let (clock, _) = choose_clock(&gathered, self.plan.clock);
-        let settings = self.resolved.conditioning(&self.plan, clock, Vector3::zeros());
+        let settings = self
+            .resolved
+            .conditioning(&self.plan, clock, Vector3::zeros());
         let mut conditioner = Conditioner::new(&settings).map_err(|e| e.to_string())?;
         conditioner.push(&gathered, &mut self.rates);
         self.running = Some(conditioner);

@@ -55,7 +55,10 @@ pub fn of(
         put(key("rotates"), stream.rotates.clone());
         put(key("world"), stream.world_axes.clone());
         put(key("body"), stream.body_axes.clone());
-        put(key("initial"), format!("{} (w {w}, x {x}, y {y}, z {z})", prepared.initial_origin));
+        put(
+            key("initial"),
+            format!("{} (w {w}, x {x}, y {y}, z {z})", prepared.initial_origin),
+        );
         put(
             key("bias_rad_s"),
             format!("{} (x {bx}, y {by}, z {bz})", prepared.bias_origin),
@@ -67,7 +70,11 @@ pub fn of(
 /// `sha256-ends:HEX`: SHA-256 over the length (8 bytes, little endian), the first and the last MiB.
 /// It names a log as surely as a hash of all of it would, without reading 10 GB for it.
 fn fingerprint(path: &Path) -> Result<String> {
-    let fail = |source| Error::Read { path: path.to_owned(), offset: 0, source };
+    let fail = |source| Error::Read {
+        path: path.to_owned(),
+        offset: 0,
+        source,
+    };
     let mut file = File::open(path).map_err(fail)?;
     let length = file.metadata().map_err(fail)?.len();
     let mut hash = Sha256::new();
@@ -76,7 +83,9 @@ fn fingerprint(path: &Path) -> Result<String> {
     for start in [0, length.saturating_sub(END)] {
         end.clear();
         file.seek(SeekFrom::Start(start)).map_err(fail)?;
-        Read::take(&mut file, END).read_to_end(&mut end).map_err(fail)?;
+        Read::take(&mut file, END)
+            .read_to_end(&mut end)
+            .map_err(fail)?;
         hash.update(&end);
     }
     let hex: String = hash.finalize().iter().map(|b| format!("{b:02x}")).collect();

@@ -71,7 +71,9 @@ pub fn run(run: &Replay, pool: &Pool, watch: &mut dyn FnMut(&Position)) -> Resul
 /// Whether a file is NDJSON, by its extension.
 fn is_lines(path: &Path) -> bool {
     path.extension().is_some_and(|e| {
-        ["ndjson", "jsonl"].iter().any(|known| e.eq_ignore_ascii_case(known))
+        ["ndjson", "jsonl"]
+            .iter()
+            .any(|known| e.eq_ignore_ascii_case(known))
     })
 }
 
@@ -80,9 +82,15 @@ fn stdin(run: &Replay, pool: &Pool, watch: &mut dyn FnMut(&Position)) -> Result<
     let mut head = Vec::new();
     Read::take(&mut input, mcap::MAGIC.len() as u64)
         .read_to_end(&mut head)
-        .map_err(|source| Error::Read { path: run.source.name(), offset: 0, source })?;
+        .map_err(|source| Error::Read {
+            path: run.source.name(),
+            offset: 0,
+            source,
+        })?;
     if head.is_empty() {
-        return Err(Error::Empty { path: run.source.name() });
+        return Err(Error::Empty {
+            path: run.source.name(),
+        });
     }
     let is_mcap = head == mcap::MAGIC;
     let whole = Box::new(std::io::Cursor::new(head).chain(input));
@@ -134,13 +142,20 @@ fn file(
     let mut failure = None;
     let report = mcap::walk(
         reader,
-        &WalkOptions { pool: Some(pool.rayon()), ..WalkOptions::default() },
+        &WalkOptions {
+            pool: Some(pool.rayon()),
+            ..WalkOptions::default()
+        },
         |channel| route(&mut chosen, reference.as_ref(), run.copy_input, channel),
         Route::map,
         |items| {
-            let done = items.last().and_then(log_time).zip(span).map(|(now, (first, last))| {
-                (now.saturating_sub(first)) as f64 / last.saturating_sub(first).max(1) as f64
-            });
+            let done = items
+                .last()
+                .and_then(log_time)
+                .zip(span)
+                .map(|(now, (first, last))| {
+                    (now.saturating_sub(first)) as f64 / last.saturating_sub(first).max(1) as f64
+                });
             match session.consume(items.drain(..), pool) {
                 Ok(Flow::Continue) => {
                     watch(&session.position(done.filter(|_| total > 0)));
@@ -261,7 +276,13 @@ impl Picked {
                         Stream::new(&channel.topic, ""),
                     ));
                 }
-                Some(Route { decoder: Some(decoder), stream: 0, is_reference: false, copied, noticed })
+                Some(Route {
+                    decoder: Some(decoder),
+                    stream: 0,
+                    is_reference: false,
+                    copied,
+                    noticed,
+                })
             }
             Err(why) => {
                 self.refusals.push(why.to_string());
@@ -273,10 +294,16 @@ impl Picked {
     /// Why nothing was picked.
     fn nothing(self, run: &Replay, path: &Path, survey: &Survey) -> Error {
         if let Some(what) = self.refusals.into_iter().next() {
-            return Error::Unsupported { path: path.to_owned(), what };
+            return Error::Unsupported {
+                path: path.to_owned(),
+                what,
+            };
         }
-        let candidates: Vec<_> =
-            survey.channels.iter().map(|c| known(&c.channel, c.messages, None).candidate()).collect();
+        let candidates: Vec<_> = survey
+            .channels
+            .iter()
+            .map(|c| known(&c.channel, c.messages, None).candidate())
+            .collect();
         match topics::choose(path, &candidates, run.plan.topic.as_deref()) {
             Err(e) => e,
             Ok(_) => Error::NoImuTopic {
@@ -294,7 +321,10 @@ impl Picked {
             .map(String::as_str)
             .collect();
         (!names.is_empty()).then(|| {
-            format!("the first IMU topic was taken; also there: {} (--topic)", names.join(", "))
+            format!(
+                "the first IMU topic was taken; also there: {} (--topic)",
+                names.join(", ")
+            )
         })
     }
 }
@@ -310,7 +340,13 @@ pub(super) struct Waiting<'r> {
 
 impl<'r> Waiting<'r> {
     pub(super) fn new(run: &'r Replay, path: &'r Path) -> Waiting<'r> {
-        Waiting { run, path, gathering: None, held: Vec::new(), session: None }
+        Waiting {
+            run,
+            path,
+            gathering: None,
+            held: Vec::new(),
+            session: None,
+        }
     }
 
     /// The stream's topic is known.
@@ -342,7 +378,9 @@ impl<'r> Waiting<'r> {
         };
         for item in items {
             if let Item::Sample(_, raw) = &item {
-                preparation.take(raw).map_err(|what| refused(self.path, &found.name, what))?;
+                preparation
+                    .take(raw)
+                    .map_err(|what| refused(self.path, &found.name, what))?;
             }
             self.held.push(item);
         }
@@ -356,8 +394,9 @@ impl<'r> Waiting<'r> {
         let Some((found, stream, preparation)) = self.gathering.take() else {
             return Ok(Flow::Continue);
         };
-        let prepared =
-            preparation.decide().map_err(|what| refused(self.path, &found.name, what))?;
+        let prepared = preparation
+            .decide()
+            .map_err(|what| refused(self.path, &found.name, what))?;
         let stream = labelled(stream, &self.run.plan, &found.resolved, &prepared);
         let session = begin(self.run, self.path, vec![found], vec![prepared], &[stream])?;
         let held = std::mem::take(&mut self.held);
@@ -365,7 +404,9 @@ impl<'r> Waiting<'r> {
     }
 
     pub(super) fn position(&self) -> Position {
-        self.session.as_ref().map_or_else(Position::default, |s| s.position(None))
+        self.session
+            .as_ref()
+            .map_or_else(Position::default, |s| s.position(None))
     }
 
     /// The input has ended.
@@ -412,7 +453,10 @@ fn choose_one(
     }
     let Some((first, decoder)) = channels.first() else {
         let what = refusals.into_iter().next().unwrap_or_default();
-        return Err(Error::Unsupported { path: path.to_owned(), what });
+        return Err(Error::Unsupported {
+            path: path.to_owned(),
+            what,
+        });
     };
     if !decoder.stated().has_gyro {
         return Err(Error::Unsupported {
@@ -439,8 +483,15 @@ fn choose_one(
         noticed: Arc::default(),
         warnings: refusals,
     };
-    let channels = channels.into_iter().map(|(k, d)| (k.channel.clone(), d)).collect();
-    Ok(Chosen { found, stream, channels })
+    let channels = channels
+        .into_iter()
+        .map(|(k, d)| (k.channel.clone(), d))
+        .collect();
+    Ok(Chosen {
+        found,
+        stream,
+        channels,
+    })
 }
 
 /// The channel whose orientations the estimate is held against; `None` = the samples' own.
@@ -478,7 +529,10 @@ fn reference(
     };
     let decoder = found
         .decoder(&crate::decode::Options::default())
-        .map_err(|why| Error::Unsupported { path: path.to_owned(), what: why.to_string() })?;
+        .map_err(|why| Error::Unsupported {
+            path: path.to_owned(),
+            what: why.to_string(),
+        })?;
     let resolved = Resolved::new(&run.plan, decoder.stated());
     Ok(Some(((found.channel.clone(), decoder), resolved)))
 }
@@ -499,7 +553,11 @@ fn prepare(
     mcap::walk(
         again(log, path)?,
         // A little ahead is enough: this usually ends at once.
-        &WalkOptions { pool: Some(pool.rayon()), in_flight: 4 << 20, ..WalkOptions::default() },
+        &WalkOptions {
+            pool: Some(pool.rayon()),
+            in_flight: 4 << 20,
+            ..WalkOptions::default()
+        },
         |channel| {
             let (stream, decoder) = find(chosen, channel)?;
             Some(Route {
@@ -513,8 +571,12 @@ fn prepare(
         Route::map,
         |items| {
             for item in items.drain(..) {
-                let Item::Sample(stream, raw) = item else { continue };
-                let Some(preparation) = preparations.get_mut(stream) else { continue };
+                let Item::Sample(stream, raw) = item else {
+                    continue;
+                };
+                let Some(preparation) = preparations.get_mut(stream) else {
+                    continue;
+                };
                 if let Err(what) = preparation.take(&raw) {
                     failure = Some((stream, what));
                     return ControlFlow::Break(());
@@ -561,7 +623,10 @@ fn route(
 ) -> Option<Route> {
     let copied = copy_input.then(|| channel.clone());
     if let Some((stream, decoder)) = find(chosen, channel) {
-        let noticed = chosen.get(stream).map(|c| c.found.noticed.clone()).unwrap_or_default();
+        let noticed = chosen
+            .get(stream)
+            .map(|c| c.found.noticed.clone())
+            .unwrap_or_default();
         return Some(Route {
             decoder: Some(decoder.clone()),
             stream,
@@ -655,5 +720,9 @@ fn again(log: &Log, path: &Path) -> Result<Reader> {
 }
 
 pub(super) fn refused(path: &Path, topic: &str, what: String) -> Error {
-    Error::Topic { path: path.to_owned(), topic: topic.to_owned(), what }
+    Error::Topic {
+        path: path.to_owned(),
+        topic: topic.to_owned(),
+        what,
+    }
 }

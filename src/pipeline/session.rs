@@ -63,8 +63,10 @@ impl Output {
         }
         self.last = samples.last().copied().or(self.last);
         self.count += samples.len() as u64;
-        self.largest_rate =
-            samples.iter().map(|s| s.rate.amax()).fold(self.largest_rate, f64::max);
+        self.largest_rate = samples
+            .iter()
+            .map(|s| s.rate.amax())
+            .fold(self.largest_rate, f64::max);
     }
 }
 
@@ -140,7 +142,13 @@ impl Session {
     /// A session over `topics` into `outlet`.
     #[must_use]
     pub fn new(topics: Vec<Topic>, outlet: Outlet) -> Session {
-        Session { topics, reference_for: 0, outlet, samples: 0, closed: false }
+        Session {
+            topics,
+            reference_for: 0,
+            outlet,
+            samples: 0,
+            closed: false,
+        }
     }
 
     /// Takes items in order and writes what is known then.
@@ -152,7 +160,9 @@ impl Session {
             match item {
                 Item::Sample(stream, raw) => {
                     self.samples += 1;
-                    let Some(topic) = self.topics.get_mut(stream) else { continue };
+                    let Some(topic) = self.topics.get_mut(stream) else {
+                        continue;
+                    };
                     topic.estimator.take(&raw);
                     if let Some(against) = &mut topic.against {
                         against.take(&raw);
@@ -160,7 +170,9 @@ impl Session {
                 }
                 Item::Undecodable(stream, why) => {
                     self.samples += 1;
-                    let Some(topic) = self.topics.get_mut(stream) else { continue };
+                    let Some(topic) = self.topics.get_mut(stream) else {
+                        continue;
+                    };
                     topic.estimator.take_undecodable();
                     topic.first_undecodable.get_or_insert(*why);
                 }
@@ -190,7 +202,11 @@ impl Session {
     /// Where the run is.
     #[must_use]
     pub fn position(&self, fraction: Option<f64>) -> Position {
-        let mut position = Position { fraction, samples: self.samples, ..Position::default() };
+        let mut position = Position {
+            fraction,
+            samples: self.samples,
+            ..Position::default()
+        };
         for topic in &self.topics {
             let report = topic.estimator.conditioning();
             position.lost += report.counts.lost();
@@ -233,7 +249,11 @@ impl Source {
     /// `-` or a path.
     #[must_use]
     pub fn parse(text: &str) -> Source {
-        if text == "-" { Source::Stdin } else { Source::File(PathBuf::from(text)) }
+        if text == "-" {
+            Source::Stdin
+        } else {
+            Source::File(PathBuf::from(text))
+        }
     }
 
     /// For messages.

@@ -40,8 +40,12 @@ pub fn run(
 #[must_use]
 pub fn problems(survey: &Survey) -> Vec<String> {
     let found = &survey.problems;
-    let mut said: Vec<String> =
-        found.first().iter().take(PROBLEMS_SAID).map(ToString::to_string).collect();
+    let mut said: Vec<String> = found
+        .first()
+        .iter()
+        .take(PROBLEMS_SAID)
+        .map(ToString::to_string)
+        .collect();
     let more = found.total().saturating_sub(said.len() as u64);
     if more > 0 {
         said.push(format!("and {more} more of the kind"));
@@ -57,7 +61,10 @@ fn of_topic(run: &Replay, topic: &Topic) -> TopicSummary {
     let q = last.map_or_else(Quaternion::identity, |s| s.q_nb);
     let angles = q.yaw_pitch_roll();
     let gaps = &conditioning.gaps;
-    let longest = gaps.kept.iter().find(|g| g.length_nanos == gaps.longest_nanos);
+    let longest = gaps
+        .kept
+        .iter()
+        .find(|g| g.length_nanos == gaps.longest_nanos);
     let first = conditioning.first.unwrap_or_default();
     let mut summary = TopicSummary {
         topic: topic.name.clone(),
@@ -67,7 +74,10 @@ fn of_topic(run: &Replay, topic: &Topic) -> TopicSummary {
         first_losses: first_losses(topic, first),
         written: topic.output.count,
         duration_secs: conditioning.last.map_or(0.0, |last| last.secs_since(first)),
-        rate_hz: conditioning.spacing_nanos.filter(|n| *n > 0).map(|n| 1e9 / n as f64),
+        rate_hz: conditioning
+            .spacing_nanos
+            .filter(|n| *n > 0)
+            .map(|n| 1e9 / n as f64),
         clock: topic.prepared.clock.name().to_owned(),
         kind: topic.resolved.kind,
         method: topic.estimator.method().to_string(),
@@ -91,7 +101,11 @@ fn of_topic(run: &Replay, topic: &Topic) -> TopicSummary {
         final_wxyz: q.wxyz(),
         final_ypr: [angles.yaw, angles.pitch, angles.roll],
         final_sigma: last.map_or([0.0; 3], |s| s.sigma.into()),
-        against: topic.against.as_ref().map(super::against::AgainstRecorded::rows).unwrap_or_default(),
+        against: topic
+            .against
+            .as_ref()
+            .map(super::against::AgainstRecorded::rows)
+            .unwrap_or_default(),
         warnings: topic.prepared.warnings.clone(),
     };
     summary.warnings.extend(topic.warnings.iter().cloned());
@@ -109,7 +123,11 @@ fn first_losses(topic: &Topic, start: Nanos) -> Vec<String> {
             let at = bad
                 .stamp
                 .map_or_else(String::new, |s| format!(" at {:.6} s", s.secs_since(start)));
-            format!("first {}: sample {}{at}", verdict.name().replace('_', " "), bad.index)
+            format!(
+                "first {}: sample {}{at}",
+                verdict.name().replace('_', " "),
+                bad.index
+            )
         })
         .collect();
     if let Some((log, why)) = &topic.first_undecodable {
@@ -140,7 +158,9 @@ fn warnings(topic: &Topic, summary: &TopicSummary) -> Vec<String> {
     }
     let carried = topic.noticed.stamps_carried.load(Ordering::Relaxed);
     if carried > 0 {
-        said.push(format!("{carried} stamps had a second or more of nanoseconds, carried over"));
+        said.push(format!(
+            "{carried} stamps had a second or more of nanoseconds, carried over"
+        ));
     }
     let restamped = summary.counts.get(Verdict::Restamped);
     if restamped > 0 {
@@ -172,9 +192,12 @@ fn warnings(topic: &Topic, summary: &TopicSummary) -> Vec<String> {
 fn kind_advice(topic: &Topic, rows: &[crate::report::summary::Against]) -> Option<String> {
     const CLEARLY: f64 = 0.95;
     let used = rows.iter().find(|r| r.kind == topic.resolved.kind.name())?;
-    let best = rows.iter().min_by(|a, b| a.median_deg.total_cmp(&b.median_deg))?;
+    let best = rows
+        .iter()
+        .min_by(|a, b| a.median_deg.total_cmp(&b.median_deg))?;
     (best.median_deg < CLEARLY * used.median_deg).then(|| match best.kind {
-        "held" => "samples fit best as held over the interval after their stamp: --method dcm-left".to_owned(),
+        "held" => "samples fit best as held over the interval after their stamp: --method dcm-left"
+            .to_owned(),
         kind => format!("samples fit best as {kind}: --sample-kind {kind}"),
     })
 }

@@ -53,7 +53,10 @@ pub fn choose(path: &Path, candidates: &[Candidate], named: Option<&str>) -> Res
         }),
         Some(topic) if topic != "all" => {
             if candidates.iter().any(|c| c.topic == topic) {
-                return Ok(Choice { topics: vec![topic.to_owned()], note: None });
+                return Ok(Choice {
+                    topics: vec![topic.to_owned()],
+                    note: None,
+                });
             }
             Err(Error::NoSuchTopic {
                 path: path.to_owned(),
@@ -68,15 +71,20 @@ pub fn choose(path: &Path, candidates: &[Candidate], named: Option<&str>) -> Res
         _ => {
             let topics = imus(best);
             if topics.len() > 1 {
-                let these: Vec<Candidate> =
-                    candidates.iter().filter(|c| c.rank == best).cloned().collect();
+                let these: Vec<Candidate> = candidates
+                    .iter()
+                    .filter(|c| c.rank == best)
+                    .cloned()
+                    .collect();
                 return Err(Error::SeveralImuTopics {
                     path: path.to_owned(),
                     topics: listing(&these),
                 });
             }
-            let others: Vec<String> =
-                imus(PICKED_UNNAMED).into_iter().filter(|t| !topics.contains(t)).collect();
+            let others: Vec<String> = imus(PICKED_UNNAMED)
+                .into_iter()
+                .filter(|t| !topics.contains(t))
+                .collect();
             let note = (!others.is_empty()).then(|| {
                 format!(
                     "took {}; {} could be taken too with --topic",
@@ -100,7 +108,9 @@ pub fn listing(candidates: &[Candidate]) -> String {
         .iter()
         .take(MOST)
         .map(|c| {
-            let count = c.messages.map_or_else(String::new, |n| format!("  {n} messages"));
+            let count = c
+                .messages
+                .map_or_else(String::new, |n| format!("  {n} messages"));
             format!("\n    {}  {}{count}", c.topic, c.described)
         })
         .collect();
@@ -116,7 +126,12 @@ mod tests {
     use super::*;
 
     fn candidate(topic: &str, rank: u8) -> Candidate {
-        Candidate { topic: topic.into(), described: "t [e]".into(), messages: Some(3), rank }
+        Candidate {
+            topic: topic.into(),
+            described: "t [e]".into(),
+            messages: Some(3),
+            rank,
+        }
     }
 
     fn chosen(candidates: &[Candidate], named: Option<&str>) -> Result<Choice> {
@@ -125,9 +140,16 @@ mod tests {
 
     #[test]
     fn the_only_imu_needs_no_name_and_an_odometry_is_never_picked_unnamed() {
-        let all = [candidate("/odom", 1), candidate("/imu", 5), candidate("/mag", 0)];
+        let all = [
+            candidate("/odom", 1),
+            candidate("/imu", 5),
+            candidate("/mag", 0),
+        ];
         assert_eq!(chosen(&all, None).unwrap().topics, ["/imu"]);
-        assert!(matches!(chosen(&all[..1], None), Err(Error::NoImuTopic { .. })));
+        assert!(matches!(
+            chosen(&all[..1], None),
+            Err(Error::NoImuTopic { .. })
+        ));
         assert_eq!(chosen(&all, Some("/odom")).unwrap().topics, ["/odom"]);
     }
 
@@ -135,13 +157,19 @@ mod tests {
     fn two_imus_are_refused_without_a_name_and_listed() {
         let all = [candidate("/a", 5), candidate("/b", 5)];
         let error = chosen(&all, None).unwrap_err().to_string();
-        assert!(error.contains("/a") && error.contains("/b") && error.contains("--topic"), "{error}");
+        assert!(
+            error.contains("/a") && error.contains("/b") && error.contains("--topic"),
+            "{error}"
+        );
         assert_eq!(chosen(&all, Some("all")).unwrap().topics, ["/a", "/b"]);
     }
 
     #[test]
     fn a_better_ranked_topic_is_taken_and_the_other_is_said() {
-        let all = [candidate("/vehicle_imu", 3), candidate("/sensor_combined", 4)];
+        let all = [
+            candidate("/vehicle_imu", 3),
+            candidate("/sensor_combined", 4),
+        ];
         let choice = chosen(&all, None).unwrap();
         assert_eq!(choice.topics, ["/sensor_combined"]);
         assert!(choice.note.unwrap().contains("/vehicle_imu"));
@@ -155,7 +183,9 @@ mod tests {
 
     #[test]
     fn a_wrong_name_lists_what_is_there() {
-        let error = chosen(&[candidate("/imu", 5)], Some("/nope")).unwrap_err().to_string();
+        let error = chosen(&[candidate("/imu", 5)], Some("/nope"))
+            .unwrap_err()
+            .to_string();
         assert!(error.contains("/nope") && error.contains("/imu"), "{error}");
     }
 }

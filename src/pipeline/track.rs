@@ -38,7 +38,9 @@ pub struct Track {
 /// # Errors
 /// The file can not be read, or holds no attitude, or several and none named.
 pub fn read(path: &Path, topic: Option<&str>, pool: &Pool) -> Result<Track> {
-    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    let extension = path
+        .extension()
+        .map(|e| e.to_string_lossy().to_ascii_lowercase());
     let plain = |entries| Track {
         name: path.display().to_string(),
         entries,
@@ -56,14 +58,20 @@ fn from_mcap(path: &Path, topic: Option<&str>, pool: &Pool) -> Result<Track> {
     let known = attitude_channel(path, &log, topic)?;
     let decoder = known
         .decoder(&Options::default())
-        .map_err(|why| Error::Unsupported { path: path.to_owned(), what: why.to_string() })?;
+        .map_err(|why| Error::Unsupported {
+            path: path.to_owned(),
+            what: why.to_string(),
+        })?;
     let convention = orientation_convention(decoder.stated());
     let mut entries = Vec::new();
     let wanted = known.channel.clone();
     let reader = log.reader().map_or_else(|| mcap::Reader::open(path), Ok)?;
     let report = mcap::walk(
         reader,
-        &WalkOptions { pool: Some(pool.rayon()), ..WalkOptions::default() },
+        &WalkOptions {
+            pool: Some(pool.rayon()),
+            ..WalkOptions::default()
+        },
         |channel| {
             (channel.topic == wanted.topic && channel.id == wanted.id).then(|| Route {
                 decoder: Some(decoder.clone()),
@@ -78,7 +86,8 @@ fn from_mcap(path: &Path, topic: Option<&str>, pool: &Pool) -> Result<Track> {
             entries.extend(items.drain(..).filter_map(|item| match item {
                 Item::Reference(raw) => {
                     let stamp = raw.header.filter(|s| s.0 != 0).unwrap_or(raw.log);
-                    raw.orientation.map(|wxyz| (stamp, in_flu(convention, wxyz)))
+                    raw.orientation
+                        .map(|wxyz| (stamp, in_flu(convention, wxyz)))
                 }
                 _ => None,
             }));
@@ -101,13 +110,15 @@ fn in_flu(recorded: Convention, wxyz: [f64; 4]) -> [f64; 4] {
 /// The channel to take attitudes from: the one named, else the best kind of which there is just one.
 fn attitude_channel<'l>(path: &Path, log: &'l Log, topic: Option<&str>) -> Result<&'l Known> {
     if let Some(name) = topic {
-        return log.channels.iter().find(|k| k.channel.topic == name).ok_or_else(|| {
-            Error::NoSuchTopic {
+        return log
+            .channels
+            .iter()
+            .find(|k| k.channel.topic == name)
+            .ok_or_else(|| Error::NoSuchTopic {
                 path: path.to_owned(),
                 topic: name.to_owned(),
                 topics: topics::listing(&log.candidates()),
-            }
-        });
+            });
     }
     let mut all: Vec<(u8, &Known)> = log
         .channels
@@ -202,7 +213,11 @@ pub fn from_ndjson(path: &Path, id: Option<&str>) -> Result<Vec<Entry>> {
         number += 1;
         let read = std::io::Read::take(&mut reader, LINE_LIMIT)
             .read_until(b'\n', &mut line)
-            .map_err(|source| Error::Read { path: path.to_owned(), offset: number, source })?;
+            .map_err(|source| Error::Read {
+                path: path.to_owned(),
+                offset: number,
+                source,
+            })?;
         if read == 0 {
             return Ok(track);
         }
@@ -212,8 +227,8 @@ pub fn from_ndjson(path: &Path, id: Option<&str>) -> Result<Vec<Entry>> {
         if read as u64 == LINE_LIMIT {
             return Err(bad_line(path, number, "longer than 64 KiB"));
         }
-        let att: Att = serde_json::from_slice(&line)
-            .map_err(|e| bad_line(path, number, &e.to_string()))?;
+        let att: Att =
+            serde_json::from_slice(&line).map_err(|e| bad_line(path, number, &e.to_string()))?;
         if att.class != "ATT" || id.is_some_and(|id| id != att.id) {
             continue;
         }
@@ -222,14 +237,20 @@ pub fn from_ndjson(path: &Path, id: Option<&str>) -> Result<Vec<Entry>> {
                 return Err(bad_line(
                     path,
                     number,
-                    &format!("attitudes of both `{first}` and `{}`; --topic ID takes one", att.id),
+                    &format!(
+                        "attitudes of both `{first}` and `{}`; --topic ID takes one",
+                        att.id
+                    ),
                 ));
             }
             Some(_) => {}
             None => seen = Some(att.id.clone()),
         }
         if let (Some(stamp), Some(q)) = (att.stamp, att.q) {
-            track.push((Nanos::from_sec_nanosec(stamp.sec, stamp.nsec), [q.w, q.x, q.y, q.z]));
+            track.push((
+                Nanos::from_sec_nanosec(stamp.sec, stamp.nsec),
+                [q.w, q.x, q.y, q.z],
+            ));
         }
     }
 }
@@ -251,19 +272,25 @@ pub fn from_csv(path: &Path) -> Result<Vec<Entry>> {
     csv::Reader::from_reader(BufReader::new(open(path)?))
         .deserialize::<Row>()
         .map(|row| {
-            row.map(|r| (Nanos(r.stamp_ns), [r.w, r.x, r.y, r.z])).map_err(|e| Error::Unsupported {
-                path: path.to_owned(),
-                what: format!("{e}\n  help: columns stamp_ns,w,x,y,z are needed"),
-            })
+            row.map(|r| (Nanos(r.stamp_ns), [r.w, r.x, r.y, r.z]))
+                .map_err(|e| Error::Unsupported {
+                    path: path.to_owned(),
+                    what: format!("{e}\n  help: columns stamp_ns,w,x,y,z are needed"),
+                })
         })
         .collect()
 }
 
 fn open(path: &Path) -> Result<File> {
     if path.is_dir() {
-        return Err(Error::IsDirectory { path: path.to_owned() });
+        return Err(Error::IsDirectory {
+            path: path.to_owned(),
+        });
     }
-    File::open(path).map_err(|source| Error::Open { path: path.to_owned(), source })
+    File::open(path).map_err(|source| Error::Open {
+        path: path.to_owned(),
+        source,
+    })
 }
 
 fn bad_line(path: &Path, number: u64, what: &str) -> Error {

@@ -71,10 +71,9 @@ fn order8<const N: usize>(m: &Moments<N>) -> Triple<N> {
     let y = b0.cross(b3);
     let s = u.cross(b1);
     let r = b0.cross(u);
-    let deepest = w * (1.0 / 2520.0) + y * (1.0 / 840.0)
-        - b0.cross(v) * (1.0 / 2520.0)
-        - s * (1.0 / 2520.0)
-        + b0.cross(r) * (1.0 / 15120.0);
+    let deepest =
+        w * (1.0 / 2520.0) + y * (1.0 / 840.0) - b0.cross(v) * (1.0 / 2520.0) - s * (1.0 / 2520.0)
+            + b0.cross(r) * (1.0 / 15120.0);
     let inner = v * (1.0 / 60.0) - r * (1.0 / 360.0)
         + b1.cross(b3) * (1.0 / 210.0)
         + v.cross(b1) * (1.0 / 420.0)

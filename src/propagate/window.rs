@@ -53,8 +53,14 @@ pub(crate) enum Note {
 impl Step {
     /// A rotation vector where a turn is expected, for the method that sums vectors.
     pub(crate) fn of_vector(phi: Triple<1>) -> Self {
-        let turn = Turn { v: phi, ..Turn::NONE };
-        Step { angle: phi.norm(), ..Step::new(turn, Note::Ordinary) }
+        let turn = Turn {
+            v: phi,
+            ..Turn::NONE
+        };
+        Step {
+            angle: phi.norm(),
+            ..Step::new(turn, Note::Ordinary)
+        }
     }
 
     /// What this step has to say in the output at its end.
@@ -79,7 +85,7 @@ impl Step {
                 turn: turn.parts(),
                 angle,
                 gap_variance: 0.0,
-            gap_noise: 0.0,
+                gap_noise: 0.0,
                 note,
             };
         }
@@ -152,7 +158,10 @@ impl Plan {
         while k <= last {
             let path = self.path(track, k);
             let mut n = 1;
-            while n < GROUP && k + n <= last && path != Path::Careful && self.path(track, k + n) == path
+            while n < GROUP
+                && k + n <= last
+                && path != Path::Careful
+                && self.path(track, k + n) == path
             {
                 n += 1;
             }
@@ -224,7 +233,7 @@ impl Plan {
                     turn: turn.lane(i).parts(),
                     angle: angle.0[i],
                     gap_variance: 0.0,
-            gap_noise: 0.0,
+                    gap_noise: 0.0,
                     note: Note::Ordinary,
                 });
             } else if loud[i] {
@@ -253,7 +262,11 @@ impl Plan {
         let ends: [(i64, i64); N] = std::array::from_fn(|lane| {
             let k = k + lane;
             // Joined increments begin where the one before ended; beside a hole only `start` is right.
-            let from = if self.increments { track.start[k] } else { track.stamp[k - 1] };
+            let from = if self.increments {
+                track.start[k]
+            } else {
+                track.stamp[k - 1]
+            };
             (from, track.stamp[k])
         });
         let length: [i64; N] = ends.map(|(a, b)| b.saturating_sub(a));
@@ -299,9 +312,14 @@ impl Plan {
     fn careful(&self, track: &Track, k: usize) -> Step {
         let hole = self.increments && track.has_hole(k);
         let bridged = hole || track.bridged[k];
-        let missing = if bridged { self.missing(track, k, hole) } else { 0.0 };
+        let missing = if bridged {
+            self.missing(track, k, hole)
+        } else {
+            0.0
+        };
         let cap = if bridged {
-            self.window.min(bridge_window(missing) - usize::from(self.increments))
+            self.window
+                .min(bridge_window(missing) - usize::from(self.increments))
         } else {
             self.window
         };
@@ -321,7 +339,11 @@ impl Plan {
         let mut step = Step::new(turn, note);
         if step.note == Note::Bridged {
             let spread = 0.5 * change.min(std::f64::consts::PI);
-            step.gap_variance = if spread.is_finite() { spread * spread } else { 0.0 };
+            step.gap_variance = if spread.is_finite() {
+                spread * spread
+            } else {
+                0.0
+            };
             step.gap_noise = track.step(k) * bridge_noise(missing);
         }
         step
@@ -329,7 +351,8 @@ impl Plan {
 
     /// How many samples are missing in interval k, by the median spacing around it; 0.5 or more.
     fn missing(&self, track: &Track, k: usize, hole: bool) -> f64 {
-        let mut around: Vec<i64> = (k.saturating_sub(8).max(1)..(k + 1 + self.look_ahead).min(track.len()))
+        let mut around: Vec<i64> = (k.saturating_sub(8).max(1)
+            ..(k + 1 + self.look_ahead).min(track.len()))
             .filter(|&i| i != k && !track.bridged[i])
             .map(|i| track.stamp[i].saturating_sub(track.start[i].max(track.stamp[i - 1])))
             .filter(|&spacing| spacing > 0)
@@ -363,7 +386,11 @@ impl Plan {
         let mut best: Option<Settled> = None;
         let (mut before, mut last) = (f64::INFINITY, f64::INFINITY);
         let joined = !hole && (!self.increments || !self.beside_hole(track, k));
-        let cap = if joined { cap } else { cap.min(collocation::UNKNOWNS) };
+        let cap = if joined {
+            cap
+        } else {
+            cap.min(collocation::UNKNOWNS)
+        };
         let cap = self.place(track, k, cap.max(smallest), hole).1;
         let full = self.over(track, k, cap, hole);
         let mut sizes: Vec<usize> = (smallest..cap).step_by(2).collect();
@@ -372,7 +399,11 @@ impl Plan {
             return full;
         }
         for size in sizes {
-            let mut this = if size == cap { full } else { self.over(track, k, size, hole) };
+            let mut this = if size == cap {
+                full
+            } else {
+                self.over(track, k, size, hole)
+            };
             if let Some(best) = &best {
                 let change: f64 = (0..2)
                     .map(|j| (this.moments.b[j] - best.moments.b[j]).norm())
@@ -382,7 +413,10 @@ impl Plan {
                 if !(shrank && change.is_finite()) {
                     // What this size would have changed is what is not known.
                     let unknown = this.change;
-                    let best = Settled { change: best.change.max(unknown), ..*best };
+                    let best = Settled {
+                        change: best.change.max(unknown),
+                        ..*best
+                    };
                     return best;
                 }
                 (before, last) = (last, change);
@@ -504,6 +538,10 @@ fn small_angle<const N: usize>(turn: &Turn<N>) -> Lanes<N> {
     let angle = (s + s * sum) * 2.0;
     Lanes(std::array::from_fn(|i| {
         // Also false for a half angle beyond a quarter turn, where the cosine has lost more than it may.
-        if s2.0[i] <= 0.0625 && turn.c.0[i] > -0.5 { angle.0[i] } else { -1.0 }
+        if s2.0[i] <= 0.0625 && turn.c.0[i] > -0.5 {
+            angle.0[i]
+        } else {
+            -1.0
+        }
     }))
 }

@@ -147,13 +147,21 @@ impl RunSummary {
             );
         }
         if self.outputs.is_empty() {
-            line(&mut out, "wrote", "nothing: add -o attitude.mcap (or .ndjson, .csv, -)");
+            line(
+                &mut out,
+                "wrote",
+                "nothing: add -o attitude.mcap (or .ndjson, .csv, -)",
+            );
         }
         let speed = self.samples() as f64 / self.elapsed_secs.max(1e-9);
         line(
             &mut out,
             "took",
-            &format!("{:.3} s, {} samples/s", self.elapsed_secs, human_count(speed)),
+            &format!(
+                "{:.3} s, {} samples/s",
+                self.elapsed_secs,
+                human_count(speed)
+            ),
         );
         out
     }
@@ -193,7 +201,11 @@ impl TopicSummary {
                 self.clock
             ),
         );
-        line(out, "method", &format!("{}; {}", self.method, meaning(self.kind)));
+        line(
+            out,
+            "method",
+            &format!("{}; {}", self.method, meaning(self.kind)),
+        );
         line(
             out,
             "frames",
@@ -259,7 +271,11 @@ impl TopicSummary {
             .map(|a| a.median_deg)
             .fold(f64::INFINITY, f64::min);
         for row in &self.against {
-            let mark = if row.median_deg == best { "  <- best" } else { "" };
+            let mark = if row.median_deg == best {
+                "  <- best"
+            } else {
+                ""
+            };
             line(
                 out,
                 "",
@@ -276,7 +292,10 @@ impl TopicSummary {
             return format!("{} removed", self.bias_origin);
         }
         let [x, y, z] = self.bias;
-        format!("({x:.6}, {y:.6}, {z:.6}) rad/s removed, {}", self.bias_origin)
+        format!(
+            "({x:.6}, {y:.6}, {z:.6}) rad/s removed, {}",
+            self.bias_origin
+        )
     }
 
     fn lost_text(&self) -> String {
@@ -372,7 +391,9 @@ pub fn meaning(kind: SampleKind) -> &'static str {
     match kind {
         SampleKind::Rate => "a sample is the rate at its stamp",
         SampleKind::Average => "a sample is the mean rate over the interval ending at its stamp",
-        SampleKind::DeltaAngle => "a sample is the angle turned over the interval ending at its stamp",
+        SampleKind::DeltaAngle => {
+            "a sample is the angle turned over the interval ending at its stamp"
+        }
     }
 }
 
@@ -435,12 +456,18 @@ mod tests {
 
     #[test]
     fn a_run_that_lost_a_sample_or_held_a_gap_is_lossy() {
-        let mut run = RunSummary { topics: vec![TopicSummary::default()], ..RunSummary::default() };
+        let mut run = RunSummary {
+            topics: vec![TopicSummary::default()],
+            ..RunSummary::default()
+        };
         assert!(!run.is_lossy());
         if let Some(topic) = run.topics.first_mut() {
             topic.counts.add(Verdict::Repeated);
         }
-        assert!(!run.is_lossy(), "an exact repeat carries nothing that could be lost");
+        assert!(
+            !run.is_lossy(),
+            "an exact repeat carries nothing that could be lost"
+        );
         if let Some(topic) = run.topics.first_mut() {
             topic.counts.add(Verdict::NotFinite);
         }

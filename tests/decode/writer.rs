@@ -170,7 +170,8 @@ impl Proto {
     }
 
     fn key(mut self, number: u32, wire: u8) -> Self {
-        self.0.extend(Self::varint_bytes(u64::from(number) << 3 | u64::from(wire)));
+        self.0
+            .extend(Self::varint_bytes(u64::from(number) << 3 | u64::from(wire)));
         self
     }
 
@@ -225,7 +226,9 @@ impl Proto {
 
     /// A `FileDescriptorSet` of one file.
     pub fn file_set(package: &str, messages: Vec<Proto>) -> Vec<u8> {
-        let file = Proto::default().bytes(1, b"a.proto").bytes(2, package.as_bytes());
+        let file = Proto::default()
+            .bytes(1, b"a.proto")
+            .bytes(2, package.as_bytes());
         let file = messages.into_iter().fold(file, |w, m| w.message(4, m));
         Proto::default().message(1, file.bytes(12, b"proto3")).0
     }

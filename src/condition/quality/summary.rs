@@ -190,7 +190,7 @@ impl std::fmt::Display for Advice {
             ),
             Advice::StampsJitter { share } => write!(
                 f,
-                "stamps jitter by {:.0} % of the step (p99): if the sensor samples evenly, --regularise-stamps",
+                "stamps jitter by {:.0} % of the step (p99): if the sensor samples evenly, --time index --rate-hz HZ puts them on an even grid",
                 share * 100.0
             ),
             Advice::ClocksDrift { ppm } => write!(

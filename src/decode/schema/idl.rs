@@ -20,7 +20,10 @@ const MAX_DEPTH: usize = 32;
 /// A sentence: not IDL, too large, or without that struct.
 pub(crate) fn parse(text: &str, type_name: &str) -> Result<Schema, String> {
     if text.len() > MAX_TEXT {
-        return Err(format!("the schema text is {} bytes, over the limit of {MAX_TEXT}", text.len()));
+        return Err(format!(
+            "the schema text is {} bytes, over the limit of {MAX_TEXT}",
+            text.len()
+        ));
     }
     let mut parser = Parser {
         tokens: tokens(text),
@@ -32,7 +35,10 @@ pub(crate) fn parse(text: &str, type_name: &str) -> Result<Schema, String> {
     parser.items(0)?;
     let wanted = ros_name(type_name);
     let schema = parser.link();
-    let root = schema.structs.iter().rposition(|s| ros_name(&s.name) == wanted);
+    let root = schema
+        .structs
+        .iter()
+        .rposition(|s| ros_name(&s.name) == wanted);
     match root {
         Some(root) => Ok(Schema { root, ..schema }),
         None => Err("the schema text does not define this message".to_owned()),
@@ -52,7 +58,9 @@ fn tokens(text: &str) -> Vec<&str> {
             1
         } else if c.is_whitespace() {
             c.len_utf8()
-        } else if line_start && (c == '#' || c == '=' || rest.starts_with("IDL:")) || rest.starts_with("//") {
+        } else if line_start && (c == '#' || c == '=' || rest.starts_with("IDL:"))
+            || rest.starts_with("//")
+        {
             line
         } else if rest.starts_with("/*") {
             rest.find("*/").map_or(rest.len(), |end| end + 2)
@@ -148,17 +156,22 @@ impl<'a> Parser<'a> {
             return Ok(());
         }
         let found = super::super::printable(self.peek());
-        Err(format!("the schema is not IDL this program reads: expected `{token}`, found `{found}`"))
+        Err(format!(
+            "the schema is not IDL this program reads: expected `{token}`, found `{found}`"
+        ))
     }
 
     fn name(&mut self) -> Result<&'a str, String> {
         let name = self.next();
-        let proper = name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_') && name.len() <= 256;
+        let proper =
+            name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_') && name.len() <= 256;
         if proper {
             Ok(name)
         } else {
             let name = super::super::printable(name);
-            Err(format!("the schema is not IDL this program reads: expected a name, found `{name}`"))
+            Err(format!(
+                "the schema is not IDL this program reads: expected a name, found `{name}`"
+            ))
         }
     }
 
@@ -173,7 +186,9 @@ impl<'a> Parser<'a> {
 
     fn items(&mut self, depth: usize) -> Result<(), String> {
         if depth > MAX_DEPTH {
-            return Err(format!("the schema nests modules more than {MAX_DEPTH} deep"));
+            return Err(format!(
+                "the schema nests modules more than {MAX_DEPTH} deep"
+            ));
         }
         while self.at < self.tokens.len() && self.peek() != "}" {
             match self.peek() {
@@ -292,7 +307,9 @@ impl<'a> Parser<'a> {
                 let size = self.next();
                 self.expect("]")?;
                 // A constant's name gives no size here: what follows can not be found.
-                many = size.parse().map_or(Many::Array(u32::MAX), |n| product(many, n));
+                many = size
+                    .parse()
+                    .map_or(Many::Array(u32::MAX), |n| product(many, n));
             }
             list.push((name.to_owned(), nested(typed, many)));
             if self.take(";") {
@@ -345,8 +362,15 @@ impl<'a> Parser<'a> {
             text @ ("string" | "wstring") => {
                 self.at += 1;
                 self.bound()?;
-                let kind = if text == "string" { Kind::Text } else { Kind::WideText };
-                return Ok(Typed { written: known(kind), many: Many::One });
+                let kind = if text == "string" {
+                    Kind::Text
+                } else {
+                    Kind::WideText
+                };
+                return Ok(Typed {
+                    written: known(kind),
+                    many: Many::One,
+                });
             }
             "sequence" => {
                 self.at += 1;
@@ -361,12 +385,18 @@ impl<'a> Parser<'a> {
             "map" | "any" | "fixed" => {
                 self.at += 1;
                 self.bound()?;
-                return Ok(Typed { written: known(Kind::Undefined), many: Many::One });
+                return Ok(Typed {
+                    written: known(Kind::Undefined),
+                    many: Many::One,
+                });
             }
             _ => return self.scoped(),
         };
         self.at += 1;
-        Ok(Typed { written, many: Many::One })
+        Ok(Typed {
+            written,
+            many: Many::One,
+        })
     }
 
     /// `<...>`, gone over.
@@ -405,7 +435,12 @@ impl<'a> Parser<'a> {
                 .iter()
                 .map(|(name, typed)| {
                     let (kind, many) = self.resolve(typed, 0);
-                    Field { name: name.clone(), kind, many, number: 0 }
+                    Field {
+                        name: name.clone(),
+                        kind,
+                        many,
+                        number: 0,
+                    }
                 })
                 .collect(),
         });
@@ -431,7 +466,11 @@ impl<'a> Parser<'a> {
         // From the innermost module outwards.
         let mut scope = scope.as_str();
         let meaning = loop {
-            let full = if scope.is_empty() { name.clone() } else { format!("{scope}::{name}") };
+            let full = if scope.is_empty() {
+                name.clone()
+            } else {
+                format!("{scope}::{name}")
+            };
             if let Some(meaning) = self.names.get(&full) {
                 break Some(meaning);
             }
@@ -508,7 +547,11 @@ module geometry_msgs { module msg { struct Vector3 { double x, y; double z; }; }
     fn modules_typedefs_enums_and_annotations_are_read() {
         let schema = parse(IMU_LIKE, "my_msgs/msg/Reading").unwrap();
         let root = schema.get(schema.root).unwrap();
-        let shape: Vec<_> = root.fields.iter().map(|f| (f.name.as_str(), f.kind, f.many)).collect();
+        let shape: Vec<_> = root
+            .fields
+            .iter()
+            .map(|f| (f.name.as_str(), f.kind, f.many))
+            .collect();
         assert_eq!(
             shape,
             [
@@ -523,18 +566,42 @@ module geometry_msgs { module msg { struct Vector3 { double x, y; double z; }; }
                 ("maybe", Kind::Undefined, Many::One),
             ]
         );
-        let vector: Vec<_> = schema.get(1).unwrap().fields.iter().map(|f| f.name.as_str()).collect();
+        let vector: Vec<_> = schema
+            .get(1)
+            .unwrap()
+            .fields
+            .iter()
+            .map(|f| f.name.as_str())
+            .collect();
         assert_eq!(vector, ["x", "y", "z"]);
     }
 
     #[test]
     fn what_is_not_idl_ends_with_a_sentence() {
-        for text in ["", "struct", "struct A {", "struct A { long", "struct A { long x", "module m { struct A { 5 } }", "typedef sequence<", "@", "\"", "/*", "struct A { string<", "}"] {
+        for text in [
+            "",
+            "struct",
+            "struct A {",
+            "struct A { long",
+            "struct A { long x",
+            "module m { struct A { 5 } }",
+            "typedef sequence<",
+            "@",
+            "\"",
+            "/*",
+            "struct A { string<",
+            "}",
+        ] {
             assert!(parse(text, "a/A").is_err(), "{text}");
         }
         let circular = "typedef A B; typedef B A; struct C { A x; sequence<sequence<long>> y; };";
         let schema = parse(circular, "C").unwrap();
-        assert!(schema.structs[0].fields.iter().all(|f| f.kind == Kind::Undefined));
+        assert!(
+            schema.structs[0]
+                .fields
+                .iter()
+                .all(|f| f.kind == Kind::Undefined)
+        );
         let deep = format!("struct A {{ {}long x; }};", "sequence<".repeat(100_000));
         assert!(parse(&deep, "A").is_err());
     }

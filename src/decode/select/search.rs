@@ -538,9 +538,9 @@ fn stamp_in(
             Some(Meaning::Stamp { rank, unit }) => {
                 stamp_at(schema, &path, end, unit, depth).map(|stamp| (rank, stamp))
             }
-            Some(Meaning::Header) => depth.checked_sub(1).and_then(|depth| {
-                stamp_in(schema, &path, end.structure(schema)?, depth)
-            }),
+            Some(Meaning::Header) => depth
+                .checked_sub(1)
+                .and_then(|depth| stamp_in(schema, &path, end.structure(schema)?, depth)),
             _ => None,
         };
         if let Some(found) = found

@@ -1,0 +1,225 @@
+//! A log's topics of samples -> how good they are: statistics, rests, clocks. I/O.
+//!
+//! Apart from the replay because it integrates nothing: `info` (and later `check`) look before
+//! anyone leaps.
+
+use super::log::{Known, Log, described, rank};
+use super::pool::Pool;
+use super::preparation::{Resolved, RestPass};
+use super::route::{Item, Route};
+use super::topics::PICKED_UNNAMED;
+use crate::condition::quality::{Quality, QualitySummary};
+use crate::condition::stillness::{self, Limits, Rests};
+use crate::condition::{Clock, choose_clock};
+use crate::config::Plan;
+use crate::decode::{self, Options};
+use crate::error::{Error, Result};
+use crate::record::RawSample;
+use crate::source::mcap::{self, Survey, WalkOptions};
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::sync::Arc;
+
+/// One topic of samples, looked at.
+#[derive(Debug)]
+pub struct Looked {
+    /// Its name.
+    pub topic: String,
+    /// Type and encoding.
+    pub described: String,
+    /// The frame its first message names.
+    pub frame: String,
+    /// How its samples are understood by default.
+    pub resolved: Resolved,
+    /// Whether the format states the meaning of a sample.
+    pub kind_stated: bool,
+    /// Statistics.
+    pub quality: QualitySummary,
+    /// Rests, rad/s.
+    pub rests: Rests,
+    /// The bias they give.
+    pub bias: Option<stillness::BiasEstimate>,
+    /// Payloads that could not be decoded.
+    pub undecodable: u64,
+    /// The clock the statistics are on.
+    pub clock: Clock,
+    /// What was noticed about the clock.
+    pub clock_warning: Option<String>,
+}
+
+/// Samples that tell which clock moves.
+const FEW: usize = 512;
+
+/// A topic being looked at.
+struct Look {
+    topic: String,
+    described: String,
+    frame: String,
+    kind_stated: bool,
+    resolved: Resolved,
+    first: Vec<RawSample>,
+    clock: Option<(Clock, Option<String>)>,
+    quality: Quality,
+    rest: RestPass,
+    undecodable: u64,
+}
+
+impl Look {
+    fn take(&mut self, raw: &RawSample) -> std::result::Result<(), String> {
+        self.rest.push(std::slice::from_ref(raw))?;
+        if self.clock.is_some() {
+            self.quality.push(raw);
+            return Ok(());
+        }
+        self.first.push(*raw);
+        if self.first.len() >= FEW {
+            self.settle();
+        }
+        Ok(())
+    }
+
+    fn settle(&mut self) {
+        let (clock, warning) = choose_clock(&self.first, Clock::Header);
+        self.quality = Quality::new(clock);
+        self.first.drain(..).for_each(|raw| self.quality.push(&raw));
+        self.clock = Some((clock, warning.map(|w| w.to_string())));
+    }
+
+    fn finish(mut self) -> std::result::Result<Looked, String> {
+        if self.clock.is_none() {
+            self.settle();
+        }
+        let (clock, clock_warning) = self.clock.unwrap_or((Clock::Header, None));
+        let rests = self.rest.finish()?;
+        Ok(Looked {
+            topic: self.topic,
+            described: self.described,
+            frame: self.frame,
+            resolved: self.resolved,
+            kind_stated: self.kind_stated,
+            quality: self.quality.summary(),
+            bias: stillness::estimate_bias(&rests, &Limits::default()).ok(),
+            rests,
+            undecodable: self.undecodable,
+            clock,
+            clock_warning,
+        })
+    }
+}
+
+/// Decodes every topic of samples once. `named` is looked at too, though it may not obviously be an
+/// IMU's.
+///
+/// # Errors
+/// The log can not be read, or `named` not decoded.
+pub fn look(
+    path: &Path,
+    log: &Log,
+    named: Option<&str>,
+    options: &Options,
+    pool: &Pool,
+) -> Result<(Vec<Looked>, Survey)> {
+    let wanted =
+        |k: &&Known| rank(&k.role) >= PICKED_UNNAMED || named == Some(k.channel.topic.as_str());
+    let mut looks: Vec<Look> = Vec::new();
+    let mut decoders = Vec::new();
+    for known in log.channels.iter().filter(wanted) {
+        let decoder = match known.decoder(options) {
+            Ok(decoder) => decoder,
+            Err(why) if named.is_some() => {
+                return Err(Error::Unsupported {
+                    path: path.to_owned(),
+                    what: why.to_string(),
+                });
+            }
+            Err(why) => {
+                tracing::warn!("{why}");
+                continue;
+            }
+        };
+        let stream = match looks.iter().position(|l| l.topic == known.channel.topic) {
+            Some(stream) => stream,
+            None => {
+                looks.push(begin(known, &decoder));
+                looks.len() - 1
+            }
+        };
+        decoders.push((known.channel.clone(), stream, decoder));
+    }
+    let mut failure = None;
+    let reader = log.reader().map_or_else(|| mcap::Reader::open(path), Ok)?;
+    let report = mcap::walk(
+        reader,
+        &WalkOptions {
+            pool: Some(pool.rayon()),
+            ..WalkOptions::default()
+        },
+        |channel| {
+            let (_, stream, decoder) = decoders
+                .iter()
+                .find(|(known, ..)| known.id == channel.id && known.topic == channel.topic)?;
+            Some(Route {
+                decoder: Some(decoder.clone()),
+                stream: *stream,
+                is_reference: false,
+                copied: None,
+                noticed: Arc::default(),
+            })
+        },
+        Route::map,
+        |items| {
+            for item in items.drain(..) {
+                let result = match item {
+                    Item::Sample(stream, raw) => {
+                        looks.get_mut(stream).map_or(Ok(()), |look| look.take(&raw))
+                    }
+                    Item::Undecodable(stream, _) => {
+                        if let Some(look) = looks.get_mut(stream) {
+                            look.undecodable += 1;
+                        }
+                        Ok(())
+                    }
+                    Item::Reference(_) | Item::Copy(_) => Ok(()),
+                };
+                if let Err(what) = result {
+                    failure = Some(what);
+                    return ControlFlow::Break(());
+                }
+            }
+            ControlFlow::Continue(())
+        },
+    )?;
+    let unsupported = |what| Error::Unsupported {
+        path: path.to_owned(),
+        what,
+    };
+    if let Some(what) = failure {
+        return Err(unsupported(what));
+    }
+    let looked = looks
+        .into_iter()
+        .map(|look| look.finish().map_err(unsupported))
+        .collect::<Result<Vec<_>>>()?;
+    Ok((looked, report.survey))
+}
+
+fn begin(known: &Known, decoder: &decode::Decoder) -> Look {
+    let plan = Plan::default();
+    let resolved = Resolved::new(&plan, decoder.stated());
+    Look {
+        topic: known.channel.topic.clone(),
+        described: described(&known.channel),
+        frame: known
+            .first
+            .as_ref()
+            .and_then(|(_, payload)| decoder.frame_id(payload))
+            .unwrap_or_default(),
+        kind_stated: decoder.stated().sample_kind.is_some(),
+        first: Vec::new(),
+        clock: None,
+        quality: Quality::new(Clock::Header),
+        rest: RestPass::new(&plan, &resolved),
+        resolved,
+        undecodable: 0,
+    }
+}

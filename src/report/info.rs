@@ -1,0 +1,442 @@
+//! What `info` found -> text or JSON. Pure.
+
+use super::summary::{human_bytes, significant};
+use crate::pipeline::log::{Known, described, rank};
+use crate::pipeline::look::Looked;
+use crate::record::Nanos;
+use crate::source::mcap::Survey;
+use serde_json::{Value, json};
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// Most other topics that are listed.
+const OTHERS: usize = 40;
+
+/// Everything `info` knows.
+#[derive(Clone, Debug)]
+pub struct Report<'a> {
+    /// The file.
+    pub path: &'a Path,
+    /// What is in it.
+    pub survey: &'a Survey,
+    /// What is wrong with it.
+    pub problems: Vec<String>,
+    /// Its channels.
+    pub channels: &'a [Known],
+    /// Its topics of samples.
+    pub looked: &'a [Looked],
+}
+
+impl Report<'_> {
+    /// For people.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let mut out = String::new();
+        self.write_file(&mut out);
+        for looked in self.looked {
+            write_topic(looked, &mut out);
+        }
+        self.write_others(&mut out);
+        for problem in &self.problems {
+            let _ = writeln!(out, "problem   {problem}");
+        }
+        let _ = writeln!(out, "next      {}", self.next());
+        out
+    }
+
+    fn write_file(&self, out: &mut String) {
+        let survey = self.survey;
+        let size = survey.file_size.map_or_else(String::new, human_bytes);
+        let profile = match survey.facts.profile.as_str() {
+            "" => String::new(),
+            name => format!("  profile {}", crate::decode::printable(name)),
+        };
+        let _ = write!(out, "file      {}  {size}{profile}", self.path.display());
+        if let Some((first, last)) = survey.times {
+            let secs = last.saturating_sub(first) as f64 * 1e-9;
+            let _ = write!(out, "  {}", duration(secs));
+            if let Some(date) = date(first) {
+                let _ = write!(out, "  {date}");
+            }
+        }
+        let _ = writeln!(out);
+        let chunks: Vec<String> = survey
+            .facts
+            .chunks
+            .iter()
+            .map(|(how, n)| format!("{n} {}", how.name()))
+            .collect();
+        let _ = writeln!(
+            out,
+            "          {} messages on {} topics; {}{}{}",
+            survey.messages,
+            survey.channels.len(),
+            if chunks.is_empty() {
+                "no chunks".to_owned()
+            } else {
+                format!("chunks: {}", chunks.join(", "))
+            },
+            if survey.has_summary {
+                ""
+            } else {
+                "; no summary section"
+            },
+            match crate::decode::printable(&survey.facts.library).as_str() {
+                "" => String::new(),
+                library => format!("; written by {library}"),
+            }
+        );
+    }
+
+    fn write_others(&self, out: &mut String) {
+        let others: Vec<&Known> = self
+            .channels
+            .iter()
+            .filter(|k| !self.looked.iter().any(|l| l.topic == k.channel.topic))
+            .collect();
+        for known in others.iter().take(OTHERS) {
+            let what = match (rank(&known.role), known.role.has_orientation) {
+                (1.., _) => "  (carries a rate: --topic takes it)",
+                (_, true) => "  (carries an orientation: compare takes it)",
+                _ => "",
+            };
+            let _ = writeln!(
+                out,
+                "{}  {}  {} messages{what}",
+                crate::decode::printable(&known.channel.topic),
+                described(&known.channel),
+                known.messages
+            );
+        }
+        if others.len() > OTHERS {
+            let _ = writeln!(out, "... and {} more topics", others.len() - OTHERS);
+        }
+    }
+
+    /// The command to run next, with the flags this log needs.
+    fn next(&self) -> String {
+        let file = self.path.display();
+        let best = match self.looked {
+            [] => {
+                return format!(
+                    "no IMU topic here; strapd replay {file} --topic NAME --field gyro=PATH names a rate in any message"
+                );
+            }
+            [one] => one,
+            several => {
+                let of = |l: &Looked| {
+                    self.channels
+                        .iter()
+                        .find(|k| k.channel.topic == l.topic)
+                        .map_or(0, |k| rank(&k.role))
+                };
+                let best = several.iter().map(of).max().unwrap_or(0);
+                let mut likely = several.iter().filter(|l| of(l) == best);
+                match (likely.next(), likely.next()) {
+                    (Some(one), None) => one,
+                    (first, _) => {
+                        return format!(
+                            "strapd replay {file} --topic {} -o attitude.mcap   (or another topic, or all)",
+                            first.map_or_else(String::new, |l| crate::decode::printable(&l.topic))
+                        );
+                    }
+                }
+            }
+        };
+        let mut flags = String::new();
+        let advice = &best.quality.advice;
+        use crate::condition::quality::Advice;
+        if advice
+            .iter()
+            .any(|a| matches!(a, Advice::RatesLookLikeDegrees { .. }))
+        {
+            flags.push_str(" --gyro-unit deg");
+        }
+        if best.bias.is_some() {
+            flags.push_str(" --bias auto");
+            let from_start =
+                best.rests
+                    .kept
+                    .first()
+                    .zip(best.rests.first)
+                    .is_some_and(|(rest, first)| {
+                        rest.mean_accel.is_some() && rest.start.secs_since(first) < 1.0
+                    });
+            if from_start {
+                flags.push_str(" --init gravity");
+            }
+        }
+        if best.quality.with_orientation > 0 {
+            flags.push_str(" --against-recorded");
+        }
+        format!("strapd replay {file} -o attitude.mcap{flags}")
+    }
+
+    /// For machines: one object.
+    #[must_use]
+    pub fn json(&self) -> Value {
+        let survey = self.survey;
+        json!({
+            "file": self.path.display().to_string(),
+            "bytes": survey.file_size,
+            "profile": survey.facts.profile,
+            "library": survey.facts.library,
+            "messages": survey.messages,
+            "log_time_ns": survey.times.map(|(a, b)| json!({ "first": a.to_string(), "last": b.to_string() })),
+            "has_summary": survey.has_summary,
+            "chunks": survey.facts.chunks.iter()
+                .map(|(how, n)| (how.name().to_owned(), json!(n)))
+                .collect::<serde_json::Map<_, _>>(),
+            "metadata_records": survey.facts.metadata,
+            "attachments": survey.facts.attachments,
+            "problems": self.problems,
+            "topics": self.channels.iter().map(|k| json!({
+                "topic": k.channel.topic,
+                "type": k.channel.schema.as_deref().map(|s| s.name.as_str()),
+                "message_encoding": k.channel.message_encoding,
+                "messages": k.messages,
+                "carries_rate": k.role.has_rate,
+                "carries_orientation": k.role.has_orientation,
+            })).collect::<Vec<_>>(),
+            "imu": self.looked.iter().map(topic_json).collect::<Vec<_>>(),
+            "next": self.next(),
+        })
+    }
+}
+
+fn write_topic(looked: &Looked, out: &mut String) {
+    let q = &looked.quality;
+    let _ = write!(
+        out,
+        "{}  {}  {} samples",
+        crate::decode::printable(&looked.topic),
+        looked.described,
+        q.count
+    );
+    if let Some(spacing) = &q.spacing {
+        let _ = write!(
+            out,
+            "  {} Hz  jitter p99 {} ms",
+            significant(spacing.rate_hz, 5),
+            significant(spacing.jitter_p99_secs * 1e3, 2)
+        );
+    }
+    let _ = writeln!(
+        out,
+        "  gaps {}  dup {}  disorder {}",
+        q.gaps, q.duplicates, q.disorder
+    );
+    let frame = if looked.frame.is_empty() {
+        "unnamed"
+    } else {
+        &looked.frame
+    };
+    let _ = write!(out, "   frame {frame}, input {}", looked.resolved.body);
+    if let (Some(g), Some(axis)) = (q.accel_at_rest, q.gravity) {
+        let _ = write!(
+            out,
+            "; gravity {} on {axis} when quietest",
+            significant(g, 4)
+        );
+    }
+    let peak = q
+        .axes
+        .iter()
+        .map(|a| a.max.abs().max(a.min.abs()))
+        .fold(0.0, f64::max);
+    let _ = writeln!(
+        out,
+        "; largest rate {} {}/s",
+        significant(peak, 4),
+        looked.resolved.unit.name()
+    );
+    if let Some(offset) = &q.offset {
+        let _ = writeln!(
+            out,
+            "   header - log time: mean {} ms, {} to {} ms, drift {} ppm; {} clock",
+            significant(offset.mean_secs * 1e3, 3),
+            significant(offset.min_secs * 1e3, 3),
+            significant(offset.max_secs * 1e3, 3),
+            significant(offset.drift_ppm, 2),
+            looked.clock.name()
+        );
+    }
+    let _ = writeln!(
+        out,
+        "   orientation: {}; a sample is taken as {}{}",
+        match q.with_orientation {
+            0 => "none".to_owned(),
+            n if n == q.count => "in every message".to_owned(),
+            n => format!("in {n} messages"),
+        },
+        looked.resolved.kind.name(),
+        if looked.kind_stated {
+            " (stated by the format)"
+        } else {
+            " (--sample-kind)"
+        }
+    );
+    match (&looked.bias, looked.rests.kept.first(), looked.rests.first) {
+        (Some(bias), Some(rest), Some(first)) => {
+            let [x, y, z]: [f64; 3] = bias.bias.into();
+            let _ = writeln!(
+                out,
+                "   rest {:.1} to {:.1} s{}: bias ({x:.5}, {y:.5}, {z:.5}) +- {:.1e} rad/s",
+                rest.start.secs_since(first),
+                rest.end.secs_since(first),
+                match looked.rests.count {
+                    0 | 1 => String::new(),
+                    n => format!(" and {} more", n - 1),
+                },
+                bias.sigma.max()
+            );
+        }
+        _ => {
+            let _ = writeln!(out, "   rest: none found");
+        }
+    }
+    for bad in bad_counts(looked) {
+        let _ = writeln!(out, "   {bad}");
+    }
+    for advice in &q.advice {
+        let _ = writeln!(out, "   note: {advice}");
+    }
+    if let Some(warning) = &looked.clock_warning {
+        let _ = writeln!(out, "   note: {warning}");
+    }
+}
+
+fn bad_counts(looked: &Looked) -> Vec<String> {
+    let q = &looked.quality;
+    [
+        (looked.undecodable, "payloads can not be decoded"),
+        (q.not_finite, "samples have NaN or infinity in the gyro"),
+        (q.no_gyro, "samples mark their gyro as absent"),
+        (q.no_stamp, "samples have no stamp"),
+        (
+            q.collisions,
+            "samples share their stamp with another, with other data",
+        ),
+        (q.zero_rows, "samples are exactly zero"),
+        (
+            q.accel_not_finite,
+            "samples have NaN or infinity in the acceleration",
+        ),
+    ]
+    .into_iter()
+    .filter(|(n, _)| *n > 0)
+    .map(|(n, what)| format!("{n} {what}"))
+    .collect()
+}
+
+fn topic_json(looked: &Looked) -> Value {
+    let q = &looked.quality;
+    json!({
+        "topic": looked.topic,
+        "decoded_as": looked.described,
+        "frame_id": looked.frame,
+        "samples": q.count,
+        "duration_s": q.duration_secs,
+        "clock": looked.clock.name(),
+        "rate_hz": q.spacing.map(|s| s.rate_hz),
+        "jitter_p50_s": q.spacing.map(|s| s.jitter_p50_secs),
+        "jitter_p99_s": q.spacing.map(|s| s.jitter_p99_secs),
+        "jitter_max_s": q.spacing.map(|s| s.jitter_max_secs),
+        "gaps": q.gaps,
+        "missing": q.missing,
+        "longest_gap_s": q.longest_gap_secs,
+        "duplicates": q.duplicates,
+        "collisions": q.collisions,
+        "disorder": q.disorder,
+        "undecodable": looked.undecodable,
+        "not_finite": q.not_finite,
+        "no_gyro": q.no_gyro,
+        "no_stamp": q.no_stamp,
+        "with_orientation": q.with_orientation,
+        "with_accel": q.with_accel,
+        "header_minus_log_s": q.offset.map(|o| json!({
+            "mean": o.mean_secs, "min": o.min_secs, "max": o.max_secs, "drift_ppm": o.drift_ppm })),
+        "gyro": q.axes.iter().map(|a| json!({
+            "min": a.min, "max": a.max, "mean": a.mean, "rms": a.rms })).collect::<Vec<_>>(),
+        "gravity": q.gravity.map(|g| g.to_string()),
+        "accel_when_quietest": q.accel_at_rest,
+        "sample_kind": looked.resolved.kind.name(),
+        "sample_kind_stated": looked.kind_stated,
+        "gyro_unit": looked.resolved.unit.name(),
+        "input_axes": looked.resolved.body.to_string(),
+        "rests": looked.rests.kept.iter().take(100).map(|r| json!({
+            "start_s": looked.rests.first.map(|f| r.start.secs_since(f)),
+            "secs": r.secs(),
+            "mean_rate": { "x": r.mean_rate.x, "y": r.mean_rate.y, "z": r.mean_rate.z },
+        })).collect::<Vec<_>>(),
+        "bias": looked.bias.map(|b| json!({
+            "x": b.bias.x, "y": b.bias.y, "z": b.bias.z, "sigma": b.sigma.max(), "rest_s": b.secs })),
+        "notes": q.advice.iter().map(ToString::to_string)
+            .chain(looked.clock_warning.clone()).collect::<Vec<_>>(),
+    })
+}
+
+/// `1 h 2 min 3 s`, or seconds with decimals below a minute.
+fn duration(secs: f64) -> String {
+    if secs < 60.0 {
+        return format!("{secs:.3} s");
+    }
+    let whole = secs.round() as u64;
+    let (hours, minutes, seconds) = (whole / 3600, whole / 60 % 60, whole % 60);
+    match hours {
+        0 => format!("{minutes} min {seconds} s"),
+        _ => format!("{hours} h {minutes} min {seconds} s"),
+    }
+}
+
+/// RFC 3339 in UTC when the clock can be Unix time (after 2000), else `None`: a boot clock has no
+/// date. Days to date after Hinnant, "chrono-compatible low-level date algorithms", 2013.
+fn date(unix_nanos: u64) -> Option<String> {
+    const Y2000: i64 = 946_684_800;
+    let stamp = Nanos(i64::try_from(unix_nanos).ok()?);
+    let (secs, _) = stamp.to_sec_nanosec();
+    if secs < Y2000 {
+        return None;
+    }
+    let days = secs.div_euclid(86_400) + 719_468;
+    let era = days.div_euclid(146_097);
+    let day_of_era = days.rem_euclid(146_097);
+    let year_of_era =
+        (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let shifted_month = (5 * day_of_year + 2) / 153;
+    let day = day_of_year - (153 * shifted_month + 2) / 5 + 1;
+    let month = if shifted_month < 10 {
+        shifted_month + 3
+    } else {
+        shifted_month - 9
+    };
+    let year = year_of_era + era * 400 + i64::from(month <= 2);
+    let second = secs.rem_euclid(86_400);
+    Some(format!(
+        "{year:04}-{month:02}-{day:02}T{:02}:{:02}:{:02}Z",
+        second / 3600,
+        second / 60 % 60,
+        second % 60
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dates_are_those_of_the_calendar() {
+        let at = |secs: u64| date(secs * 1_000_000_000);
+        assert_eq!(at(1_700_000_000).as_deref(), Some("2023-11-14T22:13:20Z"));
+        assert_eq!(at(951_782_400).as_deref(), Some("2000-02-29T00:00:00Z"));
+        assert_eq!(at(4_102_444_799).as_deref(), Some("2099-12-31T23:59:59Z"));
+        assert_eq!(at(12_345), None, "a boot clock has no date");
+    }
+
+    #[test]
+    fn durations_read_well() {
+        assert_eq!(duration(1.25), "1.250 s");
+        assert_eq!(duration(3725.0), "1 h 2 min 5 s");
+    }
+}
