@@ -361,6 +361,54 @@ fn ndjson_numbers_each_stream_by_itself_and_keeps_every_bit() {
 }
 
 #[test]
+fn two_streams_share_an_mcap_and_keep_their_channels_and_frames() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("two.mcap");
+    let streams = [
+        Stream::new("/left/imu/data_raw", "left"),
+        Stream::new("/right/imu", "right"),
+    ];
+    let (samples, pool) = (samples(100), pool(2));
+    let mut sink = Sink::create(
+        &target(&path),
+        &[],
+        Options::default(),
+        &streams,
+        &provenance(),
+    )
+    .unwrap();
+    for stream in 0..2 {
+        let part = &samples[stream * 10..];
+        assert_eq!(sink.write(stream, part, &pool).unwrap(), Flow::Continue);
+    }
+    sink.finish().unwrap();
+    let bytes = fs::read(&path).unwrap();
+    let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+    let topics: BTreeMap<u16, &str> = summary
+        .channels
+        .iter()
+        .map(|(id, c)| (*id, c.topic.as_str()))
+        .collect();
+    let expected = [
+        (1, "/left/imu/data"),
+        (2, "/right/imu/attitude"),
+        (3, "/tf"),
+    ];
+    assert_eq!(topics, BTreeMap::from(expected));
+    let (messages, _) = read_checked(&bytes);
+    let holding = |channel: u16, name: &[u8]| {
+        messages
+            .iter()
+            .filter(|(h, data)| {
+                h.channel_id == channel && data.windows(name.len()).any(|w| w == name)
+            })
+            .count()
+    };
+    assert_eq!([holding(1, b"left\0"), holding(2, b"right\0")], [100, 90]);
+    assert_eq!([holding(3, b"left\0"), holding(3, b"right\0")], [100, 90]);
+}
+
+#[test]
 fn several_topics_do_not_fit_into_a_csv_and_the_message_says_what_does() {
     let streams = [Stream::new("/a", "fa"), Stream::new("/b", "fb")];
     let dir = tempfile::tempdir().unwrap();
@@ -479,13 +527,14 @@ fn flush_brings_the_pending_samples_out() {
             .unwrap()
             .success()
     );
+    let (sender, received) = std::sync::mpsc::channel();
     let reader = std::thread::spawn({
         let fifo = fifo.clone();
         move || {
             let mut line = String::new();
             let mut file = std::io::BufReader::new(fs::File::open(fifo).unwrap());
             std::io::BufRead::read_line(&mut file, &mut line).unwrap();
-            line
+            sender.send(line).unwrap();
         }
     });
     let pool = pool(1);
@@ -499,8 +548,12 @@ fn flush_brings_the_pending_samples_out() {
     .unwrap();
     assert_eq!(sink.write(0, &samples(1), &pool).unwrap(), Flow::Continue);
     assert_eq!(sink.flush(&pool).unwrap(), Flow::Continue);
-    // Joins only if the line has come although the sink is still open.
-    assert!(reader.join().unwrap().starts_with("{\"class\":\"ATT\""));
+    // The line comes although the sink is still open. Ten seconds: for a machine that is busy.
+    let line = received
+        .recv_timeout(std::time::Duration::from_secs(10))
+        .unwrap();
+    assert!(line.starts_with("{\"class\":\"ATT\""));
+    reader.join().unwrap();
     // The reader is gone now: quiet end.
     let more = samples(20_000);
     assert_eq!(sink.write(0, &more, &pool).unwrap(), Flow::Closed);
