@@ -119,7 +119,7 @@ pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
             });
         match result {
             Ok(summary) => {
-                if summary.is_lossy() && outcome == Outcome::Done {
+                if summary.is_lossy() && !summary.closed && outcome == Outcome::Done {
                     outcome = Outcome::Lossy;
                 }
                 say(global, args, &summary)?;
@@ -193,7 +193,8 @@ impl Replay {
 
 /// The text summary: on stdout, or on stderr when the data or JSON is there.
 fn say(global: &Global, args: &Replay, summary: &RunSummary) -> Result<()> {
-    if global.quiet {
+    // A reader that has had enough (`| head`) is no occasion for words.
+    if global.quiet || summary.closed {
         return Ok(());
     }
     if global.json || writes_stdout(args) {

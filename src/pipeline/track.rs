@@ -11,7 +11,7 @@ use super::topics;
 use crate::decode::{Options, Role};
 use crate::error::{Error, Result};
 use crate::model::attitude::Quaternion;
-use crate::model::frames::{Body, Convention, Nav};
+use crate::model::frames::{Body, Convention, Nav, World};
 use crate::record::Nanos;
 use crate::source::mcap::{self, WalkOptions};
 use serde::Deserialize;
@@ -99,6 +99,15 @@ fn from_mcap(path: &Path, topic: Option<&str>, pool: &Pool) -> Result<Track> {
         entries,
         problems: problems(&report.survey),
     })
+}
+
+/// The convention behind our own `world` label; `start` and what is not known are taken as ENU, FLU.
+fn convention_of(world: &str) -> Convention {
+    world
+        .parse::<World>()
+        .ok()
+        .and_then(World::convention)
+        .unwrap_or(Convention::EnuFlu)
 }
 
 /// What is no rotation stays what it is, to be counted by the comparison.
@@ -193,6 +202,8 @@ struct Att {
     class: String,
     #[serde(default)]
     id: String,
+    #[serde(default)]
+    world: String,
     stamp: Option<Stamp>,
     q: Option<Q>,
 }
@@ -247,10 +258,8 @@ pub fn from_ndjson(path: &Path, id: Option<&str>) -> Result<Vec<Entry>> {
             None => seen = Some(att.id.clone()),
         }
         if let (Some(stamp), Some(q)) = (att.stamp, att.q) {
-            track.push((
-                Nanos::from_sec_nanosec(stamp.sec, stamp.nsec),
-                [q.w, q.x, q.y, q.z],
-            ));
+            let wxyz = in_flu(convention_of(&att.world), [q.w, q.x, q.y, q.z]);
+            track.push((Nanos::from_sec_nanosec(stamp.sec, stamp.nsec), wxyz));
         }
     }
 }

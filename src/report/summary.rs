@@ -108,6 +108,8 @@ pub struct RunSummary {
     pub file_problems: Vec<String>,
     /// How many of them lost data.
     pub file_losses: u64,
+    /// Whether the reader of an output had enough before the end.
+    pub closed: bool,
     /// Wall seconds.
     pub elapsed_secs: f64,
 }
