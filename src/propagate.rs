@@ -39,3 +39,6 @@ pub use method::{LARGEST_WINDOW, Method, Order, Placement, UnknownName};
 pub use propagator::{Propagator, Settings, SettingsError};
 pub use report::Report;
 pub use sigma::Noise;
+
+#[cfg(test)]
+mod tests;

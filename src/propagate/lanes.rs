@@ -26,6 +26,11 @@ impl<const N: usize> Lanes<N> {
     }
 
     #[inline(always)]
+    pub(crate) fn abs(self) -> Self {
+        Lanes(from_fn(|i| self.0[i].abs()))
+    }
+
+    #[inline(always)]
     pub(crate) fn recip(self) -> Self {
         Lanes(from_fn(|i| 1.0 / self.0[i]))
     }
@@ -98,6 +103,12 @@ impl<const N: usize> Triple<N> {
     #[inline(always)]
     pub(crate) fn norm_squared(self) -> Lanes<N> {
         self.x * self.x + self.y * self.y + self.z * self.z
+    }
+
+    /// A size not below the norm, and cheaper: the sum of the components' sizes.
+    #[inline(always)]
+    pub(crate) fn size(self) -> Lanes<N> {
+        self.x.abs() + self.y.abs() + self.z.abs()
     }
 
     /// Each vector times its own lane's number.

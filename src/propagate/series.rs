@@ -5,13 +5,18 @@
 //! cancellation on coarse data (`attitude.md` 3).
 
 use super::lanes::Triple;
-use super::magnus::{MOMENTS, Moments};
+use super::magnus::{MOMENTS, Moments, halves};
 use super::turn::Turn;
 
 /// Sum of `|b_j|` beyond which neither samples nor series mean anything: more than a turn in one step.
-const HOPELESS: f64 = 6.0;
-/// The terms fall like (HOPELESS/2)^k / k!; 80 are beyond the last bit with room to spare.
-const TERMS: usize = 80;
+const HOPELESS: f64 = 8.0;
+/// Sum of the polynomial's coefficients, half turns, up to which the series loses no digit to
+/// cancellation; beyond, the interval is halved.
+const MILD: f64 = 1.0;
+/// Halvings at most: a b_8 of size [`HOPELESS`] needs four.
+const DEPTH: u32 = 6;
+/// A rate that is all x^8 adds a power (MILD/9)^n / n! only with every ninth term: n = 11 is the last bit.
+const TERMS: usize = 104;
 
 /// Coefficients of x^s in P_j, row j.
 const LEGENDRE: [[f64; MOMENTS]; MOMENTS] = [
@@ -43,16 +48,34 @@ const LEGENDRE: [[f64; MOMENTS]; MOMENTS] = [
 /// A few units in the last place of the largest component of the turn's vector part.
 pub(crate) fn turn(m: &Moments<1>) -> Turn<1> {
     let size: f64 = m.b.iter().map(|b| b.norm()).sum();
-    // Also true for NaN, which then shows in the result and is refused by the caller.
-    if !(size <= HOPELESS) {
-        return Turn::exp(m.b[0]);
+    // NaN is not small either; it then shows in the result and is refused by the caller.
+    if size <= HOPELESS {
+        divided(m, DEPTH)
+    } else {
+        Turn::exp(m.b[0])
     }
+}
+
+fn divided(m: &Moments<1>, depth: u32) -> Turn<1> {
     let mut rate = [Triple::ZERO; MOMENTS];
     for j in (0..m.live).rev() {
         for s in 0..=j {
             rate[s] = rate[s] + m.b[j] * (0.5 * LEGENDRE[j][s]);
         }
     }
+    let size: f64 = rate.iter().map(|w| w.norm()).sum();
+    if size <= MILD {
+        return summed(&rate, m.live, size);
+    }
+    if depth == 0 {
+        return Turn::exp(m.b[0]);
+    }
+    let (first, second) = halves(m);
+    divided(&first, depth - 1).then(divided(&second, depth - 1))
+}
+
+/// `Q' = 1/2 Q w(x)`, coefficient by coefficient.
+fn summed(rate: &[Triple<1>; MOMENTS], live: usize, size: f64) -> Turn<1> {
     let mut w = [0.0; TERMS];
     let mut v = [Triple::ZERO; TERMS];
     w[0] = 1.0;
@@ -61,7 +84,7 @@ pub(crate) fn turn(m: &Moments<1>) -> Turn<1> {
     let mut quiet = 0;
     for k in 0..TERMS - 1 {
         let (mut next_w, mut next_v) = (0.0, Triple::<1>::ZERO);
-        for s in 0..m.live.min(k + 1) {
+        for s in 0..live.min(k + 1) {
             let (qw, qv) = (w[k - s], v[k - s]);
             next_w -= qv.x.0[0] * rate[s].x.0[0]
                 + qv.y.0[0] * rate[s].y.0[0]
@@ -80,7 +103,7 @@ pub(crate) fn turn(m: &Moments<1>) -> Turn<1> {
         // The recurrence looks back `live` terms: only that many small ones in a row end it.
         let small = w[k + 1].abs() + v[k + 1].norm() < 1e-18 * size;
         quiet = if small { quiet + 1 } else { 0 };
-        if quiet > m.live {
+        if quiet > live {
             break;
         }
     }

@@ -54,6 +54,16 @@ impl<const N: usize> Turn<N> {
         turn
     }
 
+    #[inline(always)]
+    pub(crate) fn set(&mut self, i: usize, turn: Turn<1>) {
+        let [c, x, y, z] = turn.parts();
+        self.c.0[i] = c;
+        self.v.x.0[i] = x;
+        self.v.y.0[i] = y;
+        self.v.z.0[i] = z;
+    }
+
+    #[inline(always)]
     pub(crate) fn lane(self, i: usize) -> Turn<1> {
         Turn {
             c: Lanes([self.c.0[i]]),
