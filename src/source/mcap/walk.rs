@@ -25,8 +25,12 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, Sender, channel};
 
-/// Most blocks on their way at once.
-const BLOCKS: usize = 256;
+/// Blocks on their way for each thread: enough that none waits, few enough that what one
+/// thread wrote is still in a cache when another reads it (measured: 6 blocks of 1 MiB beat 24
+/// by a tenth).
+const BLOCKS_PER_THREAD: usize = 3;
+/// ... but small blocks may be many, up to this much together.
+const SMALL: usize = 1 << 20;
 
 /// How a walk uses the machine. None of it changes what is delivered.
 #[derive(Clone, Copy, Debug)]
@@ -45,7 +49,7 @@ impl Default for WalkOptions<'_> {
     fn default() -> Self {
         WalkOptions {
             pool: None,
-            in_flight: 24 << 20,
+            in_flight: 32 << 20,
             lookahead: Lookahead::default(),
         }
     }
@@ -126,7 +130,7 @@ where
         Some(pool) => pool.in_place_scope(|scope| {
             let shared = &shared;
             let mut spawn = |ticket: Ticket<T>| scope.spawn(move |_| ticket.redeem(shared));
-            let flow = course.with_pool(options.in_flight, is_stream, &mut spawn);
+            let flow = course.with_pool(pool.current_num_threads(), options.in_flight, is_stream, &mut spawn);
             shared.cancelled.store(true, Ordering::Relaxed);
             flow
         }),
@@ -170,6 +174,7 @@ where
 
     fn with_pool(
         &mut self,
+        threads: usize,
         in_flight: usize,
         is_stream: bool,
         spawn: &mut dyn FnMut(Ticket<T>),
@@ -181,7 +186,7 @@ where
         let mut staged = None;
         let mut ended = false;
         loop {
-            while !ended && queue.len() < BLOCKS {
+            while !ended && (queue.len() < threads * BLOCKS_PER_THREAD || cost < SMALL) {
                 let block = match staged.take() {
                     Some(block) => block,
                     None => match self.next_block()? {
