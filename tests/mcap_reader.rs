@@ -8,7 +8,7 @@ mod shared_data;
 use mcap_logs::{
     PACKINGS, Read, from_bytes, in_order, log, messages, on_disk, pool, read, read_some,
 };
-use mcap_logs::{random, stretches};
+use mcap_logs::{fine, random, stretches};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use strapd::error::Error;
@@ -147,7 +147,7 @@ fn threads_and_source_change_nothing() {
     let pools = [2, 3, 4].map(pool);
     // Four blocks of about 55 messages, 1 us apart, and 400 items held back: 60 us of disorder are
     // within reach, 2 ms are not.
-    let mut near = WalkOptions::default();
+    let mut near = fine(None);
     near.lookahead.blocks = 4;
     near.lookahead.held_bytes = 400 * (size_of::<Read>() + 8);
     // In order; out of order within a chunk; out of order over several; out of order beyond help.
@@ -230,7 +230,7 @@ fn read_both(bytes: &[u8], dir: &Path, pool: &rayon::ThreadPool) -> Option<(Vec<
         Err(e) => panic!("{e}"),
     };
     // A small look-ahead makes the walk let go while it still reads.
-    let mut options = WalkOptions::default();
+    let mut options = fine(None);
     options.lookahead.blocks = 2;
     let (alone, first) = read_some(from_bytes(bytes).unwrap(), &options, |_| true);
     options.pool = Some(pool);
@@ -470,10 +470,7 @@ fn an_id_with_a_second_meaning_never_mixes_two_topics() {
     let dir = tempfile::tempdir().unwrap();
     for threads in [1, 2] {
         let pool = pool(threads);
-        let options = WalkOptions {
-            pool: Some(&pool),
-            ..WalkOptions::default()
-        };
+        let options = fine(Some(&pool));
         let file = on_disk(&joined, dir.path(), "a.mcap");
         let (items, report) = read_some(file, &options, |topic| topic != "/other");
         let imu = items.iter().filter(|m| m.0 == "/imu").count();
@@ -732,10 +729,7 @@ fn a_consumer_can_stop_a_walk() {
     let bytes = log(Some(None), 512, &messages(500, 0));
     let pool = pool(2);
     for pool in [None, Some(&pool)] {
-        let mut options = WalkOptions {
-            pool,
-            ..WalkOptions::default()
-        };
+        let mut options = fine(pool);
         options.lookahead.blocks = 1;
         let mut seen = 0;
         let report = strapd::source::mcap::walk(
@@ -760,10 +754,7 @@ fn a_consumer_can_stop_a_walk() {
 fn a_panic_of_the_callers_map_is_passed_on_not_waited_for() {
     let bytes = log(Some(None), 512, &messages(500, 0));
     let pool = pool(2);
-    let options = WalkOptions {
-        pool: Some(&pool),
-        ..WalkOptions::default()
-    };
+    let options = fine(Some(&pool));
     let _ = strapd::source::mcap::walk(
         from_bytes(&bytes).unwrap(),
         &options,

@@ -19,6 +19,10 @@ use std::sync::Arc;
 const RUN: usize = 1 << 20;
 /// What is read to see a chunk's head and the few records around it.
 const PEEK: usize = 1 << 10;
+/// What is read where chunks are small, so that one read serves many ...
+const PEEK_SMALL: usize = 256 << 10;
+/// ... which is when a chunk is shorter than this.
+const SMALL: u64 = 32 << 10;
 /// Longest name of a compression that is believed.
 const NAME: u32 = 32;
 /// Bytes that may follow the known fields of a chunk record (the format may grow).
@@ -76,6 +80,8 @@ pub(super) struct Scanner {
     /// CRC of everything so far, while every byte has been seen (no chunk yet).
     crc: Option<crc32fast::Hasher>,
     done: bool,
+    /// How far to read ahead of a record's head.
+    peek: usize,
     /// The end was reached, magic and all.
     complete: bool,
     /// Messages by the statistics of this log's summary.
@@ -102,6 +108,7 @@ impl Scanner {
             trusted: None,
             crc: Some(crc),
             done: false,
+            peek: PEEK,
             complete: false,
             claimed: None,
             claimed_in_all: Some(0),
@@ -128,7 +135,7 @@ impl Scanner {
                 continue;
             }
             let at = self.tape.position();
-            let ahead = self.tape.available(HEAD, PEEK)?;
+            let ahead = self.tape.available(HEAD, self.peek)?;
             let Some((opcode, length)) = head_at(ahead, 0) else {
                 let have = ahead.len() as u64;
                 self.end(at, have);
@@ -274,7 +281,7 @@ impl Scanner {
     fn chunk(&mut self, at: u64, length: u64) -> io::Result<Option<Item>> {
         self.section = Section::Data;
         let most = HEAD + 40 + NAME as usize;
-        let ahead = self.tape.available(most, PEEK)?;
+        let ahead = self.tape.available(most, self.peek)?;
         let head = ahead.get(HEAD..).and_then(|body| {
             let body = body.get(..most - HEAD).unwrap_or(body);
             ChunkHead::parse(body).map(|(head, _)| head)
@@ -325,8 +332,16 @@ impl Scanner {
             self.problems.add(at, kind, messages);
             return Ok(None);
         };
-        let payload = match self.tape.input() {
-            Input::File(file) => {
+        self.peek = if total < SMALL { PEEK_SMALL } else { PEEK };
+        let all = usize::try_from(total).unwrap_or(usize::MAX);
+        let copy = if total < SMALL {
+            self.tape.copy_out(all)
+        } else {
+            None
+        };
+        let payload = match (copy, self.tape.input()) {
+            (Some(held), _) => Payload::Held(held),
+            (None, Input::File(file)) => {
                 let (file, offset) = (Arc::clone(file), at + start);
                 self.tape.skip(total)?;
                 Payload::At {
@@ -335,20 +350,22 @@ impl Scanner {
                     len: packed,
                 }
             }
-            Input::Stream { .. } => {
-                let all = usize::try_from(total).unwrap_or(usize::MAX);
+            (None, Input::Stream { .. }) => {
                 let have = self.tape.available(all, all)?.len();
                 if have < all {
                     return self.lost(at, total);
                 }
-                let mut held = self.tape.hand_out(all);
-                let from = held
-                    .range
-                    .start
-                    .saturating_add(usize::try_from(start).unwrap_or(0));
+                Payload::Held(self.tape.hand_out(all))
+            }
+        };
+        let payload = match payload {
+            Payload::Held(mut held) => {
+                let start = usize::try_from(start).unwrap_or(usize::MAX);
+                let from = held.range.start.saturating_add(start);
                 held.range = from..from.saturating_add(packed);
                 Payload::Held(held)
             }
+            at => at,
         };
         self.trusted = None;
         let indexed = self.indexed()?;
@@ -393,7 +410,7 @@ impl Scanner {
         let mut messages: Option<u64> = None;
         loop {
             let at = self.tape.position();
-            let head = head_at(self.tape.available(HEAD, PEEK)?, 0);
+            let head = head_at(self.tape.available(HEAD, self.peek)?, 0);
             let Some((op::MESSAGE_INDEX, length)) = head else {
                 return Ok(messages);
             };
