@@ -275,3 +275,6 @@ impl<T> Merger<T> {
         batch
     }
 }
+
+#[cfg(test)]
+mod tests;
