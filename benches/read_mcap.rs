@@ -1,7 +1,8 @@
 //! How fast a log is read: our walk with one and two threads against `mcap::MessageStream`, on a
 //! generated log of 324-byte `sensor_msgs/msg/Imu` messages in 1 MiB chunks.
 //!
-//! `cargo bench --bench read_mcap`; `STRAPD_BENCH_MESSAGES` sets the size (default 1,000,000).
+//! `cargo bench --bench read_mcap`; `STRAPD_BENCH_MESSAGES` sets the size (default 1,000,000),
+//! `STRAPD_BENCH_CHUNK` the chunk size in bytes.
 //! Figures are the best of five, so that a busy machine disturbs the ratio least.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout)]
 
@@ -58,13 +59,18 @@ fn decode(p: &[u8]) -> Option<Rate> {
     })
 }
 
+/// A number given in the environment.
+fn setting(name: &str) -> Option<u64> {
+    std::env::var(name).ok()?.parse().ok()
+}
+
 fn generate(path: &Path, messages: u64, compression: Option<mcap::Compression>, chunked: bool) {
     let out = BufWriter::new(std::fs::File::create(path).unwrap());
     let options = mcap::WriteOptions::new()
         .compression(compression)
         .use_chunks(chunked)
         .compression_threads(0)
-        .chunk_size(Some(1 << 20))
+        .chunk_size(Some(setting("STRAPD_BENCH_CHUNK").unwrap_or(1 << 20)))
         .profile("ros2");
     let mut writer = options.create(out).unwrap();
     let schema = writer
@@ -124,14 +130,10 @@ fn theirs(bytes: &[u8], check: bool) -> f64 {
 
 /// Our walk over the file: the sum of the first rates.
 fn ours(path: &Path, pool: &rayon::ThreadPool, messages: u64) -> f64 {
-    let mut options = WalkOptions {
+    let options = WalkOptions {
         pool: Some(pool),
         ..WalkOptions::default()
     };
-    let setting = |name: &str| std::env::var(name).ok().and_then(|n| n.parse().ok());
-    if let Some(bytes) = setting("STRAPD_BENCH_IN_FLIGHT") {
-        options.in_flight = bytes;
-    }
     let mut sum = 0.0;
     let report = walk(
         Reader::open(path).unwrap(),
@@ -165,10 +167,7 @@ fn race(contenders: &[&dyn Fn() -> f64]) -> Vec<(f64, f64)> {
 }
 
 fn main() {
-    let messages = std::env::var("STRAPD_BENCH_MESSAGES")
-        .ok()
-        .and_then(|n| n.parse().ok())
-        .unwrap_or(1_000_000u64);
+    let messages = setting("STRAPD_BENCH_MESSAGES").unwrap_or(1_000_000);
     let dir = tempfile::tempdir().unwrap();
     let pools = [1, 2].map(|n| {
         rayon::ThreadPoolBuilder::new()

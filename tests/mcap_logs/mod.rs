@@ -93,6 +93,17 @@ pub fn from_bytes(bytes: &[u8]) -> strapd::error::Result<Reader> {
     Reader::from_stream("memory", Box::new(Cursor::new(bytes.to_vec())))
 }
 
+/// Options under which even a small log takes the ways of a large one: every block is handed over
+/// and passed on by itself.
+pub fn fine(pool: Option<&rayon::ThreadPool>) -> WalkOptions<'_> {
+    WalkOptions {
+        pool,
+        hand_over: 1,
+        batch: 1,
+        ..WalkOptions::default()
+    }
+}
+
 /// Every message on the topics that `wanted` likes.
 pub fn read_some(
     reader: Reader,

@@ -59,3 +59,6 @@ pub(super) fn unpack(packed: &[u8], out: &mut [u8]) -> Option<usize> {
     }
     b.rest().is_empty().then_some(done)
 }
+
+#[cfg(test)]
+mod tests;

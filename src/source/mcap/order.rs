@@ -102,6 +102,17 @@ impl<T> Batch<T> {
         out.times.extend(self.times.drain(..n));
     }
 
+    /// Puts a later batch behind this one; the emptied one goes to `put`.
+    pub(super) fn append(&mut self, mut later: Batch<T>, put: impl FnOnce(Batch<T>)) {
+        if self.capacity_bytes() < later.capacity_bytes() && self.items.is_empty() {
+            std::mem::swap(self, &mut later);
+        } else {
+            self.items.append(&mut later.items);
+            self.times.append(&mut later.times);
+        }
+        put(later);
+    }
+
     /// Both in one, in order; on equal times `self`'s come first.
     fn merge(&mut self, mut later: Batch<T>) -> Batch<T> {
         let mut out = Batch::default();
@@ -264,3 +275,6 @@ impl<T> Merger<T> {
         batch
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -4,23 +4,22 @@
 //! file and the limit before anything is allocated or skipped on its word, and where the
 //! framing is lost it is found again at the next thing that can only be a chunk.
 
+mod chunk;
+
 use super::Limits;
 use super::block::{Block, Compression, Kind, Payload};
 use super::bytes::{HEAD, head_at};
 use super::problem::{ProblemKind, Problems};
-use super::record::{ChunkHead, MAGIC, Record, op};
+use super::record::{MAGIC, Record, op};
 use super::resync;
 use super::tape::{Held, Input, Tape};
 use std::collections::BTreeMap;
 use std::io;
-use std::sync::Arc;
 
 /// Bytes of unchunked records worked on together.
 const RUN: usize = 1 << 20;
 /// What is read to see a chunk's head and the few records around it.
 const PEEK: usize = 1 << 10;
-/// Longest name of a compression that is believed.
-const NAME: u32 = 32;
 /// Bytes that may follow the known fields of a chunk record (the format may grow).
 const SLACK: u64 = 1 << 10;
 
@@ -76,6 +75,8 @@ pub(super) struct Scanner {
     /// CRC of everything so far, while every byte has been seen (no chunk yet).
     crc: Option<crc32fast::Hasher>,
     done: bool,
+    /// How far to read ahead of a record's head.
+    peek: usize,
     /// The end was reached, magic and all.
     complete: bool,
     /// Messages by the statistics of this log's summary.
@@ -102,6 +103,7 @@ impl Scanner {
             trusted: None,
             crc: Some(crc),
             done: false,
+            peek: PEEK,
             complete: false,
             claimed: None,
             claimed_in_all: Some(0),
@@ -128,7 +130,7 @@ impl Scanner {
                 continue;
             }
             let at = self.tape.position();
-            let ahead = self.tape.available(HEAD, PEEK)?;
+            let ahead = self.tape.available(HEAD, self.peek)?;
             let Some((opcode, length)) = head_at(ahead, 0) else {
                 let have = ahead.len() as u64;
                 self.end(at, have);
@@ -268,148 +270,6 @@ impl Scanner {
                 return Ok(None);
             }
             want = usize::try_from(total).unwrap_or(usize::MAX);
-        }
-    }
-
-    fn chunk(&mut self, at: u64, length: u64) -> io::Result<Option<Item>> {
-        self.section = Section::Data;
-        let most = HEAD + 40 + NAME as usize;
-        let ahead = self.tape.available(most, PEEK)?;
-        let head = ahead.get(HEAD..).and_then(|body| {
-            let body = body.get(..most - HEAD).unwrap_or(body);
-            ChunkHead::parse(body).map(|(head, _)| head)
-        });
-        let total = length.saturating_add(HEAD as u64);
-        let Some(head) = head else {
-            return self.lost(at, total);
-        };
-        let start = HEAD as u64 + head.len();
-        let (packed, size, crc) = (
-            head.compressed_size,
-            head.uncompressed_size,
-            head.uncompressed_crc,
-        );
-        let compression = Compression::named(head.compression);
-        if length == u64::MAX && packed == u64::MAX && compression.is_some() {
-            return self.unfinished(at, start, compression);
-        }
-        let fields = head.len().saturating_add(packed);
-        let name = head.compression.to_owned();
-        if !self.tape.may_have(total) || fields > length || length - fields > SLACK {
-            return self.lost(at, total);
-        }
-        self.crc = None;
-        let limit = self.limits.record;
-        let fault = if packed.max(size) > limit {
-            Some(ProblemKind::ChunkTooBig {
-                size: packed.max(size),
-                limit,
-            })
-        } else if compression.is_none() {
-            Some(ProblemKind::UnknownCompression { name })
-        } else {
-            None
-        };
-        let (Some(compression), None, Ok(size), Ok(packed)) = (
-            compression,
-            &fault,
-            usize::try_from(size),
-            usize::try_from(packed),
-        ) else {
-            self.pass_over(total)?;
-            let messages = self.indexed()?;
-            let kind = fault.unwrap_or(ProblemKind::ChunkTooBig {
-                size: length,
-                limit,
-            });
-            self.problems.add(at, kind, messages);
-            return Ok(None);
-        };
-        let payload = match self.tape.input() {
-            Input::File(file) => {
-                let (file, offset) = (Arc::clone(file), at + start);
-                self.tape.skip(total)?;
-                Payload::At {
-                    file,
-                    offset,
-                    len: packed,
-                }
-            }
-            Input::Stream { .. } => {
-                let all = usize::try_from(total).unwrap_or(usize::MAX);
-                let have = self.tape.available(all, all)?.len();
-                if have < all {
-                    return self.lost(at, total);
-                }
-                let mut held = self.tape.hand_out(all);
-                let from = held
-                    .range
-                    .start
-                    .saturating_add(usize::try_from(start).unwrap_or(0));
-                held.range = from..from.saturating_add(packed);
-                Payload::Held(held)
-            }
-        };
-        self.trusted = None;
-        let indexed = self.indexed()?;
-        *self.facts.chunks.entry(compression).or_default() += 1;
-        self.facts.unverified_chunks += u64::from(crc == 0);
-        let kind = Kind::Chunk {
-            compression,
-            size,
-            crc,
-            indexed,
-        };
-        Ok(Some(Item::Block(Block {
-            offset: at,
-            kind,
-            payload,
-        })))
-    }
-
-    /// A chunk whose length was never filled in: what is uncompressed is read as if unchunked.
-    fn unfinished(
-        &mut self,
-        at: u64,
-        start: u64,
-        compression: Option<Compression>,
-    ) -> io::Result<Option<Item>> {
-        let read_on = compression == Some(Compression::None);
-        self.problems
-            .add(at, ProblemKind::UnfinishedChunk { read_on }, None);
-        self.crc = None;
-        self.trusted = None;
-        if read_on {
-            self.tape.skip(start)?;
-        } else if !resync::next_chunk(&mut self.tape, at + 1, self.limits.record)? {
-            self.done = true;
-        }
-        Ok(None)
-    }
-
-    /// Counts messages by the indexes that follow a chunk. The count is an estimate for a
-    /// lost chunk, never used otherwise.
-    fn indexed(&mut self) -> io::Result<Option<u64>> {
-        let mut messages: Option<u64> = None;
-        loop {
-            let at = self.tape.position();
-            let head = head_at(self.tape.available(HEAD, PEEK)?, 0);
-            let Some((op::MESSAGE_INDEX, length)) = head else {
-                return Ok(messages);
-            };
-            let total = length.saturating_add(HEAD as u64);
-            if self.everything || !self.tape.may_have(total) {
-                return Ok(messages);
-            }
-            messages = Some(
-                messages
-                    .unwrap_or(0)
-                    .saturating_add(length.saturating_sub(6) / 16),
-            );
-            self.trusted = Some(at);
-            if self.tape.skip(total)? < total {
-                return Ok(messages);
-            }
         }
     }
 

@@ -15,6 +15,9 @@ const STEP: usize = 1 << 20;
 /// Handed-back buffers kept for reuse, and the largest worth keeping.
 const SPARE: usize = 32;
 const SPARE_BYTES: usize = 4 << 20;
+/// The same for copies of short stretches.
+const SMALL: usize = 256;
+const SMALL_BYTES: usize = 64 << 10;
 
 /// A regular file, read by position from any thread.
 #[derive(Debug)]
@@ -114,6 +117,7 @@ pub(super) struct Tape {
     position: u64,
     at_end: bool,
     spare: Vec<Vec<u8>>,
+    small: Vec<Vec<u8>>,
 }
 
 impl Tape {
@@ -127,6 +131,7 @@ impl Tape {
             position,
             at_end: false,
             spare: Vec::new(),
+            small: Vec::new(),
         }
     }
 
@@ -263,9 +268,26 @@ impl Tape {
         held
     }
 
+    /// The next `n` bytes as [`Tape::hand_out`], copied, if they are buffered already: for stretches
+    /// so short that a buffer for each would be waste.
+    pub(super) fn copy_out(&mut self, n: usize) -> Option<Held> {
+        if n > self.ahead().len() {
+            return None;
+        }
+        let mut bytes = self.small.pop().unwrap_or_default();
+        bytes.clear();
+        bytes.extend_from_slice(self.ahead().get(..n)?);
+        self.start += n;
+        self.position += n as u64;
+        Some(Held { bytes, range: 0..n })
+    }
+
     /// Takes back a buffer that was handed out.
     pub(super) fn recycle(&mut self, held: Held) {
-        if self.spare.len() < SPARE && (1..=SPARE_BYTES).contains(&held.bytes.capacity()) {
+        let bytes = held.bytes.capacity();
+        if bytes <= SMALL_BYTES && self.small.len() < SMALL {
+            self.small.push(held.bytes);
+        } else if bytes > SMALL_BYTES && bytes <= SPARE_BYTES && self.spare.len() < SPARE {
             self.spare.push(held.bytes);
         }
     }

@@ -129,8 +129,6 @@ pub(super) enum Done<T> {
     InOrder,
     /// The file can not be read.
     Failed(io::Error),
-    /// The caller's `map` panicked; the panic itself travels through the pool.
-    Panicked,
 }
 
 pub(super) fn place(block: &Block) -> Place {
@@ -194,28 +192,28 @@ where
     }
 }
 
-/// A block on its way: whatever happens to the worker, the walk hears of it.
+/// Blocks on their way: whatever happens to the worker, the walk hears of them.
 #[derive(Debug)]
 pub(super) struct Ticket<T> {
     number: u64,
-    block: Option<Block>,
-    to: Sender<Outcome<T>>,
+    blocks: Vec<Block>,
+    to: Option<Sender<Outcome<T>>>,
 }
 
-/// A worker's answer.
+/// A worker's answer, block by block; `None` when the caller's `map` panicked, which itself
+/// travels through the pool.
 #[derive(Debug)]
 pub(super) struct Outcome<T> {
     pub(super) number: u64,
-    pub(super) block: Option<Block>,
-    pub(super) done: Done<T>,
+    pub(super) done: Option<Vec<(Block, Done<T>)>>,
 }
 
 impl<T> Ticket<T> {
-    pub(super) fn new(number: u64, block: Block, to: Sender<Outcome<T>>) -> Self {
+    pub(super) fn new(number: u64, blocks: Vec<Block>, to: Sender<Outcome<T>>) -> Self {
         Ticket {
             number,
-            block: Some(block),
-            to,
+            blocks,
+            to: Some(to),
         }
     }
 
@@ -223,27 +221,30 @@ impl<T> Ticket<T> {
     where
         M: Fn(&D, &Message<'_>, &mut Vec<T>),
     {
-        let Some(block) = &self.block else { return };
-        let done = shared.work(block);
-        let block = self.block.take();
-        // The walk may have ended early; then nobody waits for this.
-        let _ = self.to.send(Outcome {
-            number: self.number,
-            block,
-            done,
-        });
+        let blocks = std::mem::take(&mut self.blocks);
+        let done = blocks
+            .into_iter()
+            .map(|block| {
+                let done = shared.work(&block);
+                (block, done)
+            })
+            .collect();
+        self.answer(Some(done));
+    }
+
+    fn answer(&mut self, done: Option<Vec<(Block, Done<T>)>>) {
+        if let Some(to) = self.to.take() {
+            // The walk may have ended early; then nobody waits for this.
+            let _ = to.send(Outcome {
+                number: self.number,
+                done,
+            });
+        }
     }
 }
 
 impl<T> Drop for Ticket<T> {
     fn drop(&mut self) {
-        if let Some(block) = self.block.take() {
-            let done = Done::Panicked;
-            let _ = self.to.send(Outcome {
-                number: self.number,
-                block: Some(block),
-                done,
-            });
-        }
+        self.answer(None);
     }
 }
