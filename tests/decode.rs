@@ -14,9 +14,12 @@ mod recordings;
 mod roles;
 #[path = "decode/ros.rs"]
 mod ros;
+#[path = "decode/speed.rs"]
+mod speed;
 #[path = "decode/writer.rs"]
 mod writer;
 
+#[allow(unreachable_pub)]
 mod shared_data;
 
 use strapd::decode::{Channel, Decoder, Options, Undecodable};
@@ -52,7 +55,10 @@ fn options(fields: &[&str]) -> Options {
 fn decode(decoder: &Decoder, payload: &[u8]) -> Result<Vec<RawSample>, Undecodable> {
     let mut out = Vec::new();
     let outcome = decoder.decode(payload, LOG, PUBLISH, &mut out);
-    assert!(outcome.is_ok() || out.is_empty(), "a failure pushes nothing");
+    assert!(
+        outcome.is_ok() || out.is_empty(),
+        "a failure pushes nothing"
+    );
     let outcome = outcome?;
     assert_eq!(outcome.samples, out.len());
     assert!(out.iter().all(|s| s.log == LOG && s.publish == PUBLISH));

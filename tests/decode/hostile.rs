@@ -11,28 +11,86 @@ use strapd::decode::{Channel, Decoder, MAX_BATCH, Options, decode_line, role};
 /// A payload and the decoder it was made for, one of each kind.
 fn corpus() -> Vec<(Decoder, Vec<u8>)> {
     let compile = |c: &Channel<'_>, fields: &[&str]| Decoder::compile(c, &options(fields)).unwrap();
-    let rig = format!("string[] words\nsensor_msgs/Imu[] imus\nfloat32[] data\n{}", imu_section());
-    let rig_payload = Writer::cdr(false).u32(2).string("a").string("").u32(2).imu("x").imu("yy").u32(3).f32s(&[1.0; 3]);
+    let rig = format!(
+        "string[] words\nsensor_msgs/Imu[] imus\nfloat32[] data\n{}",
+        imu_section()
+    );
+    let rig_payload = Writer::cdr(false)
+        .u32(2)
+        .string("a")
+        .string("")
+        .u32(2)
+        .imu("x")
+        .imu("yy")
+        .u32(3)
+        .f32s(&[1.0; 3]);
     let set = Proto::file_set(
         "p",
         vec![
-            Proto::message_type("S", vec![Proto::field("gyro", 1, true, 2, ""), Proto::field("t", 2, false, 4, "")]),
+            Proto::message_type(
+                "S",
+                vec![
+                    Proto::field("gyro", 1, true, 2, ""),
+                    Proto::field("t", 2, false, 4, ""),
+                ],
+            ),
             Proto::message_type("B", vec![Proto::field("samples", 4, true, 11, ".p.S")]),
         ],
     );
     let sample = Proto::default().bytes(1, &[0; 12]).varint(2, 300);
-    let proto = Channel { topic: "/p", message_encoding: "protobuf", schema_name: "p.B", schema_encoding: "protobuf", schema_data: &set };
+    let proto = Channel {
+        topic: "/p",
+        message_encoding: "protobuf",
+        schema_name: "p.B",
+        schema_encoding: "protobuf",
+        schema_data: &set,
+    };
     let json = br#"{"header":{"stamp":{"sec":1,"nanosec":2},"frame_id":"a\u00e9"},"angular_velocity":{"x":1.5,"y":-2e-3,"z":3},"items":[{"gyro":[1,2,3]}],"orientation":{"x":0,"y":0,"z":0,"w":1}}"#;
     vec![
-        (compile(&channel("cdr", "sensor_msgs/msg/Imu", IMU), &[]), Writer::cdr(false).imu("imu_link").bytes),
-        (compile(&channel("cdr", "sensor_msgs/msg/Imu", IMU), &[]), Writer::cdr(true).imu("imu_link").bytes),
-        (compile(&channel("cdr", "a/msg/Rig", &rig), &[]), rig_payload.clone().bytes),
-        (compile(&channel("cdr", "a/msg/Rig", &rig), &["gyro=data"]), rig_payload.bytes),
-        (compile(&channel("cdr", "tf2_msgs/msg/TFMessage", ""), &[]), Writer::cdr(false).u32(1).header(1, 2, "a").string("b").f64s(&[1.0; 7]).bytes),
-        (compile(&channel("ros1", "sensor_msgs/Imu", ""), &[]), Writer::ros1().imu("imu").bytes),
-        (compile(&proto, &[]), Proto::default().message(4, sample.clone()).message(4, sample).0),
+        (
+            compile(&channel("cdr", "sensor_msgs/msg/Imu", IMU), &[]),
+            Writer::cdr(false).imu("imu_link").bytes,
+        ),
+        (
+            compile(&channel("cdr", "sensor_msgs/msg/Imu", IMU), &[]),
+            Writer::cdr(true).imu("imu_link").bytes,
+        ),
+        (
+            compile(&channel("cdr", "a/msg/Rig", &rig), &[]),
+            rig_payload.clone().bytes,
+        ),
+        (
+            compile(&channel("cdr", "a/msg/Rig", &rig), &["gyro=data"]),
+            rig_payload.bytes,
+        ),
+        (
+            compile(&channel("cdr", "tf2_msgs/msg/TFMessage", ""), &[]),
+            Writer::cdr(false)
+                .u32(1)
+                .header(1, 2, "a")
+                .string("b")
+                .f64s(&[1.0; 7])
+                .bytes,
+        ),
+        (
+            compile(&channel("ros1", "sensor_msgs/Imu", ""), &[]),
+            Writer::ros1().imu("imu").bytes,
+        ),
+        (
+            compile(&proto, &[]),
+            Proto::default()
+                .message(4, sample.clone())
+                .message(4, sample)
+                .0,
+        ),
         (compile(&channel("json", "", ""), &[]), json.to_vec()),
-        (compile(&channel("json", "", ""), &["gyro=items[].gyro", "stamp=header.stamp"]), json.to_vec()),
+        (
+            compile(
+                &channel("json", "", ""),
+                &["gyro=items[].gyro", "stamp=header.stamp"],
+            ),
+            json.to_vec(),
+        ),
     ]
 }
 
@@ -91,7 +149,10 @@ fn a_hundred_thousand_mutated_payloads_do_no_harm() {
         // A payload of this size takes microseconds; a loop over a forged count would take minutes.
         assert!(start.elapsed() < Duration::from_secs(2), "{payload:?}");
     }
-    assert!(good > 10_000 && bad > 10_000, "{good} good, {bad} bad: the mutations reach both sides");
+    assert!(
+        good > 10_000 && bad > 10_000,
+        "{good} good, {bad} bad: the mutations reach both sides"
+    );
 }
 
 #[test]
@@ -106,7 +167,9 @@ fn random_bytes_do_no_harm() {
             head.copy_from_slice(&[0, 1, 0, 0]);
         }
         out.clear();
-        let _ = corpus[round % corpus.len()].0.decode(&payload, LOG, LOG, &mut out);
+        let _ = corpus[round % corpus.len()]
+            .0
+            .decode(&payload, LOG, LOG, &mut out);
     }
 }
 
@@ -144,23 +207,44 @@ fn schemas_that_grow_without_end_are_refused_quickly() {
     tree += &section("a/T40", "float64 x");
     let circle = format!("a/C c\nfloat64[3] gyro{}", section("a/C", "a/C c\nuint8 x"));
     let own = "a/Own c\nfloat64[3] gyro".to_owned();
-    let arrays = format!("a/D[4294967295] d\nfloat64[3] gyro{}", section("a/D", "a/E[4294967295] e") + &section("a/E", "string[4294967295] f"));
+    let arrays = format!(
+        "a/D[4294967295] d\nfloat64[3] gyro{}",
+        section("a/D", "a/E[4294967295] e") + &section("a/E", "string[4294967295] f")
+    );
     let long = format!("float64[3] {}", "g".repeat(900_000));
-    for text in [tree, circle, own, long, "float64[3] gyro\n".repeat(60_000), "=".repeat(1 << 21)] {
+    for text in [
+        tree,
+        circle,
+        own,
+        long,
+        "float64[3] gyro\n".repeat(60_000),
+        "=".repeat(1 << 21),
+    ] {
         let error = Decoder::compile(&channel("cdr", "a/Own", &text), &Options::default());
         assert!(error.is_err(), "{:.60}", text);
     }
     // Legal, and no payload can fill it.
     let decoder = Decoder::compile(&channel("cdr", "a/Own", &arrays), &Options::default()).unwrap();
-    assert!(decoder.decode(&[0, 1, 0, 0, 9, 9, 9, 9], LOG, LOG, &mut Vec::new()).is_err());
+    assert!(
+        decoder
+            .decode(&[0, 1, 0, 0, 9, 9, 9, 9], LOG, LOG, &mut Vec::new())
+            .is_err()
+    );
     // Empty ROS 1 messages take no bytes: four billion of them are gone over at once.
-    let empty = format!("a/E[] e\na/E[4294967295] f\nfloat64[3] gyro{}", section("a/E", "# nothing"));
+    let empty = format!(
+        "a/E[] e\na/E[4294967295] f\nfloat64[3] gyro{}",
+        section("a/E", "# nothing")
+    );
     let decoder = Decoder::compile(&channel("ros1", "a/Own", &empty), &Options::default()).unwrap();
     let payload = Writer::ros1().u32(u32::MAX).f64s(&GYRO).bytes;
     let mut out = Vec::new();
     decoder.decode(&payload, LOG, LOG, &mut out).unwrap();
     assert_eq!(out[0].gyro, Some(GYRO));
-    assert!(start.elapsed() < Duration::from_secs(5), "{:?}", start.elapsed());
+    assert!(
+        start.elapsed() < Duration::from_secs(5),
+        "{:?}",
+        start.elapsed()
+    );
 }
 
 #[test]

@@ -7,17 +7,17 @@ use strapd::record::{Nanos, RawSample};
 
 /// A channel, owned.
 #[derive(Clone)]
-pub struct Owned {
-    pub topic: String,
-    pub message_encoding: String,
-    pub schema_name: String,
-    pub schema_encoding: String,
-    pub schema_data: Vec<u8>,
-    pub log: Nanos,
+pub(crate) struct Owned {
+    pub(crate) topic: String,
+    pub(crate) message_encoding: String,
+    pub(crate) schema_name: String,
+    pub(crate) schema_encoding: String,
+    pub(crate) schema_data: Vec<u8>,
+    pub(crate) log: Nanos,
 }
 
 impl Owned {
-    pub fn channel(&self) -> Channel<'_> {
+    pub(crate) fn channel(&self) -> Channel<'_> {
         Channel {
             topic: &self.topic,
             message_encoding: &self.message_encoding,
@@ -29,7 +29,7 @@ impl Owned {
 }
 
 /// Every message of a recording up to the first damage.
-pub fn messages(relative: &str) -> Option<Vec<(Vec<u8>, Owned)>> {
+pub(crate) fn messages(relative: &str) -> Option<Vec<(Vec<u8>, Owned)>> {
     let bytes = std::fs::read(shared(relative)?).unwrap();
     let mut list = Vec::new();
     for message in mcap::MessageStream::new(&bytes).unwrap() {
@@ -39,7 +39,9 @@ pub fn messages(relative: &str) -> Option<Vec<(Vec<u8>, Owned)>> {
             topic: message.channel.topic.clone(),
             message_encoding: message.channel.message_encoding.clone(),
             schema_name: schema.as_ref().map_or(String::new(), |s| s.name.clone()),
-            schema_encoding: schema.as_ref().map_or(String::new(), |s| s.encoding.clone()),
+            schema_encoding: schema
+                .as_ref()
+                .map_or(String::new(), |s| s.encoding.clone()),
             schema_data: schema.map_or(Vec::new(), |s| s.data.to_vec()),
             log: Nanos(message.log_time as i64),
         };
@@ -48,10 +50,16 @@ pub fn messages(relative: &str) -> Option<Vec<(Vec<u8>, Owned)>> {
     Some(list)
 }
 
-/// Per topic: samples, and how many payloads could not be decoded.
-fn all(relative: &str) -> Option<BTreeMap<String, (Vec<RawSample>, usize, Decoded)>> {
+/// Samples, how many payloads could not be decoded, and what was noticed.
+type Topic = (Vec<RawSample>, usize, Decoded);
+
+/// Topic, samples, undecodable payloads.
+type Expected = [(&'static str, usize, usize)];
+
+/// What each topic of a recording decodes to.
+fn all(relative: &str) -> Option<BTreeMap<String, Topic>> {
     let mut decoders: BTreeMap<String, Option<Decoder>> = BTreeMap::new();
-    let mut topics: BTreeMap<String, (Vec<RawSample>, usize, Decoded)> = BTreeMap::new();
+    let mut topics: BTreeMap<String, Topic> = BTreeMap::new();
     for (payload, owned) in messages(relative)? {
         let decoder = decoders.entry(owned.topic.clone()).or_insert_with(|| {
             let mut decoder = Decoder::compile(&owned.channel(), &Options::default()).ok()?;
@@ -73,8 +81,11 @@ fn all(relative: &str) -> Option<BTreeMap<String, (Vec<RawSample>, usize, Decode
 
 #[test]
 fn every_recording_gives_as_many_samples_as_its_readme_says() {
-    let expected: &[(&str, &[(&str, usize, usize)])] = &[
-        ("real/ximu3_ros2_zstd", &[("/imu", 500, 0), ("/reference/orientation", 500, 0)]),
+    let expected: &[(&str, &Expected)] = &[
+        (
+            "real/ximu3_ros2_zstd",
+            &[("/imu", 500, 0), ("/reference/orientation", 500, 0)],
+        ),
         ("real/xsens_mti_ros2_none", &[("/imu", 953, 0)]),
         (
             "real/px4_fmuv6c_json_zstd",
@@ -86,12 +97,30 @@ fn every_recording_gives_as_many_samples_as_its_readme_says() {
                 ("/vehicle_imu/1", 13, 0),
             ],
         ),
-        ("real/husky_ros1_lz4", &[("/husky_velocity_controller/odom", 3952, 0), ("/imu/data", 11_865, 0)]),
+        (
+            "real/husky_ros1_lz4",
+            &[
+                ("/husky_velocity_controller/odom", 3952, 0),
+                ("/imu/data", 11_865, 0),
+            ],
+        ),
         ("real/xio_fusion_ros2_lz4", &[("/imu", 13_514, 0)]),
-        ("real/xio_gait_short_walk_protobuf_batch", &[("/imu", 16_539, 0)]),
-        ("real/broad07_60s_ros2_zstd", &[("/imu", 17_143, 0), ("/reference/orientation", 17_143, 0)]),
-        ("native/mcap_explorer_demo_json_imu", &[("/imu/front", 150, 0)]),
-        ("native/rosbag2parquet_array_msgs", &[("/one_shot/imu", 1, 0)]),
+        (
+            "real/xio_gait_short_walk_protobuf_batch",
+            &[("/imu", 16_539, 0)],
+        ),
+        (
+            "real/broad07_60s_ros2_zstd",
+            &[("/imu", 17_143, 0), ("/reference/orientation", 17_143, 0)],
+        ),
+        (
+            "native/mcap_explorer_demo_json_imu",
+            &[("/imu/front", 150, 0)],
+        ),
+        (
+            "native/rosbag2parquet_array_msgs",
+            &[("/one_shot/imu", 1, 0)],
+        ),
         ("native/tiryoh_test_sample_truncated", &[]),
         ("native/rosbag2_wrong_format", &[]),
         ("hostile/01_no_summary", &[("/imu", 953, 0)]),
@@ -100,7 +129,10 @@ fn every_recording_gives_as_many_samples_as_its_readme_says() {
         ("hostile/08_duplicate_stamps", &[("/imu", 953, 0)]),
         ("hostile/09_gap_2s", &[("/imu", 853, 0)]),
         ("hostile/10_nan_inf", &[("/imu", 953, 0)]),
-        ("hostile/13_two_imu_topics", &[("/imu", 953, 0), ("/imu2", 953, 0)]),
+        (
+            "hostile/13_two_imu_topics",
+            &[("/imu", 953, 0), ("/imu2", 953, 0)],
+        ),
         ("hostile/16_short_and_empty_payloads", &[("/imu", 950, 3)]),
         ("hostile/25_header_only", &[]),
     ];
@@ -108,7 +140,10 @@ fn every_recording_gives_as_many_samples_as_its_readme_says() {
         let Some(found) = all(&format!("logs/{file}.mcap")) else {
             return;
         };
-        let found: Vec<_> = found.iter().map(|(t, (s, bad, _))| (t.as_str(), s.len(), *bad)).collect();
+        let found: Vec<_> = found
+            .iter()
+            .map(|(t, (s, bad, _))| (t.as_str(), s.len(), *bad))
+            .collect();
         assert_eq!(&found, topics, "{file}");
     }
 }
@@ -119,16 +154,36 @@ fn the_variants_of_one_log_hold_the_same_numbers() {
     let Some(plain) = read("real/xsens_mti_ros2_none") else {
         return;
     };
-    let same = |a: &RawSample, b: &RawSample| (a.gyro, a.accel, a.orientation) == (b.gyro, b.accel, b.orientation);
+    let same = |a: &RawSample, b: &RawSample| {
+        (a.gyro, a.accel, a.orientation) == (b.gyro, b.accel, b.orientation)
+    };
     let big = read("hostile/06_big_endian_cdr").unwrap();
-    assert!(plain.iter().zip(&big).all(|(a, b)| same(a, b) && a.header == b.header));
+    assert!(
+        plain
+            .iter()
+            .zip(&big)
+            .all(|(a, b)| same(a, b) && a.header == b.header)
+    );
     let zero = read("hostile/07_zero_header_stamps").unwrap();
-    assert!(plain.iter().zip(&zero).all(|(a, b)| same(a, b) && b.header == Some(Nanos(0))));
+    assert!(
+        plain
+            .iter()
+            .zip(&zero)
+            .all(|(a, b)| same(a, b) && b.header == Some(Nanos(0)))
+    );
     let odd = read("hostile/10_nan_inf").unwrap();
-    let bad = odd.iter().filter(|s| s.gyro.is_none_or(|g| g.iter().any(|v| !v.is_finite())));
-    assert!(bad.count() >= 1, "NaN passes the decoder; conditioning counts it");
+    let bad = odd
+        .iter()
+        .filter(|s| s.gyro.is_none_or(|g| g.iter().any(|v| !v.is_finite())));
+    assert!(
+        bad.count() >= 1,
+        "NaN passes the decoder; conditioning counts it"
+    );
     let duplicates = read("hostile/08_duplicate_stamps").unwrap();
-    let pairs = duplicates.windows(2).filter(|w| w[0].header == w[1].header).count();
+    let pairs = duplicates
+        .windows(2)
+        .filter(|w| w[0].header == w[1].header)
+        .count();
     assert_eq!(pairs, 136, "logs/README.md");
 }
 
@@ -150,8 +205,14 @@ fn recorded_rates_are_plausible_and_stamps_lie_near_the_recorders_clock() {
         let rates = samples.iter().filter_map(|s| s.gyro).flatten();
         let top = rates.fold(0.0_f64, |top, v| top.max(v.abs()));
         assert!(top < rate_below && top > 0.97 * rate_below, "{name}: {top}");
-        let off = samples.iter().map(|s| s.log.since(s.header.unwrap()).abs()).max();
-        assert!(off.unwrap() < 1_000_000_000, "{name}: {off:?} ns between stamp and log time");
+        let off = samples
+            .iter()
+            .map(|s| s.log.since(s.header.unwrap()).abs())
+            .max();
+        assert!(
+            off.unwrap() < 1_000_000_000,
+            "{name}: {off:?} ns between stamp and log time"
+        );
     }
 }
 
@@ -178,11 +239,20 @@ fn the_imu_topic_of_every_recording_is_the_best_ranked_one() {
         }
         let roles: Vec<_> = first
             .iter()
-            .map(|(topic, (payload, owned))| (topic.as_str(), role(&owned.channel(), Some((payload.as_slice(), owned.log)))))
+            .map(|(topic, (payload, owned))| {
+                (
+                    topic.as_str(),
+                    role(&owned.channel(), Some((payload.as_slice(), owned.log))),
+                )
+            })
             .filter(|(_, role)| role.is_automatic())
             .collect();
         let best = roles.iter().map(|(_, r)| r.rank).min();
-        let chosen: Vec<_> = roles.iter().filter(|(_, r)| Some(r.rank) == best).map(|(t, _)| *t).collect();
+        let chosen: Vec<_> = roles
+            .iter()
+            .filter(|(_, r)| Some(r.rank) == best)
+            .map(|(t, _)| *t)
+            .collect();
         assert_eq!(chosen, expected, "{file}");
     }
 }
@@ -192,8 +262,15 @@ fn a_channel_that_can_not_be_decoded_is_refused_by_topic_type_and_encoding() {
     let Some(messages) = messages("logs/native/rosbag2_wrong_format.mcap") else {
         return;
     };
-    let error = Decoder::compile(&messages[0].1.channel(), &Options::default()).unwrap_err().to_string();
-    for part in ["/test_topic", "test_msgs/msg/BasicTypes", "wrong_format", "--topic"] {
+    let error = Decoder::compile(&messages[0].1.channel(), &Options::default())
+        .unwrap_err()
+        .to_string();
+    for part in [
+        "/test_topic",
+        "test_msgs/msg/BasicTypes",
+        "wrong_format",
+        "--topic",
+    ] {
         assert!(error.contains(part), "{error}");
     }
 }
@@ -205,14 +282,19 @@ fn layouts_built_in_equal_the_schema_texts_of_recordings() {
     };
     let mut compared = 0;
     for (payload, owned) in &messages {
-        let empty = Channel { schema_data: b"", ..owned.channel() };
+        let empty = Channel {
+            schema_data: b"",
+            ..owned.channel()
+        };
         let Ok(builtin) = Decoder::compile(&empty, &Options::default()) else {
             continue;
         };
         let text = Decoder::compile(&owned.channel(), &Options::default()).unwrap();
         let read = |decoder: &Decoder| {
             let mut out = Vec::new();
-            decoder.decode(payload, owned.log, owned.log, &mut out).unwrap();
+            decoder
+                .decode(payload, owned.log, owned.log, &mut out)
+                .unwrap();
             out
         };
         assert_eq!(read(&builtin), read(&text), "{}", owned.topic);

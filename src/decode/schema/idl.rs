@@ -8,8 +8,11 @@
 //! OMG IDL 4.2 (formal/18-01-05) 7.4; the concatenation as rosbag2 stores it: a line of `=`, a line
 //! `IDL: pkg/msg/Type`, the text.
 
+mod tokens;
+
 use super::{Field, Kind, Many, Number, Schema, Struct, ros_name};
 use std::collections::BTreeMap;
+use tokens::tokens;
 
 const MAX_TEXT: usize = 1 << 20;
 const MAX_DEPTH: usize = 32;
@@ -20,7 +23,10 @@ const MAX_DEPTH: usize = 32;
 /// A sentence: not IDL, too large, or without that struct.
 pub(crate) fn parse(text: &str, type_name: &str) -> Result<Schema, String> {
     if text.len() > MAX_TEXT {
-        return Err(format!("the schema text is {} bytes, over the limit of {MAX_TEXT}", text.len()));
+        return Err(format!(
+            "the schema text is {} bytes, over the limit of {MAX_TEXT}",
+            text.len()
+        ));
     }
     let mut parser = Parser {
         tokens: tokens(text),
@@ -32,66 +38,14 @@ pub(crate) fn parse(text: &str, type_name: &str) -> Result<Schema, String> {
     parser.items(0)?;
     let wanted = ros_name(type_name);
     let schema = parser.link();
-    let root = schema.structs.iter().rposition(|s| ros_name(&s.name) == wanted);
+    let root = schema
+        .structs
+        .iter()
+        .rposition(|s| ros_name(&s.name) == wanted);
     match root {
         Some(root) => Ok(Schema { root, ..schema }),
         None => Err("the schema text does not define this message".to_owned()),
     }
-}
-
-/// Words, numbers, punctuation; comments, preprocessor lines, section marks and the contents of
-/// strings are left out.
-fn tokens(text: &str) -> Vec<&str> {
-    let mut tokens = Vec::new();
-    let mut rest = text;
-    let mut line_start = true;
-    while let Some(c) = rest.chars().next() {
-        let line = rest.find('\n').unwrap_or(rest.len());
-        let skip = if c == '\n' {
-            line_start = true;
-            1
-        } else if c.is_whitespace() {
-            c.len_utf8()
-        } else if line_start && (c == '#' || c == '=' || rest.starts_with("IDL:")) || rest.starts_with("//") {
-            line
-        } else if rest.starts_with("/*") {
-            rest.find("*/").map_or(rest.len(), |end| end + 2)
-        } else if c == '"' || c == '\'' {
-            quoted(rest, c)
-        } else if c.is_ascii_alphanumeric() || c == '_' {
-            let end = rest.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_'));
-            end.unwrap_or(rest.len())
-        } else if rest.starts_with("::") {
-            2
-        } else {
-            c.len_utf8()
-        };
-        let token = rest.get(..skip).unwrap_or("");
-        let first = token.chars().next().unwrap_or(' ');
-        let is_token = first.is_ascii_alphanumeric() || "_{}[]<>();,:@=".contains(first);
-        if is_token && !(line_start && (first == '=' || token.starts_with("IDL:"))) {
-            tokens.push(token);
-        }
-        if c != '\n' && !c.is_whitespace() {
-            line_start = false;
-        }
-        rest = rest.get(skip.max(1)..).unwrap_or("");
-    }
-    tokens
-}
-
-/// Bytes of a quoted text at the start of `rest`.
-fn quoted(rest: &str, quote: char) -> usize {
-    let mut escaped = false;
-    for (at, c) in rest.char_indices().skip(1) {
-        match c {
-            _ if escaped => escaped = false,
-            '\\' => escaped = true,
-            _ if c == quote => return at + 1,
-            _ => {}
-        }
-    }
-    rest.len()
 }
 
 /// A type before names are resolved.
@@ -148,17 +102,22 @@ impl<'a> Parser<'a> {
             return Ok(());
         }
         let found = super::super::printable(self.peek());
-        Err(format!("the schema is not IDL this program reads: expected `{token}`, found `{found}`"))
+        Err(format!(
+            "the schema is not IDL this program reads: expected `{token}`, found `{found}`"
+        ))
     }
 
     fn name(&mut self) -> Result<&'a str, String> {
         let name = self.next();
-        let proper = name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_') && name.len() <= 256;
+        let proper =
+            name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_') && name.len() <= 256;
         if proper {
             Ok(name)
         } else {
             let name = super::super::printable(name);
-            Err(format!("the schema is not IDL this program reads: expected a name, found `{name}`"))
+            Err(format!(
+                "the schema is not IDL this program reads: expected a name, found `{name}`"
+            ))
         }
     }
 
@@ -173,7 +132,9 @@ impl<'a> Parser<'a> {
 
     fn items(&mut self, depth: usize) -> Result<(), String> {
         if depth > MAX_DEPTH {
-            return Err(format!("the schema nests modules more than {MAX_DEPTH} deep"));
+            return Err(format!(
+                "the schema nests modules more than {MAX_DEPTH} deep"
+            ));
         }
         while self.at < self.tokens.len() && self.peek() != "}" {
             match self.peek() {
@@ -292,7 +253,9 @@ impl<'a> Parser<'a> {
                 let size = self.next();
                 self.expect("]")?;
                 // A constant's name gives no size here: what follows can not be found.
-                many = size.parse().map_or(Many::Array(u32::MAX), |n| product(many, n));
+                many = size
+                    .parse()
+                    .map_or(Many::Array(u32::MAX), |n| product(many, n));
             }
             list.push((name.to_owned(), nested(typed, many)));
             if self.take(";") {
@@ -345,8 +308,15 @@ impl<'a> Parser<'a> {
             text @ ("string" | "wstring") => {
                 self.at += 1;
                 self.bound()?;
-                let kind = if text == "string" { Kind::Text } else { Kind::WideText };
-                return Ok(Typed { written: known(kind), many: Many::One });
+                let kind = if text == "string" {
+                    Kind::Text
+                } else {
+                    Kind::WideText
+                };
+                return Ok(Typed {
+                    written: known(kind),
+                    many: Many::One,
+                });
             }
             "sequence" => {
                 self.at += 1;
@@ -361,12 +331,18 @@ impl<'a> Parser<'a> {
             "map" | "any" | "fixed" => {
                 self.at += 1;
                 self.bound()?;
-                return Ok(Typed { written: known(Kind::Undefined), many: Many::One });
+                return Ok(Typed {
+                    written: known(Kind::Undefined),
+                    many: Many::One,
+                });
             }
             _ => return self.scoped(),
         };
         self.at += 1;
-        Ok(Typed { written, many: Many::One })
+        Ok(Typed {
+            written,
+            many: Many::One,
+        })
     }
 
     /// `<...>`, gone over.
@@ -405,7 +381,12 @@ impl<'a> Parser<'a> {
                 .iter()
                 .map(|(name, typed)| {
                     let (kind, many) = self.resolve(typed, 0);
-                    Field { name: name.clone(), kind, many, number: 0 }
+                    Field {
+                        name: name.clone(),
+                        kind,
+                        many,
+                        number: 0,
+                    }
                 })
                 .collect(),
         });
@@ -431,7 +412,11 @@ impl<'a> Parser<'a> {
         // From the innermost module outwards.
         let mut scope = scope.as_str();
         let meaning = loop {
-            let full = if scope.is_empty() { name.clone() } else { format!("{scope}::{name}") };
+            let full = if scope.is_empty() {
+                name.clone()
+            } else {
+                format!("{scope}::{name}")
+            };
             if let Some(meaning) = self.names.get(&full) {
                 break Some(meaning);
             }
@@ -472,70 +457,4 @@ fn product(many: Many, n: u32) -> Many {
 }
 
 #[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used)]
-    use super::*;
-
-    const IMU_LIKE: &str = r#"
-================================================================================
-IDL: my_msgs/msg/Reading
-// generated
-#include "geometry_msgs/msg/Vector3.idl"
-module my_msgs {
-  module msg {
-    typedef double double__9[9];
-    module Reading_Constants { const long A = 5; };
-    enum Mode { OFF, ON };
-    @verbatim (language="comment", text="a \" quoted; } text" "and more")
-    struct Reading {
-      @unit ("rad/s") geometry_msgs::msg::Vector3 angular_velocity;
-      double__9 covariance;
-      sequence<octet, 16> data;
-      unsigned long long stamp_ns; /* ns; */
-      Mode mode;
-      long double wide; float grid[2][3];
-      wstring label;
-      @optional long maybe;
-    };
-  };
-};
-================================================================================
-IDL: geometry_msgs/msg/Vector3
-module geometry_msgs { module msg { struct Vector3 { double x, y; double z; }; }; };
-"#;
-
-    #[test]
-    fn modules_typedefs_enums_and_annotations_are_read() {
-        let schema = parse(IMU_LIKE, "my_msgs/msg/Reading").unwrap();
-        let root = schema.get(schema.root).unwrap();
-        let shape: Vec<_> = root.fields.iter().map(|f| (f.name.as_str(), f.kind, f.many)).collect();
-        assert_eq!(
-            shape,
-            [
-                ("angular_velocity", Kind::Struct(1), Many::One),
-                ("covariance", Kind::Number(Number::F64), Many::Array(9)),
-                ("data", Kind::Number(Number::U8), Many::Sequence),
-                ("stamp_ns", Kind::Number(Number::U64), Many::One),
-                ("mode", Kind::Number(Number::U32), Many::One),
-                ("wide", Kind::Number(Number::F128), Many::One),
-                ("grid", Kind::Number(Number::F32), Many::Array(6)),
-                ("label", Kind::WideText, Many::One),
-                ("maybe", Kind::Undefined, Many::One),
-            ]
-        );
-        let vector: Vec<_> = schema.get(1).unwrap().fields.iter().map(|f| f.name.as_str()).collect();
-        assert_eq!(vector, ["x", "y", "z"]);
-    }
-
-    #[test]
-    fn what_is_not_idl_ends_with_a_sentence() {
-        for text in ["", "struct", "struct A {", "struct A { long", "struct A { long x", "module m { struct A { 5 } }", "typedef sequence<", "@", "\"", "/*", "struct A { string<", "}"] {
-            assert!(parse(text, "a/A").is_err(), "{text}");
-        }
-        let circular = "typedef A B; typedef B A; struct C { A x; sequence<sequence<long>> y; };";
-        let schema = parse(circular, "C").unwrap();
-        assert!(schema.structs[0].fields.iter().all(|f| f.kind == Kind::Undefined));
-        let deep = format!("struct A {{ {}long x; }};", "sequence<".repeat(100_000));
-        assert!(parse(&deep, "A").is_err());
-    }
-}
+mod tests;
