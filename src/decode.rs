@@ -12,10 +12,10 @@
 //!
 //! | encoding | schema | decoder |
 //! |---|---|---|
-//! | `cdr` | `ros2msg`, `ros2idl`, `omgidl`, or none for well-known types | [`ros`] |
-//! | `ros1` | `ros1msg`, or none for well-known types | [`ros`] |
-//! | `json` | any or none | [`json`] |
-//! | `protobuf` | `protobuf` (file descriptor set) | [`protobuf`] |
+//! | `cdr` | `ros2msg`, `ros2idl`, `omgidl`, or none for well-known types | `decode::ros` |
+//! | `ros1` | `ros1msg`, or none for well-known types | `decode::ros` |
+//! | `json` | any or none | `decode::json` |
+//! | `protobuf` | `protobuf` (file descriptor set) | `decode::protobuf` |
 
 mod fields;
 mod json;
@@ -163,7 +163,7 @@ impl Decoder {
         let px4 = names::px4(channel.schema_name);
         state_px4(px4, &mut stated);
         stated.description = "fields by name, in each message".to_owned();
-        let keys = json::seek::schema_keys(channel.schema_data);
+        let keys = json::keys::schema_keys(channel.schema_data);
         stated.has_gyro |= keys.0;
         stated.has_stamp |= keys.1;
         let found = if stated.has_gyro {
@@ -301,7 +301,7 @@ impl Decoder {
         match complaint {
             None => Ok(()),
             Some(why) => {
-                let keys = json::seek::keys(payload).join(", ");
+                let keys = json::keys::keys(payload).join(", ");
                 Err(unsupported(
                     &self.label,
                     format!("{why}; its keys: {keys}"),
@@ -419,7 +419,8 @@ fn compile_plan(
         "ros1" => ros::compile::Layout::Ros1,
         _ => ros::compile::Layout::Cdr,
     };
-    ros::compile::samples(schema, selection, child, layout).map(Plan::Ros)
+    let plan = ros::compile::samples(schema, selection, child, layout)?;
+    Ok(Plan::Ros(plan.recognised()))
 }
 
 fn state(type_name: &str, selection: &Selection) -> Stated {

@@ -14,9 +14,12 @@ mod recordings;
 mod roles;
 #[path = "decode/ros.rs"]
 mod ros;
+#[path = "decode/speed.rs"]
+mod speed;
 #[path = "decode/writer.rs"]
 mod writer;
 
+#[allow(unreachable_pub)]
 mod shared_data;
 
 use strapd::decode::{Channel, Decoder, Options, Undecodable};

@@ -6,6 +6,7 @@
 //! settled once, by [`super::Decoder::settle`].
 
 pub(crate) mod found;
+pub(crate) mod keys;
 pub(crate) mod line;
 pub(crate) mod scan;
 pub(crate) mod seek;

@@ -69,6 +69,16 @@ impl Registers {
         self.seen |= 1 << (slot.0 & 31);
     }
 
+    /// Puts floating-point numbers in a row.
+    #[inline]
+    pub(crate) fn floats<const N: usize>(&mut self, slot: Slot, values: [f64; N]) {
+        let from = usize::from(slot.0 & 15);
+        if let Some(row) = self.floats.get_mut(from..from + N) {
+            row.copy_from_slice(&values);
+            self.seen |= slot.bits(N as u32);
+        }
+    }
+
     /// Puts an integer.
     #[inline]
     pub(crate) fn integer(&mut self, slot: Slot, value: i64) {
@@ -171,14 +181,10 @@ impl Form {
         publish: Nanos,
         outcome: &mut Decoded,
     ) -> RawSample {
-        let marked = |slot: Slot| registers.has(slot, 1) && registers.get(slot) == -1.0;
-        let mut gyro = registers.vector(Slot::GYRO);
-        if gyro.is_some() && marked(Slot::GYRO_MARK) {
-            outcome.gyro_marked_absent += 1;
-            if !self.ignore_covariance_flag {
-                gyro = None;
-            }
-        }
+        let marked = |slot: Slot| registers.has(slot, 1) && is_mark(registers.get(slot));
+        let gyro = registers
+            .vector(Slot::GYRO)
+            .and_then(|gyro| self.gyro(gyro, marked(Slot::GYRO_MARK), outcome));
         let mut accel = registers.vector(Slot::ACCEL);
         if marked(Slot::ACCEL_MARK) && !self.ignore_covariance_flag {
             accel = None;
@@ -199,7 +205,13 @@ impl Form {
             publish,
             gyro,
             accel,
-            orientation: self.orientation(registers, marked(Slot::ORIENTATION_MARK)),
+            orientation: registers
+                .has(Slot::ORIENTATION, 4)
+                .then_some(())
+                .and_then(|()| {
+                    let q = [6, 7, 8, 9].map(|n| registers.get(Slot(n)));
+                    self.orientation(q, marked(Slot::ORIENTATION_MARK))
+                }),
             interval_nanos: registers.has(Slot::INTERVAL, 1).then(|| {
                 let unit = match self.interval {
                     // An interval is no instant: without a stated unit it is seconds.
@@ -211,14 +223,29 @@ impl Form {
         }
     }
 
+    /// The body rate unless it is marked as absent, which is counted either way.
+    #[inline]
+    pub(crate) fn gyro(
+        &self,
+        gyro: [f64; 3],
+        marked: bool,
+        outcome: &mut Decoded,
+    ) -> Option<[f64; 3]> {
+        outcome.gyro_marked_absent += usize::from(marked);
+        (!marked || self.ignore_covariance_flag).then_some(gyro)
+    }
+
     /// The orientation, when it is one: drivers without one write zeros, NaN or the mark.
-    fn orientation(&self, registers: &Registers, marked: bool) -> Option<[f64; 4]> {
-        if !registers.has(Slot::ORIENTATION, 4) || (marked && !self.ignore_covariance_flag) {
-            return None;
-        }
-        let q = [6, 7, 8, 9].map(|n| registers.get(Slot(n)));
+    #[inline]
+    pub(crate) fn orientation(&self, q: [f64; 4], marked: bool) -> Option<[f64; 4]> {
         let square: f64 = q.iter().map(|c| c * c).sum();
         // NaN compares false, so a quaternion with one is none.
-        (square >= 0.25).then_some(q)
+        (square >= 0.25 && (!marked || self.ignore_covariance_flag)).then_some(q)
     }
+}
+
+/// Whether the first element of a covariance marks its datum as absent (Imu.msg).
+#[inline]
+pub(crate) fn is_mark(covariance: f64) -> bool {
+    covariance == -1.0
 }

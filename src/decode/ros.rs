@@ -10,11 +10,13 @@
 //! encapsulation. ROS 1: <http://wiki.ros.org/roscpp/Overview/MessagesSerializationAndAdaptingTypes>.
 
 pub(crate) mod compile;
+pub(crate) mod imu;
+mod read;
 
-use super::registers::{Form, Registers, Slot};
-use super::schema::Number;
+use super::registers::{Form, Registers};
 use super::{Decoded, MAX_BATCH, Undecodable};
 use crate::record::{Nanos, RawSample};
+use read::{Read, bytes_of};
 
 /// Bytes after the last field that are still padding: writers round up to 4 or 8.
 const MAX_PADDING: usize = 7;
@@ -30,6 +32,8 @@ pub(crate) struct Plan {
     open: bool,
     batched: bool,
     cdr: bool,
+    /// The layout is that of `sensor_msgs/Imu`.
+    imu: bool,
     form: Form,
     child: Option<Box<str>>,
 }
@@ -83,15 +87,6 @@ enum Emit {
     FirstMatch,
 }
 
-/// `n` numbers in a row and the slots they go to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Read {
-    at: usize,
-    number: Number,
-    slot: Slot,
-    n: u8,
-}
-
 /// Where a field of a block ends, for the message about one that does not fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Mark {
@@ -136,6 +131,14 @@ impl Plan {
         publish: Nanos,
         out: &mut Vec<RawSample>,
     ) -> Result<Decoded, Undecodable> {
+        if self.imu {
+            let mut outcome = Decoded::default();
+            let read = if self.cdr { imu::cdr } else { imu::ros1 };
+            if let Some(sample) = read(payload, &self.form, log, publish, &mut outcome) {
+                out.push(sample);
+                return Ok(outcome);
+            }
+        }
         let before = out.len();
         let result = self
             .walk(payload, log, publish, out)
@@ -144,6 +147,12 @@ impl Plan {
             out.truncate(before);
         }
         result
+    }
+
+    /// The same plan, on the short way where its layout has one.
+    pub(crate) fn recognised(self) -> Self {
+        let imu = imu::is_imu(&self);
+        Plan { imu, ..self }
     }
 
     /// How registers become samples.
@@ -402,75 +411,6 @@ impl<'a> Walk<'a, '_> {
         self.out.push(sample);
         self.outcome.samples += 1;
     }
-}
-
-impl Read {
-    /// Reads the numbers; those beyond `bytes` stay unseen (the caller has checked the length).
-    #[inline]
-    fn apply<const BIG: bool>(&self, bytes: &[u8], registers: &mut Registers) {
-        for i in 0..self.n {
-            let at = self.at + usize::from(i) * self.number.size() as usize;
-            let slot = self.slot.plus(i);
-            match self.number {
-                Number::F64 => {
-                    if let Some(b) = bytes_of::<8>(bytes, at) {
-                        let v = if BIG {
-                            f64::from_be_bytes(b)
-                        } else {
-                            f64::from_le_bytes(b)
-                        };
-                        registers.float(slot, v);
-                    }
-                }
-                Number::F32 => {
-                    if let Some(b) = bytes_of::<4>(bytes, at) {
-                        let v = if BIG {
-                            f32::from_be_bytes(b)
-                        } else {
-                            f32::from_le_bytes(b)
-                        };
-                        registers.float(slot, f64::from(v));
-                    }
-                }
-                number => {
-                    if let Some(v) = integer::<BIG>(number, bytes, at) {
-                        registers.integer(slot, v);
-                    }
-                }
-            }
-        }
-    }
-}
-
-/// An integer; an unsigned one beyond `i64` saturates.
-#[inline]
-fn integer<const BIG: bool>(number: Number, bytes: &[u8], at: usize) -> Option<i64> {
-    macro_rules! read {
-        ($type:ty, $size:literal) => {{
-            let b = bytes_of::<$size>(bytes, at)?;
-            if BIG {
-                <$type>::from_be_bytes(b)
-            } else {
-                <$type>::from_le_bytes(b)
-            }
-        }};
-    }
-    Some(match number {
-        Number::I8 => i64::from(read!(i8, 1)),
-        Number::U8 => i64::from(read!(u8, 1)),
-        Number::I16 => i64::from(read!(i16, 2)),
-        Number::U16 => i64::from(read!(u16, 2)),
-        Number::I32 => i64::from(read!(i32, 4)),
-        Number::U32 => i64::from(read!(u32, 4)),
-        Number::I64 => read!(i64, 8),
-        Number::U64 => i64::try_from(read!(u64, 8)).unwrap_or(i64::MAX),
-        _ => return None,
-    })
-}
-
-#[inline]
-fn bytes_of<const N: usize>(bytes: &[u8], at: usize) -> Option<[u8; N]> {
-    bytes.get(at..)?.first_chunk::<N>().copied()
 }
 
 fn range<T>(items: &[T], (from, to): (u32, u32)) -> &[T] {

@@ -5,6 +5,7 @@
 
 pub(crate) mod names;
 pub(crate) mod search;
+mod shapes;
 
 use super::fields::{FieldPath, FieldRole, Segment};
 use super::registers::{Form, Slot, StampForm};
@@ -153,9 +154,9 @@ fn take_given(schema: &Schema, field: &FieldPath, selection: &mut Selection) -> 
     let first = ends.first().ok_or_else(|| nowhere(&field.text))?.clone();
     let paths = if let [(path, end)] = ends.as_slice() {
         match field.role {
-            FieldRole::Orientation => search::quaternion(schema, path, *end),
+            FieldRole::Orientation => shapes::quaternion(schema, path, *end),
             FieldRole::Interval => (end.number().is_some()).then(|| vec![path.clone()]),
-            _ => search::vector(schema, path, *end, 2),
+            _ => shapes::vector(schema, path, *end, 2),
         }
     } else {
         let all = ends.iter().all(|(_, end)| end.number().is_some());
@@ -183,7 +184,7 @@ fn take_stamp(
     let (path, end) = ends.first().ok_or_else(|| nowhere(&field.text))?;
     let unit = field.unit.unwrap_or_default();
     let stamp =
-        search::stamp_at(schema, path, *end, unit, 2).ok_or_else(|| nowhere(&field.text))?;
+        shapes::stamp_at(schema, path, *end, unit, 2).ok_or_else(|| nowhere(&field.text))?;
     selection.describe(field.role, schema, path);
     search::take_stamp(selection, stamp);
     Ok(())

@@ -7,17 +7,17 @@ use strapd::record::{Nanos, RawSample};
 
 /// A channel, owned.
 #[derive(Clone)]
-pub struct Owned {
-    pub topic: String,
-    pub message_encoding: String,
-    pub schema_name: String,
-    pub schema_encoding: String,
-    pub schema_data: Vec<u8>,
-    pub log: Nanos,
+pub(crate) struct Owned {
+    pub(crate) topic: String,
+    pub(crate) message_encoding: String,
+    pub(crate) schema_name: String,
+    pub(crate) schema_encoding: String,
+    pub(crate) schema_data: Vec<u8>,
+    pub(crate) log: Nanos,
 }
 
 impl Owned {
-    pub fn channel(&self) -> Channel<'_> {
+    pub(crate) fn channel(&self) -> Channel<'_> {
         Channel {
             topic: &self.topic,
             message_encoding: &self.message_encoding,
@@ -29,7 +29,7 @@ impl Owned {
 }
 
 /// Every message of a recording up to the first damage.
-pub fn messages(relative: &str) -> Option<Vec<(Vec<u8>, Owned)>> {
+pub(crate) fn messages(relative: &str) -> Option<Vec<(Vec<u8>, Owned)>> {
     let bytes = std::fs::read(shared(relative)?).unwrap();
     let mut list = Vec::new();
     for message in mcap::MessageStream::new(&bytes).unwrap() {
@@ -50,10 +50,16 @@ pub fn messages(relative: &str) -> Option<Vec<(Vec<u8>, Owned)>> {
     Some(list)
 }
 
-/// Per topic: samples, and how many payloads could not be decoded.
-fn all(relative: &str) -> Option<BTreeMap<String, (Vec<RawSample>, usize, Decoded)>> {
+/// Samples, how many payloads could not be decoded, and what was noticed.
+type Topic = (Vec<RawSample>, usize, Decoded);
+
+/// Topic, samples, undecodable payloads.
+type Expected = [(&'static str, usize, usize)];
+
+/// What each topic of a recording decodes to.
+fn all(relative: &str) -> Option<BTreeMap<String, Topic>> {
     let mut decoders: BTreeMap<String, Option<Decoder>> = BTreeMap::new();
-    let mut topics: BTreeMap<String, (Vec<RawSample>, usize, Decoded)> = BTreeMap::new();
+    let mut topics: BTreeMap<String, Topic> = BTreeMap::new();
     for (payload, owned) in messages(relative)? {
         let decoder = decoders.entry(owned.topic.clone()).or_insert_with(|| {
             let mut decoder = Decoder::compile(&owned.channel(), &Options::default()).ok()?;
@@ -75,7 +81,7 @@ fn all(relative: &str) -> Option<BTreeMap<String, (Vec<RawSample>, usize, Decode
 
 #[test]
 fn every_recording_gives_as_many_samples_as_its_readme_says() {
-    let expected: &[(&str, &[(&str, usize, usize)])] = &[
+    let expected: &[(&str, &Expected)] = &[
         (
             "real/ximu3_ros2_zstd",
             &[("/imu", 500, 0), ("/reference/orientation", 500, 0)],

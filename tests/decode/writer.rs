@@ -2,15 +2,15 @@
 
 /// A CDR (or packed) writer.
 #[derive(Clone)]
-pub struct Writer {
-    pub bytes: Vec<u8>,
+pub(crate) struct Writer {
+    pub(crate) bytes: Vec<u8>,
     big: bool,
     /// Where alignment counts from; `None`: nothing is aligned (ROS 1).
     origin: Option<usize>,
 }
 
 impl Writer {
-    pub fn cdr(big: bool) -> Self {
+    pub(crate) fn cdr(big: bool) -> Self {
         Writer {
             bytes: vec![0, u8::from(!big), 0, 0],
             big,
@@ -18,7 +18,7 @@ impl Writer {
         }
     }
 
-    pub fn ros1() -> Self {
+    pub(crate) fn ros1() -> Self {
         Writer {
             bytes: Vec::new(),
             big: false,
@@ -40,44 +40,44 @@ impl Writer {
         self
     }
 
-    pub fn u8(self, v: u8) -> Self {
+    pub(crate) fn u8(self, v: u8) -> Self {
         self.put(vec![v])
     }
 
-    pub fn i16(self, v: i16) -> Self {
+    pub(crate) fn i16(self, v: i16) -> Self {
         self.put(v.to_le_bytes().to_vec())
     }
 
-    pub fn i32(self, v: i32) -> Self {
+    pub(crate) fn i32(self, v: i32) -> Self {
         self.put(v.to_le_bytes().to_vec())
     }
 
-    pub fn u32(self, v: u32) -> Self {
+    pub(crate) fn u32(self, v: u32) -> Self {
         self.put(v.to_le_bytes().to_vec())
     }
 
-    pub fn u64(self, v: u64) -> Self {
+    pub(crate) fn u64(self, v: u64) -> Self {
         self.put(v.to_le_bytes().to_vec())
     }
 
-    pub fn f32(self, v: f32) -> Self {
+    pub(crate) fn f32(self, v: f32) -> Self {
         self.put(v.to_le_bytes().to_vec())
     }
 
-    pub fn f64(self, v: f64) -> Self {
+    pub(crate) fn f64(self, v: f64) -> Self {
         self.put(v.to_le_bytes().to_vec())
     }
 
-    pub fn f32s(self, values: &[f32]) -> Self {
+    pub(crate) fn f32s(self, values: &[f32]) -> Self {
         values.iter().fold(self, |w, v| w.f32(*v))
     }
 
-    pub fn f64s(self, values: &[f64]) -> Self {
+    pub(crate) fn f64s(self, values: &[f64]) -> Self {
         values.iter().fold(self, |w, v| w.f64(*v))
     }
 
     /// CDR counts and writes a terminator, ROS 1 has none.
-    pub fn string(mut self, text: &str) -> Self {
+    pub(crate) fn string(mut self, text: &str) -> Self {
         let nul = usize::from(self.origin.is_some());
         self = self.u32((text.len() + nul) as u32);
         self.bytes.extend(text.as_bytes());
@@ -85,14 +85,14 @@ impl Writer {
         self
     }
 
-    pub fn header(self, sec: i32, nanosec: u32, frame: &str) -> Self {
+    pub(crate) fn header(self, sec: i32, nanosec: u32, frame: &str) -> Self {
         let seq = self.origin.is_none();
         let w = if seq { self.u32(7) } else { self };
         w.i32(sec).u32(nanosec).string(frame)
     }
 
     /// The body of an Imu: each number tells where it stood.
-    pub fn imu_body(self, gyro_mark: f64, orientation_mark: f64) -> Self {
+    pub(crate) fn imu_body(self, gyro_mark: f64, orientation_mark: f64) -> Self {
         let mut covariance = [0.25; 9];
         covariance[0] = orientation_mark;
         let w = self.f64s(&[0.1, 0.2, 0.3, 0.9]).f64s(&covariance);
@@ -100,18 +100,18 @@ impl Writer {
         w.f64s(&GYRO).f64s(&covariance).f64s(&ACCEL).f64s(&[0.5; 9])
     }
 
-    pub fn imu(self, frame: &str) -> Self {
+    pub(crate) fn imu(self, frame: &str) -> Self {
         self.header(1_700_000_000, 5, frame).imu_body(0.0, 0.0)
     }
 }
 
-pub const GYRO: [f64; 3] = [1.5, -2.5, 3.25];
-pub const ACCEL: [f64; 3] = [0.125, -0.25, 9.75];
+pub(crate) const GYRO: [f64; 3] = [1.5, -2.5, 3.25];
+pub(crate) const ACCEL: [f64; 3] = [0.125, -0.25, 9.75];
 /// w, x, y, z of [`Writer::imu_body`].
-pub const ORIENTATION: [f64; 4] = [0.9, 0.1, 0.2, 0.3];
-pub const STAMP: i64 = 1_700_000_000_000_000_005;
+pub(crate) const ORIENTATION: [f64; 4] = [0.9, 0.1, 0.2, 0.3];
+pub(crate) const STAMP: i64 = 1_700_000_000_000_000_005;
 
-pub const IMU: &str = "\
+pub(crate) const IMU: &str = "\
 # a comment with a # in it
 std_msgs/Header header
 geometry_msgs/Quaternion orientation
@@ -142,18 +142,18 @@ float64 z
 ";
 
 /// A section of concatenated message text.
-pub fn section(name: &str, fields: &str) -> String {
+pub(crate) fn section(name: &str, fields: &str) -> String {
     format!("\n{}\nMSG: {name}\n{fields}\n", "=".repeat(80))
 }
 
 /// [`IMU`] as a section, with everything it needs.
-pub fn imu_section() -> String {
+pub(crate) fn imu_section() -> String {
     section("sensor_msgs/Imu", IMU)
 }
 
 /// A protobuf writer.
 #[derive(Default, Clone)]
-pub struct Proto(pub Vec<u8>);
+pub(crate) struct Proto(pub(crate) Vec<u8>);
 
 impl Proto {
     fn varint_bytes(mut v: u64) -> Vec<u8> {
@@ -175,37 +175,43 @@ impl Proto {
         self
     }
 
-    pub fn varint(self, number: u32, v: u64) -> Self {
+    pub(crate) fn varint(self, number: u32, v: u64) -> Self {
         let mut w = self.key(number, 0);
         w.0.extend(Self::varint_bytes(v));
         w
     }
 
-    pub fn double(self, number: u32, v: f64) -> Self {
+    pub(crate) fn double(self, number: u32, v: f64) -> Self {
         let mut w = self.key(number, 1);
         w.0.extend(v.to_le_bytes());
         w
     }
 
-    pub fn float(self, number: u32, v: f32) -> Self {
+    pub(crate) fn float(self, number: u32, v: f32) -> Self {
         let mut w = self.key(number, 5);
         w.0.extend(v.to_le_bytes());
         w
     }
 
-    pub fn bytes(self, number: u32, bytes: &[u8]) -> Self {
+    pub(crate) fn bytes(self, number: u32, bytes: &[u8]) -> Self {
         let mut w = self.key(number, 2);
         w.0.extend(Self::varint_bytes(bytes.len() as u64));
         w.0.extend(bytes);
         w
     }
 
-    pub fn message(self, number: u32, inner: Proto) -> Self {
+    pub(crate) fn message(self, number: u32, inner: Proto) -> Self {
         self.bytes(number, &inner.0)
     }
 
     /// A `FieldDescriptorProto`: type 1 double, 2 float, 3 int64, 4 uint64, 9 string, 11 message.
-    pub fn field(name: &str, number: u32, repeated: bool, kind: u64, type_name: &str) -> Proto {
+    pub(crate) fn field(
+        name: &str,
+        number: u32,
+        repeated: bool,
+        kind: u64,
+        type_name: &str,
+    ) -> Proto {
         let field = Proto::default()
             .bytes(1, name.as_bytes())
             .varint(3, u64::from(number))
@@ -219,13 +225,13 @@ impl Proto {
     }
 
     /// A `DescriptorProto`.
-    pub fn message_type(name: &str, fields: Vec<Proto>) -> Proto {
+    pub(crate) fn message_type(name: &str, fields: Vec<Proto>) -> Proto {
         let head = Proto::default().bytes(1, name.as_bytes());
         fields.into_iter().fold(head, |w, f| w.message(2, f))
     }
 
     /// A `FileDescriptorSet` of one file.
-    pub fn file_set(package: &str, messages: Vec<Proto>) -> Vec<u8> {
+    pub(crate) fn file_set(package: &str, messages: Vec<Proto>) -> Vec<u8> {
         let file = Proto::default()
             .bytes(1, b"a.proto")
             .bytes(2, package.as_bytes());

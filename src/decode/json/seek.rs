@@ -13,7 +13,7 @@ use crate::record::SampleKind;
 use std::borrow::Cow;
 
 /// How deep an object may lie whose keys are looked at by name.
-const MAX_SEARCH: u32 = 6;
+pub(super) const MAX_SEARCH: u32 = 6;
 
 type Scan<T> = Result<T, Undecodable>;
 
@@ -468,83 +468,5 @@ impl<'a, 'p> Seeker<'a, 'p> {
             });
         }
         self.scanner.number()
-    }
-}
-
-/// Whether a JSON schema declares a body rate, and a stamp.
-pub(crate) fn schema_keys(schema: &[u8]) -> (bool, bool) {
-    let list = keys(schema);
-    let mut found = (false, false);
-    for key in &list {
-        let name = key.strip_suffix(".type").unwrap_or(key);
-        let name = name.rsplit('.').next().unwrap_or(name);
-        match meaning(name) {
-            Some(Meaning::Gyro { .. } | Meaning::DeltaAngle | Meaning::GyroAxis { .. }) => {
-                found.0 = true
-            }
-            Some(Meaning::Stamp { .. }) => found.1 = true,
-            _ => {}
-        }
-    }
-    found
-}
-
-/// The keys of a message as paths, at most 60.
-pub(crate) fn keys(payload: &[u8]) -> Vec<String> {
-    let mut list = Vec::new();
-    if let Ok(mut scanner) = Scanner::new(payload) {
-        // What is broken ends the list early, no more.
-        let _ = collect_keys(&mut scanner, "", 0, &mut list);
-    }
-    list
-}
-
-fn collect_keys(
-    scanner: &mut Scanner<'_>,
-    path: &str,
-    depth: u32,
-    list: &mut Vec<String>,
-) -> Scan<()> {
-    let first = &mut true;
-    match scanner.peek() {
-        Some(b'{') if depth < MAX_SEARCH && list.len() < 60 => {
-            scanner.enter();
-            while let Some(key) = scanner.key(first)? {
-                let key = crate::decode::printable(&key);
-                let path = if path.is_empty() {
-                    key
-                } else {
-                    format!("{path}.{key}")
-                };
-                collect_keys(scanner, &path, depth + 1, list)?;
-            }
-            Ok(())
-        }
-        Some(b'[') if depth < MAX_SEARCH && list.len() < 60 => {
-            scanner.enter();
-            let mut index = 0;
-            while scanner.element(first)? {
-                match (index, scanner.peek()) {
-                    (0, Some(b'{')) => {
-                        collect_keys(scanner, &format!("{path}[]"), depth + 1, list)?
-                    }
-                    _ => scanner.skip(depth)?,
-                }
-                index += 1;
-            }
-            if !path.is_empty()
-                && !list.iter().any(|known| known.starts_with(path))
-                && list.len() < 60
-            {
-                list.push(path.to_owned());
-            }
-            Ok(())
-        }
-        _ => {
-            if !path.is_empty() && list.len() < 60 {
-                list.push(path.to_owned());
-            }
-            scanner.skip(depth)
-        }
     }
 }

@@ -4,7 +4,8 @@
 //! 37 doubles. The compiler knows the position modulo 8 as far as the layout fixes it, and leaves
 //! to the walk only the alignments it can not know, those behind a string or a sequence.
 
-use super::{Emit, Keep, Mark, Op, Plan, Read};
+use super::read::Read;
+use super::{Emit, Keep, Mark, Op, Plan};
 use crate::decode::registers::Slot;
 use crate::decode::schema::{Field, Kind, Many, Number, Schema};
 use crate::decode::select::{Batch, Selection, Step, path_text};

@@ -8,8 +8,11 @@
 //! OMG IDL 4.2 (formal/18-01-05) 7.4; the concatenation as rosbag2 stores it: a line of `=`, a line
 //! `IDL: pkg/msg/Type`, the text.
 
+mod tokens;
+
 use super::{Field, Kind, Many, Number, Schema, Struct, ros_name};
 use std::collections::BTreeMap;
+use tokens::tokens;
 
 const MAX_TEXT: usize = 1 << 20;
 const MAX_DEPTH: usize = 32;
@@ -43,63 +46,6 @@ pub(crate) fn parse(text: &str, type_name: &str) -> Result<Schema, String> {
         Some(root) => Ok(Schema { root, ..schema }),
         None => Err("the schema text does not define this message".to_owned()),
     }
-}
-
-/// Words, numbers, punctuation; comments, preprocessor lines, section marks and the contents of
-/// strings are left out.
-fn tokens(text: &str) -> Vec<&str> {
-    let mut tokens = Vec::new();
-    let mut rest = text;
-    let mut line_start = true;
-    while let Some(c) = rest.chars().next() {
-        let line = rest.find('\n').unwrap_or(rest.len());
-        let skip = if c == '\n' {
-            line_start = true;
-            1
-        } else if c.is_whitespace() {
-            c.len_utf8()
-        } else if line_start && (c == '#' || c == '=' || rest.starts_with("IDL:"))
-            || rest.starts_with("//")
-        {
-            line
-        } else if rest.starts_with("/*") {
-            rest.find("*/").map_or(rest.len(), |end| end + 2)
-        } else if c == '"' || c == '\'' {
-            quoted(rest, c)
-        } else if c.is_ascii_alphanumeric() || c == '_' {
-            let end = rest.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_'));
-            end.unwrap_or(rest.len())
-        } else if rest.starts_with("::") {
-            2
-        } else {
-            c.len_utf8()
-        };
-        let token = rest.get(..skip).unwrap_or("");
-        let first = token.chars().next().unwrap_or(' ');
-        let is_token = first.is_ascii_alphanumeric() || "_{}[]<>();,:@=".contains(first);
-        if is_token && !(line_start && (first == '=' || token.starts_with("IDL:"))) {
-            tokens.push(token);
-        }
-        if c != '\n' && !c.is_whitespace() {
-            line_start = false;
-        }
-        rest = rest.get(skip.max(1)..).unwrap_or("");
-    }
-    tokens
-}
-
-/// Bytes of a quoted text at the start of `rest`.
-fn quoted(rest: &str, quote: char) -> usize {
-    let mut escaped = false;
-    for (at, c) in rest.char_indices().skip(1) {
-        match c {
-            _ if escaped => escaped = false,
-            '\\' => escaped = true,
-            _ if c == quote => return at + 1,
-            _ => {}
-        }
-    }
-    rest.len()
 }
 
 /// A type before names are resolved.
@@ -511,98 +457,4 @@ fn product(many: Many, n: u32) -> Many {
 }
 
 #[cfg(test)]
-mod tests {
-    #![allow(clippy::unwrap_used)]
-    use super::*;
-
-    const IMU_LIKE: &str = r#"
-================================================================================
-IDL: my_msgs/msg/Reading
-// generated
-#include "geometry_msgs/msg/Vector3.idl"
-module my_msgs {
-  module msg {
-    typedef double double__9[9];
-    module Reading_Constants { const long A = 5; };
-    enum Mode { OFF, ON };
-    @verbatim (language="comment", text="a \" quoted; } text" "and more")
-    struct Reading {
-      @unit ("rad/s") geometry_msgs::msg::Vector3 angular_velocity;
-      double__9 covariance;
-      sequence<octet, 16> data;
-      unsigned long long stamp_ns; /* ns; */
-      Mode mode;
-      long double wide; float grid[2][3];
-      wstring label;
-      @optional long maybe;
-    };
-  };
-};
-================================================================================
-IDL: geometry_msgs/msg/Vector3
-module geometry_msgs { module msg { struct Vector3 { double x, y; double z; }; }; };
-"#;
-
-    #[test]
-    fn modules_typedefs_enums_and_annotations_are_read() {
-        let schema = parse(IMU_LIKE, "my_msgs/msg/Reading").unwrap();
-        let root = schema.get(schema.root).unwrap();
-        let shape: Vec<_> = root
-            .fields
-            .iter()
-            .map(|f| (f.name.as_str(), f.kind, f.many))
-            .collect();
-        assert_eq!(
-            shape,
-            [
-                ("angular_velocity", Kind::Struct(1), Many::One),
-                ("covariance", Kind::Number(Number::F64), Many::Array(9)),
-                ("data", Kind::Number(Number::U8), Many::Sequence),
-                ("stamp_ns", Kind::Number(Number::U64), Many::One),
-                ("mode", Kind::Number(Number::U32), Many::One),
-                ("wide", Kind::Number(Number::F128), Many::One),
-                ("grid", Kind::Number(Number::F32), Many::Array(6)),
-                ("label", Kind::WideText, Many::One),
-                ("maybe", Kind::Undefined, Many::One),
-            ]
-        );
-        let vector: Vec<_> = schema
-            .get(1)
-            .unwrap()
-            .fields
-            .iter()
-            .map(|f| f.name.as_str())
-            .collect();
-        assert_eq!(vector, ["x", "y", "z"]);
-    }
-
-    #[test]
-    fn what_is_not_idl_ends_with_a_sentence() {
-        for text in [
-            "",
-            "struct",
-            "struct A {",
-            "struct A { long",
-            "struct A { long x",
-            "module m { struct A { 5 } }",
-            "typedef sequence<",
-            "@",
-            "\"",
-            "/*",
-            "struct A { string<",
-            "}",
-        ] {
-            assert!(parse(text, "a/A").is_err(), "{text}");
-        }
-        let circular = "typedef A B; typedef B A; struct C { A x; sequence<sequence<long>> y; };";
-        let schema = parse(circular, "C").unwrap();
-        assert!(
-            schema.structs[0]
-                .fields
-                .iter()
-                .all(|f| f.kind == Kind::Undefined)
-        );
-        let deep = format!("struct A {{ {}long x; }};", "sequence<".repeat(100_000));
-        assert!(parse(&deep, "A").is_err());
-    }
-}
+mod tests;
