@@ -41,9 +41,6 @@ mod timing;
 pub mod quality;
 pub mod stillness;
 
-#[cfg(test)]
-mod tests;
-
 pub use clock::{Clock, ClockWarning, choose_clock};
 pub use report::{FirstBad, GAPS_KEPT, Gap, Gaps, Report};
 pub use settings::{GyroUnit, OnGap, Settings, SettingsError};
