@@ -182,7 +182,7 @@ fn a_clean_sample_costs_at_most_25_ns() {
             // The lower quartile: what it costs when nobody else uses the core.
             blocks.sort_by(f64::total_cmp);
             let best = blocks[blocks.len() / 4];
-            println!("{kind:?} window {window}: {:.1} ns/sample", best * 1e9);
+            eprintln!("{kind:?} window {window}: {:.1} ns/sample", best * 1e9);
             worst = worst.max(best);
         }
     }
