@@ -9,6 +9,7 @@ mod rest;
 #[path = "condition/rules.rs"]
 mod rules;
 #[cfg(feature = "service")]
+#[allow(unreachable_pub)]
 mod shared_data;
 #[path = "condition/statistics.rs"]
 mod statistics;
