@@ -41,9 +41,6 @@ mod timing;
 pub mod quality;
 pub mod stillness;
 
-#[cfg(test)]
-mod tests;
-
 pub use clock::{Clock, ClockWarning, choose_clock};
 pub use report::{FirstBad, GAPS_KEPT, Gap, Gaps, Report};
 pub use settings::{GyroUnit, OnGap, Settings, SettingsError};
@@ -274,7 +271,8 @@ impl Conditioner {
             };
             let is_alone = match ahead.first() {
                 Some(next) => next.stamp != entry.stamp || next.epoch != entry.epoch,
-                None => self.finishing || self.hold == 0,
+                // The end, or live: nothing to wait for.
+                None => true,
             };
             if !is_alone || self.timing.has_passed(entry) {
                 if self.drain_shared(out) {
@@ -349,4 +347,31 @@ impl Conditioner {
 /// Seconds to whole nanoseconds, saturating.
 fn secs_to_nanos(secs: f64) -> i64 {
     (secs * 1e9).round() as i64
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_has_left_is_forgotten_but_for_a_short_history() {
+        for window in [Settings::LIVE_WINDOW, Settings::REPLAY_WINDOW] {
+            let settings = Settings {
+                reorder_window: window,
+                ..Settings::default()
+            };
+            let mut conditioner = Conditioner::new(&settings).unwrap();
+            let mut out = Vec::new();
+            for n in 0..20_000 {
+                let raw = RawSample {
+                    header: Some(Nanos(1 + n * 1_000_000)),
+                    gyro: Some([n as f64 * 1e-6, 0.0, 0.0]),
+                    ..RawSample::default()
+                };
+                conditioner.push(&[raw], &mut out);
+                assert!(conditioner.order.line.len() <= 1024 + 64);
+            }
+        }
+    }
 }

@@ -79,7 +79,7 @@ impl Gate {
 
     /// The sample in SI and body axes, or why it can not be used. `spacing` is the ordinary step,
     /// needed only to see whether a delta angle without its own interval is saturated.
-    #[inline]
+    #[inline(always)]
     pub(super) fn pass(
         &self,
         raw: &RawSample,

@@ -71,7 +71,7 @@ impl Order {
     }
 
     /// Takes the next entry; `spacing` is the ordinary step.
-    #[inline]
+    #[inline(always)]
     pub(super) fn arrive(&mut self, entry: Entry, spacing: Option<i64>, report: &mut Report) {
         if self.suspects.is_empty() && self.high.is_none_or(|high| entry.stamp > high) {
             self.append(entry);
@@ -80,7 +80,7 @@ impl Order {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn append(&mut self, mut entry: Entry) {
         entry.epoch = self.epoch;
         self.high = Some(entry.stamp);

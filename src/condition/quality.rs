@@ -3,12 +3,14 @@
 //! A stage of its own, beside the conditioner and before it, because advice about units, axes
 //! and clocks must come from the samples as they were recorded, before any setting was applied.
 
+mod advice;
 mod gravity;
 mod histogram;
 mod summary;
 
+pub use advice::Advice;
 pub use gravity::GyroAgainstGravity;
-pub use summary::{Advice, AxisStats, GravityAxis, OffsetStats, QualitySummary, SpacingStats};
+pub use summary::{AxisStats, GravityAxis, OffsetStats, QualitySummary, SpacingStats};
 
 use super::clock::Clock;
 use crate::record::{Nanos, RawSample};
@@ -51,7 +53,7 @@ pub struct Quality {
     not_finite: u64,
     zero_rows: u64,
     repeated_rows: u64,
-    /// Samples above [`summary::DEGREES_ABOVE`] and below nonsense.
+    /// Samples above [`advice::DEGREES_ABOVE`] and below nonsense.
     fast_rows: u64,
     axes: [Axis; 3],
     previous: Option<[f64; 3]>,
@@ -333,7 +335,7 @@ impl Quality {
         self.previous = Some(gyro);
         let peak = gyro.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
         self.fast_rows +=
-            u64::from((summary::DEGREES_ABOVE..=super::gate::HUGE_RATE).contains(&peak));
+            u64::from((advice::DEGREES_ABOVE..=super::gate::HUGE_RATE).contains(&peak));
         for (axis, v) in self.axes.iter_mut().zip(gyro) {
             axis.push(v);
         }
@@ -364,7 +366,7 @@ impl Quality {
             self.gravity.push(stamp, &gyro, &accel);
         }
         let span = stamp.since(start);
-        if span < 0 || span > 4 * WINDOW_NANOS {
+        if !(0..=4 * WINDOW_NANOS).contains(&span) {
             // A jump or a gap: what it spans is no half second.
             *window = Window::default();
         } else if span >= WINDOW_NANOS && window.n >= WINDOW_SAMPLES {

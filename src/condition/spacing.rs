@@ -139,6 +139,7 @@ fn typical(steps: &mut [i64]) -> Option<i64> {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 

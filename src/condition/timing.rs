@@ -81,7 +81,7 @@ impl Timing {
     }
 
     /// Times one entry at `stamp`; `ahead` are the entries after it, as far as they are known.
-    #[inline]
+    #[inline(always)]
     pub(super) fn one(
         &mut self,
         entry: &Entry,
@@ -142,7 +142,7 @@ impl Timing {
     }
 
     /// Start of the interval and what was turned in it (for rates: the stamp, and the rate).
-    #[inline]
+    #[inline(always)]
     fn integrate(
         &self,
         entry: &Entry,

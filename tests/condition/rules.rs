@@ -76,6 +76,65 @@ fn a_rate_too_many_is_dropped_and_an_increment_too_many_is_not() {
 }
 
 #[test]
+fn batches_that_carry_one_stamp_are_spread_evenly() {
+    // Eight samples to a USB packet, all stamped when the packet came.
+    let raw: Vec<RawSample> = (0..400).map(|n| at(T0 + (n / 8) * 8 * STEP, n)).collect();
+    for k in [
+        SampleKind::Rate,
+        SampleKind::Average,
+        SampleKind::DeltaAngle,
+    ] {
+        let (out, report) = run(&kind(k), &raw);
+        assert_eq!(report.counts.lost(), 0);
+        assert_eq!(report.gaps.count, 0);
+        assert_eq!(steps(&out), vec![1.0; 399], "{k:?}");
+        assert!(out[1..].iter().all(|s| s.join == Join::Continuous));
+    }
+}
+
+#[test]
+fn a_delta_angle_loses_the_bias_of_its_own_interval() {
+    let bias = Vector3::new(0.1, -0.2, 0.3);
+    let mut raw = stream(100);
+    raw[50].interval_nanos = Some(STEP / 2);
+    raw.remove(70);
+    let settings = Settings {
+        bias,
+        ..kind(SampleKind::DeltaAngle)
+    };
+    let (out, _) = run(&settings, &raw);
+    for (i, (r, s)) in raw.iter().zip(&out).enumerate() {
+        let secs = if i == 50 { 0.0025 } else { 0.005 };
+        let expected = Vector3::from(r.gyro.unwrap()) - bias * secs;
+        assert!((s.value - expected).norm() < 1e-16, "{i}");
+    }
+}
+
+#[test]
+fn an_overtaken_sample_that_comes_twice_is_put_back_once() {
+    let mut raw = stream(100);
+    let overtaken = raw.remove(50);
+    raw.insert(52, overtaken);
+    raw.insert(53, overtaken);
+    let (out, report) = run(&Settings::default(), &raw);
+    assert_eq!(report.counts.get(Verdict::Repeated), 1);
+    assert_eq!(report.counts.get(Verdict::Reordered), 1);
+    assert_eq!(steps(&out), vec![1.0; 99]);
+}
+
+#[test]
+fn a_batch_sent_again_after_long_is_late_and_no_clock_set_back() {
+    let mut raw = stream(3000);
+    let again: Vec<RawSample> = raw[1000..1006].to_vec();
+    raw.splice(2500..2500, again);
+    let (out, report) = run(&Settings::default(), &raw);
+    assert_eq!(report.counts.get(Verdict::Late), 6);
+    assert_eq!(report.gaps.jumps_back, 0);
+    assert_eq!(out.len(), 3000);
+    assert!(out.iter().all(|s| s.join != Join::Hold));
+}
+
+#[test]
 fn data_sent_twice_is_dropped_and_not_a_loss() {
     let mut raw = stream(200);
     // Ten samples come again, in one batch, somewhat later.
@@ -118,6 +177,13 @@ fn two_swapped_packets_are_put_back() {
     assert_eq!(report.gaps.jumps_back, 0);
     assert!(out.is_sorted_by_key(|s| s.stamp));
     assert_eq!(out.len(), 200);
+
+    // The same, and the last of the late packet has collided with the newest stamp.
+    raw.insert(108, at(T0 + 107 * STEP, 1000));
+    let (out, report) = run(&Settings::default(), &raw);
+    assert_eq!(report.gaps.jumps_back, 0);
+    assert_eq!(report.counts.get(Verdict::Reordered), 4);
+    assert!(out.is_sorted_by_key(|s| s.stamp));
 }
 
 /// The clock of samples from `from` on is set by `by` nanoseconds.
@@ -437,6 +503,18 @@ fn a_zero_stamp_is_no_stamp_unless_the_clock_begins_there() {
     assert_eq!(out.len(), 100);
     assert_eq!(report.counts.lost(), 0);
     assert_eq!(out[0].stamp, Nanos(0));
+
+    // A simulation started again: its clock is set back to zero.
+    let twice: Vec<RawSample> = raw.iter().chain(&raw).copied().collect();
+    let (out, report) = run(&Settings::default(), &twice);
+    assert_eq!((report.counts.lost(), report.gaps.jumps_back), (0, 0));
+    // (The very same data again is a repeat; other data is a new run.)
+    assert_eq!(out.len(), 100);
+    let again: Vec<RawSample> = (0..100).map(|n| at(n * STEP, n + 100)).collect();
+    let twice: Vec<RawSample> = raw.into_iter().chain(again).collect();
+    let (out, report) = run(&Settings::default(), &twice);
+    assert_eq!((report.counts.lost(), report.gaps.jumps_back), (0, 1));
+    assert_eq!(out.len(), 200);
 }
 
 #[test]
@@ -545,13 +623,31 @@ fn live_every_sample_leaves_at_once_but_one_that_shares_its_stamp() {
 }
 
 #[test]
+fn live_the_first_increment_waits_for_the_second_to_know_its_interval() {
+    let settings = Settings {
+        reorder_window: Settings::LIVE_WINDOW,
+        ..kind(SampleKind::Average)
+    };
+    let mut conditioner = Conditioner::new(&settings).unwrap();
+    let mut out = Vec::new();
+    for (n, ready) in [(0, 0), (1, 2), (2, 3), (3, 4)] {
+        conditioner.push(&[sample(n)], &mut out);
+        assert_eq!(out.len(), ready);
+    }
+    assert!(out.iter().all(|s| s.stamp.since(s.start) == STEP));
+}
+
+#[test]
 fn components_at_the_range_are_flagged() {
+    // As a float32 this and its 200th part are a little less than they are.
+    const RANGE: f64 = 1.8;
+    assert!(f64::from(RANGE as f32) < RANGE && f64::from((RANGE * 0.005) as f32) < RANGE * 0.005);
     for (k, full) in [
-        (SampleKind::Rate, 34.9),
-        (SampleKind::DeltaAngle, 34.9 * 0.005),
+        (SampleKind::Rate, RANGE),
+        (SampleKind::DeltaAngle, RANGE * 0.005),
     ] {
         let settings = Settings {
-            gyro_range: Some(34.9),
+            gyro_range: Some(RANGE),
             ..kind(k)
         };
         let mut raw: Vec<RawSample> = (0..200)

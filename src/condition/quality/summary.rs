@@ -1,9 +1,10 @@
-//! Sums -> numbers for people, and advice with the flag that helps. Pure.
+//! Sums -> numbers for people. Pure.
 //!
-//! A stage of its own because the thresholds of advice are opinions, and opinions should lie in
-//! one place, apart from the counting.
+//! A stage of its own so that counting, which runs per sample, stays apart from dividing, which
+//! runs once.
 
-use super::{Axis, GyroAgainstGravity, Quality, Quiet};
+use super::advice::{Advice, advise};
+use super::{Axis, GyroAgainstGravity, Quality};
 use crate::record::Nanos;
 use nalgebra::Vector3;
 
@@ -72,146 +73,6 @@ impl std::fmt::Display for GravityAxis {
     }
 }
 
-/// Something to do about a recording; the text names the flag.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub enum Advice {
-    /// No gyro turns that fast in rad/s.
-    RatesLookLikeDegrees {
-        /// Largest magnitude of any axis.
-        peak: f64,
-    },
-    /// Gravity turns in the accelerometer by another factor than the gyro says.
-    GravityTurnsOtherwise {
-        /// What was found.
-        found: GyroAgainstGravity,
-        /// The value of `--gyro-unit` that it fits, if any.
-        unit: Option<&'static str>,
-    },
-    /// The acceleration at rest is one g, but not in m/s^2.
-    AccelNotInMetres {
-        /// Magnitude in the quietest half second.
-        magnitude: f64,
-        /// The unit it is plausible in.
-        unit: &'static str,
-    },
-    /// Gravity reads negative on z: the body is front-right-down.
-    LooksLikeFrd,
-    /// Gravity lies on x or y: the sensor is mounted on its side.
-    MountedOnSide {
-        /// Where it lies.
-        gravity: GravityAxis,
-    },
-    /// A gyro axis spends many samples at exactly its largest reading.
-    Saturated {
-        /// 0 = x, 1 = y, 2 = z.
-        axis: usize,
-        /// The reading.
-        at: f64,
-        /// How many samples.
-        samples: u64,
-    },
-    /// A gyro axis repeats one value for long while others move.
-    Stuck {
-        /// 0 = x, 1 = y, 2 = z.
-        axis: usize,
-        /// Longest run, samples.
-        samples: u64,
-    },
-    /// All stamps are zero or equal.
-    StampsStandStill,
-    /// Stamps jitter by more than a tenth of the step.
-    StampsJitter {
-        /// 99th percentile over the median step.
-        share: f64,
-    },
-    /// The two clocks drift apart.
-    ClocksDrift {
-        /// Parts per million.
-        ppm: f64,
-    },
-    /// Samples are missing.
-    SamplesMissing {
-        /// How many, by the ordinary step.
-        missing: u64,
-        /// Longest gap, s.
-        longest_secs: f64,
-    },
-    /// The body is never still: no bias can be had from this recording.
-    NeverStill,
-}
-
-impl std::fmt::Display for Advice {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let axis_name = |axis: &usize| ["x", "y", "z"].get(*axis).copied().unwrap_or("?");
-        match self {
-            Advice::RatesLookLikeDegrees { peak } => write!(
-                f,
-                "rates reach {peak:.1}: no gyro measures that in rad/s; deg/s would be plausible: --gyro-unit deg"
-            ),
-            Advice::GravityTurnsOtherwise {
-                found,
-                unit: Some(unit),
-            } => write!(
-                f,
-                "gravity turns by {:.4} of what the gyro says (correlation {:.2}): the rates look like {unit}/s: --gyro-unit {unit}",
-                found.factor, found.correlation
-            ),
-            Advice::GravityTurnsOtherwise { found, unit: None } => write!(
-                f,
-                "gravity turns by {:.2} of what the gyro says (correlation {:.2}): gyro and accelerometer disagree about axes, signs or unit",
-                found.factor, found.correlation
-            ),
-            Advice::AccelNotInMetres { magnitude, unit } => write!(
-                f,
-                "acceleration at rest is {magnitude:.3}: plausible in {unit}, not in m/s^2"
-            ),
-            Advice::LooksLikeFrd => write!(
-                f,
-                "gravity reads negative on z at rest: z points down, looks like --body frd"
-            ),
-            Advice::MountedOnSide { gravity } => write!(
-                f,
-                "gravity is on {gravity} at rest: the sensor is mounted on its side: --mount q=w,x,y,z or an axis map in --body"
-            ),
-            Advice::Saturated { axis, at, samples } => write!(
-                f,
-                "gyro {} reads exactly {at} in {samples} samples: looks saturated; --gyro-range {:.4} flags them",
-                axis_name(axis),
-                at.abs()
-            ),
-            Advice::Stuck { axis, samples } => write!(
-                f,
-                "gyro {} repeats one value {samples} times in a row while the others move: stuck?",
-                axis_name(axis)
-            ),
-            Advice::StampsStandStill => write!(
-                f,
-                "the stamps do not advance: --time log, or --time index --rate-hz HZ"
-            ),
-            Advice::StampsJitter { share } => write!(
-                f,
-                "stamps jitter by {:.0} % of the step (p99): if the sensor samples evenly, --time index --rate-hz HZ puts them on an even grid",
-                share * 100.0
-            ),
-            Advice::ClocksDrift { ppm } => write!(
-                f,
-                "header and log time drift apart by {ppm:.0} ppm: one of the clocks is wrong; --time chooses"
-            ),
-            Advice::SamplesMissing {
-                missing,
-                longest_secs,
-            } => write!(
-                f,
-                "{missing} samples are missing, at most {longest_secs:.3} s at a time: --max-gap, --on-gap decide what happens there"
-            ),
-            Advice::NeverStill => write!(
-                f,
-                "the body is never still for half a second: --bias auto will refuse; --bias x,y,z gives one"
-            ),
-        }
-    }
-}
-
 /// Everything `info` prints about one topic.
 #[derive(Clone, PartialEq, Debug)]
 pub struct QualitySummary {
@@ -275,22 +136,6 @@ pub struct QualitySummary {
     pub advice: Vec<Advice>,
 }
 
-/// Above this no gyro is in rad/s (11,500 deg/s; the widest range sold is 4000 to 20,000 deg/s on
-/// single-axis spin sensors, 2000 to 4000 on three-axis ones).
-pub(super) const DEGREES_ABOVE: f64 = 200.0;
-/// Rates above this that stay this even are a saturation, not a rest, in rad/s or deg/s.
-const SATURATION_FLOOR: f64 = 1.0;
-const SATURATED_SAMPLES: u64 = 5;
-/// A rest in rad/s is below this; in deg/s, a rest is below it times 57.
-const STILL_DEVIATION: f64 = 0.025;
-/// Longest credible run of one value from a moving, quantised sensor.
-const STUCK_SAMPLES: u64 = 100;
-const DRIFT_PPM: f64 = 200.0;
-/// Below this correlation the accelerometer reads too much besides gravity.
-const MIN_CORRELATION: f64 = 0.7;
-/// Factors within 2.5 of a unit's belong to it; accelerations make them vary.
-const UNIT_FACTOR: f64 = 2.5;
-
 pub(super) fn summarise(quality: &Quality) -> QualitySummary {
     let secs = |nanos: i64| nanos as f64 * 1e-9;
     let newest = quality.high;
@@ -330,7 +175,7 @@ pub(super) fn summarise(quality: &Quality) -> QualitySummary {
         gyro_against_gravity: quality.gravity.result(),
         advice: Vec::new(),
     };
-    summary.advice = advice(&summary, quality.quietest.as_ref(), quality.fast_rows);
+    summary.advice = advise(&summary, quality.quietest.as_ref(), quality.fast_rows);
     summary
 }
 
@@ -390,116 +235,4 @@ fn gravity(accel: Vector3<f64>) -> Option<GravityAxis> {
         axis,
         positive: largest > 0.0,
     })
-}
-
-fn advice(summary: &QualitySummary, quietest: Option<&Quiet>, fast_rows: u64) -> Vec<Advice> {
-    let mut advice = Vec::new();
-    let peak = summary
-        .axes
-        .iter()
-        .map(|a| a.max.abs().max(a.min.abs()))
-        .fold(0.0, f64::max);
-    // One in ten thousand may be a spike; a flipped bit is no unit.
-    let mut degrees = fast_rows > summary.count / 10_000 + 2;
-    if degrees {
-        advice.push(Advice::RatesLookLikeDegrees { peak });
-    }
-    if let Some(found) = summary.gyro_against_gravity
-        && found.correlation.abs() > MIN_CORRELATION
-        && !(1.0 / UNIT_FACTOR..=UNIT_FACTOR).contains(&found.factor)
-    {
-        let fits =
-            |factor: f64| (1.0 / UNIT_FACTOR..=UNIT_FACTOR).contains(&(found.factor / factor));
-        let unit = if fits(std::f64::consts::PI / 180.0) {
-            Some("deg")
-        } else if fits(1e-3) {
-            Some("mrad")
-        } else {
-            None
-        };
-        degrees |= unit == Some("deg");
-        advice.push(Advice::GravityTurnsOtherwise { found, unit });
-    }
-    if summary.count > 2 && summary.spacing.is_none() {
-        advice.push(Advice::StampsStandStill);
-    }
-    let unit = if degrees { 57.3 } else { 1.0 };
-    let still = quietest.filter(|q| q.deviation <= STILL_DEVIATION * unit);
-    if quietest.is_some() && still.is_none() {
-        advice.push(Advice::NeverStill);
-    }
-    if let Some(magnitude) = still.and(summary.accel_at_rest) {
-        advice
-            .extend(accel_unit(magnitude).map(|unit| Advice::AccelNotInMetres { magnitude, unit }));
-        match summary.gravity {
-            Some(GravityAxis { axis: 2, positive }) => {
-                if !positive {
-                    advice.push(Advice::LooksLikeFrd);
-                }
-            }
-            Some(gravity) => advice.push(Advice::MountedOnSide { gravity }),
-            None => {}
-        }
-    }
-    for (axis, stats) in summary.axes.iter().enumerate() {
-        let at = if stats.max.abs() >= stats.min.abs() {
-            stats.max
-        } else {
-            stats.min
-        };
-        if at.abs() > SATURATION_FLOOR * unit && stats.at_peak >= SATURATED_SAMPLES {
-            advice.push(Advice::Saturated {
-                axis,
-                at,
-                samples: stats.at_peak,
-            });
-            // A clipped axis repeats one value too, for another reason.
-            continue;
-        }
-        let others_move = summary
-            .axes
-            .iter()
-            .enumerate()
-            .any(|(i, other)| i != axis && other.longest_run * 10 < stats.longest_run);
-        if stats.longest_run >= STUCK_SAMPLES && others_move {
-            advice.push(Advice::Stuck {
-                axis,
-                samples: stats.longest_run,
-            });
-        }
-    }
-    if let Some(spacing) = &summary.spacing {
-        let share = spacing.jitter_p99_secs / spacing.median_secs.max(1e-9);
-        if share > 0.1 {
-            advice.push(Advice::StampsJitter { share });
-        }
-    }
-    if let Some(offset) = &summary.offset
-        && summary.duration_secs >= 60.0
-        && offset.drift_ppm.abs() > DRIFT_PPM
-    {
-        advice.push(Advice::ClocksDrift {
-            ppm: offset.drift_ppm,
-        });
-    }
-    if summary.missing > 0 {
-        advice.push(Advice::SamplesMissing {
-            missing: summary.missing,
-            longest_secs: summary.longest_gap_secs,
-        });
-    }
-    advice
-}
-
-/// The unit in which this is one g, when it is not m/s^2. Gravity is 9.78 to 9.83 m/s^2; scale and
-/// bias of a cheap accelerometer make that 5 %.
-fn accel_unit(magnitude: f64) -> Option<&'static str> {
-    let near = |g: f64| (magnitude / g - 1.0).abs() < 0.05;
-    if near(1.0) {
-        Some("g")
-    } else if near(1000.0) {
-        Some("mg")
-    } else {
-        None
-    }
 }
