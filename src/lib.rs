@@ -11,6 +11,7 @@
 //! Without the default feature `service` the crate is `model`, `record`, `condition` and
 //! `propagate` on nalgebra alone.
 
+pub mod compare;
 pub mod condition;
 pub mod model;
 pub mod propagate;

@@ -1,1 +1,517 @@
-//! (in progress)
+//! AttitudeSample -> the world: MCAP, NDJSON, CSV, or nothing. I/O.
+//!
+//! A stage of its own because it is the only one that may block on a disk or a pipe, and the only
+//! one that knows what output looks like. Samples collect per stream; full batches of
+//! [`BATCH_SAMPLES`] are formatted and compressed in parallel and written in the order in which they
+//! filled. The bytes depend on the samples and the order of the calls alone: not on the number of
+//! threads and not (within a stream) on how the samples were cut into calls.
+
+mod csv;
+mod decimate;
+mod json;
+mod mcap;
+mod output;
+mod stream;
+mod target;
+#[cfg(test)]
+pub(crate) mod tests;
+
+pub use decimate::Decimator;
+pub use mcap::chunk::Compression;
+pub use mcap::{Encoding, InputChannel, InputMessage};
+pub use output::Flow;
+pub use stream::{Provenance, Stream, output_topic};
+pub use target::{Format, Target};
+
+use crate::error::{Error, Result};
+use crate::record::{AttitudeSample, Nanos};
+use mcap::chunk::Chunk;
+use mcap::file::McapFile;
+use mcap::{Batch, Layout};
+use output::Output;
+use rayon::ThreadPool;
+use rayon::iter::{IntoParallelRefMutIterator, ParallelIterator};
+use std::path::PathBuf;
+
+/// Samples in one batch: one chunk of about 1 MiB in MCAP.
+const BATCH_SAMPLES: usize = 2048;
+
+/// Uncompressed size at which a chunk of copied messages is closed.
+const COPY_CHUNK_BYTES: usize = 1 << 20;
+
+/// Batches in flight: enough to keep every thread busy, few enough to bound memory (about 3 MB each).
+const MAX_BATCHES: usize = 16;
+
+/// How the output is made.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Options {
+    /// Replace an existing file (but never the input).
+    pub force: bool,
+    /// Messages of an MCAP.
+    pub encoding: Encoding,
+    /// Chunks of an MCAP.
+    pub compression: Compression,
+}
+
+/// What a finished sink has written.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Written {
+    /// The file, if it is one.
+    pub path: Option<PathBuf>,
+    /// Bytes of it.
+    pub bytes: u64,
+    /// Attitude samples in it.
+    pub samples: u64,
+    /// Messages (MCAP), lines or rows.
+    pub messages: u64,
+    /// Stamps that do not fit into the 32-bit seconds of a ROS message (before 1901, after 2038) and
+    /// were written as the nearest one that does. Their log times are exact.
+    pub stamps_out_of_range: u64,
+    /// Whether the reader hung up before the end.
+    pub closed: bool,
+}
+
+/// An open output. Dropped without [`Sink::finish`], it leaves no file.
+#[derive(Debug)]
+pub struct Sink {
+    state: State,
+    form: Form,
+    file: McapFile,
+    lanes: Vec<Lane>,
+    /// Copied messages waiting for their chunk to fill.
+    copies: Chunk,
+    /// Full batches, and how many of them are in use.
+    slots: Vec<Slot>,
+    used: usize,
+    path: Option<PathBuf>,
+    samples: u64,
+    messages: u64,
+    bytes: u64,
+    stamps_out_of_range: u64,
+}
+
+#[derive(Debug)]
+enum State {
+    Open(Output),
+    /// The reader hung up.
+    Closed,
+    /// An error has been returned; the file is gone.
+    Failed,
+}
+
+/// How a batch becomes bytes.
+#[derive(Debug)]
+enum Form {
+    Mcap {
+        layout: Layout,
+        compression: Compression,
+    },
+    Ndjson(Vec<json::AttObject>),
+    Csv,
+    Null,
+}
+
+/// What a stream has pending.
+#[derive(Debug, Default)]
+struct Lane {
+    batch: Batch,
+    last: Option<Nanos>,
+}
+
+/// One batch on its way into bytes.
+#[derive(Debug, Default)]
+struct Slot {
+    /// Empty when the chunk holds copied messages already.
+    batch: Batch,
+    chunk: Chunk,
+    text: Vec<u8>,
+    outcome: Option<std::io::Error>,
+}
+
+impl Sink {
+    /// Opens `target` and writes what comes before the first sample.
+    ///
+    /// # Errors
+    /// [`Error::OutputExists`], [`Error::OutputIsInput`], [`Error::Write`] (no such directory, disk
+    /// full, ...), [`Error::Usage`] for several streams in one CSV.
+    pub fn create(
+        target: &Target,
+        inputs: &[PathBuf],
+        options: Options,
+        streams: &[Stream],
+        provenance: &Provenance,
+    ) -> Result<Sink> {
+        if target.format() == Some(Format::Csv) && streams.len() > 1 {
+            return Err(Error::Usage(format!(
+                "a CSV has no column for the topic and {} topics are estimated\n  help: choose one with --topic, or write .ndjson or .mcap",
+                streams.len()
+            )));
+        }
+        let output = Output::open(target, inputs, options.force)?;
+        let streams: Vec<Stream> = streams.iter().map(Stream::bounded).collect();
+        let mut file = McapFile::default();
+        let mut head = Vec::new();
+        let form = match target.format() {
+            None => Form::Null,
+            Some(Format::Ndjson) => {
+                Form::Ndjson(streams.iter().map(json::AttObject::new).collect())
+            }
+            Some(Format::Csv) => {
+                head.extend_from_slice(csv::HEADER);
+                Form::Csv
+            }
+            Some(Format::Mcap) => Form::Mcap {
+                layout: Layout::begin(
+                    &mut file,
+                    &mut head,
+                    options.encoding,
+                    &streams,
+                    provenance,
+                )?,
+                compression: options.compression,
+            },
+        };
+        let lanes = (0..streams.len())
+            .map(|stream| Lane {
+                batch: Batch {
+                    stream,
+                    ..Batch::default()
+                },
+                last: None,
+            })
+            .collect();
+        let mut sink = Sink {
+            path: output.path().map(PathBuf::from),
+            state: State::Open(output),
+            form,
+            file,
+            lanes,
+            copies: Chunk::default(),
+            slots: Vec::new(),
+            used: 0,
+            samples: 0,
+            messages: 0,
+            bytes: 0,
+            stamps_out_of_range: 0,
+        };
+        // A reader that has already hung up shows at the first sample.
+        let _ = sink.put(&head)?;
+        Ok(sink)
+    }
+
+    /// Takes samples of one stream, oldest first. They are written when a batch is full, at
+    /// [`Sink::flush`] and at [`Sink::finish`].
+    ///
+    /// # Errors
+    /// [`Error::Write`]; the unfinished file is gone then, and every later call fails too.
+    /// [`Error::Usage`] when `stream` is none of those the sink was created with.
+    pub fn write(
+        &mut self,
+        stream: usize,
+        samples: &[AttitudeSample],
+        pool: &ThreadPool,
+    ) -> Result<Flow> {
+        if matches!(self.form, Form::Null) {
+            self.samples += samples.len() as u64;
+            return Ok(Flow::Continue);
+        }
+        if !self.is_open()? {
+            return Ok(Flow::Closed);
+        }
+        let mut rest = samples;
+        while !rest.is_empty() {
+            let Some(lane) = self.lanes.get_mut(stream) else {
+                return Err(Error::Usage(format!("the output has no stream {stream}")));
+            };
+            let room = BATCH_SAMPLES.saturating_sub(lane.batch.samples.len());
+            let (now, later) = rest.split_at(room.min(rest.len()));
+            lane.batch.samples.extend_from_slice(now);
+            rest = later;
+            if lane.batch.samples.len() >= BATCH_SAMPLES {
+                self.queue_lane(stream);
+                if self.make_room(pool)? == Flow::Closed {
+                    return Ok(Flow::Closed);
+                }
+            }
+        }
+        Ok(Flow::Continue)
+    }
+
+    /// Declares a channel whose messages [`Sink::copy`] will bring. Anything but an MCAP has no place
+    /// for them and ignores both.
+    ///
+    /// # Errors
+    /// [`Error::Write`]; [`Error::Usage`] when there are more than MCAP can number.
+    pub fn copy_channel(&mut self, channel: &InputChannel<'_>) -> Result<CopiedChannel> {
+        if !matches!(self.form, Form::Mcap { .. }) || !self.is_open()? {
+            return Ok(CopiedChannel(0));
+        }
+        // The declaration is written at once, so it stands before every chunk that needs it.
+        let mut records = Vec::new();
+        let id = mcap::declare_copy(&mut self.file, &mut records, channel)?;
+        let _ = self.put(&records)?;
+        Ok(CopiedChannel(id))
+    }
+
+    /// Copies a message of the input.
+    ///
+    /// # Errors
+    /// [`Error::Write`].
+    pub fn copy(
+        &mut self,
+        channel: CopiedChannel,
+        message: &InputMessage<'_>,
+        pool: &ThreadPool,
+    ) -> Result<Flow> {
+        if !matches!(self.form, Form::Mcap { .. }) {
+            return Ok(Flow::Continue);
+        }
+        if !self.is_open()? {
+            return Ok(Flow::Closed);
+        }
+        mcap::copy(&mut self.copies, channel.0, message);
+        if self.copies.plain_len() >= COPY_CHUNK_BYTES {
+            self.queue_copies();
+            return self.make_room(pool);
+        }
+        Ok(Flow::Continue)
+    }
+
+    /// Writes everything pending, for a live reader. In an MCAP this ends the chunk, so there (only)
+    /// the bytes depend on when it is called.
+    ///
+    /// # Errors
+    /// [`Error::Write`].
+    pub fn flush(&mut self, pool: &ThreadPool) -> Result<Flow> {
+        if !self.is_open()? {
+            return Ok(Flow::Closed);
+        }
+        if self.queue_everything(Some(pool))? == Flow::Closed {
+            return Ok(Flow::Closed);
+        }
+        let flow = match &mut self.state {
+            State::Open(output) => output.flush(),
+            State::Closed | State::Failed => Ok(Flow::Closed),
+        };
+        self.note(flow)
+    }
+
+    /// Writes the rest and the closing part, syncs, and gives the file its name.
+    ///
+    /// # Errors
+    /// [`Error::Write`]; [`Error::OutputExists`] when somebody else created the file meanwhile.
+    pub fn finish(mut self) -> Result<Written> {
+        if self.is_open()? && self.queue_everything(None)? == Flow::Continue {
+            if matches!(self.form, Form::Mcap { .. }) {
+                let closing = self.file.closing();
+                let _ = self.put(&closing)?;
+            }
+            if let State::Open(output) = std::mem::replace(&mut self.state, State::Closed) {
+                if output.finish()? == Flow::Continue {
+                    return Ok(self.written(false));
+                }
+            }
+        }
+        Ok(self.written(true))
+    }
+
+    fn written(&self, closed: bool) -> Written {
+        Written {
+            path: self.path.clone(),
+            bytes: self.bytes,
+            samples: self.samples,
+            messages: match self.form {
+                Form::Mcap { .. } => self.file.messages(),
+                _ => self.messages,
+            },
+            stamps_out_of_range: self.stamps_out_of_range,
+            closed,
+        }
+    }
+
+    /// `false` when the reader hung up; an error when one has been returned before.
+    fn is_open(&self) -> Result<bool> {
+        match self.state {
+            State::Open(_) => Ok(true),
+            State::Closed => Ok(false),
+            State::Failed => Err(Error::Write {
+                path: self.path.clone().unwrap_or_default(),
+                source: std::io::Error::other("an earlier write failed"),
+            }),
+        }
+    }
+
+    /// Remembers how a write ended: nothing is written after a hang-up or an error.
+    fn note(&mut self, flow: Result<Flow>) -> Result<Flow> {
+        match flow {
+            Ok(Flow::Continue) => {}
+            Ok(Flow::Closed) => self.state = State::Closed,
+            Err(_) => self.state = State::Failed,
+        }
+        flow
+    }
+
+    fn put(&mut self, bytes: &[u8]) -> Result<Flow> {
+        let flow = match &mut self.state {
+            State::Open(output) => output.write(bytes),
+            State::Closed | State::Failed => Ok(Flow::Closed),
+        };
+        if matches!(flow, Ok(Flow::Continue)) {
+            self.bytes += bytes.len() as u64;
+            if matches!(self.form, Form::Mcap { .. }) {
+                self.file.account(bytes);
+            }
+        }
+        self.note(flow)
+    }
+
+    /// A free slot at the end of the queue.
+    fn next_slot(&mut self) -> &mut Slot {
+        if self.used == self.slots.len() {
+            self.slots.push(Slot::default());
+        }
+        self.used += 1;
+        &mut self.slots[self.used - 1]
+    }
+
+    /// Moves a stream's pending samples into the queue.
+    fn queue_lane(&mut self, stream: usize) {
+        let mut lane = std::mem::take(&mut self.lanes[stream]);
+        let count = lane.batch.samples.len() as u64;
+        let next = Batch {
+            stream,
+            first: lane.batch.first + count,
+            ..Batch::default()
+        };
+        lane.batch.previous = lane.last;
+        let last = lane.batch.samples.last().map(|s| s.stamp).or(lane.last);
+        self.samples += count;
+
+        let slot = self.next_slot();
+        // The slot's old vector is emptied and goes back to the lane: no allocation per batch.
+        let mut samples = std::mem::take(&mut slot.batch.samples);
+        samples.clear();
+        slot.batch = lane.batch;
+        self.lanes[stream] = Lane {
+            batch: Batch { samples, ..next },
+            last,
+        };
+    }
+
+    /// Moves the copied messages into the queue.
+    fn queue_copies(&mut self) {
+        let full = std::mem::take(&mut self.copies);
+        let slot = self.next_slot();
+        slot.batch.samples.clear();
+        let mut empty = std::mem::replace(&mut slot.chunk, full);
+        empty.clear();
+        self.copies = empty;
+    }
+
+    fn queue_everything(&mut self, pool: Option<&ThreadPool>) -> Result<Flow> {
+        for stream in 0..self.lanes.len() {
+            if !self.lanes[stream].batch.samples.is_empty() {
+                self.queue_lane(stream);
+                if self.used >= MAX_BATCHES && self.drain(pool)? == Flow::Closed {
+                    return Ok(Flow::Closed);
+                }
+            }
+        }
+        if !self.copies.is_empty() {
+            self.queue_copies();
+        }
+        self.drain(pool)
+    }
+
+    /// Drains the queue when it is long enough for this pool.
+    fn make_room(&mut self, pool: &ThreadPool) -> Result<Flow> {
+        let limit = (2 * pool.current_num_threads()).clamp(2, MAX_BATCHES);
+        if self.used >= limit {
+            self.drain(Some(pool))
+        } else {
+            Ok(Flow::Continue)
+        }
+    }
+
+    /// Turns every queued batch into bytes, in parallel, and writes them in order.
+    fn drain(&mut self, pool: Option<&ThreadPool>) -> Result<Flow> {
+        let used = std::mem::take(&mut self.used);
+        let mut slots = std::mem::take(&mut self.slots);
+        let form = &self.form;
+        match pool {
+            Some(pool) if used > 1 => pool.install(|| {
+                slots[..used]
+                    .par_iter_mut()
+                    .for_each(|slot| slot.encode(form));
+            }),
+            _ => slots[..used].iter_mut().for_each(|slot| slot.encode(form)),
+        }
+        let mut flow = Ok(Flow::Continue);
+        for slot in &mut slots[..used] {
+            flow = self.emit(slot);
+            if !matches!(flow, Ok(Flow::Continue)) {
+                break;
+            }
+        }
+        self.slots = slots;
+        flow
+    }
+
+    fn emit(&mut self, slot: &mut Slot) -> Result<Flow> {
+        if let Some(source) = slot.outcome.take() {
+            let path = self.path.clone().unwrap_or_default();
+            return self.note(Err(Error::Write { path, source }));
+        }
+        if let Form::Mcap { compression, .. } = self.form {
+            self.file.book(&slot.chunk, compression);
+            self.stamps_out_of_range += slot.chunk.stamps_out_of_range;
+            for part in slot.chunk.parts() {
+                if self.put(part)? == Flow::Closed {
+                    return Ok(Flow::Closed);
+                }
+            }
+            slot.chunk.clear();
+            Ok(Flow::Continue)
+        } else {
+            self.messages += slot.batch.samples.len() as u64;
+            self.put(&slot.text)
+        }
+    }
+}
+
+impl Slot {
+    /// The parallel part: nothing here depends on any other batch.
+    fn encode(&mut self, form: &Form) {
+        self.text.clear();
+        match form {
+            Form::Mcap {
+                layout,
+                compression,
+            } => {
+                // Without samples the chunk holds copied messages.
+                if !self.batch.samples.is_empty() {
+                    layout.fill(&mut self.chunk, &self.batch);
+                }
+                self.outcome = self.chunk.seal(*compression).err();
+            }
+            Form::Ndjson(objects) => {
+                if let Some(object) = objects.get(self.batch.stream) {
+                    for (seq, sample) in (self.batch.first..).zip(&self.batch.samples) {
+                        object.push(&mut self.text, seq, sample);
+                        self.text.push(b'\n');
+                    }
+                }
+            }
+            Form::Csv => {
+                for sample in &self.batch.samples {
+                    csv::push_row(&mut self.text, sample);
+                }
+            }
+            Form::Null => {}
+        }
+    }
+}
+
+/// A channel declared by [`Sink::copy_channel`].
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct CopiedChannel(u16);

@@ -1,0 +1,284 @@
+//! AttitudeSample -> `sensor_msgs/msg/Imu` and `tf2_msgs/msg/TFMessage` message records in CDR. Pure.
+//!
+//! Within a stream only numbers change from message to message, always at the same places. So each
+//! stream lays its record out once and then copies and patches it: about 30 ns a message.
+
+use super::record::{MESSAGE_HEAD, message_head};
+use crate::record::{AttitudeSample, Nanos};
+
+/// Where the numbers of a message record begin, and the record with zeros in their places.
+#[derive(Debug)]
+struct Template {
+    record: Vec<u8>,
+    /// Of the stamp.
+    stamp: usize,
+    /// Of the first f64.
+    numbers: usize,
+}
+
+/// CDR, version 1, little endian: items are aligned to their size, counted from behind the four
+/// bytes of the encapsulation.
+struct Cdr {
+    bytes: Vec<u8>,
+}
+
+impl Cdr {
+    fn new() -> Cdr {
+        Cdr {
+            bytes: vec![0, 1, 0, 0],
+        }
+    }
+    fn align(&mut self, to: usize) {
+        while !(self.bytes.len() - 4).is_multiple_of(to) {
+            self.bytes.push(0);
+        }
+    }
+    fn u32(&mut self, v: u32) {
+        self.align(4);
+        self.bytes.extend_from_slice(&v.to_le_bytes());
+    }
+    /// The length counts the closing NUL.
+    fn string(&mut self, v: &str) {
+        self.u32(v.len() as u32 + 1);
+        self.bytes.extend_from_slice(v.as_bytes());
+        self.bytes.push(0);
+    }
+    /// Seconds and nanoseconds; returns where they are.
+    fn stamp(&mut self) -> usize {
+        self.align(4);
+        let at = self.bytes.len();
+        self.bytes.extend_from_slice(&[0; 8]);
+        at
+    }
+    /// `count` f64; returns where they are.
+    fn numbers(&mut self, count: usize) -> usize {
+        self.align(8);
+        let at = self.bytes.len();
+        self.bytes.resize(at + 8 * count, 0);
+        at
+    }
+}
+
+impl Template {
+    fn new(channel: u16, cdr: Cdr, stamp: usize, numbers: usize) -> Template {
+        let mut record = message_head(channel, 0, 0, 0, cdr.bytes.len()).to_vec();
+        record.extend_from_slice(&cdr.bytes);
+        Template {
+            record,
+            stamp: MESSAGE_HEAD + stamp,
+            numbers: MESSAGE_HEAD + numbers,
+        }
+    }
+
+    /// Appends a copy; the caller fills in the numbers behind the ones done here. The log time is
+    /// the publish time too: there is no publisher whose clock it could be.
+    fn append<'a>(
+        &self,
+        out: &'a mut Vec<u8>,
+        sequence: u32,
+        log_time: u64,
+        stamp: [u8; 8],
+    ) -> &'a mut [u8] {
+        let start = out.len();
+        out.extend_from_slice(&self.record);
+        let record = &mut out[start..];
+        record[11..15].copy_from_slice(&sequence.to_le_bytes());
+        record[15..23].copy_from_slice(&log_time.to_le_bytes());
+        record[23..31].copy_from_slice(&log_time.to_le_bytes());
+        record[self.stamp..self.stamp + 8].copy_from_slice(&stamp);
+        &mut record[self.numbers..]
+    }
+}
+
+/// Writes `v` as f64 from number `at` on.
+fn put<const N: usize>(numbers: &mut [u8], at: usize, v: [f64; N]) {
+    for (place, value) in numbers[8 * at..].chunks_exact_mut(8).zip(v) {
+        place.copy_from_slice(&value.to_le_bytes());
+    }
+}
+
+/// `builtin_interfaces/msg/Time`: 32-bit seconds end in 2038 (and 1901). Beyond them the nearest
+/// time there is, and `false`.
+pub(super) fn ros_time(stamp: Nanos) -> ([u8; 8], bool) {
+    let (sec, nanosec) = stamp.to_sec_nanosec();
+    let (sec, nanosec, fits) = match i32::try_from(sec) {
+        Ok(sec) => (sec, nanosec, true),
+        Err(_) if sec < 0 => (i32::MIN, 0, false),
+        Err(_) => (i32::MAX, 999_999_999, false),
+    };
+    let (s, n) = (sec.to_le_bytes(), nanosec.to_le_bytes());
+    ([s[0], s[1], s[2], s[3], n[0], n[1], n[2], n[3]], fits)
+}
+
+/// `sensor_msgs/msg/Imu` of one stream.
+#[derive(Debug)]
+pub(super) struct Imu(Template);
+
+impl Imu {
+    pub(super) fn new(channel: u16, frame_id: &str) -> Imu {
+        let mut cdr = Cdr::new();
+        let stamp = cdr.stamp();
+        cdr.string(frame_id);
+        let numbers = cdr.numbers(4 + 9 + 3 + 9 + 3 + 9);
+        Imu(Template::new(channel, cdr, stamp, numbers))
+    }
+
+    /// Bytes of one message record.
+    pub(super) fn len(&self) -> usize {
+        self.0.record.len()
+    }
+
+    /// Appends the record. Covariances as REP-145 reads them: ours of the orientation on the
+    /// diagonal (zeros when it is not finite: unknown), of the rate unknown, of an absent
+    /// acceleration -1.
+    pub(super) fn append(
+        &self,
+        out: &mut Vec<u8>,
+        sequence: u32,
+        log_time: u64,
+        stamp: [u8; 8],
+        sample: &AttitudeSample,
+    ) {
+        let numbers = self.0.append(out, sequence, log_time, stamp);
+        let [w, x, y, z] = sample.q_nb.wxyz();
+        put(numbers, 0, [x, y, z, w]);
+        let variance = sample.sigma.component_mul(&sample.sigma);
+        if variance.iter().all(|v| v.is_finite()) {
+            for axis in 0..3 {
+                put(numbers, 4 + 4 * axis, [variance[axis]]);
+            }
+        }
+        put(numbers, 13, sample.rate.into());
+        match sample.accel {
+            Some(accel) => put(numbers, 25, accel.into()),
+            None => put(numbers, 28, [-1.0]),
+        }
+    }
+}
+
+/// `tf2_msgs/msg/TFMessage` of one stream: one transform, no translation.
+#[derive(Debug)]
+pub(super) struct Tf(Template);
+
+impl Tf {
+    pub(super) fn new(channel: u16, parent: &str, child: &str) -> Tf {
+        let mut cdr = Cdr::new();
+        cdr.u32(1);
+        let stamp = cdr.stamp();
+        cdr.string(parent);
+        cdr.string(child);
+        let numbers = cdr.numbers(3 + 4);
+        Tf(Template::new(channel, cdr, stamp, numbers))
+    }
+
+    /// Bytes of one message record.
+    pub(super) fn len(&self) -> usize {
+        self.0.record.len()
+    }
+
+    /// Appends the record.
+    pub(super) fn append(
+        &self,
+        out: &mut Vec<u8>,
+        sequence: u32,
+        log_time: u64,
+        stamp: [u8; 8],
+        sample: &AttitudeSample,
+    ) {
+        let numbers = self.0.append(out, sequence, log_time, stamp);
+        let [w, x, y, z] = sample.q_nb.wxyz();
+        put(numbers, 3, [x, y, z, w]);
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::model::attitude::Quaternion;
+    use crate::sink::tests::sample;
+    use nalgebra::Vector3;
+
+    fn f64_at(bytes: &[u8], at: usize) -> f64 {
+        f64::from_le_bytes(bytes[at..at + 8].try_into().unwrap())
+    }
+
+    /// Offsets measured against rosbags 0.11.9: `base = 4 + align8(12 + n + 1)`, total `base + 296`.
+    #[test]
+    fn the_imu_layout_is_the_measured_one_for_every_length_of_frame_id() {
+        for n in 0..40 {
+            let imu = Imu::new(1, &"f".repeat(n));
+            let base = 4 + (12 + n + 1).next_multiple_of(8);
+            assert_eq!(imu.len() - MESSAGE_HEAD, base + 296, "{n}");
+            let mut s = sample(Nanos(5_000_000_007));
+            s.q_nb = Quaternion::assume_unit([0.1, 0.2, 0.3, 0.4]);
+            s.rate = Vector3::new(1.0, 2.0, 3.0);
+            s.accel = Some(Vector3::new(4.0, 5.0, 6.0));
+            s.sigma = Vector3::new(7.0, 8.0, 9.0);
+            let mut out = Vec::new();
+            imu.append(&mut out, 0, 0, ros_time(s.stamp).0, &s);
+            let m = &out[MESSAGE_HEAD..];
+            assert_eq!(m[..12], [0, 1, 0, 0, 5, 0, 0, 0, 7, 0, 0, 0]);
+            assert_eq!(m[12..16], (n as u32 + 1).to_le_bytes());
+            assert_eq!(m[16 + n], 0);
+            let xyzw: Vec<f64> = (0..4).map(|i| f64_at(m, base + 8 * i)).collect();
+            assert_eq!(xyzw, [0.2, 0.3, 0.4, 0.1]);
+            let covariance: Vec<f64> = (0..9).map(|i| f64_at(m, base + 32 + 8 * i)).collect();
+            assert_eq!(covariance, [49.0, 0., 0., 0., 64.0, 0., 0., 0., 81.0]);
+            assert_eq!(f64_at(m, base + 104), 1.0);
+            assert_eq!(f64_at(m, base + 120), 3.0);
+            assert_eq!(f64_at(m, base + 200), 4.0);
+            assert_eq!(f64_at(m, base + 224), 0.0);
+        }
+    }
+
+    #[test]
+    fn what_is_unknown_is_marked_as_rep_145_marks_it() {
+        let imu = Imu::new(1, "");
+        let mut s = sample(Nanos(0));
+        s.accel = None;
+        s.sigma = Vector3::new(f64::NAN, 1.0, 1.0);
+        let mut out = Vec::new();
+        imu.append(&mut out, 0, 0, [0; 8], &s);
+        let m = &out[MESSAGE_HEAD..];
+        // base is 20 for an empty frame_id.
+        assert!(
+            m[52..52 + 72].iter().all(|b| *b == 0),
+            "unknown orientation covariance"
+        );
+        assert_eq!(f64_at(m, 20 + 224), -1.0, "absent acceleration");
+    }
+
+    #[test]
+    fn the_tf_layout_is_the_measured_one() {
+        let tf = Tf::new(2, "world", "imu_link");
+        assert_eq!(tf.len() - MESSAGE_HEAD, 100);
+        let mut s = sample(Nanos(0));
+        s.q_nb = Quaternion::assume_unit([0.1, 0.2, 0.3, 0.4]);
+        let mut out = Vec::new();
+        tf.append(&mut out, 0, 0, [0; 8], &s);
+        let m = &out[MESSAGE_HEAD..];
+        let xyzw: Vec<f64> = (0..4).map(|i| f64_at(m, 68 + 8 * i)).collect();
+        assert_eq!(xyzw, [0.2, 0.3, 0.4, 0.1]);
+    }
+
+    #[test]
+    fn stamps_beyond_32_bit_seconds_stop_at_the_end_and_say_so() {
+        let second = 1_000_000_000;
+        let (bytes, fits) = ros_time(Nanos((i64::from(i32::MAX) + 1) * second));
+        assert_eq!(
+            (bytes[..4].to_vec(), fits),
+            (i32::MAX.to_le_bytes().to_vec(), false)
+        );
+        let (bytes, fits) = ros_time(Nanos(-second / 2));
+        assert_eq!(
+            (bytes[..4].to_vec(), fits),
+            ((-1i32).to_le_bytes().to_vec(), true)
+        );
+        let (bytes, fits) = ros_time(Nanos(i64::MIN));
+        assert_eq!(
+            (bytes[..4].to_vec(), fits),
+            (i32::MIN.to_le_bytes().to_vec(), false)
+        );
+    }
+}

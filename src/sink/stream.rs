@@ -1,0 +1,180 @@
+//! What an output stream is called: topics, frames, labels. Pure.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+/// The longest topic or frame written, in bytes. A hostile log can carry a name of 60 MB; it would
+/// be repeated in every message.
+const MAX_NAME_BYTES: usize = 255;
+
+/// The frame a nameless sensor gets: tf2 refuses an empty child.
+const NAMELESS_FRAME: &str = "body";
+
+/// One estimated topic and what its output is called.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Stream {
+    /// `id` of the `ATT` object: the input topic, unless something shorter is unambiguous.
+    pub id: String,
+    /// Where the samples came from.
+    pub input_topic: String,
+    /// Where the attitude goes ([`output_topic`]).
+    pub output_topic: String,
+    /// The frame whose attitude this is: `header.frame_id` of the Imu, child of the transform.
+    pub frame_id: String,
+    /// The frame it is given in: parent of the transform.
+    pub world_frame: String,
+    /// What the quaternion does: `sensor_to_world`, or `body_to_world` when a mounting was applied.
+    pub rotates: String,
+    /// Axes of the world: `start`, `enu`, `ned`, `nwu`.
+    pub world_axes: String,
+    /// Axes of the body: `flu`, `frd`, or an axis map.
+    pub body_axes: String,
+}
+
+impl Stream {
+    /// A stream with every default: world frame `world`, world axes `start`, body axes `flu`.
+    #[must_use]
+    pub fn new(input_topic: &str, frame_id: &str) -> Stream {
+        Stream {
+            id: input_topic.to_owned(),
+            input_topic: input_topic.to_owned(),
+            output_topic: output_topic(input_topic, &BTreeSet::new()),
+            frame_id: frame_id.to_owned(),
+            world_frame: "world".to_owned(),
+            rotates: "sensor_to_world".to_owned(),
+            world_axes: "start".to_owned(),
+            body_axes: "flu".to_owned(),
+        }
+    }
+
+    /// The same with every name cut to what can safely be repeated in each message.
+    pub(super) fn bounded(&self) -> Stream {
+        Stream {
+            id: bounded(&self.id),
+            input_topic: bounded(&self.input_topic),
+            output_topic: bounded(&self.output_topic),
+            frame_id: bounded(&self.frame_id),
+            world_frame: bounded(&self.world_frame),
+            rotates: bounded(&self.rotates),
+            world_axes: bounded(&self.world_axes),
+            body_axes: bounded(&self.body_axes),
+        }
+    }
+}
+
+/// What is known about the run and goes into the file: version, command line, method, frames,
+/// initial attitude, input hash.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub struct Provenance {
+    /// Key and value, as the reader will see them.
+    pub metadata: BTreeMap<String, String>,
+}
+
+/// The topic the attitude of `input` is written to: `X/data_raw` becomes `X/data` (the habit of
+/// ROS), anything else `X/attitude`.
+///
+/// `taken` holds the topics that are already in the file (those of `--copy-input`, and the outputs
+/// named before); the answer is never one of them.
+#[must_use]
+pub fn output_topic(input: &str, taken: &BTreeSet<String>) -> String {
+    let input = input.trim_end_matches('/');
+    let attitude = format!("{input}/attitude");
+    let ros = input
+        .strip_suffix("data_raw")
+        .filter(|rest| rest.is_empty() || rest.ends_with('/'))
+        .map(|rest| format!("{rest}data"));
+    ros.into_iter()
+        .chain([attitude.clone()])
+        .chain((2..).map(|n| format!("{attitude}_{n}")))
+        .find(|name| !taken.contains(name))
+        .unwrap_or(attitude)
+}
+
+/// The child frame of each stream's transform: unique, not empty, without leading slash and not
+/// the world itself, all of which tf2 refuses or confuses.
+pub(super) fn child_frames(streams: &[Stream]) -> Vec<String> {
+    let mut used: BTreeSet<(String, String)> = BTreeSet::new();
+    streams
+        .iter()
+        .map(|stream| {
+            let world = parent_frame(stream);
+            let own = stream.frame_id.trim_start_matches('/');
+            let base = if own.is_empty() { NAMELESS_FRAME } else { own };
+            let name = std::iter::once(base.to_owned())
+                .chain((2..).map(|n| format!("{base}_{n}")))
+                .find(|name| *name != world && !used.contains(&(world.clone(), name.clone())))
+                .unwrap_or_default();
+            used.insert((world, name.clone()));
+            name
+        })
+        .collect()
+}
+
+/// The parent frame of a stream's transform.
+pub(super) fn parent_frame(stream: &Stream) -> String {
+    match stream.world_frame.trim_start_matches('/') {
+        "" => "world".to_owned(),
+        name => name.to_owned(),
+    }
+}
+
+/// At most [`MAX_NAME_BYTES`] bytes on a character boundary, and no NUL: CDR strings end at one.
+fn bounded(name: &str) -> String {
+    let mut out: String = name.chars().filter(|c| *c != '\0').collect();
+    while out.len() > MAX_NAME_BYTES {
+        out.truncate(out.floor_char_boundary(MAX_NAME_BYTES));
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn taken(names: &[&str]) -> BTreeSet<String> {
+        names.iter().map(|n| (*n).to_owned()).collect()
+    }
+
+    #[test]
+    fn data_raw_becomes_data_and_everything_else_gets_attitude_appended() {
+        for (input, output) in [
+            ("/imu/data_raw", "/imu/data"),
+            ("/data_raw", "/data"),
+            ("data_raw", "data"),
+            ("/imu", "/imu/attitude"),
+            ("/imu/", "/imu/attitude"),
+            ("/imu/my_data_raw", "/imu/my_data_raw/attitude"),
+            ("/imu/data", "/imu/data/attitude"),
+            ("", "/attitude"),
+        ] {
+            assert_eq!(output_topic(input, &taken(&[])), output, "{input}");
+        }
+    }
+
+    #[test]
+    fn the_output_topic_is_never_one_that_is_already_in_the_file() {
+        let t = taken(&["/imu/data"]);
+        assert_eq!(output_topic("/imu/data_raw", &t), "/imu/data_raw/attitude");
+        let t = taken(&["/imu/data", "/imu/data_raw/attitude"]);
+        assert_eq!(
+            output_topic("/imu/data_raw", &t),
+            "/imu/data_raw/attitude_2"
+        );
+    }
+
+    #[test]
+    fn child_frames_are_unique_named_relative_and_never_the_world() {
+        let frames = ["imu", "/imu", "", "world", "imu"].map(|f| Stream::new("/t", f));
+        assert_eq!(
+            child_frames(&frames),
+            ["imu", "imu_2", "body", "world_2", "imu_3"]
+        );
+    }
+
+    #[test]
+    fn a_name_of_sixty_megabytes_is_cut_on_a_character_boundary_and_loses_its_nuls() {
+        let name = "a\0".to_owned() + &"é".repeat(30_000_000);
+        let cut = bounded(&name);
+        assert_eq!(cut.len(), 255, "1 + 127 * 2 bytes fit into 255");
+        assert!(!cut.contains('\0'));
+    }
+}
