@@ -406,8 +406,9 @@ fn the_jittered_log_has_uneven_stamps_and_exact_truth_at_each() {
         .collect();
     assert!(*steps.iter().min().unwrap() < 5_000_000 && *steps.iter().min().unwrap() > 0);
     assert!(*steps.iter().max().unwrap() > 15_000_000);
-    for ((_, sample), (_, reference)) in imu.iter().zip(&truth) {
+    for (k, ((_, sample), (_, reference))) in (0..).zip(imu.iter().zip(&truth)) {
         let nanos = stamp_of(sample) - start;
+        assert!((nanos - k * 10_000_000).abs() <= 3_000_000);
         assert_eq!(stamp_of(reference), stamp_of(sample));
         assert_eq!(vector_at(sample, GYRO), Motion::Coning.rate(nanos));
         assert_eq!(
@@ -426,6 +427,7 @@ fn the_same_motion_on_three_wires_carries_the_same_numbers() {
     for (((_, cdr), (_, ros1)), (_, json)) in cdr.iter().zip(&ros1).zip(&json) {
         // ROS 1: 16 bytes of numbers and length, 8 of `imu_link`, then the same 37 doubles.
         assert_eq!(ros1.len(), 320);
+        assert_eq!(ros1[12..24], *b"\x08\0\0\0imu_link");
         assert_eq!(ros1[24..], cdr[ORIENTATION..]);
         assert_eq!(ros1[4..12], cdr[4..12]);
         let json: serde_json::Value = serde_json::from_slice(json).unwrap();
