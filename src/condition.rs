@@ -1,1 +1,352 @@
-//! (in progress)
+//! RawSample -> RateSample. Pure.
+//!
+//! A stage of its own because everything that can be wrong with a recorded sample is settled
+//! here, once, with a counted [`Verdict`]: unit, axes, bias; which clock; NaN and nonsense;
+//! disorder, shared stamps, jumps, gaps. Behind it every number is finite, stamps increase
+//! strictly, and no interval crosses a place where time is unknown.
+//!
+//! ```text
+//! RawSample -> gate (one sample alone) -> order (in time) -> timing (interval, join) -> RateSample
+//! RateSample -> stillness (rests: bias, level)         RawSample -> quality (what `info` prints)
+//! ```
+//!
+//! # Policy
+//! | seen | done | verdict |
+//! |---|---|---|
+//! | NaN or infinity in the gyro; above 1e4 rad/s (1e3 rad) | dropped; the next sample carries `REJECTED_BEFORE` | `NotFinite`, `Huge` |
+//! | NaN in the acceleration | the acceleration alone is dropped | `Accepted` |
+//! | same stamp, same data (also when sent again later) | dropped, nothing is lost | `Repeated` |
+//! | same stamp, other data | given a stamp inside the longer step after it, or else before it | `Restamped` |
+//! | ... and no longer step beside it | rates: dropped; increments: spread all the same | `DuplicateStamp`, `Restamped` |
+//! | overtaken on its way, by no more than the window | put back | `Reordered` |
+//! | ... by more | dropped | `Late` |
+//! | clock set back, and it stays so | held (or reset), integration goes on behind it | `Accepted` |
+//! | one stamp far ahead, the rest carries on before it | dropped | `StrayStamp` |
+//! | step above 1.5 times the ordinary | bridged up to `max_gap_secs`, beyond it `on_gap` | `Accepted` |
+//! | ... but the stamps catch up | a late stamp, not a gap | `Accepted` |
+//!
+//! The ordinary step is learnt from the stream. An increment whose predecessor is missing covers its own
+//! interval only, so `start` is later than the stamp before, and the propagator fills the hole.
+//! An increment that states its own interval keeps it for its angle; where stamps and
+//! intervals disagree by less than half an interval, the stamps are taken to jitter.
+
+mod clock;
+mod gate;
+mod order;
+mod report;
+mod settings;
+mod spacing;
+mod timing;
+
+pub mod quality;
+pub mod stillness;
+
+#[cfg(test)]
+mod tests;
+
+pub use clock::{Clock, ClockWarning, choose_clock};
+pub use report::{FirstBad, GAPS_KEPT, Gap, Gaps, Report};
+pub use settings::{GyroUnit, OnGap, Settings, SettingsError};
+
+use crate::record::{Nanos, RateSample, RawSample, SampleKind, Status, Verdict};
+use clock::IndexClock;
+use gate::{Gate, MAX_STAMP};
+use order::Order;
+use timing::Timing;
+
+/// Entries from which the ordinary step is learnt before the first sample leaves (recordings).
+const PRIMING: usize = 32;
+/// A stamp of zero is taken for a stamp only where the clock is within this of zero.
+const ZERO_IS_CLOSE_NANOS: i64 = 10_000_000_000;
+
+/// One stream's conditioning: push blocks, cut anywhere, and finish.
+///
+/// The output depends on the samples and the settings alone, not on how they were cut into blocks.
+#[derive(Clone, Debug)]
+pub struct Conditioner {
+    clock: Clock,
+    index_clock: Option<IndexClock>,
+    gate: Gate,
+    order: Order,
+    timing: Timing,
+    window: usize,
+    /// Entries held back just now: the window, or more until the ordinary step is known.
+    hold: usize,
+    primed: bool,
+    finishing: bool,
+    /// `--start`, `--until` in nanoseconds after the first stamp.
+    trim: Option<(i64, i64)>,
+    first_stamp: Option<Nanos>,
+    /// A first sample with stamp zero, until the second tells whether that can be.
+    zero: Option<(RawSample, u64)>,
+    rejected: bool,
+    index: u64,
+    report: Report,
+}
+
+impl Conditioner {
+    /// A conditioner for one stream.
+    ///
+    /// # Errors
+    /// [`SettingsError`] when a setting can not be; the text names the flag.
+    pub fn new(settings: &Settings) -> Result<Self, SettingsError> {
+        settings.validate()?;
+        let max_gap_nanos = secs_to_nanos(settings.max_gap_secs);
+        let window = settings.reorder_window;
+        Ok(Conditioner {
+            clock: settings.clock,
+            index_clock: match settings.clock {
+                Clock::Index { rate_hz } => Some(IndexClock::new(rate_hz)),
+                _ => None,
+            },
+            gate: Gate::new(settings),
+            order: Order::new(window, max_gap_nanos),
+            timing: Timing::new(settings, max_gap_nanos),
+            window,
+            hold: match (window, settings.kind) {
+                (0, SampleKind::Rate) => 0,
+                // The first increment has no interval until the second has come.
+                (0, _) => 1,
+                (window, _) => window.max(PRIMING),
+            },
+            primed: false,
+            finishing: false,
+            trim: (settings.start.is_some() || settings.until.is_some()).then(|| {
+                (
+                    settings.start.map_or(i64::MIN, secs_to_nanos),
+                    settings.until.map_or(i64::MAX, secs_to_nanos),
+                )
+            }),
+            first_stamp: None,
+            zero: None,
+            rejected: false,
+            index: 0,
+            report: Report::default(),
+        })
+    }
+
+    /// Conditions `raw`, the next samples of the stream, and appends what is ready to `out`.
+    pub fn push(&mut self, raw: &[RawSample], out: &mut Vec<RateSample>) {
+        out.reserve(raw.len());
+        for sample in raw {
+            self.take(sample, out);
+        }
+        self.report.spacing_nanos = self.timing.spacing();
+    }
+
+    /// `n` payloads that could not be decoded stood here in the stream.
+    ///
+    /// Not the same as leaving them out: they are counted, the next sample says so, and
+    /// [`Clock::Index`] gives them their time.
+    pub fn push_undecodable(&mut self, n: u64) {
+        if n > 0 {
+            self.report.note(Verdict::Undecodable, self.index, None);
+            self.report.counts.add_many(Verdict::Undecodable, n - 1);
+            self.index = self.index.saturating_add(n);
+            self.rejected = true;
+        }
+    }
+
+    /// The stream has ended: appends what was held back. Later samples continue it.
+    pub fn finish(&mut self, out: &mut Vec<RateSample>) {
+        if let Some((_, index)) = self.zero.take() {
+            self.report.note(Verdict::NoStamp, index, Some(Nanos(0)));
+        }
+        self.order.finish(self.timing.spacing(), &mut self.report);
+        self.finishing = true;
+        self.drain(out);
+        self.finishing = false;
+        self.report.spacing_nanos = self.timing.spacing();
+    }
+
+    /// What became of the samples so far; those held back have no verdict yet.
+    #[must_use]
+    pub fn report(&self) -> &Report {
+        &self.report
+    }
+
+    #[inline]
+    fn take(&mut self, raw: &RawSample, out: &mut Vec<RateSample>) {
+        let index = self.index;
+        self.index += 1;
+        let stamp = match &mut self.index_clock {
+            None => self.clock.read(raw),
+            Some(clock) => Some(clock.stamp(index, raw.log)),
+        };
+        match stamp {
+            Some(stamp) if stamp.0.unsigned_abs() <= MAX_STAMP as u64 => {
+                if (stamp.0 == 0 || self.zero.is_some())
+                    && self.index_clock.is_none()
+                    && self.is_zero_in_doubt(raw, stamp, index, out)
+                {
+                    return;
+                }
+                self.pass(raw, stamp, index, out);
+            }
+            _ => self.reject(Verdict::NoStamp, index, stamp),
+        }
+    }
+
+    #[inline]
+    fn pass(&mut self, raw: &RawSample, stamp: Nanos, index: u64, out: &mut Vec<RateSample>) {
+        if let Some((start, until)) = self.trim {
+            let first = *self.first_stamp.get_or_insert(stamp);
+            if !(start..=until).contains(&stamp.since(first)) {
+                return self.report.note(Verdict::Trimmed, index, Some(stamp));
+            }
+        }
+        let spacing = self.timing.spacing();
+        match self.gate.pass(raw, stamp, index, spacing) {
+            Ok(mut entry) => {
+                if self.rejected {
+                    self.rejected = false;
+                    entry.status = entry.status.with(Status::REJECTED_BEFORE);
+                }
+                if raw.accel.is_some() && gate::finite_accel(&entry.accel).is_none() {
+                    self.report.accel_dropped += 1;
+                }
+                self.order.arrive(entry, spacing, &mut self.report);
+                self.drain(out);
+            }
+            Err(verdict) => self.reject(verdict, index, Some(stamp)),
+        }
+    }
+
+    /// A zero stamp is no stamp, unless the clock really begins there: the first sample with one
+    /// waits for the second. Says whether the sample has been dealt with.
+    #[cold]
+    fn is_zero_in_doubt(
+        &mut self,
+        raw: &RawSample,
+        stamp: Nanos,
+        index: u64,
+        out: &mut Vec<RateSample>,
+    ) -> bool {
+        if stamp.0 != 0 {
+            if let Some((zero, zero_index)) = self.zero.take() {
+                if stamp.0.abs() <= ZERO_IS_CLOSE_NANOS {
+                    self.pass(&zero, Nanos(0), zero_index, out);
+                } else {
+                    self.reject(Verdict::NoStamp, zero_index, Some(Nanos(0)));
+                }
+            }
+            return false;
+        }
+        match self.order.high() {
+            Some(high) if high.0.abs() <= ZERO_IS_CLOSE_NANOS => return false,
+            None if self.zero.is_none() => self.zero = Some((*raw, index)),
+            _ => self.reject(Verdict::NoStamp, index, Some(stamp)),
+        }
+        true
+    }
+
+    #[cold]
+    fn reject(&mut self, verdict: Verdict, index: u64, stamp: Option<Nanos>) {
+        self.report.note(verdict, index, stamp);
+        self.rejected = true;
+    }
+
+    /// Times every entry that need not wait any longer.
+    #[inline]
+    fn drain(&mut self, out: &mut Vec<RateSample>) {
+        loop {
+            let line = self.order.line.as_slice();
+            let i = self.order.cursor;
+            let limit = if self.finishing {
+                line.len()
+            } else {
+                let held = line.len().saturating_sub(self.hold);
+                held.max(self.order.epoch_from)
+            };
+            if i >= limit {
+                return;
+            }
+            if !self.primed {
+                self.primed = true;
+                self.hold = self.window;
+                if self.window > 0 || line.len() > 1 {
+                    self.timing.prime(line);
+                }
+                continue;
+            }
+            let Some((entry, ahead)) = line.get(i..).and_then(<[_]>::split_first) else {
+                return;
+            };
+            let is_alone = match ahead.first() {
+                Some(next) => next.stamp != entry.stamp || next.epoch != entry.epoch,
+                None => self.finishing || self.hold == 0,
+            };
+            if !is_alone || self.timing.has_passed(entry) {
+                if self.drain_shared(out) {
+                    continue;
+                }
+                return;
+            }
+            let (stamp, epoch) = (entry.stamp, entry.epoch);
+            out.push(self.timing.one(entry, stamp, ahead, &mut self.report));
+            match timing::verdict(entry.status) {
+                Verdict::Accepted => self.report.counts.add(Verdict::Accepted),
+                verdict => self.report.note(verdict, entry.index, Some(stamp)),
+            }
+            self.order.timed(stamp, epoch);
+            self.order.cursor += 1;
+        }
+    }
+
+    /// Times the entries at the cursor that share one stamp, once it is known what follows them.
+    /// Says whether it could.
+    #[cold]
+    fn drain_shared(&mut self, out: &mut Vec<RateSample>) -> bool {
+        let line = self.order.line.as_slice();
+        let Some(first) = line.get(self.order.cursor).copied() else {
+            return false;
+        };
+        let rest = line.get(self.order.cursor..).unwrap_or_default();
+        let n = rest
+            .iter()
+            .take_while(|e| e.stamp == first.stamp && e.epoch == first.epoch)
+            .count();
+        let (sharing, ahead) = rest.split_at(n);
+        if ahead.is_empty() && !self.finishing {
+            return false;
+        }
+        let next = ahead.first().filter(|next| next.epoch == first.epoch);
+        let placement = self.timing.place(sharing, next.map(|next| next.stamp));
+        let mut last = None;
+        for (i, entry) in sharing.iter().enumerate() {
+            // Never an instant that has passed, whatever was put back in between.
+            let at = placement.stamp(i).filter(|at| {
+                let placed = gate::Entry {
+                    stamp: *at,
+                    ..*entry
+                };
+                !self.timing.has_passed(&placed)
+            });
+            let Some(at) = at else {
+                self.report
+                    .note(Verdict::DuplicateStamp, entry.index, Some(entry.stamp));
+                continue;
+            };
+            let mut entry = *entry;
+            if placement.moves(at) {
+                entry.status = entry.status.with(Status::RESTAMPED);
+            }
+            out.push(self.timing.one(&entry, at, ahead, &mut self.report));
+            match timing::verdict(entry.status) {
+                Verdict::Accepted => self.report.counts.add(Verdict::Accepted),
+                verdict => self.report.note(verdict, entry.index, Some(entry.stamp)),
+            }
+            last = Some(at);
+        }
+        if let Some(last) = last {
+            self.order.timed(last, first.epoch);
+        }
+        self.order.cursor += n;
+        true
+    }
+}
+
+/// Seconds to whole nanoseconds, saturating.
+fn secs_to_nanos(secs: f64) -> i64 {
+    (secs * 1e9).round() as i64
+}

@@ -1,1 +1,472 @@
-//! (in progress)
+//! Bytes of one message -> [`RawSample`]. Pure, total, no I/O.
+//!
+//! A stage of its own because it is where outside data enters: no payload and no schema, however
+//! broken, makes it panic, loop or allocate beyond a bound. What the bytes say is not judged here;
+//! NaN, zero stamps and absurd rates pass, and conditioning counts them.
+//!
+//! ```text
+//! schema text or descriptor -> schema (one graph for all languages)
+//!                              -> select (which fields)  -> plan, compiled once per channel
+//! payload                      -> plan -> registers -> RawSample
+//! ```
+//!
+//! | encoding | schema | decoder |
+//! |---|---|---|
+//! | `cdr` | `ros2msg`, `ros2idl`, `omgidl`, or none for well-known types | [`ros`] |
+//! | `ros1` | `ros1msg`, or none for well-known types | [`ros`] |
+//! | `json` | any or none | [`json`] |
+//! | `protobuf` | `protobuf` (file descriptor set) | [`protobuf`] |
+
+mod fields;
+mod json;
+mod protobuf;
+mod refusal;
+mod registers;
+mod role;
+mod ros;
+mod schema;
+mod select;
+mod stamp;
+mod stated;
+
+pub use fields::{BadFieldPath, FieldPath, FieldRole};
+pub use json::line::{Class, Line, LineDecoder, MAX_LINE, decode_line};
+pub use refusal::{Undecodable, Unsupported, printable};
+pub use role::{Rank, Role, role};
+pub use stamp::TimeUnit;
+pub use stated::{AccelUnit, BodyAxes, GyroUnit, Stated, WorldAxes};
+
+use crate::record::{Nanos, RawSample};
+use registers::{Form, Slot, StampForm};
+use schema::rosmsg::Dialect;
+use schema::{Schema, builtin, descriptor, idl, ros_name, rosmsg};
+use select::names::{self, Px4};
+use select::{Found, Selection, select};
+
+/// Most samples one message may hold.
+pub const MAX_BATCH: usize = 65_536;
+
+/// A channel as its container describes it.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Channel<'a> {
+    /// Topic.
+    pub topic: &'a str,
+    /// `cdr`, `ros1`, `json`, `protobuf`.
+    pub message_encoding: &'a str,
+    /// Message type: `sensor_msgs/msg/Imu`.
+    pub schema_name: &'a str,
+    /// `ros2msg`, `ros1msg`, `jsonschema`, `protobuf`, or empty.
+    pub schema_encoding: &'a str,
+    /// The schema itself.
+    pub schema_data: &'a [u8],
+}
+
+/// What the user may say about messages.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// `--field` paths.
+    pub fields: Vec<FieldPath>,
+    /// Use data that its covariance (-1) marks as absent.
+    pub ignore_covariance_flag: bool,
+    /// Of several transforms in a message, take the one to this child frame; else the first.
+    pub child_frame: Option<String>,
+}
+
+/// What became of one payload.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Decoded {
+    /// Samples pushed.
+    pub samples: usize,
+    /// Of these, those whose body rate the message marks as absent (covariance -1, Imu.msg): their
+    /// `gyro` is `None`, or kept where [`Options::ignore_covariance_flag`] says so.
+    pub gyro_marked_absent: usize,
+    /// Stamps whose nanoseconds were a second or more (or negative), carried into the seconds.
+    pub stamps_carried: usize,
+}
+
+/// Reads the messages of one channel.
+#[derive(Debug, Clone)]
+pub struct Decoder {
+    plan: Plan,
+    /// Finds the frame in messages that have a schema.
+    frame: Option<Plan>,
+    stated: Stated,
+    found: Found,
+    options: Options,
+    /// For the messages about it: topic, type, encoding.
+    label: [String; 3],
+}
+
+#[derive(Debug, Clone)]
+enum Plan {
+    Ros(ros::Plan),
+    Protobuf(protobuf::Plan),
+    Json(json::Plan),
+}
+
+impl Decoder {
+    /// Compiles the decoder of a channel.
+    ///
+    /// # Errors
+    /// [`Unsupported`] with the reason: an encoding or schema this crate does not read, a schema
+    /// without body rate or orientation, a `--field` that leads nowhere (with the fields there are).
+    /// A JSON channel always compiles: what it holds shows in its messages ([`Decoder::settle`]).
+    pub fn compile(channel: &Channel<'_>, options: &Options) -> Result<Decoder, Unsupported> {
+        let label = label(channel);
+        let refuse = |(why, help): (String, &str)| unsupported(&label, why, help);
+        if channel.message_encoding == "json" {
+            return Ok(Decoder::json(channel, options, label));
+        }
+        let schema = read_schema(channel).map_err(refuse)?;
+        let selection = select(&schema, channel.schema_name, options).map_err(|why| {
+            refuse((
+                why,
+                "paths are names between dots: --field gyro=imu.angular_velocity",
+            ))
+        })?;
+        if selection.picks.is_empty()
+            || !(selection.has(Slot::GYRO, 3) || selection.has(Slot::ORIENTATION, 4))
+        {
+            return Err(refuse((
+                "the type has no body rate and no orientation under a name this program knows"
+                    .to_owned(),
+                "name it: --field gyro=PATH",
+            )));
+        }
+        let plan =
+            compile_plan(channel, &schema, &selection, options).map_err(|why| refuse((why, "")))?;
+        let frame = selection
+            .frame
+            .as_deref()
+            .and_then(|path| match channel.message_encoding {
+                "protobuf" => protobuf::plan::text(&schema, path).ok().map(Plan::Protobuf),
+                "ros1" => ros::compile::text(&schema, path, ros::compile::Layout::Ros1)
+                    .ok()
+                    .map(Plan::Ros),
+                _ => ros::compile::text(&schema, path, ros::compile::Layout::Cdr)
+                    .ok()
+                    .map(Plan::Ros),
+            });
+        Ok(Decoder {
+            plan,
+            frame,
+            stated: state(channel.schema_name, &selection),
+            found: selection.found,
+            options: options.clone(),
+            label,
+        })
+    }
+
+    fn json(channel: &Channel<'_>, options: &Options, label: [String; 3]) -> Decoder {
+        let mut stated = Stated::default();
+        state_by_type(channel.schema_name, &mut stated);
+        let px4 = names::px4(channel.schema_name);
+        state_px4(px4, &mut stated);
+        stated.description = "fields by name, in each message".to_owned();
+        let keys = json::seek::schema_keys(channel.schema_data);
+        stated.has_gyro |= keys.0;
+        stated.has_stamp |= keys.1;
+        let found = if stated.has_gyro {
+            Found::Named
+        } else {
+            Found::Nothing
+        };
+        Decoder {
+            plan: Plan::Json(json::Plan::compile(channel.schema_name, options)),
+            frame: None,
+            stated,
+            found,
+            options: options.clone(),
+            label,
+        }
+    }
+
+    /// Reads one payload and pushes its samples; pushes nothing when it fails.
+    ///
+    /// # Errors
+    /// [`Undecodable`], to be counted; it says at which field or byte.
+    pub fn decode(
+        &self,
+        payload: &[u8],
+        log: Nanos,
+        publish: Nanos,
+        out: &mut Vec<RawSample>,
+    ) -> Result<Decoded, Undecodable> {
+        match &self.plan {
+            Plan::Ros(plan) => plan.decode(payload, log, publish, out),
+            Plan::Protobuf(plan) => plan.decode(payload, log, publish, out),
+            Plan::Json(plan) => plan.decode(payload, log, publish, out),
+        }
+    }
+
+    /// Learns from one message (the first of the topic) what no schema says: the unit of a stamp
+    /// that is a bare number, by the recorder's clock and else by its magnitude, and for JSON what
+    /// the messages hold. Without this call such stamps are read by magnitude, one by one.
+    ///
+    /// # Errors
+    /// [`Unsupported`] when a JSON message lacks a `--field` path, or holds neither body rate nor
+    /// orientation; it lists the keys there are. A message that can not be decoded is no error here.
+    pub fn settle(&mut self, payload: &[u8], log: Nanos) -> Result<(), Unsupported> {
+        if let Plan::Json(_) = &self.plan {
+            return self.settle_json(payload, log);
+        }
+        let Some(form) = self.form() else {
+            return Ok(());
+        };
+        let given = *form;
+        // Read the bare number as nanoseconds to see what it is.
+        form.stamp = match given.stamp {
+            StampForm::Count(TimeUnit::ByMagnitude) => StampForm::Count(TimeUnit::Nano),
+            StampForm::Float(TimeUnit::ByMagnitude) => StampForm::Float(TimeUnit::Nano),
+            _ => return Ok(()),
+        };
+        let mut samples = Vec::new();
+        let read = self.decode(payload, log, log, &mut samples);
+        let count = samples
+            .first()
+            .and_then(|s| s.header)
+            .filter(|_| read.is_ok());
+        let Some(form) = self.form() else {
+            return Ok(());
+        };
+        *form = given;
+        if let Some(Nanos(count)) = count.filter(|n| n.0 != 0) {
+            let unit = settled_unit(count as f64, log);
+            form.stamp = match given.stamp {
+                StampForm::Count(_) => StampForm::Count(unit),
+                _ => StampForm::Float(unit),
+            };
+        }
+        Ok(())
+    }
+
+    fn form(&mut self) -> Option<&mut Form> {
+        match &mut self.plan {
+            Plan::Ros(plan) => Some(plan.form_mut()),
+            Plan::Protobuf(plan) => Some(plan.form_mut()),
+            Plan::Json(_) => None,
+        }
+    }
+
+    fn settle_json(&mut self, payload: &[u8], log: Nanos) -> Result<(), Unsupported> {
+        let Plan::Json(plan) = &mut self.plan else {
+            return Ok(());
+        };
+        let learnt = match plan.find(payload) {
+            Ok(found) => found,
+            Err(_) => return Ok(()),
+        };
+        let one = match learnt.batch.first() {
+            Some(first) if !learnt.has_gyro() => first,
+            _ => &learnt,
+        };
+        let stamped = if one.stamp.is_some() { one } else { &learnt };
+        let unit = stamped.unlabelled().map(|count| settled_unit(count, log));
+        let missing = self.options.fields.iter().find(|field| match field.role {
+            FieldRole::Gyro => !one.has_gyro(),
+            FieldRole::Accel => !one.registers.has(Slot::ACCEL, 3),
+            FieldRole::Orientation => !one.has_orientation(),
+            FieldRole::Stamp => stamped.stamp.is_none(),
+            FieldRole::Interval => !one.registers.has(Slot::INTERVAL, 1),
+        });
+        let complaint = match missing {
+            Some(field) => Some(format!(
+                "no {} at `{}`",
+                field.role.name(),
+                printable(&field.text)
+            )),
+            None if !one.has_gyro() && !one.has_orientation() => Some(
+                "the message has no body rate and no orientation under a name this program knows"
+                    .to_owned(),
+            ),
+            None => None,
+        };
+        let stated = &mut self.stated;
+        stated.has_gyro = one.has_gyro();
+        stated.has_accel = one.registers.has(Slot::ACCEL, 3);
+        stated.has_orientation = one.has_orientation();
+        stated.has_stamp = stamped.stamp.is_some();
+        stated.has_interval = one.registers.has(Slot::INTERVAL, 1);
+        stated.batched = !learnt.has_gyro() && !learnt.batch.is_empty();
+        stated.gyro_unit = one.unit.or(stated.gyro_unit);
+        stated.sample_kind = one.kind.or(stated.sample_kind);
+        self.found = match one.gyro_rank {
+            None => Found::Nothing,
+            Some(5) if plan.vector_stamped => Found::Vector,
+            Some(5) if plan.px4.is_none() => Found::Twist,
+            Some(_) => Found::Named,
+        };
+        drop(learnt);
+        plan.settled = unit.or(plan.settled);
+        match complaint {
+            None => Ok(()),
+            Some(why) => {
+                let keys = json::seek::keys(payload).join(", ");
+                Err(unsupported(
+                    &self.label,
+                    format!("{why}; its keys: {keys}"),
+                    "name it: --field gyro=PATH",
+                ))
+            }
+        }
+    }
+
+    /// What type and schema state, and which fields were chosen.
+    #[must_use]
+    pub fn stated(&self) -> &Stated {
+        &self.stated
+    }
+
+    /// The frame a message names: at most 255 bytes, control characters escaped.
+    #[must_use]
+    pub fn frame_id(&self, payload: &[u8]) -> Option<String> {
+        let bytes = match (&self.frame, &self.plan) {
+            (Some(Plan::Ros(plan)), _) => plan.text(payload)?,
+            (Some(Plan::Protobuf(plan)), _) => plan.text(payload)?,
+            (_, Plan::Json(plan)) => {
+                return plan.find(payload).ok()?.frame.as_deref().map(printable);
+            }
+            _ => return None,
+        };
+        Some(printable(&String::from_utf8_lossy(bytes)))
+    }
+
+    fn found(&self) -> Found {
+        self.found
+    }
+}
+
+fn settled_unit(count: f64, log: Nanos) -> TimeUnit {
+    TimeUnit::nearest(count, log).unwrap_or_else(|| match TimeUnit::ByMagnitude.nanos(count) {
+        1 => TimeUnit::Nano,
+        1_000 => TimeUnit::Micro,
+        1_000_000 => TimeUnit::Milli,
+        _ => TimeUnit::Second,
+    })
+}
+
+fn label(channel: &Channel<'_>) -> [String; 3] {
+    let encoding = if channel.schema_encoding.is_empty() {
+        printable(channel.message_encoding)
+    } else {
+        printable(&format!(
+            "{}/{}",
+            channel.message_encoding, channel.schema_encoding
+        ))
+    };
+    [
+        printable(channel.topic),
+        printable(channel.schema_name),
+        encoding,
+    ]
+}
+
+fn unsupported([topic, type_name, encoding]: &[String; 3], why: String, help: &str) -> Unsupported {
+    Unsupported {
+        topic: topic.clone(),
+        type_name: type_name.clone(),
+        encoding: encoding.clone(),
+        why,
+        help: help.to_owned(),
+    }
+}
+
+fn read_schema(channel: &Channel<'_>) -> Result<Schema, (String, &'static str)> {
+    let dialect = match channel.message_encoding {
+        "cdr" => Dialect::Ros2,
+        "ros1" => Dialect::Ros1,
+        "protobuf" => {
+            return descriptor::parse(channel.schema_data, channel.schema_name)
+                .map_err(|why| (why, ""));
+        }
+        _ => {
+            return Err((
+                "its message encoding is not one this program reads (cdr, ros1, json, protobuf)"
+                    .to_owned(),
+                "choose another topic with --topic",
+            ));
+        }
+    };
+    let text = std::str::from_utf8(channel.schema_data)
+        .map_err(|_| ("its schema is not UTF-8 text".to_owned(), ""))?;
+    if text.trim().is_empty() {
+        // std_msgs/Empty has an empty definition, too, but nothing in it is wanted.
+        return builtin::schema(&ros_name(channel.schema_name), dialect).ok_or((
+            "its schema text is empty, and the type is none of the well-known ones".to_owned(),
+            "",
+        ));
+    }
+    match channel.schema_encoding {
+        "ros2idl" | "omgidl" => idl::parse(text, channel.schema_name),
+        "ros2msg" | "ros1msg" => rosmsg::parse(text, channel.schema_name, dialect),
+        _ => Err(
+            "its schema encoding is not one this program reads (ros2msg, ros2idl, ros1msg)"
+                .to_owned(),
+        ),
+    }
+    .map_err(|why| (why, ""))
+}
+
+fn compile_plan(
+    channel: &Channel<'_>,
+    schema: &Schema,
+    selection: &Selection,
+    options: &Options,
+) -> Result<Plan, String> {
+    let child = options.child_frame.as_deref();
+    let layout = match channel.message_encoding {
+        "protobuf" => return protobuf::plan::samples(schema, selection, child).map(Plan::Protobuf),
+        "ros1" => ros::compile::Layout::Ros1,
+        _ => ros::compile::Layout::Cdr,
+    };
+    ros::compile::samples(schema, selection, child, layout).map(Plan::Ros)
+}
+
+fn state(type_name: &str, selection: &Selection) -> Stated {
+    let mut stated = Stated::default();
+    state_by_type(type_name, &mut stated);
+    state_by_type(&selection.holder, &mut stated);
+    stated.gyro_unit = selection.unit.or(stated.gyro_unit);
+    state_px4(names::px4(type_name), &mut stated);
+    stated.sample_kind = selection.kind.or(stated.sample_kind);
+    stated.has_gyro = selection.has(Slot::GYRO, 3);
+    stated.has_accel = selection.has(Slot::ACCEL, 3);
+    stated.has_orientation = selection.has(Slot::ORIENTATION, 4);
+    stated.has_stamp = selection.form.stamp != StampForm::None;
+    stated.has_interval = selection.has(Slot::INTERVAL, 1);
+    stated.batched = selection
+        .batch
+        .as_ref()
+        .is_some_and(|batch| batch.element == select::Step::Each);
+    stated.description = printable(&selection.description.join(", "));
+    stated
+}
+
+/// Types whose units and axes a published text fixes.
+fn state_by_type(type_name: &str, stated: &mut Stated) {
+    let name = ros_name(type_name);
+    let package = name.split('/').next().unwrap_or("");
+    if matches!(
+        package,
+        "sensor_msgs" | "geometry_msgs" | "nav_msgs" | "tf2_msgs" | "tf"
+    ) {
+        stated.ros();
+        stated.has_gyro |= name == "sensor_msgs/Imu";
+        stated.has_stamp |= name == "sensor_msgs/Imu";
+    }
+}
+
+fn state_px4(px4: Option<Px4>, stated: &mut Stated) {
+    let Some(px4) = px4 else { return };
+    stated.px4();
+    stated.has_gyro = px4 != Px4::VehicleAttitude;
+    stated.has_stamp = true;
+    stated.has_orientation = px4 == Px4::VehicleAttitude;
+    stated.sample_kind = Some(match px4 {
+        Px4::SensorCombined => crate::record::SampleKind::Average,
+        Px4::VehicleImu => crate::record::SampleKind::DeltaAngle,
+        Px4::VehicleAngularVelocity | Px4::SensorGyro | Px4::VehicleAttitude => {
+            crate::record::SampleKind::Rate
+        }
+    });
+}

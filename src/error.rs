@@ -65,6 +65,53 @@ pub enum Error {
         /// Which file.
         path: PathBuf,
     },
+    /// Standard output was closed by its reader; ends the run quietly.
+    #[error("the reader of standard output has gone")]
+    BrokenPipe,
+    /// The log holds nothing a rate can be read from.
+    #[error("{}: no IMU topic: nothing in it carries a body rate with a stamp\n  it holds:{topics}\n  help: --topic NAME with --field gyro=PATH names a rate in any message", path.display())]
+    NoImuTopic {
+        /// Which file.
+        path: PathBuf,
+        /// What is there, one indented line each.
+        topics: String,
+    },
+    /// The log holds several IMU topics and none was named.
+    #[error("{}: several IMU topics, and they must not be mixed:{topics}\n  help: --topic NAME takes one of them, --topic all each of them", path.display())]
+    SeveralImuTopics {
+        /// Which file.
+        path: PathBuf,
+        /// The candidates, one indented line each.
+        topics: String,
+    },
+    /// The topic named is not in the log.
+    #[error("{}: no topic `{topic}`\n  it holds:{topics}", path.display())]
+    NoSuchTopic {
+        /// Which file.
+        path: PathBuf,
+        /// The topic asked for.
+        topic: String,
+        /// What is there, one indented line each.
+        topics: String,
+    },
+    /// A topic's messages can not be decoded.
+    #[error("{}: {what}", path.display())]
+    Unsupported {
+        /// Which file.
+        path: PathBuf,
+        /// Topic, type, encoding, why, and the flag that helps.
+        what: String,
+    },
+    /// A run over this input can not be carried out with these settings.
+    #[error("{}: {topic}: {what}", path.display())]
+    Topic {
+        /// Which file.
+        path: PathBuf,
+        /// Which topic.
+        topic: String,
+        /// What, why, and the flag that helps.
+        what: String,
+    },
     /// A combination of arguments that can not be.
     #[error("{0}")]
     Usage(String),
@@ -72,3 +119,33 @@ pub enum Error {
 
 /// Result of a run.
 pub type Result<T> = std::result::Result<T, Error>;
+
+impl Error {
+    /// A failed write to something that has a name but no path; a closed pipe is told apart.
+    #[must_use]
+    pub fn writing(name: &str, source: std::io::Error) -> Error {
+        if source.kind() == std::io::ErrorKind::BrokenPipe {
+            Error::BrokenPipe
+        } else {
+            Error::Write {
+                path: PathBuf::from(name),
+                source,
+            }
+        }
+    }
+
+    /// Whether the run ended because its reader had enough (`| head`): not a failure.
+    #[must_use]
+    pub fn is_broken_pipe(&self) -> bool {
+        matches!(self, Error::BrokenPipe)
+    }
+
+    /// The process's exit code: 2 for bad arguments, 1 for everything else.
+    #[must_use]
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Error::Usage(_) => 2,
+            _ => 1,
+        }
+    }
+}

@@ -11,8 +11,12 @@
 //! Without the default feature `service` the crate is `model`, `record`, `condition` and
 //! `propagate` on nalgebra alone.
 
+#[cfg(feature = "service")]
+pub mod cli;
 pub mod compare;
 pub mod condition;
+#[cfg(feature = "service")]
+pub mod config;
 pub mod model;
 pub mod propagate;
 pub mod record;
@@ -21,6 +25,10 @@ pub mod record;
 pub mod decode;
 #[cfg(feature = "service")]
 pub mod error;
+#[cfg(feature = "service")]
+pub mod pipeline;
+#[cfg(feature = "service")]
+pub mod report;
 #[cfg(feature = "service")]
 pub mod sink;
 #[cfg(feature = "service")]

@@ -1,1 +1,41 @@
-//! (in progress)
+//! RateSample -> AttitudeSample. Pure; the hot loop.
+//!
+//! A stage of its own because it is the only place where rotation is integrated: replay, serving,
+//! simulation and tests all push samples through [`Propagator`] and take attitudes out.
+//!
+//! ```text
+//! samples of a run -> window of samples around an interval       window
+//!                  -> Legendre moments of the rate over it       uniform, lagrange, collocation
+//!                  -> turn, cos(a/2) - 1 and sin(a/2) axis       magnus, series
+//!                  -> attitude                                   accumulate
+//! ```
+//!
+//! Every turn is a function of the samples in its window alone, and turns are accumulated in order:
+//! the bits that come out depend neither on how the stream is cut into pushes nor on the [`Executor`].
+//!
+//! # Accuracy
+//! Top of `top.md` at 2000 Hz, 1.2 s, 24 turns: 2e-12 degrees. Coning 10 degrees, 3 Hz, sampled at
+//! 100 Hz, 60 s: 1e-7 arcsec. `tests/accuracy.rs` holds these and the orders of convergence.
+
+mod accumulate;
+mod classical;
+mod collocation;
+mod executor;
+mod lagrange;
+mod lanes;
+mod magnus;
+mod method;
+mod propagator;
+mod report;
+mod series;
+mod sigma;
+mod track;
+mod turn;
+mod uniform;
+mod window;
+
+pub use executor::{Executor, Sequential};
+pub use method::{LARGEST_WINDOW, Method, Order, Placement, UnknownName};
+pub use propagator::{Propagator, Settings, SettingsError};
+pub use report::Report;
+pub use sigma::Noise;

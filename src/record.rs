@@ -160,6 +160,9 @@ impl Status {
     /// Provisional output of streaming, to be followed by a final one.
     pub const PROVISIONAL: Status = Status(1 << 7);
 
+    /// The sample shared its recorded stamp with another and was given one of its own.
+    pub const RESTAMPED: Status = Status(1 << 8);
+
     /// Both sets of bits.
     #[must_use]
     pub fn with(self, other: Status) -> Status {
@@ -174,7 +177,7 @@ impl Status {
 
     /// The names of the bits that are set, in a fixed order; empty means `ok`.
     pub fn names(self) -> impl Iterator<Item = &'static str> {
-        const NAMES: [(Status, &str); 8] = [
+        const NAMES: [(Status, &str); 9] = [
             (Status::BRIDGED, "bridged"),
             (Status::HELD, "held"),
             (Status::RESET, "reset"),
@@ -183,6 +186,7 @@ impl Status {
             (Status::SATURATED, "saturated"),
             (Status::UNDERSAMPLED, "undersampled"),
             (Status::PROVISIONAL, "provisional"),
+            (Status::RESTAMPED, "restamped"),
         ];
         NAMES
             .into_iter()
@@ -231,19 +235,24 @@ pub enum Verdict {
     Huge,
     /// Same stamp and same data as its predecessor.
     Repeated,
-    /// Same stamp as its predecessor, other data.
+    /// Same stamp as another, other data, and no longer step beside it to put it into.
     DuplicateStamp,
     /// Older than what was already integrated, beyond the reorder window.
     Late,
-    /// Its stamp is zero, or absent, while others' are not.
+    /// Its stamp is absent, zero while others' are not, or more than 146 years from the epoch.
     NoStamp,
     /// Outside `--start`, `--until`.
     Trimmed,
+    /// Integrated at a stamp of its own inside a longer step beside it, because it shared its
+    /// recorded stamp with another sample.
+    Restamped,
+    /// Its stamp leaps far ahead, and its successors carry on from its predecessors.
+    StrayStamp,
 }
 
 impl Verdict {
     /// Every verdict, in the order of [`Counts`].
-    pub const ALL: [Verdict; 11] = [
+    pub const ALL: [Verdict; 13] = [
         Verdict::Accepted,
         Verdict::Reordered,
         Verdict::Undecodable,
@@ -255,6 +264,8 @@ impl Verdict {
         Verdict::Late,
         Verdict::NoStamp,
         Verdict::Trimmed,
+        Verdict::Restamped,
+        Verdict::StrayStamp,
     ];
 
     /// The name in summaries and JSON.
@@ -272,13 +283,18 @@ impl Verdict {
             Verdict::Late => "late",
             Verdict::NoStamp => "no_stamp",
             Verdict::Trimmed => "trimmed",
+            Verdict::Restamped => "restamped",
+            Verdict::StrayStamp => "stray_stamp",
         }
     }
 
     /// Whether a sample with this verdict was integrated.
     #[must_use]
     pub fn is_used(self) -> bool {
-        matches!(self, Verdict::Accepted | Verdict::Reordered)
+        matches!(
+            self,
+            Verdict::Accepted | Verdict::Reordered | Verdict::Restamped
+        )
     }
 
     /// Whether a sample with this verdict is data that was lost (exit code 3): everything that was

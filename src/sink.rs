@@ -2,10 +2,11 @@
 //!
 //! A stage of its own because it is the only one that may block on a disk or a pipe, and the only
 //! one that knows what output looks like. Samples collect per stream; full batches of
-//! [`BATCH_SAMPLES`] are formatted and compressed in parallel and written in the order in which they
+//! 2048 are formatted and compressed in parallel and written in the order in which they
 //! filled. The bytes depend on the samples and the order of the calls alone: not on the number of
 //! threads and not (within a stream) on how the samples were cut into calls.
 
+mod batch;
 mod csv;
 mod decimate;
 mod json;
@@ -25,10 +26,11 @@ pub use target::{Format, Target};
 
 use crate::error::{Error, Result};
 use crate::record::{AttitudeSample, Nanos};
+use batch::{Batch, Form, Slot};
+use mcap::Layout;
 use mcap::chunk::Chunk;
 use mcap::file::McapFile;
-use mcap::{Batch, Layout};
-use output::Output;
+use output::{Output, STDOUT_NAME};
 use rayon::ThreadPool;
 use rayon::iter::{IntoParallelRefMutIterator, ParallelIterator};
 use std::path::PathBuf;
@@ -41,6 +43,9 @@ const COPY_CHUNK_BYTES: usize = 1 << 20;
 
 /// Batches in flight: enough to keep every thread busy, few enough to bound memory (about 3 MB each).
 const MAX_BATCHES: usize = 16;
+
+/// Copied messages can be large; so many bytes of them are written without waiting for more.
+const MAX_QUEUED_COPIES: usize = MAX_BATCHES * COPY_CHUNK_BYTES;
 
 /// How the output is made.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -65,7 +70,7 @@ pub struct Written {
     /// Messages (MCAP), lines or rows.
     pub messages: u64,
     /// Stamps that do not fit into the 32-bit seconds of a ROS message (before 1901, after 2038) and
-    /// were written as the nearest one that does. Their log times are exact.
+    /// were written as the nearest one that does.
     pub stamps_out_of_range: u64,
     /// Whether the reader hung up before the end.
     pub closed: bool,
@@ -83,6 +88,8 @@ pub struct Sink {
     /// Full batches, and how many of them are in use.
     slots: Vec<Slot>,
     used: usize,
+    /// Uncompressed bytes of copied messages among them.
+    queued_copies: usize,
     path: Option<PathBuf>,
     samples: u64,
     messages: u64,
@@ -99,33 +106,11 @@ enum State {
     Failed,
 }
 
-/// How a batch becomes bytes.
-#[derive(Debug)]
-enum Form {
-    Mcap {
-        layout: Layout,
-        compression: Compression,
-    },
-    Ndjson(Vec<json::AttObject>),
-    Csv,
-    Null,
-}
-
 /// What a stream has pending.
 #[derive(Debug, Default)]
 struct Lane {
     batch: Batch,
     last: Option<Nanos>,
-}
-
-/// One batch on its way into bytes.
-#[derive(Debug, Default)]
-struct Slot {
-    /// Empty when the chunk holds copied messages already.
-    batch: Batch,
-    chunk: Chunk,
-    text: Vec<u8>,
-    outcome: Option<std::io::Error>,
 }
 
 impl Sink {
@@ -189,6 +174,7 @@ impl Sink {
             copies: Chunk::default(),
             slots: Vec::new(),
             used: 0,
+            queued_copies: 0,
             samples: 0,
             messages: 0,
             bytes: 0,
@@ -306,10 +292,10 @@ impl Sink {
                 let closing = self.file.closing();
                 let _ = self.put(&closing)?;
             }
-            if let State::Open(output) = std::mem::replace(&mut self.state, State::Closed) {
-                if output.finish()? == Flow::Continue {
-                    return Ok(self.written(false));
-                }
+            if let State::Open(output) = std::mem::replace(&mut self.state, State::Closed)
+                && output.finish()? == Flow::Continue
+            {
+                return Ok(self.written(false));
             }
         }
         Ok(self.written(true))
@@ -329,13 +315,18 @@ impl Sink {
         }
     }
 
+    /// The output's name in messages.
+    fn named(&self) -> PathBuf {
+        self.path.clone().unwrap_or_else(|| STDOUT_NAME.into())
+    }
+
     /// `false` when the reader hung up; an error when one has been returned before.
     fn is_open(&self) -> Result<bool> {
         match self.state {
             State::Open(_) => Ok(true),
             State::Closed => Ok(false),
             State::Failed => Err(Error::Write {
-                path: self.path.clone().unwrap_or_default(),
+                path: self.named(),
                 source: std::io::Error::other("an earlier write failed"),
             }),
         }
@@ -401,6 +392,7 @@ impl Sink {
     /// Moves the copied messages into the queue.
     fn queue_copies(&mut self) {
         let full = std::mem::take(&mut self.copies);
+        self.queued_copies += full.plain_len();
         let slot = self.next_slot();
         slot.batch.samples.clear();
         let mut empty = std::mem::replace(&mut slot.chunk, full);
@@ -426,7 +418,7 @@ impl Sink {
     /// Drains the queue when it is long enough for this pool.
     fn make_room(&mut self, pool: &ThreadPool) -> Result<Flow> {
         let limit = (2 * pool.current_num_threads()).clamp(2, MAX_BATCHES);
-        if self.used >= limit {
+        if self.used >= limit || self.queued_copies >= MAX_QUEUED_COPIES {
             self.drain(Some(pool))
         } else {
             Ok(Flow::Continue)
@@ -436,6 +428,7 @@ impl Sink {
     /// Turns every queued batch into bytes, in parallel, and writes them in order.
     fn drain(&mut self, pool: Option<&ThreadPool>) -> Result<Flow> {
         let used = std::mem::take(&mut self.used);
+        self.queued_copies = 0;
         let mut slots = std::mem::take(&mut self.slots);
         let form = &self.form;
         match pool {
@@ -459,7 +452,7 @@ impl Sink {
 
     fn emit(&mut self, slot: &mut Slot) -> Result<Flow> {
         if let Some(source) = slot.outcome.take() {
-            let path = self.path.clone().unwrap_or_default();
+            let path = self.named();
             return self.note(Err(Error::Write { path, source }));
         }
         if let Form::Mcap { compression, .. } = self.form {
@@ -475,39 +468,6 @@ impl Sink {
         } else {
             self.messages += slot.batch.samples.len() as u64;
             self.put(&slot.text)
-        }
-    }
-}
-
-impl Slot {
-    /// The parallel part: nothing here depends on any other batch.
-    fn encode(&mut self, form: &Form) {
-        self.text.clear();
-        match form {
-            Form::Mcap {
-                layout,
-                compression,
-            } => {
-                // Without samples the chunk holds copied messages.
-                if !self.batch.samples.is_empty() {
-                    layout.fill(&mut self.chunk, &self.batch);
-                }
-                self.outcome = self.chunk.seal(*compression).err();
-            }
-            Form::Ndjson(objects) => {
-                if let Some(object) = objects.get(self.batch.stream) {
-                    for (seq, sample) in (self.batch.first..).zip(&self.batch.samples) {
-                        object.push(&mut self.text, seq, sample);
-                        self.text.push(b'\n');
-                    }
-                }
-            }
-            Form::Csv => {
-                for sample in &self.batch.samples {
-                    csv::push_row(&mut self.text, sample);
-                }
-            }
-            Form::Null => {}
         }
     }
 }

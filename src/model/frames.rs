@@ -21,7 +21,7 @@
 //! ```
 //!
 //! The wrong order does not compile:
-//! ```compile_fail,E0308
+//! ```compile_fail,E0277
 //! use strapd::model::frames::{Attitude, Body, Dcm, Sensor};
 //! let c_nb = Attitude::identity();
 //! let c_bs = Dcm::<Body, Sensor>::identity();
@@ -36,11 +36,13 @@
 //! ```
 
 mod axes;
+mod worlds;
 
-pub use axes::{
-    AxisMap, AxisMapError, BodyAxes, Convention, ParseLabelError, World, enu_flu_from_ned_frd,
-    enu_flu_from_nwu_flu, enu_from_ned, flu_from_frd, frd_from_flu, ned_frd_from_enu_flu,
-    ned_frd_from_nwu_flu, ned_from_enu, nwu_flu_from_enu_flu, nwu_flu_from_ned_frd,
+pub use axes::{AxisMap, AxisMapError, BodyAxes};
+pub use worlds::{
+    Convention, ParseWorldError, World, enu_flu_from_ned_frd, enu_flu_from_nwu_flu, enu_from_ned,
+    flu_from_frd, frd_from_flu, ned_frd_from_enu_flu, ned_frd_from_nwu_flu, ned_from_enu,
+    nwu_flu_from_enu_flu, nwu_flu_from_ned_frd,
 };
 
 use nalgebra::{Matrix3, Vector3};
@@ -207,9 +209,17 @@ impl<To, From> Dcm<To, From> {
     }
 
     /// Largest entry of `C C^T - I`: how far rounding (or an attacker) has taken it from a rotation.
+    /// NaN when an entry is not finite.
     #[must_use]
     pub fn orthonormality_defect(&self) -> f64 {
-        (self.m * self.m.transpose() - Matrix3::identity()).amax()
+        // Not `amax()`, which passes over NaN.
+        (self.m * self.m.transpose() - Matrix3::identity())
+            .iter()
+            .map(|entry| entry.abs())
+            .fold(
+                0.0,
+                |worst, e| if e > worst || e.is_nan() { e } else { worst },
+            )
     }
 }
 
@@ -270,3 +280,12 @@ impl fmt::Display for NotARotation {
 }
 
 impl std::error::Error for NotARotation {}
+
+/// Outside text, fit for a message: short, and without control characters.
+fn quoted(text: &str) -> String {
+    let mut quoted: String = text.chars().take(16).flat_map(char::escape_debug).collect();
+    if text.chars().nth(16).is_some() {
+        quoted.push_str("...");
+    }
+    quoted
+}

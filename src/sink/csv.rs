@@ -95,12 +95,16 @@ mod tests {
             for p in -8..=8 {
                 for y in -17..=18 {
                     let angles = [r, p, y].map(|a| f64::from(a) * 10f64.to_radians());
-                    let got = roll_pitch_yaw(quaternion(angles[0], angles[1], angles[2]));
-                    for (a, b) in got.iter().zip(angles) {
-                        // Modulo a full turn; 2e-15 rad: a handful of roundings of numbers up to pi,
-                        // doubled by 1/cos(80 deg) = 5.8 of the input's own rounding.
-                        let d = half_turn(a - b).abs();
-                        assert!(d < 4e-15, "{angles:?} -> {got:?}: {d:e}");
+                    let q = quaternion(angles[0], angles[1], angles[2]);
+                    // q and -q are the same rotation; a continuous sign brings both.
+                    for got in [q, q.map(|c| -c)].map(roll_pitch_yaw) {
+                        for (a, b) in got.iter().zip(angles) {
+                            // 4e-15 rad, modulo a full turn: a handful of roundings of numbers up to
+                            // pi, times 1/cos(80 deg) = 5.8 for the input's own rounding.
+                            let d = half_turn(a - b).abs();
+                            assert!(d < 4e-15, "{angles:?} -> {got:?}: {d:e}");
+                            assert!(a.abs() <= std::f64::consts::PI, "{got:?}");
+                        }
                     }
                 }
             }

@@ -134,6 +134,18 @@ mod tests {
     }
 
     #[test]
+    fn after_a_gap_the_output_does_not_hurry_to_catch_up() {
+        // 100 Hz in, 10 Hz out, five seconds missing in the middle.
+        let stamps = (0..100).chain(600..700).map(|k| k * 10_000_000);
+        let kept = thin(10.0, stamps);
+        assert_eq!(kept.len(), 20);
+        assert!(
+            kept.windows(2).all(|w| w[1] - w[0] >= 100_000_000),
+            "{kept:?}"
+        );
+    }
+
+    #[test]
     fn the_status_of_samples_left_out_reaches_the_next_one_kept() {
         let mut decimator = Decimator::new(1.0).unwrap();
         let mut held = sample(Nanos(1));

@@ -10,10 +10,11 @@ pub(super) mod file;
 pub(super) mod record;
 mod schemas;
 
+use super::batch::Batch;
 use super::json::{AttObject, FrameTransform};
 use super::stream::{Provenance, Stream, child_frames, parent_frame};
 use crate::error::{Error, Result};
-use crate::record::{AttitudeSample, Nanos};
+use crate::record::AttitudeSample;
 use chunk::Chunk;
 use file::McapFile;
 use std::collections::BTreeMap;
@@ -77,17 +78,6 @@ pub struct InputMessage<'a> {
     pub publish_time: u64,
     /// Its payload.
     pub data: &'a [u8],
-}
-
-/// A run of samples of one stream, with what of its past their messages depend on.
-#[derive(Debug, Default)]
-pub(super) struct Batch {
-    pub(super) stream: usize,
-    /// Number of the first sample within its stream.
-    pub(super) first: u64,
-    /// Stamp of the sample before.
-    pub(super) previous: Option<Nanos>,
-    pub(super) samples: Vec<AttitudeSample>,
 }
 
 /// How each stream's samples become messages.

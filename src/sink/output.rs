@@ -10,6 +10,9 @@ use std::fs::{self, File, Metadata, OpenOptions};
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
+/// What standard output is called in messages.
+pub(super) const STDOUT_NAME: &str = "standard output";
+
 /// Whether whoever reads the output still wants more.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[must_use]
@@ -142,7 +145,7 @@ impl Output {
             Ok(()) => Ok(Flow::Continue),
             Err(e) if e.kind() == ErrorKind::BrokenPipe => Ok(Flow::Closed),
             Err(source) => Err(Error::Write {
-                path: self.path().unwrap_or(Path::new("standard output")).into(),
+                path: self.path().unwrap_or(Path::new(STDOUT_NAME)).into(),
                 source,
             }),
         }

@@ -119,9 +119,12 @@ pub(super) fn parent_frame(stream: &Stream) -> String {
 
 /// At most [`MAX_NAME_BYTES`] bytes on a character boundary, and no NUL: CDR strings end at one.
 fn bounded(name: &str) -> String {
-    let mut out: String = name.chars().filter(|c| *c != '\0').collect();
-    while out.len() > MAX_NAME_BYTES {
-        out.truncate(out.floor_char_boundary(MAX_NAME_BYTES));
+    let mut out = String::new();
+    for c in name.chars().filter(|c| *c != '\0') {
+        if out.len() + c.len_utf8() > MAX_NAME_BYTES {
+            break;
+        }
+        out.push(c);
     }
     out
 }

@@ -86,10 +86,16 @@ pub(super) struct Sealed {
 
 const ENTRY_BYTES: usize = 16;
 
+/// Buffers larger than this are not kept: one copied message may have been 64 MiB.
+const KEEP_BYTES: usize = 4 << 20;
+
 impl Chunk {
     /// Empties it, keeping the memory.
     pub(in crate::sink) fn clear(&mut self) {
-        self.plain.clear();
+        for buffer in [&mut self.plain, &mut self.sealed.packed] {
+            buffer.clear();
+            buffer.shrink_to(KEEP_BYTES);
+        }
         self.lanes.clear();
         self.entries.clear();
         self.times = None;

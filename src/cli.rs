@@ -1,0 +1,201 @@
+//! Arguments -> a run -> its summary on stdout. I/O.
+//!
+//! One file per command. Data goes to stdout, everything else to stderr.
+
+pub mod cat;
+pub mod compare;
+pub mod estimation;
+pub mod info;
+pub mod manual;
+pub mod outputs;
+pub mod progress;
+pub mod replay;
+
+use crate::error::{Error, Result};
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::io::{IsTerminal, Write};
+use std::process::ExitCode;
+
+/// Gyro samples in, attitude you can trust out.
+#[derive(Parser, Debug)]
+#[command(
+    name = "strapd",
+    version,
+    about,
+    max_term_width = 100,
+    after_help = "Examples:
+  strapd info flight.mcap                      what is in it, and how good it is
+  strapd replay flight.mcap -o attitude.mcap   gyro samples to attitude
+  strapd compare attitude.mcap flight.mcap     how far from a recorded orientation
+  strapd cat flight.mcap --topic /imu | head   decoded samples as NDJSON
+
+Exit codes: 0 done; 1 failed; 2 bad arguments; 3 done, but samples were lost;
+4 compare: a limit was exceeded."
+)]
+pub struct Cli {
+    /// Flags every command takes.
+    #[command(flatten)]
+    pub global: Global,
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// Flags every command takes.
+#[derive(Args, Debug, Clone)]
+pub struct Global {
+    /// Less on stderr: warnings and errors only; no summary
+    #[arg(short, long, global = true)]
+    pub quiet: bool,
+    /// More on stderr; twice for still more
+    #[arg(short, long, global = true, action = clap::ArgAction::Count)]
+    pub verbose: u8,
+    /// Colour on stderr
+    #[arg(long, global = true, value_enum, default_value = "auto")]
+    pub color: When,
+    /// Form of the diagnostics on stderr
+    #[arg(long, global = true, value_enum, default_value = "text", env = "STRAPD_LOG_FORMAT")]
+    pub log_format: LogFormat,
+    /// Progress on stderr: a bar on a terminal, nothing, or one JSON object a second
+    #[arg(long, global = true, value_enum, default_value = "auto")]
+    pub progress: Progress,
+    /// The command's summary as one JSON object on stdout
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// Worker threads; 0 = one per core. The output does not depend on it
+    #[arg(long, global = true, default_value_t = 0, env = "STRAPD_THREADS")]
+    pub threads: usize,
+}
+
+/// When to use colour.
+#[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
+pub enum When {
+    /// On a terminal, unless `NO_COLOR` is set.
+    Auto,
+    /// Always.
+    Always,
+    /// Never.
+    Never,
+}
+
+/// Form of the diagnostics.
+#[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LogFormat {
+    /// Lines for people.
+    Text,
+    /// One JSON object per line.
+    Json,
+}
+
+/// Form of the progress report.
+#[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Progress {
+    /// A bar when stderr is a terminal, nothing otherwise.
+    Auto,
+    /// Nothing.
+    None,
+    /// One JSON object per second on stderr.
+    Json,
+}
+
+/// The commands.
+#[derive(Subcommand, Debug)]
+pub enum Command {
+    /// Turn recorded gyro samples into attitude
+    Replay(Box<replay::Replay>),
+    /// What a log holds: topics, rates, clocks, frames, and what to do next
+    Info(info::Info),
+    /// Time-aligned angle error between two attitudes
+    Compare(compare::Compare),
+    /// Decoded samples as NDJSON, CSV or a table
+    Cat(cat::Cat),
+    /// Shell completions on stdout
+    Completions(manual::Completions),
+    /// The manual page (roff) on stdout, or all of them into a directory
+    Man(manual::Man),
+}
+
+/// How a run that was carried out ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// Everything asked for was done.
+    Done,
+    /// One of several inputs failed; it was said on stderr.
+    Failed,
+    /// Done, but samples were lost.
+    Lossy,
+    /// `compare`: a limit was exceeded.
+    LimitExceeded,
+}
+
+impl From<Outcome> for ExitCode {
+    fn from(outcome: Outcome) -> ExitCode {
+        ExitCode::from(match outcome {
+            Outcome::Done => 0,
+            Outcome::Failed => 1,
+            Outcome::Lossy => 3,
+            Outcome::LimitExceeded => 4,
+        })
+    }
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Whatever ended it; see [`Error`].
+pub fn run(cli: Cli) -> Result<Outcome> {
+    match cli.command {
+        Command::Replay(command) => replay::run(&cli.global, &command),
+        Command::Info(command) => info::run(&cli.global, &command),
+        Command::Compare(command) => compare::run(&cli.global, &command),
+        Command::Cat(command) => cat::run(&cli.global, &command),
+        Command::Completions(command) => manual::completions(&command),
+        Command::Man(command) => manual::man(&command),
+    }
+}
+
+/// Starts the diagnostics on stderr.
+pub fn start_diagnostics(global: &Global) {
+    use tracing_subscriber::EnvFilter;
+    let level = match (global.quiet, global.verbose) {
+        (true, _) => "warn",
+        (false, 0) => "info",
+        (false, 1) => "debug",
+        (false, _) => "trace",
+    };
+    let filter = EnvFilter::try_from_env("STRAPD_LOG").unwrap_or_else(|_| EnvFilter::new(level));
+    let builder = tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .with_target(false)
+        .with_ansi(use_colour(global.color));
+    // A second start (tests in one process) is harmless.
+    let _ = match global.log_format {
+        LogFormat::Json => builder.json().try_init(),
+        LogFormat::Text => builder.without_time().try_init(),
+    };
+}
+
+/// Whether stderr takes colour.
+#[must_use]
+pub fn use_colour(when: When) -> bool {
+    match when {
+        When::Always => true,
+        When::Never => false,
+        When::Auto => std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none(),
+    }
+}
+
+/// Says what ended the run: one `error:` line, then its details and help.
+pub fn say_error(error: &Error) {
+    // A stderr that is gone leaves nobody to tell.
+    let _ = writeln!(std::io::stderr(), "error: {error}");
+}
+
+/// Writes data to stdout; a reader that has gone is [`Error::BrokenPipe`], which ends quietly.
+pub(crate) fn print(text: &str) -> Result<()> {
+    let mut out = std::io::stdout().lock();
+    out.write_all(text.as_bytes())
+        .and_then(|()| out.flush())
+        .map_err(|e| Error::writing("stdout", e))
+}

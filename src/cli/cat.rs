@@ -1,0 +1,257 @@
+//! `strapd cat SOURCE`: decoded samples as NDJSON, CSV or a table. I/O.
+
+use super::{Global, Outcome};
+use crate::decode::{FieldPath, Options};
+use crate::error::{Error, Result};
+use crate::pipeline::log::Log;
+use crate::pipeline::pool::Pool;
+use crate::pipeline::route::{Item, Route};
+use crate::pipeline::summarise::problems;
+use crate::pipeline::topics;
+use crate::record::RawSample;
+use crate::source::mcap::{self, WalkOptions};
+use clap::{Args, ValueEnum};
+use serde_json::json;
+use std::io::{BufWriter, Write};
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Decoded samples as NDJSON, CSV or a table.
+#[derive(Args, Debug)]
+#[command(after_help = "Examples:
+  strapd cat flight.mcap -n 5 --format table
+  strapd cat flight.mcap --topic /imu > samples.ndjson     (strapd replay samples.ndjson reads it)
+  strapd cat flight.mcap --topic /odom --format csv")]
+pub struct Cat {
+    /// An MCAP file
+    #[arg(value_name = "SOURCE")]
+    pub source: PathBuf,
+    /// Topic; the IMU topic by default
+    #[arg(long, value_name = "NAME")]
+    pub topic: Option<String>,
+    /// Where a value lies in the message: ROLE=PATH, as in replay
+    #[arg(long = "field", value_name = "ROLE=PATH")]
+    pub fields: Vec<String>,
+    /// Form of the output
+    #[arg(long, value_enum, default_value = "ndjson")]
+    pub format: Format,
+    /// Stop after so many samples
+    #[arg(short = 'n', long, value_name = "N")]
+    pub count: Option<u64>,
+}
+
+/// `--format`.
+#[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// One JSON object per sample.
+    Ndjson,
+    /// One row per sample under a header row.
+    Csv,
+    /// Aligned columns for people.
+    Table,
+}
+
+const CSV_HEADER: &str =
+    "stamp_ns,log_ns,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z,qw,qx,qy,qz,interval_ns\n";
+
+/// Runs it.
+///
+/// # Errors
+/// The log can not be read or decoded; stdout can not be written.
+pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
+    let options = Options {
+        fields: args
+            .fields
+            .iter()
+            .map(|f| f.parse::<FieldPath>().map_err(|e| Error::Usage(format!("--field: {e}"))))
+            .collect::<Result<_>>()?,
+        ignore_covariance_flag: true,
+        ..Options::default()
+    };
+    let pool = Pool::new(global.threads)?;
+    let log = Log::open(&args.source, &pool)?;
+    let topic = match &args.topic {
+        Some(topic) => topic.clone(),
+        None => {
+            let choice = topics::choose(&args.source, &log.candidates(), None)?;
+            choice.topics.into_iter().next().unwrap_or_default()
+        }
+    };
+    let mut decoders = Vec::new();
+    for known in log.channels.iter().filter(|k| k.channel.topic == topic) {
+        let decoder = known.decoder(&options).map_err(|why| Error::Unsupported {
+            path: args.source.clone(),
+            what: why.to_string(),
+        })?;
+        decoders.push((known.channel.id, decoder));
+    }
+    if decoders.is_empty() {
+        return Err(Error::NoSuchTopic {
+            path: args.source.clone(),
+            topic,
+            topics: topics::listing(&log.candidates()),
+        });
+    }
+    let mut printer = Printer::new(args.format, &topic, args.count)?;
+    let mut failure = None;
+    let mut undecodable = 0u64;
+    let reader = log.reader().map_or_else(|| mcap::Reader::open(&args.source), Ok)?;
+    let report = mcap::walk(
+        reader,
+        &WalkOptions { pool: Some(pool.rayon()), ..WalkOptions::default() },
+        |channel| {
+            let (_, decoder) = decoders
+                .iter()
+                .find(|(id, _)| *id == channel.id && channel.topic == topic)?;
+            Some(Route {
+                decoder: Some(decoder.clone()),
+                stream: 0,
+                is_reference: false,
+                copied: None,
+                noticed: Arc::default(),
+            })
+        },
+        Route::map,
+        |items| {
+            for item in items.drain(..) {
+                match item {
+                    Item::Sample(_, raw) => match printer.print(&raw) {
+                        Ok(true) => {}
+                        Ok(false) => return ControlFlow::Break(()),
+                        Err(e) => {
+                            failure = Some(e);
+                            return ControlFlow::Break(());
+                        }
+                    },
+                    Item::Undecodable(_, why) => {
+                        if undecodable == 0 {
+                            tracing::warn!("first undecodable payload, logged at {} ns: {}", why.0.0, why.1);
+                        }
+                        undecodable += 1;
+                    }
+                    Item::Reference(_) | Item::Copy(_) => {}
+                }
+            }
+            ControlFlow::Continue(())
+        },
+    )?;
+    if let Some(e) = failure {
+        return Err(Error::writing("stdout", e));
+    }
+    printer.out.flush().map_err(|e| Error::writing("stdout", e))?;
+    for problem in problems(&report.survey) {
+        tracing::warn!("{}: {problem}", args.source.display());
+    }
+    if undecodable > 0 || report.survey.problems.losses() > 0 {
+        tracing::warn!("{undecodable} payloads could not be decoded");
+        return Ok(Outcome::Lossy);
+    }
+    Ok(Outcome::Done)
+}
+
+struct Printer {
+    out: BufWriter<std::io::Stdout>,
+    format: Format,
+    topic: String,
+    left: u64,
+    seq: u64,
+}
+
+impl Printer {
+    fn new(format: Format, topic: &str, count: Option<u64>) -> Result<Printer> {
+        let mut out = BufWriter::with_capacity(1 << 16, std::io::stdout());
+        let head = match format {
+            Format::Ndjson => "",
+            Format::Csv => CSV_HEADER,
+            Format::Table => {
+                "               stamp s            gyro x            y            z      accel x            y            z           qw       qx       qy       qz\n"
+            }
+        };
+        out.write_all(head.as_bytes()).map_err(|e| Error::writing("stdout", e))?;
+        Ok(Printer {
+            out,
+            format,
+            topic: topic.to_owned(),
+            left: count.unwrap_or(u64::MAX),
+            seq: 0,
+        })
+    }
+
+    /// Prints one; says whether more are wanted.
+    fn print(&mut self, raw: &RawSample) -> std::io::Result<bool> {
+        if self.left == 0 {
+            return Ok(false);
+        }
+        self.left -= 1;
+        match self.format {
+            Format::Ndjson => self.ndjson(raw)?,
+            Format::Csv => self.csv(raw)?,
+            Format::Table => self.table(raw)?,
+        }
+        self.seq += 1;
+        Ok(self.left > 0)
+    }
+
+    /// A `RATE` object as the service reads it: what is absent is left out, NaN becomes null.
+    fn ndjson(&mut self, raw: &RawSample) -> std::io::Result<()> {
+        let (sec, nsec) = raw.header.unwrap_or(raw.log).to_sec_nanosec();
+        let mut object = json!({
+            "class": "RATE", "id": self.topic, "seq": self.seq,
+            "stamp": { "sec": sec, "nsec": nsec },
+        });
+        if let Some(map) = object.as_object_mut() {
+            let mut put = |key: &str, value: serde_json::Value| map.insert(key.to_owned(), value);
+            if let Some(gyro) = raw.gyro {
+                put("gyro", json!(gyro));
+            }
+            if let Some(accel) = raw.accel {
+                put("accel", json!(accel));
+            }
+            if let Some([w, x, y, z]) = raw.orientation {
+                put("q", json!({ "w": w, "x": x, "y": y, "z": z }));
+            }
+            if let Some(interval) = raw.interval_nanos {
+                put("interval_ns", json!(interval));
+            }
+        }
+        writeln!(self.out, "{object}")
+    }
+
+    fn csv(&mut self, raw: &RawSample) -> std::io::Result<()> {
+        write!(self.out, "{},{}", raw.header.unwrap_or(raw.log).0, raw.log.0)?;
+        for vector in [raw.gyro, raw.accel] {
+            match vector {
+                Some([x, y, z]) => write!(self.out, ",{x},{y},{z}")?,
+                None => write!(self.out, ",,,")?,
+            }
+        }
+        match raw.orientation {
+            Some([w, x, y, z]) => write!(self.out, ",{w},{x},{y},{z}")?,
+            None => write!(self.out, ",,,,")?,
+        }
+        match raw.interval_nanos {
+            Some(interval) => writeln!(self.out, ",{interval}"),
+            None => writeln!(self.out, ","),
+        }
+    }
+
+    fn table(&mut self, raw: &RawSample) -> std::io::Result<()> {
+        let (sec, nsec) = raw.header.unwrap_or(raw.log).to_sec_nanosec();
+        write!(self.out, "{sec:>12}.{nsec:09}     ")?;
+        for vector in [raw.gyro, raw.accel] {
+            match vector {
+                Some(v) => v.iter().try_for_each(|c| write!(self.out, "{c:>13.6}"))?,
+                None => write!(self.out, "{:>13}{:>13}{:>13}", "-", "-", "-")?,
+            }
+        }
+        match raw.orientation {
+            Some([w, rest @ ..]) => {
+                write!(self.out, "{w:>13.6}")?;
+                rest.iter().try_for_each(|c| write!(self.out, "{c:>9.6}"))?;
+            }
+            None => write!(self.out, "{:>13}", "-")?,
+        }
+        writeln!(self.out)
+    }
+}

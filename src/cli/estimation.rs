@@ -1,0 +1,247 @@
+//! The estimation flags shared by `replay` (and, later, `serve` and `simulate`): text -> settings,
+//! checked once. Pure.
+
+use crate::condition::{Clock, GyroUnit, OnGap};
+use crate::config::{Bias, Initial, Noise, Plan, parse_mount};
+use crate::error::{Error, Result};
+use crate::propagate::{Method, Order, Placement};
+use crate::record::SampleKind;
+use clap::{Args, ValueEnum};
+
+/// How the samples are to be understood and integrated.
+#[derive(Args, Debug, Clone)]
+#[command(next_help_heading = "Estimation")]
+pub struct Estimation {
+    /// IMU topic; needed only when a log has several. `all` = each of them
+    #[arg(long, value_name = "NAME")]
+    pub topic: Option<String>,
+    /// Which clock the samples are placed on; `index` needs --rate-hz
+    #[arg(long, value_enum, default_value = "header", env = "STRAPD_TIME")]
+    pub time: TimeArg,
+    /// Sample rate for --time index
+    #[arg(long, value_name = "HZ")]
+    pub rate_hz: Option<f64>,
+    /// Where a value lies in the message: ROLE=PATH, ROLE one of gyro, accel, orientation, stamp, dt
+    #[arg(long = "field", value_name = "ROLE=PATH")]
+    pub fields: Vec<String>,
+    /// auto, magnus, causal, commit, dcm-left, dcm-right, dcm-mean, rotvec-sum
+    #[arg(long, default_value = "auto", env = "STRAPD_METHOD")]
+    pub method: String,
+    /// Samples in the window of --method magnus|causal|commit (2 to 24)
+    #[arg(long, value_name = "P")]
+    pub window: Option<usize>,
+    /// Order of the Magnus step of --method magnus|causal|commit: 2, 4, 6, 8 or exact
+    #[arg(long, value_name = "ORDER")]
+    pub order: Option<String>,
+    /// What a sample means in time: the rate at its stamp, the mean over the interval that ends at
+    /// its stamp, or the integral over it [default: rate, unless the format says otherwise]
+    #[arg(long, value_enum, env = "STRAPD_SAMPLE_KIND")]
+    pub sample_kind: Option<KindArg>,
+    /// Unit of the recorded rates [default: rad, unless the format says otherwise]
+    #[arg(long, value_enum, env = "STRAPD_GYRO_UNIT")]
+    pub gyro_unit: Option<UnitArg>,
+    /// Axes of the input: flu, frd, or a map such as YxZ (which sensor axis is x, y, z of the body;
+    /// lower case = reversed) [default: flu, unless the format says otherwise]
+    #[arg(long, value_name = "AXES", env = "STRAPD_BODY")]
+    pub body: Option<String>,
+    /// World of the output: start (the attitude at the first sample), enu, ned, nwu
+    #[arg(long, value_name = "WORLD", default_value = "start", env = "STRAPD_WORLD")]
+    pub world: String,
+    /// Rotation from sensor to body axes, C_bs, as a quaternion: q=w,x,y,z
+    #[arg(long, value_name = "q=W,X,Y,Z")]
+    pub mount: Option<String>,
+    /// Initial attitude: identity, gravity (level from the accelerometer at rest),
+    /// first-orientation, q=w,x,y,z, or rpy=roll,pitch,yaw in degrees
+    #[arg(long, value_name = "INIT", default_value = "identity", allow_hyphen_values = true)]
+    pub init: String,
+    /// Gyro bias in rad/s, body axes: none, auto (from detected rest), or x,y,z
+    #[arg(long, value_name = "BIAS", default_value = "none", allow_hyphen_values = true)]
+    pub bias: String,
+    /// Longest gap that is bridged, in seconds
+    #[arg(long, value_name = "SECS", default_value_t = 0.5)]
+    pub max_gap: f64,
+    /// Beyond that: hold the attitude, bridge all the same, or reset to the initial attitude
+    #[arg(long, value_enum, default_value = "hold")]
+    pub on_gap: OnGapArg,
+    /// Full scale of the gyro in rad/s: samples at or beyond it are marked saturated
+    #[arg(long, value_name = "RAD_S")]
+    pub gyro_range: Option<f64>,
+    /// Use a gyro whose covariance is marked -1 (absent) all the same: some drivers set it wrongly
+    #[arg(long)]
+    pub ignore_covariance_flag: bool,
+    /// Noise for the covariance: consumer, industrial, tactical, navigation, or arw=RAD_PER_SQRT_S[,bias-instability=RAD_S]
+    #[arg(long, value_name = "NOISE", default_value = "consumer")]
+    pub noise: String,
+    /// Skip the first seconds of the data
+    #[arg(long, value_name = "SECS")]
+    pub start: Option<f64>,
+    /// Stop after this many seconds of the data
+    #[arg(long, value_name = "SECS")]
+    pub until: Option<f64>,
+}
+
+/// `--time`.
+#[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TimeArg {
+    /// The stamp inside the message.
+    Header,
+    /// When it was recorded.
+    Log,
+    /// When it was sent.
+    Publish,
+    /// Its number divided by --rate-hz.
+    Index,
+}
+
+/// `--sample-kind`.
+#[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
+pub enum KindArg {
+    /// Instantaneous rate at the stamp.
+    Rate,
+    /// Mean rate over the interval ending at the stamp.
+    Average,
+    /// Integral of the rate over it.
+    DeltaAngle,
+}
+
+impl From<KindArg> for SampleKind {
+    fn from(kind: KindArg) -> SampleKind {
+        match kind {
+            KindArg::Rate => SampleKind::Rate,
+            KindArg::Average => SampleKind::Average,
+            KindArg::DeltaAngle => SampleKind::DeltaAngle,
+        }
+    }
+}
+
+/// `--gyro-unit`.
+#[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
+pub enum UnitArg {
+    /// rad/s.
+    Rad,
+    /// deg/s.
+    Deg,
+    /// mrad/s.
+    Mrad,
+}
+
+impl From<UnitArg> for GyroUnit {
+    fn from(unit: UnitArg) -> GyroUnit {
+        match unit {
+            UnitArg::Rad => GyroUnit::Rad,
+            UnitArg::Deg => GyroUnit::Deg,
+            UnitArg::Mrad => GyroUnit::Mrad,
+        }
+    }
+}
+
+/// `--on-gap`.
+#[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OnGapArg {
+    /// Keep the attitude.
+    Hold,
+    /// Interpolate all the same.
+    Bridge,
+    /// Go back to the initial attitude.
+    Reset,
+}
+
+impl From<OnGapArg> for OnGap {
+    fn from(policy: OnGapArg) -> OnGap {
+        match policy {
+            OnGapArg::Hold => OnGap::Hold,
+            OnGapArg::Bridge => OnGap::Bridge,
+            OnGapArg::Reset => OnGap::Reset,
+        }
+    }
+}
+
+impl Estimation {
+    /// The flags as one checked plan.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] naming the flag, for anything that can be judged without the data.
+    pub fn plan(&self) -> Result<Plan> {
+        let usage = |flag: &str, e: &dyn std::fmt::Display| Error::Usage(format!("{flag}: {e}"));
+        let clock = match (self.time, self.rate_hz) {
+            (TimeArg::Header, _) => Clock::Header,
+            (TimeArg::Log, _) => Clock::Log,
+            (TimeArg::Publish, _) => Clock::Publish,
+            (TimeArg::Index, Some(rate_hz)) => Clock::Index { rate_hz },
+            (TimeArg::Index, None) => {
+                return Err(Error::Usage(
+                    "--time index: the sample rate is needed too\n  help: --rate-hz HZ".to_owned(),
+                ));
+            }
+        };
+        if self.rate_hz.is_some() && self.time != TimeArg::Index {
+            return Err(Error::Usage(
+                "--rate-hz: only --time index uses it\n  help: --time index --rate-hz HZ".to_owned(),
+            ));
+        }
+        let plan = Plan {
+            topic: self.topic.clone(),
+            decode: crate::decode::Options {
+                fields: self
+                    .fields
+                    .iter()
+                    .map(|f| f.parse().map_err(|e| usage("--field", &e)))
+                    .collect::<Result<_>>()?,
+                ignore_covariance_flag: self.ignore_covariance_flag,
+                child_frame: None,
+            },
+            method: self.method()?,
+            kind: self.sample_kind.map(SampleKind::from),
+            unit: self.gyro_unit.map(GyroUnit::from),
+            body: self
+                .body
+                .as_deref()
+                .map(|b| b.parse().map_err(|e| usage("--body", &e)))
+                .transpose()?,
+            world: self.world.parse().map_err(|e| usage("--world", &e))?,
+            mount: self.mount.as_deref().map(parse_mount).transpose()?,
+            clock,
+            initial: Initial::parse(&self.init)?,
+            bias: Bias::parse(&self.bias)?,
+            max_gap_secs: self.max_gap,
+            on_gap: self.on_gap.into(),
+            gyro_range: self.gyro_range,
+            noise: Noise::parse(&self.noise)?,
+            start: self.start,
+            until: self.until,
+        };
+        plan.check()?;
+        Ok(plan)
+    }
+
+    fn method(&self) -> Result<Method> {
+        let named: Method = match self.method.as_str() {
+            "causal" => Method::Magnus { window: 5, order: Order::M6, placement: Placement::Causal },
+            name => name.parse().map_err(|e| Error::Usage(format!("--method: {e}")))?,
+        };
+        let asked_order: Option<Order> = self
+            .order
+            .as_deref()
+            .map(|o| o.parse().map_err(|e| Error::Usage(format!("--order: {e}"))))
+            .transpose()?;
+        Ok(match named {
+            Method::Magnus { window, order, placement } => Method::Magnus {
+                window: self.window.unwrap_or(window),
+                order: asked_order.unwrap_or(order),
+                placement,
+            },
+            Method::CommitProvisional { window, order, finals } => Method::CommitProvisional {
+                window: self.window.unwrap_or(window),
+                order: asked_order.unwrap_or(order),
+                finals,
+            },
+            other if self.window.is_none() && asked_order.is_none() => other,
+            _ => {
+                return Err(Error::Usage(format!(
+                    "--window and --order belong to --method magnus, causal or commit, not to {}",
+                    self.method
+                )));
+            }
+        })
+    }
+}

@@ -1,0 +1,69 @@
+//! `-o` as written -> one name per log. Pure but for asking whether a directory is there.
+
+use crate::error::{Error, Result};
+use std::path::Path;
+
+/// Resolves every `-o` for one log of `logs`.
+///
+/// `{stem}` stands for the log's name without its directory and extension; an existing directory,
+/// or a name that ends in `/`, means `<stem>.attitude.mcap` in it. With several logs a plain name
+/// is refused: each would overwrite the last.
+///
+/// # Errors
+/// [`Error::Usage`] for a plain name with several logs.
+pub fn resolve(outputs: &[String], log: &str, logs: usize) -> Result<Vec<String>> {
+    outputs.iter().map(|output| resolve_one(output, log, logs)).collect()
+}
+
+fn resolve_one(output: &str, log: &str, logs: usize) -> Result<String> {
+    if output == "-" || output == "null:" {
+        return Ok(output.to_owned());
+    }
+    if output.ends_with('/') || Path::new(output).is_dir() {
+        let dir = output.trim_end_matches('/');
+        return Ok(format!("{dir}/{}.attitude.mcap", stem(log)));
+    }
+    if output.contains("{stem}") {
+        return Ok(output.replace("{stem}", &stem(log)));
+    }
+    if logs > 1 {
+        return Err(Error::Usage(format!(
+            "-o {output}: each of the {logs} logs would be written there\n  help: -o DIR/ or a name with {{stem}}, for example -o out/{{stem}}.mcap"
+        )));
+    }
+    Ok(output.to_owned())
+}
+
+/// The log's name without directory and extension; `stdin` for `-`.
+fn stem(log: &str) -> String {
+    if log == "-" {
+        return "stdin".to_owned();
+    }
+    Path::new(log)
+        .file_stem()
+        .map_or_else(|| "log".to_owned(), |s| s.to_string_lossy().into_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn one(output: &str, log: &str, logs: usize) -> Result<String> {
+        resolve(&[output.to_owned()], log, logs).map(|v| v[0].clone())
+    }
+
+    #[test]
+    fn each_log_gets_its_own_name() {
+        assert_eq!(one("out/{stem}.csv", "/d/a.mcap", 2).unwrap(), "out/a.csv");
+        assert_eq!(one("out/", "/d/a.mcap", 2).unwrap(), "out/a.attitude.mcap");
+        assert_eq!(one("-", "/d/a.mcap", 2).unwrap(), "-");
+        assert_eq!(one("x.mcap", "/d/a.mcap", 1).unwrap(), "x.mcap");
+    }
+
+    #[test]
+    fn one_name_for_two_logs_is_refused_with_the_way_out() {
+        let error = one("x.mcap", "a.mcap", 2).unwrap_err().to_string();
+        assert!(error.contains("{stem}"), "{error}");
+    }
+}

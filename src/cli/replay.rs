@@ -1,0 +1,207 @@
+//! `strapd replay SOURCE... -o SINK...`: recorded samples -> attitude. I/O.
+
+use super::estimation::Estimation;
+use super::progress::Reporter;
+use super::{Global, Outcome, outputs, print};
+use crate::config::Shard;
+use crate::config::Plan;
+use crate::error::{Error, Result};
+use crate::pipeline::pool::Pool;
+use crate::pipeline::replay::{self, Replay as Run};
+use crate::pipeline::session::Source;
+use crate::report::summary::RunSummary;
+use crate::sink::{Compression, Encoding, Options, Target};
+use clap::{Args, ValueEnum};
+use std::io::Write;
+
+/// Turn recorded gyro samples into attitude.
+#[derive(Args, Debug)]
+#[command(after_help = "Examples:
+  strapd replay flight.mcap -o attitude.mcap
+  strapd replay flight.mcap -o - | jq .q                    NDJSON on stdout
+  strapd replay flight.mcap -o a.mcap --init gravity --bias auto --world enu
+  strapd replay flight.mcap --against-recorded              which --sample-kind fits this log
+  strapd replay *.mcap -o out/{stem}.csv --shard 0/4        one share of many logs")]
+pub struct Replay {
+    /// Logs: MCAP files, or - for a log on standard input (MCAP or NDJSON)
+    #[arg(required = true, value_name = "SOURCE")]
+    pub sources: Vec<String>,
+    /// Where the attitude goes: a .mcap, .ndjson or .csv file, a directory, - (NDJSON on stdout) or
+    /// null: (nowhere). {stem} stands for the log's name. May be given several times
+    #[arg(short, long = "output", value_name = "SINK")]
+    pub outputs: Vec<String>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub estimation: Estimation,
+    /// Replace outputs that exist
+    #[arg(long, help_heading = "Output")]
+    pub force: bool,
+    /// Copy every message of the input into MCAP outputs too
+    #[arg(long, help_heading = "Output")]
+    pub copy_input: bool,
+    /// Messages in MCAP outputs: ROS 2 CDR, or foxglove.FrameTransform as JSON
+    #[arg(long, value_enum, default_value = "cdr", help_heading = "Output")]
+    pub encoding: EncodingArg,
+    /// Compression of MCAP outputs
+    #[arg(long, value_enum, default_value = "zstd", help_heading = "Output")]
+    pub compression: CompressionArg,
+    /// Write at most this many attitudes a second; the integration always uses every sample
+    #[arg(long, value_name = "HZ", help_heading = "Output")]
+    pub out_rate: Option<f64>,
+    /// How fast: max, or a factor of data time such as 1 or 0.5
+    #[arg(long, value_name = "FACTOR", default_value = "max", help_heading = "Output")]
+    pub speed: String,
+    /// Print the error against the orientation recorded in the log (on TOPIC, or found) for each
+    /// meaning a sample can have
+    #[arg(long, value_name = "TOPIC", num_args = 0..=1, default_missing_value = "", require_equals = true)]
+    pub against_recorded: Option<String>,
+    /// Take only logs i, i+n, i+2n, ... of the list (i from 0)
+    #[arg(long, value_name = "I/N")]
+    pub shard: Option<String>,
+}
+
+/// `--encoding`.
+#[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
+pub enum EncodingArg {
+    /// `sensor_msgs/msg/Imu` and `tf2_msgs/msg/TFMessage`.
+    Cdr,
+    /// `foxglove.FrameTransform`.
+    Json,
+}
+
+/// `--compression`.
+#[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CompressionArg {
+    /// zstd, level 1.
+    Zstd,
+    /// lz4.
+    Lz4,
+    /// None.
+    None,
+}
+
+/// Runs it.
+///
+/// # Errors
+/// With one log, whatever ended it. With several, the rest still run; each failure is said.
+pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
+    let shard = args.shard.as_deref().map(Shard::parse).transpose()?;
+    let logs: Vec<&String> = args
+        .sources
+        .iter()
+        .enumerate()
+        .filter(|(i, _)| shard.is_none_or(|s| s.takes(*i)))
+        .map(|(_, log)| log)
+        .collect();
+    if global.json && writes_stdout(args) {
+        return Err(Error::Usage(
+            "--json and -o - would both write to stdout\n  help: give the attitude a file name"
+                .to_owned(),
+        ));
+    }
+    let plan = args.estimation.plan()?;
+    let pool = Pool::new(global.threads)?;
+    let mut outcome = Outcome::Done;
+    let mut summaries = Vec::new();
+    for log in &logs {
+        let result = outputs::resolve(&args.outputs, log, args.sources.len())
+            .and_then(|names| args.run(log, &names, plan.clone()))
+            .and_then(|run| {
+                let mut reporter = Reporter::new(global, log);
+                let result = replay::run(&run, &pool, &mut |position| reporter.update(position));
+                reporter.finish();
+                result
+            });
+        match result {
+            Ok(summary) => {
+                if summary.is_lossy() && outcome == Outcome::Done {
+                    outcome = Outcome::Lossy;
+                }
+                say(global, args, &summary)?;
+                summaries.push(summary);
+            }
+            Err(error) if logs.len() > 1 && !error.is_broken_pipe() && error.exit_code() != 2 => {
+                super::say_error(&error);
+                outcome = Outcome::Failed;
+            }
+            Err(error) => return Err(error),
+        }
+    }
+    if global.json {
+        say_json(args, &summaries)?;
+    }
+    Ok(outcome)
+}
+
+impl Replay {
+    /// The run for one log.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a flag that can not be.
+    fn run(&self, log: &str, outputs: &[String], plan: Plan) -> Result<Run> {
+        let speed = match self.speed.as_str() {
+            "max" => None,
+            text => Some(
+                text.parse::<f64>()
+                    .ok()
+                    .filter(|factor| factor.is_finite() && *factor > 0.0)
+                    .ok_or_else(|| {
+                        Error::Usage(format!(
+                            "--speed {text}: expected max, or a factor above 0 such as 1 or 0.5"
+                        ))
+                    })?,
+            ),
+        };
+        if self.out_rate.is_some_and(|hz| !(hz.is_finite() && hz > 0.0)) {
+            return Err(Error::Usage("--out-rate: a rate above 0 Hz".to_owned()));
+        }
+        Ok(Run {
+            source: Source::parse(log),
+            targets: outputs.iter().map(|o| Target::parse(o)).collect::<Result<_>>()?,
+            plan,
+            options: Options {
+                force: self.force,
+                encoding: match self.encoding {
+                    EncodingArg::Cdr => Encoding::Cdr,
+                    EncodingArg::Json => Encoding::Json,
+                },
+                compression: match self.compression {
+                    CompressionArg::Zstd => Compression::Zstd,
+                    CompressionArg::Lz4 => Compression::Lz4,
+                    CompressionArg::None => Compression::None,
+                },
+            },
+            copy_input: self.copy_input,
+            out_rate: self.out_rate,
+            speed,
+            against: self.against_recorded.clone(),
+            command: std::env::args().collect::<Vec<_>>().join(" "),
+        })
+    }
+}
+
+/// The text summary: on stdout, or on stderr when the data or JSON is there.
+fn say(global: &Global, args: &Replay, summary: &RunSummary) -> Result<()> {
+    if global.quiet {
+        return Ok(());
+    }
+    if global.json || writes_stdout(args) {
+        // A stderr that is gone leaves nobody to tell.
+        let _ = std::io::stderr().write_all(summary.text().as_bytes());
+        return Ok(());
+    }
+    print(&summary.text())
+}
+
+/// One object for one log, an array for several.
+fn say_json(args: &Replay, summaries: &[RunSummary]) -> Result<()> {
+    let value = match summaries {
+        [one] if args.sources.len() == 1 => one.json(),
+        many => many.iter().map(RunSummary::json).collect(),
+    };
+    print(&format!("{value}\n"))
+}
+
+fn writes_stdout(args: &Replay) -> bool {
+    args.outputs.iter().any(|o| o == "-")
+}

@@ -1,0 +1,121 @@
+//! What happened to a stream, counted. Pure.
+//!
+//! A stage of its own because bad data never ends a run: this is where it is accounted for, in
+//! bounded memory, with the first case of each kind kept so that a message can point at it.
+
+use crate::record::{Counts, Join, Nanos, Verdict};
+
+/// How many gaps are kept one by one; all are counted.
+pub const GAPS_KEPT: usize = 1000;
+
+/// One place where samples are missing.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Gap {
+    /// The last instant before it that is covered.
+    pub start: Nanos,
+    /// Nanoseconds not covered. Negative where a clock jumped back: the time lost is unknown.
+    pub length_nanos: i64,
+    /// What was done: [`Join::Bridge`], [`Join::Hold`] or [`Join::Reset`].
+    pub join: Join,
+    /// How many samples are missing, from the ordinary spacing; 0 where that is unknown.
+    pub missing: u64,
+    /// Rotation that can have happened unseen, rad: the larger of the rates on both edges times
+    /// the length (0 where the clock jumped back). A bound as long as the motion in the gap was
+    /// not faster than at its edges.
+    pub rotation_bound: f64,
+}
+
+/// Every gap of a stream.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Gaps {
+    /// How many.
+    pub count: u64,
+    /// How many of these were held or reset, not bridged.
+    pub not_bridged: u64,
+    /// How many times the clock jumped back (each counted in `count` and `not_bridged` too).
+    pub jumps_back: u64,
+    /// Samples missing in all gaps together.
+    pub missing: u64,
+    /// Nanoseconds in all gaps together (jumps back add nothing).
+    pub total_nanos: i64,
+    /// The longest, nanoseconds.
+    pub longest_nanos: i64,
+    /// Sum of the rotation bounds, rad.
+    pub rotation_bound: f64,
+    /// The first [`GAPS_KEPT`].
+    pub kept: Vec<Gap>,
+}
+
+impl Gaps {
+    pub(super) fn add(&mut self, gap: Gap) {
+        self.count += 1;
+        self.not_bridged += u64::from(gap.join != Join::Bridge);
+        self.jumps_back += u64::from(gap.length_nanos < 0);
+        self.missing = self.missing.saturating_add(gap.missing);
+        self.total_nanos = self.total_nanos.saturating_add(gap.length_nanos.max(0));
+        self.longest_nanos = self.longest_nanos.max(gap.length_nanos);
+        self.rotation_bound += gap.rotation_bound;
+        if self.kept.len() < GAPS_KEPT {
+            self.kept.push(gap);
+        }
+    }
+}
+
+/// The first sample that got a verdict other than accepted.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct FirstBad {
+    /// How many samples came before it in the stream.
+    pub index: u64,
+    /// Its stamp, where it had one.
+    pub stamp: Option<Nanos>,
+}
+
+/// What became of a stream.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Report {
+    /// Exactly one verdict per sample.
+    pub counts: Counts,
+    /// Missing samples and jumps.
+    pub gaps: Gaps,
+    /// Used samples with a component at or beyond the stated range.
+    pub saturated: u64,
+    /// Samples with a good gyro whose acceleration was not finite and was left out.
+    pub accel_dropped: u64,
+    /// The ordinary spacing, nanoseconds; `None` until two samples were used.
+    pub spacing_nanos: Option<i64>,
+    /// Stamp of the first sample used.
+    pub first: Option<Nanos>,
+    /// Stamp of the last sample used so far.
+    pub last: Option<Nanos>,
+    first_bad: [Option<FirstBad>; Verdict::ALL.len()],
+}
+
+impl Report {
+    /// The first sample that got this verdict; `None` for [`Verdict::Accepted`] and where there was none.
+    #[must_use]
+    pub fn first_bad(&self, verdict: Verdict) -> Option<FirstBad> {
+        self.first_bad.get(verdict as usize).copied().flatten()
+    }
+
+    /// Samples that shared their stamp with another: repeats, those given a stamp of their own,
+    /// and those dropped.
+    #[must_use]
+    pub fn duplicates(&self) -> u64 {
+        [
+            Verdict::Repeated,
+            Verdict::Restamped,
+            Verdict::DuplicateStamp,
+        ]
+        .into_iter()
+        .map(|v| self.counts.get(v))
+        .sum()
+    }
+
+    #[cold]
+    pub(super) fn note(&mut self, verdict: Verdict, index: u64, stamp: Option<Nanos>) {
+        self.counts.add(verdict);
+        if let Some(slot) = self.first_bad.get_mut(verdict as usize) {
+            slot.get_or_insert(FirstBad { index, stamp });
+        }
+    }
+}

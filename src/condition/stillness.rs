@@ -1,0 +1,465 @@
+//! RateSample -> rests: when the body stood still, and what the gyro and the accelerometer read. Pure.
+//!
+//! A stage of its own because bias and level are only worth having from a body at rest, and the
+//! decision that it is at rest must refuse when in doubt: a slow turn taken for a bias is worse
+//! than no bias.
+//!
+//! A body that turns slowly, steadily and about the vertical can not be told from a gyro bias by
+//! an IMU; [`Limits::max_mean_rate`] is the only defence.
+
+use crate::model::attitude::Quaternion;
+use crate::model::frames::{Body, Nav};
+use crate::record::{Join, Nanos, RateSample, SampleKind};
+use nalgebra::Vector3;
+
+/// How many rests are kept; later ones are only counted.
+pub const RESTS_KEPT: usize = 1000;
+
+/// What counts as still. The defaults fit MEMS gyros from phone to industrial grade; measured on the
+/// recordings of six devices, resting windows have a gyro deviation of 0.0015 to 0.02 rad/s, moving ones
+/// of 0.04 and more.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Limits {
+    /// Window length, s. Two in a row make a rest.
+    pub window_secs: f64,
+    /// Largest standard deviation of a gyro axis in a window, rad/s.
+    pub max_gyro_deviation: f64,
+    /// Largest mean rate about any axis that can still be a bias, rad/s (3 deg/s).
+    pub max_mean_rate: f64,
+    /// Largest standard deviation of an accelerometer axis in a window, as a share of its mean
+    /// magnitude, so that m/s^2, g and mg are all served.
+    pub max_accel_deviation: f64,
+    /// Largest change of the acceleration's direction from window to window, rad (1 deg).
+    pub max_tilt: f64,
+    /// Floor of a bias' sigma, rad/s: what white noise averages down to is not what the bias will
+    /// be later. 10 deg/h, the bias instability of consumer MEMS (Xsens MTi-1 data sheet).
+    pub bias_instability: f64,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Limits {
+            window_secs: 0.5,
+            max_gyro_deviation: 0.025,
+            max_mean_rate: 0.052,
+            max_accel_deviation: 0.03,
+            max_tilt: 0.0175,
+            bias_instability: 4.8e-5,
+        }
+    }
+}
+
+/// Fewest samples that make a window, whatever its length.
+const MIN_SAMPLES: u32 = 8;
+/// Shortest rest: "the first still second".
+const MIN_REST_SECS: f64 = 1.0;
+/// A window may end a little early: the stamps jitter.
+const SLACK: f64 = 0.9;
+
+/// A stretch of time in which the body stood still.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Rest {
+    /// Its first sample.
+    pub start: Nanos,
+    /// Its last sample.
+    pub end: Nanos,
+    /// Mean rate, rad/s, body axes: the gyro's bias (what is left of it after `--bias`).
+    pub mean_rate: Vector3<f64>,
+    /// One standard deviation of `mean_rate`, rad/s: the larger of what the noise within windows and
+    /// the scatter between windows say, and never below the bias instability.
+    pub sigma: Vector3<f64>,
+    /// Mean specific force, body axes, in the recording's unit; `None` where there is no
+    /// accelerometer.
+    pub mean_accel: Option<Vector3<f64>>,
+    /// Samples in it.
+    pub samples: u64,
+}
+
+impl Rest {
+    /// How long it lasted, s.
+    #[must_use]
+    pub fn secs(&self) -> f64 {
+        self.end.secs_since(self.start)
+    }
+}
+
+/// Every rest of a stream.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct Rests {
+    /// The first [`RESTS_KEPT`], in order of time.
+    pub kept: Vec<Rest>,
+    /// How many there were.
+    pub count: u64,
+    /// Seconds of rest in all.
+    pub secs: f64,
+    /// First stamp of the stream.
+    pub first: Option<Nanos>,
+    /// Smallest gyro deviation of any window (largest axis), rad/s: how still it ever was.
+    pub stillest: Option<f64>,
+}
+
+/// Streaming mean and variance of three axes (Welford 1962).
+#[derive(Clone, Copy, Debug, Default)]
+struct Moments {
+    n: u32,
+    mean: Vector3<f64>,
+    /// Sum of squared deviations.
+    m2: Vector3<f64>,
+}
+
+impl Moments {
+    fn push(&mut self, v: &Vector3<f64>) {
+        self.n += 1;
+        let before = v - self.mean;
+        self.mean += before / f64::from(self.n);
+        self.m2 += before.component_mul(&(v - self.mean));
+    }
+
+    fn variance(&self) -> Vector3<f64> {
+        self.m2 / f64::from(self.n.saturating_sub(1).max(1))
+    }
+
+    fn deviation(&self) -> f64 {
+        self.variance().max().max(0.0).sqrt()
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Window {
+    start: Nanos,
+    end: Nanos,
+    gyro: Moments,
+    accel: Moments,
+}
+
+/// A rest under way.
+#[derive(Clone, Copy, Debug)]
+struct Growing {
+    start: Nanos,
+    end: Nanos,
+    /// One entry per window: its mean rate.
+    windows: Moments,
+    /// Sum of the windows' variances.
+    variance: Vector3<f64>,
+    accel: Moments,
+    last_rate: Vector3<f64>,
+    last_accel: Option<Vector3<f64>>,
+    samples: u64,
+}
+
+/// Finds rests in a stream of conditioned samples.
+#[derive(Clone, Debug)]
+pub struct Stillness {
+    limits: Limits,
+    kind: SampleKind,
+    window: Option<Window>,
+    growing: Option<Growing>,
+    rests: Rests,
+}
+
+impl Stillness {
+    /// A detector for samples of this kind.
+    #[must_use]
+    pub fn new(kind: SampleKind, limits: Limits) -> Self {
+        Stillness {
+            limits,
+            kind,
+            window: None,
+            growing: None,
+            rests: Rests::default(),
+        }
+    }
+
+    /// Takes the next sample.
+    pub fn push(&mut self, sample: &RateSample) {
+        self.rests.first.get_or_insert(sample.stamp);
+        if matches!(sample.join, Join::Start | Join::Hold | Join::Reset) {
+            // What was begun before a place of unknown length does not go on behind it.
+            self.window = None;
+            self.close();
+        }
+        let rate = match self.kind {
+            SampleKind::Rate => sample.value,
+            _ => {
+                let secs = sample.stamp.secs_since(sample.start);
+                if secs <= 0.0 {
+                    return;
+                }
+                sample.value / secs
+            }
+        };
+        let window = self.window.get_or_insert(Window {
+            start: sample.stamp,
+            end: sample.stamp,
+            gyro: Moments::default(),
+            accel: Moments::default(),
+        });
+        window.end = sample.stamp;
+        window.gyro.push(&rate);
+        if let Some(accel) = &sample.accel {
+            window.accel.push(accel);
+        }
+        if window.gyro.n >= MIN_SAMPLES
+            && window.end.secs_since(window.start) >= SLACK * self.limits.window_secs
+        {
+            let window = *window;
+            self.window = None;
+            self.judge(&window);
+        }
+    }
+
+    /// The stream has ended.
+    #[must_use]
+    pub fn finish(mut self) -> Rests {
+        self.close();
+        self.rests
+    }
+
+    fn judge(&mut self, window: &Window) {
+        let deviation = window.gyro.deviation();
+        let stillest = self.rests.stillest.get_or_insert(deviation);
+        *stillest = stillest.min(deviation);
+        let rate = window.gyro.mean;
+        let accel = (window.accel.n >= MIN_SAMPLES).then_some(window.accel.mean);
+        let shakes = accel.is_some_and(|mean| {
+            window.accel.deviation() > self.limits.max_accel_deviation * mean.norm()
+        });
+        if deviation > self.limits.max_gyro_deviation
+            || rate.amax() > self.limits.max_mean_rate
+            || shakes
+        {
+            return self.close();
+        }
+        if self.growing.is_some_and(|g| self.parts(&g, window, accel)) {
+            self.close();
+        }
+        let growing = self.growing.get_or_insert(Growing {
+            start: window.start,
+            end: window.end,
+            windows: Moments::default(),
+            variance: Vector3::zeros(),
+            accel: Moments::default(),
+            last_rate: rate,
+            last_accel: accel,
+            samples: 0,
+        });
+        growing.end = window.end;
+        growing.windows.push(&rate);
+        growing.variance += window.gyro.variance() / f64::from(window.gyro.n);
+        growing.last_rate = rate;
+        growing.samples += u64::from(window.gyro.n);
+        if let Some(accel) = accel {
+            growing.accel.push(&accel);
+            growing.last_accel = Some(accel);
+        }
+    }
+
+    /// Whether the window is still, but not in the pose or at the rate of the rest before it.
+    fn parts(&self, growing: &Growing, window: &Window, accel: Option<Vector3<f64>>) -> bool {
+        let noise = (window.gyro.variance() / f64::from(window.gyro.n))
+            .max()
+            .sqrt();
+        // Five sigma of a difference of two means, and a bias' own wander.
+        let allowed = 5.0 * std::f64::consts::SQRT_2 * noise + 10.0 * self.limits.bias_instability;
+        let turned = match (growing.last_accel, accel) {
+            (Some(a), Some(b)) => a.angle(&b) > self.limits.max_tilt,
+            _ => false,
+        };
+        turned || (window.gyro.mean - growing.last_rate).amax() > allowed
+    }
+
+    fn close(&mut self) {
+        let Some(growing) = self.growing.take() else {
+            return;
+        };
+        let secs = growing.end.secs_since(growing.start);
+        if secs < SLACK * MIN_REST_SECS {
+            return;
+        }
+        let n = f64::from(growing.windows.n);
+        // Noise within windows if it is white; scatter between windows if it is not.
+        let white = growing.variance / (n * n);
+        let scatter = growing.windows.variance() / n;
+        let sigma = white
+            .zip_map(&scatter, f64::max)
+            .map(|v| v.max(0.0).sqrt().max(self.limits.bias_instability));
+        self.rests.count += 1;
+        self.rests.secs += secs;
+        if self.rests.kept.len() < RESTS_KEPT {
+            self.rests.kept.push(Rest {
+                start: growing.start,
+                end: growing.end,
+                mean_rate: growing.windows.mean,
+                sigma,
+                mean_accel: (growing.accel.n > 0).then_some(growing.accel.mean),
+                samples: growing.samples,
+            });
+        }
+    }
+}
+
+/// A gyro bias from rests.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct BiasEstimate {
+    /// rad/s, body axes.
+    pub bias: Vector3<f64>,
+    /// One standard deviation, rad/s.
+    pub sigma: Vector3<f64>,
+    /// From how many rests.
+    pub rests: u64,
+    /// Seconds of rest used.
+    pub secs: f64,
+}
+
+/// Why no bias or no level can be given.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum NoRest {
+    /// The body never stood still for a second.
+    Moving {
+        /// Smallest gyro deviation of any half second, rad/s.
+        stillest: Option<f64>,
+        /// What counts as still, rad/s.
+        limit: f64,
+    },
+    /// The rests contradict each other: at least one of them was a slow turn.
+    Disagree {
+        /// Largest scatter of their mean rates, rad/s.
+        scatter: f64,
+    },
+    /// There is a rest, but not at the start, where the attitude is wanted.
+    NotAtStart {
+        /// When the first rest begins, s after the first sample.
+        first_rest_secs: f64,
+    },
+    /// There is a rest at the start, but no acceleration in it.
+    NoAccel,
+}
+
+impl std::fmt::Display for NoRest {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            NoRest::Moving { stillest, limit } => {
+                f.write_str("the body never stands still for a second")?;
+                if let Some(stillest) = stillest {
+                    write!(
+                        f,
+                        ": the quietest half second has a gyro deviation of {stillest:.4} rad/s, still is below {limit:.4}"
+                    )?;
+                }
+                f.write_str(
+                    "\n  help: --bias x,y,z (rad/s) from a recording at rest, or --bias none; if the rates look too large, --gyro-unit deg",
+                )
+            }
+            NoRest::Disagree { scatter } => write!(
+                f,
+                "the rests contradict each other by {scatter:.4} rad/s: some are slow turns, not rests\n  help: --bias x,y,z (rad/s), or --start/--until around one true rest"
+            ),
+            NoRest::NotAtStart { first_rest_secs } => write!(
+                f,
+                "the body moves at the start; it first rests {first_rest_secs:.1} s later\n  help: --start {first_rest_secs:.1} begins there; --init identity starts unlevelled"
+            ),
+            NoRest::NoAccel => write!(
+                f,
+                "there is no acceleration to level from\n  help: --init identity, or --init rpy=r,p,y"
+            ),
+        }
+    }
+}
+
+impl std::error::Error for NoRest {}
+
+/// Rests whose mean rates scatter by more than this are not all rests, rad/s (0.6 deg/s; the bias of
+/// a MEMS gyro wanders by less than a tenth of it within an hour at constant temperature).
+const MAX_SCATTER: f64 = 0.01;
+
+/// The gyro's bias: mean of the rests' rates, weighted with their inverse variances (and their length).
+///
+/// The sigma is the larger of the weighted mean's own and of the rests' scatter about it, and
+/// never below the bias instability: more rests do not make the next hour's bias any surer.
+///
+/// # Errors
+/// [`NoRest::Moving`] without a rest, [`NoRest::Disagree`] when rests contradict each other.
+pub fn estimate_bias(rests: &Rests, limits: &Limits) -> Result<BiasEstimate, NoRest> {
+    if rests.kept.is_empty() {
+        return Err(NoRest::Moving {
+            stillest: rests.stillest,
+            limit: limits.max_gyro_deviation,
+        });
+    }
+    let mut bias = Vector3::zeros();
+    let mut sigma = Vector3::zeros();
+    for axis in 0..3 {
+        let mut weights = 0.0;
+        let mut sum = 0.0;
+        for rest in &rests.kept {
+            let weight = rest.secs() / (rest.sigma[axis] * rest.sigma[axis]);
+            weights += weight;
+            sum += weight * rest.mean_rate[axis];
+        }
+        let mean = sum / weights;
+        let mut own = 0.0;
+        let mut scatter = 0.0;
+        for rest in &rests.kept {
+            let s2 = rest.sigma[axis] * rest.sigma[axis];
+            let share = rest.secs() / s2 / weights;
+            own += share * share * s2;
+            scatter += share * (rest.mean_rate[axis] - mean).powi(2);
+        }
+        let scatter = f64::sqrt(scatter);
+        if scatter > MAX_SCATTER {
+            return Err(NoRest::Disagree { scatter });
+        }
+        bias[axis] = mean;
+        sigma[axis] = f64::sqrt(own).max(scatter).max(limits.bias_instability);
+    }
+    Ok(BiasEstimate {
+        bias,
+        sigma,
+        rests: rests.count,
+        secs: rests.kept.iter().map(Rest::secs).sum(),
+    })
+}
+
+/// The mean specific force at the start of the stream, from the rest it begins with.
+///
+/// # Errors
+/// [`NoRest::Moving`] without a rest, [`NoRest::NotAtStart`] when the body moves in the first window
+/// (the attitude is wanted at the first sample, and must not have changed since),
+/// [`NoRest::NoAccel`] without an accelerometer.
+pub fn accel_at_start(rests: &Rests, limits: &Limits) -> Result<Vector3<f64>, NoRest> {
+    let (Some(rest), Some(first)) = (rests.kept.first(), rests.first) else {
+        return Err(NoRest::Moving {
+            stillest: rests.stillest,
+            limit: limits.max_gyro_deviation,
+        });
+    };
+    let first_rest_secs = rest.start.secs_since(first);
+    if first_rest_secs > 0.1 {
+        return Err(NoRest::NotAtStart { first_rest_secs });
+    }
+    rest.mean_accel.ok_or(NoRest::NoAccel)
+}
+
+/// Level attitude q_nb from the specific force at rest; yaw 0. `None` when it has no direction.
+///
+/// # Convention
+/// World z up (ENU, NWU), body forward-left-up: at rest and level the specific force is +g on z.
+/// Yaw-pitch-roll (z, y, x): the body's x axis projects onto the world's x axis.
+#[must_use]
+pub fn level(accel_b: &Vector3<f64>) -> Option<Quaternion<Nav, Body>> {
+    let norm = accel_b.norm();
+    if !(norm.is_finite() && norm > 0.0) {
+        return None;
+    }
+    let up = accel_b / norm;
+    let roll = up.y.atan2(up.z);
+    let pitch = (-up.x).atan2(up.y.hypot(up.z));
+    let (sr, cr) = (0.5 * roll).sin_cos();
+    let (sp, cp) = (0.5 * pitch).sin_cos();
+    Some(Quaternion::assume_unit([
+        cp * cr,
+        cp * sr,
+        sp * cr,
+        -sp * sr,
+    ]))
+}

@@ -1,0 +1,316 @@
+//! What a run is: arguments as text -> values, parsed once and validated once. Pure.
+
+use crate::condition::{self, Clock, GyroUnit, OnGap};
+use crate::decode;
+use crate::error::{Error, Result};
+use crate::model::attitude::{Quaternion, YawPitchRoll};
+use crate::model::frames::{BodyAxes, Body, Nav, World};
+use crate::propagate::Method;
+use crate::record::SampleKind;
+use nalgebra::Vector3;
+
+/// How the samples of a run are to be understood and integrated: the estimation flags, checked.
+/// `None` = the format decides where it states it, else the default.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// `--topic`.
+    pub topic: Option<String>,
+    /// `--field`, `--ignore-covariance-flag`.
+    pub decode: decode::Options,
+    /// `--method`, `--window`, `--order`.
+    pub method: Method,
+    /// `--sample-kind`.
+    pub kind: Option<SampleKind>,
+    /// `--gyro-unit`.
+    pub unit: Option<GyroUnit>,
+    /// `--body`.
+    pub body: Option<BodyAxes>,
+    /// `--world`.
+    pub world: World,
+    /// `--mount`: C_bs as `[w, x, y, z]`.
+    pub mount: Option<[f64; 4]>,
+    /// `--time`, `--rate-hz`.
+    pub clock: Clock,
+    /// `--init`, in the convention of `world`.
+    pub initial: Initial,
+    /// `--bias`.
+    pub bias: Bias,
+    /// `--max-gap`.
+    pub max_gap_secs: f64,
+    /// `--on-gap`.
+    pub on_gap: OnGap,
+    /// `--gyro-range`, rad/s.
+    pub gyro_range: Option<f64>,
+    /// `--noise`.
+    pub noise: Noise,
+    /// `--start`, s.
+    pub start: Option<f64>,
+    /// `--until`, s.
+    pub until: Option<f64>,
+}
+
+impl Plan {
+    /// Checks what can be judged without the data.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] naming the flag.
+    pub fn check(&self) -> Result<()> {
+        let conditioning = condition::Settings {
+            clock: self.clock,
+            max_gap_secs: self.max_gap_secs,
+            on_gap: self.on_gap,
+            bias: match self.bias {
+                Bias::Given(bias) => bias,
+                Bias::None | Bias::Auto => Vector3::zeros(),
+            },
+            gyro_range: self.gyro_range,
+            start: self.start,
+            until: self.until,
+            ..condition::Settings::default()
+        };
+        conditioning.validate().map_err(|e| Error::Usage(e.to_string()))
+    }
+}
+
+/// `--init`.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Initial {
+    /// World = body at the first sample.
+    Identity,
+    /// Roll and pitch from the accelerometer at rest; yaw 0.
+    Gravity,
+    /// The first recorded orientation.
+    FirstOrientation,
+    /// Given: `[w, x, y, z]`, unit norm.
+    Given([f64; 4]),
+}
+
+/// `--bias`, rad/s in body axes.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Bias {
+    /// Nothing is subtracted.
+    None,
+    /// From detected rest; refused when there is none.
+    Auto,
+    /// Given.
+    Given(Vector3<f64>),
+}
+
+/// `--noise`: what the covariance is made of. 1 sigma.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Noise {
+    /// As named on the command line, for the summary.
+    pub name: String,
+    /// Angle random walk N, rad/sqrt(s).
+    pub arw: f64,
+    /// Bias instability B, rad/s; taken as the uncertainty of a constant bias.
+    pub bias_instability: f64,
+}
+
+const DEG: f64 = std::f64::consts::PI / 180.0;
+
+/// Named noise presets: name, ARW in deg/sqrt(h), bias instability in deg/h, an example.
+/// Sources: `theory/attitude.md` 9 (Bosch BMI088 class, ADIS16465, STIM300, HG9900 class).
+pub const NOISE_PRESETS: [(&str, f64, f64); 4] = [
+    ("consumer", 0.84, 5.0),
+    ("industrial", 0.15, 2.0),
+    ("tactical", 0.15, 0.5),
+    ("navigation", 0.002, 0.01),
+];
+
+impl Noise {
+    /// `consumer`, ..., or `arw=..,bias-instability=..` in rad/sqrt(s) and rad/s.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for anything else.
+    pub fn parse(text: &str) -> Result<Noise> {
+        if let Some((name, arw, bias)) = NOISE_PRESETS.iter().find(|(name, ..)| *name == text) {
+            return Ok(Noise {
+                name: (*name).to_owned(),
+                arw: arw * DEG / 60.0,
+                bias_instability: bias * DEG / 3600.0,
+            });
+        }
+        let mut noise = Noise {
+            name: text.to_owned(),
+            arw: f64::NAN,
+            bias_instability: 0.0,
+        };
+        for part in text.split(',') {
+            let (key, value) = part.split_once('=').unwrap_or((part, ""));
+            let number = value.parse::<f64>().ok().filter(|v| v.is_finite() && *v >= 0.0);
+            match (key.trim(), number) {
+                ("arw", Some(v)) => noise.arw = v,
+                ("bias-instability", Some(v)) => noise.bias_instability = v,
+                _ => {
+                    noise.arw = f64::NAN;
+                    break;
+                }
+            }
+        }
+        if noise.arw.is_nan() {
+            let names: Vec<&str> = NOISE_PRESETS.iter().map(|p| p.0).collect();
+            return Err(Error::Usage(format!(
+                "--noise {text}: not a preset and not arw=RAD_PER_SQRT_S[,bias-instability=RAD_S]\n  help: presets are {}",
+                names.join(", ")
+            )));
+        }
+        Ok(noise)
+    }
+}
+
+impl Initial {
+    /// `identity`, `gravity`, `first-orientation`, `q=w,x,y,z`, `rpy=roll,pitch,yaw` (degrees).
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for anything else, a quaternion that is not near unit norm included.
+    pub fn parse(text: &str) -> Result<Initial> {
+        match text {
+            "identity" => return Ok(Initial::Identity),
+            "gravity" => return Ok(Initial::Gravity),
+            "first-orientation" => return Ok(Initial::FirstOrientation),
+            _ => {}
+        }
+        if let Some(list) = text.strip_prefix("q=") {
+            return Ok(Initial::Given(unit_quaternion("--init", list)?));
+        }
+        if let Some(list) = text.strip_prefix("rpy=") {
+            let [roll, pitch, yaw] = numbers::<3>("--init rpy", list)?.map(f64::to_radians);
+            let q: Quaternion<Nav, Body> =
+                Quaternion::from_yaw_pitch_roll(&YawPitchRoll { yaw, pitch, roll });
+            return Ok(Initial::Given(q.wxyz()));
+        }
+        Err(Error::Usage(format!(
+            "--init {text}: expected identity, gravity, first-orientation, q=w,x,y,z or rpy=roll,pitch,yaw (degrees)"
+        )))
+    }
+}
+
+impl Bias {
+    /// `none`, `auto`, or `x,y,z` in rad/s.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for anything else.
+    pub fn parse(text: &str) -> Result<Bias> {
+        match text {
+            "none" => Ok(Bias::None),
+            "auto" => Ok(Bias::Auto),
+            list => numbers::<3>("--bias", list)
+                .map(|b| Bias::Given(Vector3::from(b)))
+                .map_err(|_| {
+                    Error::Usage(format!(
+                        "--bias {text}: expected none, auto, or three numbers x,y,z in rad/s"
+                    ))
+                }),
+        }
+    }
+}
+
+/// `--mount q=w,x,y,z` (the `q=` may be left out).
+///
+/// # Errors
+/// [`Error::Usage`] when it is not four finite numbers of about unit norm.
+pub fn parse_mount(text: &str) -> Result<[f64; 4]> {
+    unit_quaternion("--mount", text.strip_prefix("q=").unwrap_or(text))
+}
+
+/// `--shard i/n`: this process takes inputs i, i + n, i + 2n, ... of the list, i from 0.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Shard {
+    /// Which share, from 0.
+    pub index: usize,
+    /// Of how many.
+    pub of: usize,
+}
+
+impl Shard {
+    /// `i/n` with `0 <= i < n`.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] otherwise.
+    pub fn parse(text: &str) -> Result<Shard> {
+        text.split_once('/')
+            .and_then(|(i, n)| Some((i.trim().parse().ok()?, n.trim().parse().ok()?)))
+            .filter(|(i, n)| i < n)
+            .map(|(index, of)| Shard { index, of })
+            .ok_or_else(|| {
+                Error::Usage(format!(
+                    "--shard {text}: expected i/n with 0 <= i < n, for example --shard 0/4"
+                ))
+            })
+    }
+
+    /// Whether the input at `position` of the list is this share's.
+    #[must_use]
+    pub fn takes(self, position: usize) -> bool {
+        position % self.of == self.index
+    }
+}
+
+/// `N` finite numbers separated by commas.
+fn numbers<const N: usize>(flag: &str, list: &str) -> Result<[f64; N]> {
+    let parsed: Option<Vec<f64>> = list
+        .split(',')
+        .map(|part| part.trim().parse::<f64>().ok().filter(|v| v.is_finite()))
+        .collect();
+    parsed
+        .and_then(|v| <[f64; N]>::try_from(v).ok())
+        .ok_or_else(|| {
+            Error::Usage(format!(
+                "{flag} {list}: expected {N} finite numbers separated by commas"
+            ))
+        })
+}
+
+/// Four numbers of about unit norm, normalised. A norm off by more than 1 % is a mistake, not rounding.
+fn unit_quaternion(flag: &str, list: &str) -> Result<[f64; 4]> {
+    let q = numbers::<4>(flag, list)?;
+    let norm = q.iter().map(|v| v * v).sum::<f64>().sqrt();
+    if (norm - 1.0).abs() > 0.01 {
+        return Err(Error::Usage(format!(
+            "{flag} q={list}: a unit quaternion w,x,y,z is needed, this one has norm {norm}"
+        )));
+    }
+    Ok(q.map(|v| v / norm))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn a_preset_is_in_radians_and_seconds() {
+        // 0.84 deg/sqrt(h) = 0.014 deg/sqrt(s); 5 deg/h.
+        let noise = Noise::parse("consumer").unwrap();
+        assert!((noise.arw - 0.014 * DEG).abs() < 1e-15);
+        assert!((noise.bias_instability - 5.0 * DEG / 3600.0).abs() < 1e-18);
+    }
+
+    #[test]
+    fn given_noise_needs_its_angle_random_walk() {
+        assert_eq!(Noise::parse("arw=1e-4,bias-instability=2e-5").unwrap().bias_instability, 2e-5);
+        for bad in ["", "bias-instability=1e-5", "arw=-1", "arw=NaN", "arw=1e-4,x=2"] {
+            assert!(Noise::parse(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn a_quaternion_that_is_no_rotation_is_refused() {
+        assert!(matches!(Initial::parse("q=1,0,0,0"), Ok(Initial::Given([1.0, 0.0, 0.0, 0.0]))));
+        for bad in ["q=1,1,1,1", "q=0,0,0,0", "q=1,0,0", "q=NaN,0,0,1", "qq", ""] {
+            assert!(Initial::parse(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn shards_share_the_list_without_overlap() {
+        let shards: Vec<Shard> = (0..3).map(|i| Shard::parse(&format!("{i}/3")).unwrap()).collect();
+        for position in 0..20 {
+            assert_eq!(shards.iter().filter(|s| s.takes(position)).count(), 1);
+        }
+        for bad in ["3/3", "0/0", "1", "-1/2", "a/b"] {
+            assert!(Shard::parse(bad).is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! JSON -> registers. Pure.
+//!
+//! JSON channels rarely have a schema worth the name, so the choice of fields is made in each
+//! message by the names of its keys, from that message alone: the result does not depend on which
+//! message came first. What only several messages could tell (the unit of an unlabelled stamp) is
+//! settled once, by [`super::Decoder::settle`].
+
+pub(crate) mod found;
+pub(crate) mod line;
+pub(crate) mod scan;
+pub(crate) mod seek;
+pub(crate) mod trie;
+
+use super::registers::Form;
+use super::schema::{last_name, ros_name};
+use super::select::names::{Px4, px4};
+use super::stamp::TimeUnit;
+use super::{Decoded, MAX_BATCH, Options, Undecodable};
+use crate::record::{Nanos, RawSample};
+use found::Found;
+use scan::Scanner;
+use seek::Seeker;
+use trie::Trie;
+
+/// What is looked for in the messages of a channel.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Plan {
+    /// The paths of `--field`.
+    pub(crate) trie: Trie,
+    pub(crate) px4: Option<Px4>,
+    /// The channel's type is `Vector3Stamped`: its `vector` may be a body rate.
+    pub(crate) vector_stamped: bool,
+    pub(crate) child: Option<String>,
+    pub(crate) form: Form,
+    /// Unit of stamps that do not state theirs.
+    pub(crate) settled: Option<TimeUnit>,
+}
+
+impl Plan {
+    pub(crate) fn compile(type_name: &str, options: &Options) -> Self {
+        Plan {
+            trie: Trie::new(&options.fields),
+            px4: px4(type_name),
+            vector_stamped: last_name(&ros_name(type_name)) == "Vector3Stamped",
+            child: options.child_frame.clone(),
+            form: Form {
+                ignore_covariance_flag: options.ignore_covariance_flag,
+                ..Form::default()
+            },
+            settled: None,
+        }
+    }
+
+    /// Reads one payload; pushes nothing when it fails.
+    pub(crate) fn decode(
+        &self,
+        payload: &[u8],
+        log: Nanos,
+        publish: Nanos,
+        out: &mut Vec<RawSample>,
+    ) -> Result<Decoded, Undecodable> {
+        let mut seeker = Seeker::new(self, Scanner::new(payload)?);
+        let found = seeker.message()?;
+        Ok(self.push(&found, log, publish, out))
+    }
+
+    /// Everything one payload holds.
+    pub(crate) fn find<'a>(&'a self, payload: &'a [u8]) -> Result<Found<'a>, Undecodable> {
+        Seeker::new(self, Scanner::new(payload)?).message()
+    }
+
+    pub(crate) fn push(
+        &self,
+        found: &Found<'_>,
+        log: Nanos,
+        publish: Nanos,
+        out: &mut Vec<RawSample>,
+    ) -> Decoded {
+        let mut outcome = Decoded::default();
+        let header = found.instant(self.settled, &mut outcome);
+        let form = &self.form;
+        if found.has_gyro() || found.batch.is_empty() {
+            out.push(found.sample(form, header, log, publish, &mut outcome));
+            outcome.samples = 1;
+            return outcome;
+        }
+        for element in found.batch.iter().take(MAX_BATCH) {
+            let own = element.instant(self.settled, &mut outcome);
+            let stamp = if element.stamp.is_some() { own } else { header };
+            out.push(element.sample(form, stamp, log, publish, &mut outcome));
+            outcome.samples += 1;
+        }
+        outcome
+    }
+}

@@ -1,0 +1,201 @@
+//! What one JSON object held, and how the finds of nested objects join. Pure.
+
+use super::super::registers::{Form, Registers, Slot};
+use super::super::stamp::{TimeUnit, from_decimal, from_rfc3339};
+use super::super::{Decoded, GyroUnit};
+use crate::record::{Nanos, RawSample, SampleKind};
+use std::borrow::Cow;
+
+/// A stamp as it was written; its unit may depend on keys that come later.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Written<'a> {
+    /// A number, as text.
+    Number(&'a str, TimeUnit),
+    /// A string: decimal or RFC 3339.
+    Text(Cow<'a, str>, TimeUnit),
+    /// Seconds and nanoseconds.
+    Pair(&'a str, &'a str),
+}
+
+/// What one object held.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Found<'a> {
+    pub(crate) registers: Registers,
+    /// Weakness of the gyro's name; a lower one displaces it.
+    pub(crate) gyro_rank: Option<u8>,
+    pub(crate) stamp: Option<(u8, Written<'a>)>,
+    pub(crate) kind: Option<SampleKind>,
+    pub(crate) unit: Option<GyroUnit>,
+    pub(crate) interval: TimeUnit,
+    pub(crate) accel_interval: TimeUnit,
+    /// Numbers under `values`, whose meaning only a sensor's name tells.
+    pub(crate) values: Option<[f64; 3]>,
+    pub(crate) sensor: Option<Cow<'a, str>>,
+    pub(crate) frame: Option<Cow<'a, str>>,
+    pub(crate) child: Option<Cow<'a, str>>,
+    /// The specific force is a delta velocity, and means nothing without its interval.
+    pub(crate) delta_velocity: bool,
+    /// A PX4 message: an unlabelled integer stamp is in microseconds.
+    pub(crate) px4: bool,
+    /// Samples of an array inside.
+    pub(crate) batch: Vec<Found<'a>>,
+}
+
+impl<'a> Found<'a> {
+    /// Puts a body rate unless one of a better name is there.
+    pub(crate) fn gyro(
+        &mut self,
+        rank: u8,
+        unit: Option<GyroUnit>,
+        kind: Option<SampleKind>,
+        vector: [f64; 3],
+    ) {
+        if self.gyro_rank.is_some_and(|old| old <= rank) {
+            return;
+        }
+        self.gyro_rank = Some(rank);
+        self.unit = unit;
+        self.kind = kind.or(self.kind);
+        self.vector(Slot::GYRO, vector);
+    }
+
+    /// Puts one axis of a body rate.
+    pub(crate) fn gyro_axis(&mut self, axis: u8, rank: u8, unit: Option<GyroUnit>, value: f64) {
+        match self.gyro_rank {
+            Some(old) if old < rank => return,
+            Some(old) if old == rank => {}
+            _ => self.registers.seen &= !Slot::GYRO.bits(3),
+        }
+        self.gyro_rank = Some(rank);
+        self.unit = unit;
+        self.registers.float(Slot::GYRO.plus(axis), value);
+    }
+
+    pub(crate) fn vector(&mut self, slot: Slot, vector: [f64; 3]) {
+        for (n, value) in (0_u8..).zip(vector) {
+            self.registers.float(slot.plus(n), value);
+        }
+    }
+
+    pub(crate) fn stamp(&mut self, rank: u8, stamp: Written<'a>) {
+        if self.stamp.as_ref().is_none_or(|(old, _)| rank < *old) {
+            self.stamp = Some((rank, stamp));
+        }
+    }
+
+    pub(crate) fn has_gyro(&self) -> bool {
+        self.registers.has(Slot::GYRO, 3)
+    }
+
+    pub(crate) fn has_orientation(&self) -> bool {
+        self.registers.has(Slot::ORIENTATION, 4)
+    }
+
+    /// Numbers under `values` are a body rate when the sensor's name says so.
+    pub(crate) fn settle(&mut self) {
+        if self.delta_velocity && !self.registers.has(Slot::ACCEL_INTERVAL, 1) {
+            self.registers.seen &= !Slot::ACCEL.bits(3);
+        }
+        let is_gyro = |name: &str| name.to_ascii_lowercase().contains("gyro");
+        if let (Some(values), Some(sensor)) = (self.values, &self.sensor)
+            && is_gyro(sensor)
+        {
+            let sensor_is_android = sensor.starts_with("android.");
+            self.gyro(4, Some(GyroUnit::Rad), None, values);
+            // Android stamps its events in nanoseconds since boot.
+            if let (true, Some((_, Written::Number(_, unit @ TimeUnit::ByMagnitude)))) =
+                (sensor_is_android, &mut self.stamp)
+            {
+                *unit = TimeUnit::Nano;
+            }
+        }
+    }
+
+    /// Takes in what an object inside this one held.
+    pub(crate) fn join(&mut self, mut inner: Found<'a>, given_stamp: bool) {
+        let nearer = inner.has_gyro() || (inner.has_orientation() && !self.has_gyro());
+        let wanted = (inner.has_gyro() && !self.has_gyro())
+            || (inner.has_orientation() && !self.has_orientation());
+        if given_stamp && let Some((rank, stamp)) = inner.stamp.clone() {
+            self.stamp(rank, stamp);
+        }
+        if self.batch.is_empty() {
+            self.batch = std::mem::take(&mut inner.batch);
+        }
+        let loose = inner.registers.seen & !self.registers.seen != 0;
+        if !wanted && !loose {
+            return;
+        }
+        if nearer && wanted {
+            // Its own stamp is nearer to the sample than any out here.
+            if !given_stamp && inner.stamp.is_some() {
+                self.stamp = inner.stamp.take();
+            }
+            self.frame = inner.frame.take().or(self.frame.take());
+            self.child = inner.child.take().or(self.child.take());
+        }
+        if inner.has_gyro() && !self.has_gyro() {
+            self.gyro_rank = inner.gyro_rank;
+            self.unit = inner.unit;
+            self.kind = inner.kind;
+            self.interval = inner.interval;
+            self.accel_interval = inner.accel_interval;
+            self.px4 |= inner.px4;
+            // Half a body rate out here must not mix with the whole one from inside.
+            self.registers.seen &= !Slot::GYRO.bits(3);
+        }
+        self.registers.fill_from(&inner.registers);
+    }
+
+    /// The instant, once every key has been seen.
+    pub(crate) fn instant(
+        &self,
+        settled: Option<TimeUnit>,
+        outcome: &mut Decoded,
+    ) -> Option<Nanos> {
+        let unit = |named: TimeUnit| match (named, settled) {
+            (TimeUnit::ByMagnitude, _) if self.px4 => TimeUnit::Micro,
+            (TimeUnit::ByMagnitude, Some(settled)) => settled,
+            (named, _) => named,
+        };
+        match &self.stamp.as_ref()?.1 {
+            Written::Number(text, named) => from_decimal(text, unit(*named)),
+            Written::Text(text, named) => {
+                from_rfc3339(text).or_else(|| from_decimal(text, unit(*named)))
+            }
+            Written::Pair(sec, nanos) => {
+                let sec = from_decimal(sec, TimeUnit::Second)?;
+                let nanos = from_decimal(nanos, TimeUnit::Nano)?;
+                outcome.stamps_carried += usize::from(!(0..1_000_000_000).contains(&nanos.0));
+                Some(Nanos(sec.0.saturating_add(nanos.0)))
+            }
+        }
+    }
+
+    /// The number behind an unlabelled stamp, for [`TimeUnit::nearest`].
+    pub(crate) fn unlabelled(&self) -> Option<f64> {
+        match &self.stamp.as_ref()?.1 {
+            Written::Number(text, TimeUnit::ByMagnitude) if !self.px4 => text.parse().ok(),
+            Written::Text(text, TimeUnit::ByMagnitude) if !self.px4 => text.parse().ok(),
+            _ => None,
+        }
+    }
+
+    /// The sample.
+    pub(crate) fn sample(
+        &self,
+        form: &Form,
+        header: Option<Nanos>,
+        log: Nanos,
+        publish: Nanos,
+        outcome: &mut Decoded,
+    ) -> RawSample {
+        let form = Form {
+            interval: self.interval,
+            accel_interval: self.accel_interval,
+            ..*form
+        };
+        let sample = form.sample(&self.registers, log, publish, outcome);
+        RawSample { header, ..sample }
+    }
+}

@@ -1,0 +1,122 @@
+//! One line of NDJSON -> samples and what the line says of itself. Pure.
+//!
+//! For stdin and sockets: there a line has no channel, so class, sensor and sequence number travel
+//! in it. Takes our own `RATE` and `ATT`, gpsd's `IMU` and `ATT`, SensorServer, Sensor Logger, and any
+//! object with a body rate.
+
+use super::Plan;
+use super::scan::Scanner;
+use super::seek::Seeker;
+use crate::decode::refusal::printable;
+use crate::decode::{Decoded, GyroUnit, Options, Undecodable};
+use crate::record::{Nanos, RawSample, SampleKind};
+
+/// Longest line that is read.
+pub const MAX_LINE: usize = 64 << 10;
+
+/// What the `class` of a line says.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub enum Class {
+    /// No class: a bare sample.
+    #[default]
+    None,
+    /// Our own sample.
+    Rate,
+    /// Our own attitude, or gpsd's.
+    Att,
+    /// gpsd's IMU: deg/s.
+    Imu,
+    /// Another class, escaped for a terminal.
+    Other(String),
+}
+
+/// What one line held besides its samples.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Line {
+    /// Its class.
+    pub class: Class,
+    /// Which sensor, escaped for a terminal.
+    pub id: Option<String>,
+    /// The sender's sequence number.
+    pub seq: Option<u64>,
+    /// What its samples mean in time, where it says so.
+    pub sample_kind: Option<SampleKind>,
+    /// Unit of its body rate, where it says so.
+    pub gyro_unit: Option<GyroUnit>,
+    /// How many samples, and what was noticed.
+    pub decoded: Decoded,
+}
+
+/// Reads lines; holds the paths of `--field`.
+#[derive(Debug, Clone, Default)]
+pub struct LineDecoder {
+    plan: Plan,
+}
+
+impl LineDecoder {
+    /// A decoder of lines with these options.
+    #[must_use]
+    pub fn new(options: &Options) -> Self {
+        LineDecoder {
+            plan: Plan::compile("", options),
+        }
+    }
+
+    /// Reads one line, without or with its line end; `received` becomes the log and publish time.
+    ///
+    /// # Errors
+    /// Not a JSON object (or array of them), or longer than [`MAX_LINE`].
+    pub fn decode(
+        &self,
+        line: &[u8],
+        received: Nanos,
+        out: &mut Vec<RawSample>,
+    ) -> Result<Line, Undecodable> {
+        if line.len() > MAX_LINE {
+            return Err(Undecodable::Long {
+                have: line.len() as u64,
+                used: MAX_LINE as u64,
+            });
+        }
+        let mut seeker = Seeker::new(&self.plan, Scanner::new(line)?);
+        let found = seeker.message()?;
+        let class = match seeker.class.as_deref() {
+            None => Class::None,
+            Some("RATE") => Class::Rate,
+            Some("ATT") => Class::Att,
+            Some("IMU") => Class::Imu,
+            Some(other) => Class::Other(printable(other)),
+        };
+        let of_rates = |find: &super::Found<'_>| (find.kind, find.unit);
+        let (kind, unit) = match found.batch.first() {
+            Some(first) if !found.has_gyro() => of_rates(first),
+            _ => of_rates(&found),
+        };
+        let stated = match class {
+            Class::Imu => Some(GyroUnit::Deg),
+            Class::Rate | Class::Att => Some(GyroUnit::Rad),
+            Class::None | Class::Other(_) => None,
+        };
+        let decoded = self.plan.push(&found, received, received, out);
+        Ok(Line {
+            class,
+            id: seeker.id.as_deref().map(printable),
+            seq: seeker.seq,
+            sample_kind: kind,
+            gyro_unit: unit.or(stated),
+            decoded,
+        })
+    }
+}
+
+/// Reads one line without any options: see [`LineDecoder::decode`].
+///
+/// # Errors
+/// As [`LineDecoder::decode`].
+pub fn decode_line(
+    line: &[u8],
+    received: Nanos,
+    out: &mut Vec<RawSample>,
+) -> Result<Line, Undecodable> {
+    LineDecoder::default().decode(line, received, out)
+}

@@ -1,0 +1,115 @@
+//! Which channel is "the IMU topic". Pure.
+//!
+//! Apart from decoding because it is asked of every channel of a log before one is chosen, and must
+//! answer for those it can not decode as well.
+
+use super::schema::last_name;
+use super::select::Found;
+use super::{Channel, Decoder, Options, Stated};
+use crate::record::Nanos;
+
+/// How good a source of body rates a channel is; the best rank in a log is taken, and when two
+/// channels share it the user is asked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Rank {
+    /// An IMU: body rate under its own name, with a stamp.
+    Imu,
+    /// An IMU's numbers processed or thinned out (PX4 `vehicle_imu`, `vehicle_angular_velocity`).
+    Processed,
+    /// A vector whose topic says it is a body rate.
+    RateByTopic,
+    /// A twist or vector that may be one: taken only when nothing better is there.
+    Weak,
+    /// Never taken unless `--topic` names it: odometry, commands, other vectors, rates without stamp.
+    ByNameOnly,
+}
+
+/// What a channel can serve as.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Role {
+    /// It carries a body rate or delta angle.
+    pub has_rate: bool,
+    /// It carries an orientation, so it can be a reference.
+    pub has_orientation: bool,
+    /// How good a source of body rates; meaningless without [`Role::has_rate`].
+    pub rank: Rank,
+}
+
+impl Role {
+    /// Whether it may be taken without being named.
+    #[must_use]
+    pub fn is_automatic(&self) -> bool {
+        self.has_rate && self.rank < Rank::ByNameOnly
+    }
+}
+
+/// What `channel` can serve as. JSON without a schema shows only in a message: pass its first one.
+/// A channel that can not be decoded serves as nothing.
+#[must_use]
+pub fn role(channel: &Channel<'_>, first: Option<(&[u8], Nanos)>) -> Role {
+    let nothing = Role {
+        has_rate: false,
+        has_orientation: false,
+        rank: Rank::ByNameOnly,
+    };
+    let Ok(mut decoder) = Decoder::compile(channel, &Options::default()) else {
+        return nothing;
+    };
+    if let Some((payload, log)) = first {
+        // A first message that is damaged says nothing; the schema may still.
+        let _ = decoder.settle(payload, log);
+    }
+    let stated = decoder.stated();
+    Role {
+        has_rate: stated.has_gyro,
+        has_orientation: stated.has_orientation,
+        rank: rank(channel, decoder.found(), stated),
+    }
+}
+
+fn rank(channel: &Channel<'_>, found: Found, stated: &Stated) -> Rank {
+    let name = last_name(channel.schema_name)
+        .to_ascii_lowercase()
+        .replace('_', "");
+    let topic = channel.topic.to_ascii_lowercase();
+    let has = |words: &[&str]| words.iter().any(|w| topic.contains(w));
+    let is_command = ["target", "setpoint", "command", "cmd"]
+        .iter()
+        .any(|w| name.contains(w));
+    if !stated.has_stamp || name == "odometry" || is_command {
+        return Rank::ByNameOnly;
+    }
+    match found {
+        Found::Nothing => Rank::ByNameOnly,
+        Found::Given => Rank::Imu,
+        Found::Named => match name.as_str() {
+            "vehicleimu" | "vehicleangularvelocity" | "vehicleodometry" => Rank::Processed,
+            _ => Rank::Imu,
+        },
+        // Several twists in a message are several bodies.
+        Found::Twist if stated.batched => Rank::ByNameOnly,
+        Found::Twist => Rank::Weak,
+        Found::Vector => {
+            let rate = has(&[
+                "gyro",
+                "angular_vel",
+                "angular_rate",
+                "angvel",
+                "omega",
+                "body_rate",
+            ]);
+            // What drivers publish as Vector3Stamped besides rates.
+            let other = has(&[
+                "mag", "acc", "force", "gravity", "vel", "pos", "torque", "wind", "euler", "rpy",
+                "angle", "dv", "dq", "bias", "cmd", "goal", "target", "setpoint", "temp", "field",
+            ]);
+            match (rate, other) {
+                (true, _) if !has(&["bias", "mag", "cmd", "setpoint", "target"]) => {
+                    Rank::RateByTopic
+                }
+                (false, false) => Rank::Weak,
+                _ => Rank::ByNameOnly,
+            }
+        }
+    }
+}

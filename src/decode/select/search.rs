@@ -1,0 +1,637 @@
+//! Which fields of a schema hold a body rate, and what belongs to it. Pure.
+//!
+//! Breadth first: the shallowest body rate wins, then the better name. The stamp is the one nearest
+//! to it, from the inside out, because a nested message's own header is about its own sample.
+
+use super::names::{self, Meaning, Px4, is_nanos, is_seconds};
+use super::{End, Found, Pick, Selection, StampFields, Step, batch_of, path_text, px4_stamp};
+use crate::decode::fields::FieldRole;
+use crate::decode::registers::{Slot, StampForm};
+use crate::decode::schema::{Field, Kind, Many, Schema, Struct, last_name};
+use crate::decode::stamp::TimeUnit;
+use crate::decode::stated::GyroUnit;
+use crate::record::SampleKind;
+use std::collections::{BTreeSet, VecDeque};
+
+/// Deepest nesting that is searched, and most structs.
+const MAX_DEPTH: usize = 8;
+const MAX_SITES: usize = 4096;
+
+/// A struct, and the way to it.
+#[derive(Clone)]
+struct Site {
+    path: Vec<Step>,
+    structure: usize,
+    each: bool,
+    depth: usize,
+}
+
+/// Fills every role that `--field` left open.
+pub(super) fn complete(
+    schema: &Schema,
+    type_name: &str,
+    by_child: bool,
+    selection: &mut Selection,
+) {
+    let sites = sites(schema);
+    let px4 = names::px4(type_name);
+    let given = selection.found == Found::Given;
+    let around = if given {
+        selection.picks.first().map(|p| p.path.clone())
+    } else {
+        find_gyro(schema, &sites, px4, selection)
+    };
+    if let Some(path) = &around {
+        beside_gyro(schema, path, given, selection);
+    }
+    if !selection.has(Slot::ORIENTATION, 4) {
+        find_orientation(schema, &sites, px4, by_child, selection);
+    }
+    let around = around.or_else(|| {
+        let orientation = selection.picks.iter().find(|p| p.slot == Slot::ORIENTATION);
+        orientation.map(|p| p.path.clone())
+    });
+    let chain = around.map_or_else(|| vec![Vec::new()], |path| structs_on(schema, &path));
+    if selection.form.stamp == StampForm::None {
+        let found = chain.iter().find_map(|path| {
+            let structure = end_of(schema, path)?.structure(schema)?;
+            stamp_in(schema, path, structure, 2).map(|(_, stamp)| stamp)
+        });
+        if let Some(mut stamp) = found {
+            if px4.is_some() || selection.kind.is_some() {
+                stamp.form = px4_stamp(stamp.form);
+            }
+            if let Some((path, _)) = stamp.paths.first() {
+                // Of `stamp.sec` only `stamp` is worth saying.
+                let whole = path.len() - usize::from(stamp.paths.len() > 1);
+                selection.describe(FieldRole::Stamp, schema, path.get(..whole).unwrap_or(path));
+            }
+            take_stamp(selection, stamp);
+        }
+    }
+    selection.frame = chain
+        .iter()
+        .find_map(|path| text_near(schema, path, "frame_id"));
+    if by_child && let Some(batch) = &selection.batch {
+        let mut element = batch.path.clone();
+        element.push(Step::Each);
+        selection.child = text_near(schema, &element, "child_frame_id");
+    }
+}
+
+/// What a walk can not do is refused here, before any payload.
+pub(super) fn check(schema: &Schema, selection: &mut Selection) -> Result<(), String> {
+    let batch = selection.batch.clone();
+    let mut outside = false;
+    let mut wrong = None;
+    selection.picks.retain(|pick| {
+        let own = batch_of(schema, &pick.path);
+        if own == batch {
+            return true;
+        }
+        let is_stamp = [Slot::STAMP, Slot::STAMP_NANOS, Slot::STAMP_FLOAT].contains(&pick.slot);
+        if own.is_none() && is_stamp {
+            outside = true;
+            return true;
+        }
+        if pick.slot == Slot::GYRO || is_stamp {
+            wrong = Some(path_text(schema, &pick.path));
+        }
+        // Anything else outside the batch belongs to no sample of it.
+        false
+    });
+    if let Some(path) = wrong {
+        return Err(format!(
+            "`{path}` and the body rate lie in different arrays"
+        ));
+    }
+    selection.form.stamp_outside = outside && batch.is_some();
+    Ok(())
+}
+
+fn sites(schema: &Schema) -> Vec<Site> {
+    let mut found = Vec::new();
+    let mut seen = BTreeSet::new();
+    let mut queue = VecDeque::from([Site {
+        path: Vec::new(),
+        structure: schema.root,
+        each: false,
+        depth: 0,
+    }]);
+    while let Some(site) = queue.pop_front() {
+        let fields = schema.get(site.structure).map_or(&[][..], |s| &s.fields);
+        if !seen.insert((site.structure, site.each)) && site.depth > 2 {
+            continue;
+        }
+        if found.len() >= MAX_SITES {
+            break;
+        }
+        for (index, field) in fields.iter().enumerate() {
+            let Kind::Struct(structure) = field.kind else {
+                continue;
+            };
+            let each = field.many != Many::One;
+            if site.depth >= MAX_DEPTH || (each && site.each) {
+                continue;
+            }
+            let mut path = site.path.clone();
+            path.push(Step::Field(index));
+            if each {
+                path.push(Step::Each);
+            }
+            queue.push_back(Site {
+                path,
+                structure,
+                each: each || site.each,
+                depth: site.depth + 1,
+            });
+        }
+        if queue.len() > MAX_SITES {
+            queue.truncate(MAX_SITES);
+        }
+        found.push(site);
+    }
+    // Samples in an array come after a sample of the message's own, however deep.
+    found.sort_by_key(|site| site.each);
+    found
+}
+
+/// A body rate that was found.
+struct Candidate {
+    key: (Found, bool, usize, u8),
+    paths: Vec<Vec<Step>>,
+    whole: Vec<Step>,
+    holder: String,
+    unit: Option<GyroUnit>,
+    delta: bool,
+}
+
+fn find_gyro(
+    schema: &Schema,
+    sites: &[Site],
+    px4: Option<Px4>,
+    selection: &mut Selection,
+) -> Option<Vec<Step>> {
+    let mut best: Option<Candidate> = None;
+    for site in sites {
+        let structure = schema.get(site.structure)?;
+        for candidate in gyros_in(schema, site, structure, px4) {
+            if best.as_ref().is_none_or(|b| candidate.key < b.key) {
+                best = Some(candidate);
+            }
+        }
+    }
+    let best = best?;
+    selection.found = best.key.0;
+    selection.unit = best.unit;
+    selection.holder = best.holder;
+    if best.delta {
+        selection.kind = Some(SampleKind::DeltaAngle);
+    }
+    selection.batch = batch_of(schema, best.paths.first()?);
+    selection.describe(FieldRole::Gyro, schema, &best.whole);
+    let first = best.paths.first()?.clone();
+    selection.take(best.paths, Slot::GYRO);
+    Some(first)
+}
+
+fn gyros_in(schema: &Schema, site: &Site, structure: &Struct, px4: Option<Px4>) -> Vec<Candidate> {
+    let candidate = |found, rank, paths, whole, unit, delta| Candidate {
+        key: (found, site.each, site.depth, rank),
+        paths,
+        whole,
+        holder: structure.name.clone(),
+        unit,
+        delta,
+    };
+    let own_name = last_name(&structure.name);
+    let mut list = Vec::new();
+    let mut axes: [Option<(u8, Vec<Step>, Option<GyroUnit>)>; 3] = [None, None, None];
+    for (index, field) in structure.fields.iter().enumerate() {
+        let path = with(&site.path, Step::Field(index));
+        let vector = |depth| vector(schema, &path, End::from(field), depth);
+        match names::meaning(&field.name) {
+            Some(Meaning::Gyro { rank, unit }) => list.extend(
+                vector(2).map(|v| candidate(Found::Named, rank, v, path.clone(), unit, false)),
+            ),
+            Some(Meaning::DeltaAngle) => {
+                list.extend(vector(2).map(|v| {
+                    candidate(Found::Named, 1, v, path.clone(), Some(GyroUnit::Rad), true)
+                }))
+            }
+            Some(Meaning::GyroAxis { axis, rank, unit }) => {
+                let better = |old: &Option<(u8, _, _)>| old.as_ref().is_none_or(|o| rank < o.0);
+                if let Some(slot) = axes.get_mut(usize::from(axis))
+                    && End::from(field).number().is_some()
+                    && better(slot)
+                {
+                    *slot = Some((rank, path, unit));
+                }
+            }
+            _ => {
+                let found = match (field.name.as_str(), own_name, px4) {
+                    ("xyz", _, Some(Px4::VehicleAngularVelocity)) => Found::Named,
+                    ("angular", "Twist", _) => Found::Twist,
+                    ("vector", "Vector3Stamped", _) => Found::Vector,
+                    _ => continue,
+                };
+                list.extend(vector(0).map(|v| candidate(found, 0, v, path.clone(), None, false)));
+            }
+        }
+    }
+    if px4 == Some(Px4::SensorGyro) && site.depth == 0 {
+        let end = End {
+            kind: Kind::Struct(site.structure),
+            many: Many::One,
+        };
+        let own = vector(schema, &site.path, end, 0);
+        list.extend(own.map(|v| candidate(Found::Named, 0, v, Vec::new(), None, false)));
+    }
+    if let [Some(x), Some(y), Some(z)] = axes {
+        let whole = x.1.clone();
+        list.push(candidate(
+            Found::Named,
+            x.0,
+            vec![x.1, y.1, z.1],
+            whole,
+            x.2,
+            false,
+        ));
+    }
+    list
+}
+
+/// What stands in the same struct as the body rate.
+fn beside_gyro(schema: &Schema, gyro: &[Step], given: bool, selection: &mut Selection) {
+    // The struct that names the body rate: of `imu.gyro.vec.x` the struct `imu`, the outermost in
+    // which the rest of the path is still a vector.
+    let named_in = |path: &Vec<Step>| {
+        let Some(Step::Field(next)) = gyro.get(path.len()) else {
+            return false;
+        };
+        let structure = end_of(schema, path).and_then(|e| e.structure(schema));
+        let Some(field) = structure.and_then(|s| s.fields.get(*next)) else {
+            return false;
+        };
+        let own_axis =
+            gyro.len() == path.len() + 1 && !matches!(field.name.as_str(), "x" | "y" | "z");
+        let is_vector =
+            vector(schema, &with(path, Step::Field(*next)), End::from(field), 2).is_some();
+        own_axis || is_vector
+    };
+    let site = structs_on(schema, gyro).into_iter().filter(named_in).last();
+    let Some(site) = site else { return };
+    let Some(structure) = end_of(schema, &site).and_then(|e| e.structure(schema)) else {
+        return;
+    };
+    let named = gyro.get(site.len()).copied();
+    let mut accel_axes: [Option<Vec<Step>>; 3] = [None, None, None];
+    let mut velocity = None;
+    for (index, field) in structure.fields.iter().enumerate() {
+        let step = Step::Field(index);
+        let path = with(&site, step);
+        let number = End::from(field).number().is_some();
+        if Some(step) == named {
+            take_mark(structure, field, &site, Slot::GYRO_MARK, selection);
+        }
+        match names::meaning(&field.name) {
+            Some(Meaning::Accel { .. }) if !selection.has(Slot::ACCEL, 3) => {
+                if let Some(paths) = vector(schema, &path, End::from(field), 2) {
+                    selection.take(paths, Slot::ACCEL);
+                    selection.describe(FieldRole::Accel, schema, &path);
+                    take_mark(structure, field, &site, Slot::ACCEL_MARK, selection);
+                }
+            }
+            Some(Meaning::DeltaVelocity) => velocity = vector(schema, &path, End::from(field), 2),
+            Some(Meaning::AccelAxis { axis }) if number => {
+                if let Some(slot) = accel_axes.get_mut(usize::from(axis)) {
+                    slot.get_or_insert(path);
+                }
+            }
+            Some(Meaning::Orientation { .. }) if !selection.has(Slot::ORIENTATION, 4) => {
+                if let Some(paths) = quaternion(schema, &path, End::from(field)) {
+                    selection.take(paths, Slot::ORIENTATION);
+                    selection.describe(FieldRole::Orientation, schema, &path);
+                    take_mark(structure, field, &site, Slot::ORIENTATION_MARK, selection);
+                }
+            }
+            Some(Meaning::GyroInterval(unit)) if number && !given => {
+                if !selection.has(Slot::INTERVAL, 1) {
+                    selection.take(vec![path], Slot::INTERVAL);
+                    selection.form.interval = unit;
+                }
+                selection.kind.get_or_insert(SampleKind::Average);
+            }
+            Some(Meaning::Interval(unit))
+                if number
+                    && selection.kind == Some(SampleKind::DeltaAngle)
+                    && !selection.has(Slot::INTERVAL, 1) =>
+            {
+                selection.take(vec![path], Slot::INTERVAL);
+                selection.form.interval = unit;
+            }
+            _ => {}
+        }
+    }
+    if let ([Some(x), Some(y), Some(z)], false) = (accel_axes, selection.has(Slot::ACCEL, 3)) {
+        selection.take(vec![x, y, z], Slot::ACCEL);
+    }
+    take_delta_velocity(structure, &site, velocity, selection);
+}
+
+/// A delta velocity is a specific force only with its interval.
+fn take_delta_velocity(
+    structure: &Struct,
+    site: &[Step],
+    velocity: Option<Vec<Vec<Step>>>,
+    selection: &mut Selection,
+) {
+    let interval = structure
+        .fields
+        .iter()
+        .enumerate()
+        .find_map(|(index, field)| match names::meaning(&field.name) {
+            Some(Meaning::AccelInterval(unit)) => Some((with(site, Step::Field(index)), unit)),
+            _ => None,
+        });
+    if let (Some(velocity), Some((path, unit)), false) =
+        (velocity, interval, selection.has(Slot::ACCEL, 3))
+    {
+        selection.take(velocity, Slot::ACCEL);
+        selection.take(vec![path], Slot::ACCEL_INTERVAL);
+        selection.form.accel_interval = unit;
+    }
+}
+
+/// The first element of `<field>_covariance`: -1 marks the field as absent (Imu.msg).
+fn take_mark(
+    structure: &Struct,
+    field: &Field,
+    site: &[Step],
+    slot: Slot,
+    selection: &mut Selection,
+) {
+    let Some(index) = structure.position(&format!("{}_covariance", field.name)) else {
+        return;
+    };
+    let is_array = structure
+        .fields
+        .get(index)
+        .is_some_and(|f| matches!((f.kind, f.many), (Kind::Number(_), Many::Array(1..))));
+    if is_array {
+        let path = with(&with(site, Step::Field(index)), Step::At(0));
+        selection.take(vec![path], slot);
+    }
+}
+
+fn find_orientation(
+    schema: &Schema,
+    sites: &[Site],
+    px4: Option<Px4>,
+    by_child: bool,
+    selection: &mut Selection,
+) {
+    let alone = selection.found == Found::Nothing;
+    for site in sites {
+        // Beside samples of a message's own, an array of orientations belongs to something else.
+        if site.each && !alone {
+            continue;
+        }
+        let Some(structure) = schema.get(site.structure) else {
+            continue;
+        };
+        for (index, field) in structure.fields.iter().enumerate() {
+            if !matches!(
+                names::meaning(&field.name),
+                Some(Meaning::Orientation { .. })
+            ) {
+                continue;
+            }
+            let mut path = with(&site.path, Step::Field(index));
+            let paths = if px4 == Some(Px4::VehicleAttitude) && field.many == Many::Array(4) {
+                Some((0..4).map(|n| with(&path, Step::At(n))).collect())
+            } else {
+                quaternion(schema, &path, End::from(field))
+            };
+            let Some(mut paths) = paths else { continue };
+            if site.each && !by_child {
+                let steps = paths.iter_mut().flatten().chain(&mut path);
+                for step in steps.filter(|s| **s == Step::Each) {
+                    *step = Step::At(0);
+                }
+            }
+            if alone {
+                selection.batch = paths.first().and_then(|p| batch_of(schema, p));
+            }
+            selection.take(paths, Slot::ORIENTATION);
+            selection.describe(FieldRole::Orientation, schema, &path);
+            take_mark(
+                structure,
+                field,
+                &site.path,
+                Slot::ORIENTATION_MARK,
+                selection,
+            );
+            return;
+        }
+    }
+}
+
+/// Paths to x, y, z of what may be a vector: a struct with these fields, three numbers in an array,
+/// or a struct that wraps one of these in a field called `vec`, `value` or the like.
+pub(super) fn vector(
+    schema: &Schema,
+    path: &[Step],
+    end: End,
+    depth: u8,
+) -> Option<Vec<Vec<Step>>> {
+    match (end.kind, end.many) {
+        (Kind::Number(_), Many::Array(3) | Many::Sequence) => {
+            Some((0..3).map(|n| with(path, Step::At(n))).collect())
+        }
+        (Kind::Struct(index), Many::One) => {
+            let structure = schema.get(index)?;
+            if let Some(paths) = numbers(structure, path, &["x", "y", "z"]) {
+                return Some(paths);
+            }
+            if depth == 0 {
+                return None;
+            }
+            let inner = structure.fields.iter().position(|f| {
+                let wrapper = ["vec", "vector", "value", "values", "data", "xyz"];
+                wrapper.contains(&f.name.as_str())
+            })?;
+            let field = structure.fields.get(inner)?;
+            vector(
+                schema,
+                &with(path, Step::Field(inner)),
+                End::from(field),
+                depth - 1,
+            )
+        }
+        _ => None,
+    }
+}
+
+/// Paths to w, x, y, z of a struct that has them. An array of four says nothing about its order and
+/// is never taken for one.
+pub(super) fn quaternion(schema: &Schema, path: &[Step], end: End) -> Option<Vec<Vec<Step>>> {
+    numbers(end.structure(schema)?, path, &["w", "x", "y", "z"])
+}
+
+fn numbers(structure: &Struct, path: &[Step], names: &[&str]) -> Option<Vec<Vec<Step>>> {
+    names
+        .iter()
+        .map(|name| {
+            let index = structure.position(name)?;
+            End::from(structure.fields.get(index)?).number()?;
+            Some(with(path, Step::Field(index)))
+        })
+        .collect()
+}
+
+/// The stamp that `end` is or, for a header, holds; `depth` is how far structs are looked into.
+pub(super) fn stamp_at(
+    schema: &Schema,
+    path: &[Step],
+    end: End,
+    unit: TimeUnit,
+    depth: u8,
+) -> Option<StampFields> {
+    if let Some(number) = end.number() {
+        let (form, slot) = if number.is_float() {
+            (StampForm::Float(unit), Slot::STAMP_FLOAT)
+        } else {
+            (StampForm::Count(unit), Slot::STAMP)
+        };
+        let paths = vec![(path.to_vec(), slot)];
+        return Some(StampFields { form, paths });
+    }
+    let structure = end.structure(schema)?;
+    let integer = |wanted: fn(&str) -> bool| {
+        let index = structure.fields.iter().position(|f| wanted(&f.name))?;
+        let number = End::from(structure.fields.get(index)?).number()?;
+        (!number.is_float()).then(|| with(path, Step::Field(index)))
+    };
+    if let (Some(sec), Some(nanos)) = (integer(is_seconds), integer(is_nanos)) {
+        return Some(StampFields {
+            form: StampForm::SecNanos,
+            paths: vec![(sec, Slot::STAMP), (nanos, Slot::STAMP_NANOS)],
+        });
+    }
+    let depth = depth.checked_sub(1)?;
+    stamp_in(schema, path, structure, depth).map(|(_, stamp)| stamp)
+}
+
+/// The best stamp among a struct's fields and its header's.
+fn stamp_in(
+    schema: &Schema,
+    path: &[Step],
+    structure: &Struct,
+    depth: u8,
+) -> Option<(u8, StampFields)> {
+    let mut best: Option<(u8, StampFields)> = None;
+    for (index, field) in structure.fields.iter().enumerate() {
+        let path = with(path, Step::Field(index));
+        let end = End::from(field);
+        let found = match names::meaning(&field.name) {
+            Some(Meaning::Stamp { rank, unit }) => {
+                stamp_at(schema, &path, end, unit, depth).map(|stamp| (rank, stamp))
+            }
+            Some(Meaning::Header) => depth.checked_sub(1).and_then(|depth| {
+                stamp_in(schema, &path, end.structure(schema)?, depth)
+            }),
+            _ => None,
+        };
+        if let Some(found) = found
+            && best.as_ref().is_none_or(|b| found.0 < b.0)
+        {
+            best = Some(found);
+        }
+    }
+    best
+}
+
+pub(super) fn take_stamp(selection: &mut Selection, stamp: StampFields) {
+    selection.form.stamp = stamp.form;
+    for (path, slot) in stamp.paths {
+        selection.picks.push(Pick { path, slot });
+    }
+}
+
+/// A string of this name in the struct at `path`, or in its header.
+fn text_near(schema: &Schema, path: &[Step], name: &str) -> Option<Vec<Step>> {
+    let structure = end_of(schema, path)?.structure(schema)?;
+    let is_text = |f: &Field| f.kind == Kind::Text && f.many == Many::One;
+    if let Some(index) = structure.position(name)
+        && structure.fields.get(index).is_some_and(is_text)
+    {
+        return Some(with(path, Step::Field(index)));
+    }
+    let header = structure.position("header")?;
+    let inner = End::from(structure.fields.get(header)?).structure(schema)?;
+    let index = inner.position(name)?;
+    let found = inner.fields.get(index).is_some_and(is_text);
+    found.then(|| with(&with(path, Step::Field(header)), Step::Field(index)))
+}
+
+/// Every struct on the way, the innermost first, the message itself last.
+fn structs_on(schema: &Schema, path: &[Step]) -> Vec<Vec<Step>> {
+    (0..path.len())
+        .rev()
+        .filter_map(|n| path.get(..n))
+        .filter(|prefix| end_of(schema, prefix).is_some_and(|e| e.structure(schema).is_some()))
+        .map(<[Step]>::to_vec)
+        .collect()
+}
+
+fn end_of(schema: &Schema, path: &[Step]) -> Option<End> {
+    let mut end = End {
+        kind: Kind::Struct(schema.root),
+        many: Many::One,
+    };
+    for step in path {
+        match step {
+            Step::Field(index) => end = End::from(end.structure(schema)?.fields.get(*index)?),
+            Step::At(_) | Step::Each => end.many = Many::One,
+        }
+    }
+    Some(end)
+}
+
+fn with(path: &[Step], step: Step) -> Vec<Step> {
+    let mut longer = Vec::with_capacity(path.len() + 1);
+    longer.extend_from_slice(path);
+    longer.push(step);
+    longer
+}
+
+/// Paths that could fill a role, for the message about one that can not. At most 40.
+pub(super) fn available(schema: &Schema, role: FieldRole) -> Vec<String> {
+    let mut list = Vec::new();
+    for site in sites(schema) {
+        let Some(structure) = schema.get(site.structure) else {
+            continue;
+        };
+        for (index, field) in structure.fields.iter().enumerate() {
+            let path = with(&site.path, Step::Field(index));
+            let end = End::from(field);
+            let fits = match role {
+                FieldRole::Gyro | FieldRole::Accel => vector(schema, &path, end, 0).is_some(),
+                FieldRole::Orientation => quaternion(schema, &path, end).is_some(),
+                FieldRole::Stamp => {
+                    stamp_at(schema, &path, end, TimeUnit::ByMagnitude, 2).is_some()
+                        && (end.number().is_none() || names::meaning(&field.name).is_some())
+                }
+                FieldRole::Interval => end.number().is_some(),
+            };
+            if fits {
+                list.push(path_text(schema, &path));
+            }
+            if list.len() >= 40 {
+                return list;
+            }
+        }
+    }
+    list
+}

@@ -1,0 +1,18 @@
+//! Wires the stages: source -> decode -> condition -> propagate -> sink. I/O.
+
+pub mod against;
+pub mod estimator;
+pub mod lines;
+pub mod log;
+pub mod outlet;
+pub mod pace;
+pub mod pool;
+pub mod position;
+pub mod preparation;
+pub mod provenance;
+pub mod replay;
+pub mod route;
+pub mod session;
+pub mod summarise;
+pub mod topics;
+pub mod track;

@@ -1,0 +1,173 @@
+//! One topic's samples under each meaning -> error against the recorded orientation. Pure.
+//!
+//! What a sample means in time matters more than the order of the integrator and is written in no
+//! log; where an orientation was recorded too, it can be seen.
+
+use super::estimator::Estimator;
+use super::preparation::{Prepared, Resolved};
+use crate::compare::{Align, Stamped, compare};
+use crate::config::Plan;
+use crate::model::frames::World;
+use crate::propagate::{Executor, Method};
+use crate::record::{RawSample, SampleKind};
+use crate::report::summary::Against;
+
+/// Most attitudes kept per track; beyond, every second one goes, again and again, so that memory
+/// stays bounded on any log.
+const MOST: usize = 1 << 20;
+
+/// The meanings tried: name, words, kind, and the method where it is not the run's own.
+const MEANINGS: [(&str, &str, SampleKind, Option<Method>); 3] = [
+    ("rate", "the rate at its stamp", SampleKind::Rate, None),
+    ("average", "the mean over the interval ending at its stamp", SampleKind::Average, None),
+    (
+        "held",
+        "held over the interval after its stamp (--method dcm-left)",
+        SampleKind::Rate,
+        Some(Method::DcmLeft),
+    ),
+];
+
+/// A comparison under way.
+#[derive(Debug)]
+pub struct AgainstRecorded {
+    resolved: Resolved,
+    clock: crate::condition::Clock,
+    own_reference: bool,
+    estimators: Vec<Estimator>,
+    tracks: Vec<Thinned>,
+    reference: Thinned,
+}
+
+/// A track that halves itself when it grows too long.
+#[derive(Debug)]
+struct Thinned {
+    entries: Vec<Stamped>,
+    stride: u64,
+    seen: u64,
+}
+
+impl Thinned {
+    fn new() -> Thinned {
+        Thinned { entries: Vec::new(), stride: 1, seen: 0 }
+    }
+
+    fn push(&mut self, entry: Stamped) {
+        if self.seen.is_multiple_of(self.stride) {
+            if self.entries.len() >= MOST {
+                let mut keep = false;
+                self.entries.retain(|_| {
+                    keep = !keep;
+                    keep
+                });
+                self.stride *= 2;
+            }
+            if self.seen.is_multiple_of(self.stride) {
+                self.entries.push(entry);
+            }
+        }
+        self.seen += 1;
+    }
+}
+
+impl AgainstRecorded {
+    /// For samples understood as `resolved`, but for their meaning.
+    ///
+    /// # Errors
+    /// In words: settings that can not be.
+    pub fn new(plan: &Plan, resolved: &Resolved, prepared: &Prepared) -> Result<Self, String> {
+        let mut prepared = prepared.clone();
+        // The recorded attitude is brought to the convention everything is computed in.
+        prepared.world = World::Start;
+        let estimators = MEANINGS
+            .iter()
+            .map(|(_, _, kind, method)| {
+                let plan = Plan { method: method.unwrap_or(plan.method), ..plan.clone() };
+                let mut resolved = resolved.clone();
+                resolved.kind = *kind;
+                Estimator::new(&plan, &resolved, &prepared)
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        Ok(AgainstRecorded {
+            resolved: resolved.clone(),
+            clock: prepared.clock,
+            own_reference: true,
+            tracks: estimators.iter().map(|_| Thinned::new()).collect(),
+            estimators,
+            reference: Thinned::new(),
+        })
+    }
+
+    /// The reference comes from a topic of its own, whose orientations are in `recorded`'s convention.
+    pub fn take_reference_from(&mut self, recorded: &Resolved) {
+        self.own_reference = false;
+        self.resolved.recorded = recorded.recorded;
+    }
+
+    /// Takes a sample, and the orientation in it unless the reference has a topic of its own.
+    pub fn take(&mut self, raw: &RawSample) {
+        for estimator in &mut self.estimators {
+            estimator.take(raw);
+        }
+        if self.own_reference {
+            self.take_reference(raw);
+        }
+    }
+
+    /// Takes a recorded orientation.
+    pub fn take_reference(&mut self, raw: &RawSample) {
+        use crate::condition::Clock;
+        let stamp = match self.clock {
+            Clock::Header => raw.header,
+            Clock::Log | Clock::Index { .. } => Some(raw.log),
+            Clock::Publish => Some(raw.publish),
+        };
+        let attitude = raw.orientation.and_then(|wxyz| self.resolved.recorded_attitude(wxyz));
+        if let (Some(stamp), Some(attitude)) = (stamp, attitude) {
+            self.reference.push((stamp, attitude));
+        }
+    }
+
+    /// Propagates what was taken.
+    pub fn advance(&mut self, exec: &impl Executor) {
+        for (estimator, track) in self.estimators.iter_mut().zip(&mut self.tracks) {
+            for sample in estimator.attitudes(exec) {
+                track.push((sample.stamp, sample.q_nb));
+            }
+        }
+    }
+
+    /// No more samples.
+    pub fn finish(&mut self, exec: &impl Executor) {
+        for (estimator, track) in self.estimators.iter_mut().zip(&mut self.tracks) {
+            for sample in estimator.finish(exec) {
+                track.push((sample.stamp, sample.q_nb));
+            }
+        }
+    }
+
+    /// Recorded orientations that could be used.
+    #[must_use]
+    pub fn references(&self) -> usize {
+        self.reference.entries.len()
+    }
+
+    /// The errors; empty when no two recorded orientations are 1 s apart.
+    #[must_use]
+    pub fn rows(&self) -> Vec<Against> {
+        MEANINGS
+            .iter()
+            .zip(&self.tracks)
+            .filter_map(|((kind, meaning, ..), track)| {
+                let found = compare(&track.entries, &self.reference.entries, Align::First);
+                found.relative_1s.map(|r| Against {
+                    kind,
+                    meaning,
+                    median_deg: r.median.to_degrees(),
+                    p95_deg: r.p95.to_degrees(),
+                    pairs: r.count,
+                })
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,112 @@
+//! Samples of one topic -> attitude: the one path that replay, serve, simulate and tests share.
+//!
+//! Conditions and propagates; what must be known first ([`Prepared`]) is given. Reads no clock and
+//! does no I/O.
+
+use super::preparation::{Prepared, Resolved};
+use crate::condition::{self, Conditioner};
+use crate::config::Plan;
+use crate::model::frames::{Convention, World};
+use crate::propagate::{self, Executor, Method, Propagator};
+use crate::record::{AttitudeSample, RateSample, RawSample};
+
+/// An estimator of one stream.
+#[derive(Debug)]
+pub struct Estimator {
+    conditioner: Conditioner,
+    propagator: Propagator,
+    world: World,
+    rates: Vec<RateSample>,
+    out: Vec<AttitudeSample>,
+}
+
+impl Estimator {
+    /// For samples understood as `resolved`, from what `prepared` says.
+    ///
+    /// # Errors
+    /// In words, with the flag that helps: settings that can not be.
+    pub fn new(plan: &Plan, resolved: &Resolved, prepared: &Prepared) -> Result<Estimator, String> {
+        let settings = resolved.conditioning(plan, prepared.clock, prepared.bias);
+        let propagator = Propagator::new(propagate::Settings {
+            method: plan.method,
+            kind: resolved.kind,
+            initial: prepared.initial,
+            noise: propagate::Noise {
+                arw: plan.noise.arw,
+                bias: prepared.bias_sigma,
+                ..propagate::Noise::default()
+            },
+        })
+        .map_err(|e| e.to_string())?;
+        Ok(Estimator {
+            conditioner: Conditioner::new(&settings).map_err(|e| e.to_string())?,
+            propagator,
+            world: prepared.world,
+            rates: Vec::new(),
+            out: Vec::new(),
+        })
+    }
+
+    /// Takes the next sample.
+    #[inline]
+    pub fn take(&mut self, raw: &RawSample) {
+        self.conditioner.push(std::slice::from_ref(raw), &mut self.rates);
+    }
+
+    /// A payload that could not be decoded stood here in the stream.
+    pub fn take_undecodable(&mut self) {
+        self.conditioner.push_undecodable(1);
+    }
+
+    /// The attitudes that are known by now. Their bits do not depend on when they are asked for.
+    pub fn attitudes(&mut self, exec: &impl Executor) -> &[AttitudeSample] {
+        self.out.clear();
+        self.propagator.push(&self.rates, exec, &mut self.out);
+        self.rates.clear();
+        self.relabel();
+        &self.out
+    }
+
+    /// No more samples: the rest of the attitudes.
+    pub fn finish(&mut self, exec: &impl Executor) -> &[AttitudeSample] {
+        self.out.clear();
+        self.conditioner.finish(&mut self.rates);
+        self.propagator.push(&self.rates, exec, &mut self.out);
+        self.propagator.finish(exec, &mut self.out);
+        self.rates.clear();
+        self.relabel();
+        &self.out
+    }
+
+    /// What conditioning did.
+    #[must_use]
+    pub fn conditioning(&self) -> &condition::Report {
+        self.conditioner.report()
+    }
+
+    /// What propagation did.
+    #[must_use]
+    pub fn propagation(&self) -> propagate::Report {
+        self.propagator.report()
+    }
+
+    /// The method, with its window and order.
+    #[must_use]
+    pub fn method(&self) -> Method {
+        self.propagator.method()
+    }
+
+    /// From the convention everything is computed in (ENU or start, FLU) to the one asked for. World
+    /// and body change together.
+    fn relabel(&mut self) {
+        let to = match self.world.convention() {
+            None | Some(Convention::EnuFlu) => return,
+            Some(to) => to,
+        };
+        for sample in &mut self.out {
+            sample.q_nb = Convention::EnuFlu.convert(to, sample.q_nb);
+            sample.rate = Convention::EnuFlu.convert_body(to, sample.rate);
+            sample.accel = sample.accel.map(|a| Convention::EnuFlu.convert_body(to, a));
+        }
+    }
+}

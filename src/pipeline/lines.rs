@@ -1,0 +1,179 @@
+//! NDJSON samples -> the same run as from a log. I/O.
+
+use super::position::Position;
+use super::pool::Pool;
+use super::replay::{Replay, Waiting, end, refused};
+use super::route::Item;
+use super::session::{Found, Source};
+use super::preparation::Resolved;
+use crate::decode::{LineDecoder, MAX_LINE, Stated};
+use crate::error::{Error, Result};
+use crate::record::Nanos;
+use crate::report::summary::RunSummary;
+use crate::sink::{Flow, Stream, output_topic};
+use crate::source::mcap::Survey;
+use std::collections::BTreeSet;
+use std::fs::File;
+use std::io::{BufRead, Read};
+use std::path::Path;
+use std::sync::Arc;
+
+/// Samples that go through the pipeline together.
+const BATCH: usize = 2048;
+/// Lines without any sample before the first, after which this is no log of samples.
+const PATIENCE: u64 = 1000;
+
+/// Opens a file of lines.
+///
+/// # Errors
+/// It is missing, a directory, or empty.
+pub fn open(path: &Path) -> Result<File> {
+    let fail = |source| Error::Open { path: path.to_owned(), source };
+    let file = File::open(path).map_err(fail)?;
+    let metadata = file.metadata().map_err(fail)?;
+    if metadata.is_dir() {
+        return Err(Error::IsDirectory { path: path.to_owned() });
+    }
+    if metadata.is_file() && metadata.len() == 0 {
+        return Err(Error::Empty { path: path.to_owned() });
+    }
+    Ok(file)
+}
+
+/// Replays lines.
+///
+/// # Errors
+/// As [`super::replay::run`]; several sensors in one stream and none named.
+pub fn replay(
+    run: &Replay,
+    mut input: Box<dyn BufRead>,
+    pool: &Pool,
+    watch: &mut dyn FnMut(&Position),
+) -> Result<RunSummary> {
+    let path = run.source.name();
+    let decoder = LineDecoder::new(&run.plan.decode);
+    let mut waiting = Waiting::new(run, &path);
+    let mut lines = Lines { number: 0, offset: 0, line: Vec::new() };
+    let mut sensor: Option<String> = None;
+    let mut samples = Vec::new();
+    let mut items = Vec::with_capacity(BATCH);
+    let mut closed = false;
+    while !closed && lines.next(&mut input, &path)? {
+        if lines.is_blank() {
+            continue;
+        }
+        // A line carries no time of its own but the one in it: its number keeps the order.
+        let received = Nanos(i64::try_from(lines.number).unwrap_or(i64::MAX));
+        match decoder.decode(&lines.line, received, &mut samples) {
+            Err(why) if waiting.is_idle() => {
+                return Err(Error::Unsupported {
+                    path,
+                    what: format!(
+                        "line {}: {why}\n  help: one JSON object per line, with gyro and stamp; or an MCAP",
+                        lines.number
+                    ),
+                });
+            }
+            Err(why) => items.push(Item::Undecodable(0, Box::new((received, why)))),
+            Ok(line) => {
+                let has_rate = samples.iter().any(|s| s.gyro.is_some());
+                if !has_rate {
+                    // Attitudes, status and the like between the samples.
+                    samples.clear();
+                    if waiting.is_idle() && lines.number > PATIENCE {
+                        return Err(nothing(&path));
+                    }
+                    continue;
+                }
+                let id = line.id.unwrap_or_default();
+                if run.plan.topic.as_deref().is_some_and(|t| t != "all" && t != id) {
+                    samples.clear();
+                    continue;
+                }
+                match &sensor {
+                    None => {
+                        let stated = Stated {
+                            sample_kind: line.sample_kind,
+                            gyro_unit: line.gyro_unit,
+                            ..Stated::default()
+                        };
+                        waiting.meet(&mut Some(met(run, &id, &stated)))?;
+                        sensor = Some(id);
+                    }
+                    Some(first) if *first != id => {
+                        return Err(refused(
+                            &path,
+                            first,
+                            format!("line {}: samples of another sensor, `{id}`\n  help: --topic ID takes one of them", lines.number),
+                        ));
+                    }
+                    Some(_) => {}
+                }
+                items.extend(samples.drain(..).map(|raw| Item::Sample(0, raw)));
+            }
+        }
+        if items.len() >= BATCH || input_waits(&run.source) {
+            closed = waiting.consume(items.drain(..), pool)? == Flow::Closed;
+            watch(&waiting.position());
+        }
+    }
+    if waiting.is_idle() {
+        return Err(nothing(&path));
+    }
+    let _ = waiting.consume(items.into_iter(), pool)?;
+    end(run, waiting.into_session(pool)?, &Survey::default(), pool)
+}
+
+/// A pipe may stand still between two lines: what is known goes out at once.
+fn input_waits(source: &Source) -> bool {
+    *source == Source::Stdin
+}
+
+fn nothing(path: &Path) -> Error {
+    Error::Unsupported {
+        path: path.to_owned(),
+        what: "no line carries a body rate\n  help: {\"class\":\"RATE\",\"stamp\":{\"sec\":1,\"nsec\":0},\"gyro\":[0.1,0,0]}, or --field gyro=PATH".to_owned(),
+    }
+}
+
+fn met(run: &Replay, id: &str, stated: &Stated) -> (Found, Stream) {
+    let name = if id.is_empty() { "imu" } else { id };
+    let found = Found {
+        name: name.to_owned(),
+        output_topic: output_topic(name, &BTreeSet::new()),
+        described: "NDJSON".to_owned(),
+        resolved: Resolved::new(&run.plan, stated),
+        noticed: Arc::default(),
+        warnings: Vec::new(),
+    };
+    (found, Stream::new(name, ""))
+}
+
+struct Lines {
+    number: u64,
+    offset: u64,
+    line: Vec<u8>,
+}
+
+impl Lines {
+    /// Reads the next line, at most [`MAX_LINE`] and one byte of it; the rest of a longer one is
+    /// skipped.
+    fn next(&mut self, input: &mut dyn BufRead, path: &Path) -> Result<bool> {
+        self.line.clear();
+        let fail = |offset| move |source| Error::Read { path: path.to_owned(), offset, source };
+        let limit = MAX_LINE as u64 + 1;
+        let read = Read::take(&mut *input, limit)
+            .read_until(b'\n', &mut self.line)
+            .map_err(fail(self.offset))?;
+        self.number += 1;
+        self.offset += read as u64;
+        if read as u64 == limit && self.line.last() != Some(&b'\n') {
+            self.offset += input.skip_until(b'\n').map_err(fail(self.offset))? as u64;
+        }
+        Ok(read > 0)
+    }
+
+    fn is_blank(&self) -> bool {
+        self.line.iter().all(u8::is_ascii_whitespace)
+    }
+}

@@ -1,0 +1,145 @@
+//! Attitudes of every stream -> every sink of the run. I/O.
+
+use super::pace::Pace;
+use super::pool::Pool;
+use super::route::Copied;
+use crate::error::Result;
+use crate::record::AttitudeSample;
+use crate::sink::{
+    CopiedChannel, Decimator, Flow, InputChannel, InputMessage, Options, Provenance, Sink, Stream,
+    Target, Written,
+};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// What a target is called in the summary.
+fn name(target: &Target) -> String {
+    match target {
+        Target::File { path, .. } => path.display().to_string(),
+        Target::Stdout => "standard output".to_owned(),
+        Target::Null => "null:".to_owned(),
+    }
+}
+
+/// The sinks of a run.
+#[derive(Debug)]
+pub struct Outlet {
+    sinks: Vec<(String, Sink)>,
+    copied: Vec<BTreeMap<usize, CopiedChannel>>,
+    decimators: Vec<Option<Decimator>>,
+    kept: Vec<AttitudeSample>,
+    pace: Option<Pace>,
+    closed: bool,
+}
+
+impl Outlet {
+    /// Opens every target.
+    ///
+    /// # Errors
+    /// As [`Sink::create`]; nothing is left behind.
+    pub fn open(
+        targets: &[Target],
+        inputs: &[PathBuf],
+        options: Options,
+        streams: &[Stream],
+        provenance: &Provenance,
+        out_rate: Option<f64>,
+        speed: Option<f64>,
+    ) -> Result<Outlet> {
+        let sinks = targets
+            .iter()
+            .map(|target| {
+                let sink = Sink::create(target, inputs, options, streams, provenance)?;
+                Ok((name(target), sink))
+            })
+            .collect::<Result<Vec<_>>>()?;
+        Ok(Outlet {
+            copied: sinks.iter().map(|_| BTreeMap::new()).collect(),
+            sinks,
+            decimators: streams.iter().map(|_| out_rate.and_then(Decimator::new)).collect(),
+            kept: Vec::new(),
+            pace: Pace::new(speed),
+            closed: false,
+        })
+    }
+
+    /// Hands attitudes of one stream to every sink, no faster than asked.
+    ///
+    /// # Errors
+    /// As [`Sink::write`].
+    pub fn write(&mut self, stream: usize, samples: &[AttitudeSample], pool: &Pool) -> Result<Flow> {
+        self.kept.clear();
+        let mut rest = match self.decimators.get_mut(stream).and_then(Option::as_mut) {
+            Some(decimator) => {
+                decimator.select(samples, &mut self.kept);
+                self.kept.as_slice()
+            }
+            None => samples,
+        };
+        while let (false, Some(first)) = (self.closed, rest.first()) {
+            let n = match &mut self.pace {
+                None => rest.len(),
+                Some(pace) => {
+                    pace.wait(first.stamp);
+                    pace.take(rest.iter().map(|s| s.stamp))
+                }
+            };
+            let (now, later) = rest.split_at(n);
+            rest = later;
+            for (_, sink) in &mut self.sinks {
+                let mut flow = sink.write(stream, now, pool.rayon())?;
+                if self.pace.is_some() && flow == Flow::Continue {
+                    flow = sink.flush(pool.rayon())?;
+                }
+                self.closed |= flow == Flow::Closed;
+            }
+        }
+        Ok(if self.closed { Flow::Closed } else { Flow::Continue })
+    }
+
+    /// Copies a message of the input to every sink that has room for it.
+    ///
+    /// # Errors
+    /// As [`Sink::copy`].
+    pub fn copy(&mut self, message: &Copied, pool: &Pool) -> Result<()> {
+        for ((_, sink), channels) in self.sinks.iter_mut().zip(&mut self.copied) {
+            let channel = match channels.get(&message.channel.index) {
+                Some(channel) => *channel,
+                None => {
+                    let schema = message.channel.schema.as_deref();
+                    let declared = sink.copy_channel(&InputChannel {
+                        topic: &message.channel.topic,
+                        message_encoding: &message.channel.message_encoding,
+                        schema: schema
+                            .map(|s| (s.name.as_str(), s.encoding.as_str(), s.data.as_slice())),
+                        metadata: &message.channel.metadata,
+                    })?;
+                    channels.insert(message.channel.index, declared);
+                    declared
+                }
+            };
+            let _ = sink.copy(
+                channel,
+                &InputMessage {
+                    sequence: message.sequence,
+                    log_time: message.log_time,
+                    publish_time: message.publish_time,
+                    data: &message.data,
+                },
+                pool.rayon(),
+            )?;
+        }
+        Ok(())
+    }
+
+    /// Completes every output.
+    ///
+    /// # Errors
+    /// As [`Sink::finish`].
+    pub fn finish(self) -> Result<Vec<(String, Written)>> {
+        self.sinks
+            .into_iter()
+            .map(|(name, sink)| Ok((name, sink.finish()?)))
+            .collect()
+    }
+}

@@ -1,0 +1,392 @@
+//! The first samples (or a pass over the log) -> clock, bias, initial attitude. Pure.
+//!
+//! Apart from the estimator because it is all about what is not known yet: when enough has been
+//! seen, and what to say when it can not be known.
+
+use crate::condition::stillness::{self, Limits, Rests, Stillness};
+use crate::condition::{Clock, ClockWarning, Conditioner, GyroUnit, Settings, choose_clock};
+use crate::config::{Bias, Initial, Plan};
+use crate::decode::{self, Stated};
+use crate::model::attitude::{Quaternion, YawPitchRoll};
+use crate::model::frames::{Body, BodyAxes, Convention, Nav, Sensor, World};
+use crate::record::{Nanos, RateSample, RawSample, SampleKind};
+use nalgebra::{Matrix3, Vector3};
+
+/// Samples that tell the clock and hold the first orientation.
+const FEW: usize = 512;
+/// Samples, and seconds of data, in which rest is sought when the log can not be read twice.
+const MANY: usize = 200_000;
+const REST_SECS: f64 = 60.0;
+/// Standard gravity, m/s^2.
+const STANDARD_GRAVITY: f64 = 9.806_65;
+
+/// The flags and what the format states, put together: a flag wins.
+#[derive(Clone, Debug)]
+pub struct Resolved {
+    /// What a sample means.
+    pub kind: SampleKind,
+    /// Unit of the rates.
+    pub unit: GyroUnit,
+    /// Axes of the input.
+    pub body: BodyAxes,
+    /// Multiplies the recorded acceleration.
+    pub accel_scale: f64,
+    /// The convention of recorded orientations.
+    pub recorded: Convention,
+    axes: Matrix3<f64>,
+    mount: Matrix3<f64>,
+}
+
+impl Resolved {
+    /// Puts `plan` and what the channel's format states together.
+    #[must_use]
+    pub fn new(plan: &Plan, stated: &Stated) -> Resolved {
+        let body = plan.body.unwrap_or(match stated.axes {
+            Some(decode::BodyAxes::Frd) => BodyAxes::Frd,
+            Some(decode::BodyAxes::Flu) | None => BodyAxes::Flu,
+        });
+        let unit = plan.unit.unwrap_or(match stated.gyro_unit {
+            Some(decode::GyroUnit::Deg) => GyroUnit::Deg,
+            Some(decode::GyroUnit::Mrad) => GyroUnit::Mrad,
+            Some(decode::GyroUnit::Rad) | None => GyroUnit::Rad,
+        });
+        let mount: Quaternion<Body, Sensor> =
+            plan.mount.map_or_else(Quaternion::identity, Quaternion::assume_unit);
+        Resolved {
+            kind: plan.kind.or(stated.sample_kind).unwrap_or_default(),
+            unit,
+            accel_scale: match stated.accel_unit {
+                Some(decode::AccelUnit::StandardGravity) => STANDARD_GRAVITY,
+                Some(decode::AccelUnit::MetresPerSecondSquared) | None => 1.0,
+            },
+            recorded: orientation_convention(stated),
+            axes: body.c_bs().map_or_else(Matrix3::identity, |c| *c.as_matrix()),
+            mount: *mount.to_dcm().as_matrix(),
+            body,
+        }
+    }
+
+    /// The settings of the conditioning stage.
+    #[must_use]
+    pub fn conditioning(&self, plan: &Plan, clock: Clock, bias: Vector3<f64>) -> Settings {
+        Settings {
+            kind: self.kind,
+            unit: self.unit,
+            accel_scale: self.accel_scale,
+            axes: self.axes,
+            mount: self.mount,
+            clock,
+            max_gap_secs: plan.max_gap_secs,
+            on_gap: plan.on_gap,
+            bias,
+            gyro_range: plan.gyro_range,
+            start: plan.start,
+            until: plan.until,
+            ..Settings::default()
+        }
+    }
+
+    /// World and body of the output as labels. NED comes with FRD, everything else with FLU.
+    #[must_use]
+    pub fn labels(&self, world: World) -> (String, String) {
+        let body = if world == World::Ned { "frd" } else { "flu" };
+        (world.to_string(), body.to_owned())
+    }
+
+    /// Whether the output's body axes are other than the sensor's own.
+    #[must_use]
+    pub fn is_remapped(&self, plan: &Plan, world: World) -> bool {
+        let own = match self.body {
+            BodyAxes::Flu => "flu",
+            BodyAxes::Frd => "frd",
+            BodyAxes::Map(_) => "",
+        };
+        plan.mount.is_some() || self.labels(world).1 != own
+    }
+
+    /// A recorded orientation (sensor to its world) as the attitude of our body: convention and
+    /// mounting undone. `None` when it is no rotation.
+    #[must_use]
+    pub fn recorded_attitude(&self, wxyz: [f64; 4]) -> Option<Quaternion<Nav, Body>> {
+        let q: Quaternion<Nav, Body> = Quaternion::try_from_wxyz(wxyz).ok()?;
+        let flu = self.recorded.convert(Convention::EnuFlu, q);
+        let c_bs: Quaternion<Body, Body> =
+            Quaternion::from_dcm(&crate::model::frames::Dcm::assume(self.mount));
+        Some((flu * c_bs.inverse()).normalised())
+    }
+}
+
+/// The convention of the orientations a format carries.
+#[must_use]
+pub fn orientation_convention(stated: &Stated) -> Convention {
+    match stated.world {
+        Some(decode::WorldAxes::Ned) => Convention::NedFrd,
+        Some(decode::WorldAxes::Enu) | None => Convention::EnuFlu,
+    }
+}
+
+/// What was decided before the first sample was integrated.
+#[derive(Clone, Debug)]
+pub struct Prepared {
+    /// The clock.
+    pub clock: Clock,
+    /// Bias removed, rad/s, body axes.
+    pub bias: Vector3<f64>,
+    /// Its uncertainty, rad/s.
+    pub bias_sigma: f64,
+    /// Where it came from.
+    pub bias_origin: String,
+    /// q_nb at the first sample, ENU (or start) and FLU.
+    pub initial: Quaternion<Nav, Body>,
+    /// Where it came from.
+    pub initial_origin: String,
+    /// The world of the output.
+    pub world: World,
+    /// Things to know.
+    pub warnings: Vec<String>,
+}
+
+/// How long rest is sought.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Patience {
+    /// To the end: the log can be read twice.
+    WholeLog,
+    /// In the first minute: what comes can not be read again, and waits meanwhile.
+    FirstMinute,
+}
+
+/// Takes the first samples (or all of them, when rest is sought), then decides.
+#[derive(Debug)]
+pub struct Preparation {
+    plan: Plan,
+    resolved: Resolved,
+    patience: Patience,
+    first: Vec<RawSample>,
+    taken: usize,
+    last: Option<RawSample>,
+    rest: Option<RestPass>,
+}
+
+impl Preparation {
+    /// For samples understood as `resolved`.
+    #[must_use]
+    pub fn new(plan: &Plan, resolved: &Resolved, patience: Patience) -> Preparation {
+        Preparation {
+            plan: plan.clone(),
+            resolved: resolved.clone(),
+            patience,
+            first: Vec::new(),
+            taken: 0,
+            last: None,
+            rest: needs_rest(plan).then(|| RestPass::new(plan, resolved)),
+        }
+    }
+
+    /// Takes the next sample.
+    ///
+    /// # Errors
+    /// In words, when the settings do not fit.
+    pub fn take(&mut self, raw: &RawSample) -> Result<(), String> {
+        if self.first.len() < FEW {
+            self.first.push(*raw);
+        }
+        self.taken += 1;
+        self.last = Some(*raw);
+        match &mut self.rest {
+            Some(rest) => rest.push(std::slice::from_ref(raw)),
+            None => Ok(()),
+        }
+    }
+
+    /// Whether more samples would tell more.
+    #[must_use]
+    pub fn wants_more(&self) -> bool {
+        if self.first.len() < FEW {
+            return true;
+        }
+        let (Some(first), Some(last)) = (self.first.first(), &self.last) else {
+            return true;
+        };
+        let secs = |a: Option<Nanos>, b: Option<Nanos>| {
+            a.zip(b).map_or(0.0, |(a, b)| b.secs_since(a))
+        };
+        self.rest.is_some()
+            && match self.patience {
+                Patience::WholeLog => true,
+                Patience::FirstMinute => {
+                    self.taken < MANY
+                        && secs(first.header, last.header) < REST_SECS
+                        && last.log.secs_since(first.log) < REST_SECS
+                }
+            }
+    }
+
+    /// Decides from what was taken.
+    ///
+    /// # Errors
+    /// In words: no usable stamps, no rest, no orientation, and the flag that helps.
+    pub fn decide(self) -> Result<Prepared, String> {
+        let Preparation { plan, resolved, first, rest, .. } = self;
+        let (clock, warning) = choose_clock(&first, plan.clock);
+        if let Some(fatal @ ClockWarning::NoneMoves) = warning {
+            return Err(fatal.to_string());
+        }
+        let mut warnings: Vec<String> = warning.iter().map(ToString::to_string).collect();
+        let rests = rest.map_or_else(|| Ok(Rests::default()), RestPass::finish)?;
+        let (bias, bias_sigma, bias_origin) = decide_bias(&plan, &rests)?;
+        let (initial, initial_origin, world) =
+            decide_initial(&plan, &resolved, &first, &rests, &mut warnings)?;
+        Ok(Prepared {
+            clock,
+            bias,
+            bias_sigma,
+            bias_origin,
+            initial,
+            initial_origin,
+            world,
+            warnings,
+        })
+    }
+}
+
+/// Whether the plan asks for something only rest can tell.
+fn needs_rest(plan: &Plan) -> bool {
+    plan.bias == Bias::Auto || plan.initial == Initial::Gravity
+}
+
+fn decide_bias(plan: &Plan, rests: &Rests) -> Result<(Vector3<f64>, f64, String), String> {
+    match plan.bias {
+        Bias::None => Ok((Vector3::zeros(), plan.noise.bias_instability, "none".to_owned())),
+        Bias::Given(bias) => Ok((bias, plan.noise.bias_instability, "as given".to_owned())),
+        Bias::Auto => {
+            let estimate = stillness::estimate_bias(rests, &Limits::default())
+                .map_err(|e| format!("--bias auto: {e}"))?;
+            let sigma = estimate.sigma.max();
+            Ok((
+                estimate.bias,
+                sigma.hypot(plan.noise.bias_instability),
+                format!("from {:.1} s of rest, +- {sigma:.1e} rad/s", estimate.secs),
+            ))
+        }
+    }
+}
+
+fn decide_initial(
+    plan: &Plan,
+    resolved: &Resolved,
+    gathered: &[RawSample],
+    rests: &Rests,
+    warnings: &mut Vec<String>,
+) -> Result<(Quaternion<Nav, Body>, String, World), String> {
+    // What the user gives is in the convention of the world asked for.
+    let asked = plan.world.convention().unwrap_or(Convention::EnuFlu);
+    let inside = |q: Quaternion<Nav, Body>| asked.convert(Convention::EnuFlu, q);
+    match plan.initial {
+        Initial::Identity => {
+            if plan.world != World::Start {
+                warnings.push(format!(
+                    "the initial attitude was taken as identity in {}: --init gravity, first-orientation, q=.. or rpy=.. gives a real one",
+                    plan.world
+                ));
+            }
+            Ok((inside(Quaternion::identity()), "identity".to_owned(), plan.world))
+        }
+        Initial::Given(wxyz) => {
+            Ok((inside(Quaternion::assume_unit(wxyz)), "as given".to_owned(), plan.world))
+        }
+        Initial::Gravity => {
+            let level = stillness::accel_at_start(rests, &Limits::default())
+                .map_err(|e| format!("--init gravity: {e}"))?;
+            let level = stillness::level(&level)
+                .ok_or("--init gravity: the accelerometer reads zero at rest")?;
+            // Heading is unknown: zero in the convention that is shown.
+            let shown = Convention::EnuFlu.convert(asked, level);
+            let angles = shown.yaw_pitch_roll();
+            let q = Quaternion::from_yaw_pitch_roll(&YawPitchRoll { yaw: 0.0, ..angles });
+            Ok((inside(q), "level from gravity, heading 0".to_owned(), plan.world))
+        }
+        Initial::FirstOrientation => {
+            let found = gathered
+                .iter()
+                .filter_map(|s| s.orientation)
+                .find_map(|wxyz| resolved.recorded_attitude(wxyz));
+            let q = found.ok_or_else(|| {
+                "--init first-orientation: the first samples carry no orientation\n  help: --init gravity, identity, q=w,x,y,z or rpy=roll,pitch,yaw".to_owned()
+            })?;
+            let world = match (plan.world, resolved.recorded) {
+                (World::Start, Convention::NedFrd) => World::Ned,
+                (World::Start, _) => World::Enu,
+                (asked, _) => asked,
+            };
+            Ok((q, "first recorded orientation".to_owned(), world))
+        }
+    }
+}
+
+/// A pass over samples that only looks for rest.
+#[derive(Debug)]
+struct RestPass {
+    plan: Plan,
+    resolved: Resolved,
+    gathered: Vec<RawSample>,
+    running: Option<Conditioner>,
+    detector: Stillness,
+    rates: Vec<RateSample>,
+}
+
+impl RestPass {
+    fn new(plan: &Plan, resolved: &Resolved) -> RestPass {
+        RestPass {
+            plan: plan.clone(),
+            resolved: resolved.clone(),
+            gathered: Vec::new(),
+            running: None,
+            detector: Stillness::new(resolved.kind, Limits::default()),
+            rates: Vec::new(),
+        }
+    }
+
+    fn push(&mut self, raw: &[RawSample]) -> Result<(), String> {
+        match &mut self.running {
+            Some(conditioner) => {
+                conditioner.push(raw, &mut self.rates);
+                self.detect();
+            }
+            None => {
+                self.gathered.extend_from_slice(raw);
+                if self.gathered.len() >= FEW {
+                    self.begin()?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn finish(mut self) -> Result<Rests, String> {
+        if self.running.is_none() {
+            self.begin()?;
+        }
+        if let Some(conditioner) = &mut self.running {
+            conditioner.finish(&mut self.rates);
+        }
+        self.detect();
+        Ok(self.detector.finish())
+    }
+
+    fn begin(&mut self) -> Result<(), String> {
+        let gathered = std::mem::take(&mut self.gathered);
+        let (clock, _) = choose_clock(&gathered, self.plan.clock);
+        let settings = self.resolved.conditioning(&self.plan, clock, Vector3::zeros());
+        let mut conditioner = Conditioner::new(&settings).map_err(|e| e.to_string())?;
+        conditioner.push(&gathered, &mut self.rates);
+        self.running = Some(conditioner);
+        self.detect();
+        Ok(())
+    }
+
+    fn detect(&mut self) {
+        for sample in self.rates.drain(..) {
+            self.detector.push(&sample);
+        }
+    }
+}

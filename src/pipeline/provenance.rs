@@ -1,0 +1,84 @@
+//! What a reader of the output must be able to find out later -> its metadata. I/O: reads the ends
+//! of the input.
+
+use super::preparation::Prepared;
+use super::replay::Replay;
+use super::session::{Found, Source};
+use crate::error::{Error, Result};
+use crate::sink::{Provenance, Stream, Target};
+use sha2::{Digest, Sha256};
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+use std::path::Path;
+
+/// How much of each end of the input goes into its fingerprint.
+const END: u64 = 1 << 20;
+
+/// The metadata of a run's outputs.
+///
+/// # Errors
+/// The input can not be read again.
+pub fn of(
+    run: &Replay,
+    founds: &[Found],
+    prepared: &[Prepared],
+    streams: &[Stream],
+) -> Result<Provenance> {
+    let mut provenance = Provenance::default();
+    let mut put = |key: String, value: String| {
+        provenance.metadata.insert(key, value);
+    };
+    put("version".to_owned(), env!("CARGO_PKG_VERSION").to_owned());
+    put("command".to_owned(), run.command.clone());
+    put("input".to_owned(), run.source.name().display().to_string());
+    put("method".to_owned(), run.plan.method.to_string());
+    put("noise".to_owned(), run.plan.noise.name.clone());
+    // The ends are read only where there is something to write the result into.
+    if let Source::File(path) = &run.source
+        && run.targets.iter().any(|t| *t != Target::Null)
+    {
+        put("input_fingerprint".to_owned(), fingerprint(path)?);
+    }
+    for ((found, prepared), stream) in founds.iter().zip(prepared).zip(streams) {
+        let key = |name: &str| match founds {
+            [_] => name.to_owned(),
+            _ => format!("{} {name}", found.name),
+        };
+        let [w, x, y, z] = prepared.initial.wxyz();
+        let [bx, by, bz]: [f64; 3] = prepared.bias.into();
+        put(key("topic"), found.name.clone());
+        put(key("output_topic"), stream.output_topic.clone());
+        put(key("sample_kind"), found.resolved.kind.name().to_owned());
+        put(key("gyro_unit"), found.resolved.unit.name().to_owned());
+        put(key("input_axes"), found.resolved.body.to_string());
+        put(key("clock"), prepared.clock.name().to_owned());
+        put(key("rotates"), stream.rotates.clone());
+        put(key("world"), stream.world_axes.clone());
+        put(key("body"), stream.body_axes.clone());
+        put(key("initial"), format!("{} (w {w}, x {x}, y {y}, z {z})", prepared.initial_origin));
+        put(
+            key("bias_rad_s"),
+            format!("{} (x {bx}, y {by}, z {bz})", prepared.bias_origin),
+        );
+    }
+    Ok(provenance)
+}
+
+/// `sha256-ends:HEX`: SHA-256 over the length (8 bytes, little endian), the first and the last MiB.
+/// It names a log as surely as a hash of all of it would, without reading 10 GB for it.
+fn fingerprint(path: &Path) -> Result<String> {
+    let fail = |source| Error::Read { path: path.to_owned(), offset: 0, source };
+    let mut file = File::open(path).map_err(fail)?;
+    let length = file.metadata().map_err(fail)?.len();
+    let mut hash = Sha256::new();
+    hash.update(length.to_le_bytes());
+    let mut end = Vec::new();
+    for start in [0, length.saturating_sub(END)] {
+        end.clear();
+        file.seek(SeekFrom::Start(start)).map_err(fail)?;
+        Read::take(&mut file, END).read_to_end(&mut end).map_err(fail)?;
+        hash.update(&end);
+    }
+    let hex: String = hash.finalize().iter().map(|b| format!("{b:02x}")).collect();
+    Ok(format!("sha256-ends:{hex}"))
+}

@@ -1,0 +1,247 @@
+//! Items in order -> estimators -> outlet: the consuming half of a run, whatever the source. I/O
+//! only through the outlet.
+
+use super::against::AgainstRecorded;
+use super::estimator::Estimator;
+use super::outlet::Outlet;
+use super::pool::Pool;
+use super::position::Position;
+use super::preparation::{Prepared, Resolved};
+use super::route::{Item, Noticed};
+use crate::config::Plan;
+use crate::decode::Undecodable;
+use crate::error::{Error, Result};
+use crate::record::{AttitudeSample, Nanos};
+use crate::sink::{Flow, Written};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// One estimated topic of a run.
+#[derive(Debug)]
+pub struct Topic {
+    /// Where its samples come from.
+    pub name: String,
+    /// Where its attitude goes.
+    pub output_topic: String,
+    /// Type and encoding.
+    pub described: String,
+    /// How its samples are understood.
+    pub resolved: Resolved,
+    /// What was decided before the first was integrated.
+    pub prepared: Prepared,
+    /// What was noticed in its payloads.
+    pub noticed: Arc<Noticed>,
+    /// Things to know, beside those of `prepared`.
+    pub warnings: Vec<String>,
+    /// Its estimator.
+    pub estimator: Estimator,
+    /// What came out of it.
+    pub output: Output,
+    /// The first payload that could not be decoded.
+    pub first_undecodable: Option<(Nanos, Undecodable)>,
+    /// Its comparison with the recorded orientation.
+    pub against: Option<AgainstRecorded>,
+}
+
+/// What came out of an estimator.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Output {
+    /// First attitude.
+    pub first: Option<AttitudeSample>,
+    /// Last attitude.
+    pub last: Option<AttitudeSample>,
+    /// How many.
+    pub count: u64,
+    /// Largest component of any rate, rad/s.
+    pub largest_rate: f64,
+}
+
+impl Output {
+    fn add(&mut self, samples: &[AttitudeSample]) {
+        if self.first.is_none() {
+            self.first = samples.first().copied();
+        }
+        self.last = samples.last().copied().or(self.last);
+        self.count += samples.len() as u64;
+        self.largest_rate =
+            samples.iter().map(|s| s.rate.amax()).fold(self.largest_rate, f64::max);
+    }
+}
+
+impl Topic {
+    /// A topic ready to run.
+    ///
+    /// # Errors
+    /// [`Error::Topic`] when the settings do not fit it.
+    pub fn new(
+        path: &Path,
+        plan: &Plan,
+        found: Found,
+        prepared: Prepared,
+        against: bool,
+    ) -> Result<Topic> {
+        let refuse = |what: String| Error::Topic {
+            path: path.to_owned(),
+            topic: found.name.clone(),
+            what,
+        };
+        let estimator = Estimator::new(plan, &found.resolved, &prepared).map_err(refuse)?;
+        let against = against
+            .then(|| AgainstRecorded::new(plan, &found.resolved, &prepared))
+            .transpose()
+            .map_err(refuse)?;
+        Ok(Topic {
+            name: found.name,
+            output_topic: found.output_topic,
+            described: found.described,
+            resolved: found.resolved,
+            prepared,
+            noticed: found.noticed,
+            warnings: found.warnings,
+            estimator,
+            output: Output::default(),
+            first_undecodable: None,
+            against,
+        })
+    }
+}
+
+/// What is known of a topic before its first sample.
+#[derive(Clone, Debug)]
+pub struct Found {
+    /// Its name.
+    pub name: String,
+    /// Where its attitude goes.
+    pub output_topic: String,
+    /// Type and encoding.
+    pub described: String,
+    /// How its samples are understood.
+    pub resolved: Resolved,
+    /// What is noticed in its payloads.
+    pub noticed: Arc<Noticed>,
+    /// Things to know.
+    pub warnings: Vec<String>,
+}
+
+/// A run from the first integrated sample on.
+#[derive(Debug)]
+pub struct Session {
+    /// The topics.
+    pub topics: Vec<Topic>,
+    /// References of a topic of their own come here.
+    pub reference_for: usize,
+    outlet: Outlet,
+    samples: u64,
+    /// Whether a reader of an output has gone.
+    pub closed: bool,
+}
+
+impl Session {
+    /// A session over `topics` into `outlet`.
+    #[must_use]
+    pub fn new(topics: Vec<Topic>, outlet: Outlet) -> Session {
+        Session { topics, reference_for: 0, outlet, samples: 0, closed: false }
+    }
+
+    /// Takes items in order and writes what is known then.
+    ///
+    /// # Errors
+    /// As [`Outlet::write`].
+    pub fn consume(&mut self, items: impl Iterator<Item = Item>, pool: &Pool) -> Result<Flow> {
+        for item in items {
+            match item {
+                Item::Sample(stream, raw) => {
+                    self.samples += 1;
+                    let Some(topic) = self.topics.get_mut(stream) else { continue };
+                    topic.estimator.take(&raw);
+                    if let Some(against) = &mut topic.against {
+                        against.take(&raw);
+                    }
+                }
+                Item::Undecodable(stream, why) => {
+                    self.samples += 1;
+                    let Some(topic) = self.topics.get_mut(stream) else { continue };
+                    topic.estimator.take_undecodable();
+                    topic.first_undecodable.get_or_insert(*why);
+                }
+                Item::Reference(raw) => {
+                    let topic = self.topics.get_mut(self.reference_for);
+                    if let Some(against) = topic.and_then(|t| t.against.as_mut()) {
+                        against.take_reference(&raw);
+                    }
+                }
+                Item::Copy(message) => self.outlet.copy(&message, pool)?,
+            }
+        }
+        for (stream, topic) in self.topics.iter_mut().enumerate() {
+            let attitudes = topic.estimator.attitudes(pool);
+            topic.output.add(attitudes);
+            if self.outlet.write(stream, attitudes, pool)? == Flow::Closed {
+                self.closed = true;
+                return Ok(Flow::Closed);
+            }
+            if let Some(against) = &mut topic.against {
+                against.advance(pool);
+            }
+        }
+        Ok(Flow::Continue)
+    }
+
+    /// Where the run is.
+    #[must_use]
+    pub fn position(&self, fraction: Option<f64>) -> Position {
+        let mut position = Position { fraction, samples: self.samples, ..Position::default() };
+        for topic in &self.topics {
+            let report = topic.estimator.conditioning();
+            position.lost += report.counts.lost();
+            position.gaps += report.gaps.count;
+            position.written += topic.output.count;
+            if let (Some(first), Some(last)) = (topic.output.first, topic.output.last) {
+                position.data_secs = position.data_secs.max(last.stamp.secs_since(first.stamp));
+            }
+        }
+        position
+    }
+
+    /// No more items: writes the rest and completes the outputs.
+    ///
+    /// # Errors
+    /// As [`Outlet::write`] and [`Outlet::finish`].
+    pub fn finish(mut self, pool: &Pool) -> Result<(Vec<Topic>, Vec<(String, Written)>)> {
+        for (stream, topic) in self.topics.iter_mut().enumerate() {
+            let attitudes = topic.estimator.finish(pool);
+            topic.output.add(attitudes);
+            let _ = self.outlet.write(stream, attitudes, pool)?;
+            if let Some(against) = &mut topic.against {
+                against.finish(pool);
+            }
+        }
+        Ok((self.topics, self.outlet.finish()?))
+    }
+}
+
+/// Where a run's data comes from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// A file: an MCAP, or NDJSON by its extension.
+    File(PathBuf),
+    /// Standard input: MCAP or NDJSON, told apart by the first bytes.
+    Stdin,
+}
+
+impl Source {
+    /// `-` or a path.
+    #[must_use]
+    pub fn parse(text: &str) -> Source {
+        if text == "-" { Source::Stdin } else { Source::File(PathBuf::from(text)) }
+    }
+
+    /// For messages.
+    #[must_use]
+    pub fn name(&self) -> PathBuf {
+        match self {
+            Source::File(path) => path.clone(),
+            Source::Stdin => PathBuf::from("standard input"),
+        }
+    }
+}

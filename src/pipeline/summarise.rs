@@ -1,0 +1,180 @@
+//! What the stages counted -> the summary of the run. Pure.
+
+use super::replay::Replay;
+use super::session::Topic;
+use crate::model::attitude::Quaternion;
+use crate::record::{Nanos, Verdict};
+use crate::report::summary::{Gaps, RunSummary, TopicSummary, significant};
+use crate::sink::Written;
+use crate::source::mcap::Survey;
+use std::sync::atomic::Ordering;
+
+/// Above this a rate is probably not in rad/s: 200 rad/s is 11,500 deg/s, five times what most gyros
+/// can measure.
+const UNLIKELY_RATE: f64 = 200.0;
+/// Most of a file's problems that are written out.
+const PROBLEMS_SAID: usize = 5;
+
+/// The summary of a run.
+#[must_use]
+pub fn run(
+    run: &Replay,
+    topics: Vec<Topic>,
+    outputs: Vec<(String, Written)>,
+    survey: &Survey,
+) -> RunSummary {
+    RunSummary {
+        source: run.source.name().display().to_string(),
+        topics: topics.iter().map(|topic| of_topic(run, topic)).collect(),
+        outputs: outputs
+            .into_iter()
+            .map(|(name, written)| (name, written.bytes, written.messages))
+            .collect(),
+        file_problems: problems(survey),
+        file_losses: survey.problems.losses(),
+        elapsed_secs: 0.0,
+    }
+}
+
+/// What was wrong with the file, the first few in words.
+#[must_use]
+pub fn problems(survey: &Survey) -> Vec<String> {
+    let found = &survey.problems;
+    let mut said: Vec<String> =
+        found.first().iter().take(PROBLEMS_SAID).map(ToString::to_string).collect();
+    let more = found.total().saturating_sub(said.len() as u64);
+    if more > 0 {
+        said.push(format!("and {more} more of the kind"));
+    }
+    said
+}
+
+fn of_topic(run: &Replay, topic: &Topic) -> TopicSummary {
+    let conditioning = topic.estimator.conditioning();
+    let propagation = topic.estimator.propagation();
+    let (world, body) = topic.resolved.labels(topic.prepared.world);
+    let last = topic.output.last;
+    let q = last.map_or_else(Quaternion::identity, |s| s.q_nb);
+    let angles = q.yaw_pitch_roll();
+    let gaps = &conditioning.gaps;
+    let longest = gaps.kept.iter().find(|g| g.length_nanos == gaps.longest_nanos);
+    let first = conditioning.first.unwrap_or_default();
+    let mut summary = TopicSummary {
+        topic: topic.name.clone(),
+        output_topic: topic.output_topic.clone(),
+        decoded_as: topic.described.clone(),
+        counts: conditioning.counts,
+        first_losses: first_losses(topic, first),
+        written: topic.output.count,
+        duration_secs: conditioning.last.map_or(0.0, |last| last.secs_since(first)),
+        rate_hz: conditioning.spacing_nanos.filter(|n| *n > 0).map(|n| 1e9 / n as f64),
+        clock: topic.prepared.clock.name().to_owned(),
+        kind: topic.resolved.kind,
+        method: topic.estimator.method().to_string(),
+        body,
+        world,
+        initial: topic.prepared.initial_origin.clone(),
+        bias: topic.prepared.bias.into(),
+        bias_origin: topic.prepared.bias_origin.clone(),
+        noise: run.plan.noise.name.clone(),
+        gaps: Gaps {
+            bridged: gaps.count.saturating_sub(gaps.not_bridged),
+            held: propagation.holds,
+            resets: propagation.resets,
+            total_secs: gaps.total_nanos as f64 * 1e-9,
+            longest_secs: gaps.longest_nanos as f64 * 1e-9,
+            longest_at_secs: longest.map_or(0.0, |g| g.start.secs_since(first)),
+        },
+        turned: propagation.angle_turned,
+        largest_step: propagation.largest_step,
+        undersampled: propagation.undersampled,
+        final_wxyz: q.wxyz(),
+        final_ypr: [angles.yaw, angles.pitch, angles.roll],
+        final_sigma: last.map_or([0.0; 3], |s| s.sigma.into()),
+        against: topic.against.as_ref().map(super::against::AgainstRecorded::rows).unwrap_or_default(),
+        warnings: topic.prepared.warnings.clone(),
+    };
+    summary.warnings.extend(topic.warnings.iter().cloned());
+    summary.warnings.extend(warnings(topic, &summary));
+    summary
+}
+
+fn first_losses(topic: &Topic, start: Nanos) -> Vec<String> {
+    let report = topic.estimator.conditioning();
+    let mut said: Vec<String> = Verdict::ALL
+        .iter()
+        .filter(|v| v.is_loss() && **v != Verdict::Undecodable)
+        .filter_map(|v| report.first_bad(*v).map(|bad| (v, bad)))
+        .map(|(verdict, bad)| {
+            let at = bad
+                .stamp
+                .map_or_else(String::new, |s| format!(" at {:.6} s", s.secs_since(start)));
+            format!("first {}: sample {}{at}", verdict.name().replace('_', " "), bad.index)
+        })
+        .collect();
+    if let Some((log, why)) = &topic.first_undecodable {
+        said.push(format!("first undecodable, logged at {} ns: {why}", log.0));
+    }
+    said
+}
+
+fn warnings(topic: &Topic, summary: &TopicSummary) -> Vec<String> {
+    let mut said = Vec::new();
+    if topic.output.largest_rate > UNLIKELY_RATE {
+        said.push(format!(
+            "the largest rate is {} rad/s, more than gyros measure: is it in deg/s? --gyro-unit deg",
+            significant(topic.output.largest_rate, 4)
+        ));
+    }
+    if summary.undersampled > 0 {
+        said.push(format!(
+            "{} steps turn more than half a turn: the samples are too few for the motion, or the unit is wrong (--gyro-unit)",
+            summary.undersampled
+        ));
+    }
+    let marked = topic.noticed.gyro_marked_absent.load(Ordering::Relaxed);
+    if marked > 0 {
+        said.push(format!(
+            "{marked} samples mark their gyro as absent (covariance -1), which some drivers do wrongly: --ignore-covariance-flag uses it all the same"
+        ));
+    }
+    let carried = topic.noticed.stamps_carried.load(Ordering::Relaxed);
+    if carried > 0 {
+        said.push(format!("{carried} stamps had a second or more of nanoseconds, carried over"));
+    }
+    let restamped = summary.counts.get(Verdict::Restamped);
+    if restamped > 0 {
+        said.push(format!(
+            "{restamped} samples shared their stamp with another and were given one of their own between their neighbours"
+        ));
+    }
+    if topic.estimator.conditioning().saturated > 0 {
+        said.push(format!(
+            "{} samples reach the gyro's range (--gyro-range): the true rate was higher",
+            topic.estimator.conditioning().saturated
+        ));
+    }
+    if let Some(against) = &topic.against
+        && summary.against.is_empty()
+    {
+        said.push(match against.references() {
+            0 => "--against-recorded: the log holds no orientation to compare with (name its topic: --against-recorded=TOPIC)".to_owned(),
+            n => format!("--against-recorded: no two of the {n} recorded orientations are 1 s apart"),
+        });
+    }
+    if let Some(advice) = kind_advice(topic, &summary.against) {
+        said.push(advice);
+    }
+    said
+}
+
+/// Which meaning of a sample fits this log, when it is not the one used and clearly better.
+fn kind_advice(topic: &Topic, rows: &[crate::report::summary::Against]) -> Option<String> {
+    const CLEARLY: f64 = 0.95;
+    let used = rows.iter().find(|r| r.kind == topic.resolved.kind.name())?;
+    let best = rows.iter().min_by(|a, b| a.median_deg.total_cmp(&b.median_deg))?;
+    (best.median_deg < CLEARLY * used.median_deg).then(|| match best.kind {
+        "held" => "samples fit best as held over the interval after their stamp: --method dcm-left".to_owned(),
+        kind => format!("samples fit best as {kind}: --sample-kind {kind}"),
+    })
+}

@@ -1,0 +1,161 @@
+//! Channels of a log -> the topics to estimate from. Pure.
+//!
+//! Never mixes two IMUs, never guesses silently: when a choice is made it is said, when it can not
+//! be made the error lists what is there.
+
+use crate::error::{Error, Result};
+use std::path::Path;
+
+/// What the choice needs to know of one channel.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Candidate {
+    /// Topic.
+    pub topic: String,
+    /// Type and encoding, for the listing.
+    pub described: String,
+    /// Messages, where known.
+    pub messages: Option<u64>,
+    /// How likely this is "the IMU": 0 = carries no rate, 1 = could be told to, higher = better.
+    pub rank: u8,
+}
+
+/// A rank from which a topic is picked without being named.
+pub const PICKED_UNNAMED: u8 = 2;
+
+/// The topics to estimate from, and what to say about the choice.
+#[derive(Clone, Debug, PartialEq, Eq, Default)]
+pub struct Choice {
+    /// In order of appearance.
+    pub topics: Vec<String>,
+    /// A note for the user, when something else was there too.
+    pub note: Option<String>,
+}
+
+/// Chooses. `named` is `--topic`.
+///
+/// # Errors
+/// [`Error::NoImuTopic`], [`Error::SeveralImuTopics`], [`Error::NoSuchTopic`].
+pub fn choose(path: &Path, candidates: &[Candidate], named: Option<&str>) -> Result<Choice> {
+    let best = candidates.iter().map(|c| c.rank).max().unwrap_or(0);
+    let imus = |least: u8| {
+        let mut topics: Vec<String> = Vec::new();
+        for c in candidates.iter().filter(|c| c.rank >= least) {
+            if !topics.contains(&c.topic) {
+                topics.push(c.topic.clone());
+            }
+        }
+        topics
+    };
+    match named {
+        Some("all") if best >= PICKED_UNNAMED => Ok(Choice {
+            topics: imus(PICKED_UNNAMED),
+            note: None,
+        }),
+        Some(topic) if topic != "all" => {
+            if candidates.iter().any(|c| c.topic == topic) {
+                return Ok(Choice { topics: vec![topic.to_owned()], note: None });
+            }
+            Err(Error::NoSuchTopic {
+                path: path.to_owned(),
+                topic: topic.to_owned(),
+                topics: listing(candidates),
+            })
+        }
+        _ if best < PICKED_UNNAMED => Err(Error::NoImuTopic {
+            path: path.to_owned(),
+            topics: listing(candidates),
+        }),
+        _ => {
+            let topics = imus(best);
+            if topics.len() > 1 {
+                let these: Vec<Candidate> =
+                    candidates.iter().filter(|c| c.rank == best).cloned().collect();
+                return Err(Error::SeveralImuTopics {
+                    path: path.to_owned(),
+                    topics: listing(&these),
+                });
+            }
+            let others: Vec<String> =
+                imus(PICKED_UNNAMED).into_iter().filter(|t| !topics.contains(t)).collect();
+            let note = (!others.is_empty()).then(|| {
+                format!(
+                    "took {}; {} could be taken too with --topic",
+                    topics.join(", "),
+                    others.join(", ")
+                )
+            });
+            Ok(Choice { topics, note })
+        }
+    }
+}
+
+/// One indented line per channel, at most 40.
+#[must_use]
+pub fn listing(candidates: &[Candidate]) -> String {
+    const MOST: usize = 40;
+    if candidates.is_empty() {
+        return "\n    nothing".to_owned();
+    }
+    let mut out: String = candidates
+        .iter()
+        .take(MOST)
+        .map(|c| {
+            let count = c.messages.map_or_else(String::new, |n| format!("  {n} messages"));
+            format!("\n    {}  {}{count}", c.topic, c.described)
+        })
+        .collect();
+    if candidates.len() > MOST {
+        out.push_str(&format!("\n    ... and {} more", candidates.len() - MOST));
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn candidate(topic: &str, rank: u8) -> Candidate {
+        Candidate { topic: topic.into(), described: "t [e]".into(), messages: Some(3), rank }
+    }
+
+    fn chosen(candidates: &[Candidate], named: Option<&str>) -> Result<Choice> {
+        choose(Path::new("a.mcap"), candidates, named)
+    }
+
+    #[test]
+    fn the_only_imu_needs_no_name_and_an_odometry_is_never_picked_unnamed() {
+        let all = [candidate("/odom", 1), candidate("/imu", 5), candidate("/mag", 0)];
+        assert_eq!(chosen(&all, None).unwrap().topics, ["/imu"]);
+        assert!(matches!(chosen(&all[..1], None), Err(Error::NoImuTopic { .. })));
+        assert_eq!(chosen(&all, Some("/odom")).unwrap().topics, ["/odom"]);
+    }
+
+    #[test]
+    fn two_imus_are_refused_without_a_name_and_listed() {
+        let all = [candidate("/a", 5), candidate("/b", 5)];
+        let error = chosen(&all, None).unwrap_err().to_string();
+        assert!(error.contains("/a") && error.contains("/b") && error.contains("--topic"), "{error}");
+        assert_eq!(chosen(&all, Some("all")).unwrap().topics, ["/a", "/b"]);
+    }
+
+    #[test]
+    fn a_better_ranked_topic_is_taken_and_the_other_is_said() {
+        let all = [candidate("/vehicle_imu", 3), candidate("/sensor_combined", 4)];
+        let choice = chosen(&all, None).unwrap();
+        assert_eq!(choice.topics, ["/sensor_combined"]);
+        assert!(choice.note.unwrap().contains("/vehicle_imu"));
+    }
+
+    #[test]
+    fn two_channels_of_one_topic_are_one_topic() {
+        let all = [candidate("/imu", 5), candidate("/imu", 5)];
+        assert_eq!(chosen(&all, None).unwrap().topics, ["/imu"]);
+    }
+
+    #[test]
+    fn a_wrong_name_lists_what_is_there() {
+        let error = chosen(&[candidate("/imu", 5)], Some("/nope")).unwrap_err().to_string();
+        assert!(error.contains("/nope") && error.contains("/imu"), "{error}");
+    }
+}

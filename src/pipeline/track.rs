@@ -1,0 +1,274 @@
+//! Attitude files -> a track of attitudes over time, for `compare`. I/O.
+//!
+//! NDJSON and CSV are our own outputs; MCAP goes through the same walk and decoders as a replay.
+
+use super::log::{Known, Log, rank};
+use super::pool::Pool;
+use super::preparation::orientation_convention;
+use super::route::{Item, Route};
+use super::summarise::problems;
+use super::topics;
+use crate::decode::{Options, Role};
+use crate::error::{Error, Result};
+use crate::model::attitude::Quaternion;
+use crate::model::frames::{Body, Convention, Nav};
+use crate::record::Nanos;
+use crate::source::mcap::{self, WalkOptions};
+use serde::Deserialize;
+use std::fs::File;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+
+/// One attitude as found: `[w, x, y, z]`, unchecked.
+pub type Entry = (Nanos, [f64; 4]);
+
+/// A track of attitudes.
+#[derive(Clone, Debug, Default)]
+pub struct Track {
+    /// File and topic, for people.
+    pub name: String,
+    /// In file order; ENU (or start) and FLU.
+    pub entries: Vec<Entry>,
+    /// What was wrong with the file.
+    pub problems: Vec<String>,
+}
+
+/// Reads a track by the file's extension: `.ndjson`, `.jsonl`, `.csv`, else MCAP.
+///
+/// # Errors
+/// The file can not be read, or holds no attitude, or several and none named.
+pub fn read(path: &Path, topic: Option<&str>, pool: &Pool) -> Result<Track> {
+    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    let plain = |entries| Track {
+        name: path.display().to_string(),
+        entries,
+        problems: Vec::new(),
+    };
+    match extension.as_deref() {
+        Some("ndjson" | "jsonl") => from_ndjson(path, topic).map(plain),
+        Some("csv") => from_csv(path).map(plain),
+        _ => from_mcap(path, topic, pool),
+    }
+}
+
+fn from_mcap(path: &Path, topic: Option<&str>, pool: &Pool) -> Result<Track> {
+    let log = Log::open(path, pool)?;
+    let known = attitude_channel(path, &log, topic)?;
+    let decoder = known
+        .decoder(&Options::default())
+        .map_err(|why| Error::Unsupported { path: path.to_owned(), what: why.to_string() })?;
+    let convention = orientation_convention(decoder.stated());
+    let mut entries = Vec::new();
+    let wanted = known.channel.clone();
+    let reader = log.reader().map_or_else(|| mcap::Reader::open(path), Ok)?;
+    let report = mcap::walk(
+        reader,
+        &WalkOptions { pool: Some(pool.rayon()), ..WalkOptions::default() },
+        |channel| {
+            (channel.topic == wanted.topic && channel.id == wanted.id).then(|| Route {
+                decoder: Some(decoder.clone()),
+                stream: 0,
+                is_reference: true,
+                copied: None,
+                noticed: std::sync::Arc::default(),
+            })
+        },
+        Route::map,
+        |items| {
+            entries.extend(items.drain(..).filter_map(|item| match item {
+                Item::Reference(raw) => {
+                    let stamp = raw.header.filter(|s| s.0 != 0).unwrap_or(raw.log);
+                    raw.orientation.map(|wxyz| (stamp, in_flu(convention, wxyz)))
+                }
+                _ => None,
+            }));
+            std::ops::ControlFlow::Continue(())
+        },
+    )?;
+    Ok(Track {
+        name: format!("{} {}", path.display(), known.channel.topic),
+        entries,
+        problems: problems(&report.survey),
+    })
+}
+
+/// What is no rotation stays what it is, to be counted by the comparison.
+fn in_flu(recorded: Convention, wxyz: [f64; 4]) -> [f64; 4] {
+    Quaternion::<Nav, Body>::try_from_wxyz(wxyz)
+        .map_or(wxyz, |q| recorded.convert(Convention::EnuFlu, q).wxyz())
+}
+
+/// The channel to take attitudes from: the one named, else the best kind of which there is just one.
+fn attitude_channel<'l>(path: &Path, log: &'l Log, topic: Option<&str>) -> Result<&'l Known> {
+    if let Some(name) = topic {
+        return log.channels.iter().find(|k| k.channel.topic == name).ok_or_else(|| {
+            Error::NoSuchTopic {
+                path: path.to_owned(),
+                topic: name.to_owned(),
+                topics: topics::listing(&log.candidates()),
+            }
+        });
+    }
+    let mut all: Vec<(u8, &Known)> = log
+        .channels
+        .iter()
+        .filter(|k| k.role.has_orientation && carries_orientation(k))
+        .map(|k| (goodness(&k.role, &k.channel.topic), k))
+        .collect();
+    all.sort_by_key(|(goodness, _)| std::cmp::Reverse(*goodness));
+    match all.as_slice() {
+        [] => Err(Error::Unsupported {
+            path: path.to_owned(),
+            what: format!(
+                "holds no attitude; it holds:{}",
+                topics::listing(&log.candidates())
+            ),
+        }),
+        [(best, known), rest @ ..] if rest.first().is_none_or(|(next, _)| next < best) => Ok(known),
+        several => {
+            let list: Vec<_> = several.iter().map(|(_, k)| k.candidate()).collect();
+            Err(Error::Unsupported {
+                path: path.to_owned(),
+                what: format!(
+                    "several topics carry an attitude:{}\n  help: --topic NAME (or --ref-topic NAME) takes one",
+                    topics::listing(&list)
+                ),
+            })
+        }
+    }
+}
+
+/// An orientation of its own topic before one in an Imu, before poses of other things and `/tf`.
+fn goodness(role: &Role, topic: &str) -> u8 {
+    match rank(role) {
+        _ if topic.trim_start_matches('/') == "tf" || topic.ends_with("tf_static") => 0,
+        0 => 3,
+        1 => 1,
+        _ => 2,
+    }
+}
+
+/// Whether the first message really has one: an Imu may mark it as absent. A track whose first rows
+/// are NaN still counts.
+fn carries_orientation(known: &Known) -> bool {
+    let (Some((log, payload)), Ok(decoder)) = (&known.first, known.decoder(&Options::default()))
+    else {
+        return false;
+    };
+    let mut samples = Vec::new();
+    decoder.decode(payload, *log, *log, &mut samples).is_ok()
+        && (samples.iter().any(|s| s.orientation.is_some()) || rank(&known.role) == 0)
+}
+
+/// The longest line read from an NDJSON file.
+const LINE_LIMIT: u64 = 64 * 1024;
+
+#[derive(Deserialize)]
+struct Stamp {
+    sec: i64,
+    nsec: u32,
+}
+
+#[derive(Deserialize)]
+struct Q {
+    w: f64,
+    x: f64,
+    y: f64,
+    z: f64,
+}
+
+#[derive(Deserialize)]
+struct Att {
+    class: String,
+    #[serde(default)]
+    id: String,
+    stamp: Option<Stamp>,
+    q: Option<Q>,
+}
+
+/// Reads the `ATT` lines of an NDJSON file; `id` picks one of several streams.
+///
+/// # Errors
+/// The file can not be read, a line is not JSON or is too long, or several ids and none named.
+pub fn from_ndjson(path: &Path, id: Option<&str>) -> Result<Vec<Entry>> {
+    let file = open(path)?;
+    let mut reader = BufReader::new(file);
+    let mut track = Vec::new();
+    let mut seen: Option<String> = None;
+    let mut line = Vec::new();
+    let mut number = 0u64;
+    loop {
+        line.clear();
+        number += 1;
+        let read = std::io::Read::take(&mut reader, LINE_LIMIT)
+            .read_until(b'\n', &mut line)
+            .map_err(|source| Error::Read { path: path.to_owned(), offset: number, source })?;
+        if read == 0 {
+            return Ok(track);
+        }
+        if line.iter().all(u8::is_ascii_whitespace) {
+            continue;
+        }
+        if read as u64 == LINE_LIMIT {
+            return Err(bad_line(path, number, "longer than 64 KiB"));
+        }
+        let att: Att = serde_json::from_slice(&line)
+            .map_err(|e| bad_line(path, number, &e.to_string()))?;
+        if att.class != "ATT" || id.is_some_and(|id| id != att.id) {
+            continue;
+        }
+        match &seen {
+            Some(first) if *first != att.id => {
+                return Err(bad_line(
+                    path,
+                    number,
+                    &format!("attitudes of both `{first}` and `{}`; --topic ID takes one", att.id),
+                ));
+            }
+            Some(_) => {}
+            None => seen = Some(att.id.clone()),
+        }
+        if let (Some(stamp), Some(q)) = (att.stamp, att.q) {
+            track.push((Nanos::from_sec_nanosec(stamp.sec, stamp.nsec), [q.w, q.x, q.y, q.z]));
+        }
+    }
+}
+
+#[derive(Deserialize)]
+struct Row {
+    stamp_ns: i64,
+    w: f64,
+    x: f64,
+    y: f64,
+    z: f64,
+}
+
+/// Reads a CSV file with at least the columns `stamp_ns,w,x,y,z`.
+///
+/// # Errors
+/// The file can not be read, a column is missing, or a cell is not a number.
+pub fn from_csv(path: &Path) -> Result<Vec<Entry>> {
+    csv::Reader::from_reader(BufReader::new(open(path)?))
+        .deserialize::<Row>()
+        .map(|row| {
+            row.map(|r| (Nanos(r.stamp_ns), [r.w, r.x, r.y, r.z])).map_err(|e| Error::Unsupported {
+                path: path.to_owned(),
+                what: format!("{e}\n  help: columns stamp_ns,w,x,y,z are needed"),
+            })
+        })
+        .collect()
+}
+
+fn open(path: &Path) -> Result<File> {
+    if path.is_dir() {
+        return Err(Error::IsDirectory { path: path.to_owned() });
+    }
+    File::open(path).map_err(|source| Error::Open { path: path.to_owned(), source })
+}
+
+fn bad_line(path: &Path, number: u64, what: &str) -> Error {
+    Error::Unsupported {
+        path: path.to_owned(),
+        what: format!("line {number}: {what}"),
+    }
+}

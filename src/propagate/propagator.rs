@@ -1,0 +1,611 @@
+//! The stream: runs, breaks, outputs in order. Pure.
+
+use super::accumulate::Accumulator;
+use super::classical;
+use super::executor::Executor;
+use super::lanes::Triple;
+use super::method::{LARGEST_WINDOW, Method, Order, Placement};
+use super::report::Report;
+use super::sigma::{Noise, Sigma};
+use super::track::{Track, secs};
+use super::turn::Turn;
+use super::window::{Note, Plan, Step};
+use crate::model::attitude::Quaternion;
+use crate::model::frames::{Body, Nav};
+use crate::record::{AttitudeSample, Join, Nanos, RateSample, SampleKind, Status};
+use nalgebra::Vector3;
+use std::collections::VecDeque;
+use std::fmt;
+
+/// Intervals one call of the executor's function integrates.
+const SEGMENT: usize = 1024;
+/// Samples taken in before outputs are made: bounds memory, whatever is pushed at once.
+const BLOCK: usize = 32 * SEGMENT;
+/// Fastest rate, and largest increment, that is believed: those of [`crate::record::Verdict::Huge`].
+const FASTEST: f64 = 1e4;
+const LARGEST: f64 = 1e3;
+
+/// What a propagator is to do.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    /// How samples become turns.
+    pub method: Method,
+    /// What the samples mean.
+    pub kind: SampleKind,
+    /// Attitude at the first sample, and after a reset.
+    pub initial: Quaternion<Nav, Body>,
+    /// For the uncertainty that goes with every attitude; zeros for none.
+    pub noise: Noise,
+}
+
+/// Settings that can not be.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[non_exhaustive]
+pub enum SettingsError {
+    /// The window is not in `smallest ..= largest` samples.
+    Window {
+        /// What was asked for.
+        given: usize,
+        /// What there is: two rates, one increment.
+        smallest: usize,
+        /// [`LARGEST_WINDOW`].
+        largest: usize,
+    },
+    /// The initial attitude is no rotation.
+    Initial {
+        /// Its `[w, x, y, z]`.
+        wxyz: [f64; 4],
+    },
+    /// A noise figure is negative, not finite, or absurd.
+    Noise {
+        /// Which.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+    },
+}
+
+impl fmt::Display for SettingsError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            SettingsError::Window {
+                given,
+                smallest,
+                largest,
+            } => write!(
+                f,
+                "a window of {given} samples can not be used\n  help: --window takes {smallest} to {largest}"
+            ),
+            SettingsError::Initial { wxyz } => write!(
+                f,
+                "the initial attitude {wxyz:?} (w, x, y, z) is not a unit quaternion\n  help: --init q=w,x,y,z with norm 1"
+            ),
+            SettingsError::Noise { name, value } => write!(
+                f,
+                "noise {name} = {value} can not be\n  help: --noise takes numbers from 0 up, in SI units"
+            ),
+        }
+    }
+}
+
+impl std::error::Error for SettingsError {}
+
+/// Integrates a stream of samples to attitude. See the [module](crate::propagate).
+///
+/// # Example
+/// ```
+/// use strapd::model::attitude::Quaternion;
+/// use strapd::propagate::{Method, Noise, Propagator, Sequential, Settings};
+/// use strapd::record::{Join, Nanos, RateSample, SampleKind, Status};
+///
+/// let mut propagator = Propagator::new(Settings {
+///     method: Method::Auto,
+///     kind: SampleKind::Rate,
+///     initial: Quaternion::identity(),
+///     noise: Noise::default(),
+/// })?;
+/// // A quarter turn about z in one second.
+/// let samples: Vec<RateSample> = (0..=100)
+///     .map(|i| RateSample {
+///         stamp: Nanos(i * 10_000_000),
+///         start: Nanos(i * 10_000_000),
+///         value: [0.0, 0.0, std::f64::consts::FRAC_PI_2].into(),
+///         accel: None,
+///         join: if i == 0 { Join::Start } else { Join::Continuous },
+///         status: Status::OK,
+///         log: Nanos(i * 10_000_000),
+///     })
+///     .collect();
+/// let mut attitudes = Vec::new();
+/// propagator.push(&samples, &Sequential, &mut attitudes);
+/// propagator.finish(&Sequential, &mut attitudes);
+/// assert_eq!(attitudes.len(), 101);
+/// let [w, x, y, z] = attitudes[100].q_nb.wxyz();
+/// let half = std::f64::consts::FRAC_1_SQRT_2;
+/// assert!((w - half).abs() < 1e-15 && (z - half).abs() < 1e-15 && x == 0.0 && y == 0.0);
+/// # Ok::<(), strapd::propagate::SettingsError>(())
+/// ```
+#[derive(Debug)]
+pub struct Propagator {
+    method: Method,
+    engine: Engine,
+    initial: [f64; 4],
+    track: Track,
+    /// Samples not yet output. Those that turn nothing come out with the attitude before them.
+    queue: VecDeque<Waiting>,
+    /// Element whose interval is integrated next.
+    next: usize,
+    state: State,
+    started: bool,
+    last_rate: [f64; 3],
+    last_stamp: i64,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Waiting {
+    sample: RateSample,
+    turns: bool,
+}
+
+/// How steps are computed.
+#[derive(Debug)]
+enum Engine {
+    Sliding(Box<Plan>),
+    Commit { plan: Box<Plan>, finals: bool },
+    Classical(Method),
+}
+
+/// What the outputs are made of.
+#[derive(Debug)]
+struct State {
+    attitude: Accumulator,
+    /// Sum of rotation vectors, for the method that wants it.
+    sum: Option<Triple<1>>,
+    sigma: Sigma,
+    /// Bits of the output being made that the propagator adds.
+    added: Status,
+    report: Report,
+    reset_count: u32,
+    rate: Vector3<f64>,
+    integrated_nanos: i64,
+}
+
+impl Propagator {
+    /// Ready for the first sample.
+    ///
+    /// # Errors
+    /// A window out of range, an initial attitude that is no rotation, impossible noise.
+    pub fn new(settings: Settings) -> Result<Self, SettingsError> {
+        let increments = settings.kind != SampleKind::Rate;
+        let wxyz = settings.initial.wxyz();
+        let norm = wxyz.iter().map(|c| c * c).sum::<f64>().sqrt();
+        if !((norm - 1.0).abs() < 1e-6) {
+            return Err(SettingsError::Initial { wxyz });
+        }
+        if let Some((name, value)) = settings.noise.fault() {
+            return Err(SettingsError::Noise { name, value });
+        }
+        let initial = wxyz.map(|c| c / norm);
+        let engine = match settings.method {
+            Method::Auto => {
+                let window = if increments { 15 } else { 16 };
+                let plan = plan(window, Order::Exact, Placement::Centred, increments)?;
+                Engine::Sliding(plan)
+            }
+            Method::Magnus {
+                window,
+                order,
+                placement,
+            } => Engine::Sliding(plan(window, order, placement, increments)?),
+            Method::CommitProvisional {
+                window,
+                order,
+                finals,
+            } => Engine::Commit {
+                plan: plan(window, order, Placement::Centred, increments)?,
+                finals,
+            },
+            classical => Engine::Classical(classical),
+        };
+        let sum = (settings.method == Method::RotvecSum).then(|| rotation_vector(initial));
+        Ok(Propagator {
+            method: settings.method,
+            engine,
+            initial,
+            track: Track::new(increments),
+            queue: VecDeque::new(),
+            next: 1,
+            state: State {
+                attitude: Accumulator::new(initial),
+                sum,
+                sigma: Sigma::new(settings.noise),
+                added: Status::OK,
+                report: Report::default(),
+                reset_count: 0,
+                rate: Vector3::zeros(),
+                integrated_nanos: 0,
+            },
+            started: false,
+            last_rate: [0.0; 3],
+            last_stamp: 0,
+        })
+    }
+
+    /// Takes samples in and appends the attitudes that are ready: all but the last few, which wait
+    /// for the method's look-ahead.
+    pub fn push(
+        &mut self,
+        samples: &[RateSample],
+        exec: &impl Executor,
+        out: &mut Vec<AttitudeSample>,
+    ) {
+        for block in samples.chunks(BLOCK) {
+            for sample in block {
+                let breaks = !self.started
+                    || matches!(sample.join, Join::Start | Join::Hold | Join::Reset);
+                if breaks {
+                    self.advance(true, exec, out);
+                    self.begin(sample, out);
+                } else {
+                    self.admit(sample);
+                }
+                if matches!(self.engine, Engine::Commit { .. }) {
+                    self.advance_live(out);
+                }
+            }
+            self.advance(false, exec, out);
+            self.forget();
+        }
+    }
+
+    /// The stream has ended: appends the attitudes still waiting. More samples may follow; unless they
+    /// say otherwise, the attitude is held between.
+    pub fn finish(&mut self, exec: &impl Executor, out: &mut Vec<AttitudeSample>) {
+        self.advance(true, exec, out);
+        self.started = false;
+    }
+
+    /// What has happened so far.
+    #[must_use]
+    pub fn report(&self) -> Report {
+        Report {
+            integrated_secs: secs(self.state.integrated_nanos),
+            ..self.state.report
+        }
+    }
+
+    /// The method, with its window and order.
+    #[must_use]
+    pub fn method(&self) -> Method {
+        self.method
+    }
+
+    /// Samples the outputs lag behind the input.
+    #[must_use]
+    pub fn latency(&self) -> usize {
+        match &self.engine {
+            Engine::Sliding(plan) => plan.look_ahead,
+            Engine::Commit { .. } | Engine::Classical(_) => 0,
+        }
+    }
+
+    /// First sample of a run.
+    fn begin(&mut self, sample: &RateSample, out: &mut Vec<AttitudeSample>) {
+        self.track.clear();
+        self.next = 1;
+        let sample = self.trusted(sample);
+        let first = self.state.report.samples == 0;
+        if sample.join == Join::Reset {
+            self.state.reset(self.initial);
+        }
+        if !first {
+            self.state.reset_count = self.state.reset_count.saturating_add(1);
+            let status = if sample.join == Join::Reset {
+                self.state.report.resets += 1;
+                Status::RESET
+            } else {
+                self.state.report.holds += 1;
+                let gap = secs(sample.stamp.0.saturating_sub(self.last_stamp));
+                let [x, y, z] = self.last_rate;
+                self.state.sigma.hold(Vector3::new(x, y, z).norm(), gap);
+                Status::HELD
+            };
+            self.state.added = self.state.added.with(status);
+        }
+        self.started = true;
+        self.append(&sample);
+        let rate = self.track.rate(0);
+        self.state.output_at(&sample, Some(rate), out);
+    }
+
+    /// Any later sample of a run.
+    fn admit(&mut self, sample: &RateSample) {
+        let sample = self.trusted(sample);
+        let turns = sample.stamp.0 > self.last_stamp;
+        if turns {
+            self.append(&sample);
+        } else {
+            self.state.report.stalled += 1;
+        }
+        self.queue.push_back(Waiting { sample, turns });
+    }
+
+    fn append(&mut self, sample: &RateSample) {
+        let value = [sample.value.x, sample.value.y, sample.value.z];
+        let bridged = sample.join == Join::Bridge;
+        self.track.push(sample.stamp.0, sample.start.0, value, bridged);
+        let rate = self.track.rate(self.track.len() - 1);
+        self.last_rate = [rate.x.0[0], rate.y.0[0], rate.z.0[0]];
+        self.last_stamp = sample.stamp.0;
+    }
+
+    /// The sample, with a value that can be calculated with: one that is not finite, or that no gyro
+    /// delivers, becomes the rate before, and says so.
+    fn trusted(&mut self, sample: &RateSample) -> RateSample {
+        let limit = if self.track.increments { LARGEST } else { FASTEST };
+        if sample.value.iter().all(|v| v.abs() <= limit) {
+            return *sample;
+        }
+        self.state.report.rejected += 1;
+        let mut sample = *sample;
+        sample.status = sample.status.with(Status::REJECTED_BEFORE);
+        let [x, y, z] = self.last_rate;
+        let factor = if self.track.increments {
+            secs(sample.stamp.since(sample.start).max(0))
+        } else {
+            1.0
+        };
+        sample.value = Vector3::new(x, y, z) * factor;
+        if !sample.value.iter().all(|v| v.abs() <= limit) {
+            sample.value = Vector3::zeros();
+        }
+        sample
+    }
+
+    /// Integrates every interval whose window is known: to the end of the run if it has `ended`.
+    fn advance(&mut self, ended: bool, exec: &impl Executor, out: &mut Vec<AttitudeSample>) {
+        let known = self.known(ended);
+        match &self.engine {
+            Engine::Sliding(plan) => {
+                let (track, first) = (&self.track, self.next);
+                let count = known.saturating_sub(first);
+                let segments = exec.map(count.div_ceil(SEGMENT), |i| {
+                    let from = first + i * SEGMENT;
+                    plan.steps(track, from, (from + SEGMENT).min(known) - 1)
+                });
+                out.reserve(count);
+                for step in segments.iter().flatten() {
+                    self.next += 1;
+                    self.state.step(step, &self.track, self.next - 1);
+                    self.state.emit(&mut self.queue, &self.track, self.next - 1, out);
+                }
+            }
+            Engine::Classical(method) => {
+                for k in self.next..known {
+                    let step = classical::step(*method, &self.track, k);
+                    self.next += 1;
+                    self.state.step(&step, &self.track, k);
+                    self.state.emit(&mut self.queue, &self.track, k, out);
+                }
+            }
+            Engine::Commit { .. } => {
+                if ended {
+                    self.commit(known, out);
+                }
+            }
+        }
+        self.state.flush_stalled(&mut self.queue, out);
+    }
+
+    /// End of the intervals that can be integrated for good.
+    fn known(&self, ended: bool) -> usize {
+        let plan = match &self.engine {
+            Engine::Sliding(plan) | Engine::Commit { plan, .. } => plan,
+            Engine::Classical(_) => return self.track.len(),
+        };
+        if ended {
+            return self.track.len();
+        }
+        // A centred window at the start of a run is one-sided: its samples must all have come.
+        let starting = self.track.base == 0 && plan.look_ahead > 0;
+        if starting && self.track.len() < plan.window + self.track.first() {
+            return 0;
+        }
+        self.track.len().saturating_sub(plan.look_ahead)
+    }
+
+    /// Drops elements no window needs any more, now and then.
+    fn forget(&mut self) {
+        let needed = self.next.saturating_sub(LARGEST_WINDOW + classical::LOOK_BACK + 8);
+        if needed >= 2 * SEGMENT {
+            self.track.drop_front(needed);
+            self.next -= needed;
+        }
+    }
+
+    /// Commit/provisional: after each sample, commits what has its look-ahead and outputs the newest
+    /// attitude with provisional steps on top (attitude.md 4.3).
+    fn advance_live(&mut self, out: &mut Vec<AttitudeSample>) {
+        let known = self.known(false);
+        self.commit(known, out);
+        let Engine::Commit { plan, .. } = &self.engine else {
+            return;
+        };
+        while let Some(Waiting { sample, turns }) = self.queue.pop_front() {
+            let newest = self.track.len() - 1;
+            let rate = if turns { Some(self.track.rate(newest)) } else { None };
+            let mut ahead = self.state.attitude;
+            let mut sigma = self.state.sigma;
+            if newest >= self.next {
+                let steps = plan.steps(&self.track, self.next, newest);
+                for (i, step) in steps.iter().enumerate() {
+                    ahead.turn(step.turn);
+                    sigma.integrate(self.track.spacing(self.next + i));
+                    sigma.bridge(step.gap_variance, step.gap_noise);
+                }
+                if let (true, Some(step)) = (turns, steps.last()) {
+                    self.state.added = self.state.added.with(step.status());
+                }
+            }
+            let committed = (self.state.attitude, self.state.sigma);
+            (self.state.attitude, self.state.sigma) = (ahead, sigma);
+            if newest >= self.next {
+                self.state.added = self.state.added.with(Status::PROVISIONAL);
+            }
+            self.state.output_at(&sample, rate, out);
+            (self.state.attitude, self.state.sigma) = committed;
+        }
+    }
+
+    fn commit(&mut self, known: usize, out: &mut Vec<AttitudeSample>) {
+        let Engine::Commit { plan, finals } = &self.engine else {
+            return;
+        };
+        if known <= self.next {
+            return;
+        }
+        for step in plan.steps(&self.track, self.next, known - 1) {
+            let k = self.next;
+            self.next += 1;
+            self.state.step(&step, &self.track, k);
+            if *finals {
+                let stamp = Nanos(self.track.stamp[k]);
+                let sample = RateSample {
+                    stamp,
+                    start: stamp,
+                    value: Vector3::zeros(),
+                    accel: None,
+                    join: Join::Continuous,
+                    status: Status::OK,
+                    log: stamp,
+                };
+                self.state.output_at(&sample, Some(self.track.rate(k)), out);
+                self.state.report.samples -= 1;
+            } else {
+                self.state.added = Status::OK;
+            }
+        }
+    }
+}
+
+impl State {
+    fn reset(&mut self, initial: [f64; 4]) {
+        self.attitude.restart(initial);
+        self.sigma.reset();
+        if let Some(sum) = &mut self.sum {
+            *sum = rotation_vector(initial);
+        }
+    }
+
+    /// Turns on over interval k.
+    #[inline(always)]
+    fn step(&mut self, step: &Step, track: &Track, k: usize) {
+        match &mut self.sum {
+            None => self.attitude.turn(step.turn),
+            Some(sum) => {
+                let [_, x, y, z] = step.turn;
+                *sum = *sum + Triple::new(x, y, z);
+                let turn = Turn::exp(*sum);
+                let [c, x, y, z] = turn.parts();
+                self.attitude = Accumulator::new([1.0 + c, x, y, z]);
+            }
+        }
+        let spacing = track.spacing(k);
+        self.sigma.integrate(spacing);
+        self.integrated_nanos = self.integrated_nanos.saturating_add(spacing);
+        self.report.angle_turned += step.angle;
+        self.report.largest_step = self.report.largest_step.max(step.angle);
+        self.added = self.added.with(step.status());
+        if step.angle > std::f64::consts::PI {
+            self.report.undersampled += 1;
+        }
+        match step.note {
+            Note::Ordinary => {}
+            Note::Reduced => self.report.reduced += 1,
+            Note::Bridged => {
+                self.report.bridged += 1;
+                self.sigma.bridge(step.gap_variance, step.gap_noise);
+            }
+            Note::Refused => self.report.refused += 1,
+        }
+    }
+
+    /// Outputs the sample that ends interval k, and those after it that turned nothing.
+    #[inline(always)]
+    fn emit(
+        &mut self,
+        queue: &mut VecDeque<Waiting>,
+        track: &Track,
+        k: usize,
+        out: &mut Vec<AttitudeSample>,
+    ) {
+        if let Some(Waiting { sample, .. }) = queue.pop_front() {
+            self.output_at(&sample, Some(track.rate(k)), out);
+        }
+        self.flush_stalled(queue, out);
+    }
+
+    /// Outputs samples that turned nothing, up to the next that will.
+    #[inline(always)]
+    fn flush_stalled(&mut self, queue: &mut VecDeque<Waiting>, out: &mut Vec<AttitudeSample>) {
+        while let Some(&Waiting {
+            sample,
+            turns: false,
+        }) = queue.front()
+        {
+            queue.pop_front();
+            self.output_at(&sample, None, out);
+        }
+    }
+
+    #[inline(always)]
+    fn output_at(
+        &mut self,
+        sample: &RateSample,
+        rate: Option<Triple<1>>,
+        out: &mut Vec<AttitudeSample>,
+    ) {
+        if let Some(rate) = rate {
+            self.rate = Vector3::new(rate.x.0[0], rate.y.0[0], rate.z.0[0]);
+        }
+        let sigma = self.sigma.value();
+        out.push(AttitudeSample {
+            stamp: sample.stamp,
+            q_nb: Quaternion::assume_unit(self.attitude.attitude()),
+            rate: self.rate,
+            accel: sample.accel,
+            sigma: Vector3::new(sigma, sigma, sigma),
+            status: sample.status.with(self.added),
+            reset_count: self.reset_count,
+            log: sample.log,
+        });
+        self.added = Status::OK;
+        self.report.samples += 1;
+    }
+}
+
+fn plan(
+    window: usize,
+    order: Order,
+    placement: Placement,
+    increments: bool,
+) -> Result<Box<Plan>, SettingsError> {
+    let smallest = if increments { 1 } else { 2 };
+    if !(smallest..=LARGEST_WINDOW).contains(&window) {
+        return Err(SettingsError::Window {
+            given: window,
+            smallest,
+            largest: LARGEST_WINDOW,
+        });
+    }
+    Ok(Box::new(Plan::new(window, order, placement, increments)))
+}
+
+/// log of a unit quaternion: the rotation vector of at most half a turn.
+fn rotation_vector([w, x, y, z]: [f64; 4]) -> Triple<1> {
+    let sign = if w < 0.0 { -1.0 } else { 1.0 };
+    let v = Triple::new(x * sign, y * sign, z * sign);
+    let s = v.norm();
+    let half = s.atan2(w * sign);
+    v * if s > 0.0 { 2.0 * half / s } else { 2.0 }
+}

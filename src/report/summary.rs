@@ -1,0 +1,449 @@
+//! Summary of a replay -> text or JSON. Pure.
+//!
+//! Built by the pipeline, which knows the numbers; the words are here, in one place.
+
+use crate::record::{Counts, SampleKind, Verdict};
+use serde_json::{Value, json};
+use std::fmt::Write as _;
+
+/// What one topic of one log became.
+#[derive(Clone, Debug, Default)]
+pub struct TopicSummary {
+    /// Topic of the samples.
+    pub topic: String,
+    /// Topic of the attitude.
+    pub output_topic: String,
+    /// Message type and encoding, as found.
+    pub decoded_as: String,
+    /// What became of every sample.
+    pub counts: Counts,
+    /// The first sample of each verdict that is a loss, explained.
+    pub first_losses: Vec<String>,
+    /// Attitudes written.
+    pub written: u64,
+    /// First to last stamp, s.
+    pub duration_secs: f64,
+    /// Median sample rate, Hz.
+    pub rate_hz: Option<f64>,
+    /// The clock the samples were placed on.
+    pub clock: String,
+    /// What a sample was taken to mean.
+    pub kind: SampleKind,
+    /// The integrator in words.
+    pub method: String,
+    /// Axes of the body.
+    pub body: String,
+    /// World of the attitude.
+    pub world: String,
+    /// Where the initial attitude came from.
+    pub initial: String,
+    /// Bias removed, rad/s, body axes.
+    pub bias: [f64; 3],
+    /// Where the bias came from, with its sigma where it was estimated.
+    pub bias_origin: String,
+    /// Noise behind sigma.
+    pub noise: String,
+    /// Gaps.
+    pub gaps: Gaps,
+    /// Sum of the angles of all steps, rad.
+    pub turned: f64,
+    /// Largest angle of one step, rad.
+    pub largest_step: f64,
+    /// Steps of more than half a turn.
+    pub undersampled: u64,
+    /// Last attitude `[w, x, y, z]`.
+    pub final_wxyz: [f64; 4],
+    /// Its yaw, pitch, roll, rad.
+    pub final_ypr: [f64; 3],
+    /// One standard deviation about each body axis at the end, rad.
+    pub final_sigma: [f64; 3],
+    /// Against the recorded orientation, one row per sample kind.
+    pub against: Vec<Against>,
+    /// Things to know, each with the flag that helps.
+    pub warnings: Vec<String>,
+}
+
+/// Gaps and jumps.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Gaps {
+    /// Bridged by interpolation.
+    pub bridged: u64,
+    /// Attitude held over.
+    pub held: u64,
+    /// Attitude reset at.
+    pub resets: u64,
+    /// Seconds missing in all.
+    pub total_secs: f64,
+    /// The longest, s.
+    pub longest_secs: f64,
+    /// Where the longest begins, seconds after the first sample.
+    pub longest_at_secs: f64,
+}
+
+/// Error against a recorded orientation for one meaning of a sample.
+#[derive(Clone, Debug)]
+pub struct Against {
+    /// `rate`, `average` or `held`.
+    pub kind: &'static str,
+    /// What that means.
+    pub meaning: &'static str,
+    /// Median of the error of the rotation over 1 s, deg.
+    pub median_deg: f64,
+    /// 95th percentile of it, deg.
+    pub p95_deg: f64,
+    /// Pairs compared.
+    pub pairs: usize,
+}
+
+/// What one log became.
+#[derive(Clone, Debug, Default)]
+pub struct RunSummary {
+    /// The log.
+    pub source: String,
+    /// One per topic.
+    pub topics: Vec<TopicSummary>,
+    /// Outputs: name, bytes, messages.
+    pub outputs: Vec<(String, u64, u64)>,
+    /// What was wrong with the file itself.
+    pub file_problems: Vec<String>,
+    /// How many of them lost data.
+    pub file_losses: u64,
+    /// Wall seconds.
+    pub elapsed_secs: f64,
+}
+
+impl RunSummary {
+    /// Whether anything was lost: exit code 3.
+    #[must_use]
+    pub fn is_lossy(&self) -> bool {
+        self.file_losses > 0
+            || self
+                .topics
+                .iter()
+                .any(|t| t.counts.lost() > 0 || t.gaps.held + t.gaps.resets > 0)
+    }
+
+    /// Samples seen on all topics.
+    #[must_use]
+    pub fn samples(&self) -> u64 {
+        self.topics.iter().map(|t| t.counts.total()).sum()
+    }
+
+    /// For people.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let mut out = String::new();
+        for topic in &self.topics {
+            topic.write_text(&self.source, &mut out);
+        }
+        for problem in &self.file_problems {
+            line(&mut out, "file", problem);
+        }
+        for (name, bytes, messages) in &self.outputs {
+            line(
+                &mut out,
+                "wrote",
+                &format!("{name}  {}  {messages} messages", human_bytes(*bytes)),
+            );
+        }
+        if self.outputs.is_empty() {
+            line(&mut out, "wrote", "nothing: add -o attitude.mcap (or .ndjson, .csv, -)");
+        }
+        let speed = self.samples() as f64 / self.elapsed_secs.max(1e-9);
+        line(
+            &mut out,
+            "took",
+            &format!("{:.3} s, {} samples/s", self.elapsed_secs, human_count(speed)),
+        );
+        out
+    }
+
+    /// For machines: one object.
+    #[must_use]
+    pub fn json(&self) -> Value {
+        json!({
+            "source": self.source,
+            "topics": self.topics.iter().map(TopicSummary::json).collect::<Vec<_>>(),
+            "file_problems": self.file_problems,
+            "file_losses": self.file_losses,
+            "outputs": self.outputs.iter().map(|(name, bytes, messages)| json!({
+                "name": name, "bytes": bytes, "messages": messages,
+            })).collect::<Vec<_>>(),
+            "elapsed_s": self.elapsed_secs,
+            "samples_per_s": self.samples() as f64 / self.elapsed_secs.max(1e-9),
+            "lossy": self.is_lossy(),
+        })
+    }
+}
+
+impl TopicSummary {
+    fn write_text(&self, source: &str, out: &mut String) {
+        let _ = writeln!(out, "{source}  {}  {}", self.topic, self.decoded_as);
+        let rate = self
+            .rate_hz
+            .map_or_else(String::new, |hz| format!(" at {} Hz", significant(hz, 5)));
+        line(
+            out,
+            "samples",
+            &format!(
+                "{} in, {} used; {:.3} s{rate}, {} clock",
+                self.counts.total(),
+                self.counts.used(),
+                self.duration_secs,
+                self.clock
+            ),
+        );
+        line(out, "method", &format!("{}; {}", self.method, meaning(self.kind)));
+        line(
+            out,
+            "frames",
+            &format!(
+                "body {} -> world {}; initial attitude: {}",
+                self.body, self.world, self.initial
+            ),
+        );
+        line(out, "bias", &self.bias_text());
+        line(
+            out,
+            "turned",
+            &format!(
+                "{:.1} deg in all, at most {:.3} deg in one step",
+                self.turned.to_degrees(),
+                self.largest_step.to_degrees()
+            ),
+        );
+        let [w, x, y, z] = self.final_wxyz;
+        let [yaw, pitch, roll] = self.final_ypr.map(f64::to_degrees);
+        line(
+            out,
+            "final",
+            &format!(
+                "roll {roll:.3}  pitch {pitch:.3}  yaw {yaw:.3} deg   q w {w:.6}  x {x:.6}  y {y:.6}  z {z:.6}"
+            ),
+        );
+        let [sx, sy, sz] = self.final_sigma.map(f64::to_degrees);
+        line(
+            out,
+            "sigma",
+            &format!(
+                "{}, {}, {} deg about x, y, z at the end ({} noise)",
+                significant(sx, 2),
+                significant(sy, 2),
+                significant(sz, 2),
+                self.noise
+            ),
+        );
+        line(out, "gaps", &self.gaps.text());
+        line(out, "lost", &self.lost_text());
+        for first in &self.first_losses {
+            line(out, "", first);
+        }
+        self.write_against(out);
+        for warning in &self.warnings {
+            line(out, "warning", warning);
+        }
+    }
+
+    fn write_against(&self, out: &mut String) {
+        if self.against.is_empty() {
+            return;
+        }
+        line(
+            out,
+            "against",
+            "the recorded orientation: error of the rotation over 1 s, median / 95 %, deg",
+        );
+        let best = self
+            .against
+            .iter()
+            .map(|a| a.median_deg)
+            .fold(f64::INFINITY, f64::min);
+        for row in &self.against {
+            let mark = if row.median_deg == best { "  <- best" } else { "" };
+            line(
+                out,
+                "",
+                &format!(
+                    "{:<8} {:>8.3} / {:<8.3} {}{mark}",
+                    row.kind, row.median_deg, row.p95_deg, row.meaning
+                ),
+            );
+        }
+    }
+
+    fn bias_text(&self) -> String {
+        if self.bias == [0.0; 3] {
+            return format!("{} removed", self.bias_origin);
+        }
+        let [x, y, z] = self.bias;
+        format!("({x:.6}, {y:.6}, {z:.6}) rad/s removed, {}", self.bias_origin)
+    }
+
+    fn lost_text(&self) -> String {
+        let parts: Vec<String> = Verdict::ALL
+            .iter()
+            .filter(|v| !matches!(v, Verdict::Accepted) && self.counts.get(**v) > 0)
+            .map(|v| format!("{} {}", self.counts.get(*v), v.name().replace('_', " ")))
+            .collect();
+        if parts.is_empty() {
+            return "nothing".to_owned();
+        }
+        format!(
+            "{} of {} samples ({})",
+            self.counts.lost(),
+            self.counts.total(),
+            parts.join(", ")
+        )
+    }
+
+    fn json(&self) -> Value {
+        let [w, x, y, z] = self.final_wxyz;
+        let [yaw, pitch, roll] = self.final_ypr.map(f64::to_degrees);
+        json!({
+            "topic": self.topic,
+            "output_topic": self.output_topic,
+            "decoded_as": self.decoded_as,
+            "samples": {
+                "total": self.counts.total(),
+                "used": self.counts.used(),
+                "lost": self.counts.lost(),
+                "by_verdict": Verdict::ALL.iter()
+                    .map(|v| (v.name().to_owned(), json!(self.counts.get(*v))))
+                    .collect::<serde_json::Map<_, _>>(),
+            },
+            "first_losses": self.first_losses,
+            "written": self.written,
+            "duration_s": self.duration_secs,
+            "rate_hz": self.rate_hz,
+            "clock": self.clock,
+            "sample_kind": self.kind.name(),
+            "method": self.method,
+            "body": self.body,
+            "world": self.world,
+            "initial": self.initial,
+            "bias_rad_s": { "x": self.bias[0], "y": self.bias[1], "z": self.bias[2],
+                            "origin": self.bias_origin },
+            "noise": self.noise,
+            "gaps": {
+                "bridged": self.gaps.bridged,
+                "held": self.gaps.held,
+                "resets": self.gaps.resets,
+                "total_s": self.gaps.total_secs,
+                "longest_s": self.gaps.longest_secs,
+                "longest_at_s": self.gaps.longest_at_secs,
+            },
+            "turned_deg": self.turned.to_degrees(),
+            "largest_step_deg": self.largest_step.to_degrees(),
+            "undersampled_steps": self.undersampled,
+            "final": {
+                "q": { "w": w, "x": x, "y": y, "z": z },
+                "roll_deg": roll, "pitch_deg": pitch, "yaw_deg": yaw,
+                "sigma_deg": self.final_sigma.map(f64::to_degrees),
+            },
+            "against_recorded": self.against.iter().map(|a| json!({
+                "kind": a.kind, "median_deg": a.median_deg, "p95_deg": a.p95_deg, "pairs": a.pairs,
+            })).collect::<Vec<_>>(),
+            "warnings": self.warnings,
+        })
+    }
+}
+
+impl Gaps {
+    fn text(&self) -> String {
+        let count = self.bridged + self.held + self.resets;
+        if count == 0 {
+            return "none".to_owned();
+        }
+        format!(
+            "{count}: {} bridged, {} held, {} reset; {:.3} s in all, longest {:.3} s at {:.3} s",
+            self.bridged,
+            self.held,
+            self.resets,
+            self.total_secs,
+            self.longest_secs,
+            self.longest_at_secs
+        )
+    }
+}
+
+/// A sample kind in words.
+#[must_use]
+pub fn meaning(kind: SampleKind) -> &'static str {
+    match kind {
+        SampleKind::Rate => "a sample is the rate at its stamp",
+        SampleKind::Average => "a sample is the mean rate over the interval ending at its stamp",
+        SampleKind::DeltaAngle => "a sample is the angle turned over the interval ending at its stamp",
+    }
+}
+
+fn line(out: &mut String, label: &str, text: &str) {
+    let _ = writeln!(out, "  {label:<8} {text}");
+}
+
+/// `value` with about `digits` significant digits, without an exponent where that is short.
+#[must_use]
+pub fn significant(value: f64, digits: usize) -> String {
+    if !value.is_finite() || value == 0.0 {
+        return format!("{value}");
+    }
+    let exponent = value.abs().log10().floor() as i64;
+    if !(-4..7).contains(&exponent) {
+        return format!("{value:.*e}", digits.saturating_sub(1));
+    }
+    let decimals = usize::try_from(digits as i64 - 1 - exponent).unwrap_or(0);
+    format!("{value:.decimals$}")
+}
+
+/// `4.2 MB`.
+#[must_use]
+pub fn human_bytes(bytes: u64) -> String {
+    const UNITS: [(&str, f64); 3] = [("GB", 1e9), ("MB", 1e6), ("kB", 1e3)];
+    UNITS
+        .iter()
+        .find(|(_, scale)| bytes as f64 >= *scale)
+        .map_or_else(
+            || format!("{bytes} B"),
+            |(unit, scale)| format!("{:.1} {unit}", bytes as f64 / scale),
+        )
+}
+
+/// `3.2 M`.
+#[must_use]
+pub fn human_count(count: f64) -> String {
+    if count >= 1e6 {
+        format!("{:.2} M", count / 1e6)
+    } else if count >= 1e4 {
+        format!("{:.0} k", count / 1e3)
+    } else {
+        format!("{count:.0}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_keep_the_digits_that_matter() {
+        assert_eq!(significant(286.0, 5), "286.00");
+        assert_eq!(significant(0.00123456, 2), "0.0012");
+        assert_eq!(significant(1.5e-9, 2), "1.5e-9");
+        assert_eq!(significant(0.0, 2), "0");
+        assert_eq!(human_bytes(4_200_000), "4.2 MB");
+        assert_eq!(human_count(2_500_000.0), "2.50 M");
+    }
+
+    #[test]
+    fn a_run_that_lost_a_sample_or_held_a_gap_is_lossy() {
+        let mut run = RunSummary { topics: vec![TopicSummary::default()], ..RunSummary::default() };
+        assert!(!run.is_lossy());
+        if let Some(topic) = run.topics.first_mut() {
+            topic.counts.add(Verdict::Repeated);
+        }
+        assert!(!run.is_lossy(), "an exact repeat carries nothing that could be lost");
+        if let Some(topic) = run.topics.first_mut() {
+            topic.counts.add(Verdict::NotFinite);
+        }
+        assert!(run.is_lossy());
+    }
+}

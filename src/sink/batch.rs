@@ -1,0 +1,76 @@
+//! A batch of AttitudeSample -> bytes. Pure.
+//!
+//! A stage of its own because this is the part that runs on every thread at once: what a batch
+//! becomes depends on nothing but the batch.
+
+use super::csv;
+use super::json::AttObject;
+use super::mcap::Layout;
+use super::mcap::chunk::{Chunk, Compression};
+use crate::record::{AttitudeSample, Nanos};
+
+/// A run of samples of one stream, with what of its past their messages depend on.
+#[derive(Debug, Default)]
+pub(super) struct Batch {
+    pub(super) stream: usize,
+    /// Number of the first sample within its stream.
+    pub(super) first: u64,
+    /// Stamp of the sample before.
+    pub(super) previous: Option<Nanos>,
+    pub(super) samples: Vec<AttitudeSample>,
+}
+
+/// How a batch becomes bytes.
+#[derive(Debug)]
+pub(super) enum Form {
+    Mcap {
+        layout: Layout,
+        compression: Compression,
+    },
+    Ndjson(Vec<AttObject>),
+    Csv,
+    Null,
+}
+
+/// One batch on its way into bytes.
+#[derive(Debug, Default)]
+pub(super) struct Slot {
+    /// Empty when the chunk holds copied messages already.
+    pub(super) batch: Batch,
+    pub(super) chunk: Chunk,
+    pub(super) text: Vec<u8>,
+    pub(super) outcome: Option<std::io::Error>,
+}
+
+impl Slot {
+    /// The parallel part: nothing here depends on any other batch.
+    pub(super) fn encode(&mut self, form: &Form) {
+        self.text.clear();
+        match form {
+            Form::Mcap {
+                layout,
+                compression,
+            } => {
+                // Without samples the chunk holds copied messages.
+                if !self.batch.samples.is_empty() {
+                    layout.fill(&mut self.chunk, &self.batch);
+                }
+                self.outcome = self.chunk.seal(*compression).err();
+            }
+            Form::Ndjson(objects) => {
+                if let Some(object) = objects.get(self.batch.stream) {
+                    for (seq, sample) in (self.batch.first..).zip(&self.batch.samples) {
+                        object.push(&mut self.text, seq, sample);
+                        self.text.push(b'\n');
+                    }
+                }
+            }
+            Form::Csv => {
+                for sample in &self.batch.samples {
+                    csv::push_row(&mut self.text, sample);
+                }
+            }
+            Form::Null => {}
+        }
+    }
+}

@@ -1,0 +1,187 @@
+//! MCAP logs -> messages in a stable order. I/O.
+//!
+//! A stage of its own because recordings come damaged, and general readers stop at the first
+//! fault, believe every length, or do not look at checksums. Here every length is held
+//! against the file and a limit before anything is allocated, a chunk's CRC is compared before its
+//! messages are used, and what is bad is skipped, counted and told ([`Problems`]).
+//!
+//! ```text
+//! tape -> scan -> blocks -> (workers: block -> messages -> items) -> order -> the caller
+//! ```
+//!
+//! [`walk`] reads a log once, in parallel, and hands over decoded items ordered by log time, then place
+//! in the file; [`survey`] says what is in it; [`list`] gives every record. Memory is bounded by
+//! [`WalkOptions::in_flight`] and the largest chunk, whatever the size of the file.
+//!
+//! Layouts: MCAP specification, <https://mcap.dev/spec>.
+
+mod block;
+mod bytes;
+mod channels;
+mod list;
+mod lz4;
+mod messages;
+mod order;
+mod problem;
+mod record;
+mod resync;
+mod scan;
+mod summary;
+mod survey;
+mod tape;
+mod walk;
+mod workers;
+
+pub use block::Compression;
+pub use channels::{Channel, Schema};
+pub use list::{Listed, list};
+pub use messages::{Message, Tally};
+pub use order::Lookahead;
+pub use problem::{Problem, ProblemKind, Problems};
+pub use record::{
+    AttachmentIndex, AttachmentRecord, ChannelRecord, ChunkHead, ChunkIndex, Footer, MAGIC,
+    MessageRecord, Record, SchemaRecord, Statistics, op,
+};
+pub use scan::Facts;
+pub use survey::{ChannelSurvey, Survey, survey};
+pub use walk::{WalkOptions, WalkReport, walk};
+
+use crate::error::{Error, Result};
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use tape::{Input, LogFile};
+
+/// What the reader believes a file's length fields up to.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Limits {
+    /// Longest record that is loaded, and largest chunk that is unpacked, bytes. Attachments are
+    /// stepped over, so they may be longer.
+    pub record: u64,
+    /// Bytes all schemas and channels may take together.
+    pub definitions: usize,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Limits {
+            record: 64 << 20,
+            definitions: 64 << 20,
+        }
+    }
+}
+
+/// A log that has been opened and is an MCAP file by its first bytes.
+#[derive(Debug)]
+pub struct Reader {
+    input: Input,
+    limits: Limits,
+}
+
+impl Reader {
+    /// Opens a log. What is not a regular file (a pipe, a device) is read as a stream.
+    ///
+    /// # Errors
+    /// [`Error::Open`], [`Error::IsDirectory`], [`Error::Empty`], [`Error::NotMcap`], [`Error::Read`].
+    pub fn open(path: &Path) -> Result<Reader> {
+        let open = |source| Error::Open {
+            path: path.to_owned(),
+            source,
+        };
+        let file = File::open(path).map_err(open)?;
+        let meta = file.metadata().map_err(open)?;
+        if meta.is_dir() {
+            return Err(Error::IsDirectory {
+                path: path.to_owned(),
+            });
+        }
+        if !meta.is_file() {
+            return Reader::from_stream(path, Box::new(file));
+        }
+        let file = LogFile::new(path, file, meta.len());
+        let mut magic = [0; MAGIC.len()];
+        let have = file
+            .read_at(&mut magic, 0)
+            .map_err(|e| read_error(path, 0, e))?;
+        check_magic(path, magic.get(..have).unwrap_or(&[]))?;
+        Ok(Reader {
+            input: Input::File(Arc::new(file)),
+            limits: Limits::default(),
+        })
+    }
+
+    /// Reads a log from a stream; `name` is what errors call it.
+    ///
+    /// # Errors
+    /// [`Error::Empty`], [`Error::NotMcap`], [`Error::Read`].
+    pub fn from_stream(name: impl Into<PathBuf>, from: Box<dyn Read + Send>) -> Result<Reader> {
+        let (name, mut from) = (name.into(), from);
+        let mut magic = Vec::with_capacity(MAGIC.len());
+        from.by_ref()
+            .take(MAGIC.len() as u64)
+            .read_to_end(&mut magic)
+            .map_err(|e| read_error(&name, 0, e))?;
+        check_magic(&name, &magic)?;
+        Ok(Reader {
+            input: Input::Stream { name, from },
+            limits: Limits::default(),
+        })
+    }
+
+    /// The same log with other limits.
+    #[must_use]
+    pub fn with_limits(self, limits: Limits) -> Reader {
+        Reader { limits, ..self }
+    }
+
+    /// The path, or the name given to the stream.
+    #[must_use]
+    pub fn name(&self) -> &Path {
+        self.input.name()
+    }
+
+    /// Bytes of a file; unknown for a stream.
+    #[must_use]
+    pub fn size(&self) -> Option<u64> {
+        match &self.input {
+            Input::File(file) => Some(file.len),
+            Input::Stream { .. } => None,
+        }
+    }
+
+    /// A second reader of the same file; `None` for a stream, which can be read once.
+    #[must_use]
+    pub fn again(&self) -> Option<Reader> {
+        match &self.input {
+            Input::File(file) => Some(Reader {
+                input: Input::File(Arc::clone(file)),
+                limits: self.limits,
+            }),
+            Input::Stream { .. } => None,
+        }
+    }
+}
+
+fn read_error(path: &Path, offset: u64, source: std::io::Error) -> Error {
+    Error::Read {
+        path: path.to_owned(),
+        offset,
+        source,
+    }
+}
+
+fn check_magic(path: &Path, found: &[u8]) -> Result<()> {
+    let path = || path.to_owned();
+    if found.is_empty() {
+        return Err(Error::Empty { path: path() });
+    }
+    if found != MAGIC {
+        let found = found.escape_ascii().to_string();
+        return Err(Error::NotMcap {
+            path: path(),
+            found,
+        });
+    }
+    Ok(())
+}

@@ -1,0 +1,269 @@
+//! A block of the log -> its records, unpacked and checked. I/O (reads its own part of the file).
+//!
+//! A stage of its own because it is what worker threads do, each with its own buffers: read,
+//! unpack within declared bounds, compare the CRC. Nothing of a chunk is used before its CRC holds.
+
+use super::problem::ProblemKind;
+use super::tape::{Held, LogFile};
+use std::io;
+use std::sync::Arc;
+
+/// Buffers larger than this are given back after use, so that one large chunk does not stay.
+const KEEP: usize = 8 << 20;
+
+/// How a chunk is packed.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub enum Compression {
+    /// Not at all.
+    None,
+    /// LZ4 frame.
+    Lz4,
+    /// Zstandard.
+    Zstd,
+}
+
+impl Compression {
+    pub(super) fn named(name: &str) -> Option<Self> {
+        match name {
+            "" => Some(Compression::None),
+            "lz4" => Some(Compression::Lz4),
+            "zstd" => Some(Compression::Zstd),
+            _ => None,
+        }
+    }
+
+    /// The name in summaries.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Compression::None => "none",
+            Compression::Lz4 => "lz4",
+            Compression::Zstd => "zstd",
+        }
+    }
+}
+
+/// A stretch of the log whose records are worked on together.
+#[derive(Debug)]
+pub(super) struct Block {
+    /// Where it begins in the file.
+    pub(super) offset: u64,
+    pub(super) kind: Kind,
+    pub(super) payload: Payload,
+}
+
+#[derive(Debug)]
+pub(super) enum Kind {
+    /// Unchunked records, one after another; their framing has been checked.
+    Run,
+    Chunk {
+        compression: Compression,
+        /// Unpacked size as declared, within the limit.
+        size: usize,
+        crc: u32,
+        /// Messages in it by the index behind it.
+        indexed: Option<u64>,
+    },
+}
+
+#[derive(Debug)]
+pub(super) enum Payload {
+    /// In the file; read by whoever works on it.
+    At {
+        file: Arc<LogFile>,
+        offset: u64,
+        len: usize,
+    },
+    Held(Held),
+}
+
+impl Block {
+    /// Memory it may take while it is worked on.
+    pub(super) fn cost(&self) -> usize {
+        let packed = match &self.payload {
+            Payload::At { len, .. } => *len,
+            Payload::Held(held) => held.bytes.capacity(),
+        };
+        match self.kind {
+            Kind::Chunk {
+                compression, size, ..
+            } if compression != Compression::None => packed + size,
+            _ => packed,
+        }
+    }
+
+    pub(super) fn indexed(&self) -> Option<u64> {
+        match self.kind {
+            Kind::Chunk { indexed, .. } => indexed,
+            Kind::Run => None,
+        }
+    }
+}
+
+/// Whether the CRC is over the bytes as they lie in the file.
+fn plain_crc(kind: &Kind) -> bool {
+    matches!(kind, Kind::Chunk { compression: Compression::None, crc, .. } if *crc != 0)
+}
+
+/// The buffers of one worker.
+#[derive(Default)]
+pub(super) struct Buffers {
+    raw: Vec<u8>,
+    plain: Vec<u8>,
+    zstd: Option<zstd::bulk::Decompressor<'static>>,
+}
+
+impl std::fmt::Debug for Buffers {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "Buffers({}, {})",
+            self.raw.capacity(),
+            self.plain.capacity()
+        )
+    }
+}
+
+/// What is read at a time: its CRC is taken while it is still in the cache.
+const PIECE: usize = 128 << 10;
+
+/// A slice of exactly `n` bytes of `buf`, which grows but is not shrunk or zeroed again.
+fn room(buf: &mut Vec<u8>, n: usize) -> &mut [u8] {
+    if buf.len() < n {
+        // A fresh zeroed buffer, not `resize`: nothing of the old one is worth copying.
+        *buf = vec![0; n];
+    }
+    buf.get_mut(..n).unwrap_or(&mut [])
+}
+
+/// The records of a block, or why they can not be used.
+pub(super) type Opened<'a> = Result<&'a [u8], ProblemKind>;
+
+impl Buffers {
+    /// Reads, unpacks and checks a block.
+    ///
+    /// # Errors
+    /// Only when the file itself can not be read.
+    pub(super) fn open<'a>(&'a mut self, block: &'a Block) -> io::Result<Opened<'a>> {
+        let mut seen = crc32fast::Hasher::new();
+        let packed = match &block.payload {
+            Payload::Held(held) => {
+                let packed = held.as_slice();
+                if plain_crc(&block.kind) {
+                    seen.update(packed);
+                }
+                packed
+            }
+            Payload::At { file, offset, len } => {
+                let raw = room(&mut self.raw, *len);
+                let mut got = 0;
+                for piece in raw.chunks_mut(PIECE) {
+                    let n = file.read_at(piece, *offset + got as u64)?;
+                    got += n;
+                    if n < piece.len() {
+                        // The file was cut after the walk had seen its length.
+                        let (need, have) = (*len as u64, got as u64);
+                        return Ok(Err(ProblemKind::Truncated { need, have }));
+                    }
+                    if plain_crc(&block.kind) {
+                        seen.update(piece);
+                    }
+                }
+                raw
+            }
+        };
+        let Kind::Chunk {
+            compression,
+            size,
+            crc,
+            ..
+        } = block.kind
+        else {
+            return Ok(Ok(packed));
+        };
+        let plain = match compression {
+            Compression::None if packed.len() == size => packed,
+            Compression::None => {
+                let (declared, actual) = (size as u64, packed.len() as u64);
+                return Ok(Err(ProblemKind::ChunkSize { declared, actual }));
+            }
+            Compression::Lz4 | Compression::Zstd => {
+                let plain = room(&mut self.plain, size);
+                let actual = match compression {
+                    Compression::Lz4 => unlz4(packed, plain, crc),
+                    _ => unzstd(&mut self.zstd, packed, plain),
+                };
+                match actual {
+                    Ok(n) if n == size => plain,
+                    Ok(n) => {
+                        let (declared, actual) = (size as u64, n as u64);
+                        return Ok(Err(ProblemKind::ChunkSize { declared, actual }));
+                    }
+                    Err(e) => return Ok(Err(ProblemKind::Unpack { why: e.to_string() })),
+                }
+            }
+        };
+        if crc != 0 {
+            let computed = match compression {
+                Compression::None => seen.finalize(),
+                _ => crc32fast::hash(plain),
+            };
+            if computed != crc {
+                return Ok(Err(ProblemKind::ChunkCrc {
+                    stored: crc,
+                    computed,
+                }));
+            }
+        }
+        Ok(Ok(plain))
+    }
+
+    /// Lets go of what one large chunk needed.
+    pub(super) fn trim(&mut self) {
+        for buf in [&mut self.raw, &mut self.plain] {
+            if buf.capacity() > KEEP {
+                *buf = Vec::new();
+            }
+        }
+    }
+}
+
+fn unzstd(
+    context: &mut Option<zstd::bulk::Decompressor<'static>>,
+    packed: &[u8],
+    plain: &mut [u8],
+) -> io::Result<usize> {
+    if packed.is_empty() {
+        return Ok(0);
+    }
+    let context = match context {
+        Some(context) => context,
+        None => context.insert(zstd::bulk::Decompressor::new()?),
+    };
+    context.decompress_to_buffer(packed, plain)
+}
+
+fn unlz4(packed: &[u8], plain: &mut [u8], crc: u32) -> io::Result<usize> {
+    if packed.is_empty() {
+        return Ok(0);
+    }
+    if crc != 0
+        && let Some(n) = super::lz4::unpack(packed, plain)
+    {
+        return Ok(n);
+    }
+    // No chunk CRC: the frame's own checksums are all there is, so they are checked.
+    let mut frame = lz4_flex::frame::FrameDecoder::new(packed);
+    let mut done = 0;
+    while let Some(rest) = plain.get_mut(done..).filter(|r| !r.is_empty()) {
+        match io::Read::read(&mut frame, rest)? {
+            0 => return Ok(done),
+            n => done += n,
+        }
+    }
+    // One byte more would be one too many; this read also verifies the checksum at the end.
+    match io::Read::read(&mut frame, &mut [0])? {
+        0 => Ok(done),
+        _ => Ok(done + 1),
+    }
+}

@@ -1,0 +1,272 @@
+//! A file or a stream -> bytes in order, ahead of a position. I/O.
+//!
+//! A stage of its own so that the walk is written once: it sees a position, the bytes after it,
+//! and a way to hand a stretch of them to another thread. Files are read by position
+//! (no memory map: a file cut by another process must be an error, not a signal), streams in sequence.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// How much a stream is allowed to make us allocate at once on the word of a length field.
+const STEP: usize = 1 << 20;
+/// Handed-back buffers kept for reuse, and the largest worth keeping.
+const SPARE: usize = 32;
+const SPARE_BYTES: usize = 4 << 20;
+
+/// A regular file, read by position from any thread.
+#[derive(Debug)]
+pub(super) struct LogFile {
+    pub(super) path: PathBuf,
+    /// Length when it was opened; what is appended later is not seen.
+    pub(super) len: u64,
+    file: File,
+    #[cfg(not(unix))]
+    turn: std::sync::Mutex<()>,
+}
+
+impl LogFile {
+    pub(super) fn new(path: &Path, file: File, len: u64) -> Self {
+        LogFile {
+            path: path.to_owned(),
+            len,
+            file,
+            #[cfg(not(unix))]
+            turn: std::sync::Mutex::new(()),
+        }
+    }
+
+    #[cfg(unix)]
+    fn read_once(&self, buf: &mut [u8], offset: u64) -> io::Result<usize> {
+        std::os::unix::fs::FileExt::read_at(&self.file, buf, offset)
+    }
+
+    #[cfg(not(unix))]
+    fn read_once(&self, buf: &mut [u8], offset: u64) -> io::Result<usize> {
+        use std::io::{Seek, SeekFrom};
+        let _turn = self.turn.lock().unwrap_or_else(|e| e.into_inner());
+        (&self.file).seek(SeekFrom::Start(offset))?;
+        (&self.file).read(buf)
+    }
+
+    /// Fills `buf` from `offset`; less only at the end of the file.
+    pub(super) fn read_at(&self, buf: &mut [u8], offset: u64) -> io::Result<usize> {
+        let mut got = 0;
+        while let Some(rest) = buf.get_mut(got..).filter(|r| !r.is_empty()) {
+            match self.read_once(rest, offset.saturating_add(got as u64)) {
+                Ok(0) => break,
+                Ok(n) => got += n,
+                Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+                Err(e) => return Err(e),
+            }
+        }
+        Ok(got)
+    }
+}
+
+/// Where the bytes come from.
+pub(super) enum Input {
+    File(Arc<LogFile>),
+    Stream {
+        name: PathBuf,
+        from: Box<dyn Read + Send>,
+    },
+}
+
+impl std::fmt::Debug for Input {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Input({})", self.name().display())
+    }
+}
+
+impl Input {
+    pub(super) fn name(&self) -> &Path {
+        match self {
+            Input::File(file) => &file.path,
+            Input::Stream { name, .. } => name,
+        }
+    }
+}
+
+/// Bytes that belong to whoever holds them: `bytes[range]`.
+#[derive(Debug, Default)]
+pub(super) struct Held {
+    pub(super) bytes: Vec<u8>,
+    pub(super) range: Range<usize>,
+}
+
+impl Held {
+    pub(super) fn as_slice(&self) -> &[u8] {
+        self.bytes.get(self.range.clone()).unwrap_or(&[])
+    }
+}
+
+/// The input, a position in it, and what has been read ahead of the position.
+#[derive(Debug)]
+pub(super) struct Tape {
+    input: Input,
+    buf: Vec<u8>,
+    start: usize,
+    end: usize,
+    /// Offset in the input of `buf[start]`.
+    position: u64,
+    at_end: bool,
+    spare: Vec<Vec<u8>>,
+}
+
+impl Tape {
+    /// `position` is how much of a stream has been read already; 0 for a file.
+    pub(super) fn new(input: Input, position: u64) -> Self {
+        Tape {
+            input,
+            buf: Vec::new(),
+            start: 0,
+            end: 0,
+            position,
+            at_end: false,
+            spare: Vec::new(),
+        }
+    }
+
+    pub(super) fn input(&self) -> &Input {
+        &self.input
+    }
+
+    pub(super) fn position(&self) -> u64 {
+        self.position
+    }
+
+    /// Bytes between the position and the end of a file; unknown for a stream.
+    pub(super) fn remaining(&self) -> Option<u64> {
+        match &self.input {
+            Input::File(file) => Some(file.len.saturating_sub(self.position)),
+            Input::Stream { .. } => None,
+        }
+    }
+
+    /// Whether `n` more bytes can be there; a stream can only be tried.
+    pub(super) fn may_have(&self, n: u64) -> bool {
+        self.remaining().is_none_or(|r| n <= r)
+    }
+
+    /// What is buffered ahead of the position already.
+    fn ahead(&self) -> &[u8] {
+        self.buf.get(self.start..self.end).unwrap_or(&[])
+    }
+
+    /// At least `need` bytes ahead of the position, less only at the end of the input. Where it
+    /// has to read, it reads `want`, so that many small needs cost one read.
+    pub(super) fn available(&mut self, need: usize, want: usize) -> io::Result<&[u8]> {
+        if self.end - self.start < need && !self.at_end {
+            self.read_more(need, want.max(need))?;
+        }
+        Ok(self.ahead())
+    }
+
+    fn read_more(&mut self, need: usize, want: usize) -> io::Result<()> {
+        if self.start > 0 {
+            self.buf.copy_within(self.start..self.end, 0);
+            self.end -= self.start;
+            self.start = 0;
+        }
+        while self.end < need && !self.at_end {
+            let goal = match self.remaining() {
+                Some(left) => want.min(usize::try_from(left).unwrap_or(usize::MAX)),
+                None => want.min(self.end + STEP),
+            };
+            if goal <= self.end {
+                self.at_end = true;
+                break;
+            }
+            if self.buf.len() < goal {
+                self.buf.resize(goal, 0);
+            }
+            let Some(room) = self.buf.get_mut(self.end..goal) else {
+                break;
+            };
+            let got = match &mut self.input {
+                Input::File(file) => file.read_at(room, self.position + self.end as u64)?,
+                Input::Stream { from, .. } => loop {
+                    match from.read(room) {
+                        Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+                        other => break other?,
+                    }
+                },
+            };
+            // A `Read` that claims more than it was given room for must not move us past the buffer.
+            self.end += got.min(goal - self.end);
+            self.at_end = got == 0;
+        }
+        Ok(())
+    }
+
+    /// Moves on by `n` bytes; how many there were (fewer only at the end).
+    pub(super) fn skip(&mut self, n: u64) -> io::Result<u64> {
+        let ahead = (self.end - self.start) as u64;
+        if n <= ahead {
+            self.start += n as usize;
+            self.position += n;
+            return Ok(n);
+        }
+        if let Some(left) = self.remaining() {
+            let n = n.min(left);
+            self.seek(self.position + n);
+            return Ok(n);
+        }
+        let mut done = 0;
+        while done < n {
+            let here = self.available(1, STEP.min(usize::try_from(n - done).unwrap_or(STEP)))?;
+            let step = (here.len() as u64).min(n - done);
+            if step == 0 {
+                break;
+            }
+            self.start += step as usize;
+            self.position += step;
+            done += step;
+        }
+        Ok(done)
+    }
+
+    /// Moves a file's position anywhere; a stream can not.
+    pub(super) fn seek(&mut self, position: u64) {
+        if let Input::File(_) = self.input {
+            self.position = position;
+            self.start = 0;
+            self.end = 0;
+            self.at_end = false;
+        }
+    }
+
+    /// Hands out the next `n` bytes, which must be available, without copying them; what was read
+    /// beyond them moves to a spare buffer.
+    pub(super) fn hand_out(&mut self, n: usize) -> Held {
+        let n = n.min(self.end - self.start);
+        let cut = self.start + n;
+        let mut next = self.spare.pop().unwrap_or_default();
+        let tail = self.buf.get(cut..self.end).unwrap_or(&[]);
+        if next.len() < tail.len() {
+            next.resize(tail.len(), 0);
+        }
+        if let Some(room) = next.get_mut(..tail.len()) {
+            room.copy_from_slice(tail);
+        }
+        let tail = tail.len();
+        let held = Held {
+            bytes: std::mem::replace(&mut self.buf, next),
+            range: self.start..cut,
+        };
+        self.start = 0;
+        self.end = tail;
+        self.position += n as u64;
+        held
+    }
+
+    /// Takes back a buffer that was handed out.
+    pub(super) fn recycle(&mut self, held: Held) {
+        if self.spare.len() < SPARE && (1..=SPARE_BYTES).contains(&held.bytes.capacity()) {
+            self.spare.push(held.bytes);
+        }
+    }
+}

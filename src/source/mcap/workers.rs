@@ -1,0 +1,249 @@
+//! Blocks -> outcomes, on worker threads. I/O (each reads its own part of the file).
+//!
+//! A stage of its own because what workers find depends on definitions they may not have seen yet: an
+//! outcome says which meaning of each channel id it used, and the walk, which sees blocks in file order,
+//! accepts it or does the block again. So the result never depends on the number of threads.
+
+use super::block::{Block, Buffers, Kind};
+use super::channels::{NONE, Table};
+use super::messages::{Message, Met, Place, Stop, Tally, pass};
+use super::order::Batch;
+use super::problem::ProblemKind;
+use std::collections::BTreeMap;
+use std::io;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::Sender;
+use std::sync::{Mutex, MutexGuard, PoisonError, RwLock};
+
+/// Batches kept for reuse, and the largest worth keeping.
+const SPARE: usize = 64;
+const SPARE_BYTES: usize = 4 << 20;
+
+/// What one worker needs and the next can use again.
+#[derive(Debug, Default)]
+pub(super) struct Bench {
+    pub(super) buffers: Buffers,
+    pub(super) met: Met,
+}
+
+/// What all threads of a walk share.
+#[derive(Debug)]
+pub(super) struct Shared<T, D, M> {
+    pub(super) table: RwLock<Table<D>>,
+    pub(super) map: M,
+    pub(super) cancelled: AtomicBool,
+    benches: Mutex<Vec<Bench>>,
+    batches: Mutex<Vec<Batch<T>>>,
+}
+
+/// A panic elsewhere ends the walk anyway; until then what it left is no less valid.
+fn lock<X>(mutex: &Mutex<X>) -> MutexGuard<'_, X> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl<T, D, M> Shared<T, D, M> {
+    pub(super) fn new(table: Table<D>, map: M) -> Self {
+        Shared {
+            table: RwLock::new(table),
+            map,
+            cancelled: AtomicBool::new(false),
+            benches: Mutex::default(),
+            batches: Mutex::default(),
+        }
+    }
+
+    pub(super) fn bench(&self) -> Bench {
+        lock(&self.benches).pop().unwrap_or_default()
+    }
+
+    pub(super) fn put_bench(&self, mut bench: Bench) {
+        bench.buffers.trim();
+        bench.met.clear();
+        lock(&self.benches).push(bench);
+    }
+
+    pub(super) fn batch(&self) -> Batch<T> {
+        lock(&self.batches).pop().unwrap_or_default()
+    }
+
+    pub(super) fn put_batch(&self, mut batch: Batch<T>) {
+        batch.clear();
+        let mut batches = lock(&self.batches);
+        if batches.len() < SPARE && batch.capacity_bytes() <= SPARE_BYTES {
+            batches.push(batch);
+        }
+    }
+
+    /// Runs `look` on the table as it is now.
+    pub(super) fn with_table<R>(&self, look: impl FnOnce(&Table<D>) -> R) -> R {
+        look(&self.table.read().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Runs `change` on the table; only the walk itself does, in file order.
+    pub(super) fn change_table<R>(&self, change: impl FnOnce(&mut Table<D>) -> R) -> R {
+        change(&mut self.table.write().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+/// What was met in a block, in a form that can be checked and added up.
+#[derive(Debug, Default)]
+pub(super) struct Findings {
+    /// Channel ids, what they were taken for, and their messages.
+    pub(super) channels: Vec<(u16, u32, Tally)>,
+    pub(super) unknown: BTreeMap<u16, u64>,
+    pub(super) short: u64,
+}
+
+impl Findings {
+    pub(super) fn of(met: &mut Met) -> Self {
+        Findings {
+            channels: met.channels().collect(),
+            unknown: std::mem::take(&mut met.unknown),
+            short: met.short,
+        }
+    }
+
+    /// Whether every id still means what it was taken for.
+    pub(super) fn hold<D>(&self, table: &Table<D>) -> bool {
+        self.channels
+            .iter()
+            .all(|(id, index, _)| table.lookup(*id) == *index)
+            && self
+                .unknown
+                .keys()
+                .all(|id| table.lookup(*id) == NONE && !table.can_adopt(*id))
+    }
+}
+
+/// What became of a block.
+#[derive(Debug)]
+pub(super) enum Done<T> {
+    Walked {
+        batch: Batch<T>,
+        findings: Findings,
+        fault: Option<ProblemKind>,
+    },
+    /// The block can not be used.
+    Bad(ProblemKind),
+    /// It changes the table, so it has to be done in file order.
+    InOrder,
+    /// The file can not be read.
+    Failed(io::Error),
+    /// The caller's `map` panicked; the panic itself travels through the pool.
+    Panicked,
+}
+
+pub(super) fn place(block: &Block) -> Place {
+    Place {
+        offset: block.offset,
+        chunked: matches!(block.kind, Kind::Chunk { .. }),
+    }
+}
+
+impl<T, D, M> Shared<T, D, M>
+where
+    M: Fn(&D, &Message<'_>, &mut Vec<T>),
+{
+    /// Does a block as far as the table allows.
+    pub(super) fn work(&self, block: &Block) -> Done<T> {
+        if self.cancelled.load(Ordering::Relaxed) {
+            return Done::InOrder;
+        }
+        let mut bench = self.bench();
+        let done = match bench.buffers.open(block) {
+            Err(e) => Done::Failed(e),
+            Ok(Err(kind)) => Done::Bad(kind),
+            Ok(Ok(records)) => {
+                let mut batch = self.batch();
+                let stop = self.with_table(|table| {
+                    pass(
+                        records,
+                        0,
+                        place(block),
+                        table,
+                        &self.map,
+                        &mut bench.met,
+                        &mut batch,
+                    )
+                });
+                let fault = match stop {
+                    Stop::Broken { at, length } => Some(ProblemKind::InnerRecord {
+                        at: at as u64,
+                        length,
+                    }),
+                    _ => None,
+                };
+                match stop {
+                    Stop::End | Stop::Broken { .. } => {
+                        batch.sort();
+                        Done::Walked {
+                            batch,
+                            findings: Findings::of(&mut bench.met),
+                            fault,
+                        }
+                    }
+                    Stop::Definition { .. } | Stop::Adopt { .. } => {
+                        self.put_batch(batch);
+                        Done::InOrder
+                    }
+                }
+            }
+        };
+        self.put_bench(bench);
+        done
+    }
+}
+
+/// A block on its way: whatever happens to the worker, the walk hears of it.
+#[derive(Debug)]
+pub(super) struct Ticket<T> {
+    number: u64,
+    block: Option<Block>,
+    to: Sender<Outcome<T>>,
+}
+
+/// A worker's answer.
+#[derive(Debug)]
+pub(super) struct Outcome<T> {
+    pub(super) number: u64,
+    pub(super) block: Option<Block>,
+    pub(super) done: Done<T>,
+}
+
+impl<T> Ticket<T> {
+    pub(super) fn new(number: u64, block: Block, to: Sender<Outcome<T>>) -> Self {
+        Ticket {
+            number,
+            block: Some(block),
+            to,
+        }
+    }
+
+    pub(super) fn redeem<D, M>(mut self, shared: &Shared<T, D, M>)
+    where
+        M: Fn(&D, &Message<'_>, &mut Vec<T>),
+    {
+        let Some(block) = &self.block else { return };
+        let done = shared.work(block);
+        let block = self.block.take();
+        // The walk may have ended early; then nobody waits for this.
+        let _ = self.to.send(Outcome {
+            number: self.number,
+            block,
+            done,
+        });
+    }
+}
+
+impl<T> Drop for Ticket<T> {
+    fn drop(&mut self) {
+        if let Some(block) = self.block.take() {
+            let done = Done::Panicked;
+            let _ = self.to.send(Outcome {
+                number: self.number,
+                block: Some(block),
+                done,
+            });
+        }
+    }
+}

@@ -1,0 +1,63 @@
+//! Samples -> attitudes through the public door, and how far they are from truth.
+
+use strapd::model::attitude::Quaternion;
+use strapd::propagate::{Method, Noise, Propagator, Sequential, Settings};
+use strapd::record::{AttitudeSample, Join, Nanos, RateSample, SampleKind, Status};
+
+pub const ARCSEC: f64 = 3600.0;
+
+pub fn sample(start: i64, stamp: i64, value: [f64; 3]) -> RateSample {
+    RateSample {
+        stamp: Nanos(stamp),
+        start: Nanos(start),
+        value: value.into(),
+        accel: None,
+        join: Join::Continuous,
+        status: Status::OK,
+        log: Nanos(stamp),
+    }
+}
+
+pub fn propagator(method: Method, kind: SampleKind, initial: [f64; 4]) -> Propagator {
+    Propagator::new(Settings {
+        method,
+        kind,
+        initial: Quaternion::assume_unit(initial),
+        noise: Noise::default(),
+    })
+    .unwrap()
+}
+
+pub fn propagate(
+    method: Method,
+    kind: SampleKind,
+    initial: [f64; 4],
+    samples: &[RateSample],
+) -> Vec<AttitudeSample> {
+    let mut propagator = propagator(method, kind, initial);
+    let mut out = Vec::new();
+    propagator.push(samples, &Sequential, &mut out);
+    propagator.finish(&Sequential, &mut out);
+    assert_eq!(out.len(), samples.len(), "one attitude for every sample");
+    out
+}
+
+/// Angle between two attitudes in degrees; exact for small ones.
+pub fn angle_degrees(a: [f64; 4], b: [f64; 4]) -> f64 {
+    let [aw, ax, ay, az] = a;
+    let [bw, bx, by, bz] = b;
+    let w = aw * bw + ax * bx + ay * by + az * bz;
+    let x = aw * bx - ax * bw - ay * bz + az * by;
+    let y = aw * by - ay * bw - az * bx + ax * bz;
+    let z = aw * bz - az * bw - ax * by + ay * bx;
+    let s = (x * x + y * y + z * z).sqrt();
+    (2.0 * s.atan2(w.abs())).to_degrees()
+}
+
+/// Worst angle between outputs and truth over `range`, degrees.
+pub fn worst(out: &[AttitudeSample], truth: impl Fn(usize) -> [f64; 4]) -> f64 {
+    out.iter()
+        .enumerate()
+        .map(|(i, a)| angle_degrees(a.q_nb.wxyz(), truth(i)))
+        .fold(0.0, f64::max)
+}
