@@ -39,13 +39,11 @@ pub(crate) fn xsens(text: &str) -> Result<Vec<XsensRow>, BadLine> {
     const FILE: &str = "xsens_mti.txt";
     const COMMENT_AND_HEADING_LINES: usize = 5;
     const TICK: i64 = 20_000_000; // "Sample rate: 50.0Hz"
-    rows::<14>(FILE, text, COMMENT_AND_HEADING_LINES, |c: char| {
-        c.is_ascii_whitespace()
-    })?
-    .into_iter()
-    .map(
-        |[counter, ax, ay, az, wx, wy, wz, mx, my, mz, qw, qx, qy, qz]| {
-            Ok(XsensRow {
+    let is_tab = |c| c == '\t';
+    Ok(rows::<14>(FILE, text, COMMENT_AND_HEADING_LINES, is_tab)?
+        .into_iter()
+        .map(
+            |[counter, ax, ay, az, wx, wy, wz, mx, my, mz, qw, qx, qy, qz]| XsensRow {
                 imu: ImuSample {
                     stamp: EPOCH + counter as i64 * TICK,
                     orientation: Some([qw, qx, qy, qz]),
@@ -54,10 +52,9 @@ pub(crate) fn xsens(text: &str) -> Result<Vec<XsensRow>, BadLine> {
                     accel: [ax, ay, az],
                 },
                 field: [mx, my, mz],
-            })
-        },
-    )
-    .collect()
+            },
+        )
+        .collect())
 }
 
 /// x-IMU3 `Inertial.csv`: microseconds, rate in deg/s, specific force in g.

@@ -40,8 +40,8 @@ impl DoubleDouble {
 /// `(sin, cos)` of `numerator / denominator` turns.
 ///
 /// # Accuracy
-/// Correctly rounded but for ties closer than 2^-98; swept against the platform's sine in
-/// `tests/fixtures.rs`.
+/// Summed to about 2^-100 and rounded once, so the nearest double but where two are all but equally near;
+/// swept against the platform's sine in `tests/fixtures.rs`.
 ///
 /// # Panics
 /// When `denominator` is not in `1..=2^50`: a mistake in a recipe.
