@@ -1,4 +1,7 @@
 //! Mathematics: no I/O, no async, no clock, no logging, no randomness but a passed seed.
 
 pub mod attitude;
+mod double_double;
 pub mod frames;
+pub mod inertia;
+mod quaternion_kernel;
