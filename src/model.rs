@@ -5,3 +5,5 @@ mod double_double;
 pub mod frames;
 pub mod inertia;
 mod quaternion_kernel;
+pub mod rigid_body;
+pub mod top;
