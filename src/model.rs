@@ -2,8 +2,10 @@
 
 pub mod attitude;
 mod double_double;
+mod elliptic;
 pub mod frames;
 pub mod inertia;
 mod quaternion_kernel;
+pub mod motion;
 pub mod rigid_body;
 pub mod top;

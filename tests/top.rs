@@ -69,3 +69,16 @@ fn the_exact_top_agrees_with_the_golden_rows() {
         );
     }
 }
+
+#[test]
+fn closed() {
+    let (top, start) = cusped();
+    let mut exact = top.exact(&start).unwrap();
+    let form = ClosedForm::new(&top, &start).unwrap();
+    println!("{form:?} {:?} {}", form.nutation_range(), form.nutation_period());
+    for ms in [0u64, 1, 10, 100, 1200, 10000, 60000] {
+        let q = exact.at_nanos(ms * 1_000_000).q_nb;
+        let c = form.at_nanos(ms * 1_000_000);
+        println!("{ms} {:e} {c:?}", angle(&q, &c.quaternion()));
+    }
+}

@@ -28,7 +28,7 @@ pub use heavy::HeavyBody;
 pub use integrator::{HeldRate, Method, NotConverged};
 pub(crate) use integrator::{gauss_legendre6, rk4};
 pub use six_dof::{Pose, Vessel, Wrench};
-pub(crate) use taylor::{Rates, Trajectory};
+pub(crate) use taylor::{Rates, Sine, Trajectory};
 
 use super::attitude::Quaternion;
 use super::frames::{Body, Nav};

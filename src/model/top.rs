@@ -20,12 +20,12 @@
 //! The seed document's errata are in `docs/top.md`, each with the test that shows it.
 
 mod case;
-// mod closed_form;
+mod closed_form;
 mod compare;
 mod euler_angles;
 
 pub use case::Case;
-// pub use closed_form::ClosedForm;
+pub use closed_form::ClosedForm;
 pub use compare::{MethodError, TopMethod, TopRun, compare};
 pub use euler_angles::{EulerAngles, EulerState};
 
