@@ -5,7 +5,7 @@ mod double_double;
 mod elliptic;
 pub mod frames;
 pub mod inertia;
-mod quaternion_kernel;
 pub mod motion;
+mod quaternion_kernel;
 pub mod rigid_body;
 pub mod top;

@@ -82,12 +82,7 @@ impl BandLimited {
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub fn random(
-        seed: u64,
-        rms: f64,
-        highest_hz: f64,
-        sines: usize,
-    ) -> Result<Self, MotionError> {
+    pub fn random(seed: u64, rms: f64, highest_hz: f64, sines: usize) -> Result<Self, MotionError> {
         within("number of sines", sines as f64, Self::MOST_SINES as f64)?;
         let mut random = SplitMix(seed);
         // Each sine has half the square of its amplitude in it.
