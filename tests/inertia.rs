@@ -1,7 +1,9 @@
 //! Inertia against particle clouds computed elsewhere (`golden/inertia_golden.json`), the seed
 //! document's example, and the seed's errors, each refuted by name.
-#![allow(clippy::unwrap_used, clippy::expect_used)]
+// Prints what it measured, for `--nocapture`.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout)]
 
+#[allow(unreachable_pub)]
 mod shared_data;
 
 use nalgebra::{Matrix3, Matrix4, Matrix6, Vector3, Vector6};

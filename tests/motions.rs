@@ -1,6 +1,7 @@
 //! Analytic motions: attitude, rate and delta angle belong together, shown by integrators that
 //! share nothing with the library (extrapolated midpoint rule, Romberg's quadrature).
-#![allow(clippy::unwrap_used, clippy::expect_used)]
+// Prints what it measured, for `--nocapture`.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout)]
 
 use nalgebra::{Matrix3, Vector3};
 use strapd::model::attitude::Quaternion;
@@ -240,7 +241,7 @@ fn random_sines_are_the_same_everywhere_and_as_strong_as_asked() {
 #[test]
 fn the_free_body_is_consistent() {
     for (moments, w) in free_bodies() {
-        let (q, d) = consistency(&mut Motion::FreeBody(free(moments, w)), 200);
+        let (q, d) = consistency(&mut Motion::FreeBody(Box::new(free(moments, w))), 200);
         // As for the constant rate, fewer steps.
         assert!(q < 2e-14, "{moments:?} {w:?} {q:e}");
         // Antiderivatives up to a few rad at 1e-16.

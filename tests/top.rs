@@ -1,7 +1,9 @@
 //! The top: the exact reference proven, the seed document's methods measured against it, the seed's
 //! errors refuted by name.
-#![allow(clippy::unwrap_used, clippy::expect_used)]
+// Prints what it measured, for `--nocapture`.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout)]
 
+#[allow(unreachable_pub)]
 mod shared_data;
 
 use nalgebra::{Matrix3, Vector3};
@@ -389,7 +391,8 @@ fn a_disk_on_an_arm_has_the_seed_script_inertia() {
 // ---- the methods ----
 
 /// theory/top.md, section 4: axis / attitude in degrees, in the order of the three held rates.
-const TABLE: [(f64, u64, [(f64, f64); 6]); 2] = [
+type Row = (f64, u64, [(f64, f64); 6]);
+const TABLE: [Row; 2] = [
     (
         2000.0,
         2400,

@@ -45,7 +45,7 @@ impl fmt::Display for MotionError {
 impl std::error::Error for MotionError {}
 
 /// The value, when it is a number of size at most `most`.
-fn within(what: &'static str, value: f64, most: f64) -> Result<f64, MotionError> {
+pub(crate) fn within(what: &'static str, value: f64, most: f64) -> Result<f64, MotionError> {
     if value.abs() <= most {
         Ok(value)
     } else {
@@ -54,7 +54,7 @@ fn within(what: &'static str, value: f64, most: f64) -> Result<f64, MotionError>
 }
 
 /// The largest rate or angular frequency taken, rad/s: ten times what any gyro reads.
-const FASTEST: f64 = 1e5;
+pub(crate) const FASTEST: f64 = 1e5;
 
 /// Any of the motions.
 #[derive(Clone, Debug)]
@@ -66,7 +66,7 @@ pub enum Motion {
     /// Sums of sines about each axis.
     BandLimited(Box<BandLimited>),
     /// A free body with three different moments of inertia.
-    FreeBody(FreeBody),
+    FreeBody(Box<FreeBody>),
     /// A top, or any body about a fixed point under gravity.
     HeavyBody(Box<HeavyBody>),
 }

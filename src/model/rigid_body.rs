@@ -17,7 +17,7 @@
 //! | `Rk4` | 4 | comparison |
 //! | `GaussLegendre6` | 6 | default for any torque; keeps the norm, energy and momentum of a free body to rounding |
 //!
-//! For gravity alone there is [`HeavyBody`], exact to 1e-15 rad, with random access in time.
+//! For gravity alone there is [`HeavyBody`], exact to rounding, at any instant.
 
 mod heavy;
 mod integrator;

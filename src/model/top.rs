@@ -30,6 +30,7 @@ pub use compare::{MethodError, TopMethod, TopRun, compare};
 pub use euler_angles::{EulerAngles, EulerState};
 
 use super::inertia::{InertiaError, RigidBody};
+use super::motion::MotionError;
 use super::rigid_body::{HeavyBody, NotConverged, Rotor};
 use nalgebra::{Matrix3, Vector3};
 use std::fmt;
@@ -110,6 +111,14 @@ impl From<InertiaError> for TopError {
         Self::Inertia(e)
     }
 }
+impl From<MotionError> for TopError {
+    fn from(e: MotionError) -> Self {
+        Self::OutOfRange {
+            what: e.what,
+            value: e.value,
+        }
+    }
+}
 impl From<NotConverged> for TopError {
     fn from(e: NotConverged) -> Self {
         Self::NotConverged(e)
@@ -148,7 +157,11 @@ impl SymmetricTop {
                 return Err(TopError::OutOfRange { what, value });
             }
         }
-        for (what, value) in [("arm", arm), ("gravity", gravity)] {
+        for (what, value) in [
+            ("arm", arm),
+            ("gravity", gravity),
+            ("torque of gravity", mass * gravity * arm),
+        ] {
             if !(value >= 0.0 && value.is_finite()) {
                 return Err(TopError::OutOfRange { what, value });
             }
@@ -243,7 +256,8 @@ impl SymmetricTop {
         let b = self.axial * w3;
         let c = self.largest_torque();
         let discriminant = b * b - 4.0 * a * c;
-        if !(discriminant >= 0.0) {
+        let real = discriminant >= 0.0;
+        if !real {
             return Err(TopError::NoSteadyPrecession {
                 w3,
                 needed: 2.0 * (a * c).sqrt() / self.axial,
@@ -251,6 +265,9 @@ impl SymmetricTop {
         }
         // The sum of two numbers of one sign: the slow root loses no digits.
         let q = 0.5 * (b + b.signum() * discriminant.sqrt());
+        if q == 0.0 {
+            return Err(TopError::NoSteadyPrecession { w3, needed: 0.0 });
+        }
         Ok((c / q, q / a))
     }
 
@@ -283,7 +300,7 @@ impl SymmetricTop {
     /// The exact motion from a start (method D).
     ///
     /// # Errors
-    /// [`TopError::Inertia`] for numbers out of all proportion ([`HeavyBody::new`]).
+    /// [`TopError::OutOfRange`] for numbers out of all proportion ([`HeavyBody::new`]).
     pub fn exact(&self, start: &EulerState) -> Result<HeavyBody, TopError> {
         Ok(HeavyBody::new(
             self.rotor()?,

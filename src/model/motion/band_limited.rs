@@ -101,14 +101,7 @@ impl BandLimited {
 
     /// Attitude and body rate at `nanos` nanoseconds.
     pub fn at_nanos(&mut self, nanos: u64) -> Spin {
-        let t = DoubleDouble::from_nanos(nanos);
-        let (q, _) = self.trajectory.at(t);
-        let w_nb_b = Vector3::from_fn(|i, _| {
-            self.axes[i]
-                .iter()
-                .map(|s| s.amplitude * (t * s.omega + DoubleDouble::from(s.phase)).sin_cos().0)
-                .sum()
-        });
+        let (q, w_nb_b) = self.trajectory.at(DoubleDouble::from_nanos(nanos));
         Spin {
             q_nb: Quaternion::assume_unit(q),
             w_nb_b,

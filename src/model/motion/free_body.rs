@@ -157,7 +157,8 @@ impl Tumbling {
         let mc = middle * ratio;
         // Closer than this the quarter period is more than 35 time constants: what happens after
         // one is decided by digits the rates do not have.
-        if !(mc.to_f64() > 1e-30) {
+        let clear = mc.to_f64() > 1e-30;
+        if !clear {
             return Err(MotionError {
                 what: "distance from the separatrix (use the power series there)",
                 value: mc.to_f64(),

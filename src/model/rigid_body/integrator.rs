@@ -129,8 +129,9 @@ pub(crate) fn gauss_legendre6<const N: usize>(
         }
         last = remaining;
     }
-    // The other way round would let NaN pass.
-    if !(remaining <= FLOOR) {
+    // False for NaN.
+    let converged = remaining <= FLOOR;
+    if !converged {
         return Err(NotConverged {
             step_secs: h,
             remaining,

@@ -87,7 +87,8 @@ impl Case {
                 let (_, fast) = top.steady_precession(tilt, w3)?;
                 // At 90 degrees the fast root has gone to infinity; rates a gyro can not read are
                 // no motion to simulate.
-                if !(fast.abs() <= 1e4) {
+                let readable = fast.abs() <= 1e4;
+                if !readable {
                     return Err(TopError::OutOfRange {
                         what: "fast precession (rad/s)",
                         value: fast,

@@ -66,7 +66,7 @@ impl ClosedForm {
     pub fn new(top: &SymmetricTop, start: &EulerState) -> Result<Self, TopError> {
         let dd = DoubleDouble::from;
         let i1 = top.transverse();
-        if !(top.largest_torque() > 0.0) {
+        if top.largest_torque() <= 0.0 {
             return Err(TopError::OutOfRange {
                 what: "torque of gravity, for the closed form",
                 value: top.largest_torque(),
@@ -90,7 +90,8 @@ impl ClosedForm {
         };
         // cos(1e-3) = 1 - 5e-7.
         for u in [u1.to_f64(), u2.to_f64()] {
-            if !(u.abs() < 1.0 - 5e-7) {
+            let clear = u.abs() < 1.0 - 5e-7;
+            if !clear {
                 return Err(singular(u));
             }
         }
@@ -213,7 +214,8 @@ fn roots(
             let slope = (beta * x * 3.0 + c2 * 2.0) * x + c1;
             let step = f / slope;
             x = x - step;
-            if !(step.to_f64().abs() > 1e-30 * x.to_f64().abs()) {
+            let moves = step.to_f64().abs() > 1e-30 * x.to_f64().abs();
+            if !moves {
                 break;
             }
         }

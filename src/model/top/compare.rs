@@ -86,7 +86,8 @@ impl TopRun {
         }
         let spin = start.spin();
         let needed_hz = spin.w_nb_b.norm() / std::f64::consts::PI;
-        if !(needed_hz < rate_hz) {
+        let follows = needed_hz < rate_hz;
+        if !follows {
             return Err(TopError::RateTooLow { rate_hz, needed_hz });
         }
         let run = Self {
