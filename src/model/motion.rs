@@ -11,7 +11,7 @@
 //! | [`Coning`] | closed form | closed form |
 //! | [`BandLimited`] | power series in 32 digits | closed form |
 //! | [`FreeBody`] | Jacobi's functions | closed form |
-//! | [`HeavyBody`](super::rigid_body::HeavyBody) (the top) | power series in 32 digits | power series |
+//! | [`HeavyBody`] (the top) | power series in 32 digits | power series |
 //!
 //! Time is integer nanoseconds since the start.
 
