@@ -3,4 +3,11 @@
 //! [`frames`] says what a rotation joins, [`attitude`] how it is held and moved.
 
 pub mod attitude;
+mod double_double;
+mod elliptic;
 pub mod frames;
+pub mod inertia;
+pub mod motion;
+mod quaternion_kernel;
+pub mod rigid_body;
+pub mod top;

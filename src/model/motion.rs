@@ -1,0 +1,96 @@
+//! A motion in closed form (or as good as) -> attitude, rate and delta angle at any instant. Pure.
+//!
+//! A stage of its own because an integrator can only be judged by motions whose truth no integrator
+//! made. Each motion gives three things that belong together: the exact attitude, the exact body
+//! rate and the exact integral of the rate over an interval (what an integrating gyro puts out, and
+//! not yet a rotation). Tests integrate each from its rates by an independent method and compare.
+//!
+//! | motion | attitude | delta angle |
+//! |---|---|---|
+//! | [`ConstantRate`] | closed form | closed form |
+//! | [`Coning`] | closed form | closed form |
+//! | [`BandLimited`] | power series in 32 digits | closed form |
+//! | [`FreeBody`] | Jacobi's functions | closed form |
+//! | [`HeavyBody`] (the top) | power series in 32 digits | power series |
+//!
+//! Time is integer nanoseconds since the start.
+
+mod band_limited;
+mod coning;
+mod free_body;
+
+pub use band_limited::{BandLimited, Sine};
+pub use coning::{Coning, ConstantRate};
+pub use free_body::FreeBody;
+
+use super::rigid_body::{HeavyBody, Spin};
+use nalgebra::Vector3;
+use std::fmt;
+
+/// A motion can not have this parameter.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct MotionError {
+    /// Which parameter.
+    pub what: &'static str,
+    /// As given.
+    pub value: f64,
+}
+
+impl fmt::Display for MotionError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} can not be {}", self.what, self.value)
+    }
+}
+
+impl std::error::Error for MotionError {}
+
+/// The value, when it is a number of size at most `most`.
+pub(crate) fn within(what: &'static str, value: f64, most: f64) -> Result<f64, MotionError> {
+    if value.abs() <= most {
+        Ok(value)
+    } else {
+        Err(MotionError { what, value })
+    }
+}
+
+/// The largest rate or angular frequency taken, rad/s: ten times what any gyro reads.
+pub(crate) const FASTEST: f64 = 1e5;
+
+/// Any of the motions.
+#[derive(Clone, Debug)]
+pub enum Motion {
+    /// One axis, one rate.
+    ConstantRate(ConstantRate),
+    /// The axis runs round a cone: the worst case of attitude integration.
+    Coning(Coning),
+    /// Sums of sines about each axis.
+    BandLimited(Box<BandLimited>),
+    /// A free body with three different moments of inertia.
+    FreeBody(Box<FreeBody>),
+    /// A top, or any body about a fixed point under gravity.
+    HeavyBody(Box<HeavyBody>),
+}
+
+impl Motion {
+    /// Attitude and body rate at `nanos` nanoseconds.
+    pub fn at_nanos(&mut self, nanos: u64) -> Spin {
+        match self {
+            Self::ConstantRate(m) => m.at_nanos(nanos),
+            Self::Coning(m) => m.at_nanos(nanos),
+            Self::BandLimited(m) => m.at_nanos(nanos),
+            Self::FreeBody(m) => m.at_nanos(nanos),
+            Self::HeavyBody(m) => m.at_nanos(nanos),
+        }
+    }
+
+    /// Integral of the body rate over `from..to` in nanoseconds, rad.
+    pub fn delta_angle(&mut self, from: u64, to: u64) -> Vector3<f64> {
+        match self {
+            Self::ConstantRate(m) => m.delta_angle(from, to),
+            Self::Coning(m) => m.delta_angle(from, to),
+            Self::BandLimited(m) => m.delta_angle(from, to),
+            Self::FreeBody(m) => m.delta_angle(from, to),
+            Self::HeavyBody(m) => m.delta_angle(from, to),
+        }
+    }
+}
