@@ -117,22 +117,10 @@ impl Decoder {
         if channel.message_encoding == "json" {
             return Ok(Decoder::json(channel, options, label));
         }
-        let schema = read_schema(channel).map_err(refuse)?;
-        let selection = select(&schema, channel.schema_name, options).map_err(|why| {
-            refuse((
-                why,
-                "paths are names between dots: --field gyro=imu.angular_velocity",
-            ))
-        })?;
-        if selection.picks.is_empty()
-            || !(selection.has(Slot::GYRO, 3) || selection.has(Slot::ORIENTATION, 4))
-        {
-            return Err(refuse((
-                "the type has no body rate and no orientation under a name this program knows"
-                    .to_owned(),
-                "name it: --field gyro=PATH",
-            )));
-        }
+        // A recorder may leave a well-known type's text out, or shorten it to a stub.
+        let (schema, selection) = understand(channel, read_schema(channel), options)
+            .or_else(|why| understand(channel, well_known(channel), options).map_err(|_| why))
+            .map_err(refuse)?;
         let plan =
             compile_plan(channel, &schema, &selection, options).map_err(|why| refuse((why, "")))?;
         let frame = selection
@@ -369,6 +357,39 @@ fn unsupported([topic, type_name, encoding]: &[String; 3], why: String, help: &s
         why,
         help: help.to_owned(),
     }
+}
+
+/// What the type of this name is everywhere.
+fn well_known(channel: &Channel<'_>) -> Result<Schema, (String, &'static str)> {
+    let dialect = match channel.message_encoding {
+        "cdr" => Dialect::Ros2,
+        _ => Dialect::Ros1,
+    };
+    builtin::schema(&ros_name(channel.schema_name), dialect)
+        .filter(|_| matches!(channel.message_encoding, "cdr" | "ros1"))
+        .ok_or((String::new(), ""))
+}
+
+/// The schema with the fields that are wanted of it.
+fn understand(
+    channel: &Channel<'_>,
+    schema: Result<Schema, (String, &'static str)>,
+    options: &Options,
+) -> Result<(Schema, Selection), (String, &'static str)> {
+    let schema = schema?;
+    let selection = select(&schema, channel.schema_name, options).map_err(|why| {
+        (
+            why,
+            "paths are names between dots: --field gyro=imu.angular_velocity",
+        )
+    })?;
+    if selection.has(Slot::GYRO, 3) || selection.has(Slot::ORIENTATION, 4) {
+        return Ok((schema, selection));
+    }
+    Err((
+        "the type has no body rate and no orientation under a name this program knows".to_owned(),
+        "name it: --field gyro=PATH",
+    ))
 }
 
 fn read_schema(channel: &Channel<'_>) -> Result<Schema, (String, &'static str)> {

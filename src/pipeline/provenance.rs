@@ -42,7 +42,7 @@ pub fn of(
     for ((found, prepared), stream) in founds.iter().zip(prepared).zip(streams) {
         let key = |name: &str| match founds {
             [_] => name.to_owned(),
-            _ => format!("{} {name}", found.name),
+            _ => format!("{} {name}", stream.output_topic),
         };
         let [w, x, y, z] = prepared.initial.wxyz();
         let [bx, by, bz]: [f64; 3] = prepared.bias.into();

@@ -62,8 +62,8 @@ fn from_mcap(path: &Path, topic: Option<&str>, pool: &Pool) -> Result<Track> {
             path: path.to_owned(),
             what: why.to_string(),
         })?;
-    let convention = orientation_convention(decoder.stated());
-    let mut entries = Vec::new();
+    let stated = orientation_convention(decoder.stated());
+    let mut entries: Vec<Entry> = Vec::new();
     let wanted = known.channel.clone();
     let reader = log.reader().map_or_else(|| mcap::Reader::open(path), Ok)?;
     let report = mcap::walk(
@@ -87,13 +87,22 @@ fn from_mcap(path: &Path, topic: Option<&str>, pool: &Pool) -> Result<Track> {
                 Item::Reference(raw) => {
                     let stamp = raw.header.filter(|s| s.0 != 0).unwrap_or(raw.log);
                     raw.orientation
-                        .map(|wxyz| (stamp, in_flu(convention, wxyz)))
+                        .map(|wxyz| (stamp, wxyz))
                 }
                 _ => None,
             }));
             std::ops::ControlFlow::Continue(())
         },
     )?;
+    // Our own outputs say what world their numbers are in.
+    let labels = &report.survey.facts.provenance;
+    let world = labels
+        .get("world")
+        .or_else(|| labels.get(&format!("{} world", known.channel.topic)));
+    let convention = world.map_or(stated, |world| convention_of(world));
+    for (_, wxyz) in &mut entries {
+        *wxyz = in_flu(convention, *wxyz);
+    }
     Ok(Track {
         name: format!("{} {}", path.display(), known.channel.topic),
         entries,

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 ///
 /// # Panics
 /// In CI (`CI` set) when it is absent: there a skip would be a test that can not fail.
-#[allow(dead_code)]
+#[allow(dead_code, unreachable_pub)]
 pub fn shared(relative: &str) -> Option<PathBuf> {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR"))
         .join("../shared")

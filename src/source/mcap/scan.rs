@@ -23,6 +23,9 @@ const PEEK: usize = 1 << 10;
 /// Bytes that may follow the known fields of a chunk record (the format may grow).
 const SLACK: u64 = 1 << 10;
 
+/// Metadata records up to this long are looked into; ours takes about 1 kB.
+const METADATA_READ: u64 = 64 << 10;
+
 /// What a log says about itself outside its messages.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Facts {
@@ -36,6 +39,8 @@ pub struct Facts {
     pub unverified_chunks: u64,
     /// Metadata records met.
     pub metadata: u64,
+    /// The first metadata record named `strapd`: what our own output says about its frames.
+    pub provenance: BTreeMap<String, String>,
     /// Attachments met.
     pub attachments: u64,
 }
@@ -283,8 +288,10 @@ impl Scanner {
             op::FOOTER => self.section = Section::Footer,
             _ => {}
         }
-        let wanted =
-            self.everything || matches!(opcode, op::HEADER | op::DATA_END | op::STATISTICS);
+        let small = opcode == op::METADATA && length <= METADATA_READ;
+        let wanted = small
+            || self.everything
+            || matches!(opcode, op::HEADER | op::DATA_END | op::STATISTICS);
         if !wanted || length > self.limits.record {
             self.pass_over(total)?;
             return Ok(None);
@@ -301,6 +308,14 @@ impl Scanner {
             Some(Record::Header { profile, library }) if self.facts.profile.is_empty() => {
                 self.facts.profile = profile.to_owned();
                 self.facts.library = library.to_owned();
+            }
+            Some(Record::Metadata { name: "strapd", metadata })
+                if self.facts.provenance.is_empty() =>
+            {
+                self.facts.provenance = metadata
+                    .into_iter()
+                    .map(|(key, value)| (key.to_owned(), value.to_owned()))
+                    .collect();
             }
             Some(Record::Statistics(s)) => self.claimed = Some(s.message_count),
             Some(Record::DataEnd {
