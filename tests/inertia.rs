@@ -670,6 +670,21 @@ fn a_thrown_body_falls_with_its_centre_of_gravity_on_a_parabola() {
             })
             .unwrap();
     }
+    // Weight acts at the centre of gravity: it does not turn the body.
+    let mut weightless = Pose {
+        q_nb: Quaternion::identity(),
+        p_o_n: Vector3::zeros(),
+        nu: Vector6::new(3.0, 1.0, 8.0, 0.5, -1.0, 2.0),
+    };
+    for n in 0..1500 {
+        weightless = vessel
+            .step(f64::from(n) * h, &weightless, h, |_, _| Vector6::zeros())
+            .unwrap();
+    }
+    let turned_otherwise =
+        (turned(&pose, &Vector3::x()) - turned(&weightless, &Vector3::x())).norm();
+    // 1500 roundings of a few rad/s.
+    assert!(turned_otherwise < 1e-12, "{turned_otherwise:e}");
     let expected = start + v_cg * 1.5 + gravity * (0.5 * 1.5 * 1.5);
     // 1500 roundings of 10 m.
     assert!(
