@@ -273,6 +273,11 @@ fn hostile_numbers_are_refused_not_propagated() {
     assert!(b.resolved_in(&-Matrix3::identity()).is_err(), "a mirror");
     assert!(b.resolved_in(&Matrix3::from_element(f64::NAN)).is_err());
     assert_eq!(RigidBody::combined(&[]), Err(InertiaError::NoBodies));
+    // A fluid that would push by itself.
+    let mut negative = Matrix6::identity();
+    negative[(2, 2)] = -1e-3;
+    assert_eq!(AddedMass::new(negative), Err(InertiaError::NotInvertible));
+    assert!(AddedMass::new(Matrix6::zeros()).is_ok(), "no fluid at all");
 }
 
 fn seed_example() -> RigidBody {
