@@ -273,6 +273,11 @@ fn hostile_numbers_are_refused_not_propagated() {
     assert!(b.resolved_in(&-Matrix3::identity()).is_err(), "a mirror");
     assert!(b.resolved_in(&Matrix3::from_element(f64::NAN)).is_err());
     assert_eq!(RigidBody::combined(&[]), Err(InertiaError::NoBodies));
+    // A fluid that would push by itself.
+    let mut negative = Matrix6::identity();
+    negative[(2, 2)] = -1e-3;
+    assert_eq!(AddedMass::new(negative), Err(InertiaError::NotInvertible));
+    assert!(AddedMass::new(Matrix6::zeros()).is_ok(), "no fluid at all");
 }
 
 fn seed_example() -> RigidBody {
@@ -670,6 +675,21 @@ fn a_thrown_body_falls_with_its_centre_of_gravity_on_a_parabola() {
             })
             .unwrap();
     }
+    // Weight acts at the centre of gravity: it does not turn the body.
+    let mut weightless = Pose {
+        q_nb: Quaternion::identity(),
+        p_o_n: Vector3::zeros(),
+        nu: Vector6::new(3.0, 1.0, 8.0, 0.5, -1.0, 2.0),
+    };
+    for n in 0..1500 {
+        weightless = vessel
+            .step(f64::from(n) * h, &weightless, h, |_, _| Vector6::zeros())
+            .unwrap();
+    }
+    let turned_otherwise =
+        (turned(&pose, &Vector3::x()) - turned(&weightless, &Vector3::x())).norm();
+    // 1500 roundings of a few rad/s.
+    assert!(turned_otherwise < 1e-12, "{turned_otherwise:e}");
     let expected = start + v_cg * 1.5 + gravity * (0.5 * 1.5 * 1.5);
     // 1500 roundings of 10 m.
     assert!(

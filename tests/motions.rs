@@ -307,6 +307,25 @@ fn a_rotation_about_a_principal_axis_stays_there() {
 }
 
 #[test]
+fn a_wobble_too_small_to_square_is_still_a_number() {
+    for w in [
+        [1e-155, 0.0, 1.0],
+        [1e-200, 1e-300, 2.0],
+        [2.0, 1e-160, 1e-160],
+        [1e-9, 1e-310, -3.0],
+    ] {
+        let closed = free([1.0, 2.0, 3.0], w);
+        let mut series = the_same_by_power_series([1.0, 2.0, 3.0], w);
+        let t = 7_000_000_000;
+        let (a, b) = (closed.at_nanos(t), series.at_nanos(t));
+        // Roundings of 20 rad reduced in 32 digits.
+        assert!(distance(&a.q_nb.wxyz(), &b.q_nb.wxyz()) < 1e-14, "{w:?}");
+        let delta = closed.delta_angle(0, t) - series.delta_angle(0, t);
+        assert!(delta.amax() < 1e-14, "{w:?} {delta:?}");
+    }
+}
+
+#[test]
 fn the_separatrix_is_refused_not_guessed() {
     // I1 (I1 - I2) w1^2 + I3 (I3 - I2) w3^2 = -0.5625 + 0.5625, exactly.
     let start = Spin {

@@ -135,11 +135,11 @@ fn closed_form_and_power_series_agree_over_a_minute() {
 #[test]
 fn closed_form_and_power_series_agree_for_a_start_between_turning_points() {
     let top = SymmetricTop::new(0.3, 0.11, 0.004, 0.0009, 9.81).unwrap();
-    for nutation_rate in [2.0, -2.0] {
+    for (nutation, nutation_rate) in [(1.1, 2.0), (1.1, -2.0), (-1.1, 2.0), (-2.3, -1.0)] {
         let start = EulerState {
             angles: EulerAngles {
                 precession: 0.4,
-                nutation: 1.1,
+                nutation,
                 spin: -2.0,
             },
             precession_rate: 1.5,
@@ -523,6 +523,7 @@ fn error_of(method: Method, rate_hz: u64) -> f64 {
 fn each_integrator_has_its_order() {
     for (method, order, rates) in [
         (Method::HeldTorque(HeldRate::Left), 1.0, [8000, 16_000]),
+        (Method::HeldTorque(HeldRate::Right), 1.0, [2000, 4000]),
         (Method::Rk4, 4.0, [1000, 2000]),
         (Method::GaussLegendre6, 6.0, [500, 1000]),
     ] {

@@ -66,6 +66,13 @@ impl ClosedForm {
     pub fn new(top: &SymmetricTop, start: &EulerState) -> Result<Self, TopError> {
         let dd = DoubleDouble::from;
         let i1 = top.transverse();
+        let nutation = start.angles.nutation;
+        if nutation.abs() > std::f64::consts::PI {
+            return Err(TopError::OutOfRange {
+                what: "nutation beyond half a turn (rad), for the closed form",
+                value: nutation,
+            });
+        }
         if top.largest_torque() <= 0.0 {
             return Err(TopError::OutOfRange {
                 what: "torque of gravity, for the closed form",
