@@ -376,6 +376,8 @@ fn a_mean_rate_is_the_integral_of_the_rate_over_its_interval() {
 fn the_mean_rates_of_the_coning_log_add_up_to_the_drift_that_summing_shows() {
     // Summed delta angles of coning over whole cycles: nothing in x and y, omega (1 - cos a) in z.
     let imu = messages("coning_average.mcap", "/imu/data_raw");
+    let before_the_start = Motion::Coning.mean_rate(-10_000_000, 0);
+    assert_eq!(vector_at(&imu[0].1, GYRO), before_the_start);
     let mut sum = [0.0; 3];
     for pair in imu.windows(2) {
         let seconds = (stamp_of(&pair[1].1) - stamp_of(&pair[0].1)) as f64 * 1e-9;

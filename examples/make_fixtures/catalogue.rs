@@ -90,7 +90,8 @@ fn fixture(name: &'static str, bytes: Vec<u8>) -> Fixture {
 enum Sampling {
     /// The rate at the stamp.
     Rate,
-    /// Its mean since the stamp before. The first sample has no interval and holds the rate at its stamp.
+    /// Its mean since the stamp before; for the first sample, over as long an interval before the start:
+    /// a sensor that averages was running before it was recorded.
     Average,
 }
 
@@ -225,13 +226,16 @@ fn motion_log(
     let mut log = Log::new("ros2", storage)?;
     let imu = imu_topic(&mut log, "/imu/data_raw")?;
     let truth = quaternion_topic(&mut log, "/truth")?;
-    let mut before = None;
+    let mut before = match instants {
+        [first, second, ..] => first - (second - first),
+        _ => 0,
+    };
     for &nanos in instants {
         let mut sample = sample_of(motion, nanos);
-        if let (Sampling::Average, Some(start)) = (sampling, before) {
-            sample.gyro = motion.mean_rate(start, nanos);
+        if sampling == Sampling::Average {
+            sample.gyro = motion.mean_rate(before, nanos);
         }
-        before = Some(nanos);
+        before = nanos;
         let stamp = sample.stamp;
         log.write(imu, stamp, &imu_message(SENSOR_FRAME, &sample))?;
         let message = quaternion_message(stamp, "start", motion.attitude(nanos));
