@@ -123,6 +123,7 @@ fn first_losses(topic: &Topic, start: Nanos) -> Vec<String> {
         .map(|(verdict, bad)| {
             let at = bad
                 .stamp
+                .filter(|_| *verdict != Verdict::NoStamp)
                 .map_or_else(String::new, |s| format!(" at {:.6} s", s.secs_since(start)));
             format!(
                 "first {}: sample {}{at}",
