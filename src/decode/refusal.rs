@@ -65,6 +65,14 @@ pub enum Undecodable {
         /// Bytes the schema accounts for.
         used: u64,
     },
+    /// A line beyond what one may be.
+    #[error("a line of {have} bytes, over the limit of {limit}")]
+    LongLine {
+        /// Bytes there are.
+        have: u64,
+        /// The most there may be.
+        limit: u64,
+    },
     /// A CDR encapsulation this crate does not read.
     #[error("CDR encapsulation {:02x} {:02x} is {what}; only plain CDR (00 00, 00 01) is read", found[0], found[1])]
     Encapsulation {

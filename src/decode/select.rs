@@ -36,6 +36,8 @@ pub(crate) struct Pick {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Selection {
     pub(crate) picks: Vec<Pick>,
+    /// How many of the picks, the first ones, the user gave.
+    pub(crate) given: usize,
     pub(crate) form: Form,
     /// The array whose elements are samples.
     pub(crate) batch: Option<Batch>,
@@ -116,6 +118,7 @@ pub(crate) fn select(
     for field in given {
         take_given(schema, field, &mut selection)?;
     }
+    selection.given = selection.picks.len();
     search::complete(
         schema,
         type_name,
@@ -165,6 +168,8 @@ fn take_given(schema: &Schema, field: &FieldPath, selection: &mut Selection) -> 
     selection.take(paths.ok_or_else(|| nowhere(&field.text))?, slot);
     if field.role == FieldRole::Gyro {
         selection.found = Found::Given;
+    }
+    if matches!(field.role, FieldRole::Gyro | FieldRole::Orientation) && selection.batch.is_none() {
         selection.batch = batch_of(schema, &first.0);
     }
     if field.role == FieldRole::Interval {

@@ -271,6 +271,11 @@ mod tests {
             TimeUnit::nearest(27_329_869.0, Nanos(1_700_000_000_000_000_000)),
             None
         );
+        assert_eq!(
+            TimeUnit::nearest(1.7e18, log),
+            None,
+            "an epoch beside a boot clock"
+        );
         assert_eq!(TimeUnit::nearest(0.0, Nanos(0)), None);
     }
 

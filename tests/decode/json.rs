@@ -35,6 +35,49 @@ fn a_body_rate_is_found_under_every_name_and_shape() {
 }
 
 #[test]
+fn the_stamp_nearest_to_the_body_rate_is_its_own() {
+    let decoder = decoder("");
+    let header = |sec| format!(r#""header":{{"stamp":{{"sec":{sec},"nsec":0}}}}"#);
+    for (text, sec) in [
+        (
+            format!(
+                r#"{{{},"imu":{{{},"gyro":[1,2,3]}}}}"#,
+                header(1),
+                header(2)
+            ),
+            2,
+        ),
+        (
+            format!(
+                r#"{{"imu":{{"gyro":[1,2,3],{}}},{}}}"#,
+                header(2),
+                header(1)
+            ),
+            2,
+        ),
+        (
+            format!(
+                r#"{{{},"imu":{{"gyro":[1,2,3]}},"other":{{{}}}}}"#,
+                header(1),
+                header(9)
+            ),
+            1,
+        ),
+        (
+            format!(
+                r#"{{{},"imu":{{{},"gyro":[1,2,3]}},"gyro":[4,5,6]}}"#,
+                header(1),
+                header(2)
+            ),
+            1,
+        ),
+    ] {
+        let stamp = decode_one(&decoder, text.as_bytes()).header;
+        assert_eq!(stamp, Some(Nanos(sec * 1_000_000_000)), "{text}");
+    }
+}
+
+#[test]
 fn a_stamp_is_read_in_every_notation_to_the_nanosecond() {
     let decoder = decoder("");
     for stamp in [
@@ -189,6 +232,11 @@ fn px4_messages_bring_their_own_interval_and_meaning() {
     assert_eq!(
         decode_one(&decoder("px4.vehicle_attitude"), attitude.as_bytes()).orientation,
         Some([0.5, 0.25, -0.125, 0.75])
+    );
+    let five = r#"{"timestamp_sample":5,"q":[1,0,0,0,0]}"#;
+    assert_eq!(
+        decode_one(&decoder("px4.vehicle_attitude"), five.as_bytes()).orientation,
+        None
     );
     let rate = r#"{"timestamp":9,"timestamp_sample":5,"xyz":[1,2,3],"xyz_derivative":[7,7,7]}"#;
     assert_eq!(

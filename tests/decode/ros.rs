@@ -661,3 +661,66 @@ fn an_unlabelled_integer_stamp_is_settled_by_the_recorders_clock() {
         Some(Nanos(27_329_869_000))
     );
 }
+
+#[test]
+fn a_forged_count_is_refused_by_what_it_would_need() {
+    let text = format!("sensor_msgs/Imu[] imus\n{}", imu_section());
+    let decoder = Decoder::compile(&channel("cdr", "a/msg/B", &text), &Options::default()).unwrap();
+    let payload = Writer::cdr(false).u32(u32::MAX).imu("imu").bytes;
+    match decode(&decoder, &payload) {
+        // 2^32 - 1 times 8 bytes of stamp, 4 of count, 296 of numbers.
+        Err(Undecodable::Short { need, field, .. }) => {
+            assert_eq!(
+                (need, field.as_str()),
+                (8 + u64::from(u32::MAX) * 308, "imus")
+            );
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn a_messages_own_orientation_comes_before_those_in_its_arrays() {
+    let types = section("a/P", "Q orientation")
+        + &section("a/Q", "float64 x\nfloat64 y\nfloat64 z\nfloat64 w");
+    let text = format!(
+        "a/P[] others\na/Deep own\n{}{types}",
+        section("a/Deep", "a/P pose")
+    );
+    let decoder = Decoder::compile(&channel("cdr", "a/msg/M", &text), &Options::default()).unwrap();
+    let others = Writer::cdr(false).u32(1).f64s(&[1.0, 0.0, 0.0, 0.0]);
+    let payload = others.f64s(&[0.1, 0.2, 0.3, 0.9]).bytes;
+    assert_eq!(
+        decode_one(&decoder, &payload).orientation,
+        Some(ORIENTATION)
+    );
+    let given = options(&["orientation=others[0].orientation"]);
+    let decoder = Decoder::compile(&channel("cdr", "a/msg/M", &text), &given).unwrap();
+    assert_eq!(
+        decode_one(&decoder, &payload).orientation,
+        Some([0.0, 1.0, 0.0, 0.0])
+    );
+}
+
+#[test]
+fn a_given_field_outside_the_batch_is_refused_not_dropped() {
+    let text = format!(
+        "float64[3] accel\na/S[] samples\n{}",
+        section("a/S", "float64[3] gyro\nuint32 dt_us")
+    );
+    let channel = channel("cdr", "a/msg/B", &text);
+    let error = Decoder::compile(&channel, &options(&["accel=accel"])).unwrap_err();
+    assert!(error.to_string().contains("different arrays"), "{error}");
+    let given = options(&["gyro=samples[].gyro", "dt=samples[].dt_us:us"]);
+    let decoder = Decoder::compile(&channel, &given).unwrap();
+    let payload = Writer::cdr(false)
+        .f64s(&ACCEL)
+        .u32(1)
+        .f64s(&GYRO)
+        .u32(2500)
+        .bytes;
+    assert_eq!(
+        decode_one(&decoder, &payload).interval_nanos,
+        Some(2_500_000)
+    );
+}

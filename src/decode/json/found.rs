@@ -37,6 +37,8 @@ pub(crate) struct Found<'a> {
     pub(crate) delta_velocity: bool,
     /// A PX4 message: an unlabelled integer stamp is in microseconds.
     pub(crate) px4: bool,
+    /// What objects inside this one held; joined last, so that the order of keys does not matter.
+    pub(crate) nested: Option<Box<Found<'a>>>,
     /// Samples of an array inside.
     pub(crate) batch: Vec<Found<'a>>,
 }
@@ -91,8 +93,25 @@ impl<'a> Found<'a> {
         self.registers.has(Slot::ORIENTATION, 4)
     }
 
-    /// Numbers under `values` are a body rate when the sensor's name says so.
-    pub(crate) fn settle(&mut self) {
+    /// Keeps what an object inside this one held, until all keys have been seen.
+    pub(crate) fn nest(&mut self, inner: Found<'a>, given_stamp: bool) {
+        if inner.registers.seen == 0 && inner.batch.is_empty() && inner.stamp.is_none() {
+            return;
+        }
+        match &mut self.nested {
+            Some(nested) => nested.join(inner, given_stamp),
+            // An empty one joins first, as any other: a stamp alone must not come in by itself.
+            None => {
+                let mut nested = Found::default();
+                nested.join(inner, given_stamp);
+                self.nested = Some(Box::new(nested));
+            }
+        }
+    }
+
+    /// All keys have been seen: joins what lay inside, and reads `values` as a body rate when the
+    /// sensor's name says so.
+    pub(crate) fn settle(&mut self, given_stamp: bool) {
         if self.delta_velocity && !self.registers.has(Slot::ACCEL_INTERVAL, 1) {
             self.registers.seen &= !Slot::ACCEL.bits(3);
         }
@@ -109,10 +128,13 @@ impl<'a> Found<'a> {
                 *unit = TimeUnit::Nano;
             }
         }
+        if let Some(nested) = self.nested.take() {
+            self.join(*nested, given_stamp);
+        }
     }
 
     /// Takes in what an object inside this one held.
-    pub(crate) fn join(&mut self, mut inner: Found<'a>, given_stamp: bool) {
+    fn join(&mut self, mut inner: Found<'a>, given_stamp: bool) {
         let nearer = inner.has_gyro() || (inner.has_orientation() && !self.has_gyro());
         let wanted = (inner.has_gyro() && !self.has_gyro())
             || (inner.has_orientation() && !self.has_orientation());

@@ -73,9 +73,9 @@ impl LineDecoder {
         out: &mut Vec<RawSample>,
     ) -> Result<Line, Undecodable> {
         if line.len() > MAX_LINE {
-            return Err(Undecodable::Long {
+            return Err(Undecodable::LongLine {
                 have: line.len() as u64,
-                used: MAX_LINE as u64,
+                limit: MAX_LINE as u64,
             });
         }
         let mut seeker = Seeker::new(&self.plan, Scanner::new(line)?);

@@ -103,9 +103,6 @@ impl<'a> Scanner<'a> {
             }
             Some(b',') => {
                 self.pos += 1;
-                if self.peek() == Some(close) {
-                    return self.broken("a comma with nothing behind it");
-                }
                 Ok(true)
             }
             Some(_) => self.broken("expected `,`"),

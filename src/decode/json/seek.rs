@@ -56,6 +56,7 @@ impl<'a, 'p> Seeker<'a, 'p> {
             Some(b'[') => {
                 let mut found = Found::default();
                 self.array(Some(0), 0, &mut found)?;
+                found.settle(!self.auto_stamp);
                 found
             }
             Some(b'{') => self.object(Some(0), 0, false)?,
@@ -83,7 +84,7 @@ impl<'a, 'p> Seeker<'a, 'p> {
                 None => self.named(&key, depth, twist, &mut found)?,
             }
         }
-        found.settle();
+        found.settle(!self.auto_stamp);
         Ok(found)
     }
 
@@ -164,7 +165,7 @@ impl<'a, 'p> Seeker<'a, 'p> {
                     found.stamp(rank, stamp);
                 }
                 found.frame = header.frame.clone().or(found.frame.take());
-                found.join(header, !self.auto_stamp);
+                found.nest(header, !self.auto_stamp);
             }
             Some(Meaning::GyroInterval(unit)) if self.auto_interval => {
                 found.px4 = true;
@@ -244,7 +245,7 @@ impl<'a, 'p> Seeker<'a, 'p> {
         match self.scanner.peek() {
             Some(b'{') if depth < limit => {
                 let inner = self.object(at, depth + 1, twist)?;
-                found.join(inner, !self.auto_stamp);
+                found.nest(inner, !self.auto_stamp);
                 Ok(())
             }
             Some(b'[') if depth < limit => self.array(at, depth, found),
@@ -291,7 +292,7 @@ impl<'a, 'p> Seeker<'a, 'p> {
                 None => true,
             };
             if wanted {
-                found.join(element, !self.auto_stamp);
+                found.nest(element, !self.auto_stamp);
             }
         }
         Ok(())

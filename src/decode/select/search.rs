@@ -85,7 +85,10 @@ pub(super) fn check(schema: &Schema, selection: &mut Selection) -> Result<(), St
     let batch = selection.batch.clone();
     let mut outside = false;
     let mut wrong = None;
+    let mut at = 0;
+    let given = selection.given;
     selection.picks.retain(|pick| {
+        at += 1;
         let own = batch_of(schema, &pick.path);
         if own == batch {
             return true;
@@ -95,16 +98,14 @@ pub(super) fn check(schema: &Schema, selection: &mut Selection) -> Result<(), St
             outside = true;
             return true;
         }
-        if pick.slot == Slot::GYRO || is_stamp {
+        if pick.slot == Slot::GYRO || is_stamp || at <= given {
             wrong = Some(path_text(schema, &pick.path));
         }
         // Anything else outside the batch belongs to no sample of it.
         false
     });
     if let Some(path) = wrong {
-        return Err(format!(
-            "`{path}` and the body rate lie in different arrays"
-        ));
+        return Err(format!("`{path}` and the samples lie in different arrays"));
     }
     selection.form.stamp_outside = outside && batch.is_some();
     Ok(())
