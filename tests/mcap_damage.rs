@@ -305,6 +305,48 @@ fn lengths_that_can_not_be_are_refused_and_reading_goes_on_at_the_next_chunk() {
 }
 
 #[test]
+fn a_chunk_whose_length_is_too_long_does_not_take_its_neighbours_with_it() {
+    let written = messages(200, 0);
+    let bytes = log(Some(None), 1_024, &written);
+    let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+    let second = &summary.chunk_indexes[1];
+    let at = second.chunk_start_offset as usize;
+    let lost: Vec<u32> = summary
+        .stream_chunk(&bytes, second)
+        .unwrap()
+        .map(|m| m.unwrap().sequence)
+        .collect();
+    let mut broken = bytes.clone();
+    let length = (second.chunk_length - 9 + 5_000).to_le_bytes();
+    broken[at + 1..at + 9].copy_from_slice(&length);
+    let (items, report) = read(from_bytes(&broken).unwrap());
+    let mut kept = written.clone();
+    kept.retain(|m| !lost.contains(&m.2));
+    assert!(items == kept, "{} of {}", items.len(), kept.len());
+    // The statistics tell how many are missing.
+    assert_eq!(report.survey.problems.messages_lost(), lost.len() as u64);
+}
+
+#[test]
+fn a_record_of_the_summary_that_became_a_message_is_none() {
+    let written = messages(50, 0);
+    let bytes = log(Some(None), 1_024, &written);
+    let (data, rest) = split_at_data_end(&bytes);
+    // Behind the 13 bytes of DataEnd the summary begins, with a schema or a channel.
+    let at = data.len() + 13;
+    assert!(
+        matches!(bytes[at], op::SCHEMA | op::CHANNEL),
+        "{}",
+        rest[13]
+    );
+    let mut broken = bytes.clone();
+    broken[at] = op::MESSAGE;
+    let (items, report) = read(from_bytes(&broken).unwrap());
+    assert!(items == written);
+    assert!(!report.survey.problems.is_empty());
+}
+
+#[test]
 fn a_chunk_its_writer_never_finished_is_told_and_read_where_it_is_not_compressed() {
     let written = messages(50, 0);
     let bytes = log(Some(None), 1_024, &written);

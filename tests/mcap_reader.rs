@@ -262,6 +262,50 @@ fn an_id_with_a_second_meaning_never_mixes_two_topics() {
 }
 
 #[test]
+fn definitions_hold_from_where_they_stand_for_any_number_of_threads() {
+    // Logs of many chunks, joined: each gives the ids another meaning, or a first one, in its first
+    // chunk only, while workers are chunks ahead.
+    let part = |round: u32| {
+        let options = mcap::WriteOptions::new()
+            .chunk_size(Some(300))
+            .compression(None);
+        let mut writer = options.create(std::io::Cursor::new(Vec::new())).unwrap();
+        for i in 0..200u32 {
+            // One channel more in each round; all of them defined in the first chunk.
+            let topic = format!("/{round}/{}", i % (round + 1));
+            let id = writer
+                .add_channel(0, &topic, "x", &Default::default())
+                .unwrap();
+            let log_time = u64::from(round * 1000 + i);
+            let header = mcap::records::MessageHeader {
+                channel_id: id,
+                sequence: i,
+                log_time,
+                publish_time: log_time,
+            };
+            writer
+                .write_to_known_channel(&header, topic.as_bytes())
+                .unwrap();
+        }
+        writer.finish().unwrap();
+        writer.into_inner().into_inner()
+    };
+    let joined: Vec<u8> = (0..5).flat_map(part).collect();
+    let pools = [2, 4].map(pool);
+    let (expected, report) = read_some(from_bytes(&joined).unwrap(), &fine(None), |_| true);
+    assert_eq!(expected.len(), 1000);
+    assert_eq!(report.survey.channels.len(), 1 + 2 + 3 + 4 + 5);
+    for pool in [None, Some(&pools[0]), Some(&pools[1])] {
+        let reader = from_bytes(&joined).unwrap();
+        let (items, again) = read_some(reader, &fine(pool), |_| true);
+        // Every message names the topic it was written on.
+        assert!(items.iter().all(|m| m.0.as_bytes() == m.3));
+        assert!(items == expected);
+        assert_eq!(again, report);
+    }
+}
+
+#[test]
 fn a_survey_by_summary_and_a_survey_by_walking_agree() {
     let dir = tempfile::tempdir().unwrap();
     for (name, packing) in PACKINGS {
