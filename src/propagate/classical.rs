@@ -40,7 +40,11 @@ pub(crate) fn step(method: Method, track: &Track, k: usize) -> Step {
         Method::Coning4 => coning(track, k, 4),
         Method::RotvecSum => {
             // The seed's sum runs over w(t_0) .. w(t_i) for the attitude at t_i+1.
-            let phi = if track.increments { right * h } else { left * h };
+            let phi = if track.increments {
+                right * h
+            } else {
+                left * h
+            };
             return Step::of_vector(phi);
         }
         // The others are no classical methods; the end rate is what `dcm-right` means.

@@ -98,7 +98,5 @@ fn solve(rows: &mut [[f64; UNKNOWNS + 3]; UNKNOWNS], n: usize) -> Option<[Triple
         }
         c[k] = sum * (1.0 / row[k]);
     }
-    c.iter()
-        .all(|c| c.norm().is_finite())
-        .then_some(c)
+    c.iter().all(|c| c.norm().is_finite()).then_some(c)
 }

@@ -72,10 +72,9 @@ fn order8<const N: usize>(m: &Moments<N>) -> Triple<N> {
     let y = b0.cross(b3);
     let s = u.cross(b1);
     let r = b0.cross(u);
-    let deepest = w * (1.0 / 2520.0) + y * (1.0 / 840.0)
-        - b0.cross(v) * (1.0 / 2520.0)
-        - s * (1.0 / 2520.0)
-        + b0.cross(r) * (1.0 / 15120.0);
+    let deepest =
+        w * (1.0 / 2520.0) + y * (1.0 / 840.0) - b0.cross(v) * (1.0 / 2520.0) - s * (1.0 / 2520.0)
+            + b0.cross(r) * (1.0 / 15120.0);
     let inner = v * (1.0 / 60.0) - r * (1.0 / 360.0)
         + b1.cross(b3) * (1.0 / 210.0)
         + v.cross(b1) * (1.0 / 420.0)
@@ -193,8 +192,8 @@ const HALVED: [[f64; MOMENTS]; MOMENTS] = {
                 times_x += columns[k][j + 1] * (j + 1) as f64 / (2 * j + 3) as f64;
             }
             let times_y = 0.5 * (times_x + columns[k][j]);
-            columns[k + 1][j] = ((2 * k + 1) as f64 * times_y - k as f64 * columns[k - 1][j])
-                / (k + 1) as f64;
+            columns[k + 1][j] =
+                ((2 * k + 1) as f64 * times_y - k as f64 * columns[k - 1][j]) / (k + 1) as f64;
             j += 1;
         }
         k += 1;
@@ -254,7 +253,11 @@ fn left_out<const N: usize>(m: &Moments<N>) -> Lanes<N> {
         + seventh * BRACKETS[4]
         + eighth * BRACKETS[5];
     Lanes(std::array::from_fn(|i| {
-        if b.0[i] <= 1.0 { bound.0[i] } else { f64::INFINITY }
+        if b.0[i] <= 1.0 {
+            bound.0[i]
+        } else {
+            f64::INFINITY
+        }
     }))
 }
 

@@ -113,8 +113,10 @@ const ORDERS: [(&str, Order); 5] = [
     ("exact", Order::Exact),
 ];
 
-const PLACEMENTS: [(&str, Placement); 2] =
-    [("centred", Placement::Centred), ("causal", Placement::Causal)];
+const PLACEMENTS: [(&str, Placement); 2] = [
+    ("centred", Placement::Centred),
+    ("causal", Placement::Causal),
+];
 
 impl Method {
     /// The name `--method` takes.
@@ -150,7 +152,11 @@ impl fmt::Display for Method {
                 placement,
             } => {
                 let placement = placement.name();
-                write!(f, "magnus (window {window}, order {}, {placement})", order.name())
+                write!(
+                    f,
+                    "magnus (window {window}, order {}, {placement})",
+                    order.name()
+                )
             }
             Method::CommitProvisional { window, order, .. } => {
                 write!(f, "commit (window {window}, order {})", order.name())
@@ -203,7 +209,11 @@ impl fmt::Display for UnknownName {
 
 impl std::error::Error for UnknownName {}
 
-fn parse<T: Copy>(what: &'static str, table: &[(&'static str, T)], s: &str) -> Result<T, UnknownName> {
+fn parse<T: Copy>(
+    what: &'static str,
+    table: &[(&'static str, T)],
+    s: &str,
+) -> Result<T, UnknownName> {
     table
         .iter()
         .find(|(name, _)| *name == s)

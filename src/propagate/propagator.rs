@@ -241,8 +241,8 @@ impl Propagator {
     ) {
         for block in samples.chunks(BLOCK) {
             for sample in block {
-                let breaks = !self.started
-                    || matches!(sample.join, Join::Start | Join::Hold | Join::Reset);
+                let breaks =
+                    !self.started || matches!(sample.join, Join::Start | Join::Hold | Join::Reset);
                 if breaks {
                     self.advance(true, exec, out);
                     self.begin(sample, out);
@@ -333,7 +333,8 @@ impl Propagator {
     fn append(&mut self, sample: &RateSample) {
         let value = [sample.value.x, sample.value.y, sample.value.z];
         let bridged = sample.join == Join::Bridge;
-        self.track.push(sample.stamp.0, sample.start.0, value, bridged);
+        self.track
+            .push(sample.stamp.0, sample.start.0, value, bridged);
         let rate = self.track.rate(self.track.len() - 1);
         self.last_rate = [rate.x.0[0], rate.y.0[0], rate.z.0[0]];
         self.last_stamp = sample.stamp.0;
@@ -342,7 +343,11 @@ impl Propagator {
     /// The sample, with a value that can be calculated with: one that is not finite, or that no gyro
     /// delivers, becomes the rate before, and says so.
     fn trusted(&mut self, sample: &RateSample) -> RateSample {
-        let limit = if self.track.increments { LARGEST } else { FASTEST };
+        let limit = if self.track.increments {
+            LARGEST
+        } else {
+            FASTEST
+        };
         if sample.value.iter().all(|v| v.abs() <= limit) {
             return *sample;
         }
@@ -377,7 +382,8 @@ impl Propagator {
                 for step in segments.iter().flatten() {
                     self.next += 1;
                     self.state.step(step, &self.track, self.next - 1);
-                    self.state.emit(&mut self.queue, &self.track, self.next - 1, out);
+                    self.state
+                        .emit(&mut self.queue, &self.track, self.next - 1, out);
                 }
             }
             Engine::Classical(method) => {
@@ -416,7 +422,9 @@ impl Propagator {
 
     /// Drops elements no window needs any more, now and then.
     fn forget(&mut self) {
-        let needed = self.next.saturating_sub(LARGEST_WINDOW + classical::LOOK_BACK + 8);
+        let needed = self
+            .next
+            .saturating_sub(LARGEST_WINDOW + classical::LOOK_BACK + 8);
         if needed >= 2 * SEGMENT {
             self.track.drop_front(needed);
             self.next -= needed;
@@ -433,7 +441,11 @@ impl Propagator {
         };
         while let Some(Waiting { sample, turns }) = self.queue.pop_front() {
             let newest = self.track.len() - 1;
-            let rate = if turns { Some(self.track.rate(newest)) } else { None };
+            let rate = if turns {
+                Some(self.track.rate(newest))
+            } else {
+                None
+            };
             let mut ahead = self.state.attitude;
             let mut sigma = self.state.sigma;
             if newest >= self.next {

@@ -29,7 +29,15 @@ const LEGENDRE: [[f64; MOMENTS]; MOMENTS] = [
     [-0.3125, 0.0, 6.5625, 0.0, -19.6875, 0.0, 14.4375, 0.0, 0.0],
     [0.0, -2.1875, 0.0, 19.6875, 0.0, -43.3125, 0.0, 26.8125, 0.0],
     [
-        0.273_437_5, 0.0, -9.843_75, 0.0, 54.140_625, 0.0, -93.843_75, 0.0, 50.273_437_5,
+        0.273_437_5,
+        0.0,
+        -9.843_75,
+        0.0,
+        54.140_625,
+        0.0,
+        -93.843_75,
+        0.0,
+        50.273_437_5,
     ],
 ];
 
@@ -102,8 +110,7 @@ fn summed(rate: &[Triple<1>; MOMENTS], live: usize, size: f64) -> Turn<1> {
     // Q(-1)* Q(+1) with Q(+-1) = E +- O: the vector part is 2 vec(E* O), which keeps the relative
     // precision of small turns; the scalar part is |E|^2 - |O|^2.
     let vector = (odd_v * even_w - even_v * odd_w - even_v.cross(odd_v)) * 2.0;
-    let scalar = even_w * even_w + even_v.norm_squared().0[0]
-        - odd_w * odd_w
-        - odd_v.norm_squared().0[0];
+    let scalar =
+        even_w * even_w + even_v.norm_squared().0[0] - odd_w * odd_w - odd_v.norm_squared().0[0];
     Turn::from_parts(scalar, vector)
 }

@@ -41,7 +41,10 @@ impl fmt::Display for Noise {
             bias,
             rrw,
         } = self;
-        write!(f, "arw={arw:e},bias={bias:e},rrw={rrw:e},initial={initial:e}")
+        write!(
+            f,
+            "arw={arw:e},bias={bias:e},rrw={rrw:e},initial={initial:e}"
+        )
     }
 }
 

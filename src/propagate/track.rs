@@ -103,7 +103,10 @@ impl Track {
     pub(crate) fn first(&self) -> usize {
         let useless = self.increments
             && self.base == 0
-            && self.stamp.first().is_some_and(|s| Some(s) == self.start.first());
+            && self
+                .stamp
+                .first()
+                .is_some_and(|s| Some(s) == self.start.first());
         usize::from(useless)
     }
 
@@ -131,7 +134,11 @@ impl Track {
             return self.value(k);
         }
         let h = secs(self.stamp[k].saturating_sub(self.start[k]));
-        if h > 0.0 { self.value(k) * (1.0 / h) } else { Triple::ZERO }
+        if h > 0.0 {
+            self.value(k) * (1.0 / h)
+        } else {
+            Triple::ZERO
+        }
     }
 
     /// Length of interval k in nanoseconds, any hole included.

@@ -4,7 +4,8 @@
 //! arbitrary stamps (general interpolation), a careful one where the window is one-sided, irregular or
 //! bridges a gap, and collocation where increments are missing.
 
-use super::collocation;
+mod careful;
+
 use super::lagrange::{self, POINTS, Quadrature};
 use super::lanes::{Lanes, Triple};
 use super::magnus::{self, Moments};
@@ -53,8 +54,14 @@ pub(crate) enum Note {
 impl Step {
     /// A rotation vector where a turn is expected, for the method that sums vectors.
     pub(crate) fn of_vector(phi: Triple<1>) -> Self {
-        let turn = Turn { v: phi, ..Turn::NONE };
-        Step { angle: phi.norm(), ..Step::new(turn, Note::Ordinary) }
+        let turn = Turn {
+            v: phi,
+            ..Turn::NONE
+        };
+        Step {
+            angle: phi.norm(),
+            ..Step::new(turn, Note::Ordinary)
+        }
     }
 
     /// What this step has to say in the output at its end.
@@ -79,7 +86,7 @@ impl Step {
                 turn: turn.parts(),
                 angle,
                 gap_variance: 0.0,
-            gap_noise: 0.0,
+                gap_noise: 0.0,
                 note,
             };
         }
@@ -152,7 +159,10 @@ impl Plan {
         while k <= last {
             let path = self.path(track, k);
             let mut n = 1;
-            while n < GROUP && k + n <= last && path != Path::Careful && self.path(track, k + n) == path
+            while n < GROUP
+                && k + n <= last
+                && path != Path::Careful
+                && self.path(track, k + n) == path
             {
                 n += 1;
             }
@@ -224,7 +234,7 @@ impl Plan {
                     turn: turn.lane(i).parts(),
                     angle: angle.0[i],
                     gap_variance: 0.0,
-            gap_noise: 0.0,
+                    gap_noise: 0.0,
                     note: Note::Ordinary,
                 });
             } else if loud[i] {
@@ -253,7 +263,11 @@ impl Plan {
         let ends: [(i64, i64); N] = std::array::from_fn(|lane| {
             let k = k + lane;
             // Joined increments begin where the one before ended; beside a hole only `start` is right.
-            let from = if self.increments { track.start[k] } else { track.stamp[k - 1] };
+            let from = if self.increments {
+                track.start[k]
+            } else {
+                track.stamp[k - 1]
+            };
             (from, track.stamp[k])
         });
         let length: [i64; N] = ends.map(|(a, b)| b.saturating_sub(a));
@@ -294,156 +308,6 @@ impl Plan {
             )
         }
     }
-
-    /// One interval at an end of the run, beside or across a gap, or among irregular stamps.
-    fn careful(&self, track: &Track, k: usize) -> Step {
-        let hole = self.increments && track.has_hole(k);
-        let bridged = hole || track.bridged[k];
-        let missing = if bridged { self.missing(track, k, hole) } else { 0.0 };
-        let cap = if bridged {
-            self.window.min(bridge_window(missing) - usize::from(self.increments))
-        } else {
-            self.window
-        };
-        let own = self.settle(track, k, cap, false);
-        let mut turn = magnus::turn(&own.moments, self.order);
-        let mut change = own.change;
-        if hole {
-            let gap = self.settle(track, k, cap, true);
-            change = gap.change;
-            turn = magnus::turn(&gap.moments, self.order).then(turn);
-        }
-        let note = match (bridged, own.used < self.window) {
-            (true, _) => Note::Bridged,
-            (false, true) => Note::Reduced,
-            (false, false) => Note::Ordinary,
-        };
-        let mut step = Step::new(turn, note);
-        if step.note == Note::Bridged {
-            let spread = 0.5 * change.min(std::f64::consts::PI);
-            step.gap_variance = if spread.is_finite() { spread * spread } else { 0.0 };
-            step.gap_noise = track.step(k) * bridge_noise(missing);
-        }
-        step
-    }
-
-    /// How many samples are missing in interval k, by the median spacing around it; 0.5 or more.
-    fn missing(&self, track: &Track, k: usize, hole: bool) -> f64 {
-        let mut around: Vec<i64> = (k.saturating_sub(8).max(1)..(k + 1 + self.look_ahead).min(track.len()))
-            .filter(|&i| i != k && !track.bridged[i])
-            .map(|i| track.stamp[i].saturating_sub(track.start[i].max(track.stamp[i - 1])))
-            .filter(|&spacing| spacing > 0)
-            .collect();
-        if self.increments {
-            let own = track.stamp[k].saturating_sub(track.start[k]);
-            if hole && own > 0 {
-                around.push(own);
-            }
-        }
-        around.sort_unstable();
-        let Some(&median) = around.get(around.len() / 2) else {
-            return 1.0;
-        };
-        let empty = if hole {
-            track.start[k].saturating_sub(track.stamp[k - 1]) as f64
-        } else {
-            track.spacing(k).saturating_sub(median) as f64
-        };
-        (empty / median as f64).max(0.5)
-    }
-
-    /// Moments of interval k (or of the hole before its increment) from a window of up to `cap` samples:
-    /// all of them if that is quiet, otherwise as many as the data support.
-    ///
-    /// Starting from the smallest window, each larger one corrects the result. On smooth data the
-    /// corrections shrink; where they are noise, they grow about fourfold with each pair of samples.
-    /// The last window whose correction still shrank is taken.
-    fn settle(&self, track: &Track, k: usize, cap: usize, hole: bool) -> Settled {
-        let smallest = if self.increments { 1 } else { 2 };
-        let mut best: Option<Settled> = None;
-        let (mut before, mut last) = (f64::INFINITY, f64::INFINITY);
-        let joined = !hole && (!self.increments || !self.beside_hole(track, k));
-        let cap = if joined { cap } else { cap.min(collocation::UNKNOWNS) };
-        let cap = self.place(track, k, cap.max(smallest), hole).1;
-        let full = self.over(track, k, cap, hole);
-        let mut sizes: Vec<usize> = (smallest..cap).step_by(2).collect();
-        sizes.push(cap);
-        if full.gain <= self.loud && !track.bridged[k] && !hole {
-            return full;
-        }
-        for size in sizes {
-            let mut this = if size == cap { full } else { self.over(track, k, size, hole) };
-            if let Some(best) = &best {
-                let change: f64 = (0..2)
-                    .map(|j| (this.moments.b[j] - best.moments.b[j]).norm())
-                    .sum();
-                this.change = (this.moments.b[0] - best.moments.b[0]).norm();
-                let shrank = change <= 0.5 * last.max(0.25 * before);
-                if !(shrank && change.is_finite()) {
-                    // What this size would have changed is what is not known.
-                    let unknown = this.change;
-                    let best = Settled { change: best.change.max(unknown), ..*best };
-                    return best;
-                }
-                (before, last) = (last, change);
-            }
-            best = Some(this);
-        }
-        best.unwrap_or(full)
-    }
-
-    /// Whether increments are missing within reach of interval k.
-    fn beside_hole(&self, track: &Track, k: usize) -> bool {
-        let (first, size) = self.place(track, k, self.window, false);
-        (first + 1..first + size).any(|i| track.has_hole(i))
-    }
-
-    /// First element and length of a window of up to `size` elements around interval k, as central as
-    /// the run allows. It never reaches beyond what this method may wait for, so that nothing depends
-    /// on how much happens to be known already.
-    fn place(&self, track: &Track, k: usize, size: usize, hole: bool) -> (usize, usize) {
-        let (lo, hi) = (track.first(), track.len());
-        let known = match self.placement {
-            Placement::Centred => hi,
-            Placement::Causal => k + 1,
-        };
-        let size = size.min(known - lo);
-        let ahead = if self.increments && !hole {
-            (size - 1) / 2
-        } else {
-            (size / 2).saturating_sub(1)
-        };
-        let end = (k + 1 + ahead.min(self.look_ahead)).min(hi).max(lo + size);
-        (end - size, size)
-    }
-
-    /// From `size` samples around interval k.
-    fn over(&self, track: &Track, k: usize, size: usize, hole: bool) -> Settled {
-        let (first, size) = self.place(track, k, size, hole);
-        let joined = !hole && track.is_joined(first, size);
-        let (moments, gain) = if joined {
-            let (moments, gain) = self.interpolate::<1>(track, k, first, size);
-            (moments, gain.0[0])
-        } else {
-            let quadrature = &self.quadratures[size];
-            let target = if hole {
-                (track.stamp[k - 1], track.start[k])
-            } else {
-                (track.start[k], track.stamp[k])
-            };
-            let mut moments = collocation::moments(track, first, size, target, quadrature);
-            if !hole {
-                moments.b[0] = track.value(k);
-            }
-            (moments, f64::INFINITY)
-        };
-        Settled {
-            moments,
-            gain,
-            used: size,
-            change: 0.0,
-        }
-    }
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -451,37 +315,6 @@ enum Path {
     Uniform,
     General,
     Careful,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Settled {
-    moments: Moments<1>,
-    gain: f64,
-    used: usize,
-    /// How far the delta angle moved with the last enlargement of the window, rad.
-    change: f64,
-}
-
-/// The window for a gap of `missing` samples (attitude.md 6.4): high order wins across short gaps and
-/// loses across long ones.
-fn bridge_window(missing: f64) -> usize {
-    match missing {
-        m if m < 2.5 => 8,
-        m if m < 4.5 => 6,
-        m if m < 8.5 => 4,
-        _ => 2,
-    }
-}
-
-/// Variance of the bridge over that of white noise integrated as long (attitude.md 6.4, squared and
-/// rounded up); for two samples it is half the number missing.
-fn bridge_noise(missing: f64) -> f64 {
-    match missing {
-        m if m < 2.5 => 4.0,
-        m if m < 4.5 => 20.0,
-        m if m < 8.5 => 34.0,
-        m => 0.5 * m,
-    }
 }
 
 /// The angle of each turn below half a radian; -1 where it is larger, or not a number.
@@ -504,6 +337,10 @@ fn small_angle<const N: usize>(turn: &Turn<N>) -> Lanes<N> {
     let angle = (s + s * sum) * 2.0;
     Lanes(std::array::from_fn(|i| {
         // Also false for a half angle beyond a quarter turn, where the cosine has lost more than it may.
-        if s2.0[i] <= 0.0625 && turn.c.0[i] > -0.5 { angle.0[i] } else { -1.0 }
+        if s2.0[i] <= 0.0625 && turn.c.0[i] > -0.5 {
+            angle.0[i]
+        } else {
+            -1.0
+        }
     }))
 }
