@@ -409,7 +409,7 @@ fn block_algorithms_drift_as_miller_and_yan_say() {
         (Method::DcmRight, 1, 0.5_f64),
         (Method::Coning2, 2, 0.5),
         (Method::Coning3, 3, 0.1),
-        (Method::Coning4, 4, 0.01),
+        (Method::Coning4, 4, 0.002),
     ] {
         // W ts = 2 pi f / fs: 0.1 as near as small whole numbers come.
         let (f, fs) = (2, 125);

@@ -126,7 +126,8 @@ impl Plan {
         let centred = if increments {
             (window % 2 == 1 && look_ahead == window / 2).then(|| Centred::for_increments(window))
         } else {
-            (window % 2 == 0 && look_ahead + 1 == window / 2).then(|| Centred::for_rates(window))
+            (window.is_multiple_of(2) && look_ahead + 1 == window / 2)
+                .then(|| Centred::for_rates(window))
         };
         let quadratures: Vec<Quadrature> = (0..=LARGEST_WINDOW + 1).map(Quadrature::new).collect();
         let mut plan = Plan {
@@ -220,7 +221,7 @@ impl Plan {
             }
             _ => {
                 let (moments, gain) = self.interpolate::<N>(track, k, first, self.window);
-                loud = gain.0.map(|gain| !(gain <= self.loud));
+                loud = gain.0.map(|gain| gain > self.loud || gain.is_nan());
                 moments
             }
         };
