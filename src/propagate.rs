@@ -33,6 +33,10 @@ mod propagator;
 mod report;
 mod series;
 mod settings;
+#[cfg(test)]
+#[path = "../tests/shared_data/mod.rs"]
+#[allow(unreachable_pub, reason = "shared with the integration tests")]
+mod shared_data;
 mod sigma;
 mod track;
 mod turn;

@@ -8,7 +8,7 @@ use super::method::{LARGEST_WINDOW, Method, Order, Placement};
 use super::report::Report;
 use super::settings::{Settings, SettingsError};
 use super::track::{Track, secs};
-use super::window::Plan;
+use super::window::{Plan, Step};
 use crate::record::{AttitudeSample, Join, Nanos, RateSample, SampleKind, Status};
 use nalgebra::Vector3;
 use state::{State, Waiting};
@@ -71,6 +71,8 @@ pub struct Propagator {
     started: bool,
     last_rate: [f64; 3],
     last_stamp: i64,
+    /// Provisional steps, kept for its memory.
+    scratch: Vec<Step>,
 }
 
 /// How steps are computed.
@@ -93,19 +95,24 @@ impl Propagator {
             Method::Auto => {
                 let window = if increments { 15 } else { 16 };
                 let plan = plan(window, Order::Exact, Placement::Centred, increments)?;
-                Engine::Sliding(plan)
+                Engine::Sliding(Box::new(plan))
             }
             Method::Magnus {
                 window,
                 order,
                 placement,
-            } => Engine::Sliding(plan(window, order, placement, increments)?),
+            } => {
+                let plan = plan(window, order, placement, increments)?;
+                Engine::Sliding(Box::new(plan))
+            }
             Method::CommitProvisional {
                 window,
                 order,
                 finals,
             } => Engine::Commit {
-                plan: plan(window, order, Placement::Centred, increments)?,
+                plan: Box::new(
+                    plan(window, order, Placement::Centred, increments)?.with_provisional(),
+                ),
                 finals,
             },
             classical => Engine::Classical(classical),
@@ -121,6 +128,7 @@ impl Propagator {
             started: false,
             last_rate: [0.0; 3],
             last_stamp: 0,
+            scratch: Vec::new(),
         })
     }
 
@@ -343,13 +351,14 @@ impl Propagator {
             let mut ahead = self.state.attitude;
             let mut sigma = self.state.sigma;
             if newest >= self.next {
-                let steps = plan.steps(&self.track, self.next, newest);
-                for (i, step) in steps.iter().enumerate() {
+                self.scratch.clear();
+                plan.append_steps(&self.track, self.next, newest, &mut self.scratch);
+                for (i, step) in self.scratch.iter().enumerate() {
                     ahead.turn(step.turn);
                     sigma.integrate(self.track.spacing(self.next + i));
                     sigma.bridge(step.gap_variance, step.gap_noise);
                 }
-                if let (true, Some(step)) = (turns, steps.last()) {
+                if let (true, Some(step)) = (turns, self.scratch.last()) {
                     self.state.added = self.state.added.with(step.status());
                 }
             }
@@ -370,10 +379,12 @@ impl Propagator {
         if known <= self.next {
             return;
         }
-        for step in plan.steps(&self.track, self.next, known - 1) {
+        self.scratch.clear();
+        plan.append_steps(&self.track, self.next, known - 1, &mut self.scratch);
+        for step in &self.scratch {
             let k = self.next;
             self.next += 1;
-            self.state.step(&step, &self.track, k);
+            self.state.step(step, &self.track, k);
             if *finals {
                 let stamp = Nanos(self.track.stamp[k]);
                 let sample = RateSample {
@@ -399,7 +410,7 @@ fn plan(
     order: Order,
     placement: Placement,
     increments: bool,
-) -> Result<Box<Plan>, SettingsError> {
+) -> Result<Plan, SettingsError> {
     let smallest = if increments { 1 } else { 2 };
     if !(smallest..=LARGEST_WINDOW).contains(&window) {
         return Err(SettingsError::Window {
@@ -408,5 +419,5 @@ fn plan(
             largest: LARGEST_WINDOW,
         });
     }
-    Ok(Box::new(Plan::new(window, order, placement, increments)))
+    Ok(Plan::new(window, order, placement, increments))
 }

@@ -12,7 +12,7 @@ use super::magnus::{self, Moments};
 use super::method::{LARGEST_WINDOW, Order, Placement};
 use super::track::{Track, secs};
 use super::turn::Turn;
-use super::uniform::Centred;
+use super::uniform::{Centred, Skewed};
 use crate::record::Status;
 
 /// How many neighbouring intervals go through the kernels together.
@@ -112,6 +112,8 @@ pub(crate) struct Plan {
     /// By number of interpolation points.
     quadratures: Vec<Quadrature>,
     centred: Option<Centred>,
+    /// By place of the interval in its window, where the method uses it on equal spacings.
+    skewed: Vec<Option<Skewed>>,
     /// Largest noise gain taken unasked: [`LOUD`], or that of the method's own window if larger.
     loud: f64,
 }
@@ -129,33 +131,55 @@ impl Plan {
             (window.is_multiple_of(2) && look_ahead + 1 == window / 2)
                 .then(|| Centred::for_rates(window))
         };
-        let quadratures: Vec<Quadrature> = (0..=LARGEST_WINDOW + 1).map(Quadrature::new).collect();
-        let mut plan = Plan {
+        let nominal = window - 1 - look_ahead;
+        let table = skewed(window, nominal, increments);
+        // A causal window is louder than a centred one even on perfect stamps: who asks for one gets it.
+        let loud = LOUD.max(1.5 * table.gain);
+        let mut tables = vec![None; window];
+        if centred.is_none() {
+            tables[nominal] = Some(table);
+        }
+        Plan {
             window,
             look_ahead,
             placement,
             order,
             increments,
-            quadratures,
+            quadratures: (0..=LARGEST_WINDOW + 1).map(Quadrature::new).collect(),
             centred,
-            loud: LOUD,
-        };
-        // A causal window is louder than a centred one even on perfect stamps: who asks for one gets it.
-        let mut track = Track::new(increments);
-        for k in 0..window as i64 {
-            track.push(k * 1000, (k - 1) * 1000, [0.0; 3], false);
+            skewed: tables,
+            loud,
         }
-        let k = window - 1 - look_ahead;
-        if k > 0 {
-            let (_, gain) = plan.interpolate::<1>(&track, k, 0, window);
-            plan.loud = LOUD.max(1.5 * gain.0[0]);
+    }
+
+    /// Also fast for intervals whose look-ahead has not all come yet, as provisional steps need.
+    pub(crate) fn with_provisional(mut self) -> Self {
+        for place in self.nominal() + 1..self.window {
+            self.skewed[place] = Some(skewed(self.window, place, self.increments));
         }
-        plan
+        self
+    }
+
+    /// Place of an interval in its window when nothing is in the way.
+    fn nominal(&self) -> usize {
+        self.window - 1 - self.look_ahead
     }
 
     /// Turns of intervals `first ..= last`; the run is known up to the track's end.
     pub(crate) fn steps(&self, track: &Track, first: usize, last: usize) -> Vec<Step> {
         let mut steps = Vec::with_capacity(last + 1 - first);
+        self.append_steps(track, first, last, &mut steps);
+        steps
+    }
+
+    /// As [`steps`](Self::steps), appended.
+    pub(crate) fn append_steps(
+        &self,
+        track: &Track,
+        first: usize,
+        last: usize,
+        steps: &mut Vec<Step>,
+    ) {
         let mut k = first;
         while k <= last {
             let path = self.path(track, k);
@@ -168,20 +192,19 @@ impl Plan {
                 n += 1;
             }
             if n == GROUP && path != Path::Careful {
-                self.group::<GROUP>(track, k, path, &mut steps);
+                self.group::<GROUP>(track, k, path, steps);
                 k += GROUP;
             } else {
                 for k in k..k + n {
                     if path == Path::Careful {
                         steps.push(self.careful(track, k));
                     } else {
-                        self.group::<1>(track, k, path, &mut steps);
+                        self.group::<1>(track, k, path, steps);
                     }
                 }
                 k += n;
             }
         }
-        steps
     }
 
     /// The path of interval k. Depends on stamps only.
@@ -192,7 +215,7 @@ impl Plan {
             return Path::Careful;
         }
         let first = end - self.window;
-        if self.centred.is_some() && track.is_uniform(first, self.window) {
+        if track.is_uniform(first, self.window) {
             Path::Uniform
         } else if track.is_joined(first, self.window) {
             Path::General
@@ -204,27 +227,16 @@ impl Plan {
     fn group<const N: usize>(&self, track: &Track, k: usize, path: Path, steps: &mut Vec<Step>) {
         let first = k + self.look_ahead + 1 - self.window;
         let mut loud = [false; N];
-        let moments = match (&self.centred, path) {
-            (Some(centred), Path::Uniform) => {
-                let h = if self.increments {
-                    Lanes::splat(1.0)
-                } else {
-                    Lanes(std::array::from_fn(|i| track.step(k + i)))
-                };
-                let end = first + self.window + N - 1;
-                centred.moments::<N>(
-                    &track.x[first..end],
-                    &track.y[first..end],
-                    &track.z[first..end],
-                    h,
-                )
-            }
-            _ => {
-                let (moments, gain) = self.interpolate::<N>(track, k, first, self.window);
-                loud = gain.0.map(|gain| gain > self.loud || gain.is_nan());
-                moments
-            }
+        let moments = if path == Path::Uniform {
+            self.tabulated::<N>(track, k, first)
+        } else {
+            None
         };
+        let moments = moments.unwrap_or_else(|| {
+            let (moments, gain) = self.interpolate::<N>(track, k, first, self.window);
+            loud = gain.0.map(|gain| gain > self.loud || gain.is_nan());
+            moments
+        });
         let turn = magnus::turn(&moments, self.order);
         // |v| = sin(a/2): the angle without trigonometry while it is small.
         let angle = small_angle(&turn);
@@ -244,6 +256,33 @@ impl Plan {
                 steps.push(Step::new(turn.lane(i), Note::Ordinary));
             }
         }
+    }
+
+    /// Moments of N neighbouring intervals from equally spaced windows, the first beginning at `first`;
+    /// `None` where there is no table.
+    #[inline(always)]
+    fn tabulated<const N: usize>(
+        &self,
+        track: &Track,
+        k: usize,
+        first: usize,
+    ) -> Option<Moments<N>> {
+        let h = if self.increments {
+            Lanes::splat(1.0)
+        } else {
+            Lanes(std::array::from_fn(|i| track.step(k + i)))
+        };
+        let end = first + self.window + N - 1;
+        let (x, y, z) = (
+            &track.x[first..end],
+            &track.y[first..end],
+            &track.z[first..end],
+        );
+        let place = k - first;
+        if let (Some(centred), true) = (&self.centred, place == self.nominal()) {
+            return Some(centred.moments(x, y, z, h));
+        }
+        Some(self.skewed[place].as_ref()?.moments(x, y, z, h))
     }
 
     /// Moments of N neighbouring intervals from windows of `window` elements, the first beginning at
@@ -316,6 +355,14 @@ enum Path {
     Uniform,
     General,
     Careful,
+}
+
+fn skewed(window: usize, place: usize, increments: bool) -> Skewed {
+    if increments {
+        Skewed::for_increments(window, place)
+    } else {
+        Skewed::for_rates(window, place)
+    }
 }
 
 /// The angle of each turn below half a radian; -1 where it is larger, or not a number.

@@ -1,9 +1,9 @@
+#![allow(clippy::unwrap_used)]
+
 use super::*;
+use crate::propagate::shared_data;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-
-#[path = "../../../tests/shared_data/mod.rs"]
-mod shared_data;
 
 fn direction(rng: &mut ChaCha8Rng) -> Triple<1> {
     loop {
