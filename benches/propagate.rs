@@ -34,10 +34,18 @@ fn log(kind: SampleKind, noise: f64, jitter: bool) -> Vec<RateSample> {
             before = stamp;
             RateSample {
                 stamp: Nanos(stamp),
-                start: Nanos(if kind == SampleKind::Rate { stamp } else { start }),
+                start: Nanos(if kind == SampleKind::Rate {
+                    stamp
+                } else {
+                    start
+                }),
                 value: value.into(),
                 accel: None,
-                join: if i == 0 { Join::Start } else { Join::Continuous },
+                join: if i == 0 {
+                    Join::Start
+                } else {
+                    Join::Continuous
+                },
                 status: Status::OK,
                 log: Nanos(stamp),
             }
@@ -87,11 +95,31 @@ fn propagate(c: &mut Criterion) {
         ("rk4", Method::Rk4),
     ];
     let inputs = [
-        ("smooth", log(SampleKind::Rate, 0.0, false), SampleKind::Rate),
-        ("noisy", log(SampleKind::Rate, 5e-3, false), SampleKind::Rate),
-        ("jittered", log(SampleKind::Rate, 5e-3, true), SampleKind::Rate),
-        ("increments", log(SampleKind::DeltaAngle, 5e-3, false), SampleKind::DeltaAngle),
-        ("increments-jittered", log(SampleKind::DeltaAngle, 5e-3, true), SampleKind::DeltaAngle),
+        (
+            "smooth",
+            log(SampleKind::Rate, 0.0, false),
+            SampleKind::Rate,
+        ),
+        (
+            "noisy",
+            log(SampleKind::Rate, 5e-3, false),
+            SampleKind::Rate,
+        ),
+        (
+            "jittered",
+            log(SampleKind::Rate, 5e-3, true),
+            SampleKind::Rate,
+        ),
+        (
+            "increments",
+            log(SampleKind::DeltaAngle, 5e-3, false),
+            SampleKind::DeltaAngle,
+        ),
+        (
+            "increments-jittered",
+            log(SampleKind::DeltaAngle, 5e-3, true),
+            SampleKind::DeltaAngle,
+        ),
     ];
     let mut group = c.benchmark_group("propagate");
     group.throughput(Throughput::Elements(SAMPLES as u64));

@@ -16,6 +16,10 @@
 //! # Accuracy
 //! Top of `top.md` at 2000 Hz, 1.2 s, 24 turns: 2e-12 degrees. Coning 10 degrees, 3 Hz, sampled at
 //! 100 Hz, 60 s: 1e-7 arcsec. `tests/accuracy.rs` holds these and the orders of convergence.
+#![allow(
+    clippy::needless_range_loop,
+    reason = "an index here is the subscript of a formula, and often runs through several arrays"
+)]
 
 mod accumulate;
 mod classical;
@@ -28,6 +32,11 @@ mod method;
 mod propagator;
 mod report;
 mod series;
+mod settings;
+#[cfg(test)]
+#[path = "../tests/shared_data/mod.rs"]
+#[allow(unreachable_pub, reason = "shared with the integration tests")]
+mod shared_data;
 mod sigma;
 mod track;
 mod turn;
@@ -36,9 +45,7 @@ mod window;
 
 pub use executor::{Executor, Sequential};
 pub use method::{LARGEST_WINDOW, Method, Order, Placement, UnknownName};
-pub use propagator::{Propagator, Settings, SettingsError};
+pub use propagator::Propagator;
 pub use report::Report;
+pub use settings::{Settings, SettingsError};
 pub use sigma::Noise;
-
-#[cfg(test)]
-mod tests;

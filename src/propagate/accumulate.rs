@@ -51,7 +51,7 @@ impl Accumulator {
         // 1/sqrt(n) to second order: n - 1 stays below 1e-12.
         let scale = 1.5 - 0.5 * n;
         let unit = self.q.map(|c| c * scale);
-        if !((n - 1.0).abs() < 1e-12) {
+        if (n - 1.0).abs() > 1e-12 {
             let scale = 1.0 / n.sqrt();
             *self = Accumulator::new(self.q.map(|c| c * scale));
             return self.q;

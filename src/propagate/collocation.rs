@@ -79,7 +79,7 @@ fn solve(rows: &mut [[f64; UNKNOWNS + 3]; UNKNOWNS], n: usize) -> Option<[Triple
         let pivot = (k..n).max_by(|&i, &j| rows[i][k].abs().total_cmp(&rows[j][k].abs()))?;
         rows.swap(k, pivot);
         let top = rows[k];
-        if !(top[k].abs() > 1e-13) || !top[k].is_finite() {
+        if top[k].abs() < 1e-13 || !top[k].is_finite() {
             return None;
         }
         for row in &mut rows[k + 1..n] {

@@ -216,6 +216,10 @@ pub(crate) fn from_increments<const N: usize>(
     }
     let (values, gain) = at_nodes(x, &angle[..=count], quadrature);
     let mut m = quadrature.of_angle(&values);
+    m.live = m.live.min(count.max(1));
     m.b[0] = delta;
     (m, gain)
 }
+
+#[cfg(test)]
+mod tests;

@@ -192,8 +192,8 @@ const HALVED: [[f64; MOMENTS]; MOMENTS] = {
                 times_x += columns[k][j + 1] * (j + 1) as f64 / (2 * j + 3) as f64;
             }
             let times_y = 0.5 * (times_x + columns[k][j]);
-            columns[k + 1][j] = ((2 * k + 1) as f64 * times_y - k as f64 * columns[k - 1][j])
-                / (k + 1) as f64;
+            columns[k + 1][j] =
+                ((2 * k + 1) as f64 * times_y - k as f64 * columns[k - 1][j]) / (k + 1) as f64;
             j += 1;
         }
         k += 1;
@@ -253,7 +253,11 @@ fn left_out<const N: usize>(m: &Moments<N>) -> Lanes<N> {
         + seventh * BRACKETS[4]
         + eighth * BRACKETS[5];
     Lanes(std::array::from_fn(|i| {
-        if b.0[i] <= 1.0 { bound.0[i] } else { f64::INFINITY }
+        if b.0[i] <= 1.0 {
+            bound.0[i]
+        } else {
+            f64::INFINITY
+        }
     }))
 }
 

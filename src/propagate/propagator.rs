@@ -1,21 +1,18 @@
 //! The stream: runs, breaks, outputs in order. Pure.
 
-use super::accumulate::Accumulator;
+mod state;
+
 use super::classical;
 use super::executor::Executor;
-use super::lanes::Triple;
 use super::method::{LARGEST_WINDOW, Method, Order, Placement};
 use super::report::Report;
-use super::sigma::{Noise, Sigma};
+use super::settings::{Settings, SettingsError};
 use super::track::{Track, secs};
-use super::turn::Turn;
-use super::window::{Note, Plan, Step};
-use crate::model::attitude::Quaternion;
-use crate::model::frames::{Body, Nav};
+use super::window::{Plan, Step};
 use crate::record::{AttitudeSample, Join, Nanos, RateSample, SampleKind, Status};
 use nalgebra::Vector3;
+use state::{State, Waiting};
 use std::collections::VecDeque;
-use std::fmt;
 
 /// Intervals one call of the executor's function integrates.
 const SEGMENT: usize = 1024;
@@ -24,71 +21,6 @@ const BLOCK: usize = 32 * SEGMENT;
 /// Fastest rate, and largest increment, that is believed: those of [`crate::record::Verdict::Huge`].
 const FASTEST: f64 = 1e4;
 const LARGEST: f64 = 1e3;
-
-/// What a propagator is to do.
-#[derive(Clone, Copy, Debug)]
-pub struct Settings {
-    /// How samples become turns.
-    pub method: Method,
-    /// What the samples mean.
-    pub kind: SampleKind,
-    /// Attitude at the first sample, and after a reset.
-    pub initial: Quaternion<Nav, Body>,
-    /// For the uncertainty that goes with every attitude; zeros for none.
-    pub noise: Noise,
-}
-
-/// Settings that can not be.
-#[derive(Clone, Copy, PartialEq, Debug)]
-#[non_exhaustive]
-pub enum SettingsError {
-    /// The window is not in `smallest ..= largest` samples.
-    Window {
-        /// What was asked for.
-        given: usize,
-        /// What there is: two rates, one increment.
-        smallest: usize,
-        /// [`LARGEST_WINDOW`].
-        largest: usize,
-    },
-    /// The initial attitude is no rotation.
-    Initial {
-        /// Its `[w, x, y, z]`.
-        wxyz: [f64; 4],
-    },
-    /// A noise figure is negative, not finite, or absurd.
-    Noise {
-        /// Which.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-    },
-}
-
-impl fmt::Display for SettingsError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            SettingsError::Window {
-                given,
-                smallest,
-                largest,
-            } => write!(
-                f,
-                "a window of {given} samples can not be used\n  help: --window takes {smallest} to {largest}"
-            ),
-            SettingsError::Initial { wxyz } => write!(
-                f,
-                "the initial attitude {wxyz:?} (w, x, y, z) is not a unit quaternion\n  help: --init q=w,x,y,z with norm 1"
-            ),
-            SettingsError::Noise { name, value } => write!(
-                f,
-                "noise {name} = {value} can not be\n  help: --noise takes numbers from 0 up, in SI units"
-            ),
-        }
-    }
-}
-
-impl std::error::Error for SettingsError {}
 
 /// Integrates a stream of samples to attitude. See the [module](crate::propagate).
 ///
@@ -139,12 +71,8 @@ pub struct Propagator {
     started: bool,
     last_rate: [f64; 3],
     last_stamp: i64,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Waiting {
-    sample: RateSample,
-    turns: bool,
+    /// Provisional steps, kept for its memory.
+    scratch: Vec<Step>,
 }
 
 /// How steps are computed.
@@ -155,21 +83,6 @@ enum Engine {
     Classical(Method),
 }
 
-/// What the outputs are made of.
-#[derive(Debug)]
-struct State {
-    attitude: Accumulator,
-    /// Sum of rotation vectors, for the method that wants it.
-    sum: Option<Triple<1>>,
-    sigma: Sigma,
-    /// Bits of the output being made that the propagator adds.
-    added: Status,
-    report: Report,
-    reset_count: u32,
-    rate: Vector3<f64>,
-    integrated_nanos: i64,
-}
-
 impl Propagator {
     /// Ready for the first sample.
     ///
@@ -177,37 +90,33 @@ impl Propagator {
     /// A window out of range, an initial attitude that is no rotation, impossible noise.
     pub fn new(settings: Settings) -> Result<Self, SettingsError> {
         let increments = settings.kind != SampleKind::Rate;
-        let wxyz = settings.initial.wxyz();
-        let norm = wxyz.iter().map(|c| c * c).sum::<f64>().sqrt();
-        if !((norm - 1.0).abs() < 1e-6) {
-            return Err(SettingsError::Initial { wxyz });
-        }
-        if let Some((name, value)) = settings.noise.fault() {
-            return Err(SettingsError::Noise { name, value });
-        }
-        let initial = wxyz.map(|c| c / norm);
+        let initial = settings.checked()?;
         let engine = match settings.method {
             Method::Auto => {
                 let window = if increments { 15 } else { 16 };
                 let plan = plan(window, Order::Exact, Placement::Centred, increments)?;
-                Engine::Sliding(plan)
+                Engine::Sliding(Box::new(plan))
             }
             Method::Magnus {
                 window,
                 order,
                 placement,
-            } => Engine::Sliding(plan(window, order, placement, increments)?),
+            } => {
+                let plan = plan(window, order, placement, increments)?;
+                Engine::Sliding(Box::new(plan))
+            }
             Method::CommitProvisional {
                 window,
                 order,
                 finals,
             } => Engine::Commit {
-                plan: plan(window, order, Placement::Centred, increments)?,
+                plan: Box::new(
+                    plan(window, order, Placement::Centred, increments)?.with_provisional(),
+                ),
                 finals,
             },
             classical => Engine::Classical(classical),
         };
-        let sum = (settings.method == Method::RotvecSum).then(|| rotation_vector(initial));
         Ok(Propagator {
             method: settings.method,
             engine,
@@ -215,19 +124,11 @@ impl Propagator {
             track: Track::new(increments),
             queue: VecDeque::new(),
             next: 1,
-            state: State {
-                attitude: Accumulator::new(initial),
-                sum,
-                sigma: Sigma::new(settings.noise),
-                added: Status::OK,
-                report: Report::default(),
-                reset_count: 0,
-                rate: Vector3::zeros(),
-                integrated_nanos: 0,
-            },
+            state: State::new(&settings, initial),
             started: false,
             last_rate: [0.0; 3],
             last_stamp: 0,
+            scratch: Vec::new(),
         })
     }
 
@@ -370,6 +271,8 @@ impl Propagator {
     /// Integrates every interval whose window is known: to the end of the run if it has `ended`.
     fn advance(&mut self, ended: bool, exec: &impl Executor, out: &mut Vec<AttitudeSample>) {
         let known = self.known(ended);
+        // Those at the front follow the sample output last.
+        self.state.flush_stalled(&mut self.queue, out);
         match &self.engine {
             Engine::Sliding(plan) => {
                 let (track, first) = (&self.track, self.next);
@@ -400,7 +303,6 @@ impl Propagator {
                 }
             }
         }
-        self.state.flush_stalled(&mut self.queue, out);
     }
 
     /// End of the intervals that can be integrated for good.
@@ -449,13 +351,14 @@ impl Propagator {
             let mut ahead = self.state.attitude;
             let mut sigma = self.state.sigma;
             if newest >= self.next {
-                let steps = plan.steps(&self.track, self.next, newest);
-                for (i, step) in steps.iter().enumerate() {
+                self.scratch.clear();
+                plan.append_steps(&self.track, self.next, newest, &mut self.scratch);
+                for (i, step) in self.scratch.iter().enumerate() {
                     ahead.turn(step.turn);
                     sigma.integrate(self.track.spacing(self.next + i));
                     sigma.bridge(step.gap_variance, step.gap_noise);
                 }
-                if let (true, Some(step)) = (turns, steps.last()) {
+                if let (true, Some(step)) = (turns, self.scratch.last()) {
                     self.state.added = self.state.added.with(step.status());
                 }
             }
@@ -476,10 +379,12 @@ impl Propagator {
         if known <= self.next {
             return;
         }
-        for step in plan.steps(&self.track, self.next, known - 1) {
+        self.scratch.clear();
+        plan.append_steps(&self.track, self.next, known - 1, &mut self.scratch);
+        for step in &self.scratch {
             let k = self.next;
             self.next += 1;
-            self.state.step(&step, &self.track, k);
+            self.state.step(step, &self.track, k);
             if *finals {
                 let stamp = Nanos(self.track.stamp[k]);
                 let sample = RateSample {
@@ -500,108 +405,12 @@ impl Propagator {
     }
 }
 
-impl State {
-    fn reset(&mut self, initial: [f64; 4]) {
-        self.attitude.restart(initial);
-        self.sigma.reset();
-        if let Some(sum) = &mut self.sum {
-            *sum = rotation_vector(initial);
-        }
-    }
-
-    /// Turns on over interval k.
-    #[inline(always)]
-    fn step(&mut self, step: &Step, track: &Track, k: usize) {
-        match &mut self.sum {
-            None => self.attitude.turn(step.turn),
-            Some(sum) => {
-                let [_, x, y, z] = step.turn;
-                *sum = *sum + Triple::new(x, y, z);
-                let turn = Turn::exp(*sum);
-                let [c, x, y, z] = turn.parts();
-                self.attitude = Accumulator::new([1.0 + c, x, y, z]);
-            }
-        }
-        let spacing = track.spacing(k);
-        self.sigma.integrate(spacing);
-        self.integrated_nanos = self.integrated_nanos.saturating_add(spacing);
-        self.report.angle_turned += step.angle;
-        self.report.largest_step = self.report.largest_step.max(step.angle);
-        self.added = self.added.with(step.status());
-        if step.angle > std::f64::consts::PI {
-            self.report.undersampled += 1;
-        }
-        match step.note {
-            Note::Ordinary => {}
-            Note::Reduced => self.report.reduced += 1,
-            Note::Bridged => {
-                self.report.bridged += 1;
-                self.sigma.bridge(step.gap_variance, step.gap_noise);
-            }
-            Note::Refused => self.report.refused += 1,
-        }
-    }
-
-    /// Outputs the sample that ends interval k, and those after it that turned nothing.
-    #[inline(always)]
-    fn emit(
-        &mut self,
-        queue: &mut VecDeque<Waiting>,
-        track: &Track,
-        k: usize,
-        out: &mut Vec<AttitudeSample>,
-    ) {
-        if let Some(Waiting { sample, .. }) = queue.pop_front() {
-            self.output_at(&sample, Some(track.rate(k)), out);
-        }
-        self.flush_stalled(queue, out);
-    }
-
-    /// Outputs samples that turned nothing, up to the next that will.
-    #[inline(always)]
-    fn flush_stalled(&mut self, queue: &mut VecDeque<Waiting>, out: &mut Vec<AttitudeSample>) {
-        while let Some(&Waiting {
-            sample,
-            turns: false,
-        }) = queue.front()
-        {
-            queue.pop_front();
-            self.output_at(&sample, None, out);
-        }
-    }
-
-    #[inline(always)]
-    fn output_at(
-        &mut self,
-        sample: &RateSample,
-        rate: Option<Triple<1>>,
-        out: &mut Vec<AttitudeSample>,
-    ) {
-        if let Some(rate) = rate {
-            self.rate = Vector3::new(rate.x.0[0], rate.y.0[0], rate.z.0[0]);
-        }
-        let sigma = self.sigma.value();
-        out.push(AttitudeSample {
-            stamp: sample.stamp,
-            q_nb: Quaternion::assume_unit(self.attitude.attitude()),
-            rate: self.rate,
-            accel: sample.accel,
-            sigma: Vector3::new(sigma, sigma, sigma),
-            status: sample.status.with(self.added),
-            reset_count: self.reset_count,
-            log: sample.log,
-        });
-        self.added = Status::OK;
-        self.report.samples += 1;
-    }
-}
-
 fn plan(
     window: usize,
     order: Order,
     placement: Placement,
     increments: bool,
-) -> Result<Box<Plan>, SettingsError> {
+) -> Result<Plan, SettingsError> {
     let smallest = if increments { 1 } else { 2 };
     if !(smallest..=LARGEST_WINDOW).contains(&window) {
         return Err(SettingsError::Window {
@@ -610,14 +419,5 @@ fn plan(
             largest: LARGEST_WINDOW,
         });
     }
-    Ok(Box::new(Plan::new(window, order, placement, increments)))
-}
-
-/// log of a unit quaternion: the rotation vector of at most half a turn.
-fn rotation_vector([w, x, y, z]: [f64; 4]) -> Triple<1> {
-    let sign = if w < 0.0 { -1.0 } else { 1.0 };
-    let v = Triple::new(x * sign, y * sign, z * sign);
-    let s = v.norm();
-    let half = s.atan2(w * sign);
-    v * if s > 0.0 { 2.0 * half / s } else { 2.0 }
+    Ok(Plan::new(window, order, placement, increments))
 }

@@ -40,8 +40,8 @@ impl<const N: usize> Turn<N> {
             v: phi.times(s * 0.5),
         };
         for i in 0..N {
-            // Written so that NaN goes this way too and stays NaN, to be seen and refused later.
-            if !(z.0[i] <= SMALL) {
+            // NaN stays NaN either way, to be seen and refused later.
+            if z.0[i] > SMALL {
                 let half = z.0[i].sqrt();
                 let quarter = (0.5 * half).sin();
                 let sinc = 0.5 * half.sin() / half;

@@ -2,7 +2,7 @@
 //!
 //! With equal spacings the map from samples to moments is a constant; with the interval in the middle
 //! of its window it splits in two halves: even moments see sums of samples left and right, odd ones
-//! differences. The table comes from the general path, so both agree to rounding by construction.
+//! differences. The tables come from the general path, so both agree to rounding by construction.
 
 use super::lagrange::{self, Quadrature};
 use super::lanes::{Lanes, Triple};
@@ -11,7 +11,31 @@ use super::magnus::{MOMENTS, Moments};
 const EVEN: usize = 5;
 const ODD: usize = 4;
 
-/// Coefficients of one pair of samples, `distance` to either side.
+/// What each sample of a window contributes to each moment, in a run of 1s between equal spacings.
+fn response(window: usize, place: usize, increments: bool) -> (Vec<Moments<1>>, f64) {
+    let mut noise_gain = 0.0;
+    let rows = (0..window)
+        .map(|i| {
+            let mut unit = vec![Triple::ZERO; window];
+            unit[i] = Triple::new(1.0, 0.0, 0.0);
+            // In half spacings, the interval from -1 to 1.
+            let at = |i: usize, end: usize| Lanes([2.0 * i as f64 - 2.0 * end as f64 + 1.0]);
+            let (m, gain) = if increments {
+                let x: Vec<Lanes<1>> = (0..=window).map(|i| at(i, place + 1)).collect();
+                lagrange::from_increments(&x, &unit, place, &Quadrature::new(window + 1))
+            } else {
+                let x: Vec<Lanes<1>> = (0..window).map(|i| at(i, place)).collect();
+                let (one, zero) = (Lanes([1.0]), Triple::ZERO);
+                lagrange::from_rates(&x, &mut unit, zero, one, &Quadrature::new(window))
+            };
+            noise_gain = gain.0[0];
+            m
+        })
+        .collect();
+    (rows, noise_gain)
+}
+
+/// Coefficients of one pair of samples, symmetric about the interval.
 #[derive(Clone, Copy, Debug)]
 struct Pair {
     left: usize,
@@ -31,70 +55,34 @@ pub(crate) struct Centred {
     pairs: Vec<Pair>,
 }
 
-fn split(m: &Moments<1>, sign: f64) -> ([f64; EVEN], [f64; ODD]) {
-    let b = |j: usize| sign * m.b[j].x.0[0];
-    (
-        std::array::from_fn(|k| b(2 * k)),
-        std::array::from_fn(|k| b(2 * k + 1)),
-    )
-}
-
 impl Centred {
     /// For instantaneous rates; `window` even, 2 or more.
     pub(crate) fn for_rates(window: usize) -> Self {
-        let quadrature = Quadrature::new(window);
-        let x: Vec<Lanes<1>> = (0..window)
-            .map(|i| Lanes([2.0 * i as f64 - (window - 1) as f64]))
-            .collect();
-        let response = |i: usize| {
-            let mut unit = vec![Triple::ZERO; window];
-            unit[i] = Triple::new(1.0, 0.0, 0.0);
-            let one = Lanes([1.0]);
-            let (m, _) = lagrange::from_rates(&x, &mut unit, Triple::ZERO, one, &quadrature);
-            split(&m, 1.0)
-        };
-        Self::assemble(window, window / 2 - 1, window / 2, response)
+        Self::assemble(window, window / 2 - 1, window / 2, false)
     }
 
     /// For increments; `window` odd.
     pub(crate) fn for_increments(window: usize) -> Self {
-        let quadrature = Quadrature::new(window + 1);
-        let own = window / 2;
-        let x: Vec<Lanes<1>> = (0..=window)
-            .map(|i| Lanes([2.0 * i as f64 - window as f64]))
-            .collect();
-        let response = |i: usize| {
-            let mut unit = vec![Triple::ZERO; window];
-            unit[i] = Triple::new(1.0, 0.0, 0.0);
-            let (m, _) = lagrange::from_increments(&x, &unit, own, &quadrature);
-            split(&m, 1.0)
-        };
-        Self::assemble(window, own, own, response)
+        Self::assemble(window, window / 2, window / 2, true)
     }
 
-    fn assemble(
-        window: usize,
-        left: usize,
-        right: usize,
-        response: impl Fn(usize) -> ([f64; EVEN], [f64; ODD]),
-    ) -> Self {
-        let pairs = (1..=left)
-            .map(|k| {
-                let (even, odd) = response(right + k);
-                Pair {
-                    left: left - k,
-                    right: right + k,
-                    even,
-                    odd,
-                }
-            })
-            .collect();
+    fn assemble(window: usize, left: usize, right: usize, increments: bool) -> Self {
+        let (rows, _) = response(window, right, increments);
+        let even = |i: usize| std::array::from_fn(|k| rows[i].b[2 * k].x.0[0]);
+        let odd = |i: usize| std::array::from_fn(|k| rows[i].b[2 * k + 1].x.0[0]);
         Centred {
-            live: window.min(MOMENTS),
+            live: rows[0].live,
             left,
             right,
-            inner_odd: response(right).1,
-            pairs,
+            inner_odd: odd(right),
+            pairs: (1..=left)
+                .map(|k| Pair {
+                    left: left - k,
+                    right: right + k,
+                    even: even(right + k),
+                    odd: odd(right + k),
+                })
+                .collect(),
         }
     }
 
@@ -147,5 +135,85 @@ impl Centred {
         // Constants have no moment but b_0: taking the inner pair off the others left all else alone.
         even[0] = even[0] + inner * 0.5;
         std::array::from_fn(|j| h * if j % 2 == 0 { even[j / 2] } else { odd[j / 2] })
+    }
+}
+
+/// The constant map of a window in which the interval lies anywhere.
+#[derive(Clone, Debug)]
+pub(crate) struct Skewed {
+    live: usize,
+    /// Sample at the end of the interval.
+    place: usize,
+    increments: bool,
+    /// Noise gain of the window, as the general path gives it.
+    pub(crate) gain: f64,
+    rows: Vec<[f64; MOMENTS]>,
+}
+
+impl Skewed {
+    /// For instantaneous rates, the interval ending at sample `place` of the window, 1 or more.
+    pub(crate) fn for_rates(window: usize, place: usize) -> Self {
+        Self::assemble(window, place, false)
+    }
+
+    /// For increments, of which `place` is the interval's own.
+    pub(crate) fn for_increments(window: usize, place: usize) -> Self {
+        Self::assemble(window, place, true)
+    }
+
+    fn assemble(window: usize, place: usize, increments: bool) -> Self {
+        let (rows, gain) = response(window, place, increments);
+        Skewed {
+            live: rows[0].live,
+            place,
+            increments,
+            gain,
+            rows: rows.iter().map(|m| m.b.map(|b| b.x.0[0])).collect(),
+        }
+    }
+
+    /// As [`Centred::moments`].
+    #[inline(always)]
+    pub(crate) fn moments<const N: usize>(
+        &self,
+        x: &[f64],
+        y: &[f64],
+        z: &[f64],
+        h: Lanes<N>,
+    ) -> Moments<N> {
+        let x = self.axis(x, h);
+        let y = self.axis(y, h);
+        let z = self.axis(z, h);
+        Moments {
+            b: std::array::from_fn(|j| Triple {
+                x: x[j],
+                y: y[j],
+                z: z[j],
+            }),
+            live: self.live,
+        }
+    }
+
+    #[inline(always)]
+    fn axis<const N: usize>(&self, v: &[f64], h: Lanes<N>) -> [Lanes<N>; MOMENTS] {
+        let at = |i: usize| -> Lanes<N> {
+            let v = &v[i..i + N];
+            Lanes(std::array::from_fn(|k| v[k]))
+        };
+        // Constants have no moment but b_0, so a reference near the values may be taken off them.
+        let reference = if self.increments {
+            at(self.place)
+        } else {
+            (at(self.place - 1) + at(self.place)) * 0.5
+        };
+        let mut moments = [Lanes::<N>::ZERO; MOMENTS];
+        for (i, row) in self.rows.iter().enumerate() {
+            let difference = at(i) - reference;
+            for j in 0..self.live {
+                moments[j] = moments[j] + difference * row[j];
+            }
+        }
+        moments[0] = moments[0] + reference;
+        moments.map(|m| m * h)
     }
 }

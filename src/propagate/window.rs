@@ -4,14 +4,15 @@
 //! arbitrary stamps (general interpolation), a careful one where the window is one-sided, irregular or
 //! bridges a gap, and collocation where increments are missing.
 
-use super::collocation;
+mod careful;
+
 use super::lagrange::{self, POINTS, Quadrature};
 use super::lanes::{Lanes, Triple};
 use super::magnus::{self, Moments};
 use super::method::{LARGEST_WINDOW, Order, Placement};
 use super::track::{Track, secs};
 use super::turn::Turn;
-use super::uniform::Centred;
+use super::uniform::{Centred, Skewed};
 use crate::record::Status;
 
 /// How many neighbouring intervals go through the kernels together.
@@ -111,6 +112,8 @@ pub(crate) struct Plan {
     /// By number of interpolation points.
     quadratures: Vec<Quadrature>,
     centred: Option<Centred>,
+    /// By place of the interval in its window, where the method uses it on equal spacings.
+    skewed: Vec<Option<Skewed>>,
     /// Largest noise gain taken unasked: [`LOUD`], or that of the method's own window if larger.
     loud: f64,
 }
@@ -125,35 +128,58 @@ impl Plan {
         let centred = if increments {
             (window % 2 == 1 && look_ahead == window / 2).then(|| Centred::for_increments(window))
         } else {
-            (window % 2 == 0 && look_ahead + 1 == window / 2).then(|| Centred::for_rates(window))
+            (window.is_multiple_of(2) && look_ahead + 1 == window / 2)
+                .then(|| Centred::for_rates(window))
         };
-        let quadratures: Vec<Quadrature> = (0..=LARGEST_WINDOW + 1).map(Quadrature::new).collect();
-        let mut plan = Plan {
+        let nominal = window - 1 - look_ahead;
+        let table = skewed(window, nominal, increments);
+        // A causal window is louder than a centred one even on perfect stamps: who asks for one gets it.
+        let loud = LOUD.max(1.5 * table.gain);
+        let mut tables = vec![None; window];
+        if centred.is_none() {
+            tables[nominal] = Some(table);
+        }
+        Plan {
             window,
             look_ahead,
             placement,
             order,
             increments,
-            quadratures,
+            quadratures: (0..=LARGEST_WINDOW + 1).map(Quadrature::new).collect(),
             centred,
-            loud: LOUD,
-        };
-        // A causal window is louder than a centred one even on perfect stamps: who asks for one gets it.
-        let mut track = Track::new(increments);
-        for k in 0..window as i64 {
-            track.push(k * 1000, (k - 1) * 1000, [0.0; 3], false);
+            skewed: tables,
+            loud,
         }
-        let k = window - 1 - look_ahead;
-        if k > 0 {
-            let (_, gain) = plan.interpolate::<1>(&track, k, 0, window);
-            plan.loud = LOUD.max(1.5 * gain.0[0]);
+    }
+
+    /// Also fast for intervals whose look-ahead has not all come yet, as provisional steps need.
+    pub(crate) fn with_provisional(mut self) -> Self {
+        for place in self.nominal() + 1..self.window {
+            self.skewed[place] = Some(skewed(self.window, place, self.increments));
         }
-        plan
+        self
+    }
+
+    /// Place of an interval in its window when nothing is in the way.
+    fn nominal(&self) -> usize {
+        self.window - 1 - self.look_ahead
     }
 
     /// Turns of intervals `first ..= last`; the run is known up to the track's end.
     pub(crate) fn steps(&self, track: &Track, first: usize, last: usize) -> Vec<Step> {
         let mut steps = Vec::with_capacity(last + 1 - first);
+        self.append_steps(track, first, last, &mut steps);
+        steps
+    }
+
+    /// As [`steps`](Self::steps), appended.
+    pub(crate) fn append_steps(
+        &self,
+        track: &Track,
+        first: usize,
+        last: usize,
+        steps: &mut Vec<Step>,
+    ) {
         let mut k = first;
         while k <= last {
             let path = self.path(track, k);
@@ -166,20 +192,19 @@ impl Plan {
                 n += 1;
             }
             if n == GROUP && path != Path::Careful {
-                self.group::<GROUP>(track, k, path, &mut steps);
+                self.group::<GROUP>(track, k, path, steps);
                 k += GROUP;
             } else {
                 for k in k..k + n {
                     if path == Path::Careful {
                         steps.push(self.careful(track, k));
                     } else {
-                        self.group::<1>(track, k, path, &mut steps);
+                        self.group::<1>(track, k, path, steps);
                     }
                 }
                 k += n;
             }
         }
-        steps
     }
 
     /// The path of interval k. Depends on stamps only.
@@ -190,7 +215,7 @@ impl Plan {
             return Path::Careful;
         }
         let first = end - self.window;
-        if self.centred.is_some() && track.is_uniform(first, self.window) {
+        if track.is_uniform(first, self.window) {
             Path::Uniform
         } else if track.is_joined(first, self.window) {
             Path::General
@@ -202,27 +227,16 @@ impl Plan {
     fn group<const N: usize>(&self, track: &Track, k: usize, path: Path, steps: &mut Vec<Step>) {
         let first = k + self.look_ahead + 1 - self.window;
         let mut loud = [false; N];
-        let moments = match (&self.centred, path) {
-            (Some(centred), Path::Uniform) => {
-                let h = if self.increments {
-                    Lanes::splat(1.0)
-                } else {
-                    Lanes(std::array::from_fn(|i| track.step(k + i)))
-                };
-                let end = first + self.window + N - 1;
-                centred.moments::<N>(
-                    &track.x[first..end],
-                    &track.y[first..end],
-                    &track.z[first..end],
-                    h,
-                )
-            }
-            _ => {
-                let (moments, gain) = self.interpolate::<N>(track, k, first, self.window);
-                loud = gain.0.map(|gain| !(gain <= self.loud));
-                moments
-            }
+        let moments = if path == Path::Uniform {
+            self.tabulated::<N>(track, k, first)
+        } else {
+            None
         };
+        let moments = moments.unwrap_or_else(|| {
+            let (moments, gain) = self.interpolate::<N>(track, k, first, self.window);
+            loud = gain.0.map(|gain| gain > self.loud || gain.is_nan());
+            moments
+        });
         let turn = magnus::turn(&moments, self.order);
         // |v| = sin(a/2): the angle without trigonometry while it is small.
         let angle = small_angle(&turn);
@@ -242,6 +256,33 @@ impl Plan {
                 steps.push(Step::new(turn.lane(i), Note::Ordinary));
             }
         }
+    }
+
+    /// Moments of N neighbouring intervals from equally spaced windows, the first beginning at `first`;
+    /// `None` where there is no table.
+    #[inline(always)]
+    fn tabulated<const N: usize>(
+        &self,
+        track: &Track,
+        k: usize,
+        first: usize,
+    ) -> Option<Moments<N>> {
+        let h = if self.increments {
+            Lanes::splat(1.0)
+        } else {
+            Lanes(std::array::from_fn(|i| track.step(k + i)))
+        };
+        let end = first + self.window + N - 1;
+        let (x, y, z) = (
+            &track.x[first..end],
+            &track.y[first..end],
+            &track.z[first..end],
+        );
+        let place = k - first;
+        if let (Some(centred), true) = (&self.centred, place == self.nominal()) {
+            return Some(centred.moments(x, y, z, h));
+        }
+        Some(self.skewed[place].as_ref()?.moments(x, y, z, h))
     }
 
     /// Moments of N neighbouring intervals from windows of `window` elements, the first beginning at
@@ -307,177 +348,6 @@ impl Plan {
             )
         }
     }
-
-    /// One interval at an end of the run, beside or across a gap, or among irregular stamps.
-    fn careful(&self, track: &Track, k: usize) -> Step {
-        let hole = self.increments && track.has_hole(k);
-        let bridged = hole || track.bridged[k];
-        let missing = if bridged {
-            self.missing(track, k, hole)
-        } else {
-            0.0
-        };
-        let cap = if bridged {
-            self.window
-                .min(bridge_window(missing) - usize::from(self.increments))
-        } else {
-            self.window
-        };
-        let own = self.settle(track, k, cap, false);
-        let mut turn = magnus::turn(&own.moments, self.order);
-        let mut change = own.change;
-        if hole {
-            let gap = self.settle(track, k, cap, true);
-            change = gap.change;
-            turn = magnus::turn(&gap.moments, self.order).then(turn);
-        }
-        let note = match (bridged, own.used < self.window) {
-            (true, _) => Note::Bridged,
-            (false, true) => Note::Reduced,
-            (false, false) => Note::Ordinary,
-        };
-        let mut step = Step::new(turn, note);
-        if step.note == Note::Bridged {
-            let spread = 0.5 * change.min(std::f64::consts::PI);
-            step.gap_variance = if spread.is_finite() {
-                spread * spread
-            } else {
-                0.0
-            };
-            step.gap_noise = track.step(k) * bridge_noise(missing);
-        }
-        step
-    }
-
-    /// How many samples are missing in interval k, by the median spacing around it; 0.5 or more.
-    fn missing(&self, track: &Track, k: usize, hole: bool) -> f64 {
-        let mut around: Vec<i64> = (k.saturating_sub(8).max(1)
-            ..(k + 1 + self.look_ahead).min(track.len()))
-            .filter(|&i| i != k && !track.bridged[i])
-            .map(|i| track.stamp[i].saturating_sub(track.start[i].max(track.stamp[i - 1])))
-            .filter(|&spacing| spacing > 0)
-            .collect();
-        if self.increments {
-            let own = track.stamp[k].saturating_sub(track.start[k]);
-            if hole && own > 0 {
-                around.push(own);
-            }
-        }
-        around.sort_unstable();
-        let Some(&median) = around.get(around.len() / 2) else {
-            return 1.0;
-        };
-        let empty = if hole {
-            track.start[k].saturating_sub(track.stamp[k - 1]) as f64
-        } else {
-            track.spacing(k).saturating_sub(median) as f64
-        };
-        (empty / median as f64).max(0.5)
-    }
-
-    /// Moments of interval k (or of the hole before its increment) from a window of up to `cap` samples:
-    /// all of them if that is quiet, otherwise as many as the data support.
-    ///
-    /// Starting from the smallest window, each larger one corrects the result. On smooth data the
-    /// corrections shrink; where they are noise, they grow about fourfold with each pair of samples.
-    /// The last window whose correction still shrank is taken.
-    fn settle(&self, track: &Track, k: usize, cap: usize, hole: bool) -> Settled {
-        let smallest = if self.increments { 1 } else { 2 };
-        let mut best: Option<Settled> = None;
-        let (mut before, mut last) = (f64::INFINITY, f64::INFINITY);
-        let joined = !hole && (!self.increments || !self.beside_hole(track, k));
-        let cap = if joined {
-            cap
-        } else {
-            cap.min(collocation::UNKNOWNS)
-        };
-        let cap = self.place(track, k, cap.max(smallest), hole).1;
-        let full = self.over(track, k, cap, hole);
-        let mut sizes: Vec<usize> = (smallest..cap).step_by(2).collect();
-        sizes.push(cap);
-        if full.gain <= self.loud && !track.bridged[k] && !hole {
-            return full;
-        }
-        for size in sizes {
-            let mut this = if size == cap {
-                full
-            } else {
-                self.over(track, k, size, hole)
-            };
-            if let Some(best) = &best {
-                let change: f64 = (0..2)
-                    .map(|j| (this.moments.b[j] - best.moments.b[j]).norm())
-                    .sum();
-                this.change = (this.moments.b[0] - best.moments.b[0]).norm();
-                let shrank = change <= 0.5 * last.max(0.25 * before);
-                if !(shrank && change.is_finite()) {
-                    // What this size would have changed is what is not known.
-                    let unknown = this.change;
-                    let best = Settled {
-                        change: best.change.max(unknown),
-                        ..*best
-                    };
-                    return best;
-                }
-                (before, last) = (last, change);
-            }
-            best = Some(this);
-        }
-        best.unwrap_or(full)
-    }
-
-    /// Whether increments are missing within reach of interval k.
-    fn beside_hole(&self, track: &Track, k: usize) -> bool {
-        let (first, size) = self.place(track, k, self.window, false);
-        (first + 1..first + size).any(|i| track.has_hole(i))
-    }
-
-    /// First element and length of a window of up to `size` elements around interval k, as central as
-    /// the run allows. It never reaches beyond what this method may wait for, so that nothing depends
-    /// on how much happens to be known already.
-    fn place(&self, track: &Track, k: usize, size: usize, hole: bool) -> (usize, usize) {
-        let (lo, hi) = (track.first(), track.len());
-        let known = match self.placement {
-            Placement::Centred => hi,
-            Placement::Causal => k + 1,
-        };
-        let size = size.min(known - lo);
-        let ahead = if self.increments && !hole {
-            (size - 1) / 2
-        } else {
-            (size / 2).saturating_sub(1)
-        };
-        let end = (k + 1 + ahead.min(self.look_ahead)).min(hi).max(lo + size);
-        (end - size, size)
-    }
-
-    /// From `size` samples around interval k.
-    fn over(&self, track: &Track, k: usize, size: usize, hole: bool) -> Settled {
-        let (first, size) = self.place(track, k, size, hole);
-        let joined = !hole && track.is_joined(first, size);
-        let (moments, gain) = if joined {
-            let (moments, gain) = self.interpolate::<1>(track, k, first, size);
-            (moments, gain.0[0])
-        } else {
-            let quadrature = &self.quadratures[size];
-            let target = if hole {
-                (track.stamp[k - 1], track.start[k])
-            } else {
-                (track.start[k], track.stamp[k])
-            };
-            let mut moments = collocation::moments(track, first, size, target, quadrature);
-            if !hole {
-                moments.b[0] = track.value(k);
-            }
-            (moments, f64::INFINITY)
-        };
-        Settled {
-            moments,
-            gain,
-            used: size,
-            change: 0.0,
-        }
-    }
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -487,34 +357,11 @@ enum Path {
     Careful,
 }
 
-#[derive(Clone, Copy, Debug)]
-struct Settled {
-    moments: Moments<1>,
-    gain: f64,
-    used: usize,
-    /// How far the delta angle moved with the last enlargement of the window, rad.
-    change: f64,
-}
-
-/// The window for a gap of `missing` samples (attitude.md 6.4): high order wins across short gaps and
-/// loses across long ones.
-fn bridge_window(missing: f64) -> usize {
-    match missing {
-        m if m < 2.5 => 8,
-        m if m < 4.5 => 6,
-        m if m < 8.5 => 4,
-        _ => 2,
-    }
-}
-
-/// Variance of the bridge over that of white noise integrated as long (attitude.md 6.4, squared and
-/// rounded up); for two samples it is half the number missing.
-fn bridge_noise(missing: f64) -> f64 {
-    match missing {
-        m if m < 2.5 => 4.0,
-        m if m < 4.5 => 20.0,
-        m if m < 8.5 => 34.0,
-        m => 0.5 * m,
+fn skewed(window: usize, place: usize, increments: bool) -> Skewed {
+    if increments {
+        Skewed::for_increments(window, place)
+    } else {
+        Skewed::for_rates(window, place)
     }
 }
 

@@ -54,10 +54,41 @@ pub fn angle_degrees(a: [f64; 4], b: [f64; 4]) -> f64 {
     (2.0 * s.atan2(w.abs())).to_degrees()
 }
 
-/// Worst angle between outputs and truth over `range`, degrees.
+/// Worst angle between outputs and truth, degrees.
 pub fn worst(out: &[AttitudeSample], truth: impl Fn(usize) -> [f64; 4]) -> f64 {
     out.iter()
         .enumerate()
         .map(|(i, a)| angle_degrees(a.q_nb.wxyz(), truth(i)))
         .fold(0.0, f64::max)
+}
+
+/// Worst angle, in degrees, between what was turned since output `margin` and what truly was; the last
+/// `margin` outputs left out. Keeps the ends of a run, where windows are one-sided, out of a figure.
+pub fn worst_inside(
+    out: &[AttitudeSample],
+    truth: impl Fn(usize) -> [f64; 4],
+    margin: usize,
+) -> f64 {
+    let since = |q0: [f64; 4], q: [f64; 4]| {
+        let [w, x, y, z] = q0;
+        product([w, -x, -y, -z], q)
+    };
+    (margin..out.len() - margin)
+        .map(|i| {
+            let estimate = since(out[margin].q_nb.wxyz(), out[i].q_nb.wxyz());
+            angle_degrees(estimate, since(truth(margin), truth(i)))
+        })
+        .fold(0.0, f64::max)
+}
+
+/// Hamilton product.
+pub fn product(a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
+    let [aw, ax, ay, az] = a;
+    let [bw, bx, by, bz] = b;
+    [
+        aw * bw - ax * bx - ay * by - az * bz,
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by + ay * bw + az * bx - ax * bz,
+        aw * bz + az * bw + ax * by - ay * bx,
+    ]
 }

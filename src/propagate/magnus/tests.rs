@@ -1,9 +1,9 @@
+#![allow(clippy::unwrap_used)]
+
 use super::*;
+use crate::propagate::shared_data;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-
-#[path = "../../../tests/shared_data/mod.rs"]
-mod shared_data;
 
 fn direction(rng: &mut ChaCha8Rng) -> Triple<1> {
     loop {
@@ -38,7 +38,6 @@ fn moments(rng: &mut ChaCha8Rng, largest: f64) -> Moments<1> {
 fn between(a: Turn<1>, b: Turn<1>) -> f64 {
     a.inverse().then(b).angle()
 }
-
 
 fn golden() -> Option<serde_json::Value> {
     let path = shared_data::shared("golden/attitude.json")?;
@@ -135,7 +134,10 @@ fn exact_is_as_exact_as_it_says() {
         branches[branch] += 1;
         // Beyond the promise: rounding, of terms up to the size of the turn.
         let promised = allowed + 1e-15 * largest;
-        assert!(error <= promised, "{error:e} > {promised:e}, branch {branch}");
+        assert!(
+            error <= promised,
+            "{error:e} > {promised:e}, branch {branch}"
+        );
     }
     // Whole intervals, divided ones and the series have all been swept.
     assert!(branches.iter().all(|&n| n > 3_000), "{branches:?}");
@@ -200,7 +202,10 @@ fn a_constant_rate_turns_by_its_angle_whatever_the_order() {
             let half = 0.5 * angle;
             // 0.6^2 + 0.8^2 rounds, and the sine of 25 magnifies that by 25.
             let tolerance = 3e-16 * (1.0 + angle);
-            assert!((1.0 + c - half.cos()).abs() < tolerance, "{order:?} {angle}");
+            assert!(
+                (1.0 + c - half.cos()).abs() < tolerance,
+                "{order:?} {angle}"
+            );
             assert!((x - 0.6 * half.sin()).abs() < tolerance && y == 0.0);
             assert!((z + 0.8 * half.sin()).abs() < tolerance);
         }

@@ -1,0 +1,160 @@
+//! Steps and waiting samples -> outputs. Pure.
+
+use crate::model::attitude::Quaternion;
+use crate::propagate::accumulate::Accumulator;
+use crate::propagate::lanes::Triple;
+use crate::propagate::method::Method;
+use crate::propagate::report::Report;
+use crate::propagate::settings::Settings;
+use crate::propagate::sigma::Sigma;
+use crate::propagate::track::Track;
+use crate::propagate::turn::Turn;
+use crate::propagate::window::{Note, Step};
+use crate::record::{AttitudeSample, RateSample, Status};
+use nalgebra::Vector3;
+use std::collections::VecDeque;
+
+/// A sample taken in and not yet output.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Waiting {
+    pub(super) sample: RateSample,
+    /// Whether it advances in time and so ends an interval.
+    pub(super) turns: bool,
+}
+
+/// What the outputs are made of.
+#[derive(Debug)]
+pub(super) struct State {
+    pub(super) attitude: Accumulator,
+    /// Sum of rotation vectors, for the method that wants it.
+    sum: Option<Triple<1>>,
+    pub(super) sigma: Sigma,
+    /// Bits of the output being made that the propagator adds.
+    pub(super) added: Status,
+    pub(super) report: Report,
+    pub(super) reset_count: u32,
+    rate: Vector3<f64>,
+    pub(super) integrated_nanos: i64,
+}
+
+impl State {
+    pub(super) fn new(settings: &Settings, initial: [f64; 4]) -> Self {
+        State {
+            attitude: Accumulator::new(initial),
+            sum: (settings.method == Method::RotvecSum).then(|| rotation_vector(initial)),
+            sigma: Sigma::new(settings.noise),
+            added: Status::OK,
+            report: Report::default(),
+            reset_count: 0,
+            rate: Vector3::zeros(),
+            integrated_nanos: 0,
+        }
+    }
+
+    pub(super) fn reset(&mut self, initial: [f64; 4]) {
+        self.attitude.restart(initial);
+        self.sigma.reset();
+        if let Some(sum) = &mut self.sum {
+            *sum = rotation_vector(initial);
+        }
+    }
+
+    /// Turns on over interval k.
+    #[inline(always)]
+    pub(super) fn step(&mut self, step: &Step, track: &Track, k: usize) {
+        match &mut self.sum {
+            None => self.attitude.turn(step.turn),
+            Some(sum) => {
+                let [_, x, y, z] = step.turn;
+                *sum = *sum + Triple::new(x, y, z);
+                let turn = Turn::exp(*sum);
+                let [c, x, y, z] = turn.parts();
+                self.attitude = Accumulator::new([1.0 + c, x, y, z]);
+            }
+        }
+        let spacing = track.spacing(k);
+        self.sigma.integrate(spacing);
+        self.integrated_nanos = self.integrated_nanos.saturating_add(spacing);
+        self.report.angle_turned += step.angle;
+        self.report.largest_step = self.report.largest_step.max(step.angle);
+        self.added = self.added.with(step.status());
+        if step.angle > std::f64::consts::PI {
+            self.report.undersampled += 1;
+        }
+        match step.note {
+            Note::Ordinary => {}
+            Note::Reduced => self.report.reduced += 1,
+            Note::Bridged => {
+                self.report.bridged += 1;
+                self.sigma.bridge(step.gap_variance, step.gap_noise);
+            }
+            Note::Refused => self.report.refused += 1,
+        }
+    }
+
+    /// Outputs the sample that ends interval k, and those after it that turned nothing.
+    #[inline(always)]
+    pub(super) fn emit(
+        &mut self,
+        queue: &mut VecDeque<Waiting>,
+        track: &Track,
+        k: usize,
+        out: &mut Vec<AttitudeSample>,
+    ) {
+        if let Some(Waiting { sample, .. }) = queue.pop_front() {
+            self.output_at(&sample, Some(track.rate(k)), out);
+        }
+        self.flush_stalled(queue, out);
+    }
+
+    /// Outputs samples that turned nothing, up to the next that will.
+    #[inline(always)]
+    pub(super) fn flush_stalled(
+        &mut self,
+        queue: &mut VecDeque<Waiting>,
+        out: &mut Vec<AttitudeSample>,
+    ) {
+        while let Some(&Waiting {
+            sample,
+            turns: false,
+        }) = queue.front()
+        {
+            queue.pop_front();
+            self.output_at(&sample, None, out);
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn output_at(
+        &mut self,
+        sample: &RateSample,
+        rate: Option<Triple<1>>,
+        out: &mut Vec<AttitudeSample>,
+    ) {
+        if let Some(rate) = rate {
+            self.rate = Vector3::new(rate.x.0[0], rate.y.0[0], rate.z.0[0]);
+        }
+        let sigma = self.sigma.value();
+        out.push(AttitudeSample {
+            stamp: sample.stamp,
+            q_nb: Quaternion::assume_unit(self.attitude.attitude()),
+            rate: self.rate,
+            accel: sample.accel,
+            sigma: Vector3::new(sigma, sigma, sigma),
+            status: sample.status.with(self.added),
+            reset_count: self.reset_count,
+            log: sample.log,
+        });
+        self.added = Status::OK;
+        self.report.samples += 1;
+    }
+}
+
+/// log of a unit quaternion: the rotation vector of at most half a turn.
+fn rotation_vector([w, x, y, z]: [f64; 4]) -> Triple<1> {
+    let sign = if w < 0.0 { -1.0 } else { 1.0 };
+    let v = Triple::new(x * sign, y * sign, z * sign);
+    let s = v.norm();
+    let half = s.atan2(w * sign);
+    v * if s > 0.0 { 2.0 * half / s } else { 2.0 }
+}

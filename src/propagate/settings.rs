@@ -1,0 +1,88 @@
+//! What a run of the propagator is to do -> checked once. Pure.
+
+use super::method::Method;
+use super::sigma::Noise;
+use crate::model::attitude::Quaternion;
+use crate::model::frames::{Body, Nav};
+use crate::record::SampleKind;
+use std::fmt;
+
+/// What a propagator is to do.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    /// How samples become turns.
+    pub method: Method,
+    /// What the samples mean.
+    pub kind: SampleKind,
+    /// Attitude at the first sample, and after a reset.
+    pub initial: Quaternion<Nav, Body>,
+    /// For the uncertainty that goes with every attitude; zeros for none.
+    pub noise: Noise,
+}
+
+/// Settings that can not be.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[non_exhaustive]
+pub enum SettingsError {
+    /// The window is not in `smallest ..= largest` samples.
+    Window {
+        /// What was asked for.
+        given: usize,
+        /// What there is: two rates, one increment.
+        smallest: usize,
+        /// [`LARGEST_WINDOW`].
+        largest: usize,
+    },
+    /// The initial attitude is no rotation.
+    Initial {
+        /// Its `[w, x, y, z]`.
+        wxyz: [f64; 4],
+    },
+    /// A noise figure is negative, not finite, or absurd.
+    Noise {
+        /// Which.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+    },
+}
+
+impl fmt::Display for SettingsError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            SettingsError::Window {
+                given,
+                smallest,
+                largest,
+            } => write!(
+                f,
+                "a window of {given} samples can not be used\n  help: --window takes {smallest} to {largest}"
+            ),
+            SettingsError::Initial { wxyz } => write!(
+                f,
+                "the initial attitude {wxyz:?} (w, x, y, z) is not a unit quaternion\n  help: --init q=w,x,y,z with norm 1"
+            ),
+            SettingsError::Noise { name, value } => write!(
+                f,
+                "noise {name} = {value} can not be\n  help: --noise takes numbers from 0 up, in SI units"
+            ),
+        }
+    }
+}
+
+impl std::error::Error for SettingsError {}
+
+impl Settings {
+    /// The initial attitude, to the last bit of norm 1.
+    pub(crate) fn checked(&self) -> Result<[f64; 4], SettingsError> {
+        let wxyz = self.initial.wxyz();
+        let norm = wxyz.iter().map(|c| c * c).sum::<f64>().sqrt();
+        if (norm - 1.0).abs() > 1e-6 || norm.is_nan() {
+            return Err(SettingsError::Initial { wxyz });
+        }
+        if let Some((name, value)) = self.noise.fault() {
+            return Err(SettingsError::Noise { name, value });
+        }
+        Ok(wxyz.map(|c| c / norm))
+    }
+}
