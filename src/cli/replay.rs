@@ -118,6 +118,8 @@ pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
                 result
             });
         match result {
+            // Whoever read the output has enough: nothing more to say or do.
+            Ok(summary) if summary.reader_gone => return Ok(outcome),
             Ok(summary) => {
                 if summary.is_lossy() && outcome == Outcome::Done {
                     outcome = Outcome::Lossy;

@@ -94,13 +94,17 @@ impl Outlet {
             };
             let (now, later) = rest.split_at(n);
             rest = later;
+            let mut flows = Vec::with_capacity(self.sinks.len());
             for (_, sink) in &mut self.sinks {
                 let mut flow = sink.write(stream, now, pool.rayon())?;
                 if self.pace.is_some() && flow == Flow::Continue {
                     flow = sink.flush(pool.rayon())?;
                 }
-                self.closed |= flow == Flow::Closed;
+                flows.push(flow);
             }
+            // A reader that has gone ends the run only when nobody else is served: a file beside it
+            // must still become whole.
+            self.closed = !flows.is_empty() && flows.iter().all(|flow| *flow == Flow::Closed);
         }
         Ok(if self.closed {
             Flow::Closed

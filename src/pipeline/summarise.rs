@@ -26,6 +26,7 @@ pub fn run(
     RunSummary {
         source: run.source.name().display().to_string(),
         topics: topics.iter().map(|topic| of_topic(run, topic)).collect(),
+        reader_gone: !outputs.is_empty() && outputs.iter().all(|(_, written)| written.closed),
         outputs: outputs
             .into_iter()
             .map(|(name, written)| (name, written.bytes, written.messages))

@@ -108,6 +108,9 @@ pub struct RunSummary {
     pub file_problems: Vec<String>,
     /// How many of them lost data.
     pub file_losses: u64,
+    /// Whether the readers of every output hung up before the end (`| head`): the run stopped there,
+    /// on purpose.
+    pub reader_gone: bool,
     /// Wall seconds.
     pub elapsed_secs: f64,
 }
