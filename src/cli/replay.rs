@@ -104,6 +104,7 @@ pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
                 .to_owned(),
         ));
     }
+    outputs::check_distinct(&args.outputs, &args.sources)?;
     let plan = args.estimation.plan()?;
     let pool = Pool::new(global.threads)?;
     let mut outcome = Outcome::Done;
