@@ -197,6 +197,7 @@ impl Replay {
 /// The text summary: on stdout, or on stderr when the data or JSON is there.
 fn say(global: &Global, args: &Replay, summary: &RunSummary) -> Result<()> {
     if global.quiet {
+        say_warnings(summary);
         return Ok(());
     }
     if global.json || writes_stdout(args) {
@@ -205,6 +206,32 @@ fn say(global: &Global, args: &Replay, summary: &RunSummary) -> Result<()> {
         return Ok(());
     }
     print(&summary.text())
+}
+
+/// What `--quiet` leaves: why the exit code is 3, and the warnings.
+fn say_warnings(summary: &RunSummary) {
+    let source = &summary.source;
+    for topic in &summary.topics {
+        let lost = topic.counts.lost();
+        if lost > 0 {
+            let total = topic.counts.total();
+            tracing::warn!("{source}: {}: lost {lost} of {total} samples", topic.topic);
+        }
+        let breaks = topic.gaps.held + topic.gaps.resets;
+        if breaks > 0 {
+            tracing::warn!(
+                "{source}: {}: {breaks} gaps were not integrated over, {:.3} s in all",
+                topic.topic,
+                topic.gaps.total_secs
+            );
+        }
+        for warning in &topic.warnings {
+            tracing::warn!("{source}: {}: {warning}", topic.topic);
+        }
+    }
+    for problem in &summary.file_problems {
+        tracing::warn!("{source}: {problem}");
+    }
 }
 
 /// One object for one log, an array for several.
