@@ -3,7 +3,7 @@
 //! A file is read twice: once as far as is needed to know clock, bias and initial attitude, then
 //! to integrate. A stream is read once; its first samples wait until these are known.
 
-use super::log::{Known, Log, described, known, plain, rank};
+use super::log::{Known, Log, described, explained, known, plain, rank};
 use super::outlet::Outlet;
 use super::pool::Pool;
 use super::position::Position;
@@ -116,7 +116,7 @@ fn file(
     watch: &mut dyn FnMut(&Position),
 ) -> Result<RunSummary> {
     let log = Log::open(path, pool)?;
-    let choice = topics::choose(path, &log.candidates(), run.plan.topic.as_deref())?;
+    let choice = log.choose(path, run.plan.topic.as_deref())?;
     let mut chosen = choose(run, path, &log, &choice.topics)?;
     if let (Some(note), Some(first)) = (choice.note, chosen.first_mut()) {
         first.found.warnings.push(note);
@@ -299,18 +299,20 @@ impl Picked {
                 what,
             };
         }
-        let candidates: Vec<_> = survey
+        let channels: Vec<Known> = survey
             .channels
             .iter()
-            .map(|c| known(&c.channel, c.messages, None).candidate())
+            .map(|c| known(&c.channel, c.messages, None))
             .collect();
-        match topics::choose(path, &candidates, run.plan.topic.as_deref()) {
+        let candidates: Vec<_> = channels.iter().map(Known::candidate).collect();
+        let error = match topics::choose(path, &candidates, run.plan.topic.as_deref()) {
             Err(e) => e,
             Ok(_) => Error::NoImuTopic {
                 path: path.to_owned(),
                 topics: topics::listing(&candidates),
             },
-        }
+        };
+        explained(error, &channels, &summarise::problems(survey))
     }
 
     fn passed_over(&self) -> Option<String> {
