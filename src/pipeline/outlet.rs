@@ -12,11 +12,14 @@ use crate::sink::{
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+/// What standard output is called in the summary.
+const STDOUT: &str = "standard output";
+
 /// What a target is called in the summary.
 fn name(target: &Target) -> String {
     match target {
         Target::File { path, .. } => path.display().to_string(),
-        Target::Stdout => "standard output".to_owned(),
+        Target::Stdout => STDOUT.to_owned(),
         Target::Null => "null:".to_owned(),
     }
 }
@@ -111,6 +114,21 @@ impl Outlet {
         } else {
             Flow::Continue
         })
+    }
+
+    /// Pushes what was handed over out to standard output, whose reader may wait for it. Files are
+    /// left to fill their batches: nobody reads them yet, and an MCAP's bytes would show it.
+    ///
+    /// # Errors
+    /// As [`Sink::flush`].
+    pub fn flush_to_readers(&mut self, pool: &Pool) -> Result<()> {
+        for (name, sink) in &mut self.sinks {
+            if name == STDOUT {
+                // That it has hung up is noticed at the next write.
+                let _ = sink.flush(pool.rayon())?;
+            }
+        }
+        Ok(())
     }
 
     /// Copies a message of the input to every sink that has room for it.
