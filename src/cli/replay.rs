@@ -46,7 +46,12 @@ pub struct Replay {
     #[arg(long, value_enum, default_value = "zstd", help_heading = "Output")]
     pub compression: CompressionArg,
     /// Write at most this many attitudes a second; the integration always uses every sample
-    #[arg(long, value_name = "HZ", help_heading = "Output")]
+    #[arg(
+        long,
+        value_name = "HZ",
+        allow_negative_numbers = true,
+        help_heading = "Output"
+    )]
     pub out_rate: Option<f64>,
     /// How fast: max, or a factor of data time such as 1 or 0.5
     #[arg(
