@@ -5,7 +5,7 @@ use crate::decode;
 use crate::error::{Error, Result};
 use crate::model::attitude::{Quaternion, YawPitchRoll};
 use crate::model::frames::{Body, BodyAxes, Nav, World};
-use crate::propagate::Method;
+use crate::propagate::{self, Method, Propagator};
 use crate::record::SampleKind;
 use nalgebra::Vector3;
 
@@ -100,7 +100,20 @@ impl Plan {
         };
         conditioning
             .validate()
-            .map_err(|e| Error::Usage(e.to_string()))
+            .map_err(|e| Error::Usage(e.to_string()))?;
+        Propagator::new(propagate::Settings {
+            method: self.method,
+            // Where the format decides, the kind with the wider choice: the rest is said by topic.
+            kind: self.kind.unwrap_or(SampleKind::Average),
+            initial: Quaternion::identity(),
+            noise: propagate::Noise {
+                arw: self.noise.arw,
+                bias: self.noise.bias_instability,
+                ..propagate::Noise::default()
+            },
+        })
+        .map_err(|e| Error::Usage(e.to_string()))?;
+        Ok(())
     }
 }
 

@@ -77,7 +77,7 @@ pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
     let topic = match &args.topic {
         Some(topic) => topic.clone(),
         None => {
-            let choice = topics::choose(&args.source, &log.candidates(), None)?;
+            let choice = log.choose(&args.source, None)?;
             choice.topics.into_iter().next().unwrap_or_default()
         }
     };

@@ -19,7 +19,7 @@ pub struct Estimation {
     #[arg(long, value_enum, default_value = "header", env = "STRAPD_TIME")]
     pub time: TimeArg,
     /// Sample rate for --time index
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub rate_hz: Option<f64>,
     /// Where a value lies in the message: ROLE=PATH, ROLE one of gyro, accel, orientation, stamp, dt
     #[arg(long = "field", value_name = "ROLE=PATH")]
@@ -73,13 +73,18 @@ pub struct Estimation {
     )]
     pub bias: String,
     /// Longest gap that is bridged, in seconds
-    #[arg(long, value_name = "SECS", default_value_t = 0.5)]
+    #[arg(
+        long,
+        value_name = "SECS",
+        default_value_t = 0.5,
+        allow_negative_numbers = true
+    )]
     pub max_gap: f64,
     /// Beyond that: hold the attitude, bridge all the same, or reset to the initial attitude
     #[arg(long, value_enum, default_value = "hold")]
     pub on_gap: OnGapArg,
     /// Full scale of the gyro in rad/s: samples at or beyond it are marked saturated
-    #[arg(long, value_name = "RAD_S")]
+    #[arg(long, value_name = "RAD_S", allow_negative_numbers = true)]
     pub gyro_range: Option<f64>,
     /// Use a gyro whose covariance is marked -1 (absent) all the same: some drivers set it wrongly
     #[arg(long)]
@@ -88,10 +93,10 @@ pub struct Estimation {
     #[arg(long, value_name = "NOISE", default_value = "consumer")]
     pub noise: String,
     /// Skip the first seconds of the data
-    #[arg(long, value_name = "SECS")]
+    #[arg(long, value_name = "SECS", allow_negative_numbers = true)]
     pub start: Option<f64>,
     /// Stop after this many seconds of the data
-    #[arg(long, value_name = "SECS")]
+    #[arg(long, value_name = "SECS", allow_negative_numbers = true)]
     pub until: Option<f64>,
 }
 

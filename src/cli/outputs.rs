@@ -1,7 +1,8 @@
 //! `-o` as written -> one name per log. Pure but for asking whether a directory is there.
 
 use crate::error::{Error, Result};
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::path::{Component, Path, PathBuf};
 
 /// Resolves every `-o` for one log of `logs`.
 ///
@@ -15,6 +16,43 @@ pub fn resolve(outputs: &[String], log: &str, logs: usize) -> Result<Vec<String>
     outputs
         .iter()
         .map(|output| resolve_one(output, log, logs))
+        .collect()
+}
+
+/// Checks that no two logs of a run, and no two `-o`, lead to the same file.
+///
+/// All logs are looked at, those of other shards too: what one process would refuse, many must not
+/// do to each other unseen.
+///
+/// # Errors
+/// [`Error::Usage`] naming the file and who would write it.
+pub fn check_distinct(outputs: &[String], logs: &[String]) -> Result<()> {
+    let mut writers: BTreeMap<PathBuf, &String> = BTreeMap::new();
+    for log in logs {
+        for name in resolve(outputs, log, logs.len())? {
+            if name == "-" || name == "null:" {
+                continue;
+            }
+            let Some(other) = writers.insert(plain(&name), log) else {
+                continue;
+            };
+            return Err(Error::Usage(if other == log {
+                format!("-o {name}: given twice")
+            } else {
+                format!(
+                    "-o {name}: both {other} and {log} would be written there\n  help: give them different names, or run them one by one"
+                )
+            }));
+        }
+    }
+    Ok(())
+}
+
+/// The path without `.` and double slashes, as far as that can be told without asking the disk.
+fn plain(name: &str) -> PathBuf {
+    Path::new(name)
+        .components()
+        .filter(|part| *part != Component::CurDir)
         .collect()
 }
 
@@ -62,6 +100,23 @@ mod tests {
         assert_eq!(one("out/", "/d/a.mcap", 2).unwrap(), "out/a.attitude.mcap");
         assert_eq!(one("-", "/d/a.mcap", 2).unwrap(), "-");
         assert_eq!(one("x.mcap", "/d/a.mcap", 1).unwrap(), "x.mcap");
+    }
+
+    #[test]
+    fn two_logs_of_one_name_do_not_replace_each_other() {
+        let check = |outputs: &[&str], logs: &[&str]| {
+            let owned = |list: &[&str]| list.iter().map(|s| (*s).to_owned()).collect::<Vec<_>>();
+            check_distinct(&owned(outputs), &owned(logs)).map_err(|e| e.to_string())
+        };
+        let error = check(&["out/"], &["a/x.mcap", "b/x.mcap"]).unwrap_err();
+        assert!(
+            error.contains("a/x.mcap") && error.contains("b/x.mcap"),
+            "{error}"
+        );
+        assert!(check(&["a.csv", "./a.csv"], &["x.mcap"]).is_err());
+        assert!(check(&["-", "null:", "a.csv", "a.mcap"], &["x.mcap"]).is_ok());
+        assert!(check(&["-"], &["a/x.mcap", "b/x.mcap"]).is_ok());
+        assert!(check(&["{stem}.csv"], &["a.mcap", "b.mcap"]).is_ok());
     }
 
     #[test]

@@ -46,7 +46,12 @@ pub struct Replay {
     #[arg(long, value_enum, default_value = "zstd", help_heading = "Output")]
     pub compression: CompressionArg,
     /// Write at most this many attitudes a second; the integration always uses every sample
-    #[arg(long, value_name = "HZ", help_heading = "Output")]
+    #[arg(
+        long,
+        value_name = "HZ",
+        allow_negative_numbers = true,
+        help_heading = "Output"
+    )]
     pub out_rate: Option<f64>,
     /// How fast: max, or a factor of data time such as 1 or 0.5
     #[arg(
@@ -104,6 +109,7 @@ pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
                 .to_owned(),
         ));
     }
+    outputs::check_distinct(&args.outputs, &args.sources)?;
     let plan = args.estimation.plan()?;
     let pool = Pool::new(global.threads)?;
     let mut outcome = Outcome::Done;
@@ -118,8 +124,10 @@ pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
                 result
             });
         match result {
+            // Whoever read the output has enough: nothing more to say or do.
+            Ok(summary) if summary.reader_gone => return Ok(outcome),
             Ok(summary) => {
-                if summary.is_lossy() && !summary.closed && outcome == Outcome::Done {
+                if summary.is_lossy() && outcome == Outcome::Done {
                     outcome = Outcome::Lossy;
                 }
                 say(global, args, &summary)?;
@@ -193,8 +201,8 @@ impl Replay {
 
 /// The text summary: on stdout, or on stderr when the data or JSON is there.
 fn say(global: &Global, args: &Replay, summary: &RunSummary) -> Result<()> {
-    // A reader that has had enough (`| head`) is no occasion for words.
-    if global.quiet || summary.closed {
+    if global.quiet {
+        say_warnings(summary);
         return Ok(());
     }
     if global.json || writes_stdout(args) {
@@ -203,6 +211,32 @@ fn say(global: &Global, args: &Replay, summary: &RunSummary) -> Result<()> {
         return Ok(());
     }
     print(&summary.text())
+}
+
+/// What `--quiet` leaves: why the exit code is 3, and the warnings.
+fn say_warnings(summary: &RunSummary) {
+    let source = &summary.source;
+    for topic in &summary.topics {
+        let lost = topic.counts.lost();
+        if lost > 0 {
+            let total = topic.counts.total();
+            tracing::warn!("{source}: {}: lost {lost} of {total} samples", topic.topic);
+        }
+        let breaks = topic.gaps.held + topic.gaps.resets;
+        if breaks > 0 {
+            tracing::warn!(
+                "{source}: {}: {breaks} gaps were not integrated over, {:.3} s in all",
+                topic.topic,
+                topic.gaps.total_secs
+            );
+        }
+        for warning in &topic.warnings {
+            tracing::warn!("{source}: {}: {warning}", topic.topic);
+        }
+    }
+    for problem in &summary.file_problems {
+        tracing::warn!("{source}: {problem}");
+    }
 }
 
 /// One object for one log, an array for several.

@@ -5,7 +5,7 @@ use super::position::Position;
 use super::preparation::Resolved;
 use super::replay::{Replay, Waiting, end, refused};
 use super::route::Item;
-use super::session::{Found, Source};
+use super::session::Found;
 use crate::decode::{LineDecoder, MAX_LINE, Stated};
 use crate::error::{Error, Result};
 use crate::record::Nanos;
@@ -14,7 +14,7 @@ use crate::sink::{Flow, Stream, output_topic};
 use crate::source::mcap::Survey;
 use std::collections::BTreeSet;
 use std::fs::File;
-use std::io::{BufRead, Read};
+use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -53,7 +53,7 @@ pub fn open(path: &Path) -> Result<File> {
 /// As [`super::replay::run`]; several sensors in one stream and none named.
 pub fn replay(
     run: &Replay,
-    mut input: Box<dyn BufRead>,
+    mut input: BufReader<impl Read>,
     pool: &Pool,
     watch: &mut dyn FnMut(&Position),
 ) -> Result<RunSummary> {
@@ -131,9 +131,15 @@ pub fn replay(
                 items.extend(samples.drain(..).map(|raw| Item::Sample(0, raw)));
             }
         }
-        if items.len() >= BATCH || input_waits(&run.source) {
+        // With nothing left in the buffer the next line may be long in coming: what is known goes
+        // out first.
+        let may_wait = input.buffer().is_empty();
+        if items.len() >= BATCH || may_wait {
             closed = waiting.consume(items.drain(..), pool)? == Flow::Closed;
             watch(&waiting.position());
+        }
+        if may_wait {
+            waiting.flush_to_readers(pool)?;
         }
     }
     if waiting.is_idle() {
@@ -141,11 +147,6 @@ pub fn replay(
     }
     let _ = waiting.consume(items.into_iter(), pool)?;
     end(run, waiting.into_session(pool)?, &Survey::default(), pool)
-}
-
-/// A pipe may stand still between two lines: what is known goes out at once.
-fn input_waits(source: &Source) -> bool {
-    *source == Source::Stdin
 }
 
 fn nothing(path: &Path) -> Error {

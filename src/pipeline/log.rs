@@ -4,9 +4,10 @@
 //! channels, which of them carry a rate or an orientation, and a decoder that has seen a message.
 
 use super::pool::Pool;
-use super::topics::Candidate;
+use super::summarise;
+use super::topics::{self, Candidate, Choice};
 use crate::decode::{self, Decoder, Rank, Role, Unsupported, role};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::record::Nanos;
 use crate::source::mcap::{self, Channel, Reader, Survey, WalkOptions};
 use std::ops::ControlFlow;
@@ -22,6 +23,9 @@ pub struct Log {
     pub survey: Survey,
     /// Its channels, with what they can serve as.
     pub channels: Vec<Known>,
+    /// What was wrong with it as far as it was read: all of it when it has no summary, otherwise up
+    /// to the first message of the last channel.
+    pub problems: Vec<String>,
 }
 
 /// A channel and its first message.
@@ -44,14 +48,20 @@ impl Log {
     /// It can not be opened or read, or is no MCAP.
     pub fn open(path: &Path, pool: &Pool) -> Result<Log> {
         let reader = Reader::open(path)?;
+        if reader.again().is_none() {
+            return Err(Error::Unsupported {
+                path: path.to_owned(),
+                what: "a pipe can be read only once, and this needs to look twice\n  help: save it to a file first; strapd replay reads pipes".to_owned(),
+            });
+        }
         let options = WalkOptions {
             pool: Some(pool.rayon()),
             ..WalkOptions::default()
         };
         let survey = mcap::survey(&reader, &options)?;
-        let firsts = match reader.again() {
+        let (firsts, problems) = match reader.again() {
             Some(again) => first_messages(again, &survey)?,
-            None => Vec::new(),
+            None => (Vec::new(), Vec::new()),
         };
         let channels = survey
             .channels
@@ -65,10 +75,24 @@ impl Log {
             })
             .collect();
         Ok(Log {
+            problems: match summarise::problems(&survey) {
+                none if none.is_empty() => problems,
+                whole => whole,
+            },
             reader,
             survey,
             channels,
         })
+    }
+
+    /// The topics to estimate from ([`topics::choose`]). Where there are none, the error also says
+    /// what is wrong with those that sound like an IMU, and with the file.
+    ///
+    /// # Errors
+    /// As [`topics::choose`].
+    pub fn choose(&self, path: &Path, named: Option<&str>) -> Result<Choice> {
+        topics::choose(path, &self.candidates(), named)
+            .map_err(|error| explained(error, &self.channels, &self.problems))
     }
 
     /// The file once more, from its beginning.
@@ -147,6 +171,32 @@ pub fn rank(role: &Role) -> u8 {
     }
 }
 
+/// "No IMU topic" with what is wrong with those that sound like one, and with the file.
+#[must_use]
+pub fn explained(error: Error, channels: &[Known], problems: &[String]) -> Error {
+    let Error::NoImuTopic { path, mut topics } = error else {
+        return error;
+    };
+    let sounds_like_one = |k: &&Known| {
+        let name = k.channel.schema.as_deref().map_or("", |s| &s.name);
+        !k.role.has_rate && name.to_ascii_lowercase().contains("imu")
+    };
+    let refusals = channels
+        .iter()
+        .filter(sounds_like_one)
+        .filter_map(|k| k.decoder(&decode::Options::default()).err())
+        .map(|why| why.to_string());
+    for why in refusals.take(SAID) {
+        // Its own help is about naming a field; so is the error's.
+        let why = why.lines().next().unwrap_or_default();
+        topics.push_str(&format!("\n  {why}"));
+    }
+    for problem in problems.iter().take(SAID) {
+        topics.push_str(&format!("\n  the file is damaged: {problem}"));
+    }
+    Error::NoImuTopic { path, topics }
+}
+
 /// A channel with what it can serve as.
 #[must_use]
 pub fn known(channel: &Arc<Channel>, messages: u64, first: Option<(Nanos, Vec<u8>)>) -> Known {
@@ -173,6 +223,9 @@ pub fn nanos(time: u64) -> Nanos {
 const FIRST_LIMIT: usize = 64 << 10;
 const FIRSTS_LIMIT: usize = 16 << 20;
 
+/// Most refusals, and most faults of the file, that an error goes into.
+const SAID: usize = 3;
+
 struct First {
     id: u16,
     topic: String,
@@ -180,13 +233,14 @@ struct First {
     data: Vec<u8>,
 }
 
-/// The first message of every channel, in file order, reading no further than needed.
-fn first_messages(reader: Reader, survey: &Survey) -> Result<Vec<First>> {
+/// The first message of every channel, in file order, reading no further than needed; and what was
+/// wrong with the file up to there.
+fn first_messages(reader: Reader, survey: &Survey) -> Result<(Vec<First>, Vec<String>)> {
     let wanted = survey.channels.iter().filter(|c| c.messages > 0).count();
     let mut firsts: Vec<First> = Vec::new();
     let (mut met, mut bytes) = (0, 0);
     // On the calling thread: "first" must not depend on who was faster.
-    mcap::walk(
+    let report = mcap::walk(
         reader,
         &WalkOptions::default(),
         |_| Some(AtomicBool::new(false)),
@@ -218,5 +272,5 @@ fn first_messages(reader: Reader, survey: &Survey) -> Result<Vec<First>> {
             }
         },
     )?;
-    Ok(firsts)
+    Ok((firsts, summarise::problems(&report.survey)))
 }

@@ -12,11 +12,14 @@ use crate::sink::{
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+/// What standard output is called in the summary.
+const STDOUT: &str = "standard output";
+
 /// What a target is called in the summary.
 fn name(target: &Target) -> String {
     match target {
         Target::File { path, .. } => path.display().to_string(),
-        Target::Stdout => "standard output".to_owned(),
+        Target::Stdout => STDOUT.to_owned(),
         Target::Null => "null:".to_owned(),
     }
 }
@@ -94,19 +97,38 @@ impl Outlet {
             };
             let (now, later) = rest.split_at(n);
             rest = later;
+            let mut flows = Vec::with_capacity(self.sinks.len());
             for (_, sink) in &mut self.sinks {
                 let mut flow = sink.write(stream, now, pool.rayon())?;
                 if self.pace.is_some() && flow == Flow::Continue {
                     flow = sink.flush(pool.rayon())?;
                 }
-                self.closed |= flow == Flow::Closed;
+                flows.push(flow);
             }
+            // A reader that has gone ends the run only when nobody else is served: a file beside it
+            // must still become whole.
+            self.closed = !flows.is_empty() && flows.iter().all(|flow| *flow == Flow::Closed);
         }
         Ok(if self.closed {
             Flow::Closed
         } else {
             Flow::Continue
         })
+    }
+
+    /// Pushes what was handed over out to standard output, whose reader may wait for it. Files are
+    /// left to fill their batches: nobody reads them yet, and an MCAP's bytes would show it.
+    ///
+    /// # Errors
+    /// As [`Sink::flush`].
+    pub fn flush_to_readers(&mut self, pool: &Pool) -> Result<()> {
+        for (name, sink) in &mut self.sinks {
+            if name == STDOUT {
+                // That it has hung up is noticed at the next write.
+                let _ = sink.flush(pool.rayon())?;
+            }
+        }
+        Ok(())
     }
 
     /// Copies a message of the input to every sink that has room for it.

@@ -3,7 +3,7 @@
 //! Apart from the estimator because it is all about what is not known yet: when enough has been
 //! seen, and what to say when it can not be known.
 
-use crate::condition::stillness::{self, Limits, Rests, Stillness};
+use crate::condition::stillness::{self, Limits, NoRest, Rests, Stillness};
 use crate::condition::{Clock, ClockWarning, Conditioner, GyroUnit, Settings, choose_clock};
 use crate::config::{Bias, Initial, Plan};
 use crate::decode::{self, Stated};
@@ -313,8 +313,8 @@ fn decide_initial(
             plan.world,
         )),
         Initial::Gravity => {
-            let level = stillness::accel_at_start(rests, &Limits::default())
-                .map_err(|e| format!("--init gravity: {e}"))?;
+            let level =
+                stillness::accel_at_start(rests, &Limits::default()).map_err(|e| not_level(&e))?;
             let level = stillness::level(&level)
                 .ok_or("--init gravity: the accelerometer reads zero at rest")?;
             // Heading is unknown: zero in the convention that is shown.
@@ -342,6 +342,20 @@ fn decide_initial(
             };
             Ok((q, "first recorded orientation".to_owned(), world))
         }
+    }
+}
+
+/// Why `--init gravity` can not be. The reasons are those of a bias, the ways out are not.
+fn not_level(why: &NoRest) -> String {
+    let said = format!("--init gravity: {why}");
+    match why {
+        NoRest::Moving { .. } | NoRest::Disagree { .. } => {
+            let why = said.lines().next().unwrap_or_default();
+            format!(
+                "{why}\n  help: --init identity starts unlevelled, --init rpy=roll,pitch,yaw (degrees) as you say; if the rates look too large, --gyro-unit deg"
+            )
+        }
+        NoRest::NotAtStart { .. } | NoRest::NoAccel => said,
     }
 }
 

@@ -33,8 +33,10 @@ pub fn of(
     put("input".to_owned(), run.source.name().display().to_string());
     put("method".to_owned(), run.plan.method.to_string());
     put("noise".to_owned(), run.plan.noise.name.clone());
-    // The ends are read only where there is something to write the result into.
+    // The ends are read only where there is something to write the result into, and never of a
+    // pipe: opening it a second time would wait for a second writer.
     if let Source::File(path) = &run.source
+        && path.is_file()
         && run.targets.iter().any(|t| *t != Target::Null)
     {
         put("input_fingerprint".to_owned(), fingerprint(path)?);

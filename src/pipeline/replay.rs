@@ -3,7 +3,7 @@
 //! A file is read twice: once as far as is needed to know clock, bias and initial attitude, then
 //! to integrate. A stream is read once; its first samples wait until these are known.
 
-use super::log::{Known, Log, described, known, plain, rank};
+use super::log::{Known, Log, described, explained, known, plain, rank};
 use super::outlet::Outlet;
 use super::pool::Pool;
 use super::position::Position;
@@ -59,10 +59,14 @@ pub fn run(run: &Replay, pool: &Pool, watch: &mut dyn FnMut(&Position)) -> Resul
     let mut summary = match &run.source {
         Source::File(path) if is_lines(path) => {
             let file = lines::open(path)?;
-            lines::replay(run, Box::new(BufReader::new(file)), pool, watch)?
+            lines::replay(run, BufReader::new(file), pool, watch)?
+        }
+        Source::File(path) if is_pipe(path) => {
+            let pipe = lines::open(path)?;
+            piped(run, pipe, pool, watch)?
         }
         Source::File(path) => file(run, path, pool, watch)?,
-        Source::Stdin => stdin(run, pool, watch)?,
+        Source::Stdin => piped(run, std::io::stdin(), pool, watch)?,
     };
     summary.elapsed_secs = begun.elapsed().as_secs_f64();
     Ok(summary)
@@ -77,8 +81,19 @@ fn is_lines(path: &Path) -> bool {
     })
 }
 
-fn stdin(run: &Replay, pool: &Pool, watch: &mut dyn FnMut(&Position)) -> Result<RunSummary> {
-    let mut input = BufReader::with_capacity(1 << 16, std::io::stdin());
+/// Whether a path names what can be read only once: a named pipe, a shell's `<(...)`, a device.
+fn is_pipe(path: &Path) -> bool {
+    std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
+}
+
+/// Standard input or a named pipe: an MCAP or lines, told apart by the first bytes.
+fn piped(
+    run: &Replay,
+    input: impl Read + Send + 'static,
+    pool: &Pool,
+    watch: &mut dyn FnMut(&Position),
+) -> Result<RunSummary> {
+    let mut input = BufReader::with_capacity(1 << 16, input);
     let mut head = Vec::new();
     Read::take(&mut input, mcap::MAGIC.len() as u64)
         .read_to_end(&mut head)
@@ -93,12 +108,12 @@ fn stdin(run: &Replay, pool: &Pool, watch: &mut dyn FnMut(&Position)) -> Result<
         });
     }
     let is_mcap = head == mcap::MAGIC;
-    let whole = Box::new(std::io::Cursor::new(head).chain(input));
+    let whole = std::io::Cursor::new(head).chain(input);
     if is_mcap {
-        let reader = Reader::from_stream(run.source.name(), whole)?;
+        let reader = Reader::from_stream(run.source.name(), Box::new(whole))?;
         stream(run, reader, pool, watch)
     } else {
-        lines::replay(run, Box::new(BufReader::new(whole)), pool, watch)
+        lines::replay(run, BufReader::with_capacity(1 << 16, whole), pool, watch)
     }
 }
 
@@ -116,7 +131,7 @@ fn file(
     watch: &mut dyn FnMut(&Position),
 ) -> Result<RunSummary> {
     let log = Log::open(path, pool)?;
-    let choice = topics::choose(path, &log.candidates(), run.plan.topic.as_deref())?;
+    let choice = log.choose(path, run.plan.topic.as_deref())?;
     let mut chosen = choose(run, path, &log, &choice.topics)?;
     if let (Some(note), Some(first)) = (choice.note, chosen.first_mut()) {
         first.found.warnings.push(note);
@@ -299,18 +314,20 @@ impl Picked {
                 what,
             };
         }
-        let candidates: Vec<_> = survey
+        let channels: Vec<Known> = survey
             .channels
             .iter()
-            .map(|c| known(&c.channel, c.messages, None).candidate())
+            .map(|c| known(&c.channel, c.messages, None))
             .collect();
-        match topics::choose(path, &candidates, run.plan.topic.as_deref()) {
+        let candidates: Vec<_> = channels.iter().map(Known::candidate).collect();
+        let error = match topics::choose(path, &candidates, run.plan.topic.as_deref()) {
             Err(e) => e,
             Ok(_) => Error::NoImuTopic {
                 path: path.to_owned(),
                 topics: topics::listing(&candidates),
             },
-        }
+        };
+        explained(error, &channels, &summarise::problems(survey))
     }
 
     fn passed_over(&self) -> Option<String> {
@@ -401,6 +418,14 @@ impl<'r> Waiting<'r> {
         let session = begin(self.run, self.path, vec![found], vec![prepared], &[stream])?;
         let held = std::mem::take(&mut self.held);
         self.session.insert(session).consume(held.into_iter(), pool)
+    }
+
+    /// Pushes what is known out to whoever reads it as it comes.
+    pub(super) fn flush_to_readers(&mut self, pool: &Pool) -> Result<()> {
+        match &mut self.session {
+            Some(session) => session.flush_to_readers(pool),
+            None => Ok(()),
+        }
     }
 
     pub(super) fn position(&self) -> Position {

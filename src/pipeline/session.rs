@@ -199,6 +199,14 @@ impl Session {
         Ok(Flow::Continue)
     }
 
+    /// Pushes what is known out to whoever reads it as it comes.
+    ///
+    /// # Errors
+    /// As [`Outlet::write`].
+    pub fn flush_to_readers(&mut self, pool: &Pool) -> Result<()> {
+        self.outlet.flush_to_readers(pool)
+    }
+
     /// Where the run is.
     #[must_use]
     pub fn position(&self, fraction: Option<f64>) -> Position {

@@ -26,7 +26,7 @@ pub fn run(
     RunSummary {
         source: run.source.name().display().to_string(),
         topics: topics.iter().map(|topic| of_topic(run, topic)).collect(),
-        closed: outputs.iter().any(|(_, written)| written.closed),
+        reader_gone: !outputs.is_empty() && outputs.iter().all(|(_, written)| written.closed),
         outputs: outputs
             .into_iter()
             .map(|(name, written)| (name, written.bytes, written.messages))
@@ -123,6 +123,7 @@ fn first_losses(topic: &Topic, start: Nanos) -> Vec<String> {
         .map(|(verdict, bad)| {
             let at = bad
                 .stamp
+                // A stamp that is none says nothing about when.
                 .filter(|_| *verdict != Verdict::NoStamp)
                 .map_or_else(String::new, |s| format!(" at {:.6} s", s.secs_since(start)));
             format!(
@@ -140,6 +141,9 @@ fn first_losses(topic: &Topic, start: Nanos) -> Vec<String> {
 
 fn warnings(topic: &Topic, summary: &TopicSummary) -> Vec<String> {
     let mut said = Vec::new();
+    if summary.counts.used() == 0 {
+        said.push(nothing_used(summary));
+    }
     if topic.output.largest_rate > UNLIKELY_RATE {
         said.push(format!(
             "the largest rate is {} rad/s, more than gyros measure: is it in deg/s? --gyro-unit deg",
@@ -188,6 +192,19 @@ fn warnings(topic: &Topic, summary: &TopicSummary) -> Vec<String> {
         said.push(advice);
     }
     said
+}
+
+/// Why a run gave no attitude at all.
+fn nothing_used(summary: &TopicSummary) -> String {
+    let total = summary.counts.total();
+    let trimmed = summary.counts.get(Verdict::Trimmed);
+    if total == 0 {
+        "no sample was used: the topic has no messages".to_owned()
+    } else if trimmed == total {
+        format!("no sample was used: all {total} lie outside --start, --until")
+    } else {
+        format!("no sample was used: all {total} were turned away (see lost)")
+    }
 }
 
 /// Which meaning of a sample fits this log, when it is not the one used and clearly better.

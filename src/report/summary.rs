@@ -108,8 +108,9 @@ pub struct RunSummary {
     pub file_problems: Vec<String>,
     /// How many of them lost data.
     pub file_losses: u64,
-    /// Whether the reader of an output had enough before the end.
-    pub closed: bool,
+    /// Whether the readers of every output hung up before the end (`| head`): the run stopped there,
+    /// on purpose.
+    pub reader_gone: bool,
     /// Wall seconds.
     pub elapsed_secs: f64,
 }
@@ -136,17 +137,18 @@ impl RunSummary {
     pub fn text(&self) -> String {
         let mut out = String::new();
         for topic in &self.topics {
-            topic.write_text(&self.source, &mut out);
+            topic.write_text(&self.source, self.file_losses > 0, &mut out);
         }
         for problem in &self.file_problems {
             line(&mut out, "file", problem);
         }
         for (name, bytes, messages) in &self.outputs {
-            line(
-                &mut out,
-                "wrote",
-                &format!("{name}  {}  {messages} messages", human_bytes(*bytes)),
-            );
+            let what = if name == "null:" {
+                "null: (nothing was kept)".to_owned()
+            } else {
+                format!("{name}  {}  {messages} messages", human_bytes(*bytes))
+            };
+            line(&mut out, "wrote", &what);
         }
         if self.outputs.is_empty() {
             line(
@@ -187,7 +189,7 @@ impl RunSummary {
 }
 
 impl TopicSummary {
-    fn write_text(&self, source: &str, out: &mut String) {
+    fn write_text(&self, source: &str, damaged: bool, out: &mut String) {
         let _ = writeln!(out, "{source}  {}  {}", self.topic, self.decoded_as);
         let rate = self
             .rate_hz
@@ -248,7 +250,7 @@ impl TopicSummary {
             ),
         );
         line(out, "gaps", &self.gaps.text());
-        line(out, "lost", &self.lost_text());
+        line(out, "lost", &self.lost_text(damaged));
         for first in &self.first_losses {
             line(out, "", first);
         }
@@ -300,14 +302,18 @@ impl TopicSummary {
         )
     }
 
-    fn lost_text(&self) -> String {
+    fn lost_text(&self, damaged: bool) -> String {
         let parts: Vec<String> = Verdict::ALL
             .iter()
             .filter(|v| !matches!(v, Verdict::Accepted) && self.counts.get(**v) > 0)
             .map(|v| format!("{} {}", self.counts.get(*v), v.name().replace('_', " ")))
             .collect();
         if parts.is_empty() {
-            return "nothing".to_owned();
+            return if damaged {
+                "nothing of what could be read, but the file is damaged:".to_owned()
+            } else {
+                "nothing".to_owned()
+            };
         }
         format!(
             "{} of {} samples ({})",
@@ -399,8 +405,13 @@ pub fn meaning(kind: SampleKind) -> &'static str {
     }
 }
 
+/// One labelled entry; what follows its first line stands under it.
 fn line(out: &mut String, label: &str, text: &str) {
-    let _ = writeln!(out, "  {label:<8} {text}");
+    let mut label = label;
+    for part in text.lines() {
+        let _ = writeln!(out, "  {label:<8} {}", part.trim_start());
+        label = "";
+    }
 }
 
 /// `value` with about `digits` significant digits, without an exponent where that is short.

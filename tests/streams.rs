@@ -1,0 +1,231 @@
+//! Promise: what must not change the result changes no bit of it: threads, speed, the form of the
+//! output, and the way the samples came in (service.md T3).
+
+#![cfg(feature = "service")]
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
+mod made_logs;
+mod replays;
+
+use assert_cmd::Command;
+use made_logs::{motion, written};
+use replays::{Bits, csv, fixture, mcap, ndjson, replay_of, target};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::Stdio;
+use strapd::pipeline::pool::Pool;
+use strapd::pipeline::replay::run;
+use strapd::sink::Compression;
+
+fn strapd() -> Command {
+    Command::cargo_bin("strapd").unwrap()
+}
+
+/// Long enough for several batches of 2048 and several chunks of every worker.
+fn long_log(dir: &Path) -> PathBuf {
+    written(dir, "long.mcap", &motion(9000))
+}
+
+#[test]
+fn one_two_and_four_threads_write_the_same_bytes_in_every_format() {
+    let dir = tempfile::tempdir().unwrap();
+    let logs = [
+        long_log(dir.path()),
+        fixture("xsens_mti.mcap"),
+        fixture("faults.mcap"),
+        fixture("coning_jitter.mcap"),
+    ];
+    for log in &logs {
+        let mut first: Option<Vec<Vec<u8>>> = None;
+        for threads in [1, 2, 4] {
+            let pool = Pool::new(threads).unwrap();
+            let mut all = Vec::new();
+            for (name, compression, copy_input) in [
+                ("a.mcap", Compression::Zstd, false),
+                ("a.mcap", Compression::Lz4, true),
+                ("a.mcap", Compression::None, false),
+                ("a.ndjson", Compression::Zstd, false),
+                ("a.csv", Compression::Zstd, false),
+            ] {
+                let path = dir.path().join(name);
+                let mut replay = replay_of(log);
+                replay.options.force = true;
+                replay.options.compression = compression;
+                replay.copy_input = copy_input;
+                replay.targets = vec![target(&path)];
+                run(&replay, &pool, &mut |_| {}).unwrap();
+                all.push(std::fs::read(&path).unwrap());
+            }
+            match &first {
+                None => first = Some(all),
+                Some(first) => {
+                    for (k, (one, other)) in first.iter().zip(&all).enumerate() {
+                        let at = one.iter().zip(other).position(|(a, b)| a != b);
+                        assert!(
+                            one == other,
+                            "{}: output {k} with {threads} threads differs from 1 at {at:?} of {} and {}",
+                            log.display(),
+                            one.len(),
+                            other.len()
+                        );
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The attitudes `strapd replay SOURCE -o -` prints.
+fn printed(command: &mut Command) -> Vec<Bits> {
+    let output = command.output().unwrap();
+    assert!(output.status.success(), "{output:?}");
+    ndjson(&String::from_utf8(output.stdout).unwrap())
+}
+
+#[test]
+fn file_standard_input_and_cat_in_a_pipe_give_the_same_attitudes() {
+    let dir = tempfile::tempdir().unwrap();
+    for log in [
+        long_log(dir.path()),
+        fixture("xsens_mti.mcap"),
+        fixture("ximu3.mcap"),
+        fixture("coning_jitter.mcap"),
+        fixture("constant_rate_json.mcap"),
+        fixture("constant_rate_ros1.mcap"),
+    ] {
+        let what = log.display();
+        let from_file = printed(strapd().arg("replay").arg(&log).args(["-o", "-"]));
+        assert!(from_file.len() > 200, "{what}: {}", from_file.len());
+        let bytes = std::fs::read(&log).unwrap();
+        let from_stdin = printed(strapd().args(["replay", "-", "-o", "-"]).write_stdin(bytes));
+        assert_eq!(from_stdin, from_file, "{what} through standard input");
+        let cat = strapd().arg("cat").arg(&log).output().unwrap();
+        assert!(cat.status.success(), "{what}: {cat:?}");
+        let from_cat = printed(
+            strapd()
+                .args(["replay", "-", "-o", "-"])
+                .write_stdin(cat.stdout.clone()),
+        );
+        assert_eq!(from_cat, from_file, "{what} through cat");
+        let lines = dir.path().join("samples.ndjson");
+        std::fs::write(&lines, &cat.stdout).unwrap();
+        let from_lines = printed(strapd().arg("replay").arg(&lines).args(["-o", "-"]));
+        assert_eq!(from_lines, from_file, "{what} through a file of lines");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_named_pipe_is_read_like_standard_input() {
+    let dir = tempfile::tempdir().unwrap();
+    let log = fixture("xsens_mti.mcap");
+    let expected = printed(strapd().arg("replay").arg(&log).args(["-o", "-"]));
+    let pipe = dir.path().join("pipe.mcap");
+    let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+    assert!(made.unwrap().success());
+    let writer = {
+        let pipe = pipe.clone();
+        std::thread::spawn(move || {
+            let bytes = std::fs::read(log).unwrap();
+            let mut to = std::fs::OpenOptions::new().write(true).open(pipe).unwrap();
+            // The reader may have refused it: then what matters is its answer.
+            let _ = to.write_all(&bytes);
+        })
+    };
+    let found = strapd()
+        .arg("replay")
+        .arg(&pipe)
+        .args(["-o", "-"])
+        // A second open of the pipe would wait for a second writer, for ever.
+        .timeout(std::time::Duration::from_secs(20))
+        .output()
+        .unwrap();
+    writer.join().unwrap();
+    assert!(found.status.success(), "{found:?}");
+    assert_eq!(ndjson(&String::from_utf8(found.stdout).unwrap()), expected);
+}
+
+#[test]
+fn every_format_holds_the_same_attitudes() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = |name: &str| dir.path().join(name);
+    strapd()
+        .arg("replay")
+        .arg(fixture("coning.mcap"))
+        .args(["--quiet", "-o"])
+        .arg(file("a.mcap"))
+        .arg("-o")
+        .arg(file("a.ndjson"))
+        .arg("-o")
+        .arg(file("a.csv"))
+        .assert()
+        .success();
+    let lines = ndjson(&std::fs::read_to_string(file("a.ndjson")).unwrap());
+    assert_eq!(lines.len(), 2001);
+    assert_eq!(csv(&std::fs::read_to_string(file("a.csv")).unwrap()), lines);
+    let topic = "/imu/data";
+    assert_eq!(mcap(&std::fs::read(file("a.mcap")).unwrap(), topic), lines);
+}
+
+#[test]
+fn the_speed_changes_when_a_result_is_written_and_not_which() {
+    // 2 s of data.
+    let dir = tempfile::tempdir().unwrap();
+    let log = written(dir.path(), "short.mcap", &motion(200));
+    let at_speed = |speed: &str| {
+        let begun = std::time::Instant::now();
+        let found = printed(
+            strapd()
+                .arg("replay")
+                .arg(&log)
+                .args(["-o", "-", "--speed", speed]),
+        );
+        (found, begun.elapsed().as_secs_f64())
+    };
+    let (expected, _) = at_speed("max");
+    for (speed, least) in [("40", 0.04), ("4", 0.4), ("1.9", 0.9)] {
+        let (found, secs) = at_speed(speed);
+        assert_eq!(found, expected, "--speed {speed}");
+        // A little under 1.99 s / speed: the first slice of 5 ms goes at once, and so does the last.
+        assert!(secs >= least, "--speed {speed} took {secs} s");
+    }
+}
+
+#[test]
+fn a_line_is_answered_while_the_pipe_stays_open() {
+    // The order of a filter in a pipe: with the centred default a sample's attitude is known some
+    // samples later, and must not wait for a buffer to fill.
+    let mut child = std::process::Command::new(assert_cmd::cargo::cargo_bin("strapd"))
+        .args(["replay", "-", "-o", "-", "--method", "dcm-left", "-q"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut to = child.stdin.take().unwrap();
+    let mut from = std::io::BufReader::new(child.stdout.take().unwrap());
+    for k in 0..2000 {
+        writeln!(
+            to,
+            r#"{{"class":"RATE","stamp":{{"sec":1700000000,"nsec":{}}},"gyro":[0.1,0,0]}}"#,
+            k * 100_000
+        )
+        .unwrap();
+    }
+    to.flush().unwrap();
+    // The pipe is still open: what is known must come out.
+    let (sender, receiver) = std::sync::mpsc::channel();
+    let reader = std::thread::spawn(move || {
+        let mut line = String::new();
+        std::io::BufRead::read_line(&mut from, &mut line).unwrap();
+        sender.send(line).unwrap();
+        let mut rest = String::new();
+        std::io::Read::read_to_string(&mut from, &mut rest).unwrap();
+        rest.lines().count() + 1
+    });
+    let first = receiver.recv_timeout(std::time::Duration::from_secs(20));
+    drop(to);
+    let lines = reader.join();
+    assert!(child.wait().unwrap().success());
+    assert!(first.is_ok(), "no attitude within 20 s of 2000 samples");
+    assert_eq!(lines.unwrap(), 2000);
+}
