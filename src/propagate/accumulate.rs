@@ -66,3 +66,53 @@ impl Accumulator {
         *self = Accumulator::new(q.map(|c| c * sign));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::propagate::lanes::Triple;
+    use crate::propagate::turn::Turn;
+
+    /// Sine and cosine of half the angle of `n` turns of `step` about x.
+    fn turned(n: u32, step: f64) -> [f64; 4] {
+        let mut accumulator = Accumulator::new([1.0, 0.0, 0.0, 0.0]);
+        let turn = Turn::exp(Triple::new(step, 0.0, 0.0)).parts();
+        for _ in 0..n {
+            accumulator.turn(turn);
+        }
+        accumulator.attitude()
+    }
+
+    #[test]
+    fn a_million_tiny_turns_keep_every_digit() {
+        // The Earth's rotation in a millisecond. Without compensation the same loop is off by 1e-12;
+        // with it, by the rounding of one step, n |phi| 1e-16 = 7e-18 rad, and of the output, 1e-16.
+        let step = 7.29e-8;
+        let [w, x, y, z] = turned(1_000_000, step);
+        let half = 0.5 * step * 1e6;
+        assert!((x - half.sin()).abs() < 2e-17, "{:e}", x - half.sin());
+        assert!((w - half.cos()).abs() < 2e-16 && y == 0.0 && z == 0.0);
+    }
+
+    #[test]
+    fn increments_turn_about_body_axes() {
+        // A quarter about x, then a quarter about the body's new z: nav's -y.
+        let quarter = |v: [f64; 3]| Turn::exp(Triple::new(v[0], v[1], v[2])).parts();
+        let right = std::f64::consts::FRAC_PI_2;
+        let mut accumulator = Accumulator::new([1.0, 0.0, 0.0, 0.0]);
+        accumulator.turn(quarter([right, 0.0, 0.0]));
+        accumulator.turn(quarter([0.0, 0.0, right]));
+        let q = accumulator.attitude();
+        for (found, expected) in q.into_iter().zip([0.5, 0.5, -0.5, 0.5]) {
+            // One rounding.
+            assert!((found - expected).abs() < 2e-16, "{q:?}");
+        }
+    }
+
+    #[test]
+    fn a_restart_keeps_to_its_side_of_the_sphere() {
+        let mut accumulator = Accumulator::new([-0.6, 0.0, 0.8, 0.0]);
+        accumulator.restart([1.0, 0.0, 0.0, 0.0]);
+        assert_eq!(accumulator.attitude(), [-1.0, 0.0, 0.0, 0.0]);
+    }
+}

@@ -55,7 +55,7 @@ pub(crate) fn step(method: Method, track: &Track, k: usize) -> Step {
     } else {
         Note::Ordinary
     };
-    Step::new(turn, note)
+    Step::new(turn, right.norm() * h, note)
 }
 
 /// The increment of interval k: recorded, or by the trapezoid rule.
@@ -111,4 +111,29 @@ fn rk4(track: &Track, k: usize, left: Triple<1>, right: Triple<1>) -> Turn<1> {
     let w = 1.0 + (k1.0 + 2.0 * (k2.0 + k3.0) + k4.0) * (h / 6.0);
     let v = (k1.1 + (k2.1 + k3.1) * 2.0 + k4.1) * (h / 6.0);
     Turn::from_parts(w, v)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::KAPPA;
+    use crate::propagate::shared_data;
+
+    #[test]
+    fn block_weights_equal_the_golden_fractions() {
+        let Some(path) = shared_data::shared("golden/attitude.json") else {
+            return;
+        };
+        let golden: serde_json::Value =
+            serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
+        for (n, weights) in KAPPA.iter().enumerate().skip(2) {
+            let fractions = golden["kappa_block"][n.to_string()].as_array().unwrap();
+            assert_eq!(fractions.len(), weights.len());
+            for (fraction, weight) in fractions.iter().zip(*weights) {
+                let (top, bottom) = fraction.as_str().unwrap().split_once('/').unwrap();
+                let (top, bottom): (f64, f64) = (top.parse().unwrap(), bottom.parse().unwrap());
+                assert_eq!(top / bottom, *weight, "{n} samples");
+            }
+        }
+    }
 }

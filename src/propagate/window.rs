@@ -60,7 +60,7 @@ impl Step {
         };
         Step {
             angle: phi.norm(),
-            ..Step::new(turn, Note::Ordinary)
+            ..Step::new(turn, 0.0, Note::Ordinary)
         }
     }
 
@@ -79,8 +79,13 @@ impl Step {
         })
     }
 
-    pub(crate) fn new(turn: Turn<1>, note: Note) -> Self {
-        let angle = turn.angle();
+    /// `delta` is the size of the delta angle: a turn only knows its angle up to whole turns.
+    pub(crate) fn new(turn: Turn<1>, delta: f64, note: Note) -> Self {
+        let angle = if delta > std::f64::consts::PI {
+            delta
+        } else {
+            turn.angle()
+        };
         if angle.is_finite() && turn.parts().iter().all(|c| c.is_finite()) {
             return Step {
                 turn: turn.parts(),
@@ -239,7 +244,7 @@ impl Plan {
         });
         let turn = magnus::turn(&moments, self.order);
         // |v| = sin(a/2): the angle without trigonometry while it is small.
-        let angle = small_angle(&turn);
+        let angle = small_angle(&turn, moments.b[0].size());
         for i in 0..N {
             let ok = angle.0[i] >= 0.0 && !loud[i];
             if ok {
@@ -253,7 +258,8 @@ impl Plan {
             } else if loud[i] {
                 steps.push(self.careful(track, k + i));
             } else {
-                steps.push(Step::new(turn.lane(i), Note::Ordinary));
+                let delta = moments.b[0].lane(i).norm();
+                steps.push(Step::new(turn.lane(i), delta, Note::Ordinary));
             }
         }
     }
@@ -365,9 +371,10 @@ fn skewed(window: usize, place: usize, increments: bool) -> Skewed {
     }
 }
 
-/// The angle of each turn below half a radian; -1 where it is larger, or not a number.
+/// The angle of each turn below half a radian, to 1e-10 of it; -1 where it is larger, or not a number.
+/// `delta` is a size not below that of the delta angle.
 #[inline(always)]
-fn small_angle<const N: usize>(turn: &Turn<N>) -> Lanes<N> {
+fn small_angle<const N: usize>(turn: &Turn<N>, delta: Lanes<N>) -> Lanes<N> {
     let s2 = turn.v.norm_squared();
     let s = s2.sqrt();
     let terms = [
@@ -385,7 +392,8 @@ fn small_angle<const N: usize>(turn: &Turn<N>) -> Lanes<N> {
     let angle = (s + s * sum) * 2.0;
     Lanes(std::array::from_fn(|i| {
         // Also false for a half angle beyond a quarter turn, where the cosine has lost more than it may.
-        if s2.0[i] <= 0.0625 && turn.c.0[i] > -0.5 {
+        let once = delta.0[i] <= std::f64::consts::PI;
+        if once && s2.0[i] <= 0.0625 && turn.c.0[i] > -0.5 {
             angle.0[i]
         } else {
             -1.0

@@ -39,9 +39,10 @@ pub(super) struct State {
 
 impl State {
     pub(super) fn new(settings: &Settings, initial: [f64; 4]) -> Self {
+        let sum = (settings.method == Method::RotvecSum).then(|| rotation_vector(initial));
         State {
-            attitude: Accumulator::new(initial),
-            sum: (settings.method == Method::RotvecSum).then(|| rotation_vector(initial)),
+            attitude: sum.map_or(Accumulator::new(initial), turned_by),
+            sum,
             sigma: Sigma::new(settings.noise),
             added: Status::OK,
             report: Report::default(),
@@ -56,6 +57,7 @@ impl State {
         self.sigma.reset();
         if let Some(sum) = &mut self.sum {
             *sum = rotation_vector(initial);
+            self.attitude = turned_by(*sum);
         }
     }
 
@@ -67,9 +69,7 @@ impl State {
             Some(sum) => {
                 let [_, x, y, z] = step.turn;
                 *sum = *sum + Triple::new(x, y, z);
-                let turn = Turn::exp(*sum);
-                let [c, x, y, z] = turn.parts();
-                self.attitude = Accumulator::new([1.0 + c, x, y, z]);
+                self.attitude = turned_by(*sum);
             }
         }
         let spacing = track.spacing(k);
@@ -148,6 +148,12 @@ impl State {
         self.added = Status::OK;
         self.report.samples += 1;
     }
+}
+
+/// The attitude a rotation vector leads to from none.
+fn turned_by(phi: Triple<1>) -> Accumulator {
+    let [c, x, y, z] = Turn::exp(phi).parts();
+    Accumulator::new([1.0 + c, x, y, z])
 }
 
 /// log of a unit quaternion: the rotation vector of at most half a turn.

@@ -40,24 +40,29 @@ impl Plan {
             } else {
                 Note::Ordinary
             };
-            return Step::new(magnus::turn(&own.moments, self.order), note);
+            let turn = magnus::turn(&own.moments, self.order);
+            return Step::new(turn, own.moments.b[0].norm(), note);
         }
         let missing = self.missing(track, k);
         let cap = self.window.min(bridge_window(missing));
-        let (turn, change) = if hole {
+        let (turn, delta, change) = if hole {
             let gap = self.settle(track, k, cap, Target::Hole);
             let own = self.settle(track, k, self.window, Target::Interval);
+            let delta = (gap.moments.b[0] + own.moments.b[0]).norm();
             let own = magnus::turn(&own.moments, self.order);
-            (magnus::turn(&gap.moments, self.order).then(own), gap.change)
+            let turn = magnus::turn(&gap.moments, self.order).then(own);
+            (turn, delta, gap.change)
         } else if self.increments {
             // Its increment covers the whole interval: marked, but nothing is missing.
             let own = self.settle(track, k, self.window, Target::Interval);
-            (magnus::turn(&own.moments, self.order), 0.0)
+            let turn = magnus::turn(&own.moments, self.order);
+            (turn, own.moments.b[0].norm(), 0.0)
         } else {
             let own = self.settle(track, k, cap, Target::Bridge);
-            (magnus::turn(&own.moments, self.order), own.change)
+            let turn = magnus::turn(&own.moments, self.order);
+            (turn, own.moments.b[0].norm(), own.change)
         };
-        let mut step = Step::new(turn, Note::Bridged);
+        let mut step = Step::new(turn, delta, Note::Bridged);
         if step.note == Note::Bridged && (hole || !self.increments) {
             let spread = 0.5 * change.min(std::f64::consts::PI);
             step.gap_variance = if spread.is_finite() {
@@ -174,10 +179,9 @@ impl Plan {
     /// on how much happens to be known already.
     fn place(&self, track: &Track, k: usize, size: usize, target: Target) -> (usize, usize) {
         let (lo, hi) = (track.first(), track.len());
-        let known = match self.placement {
-            Placement::Centred => hi,
-            Placement::Causal => k + 1,
-        };
+        // A method that never waits must not look ahead at the start of a run either.
+        let waits = self.placement == Placement::Centred && self.look_ahead > 0;
+        let known = if waits { hi } else { k + 1 };
         let size = size.min(known - lo);
         let ahead = if self.increments && target != Target::Hole {
             size.saturating_sub(1) / 2
