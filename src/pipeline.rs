@@ -1,6 +1,7 @@
 //! Wires the stages: source -> decode -> condition -> propagate -> sink. I/O.
 
 pub mod against;
+mod chosen;
 pub mod estimator;
 pub mod lines;
 pub mod log;
@@ -14,6 +15,8 @@ pub mod provenance;
 pub mod replay;
 pub mod route;
 pub mod session;
+mod streamed;
 pub mod summarise;
 pub mod topics;
 pub mod track;
+mod waiting;

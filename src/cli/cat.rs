@@ -15,7 +15,6 @@ use serde_json::json;
 use std::io::{BufWriter, Write};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
-use std::sync::Arc;
 
 /// Decoded samples as NDJSON, CSV or a table.
 #[derive(Args, Debug)]
@@ -112,13 +111,7 @@ pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
             let (_, decoder) = decoders
                 .iter()
                 .find(|(id, _)| *id == channel.id && channel.topic == topic)?;
-            Some(Route {
-                decoder: Some(decoder.clone()),
-                stream: 0,
-                is_reference: false,
-                copied: None,
-                noticed: Arc::default(),
-            })
+            Some(Route::samples(decoder.clone(), 0))
         },
         Route::map,
         |items| {

@@ -3,7 +3,8 @@
 use super::pool::Pool;
 use super::position::Position;
 use super::preparation::Resolved;
-use super::replay::{Replay, Waiting, end, refused};
+use super::replay::{Replay, end, refused};
+use super::waiting::Waiting;
 use super::route::Item;
 use super::session::Found;
 use crate::decode::{LineDecoder, MAX_LINE, Stated};

@@ -18,7 +18,6 @@ use crate::record::RawSample;
 use crate::source::mcap::{self, Survey, WalkOptions};
 use std::ops::ControlFlow;
 use std::path::Path;
-use std::sync::Arc;
 
 /// One topic of samples, looked at.
 #[derive(Debug)]
@@ -158,13 +157,7 @@ pub fn look(
             let (_, stream, decoder) = decoders
                 .iter()
                 .find(|(known, ..)| known.id == channel.id && known.topic == channel.topic)?;
-            Some(Route {
-                decoder: Some(decoder.clone()),
-                stream: *stream,
-                is_reference: false,
-                copied: None,
-                noticed: Arc::default(),
-            })
+            Some(Route::samples(decoder.clone(), *stream))
         },
         Route::map,
         |items| {

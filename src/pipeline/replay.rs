@@ -3,27 +3,24 @@
 //! A file is read twice: once as far as is needed to know clock, bias and initial attitude, then
 //! to integrate. A stream is read once; its first samples wait until these are known.
 
-use super::log::{Known, Log, described, explained, known, plain, rank};
+use super::chosen::{Chosen, choose, find, reference, route};
+use super::log::Log;
 use super::outlet::Outlet;
 use super::pool::Pool;
 use super::position::Position;
 use super::preparation::{Patience, Preparation, Prepared, Resolved};
-use super::route::{Item, Noticed, Route};
+use super::route::{Item, Route};
 use super::session::{Found, Session, Source, Topic};
 use super::summarise;
-use super::topics::{self, PICKED_UNNAMED};
-use super::{lines, provenance};
+use super::{lines, provenance, streamed};
 use crate::config::Plan;
-use crate::decode::Decoder;
 use crate::error::{Error, Result};
 use crate::report::summary::RunSummary;
-use crate::sink::{self, Flow, Stream, Target, output_topic};
-use crate::source::mcap::{self, Channel, Reader, Survey, WalkOptions};
-use std::collections::BTreeSet;
+use crate::sink::{self, Flow, Stream, Target};
+use crate::source::mcap::{self, Reader, Survey, WalkOptions};
 use std::io::{BufReader, Read};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::time::Instant;
 
 /// A replay to be done.
@@ -111,17 +108,10 @@ fn piped(
     let whole = std::io::Cursor::new(head).chain(input);
     if is_mcap {
         let reader = Reader::from_stream(run.source.name(), Box::new(whole))?;
-        stream(run, reader, pool, watch)
+        streamed::replay(run, reader, pool, watch)
     } else {
         lines::replay(run, BufReader::with_capacity(1 << 16, whole), pool, watch)
     }
-}
-
-/// A topic that was chosen, and how its channels are read.
-struct Chosen {
-    found: Found,
-    stream: Stream,
-    channels: Vec<(Arc<Channel>, Decoder)>,
 }
 
 fn file(
@@ -190,378 +180,6 @@ fn file(
     end(run, session, &report.survey, pool)
 }
 
-/// An MCAP that can be read only once.
-fn stream(
-    run: &Replay,
-    reader: Reader,
-    pool: &Pool,
-    watch: &mut dyn FnMut(&Position),
-) -> Result<RunSummary> {
-    let path = run.source.name();
-    let mut waiting = Waiting::new(run, &path);
-    let mut failure = None;
-    let picked = std::cell::RefCell::new(Picked::default());
-    let report = mcap::walk(
-        reader,
-        // On this thread: what is learnt from a first message must not depend on who was faster.
-        &WalkOptions::default(),
-        |channel| picked.borrow_mut().route(run, channel),
-        Route::map,
-        |items| {
-            let step = waiting
-                .meet(&mut picked.borrow_mut().found)
-                .and_then(|()| waiting.consume(items.drain(..), pool));
-            match step {
-                Ok(Flow::Continue) => {
-                    watch(&waiting.position());
-                    ControlFlow::Continue(())
-                }
-                Ok(Flow::Closed) => ControlFlow::Break(()),
-                Err(e) => {
-                    failure = Some(e);
-                    ControlFlow::Break(())
-                }
-            }
-        },
-    )?;
-    if let Some(e) = failure {
-        return Err(e);
-    }
-    let picked = picked.into_inner();
-    if waiting.is_idle() {
-        return Err(picked.nothing(run, &path, &report.survey));
-    }
-    let session = waiting.into_session(pool)?;
-    let mut summary = end(run, session, &report.survey, pool)?;
-    if let Some(topic) = summary.topics.first_mut() {
-        topic.warnings.extend(picked.passed_over());
-    }
-    Ok(summary)
-}
-
-/// The first IMU of a stream.
-#[derive(Default)]
-struct Picked {
-    topic: Option<String>,
-    found: Option<(Found, Stream)>,
-    others: BTreeSet<String>,
-    refusals: Vec<String>,
-}
-
-impl Picked {
-    fn route(&mut self, run: &Replay, channel: &Arc<Channel>) -> Option<Route> {
-        let copied = run.copy_input.then(|| channel.clone());
-        let only_copied = |copied: Option<Arc<Channel>>| {
-            copied.map(|channel| Route {
-                decoder: None,
-                stream: 0,
-                is_reference: false,
-                copied: Some(channel),
-                noticed: Arc::default(),
-            })
-        };
-        let found = known(channel, 0, None);
-        let named = run.plan.topic.as_deref().filter(|t| *t != "all");
-        let wanted = match (&self.topic, named) {
-            (Some(topic), _) => *topic == channel.topic,
-            (None, Some(name)) => name == channel.topic,
-            (None, None) => rank(&found.role) >= PICKED_UNNAMED,
-        };
-        if !wanted {
-            if rank(&found.role) >= PICKED_UNNAMED {
-                self.others.insert(channel.topic.clone());
-            }
-            return only_copied(copied);
-        }
-        match Decoder::compile(&plain(channel), &run.plan.decode) {
-            Ok(decoder) => {
-                let noticed = Arc::<Noticed>::default();
-                if self.topic.is_none() {
-                    self.topic = Some(channel.topic.clone());
-                    let resolved = Resolved::new(&run.plan, decoder.stated());
-                    self.found = Some((
-                        Found {
-                            name: channel.topic.clone(),
-                            output_topic: output_topic(&channel.topic, &BTreeSet::new()),
-                            described: described(channel),
-                            resolved,
-                            noticed: noticed.clone(),
-                            warnings: Vec::new(),
-                        },
-                        Stream::new(&channel.topic, ""),
-                    ));
-                }
-                Some(Route {
-                    decoder: Some(decoder),
-                    stream: 0,
-                    is_reference: false,
-                    copied,
-                    noticed,
-                })
-            }
-            Err(why) => {
-                self.refusals.push(why.to_string());
-                only_copied(copied)
-            }
-        }
-    }
-
-    /// Why nothing was picked.
-    fn nothing(self, run: &Replay, path: &Path, survey: &Survey) -> Error {
-        if let Some(what) = self.refusals.into_iter().next() {
-            return Error::Unsupported {
-                path: path.to_owned(),
-                what,
-            };
-        }
-        let channels: Vec<Known> = survey
-            .channels
-            .iter()
-            .map(|c| known(&c.channel, c.messages, None))
-            .collect();
-        let candidates: Vec<_> = channels.iter().map(Known::candidate).collect();
-        let error = match topics::choose(path, &candidates, run.plan.topic.as_deref()) {
-            Err(e) => e,
-            Ok(_) => Error::NoImuTopic {
-                path: path.to_owned(),
-                topics: topics::listing(&candidates),
-            },
-        };
-        explained(error, &channels, &summarise::problems(survey))
-    }
-
-    fn passed_over(&self) -> Option<String> {
-        let names: Vec<&str> = self
-            .others
-            .iter()
-            .filter(|t| Some(*t) != self.topic.as_ref())
-            .map(String::as_str)
-            .collect();
-        (!names.is_empty()).then(|| {
-            format!(
-                "the first IMU topic was taken; also there: {} (--topic)",
-                names.join(", ")
-            )
-        })
-    }
-}
-
-/// A run over a stream: first gathers, then runs.
-pub(super) struct Waiting<'r> {
-    run: &'r Replay,
-    path: &'r Path,
-    gathering: Option<(Found, Stream, Preparation)>,
-    held: Vec<Item>,
-    session: Option<Session>,
-}
-
-impl<'r> Waiting<'r> {
-    pub(super) fn new(run: &'r Replay, path: &'r Path) -> Waiting<'r> {
-        Waiting {
-            run,
-            path,
-            gathering: None,
-            held: Vec::new(),
-            session: None,
-        }
-    }
-
-    /// The stream's topic is known.
-    pub(super) fn meet(&mut self, found: &mut Option<(Found, Stream)>) -> Result<()> {
-        if let Some((found, stream)) = found.take() {
-            let preparation =
-                Preparation::new(&self.run.plan, &found.resolved, Patience::FirstMinute);
-            self.gathering = Some((found, stream, preparation));
-        }
-        Ok(())
-    }
-
-    /// Whether no topic was met.
-    pub(super) fn is_idle(&self) -> bool {
-        self.gathering.is_none() && self.session.is_none()
-    }
-
-    pub(super) fn consume(
-        &mut self,
-        items: impl Iterator<Item = Item>,
-        pool: &Pool,
-    ) -> Result<Flow> {
-        if let Some(session) = &mut self.session {
-            return session.consume(items, pool);
-        }
-        let Some((found, _, preparation)) = &mut self.gathering else {
-            self.held.extend(items);
-            return Ok(Flow::Continue);
-        };
-        for item in items {
-            if let Item::Sample(_, raw) = &item {
-                preparation
-                    .take(raw)
-                    .map_err(|what| refused(self.path, &found.name, what))?;
-            }
-            self.held.push(item);
-        }
-        if preparation.wants_more() {
-            return Ok(Flow::Continue);
-        }
-        self.begin(pool)
-    }
-
-    fn begin(&mut self, pool: &Pool) -> Result<Flow> {
-        let Some((found, stream, preparation)) = self.gathering.take() else {
-            return Ok(Flow::Continue);
-        };
-        let prepared = preparation
-            .decide()
-            .map_err(|what| refused(self.path, &found.name, what))?;
-        let stream = labelled(stream, &self.run.plan, &found.resolved, &prepared);
-        let session = begin(self.run, self.path, vec![found], vec![prepared], &[stream])?;
-        let held = std::mem::take(&mut self.held);
-        self.session.insert(session).consume(held.into_iter(), pool)
-    }
-
-    /// Pushes what is known out to whoever reads it as it comes.
-    pub(super) fn flush_to_readers(&mut self, pool: &Pool) -> Result<()> {
-        match &mut self.session {
-            Some(session) => session.flush_to_readers(pool),
-            None => Ok(()),
-        }
-    }
-
-    pub(super) fn position(&self) -> Position {
-        self.session
-            .as_ref()
-            .map_or_else(Position::default, |s| s.position(None))
-    }
-
-    /// The input has ended.
-    pub(super) fn into_session(mut self, pool: &Pool) -> Result<Session> {
-        if self.session.is_none() {
-            let _ = self.begin(pool)?;
-        }
-        self.session.ok_or_else(|| Error::NoImuTopic {
-            path: self.path.to_owned(),
-            topics: topics::listing(&[]),
-        })
-    }
-}
-
-fn choose(run: &Replay, path: &Path, log: &Log, names: &[String]) -> Result<Vec<Chosen>> {
-    let mut taken: BTreeSet<String> = BTreeSet::new();
-    if run.copy_input {
-        taken.extend(log.channels.iter().map(|c| c.channel.topic.clone()));
-    }
-    names
-        .iter()
-        .map(|name| {
-            let chosen = choose_one(run, path, log, name, &taken)?;
-            taken.insert(chosen.found.output_topic.clone());
-            Ok(chosen)
-        })
-        .collect()
-}
-
-fn choose_one(
-    run: &Replay,
-    path: &Path,
-    log: &Log,
-    name: &str,
-    taken: &BTreeSet<String>,
-) -> Result<Chosen> {
-    let mut channels = Vec::new();
-    let mut refusals = Vec::new();
-    for known in log.channels.iter().filter(|c| c.channel.topic == name) {
-        match known.decoder(&run.plan.decode) {
-            Ok(decoder) => channels.push((known, decoder)),
-            Err(why) => refusals.push(why.to_string()),
-        }
-    }
-    let Some((first, decoder)) = channels.first() else {
-        let what = refusals.into_iter().next().unwrap_or_default();
-        return Err(Error::Unsupported {
-            path: path.to_owned(),
-            what,
-        });
-    };
-    if !decoder.stated().has_gyro {
-        return Err(Error::Unsupported {
-            path: path.to_owned(),
-            what: format!(
-                "{name} ({}): carries no body rate\n  help: --field gyro=PATH names one",
-                described(&first.channel)
-            ),
-        });
-    }
-    let frame = first
-        .first
-        .as_ref()
-        .and_then(|(_, payload)| decoder.frame_id(payload))
-        .unwrap_or_default();
-    let topic = output_topic(name, taken);
-    let mut stream = Stream::new(name, &frame);
-    stream.output_topic = topic.clone();
-    let found = Found {
-        name: name.to_owned(),
-        output_topic: topic,
-        described: described(&first.channel),
-        resolved: Resolved::new(&run.plan, decoder.stated()),
-        noticed: Arc::default(),
-        warnings: refusals,
-    };
-    let channels = channels
-        .into_iter()
-        .map(|(k, d)| (k.channel.clone(), d))
-        .collect();
-    Ok(Chosen {
-        found,
-        stream,
-        channels,
-    })
-}
-
-/// The channel whose orientations the estimate is held against; `None` = the samples' own.
-fn reference(
-    run: &Replay,
-    path: &Path,
-    log: &Log,
-    chosen: &[Chosen],
-) -> Result<Option<((Arc<Channel>, Decoder), Resolved)>> {
-    let Some(asked) = &run.against else {
-        return Ok(None);
-    };
-    let taken = |k: &&Known| chosen.iter().any(|c| c.found.name == k.channel.topic);
-    let found = if asked.is_empty() {
-        let mut others = log.channels.iter().filter(|k| {
-            !taken(k) && k.role.has_orientation && rank(&k.role) <= 1 && k.messages > 0
-        });
-        match (others.next(), others.next()) {
-            // An odometry's or a camera's pose beside an IMU that has its own is another matter.
-            (Some(one), None) if !one.role.has_rate => one,
-            _ => return Ok(None),
-        }
-    } else {
-        let Some(named) = log.channels.iter().find(|k| k.channel.topic == *asked) else {
-            return Err(Error::NoSuchTopic {
-                path: path.to_owned(),
-                topic: asked.clone(),
-                topics: topics::listing(&log.candidates()),
-            });
-        };
-        if taken(&named) {
-            return Ok(None);
-        }
-        named
-    };
-    let decoder = found
-        .decoder(&crate::decode::Options::default())
-        .map_err(|why| Error::Unsupported {
-            path: path.to_owned(),
-            what: why.to_string(),
-        })?;
-    let resolved = Resolved::new(&run.plan, decoder.stated());
-    Ok(Some(((found.channel.clone(), decoder), resolved)))
-}
-
 /// Reads as far as needed to know clock, bias and initial attitude of every topic.
 fn prepare(
     run: &Replay,
@@ -585,13 +203,7 @@ fn prepare(
         },
         |channel| {
             let (stream, decoder) = find(chosen, channel)?;
-            Some(Route {
-                decoder: Some(decoder.clone()),
-                stream,
-                is_reference: false,
-                copied: None,
-                noticed: Arc::default(),
-            })
+            Some(Route::samples(decoder.clone(), stream))
         },
         Route::map,
         |items| {
@@ -625,53 +237,6 @@ fn prepare(
         .collect()
 }
 
-fn find<'c>(chosen: &'c [Chosen], channel: &Channel) -> Option<(usize, &'c Decoder)> {
-    chosen.iter().enumerate().find_map(|(stream, c)| {
-        c.channels
-            .iter()
-            .find(|(known, _)| is_same(known, channel))
-            .map(|(_, decoder)| (stream, decoder))
-    })
-}
-
-/// Whether a channel met in a walk is the one the survey knows: the index may differ, since the
-/// summary lists them in another order.
-fn is_same(known: &Channel, met: &Channel) -> bool {
-    known.id == met.id && known.topic == met.topic && known.schema_id == met.schema_id
-}
-
-fn route(
-    chosen: &mut [Chosen],
-    reference: Option<&((Arc<Channel>, Decoder), Resolved)>,
-    copy_input: bool,
-    channel: &Arc<Channel>,
-) -> Option<Route> {
-    let copied = copy_input.then(|| channel.clone());
-    if let Some((stream, decoder)) = find(chosen, channel) {
-        let noticed = chosen
-            .get(stream)
-            .map(|c| c.found.noticed.clone())
-            .unwrap_or_default();
-        return Some(Route {
-            decoder: Some(decoder.clone()),
-            stream,
-            is_reference: false,
-            copied,
-            noticed,
-        });
-    }
-    let decoder = reference
-        .filter(|((known, _), _)| is_same(known, channel))
-        .map(|((_, decoder), _)| decoder.clone());
-    (decoder.is_some() || copied.is_some()).then(|| Route {
-        is_reference: decoder.is_some(),
-        decoder,
-        stream: 0,
-        copied,
-        noticed: Arc::default(),
-    })
-}
-
 fn log_time(item: &Item) -> Option<u64> {
     match item {
         Item::Sample(_, raw) | Item::Reference(raw) => u64::try_from(raw.log.0).ok(),
@@ -681,7 +246,7 @@ fn log_time(item: &Item) -> Option<u64> {
 }
 
 /// The output's labels: frames and axes as they will be in the numbers.
-fn labelled(mut stream: Stream, plan: &Plan, resolved: &Resolved, prepared: &Prepared) -> Stream {
+pub(super) fn labelled(mut stream: Stream, plan: &Plan, resolved: &Resolved, prepared: &Prepared) -> Stream {
     let (world, body) = resolved.labels(prepared.world);
     stream.world_axes = world;
     stream.body_axes = body;
@@ -696,7 +261,7 @@ fn labelled(mut stream: Stream, plan: &Plan, resolved: &Resolved, prepared: &Pre
     stream
 }
 
-fn begin(
+pub(super) fn begin(
     run: &Replay,
     path: &Path,
     founds: Vec<Found>,

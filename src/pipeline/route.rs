@@ -66,6 +66,48 @@ thread_local! {
 }
 
 impl Route {
+    /// Messages that are samples of a stream.
+    #[must_use]
+    pub fn samples(decoder: Decoder, stream: usize) -> Route {
+        Route {
+            decoder: Some(decoder),
+            stream,
+            is_reference: false,
+            copied: None,
+            noticed: Arc::default(),
+        }
+    }
+
+    /// Messages that are recorded orientations.
+    #[must_use]
+    pub fn reference(decoder: Decoder) -> Route {
+        Route { is_reference: true, ..Route::samples(decoder, 0) }
+    }
+
+    /// Messages that are only copied.
+    #[must_use]
+    pub fn only_copied(channel: Arc<Channel>) -> Route {
+        Route {
+            decoder: None,
+            stream: 0,
+            is_reference: false,
+            copied: Some(channel),
+            noticed: Arc::default(),
+        }
+    }
+
+    /// The same, the messages also copied where a channel is given.
+    #[must_use]
+    pub fn copying(self, channel: Option<Arc<Channel>>) -> Route {
+        Route { copied: channel, ..self }
+    }
+
+    /// The same, what is noticed going to `noticed`.
+    #[must_use]
+    pub fn noticing(self, noticed: &Arc<Noticed>) -> Route {
+        Route { noticed: noticed.clone(), ..self }
+    }
+
     /// Appends what `message` becomes.
     pub fn map(&self, message: &Message<'_>, out: &mut Vec<Item>) {
         if let Some(decoder) = &self.decoder {

@@ -73,13 +73,7 @@ fn from_mcap(path: &Path, topic: Option<&str>, pool: &Pool) -> Result<Track> {
             ..WalkOptions::default()
         },
         |channel| {
-            (channel.topic == wanted.topic && channel.id == wanted.id).then(|| Route {
-                decoder: Some(decoder.clone()),
-                stream: 0,
-                is_reference: true,
-                copied: None,
-                noticed: std::sync::Arc::default(),
-            })
+            (channel.topic == wanted.topic && channel.id == wanted.id).then(|| Route::reference(decoder.clone()))
         },
         Route::map,
         |items| {

@@ -1,0 +1,165 @@
+//! An MCAP that can be read only once -> attitude. I/O.
+//!
+//! Nothing is known before it comes: the first IMU topic is taken, and its first samples wait until
+//! clock, bias and initial attitude are known.
+
+use super::log::{Known, described, explained, known, plain, rank};
+use super::pool::Pool;
+use super::position::Position;
+use super::preparation::Resolved;
+use super::replay::{Replay, end};
+use super::route::{Noticed, Route};
+use super::session::Found;
+use super::summarise;
+use super::topics::{self, PICKED_UNNAMED};
+use super::waiting::Waiting;
+use crate::decode::Decoder;
+use crate::error::{Error, Result};
+use crate::report::summary::RunSummary;
+use crate::sink::{Flow, Stream, output_topic};
+use crate::source::mcap::{self, Channel, Reader, Survey, WalkOptions};
+use std::collections::BTreeSet;
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::sync::Arc;
+
+/// An MCAP that can be read only once.
+pub(super) fn replay(
+    run: &Replay,
+    reader: Reader,
+    pool: &Pool,
+    watch: &mut dyn FnMut(&Position),
+) -> Result<RunSummary> {
+    let path = run.source.name();
+    let mut waiting = Waiting::new(run, &path);
+    let mut failure = None;
+    let picked = std::cell::RefCell::new(Picked::default());
+    let report = mcap::walk(
+        reader,
+        // On this thread: what is learnt from a first message must not depend on who was faster.
+        &WalkOptions::default(),
+        |channel| picked.borrow_mut().route(run, channel),
+        Route::map,
+        |items| {
+            let step = waiting
+                .meet(&mut picked.borrow_mut().found)
+                .and_then(|()| waiting.consume(items.drain(..), pool));
+            match step {
+                Ok(Flow::Continue) => {
+                    watch(&waiting.position());
+                    ControlFlow::Continue(())
+                }
+                Ok(Flow::Closed) => ControlFlow::Break(()),
+                Err(e) => {
+                    failure = Some(e);
+                    ControlFlow::Break(())
+                }
+            }
+        },
+    )?;
+    if let Some(e) = failure {
+        return Err(e);
+    }
+    let picked = picked.into_inner();
+    if waiting.is_idle() {
+        return Err(picked.nothing(run, &path, &report.survey));
+    }
+    let session = waiting.into_session(pool)?;
+    let mut summary = end(run, session, &report.survey, pool)?;
+    if let Some(topic) = summary.topics.first_mut() {
+        topic.warnings.extend(picked.passed_over());
+    }
+    Ok(summary)
+}
+
+/// The first IMU of a stream.
+#[derive(Default)]
+struct Picked {
+    topic: Option<String>,
+    found: Option<(Found, Stream)>,
+    others: BTreeSet<String>,
+    refusals: Vec<String>,
+}
+
+impl Picked {
+    fn route(&mut self, run: &Replay, channel: &Arc<Channel>) -> Option<Route> {
+        let copied = run.copy_input.then(|| channel.clone());
+        let found = known(channel, 0, None);
+        let named = run.plan.topic.as_deref().filter(|t| *t != "all");
+        let wanted = match (&self.topic, named) {
+            (Some(topic), _) => *topic == channel.topic,
+            (None, Some(name)) => name == channel.topic,
+            (None, None) => rank(&found.role) >= PICKED_UNNAMED,
+        };
+        if !wanted {
+            if rank(&found.role) >= PICKED_UNNAMED {
+                self.others.insert(channel.topic.clone());
+            }
+            return copied.map(Route::only_copied);
+        }
+        match Decoder::compile(&plain(channel), &run.plan.decode) {
+            Ok(decoder) => {
+                let noticed = Arc::<Noticed>::default();
+                if self.topic.is_none() {
+                    self.topic = Some(channel.topic.clone());
+                    let resolved = Resolved::new(&run.plan, decoder.stated());
+                    self.found = Some((
+                        Found {
+                            name: channel.topic.clone(),
+                            output_topic: output_topic(&channel.topic, &BTreeSet::new()),
+                            described: described(channel),
+                            resolved,
+                            noticed: noticed.clone(),
+                            warnings: Vec::new(),
+                        },
+                        Stream::new(&channel.topic, ""),
+                    ));
+                }
+                Some(Route::samples(decoder, 0).noticing(&noticed).copying(copied))
+            }
+            Err(why) => {
+                self.refusals.push(why.to_string());
+                copied.map(Route::only_copied)
+            }
+        }
+    }
+
+    /// Why nothing was picked.
+    fn nothing(self, run: &Replay, path: &Path, survey: &Survey) -> Error {
+        if let Some(what) = self.refusals.into_iter().next() {
+            return Error::Unsupported {
+                path: path.to_owned(),
+                what,
+            };
+        }
+        let channels: Vec<Known> = survey
+            .channels
+            .iter()
+            .map(|c| known(&c.channel, c.messages, None))
+            .collect();
+        let candidates: Vec<_> = channels.iter().map(Known::candidate).collect();
+        let error = match topics::choose(path, &candidates, run.plan.topic.as_deref()) {
+            Err(e) => e,
+            Ok(_) => Error::NoImuTopic {
+                path: path.to_owned(),
+                topics: topics::listing(&candidates),
+            },
+        };
+        explained(error, &channels, &summarise::problems(survey))
+    }
+
+    fn passed_over(&self) -> Option<String> {
+        let names: Vec<&str> = self
+            .others
+            .iter()
+            .filter(|t| Some(*t) != self.topic.as_ref())
+            .map(String::as_str)
+            .collect();
+        (!names.is_empty()).then(|| {
+            format!(
+                "the first IMU topic was taken; also there: {} (--topic)",
+                names.join(", ")
+            )
+        })
+    }
+}
