@@ -11,28 +11,60 @@ use strapd::record::{Join, Nanos, RateSample, SampleKind, Status};
 type Failure = Box<dyn std::error::Error>;
 
 const METHODS: [(&str, Method); 14] = [
-    ("dcm-left: w(t_i) (first order, as most peers)", Method::DcmLeft),
-    ("dcm-right: w(t_i+1) (the seed's rule on gyro data)", Method::DcmRight),
+    (
+        "dcm-left: w(t_i) (first order, as most peers)",
+        Method::DcmLeft,
+    ),
+    (
+        "dcm-right: w(t_i+1) (the seed's rule on gyro data)",
+        Method::DcmRight,
+    ),
     ("dcm-mean", Method::DcmMean),
     ("rk4, rate linear over the step", Method::Rk4),
     ("causal 3, order 6", magnus(3, Order::M6, Placement::Causal)),
-    ("causal 5, order 6 (`--method causal`)", magnus(5, Order::M6, Placement::Causal)),
+    (
+        "causal 5, order 6 (`--method causal`)",
+        magnus(5, Order::M6, Placement::Causal),
+    ),
     ("commit 6, order 8 (live, zero latency)", commit(6)),
     ("commit 8, order 8", commit(8)),
-    ("centred 2, order 4 (pyins, PX4 in kind)", magnus(2, Order::M4, Placement::Centred)),
-    ("centred 4, order 8", magnus(4, Order::M8, Placement::Centred)),
-    ("centred 6, order 8", magnus(6, Order::M8, Placement::Centred)),
-    ("centred 8, order 8", magnus(8, Order::M8, Placement::Centred)),
-    ("centred 10, order 8", magnus(10, Order::M8, Placement::Centred)),
+    (
+        "centred 2, order 4 (pyins, PX4 in kind)",
+        magnus(2, Order::M4, Placement::Centred),
+    ),
+    (
+        "centred 4, order 8",
+        magnus(4, Order::M8, Placement::Centred),
+    ),
+    (
+        "centred 6, order 8",
+        magnus(6, Order::M8, Placement::Centred),
+    ),
+    (
+        "centred 8, order 8",
+        magnus(8, Order::M8, Placement::Centred),
+    ),
+    (
+        "centred 10, order 8",
+        magnus(10, Order::M8, Placement::Centred),
+    ),
     ("**auto**: centred 16 (15 increments), exact", Method::Auto),
 ];
 
 const fn magnus(window: usize, order: Order, placement: Placement) -> Method {
-    Method::Magnus { window, order, placement }
+    Method::Magnus {
+        window,
+        order,
+        placement,
+    }
 }
 
 const fn commit(window: usize) -> Method {
-    Method::CommitProvisional { window, order: Order::M8, finals: false }
+    Method::CommitProvisional {
+        window,
+        order: Order::M8,
+        finals: false,
+    }
 }
 
 fn main() -> Result<(), Failure> {
@@ -40,10 +72,15 @@ fn main() -> Result<(), Failure> {
     let start = Case::Cusped.start(&top, Case::SEED_TILT, Case::SEED_W3)?;
     say("### Spinning top, worst error of the attitude over 1.2 s, degrees\n");
     for kind in [SampleKind::Rate, SampleKind::DeltaAngle] {
-        say(&format!("Samples: {}.\n\n| method | 500 Hz | 1000 Hz | 2000 Hz | 4000 Hz |", kind.name()));
+        say(&format!(
+            "Samples: {}.\n\n| method | 500 Hz | 1000 Hz | 2000 Hz | 4000 Hz |",
+            kind.name()
+        ));
         say("|---|---|---|---|---|");
         // Of a delta angle the classical methods see only the neighbour, or nothing at all.
-        let methods = METHODS.iter().skip(if kind == SampleKind::Rate { 0 } else { 4 });
+        let methods = METHODS
+            .iter()
+            .skip(if kind == SampleKind::Rate { 0 } else { 4 });
         for (name, method) in methods {
             let mut row = format!("| {name} |");
             for hz in [500, 1000, 2000, 4000] {
@@ -55,15 +92,23 @@ fn main() -> Result<(), Failure> {
         }
         say("");
     }
-    say("### Coning, half angle 10 degrees, sampled at 100 Hz, 60 s: worst error away from the ends, arcsec\n");
+    say(
+        "### Coning, half angle 10 degrees, sampled at 100 Hz, 60 s: worst error away from the ends, arcsec\n",
+    );
     say("| method | 0.1 Hz | 1 Hz | 3 Hz | 10 Hz |");
     say("|---|---|---|---|---|");
     for (name, method) in METHODS {
         let mut row = format!("| {name} |");
         for hz in [0.1, 1.0, 3.0, 10.0] {
             let mut motion = Motion::Coning(Coning::new(10f64.to_radians(), hz)?);
-            let error =
-                worst(&mut motion, method, SampleKind::Rate, 100, 60_000_000_000, 24)?;
+            let error = worst(
+                &mut motion,
+                method,
+                SampleKind::Rate,
+                100,
+                60_000_000_000,
+                24,
+            )?;
             row.push_str(&format!(" {:.1e} |", error.to_degrees() * 3600.0));
         }
         say(&row);
@@ -101,7 +146,11 @@ fn worst(
             start: Nanos(start as i64),
             value,
             accel: None,
-            join: if i == 0 { Join::Start } else { Join::Continuous },
+            join: if i == 0 {
+                Join::Start
+            } else {
+                Join::Continuous
+            },
             status: Status::OK,
             log: Nanos(now as i64),
         });

@@ -399,6 +399,7 @@ fn every_fault_of_a_chunk_is_named() {
     let lz4 = lz4_flex::block::compress(&[7; 1000]);
     let chunk = |head: Vec<u8>, packed: &[u8]| record(op::CHUNK, &[head, packed.to_vec()].concat());
     let over = 65 << 20;
+    #[allow(clippy::type_complexity)] // A file and the problem it must show.
     let cases: [(Vec<u8>, fn(&ProblemKind) -> bool); 8] = [
         (chunk(chunk_head(1000, 1, "zstd", n), &packed), |k| {
             matches!(k, ProblemKind::ChunkCrc { stored: 1, .. })

@@ -50,7 +50,10 @@ pub fn run(global: &Global, args: &Compare) -> Result<Outcome> {
         .align
         .parse()
         .map_err(|e| Error::Usage(format!("--align {}: {e}", args.align)))?;
-    if args.max_angle.is_some_and(|limit| !(limit >= 0.0)) {
+    if args
+        .max_angle
+        .is_some_and(|limit| limit.is_nan() || limit < 0.0)
+    {
         return Err(Error::Usage(
             "--max-angle: an angle of 0 degrees or more".to_owned(),
         ));
@@ -67,7 +70,7 @@ pub fn run(global: &Global, args: &Compare) -> Result<Outcome> {
     };
     let exceeded = args
         .max_angle
-        .is_some_and(|limit| !(errors.total.max.to_degrees() <= limit));
+        .is_some_and(|limit| errors.total.max.to_degrees() > limit);
     if global.json {
         print(&format!(
             "{}\n",

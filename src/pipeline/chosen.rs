@@ -24,7 +24,12 @@ pub(super) struct Chosen {
     channels: Vec<(Arc<Channel>, Decoder)>,
 }
 
-pub(super) fn choose(run: &Replay, path: &Path, log: &Log, names: &[String]) -> Result<Vec<Chosen>> {
+pub(super) fn choose(
+    run: &Replay,
+    path: &Path,
+    log: &Log,
+    names: &[String],
+) -> Result<Vec<Chosen>> {
     let mut taken: BTreeSet<String> = BTreeSet::new();
     if run.copy_input {
         taken.extend(log.channels.iter().map(|c| c.channel.topic.clone()));
@@ -97,13 +102,21 @@ fn choose_one(
     })
 }
 
+/// A channel of recorded orientations the estimate is held against.
+pub(super) struct Reference {
+    channel: Arc<Channel>,
+    decoder: Decoder,
+    /// How its orientations are understood.
+    pub(super) resolved: Resolved,
+}
+
 /// The channel whose orientations the estimate is held against; `None` = the samples' own.
 pub(super) fn reference(
     run: &Replay,
     path: &Path,
     log: &Log,
     chosen: &[Chosen],
-) -> Result<Option<((Arc<Channel>, Decoder), Resolved)>> {
+) -> Result<Option<Reference>> {
     let Some(asked) = &run.against else {
         return Ok(None);
     };
@@ -136,8 +149,11 @@ pub(super) fn reference(
             path: path.to_owned(),
             what: why.to_string(),
         })?;
-    let resolved = Resolved::new(&run.plan, decoder.stated());
-    Ok(Some(((found.channel.clone(), decoder), resolved)))
+    Ok(Some(Reference {
+        channel: found.channel.clone(),
+        resolved: Resolved::new(&run.plan, decoder.stated()),
+        decoder,
+    }))
 }
 
 pub(super) fn find<'c>(chosen: &'c [Chosen], channel: &Channel) -> Option<(usize, &'c Decoder)> {
@@ -157,7 +173,7 @@ fn is_same(known: &Channel, met: &Channel) -> bool {
 
 pub(super) fn route(
     chosen: &mut [Chosen],
-    reference: Option<&((Arc<Channel>, Decoder), Resolved)>,
+    reference: Option<&Reference>,
     copy_input: bool,
     channel: &Arc<Channel>,
 ) -> Option<Route> {
@@ -173,8 +189,8 @@ pub(super) fn route(
                 .copying(copied),
         );
     }
-    match reference.filter(|((known, _), _)| is_same(known, channel)) {
-        Some(((_, decoder), _)) => Some(Route::reference(decoder.clone()).copying(copied)),
+    match reference.filter(|r| is_same(&r.channel, channel)) {
+        Some(r) => Some(Route::reference(r.decoder.clone()).copying(copied)),
         None => copied.map(Route::only_copied),
     }
 }

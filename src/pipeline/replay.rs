@@ -136,10 +136,10 @@ fn file(
         .collect();
     let founds: Vec<Found> = chosen.iter().map(|c| c.found.clone()).collect();
     let mut session = begin(run, path, founds, prepared, &streams)?;
-    if let (Some((_, resolved)), Some(topic)) = (&reference, session.topics.first_mut())
+    if let (Some(reference), Some(topic)) = (&reference, session.topics.first_mut())
         && let Some(against) = &mut topic.against
     {
-        against.take_reference_from(resolved);
+        against.take_reference_from(&reference.resolved);
     }
     let span = log.survey.times;
     let total: u64 = log.survey.channels.iter().map(|c| c.messages).sum();
@@ -246,7 +246,12 @@ fn log_time(item: &Item) -> Option<u64> {
 }
 
 /// The output's labels: frames and axes as they will be in the numbers.
-pub(super) fn labelled(mut stream: Stream, plan: &Plan, resolved: &Resolved, prepared: &Prepared) -> Stream {
+pub(super) fn labelled(
+    mut stream: Stream,
+    plan: &Plan,
+    resolved: &Resolved,
+    prepared: &Prepared,
+) -> Stream {
     let (world, body) = resolved.labels(prepared.world);
     stream.world_axes = world;
     stream.body_axes = body;
@@ -298,8 +303,7 @@ pub(super) fn end(
     survey: &Survey,
     pool: &Pool,
 ) -> Result<RunSummary> {
-    let (topics, outputs) = session.finish(pool)?;
-    Ok(summarise::run(run, topics, outputs, survey))
+    Ok(summarise::run(run, session.finish(pool)?, survey))
 }
 
 fn again(log: &Log, path: &Path) -> Result<Reader> {

@@ -81,7 +81,10 @@ impl Route {
     /// Messages that are recorded orientations.
     #[must_use]
     pub fn reference(decoder: Decoder) -> Route {
-        Route { is_reference: true, ..Route::samples(decoder, 0) }
+        Route {
+            is_reference: true,
+            ..Route::samples(decoder, 0)
+        }
     }
 
     /// Messages that are only copied.
@@ -99,13 +102,19 @@ impl Route {
     /// The same, the messages also copied where a channel is given.
     #[must_use]
     pub fn copying(self, channel: Option<Arc<Channel>>) -> Route {
-        Route { copied: channel, ..self }
+        Route {
+            copied: channel,
+            ..self
+        }
     }
 
     /// The same, what is noticed going to `noticed`.
     #[must_use]
     pub fn noticing(self, noticed: &Arc<Noticed>) -> Route {
-        Route { noticed: noticed.clone(), ..self }
+        Route {
+            noticed: noticed.clone(),
+            ..self
+        }
     }
 
     /// Appends what `message` becomes.

@@ -231,7 +231,7 @@ impl Session {
     ///
     /// # Errors
     /// As [`Outlet::write`] and [`Outlet::finish`].
-    pub fn finish(mut self, pool: &Pool) -> Result<(Vec<Topic>, Vec<(String, Written)>)> {
+    pub fn finish(mut self, pool: &Pool) -> Result<Ended> {
         for (stream, topic) in self.topics.iter_mut().enumerate() {
             let attitudes = topic.estimator.finish(pool);
             topic.output.add(attitudes);
@@ -240,8 +240,20 @@ impl Session {
                 against.finish(pool);
             }
         }
-        Ok((self.topics, self.outlet.finish()?))
+        Ok(Ended {
+            topics: self.topics,
+            outputs: self.outlet.finish()?,
+        })
     }
+}
+
+/// A run that is over.
+#[derive(Debug)]
+pub struct Ended {
+    /// Its topics.
+    pub topics: Vec<Topic>,
+    /// Its outputs by name.
+    pub outputs: Vec<(String, Written)>,
 }
 
 /// Where a run's data comes from.

@@ -115,7 +115,11 @@ impl Picked {
                         Stream::new(&channel.topic, ""),
                     ));
                 }
-                Some(Route::samples(decoder, 0).noticing(&noticed).copying(copied))
+                Some(
+                    Route::samples(decoder, 0)
+                        .noticing(&noticed)
+                        .copying(copied),
+                )
             }
             Err(why) => {
                 self.refusals.push(why.to_string());

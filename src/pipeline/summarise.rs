@@ -1,11 +1,10 @@
 //! What the stages counted -> the summary of the run. Pure.
 
 use super::replay::Replay;
-use super::session::Topic;
+use super::session::{Ended, Topic};
 use crate::model::attitude::Quaternion;
 use crate::record::{Nanos, Verdict};
 use crate::report::summary::{Gaps, RunSummary, TopicSummary, significant};
-use crate::sink::Written;
 use crate::source::mcap::Survey;
 use std::sync::atomic::Ordering;
 
@@ -17,12 +16,8 @@ const PROBLEMS_SAID: usize = 5;
 
 /// The summary of a run.
 #[must_use]
-pub fn run(
-    run: &Replay,
-    topics: Vec<Topic>,
-    outputs: Vec<(String, Written)>,
-    survey: &Survey,
-) -> RunSummary {
+pub fn run(run: &Replay, ended: Ended, survey: &Survey) -> RunSummary {
+    let Ended { topics, outputs } = ended;
     RunSummary {
         source: run.source.name().display().to_string(),
         topics: topics.iter().map(|topic| of_topic(run, topic)).collect(),

@@ -73,15 +73,15 @@ fn from_mcap(path: &Path, topic: Option<&str>, pool: &Pool) -> Result<Track> {
             ..WalkOptions::default()
         },
         |channel| {
-            (channel.topic == wanted.topic && channel.id == wanted.id).then(|| Route::reference(decoder.clone()))
+            (channel.topic == wanted.topic && channel.id == wanted.id)
+                .then(|| Route::reference(decoder.clone()))
         },
         Route::map,
         |items| {
             entries.extend(items.drain(..).filter_map(|item| match item {
                 Item::Reference(raw) => {
                     let stamp = raw.header.filter(|s| s.0 != 0).unwrap_or(raw.log);
-                    raw.orientation
-                        .map(|wxyz| (stamp, wxyz))
+                    raw.orientation.map(|wxyz| (stamp, wxyz))
                 }
                 _ => None,
             }));

@@ -309,9 +309,10 @@ impl Scanner {
                 self.facts.profile = profile.to_owned();
                 self.facts.library = library.to_owned();
             }
-            Some(Record::Metadata { name: "strapd", metadata })
-                if self.facts.provenance.is_empty() =>
-            {
+            Some(Record::Metadata {
+                name: "strapd",
+                metadata,
+            }) if self.facts.provenance.is_empty() => {
                 self.facts.provenance = metadata
                     .into_iter()
                     .map(|(key, value)| (key.to_owned(), value.to_owned()))
