@@ -271,8 +271,8 @@ fn definitions_hold_from_where_they_stand_for_any_number_of_threads() {
             .compression(None);
         let mut writer = options.create(std::io::Cursor::new(Vec::new())).unwrap();
         for i in 0..200u32 {
-            // One channel more in each round; all of them defined in the first chunk.
-            let topic = format!("/{round}/{}", i % (round + 1));
+            // 1, 2, 3, 2, 1 channels, all defined in the first chunk: ids appear, then change meaning.
+            let topic = format!("/{round}/{}", i % [1, 2, 3, 2, 1][round as usize]);
             let id = writer
                 .add_channel(0, &topic, "x", &Default::default())
                 .unwrap();
@@ -298,7 +298,7 @@ fn definitions_hold_from_where_they_stand_for_any_number_of_threads() {
         let file = || on_disk(bytes, dir.path(), "a.mcap");
         let (expected, report) = read_some(file(), &fine(None), |_| true);
         assert_eq!(expected.len(), 1000);
-        assert_eq!(report.survey.channels.len(), 1 + 2 + 3 + 4 + 5);
+        assert_eq!(report.survey.channels.len(), 1 + 2 + 3 + 2 + 1);
         // Every message names the topic it was written on.
         assert!(expected.iter().all(|m| m.0.as_bytes() == m.3));
         // By position, so that several blocks are on their way before the first is taken back.
