@@ -160,26 +160,26 @@ const fn commit(window: usize) -> Method {
 
 #[test]
 fn jittered_sampling_and_lost_samples_cost_what_the_table_says() {
-    // The greatest error of 60 s hangs on where fast motion and losses meet: the theory's own seed gave
-    // one draw of it, ours give two. Three times that draw is within chance, a lower order is not.
-    const CHANCE: f64 = 3.0;
+    // The greatest error of 60 s hangs on where fast motion and losses meet, above all two losses in a
+    // row: one seed gives three times another's. The theory had one draw; the median of three of ours is
+    // within 2.3 of it throughout. A lower order would be off by fifty.
+    const CHANCE: f64 = 2.5;
     // Truth's Runge-Kutta leaves this much in 60 s, found by halving its step, arc seconds.
     const TRUTH: f64 = 2e-4;
-    for seed in [1, 2] {
-        for part in [0.05, 0.1] {
-            let jittered = log(seed, part, 0.0, Join::Continuous);
-            let lossy = log(seed, part, 0.01, Join::Continuous);
-            for (_, kind, method, expected, expected_lossy) in
-                TABLE.into_iter().filter(|row| row.0 == part)
-            {
-                for (log, expected) in [(&jittered, expected), (&lossy, expected_lossy)] {
-                    let found = error(log, kind, method);
-                    // NaN: nine increments of which one is missing are fewer than the table's.
-                    assert!(
-                        expected.is_nan() || found < CHANCE * expected + TRUTH,
-                        "{part}, {method}, {kind:?}: {found:.2e}, table {expected:.2e}"
-                    );
-                }
+    for part in [0.05, 0.1] {
+        let logs = |lost| [1, 2, 3].map(|seed| log(seed, part, lost, Join::Continuous));
+        let (jittered, lossy) = (logs(0.0), logs(0.01));
+        for (_, kind, method, expected, expected_lossy) in
+            TABLE.into_iter().filter(|row| row.0 == part)
+        {
+            for (logs, expected) in [(&jittered, expected), (&lossy, expected_lossy)] {
+                let mut found = logs.each_ref().map(|log| error(log, kind, method));
+                found.sort_by(f64::total_cmp);
+                // NaN: nine increments of which one is missing are fewer than the table's.
+                assert!(
+                    expected.is_nan() || found[1] < CHANCE * expected + TRUTH,
+                    "{part}, {method}, {kind:?}: {found:?}, table {expected}"
+                );
             }
         }
     }
