@@ -14,7 +14,7 @@
 //! the bits that come out depend neither on how the stream is cut into pushes nor on the [`Executor`].
 //!
 //! # Accuracy
-//! Top of `top.md` at 2000 Hz, 1.2 s, 24 turns: 2e-12 degrees. Coning 10 degrees, 3 Hz, sampled at
+//! Heavy top spinning at 20 Hz, sampled at 2000 Hz for 1.2 s: 2e-12 degrees. Coning 10 degrees, 3 Hz, at
 //! 100 Hz, 60 s: 1e-7 arcsec. `tests/accuracy.rs` holds these and the orders of convergence.
 #![allow(
     clippy::needless_range_loop,

@@ -10,6 +10,8 @@ mod double;
 mod gaps;
 #[path = "accuracy/noise.rs"]
 mod noise;
+#[path = "accuracy/random.rs"]
+mod random;
 #[path = "accuracy/run.rs"]
 mod run;
 #[path = "shared_data/mod.rs"]

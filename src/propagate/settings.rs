@@ -30,7 +30,7 @@ pub enum SettingsError {
         given: usize,
         /// What there is: two rates, one increment.
         smallest: usize,
-        /// [`LARGEST_WINDOW`].
+        /// [`LARGEST_WINDOW`](super::LARGEST_WINDOW).
         largest: usize,
     },
     /// The initial attitude is no rotation.

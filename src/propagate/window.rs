@@ -216,7 +216,8 @@ impl Plan {
     #[inline(always)]
     fn path(&self, track: &Track, k: usize) -> Path {
         let end = k + self.look_ahead + 1;
-        if end > track.len() || end < self.window + track.first() || track.bridged[k] {
+        let one_sided = end > track.len() || end < self.window + track.first();
+        if one_sided || track.bridged[k] || (self.increments && track.has_hole(k)) {
             return Path::Careful;
         }
         let first = end - self.window;

@@ -127,7 +127,8 @@ impl Plan {
         };
         let sizes = (smallest..probe).step_by(2).chain([probe]);
         let variation = self.variation(track, k, smallest + 2, target);
-        let (mut before, mut last) = (0.0, variation);
+        // The first moment itself, which one increment does not know, is half of what rates vary by.
+        let (mut before, mut last) = (0.0, 2.0 * variation);
         let mut best: Option<Settled> = None;
         for size in sizes {
             let mut this = if size == cap {
