@@ -9,7 +9,9 @@ use std::path::PathBuf;
 /// In CI (`CI` set) when it is absent: there a skip would be a test that can not fail.
 #[allow(dead_code, unreachable_pub)]
 pub fn shared(relative: &str) -> Option<PathBuf> {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared").join(relative);
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+        .join("../shared")
+        .join(relative);
     if path.exists() {
         return Some(path);
     }
@@ -18,6 +20,9 @@ pub fn shared(relative: &str) -> Option<PathBuf> {
         "{} is absent, and this is CI: the test must run",
         path.display()
     );
-    eprintln!("SKIPPED LOUDLY: {} is absent; this test proved nothing", path.display());
+    eprintln!(
+        "SKIPPED LOUDLY: {} is absent; this test proved nothing",
+        path.display()
+    );
     None
 }
