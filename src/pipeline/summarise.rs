@@ -3,7 +3,8 @@
 use super::replay::Replay;
 use super::session::{Ended, Topic};
 use crate::model::attitude::Quaternion;
-use crate::record::{Nanos, Verdict};
+use crate::propagate::Method;
+use crate::record::{Nanos, SampleKind, Verdict};
 use crate::report::summary::{Gaps, RunSummary, TopicSummary, significant};
 use crate::source::mcap::Survey;
 use std::sync::atomic::Ordering;
@@ -76,13 +77,15 @@ fn of_topic(run: &Replay, topic: &Topic) -> TopicSummary {
             .map(|n| 1e9 / n as f64),
         clock: topic.prepared.clock.name().to_owned(),
         kind: topic.resolved.kind,
-        method: topic.estimator.method().to_string(),
+        method: method_words(topic),
         body,
         world,
         initial: topic.prepared.initial_origin.clone(),
         bias: topic.prepared.bias.into(),
         bias_origin: topic.prepared.bias_origin.clone(),
         noise: run.plan.noise.name.clone(),
+        drift: topic.prepared.bias_sigma,
+        input_axes: topic.resolved.body.to_string(),
         gaps: Gaps {
             bridged: gaps.count.saturating_sub(gaps.not_bridged),
             held: propagation.holds,
@@ -107,6 +110,15 @@ fn of_topic(run: &Replay, topic: &Topic) -> TopicSummary {
     summary.warnings.extend(topic.warnings.iter().cloned());
     summary.warnings.extend(warnings(topic, &summary));
     summary
+}
+
+/// The method, `auto` with what it stands for.
+fn method_words(topic: &Topic) -> String {
+    match (topic.estimator.method(), topic.resolved.kind) {
+        (Method::Auto, SampleKind::Rate) => "auto: centred window of 16 samples, exact".to_owned(),
+        (Method::Auto, _) => "auto: centred window of 15 increments, exact".to_owned(),
+        (other, _) => other.to_string(),
+    }
 }
 
 fn first_losses(topic: &Topic, start: Nanos) -> Vec<String> {

@@ -31,6 +31,8 @@ pub struct TopicSummary {
     pub kind: SampleKind,
     /// The integrator in words.
     pub method: String,
+    /// Axes of the recorded numbers.
+    pub input_axes: String,
     /// Axes of the body.
     pub body: String,
     /// World of the attitude.
@@ -43,6 +45,8 @@ pub struct TopicSummary {
     pub bias_origin: String,
     /// Noise behind sigma.
     pub noise: String,
+    /// Drift to be expected from what is not known of the bias, rad/s.
+    pub drift: f64,
     /// Gaps.
     pub gaps: Gaps,
     /// Sum of the angles of all steps, rad.
@@ -214,8 +218,8 @@ impl TopicSummary {
             out,
             "frames",
             &format!(
-                "body {} -> world {}; initial attitude: {}",
-                self.body, self.world, self.initial
+                "input {} -> body {} -> world {}; initial attitude: {}",
+                self.input_axes, self.body, self.world, self.initial
             ),
         );
         line(out, "bias", &self.bias_text());
@@ -242,10 +246,11 @@ impl TopicSummary {
             out,
             "sigma",
             &format!(
-                "{}, {}, {} deg about x, y, z at the end ({} noise)",
+                "{}, {}, {} deg about x, y, z at the end; drift of about {} deg/h to be expected ({} noise)",
                 significant(sx, 2),
                 significant(sy, 2),
                 significant(sz, 2),
+                significant(self.drift.to_degrees() * 3600.0, 2),
                 self.noise
             ),
         );
@@ -345,12 +350,14 @@ impl TopicSummary {
             "clock": self.clock,
             "sample_kind": self.kind.name(),
             "method": self.method,
+            "input_axes": self.input_axes,
             "body": self.body,
             "world": self.world,
             "initial": self.initial,
             "bias_rad_s": { "x": self.bias[0], "y": self.bias[1], "z": self.bias[2],
                             "origin": self.bias_origin },
             "noise": self.noise,
+            "drift_deg_per_h": self.drift.to_degrees() * 3600.0,
             "gaps": {
                 "bridged": self.gaps.bridged,
                 "held": self.gaps.held,
