@@ -7,9 +7,21 @@
 //!                          model: the mathematics beside it, pure
 //! ```
 //!
-//! Reading order: [`record`], [`propagate`], [`condition`], then the rims.
-//! Without the default feature `service` the crate is `model`, `record`, `condition` and
-//! `propagate` on nalgebra alone.
+//! | module | arrow | |
+//! |---|---|---|
+//! | [`record`] | what crosses the borders between stages | pure |
+//! | `source` | files and streams -> messages | I/O |
+//! | `decode` | bytes of one message -> raw samples | pure |
+//! | [`condition`] | raw samples -> SI, body axes, in order, finite | pure |
+//! | [`propagate`] | rates -> attitude: the hot loop | pure |
+//! | `sink` | attitude -> MCAP, NDJSON, CSV | I/O |
+//! | `pipeline` | the stages wired: replay, tracks, what a log holds | I/O |
+//! | [`compare`] | two attitudes -> how far apart | pure |
+//! | `config`, `report`, `cli` | arguments -> a run -> its summary | |
+//! | [`model`] | frames, attitude, rigid body, top, inertia, motions with exact truth | pure |
+//!
+//! Reading order: [`record`], `pipeline::estimator`, then one stage.
+//! Without the default feature `service` the crate is the modules with links above, on nalgebra alone.
 
 #[cfg(feature = "service")]
 pub mod cli;

@@ -1,4 +1,3 @@
 //! What a run says about itself, for people and for machines. Pure.
 
-pub mod info;
 pub mod summary;

@@ -3,10 +3,9 @@
 use super::{Global, Outcome};
 use crate::decode::{FieldPath, Options};
 use crate::error::{Error, Result};
-use crate::pipeline::log::Log;
+use crate::pipeline::log::{Log, problems};
 use crate::pipeline::pool::Pool;
 use crate::pipeline::route::{Item, Route};
-use crate::pipeline::summarise::problems;
 use crate::pipeline::topics;
 use crate::record::RawSample;
 use crate::source::mcap::{self, WalkOptions};

@@ -1,14 +1,14 @@
 //! `strapd info FILE`: what a log holds, how good it is, and what to do next. I/O.
 
+mod words;
+
 use super::{Global, Outcome, print};
 use crate::decode::Options;
 use crate::error::{Error, Result};
-use crate::pipeline::log::Log;
+use crate::pipeline::log::{Log, problems};
 use crate::pipeline::look::look;
 use crate::pipeline::pool::Pool;
-use crate::pipeline::summarise::problems;
 use crate::pipeline::topics;
-use crate::report::info as words;
 use clap::Args;
 use std::path::PathBuf;
 

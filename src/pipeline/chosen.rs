@@ -5,8 +5,8 @@
 
 use super::log::{Known, Log, described, rank};
 use super::preparation::Resolved;
-use super::replay::Replay;
 use super::route::Route;
+use super::run::Replay;
 use super::session::Found;
 use super::topics;
 use crate::decode::Decoder;

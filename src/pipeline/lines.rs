@@ -3,9 +3,10 @@
 use super::pool::Pool;
 use super::position::Position;
 use super::preparation::Resolved;
-use super::replay::{Replay, end, refused};
 use super::route::Item;
+use super::run::{Replay, refused};
 use super::session::Found;
+use super::summarise;
 use super::waiting::Waiting;
 use crate::decode::{LineDecoder, MAX_LINE, Stated};
 use crate::error::{Error, Result};
@@ -147,7 +148,8 @@ pub fn replay(
         return Err(nothing(&path));
     }
     let _ = waiting.consume(items.into_iter(), pool)?;
-    end(run, waiting.into_session(pool)?, &Survey::default(), pool)
+    let ended = waiting.into_session(pool)?.finish(pool)?;
+    Ok(summarise::run(run, ended, &Survey::default()))
 }
 
 fn nothing(path: &Path) -> Error {

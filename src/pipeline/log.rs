@@ -4,7 +4,6 @@
 //! channels, which of them carry a rate or an orientation, and a decoder that has seen a message.
 
 use super::pool::Pool;
-use super::summarise;
 use super::topics::{self, Candidate, Choice};
 use crate::decode::{self, Decoder, Rank, Role, Unsupported, role};
 use crate::error::{Error, Result};
@@ -59,7 +58,7 @@ impl Log {
             ..WalkOptions::default()
         };
         let survey = mcap::survey(&reader, &options)?;
-        let (firsts, problems) = match reader.again() {
+        let (firsts, met) = match reader.again() {
             Some(again) => first_messages(again, &survey)?,
             None => (Vec::new(), Vec::new()),
         };
@@ -75,8 +74,8 @@ impl Log {
             })
             .collect();
         Ok(Log {
-            problems: match summarise::problems(&survey) {
-                none if none.is_empty() => problems,
+            problems: match problems(&survey) {
+                none if none.is_empty() => met,
                 whole => whole,
             },
             reader,
@@ -272,5 +271,25 @@ fn first_messages(reader: Reader, survey: &Survey) -> Result<(Vec<First>, Vec<St
             }
         },
     )?;
-    Ok((firsts, summarise::problems(&report.survey)))
+    Ok((firsts, problems(&report.survey)))
+}
+
+/// Most of a file's problems that are written out.
+const PROBLEMS_SAID: usize = 5;
+
+/// What was wrong with the file, the first few in words.
+#[must_use]
+pub fn problems(survey: &Survey) -> Vec<String> {
+    let found = &survey.problems;
+    let mut said: Vec<String> = found
+        .first()
+        .iter()
+        .take(PROBLEMS_SAID)
+        .map(ToString::to_string)
+        .collect();
+    let more = found.total().saturating_sub(said.len() as u64);
+    if more > 0 {
+        said.push(format!("and {more} more of the kind"));
+    }
+    said
 }

@@ -2,8 +2,8 @@
 //! of the input.
 
 use super::preparation::Prepared;
-use super::replay::Replay;
-use super::session::{Found, Source};
+use super::run::{Replay, Source};
+use super::session::Found;
 use crate::error::{Error, Result};
 use crate::sink::{Provenance, Stream, Target};
 use sha2::{Digest, Sha256};

@@ -5,46 +5,23 @@
 
 use super::chosen::{Chosen, choose, find, reference, route};
 use super::log::Log;
-use super::outlet::Outlet;
+use super::opening::{begin, labelled};
 use super::pool::Pool;
 use super::position::Position;
-use super::preparation::{Patience, Preparation, Prepared, Resolved};
+use super::preparation::{Patience, Preparation, Prepared};
 use super::route::{Item, Route};
-use super::session::{Found, Session, Source, Topic};
+use super::run::{Replay, Source, refused};
+use super::session::Found;
 use super::summarise;
-use super::{lines, provenance, streamed};
-use crate::config::Plan;
+use super::{lines, streamed};
 use crate::error::{Error, Result};
 use crate::report::summary::RunSummary;
-use crate::sink::{self, Flow, Stream, Target};
-use crate::source::mcap::{self, Reader, Survey, WalkOptions};
+use crate::sink::{Flow, Stream};
+use crate::source::mcap::{self, Reader, WalkOptions};
 use std::io::{BufReader, Read};
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Instant;
-
-/// A replay to be done.
-#[derive(Clone, Debug)]
-pub struct Replay {
-    /// From where.
-    pub source: Source,
-    /// To where.
-    pub targets: Vec<Target>,
-    /// How samples are understood and integrated.
-    pub plan: Plan,
-    /// How outputs are made.
-    pub options: sink::Options,
-    /// Whether every message of the input is copied to MCAP outputs.
-    pub copy_input: bool,
-    /// `--out-rate`, Hz.
-    pub out_rate: Option<f64>,
-    /// `--speed`; `None` = as fast as possible.
-    pub speed: Option<f64>,
-    /// `--against-recorded`: the reference's topic, empty = found.
-    pub against: Option<String>,
-    /// The command as typed, for the output's metadata.
-    pub command: String,
-}
 
 /// Does it. `watch` is told where it is, often.
 ///
@@ -177,7 +154,7 @@ fn file(
     if let Some(e) = failure {
         return Err(e);
     }
-    end(run, session, &report.survey, pool)
+    Ok(summarise::run(run, session.finish(pool)?, &report.survey))
 }
 
 /// Reads as far as needed to know clock, bias and initial attitude of every topic.
@@ -245,78 +222,9 @@ fn log_time(item: &Item) -> Option<u64> {
     }
 }
 
-/// The output's labels: frames and axes as they will be in the numbers.
-pub(super) fn labelled(
-    mut stream: Stream,
-    plan: &Plan,
-    resolved: &Resolved,
-    prepared: &Prepared,
-) -> Stream {
-    let (world, body) = resolved.labels(prepared.world);
-    stream.world_axes = world;
-    stream.body_axes = body;
-    if resolved.is_remapped(plan, prepared.world) {
-        stream.rotates = "body_to_world".to_owned();
-        // The sensor's own frame keeps its axes; this is another one.
-        stream.frame_id = match stream.frame_id.as_str() {
-            "" => stream.body_axes.clone(),
-            id => format!("{id}_{}", stream.body_axes),
-        };
-    }
-    stream
-}
-
-pub(super) fn begin(
-    run: &Replay,
-    path: &Path,
-    founds: Vec<Found>,
-    prepared: Vec<Prepared>,
-    streams: &[Stream],
-) -> Result<Session> {
-    let provenance = provenance::of(run, &founds, &prepared, streams)?;
-    let topics = founds
-        .into_iter()
-        .zip(prepared)
-        .map(|(found, prepared)| {
-            Topic::new(path, &run.plan, found, prepared, run.against.is_some())
-        })
-        .collect::<Result<Vec<_>>>()?;
-    let inputs: Vec<PathBuf> = match &run.source {
-        Source::File(path) => vec![path.clone()],
-        Source::Stdin => Vec::new(),
-    };
-    let outlet = Outlet::open(
-        &run.targets,
-        &inputs,
-        run.options,
-        streams,
-        &provenance,
-        run.out_rate,
-        run.speed,
-    )?;
-    Ok(Session::new(topics, outlet))
-}
-
-pub(super) fn end(
-    run: &Replay,
-    session: Session,
-    survey: &Survey,
-    pool: &Pool,
-) -> Result<RunSummary> {
-    Ok(summarise::run(run, session.finish(pool)?, survey))
-}
-
 fn again(log: &Log, path: &Path) -> Result<Reader> {
     match log.reader() {
         Some(reader) => Ok(reader),
         None => Reader::open(path),
-    }
-}
-
-pub(super) fn refused(path: &Path, topic: &str, what: String) -> Error {
-    Error::Topic {
-        path: path.to_owned(),
-        topic: topic.to_owned(),
-        what,
     }
 }

@@ -13,7 +13,7 @@ use crate::decode::Undecodable;
 use crate::error::{Error, Result};
 use crate::record::{AttitudeSample, Nanos};
 use crate::sink::{Flow, Written};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 /// One estimated topic of a run.
@@ -254,34 +254,4 @@ pub struct Ended {
     pub topics: Vec<Topic>,
     /// Its outputs by name.
     pub outputs: Vec<(String, Written)>,
-}
-
-/// Where a run's data comes from.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Source {
-    /// A file: an MCAP, or NDJSON by its extension.
-    File(PathBuf),
-    /// Standard input: MCAP or NDJSON, told apart by the first bytes.
-    Stdin,
-}
-
-impl Source {
-    /// `-` or a path.
-    #[must_use]
-    pub fn parse(text: &str) -> Source {
-        if text == "-" {
-            Source::Stdin
-        } else {
-            Source::File(PathBuf::from(text))
-        }
-    }
-
-    /// For messages.
-    #[must_use]
-    pub fn name(&self) -> PathBuf {
-        match self {
-            Source::File(path) => path.clone(),
-            Source::Stdin => PathBuf::from("standard input"),
-        }
-    }
 }

@@ -3,12 +3,12 @@
 //! Nothing is known before it comes: the first IMU topic is taken, and its first samples wait until
 //! clock, bias and initial attitude are known.
 
-use super::log::{Known, described, explained, known, plain, rank};
+use super::log::{Known, described, explained, known, plain, problems, rank};
 use super::pool::Pool;
 use super::position::Position;
 use super::preparation::Resolved;
-use super::replay::{Replay, end};
 use super::route::{Noticed, Route};
+use super::run::Replay;
 use super::session::Found;
 use super::summarise;
 use super::topics::{self, PICKED_UNNAMED};
@@ -65,7 +65,7 @@ pub(super) fn replay(
         return Err(picked.nothing(run, &path, &report.survey));
     }
     let session = waiting.into_session(pool)?;
-    let mut summary = end(run, session, &report.survey, pool)?;
+    let mut summary = summarise::run(run, session.finish(pool)?, &report.survey);
     if let Some(topic) = summary.topics.first_mut() {
         topic.warnings.extend(picked.passed_over());
     }
@@ -149,7 +149,7 @@ impl Picked {
                 topics: topics::listing(&candidates),
             },
         };
-        explained(error, &channels, &summarise::problems(survey))
+        explained(error, &channels, &problems(survey))
     }
 
     fn passed_over(&self) -> Option<String> {

@@ -1,6 +1,6 @@
 //! What the stages counted -> the summary of the run. Pure.
 
-use super::replay::Replay;
+use super::run::Replay;
 use super::session::{Ended, Topic};
 use crate::model::attitude::Quaternion;
 use crate::propagate::Method;
@@ -12,8 +12,6 @@ use std::sync::atomic::Ordering;
 /// Above this a rate is probably not in rad/s: 200 rad/s is 11,500 deg/s, five times what most gyros
 /// can measure.
 const UNLIKELY_RATE: f64 = 200.0;
-/// Most of a file's problems that are written out.
-const PROBLEMS_SAID: usize = 5;
 
 /// The summary of a run.
 #[must_use]
@@ -27,27 +25,10 @@ pub fn run(run: &Replay, ended: Ended, survey: &Survey) -> RunSummary {
             .into_iter()
             .map(|(name, written)| (name, written.bytes, written.messages))
             .collect(),
-        file_problems: problems(survey),
+        file_problems: super::log::problems(survey),
         file_losses: survey.problems.losses(),
         elapsed_secs: 0.0,
     }
-}
-
-/// What was wrong with the file, the first few in words.
-#[must_use]
-pub fn problems(survey: &Survey) -> Vec<String> {
-    let found = &survey.problems;
-    let mut said: Vec<String> = found
-        .first()
-        .iter()
-        .take(PROBLEMS_SAID)
-        .map(ToString::to_string)
-        .collect();
-    let more = found.total().saturating_sub(said.len() as u64);
-    if more > 0 {
-        said.push(format!("and {more} more of the kind"));
-    }
-    said
 }
 
 fn of_topic(run: &Replay, topic: &Topic) -> TopicSummary {

@@ -2,11 +2,10 @@
 //!
 //! NDJSON and CSV are our own outputs; MCAP goes through the same walk and decoders as a replay.
 
-use super::log::{Known, Log, rank};
+use super::log::{Known, Log, problems, rank};
 use super::pool::Pool;
 use super::preparation::orientation_convention;
 use super::route::{Item, Route};
-use super::summarise::problems;
 use super::topics;
 use crate::decode::{Options, Role};
 use crate::error::{Error, Result};

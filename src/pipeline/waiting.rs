@@ -1,11 +1,12 @@
 //! Items of a stream that can be read only once -> a session, as soon as enough has been seen. I/O
 //! only through the session.
 
+use super::opening::{begin, labelled};
 use super::pool::Pool;
 use super::position::Position;
 use super::preparation::{Patience, Preparation};
-use super::replay::{Replay, begin, labelled, refused};
 use super::route::Item;
+use super::run::{Replay, refused};
 use super::session::{Found, Session};
 use super::topics;
 use crate::error::{Error, Result};

@@ -7,7 +7,8 @@ use crate::made_logs::{PACKINGS, TOPIC, bytes, logged, motion};
 use crate::replays::replay_of;
 use strapd::error::Error;
 use strapd::pipeline::pool::Pool;
-use strapd::pipeline::replay::{Replay, run};
+use strapd::pipeline::replay::run;
+use strapd::pipeline::run::Replay;
 use strapd::report::summary::RunSummary;
 
 /// Samples in each log: some forty chunks' worth of bytes would only take longer.

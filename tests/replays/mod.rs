@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use strapd::config::Plan;
 use strapd::error::Result;
 use strapd::pipeline::pool::Pool;
-use strapd::pipeline::replay::{Replay, run};
-use strapd::pipeline::session::Source;
+use strapd::pipeline::replay::run;
+use strapd::pipeline::run::{Replay, Source};
 use strapd::report::summary::{RunSummary, TopicSummary};
 use strapd::sink::{Options, Target};
 

@@ -1,9 +1,9 @@
 //! What `info` found -> text or JSON. Pure.
 
-use super::summary::{human_bytes, significant};
 use crate::pipeline::log::{Known, described, rank};
 use crate::pipeline::look::Looked;
 use crate::record::Nanos;
+use crate::report::summary::{human_bytes, significant};
 use crate::source::mcap::Survey;
 use serde_json::{Value, json};
 use std::fmt::Write as _;

@@ -1,0 +1,68 @@
+//! What a replay is: from where, to where, how. Pure.
+
+use crate::config::Plan;
+use crate::error::Error;
+use crate::sink::{self, Target};
+use std::path::{Path, PathBuf};
+
+/// A replay to be done.
+#[derive(Clone, Debug)]
+pub struct Replay {
+    /// From where.
+    pub source: Source,
+    /// To where.
+    pub targets: Vec<Target>,
+    /// How samples are understood and integrated.
+    pub plan: Plan,
+    /// How outputs are made.
+    pub options: sink::Options,
+    /// Whether every message of the input is copied to MCAP outputs.
+    pub copy_input: bool,
+    /// `--out-rate`, Hz.
+    pub out_rate: Option<f64>,
+    /// `--speed`; `None` = as fast as possible.
+    pub speed: Option<f64>,
+    /// `--against-recorded`: the reference's topic, empty = found.
+    pub against: Option<String>,
+    /// The command as typed, for the output's metadata.
+    pub command: String,
+}
+
+/// Where a run's data comes from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// A file: an MCAP, or NDJSON by its extension.
+    File(PathBuf),
+    /// Standard input: MCAP or NDJSON, told apart by the first bytes.
+    Stdin,
+}
+
+impl Source {
+    /// `-` or a path.
+    #[must_use]
+    pub fn parse(text: &str) -> Source {
+        if text == "-" {
+            Source::Stdin
+        } else {
+            Source::File(PathBuf::from(text))
+        }
+    }
+
+    /// For messages.
+    #[must_use]
+    pub fn name(&self) -> PathBuf {
+        match self {
+            Source::File(path) => path.clone(),
+            Source::Stdin => PathBuf::from("standard input"),
+        }
+    }
+}
+
+/// A topic that can not be run, in the words of the stage that refused it.
+pub(super) fn refused(path: &Path, topic: &str, what: String) -> Error {
+    Error::Topic {
+        path: path.to_owned(),
+        topic: topic.to_owned(),
+        what,
+    }
+}
