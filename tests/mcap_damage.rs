@@ -328,6 +328,26 @@ fn a_chunk_whose_length_is_too_long_does_not_take_its_neighbours_with_it() {
 }
 
 #[test]
+fn an_index_whose_length_is_too_long_costs_no_messages() {
+    let written = messages(200, 0);
+    let bytes = log(Some(None), 1_024, &written);
+    let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+    let offsets = &summary.chunk_indexes[1].message_index_offsets;
+    let at = *offsets.values().max().unwrap() as usize;
+    assert_eq!(bytes[at], op::MESSAGE_INDEX);
+    for more in [1, 100, 2_000] {
+        let mut broken = bytes.clone();
+        let length = u64::from_le_bytes(bytes[at + 1..at + 9].try_into().unwrap()) + more;
+        broken[at + 1..at + 9].copy_from_slice(&length.to_le_bytes());
+        let dir = tempfile::tempdir().unwrap();
+        // A stream can not go back to where it still knew what it read; a file can.
+        let (items, report) = read(on_disk(&broken, dir.path(), "a.mcap"));
+        assert!(items == written, "{more}: {}", items.len());
+        assert!(report.survey.problems.losses() > 0, "{more}");
+    }
+}
+
+#[test]
 fn a_record_of_the_summary_that_became_a_message_is_none() {
     let written = messages(50, 0);
     let bytes = log(Some(None), 1_024, &written);
@@ -399,8 +419,8 @@ fn every_fault_of_a_chunk_is_named() {
     let lz4 = lz4_flex::block::compress(&[7; 1000]);
     let chunk = |head: Vec<u8>, packed: &[u8]| record(op::CHUNK, &[head, packed.to_vec()].concat());
     let over = 65 << 20;
-    #[allow(clippy::type_complexity)] // A file and the problem it must show.
-    let cases: [(Vec<u8>, fn(&ProblemKind) -> bool); 8] = [
+    type Case = (Vec<u8>, fn(&ProblemKind) -> bool);
+    let cases: [Case; 8] = [
         (chunk(chunk_head(1000, 1, "zstd", n), &packed), |k| {
             matches!(k, ProblemKind::ChunkCrc { stored: 1, .. })
         }),

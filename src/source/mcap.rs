@@ -9,8 +9,8 @@
 //! tape -> scan -> blocks -> (workers: block -> messages -> items) -> order -> the caller
 //! ```
 //!
-//! [`walk`] reads a log once, in parallel, and hands over decoded items ordered by log time, then place
-//! in the file; [`survey`] says what is in it; [`list`] gives every record. Memory is bounded by
+//! [`walk()`] reads a log once, in parallel, and hands over decoded items ordered by log time, then place
+//! in the file; [`survey()`] says what is in it; [`list()`] gives every record. Memory is bounded by
 //! [`WalkOptions::in_flight`] and the largest chunk, whatever the size of the file.
 //!
 //! Layouts: MCAP specification, <https://mcap.dev/spec>.

@@ -7,9 +7,15 @@ use super::Limits;
 use super::bytes::{HEAD, head_at};
 use super::channels::Fallback;
 use super::record::{Footer, MAGIC, Record, Statistics, op};
-use super::tape::LogFile;
+use super::tape::{Input, LogFile, Tape};
 use std::collections::BTreeMap;
 use std::io;
+use std::sync::Arc;
+
+/// What is read of it at a time.
+const WINDOW: usize = 256 << 10;
+
+const BROKEN: &str = "its records do not add up";
 
 /// What the summary says, checked as far as it can be without reading the data.
 #[derive(Debug, Default)]
@@ -18,6 +24,8 @@ pub(super) struct Summary {
     pub(super) statistics: Option<Statistics>,
     /// Chunks by compression name.
     pub(super) chunks: BTreeMap<String, u64>,
+    /// Bytes of definitions so far.
+    bytes: usize,
 }
 
 /// A summary, none (`Ok(None)`), or why there is one that can not be used.
@@ -27,7 +35,7 @@ pub(super) type Found = Result<Option<Summary>, &'static str>;
 ///
 /// # Errors
 /// Only when the file itself can not be read.
-pub(super) fn read(file: &LogFile, limits: Limits) -> io::Result<Found> {
+pub(super) fn read(file: &Arc<LogFile>, limits: Limits) -> io::Result<Found> {
     const END: usize = HEAD + Footer::LEN as usize + MAGIC.len();
     let Some(footer_at) = file
         .len
@@ -54,55 +62,72 @@ pub(super) fn read(file: &LogFile, limits: Limits) -> io::Result<Found> {
     if start < MAGIC.len() as u64 || start > footer_at {
         return Ok(Err("it begins outside the file"));
     }
-    let len = footer_at - start;
-    if len > limits.record {
-        return Ok(Err("it is longer than the limit"));
-    }
-    let mut section = vec![0; usize::try_from(len).unwrap_or(0)];
-    let have = file.read_at(&mut section, start)?;
-    if have < section.len() {
-        return Ok(Err("it is cut"));
-    }
-    if footer.summary_crc != 0 {
-        let mut crc = crc32fast::Hasher::new();
-        crc.update(&section);
-        crc.update(end.get(..HEAD + Footer::LEN as usize - 4).unwrap_or(&[]));
-        if crc.finalize() != footer.summary_crc {
-            return Ok(Err("its CRC is wrong"));
+    let mut tape = Tape::new(Input::File(Arc::clone(file)), start);
+    let mut crc = crc32fast::Hasher::new();
+    let mut summary = Summary::default();
+    while tape.position() < footer_at {
+        let left = footer_at - tape.position();
+        // Record by record: the section of a long log may be larger than what should be in memory.
+        let head = head_at(tape.available(HEAD, WINDOW)?, 0);
+        let total = head.map(|(_, length)| length.saturating_add(HEAD as u64));
+        let (Some((opcode, length)), Some(total)) = (head, total.filter(|total| *total <= left))
+        else {
+            return Ok(Err(BROKEN));
+        };
+        let (true, Ok(all)) = (length <= limits.record, usize::try_from(total)) else {
+            return Ok(Err("a record of it is longer than the limit"));
+        };
+        let ahead = tape.available(all, all.max(WINDOW))?;
+        let Some((record, body)) = ahead.get(..all).and_then(|r| Some((r, r.get(HEAD..)?))) else {
+            return Ok(Err("it is cut"));
+        };
+        crc.update(record);
+        if let Err(why) = summary.take_in(opcode, body, start, limits) {
+            return Ok(Err(why));
         }
+        tape.skip(total)?;
     }
-    Ok(parse(&section, start))
+    crc.update(end.get(..HEAD + Footer::LEN as usize - 4).unwrap_or(&[]));
+    if footer.summary_crc != 0 && crc.finalize() != footer.summary_crc {
+        return Ok(Err("its CRC is wrong"));
+    }
+    Ok(Ok(Some(summary)))
 }
 
-fn parse(section: &[u8], start: u64) -> Found {
-    const BROKEN: &str = "its records do not add up";
-    let mut summary = Summary::default();
-    let mut rest = section;
-    while !rest.is_empty() {
-        let (opcode, length) = head_at(rest, 0).ok_or(BROKEN)?;
-        let end = usize::try_from(length)
-            .ok()
-            .and_then(|n| n.checked_add(HEAD))
-            .ok_or(BROKEN)?;
-        let body = rest.get(HEAD..end).ok_or(BROKEN)?;
-        rest = rest.get(end..).ok_or(BROKEN)?;
+impl Summary {
+    fn take_in(
+        &mut self,
+        opcode: u8,
+        body: &[u8],
+        start: u64,
+        limits: Limits,
+    ) -> Result<(), &'static str> {
         match Record::parse(opcode, body).ok_or(BROKEN)? {
             Record::Schema(s) => {
-                summary.definitions.schemas.insert(s.id, body.to_owned());
+                self.bytes = self.bytes.saturating_add(body.len());
+                self.definitions.schemas.insert(s.id, body.to_owned());
             }
             Record::Channel(c) => {
-                summary.definitions.channels.insert(c.id, body.to_owned());
+                self.bytes = self.bytes.saturating_add(body.len());
+                self.definitions.channels.insert(c.id, body.to_owned());
             }
-            Record::Statistics(s) => summary.statistics = Some(s),
+            Record::Statistics(s) => self.statistics = Some(s),
             Record::ChunkIndex(c) => {
                 let end = c.chunk_start_offset.checked_add(c.chunk_length);
                 if end.is_none_or(|end| end > start) {
                     return Err("it names a chunk outside the data");
                 }
-                *summary.chunks.entry(c.compression.to_owned()).or_default() += 1;
+                // A log has three kinds; more than a few is not a log.
+                if self.chunks.len() > 16 {
+                    return Err("it names too many compressions");
+                }
+                *self.chunks.entry(c.compression.to_owned()).or_default() += 1;
             }
             _ => {}
         }
+        if self.bytes > limits.definitions {
+            return Err("its definitions are longer than the limit");
+        }
+        Ok(())
     }
-    Ok(Some(summary))
 }

@@ -73,7 +73,7 @@ impl Survey {
 /// walking all of it. Damage in the data section shows only in a walk.
 ///
 /// # Errors
-/// [`Error::Read`]; [`Error::Usage`] for a stream, whose survey is in the report of its [`walk`].
+/// [`Error::Read`]; [`Error::Usage`] for a stream, whose survey is in the report of its [`walk()`].
 pub fn survey(reader: &Reader, options: &WalkOptions<'_>) -> Result<Survey> {
     let (Input::File(file), Some(again)) = (&reader.input, reader.again()) else {
         let name = reader.name().display();
