@@ -14,23 +14,23 @@ const OTHERS: usize = 40;
 
 /// Everything `info` knows.
 #[derive(Clone, Debug)]
-pub struct Report<'a> {
+pub(super) struct Report<'a> {
     /// The file.
-    pub path: &'a Path,
+    pub(super) path: &'a Path,
     /// What is in it.
-    pub survey: &'a Survey,
+    pub(super) survey: &'a Survey,
     /// What is wrong with it.
-    pub problems: Vec<String>,
+    pub(super) problems: Vec<String>,
     /// Its channels.
-    pub channels: &'a [Known],
+    pub(super) channels: &'a [Known],
     /// Its topics of samples.
-    pub looked: &'a [Looked],
+    pub(super) looked: &'a [Looked],
 }
 
 impl Report<'_> {
     /// For people.
     #[must_use]
-    pub fn text(&self) -> String {
+    pub(super) fn text(&self) -> String {
         let mut out = String::new();
         self.write_file(&mut out);
         for looked in self.looked {
@@ -174,7 +174,7 @@ impl Report<'_> {
 
     /// For machines: one object.
     #[must_use]
-    pub fn json(&self) -> Value {
+    pub(super) fn json(&self) -> Value {
         let survey = self.survey;
         json!({
             "file": self.path.display().to_string(),
