@@ -114,6 +114,36 @@ fn file_standard_input_and_cat_in_a_pipe_give_the_same_attitudes() {
     }
 }
 
+#[test]
+fn what_is_lost_in_a_log_is_lost_and_counted_through_a_pipe_of_lines_too() {
+    // NaN can not be written as JSON: the line says null, and must not be passed over.
+    let dir = tempfile::tempdir().unwrap();
+    let mut samples = motion(300);
+    samples[0].gyro[1] = f64::NAN;
+    samples[100].gyro[0] = f64::NAN;
+    samples[200].gyro[2] = f64::INFINITY;
+    let log = written(dir.path(), "bad.mcap", &samples);
+    let replayed = |source: &Path, stdin: Vec<u8>| {
+        let out = dir.path().join("out.ndjson");
+        let output = strapd()
+            .args(["replay", "--json", "--force", "-o"])
+            .arg(&out)
+            .arg(source)
+            .write_stdin(stdin)
+            .output()
+            .unwrap();
+        assert_eq!(output.status.code(), Some(3), "{output:?}");
+        let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(json["topics"][0]["samples"]["total"], 300, "{json}");
+        assert_eq!(json["topics"][0]["samples"]["lost"], 3, "{json}");
+        ndjson(&std::fs::read_to_string(out).unwrap())
+    };
+    let from_file = replayed(&log, Vec::new());
+    assert_eq!(from_file.len(), 297);
+    let cat = strapd().arg("cat").arg(&log).output().unwrap();
+    assert_eq!(replayed(Path::new("-"), cat.stdout), from_file);
+}
+
 #[cfg(unix)]
 #[test]
 fn a_named_pipe_is_read_like_standard_input() {
@@ -203,6 +233,16 @@ fn a_line_is_answered_while_the_pipe_stays_open() {
         .unwrap();
     let mut to = child.stdin.take().unwrap();
     let mut from = std::io::BufReader::new(child.stdout.take().unwrap());
+    // Reads from the start: a pipe holds less than the answers to what is about to be written.
+    let (sender, receiver) = std::sync::mpsc::channel();
+    let reader = std::thread::spawn(move || {
+        let mut line = String::new();
+        std::io::BufRead::read_line(&mut from, &mut line).unwrap();
+        sender.send(line).unwrap();
+        let mut rest = String::new();
+        std::io::Read::read_to_string(&mut from, &mut rest).unwrap();
+        rest.lines().count() + 1
+    });
     for k in 0..2000 {
         writeln!(
             to,
@@ -213,15 +253,6 @@ fn a_line_is_answered_while_the_pipe_stays_open() {
     }
     to.flush().unwrap();
     // The pipe is still open: what is known must come out.
-    let (sender, receiver) = std::sync::mpsc::channel();
-    let reader = std::thread::spawn(move || {
-        let mut line = String::new();
-        std::io::BufRead::read_line(&mut from, &mut line).unwrap();
-        sender.send(line).unwrap();
-        let mut rest = String::new();
-        std::io::Read::read_to_string(&mut from, &mut rest).unwrap();
-        rest.lines().count() + 1
-    });
     let first = receiver.recv_timeout(std::time::Duration::from_secs(20));
     drop(to);
     let lines = reader.join();

@@ -27,6 +27,9 @@ pub fn resolve(outputs: &[String], log: &str, logs: usize) -> Result<Vec<String>
 /// # Errors
 /// [`Error::Usage`] naming the file and who would write it.
 pub fn check_distinct(outputs: &[String], logs: &[String]) -> Result<()> {
+    if outputs.iter().filter(|name| *name == "-").count() > 1 {
+        return Err(Error::Usage("-o -: given twice".to_owned()));
+    }
     let mut writers: BTreeMap<PathBuf, &String> = BTreeMap::new();
     for log in logs {
         for name in resolve(outputs, log, logs.len())? {
@@ -116,6 +119,7 @@ mod tests {
         assert!(check(&["a.csv", "./a.csv"], &["x.mcap"]).is_err());
         assert!(check(&["-", "null:", "a.csv", "a.mcap"], &["x.mcap"]).is_ok());
         assert!(check(&["-"], &["a/x.mcap", "b/x.mcap"]).is_ok());
+        assert!(check(&["-", "-"], &["x.mcap"]).is_err());
         assert!(check(&["{stem}.csv"], &["a.mcap", "b.mcap"]).is_ok());
     }
 

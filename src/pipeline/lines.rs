@@ -8,7 +8,7 @@ use super::run::{Replay, refused};
 use super::session::Found;
 use super::summarise;
 use super::waiting::Waiting;
-use crate::decode::{LineDecoder, MAX_LINE, Stated};
+use crate::decode::{Class, LineDecoder, MAX_LINE, Stated};
 use crate::error::{Error, Result};
 use crate::record::Nanos;
 use crate::report::summary::RunSummary;
@@ -89,8 +89,10 @@ pub fn replay(
             }
             Err(why) => items.push(Item::Undecodable(0, Box::new((received, why)))),
             Ok(line) => {
-                let has_rate = samples.iter().any(|s| s.gyro.is_some());
-                if !has_rate {
+                // A sample of our own whose rate is null was one with NaN: it is counted, not
+                // passed over.
+                let is_sample = line.class == Class::Rate && !samples.is_empty();
+                if !is_sample && samples.iter().all(|s| s.gyro.is_none()) {
                     // Attitudes, status and the like between the samples.
                     samples.clear();
                     if waiting.is_idle() && lines.number > PATIENCE {

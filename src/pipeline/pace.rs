@@ -9,11 +9,15 @@ use std::time::{Duration, Instant};
 /// Largest share of data handed on at once, s of data time at speed 1.
 const SLICE_NANOS: i64 = 5_000_000;
 
+/// A longer step of data time is not waited for.
+const JUMP_NANOS: i64 = 10_000_000_000;
+
 /// Paces a stream: data time advances `speed` times as fast as the wall clock.
 #[derive(Debug)]
 pub struct Pace {
     speed: f64,
     origin: Option<(Nanos, Instant)>,
+    last: Option<Nanos>,
 }
 
 impl Pace {
@@ -23,12 +27,13 @@ impl Pace {
         speed.map(|speed| Pace {
             speed,
             origin: None,
+            last: None,
         })
     }
 
     /// How many of the samples with these stamps may go together now: at least one.
     pub fn take(&self, stamps: impl Iterator<Item = Nanos>) -> usize {
-        let slice = (SLICE_NANOS as f64 * self.speed.max(1e-3)) as i64;
+        let slice = self.slice_nanos();
         let mut first = None;
         stamps
             .take_while(|stamp| stamp.since(*first.get_or_insert(*stamp)).abs() <= slice)
@@ -36,20 +41,34 @@ impl Pace {
             .max(1)
     }
 
-    /// Sleeps until `stamp` is due. A stamp before the origin, or far beyond the last (a clock
-    /// jump), restarts the origin instead of waiting.
+    /// Sleeps until `stamp` is due. A stamp far from the last one (a clock jump, a long gap) restarts
+    /// the origin instead of waiting; one a little before it, of another topic, goes at once.
     pub fn wait(&mut self, stamp: Nanos) {
-        const JUMP_SECS: f64 = 10.0;
-        let now = Instant::now();
-        let (start, begun) = *self.origin.get_or_insert((stamp, now));
-        let due_secs = stamp.secs_since(start) / self.speed;
-        let elapsed = now.duration_since(begun).as_secs_f64();
-        let wait = due_secs - elapsed;
-        if due_secs < 0.0 || wait > JUMP_SECS {
-            self.origin = Some((stamp, now));
-        } else if wait > 0.0 {
-            std::thread::sleep(Duration::from_secs_f64(wait));
+        let wait = self.until(stamp, Instant::now());
+        if wait > Duration::ZERO {
+            std::thread::sleep(wait);
         }
+    }
+
+    /// How long after `now` `stamp` is due.
+    fn until(&mut self, stamp: Nanos, now: Instant) -> Duration {
+        // In data time: at a low speed an ordinary step is long on the wall.
+        let longest = JUMP_NANOS.max(self.slice_nanos().saturating_mul(2));
+        let jumped = self
+            .last
+            .is_some_and(|last| stamp.since(last).saturating_abs() > longest);
+        self.last = Some(stamp);
+        if jumped {
+            self.origin = None;
+        }
+        let (start, begun) = *self.origin.get_or_insert((stamp, now));
+        let due = stamp.secs_since(start) / self.speed;
+        let elapsed = now.duration_since(begun).as_secs_f64();
+        Duration::try_from_secs_f64(due - elapsed).unwrap_or(Duration::ZERO)
+    }
+
+    fn slice_nanos(&self) -> i64 {
+        (SLICE_NANOS as f64 * self.speed.max(1e-3)) as i64
     }
 }
 
@@ -65,6 +84,44 @@ mod tests {
         let stamps = |n: i64, step: i64| (0..n).map(move |i| Nanos(i * step));
         assert_eq!(pace.take(stamps(10, 100_000_000)), 1);
         assert_eq!(pace.take(stamps(100, 1_000_000)), 6);
+    }
+
+    #[test]
+    fn a_step_of_data_takes_its_time_however_slow_the_replay() {
+        let now = Instant::now();
+        for (speed, step_nanos) in [
+            (1.0, 20_000_000),
+            (0.001, 20_000_000),
+            (0.01, 1_000_000_000),
+        ] {
+            let Some(mut pace) = Pace::new(Some(speed)) else {
+                return;
+            };
+            assert_eq!(pace.until(Nanos(0), now), Duration::ZERO);
+            let wait = pace.until(Nanos(step_nanos), now).as_secs_f64();
+            let due = step_nanos as f64 * 1e-9 / speed;
+            // Rounded to nanoseconds.
+            assert!(
+                (wait - due).abs() < 1e-6,
+                "speed {speed}: {wait} s, due {due} s"
+            );
+        }
+    }
+
+    #[test]
+    fn two_topics_that_take_turns_take_the_time_of_one() {
+        let Some(mut pace) = Pace::new(Some(1.0)) else {
+            return;
+        };
+        let now = Instant::now();
+        let second = |k: i64| Nanos(k * 1_000_000_000);
+        for k in 0..3 {
+            // The second topic's stretch begins where the first one's began.
+            for stamp in [second(k), second(k + 1), second(k), second(k + 1)] {
+                let _ = pace.until(stamp, now);
+            }
+        }
+        assert_eq!(pace.until(second(4), now), Duration::from_secs(4));
     }
 
     #[test]

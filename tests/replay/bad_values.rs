@@ -62,7 +62,7 @@ fn kinds() -> impl Strategy<Value = (SampleKind, Method)> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 48, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn a_sample_that_is_no_measurement_is_as_if_it_were_not_there(

@@ -301,12 +301,14 @@ fn messages(bytes: &[u8]) -> BTreeMap<String, Vec<(u64, u64, u32, Vec<u8>)>> {
 #[test]
 fn a_copied_input_is_whole_in_the_output_channels_schemas_and_bytes() {
     let dir = tempfile::tempdir().unwrap();
-    for name in [
-        "xsens_mti.mcap",
-        "constant_rate_ros1.mcap",
-        "constant_rate_json.mcap",
+    let made = written(dir.path(), "made.mcap", &motion(100));
+    for path in [
+        made,
+        fixture("xsens_mti.mcap"),
+        fixture("constant_rate_ros1.mcap"),
+        fixture("constant_rate_json.mcap"),
     ] {
-        let path = fixture(name);
+        let name = path.file_name().unwrap().to_str().unwrap();
         let out = dir.path().join(format!("copy_of_{name}"));
         let mut replay = replay_of(&path);
         replay.copy_input = true;
