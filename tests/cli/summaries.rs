@@ -13,7 +13,7 @@ fn the_summary_in_words_has_every_line_a_user_looks_for() {
         "log.mcap  /imu/data_raw  sensor_msgs/msg/Imu [cdr]",
         "  samples  300 in, 300 used; 2.990 s at 100.00 Hz, header clock",
         "  method   auto",
-        "  frames   body flu -> world start; initial attitude: identity",
+        "  frames   input flu -> body flu -> world start; initial attitude: identity",
         "  bias     none removed",
         "  turned   ",
         "  final    roll ",
