@@ -6,6 +6,8 @@
 
 mod made_logs;
 mod replays;
+#[allow(unreachable_pub)]
+mod shared_data;
 
 use assert_cmd::Command;
 use made_logs::{motion, written};
@@ -85,14 +87,17 @@ fn printed(command: &mut Command) -> Vec<Bits> {
 #[test]
 fn file_standard_input_and_cat_in_a_pipe_give_the_same_attitudes() {
     let dir = tempfile::tempdir().unwrap();
-    for log in [
+    let mut logs = vec![
         long_log(dir.path()),
         fixture("xsens_mti.mcap"),
         fixture("ximu3.mcap"),
         fixture("coning_jitter.mcap"),
         fixture("constant_rate_json.mcap"),
         fixture("constant_rate_ros1.mcap"),
-    ] {
+    ];
+    // Axes FRD, means with an interval of their own: a line must carry what the format says.
+    logs.extend(shared_data::shared("logs/real/px4_fmuv6c_json_zstd.mcap"));
+    for log in logs {
         let what = log.display();
         let from_file = printed(strapd().arg("replay").arg(&log).args(["-o", "-"]));
         assert!(from_file.len() > 200, "{what}: {}", from_file.len());
@@ -112,6 +117,65 @@ fn file_standard_input_and_cat_in_a_pipe_give_the_same_attitudes() {
         let from_lines = printed(strapd().arg("replay").arg(&lines).args(["-o", "-"]));
         assert_eq!(from_lines, from_file, "{what} through a file of lines");
     }
+}
+
+#[test]
+fn lines_without_a_time_are_refused_and_not_numbered() {
+    let line = |stamp: &str| format!("{{\"class\":\"RATE\",{stamp}\"gyro\":[0.1,0,0]}}\n");
+    for stamp in ["\"stamp\":{\"sec\":0,\"nsec\":0},", ""] {
+        let output = strapd()
+            .args(["replay", "-", "-o", "null:"])
+            .write_stdin(line(stamp).repeat(100))
+            .output()
+            .unwrap();
+        assert_eq!(output.status.code(), Some(1), "{stamp}: {output:?}");
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(said.contains("--time index --rate-hz"), "{stamp}: {said}");
+        // And that flag helps.
+        let output = strapd()
+            .args([
+                "replay",
+                "-",
+                "-o",
+                "-",
+                "-q",
+                "--time",
+                "index",
+                "--rate-hz",
+                "10",
+            ])
+            .write_stdin(line(stamp).repeat(101))
+            .output()
+            .unwrap();
+        assert_eq!(output.status.code(), Some(0), "{stamp}: {output:?}");
+        let found = ndjson(&String::from_utf8(output.stdout).unwrap());
+        // 10 s at 0.1 rad/s about x: one radian. 1e-12 is far above the rounding of 100 steps.
+        let [w, x, ..] = found[100].numbers();
+        assert!((w - 0.5_f64.cos()).abs() < 1e-12 && (x - 0.5_f64.sin()).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn attitudes_from_lines_are_logged_at_their_stamps() {
+    let dir = tempfile::tempdir().unwrap();
+    let log = written(dir.path(), "log.mcap", &motion(100));
+    let cat = strapd().arg("cat").arg(&log).output().unwrap();
+    let out = dir.path().join("out.mcap");
+    strapd()
+        .args(["replay", "-", "-q", "-o"])
+        .arg(&out)
+        .write_stdin(cat.stdout)
+        .assert()
+        .success();
+    let bytes = std::fs::read(out).unwrap();
+    let times: Vec<u64> = ::mcap::MessageStream::new(&bytes)
+        .unwrap()
+        .map(Result::unwrap)
+        .filter(|m| m.channel.topic == "/imu/data")
+        .map(|m| m.log_time)
+        .collect();
+    let stamps: Vec<u64> = motion(100).iter().map(|s| s.stamp as u64).collect();
+    assert_eq!(times, stamps);
 }
 
 #[test]

@@ -1,13 +1,15 @@
 //! `strapd cat SOURCE`: decoded samples as NDJSON, CSV or a table. I/O.
 
 use super::{Global, Outcome};
+use crate::config::Plan;
 use crate::decode::{FieldPath, Options};
 use crate::error::{Error, Result};
 use crate::pipeline::log::{Log, problems};
 use crate::pipeline::pool::Pool;
+use crate::pipeline::preparation::Resolved;
 use crate::pipeline::route::{Item, Route};
 use crate::pipeline::topics;
-use crate::record::RawSample;
+use crate::record::{RawSample, SampleKind};
 use crate::source::mcap::{self, WalkOptions};
 use clap::{Args, ValueEnum};
 use serde_json::json;
@@ -15,7 +17,7 @@ use std::io::{BufWriter, Write};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
-/// Decoded samples as NDJSON, CSV or a table.
+/// Decoded samples as NDJSON, CSV or a table: rad/s, m/s^2, axes FLU.
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:
   strapd cat flight.mcap -n 5 --format table
@@ -80,11 +82,13 @@ pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
         }
     };
     let mut decoders = Vec::new();
+    let mut meanings = Vec::new();
     for known in log.channels.iter().filter(|k| k.channel.topic == topic) {
         let decoder = known.decoder(&options).map_err(|why| Error::Unsupported {
             path: args.source.clone(),
             what: why.to_string(),
         })?;
+        meanings.push(Resolved::new(&Plan::default(), decoder.stated()));
         decoders.push((known.channel.id, decoder));
     }
     if decoders.is_empty() {
@@ -107,16 +111,20 @@ pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
             ..WalkOptions::default()
         },
         |channel| {
-            let (_, decoder) = decoders
+            let (stream, (_, decoder)) = decoders
                 .iter()
-                .find(|(id, _)| *id == channel.id && channel.topic == topic)?;
-            Some(Route::samples(decoder.clone(), 0))
+                .enumerate()
+                .find(|(_, (id, _))| *id == channel.id && channel.topic == topic)?;
+            Some(Route::samples(decoder.clone(), stream))
         },
         Route::map,
         |items| {
             for item in items.drain(..) {
                 match item {
-                    Item::Sample(_, raw) => match printer.print(&raw) {
+                    Item::Sample(stream, raw) => match meanings
+                        .get(stream)
+                        .map_or(Ok(true), |m| printer.print(&m.in_flu(&raw), m.kind))
+                    {
                         Ok(true) => {}
                         Ok(false) => return ControlFlow::Break(()),
                         Err(e) => {
@@ -187,13 +195,13 @@ impl Printer {
     }
 
     /// Prints one; says whether more are wanted.
-    fn print(&mut self, raw: &RawSample) -> std::io::Result<bool> {
+    fn print(&mut self, raw: &RawSample, kind: SampleKind) -> std::io::Result<bool> {
         if self.left == 0 {
             return Ok(false);
         }
         self.left -= 1;
         match self.format {
-            Format::Ndjson => self.ndjson(raw)?,
+            Format::Ndjson => self.ndjson(raw, kind)?,
             Format::Csv => self.csv(raw)?,
             Format::Table => self.table(raw)?,
         }
@@ -202,7 +210,7 @@ impl Printer {
     }
 
     /// A `RATE` object as the service reads it: what is absent is left out, NaN becomes null.
-    fn ndjson(&mut self, raw: &RawSample) -> std::io::Result<()> {
+    fn ndjson(&mut self, raw: &RawSample, kind: SampleKind) -> std::io::Result<()> {
         let (sec, nsec) = raw.header.unwrap_or(raw.log).to_sec_nanosec();
         let mut object = json!({
             "class": "RATE", "id": self.topic, "seq": self.seq,
@@ -220,7 +228,10 @@ impl Printer {
                 put("q", json!({ "w": w, "x": x, "y": y, "z": z }));
             }
             if let Some(interval) = raw.interval_nanos {
-                put("interval_ns", json!(interval));
+                put("dt_ns", json!(interval));
+            }
+            if kind != SampleKind::default() {
+                put("sample_kind", json!(kind.name()));
             }
         }
         writeln!(self.out, "{object}")

@@ -10,7 +10,7 @@ use super::summarise;
 use super::waiting::Waiting;
 use crate::decode::{Class, LineDecoder, MAX_LINE, Stated};
 use crate::error::{Error, Result};
-use crate::record::Nanos;
+use crate::record::{Nanos, RawSample};
 use crate::report::summary::RunSummary;
 use crate::sink::{Flow, Stream, output_topic};
 use crate::source::mcap::Survey;
@@ -24,6 +24,10 @@ use std::sync::Arc;
 const BATCH: usize = 2048;
 /// Lines without any sample before the first, after which this is no log of samples.
 const PATIENCE: u64 = 1000;
+
+/// What lines are called in the summary. Their undecodable payloads carry the line's number where
+/// others carry a time.
+pub(super) const DESCRIBED: &str = "NDJSON";
 
 /// Opens a file of lines.
 ///
@@ -75,8 +79,8 @@ pub fn replay(
         if lines.is_blank() {
             continue;
         }
-        // A line carries no time of its own but the one in it: its number keeps the order.
-        let received = Nanos(i64::try_from(lines.number).unwrap_or(i64::MAX));
+        // A line has no time but the one in it.
+        let received = Nanos(0);
         match decoder.decode(&lines.line, received, &mut samples) {
             Err(why) if waiting.is_idle() => {
                 return Err(Error::Unsupported {
@@ -87,7 +91,10 @@ pub fn replay(
                     ),
                 });
             }
-            Err(why) => items.push(Item::Undecodable(0, Box::new((received, why)))),
+            Err(why) => {
+                let number = Nanos(i64::try_from(lines.number).unwrap_or(i64::MAX));
+                items.push(Item::Undecodable(0, Box::new((number, why))));
+            }
             Ok(line) => {
                 // A sample of our own whose rate is null was one with NaN: it is counted, not
                 // passed over.
@@ -132,7 +139,17 @@ pub fn replay(
                     }
                     Some(_) => {}
                 }
-                items.extend(samples.drain(..).map(|raw| Item::Sample(0, raw)));
+                items.extend(samples.drain(..).map(|raw| {
+                    let stamp = raw.header.unwrap_or(received);
+                    Item::Sample(
+                        0,
+                        RawSample {
+                            log: stamp,
+                            publish: stamp,
+                            ..raw
+                        },
+                    )
+                }));
             }
         }
         // With nothing left in the buffer the next line may be long in coming: what is known goes
@@ -166,7 +183,7 @@ fn met(run: &Replay, id: &str, stated: &Stated) -> (Found, Stream) {
     let found = Found {
         name: name.to_owned(),
         output_topic: output_topic(name, &BTreeSet::new()),
-        described: "NDJSON".to_owned(),
+        described: DESCRIBED.to_owned(),
         resolved: Resolved::new(&run.plan, stated),
         noticed: Arc::default(),
         warnings: Vec::new(),

@@ -96,6 +96,30 @@ impl Resolved {
         (world.to_string(), body.to_owned())
     }
 
+    /// The sample in rad/s, m/s^2 and FLU, its orientation from FLU to ENU: what a `RATE` line
+    /// promises. The same products as in conditioning, so that no bit is lost on the way through one.
+    #[must_use]
+    pub fn in_flu(&self, raw: &RawSample) -> RawSample {
+        let by = |m: Matrix3<f64>, v: [f64; 3]| {
+            if m == Matrix3::identity() {
+                v
+            } else {
+                (m * Vector3::from(v)).into()
+            }
+        };
+        RawSample {
+            gyro: raw.gyro.map(|v| by(self.axes * self.unit.to_rad(), v)),
+            accel: raw.accel.map(|v| by(self.axes * self.accel_scale, v)),
+            orientation: raw.orientation.map(|wxyz| {
+                match (self.recorded, Quaternion::<Nav, Body>::try_from_wxyz(wxyz)) {
+                    (Convention::EnuFlu, _) | (_, Err(_)) => wxyz,
+                    (other, Ok(q)) => other.convert(Convention::EnuFlu, q).wxyz(),
+                }
+            }),
+            ..*raw
+        }
+    }
+
     /// Whether the output's body axes are other than the sensor's own.
     #[must_use]
     pub fn is_remapped(&self, plan: &Plan, world: World) -> bool {

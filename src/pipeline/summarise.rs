@@ -1,5 +1,6 @@
 //! What the stages counted -> the summary of the run. Pure.
 
+use super::lines;
 use super::run::Replay;
 use super::session::{Ended, Topic};
 use crate::model::attitude::Quaternion;
@@ -122,7 +123,11 @@ fn first_losses(topic: &Topic, start: Nanos) -> Vec<String> {
         })
         .collect();
     if let Some((log, why)) = &topic.first_undecodable {
-        said.push(format!("first undecodable, logged at {} ns: {why}", log.0));
+        said.push(if topic.described == lines::DESCRIBED {
+            format!("first undecodable, line {}: {why}", log.0)
+        } else {
+            format!("first undecodable, logged at {} ns: {why}", log.0)
+        });
     }
     said
 }

@@ -102,11 +102,22 @@ impl LineDecoder {
             class,
             id: seeker.id.as_deref().map(printable),
             seq: seeker.seq,
-            sample_kind: kind,
+            sample_kind: kind_named(seeker.kind.as_deref()).or(kind),
             gyro_unit: unit.or(stated),
             decoded,
         })
     }
+}
+
+/// The `sample_kind` of a line: what a sample means, said outright.
+fn kind_named(name: Option<&str>) -> Option<SampleKind> {
+    [
+        SampleKind::Rate,
+        SampleKind::Average,
+        SampleKind::DeltaAngle,
+    ]
+    .into_iter()
+    .find(|kind| Some(kind.name()) == name)
 }
 
 /// Reads one line without any options: see [`LineDecoder::decode`].

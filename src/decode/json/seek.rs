@@ -31,6 +31,7 @@ pub(crate) struct Seeker<'a, 'p> {
     pub(crate) class: Option<Cow<'a, str>>,
     pub(crate) id: Option<Cow<'a, str>>,
     pub(crate) seq: Option<u64>,
+    pub(crate) kind: Option<Cow<'a, str>>,
 }
 
 impl<'a, 'p> Seeker<'a, 'p> {
@@ -47,6 +48,7 @@ impl<'a, 'p> Seeker<'a, 'p> {
             class: None,
             id: None,
             seq: None,
+            kind: None,
         }
     }
 
@@ -219,6 +221,7 @@ impl<'a, 'p> Seeker<'a, 'p> {
                     "type" | "name" | "sensor" => &mut found.sensor,
                     "class" if depth == 0 => &mut self.class,
                     "id" | "device" if depth == 0 => &mut self.id,
+                    "sample_kind" if depth == 0 => &mut self.kind,
                     _ => return Ok(()),
                 };
                 slot.get_or_insert(text);
