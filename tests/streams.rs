@@ -120,6 +120,18 @@ fn file_standard_input_and_cat_in_a_pipe_give_the_same_attitudes() {
 }
 
 #[test]
+fn a_stream_takes_the_imu_and_not_a_twist_that_comes_before_it() {
+    let Some(log) = shared_data::shared("logs/native/rosbags_rs_all_types.mcap") else {
+        return;
+    };
+    let from_file = printed(strapd().arg("replay").arg(&log).args(["-o", "-"]));
+    let bytes = std::fs::read(log).unwrap();
+    let from_stdin = printed(strapd().args(["replay", "-", "-o", "-"]).write_stdin(bytes));
+    assert_eq!(from_file.len(), 2);
+    assert_eq!(from_stdin, from_file);
+}
+
+#[test]
 fn lines_without_a_time_are_refused_and_not_numbered() {
     let line = |stamp: &str| format!("{{\"class\":\"RATE\",{stamp}\"gyro\":[0.1,0,0]}}\n");
     for stamp in ["\"stamp\":{\"sec\":0,\"nsec\":0},", ""] {
@@ -206,6 +218,35 @@ fn what_is_lost_in_a_log_is_lost_and_counted_through_a_pipe_of_lines_too() {
     assert_eq!(from_file.len(), 297);
     let cat = strapd().arg("cat").arg(&log).output().unwrap();
     assert_eq!(replayed(Path::new("-"), cat.stdout), from_file);
+}
+
+#[test]
+fn a_log_on_standard_input_keeps_the_frame_of_its_sensor() {
+    let dir = tempfile::tempdir().unwrap();
+    let log = fixture("xsens_mti.mcap");
+    let frames = |source: &Path, stdin: Vec<u8>| -> Vec<(String, Vec<u8>)> {
+        let out = dir.path().join("out.mcap");
+        strapd()
+            .args(["replay", "-q", "--force", "-o"])
+            .arg(&out)
+            .arg(source)
+            .write_stdin(stdin)
+            .assert()
+            .success();
+        ::mcap::MessageStream::new(&std::fs::read(out).unwrap())
+            .unwrap()
+            .map(Result::unwrap)
+            .take(4)
+            .map(|m| (m.channel.topic.clone(), m.data.to_vec()))
+            .collect()
+    };
+    let from_file = frames(&log, Vec::new());
+    let has_frame = |data: &[u8]| data.windows(9).any(|w| w == b"imu_link\0");
+    assert!(from_file.iter().all(|(_, data)| has_frame(data)));
+    assert_eq!(
+        frames(Path::new("-"), std::fs::read(log).unwrap()),
+        from_file
+    );
 }
 
 #[cfg(unix)]

@@ -69,7 +69,7 @@ pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
                     .map_err(|e| Error::Usage(format!("--field: {e}")))
             })
             .collect::<Result<_>>()?,
-        ignore_covariance_flag: true,
+        ignore_covariance_flag: false,
         ..Options::default()
     };
     let pool = Pool::new(global.threads)?;

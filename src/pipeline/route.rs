@@ -5,8 +5,8 @@ use crate::decode::{Decoder, Undecodable};
 use crate::record::{Nanos, RawSample};
 use crate::source::mcap::{Channel, Message};
 use std::cell::RefCell;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, OnceLock};
 
 /// What a channel's messages are used for.
 #[derive(Debug)]
@@ -30,6 +30,9 @@ pub struct Noticed {
     pub gyro_marked_absent: AtomicU64,
     /// Stamps with a second or more of nanoseconds.
     pub stamps_carried: AtomicU64,
+    /// The frame the first message names; empty when it names none. Which message was first is
+    /// certain only where one thread reads.
+    pub frame_id: OnceLock<String>,
 }
 
 /// What a message became.
@@ -135,6 +138,9 @@ impl Route {
 
     fn decode(&self, decoder: &Decoder, message: &Message<'_>, out: &mut Vec<Item>) {
         let log = nanos(message.log_time);
+        self.noticed
+            .frame_id
+            .get_or_init(|| decoder.frame_id(message.data).unwrap_or_default());
         SCRATCH.with_borrow_mut(|samples| {
             samples.clear();
             match decoder.decode(message.data, log, nanos(message.publish_time), samples) {

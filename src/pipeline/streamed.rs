@@ -89,7 +89,9 @@ impl Picked {
         let wanted = match (&self.topic, named) {
             (Some(topic), _) => *topic == channel.topic,
             (None, Some(name)) => name == channel.topic,
-            (None, None) => rank(&found.role) >= PICKED_UNNAMED,
+            // A twist that may be a body rate is taken only when nothing better is there, and what
+            // is still to come nobody knows.
+            (None, None) => rank(&found.role) > PICKED_UNNAMED,
         };
         if !wanted {
             if rank(&found.role) >= PICKED_UNNAMED {
@@ -144,9 +146,12 @@ impl Picked {
         let candidates: Vec<_> = channels.iter().map(Known::candidate).collect();
         let error = match topics::choose(path, &candidates, run.plan.topic.as_deref()) {
             Err(e) => e,
-            Ok(_) => Error::NoImuTopic {
+            Ok(choice) => Error::Unsupported {
                 path: path.to_owned(),
-                topics: topics::listing(&candidates),
+                what: format!(
+                    "no IMU topic; {} may carry a body rate, but is not taken unnamed from a stream, where a better one could still come\n  help: --topic NAME",
+                    choice.topics.join(", ")
+                ),
             },
         };
         explained(error, &channels, &problems(survey))

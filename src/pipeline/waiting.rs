@@ -75,9 +75,13 @@ impl<'r> Waiting<'r> {
     }
 
     fn begin(&mut self, pool: &Pool) -> Result<Flow> {
-        let Some((found, stream, preparation)) = self.gathering.take() else {
+        let Some((found, mut stream, preparation)) = self.gathering.take() else {
             return Ok(Flow::Continue);
         };
+        // Read on this thread alone, so that the first message is the first.
+        if let Some(frame) = found.noticed.frame_id.get() {
+            stream.frame_id.clone_from(frame);
+        }
         let prepared = preparation
             .decide()
             .map_err(|what| refused(self.path, &found.name, what))?;

@@ -34,7 +34,7 @@ fn a_file_that_may_not_be_read_says_why() {
     use std::os::unix::fs::PermissionsExt;
     let dir = bench();
     let log = dir.path().join("log.mcap");
-    std::fs::set_permissions(&log, std::fs::Permissions::from_mode(0o0)).unwrap();
+    std::fs::set_permissions(&log, std::fs::Permissions::from_mode(0o000)).unwrap();
     if std::fs::File::open(&log).is_ok() {
         eprintln!("SKIPPED: this user may read everything");
         return;

@@ -282,9 +282,11 @@ fn every_imu_of_a_log_gets_an_output_topic_of_its_own_and_they_are_not_mixed() {
     assert!(!csv.exists());
 }
 
-/// Topic -> its messages: log time, publish time, sequence, payload.
-#[allow(clippy::type_complexity)] // The fields of a message, by topic.
-fn messages(bytes: &[u8]) -> BTreeMap<String, Vec<(u64, u64, u32, Vec<u8>)>> {
+/// Log time, publish time, sequence, payload.
+type Message = (u64, u64, u32, Vec<u8>);
+
+/// Topic -> its messages.
+fn messages(bytes: &[u8]) -> BTreeMap<String, Vec<Message>> {
     let mut all: BTreeMap<String, Vec<_>> = BTreeMap::new();
     for message in mcap::MessageStream::new(bytes).unwrap() {
         let m = message.unwrap();
