@@ -241,7 +241,11 @@ fn first_messages(reader: Reader, survey: &Survey) -> Result<(Vec<First>, Vec<St
     // On the calling thread: "first" must not depend on who was faster.
     let report = mcap::walk(
         reader,
-        &WalkOptions::default(),
+        // One item a channel: waiting for a batch of them would read the whole log.
+        &WalkOptions {
+            batch: 1,
+            ..WalkOptions::default()
+        },
         |_| Some(AtomicBool::new(false)),
         |seen, message, out: &mut Vec<First>| {
             if !seen.swap(true, Ordering::Relaxed) {

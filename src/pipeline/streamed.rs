@@ -37,7 +37,11 @@ pub(super) fn replay(
     let report = mcap::walk(
         reader,
         // On this thread: what is learnt from a first message must not depend on who was faster.
-        &WalkOptions::default(),
+        // And nothing waits for a batch: the stream may pause.
+        &WalkOptions {
+            batch: 1,
+            ..WalkOptions::default()
+        },
         |channel| picked.borrow_mut().route(run, channel),
         Route::map,
         |items| {
