@@ -29,12 +29,13 @@ mod select;
 mod stamp;
 mod stated;
 
+pub use crate::condition::GyroUnit;
 pub use fields::{BadFieldPath, FieldPath, FieldRole};
 pub use json::line::{Class, Line, LineDecoder, MAX_LINE, decode_line};
 pub use refusal::{Undecodable, Unsupported, printable};
 pub use role::{Rank, Role, role};
 pub use stamp::TimeUnit;
-pub use stated::{AccelUnit, BodyAxes, GyroUnit, Stated, WorldAxes};
+pub use stated::{AccelUnit, BodyAxes, Stated, WorldAxes};
 
 use crate::record::{Nanos, RawSample};
 use registers::{Form, Slot, StampForm};

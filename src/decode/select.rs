@@ -11,7 +11,7 @@ use super::fields::{FieldPath, FieldRole, Segment};
 use super::registers::{Form, Slot, StampForm};
 use super::schema::{Field, Kind, Many, Schema, Struct};
 use super::stamp::TimeUnit;
-use super::stated::GyroUnit;
+use crate::condition::GyroUnit;
 use crate::record::SampleKind;
 
 /// One step from a struct towards a number.

@@ -3,18 +3,8 @@
 //! Apart from the samples because it is decided once per channel, and because the user may know
 //! better: a flag given by hand wins over anything stated here.
 
+use crate::condition::GyroUnit;
 use crate::record::SampleKind;
-
-/// Unit of a body rate; a delta angle has the same without the second.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Hash)]
-pub enum GyroUnit {
-    /// rad/s.
-    Rad,
-    /// deg/s.
-    Deg,
-    /// mrad/s.
-    Mrad,
-}
 
 /// Unit of a specific force.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Hash)]

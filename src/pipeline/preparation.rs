@@ -45,11 +45,7 @@ impl Resolved {
             Some(decode::BodyAxes::Frd) => BodyAxes::Frd,
             Some(decode::BodyAxes::Flu) | None => BodyAxes::Flu,
         });
-        let unit = plan.unit.unwrap_or(match stated.gyro_unit {
-            Some(decode::GyroUnit::Deg) => GyroUnit::Deg,
-            Some(decode::GyroUnit::Mrad) => GyroUnit::Mrad,
-            Some(decode::GyroUnit::Rad) | None => GyroUnit::Rad,
-        });
+        let unit = plan.unit.or(stated.gyro_unit).unwrap_or_default();
         let mount: Quaternion<Body, Sensor> = plan
             .mount
             .map_or_else(Quaternion::identity, Quaternion::assume_unit);
