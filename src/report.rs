@@ -1,3 +1,4 @@
 //! What a run says about itself, for people and for machines. Pure.
 
+pub mod plot;
 pub mod summary;
