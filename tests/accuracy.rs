@@ -30,7 +30,7 @@ use top::Top;
 const MARGIN: usize = 24;
 const FINE: usize = 4000;
 
-fn centred(window: usize, order: Order) -> Method {
+const fn centred(window: usize, order: Order) -> Method {
     Method::Magnus {
         window,
         order,
@@ -46,7 +46,7 @@ fn causal(window: usize, order: Order) -> Method {
     }
 }
 
-fn commit(window: usize) -> Method {
+const fn commit(window: usize) -> Method {
     Method::CommitProvisional {
         window,
         order: Order::M8,
