@@ -12,6 +12,8 @@ mod gaps;
 mod live;
 #[path = "accuracy/noise.rs"]
 mod noise;
+#[path = "accuracy/peers.rs"]
+mod peers;
 #[path = "accuracy/random.rs"]
 mod random;
 #[path = "accuracy/run.rs"]
