@@ -12,6 +12,8 @@ mod gaps;
 mod live;
 #[path = "accuracy/noise.rs"]
 mod noise;
+#[path = "accuracy/orders.rs"]
+mod orders;
 #[path = "accuracy/peers.rs"]
 mod peers;
 #[path = "accuracy/random.rs"]
@@ -42,7 +44,7 @@ const fn centred(window: usize, order: Order) -> Method {
     }
 }
 
-fn causal(window: usize, order: Order) -> Method {
+const fn causal(window: usize, order: Order) -> Method {
     Method::Magnus {
         window,
         order,
