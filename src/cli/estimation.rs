@@ -89,7 +89,11 @@ pub struct Estimation {
     /// Use a gyro whose covariance is marked -1 (absent) all the same: some drivers set it wrongly
     #[arg(long)]
     pub ignore_covariance_flag: bool,
-    /// Noise for the covariance: consumer, industrial, tactical, navigation, or arw=RAD_PER_SQRT_S[,bias-instability=RAD_S]
+    /// Noise for the covariance: consumer, industrial, tactical, navigation, or a list
+    ///
+    /// arw=RAD_PER_SQRT_S[,bias-instability=RAD_S][,rrw=RAD_S_PER_SQRT_S][,turn-on-bias=RAD_S][,initial=RAD],
+    /// each one number, or three x/y/z for the body axes. The turn-on bias counts unless a bias is removed
+    /// (--bias); initial is the uncertainty of the initial attitude.
     #[arg(long, value_name = "NOISE", default_value = "consumer")]
     pub noise: String,
     /// Skip the first seconds of the data

@@ -201,14 +201,17 @@ impl Propagator {
         }
         if !first {
             self.state.reset_count = self.state.reset_count.saturating_add(1);
+            let gap = secs(sample.stamp.0.saturating_sub(self.last_stamp));
             let status = if sample.join == Join::Reset {
                 self.state.report.resets += 1;
+                self.state.covariance.pass(gap);
                 Status::RESET
             } else {
                 self.state.report.holds += 1;
-                let gap = secs(sample.stamp.0.saturating_sub(self.last_stamp));
                 let [x, y, z] = self.last_rate;
-                self.state.sigma.hold(Vector3::new(x, y, z).norm(), gap);
+                self.state
+                    .covariance
+                    .hold(Vector3::new(x, y, z).norm(), gap);
                 Status::HELD
             };
             self.state.added = self.state.added.with(status);
@@ -349,26 +352,26 @@ impl Propagator {
                 None
             };
             let mut ahead = self.state.attitude;
-            let mut sigma = self.state.sigma;
+            let mut covariance = self.state.covariance;
             if newest >= self.next {
                 self.scratch.clear();
                 plan.append_steps(&self.track, self.next, newest, &mut self.scratch);
                 for (i, step) in self.scratch.iter().enumerate() {
                     ahead.turn(step.turn);
-                    sigma.integrate(self.track.spacing(self.next + i));
-                    sigma.bridge(step.gap_variance, step.gap_noise);
+                    covariance.advance(step.turn, self.track.step(self.next + i));
+                    covariance.bridge(step.gap_variance, step.gap_noise);
                 }
                 if let (true, Some(step)) = (turns, self.scratch.last()) {
                     self.state.added = self.state.added.with(step.status());
                 }
             }
-            let committed = (self.state.attitude, self.state.sigma);
-            (self.state.attitude, self.state.sigma) = (ahead, sigma);
+            let committed = (self.state.attitude, self.state.covariance);
+            (self.state.attitude, self.state.covariance) = (ahead, covariance);
             if newest >= self.next {
                 self.state.added = self.state.added.with(Status::PROVISIONAL);
             }
             self.state.output_at(&sample, rate, out);
-            (self.state.attitude, self.state.sigma) = committed;
+            (self.state.attitude, self.state.covariance) = committed;
         }
     }
 
