@@ -27,7 +27,7 @@ pub struct Estimation {
     /// auto, magnus, causal, commit, dcm-left, dcm-right, dcm-mean, rotvec-sum
     #[arg(long, default_value = "auto", env = "STRAPD_METHOD")]
     pub method: String,
-    /// Samples in the window of --method magnus|causal|commit (2 to 24)
+    /// Samples in the window of --method magnus|causal|commit (2 to 24; commit: 6 rates or 5 increments)
     #[arg(long, value_name = "P")]
     pub window: Option<usize>,
     /// Order of the Magnus step of --method magnus|causal|commit: 2, 4, 6, 8 or exact
@@ -265,15 +265,17 @@ impl Estimation {
                 order: asked_order.unwrap_or(order),
                 placement,
             },
-            Method::CommitProvisional {
-                window,
-                order,
-                finals,
-            } => Method::CommitProvisional {
-                window: self.window.unwrap_or(window),
-                order: asked_order.unwrap_or(order),
-                finals,
-            },
+            Method::Live { order, finals } => {
+                let order = asked_order.unwrap_or(order);
+                match self.window {
+                    Some(window) => Method::CommitProvisional {
+                        window,
+                        order,
+                        finals,
+                    },
+                    None => Method::Live { order, finals },
+                }
+            }
             other if self.window.is_none() && asked_order.is_none() => other,
             _ => {
                 return Err(Error::Usage(format!(
