@@ -3,6 +3,7 @@
 //! [`frames`] says what a rotation joins, [`attitude`] how it is held and moved.
 
 pub mod attitude;
+pub mod dh;
 mod double_double;
 mod elliptic;
 pub mod frames;
@@ -11,3 +12,4 @@ pub mod motion;
 mod quaternion_kernel;
 pub mod rigid_body;
 pub mod top;
+pub mod youbot;
