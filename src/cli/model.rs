@@ -5,6 +5,7 @@
 
 mod filter;
 mod inertia;
+pub(crate) mod top_flags;
 
 use super::{Global, Outcome};
 use crate::error::Result;
