@@ -7,6 +7,7 @@ pub mod dh;
 mod double_double;
 mod elliptic;
 pub mod frames;
+pub mod imu_error;
 pub mod inertia;
 pub mod motion;
 mod quaternion_kernel;
