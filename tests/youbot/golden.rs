@@ -332,11 +332,11 @@ fn an_imu_on_the_joint_trajectory() {
         let secs = sample["t"].as_f64().unwrap();
         let what = format!("t = {secs}");
         let nanos = (secs * 1e9).round() as u64;
-        let m = imu.joints(nanos).unwrap();
+        let m = imu.joints(nanos);
         close(&what, &m.q().angles(), &sample["q"], EXACT);
         close(&what, &m.qd(), &sample["qd"], EXACT);
         close(&what, &m.qdd(), &sample["qdd"], EXACT);
-        let reading = imu.at_nanos(nanos).unwrap();
+        let reading = imu.read(nanos);
         close(&what, reading.rate.0.as_slice(), &sample["gyro"], EXACT);
         let f = reading.specific_force.as_vector();
         close(&what, f.as_slice(), &sample["accel"], EXACT);

@@ -281,11 +281,69 @@ fn paths_meet_the_base_axis_and_the_stops_with_a_reason() {
         }; 5],
     )
     .unwrap();
-    let imu = Gripper::along_joints(Arm::seed(), swing, ImuMount::at_tool(), level()).unwrap();
-    assert!(imu.at_nanos(0).is_ok());
-    let said = imu.at_nanos(2_000_000_000).unwrap_err().to_string();
+    let refused = Gripper::along_joints(Arm::seed(), swing, ImuMount::at_tool(), level());
     assert_eq!(
-        said,
-        "at 2.000000 s of the path: joint 2 would be at 144.638 deg, its range is -90.0 to 65.0 deg (seed convention)"
+        refused.unwrap_err().to_string(),
+        "joint 2 would be at 171.887 deg, its range is -90.0 to 65.0 deg (seed convention)"
     );
+    // One that stands still is where it is, not where it might swing to.
+    let still = JointPath::sinusoids(
+        [Sinusoid {
+            amplitude: 3.0,
+            ..Sinusoid::default()
+        }; 5],
+    )
+    .unwrap();
+    assert!(still.check(Arm::seed().limits()).is_ok());
+    let arm = Arm::seed();
+    let beyond = degrees([0.0, 0.0, 0.0, 200.0, 0.0]);
+    let legs = JointPath::through(&arm, &[SeedJoints::ZERO, beyond]).unwrap();
+    assert!(matches!(
+        legs.check(arm.limits()),
+        Err(ArmError::Limit { joint: 4, .. })
+    ));
+    let knots = JointPath::knots(0.5, vec![SeedJoints::ZERO.at_rest(), beyond.at_rest()]).unwrap();
+    let said = knots.check(arm.limits()).unwrap_err().to_string();
+    assert!(
+        said.starts_with("at 0.500000 s of the path: joint 4 would be at 200.000"),
+        "{said}"
+    );
+}
+
+#[test]
+fn knots_meet_the_path_they_were_taken_from() {
+    let start = SeedJoints::new([0.0, 0.106, -1.767, 1.24, 0.0]).unwrap();
+    let track = ToolTrack::new(Arm::seed(), cartesian_path(), &start).unwrap();
+    let path = track.joint_path(7.0).unwrap();
+    near(&[path.duration().unwrap()], &[7.0], 1e-12);
+    let mut worst = [0.0_f64; 3];
+    for i in 0..1000 {
+        let secs = 0.006_99 * f64::from(i);
+        let (a, b) = (track.at(secs).unwrap(), path.at(secs).unwrap());
+        let off = |x: [f64; 5], y: [f64; 5]| {
+            x.iter()
+                .zip(y)
+                .map(|(x, y)| (x - y).abs())
+                .fold(0.0, f64::max)
+        };
+        worst[0] = worst[0].max(off(a.q().angles(), b.q().angles()));
+        worst[1] = worst[1].max(off(a.qd(), b.qd()));
+        worst[2] = worst[2].max(off(a.qdd(), b.qdd()));
+    }
+    println!(
+        "knots every 10 ms: {:.1e} rad, {:.1e} rad/s, {:.1e} rad/s^2",
+        worst[0], worst[1], worst[2]
+    );
+    assert!(
+        worst[0] < 1e-13 && worst[1] < 1e-11 && worst[2] < 1e-8,
+        "{worst:?}"
+    );
+    // Slow, it is the same path later; outside it stands.
+    let slow = path.slowed(2.0).unwrap();
+    let (a, b) = (path.at(1.234).unwrap(), slow.at(2.468).unwrap());
+    near(&a.q().angles(), &b.q().angles(), 1e-14);
+    near(&a.qd(), &b.qd().map(|w| 2.0 * w), 1e-13);
+    near(&a.qdd(), &b.qdd().map(|w| 4.0 * w), 1e-11);
+    assert_eq!(path.at(8.0).unwrap().qd(), [0.0; 5]);
+    assert_eq!(path.at(-1.0).unwrap().q(), path.at(0.0).unwrap().q());
 }

@@ -8,6 +8,7 @@ use super::{Arm, ArmError, Base, Tool};
 use crate::model::attitude::{BodyRate, DeltaAngle, Quaternion};
 use crate::model::dh::Transform;
 use crate::model::frames::{Dcm, In, NotARotation, Sensor};
+use crate::model::rigid_body::Spin;
 use nalgebra::Vector3;
 
 /// How an IMU sits on the gripper: its axes and its place in the tool frame.
@@ -100,86 +101,89 @@ impl ImuReading {
     }
 }
 
-/// Where the joints' motion in time comes from.
-#[derive(Clone, PartialEq, Debug)]
-enum Course {
-    Joints(JointPath),
-    Tool(Box<ToolTrack>),
-}
-
 /// The gripper as a synthetic IMU: readings and exact attitude at any instant.
+///
+/// Everything that can go wrong on the way is found when it is made; after that every instant has an
+/// answer.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Gripper {
     arm: Arm,
-    course: Course,
+    path: JointPath,
     mount: ImuMount,
     g_b: In<Base>,
 }
 
 impl Gripper {
-    /// Along a path in joint space; gravity in m/s^2, base axes. The joints' stops are looked at as it
-    /// runs.
+    /// Along a path in joint space; gravity in m/s^2, base axes.
     ///
     /// # Errors
-    /// Gravity not finite or beyond 1e6 m/s^2.
+    /// [`ArmError::Limit`] when the path takes a joint past its stop at any time; gravity not finite or
+    /// beyond 1e6 m/s^2.
     pub fn along_joints(
         arm: Arm,
         path: JointPath,
         mount: ImuMount,
         g_b: In<Base>,
     ) -> Result<Self, ArmError> {
-        Self::on(arm, Course::Joints(path), mount, g_b)
-    }
-
-    /// Along a path of the gripper.
-    ///
-    /// # Errors
-    /// As [`Gripper::along_joints`].
-    pub fn along_track(track: ToolTrack, mount: ImuMount, g_b: In<Base>) -> Result<Self, ArmError> {
-        Self::on(*track.arm(), Course::Tool(Box::new(track)), mount, g_b)
-    }
-
-    fn on(arm: Arm, course: Course, mount: ImuMount, g_b: In<Base>) -> Result<Self, ArmError> {
         let g = g_b.as_vector();
         bounded("gravity (m/s^2)", [g.x, g.y, g.z], 1e6)?;
+        path.check(arm.limits())?;
         Ok(Self {
             arm,
-            course,
+            path,
             mount,
             g_b,
         })
     }
 
-    /// Joints at `nanos` nanoseconds from the start.
+    /// Along a path of the gripper, for `secs` seconds; after that it stands.
     ///
     /// # Errors
-    /// [`ArmError::Path`] with the time: past a stop, out of reach, singular.
-    pub fn joints(&self, nanos: u64) -> Result<SeedMotion, ArmError> {
-        self.joints_at(secs(nanos))
+    /// [`ArmError::Path`] with the time and the reason.
+    pub fn along_track(
+        track: &ToolTrack,
+        secs: f64,
+        mount: ImuMount,
+        g_b: In<Base>,
+    ) -> Result<Self, ArmError> {
+        let path = track.joint_path(secs)?;
+        Self::along_joints(*track.arm(), path, mount, g_b)
     }
 
-    fn joints_at(&self, secs: f64) -> Result<SeedMotion, ArmError> {
-        let path = match &self.course {
-            Course::Tool(track) => return track.at(secs),
-            Course::Joints(path) => path,
-        };
-        let checked = path.at(secs).and_then(|motion| {
-            self.arm.limits().check(motion.q())?;
-            Ok(motion)
-        });
-        checked.map_err(|why| ArmError::Path {
-            secs,
-            why: Box::new(why),
-        })
+    /// The arm.
+    #[must_use]
+    pub fn arm(&self) -> &Arm {
+        &self.arm
+    }
+
+    /// Joints at `nanos` nanoseconds from the start.
+    #[must_use]
+    pub fn joints(&self, nanos: u64) -> SeedMotion {
+        self.path.motion(secs(nanos))
     }
 
     /// Reading and truth at `nanos` nanoseconds from the start.
-    ///
-    /// # Errors
-    /// As [`Gripper::joints`].
-    pub fn at_nanos(&self, nanos: u64) -> Result<ImuReading, ArmError> {
-        let motion = self.joints(nanos)?;
-        Ok(self.mount.read(&self.arm, &motion, &self.g_b))
+    #[must_use]
+    pub fn read(&self, nanos: u64) -> ImuReading {
+        self.mount.read(&self.arm, &self.joints(nanos), &self.g_b)
+    }
+
+    /// The truth as a motion of a body against a world: base axes are n, sensor axes are b.
+    #[must_use]
+    pub fn at_nanos(&self, nanos: u64) -> Spin {
+        let reading = self.read(nanos);
+        Spin {
+            q_nb: Quaternion::assume_unit(reading.attitude().wxyz()),
+            w_nb_b: reading.rate.0,
+        }
+    }
+
+    /// Acceleration of the IMU, m/s^2, base axes.
+    #[must_use]
+    pub fn acceleration(&self, nanos: u64) -> In<Base> {
+        let reading = self.read(nanos);
+        let f = reading.t_base_imu.rotation() * reading.specific_force;
+        In::assume(f.as_vector() + self.g_b.as_vector())
     }
 
     /// Integral of the angular rate over `from..to` nanoseconds, sensor axes: what an integrating gyro
@@ -187,34 +191,28 @@ impl Gripper {
     ///
     /// # Accuracy
     /// 1e-15 rad for intervals up to a second at the arm's rates: Gauss's rule of eight points on
-    /// pieces of at most 50 ms leaves less than rounding.
-    ///
-    /// # Errors
-    /// As [`Gripper::joints`]; [`ArmError::TooLarge`] for an interval above 1000 s.
-    pub fn delta_angle(&self, from: u64, to: u64) -> Result<DeltaAngle, ArmError> {
+    /// pieces of at most 50 ms (up to 14 h; longer for more) leaves less than rounding.
+    #[must_use]
+    pub fn delta_angle(&self, from: u64, to: u64) -> DeltaAngle {
         let (sign, from, to) = if to >= from {
             (1.0, from, to)
         } else {
             (-1.0, to, from)
         };
         let whole = secs(to - from);
-        bounded("interval of a delta angle (s)", [whole], 1e3)?;
-        let pieces = (whole / 0.05).ceil().max(1.0);
-        let half = 0.5 * whole / pieces;
+        let pieces = (whole / 0.05).ceil().clamp(1.0, 1e6) as u32;
+        let half = 0.5 * whole / f64::from(pieces);
         let start = secs(from);
         let mut sum = Vector3::zeros();
-        let mut piece = 0.0;
-        while piece < pieces {
-            let middle = start + half * (2.0 * piece + 1.0);
+        for piece in 0..pieces {
+            let middle = start + half * (2.0 * f64::from(piece) + 1.0);
             for (node, weight) in GAUSS {
                 for at in [middle - half * node, middle + half * node] {
-                    let motion = self.joints_at(at)?;
-                    sum += self.mount.rate(&self.arm, &motion).0 * weight;
+                    sum += self.mount.rate(&self.arm, &self.path.motion(at)).0 * weight;
                 }
             }
-            piece += 1.0;
         }
-        Ok(DeltaAngle(sum * (half * sign)))
+        DeltaAngle(sum * (half * sign))
     }
 }
 

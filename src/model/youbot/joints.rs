@@ -144,6 +144,15 @@ impl SeedMotion {
         })
     }
 
+    /// A motion the library computed from bounded numbers: finite by construction.
+    pub(super) fn computed(q: [f64; JOINTS], qd: [f64; JOINTS], qdd: [f64; JOINTS]) -> Self {
+        Self {
+            q: SeedJoints(q),
+            qd,
+            qdd,
+        }
+    }
+
     /// Angles, rad.
     #[must_use]
     pub fn q(&self) -> &SeedJoints {

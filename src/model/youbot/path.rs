@@ -1,8 +1,11 @@
-//! Time -> joints: sinusoids, and rests joined by smooth legs. Pure.
+//! Time -> joints: sinusoids, rests joined by smooth legs, knots. Pure.
 
 use super::error::bounded;
 use super::joints::{JOINTS, SeedJoints, SeedMotion};
+use super::limits::Limits;
 use super::{Arm, ArmError};
+
+mod knots;
 
 /// `c + A sin(w t + p)` with its derivatives.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
@@ -85,6 +88,13 @@ pub enum JointPath {
         /// In order.
         legs: Vec<Leg>,
     },
+    /// Joints, rates and accelerations at equal intervals; polynomials of fifth degree between.
+    Knots {
+        /// Interval, s.
+        step: f64,
+        /// The first is at zero.
+        knots: Vec<SeedMotion>,
+    },
 }
 
 impl JointPath {
@@ -141,6 +151,21 @@ impl JointPath {
         Self::legs(*first, legs)
     }
 
+    /// Knots every `step` seconds.
+    ///
+    /// # Errors
+    /// A step below a microsecond or above 1000 s; no knots.
+    pub fn knots(step: f64, knots: Vec<SeedMotion>) -> Result<Self, ArmError> {
+        bounded("interval between knots (s)", [step], 1e3)?;
+        if step < 1e-6 || knots.is_empty() {
+            return Err(ArmError::Impossible {
+                what: "knots must be at least one, and a microsecond apart (s)",
+                value: step,
+            });
+        }
+        Ok(Self::Knots { step, knots })
+    }
+
     /// Default motion of the simulator: every joint swings between its stops, none above 90 deg/s.
     #[must_use]
     pub fn demonstration() -> Self {
@@ -165,6 +190,7 @@ impl JointPath {
         match self {
             Self::Sinusoids(_) => None,
             Self::Legs { legs, .. } => Some(legs.iter().map(|leg| leg.duration).sum()),
+            Self::Knots { step, knots } => Some(step * (knots.len() - 1) as f64),
         }
     }
 
@@ -174,14 +200,25 @@ impl JointPath {
     /// [`ArmError::NotFinite`] time; [`ArmError::TooLarge`] beyond 1e9 s.
     pub fn at(&self, secs: f64) -> Result<SeedMotion, ArmError> {
         bounded("time on the path (s)", [secs], 1e9)?;
+        let motion = self.motion(secs);
+        SeedMotion::new(
+            SeedJoints::new(motion.q().angles())?,
+            motion.qd(),
+            motion.qdd(),
+        )
+    }
+
+    /// As [`JointPath::at`] for a finite time, without a look at the size of the numbers.
+    pub(super) fn motion(&self, secs: f64) -> SeedMotion {
         match self {
             Self::Sinusoids(joints) => {
                 let (mut q, mut qd, mut qdd) = ([0.0; JOINTS], [0.0; JOINTS], [0.0; JOINTS]);
                 for (i, joint) in joints.iter().enumerate() {
                     [q[i], qd[i], qdd[i]] = joint.at(secs);
                 }
-                SeedMotion::new(SeedJoints::new(q)?, qd, qdd)
+                SeedMotion::computed(q, qd, qdd)
             }
+            Self::Knots { step, knots } => knots::at(*step, knots, secs),
             Self::Legs { from, legs } => {
                 let mut start = 0.0;
                 let mut before = *from;
@@ -192,12 +229,47 @@ impl JointPath {
                     start += leg.duration;
                     before = leg.to;
                 }
-                Ok(before.at_rest())
+                before.at_rest()
             }
         }
     }
 
-    /// The fastest each joint ever moves, rad/s, exact.
+    /// Whether no joint ever passes its stop.
+    ///
+    /// # Errors
+    /// [`ArmError::Limit`] with the joint and the farthest it goes; for knots also the time.
+    pub fn check(&self, limits: &Limits) -> Result<(), ArmError> {
+        match self {
+            Self::Sinusoids(joints) => {
+                for side in [1.0, -1.0] {
+                    let farthest = joints.map(|j| {
+                        if j.angular_frequency == 0.0 {
+                            return j.centre + j.amplitude * j.phase.sin();
+                        }
+                        j.centre + j.amplitude.abs() * side
+                    });
+                    limits.check(&SeedJoints::new(farthest)?)?;
+                }
+                Ok(())
+            }
+            // Between two points every joint stays between its two angles.
+            Self::Legs { from, legs } => {
+                limits.check(from)?;
+                legs.iter().try_for_each(|leg| limits.check(&leg.to))
+            }
+            Self::Knots { step, knots } => {
+                for (knot, i) in knots.iter().zip(0_u32..) {
+                    limits.check(knot.q()).map_err(|why| ArmError::Path {
+                        secs: step * f64::from(i),
+                        why: Box::new(why),
+                    })?;
+                }
+                Ok(())
+            }
+        }
+    }
+
+    /// The fastest each joint ever moves, rad/s; exact but for knots, of which it knows the knots.
     #[must_use]
     pub fn peak_rates(&self) -> [f64; JOINTS] {
         match self {
@@ -216,6 +288,12 @@ impl JointPath {
                 }
                 peaks
             }
+            Self::Knots { knots, .. } => knots.iter().fold([0.0; JOINTS], |mut peaks, knot| {
+                for (peak, rate) in peaks.iter_mut().zip(knot.qd()) {
+                    *peak = rate.abs().max(*peak);
+                }
+                peaks
+            }),
         }
     }
 
@@ -241,6 +319,15 @@ impl JointPath {
                 }
                 Self::legs(*from, legs)
             }
+            Self::Knots { step, knots } => {
+                let slow = |knot: &SeedMotion| {
+                    let qd = knot.qd().map(|w| w / factor);
+                    let qdd = knot.qdd().map(|a| a / (factor * factor));
+                    SeedMotion::new(*knot.q(), qd, qdd)
+                };
+                let knots: Result<Vec<_>, _> = knots.iter().map(slow).collect();
+                Self::knots(step * factor, knots?)
+            }
         }
     }
 
@@ -258,7 +345,7 @@ impl JointPath {
 }
 
 /// A leg, `secs` after its start.
-fn along(from: &SeedJoints, leg: &Leg, secs: f64) -> Result<SeedMotion, ArmError> {
+fn along(from: &SeedJoints, leg: &Leg, secs: f64) -> SeedMotion {
     let [s, sd, sdd] = rest_to_rest(secs, leg.duration);
     let start = from.angles();
     let (mut q, mut qd, mut qdd) = (start, [0.0; JOINTS], [0.0; JOINTS]);
@@ -266,5 +353,5 @@ fn along(from: &SeedJoints, leg: &Leg, secs: f64) -> Result<SeedMotion, ArmError
         let way = b - a;
         (q[i], qd[i], qdd[i]) = (a + way * s, way * sd, way * sdd);
     }
-    SeedMotion::new(SeedJoints::new(q)?, qd, qdd)
+    SeedMotion::computed(q, qd, qdd)
 }
