@@ -7,9 +7,11 @@ pub mod compare;
 pub mod estimation;
 pub mod info;
 pub mod manual;
+pub mod model;
 pub mod outputs;
 pub mod progress;
 pub mod replay;
+pub mod simulate;
 
 use crate::error::{Error, Result};
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -27,6 +29,7 @@ use std::process::ExitCode;
   strapd info flight.mcap                      what is in it, and how good it is
   strapd replay flight.mcap -o attitude.mcap   gyro samples to attitude
   strapd compare attitude.mcap flight.mcap     how far from a recorded orientation
+  strapd simulate top -o top.mcap              a gyro whose truth is known, to try it all on
   strapd cat flight.mcap --topic /imu | head   decoded samples as NDJSON
 
 Exit codes: 0 done; 1 failed; 2 bad arguments; 3 done, but samples were lost;
@@ -115,6 +118,10 @@ pub enum Command {
     Compare(compare::Compare),
     /// Decoded samples as NDJSON, CSV or a table
     Cat(cat::Cat),
+    /// Samples of a synthetic gyro whose true attitude is known exactly
+    Simulate(Box<simulate::Simulate>),
+    /// The model library: requests as NDJSON on stdin, answers on stdout
+    Model(model::Model),
     /// Shell completions on stdout
     Completions(manual::Completions),
     /// The manual page (roff) on stdout, or all of them into a directory
@@ -155,6 +162,8 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Info(command) => info::run(&cli.global, &command),
         Command::Compare(command) => compare::run(&cli.global, &command),
         Command::Cat(command) => cat::run(&cli.global, &command),
+        Command::Simulate(command) => simulate::run(&cli.global, &command),
+        Command::Model(command) => model::run(&cli.global, &command),
         Command::Completions(command) => manual::completions(&command),
         Command::Man(command) => manual::man(&command),
     }

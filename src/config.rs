@@ -351,7 +351,7 @@ impl Shard {
 }
 
 /// `N` finite numbers separated by commas.
-fn numbers<const N: usize>(flag: &str, list: &str) -> Result<[f64; N]> {
+pub(crate) fn numbers<const N: usize>(flag: &str, list: &str) -> Result<[f64; N]> {
     let parsed: Option<Vec<f64>> = list
         .split(',')
         .map(|part| part.trim().parse::<f64>().ok().filter(|v| v.is_finite()))

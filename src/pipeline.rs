@@ -17,6 +17,7 @@ pub mod replay;
 pub mod route;
 pub mod run;
 pub mod session;
+pub mod simulate;
 mod streamed;
 pub mod summarise;
 pub mod topics;

@@ -1,4 +1,4 @@
-//! AttitudeSample -> the world: MCAP, NDJSON, CSV, or nothing. I/O.
+//! AttitudeSample (and, from a synthetic gyro, RawSample) -> the world: MCAP, NDJSON, CSV, or nothing. I/O.
 //!
 //! A stage of its own because it is the only one that may block on a disk or a pipe, and the only
 //! one that knows what output looks like. Samples collect per stream; full batches of
@@ -21,11 +21,11 @@ pub use decimate::Decimator;
 pub use mcap::chunk::Compression;
 pub use mcap::{Encoding, InputChannel, InputMessage};
 pub use output::Flow;
-pub use stream::{Provenance, Stream, output_topic};
+pub use stream::{Content, Provenance, Stream, output_topic};
 pub use target::{Format, Target};
 
 use crate::error::{Error, Result};
-use crate::record::{AttitudeSample, Nanos};
+use crate::record::{AttitudeSample, Nanos, RawSample};
 use batch::{Batch, Form, Slot};
 use mcap::Layout;
 use mcap::chunk::Chunk;
@@ -111,6 +111,8 @@ enum State {
 struct Lane {
     batch: Batch,
     last: Option<Nanos>,
+    /// The form has no place for it.
+    left_out: bool,
 }
 
 impl Sink {
@@ -126,7 +128,9 @@ impl Sink {
         streams: &[Stream],
         provenance: &Provenance,
     ) -> Result<Sink> {
-        if target.format() == Some(Format::Csv) && streams.len() > 1 {
+        let mut tables = streams.iter().filter(|s| s.content != Content::Truth);
+        let table = tables.next().map(|s| s.content);
+        if target.format() == Some(Format::Csv) && tables.next().is_some() {
             return Err(Error::Usage(format!(
                 "a CSV has no column for the topic and {} topics are estimated\n  help: choose one with --topic, or write .ndjson or .mcap",
                 streams.len()
@@ -138,11 +142,12 @@ impl Sink {
         let mut head = Vec::new();
         let form = match target.format() {
             None => Form::Null,
-            Some(Format::Ndjson) => {
-                Form::Ndjson(streams.iter().map(json::AttObject::new).collect())
-            }
+            Some(Format::Ndjson) => Form::Ndjson(streams.iter().map(json::Objects::new).collect()),
             Some(Format::Csv) => {
-                head.extend_from_slice(csv::HEADER);
+                head.extend_from_slice(match table {
+                    Some(Content::Samples(_)) => csv::RAW_HEADER,
+                    _ => csv::HEADER,
+                });
                 Form::Csv
             }
             Some(Format::Mcap) => Form::Mcap {
@@ -163,6 +168,10 @@ impl Sink {
                     ..Batch::default()
                 },
                 last: None,
+                left_out: matches!(form, Form::Csv)
+                    && streams
+                        .get(stream)
+                        .is_some_and(|s| s.content == Content::Truth),
             })
             .collect();
         let mut sink = Sink {
@@ -197,6 +206,30 @@ impl Sink {
         samples: &[AttitudeSample],
         pool: &ThreadPool,
     ) -> Result<Flow> {
+        self.take(stream, samples, |batch| &mut batch.samples, pool)
+    }
+
+    /// Takes samples of a [`Content::Samples`] stream, oldest first, as [`Sink::write`] takes
+    /// attitudes.
+    ///
+    /// # Errors
+    /// As [`Sink::write`].
+    pub fn write_raw(
+        &mut self,
+        stream: usize,
+        samples: &[RawSample],
+        pool: &ThreadPool,
+    ) -> Result<Flow> {
+        self.take(stream, samples, |batch| &mut batch.raw, pool)
+    }
+
+    fn take<T: Copy>(
+        &mut self,
+        stream: usize,
+        samples: &[T],
+        collected: fn(&mut Batch) -> &mut Vec<T>,
+        pool: &ThreadPool,
+    ) -> Result<Flow> {
         if matches!(self.form, Form::Null) {
             self.samples += samples.len() as u64;
             return Ok(Flow::Continue);
@@ -209,11 +242,14 @@ impl Sink {
             let Some(lane) = self.lanes.get_mut(stream) else {
                 return Err(Error::Usage(format!("the output has no stream {stream}")));
             };
-            let room = BATCH_SAMPLES.saturating_sub(lane.batch.samples.len());
+            if lane.left_out {
+                break;
+            }
+            let room = BATCH_SAMPLES.saturating_sub(lane.batch.len());
             let (now, later) = rest.split_at(room.min(rest.len()));
-            lane.batch.samples.extend_from_slice(now);
+            collected(&mut lane.batch).extend_from_slice(now);
             rest = later;
-            if lane.batch.samples.len() >= BATCH_SAMPLES {
+            if lane.batch.len() >= BATCH_SAMPLES {
                 self.queue_lane(stream);
                 if self.make_room(pool)? == Flow::Closed {
                     return Ok(Flow::Closed);
@@ -368,7 +404,7 @@ impl Sink {
     /// Moves a stream's pending samples into the queue.
     fn queue_lane(&mut self, stream: usize) {
         let mut lane = std::mem::take(&mut self.lanes[stream]);
-        let count = lane.batch.samples.len() as u64;
+        let count = lane.batch.len() as u64;
         let next = Batch {
             stream,
             first: lane.batch.first + count,
@@ -379,13 +415,20 @@ impl Sink {
         self.samples += count;
 
         let slot = self.next_slot();
-        // The slot's old vector is emptied and goes back to the lane: no allocation per batch.
+        // The slot's old vectors are emptied and go back to the lane: no allocation per batch.
         let mut samples = std::mem::take(&mut slot.batch.samples);
+        let mut raw = std::mem::take(&mut slot.batch.raw);
         samples.clear();
+        raw.clear();
         slot.batch = lane.batch;
         self.lanes[stream] = Lane {
-            batch: Batch { samples, ..next },
+            batch: Batch {
+                samples,
+                raw,
+                ..next
+            },
             last,
+            left_out: lane.left_out,
         };
     }
 
@@ -395,6 +438,7 @@ impl Sink {
         self.queued_copies += full.plain_len();
         let slot = self.next_slot();
         slot.batch.samples.clear();
+        slot.batch.raw.clear();
         let mut empty = std::mem::replace(&mut slot.chunk, full);
         empty.clear();
         self.copies = empty;
@@ -402,7 +446,7 @@ impl Sink {
 
     fn queue_everything(&mut self, pool: Option<&ThreadPool>) -> Result<Flow> {
         for stream in 0..self.lanes.len() {
-            if !self.lanes[stream].batch.samples.is_empty() {
+            if !self.lanes[stream].batch.is_empty() {
                 self.queue_lane(stream);
                 if self.used >= MAX_BATCHES && self.drain(pool)? == Flow::Closed {
                     return Ok(Flow::Closed);
@@ -466,7 +510,7 @@ impl Sink {
             slot.chunk.clear();
             Ok(Flow::Continue)
         } else {
-            self.messages += slot.batch.samples.len() as u64;
+            self.messages += slot.batch.len() as u64;
             self.put(&slot.text)
         }
     }

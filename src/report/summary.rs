@@ -413,7 +413,7 @@ pub fn meaning(kind: SampleKind) -> &'static str {
 }
 
 /// One labelled entry; what follows its first line stands under it.
-fn line(out: &mut String, label: &str, text: &str) {
+pub(super) fn line(out: &mut String, label: &str, text: &str) {
     let mut label = label;
     for part in text.lines() {
         let _ = writeln!(out, "  {label:<8} {}", part.trim_start());

@@ -1,11 +1,36 @@
 //! AttitudeSample -> a CSV row. Pure.
 
 use super::json::{push_f64, push_i64, push_status};
-use crate::record::AttitudeSample;
+use crate::record::{AttitudeSample, RawSample};
 
 /// The first row. Angles in degrees, rates in rad/s, stamps in nanoseconds; roll, pitch and yaw are
 /// turned about z, then y, then x (ZYX).
 pub(super) const HEADER: &[u8] = b"stamp_ns,w,x,y,z,roll_deg,pitch_deg,yaw_deg,wx,wy,wz,sigma_x_deg,sigma_y_deg,sigma_z_deg,status\n";
+
+/// The first row over samples of a gyro. Rates in rad/s (delta angles in rad), specific force in
+/// m/s^2; `w,x,y,z` is the orientation that goes with the sample, where there is one.
+pub(super) const RAW_HEADER: &[u8] =
+    b"stamp_ns,log_ns,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z,w,x,y,z,interval_ns\n";
+
+/// Appends one row with its line end; what is absent is an empty cell.
+pub(super) fn push_raw_row(out: &mut Vec<u8>, sample: &RawSample) {
+    push_i64(out, sample.header.unwrap_or(sample.log).0);
+    out.push(b',');
+    push_i64(out, sample.log.0);
+    let vectors = [sample.gyro, sample.accel].map(|v| v.map_or([None; 3], |v| v.map(Some)));
+    let orientation = sample.orientation.map_or([None; 4], |q| q.map(Some));
+    for value in vectors.into_iter().flatten().chain(orientation) {
+        out.push(b',');
+        if let Some(value) = value {
+            push_number(out, value);
+        }
+    }
+    out.push(b',');
+    if let Some(interval) = sample.interval_nanos {
+        push_i64(out, interval);
+    }
+    out.push(b'\n');
+}
 
 /// Appends one row with its line end. Several status names are joined by `|`.
 pub(super) fn push_row(out: &mut Vec<u8>, sample: &AttitudeSample) {

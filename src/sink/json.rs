@@ -4,8 +4,9 @@
 //! copies and ten floats. Floats are the shortest decimals that read back to the same bits.
 //! JSON has no NaN: what is not finite is `null`.
 
-use super::stream::Stream;
-use crate::record::{AttitudeSample, Nanos};
+use super::batch::Batch;
+use super::stream::{Content, Stream};
+use crate::record::{AttitudeSample, Nanos, RawSample, SampleKind};
 use serde_json::ser::{CompactFormatter, Formatter};
 
 /// Appends the shortest decimal that reads back to the same bits, or `null`.
@@ -51,6 +52,85 @@ fn push_stamp(out: &mut Vec<u8>, stamp: Nanos) {
     out.extend_from_slice(b",\"nsec\":");
     push_u64(out, u64::from(nsec));
     out.push(b'}');
+}
+
+/// The lines of one stream.
+#[derive(Debug)]
+pub(super) enum Objects {
+    Att(AttObject),
+    Rate(RateObject),
+}
+
+impl Objects {
+    pub(super) fn new(stream: &Stream) -> Objects {
+        match stream.content {
+            Content::Attitude | Content::Truth => Objects::Att(AttObject::new(stream)),
+            Content::Samples(kind) => Objects::Rate(RateObject::new(stream, kind)),
+        }
+    }
+
+    /// Appends a line a sample.
+    pub(super) fn push(&self, out: &mut Vec<u8>, batch: &Batch) {
+        match self {
+            Objects::Att(object) => {
+                for (seq, sample) in (batch.first..).zip(&batch.samples) {
+                    object.push(out, seq, sample);
+                    out.push(b'\n');
+                }
+            }
+            Objects::Rate(object) => {
+                for (seq, sample) in (batch.first..).zip(&batch.raw) {
+                    object.push(out, seq, sample);
+                    out.push(b'\n');
+                }
+            }
+        }
+    }
+}
+
+/// The `RATE` object of one stream: what is absent is left out. Rate in rad/s (a delta angle in
+/// rad), specific force in m/s^2.
+#[derive(Debug)]
+pub(super) struct RateObject {
+    head: Vec<u8>,
+    kind: Vec<u8>,
+}
+
+impl RateObject {
+    pub(super) fn new(stream: &Stream, kind: SampleKind) -> RateObject {
+        let mut head = b"{\"class\":\"RATE\",\"id\":".to_vec();
+        push_string(&mut head, &stream.id);
+        head.extend_from_slice(b",\"seq\":");
+        let mut named = Vec::new();
+        if kind != SampleKind::default() {
+            named.extend_from_slice(b",\"sample_kind\":");
+            push_string(&mut named, kind.name());
+        }
+        RateObject { head, kind: named }
+    }
+
+    /// Appends the object, without a line end.
+    pub(super) fn push(&self, out: &mut Vec<u8>, seq: u64, sample: &RawSample) {
+        out.extend_from_slice(&self.head);
+        push_u64(out, seq);
+        out.extend_from_slice(b",\"stamp\":");
+        push_stamp(out, sample.header.unwrap_or(sample.log));
+        for (name, vector) in [
+            (&b",\"gyro\":"[..], sample.gyro),
+            (b",\"accel\":", sample.accel),
+        ] {
+            if let Some(vector) = vector {
+                out.extend_from_slice(name);
+                push_array3(out, vector);
+            }
+        }
+        if let Some(interval) = sample.interval_nanos {
+            out.extend_from_slice(b",\"dt_ns\":");
+            push_i64(out, interval);
+        }
+        out.extend_from_slice(&self.kind);
+        out.push(b'}');
+    }
 }
 
 /// The `ATT` object of one stream, everything constant laid out beforehand.

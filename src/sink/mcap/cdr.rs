@@ -1,10 +1,11 @@
-//! AttitudeSample -> `sensor_msgs/msg/Imu` and `tf2_msgs/msg/TFMessage` message records in CDR. Pure.
+//! Samples -> `sensor_msgs/msg/Imu`, `tf2_msgs/msg/TFMessage`, `geometry_msgs/msg/QuaternionStamped` and
+//! `geometry_msgs/msg/Vector3Stamped` message records in CDR. Pure.
 //!
 //! Within a stream only numbers change from message to message, always at the same places. So each
 //! stream lays its record out once and then copies and patches it: about 30 ns a message.
 
 use super::record::{MESSAGE_HEAD, message_head};
-use crate::record::{AttitudeSample, Nanos};
+use crate::record::{AttitudeSample, Nanos, RawSample};
 
 /// Where the numbers of a message record begin, and the record with zeros in their places.
 #[derive(Debug)]
@@ -152,6 +153,59 @@ impl Imu {
             Some(accel) => put(numbers, 25, accel.into()),
             None => put(numbers, 28, [-1.0]),
         }
+    }
+
+    /// Appends the record of what a sensor put out: no orientation, covariances unknown; a rate or
+    /// specific force that is absent is marked so.
+    pub(super) fn append_raw(
+        &self,
+        out: &mut Vec<u8>,
+        sequence: u32,
+        log_time: u64,
+        stamp: [u8; 8],
+        sample: &RawSample,
+    ) {
+        let numbers = self.0.append(out, sequence, log_time, stamp);
+        // REP-145: a quaternion of no rotation, and a covariance that says it is none.
+        put(numbers, 3, [1.0, -1.0]);
+        for (vector, at) in [(sample.gyro, 13), (sample.accel, 25)] {
+            match vector {
+                Some(vector) => put(numbers, at, vector),
+                None => put(numbers, at + 3, [-1.0]),
+            }
+        }
+    }
+}
+
+/// A header and `N` numbers: `geometry_msgs/msg/QuaternionStamped` (x, y, z, w) and
+/// `geometry_msgs/msg/Vector3Stamped` of one stream.
+#[derive(Debug)]
+pub(super) struct Stamped<const N: usize>(Template);
+
+impl<const N: usize> Stamped<N> {
+    pub(super) fn new(channel: u16, frame_id: &str) -> Self {
+        let mut cdr = Cdr::new();
+        let stamp = cdr.stamp();
+        cdr.string(frame_id);
+        let numbers = cdr.numbers(N);
+        Stamped(Template::new(channel, cdr, stamp, numbers))
+    }
+
+    /// Bytes of one message record.
+    pub(super) fn len(&self) -> usize {
+        self.0.record.len()
+    }
+
+    /// Appends the record.
+    pub(super) fn append(
+        &self,
+        out: &mut Vec<u8>,
+        sequence: u32,
+        log_time: u64,
+        stamp: [u8; 8],
+        values: [f64; N],
+    ) {
+        put(self.0.append(out, sequence, log_time, stamp), 0, values);
     }
 }
 

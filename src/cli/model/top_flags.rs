@@ -1,0 +1,190 @@
+//! The flags that say which top, and how it starts: shared by `simulate top` and `model top`. Pure.
+
+use crate::config::numbers;
+use crate::error::{Error, Result};
+use crate::model::top::{Case, EulerAngles, EulerState, SymmetricTop};
+use clap::Args;
+use std::f64::consts::TAU;
+
+/// Which top, and how it starts. The defaults are the seed document's.
+#[derive(Args, Debug, Clone)]
+#[command(next_help_heading = "Top")]
+pub struct TopFlags {
+    /// cusped, wavy, looping, steady-slow, steady-fast, sleeping or falling [default: cusped]
+    #[arg(long, value_name = "CASE", value_parser = case, conflicts_with_all = ["euler", "euler_rates"])]
+    pub case: Option<Case>,
+    /// Turns a second about the axis of symmetry (the body's z rate)
+    #[arg(
+        long,
+        value_name = "HZ",
+        default_value_t = 20.0,
+        allow_negative_numbers = true
+    )]
+    pub spin_hz: f64,
+    /// Angle of the axis from the vertical at the start, degrees [default: 54.57]
+    #[arg(
+        long,
+        value_name = "DEG",
+        allow_negative_numbers = true,
+        conflicts_with = "euler"
+    )]
+    pub tilt_deg: Option<f64>,
+    /// Any start: precession,nutation,spin angles in degrees, turned about z, x', z''
+    #[arg(long, value_name = "DEG,DEG,DEG", allow_hyphen_values = true)]
+    pub euler: Option<String>,
+    /// Their rates, degrees a second; instead of --spin-hz
+    #[arg(
+        long,
+        value_name = "DPS,DPS,DPS",
+        allow_hyphen_values = true,
+        requires = "euler",
+        conflicts_with = "spin_hz"
+    )]
+    pub euler_rates: Option<String>,
+    /// Mass, kg
+    #[arg(
+        long,
+        value_name = "KG",
+        default_value_t = 1.0,
+        allow_negative_numbers = true
+    )]
+    pub mass: f64,
+    /// Pivot to centre of gravity, m
+    #[arg(
+        long,
+        value_name = "M",
+        default_value_t = 0.04,
+        allow_negative_numbers = true
+    )]
+    pub arm: f64,
+    /// Moments of inertia about the pivot, across and along the axis, kg m^2
+    #[arg(
+        long,
+        value_name = "ACROSS,ALONG",
+        default_value = "0.002,0.0008",
+        allow_hyphen_values = true
+    )]
+    pub inertia: String,
+    /// Gravity, m/s^2, downwards
+    #[arg(
+        long,
+        value_name = "M_S2",
+        default_value_t = 9.8,
+        allow_negative_numbers = true
+    )]
+    pub gravity: f64,
+}
+
+/// A case by its name.
+///
+/// # Errors
+/// An unknown one; says which there are.
+pub(crate) fn case(name: &str) -> std::result::Result<Case, String> {
+    Case::from_name(name).ok_or_else(|| {
+        let names: Vec<&str> = Case::ALL.iter().map(|c| c.name()).collect();
+        format!(
+            "unknown case `{}`: one of {}",
+            name.escape_debug(),
+            names.join(", ")
+        )
+    })
+}
+
+impl TopFlags {
+    /// The top.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a body that can not be.
+    pub(crate) fn body(&self) -> Result<SymmetricTop> {
+        let [across, along] = numbers("--inertia", &self.inertia)?;
+        if along > 2.0 * across {
+            return Err(Error::Usage(format!(
+                "--inertia {across},{along}: the moment along the axis exceeds the sum of the two across it ({}), which no matter can",
+                2.0 * across
+            )));
+        }
+        SymmetricTop::new(self.mass, self.arm, across, along, self.gravity)
+            .map_err(|e| Error::Usage(format!("top: {e}")))
+    }
+
+    /// Its start.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a start the case does not have.
+    pub(crate) fn start(&self, top: &SymmetricTop) -> Result<EulerState> {
+        let w3 = self.spin_hz * TAU;
+        let Some(euler) = &self.euler else {
+            let tilt = self.tilt_deg.map_or(Case::SEED_TILT, f64::to_radians);
+            let case = self.case.unwrap_or(Case::Cusped);
+            return case
+                .start(top, tilt, w3)
+                .map_err(|e| Error::Usage(format!("top, case {}: {e}", case.name())));
+        };
+        let degrees = |flag, list: &str| numbers::<3>(flag, list).map(|v| v.map(f64::to_radians));
+        let [precession, nutation, spin] = degrees("--euler", euler)?;
+        let mut state = EulerState {
+            angles: EulerAngles {
+                precession,
+                nutation,
+                spin,
+            },
+            w3,
+            ..EulerState::default()
+        };
+        if let Some(rates) = &self.euler_rates {
+            let [precession_rate, nutation_rate, spin_rate] = degrees("--euler-rates", rates)?;
+            state.precession_rate = precession_rate;
+            state.nutation_rate = nutation_rate;
+            state.w3 = precession_rate * nutation.cos() + spin_rate;
+        }
+        Ok(state)
+    }
+
+    /// What was asked for, by name.
+    pub(crate) fn parameters(&self) -> Vec<(&'static str, String)> {
+        let mut list = vec![
+            ("mass_kg", self.mass.to_string()),
+            ("arm_m", self.arm.to_string()),
+            ("inertia_across_along_kg_m2", self.inertia.clone()),
+        ];
+        match &self.euler {
+            None => {
+                let case = self.case.unwrap_or(Case::Cusped);
+                list.push(("case", case.name().to_owned()));
+                if case != Case::Sleeping {
+                    list.push(("tilt_deg", self.tilt_deg.unwrap_or(54.57).to_string()));
+                }
+            }
+            Some(euler) => list.push(("euler_deg", euler.clone())),
+        }
+        match &self.euler_rates {
+            None => list.push(("spin_hz", self.spin_hz.to_string())),
+            Some(rates) => list.push(("euler_rates_deg_s", rates.clone())),
+        }
+        list
+    }
+
+    /// What a start leads to that may not have been meant.
+    pub(crate) fn notes(top: &SymmetricTop, start: &EulerState) -> Vec<String> {
+        let mut notes = Vec::new();
+        let spin_hz = start.w3.abs() / TAU;
+        let upright = start.angles.nutation.sin().abs() < 1e-6 && start.angles.nutation.cos() > 0.0;
+        if upright {
+            let threshold = top.sleeping_threshold();
+            if start.w3.abs() < threshold {
+                notes.push(format!(
+                    "spin {spin_hz:.3} Hz is below the {:.3} Hz at which an upright top sleeps: the least push tips it over",
+                    threshold / TAU
+                ));
+            }
+        } else {
+            let threshold = top.spin_threshold_hz(start.angles.nutation);
+            if spin_hz < threshold {
+                notes.push(format!(
+                    "spin {spin_hz:.3} Hz is below the threshold of {threshold:.3} Hz (sqrt(M g arm sin(tilt) / (2 pi I3))): it tips over rather than precess"
+                ));
+            }
+        }
+        notes
+    }
+}
