@@ -5,6 +5,7 @@
 
 mod filter;
 mod inertia;
+mod top;
 pub(crate) mod top_flags;
 
 use super::{Global, Outcome};
@@ -16,7 +17,11 @@ use clap::{Args, Subcommand};
 #[command(
     after_help = "Every request is a JSON object on one line; the answers come in order, one line each.
 What can not be answered becomes {\"error\": \"...\"} on its line, and the exit code is 3.
-SI units and radians."
+SI units and radians.
+
+Examples:
+  strapd model top --compare                   the tables of docs/top.md, run now
+  strapd model inertia < requests.ndjson > answers.ndjson"
 )]
 pub struct Model {
     /// Which model
@@ -27,6 +32,8 @@ pub struct Model {
 /// The models.
 #[derive(Subcommand, Debug)]
 pub enum Which {
+    /// The symmetric top: its cases, and how well each method finds its attitude
+    Top(Box<top::Top>),
     /// Mass, centre of gravity, inertia -> 6x6 matrices, Coriolis forces, acceleration
     Inertia(inertia::Inertia),
 }
@@ -36,8 +43,8 @@ pub enum Which {
 /// # Errors
 /// Standard input or output fails; flags that can not be.
 pub fn run(global: &Global, args: &Model) -> Result<Outcome> {
-    let _ = global;
     match &args.which {
+        Which::Top(command) => top::run(global, command),
         Which::Inertia(command) => inertia::run(command),
     }
 }
