@@ -2,6 +2,7 @@
 //!
 //! One file per command. Data goes to stdout, everything else to stderr.
 
+pub mod allan;
 pub mod cat;
 pub mod compare;
 pub mod estimation;
@@ -115,6 +116,8 @@ pub enum Command {
     Compare(compare::Compare),
     /// Decoded samples as NDJSON, CSV or a table
     Cat(cat::Cat),
+    /// Allan deviation of a recording at rest: noise terms, and the flags for them
+    Allan(allan::Allan),
     /// Shell completions on stdout
     Completions(manual::Completions),
     /// The manual page (roff) on stdout, or all of them into a directory
@@ -155,6 +158,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Info(command) => info::run(&cli.global, &command),
         Command::Compare(command) => compare::run(&cli.global, &command),
         Command::Cat(command) => cat::run(&cli.global, &command),
+        Command::Allan(command) => allan::run(&cli.global, &command),
         Command::Completions(command) => manual::completions(&command),
         Command::Man(command) => manual::man(&command),
     }

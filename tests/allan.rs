@@ -2,6 +2,8 @@
 #![cfg(feature = "random")]
 #![allow(clippy::unwrap_used)]
 
+#[path = "allan/estimator.rs"]
+mod estimator;
 #[path = "allan/recovery.rs"]
 mod recovery;
 #[path = "allan/theory.rs"]

@@ -76,7 +76,8 @@ fn two_hours_give_each_term_back() {
         "arw=0.3,bias-instability=30",
         "arw=0.3,rrw=60",
         "arw=0.3,quantization=1,bias-instability=30",
-        "arw=0.3,quantization=1,bias-instability=30,rrw=60",
+        "arw=0.3,rrw=300",
+        "arw=0.3,quantization=1,bias-instability=30,rrw=400",
         "consumer_mems_b",
         "tactical",
     ] {
@@ -91,6 +92,30 @@ fn two_hours_give_each_term_back() {
                 r.unseen,
                 r.of
             );
+        }
+    }
+}
+
+/// Twenty minutes at 100 Hz, each term large enough to be seen in them.
+#[test]
+fn what_was_put_in_comes_out_again() {
+    const MOST: [f64; 4] = [0.02, 0.05, 0.10, 0.15];
+    for (text, seen) in [
+        ("arw=0.3,quantization=1", [true, true, false, false]),
+        (
+            "arw=0.3,quantization=1,bias-instability=40",
+            [true, true, true, false],
+        ),
+        ("arw=0.1,rrw=1000", [false, true, false, true]),
+    ] {
+        let found = recover(text, 10_000_000, 120_000, 1);
+        for ((found, most), seen) in found.iter().zip(MOST).zip(seen) {
+            assert_eq!(
+                found.unseen,
+                if seen { 0 } else { found.of },
+                "{text}: {found:?}"
+            );
+            assert!(found.worst < most, "{text}: {found:?} beyond {most}");
         }
     }
 }
