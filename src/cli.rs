@@ -2,6 +2,7 @@
 //!
 //! One file per command. Data goes to stdout, everything else to stderr.
 
+pub mod allan;
 pub mod cat;
 pub mod compare;
 pub mod estimation;
@@ -122,6 +123,8 @@ pub enum Command {
     Simulate(Box<simulate::Simulate>),
     /// The model library: requests as NDJSON on stdin, answers on stdout
     Model(model::Model),
+    /// Allan deviation of a recording at rest: noise terms, and the flags for them
+    Allan(allan::Allan),
     /// Shell completions on stdout
     Completions(manual::Completions),
     /// The manual page (roff) on stdout, or all of them into a directory
@@ -164,6 +167,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Cat(command) => cat::run(&cli.global, &command),
         Command::Simulate(command) => simulate::run(&cli.global, &command),
         Command::Model(command) => model::run(&cli.global, &command),
+        Command::Allan(command) => allan::run(&cli.global, &command),
         Command::Completions(command) => manual::completions(&command),
         Command::Man(command) => manual::man(&command),
     }
