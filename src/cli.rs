@@ -9,6 +9,7 @@ pub mod info;
 pub mod manual;
 pub mod outputs;
 pub mod progress;
+pub mod recover;
 pub mod replay;
 
 use crate::error::{Error, Result};
@@ -115,6 +116,8 @@ pub enum Command {
     Compare(compare::Compare),
     /// Decoded samples as NDJSON, CSV or a table
     Cat(cat::Cat),
+    /// Salvage every intact message of a damaged MCAP
+    Recover(recover::Recover),
     /// Shell completions on stdout
     Completions(manual::Completions),
     /// The manual page (roff) on stdout, or all of them into a directory
@@ -155,6 +158,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Info(command) => info::run(&cli.global, &command),
         Command::Compare(command) => compare::run(&cli.global, &command),
         Command::Cat(command) => cat::run(&cli.global, &command),
+        Command::Recover(command) => recover::run(&cli.global, &command),
         Command::Completions(command) => manual::completions(&command),
         Command::Man(command) => manual::man(&command),
     }

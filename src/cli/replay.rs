@@ -90,6 +90,16 @@ pub enum CompressionArg {
     None,
 }
 
+impl From<CompressionArg> for Compression {
+    fn from(named: CompressionArg) -> Compression {
+        match named {
+            CompressionArg::Zstd => Compression::Zstd,
+            CompressionArg::Lz4 => Compression::Lz4,
+            CompressionArg::None => Compression::None,
+        }
+    }
+}
+
 /// Runs it.
 ///
 /// # Errors
@@ -184,11 +194,7 @@ impl Replay {
                     EncodingArg::Cdr => Encoding::Cdr,
                     EncodingArg::Json => Encoding::Json,
                 },
-                compression: match self.compression {
-                    CompressionArg::Zstd => Compression::Zstd,
-                    CompressionArg::Lz4 => Compression::Lz4,
-                    CompressionArg::None => Compression::None,
-                },
+                compression: self.compression.into(),
             },
             copy_input: self.copy_input,
             out_rate: self.out_rate,
