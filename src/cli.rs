@@ -11,6 +11,7 @@ pub mod manual;
 pub mod model;
 pub mod outputs;
 pub mod progress;
+pub mod recover;
 pub mod replay;
 pub mod simulate;
 
@@ -125,6 +126,8 @@ pub enum Command {
     Model(model::Model),
     /// Allan deviation of a recording at rest: noise terms, and the flags for them
     Allan(allan::Allan),
+    /// Salvage every intact message of a damaged MCAP
+    Recover(recover::Recover),
     /// Shell completions on stdout
     Completions(manual::Completions),
     /// The manual page (roff) on stdout, or all of them into a directory
@@ -168,6 +171,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Simulate(command) => simulate::run(&cli.global, &command),
         Command::Model(command) => model::run(&cli.global, &command),
         Command::Allan(command) => allan::run(&cli.global, &command),
+        Command::Recover(command) => recover::run(&cli.global, &command),
         Command::Completions(command) => manual::completions(&command),
         Command::Man(command) => manual::man(&command),
     }

@@ -13,6 +13,7 @@ pub mod pool;
 pub mod position;
 pub mod preparation;
 pub mod provenance;
+pub mod recover;
 pub mod replay;
 pub mod route;
 pub mod run;
