@@ -1,7 +1,7 @@
 //! Statistics of the samples as recorded -> findings. Pure.
 
 use super::{Finding, Severity};
-use crate::condition::quality::Advice;
+use crate::condition::quality::{Advice, AxisStats};
 use crate::model::frames::BodyAxes;
 use crate::pipeline::check::CheckedTopic;
 use crate::report::summary::significant;
@@ -14,6 +14,8 @@ const BIAS_SIGMAS: f64 = 5.0;
 const BIAS_DEG_PER_H: f64 = 10.0;
 /// Share of rows repeated exactly above which something upstream repeats samples.
 const REPEATED_SHARE: f64 = 0.003;
+/// Longer runs of one value are no repeats of a sensor with noise.
+const LONG_RUN: u64 = 20;
 
 pub(super) fn find(topic: &CheckedTopic, out: &mut Vec<Finding>) {
     counted(topic, out);
@@ -29,8 +31,34 @@ pub(super) fn find(topic: &CheckedTopic, out: &mut Vec<Finding>) {
     for advice in &topic.looked.quality.advice {
         out.extend(advised(topic, advice));
     }
+    silent(topic, out);
     clocks(topic, out);
     bias(topic, out);
+}
+
+/// Axes that never read but one value, while another moves.
+fn silent(topic: &CheckedTopic, out: &mut Vec<Finding>) {
+    let q = &topic.looked.quality;
+    let varies = |a: &AxisStats| a.max > a.min;
+    if !q.axes.iter().any(varies) || q.count < LONG_RUN {
+        return;
+    }
+    for (axis, stats) in q.axes.iter().enumerate().filter(|(_, a)| !varies(a)) {
+        out.push(
+            Finding::new(
+                Severity::Note,
+                "axis-silent",
+                format!(
+                    "gyro {} reads {} in every sample",
+                    axis_name(axis),
+                    significant(stats.min, 4)
+                ),
+            )
+            .with("axis", axis_name(axis))
+            .with("reading", stats.min)
+            .advise("fine for a body that turns about one axis; a real sensor has noise"),
+        );
+    }
 }
 
 /// Rows that are bad in themselves.
@@ -107,7 +135,9 @@ fn counted(topic: &CheckedTopic, out: &mut Vec<Finding>) {
         "",
     );
     let repeated = q.repeated_rows.saturating_sub(q.duplicates);
-    if repeated as f64 > REPEATED_SHARE * total as f64 && repeated > q.zero_rows && moves(topic) {
+    // A rest, or a steady turn, without noise repeats itself for long; a sensor read too often does not.
+    let longest = q.axes.iter().map(|a| a.longest_run).max().unwrap_or(0);
+    if repeated as f64 > REPEATED_SHARE * total as f64 && longest < LONG_RUN {
         add(
             repeated,
             Warning,
@@ -117,9 +147,9 @@ fn counted(topic: &CheckedTopic, out: &mut Vec<Finding>) {
             "",
         );
     }
-    if q.zero_rows > 0 && moves(topic) {
+    if q.lone_zero_rows > 0 {
         add(
-            q.zero_rows,
+            q.lone_zero_rows,
             Warning,
             "zero-rows",
             "samples are exactly zero about all axes",
@@ -135,11 +165,6 @@ fn counted(topic: &CheckedTopic, out: &mut Vec<Finding>) {
         "only levelling is affected",
         "",
     );
-}
-
-/// Whether the gyro has noise or motion at all: a synthetic body at rest repeats its zeros rightly.
-fn moves(topic: &CheckedTopic) -> bool {
-    topic.looked.quality.axes.iter().any(|a| a.max > a.min)
 }
 
 fn advised(topic: &CheckedTopic, advice: &Advice) -> Option<Finding> {
