@@ -4,6 +4,7 @@
 
 pub mod allan;
 pub mod cat;
+pub mod check;
 pub mod compare;
 pub mod estimation;
 pub mod info;
@@ -34,7 +35,7 @@ use std::process::ExitCode;
   strapd simulate top -o top.mcap              a gyro whose truth is known, to try it all on
   strapd cat flight.mcap --topic /imu | head   decoded samples as NDJSON
 
-Exit codes: 0 done; 1 failed; 2 bad arguments; 3 done, but samples were lost;
+Exit codes: 0 done; 1 failed; 2 bad arguments; 3 done, but samples were lost (check: something was found);
 4 compare: a limit was exceeded."
 )]
 pub struct Cli {
@@ -116,6 +117,8 @@ pub enum Command {
     Replay(Box<replay::Replay>),
     /// What a log holds: topics, rates, clocks, frames, and what to do next
     Info(info::Info),
+    /// Everything that may spoil the attitude from a log, with the flag that helps
+    Check(check::Check),
     /// Time-aligned angle error between two attitudes
     Compare(compare::Compare),
     /// Decoded samples as NDJSON, CSV or a table
@@ -166,6 +169,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
     match cli.command {
         Command::Replay(command) => replay::run(&cli.global, &command),
         Command::Info(command) => info::run(&cli.global, &command),
+        Command::Check(command) => check::run(&cli.global, &command),
         Command::Compare(command) => compare::run(&cli.global, &command),
         Command::Cat(command) => cat::run(&cli.global, &command),
         Command::Simulate(command) => simulate::run(&cli.global, &command),

@@ -87,6 +87,10 @@ fn of_topic(run: &Replay, topic: &Topic) -> TopicSummary {
             .as_ref()
             .map(super::against::AgainstRecorded::rows)
             .unwrap_or_default(),
+        recorded: topic
+            .against
+            .as_ref()
+            .and_then(super::against::AgainstRecorded::recorded),
         warnings: topic.prepared.warnings.clone(),
     };
     summary.warnings.extend(topic.warnings.iter().cloned());
