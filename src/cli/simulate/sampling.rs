@@ -187,8 +187,11 @@ impl Common {
             }
         }
         if let Some(sensor) = source.sensor() {
-            let [x, y, z]: [f64; 3] = sensor.constants().bias.into();
-            parameters.push(parameter("unit_bias_rad_s", format!("{x},{y},{z}")));
+            let bias = sensor.constants().bias;
+            if bias.amax() > 0.0 {
+                let text = format!("{},{},{}", bias.x, bias.y, bias.z);
+                parameters.push(parameter("unit_bias_rad_s", text));
+            }
         }
         Ok(Simulation {
             name: name.to_owned(),
