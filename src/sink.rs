@@ -157,28 +157,33 @@ impl Sink {
                 compression: options.compression,
             },
         };
-        Sink::begin(output, form, file, &head, streams.len())
+        // A table has no rows for truth.
+        let left_out: Vec<bool> = streams
+            .iter()
+            .map(|s| matches!(form, Form::Csv) && s.content == Content::Truth)
+            .collect();
+        Sink::begin(output, form, file, &head, &left_out)
     }
 
-    /// The sink once its head is made; writes it.
+    /// The sink once its head is made; writes it. `left_out`: by stream, whether nothing of it is
+    /// written.
     fn begin(
         output: Output,
         form: Form,
         file: McapFile,
         head: &[u8],
-        streams: usize,
+        left_out: &[bool],
     ) -> Result<Sink> {
-        let lanes = (0..streams)
-            .map(|stream| Lane {
+        let lanes = left_out
+            .iter()
+            .enumerate()
+            .map(|(stream, left_out)| Lane {
                 batch: Batch {
                     stream,
                     ..Batch::default()
                 },
                 last: None,
-                left_out: matches!(form, Form::Csv)
-                    && streams
-                        .get(stream)
-                        .is_some_and(|s| s.content == Content::Truth),
+                left_out: *left_out,
             })
             .collect();
         let mut sink = Sink {

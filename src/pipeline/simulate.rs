@@ -4,11 +4,10 @@ use super::outlet::Outlet;
 use super::pool::Pool;
 use super::position::Position;
 use crate::error::{Error, Result};
-use crate::record::{AttitudeSample, SampleKind, Status};
+use crate::record::{AttitudeCovariance, AttitudeSample, SampleKind, Status};
 use crate::report::simulation::SimulationSummary;
 use crate::sink::{Content, Flow, Options, Provenance, Stream, Target};
 use crate::source::synthetic::{Stretch, Synthetic, Truth};
-use nalgebra::Vector3;
 use std::time::Instant;
 
 /// The topic of the samples.
@@ -161,7 +160,7 @@ fn as_attitude(truth: &Truth) -> AttitudeSample {
         q_nb: truth.spin.q_nb,
         rate: truth.spin.w_nb_b,
         accel: None,
-        sigma: Vector3::zeros(),
+        covariance: AttitudeCovariance::default(),
         status: Status::OK,
         reset_count: 0,
         log: truth.stamp,

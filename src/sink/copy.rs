@@ -41,7 +41,7 @@ impl Sink {
             layout: Layout::default(),
             compression: options.compression,
         };
-        Sink::begin(output, form, McapFile::default(), &[], 0)
+        Sink::begin(output, form, McapFile::default(), &[], &[])
     }
 
     /// Writes the head of the file, with the profile of the other.
