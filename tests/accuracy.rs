@@ -8,6 +8,8 @@ mod coning;
 mod double;
 #[path = "accuracy/gaps.rs"]
 mod gaps;
+#[path = "accuracy/integration_error.rs"]
+mod integration_error;
 #[path = "accuracy/noise.rs"]
 mod noise;
 #[path = "accuracy/random.rs"]
