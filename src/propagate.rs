@@ -26,6 +26,7 @@ mod accumulate;
 mod classical;
 mod collocation;
 pub mod covariance;
+mod difference;
 mod executor;
 mod lagrange;
 mod lanes;

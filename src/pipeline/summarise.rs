@@ -67,6 +67,7 @@ fn of_topic(run: &Replay, topic: &Topic) -> TopicSummary {
         bias_origin: topic.prepared.bias_origin.clone(),
         noise: run.plan.noise.name.clone(),
         drift: drift(run, topic, propagation.integrated_secs),
+        integration_error: propagation.integration_error,
         input_axes: topic.resolved.body.to_string(),
         gaps: Gaps {
             bridged: gaps.count.saturating_sub(gaps.not_bridged),

@@ -177,9 +177,15 @@ impl Propagator {
     /// What has happened so far.
     #[must_use]
     pub fn report(&self) -> Report {
+        let report = &self.state.report;
+        let tells = match &self.engine {
+            Engine::Sliding(plan) | Engine::Commit { plan, .. } => plan.tells_error(),
+            Engine::Classical(_) => false,
+        };
         Report {
+            integration_error: tells.then(|| self.state.difference.worst(report.angle_turned)),
             integrated_secs: secs(self.state.integrated_nanos),
-            ..self.state.report
+            ..*report
         }
     }
 
@@ -361,11 +367,13 @@ impl Propagator {
             };
             let mut ahead = self.state.attitude;
             let mut covariance = self.state.covariance;
+            let mut difference = self.state.difference;
             if newest >= self.next {
                 self.scratch.clear();
                 plan.append_steps(&self.track, self.next, newest, &mut self.scratch);
                 for (i, step) in self.scratch.iter().enumerate() {
                     ahead.turn(step.turn);
+                    difference.add(&ahead, step.outer);
                     covariance.advance(step.turn, self.track.step(self.next + i));
                     covariance.bridge(step.gap_variance, step.gap_noise);
                 }
@@ -373,6 +381,7 @@ impl Propagator {
                     self.state.added = self.state.added.with(step.status());
                 }
             }
+            self.state.difference.seen(&difference);
             let committed = (self.state.attitude, self.state.covariance);
             (self.state.attitude, self.state.covariance) = (ahead, covariance);
             if newest >= self.next {

@@ -48,6 +48,8 @@ pub struct TopicSummary {
     pub noise: String,
     /// Drift to be expected from what is not known of the bias, rad/s.
     pub drift: f64,
+    /// Bound on the worst attitude error of the integration itself, rad; `None` where the method can not tell.
+    pub integration_error: Option<f64>,
     /// Gaps.
     pub gaps: Gaps,
     /// Sum of the angles of all steps, rad.
@@ -270,6 +272,19 @@ impl TopicSummary {
                 self.noise
             ),
         );
+        line(
+            out,
+            "numeric",
+            &self.integration_error.map_or_else(
+                || "integration error not estimated for this method".to_owned(),
+                |error| {
+                    format!(
+                        "integration error at most about {} deg, by a window of four samples less",
+                        significant(error.to_degrees(), 2)
+                    )
+                },
+            ),
+        );
         line(out, "gaps", &self.gaps.text());
         line(out, "lost", &self.lost_text(damaged));
         for first in &self.first_losses {
@@ -374,6 +389,7 @@ impl TopicSummary {
                             "origin": self.bias_origin },
             "noise": self.noise,
             "drift_deg_per_h": self.drift.to_degrees() * 3600.0,
+            "integration_error_deg": self.integration_error.map(f64::to_degrees),
             "gaps": {
                 "bridged": self.gaps.bridged,
                 "held": self.gaps.held,

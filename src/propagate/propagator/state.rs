@@ -3,6 +3,7 @@
 use crate::model::attitude::Quaternion;
 use crate::propagate::accumulate::Accumulator;
 use crate::propagate::covariance::Covariance;
+use crate::propagate::difference::Difference;
 use crate::propagate::lanes::Triple;
 use crate::propagate::method::Method;
 use crate::propagate::report::Report;
@@ -29,6 +30,7 @@ pub(super) struct State {
     /// Sum of rotation vectors, for the method that wants it.
     sum: Option<Triple<1>>,
     pub(super) covariance: Covariance,
+    pub(super) difference: Difference,
     /// Bits of the output being made that the propagator adds.
     pub(super) added: Status,
     pub(super) report: Report,
@@ -44,6 +46,7 @@ impl State {
             attitude: sum.map_or(Accumulator::new(initial), turned_by),
             sum,
             covariance: Covariance::new(settings.noise),
+            difference: Difference::default(),
             added: Status::OK,
             report: Report::default(),
             reset_count: 0,
@@ -55,6 +58,7 @@ impl State {
     pub(super) fn reset(&mut self, initial: [f64; 4]) {
         self.attitude.restart(initial);
         self.covariance.restart();
+        self.difference.restart();
         if let Some(sum) = &mut self.sum {
             *sum = rotation_vector(initial);
             self.attitude = turned_by(*sum);
@@ -75,6 +79,7 @@ impl State {
                 turn = Turn::exp(phi).parts();
             }
         }
+        self.difference.add(&self.attitude, step.outer);
         let spacing = track.spacing(k);
         self.covariance.advance(turn, secs(spacing));
         self.integrated_nanos = self.integrated_nanos.saturating_add(spacing);
