@@ -14,6 +14,8 @@ mod live;
 mod integration_error;
 #[path = "accuracy/noise.rs"]
 mod noise;
+#[path = "accuracy/peers.rs"]
+mod peers;
 #[path = "accuracy/random.rs"]
 mod random;
 #[path = "accuracy/run.rs"]
