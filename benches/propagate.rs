@@ -64,6 +64,7 @@ fn run(method: Method, kind: SampleKind, samples: &[RateSample], out: &mut Vec<A
         kind,
         initial: Quaternion::identity(),
         noise,
+        ..Settings::default()
     })
     .unwrap();
     out.clear();

@@ -5,7 +5,7 @@
 
 use strapd::model::motion::{Coning, Motion};
 use strapd::model::top::{Case, SymmetricTop};
-use strapd::propagate::{Method, Noise, Order, Placement, Propagator, Sequential, Settings};
+use strapd::propagate::{Method, Order, Placement, Propagator, Sequential, Settings};
 use strapd::record::{Join, Nanos, RateSample, SampleKind, Status};
 
 type Failure = Box<dyn std::error::Error>;
@@ -160,7 +160,7 @@ fn worst(
         method,
         kind,
         initial: *initial,
-        noise: Noise::default(),
+        ..Settings::default()
     })?;
     let mut out = Vec::new();
     propagator.push(&samples, &Sequential, &mut out);

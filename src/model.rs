@@ -8,6 +8,6 @@ mod elliptic;
 pub mod frames;
 pub mod inertia;
 pub mod motion;
-mod quaternion_kernel;
+pub(crate) mod quaternion_kernel;
 pub mod rigid_body;
 pub mod top;

@@ -1,6 +1,7 @@
 //! The stream: runs, breaks, outputs in order. Pure.
 
 mod state;
+mod world;
 
 use super::classical;
 use super::executor::Executor;
@@ -27,14 +28,14 @@ const LARGEST: f64 = 1e3;
 /// # Example
 /// ```
 /// use strapd::model::attitude::Quaternion;
-/// use strapd::propagate::{Method, Noise, Propagator, Sequential, Settings};
+/// use strapd::propagate::{Method, Propagator, Sequential, Settings};
 /// use strapd::record::{Join, Nanos, RateSample, SampleKind, Status};
 ///
 /// let mut propagator = Propagator::new(Settings {
 ///     method: Method::Auto,
 ///     kind: SampleKind::Rate,
 ///     initial: Quaternion::identity(),
-///     noise: Noise::default(),
+///     ..Settings::default()
 /// })?;
 /// // A quarter turn about z in one second.
 /// let samples: Vec<RateSample> = (0..=100)
@@ -196,6 +197,7 @@ impl Propagator {
         self.next = 1;
         let sample = self.trusted(sample);
         let first = self.state.report.samples == 0;
+        self.state.begin(sample.stamp.0);
         if sample.join == Join::Reset {
             self.state.reset(self.initial);
         }
@@ -348,6 +350,7 @@ impl Propagator {
             } else {
                 None
             };
+            let committed_at = self.state.now;
             let mut ahead = self.state.attitude;
             let mut sigma = self.state.sigma;
             if newest >= self.next {
@@ -364,11 +367,13 @@ impl Propagator {
             }
             let committed = (self.state.attitude, self.state.sigma);
             (self.state.attitude, self.state.sigma) = (ahead, sigma);
+            self.state.now = self.track.stamp[newest];
             if newest >= self.next {
                 self.state.added = self.state.added.with(Status::PROVISIONAL);
             }
             self.state.output_at(&sample, rate, out);
             (self.state.attitude, self.state.sigma) = committed;
+            self.state.now = committed_at;
         }
     }
 
@@ -385,6 +390,12 @@ impl Propagator {
             let k = self.next;
             self.next += 1;
             self.state.step(step, &self.track, k);
+            // Without look-ahead a step is committed before its sample is output: what was noticed is
+            // for that output. Otherwise it was said with the provisional one.
+            let kept = match plan.look_ahead {
+                0 => self.state.added,
+                _ => Status::OK,
+            };
             if *finals {
                 let stamp = Nanos(self.track.stamp[k]);
                 let sample = RateSample {
@@ -398,9 +409,8 @@ impl Propagator {
                 };
                 self.state.output_at(&sample, Some(self.track.rate(k)), out);
                 self.state.report.samples -= 1;
-            } else {
-                self.state.added = Status::OK;
             }
+            self.state.added = kept;
         }
     }
 }
