@@ -60,6 +60,7 @@ fn propagated(method: Method, truth: &[Spin], rate_hz: f64) -> Result<Vec<Attitu
         kind: SampleKind::Rate,
         initial: truth.first().ok_or("no samples")?.q_nb,
         noise: Noise::default(),
+        ..Settings::default()
     })?;
     let samples: Vec<RateSample> = truth
         .iter()

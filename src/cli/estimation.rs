@@ -83,6 +83,14 @@ pub struct Estimation {
     /// Beyond that: hold the attitude, bridge all the same, or reset to the initial attitude
     #[arg(long, value_enum, default_value = "hold")]
     pub on_gap: OnGapArg,
+    /// Take out the Earth's rotation at a fixed site, exactly: its latitude in degrees, north positive.
+    /// Needs --world enu, ned or nwu and a known heading
+    #[arg(long, value_name = "LAT_DEG", allow_negative_numbers = true)]
+    pub earth_rate: Option<f64>,
+    /// Replace stamps that jitter by evenly spaced ones: a straight line through the stamps of each
+    /// stretch of constant rate (a stream: a causal tracker). Only for a sensor that samples evenly
+    #[arg(long)]
+    pub regularise_stamps: bool,
     /// Full scale of the gyro in rad/s: samples at or beyond it are marked saturated
     #[arg(long, value_name = "RAD_S", allow_negative_numbers = true)]
     pub gyro_range: Option<f64>,
@@ -230,6 +238,8 @@ impl Estimation {
             bias: Bias::parse(&self.bias)?,
             max_gap_secs: self.max_gap,
             on_gap: self.on_gap.into(),
+            latitude_deg: self.earth_rate,
+            regularise_stamps: self.regularise_stamps,
             gyro_range: self.gyro_range,
             noise: Noise::parse(&self.noise)?,
             start: self.start,

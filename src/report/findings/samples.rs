@@ -229,6 +229,15 @@ fn advised(topic: &CheckedTopic, advice: &Advice) -> Option<Finding> {
             )
             .advise("if the sensor samples evenly and only its stamps jitter, straighten them; if it samples unevenly, keep them")
             .flags("--regularise-stamps"),
+        Advice::StampsJitterEvenly { jitter, segments } => finding(Warning, "jitter")
+            .with("rms_share_of_step", jitter)
+            .with("constant_rates", segments)
+            .advise("if the sensor samples evenly, as most do, straighten its stamps; if it samples unevenly, keep them")
+            .flags("--regularise-stamps"),
+        Advice::StampsUneven { share } => finding(Warning, "uneven")
+            .with("p99_share_of_step", share)
+            .advise("another clock may be steadier; if no sample is missing, count them")
+            .flags("--time log or --time index --rate-hz HZ"),
         Advice::ClocksDrift { ppm } => finding(Warning, "clock-drift")
             .with("ppm", ppm)
             .advise("one of the clocks is wrong by as much, and so is every angle")

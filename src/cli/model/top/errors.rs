@@ -182,6 +182,7 @@ pub(super) fn propagated(
             .first()
             .map_or(Quaternion::identity(), |(_, spin)| spin.q_nb),
         noise: Noise::default(),
+        ..Settings::default()
     })
     .map_err(|e| e.to_string())?;
     let samples: Vec<RateSample> = truth
