@@ -9,8 +9,11 @@ use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::Path;
 
+/// Which term of a fit.
+type Of = fn(&AllanFit) -> &FittedTerm;
+
 /// The fitted terms by key.
-const FITTED: [(&str, fn(&AllanFit) -> &FittedTerm); 5] = [
+const FITTED: [(&str, Of); 5] = [
     ("quantization", |f| &f.quantization),
     ("arw", |f| &f.arw),
     ("bias_instability", |f| &f.bias_instability),
@@ -48,7 +51,7 @@ fn together(gathered: &Gathered, axes: &[Axis]) -> ImuError {
         return ImuError::default();
     }
     let fits: Vec<&AllanFit> = axes.iter().filter_map(|a| a.fit.as_ref()).collect();
-    let typical = |of: fn(&AllanFit) -> &FittedTerm| {
+    let typical = |of: Of| {
         let seen: Vec<f64> = fits.iter().filter_map(|f| of(f).value).collect();
         if 2 * seen.len() <= fits.len() {
             return 0.0;
