@@ -4,6 +4,7 @@
 
 pub mod allan;
 pub mod attitude;
+pub mod dh;
 mod double_double;
 mod elliptic;
 pub mod frames;
@@ -13,3 +14,4 @@ pub mod motion;
 mod quaternion_kernel;
 pub mod rigid_body;
 pub mod top;
+pub mod youbot;

@@ -6,6 +6,7 @@ use super::preparation::Resolved;
 use super::route::Item;
 use super::run::{Replay, refused};
 use super::session::Found;
+use super::simulate::TRUTH_ID;
 use super::summarise;
 use super::waiting::Waiting;
 use crate::decode::{Class, LineDecoder, MAX_LINE, Stated};
@@ -72,6 +73,7 @@ pub fn replay(
         line: Vec::new(),
     };
     let mut sensor: Option<String> = None;
+    let mut has_rates = false;
     let mut samples = Vec::new();
     let mut items = Vec::with_capacity(BATCH);
     let mut closed = false;
@@ -108,6 +110,13 @@ pub fn replay(
                     continue;
                 }
                 let id = line.id.unwrap_or_default();
+                // An attitude carries the rate behind it, which makes it a sample where there is
+                // nothing else: not beside samples, and not when it is the truth about them.
+                let truth = id == TRUTH_ID && run.plan.topic.as_deref() != Some(TRUTH_ID);
+                if line.class == Class::Att && (has_rates || truth) {
+                    samples.clear();
+                    continue;
+                }
                 if run
                     .plan
                     .topic
@@ -117,6 +126,7 @@ pub fn replay(
                     samples.clear();
                     continue;
                 }
+                has_rates |= line.class == Class::Rate;
                 match &sensor {
                     None => {
                         let stated = Stated {
