@@ -9,8 +9,11 @@ use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::Path;
 
+/// Which term of a fit.
+type Of = fn(&AllanFit) -> &FittedTerm;
+
 /// The fitted terms by key.
-const FITTED: [(&str, fn(&AllanFit) -> &FittedTerm); 5] = [
+const FITTED: [(&str, Of); 5] = [
     ("quantization", |f| &f.quantization),
     ("arw", |f| &f.arw),
     ("bias_instability", |f| &f.bias_instability),
@@ -48,7 +51,7 @@ fn together(gathered: &Gathered, axes: &[Axis]) -> ImuError {
         return ImuError::default();
     }
     let fits: Vec<&AllanFit> = axes.iter().filter_map(|a| a.fit.as_ref()).collect();
-    let typical = |of: fn(&AllanFit) -> &FittedTerm| {
+    let typical = |of: Of| {
         let seen: Vec<f64> = fits.iter().filter_map(|f| of(f).value).collect();
         if 2 * seen.len() <= fits.len() {
             return 0.0;
@@ -65,15 +68,28 @@ fn together(gathered: &Gathered, axes: &[Axis]) -> ImuError {
     }
 }
 
-/// What `replay --noise` takes: rad/sqrt(s) and rad/s. `None` without an angle random walk.
-fn for_replay(error: &ImuError) -> Option<String> {
-    (error.arw > 0.0).then(|| {
-        let mut text = format!("arw={:.3e}", error.arw);
-        if error.bias_instability > 0.0 {
-            let _ = write!(text, ",bias-instability={:.3e}", error.bias_instability);
-        }
-        text
-    })
+/// What `replay --noise` takes, axis by axis: rad/sqrt(s), rad/s, rad/s/sqrt(s). `None` without an
+/// angle random walk on every axis, or from a sensor that moved.
+fn for_replay(gathered: &Gathered, axes: &[Axis]) -> Option<String> {
+    let errors: Option<Vec<ImuError>> = axes
+        .iter()
+        .map(|a| a.fit.as_ref().map(AllanFit::error))
+        .collect();
+    let errors = errors.filter(|e| !gathered.moved() && e.iter().all(|e| e.arw > 0.0))?;
+    let keys: [(&str, fn(&ImuError) -> f64); 3] = [
+        ("arw", |e| e.arw),
+        ("bias-instability", |e| e.bias_instability),
+        ("rrw", |e| e.rrw),
+    ];
+    let parts: Vec<String> = keys
+        .iter()
+        .filter(|(_, of)| errors.iter().any(|e| of(e) > 0.0))
+        .map(|(key, of)| {
+            let values: Vec<String> = errors.iter().map(|e| format!("{:.3e}", of(e))).collect();
+            format!("{key}={}", values.join("/"))
+        })
+        .collect();
+    Some(parts.join(","))
 }
 
 /// The lowest point of a curve.
@@ -140,8 +156,11 @@ pub(super) fn text(path: &Path, gathered: &Gathered, axes: &[Axis]) -> String {
     if error != ImuError::default() {
         let _ = writeln!(out, "  to use   simulate --noise {}", error.text());
     }
-    if let Some(flag) = for_replay(&error) {
-        let _ = writeln!(out, "           replay --noise {flag}   (rad, s)");
+    if let Some(flag) = for_replay(gathered, axes) {
+        let _ = writeln!(
+            out,
+            "           replay --noise {flag}   (rad, s; axis by axis)"
+        );
     }
     // The last column is padded.
     out.lines()
@@ -190,7 +209,7 @@ pub(super) fn json(gathered: &Gathered, axes: &[Axis]) -> Value {
         "axes": axes.iter().map(axis_json).collect::<Vec<_>>(),
         "noise_si": noise,
         "simulate_noise": error.text(),
-        "replay_noise": for_replay(&error),
+        "replay_noise": for_replay(gathered, axes),
         "warnings": doubts,
     })
 }

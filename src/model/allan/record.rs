@@ -61,10 +61,9 @@ impl AngleRecord {
     /// A gap: what follows does not continue what came before.
     pub fn split(&mut self) {
         // A piece of nothing but its beginning says nothing.
-        if self.begins.last().is_some_and(|&b| b + 1 >= self.len()) {
-            if let Some(begin) = self.begins.pop() {
-                self.angles.iter_mut().for_each(|a| a.truncate(begin));
-            }
+        let end = self.len();
+        if let Some(begin) = self.begins.pop_if(|b| *b + 1 >= end) {
+            self.angles.iter_mut().for_each(|a| a.truncate(begin));
         }
         self.begins.push(self.len());
         self.angle = Vector3::zeros();

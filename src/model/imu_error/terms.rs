@@ -121,14 +121,14 @@ impl ImuError {
     pub fn parse(text: &str) -> Result<ImuError, ImuErrorFault> {
         let mut parts = text.split(',').map(str::trim).peekable();
         let mut error = ImuError::default();
-        if let Some(name) = parts.next_if(|p| !p.contains('=')) {
-            if name != "none" {
-                let preset = PRESETS
-                    .iter()
-                    .find(|p| same(p.name, name))
-                    .ok_or_else(|| ImuErrorFault(unknown_preset(name)))?;
-                error = preset.error()?;
-            }
+        if let Some(name) = parts.next_if(|p| !p.contains('='))
+            && name != "none"
+        {
+            error = PRESETS
+                .iter()
+                .find(|p| same(p.name, name))
+                .ok_or_else(|| ImuErrorFault(unknown_preset(name)))?
+                .error()?;
         }
         let mut seen = Vec::new();
         for part in parts {
