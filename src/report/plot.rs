@@ -46,6 +46,15 @@ impl Axis {
         }
     }
 
+    /// The value of a mark: zero where steps along a linear axis reach it but for rounding.
+    fn tick(&self, value: f64, span: f64) -> f64 {
+        if !self.log && value.abs() < 1e-9 * span {
+            0.0
+        } else {
+            value
+        }
+    }
+
     /// A logarithmic axis that fits the data.
     #[must_use]
     pub fn log(label: impl Into<String>) -> Axis {
@@ -205,6 +214,9 @@ impl Chart {
         let (width, _) = area.dim_in_pixel();
         area.draw_text(&self.title, &title, (width as i32 / 2, 12))
             .map_err(say)?;
+        let span = |(low, high): (f64, f64)| high - low;
+        let x_span = self.range(0, &self.x).map_or(0.0, span);
+        let y_span = self.range(1, &self.y).map_or(0.0, span);
         let mut chart = ChartBuilder::on(area)
             .margin_top(40)
             .margin_right(24)
@@ -222,8 +234,8 @@ impl Chart {
             .label_style(("sans-serif", 13))
             .x_desc(self.x.label.as_str())
             .y_desc(self.y.label.as_str())
-            .x_label_formatter(&number)
-            .y_label_formatter(&number)
+            .x_label_formatter(&|v| number(&self.x.tick(*v, x_span)))
+            .y_label_formatter(&|v| number(&self.y.tick(*v, y_span)))
             .draw()
             .map_err(say)?;
         for (i, series) in self.series.iter().enumerate() {
@@ -368,6 +380,17 @@ mod tests {
         let (x, y) = widened((0.0, 1.0), (0.0, 1.0), 800.0, 400.0);
         assert!(((x.1 - x.0) / 800.0 - (y.1 - y.0) / 400.0).abs() < 1e-15);
         assert!(x.0 < 0.0 && y.0 <= 0.0 && y.1 >= 1.0);
+    }
+
+    #[test]
+    fn the_mark_at_zero_says_zero() {
+        let mut chart = chart();
+        chart.x = Axis::linear("x");
+        chart.x.range = Some((-1.05, 1.05));
+        chart.size = (560, 600);
+        chart.series[0].points = vec![[-1.0, 1e-3], [1.0, 1.0]];
+        let svg = chart.svg().unwrap();
+        assert!(!svg.contains("e-16"), "{svg}");
     }
 
     #[test]
