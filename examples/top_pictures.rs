@@ -162,7 +162,7 @@ fn path_of_the_axis(case: Case) -> Result<Chart, Failure> {
             ..Axis::linear("east")
         },
         y: Axis {
-            range: Some((-1.05, 1.05)),
+            range: Some((-1.05, 1.55)),
             ..Axis::linear("north, tilted by the view")
         },
         series: vec![
@@ -182,7 +182,7 @@ fn path_of_the_axis(case: Case) -> Result<Chart, Failure> {
             line("Euler-angle equations", locus(&angles, 6), Look::Dashed, 0),
         ],
         equal: true,
-        size: (560, 600),
+        size: (560, 680),
     })
 }
 
@@ -218,8 +218,7 @@ fn attitudes(
 
 fn error_over_time() -> Result<Chart, Failure> {
     let (top, start, truth) = truth(Case::Cusped, RATE_HZ)?;
-    let compared: [Compared; 8] = [
-        ("live, w(t_i)", How::Top(TopMethod::Live(HeldRate::Left))),
+    let compared: [Compared; 7] = [
         (
             "live, w(t_i+1): the seed's",
             How::Top(TopMethod::Live(HeldRate::Right)),
@@ -251,11 +250,11 @@ fn error_over_time() -> Result<Chart, Failure> {
     Ok(Chart {
         title: "cusped top, 2000 Hz: error of the attitude".to_owned(),
         x: Axis {
-            range: Some((0.0, 1.9)),
+            range: Some((0.0, 1.2)),
             ..Axis::linear("time, s")
         },
         y: Axis {
-            range: Some((1e-14, 1e2)),
+            range: Some((1e-14, 1e10)),
             ..Axis::log("error, deg")
         },
         series,
