@@ -162,7 +162,7 @@ fn path_of_the_axis(case: Case) -> Result<Chart, Failure> {
             ..Axis::linear("east")
         },
         y: Axis {
-            range: Some((-1.05, 1.55)),
+            range: Some((-1.05, 1.05)),
             ..Axis::linear("north, tilted by the view")
         },
         series: vec![
@@ -254,7 +254,7 @@ fn error_over_time() -> Result<Chart, Failure> {
             ..Axis::linear("time, s")
         },
         y: Axis {
-            range: Some((1e-14, 1e10)),
+            range: Some((1e-14, 1e3)),
             ..Axis::log("error, deg")
         },
         series,
@@ -297,7 +297,7 @@ fn error_over_rate() -> Result<Chart, Failure> {
     Ok(Chart {
         title: "cusped top, 20 turns a second: largest error over 1.2 s".to_owned(),
         x: Axis {
-            range: Some((20.0, 15000.0)),
+            range: Some((150.0, 15000.0)),
             ..Axis::log("sample rate, Hz")
         },
         y: Axis {
