@@ -181,6 +181,7 @@ fn a_reset_forgets_the_attitudes_error_and_not_what_is_unknown_of_the_bias() {
         kind: SampleKind::Rate,
         initial: Quaternion::identity(),
         noise,
+        ..Settings::default()
     })
     .unwrap();
     let at = |secs: i64, join| RateSample {
@@ -242,6 +243,7 @@ fn pushed(
         kind: SampleKind::Rate,
         initial: Quaternion::identity(),
         noise,
+        ..Settings::default()
     })
     .unwrap();
     let mut out = Vec::new();

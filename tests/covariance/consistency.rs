@@ -108,6 +108,7 @@ fn propagated(flight: &Flight, method: Method, noise: &Noise) -> Vec<AttitudeSam
         kind: SampleKind::DeltaAngle,
         initial: flight.initial,
         noise: *noise,
+        ..Settings::default()
     })
     .unwrap();
     let none = Vector3::zeros();
