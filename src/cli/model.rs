@@ -6,6 +6,7 @@
 mod filter;
 mod inertia;
 pub(crate) mod top_flags;
+pub(crate) mod youbot;
 
 use super::{Global, Outcome};
 use crate::error::Result;
@@ -27,6 +28,8 @@ pub struct Model {
 /// The models.
 #[derive(Subcommand, Debug)]
 pub enum Which {
+    /// The KUKA youBot's arm: kinematics, forces, paths
+    Youbot(youbot::Youbot),
     /// Mass, centre of gravity, inertia -> 6x6 matrices, Coriolis forces, acceleration
     Inertia(inertia::Inertia),
 }
@@ -39,5 +42,6 @@ pub fn run(global: &Global, args: &Model) -> Result<Outcome> {
     let _ = global;
     match &args.which {
         Which::Inertia(command) => inertia::run(command),
+        Which::Youbot(command) => youbot::run(command),
     }
 }
