@@ -1,139 +1,74 @@
-//! Nanoseconds per sample of every method, single core, samples in and attitudes out.
-#![allow(missing_docs, clippy::unwrap_used)]
+//! Nanoseconds per sample of every method, single core, samples in and attitudes out; at last their ratios to one
+//! exponential a sample, measured in turn.
+#![allow(
+    missing_docs,
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    unreachable_pub
+)]
+
+#[path = "propagate/cases.rs"]
+mod cases;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
 use std::hint::black_box;
-use strapd::model::attitude::Quaternion;
-use strapd::propagate::{Method, Noise, Order, Placement, Propagator, Sequential, Settings};
-use strapd::record::{AttitudeSample, Join, Nanos, RateSample, SampleKind, Status};
+use std::time::Instant;
 
 const SAMPLES: usize = 65_536;
 
-/// 200 Hz, 2 rad/s, a few Hz; optionally white noise of 5 mrad/s and stamps off by up to a fifth.
-fn log(kind: SampleKind, noise: f64, jitter: bool) -> Vec<RateSample> {
-    let mut rng = ChaCha8Rng::seed_from_u64(1);
-    let mut before = 0;
-    (0..SAMPLES)
-        .map(|i| {
-            let mut stamp = i as i64 * 5_000_000;
-            if jitter {
-                stamp += rng.random_range(-500_000..500_000);
-            }
-            let t = stamp as f64 * 1e-9;
-            let mut axis = |f: f64, phase: f64| {
-                (f * t * std::f64::consts::TAU + phase).sin() * 2.0
-                    + noise * rng.random_range(-1.7..1.7)
-            };
-            let mut value = [axis(2.3, 0.0), axis(3.1, 1.0), axis(4.7, 2.0)];
-            let start = if i == 0 { stamp - 5_000_000 } else { before };
-            if kind != SampleKind::Rate {
-                value = value.map(|v| v * (stamp - start) as f64 * 1e-9);
-            }
-            before = stamp;
-            RateSample {
-                stamp: Nanos(stamp),
-                start: Nanos(if kind == SampleKind::Rate {
-                    stamp
-                } else {
-                    start
-                }),
-                value: value.into(),
-                accel: None,
-                join: if i == 0 {
-                    Join::Start
-                } else {
-                    Join::Continuous
-                },
-                status: Status::OK,
-                log: Nanos(stamp),
-            }
-        })
-        .collect()
-}
-
-fn run(method: Method, kind: SampleKind, samples: &[RateSample], out: &mut Vec<AttitudeSample>) {
-    let noise = Noise {
-        arw: 2.4e-4,
-        bias: 1e-3,
-        ..Noise::default()
-    };
-    let mut propagator = Propagator::new(Settings {
-        method,
-        kind,
-        initial: Quaternion::identity(),
-        noise,
-    })
-    .unwrap();
-    out.clear();
-    for chunk in samples.chunks(8192) {
-        propagator.push(chunk, &Sequential, out);
-    }
-    propagator.finish(&Sequential, out);
-    black_box(out);
-}
-
 fn propagate(c: &mut Criterion) {
-    let magnus = |window, order, placement| Method::Magnus {
-        window,
-        order,
-        placement,
-    };
-    let commit = |window| Method::CommitProvisional {
-        window,
-        order: Order::M8,
-        finals: false,
-    };
-    let methods = [
-        ("dcm-right", Method::DcmRight),
-        ("auto", Method::Auto),
-        ("causal5-6", magnus(5, Order::M6, Placement::Causal)),
-        ("centred8-8", magnus(8, Order::M8, Placement::Centred)),
-        ("commit6", commit(6)),
-        ("coning3", Method::Coning3),
-        ("rk4", Method::Rk4),
-    ];
-    let inputs = [
-        (
-            "smooth",
-            log(SampleKind::Rate, 0.0, false),
-            SampleKind::Rate,
-        ),
-        (
-            "noisy",
-            log(SampleKind::Rate, 5e-3, false),
-            SampleKind::Rate,
-        ),
-        (
-            "jittered",
-            log(SampleKind::Rate, 5e-3, true),
-            SampleKind::Rate,
-        ),
-        (
-            "increments",
-            log(SampleKind::DeltaAngle, 5e-3, false),
-            SampleKind::DeltaAngle,
-        ),
-        (
-            "increments-jittered",
-            log(SampleKind::DeltaAngle, 5e-3, true),
-            SampleKind::DeltaAngle,
-        ),
-    ];
     let mut group = c.benchmark_group("propagate");
     group.throughput(Throughput::Elements(SAMPLES as u64));
     group.sample_size(20);
     let mut out = Vec::with_capacity(SAMPLES);
-    for (input, samples, kind) in &inputs {
-        for (name, method) in methods {
-            group.bench_with_input(BenchmarkId::new(name, input), samples, |b, samples| {
-                b.iter(|| run(method, *kind, samples, &mut out));
-            });
+    for (name, input) in cases::INPUTS {
+        let samples = cases::log(SAMPLES, &input);
+        for (method_name, method) in cases::METHODS {
+            group.bench_with_input(
+                BenchmarkId::new(method_name, name),
+                &samples,
+                |b, samples| {
+                    b.iter(|| {
+                        cases::run(method, input.kind, samples, &mut out).unwrap();
+                        black_box(&out);
+                    });
+                },
+            );
         }
     }
     group.finish();
 }
 
-criterion_group!(benches, propagate);
+/// In each round every method once, one after another: a slow moment hits neighbours alike. Medians of rounds.
+fn ratios(_: &mut Criterion) {
+    const ROUNDS: usize = 21;
+    if std::env::args().any(|argument| argument == "--test") {
+        return;
+    }
+    for (name, input) in cases::INPUTS {
+        let samples = cases::log(SAMPLES, &input);
+        let mut out = Vec::with_capacity(SAMPLES);
+        let mut seconds = [[0.0; ROUNDS]; cases::METHODS.len()];
+        for round in 0..ROUNDS {
+            for (row, (_, method)) in seconds.iter_mut().zip(cases::METHODS) {
+                let start = Instant::now();
+                cases::run(method, input.kind, &samples, &mut out).unwrap();
+                black_box(&out);
+                row[round] = start.elapsed().as_secs_f64();
+            }
+        }
+        println!("\n| {name} | ns per sample | of dcm-right's |\n|---|---|---|");
+        let median = |mut values: [f64; ROUNDS]| {
+            values.sort_by(f64::total_cmp);
+            values[ROUNDS / 2]
+        };
+        for (row, (method_name, _)) in seconds.iter().zip(cases::METHODS) {
+            let ratio = median(std::array::from_fn(|i| row[i] / seconds[0][i]));
+            let nanos = median(*row) * 1e9 / SAMPLES as f64;
+            println!("| {method_name} | {nanos:.0} | {ratio:.2} |");
+        }
+    }
+}
+
+criterion_group!(benches, propagate, ratios);
 criterion_main!(benches);

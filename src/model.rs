@@ -2,6 +2,7 @@
 //!
 //! [`frames`] says what a rotation joins, [`attitude`] how it is held and moved.
 
+pub mod allan;
 pub mod attitude;
 pub mod dh;
 mod double_double;

@@ -1,6 +1,7 @@
 //! Wires the stages: source -> decode -> condition -> propagate -> sink. I/O.
 
 pub mod against;
+pub mod check;
 mod chosen;
 pub mod estimator;
 pub mod lines;
@@ -13,6 +14,7 @@ pub mod pool;
 pub mod position;
 pub mod preparation;
 pub mod provenance;
+pub mod recover;
 pub mod replay;
 pub mod route;
 pub mod run;

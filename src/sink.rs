@@ -7,6 +7,7 @@
 //! threads and not (within a stream) on how the samples were cut into calls.
 
 mod batch;
+mod copy;
 mod csv;
 mod decimate;
 mod json;
@@ -17,9 +18,10 @@ mod target;
 #[cfg(test)]
 pub(crate) mod tests;
 
+pub use copy::CopiedChannel;
 pub use decimate::Decimator;
 pub use mcap::chunk::Compression;
-pub use mcap::{Encoding, InputChannel, InputMessage};
+pub use mcap::{Attachment, Encoding, InputChannel, InputMessage};
 pub use output::Flow;
 pub use stream::{Content, Provenance, Stream, output_topic};
 pub use target::{Format, Target};
@@ -38,14 +40,8 @@ use std::path::PathBuf;
 /// Samples in one batch: one chunk of about 1 MiB in MCAP.
 const BATCH_SAMPLES: usize = 2048;
 
-/// Uncompressed size at which a chunk of copied messages is closed.
-const COPY_CHUNK_BYTES: usize = 1 << 20;
-
 /// Batches in flight: enough to keep every thread busy, few enough to bound memory (about 3 MB each).
 const MAX_BATCHES: usize = 16;
-
-/// Copied messages can be large; so many bytes of them are written without waiting for more.
-const MAX_QUEUED_COPIES: usize = MAX_BATCHES * COPY_CHUNK_BYTES;
 
 /// How the output is made.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -161,17 +157,33 @@ impl Sink {
                 compression: options.compression,
             },
         };
-        let lanes = (0..streams.len())
-            .map(|stream| Lane {
+        // A table has no rows for truth.
+        let left_out: Vec<bool> = streams
+            .iter()
+            .map(|s| matches!(form, Form::Csv) && s.content == Content::Truth)
+            .collect();
+        Sink::begin(output, form, file, &head, &left_out)
+    }
+
+    /// The sink once its head is made; writes it. `left_out`: by stream, whether nothing of it is
+    /// written.
+    fn begin(
+        output: Output,
+        form: Form,
+        file: McapFile,
+        head: &[u8],
+        left_out: &[bool],
+    ) -> Result<Sink> {
+        let lanes = left_out
+            .iter()
+            .enumerate()
+            .map(|(stream, left_out)| Lane {
                 batch: Batch {
                     stream,
                     ..Batch::default()
                 },
                 last: None,
-                left_out: matches!(form, Form::Csv)
-                    && streams
-                        .get(stream)
-                        .is_some_and(|s| s.content == Content::Truth),
+                left_out: *left_out,
             })
             .collect();
         let mut sink = Sink {
@@ -190,7 +202,7 @@ impl Sink {
             stamps_out_of_range: 0,
         };
         // A reader that has already hung up shows at the first sample.
-        let _ = sink.put(&head)?;
+        let _ = sink.put(head)?;
         Ok(sink)
     }
 
@@ -255,46 +267,6 @@ impl Sink {
                     return Ok(Flow::Closed);
                 }
             }
-        }
-        Ok(Flow::Continue)
-    }
-
-    /// Declares a channel whose messages [`Sink::copy`] will bring. Anything but an MCAP has no place
-    /// for them and ignores both.
-    ///
-    /// # Errors
-    /// [`Error::Write`]; [`Error::Usage`] when there are more than MCAP can number.
-    pub fn copy_channel(&mut self, channel: &InputChannel<'_>) -> Result<CopiedChannel> {
-        if !matches!(self.form, Form::Mcap { .. }) || !self.is_open()? {
-            return Ok(CopiedChannel(0));
-        }
-        // The declaration is written at once, so it stands before every chunk that needs it.
-        let mut records = Vec::new();
-        let id = mcap::declare_copy(&mut self.file, &mut records, channel)?;
-        let _ = self.put(&records)?;
-        Ok(CopiedChannel(id))
-    }
-
-    /// Copies a message of the input.
-    ///
-    /// # Errors
-    /// [`Error::Write`].
-    pub fn copy(
-        &mut self,
-        channel: CopiedChannel,
-        message: &InputMessage<'_>,
-        pool: &ThreadPool,
-    ) -> Result<Flow> {
-        if !matches!(self.form, Form::Mcap { .. }) {
-            return Ok(Flow::Continue);
-        }
-        if !self.is_open()? {
-            return Ok(Flow::Closed);
-        }
-        mcap::copy(&mut self.copies, channel.0, message);
-        if self.copies.plain_len() >= COPY_CHUNK_BYTES {
-            self.queue_copies();
-            return self.make_room(pool);
         }
         Ok(Flow::Continue)
     }
@@ -432,18 +404,6 @@ impl Sink {
         };
     }
 
-    /// Moves the copied messages into the queue.
-    fn queue_copies(&mut self) {
-        let full = std::mem::take(&mut self.copies);
-        self.queued_copies += full.plain_len();
-        let slot = self.next_slot();
-        slot.batch.samples.clear();
-        slot.batch.raw.clear();
-        let mut empty = std::mem::replace(&mut slot.chunk, full);
-        empty.clear();
-        self.copies = empty;
-    }
-
     fn queue_everything(&mut self, pool: Option<&ThreadPool>) -> Result<Flow> {
         for stream in 0..self.lanes.len() {
             if !self.lanes[stream].batch.is_empty() {
@@ -462,7 +422,7 @@ impl Sink {
     /// Drains the queue when it is long enough for this pool.
     fn make_room(&mut self, pool: &ThreadPool) -> Result<Flow> {
         let limit = (2 * pool.current_num_threads()).clamp(2, MAX_BATCHES);
-        if self.used >= limit || self.queued_copies >= MAX_QUEUED_COPIES {
+        if self.used >= limit || self.queued_copies >= copy::MAX_QUEUED_COPIES {
             self.drain(Some(pool))
         } else {
             Ok(Flow::Continue)
@@ -515,7 +475,3 @@ impl Sink {
         }
     }
 }
-
-/// A channel declared by [`Sink::copy_channel`].
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct CopiedChannel(u16);

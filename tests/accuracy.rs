@@ -8,8 +8,14 @@ mod coning;
 mod double;
 #[path = "accuracy/gaps.rs"]
 mod gaps;
+#[path = "accuracy/live.rs"]
+mod live;
+#[path = "accuracy/integration_error.rs"]
+mod integration_error;
 #[path = "accuracy/noise.rs"]
 mod noise;
+#[path = "accuracy/peers.rs"]
+mod peers;
 #[path = "accuracy/random.rs"]
 mod random;
 #[path = "accuracy/run.rs"]
@@ -30,7 +36,7 @@ use top::Top;
 const MARGIN: usize = 24;
 const FINE: usize = 4000;
 
-fn centred(window: usize, order: Order) -> Method {
+const fn centred(window: usize, order: Order) -> Method {
     Method::Magnus {
         window,
         order,
@@ -46,7 +52,7 @@ fn causal(window: usize, order: Order) -> Method {
     }
 }
 
-fn commit(window: usize) -> Method {
+const fn commit(window: usize) -> Method {
     Method::CommitProvisional {
         window,
         order: Order::M8,

@@ -91,8 +91,8 @@ pub enum CompressionArg {
 }
 
 impl From<CompressionArg> for Compression {
-    fn from(compression: CompressionArg) -> Compression {
-        match compression {
+    fn from(named: CompressionArg) -> Compression {
+        match named {
             CompressionArg::Zstd => Compression::Zstd,
             CompressionArg::Lz4 => Compression::Lz4,
             CompressionArg::None => Compression::None,

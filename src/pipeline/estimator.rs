@@ -31,11 +31,7 @@ impl Estimator {
             method: plan.method,
             kind: resolved.kind,
             initial: prepared.initial,
-            noise: propagate::Noise {
-                arw: plan.noise.arw,
-                bias: prepared.bias_sigma,
-                ..propagate::Noise::default()
-            },
+            noise: plan.noise.with_bias(prepared.bias_sigma.into()),
         })
         .map_err(|e| e.to_string())?;
         Ok(Estimator {
@@ -107,6 +103,9 @@ impl Estimator {
         for sample in &mut self.out {
             sample.q_nb = Convention::EnuFlu.convert(to, sample.q_nb);
             sample.rate = Convention::EnuFlu.convert_body(to, sample.rate);
+            sample.covariance = sample
+                .covariance
+                .relabelled(|v| Convention::EnuFlu.convert_body(to, v));
             sample.accel = sample.accel.map(|a| Convention::EnuFlu.convert_body(to, a));
         }
     }

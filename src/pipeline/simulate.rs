@@ -3,12 +3,11 @@
 use super::outlet::Outlet;
 use super::pool::Pool;
 use super::position::Position;
-use crate::error::Result;
-use crate::record::{AttitudeSample, SampleKind, Status};
+use crate::error::{Error, Result};
+use crate::record::{AttitudeCovariance, AttitudeSample, SampleKind, Status};
 use crate::report::simulation::SimulationSummary;
 use crate::sink::{Content, Flow, Options, Provenance, Stream, Target};
 use crate::source::synthetic::{Stretch, Synthetic, Truth};
-use nalgebra::Vector3;
 use std::time::Instant;
 
 /// The topic of the samples.
@@ -76,7 +75,13 @@ pub fn run(
     let source = &mut simulation.source;
     let (mut stretch, mut truth) = (Stretch::default(), Vec::new());
     let mut reader_gone = false;
-    while !reader_gone && source.next_stretch(batch, &mut stretch) > 0 {
+    while !reader_gone {
+        let made = source
+            .next_stretch(batch, &mut stretch)
+            .map_err(|e| Error::Usage(format!("simulate {}: {e}", simulation.name)))?;
+        if made == 0 {
+            break;
+        }
         truth.clear();
         truth.extend(stretch.truth.iter().map(as_attitude));
         // Samples first: a stream of lines is told apart by its first one.
@@ -155,7 +160,7 @@ fn as_attitude(truth: &Truth) -> AttitudeSample {
         q_nb: truth.spin.q_nb,
         rate: truth.spin.w_nb_b,
         accel: None,
-        sigma: Vector3::zeros(),
+        covariance: AttitudeCovariance::default(),
         status: Status::OK,
         reset_count: 0,
         log: truth.stamp,

@@ -45,6 +45,12 @@ impl SimulationSummary {
                 n.fastest / std::f64::consts::PI
             ));
         }
+        if n.saturated > 0 {
+            warnings.push(format!(
+                "{} of {} samples are at the end of the sensor's range; --noise PRESET,range=DEG_S widens it",
+                n.saturated, n.samples
+            ));
+        }
         if self.stamps_out_of_range > 0 {
             warnings.push(format!(
                 "{} stamps do not fit into the 32-bit seconds of ROS messages (1901 to 2038); --start-stamp",
@@ -68,8 +74,13 @@ impl SimulationSummary {
             &mut out,
             "samples",
             &format!(
-                "{} at {} Hz over {secs} s; {}",
+                "{}{} at {} Hz over {secs} s; {}",
                 n.samples,
+                if n.dropped > 0 {
+                    format!(" ({} lost)", n.dropped)
+                } else {
+                    String::new()
+                },
                 self.rate_hz,
                 meaning(self.kind)
             ),
@@ -105,6 +116,8 @@ impl SimulationSummary {
             "motion": self.name,
             "instants": n.instants,
             "samples": n.samples,
+            "dropped": n.dropped,
+            "saturated": n.saturated,
             "rate_hz": self.rate_hz,
             "sample_kind": self.kind.name(),
             "fastest_rad_s": n.fastest,

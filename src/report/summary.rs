@@ -2,6 +2,7 @@
 //!
 //! Built by the pipeline, which knows the numbers; the words are here, in one place.
 
+use crate::compare::BodyAxesFit;
 use crate::record::{Counts, SampleKind, Verdict};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
@@ -47,6 +48,8 @@ pub struct TopicSummary {
     pub noise: String,
     /// Drift to be expected from what is not known of the bias, rad/s.
     pub drift: f64,
+    /// Bound on the worst attitude error of the integration itself, rad; `None` where the method can not tell.
+    pub integration_error: Option<f64>,
     /// Gaps.
     pub gaps: Gaps,
     /// Sum of the angles of all steps, rad.
@@ -63,6 +66,8 @@ pub struct TopicSummary {
     pub final_sigma: [f64; 3],
     /// Against the recorded orientation, one row per sample kind.
     pub against: Vec<Against>,
+    /// What the recorded orientation itself is like, where one was compared with.
+    pub recorded: Option<Recorded>,
     /// Things to know, each with the flag that helps.
     pub warnings: Vec<String>,
 }
@@ -97,6 +102,19 @@ pub struct Against {
     pub p95_deg: f64,
     /// Pairs compared.
     pub pairs: usize,
+}
+
+/// A recorded orientation that was compared with.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Recorded {
+    /// Recorded attitudes that are rotations (a long log's are thinned).
+    pub usable: usize,
+    /// Recorded quadruples that are none: norm far from 1, zero, NaN.
+    pub unusable: u64,
+    /// All of them are one and the same.
+    pub constant: bool,
+    /// How its body axes lie to the gyro's; `None` = the motion does not tell.
+    pub axes: Option<BodyAxesFit>,
 }
 
 /// What one log became.
@@ -254,6 +272,19 @@ impl TopicSummary {
                 self.noise
             ),
         );
+        line(
+            out,
+            "numeric",
+            &self.integration_error.map_or_else(
+                || "integration error not estimated for this method".to_owned(),
+                |error| {
+                    format!(
+                        "integration error at most about {} deg, by a window of four samples less",
+                        significant(error.to_degrees(), 2)
+                    )
+                },
+            ),
+        );
         line(out, "gaps", &self.gaps.text());
         line(out, "lost", &self.lost_text(damaged));
         for first in &self.first_losses {
@@ -358,6 +389,7 @@ impl TopicSummary {
                             "origin": self.bias_origin },
             "noise": self.noise,
             "drift_deg_per_h": self.drift.to_degrees() * 3600.0,
+            "integration_error_deg": self.integration_error.map(f64::to_degrees),
             "gaps": {
                 "bridged": self.gaps.bridged,
                 "held": self.gaps.held,

@@ -37,7 +37,7 @@ pub(super) fn push_row(out: &mut Vec<u8>, sample: &AttitudeSample) {
     push_i64(out, sample.stamp.0);
     let q = sample.q_nb.wxyz();
     let [roll, pitch, yaw] = roll_pitch_yaw(q).map(f64::to_degrees);
-    let sigma = sample.sigma.map(f64::to_degrees);
+    let sigma = sample.covariance.sigma().map(f64::to_degrees);
     let numbers = q
         .into_iter()
         .chain([roll, pitch, yaw])
@@ -101,7 +101,7 @@ fn half_turn(angle: f64) -> f64 {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use crate::record::{Nanos, Status};
+    use crate::record::{AttitudeCovariance, Nanos, Status};
     use crate::sink::tests::sample;
     use nalgebra::{UnitQuaternion, Vector3};
 
@@ -154,7 +154,7 @@ mod tests {
     #[test]
     fn a_row_has_a_value_under_every_heading() {
         let mut s = sample(Nanos(1_700_000_000_000_000_001));
-        s.sigma = Vector3::new(f64::NAN, f64::INFINITY, 0.0);
+        s.covariance = AttitudeCovariance::from_sigma(Vector3::new(f64::NAN, f64::INFINITY, 0.0));
         s.status = Status::HELD.with(Status::SATURATED);
         let mut out = HEADER.to_vec();
         push_row(&mut out, &s);

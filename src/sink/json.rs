@@ -177,7 +177,7 @@ impl AttObject {
         out.extend_from_slice(&self.labels);
         push_array3(out, sample.rate.into());
         out.extend_from_slice(b",\"sigma_deg\":");
-        push_array3(out, sample.sigma.map(f64::to_degrees).into());
+        push_array3(out, sample.covariance.sigma().map(f64::to_degrees).into());
         out.extend_from_slice(b",\"status\":[");
         push_status(out, sample, b"\"", b",");
         out.extend_from_slice(b"],\"reset\":");
@@ -242,7 +242,7 @@ impl FrameTransform {
 mod tests {
     use super::*;
     use crate::model::attitude::Quaternion;
-    use crate::record::Status;
+    use crate::record::{AttitudeCovariance, Status};
     use crate::sink::tests::sample;
     use nalgebra::Vector3;
 
@@ -259,7 +259,8 @@ mod tests {
         let mut s = sample(Nanos(1_700_000_000_005_000_000));
         s.q_nb = Quaternion::identity();
         s.rate = Vector3::new(0.01, 0.0, -0.2);
-        s.sigma = Vector3::new(0.5, 1.0, 2.0).map(f64::to_radians);
+        let sigma = Vector3::new(0.5, 1.0, 2.0).map(f64::to_radians);
+        s.covariance = AttitudeCovariance::from_sigma(sigma);
         let expected = concat!(
             r#"{"class":"ATT","id":"imu0","seq":17,"stamp":{"sec":1700000000,"nsec":5000000},"#,
             r#""q":{"w":1.0,"x":0.0,"y":0.0,"z":0.0},"rotates":"sensor_to_world","world":"start","#,

@@ -80,8 +80,23 @@ pub struct InputMessage<'a> {
     pub data: &'a [u8],
 }
 
+/// A file carried inside another log, for a copy of it.
+#[derive(Clone, Copy, Debug)]
+pub struct Attachment<'a> {
+    /// When it was recorded, ns.
+    pub log_time: u64,
+    /// When it was made, ns.
+    pub create_time: u64,
+    /// Its name.
+    pub name: &'a str,
+    /// Its media type.
+    pub media_type: &'a str,
+    /// Its bytes.
+    pub data: &'a [u8],
+}
+
 /// How each stream's samples become messages.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Layout {
     streams: Vec<Messages>,
 }
@@ -375,5 +390,5 @@ fn only_attitudes_are_json() -> Error {
 }
 
 fn too_many_channels() -> Error {
-    Error::Usage("an MCAP file holds at most 65535 channels and schemas\n  help: without --copy-input only the attitude is written".to_owned())
+    Error::Usage("an MCAP file holds at most 65535 channels and schemas\n  help: a copy of this log (--copy-input, recover) does not fit into one".to_owned())
 }

@@ -1,4 +1,4 @@
-//! A motion with exact truth -> RawSample, and the truth beside it. Pure.
+//! A motion with exact truth, and a sensor with known errors -> RawSample, and the truth beside it. Pure.
 //!
 //! A source like any other: what comes out takes the same way through conditioning and integration as
 //! a recording, and is the only source whose answer is known beforehand.
@@ -8,12 +8,17 @@
 //! whatever x points at is called east, so the world of the truth is ENU. The specific force is
 //! `f_b = C_nb^T (a_n - g_n)`: 9.8 m/s^2 upwards at rest.
 //!
-//! Sample k is taken at `round(k 1e9 / rate)` ns after the start, and the motion is evaluated at that
-//! very nanosecond. Rates begin at k = 0; averages and delta angles are over the interval that ends at
-//! their stamp, and so begin at k = 1. Truth is given for every k from 0 on.
+//! Sample k is taken at `round(k 1e9 / rate)` ns after the start (or beside it, with sampling jitter),
+//! and the motion is evaluated at that very nanosecond. Rates begin at k = 0; averages and delta
+//! angles are over the interval that ends at their stamp, and so begin at k = 1. Truth is given for
+//! every k from 0 on, at the instant itself: whatever the stamps say, and whether or not the sample
+//! arrives.
 
 use crate::model::attitude::Quaternion;
 use crate::model::frames::{Body, In, Nav};
+use crate::model::imu_error::{
+    self, GyroModel, ImuError, ImuErrorFault, MeasureError, StampError, StampModel,
+};
 use crate::model::motion::Motion;
 use crate::model::rigid_body::Spin;
 use crate::record::{Nanos, RawSample, SampleKind};
@@ -33,6 +38,12 @@ pub struct Sampling {
     pub start: Nanos,
     /// Gravity, m/s^2, downwards.
     pub gravity: f64,
+    /// The sensor's errors. Without any, samples are the motion's own numbers.
+    pub error: ImuError,
+    /// Errors of sampling instants and stamps, and losses.
+    pub stamps: StampError,
+    /// Seed of everything random.
+    pub seed: u64,
 }
 
 /// Fastest sampling: a nanosecond is then a thousandth of the interval.
@@ -60,6 +71,8 @@ pub enum SamplingError {
         /// The rate that must be exceeded, Hz.
         needed_hz: f64,
     },
+    /// Errors no sensor can have.
+    Errors(ImuErrorFault),
     /// Stamps would run over the end of 64-bit nanoseconds.
     StampOverflow {
         /// The first one.
@@ -79,6 +92,7 @@ impl fmt::Display for SamplingError {
                 f,
                 "at {rate_hz} Hz the motion turns half a turn or more from sample to sample\n  help: --rate-hz above {needed_hz:.1}, several times that for a good attitude"
             ),
+            SamplingError::Errors(fault) => write!(f, "{fault}"),
             SamplingError::StampOverflow { start } => write!(
                 f,
                 "the stamps, from {} ns on, run over the end of 64-bit nanoseconds\n  help: an earlier --start-stamp",
@@ -89,6 +103,12 @@ impl fmt::Display for SamplingError {
 }
 
 impl std::error::Error for SamplingError {}
+
+impl From<ImuErrorFault> for SamplingError {
+    fn from(fault: ImuErrorFault) -> Self {
+        SamplingError::Errors(fault)
+    }
+}
 
 /// What truly was at an instant.
 #[derive(Clone, Copy, Debug)]
@@ -104,8 +124,8 @@ pub struct Truth {
 pub struct Stretch {
     /// Every instant.
     pub truth: Vec<Truth>,
-    /// What the sensor put out. `orientation` holds the true one at the sample's instant, `log` that
-    /// instant.
+    /// What the sensor put out and was not lost. `orientation` holds the true one at the sample's
+    /// instant, `log` that instant.
     pub samples: Vec<RawSample>,
 }
 
@@ -116,6 +136,10 @@ pub struct Noticed {
     pub instants: u64,
     /// Samples put out.
     pub samples: u64,
+    /// Samples lost on purpose.
+    pub dropped: u64,
+    /// Samples with an axis at the end of the sensor's range.
+    pub saturated: u64,
     /// Steps of half a turn or more.
     pub undersampled: u64,
     /// Largest body rate, rad/s.
@@ -127,6 +151,9 @@ pub struct Noticed {
 pub struct Synthetic {
     motion: Motion,
     sampling: Sampling,
+    ticks: StampModel,
+    /// `None` without errors.
+    sensor: Option<GyroModel>,
     /// Instants in all.
     count: u64,
     /// The next one.
@@ -148,7 +175,10 @@ impl Synthetic {
             duration_secs,
             gravity,
             start,
-            ..
+            error,
+            stamps,
+            seed,
+            kind,
         } = sampling;
         let within = |what, value: f64, ok: bool, allowed| {
             if ok {
@@ -184,22 +214,32 @@ impl Synthetic {
         if needed_hz >= rate_hz {
             return Err(SamplingError::UnderSampled { rate_hz, needed_hz });
         }
+        let sensor = (error != ImuError::default())
+            .then(|| GyroModel::new(&error, kind, seed))
+            .transpose()?;
         // A product that falls short of a whole number by rounding alone still reaches it.
         let intervals = (duration_secs * rate_hz * (1.0 + 4.0 * f64::EPSILON)).floor() as u64;
-        let synthetic = Synthetic {
+        let end = (intervals as f64 * 1e9 / rate_hz).ceil() as i64;
+        if start.0.checked_add(end).is_none() {
+            return Err(SamplingError::StampOverflow { start });
+        }
+        Ok(Synthetic {
             motion,
+            ticks: StampModel::new(&stamps, start, rate_hz, seed)?,
+            sensor,
             count: intervals + 1,
             next: 0,
             before: 0,
             last_q_nb: spin.q_nb,
             noticed: Noticed::default(),
             sampling,
-        };
-        let end = i64::try_from(synthetic.nanos(intervals)).ok();
-        if end.and_then(|end| start.0.checked_add(end)).is_none() {
-            return Err(SamplingError::StampOverflow { start });
-        }
-        Ok(synthetic)
+        })
+    }
+
+    /// What this unit of the sensor drew of its constant errors, when it has errors.
+    #[must_use]
+    pub fn sensor(&self) -> Option<&GyroModel> {
+        self.sensor.as_ref()
     }
 
     /// How many instants there are, past ones included.
@@ -214,24 +254,24 @@ impl Synthetic {
         self.noticed
     }
 
-    /// Nanoseconds from the start to instant `k`.
-    fn nanos(&self, k: u64) -> u64 {
-        (k as f64 * 1e9 / self.sampling.rate_hz).round() as u64
-    }
-
     /// Replaces what is in `out` by the next `most` instants at most; says how many there were.
-    pub fn next_stretch(&mut self, most: usize, out: &mut Stretch) -> usize {
+    ///
+    /// # Errors
+    /// The motion is not finite at some instant.
+    pub fn next_stretch(&mut self, most: usize, out: &mut Stretch) -> Result<usize, MeasureError> {
         out.truth.clear();
         out.samples.clear();
         let n = usize::try_from(self.count - self.next).map_or(most, |left| left.min(most));
         for _ in 0..n {
-            self.one(out);
+            self.one(out)?;
         }
-        n
+        Ok(n)
     }
 
-    fn one(&mut self, out: &mut Stretch) {
-        let now = self.nanos(self.next);
+    fn one(&mut self, out: &mut Stretch) -> Result<(), MeasureError> {
+        let tick = self.ticks.tick();
+        // Jitter may not take the first sample to before the motion began.
+        let now = tick.instant.since(self.sampling.start).max(0) as u64;
         let mut spin = self.motion.at_nanos(now);
         spin.q_nb = spin.q_nb.same_sign_as(&self.last_q_nb);
         self.last_q_nb = spin.q_nb;
@@ -243,33 +283,77 @@ impl Synthetic {
             u64::from(rate >= std::f64::consts::PI * self.sampling.rate_hz);
         self.noticed.instants += 1;
 
-        let interval = now - self.before;
-        let value = match self.sampling.kind {
-            SampleKind::Rate => Some(spin.w_nb_b),
-            SampleKind::Average | SampleKind::DeltaAngle if self.next == 0 => None,
-            SampleKind::Average => {
-                let secs = interval as f64 / 1e9;
-                Some(self.motion.delta_angle(self.before, now) / secs)
+        let held_n = In::<Nav>::assume(
+            self.motion.acceleration_n(now) + Vector3::new(0.0, 0.0, self.sampling.gravity),
+        );
+        let force_b = *(spin.q_nb.inverse() * held_n).as_vector();
+        if let Some((gyro, accel)) = self.measured(at, now, &spin, &force_b)? {
+            if tick.dropped {
+                self.noticed.dropped += 1;
+            } else {
+                let rates = self.sampling.kind == SampleKind::Rate;
+                out.samples.push(RawSample {
+                    header: Some(tick.stamp),
+                    log: at,
+                    publish: at,
+                    gyro: Some(gyro.into()),
+                    accel: Some(accel.into()),
+                    orientation: Some(spin.q_nb.wxyz()),
+                    interval_nanos: (!rates).then_some((now - self.before) as i64),
+                });
+                self.noticed.samples += 1;
             }
-            SampleKind::DeltaAngle => Some(self.motion.delta_angle(self.before, now)),
-        };
-        if let Some(value) = value {
-            let held_n = In::<Nav>::assume(
-                self.motion.acceleration_n(now) + Vector3::new(0.0, 0.0, self.sampling.gravity),
-            );
-            let force_b = spin.q_nb.inverse() * held_n;
-            out.samples.push(RawSample {
-                header: Some(at),
-                log: at,
-                publish: at,
-                gyro: Some(value.into()),
-                accel: Some((*force_b.as_vector()).into()),
-                orientation: Some(spin.q_nb.wxyz()),
-                interval_nanos: (self.sampling.kind != SampleKind::Rate).then_some(interval as i64),
-            });
-            self.noticed.samples += 1;
         }
         self.before = now;
         self.next += 1;
+        Ok(())
+    }
+
+    /// What the sensor reads at `now`: rate (or delta angle) and specific force. `None` for the
+    /// interval before the start.
+    fn measured(
+        &mut self,
+        at: Nanos,
+        now: u64,
+        spin: &Spin,
+        force_b: &Vector3<f64>,
+    ) -> Result<Option<(Vector3<f64>, Vector3<f64>)>, MeasureError> {
+        let rates = self.sampling.kind == SampleKind::Rate;
+        let first = self.next == 0;
+        if first && !rates {
+            return Ok(None);
+        }
+        if self.sensor.is_none() && rates {
+            return Ok(Some((spin.w_nb_b, *force_b)));
+        }
+        // A rate at the start has no interval before it: as if the body had come at this rate.
+        let nanos = if first {
+            (1e9 / self.sampling.rate_hz).round().max(1.0) as u64
+        } else {
+            now - self.before
+        };
+        let secs = nanos as f64 / 1e9;
+        let delta_angle = if first {
+            spin.w_nb_b * secs
+        } else {
+            self.motion.delta_angle(self.before, now)
+        };
+        let Some(sensor) = &mut self.sensor else {
+            let gyro = match self.sampling.kind {
+                SampleKind::DeltaAngle => delta_angle,
+                SampleKind::Average | SampleKind::Rate => delta_angle / secs,
+            };
+            return Ok(Some((gyro, *force_b)));
+        };
+        let truth = imu_error::Truth {
+            rate: spin.w_nb_b,
+            delta_angle,
+            specific_force: *force_b,
+            temperature: 0.0,
+        };
+        let from = Nanos(at.0.saturating_sub(nanos as i64));
+        let read = sensor.measure(from, at, &truth)?;
+        self.noticed.saturated += u64::from(read.saturated);
+        Ok(Some((read.gyro, read.specific_force)))
     }
 }

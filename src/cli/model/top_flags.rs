@@ -13,14 +13,9 @@ pub struct TopFlags {
     /// cusped, wavy, looping, steady-slow, steady-fast, sleeping or falling [default: cusped]
     #[arg(long, value_name = "CASE", value_parser = case, conflicts_with_all = ["euler", "euler_rates"])]
     pub case: Option<Case>,
-    /// Turns a second about the axis of symmetry (the body's z rate)
-    #[arg(
-        long,
-        value_name = "HZ",
-        default_value_t = 20.0,
-        allow_negative_numbers = true
-    )]
-    pub spin_hz: f64,
+    /// Turns a second about the axis of symmetry (the body's z rate) [default: 20]
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    pub spin_hz: Option<f64>,
     /// Angle of the axis from the vertical at the start, degrees [default: 54.57]
     #[arg(
         long,
@@ -41,38 +36,18 @@ pub struct TopFlags {
         conflicts_with = "spin_hz"
     )]
     pub euler_rates: Option<String>,
-    /// Mass, kg
-    #[arg(
-        long,
-        value_name = "KG",
-        default_value_t = 1.0,
-        allow_negative_numbers = true
-    )]
-    pub mass: f64,
-    /// Pivot to centre of gravity, m
-    #[arg(
-        long,
-        value_name = "M",
-        default_value_t = 0.04,
-        allow_negative_numbers = true
-    )]
-    pub arm: f64,
-    /// Moments of inertia about the pivot, across and along the axis, kg m^2
-    #[arg(
-        long,
-        value_name = "ACROSS,ALONG",
-        default_value = "0.002,0.0008",
-        allow_hyphen_values = true
-    )]
-    pub inertia: String,
-    /// Gravity, m/s^2, downwards
-    #[arg(
-        long,
-        value_name = "M_S2",
-        default_value_t = 9.8,
-        allow_negative_numbers = true
-    )]
-    pub gravity: f64,
+    /// Mass, kg [default: 1]
+    #[arg(long, value_name = "KG", allow_negative_numbers = true)]
+    pub mass: Option<f64>,
+    /// Pivot to centre of gravity, m [default: 0.04]
+    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    pub arm: Option<f64>,
+    /// Moments of inertia about the pivot, across and along the axis, kg m^2 [default: 0.002,0.0008]
+    #[arg(long, value_name = "ACROSS,ALONG", allow_hyphen_values = true)]
+    pub inertia: Option<String>,
+    /// Gravity, m/s^2, downwards [default: 9.8]
+    #[arg(long, value_name = "M_S2", allow_negative_numbers = true)]
+    pub gravity: Option<f64>,
 }
 
 /// A case by its name.
@@ -90,21 +65,59 @@ pub(crate) fn case(name: &str) -> std::result::Result<Case, String> {
     })
 }
 
+/// A top some arrangement of matter can be.
+///
+/// # Errors
+/// What can not be, with its numbers.
+pub(crate) fn top(
+    mass: f64,
+    arm: f64,
+    [across, along]: [f64; 2],
+    gravity: f64,
+) -> std::result::Result<SymmetricTop, String> {
+    if along > 2.0 * across {
+        return Err(format!(
+            "inertia {across} across, {along} along the axis: the latter exceeds the sum of the two across it ({}), which no matter can",
+            2.0 * across
+        ));
+    }
+    SymmetricTop::new(mass, arm, across, along, gravity).map_err(|e| e.to_string())
+}
+
 impl TopFlags {
     /// The top.
     ///
     /// # Errors
     /// [`Error::Usage`] for a body that can not be.
     pub(crate) fn body(&self) -> Result<SymmetricTop> {
-        let [across, along] = numbers("--inertia", &self.inertia)?;
-        if along > 2.0 * across {
-            return Err(Error::Usage(format!(
-                "--inertia {across},{along}: the moment along the axis exceeds the sum of the two across it ({}), which no matter can",
-                2.0 * across
-            )));
-        }
-        SymmetricTop::new(self.mass, self.arm, across, along, self.gravity)
-            .map_err(|e| Error::Usage(format!("top: {e}")))
+        let seed = SymmetricTop::seed();
+        let [across, along] = match &self.inertia {
+            Some(list) => numbers("--inertia", list)?,
+            None => [seed.transverse(), seed.axial()],
+        };
+        top(
+            self.mass.unwrap_or(seed.mass()),
+            self.arm.unwrap_or(seed.arm()),
+            [across, along],
+            self.gravity.unwrap_or(seed.gravity()),
+        )
+        .map_err(|e| Error::Usage(format!("top: {e}")))
+    }
+
+    /// Whether no flag says anything.
+    pub(crate) fn is_bare(&self) -> bool {
+        self.case.is_none()
+            && self.tilt_deg.is_none()
+            && self.euler.is_none()
+            && self.spin_hz.is_none()
+            && self.mass.is_none()
+            && self.arm.is_none()
+            && self.inertia.is_none()
+            && self.gravity.is_none()
+    }
+
+    fn spin_hz(&self) -> f64 {
+        self.spin_hz.unwrap_or(20.0)
     }
 
     /// Its start.
@@ -112,7 +125,7 @@ impl TopFlags {
     /// # Errors
     /// [`Error::Usage`] for a start the case does not have.
     pub(crate) fn start(&self, top: &SymmetricTop) -> Result<EulerState> {
-        let w3 = self.spin_hz * TAU;
+        let w3 = self.spin_hz() * TAU;
         let Some(euler) = &self.euler else {
             let tilt = self.tilt_deg.map_or(Case::SEED_TILT, f64::to_radians);
             let case = self.case.unwrap_or(Case::Cusped);
@@ -142,10 +155,15 @@ impl TopFlags {
 
     /// What was asked for, by name.
     pub(crate) fn parameters(&self) -> Vec<(&'static str, String)> {
+        let seed = SymmetricTop::seed();
+        let inertia = || format!("{},{}", seed.transverse(), seed.axial());
         let mut list = vec![
-            ("mass_kg", self.mass.to_string()),
-            ("arm_m", self.arm.to_string()),
-            ("inertia_across_along_kg_m2", self.inertia.clone()),
+            ("mass_kg", self.mass.unwrap_or(seed.mass()).to_string()),
+            ("arm_m", self.arm.unwrap_or(seed.arm()).to_string()),
+            (
+                "inertia_across_along_kg_m2",
+                self.inertia.clone().unwrap_or_else(inertia),
+            ),
         ];
         match &self.euler {
             None => {
@@ -158,7 +176,7 @@ impl TopFlags {
             Some(euler) => list.push(("euler_deg", euler.clone())),
         }
         match &self.euler_rates {
-            None => list.push(("spin_hz", self.spin_hz.to_string())),
+            None => list.push(("spin_hz", self.spin_hz().to_string())),
             Some(rates) => list.push(("euler_rates_deg_s", rates.clone())),
         }
         list

@@ -4,6 +4,7 @@ use super::{Made, parameter};
 use crate::cli::estimation::KindArg;
 use crate::cli::replay::CompressionArg;
 use crate::error::{Error, Result};
+use crate::model::imu_error::{ImuError, StampError};
 use crate::pipeline::simulate::Simulation;
 use crate::record::{Nanos, SampleKind};
 use crate::sink::{Options, Target};
@@ -64,6 +65,69 @@ pub struct Common {
     /// Seed of everything random; the same seed gives the same bytes
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
+    /// Errors of the sensor: none, a preset (consumer_mems, industrial_mems, tactical, navigation, ...),
+    /// or terms in the units of data sheets: arw=0.15,bias-instability=0.5,...
+    #[arg(
+        long,
+        value_name = "NOISE",
+        default_value = "none",
+        help_heading = "Errors"
+    )]
+    pub noise: String,
+    /// Samples are taken up to this part of an interval early or late, and the stamps say so
+    #[arg(
+        long,
+        value_name = "PART",
+        default_value_t = 0.0,
+        allow_negative_numbers = true,
+        help_heading = "Errors"
+    )]
+    pub jitter: f64,
+    /// Stamps are wrong by this part of an interval (1 sigma)
+    #[arg(
+        long,
+        value_name = "PART",
+        default_value_t = 0.0,
+        allow_negative_numbers = true,
+        help_heading = "Errors"
+    )]
+    pub stamp_jitter: f64,
+    /// Added to every stamp, seconds
+    #[arg(
+        long,
+        value_name = "SECS",
+        default_value = "0",
+        allow_hyphen_values = true,
+        help_heading = "Errors"
+    )]
+    pub stamp_offset: String,
+    /// The sensor's clock runs fast by this many millionths
+    #[arg(
+        long,
+        value_name = "PPM",
+        default_value_t = 0.0,
+        allow_negative_numbers = true,
+        help_heading = "Errors"
+    )]
+    pub stamp_drift: f64,
+    /// Part of the samples that is lost
+    #[arg(
+        long,
+        value_name = "PART",
+        default_value_t = 0.0,
+        allow_negative_numbers = true,
+        help_heading = "Errors"
+    )]
+    pub drop: f64,
+    /// Mean length of a run of lost samples
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 1.0,
+        allow_negative_numbers = true,
+        help_heading = "Errors"
+    )]
+    pub burst: f64,
     /// Stamp of the first instant, seconds since 1970 (up to nine decimals)
     #[arg(
         long,
@@ -84,7 +148,10 @@ impl Common {
     /// [`Error::Usage`] naming the flag.
     pub(super) fn simulation(&self, name: &str, made: Made) -> Result<Simulation> {
         let kind = SampleKind::from(self.sample_kind);
-        let start = stamp(&self.start_stamp)?;
+        let start = stamp("--start-stamp", &self.start_stamp)?;
+        let error = ImuError::parse(&self.noise)
+            .map_err(|e| Error::Usage(format!("--noise {}: {e}", self.noise)))?;
+        let stamps = self.stamps()?;
         let gravity = made.gravity.unwrap_or(GRAVITY);
         let sampling = Sampling {
             rate_hz: self.rate_hz,
@@ -92,6 +159,9 @@ impl Common {
             kind,
             start,
             gravity,
+            error,
+            stamps,
+            seed: self.seed,
         };
         let source = Synthetic::new(made.motion, sampling)
             .map_err(|e| Error::Usage(format!("simulate {name}: {e}")))?;
@@ -102,7 +172,27 @@ impl Common {
             parameter("duration_s", self.duration),
             parameter("seed", self.seed),
             parameter("start_stamp_ns", start.0),
+            parameter("noise", error.text()),
         ]);
+        for (name, value, plain) in [
+            ("jitter", stamps.sampling_jitter, 0.0),
+            ("stamp_jitter", stamps.stamp_jitter, 0.0),
+            ("stamp_offset_ns", stamps.offset_nanos as f64, 0.0),
+            ("stamp_drift_ppm", stamps.drift_ppm, 0.0),
+            ("drop", stamps.drop_probability, 0.0),
+            ("burst", stamps.burst_length, 1.0),
+        ] {
+            if value != plain {
+                parameters.push(parameter(name, value));
+            }
+        }
+        if let Some(sensor) = source.sensor() {
+            let bias = sensor.constants().bias;
+            if bias.amax() > 0.0 {
+                let text = format!("{},{},{}", bias.x, bias.y, bias.z);
+                parameters.push(parameter("unit_bias_rad_s", text));
+            }
+        }
         Ok(Simulation {
             name: name.to_owned(),
             source,
@@ -126,8 +216,27 @@ impl Common {
     }
 }
 
+impl Common {
+    fn stamps(&self) -> Result<StampError> {
+        let stamps = StampError {
+            offset_nanos: stamp("--stamp-offset", &self.stamp_offset)?.0,
+            drift_ppm: self.stamp_drift,
+            sampling_jitter: self.jitter,
+            stamp_jitter: self.stamp_jitter,
+            drop_probability: self.drop,
+            burst_length: self.burst,
+        };
+        stamps.check().map_err(|e| {
+            Error::Usage(format!(
+                "{e}\n  help: --stamp-drift, --jitter, --stamp-jitter, --drop, --burst"
+            ))
+        })?;
+        Ok(stamps)
+    }
+}
+
 /// Decimal seconds as whole nanoseconds: through a float today's epoch would lose 2e-7 s.
-fn stamp(text: &str) -> Result<Nanos> {
+fn stamp(flag: &str, text: &str) -> Result<Nanos> {
     let parsed = || {
         let (sign, digits) = match text.strip_prefix('-') {
             Some(rest) => (-1, rest),
@@ -144,7 +253,7 @@ fn stamp(text: &str) -> Result<Nanos> {
     };
     parsed().ok_or_else(|| {
         Error::Usage(format!(
-            "--start-stamp {text}: seconds since 1970 with up to nine decimals are needed, within 292 years"
+            "{flag} {text}: seconds with up to nine decimals are needed, at most 292 years"
         ))
     })
 }
@@ -163,7 +272,11 @@ mod tests {
             ("-0.000000001", -1),
             ("9223372036.854775807", i64::MAX),
         ] {
-            assert_eq!(stamp(text).unwrap(), Nanos(nanos), "{text}");
+            assert_eq!(
+                stamp("--start-stamp", text).unwrap(),
+                Nanos(nanos),
+                "{text}"
+            );
         }
         for bad in [
             "",
@@ -176,7 +289,7 @@ mod tests {
             "1.-5",
             "--1",
         ] {
-            assert!(stamp(bad).is_err(), "{bad}");
+            assert!(stamp("--start-stamp", bad).is_err(), "{bad}");
         }
     }
 }

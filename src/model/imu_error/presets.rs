@@ -24,7 +24,7 @@ impl Preset {
 }
 
 /// The presets. All values 1 sigma.
-pub const PRESETS: [Preset; 12] = [
+pub static PRESETS: [Preset; 12] = [
     Preset {
         name: "consumer_mems",
         terms: "arw=0.84,bias_instability=5,scale_ppm=10000,misalignment=1,g_sensitivity=360,range=2000",

@@ -49,7 +49,7 @@ macro_rules! term {
 }
 
 /// Every key, in the order of [`ImuError::text`]: the noise first.
-pub const TERMS: [Term; 22] = [
+pub static TERMS: [Term; 22] = [
     term!("arw", arw, "deg/sqrt(h)", DEG / 60.0, 1e4),
     term!(
         "bias_instability",

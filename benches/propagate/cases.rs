@@ -1,0 +1,168 @@
+//! What is timed and counted: methods and logs.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use strapd::model::attitude::Quaternion;
+use strapd::propagate::{
+    Method, Noise, Order, Placement, Propagator, Sequential, Settings, SettingsError,
+};
+use strapd::record::{AttitudeSample, Join, Nanos, RateSample, SampleKind, Status};
+
+/// A log, as its samples are made.
+#[derive(Clone, Copy)]
+pub struct Input {
+    pub kind: SampleKind,
+    /// White noise, rad/s, rms.
+    noise: f64,
+    /// Whether sampling instants are off by up to a tenth of the interval.
+    jitter: bool,
+}
+
+/// Every input, and its name.
+pub const INPUTS: [(&str, Input); 5] = [
+    (
+        "smooth",
+        Input {
+            kind: SampleKind::Rate,
+            noise: 0.0,
+            jitter: false,
+        },
+    ),
+    (
+        "rates",
+        Input {
+            kind: SampleKind::Rate,
+            noise: 5e-3,
+            jitter: false,
+        },
+    ),
+    (
+        "jittered",
+        Input {
+            kind: SampleKind::Rate,
+            noise: 5e-3,
+            jitter: true,
+        },
+    ),
+    (
+        "increments",
+        Input {
+            kind: SampleKind::DeltaAngle,
+            noise: 5e-3,
+            jitter: false,
+        },
+    ),
+    (
+        "increments-jittered",
+        Input {
+            kind: SampleKind::DeltaAngle,
+            noise: 5e-3,
+            jitter: true,
+        },
+    ),
+];
+
+const fn magnus(window: usize, order: Order, placement: Placement) -> Method {
+    Method::Magnus {
+        window,
+        order,
+        placement,
+    }
+}
+
+const fn commit(window: usize) -> Method {
+    Method::CommitProvisional {
+        window,
+        order: Order::M8,
+        finals: false,
+    }
+}
+
+/// Every method of the enum, with the windows the documents speak of; the one exponential first.
+pub const METHODS: [(&str, Method); 17] = [
+    ("dcm-right", Method::DcmRight),
+    ("dcm-left", Method::DcmLeft),
+    ("dcm-mean", Method::DcmMean),
+    ("rotvec-sum", Method::RotvecSum),
+    ("coning2", Method::Coning2),
+    ("coning3", Method::Coning3),
+    ("coning4", Method::Coning4),
+    ("rk4", Method::Rk4),
+    ("causal3-6", magnus(3, Order::M6, Placement::Causal)),
+    ("causal5-6", magnus(5, Order::M6, Placement::Causal)),
+    ("centred6-8", magnus(6, Order::M8, Placement::Centred)),
+    ("centred8-8", magnus(8, Order::M8, Placement::Centred)),
+    ("centred16-8", magnus(16, Order::M8, Placement::Centred)),
+    ("auto", Method::Auto),
+    ("commit5", commit(5)),
+    ("commit6", commit(6)),
+    ("commit8", commit(8)),
+];
+
+/// 200 Hz, 2 rad/s, a few Hz.
+pub fn log(count: usize, input: &Input) -> Vec<RateSample> {
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let mut before = 0;
+    (0..count)
+        .map(|i| {
+            let mut stamp = i as i64 * 5_000_000;
+            if input.jitter {
+                stamp += rng.random_range(-500_000..500_000);
+            }
+            let t = stamp as f64 * 1e-9;
+            let mut axis = |f: f64, phase: f64| {
+                (f * t * std::f64::consts::TAU + phase).sin() * 2.0
+                    + input.noise * rng.random_range(-1.7..1.7)
+            };
+            let mut value = [axis(2.3, 0.0), axis(3.1, 1.0), axis(4.7, 2.0)];
+            let start = if i == 0 { stamp - 5_000_000 } else { before };
+            if input.kind != SampleKind::Rate {
+                value = value.map(|v| v * (stamp - start) as f64 * 1e-9);
+            }
+            before = stamp;
+            RateSample {
+                stamp: Nanos(stamp),
+                start: Nanos(if input.kind == SampleKind::Rate {
+                    stamp
+                } else {
+                    start
+                }),
+                value: value.into(),
+                accel: None,
+                join: if i == 0 {
+                    Join::Start
+                } else {
+                    Join::Continuous
+                },
+                status: Status::OK,
+                log: Nanos(stamp),
+            }
+        })
+        .collect()
+}
+
+/// Samples in, attitudes out, as a file's reader pushes them.
+pub fn run(
+    method: Method,
+    kind: SampleKind,
+    samples: &[RateSample],
+    out: &mut Vec<AttitudeSample>,
+) -> Result<(), SettingsError> {
+    let noise = Noise {
+        arw: 2.4e-4,
+        bias: 1e-3,
+        ..Noise::default()
+    };
+    let mut propagator = Propagator::new(Settings {
+        method,
+        kind,
+        initial: Quaternion::identity(),
+        noise,
+    })?;
+    out.clear();
+    for chunk in samples.chunks(8192) {
+        propagator.push(chunk, &Sequential, out);
+    }
+    propagator.finish(&Sequential, out);
+    Ok(())
+}

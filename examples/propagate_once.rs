@@ -1,0 +1,43 @@
+//! One method over one log, as often as asked: for counting instructions (`benches/callgrind.sh`).
+//!
+//! ```text
+//! cargo run --release --no-default-features --example propagate_once -- METHOD INPUT PASSES
+//! ```
+//!
+//! METHOD as in the table below; INPUT `rates`, `jittered`, `increments` or `increments-jittered`, 8192 samples at
+//! 200 Hz of 2 rad/s with white noise of 5 mrad/s. The cost of a sample is the difference of two runs over that of
+//! their passes. Without a method: their names.
+
+#![allow(clippy::print_stdout, unreachable_pub)]
+
+#[path = "../benches/propagate/cases.rs"]
+mod cases;
+
+use std::hint::black_box;
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let Some(name) = arguments.next() else {
+        for (name, _) in cases::METHODS {
+            println!("{name}");
+        }
+        return Ok(());
+    };
+    let input = arguments.next().ok_or("INPUT is missing")?;
+    let passes: usize = arguments.next().ok_or("PASSES is missing")?.parse()?;
+    let (_, method) = cases::METHODS
+        .into_iter()
+        .find(|(known, _)| *known == name)
+        .ok_or_else(|| format!("no method is called {name}"))?;
+    let (_, input) = cases::INPUTS
+        .into_iter()
+        .find(|(known, _)| *known == input)
+        .ok_or_else(|| format!("no input is called {input}"))?;
+    let samples = cases::log(8192, &input);
+    let mut out = Vec::with_capacity(samples.len());
+    for _ in 0..passes {
+        cases::run(method, input.kind, &samples, &mut out)?;
+    }
+    black_box(&out);
+    Ok(())
+}
