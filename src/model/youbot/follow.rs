@@ -337,9 +337,9 @@ impl ToolTrack {
     /// paths of a few rad/s, and as smooth.
     ///
     /// # Errors
-    /// As [`ToolTrack::at`]; more than 1e7 knots.
+    /// As [`ToolTrack::at`]; longer than 1e4 s (a million knots).
     pub fn joint_path(&self, secs: f64) -> Result<JointPath, ArmError> {
-        bounded("duration of a gripper path (s)", [secs], 1e5)?;
+        bounded("duration of a gripper path (s)", [secs], 1e4)?;
         let count = (secs / 0.01).ceil().max(1.0);
         let step = secs / count;
         let count = count as u32;
