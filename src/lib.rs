@@ -16,9 +16,10 @@
 //! | [`propagate`] | rates -> attitude: the hot loop | pure |
 //! | `sink` | attitude -> MCAP, NDJSON, CSV | I/O |
 //! | `pipeline` | the stages wired: replay, tracks, what a log holds | I/O |
+//! | `serve` | the daemon's parts: the recorder | I/O |
 //! | [`compare`] | two attitudes -> how far apart | pure |
 //! | `config`, `report`, `cli` | arguments -> a run -> its summary | |
-//! | [`model`] | frames, attitude, rigid body, top, inertia, motions with exact truth | pure |
+//! | [`model`] | frames, attitude, rigid body, top, inertia, the youBot's arm, motions with exact truth | pure |
 //!
 //! Reading order: [`record`], `pipeline::estimator`, then one stage.
 //! Without the default feature `service` the crate is the modules with links above, on nalgebra alone.
@@ -41,6 +42,8 @@ pub mod error;
 pub mod pipeline;
 #[cfg(feature = "service")]
 pub mod report;
+#[cfg(feature = "service")]
+pub mod serve;
 #[cfg(feature = "service")]
 pub mod sink;
 #[cfg(feature = "service")]

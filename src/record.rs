@@ -7,6 +7,10 @@
 //! Bad data never becomes an `Err`: it becomes a [`Verdict`], is counted in
 //! [`Counts`], and the run goes on.
 
+mod covariance;
+
+pub use covariance::AttitudeCovariance;
+
 use crate::model::attitude::Quaternion;
 use crate::model::frames::{Body, Nav};
 use nalgebra::Vector3;
@@ -204,11 +208,13 @@ pub struct AttitudeSample {
     /// sample before.
     pub q_nb: Quaternion<Nav, Body>,
     /// Bias-corrected body rate in rad/s: the sample itself, or the increment divided by its interval.
+    /// What a gyro measures: relative to inertial space (w_ib), Earth's rotation included, also where
+    /// `q_nb` is relative to a world that turns with it.
     pub rate: Vector3<f64>,
     /// Specific force in body axes, m/s^2, copied through.
     pub accel: Option<Vector3<f64>>,
-    /// One standard deviation about each body axis, rad.
-    pub sigma: Vector3<f64>,
+    /// Of its error, rad^2, body axes: see [`AttitudeCovariance::sigma`] for three numbers.
+    pub covariance: AttitudeCovariance,
     /// What was noticed.
     pub status: Status,
     /// How often the attitude has been reset or held so far; a reader that sees it change must not

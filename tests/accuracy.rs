@@ -10,6 +10,8 @@ mod double;
 mod gaps;
 #[path = "accuracy/live.rs"]
 mod live;
+#[path = "accuracy/integration_error.rs"]
+mod integration_error;
 #[path = "accuracy/noise.rs"]
 mod noise;
 #[path = "accuracy/orders.rs"]

@@ -164,8 +164,8 @@ pub fn run(
         return Ok(());
     };
     let noise = Noise {
-        arw: 2.4e-4,
-        bias: 1e-3,
+        arw: [2.4e-4; 3],
+        bias: [1e-3; 3],
         ..Noise::default()
     };
     let mut propagator = Propagator::new(Settings {
@@ -173,6 +173,7 @@ pub fn run(
         kind,
         initial: Quaternion::identity(),
         noise,
+        ..Settings::default()
     })?;
     out.clear();
     for chunk in samples.chunks(8192) {

@@ -4,6 +4,7 @@
 //! does no I/O.
 
 use super::preparation::{Prepared, Resolved};
+use crate::condition::regularise::{self, Regulariser};
 use crate::condition::{self, Conditioner};
 use crate::config::Plan;
 use crate::model::frames::{Convention, World};
@@ -14,9 +15,12 @@ use crate::record::{AttitudeSample, RateSample, RawSample};
 #[derive(Debug)]
 pub struct Estimator {
     conditioner: Conditioner,
+    regulariser: Option<Regulariser>,
     propagator: Propagator,
     world: World,
     rates: Vec<RateSample>,
+    /// The same with their new stamps.
+    even: Vec<RateSample>,
     out: Vec<AttitudeSample>,
 }
 
@@ -31,18 +35,17 @@ impl Estimator {
             method: plan.method,
             kind: resolved.kind,
             initial: prepared.initial,
-            noise: propagate::Noise {
-                arw: plan.noise.arw,
-                bias: prepared.bias_sigma,
-                ..propagate::Noise::default()
-            },
+            world_rate: prepared.world_rate,
+            noise: plan.noise.with_bias(prepared.bias_sigma.into()),
         })
         .map_err(|e| e.to_string())?;
         Ok(Estimator {
             conditioner: Conditioner::new(&settings).map_err(|e| e.to_string())?,
+            regulariser: prepared.stamps.regulariser(resolved.kind)?,
             propagator,
             world: prepared.world,
             rates: Vec::new(),
+            even: Vec::new(),
             out: Vec::new(),
         })
     }
@@ -62,8 +65,7 @@ impl Estimator {
     /// The attitudes that are known by now. Their bits do not depend on when they are asked for.
     pub fn attitudes(&mut self, exec: &impl Executor) -> &[AttitudeSample] {
         self.out.clear();
-        self.propagator.push(&self.rates, exec, &mut self.out);
-        self.rates.clear();
+        self.propagate(exec);
         self.relabel();
         &self.out
     }
@@ -72,17 +74,40 @@ impl Estimator {
     pub fn finish(&mut self, exec: &impl Executor) -> &[AttitudeSample] {
         self.out.clear();
         self.conditioner.finish(&mut self.rates);
-        self.propagator.push(&self.rates, exec, &mut self.out);
+        self.propagate(exec);
+        if let Some(regulariser) = &mut self.regulariser {
+            regulariser.finish(&mut self.even);
+            self.propagator.push(&self.even, exec, &mut self.out);
+            self.even.clear();
+        }
         self.propagator.finish(exec, &mut self.out);
-        self.rates.clear();
         self.relabel();
         &self.out
+    }
+
+    fn propagate(&mut self, exec: &impl Executor) {
+        match &mut self.regulariser {
+            None => self.propagator.push(&self.rates, exec, &mut self.out),
+            Some(regulariser) => {
+                regulariser.push(&self.rates, &mut self.even);
+                self.propagator.push(&self.even, exec, &mut self.out);
+                self.even.clear();
+            }
+        }
+        self.rates.clear();
     }
 
     /// What conditioning did.
     #[must_use]
     pub fn conditioning(&self) -> &condition::Report {
         self.conditioner.report()
+    }
+
+    /// What became of the stamps, where they were regularised: whether causally, and how.
+    #[must_use]
+    pub fn regularising(&self) -> Option<(bool, regularise::Report)> {
+        let regulariser = self.regulariser.as_ref()?;
+        Some((regulariser.is_causal(), regulariser.report()))
     }
 
     /// What propagation did.
@@ -107,6 +132,9 @@ impl Estimator {
         for sample in &mut self.out {
             sample.q_nb = Convention::EnuFlu.convert(to, sample.q_nb);
             sample.rate = Convention::EnuFlu.convert_body(to, sample.rate);
+            sample.covariance = sample
+                .covariance
+                .relabelled(|v| Convention::EnuFlu.convert_body(to, v));
             sample.accel = sample.accel.map(|a| Convention::EnuFlu.convert_body(to, a));
         }
     }

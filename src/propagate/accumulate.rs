@@ -40,6 +40,22 @@ impl Accumulator {
         }
     }
 
+    /// A vector of body axes in fixed ones; as exact as the norm, which is within 1e-12.
+    #[inline(always)]
+    pub(crate) fn turned(&self, [vx, vy, vz]: [f64; 3]) -> [f64; 3] {
+        let [w, x, y, z] = self.q;
+        let (tx, ty, tz) = (
+            2.0 * (y * vz - z * vy),
+            2.0 * (z * vx - x * vz),
+            2.0 * (x * vy - y * vx),
+        );
+        [
+            vx + w * tx + (y * tz - z * ty),
+            vy + w * ty + (z * tx - x * tz),
+            vz + w * tz + (x * ty - y * tx),
+        ]
+    }
+
     /// The unit quaternion. Its sign never jumps: accumulation is continuous and normalising keeps it.
     ///
     /// Also brings the norm back, should years of samples have moved it: from where this is called

@@ -5,8 +5,10 @@
 //! to 24 points), and the nodes are summed to moments. A reference value is taken off first, so a
 //! constant rate comes through untouched.
 
+use super::difference::FEWER;
 use super::lanes::{Lanes, Triple};
 use super::magnus::{MOMENTS, Moments};
+use std::ops::Range;
 
 /// Most points an interpolation has: a window of increments has one more knot than increments.
 pub(crate) const POINTS: usize = super::method::LARGEST_WINDOW + 1;
@@ -105,8 +107,8 @@ impl Quadrature {
     ) -> Moments<N> {
         let half = self.nodes / 2;
         let mut m = Moments {
-            b: [Triple::ZERO; MOMENTS],
             live: self.live,
+            ..Moments::ZERO
         };
         for n in 0..half {
             let (left, right) = (values[n], values[self.nodes - 1 - n]);
@@ -122,14 +124,32 @@ impl Quadrature {
     }
 }
 
-/// Values at the Gauss nodes of the polynomial through `(x_i, f_i)`, and its noise gain: the sum of
-/// squares of Lagrange's coefficients at mid-interval (1/2 for the mean of two samples).
+/// The points of a narrower window: [`FEWER`] samples less, or as many as leave the interval its ends. From
+/// both sides, where the window has them to lose. The interval ends at sample `place` of the window.
+pub(crate) fn inner(window: usize, place: usize, increments: bool) -> Range<usize> {
+    let (smallest, points, ahead, behind) = if increments {
+        (1, window + 1, window - 1 - place, place)
+    } else {
+        (2, window, window - 1 - place, place - 1)
+    };
+    let fewer = FEWER.min(window.saturating_sub(smallest));
+    let newer = (FEWER / 2)
+        .min(ahead)
+        .max(fewer.saturating_sub(behind))
+        .min(fewer);
+    fewer - newer..points - newer
+}
+
+/// Values at the Gauss nodes of the polynomial through `(x_i, f_i)`; its noise gain: the sum of
+/// squares of Lagrange's coefficients at mid-interval (1/2 for the mean of two samples); and by how much
+/// it differs there from the polynomial through the points `inner`.
 #[inline(always)]
 fn at_nodes<const N: usize>(
     x: &[Lanes<N>],
     f: &[Triple<N>],
+    inner: Range<usize>,
     quadrature: &Quadrature,
-) -> ([Triple<N>; MOMENTS], Lanes<N>) {
+) -> ([Triple<N>; MOMENTS], Lanes<N>, Triple<N>) {
     let p = x.len().min(POINTS);
     let (x, f) = (&x[..p], &f[..p]);
     let mut product = [Lanes::<N>::splat(1.0); POINTS];
@@ -151,6 +171,7 @@ fn at_nodes<const N: usize>(
     }
     let mut values = [Triple::ZERO; MOMENTS];
     let mut gain = Lanes::ZERO;
+    let mut middle_coefficient = [Lanes::<N>::ZERO; POINTS];
     let middle = quadrature.nodes / 2;
     for (n, &g) in quadrature.nodes().iter().enumerate() {
         let g = Lanes::splat(g);
@@ -166,12 +187,27 @@ fn at_nodes<const N: usize>(
             if n == middle {
                 let l = l * weight[i];
                 gain = gain + l * l;
+                middle_coefficient[i] = l;
             }
             prefix = prefix * (g - x[i]);
         }
         values[n] = value;
     }
-    (values, gain)
+    // Lagrange's coefficients at mid-interval, where x = 0, without the outer points.
+    let outer = || (0..inner.start).chain(inner.end..p);
+    let mut reciprocal = [Lanes::<N>::ZERO; POINTS];
+    for j in outer() {
+        reciprocal[j] = x[j].recip();
+    }
+    let mut narrow = Triple::ZERO;
+    for i in inner.clone() {
+        let mut without = middle_coefficient[i];
+        for j in outer() {
+            without = without * (Lanes::splat(1.0) - x[i] * reciprocal[j]);
+        }
+        narrow = narrow + f[i].times(without);
+    }
+    (values, gain, values[middle] - narrow)
 }
 
 /// Moments over an interval of `h` seconds from rates at `x` (interval from -1 to 1), and the noise gain.
@@ -183,14 +219,17 @@ pub(crate) fn from_rates<const N: usize>(
     rates: &mut [Triple<N>],
     reference: Triple<N>,
     h: Lanes<N>,
+    inner: Range<usize>,
     quadrature: &Quadrature,
 ) -> (Moments<N>, Lanes<N>) {
     for rate in rates.iter_mut() {
         *rate = *rate - reference;
     }
-    let (values, gain) = at_nodes(x, rates, quadrature);
+    let (values, gain, difference) = at_nodes(x, rates, inner, quadrature);
     let mut m = quadrature.of_rate(&values, h);
     m.b[0] = m.b[0] + reference.times(h);
+    // Both polynomials pass through the ends of the interval: between them they differ by about a parabola.
+    m.outer = difference.times(h) * (2.0 / 3.0);
     (m, gain)
 }
 
@@ -201,6 +240,7 @@ pub(crate) fn from_increments<const N: usize>(
     x: &[Lanes<N>],
     increments: &[Triple<N>],
     own: usize,
+    inner: Range<usize>,
     quadrature: &Quadrature,
 ) -> (Moments<N>, Lanes<N>) {
     let count = increments.len().min(POINTS - 1);
@@ -214,10 +254,11 @@ pub(crate) fn from_increments<const N: usize>(
     for i in (0..own).rev() {
         angle[i] = angle[i + 1] - surplus(i);
     }
-    let (values, gain) = at_nodes(x, &angle[..=count], quadrature);
+    let (values, gain, difference) = at_nodes(x, &angle[..=count], inner, quadrature);
     let mut m = quadrature.of_angle(&values);
     m.live = m.live.min(count.max(1));
     m.b[0] = delta;
+    m.outer = difference * (2.0 / 3.0);
     (m, gain)
 }
 

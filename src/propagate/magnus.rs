@@ -21,12 +21,16 @@ pub(crate) const MOMENTS: usize = 9;
 pub(crate) struct Moments<const N: usize> {
     pub(crate) b: [Triple<N>; MOMENTS],
     pub(crate) live: usize,
+    /// What the outermost samples of the window have changed, rad, in the middle of the interval:
+    /// of the delta angle from rates, of two thirds of the angle half-way from increments.
+    pub(crate) outer: Triple<N>,
 }
 
 impl<const N: usize> Moments<N> {
     pub(crate) const ZERO: Self = Moments {
         b: [Triple::ZERO; MOMENTS],
         live: 1,
+        outer: Triple::ZERO,
     };
 
     #[inline(always)]
@@ -34,6 +38,7 @@ impl<const N: usize> Moments<N> {
         Moments {
             b: self.b.map(|b| b.lane(i)),
             live: self.live,
+            outer: self.outer.lane(i),
         }
     }
 }

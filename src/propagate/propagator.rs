@@ -1,6 +1,7 @@
 //! The stream: runs, breaks, outputs in order. Pure.
 
 mod state;
+mod world;
 
 use super::classical;
 use super::executor::Executor;
@@ -27,14 +28,14 @@ const LARGEST: f64 = 1e3;
 /// # Example
 /// ```
 /// use strapd::model::attitude::Quaternion;
-/// use strapd::propagate::{Method, Noise, Propagator, Sequential, Settings};
+/// use strapd::propagate::{Method, Propagator, Sequential, Settings};
 /// use strapd::record::{Join, Nanos, RateSample, SampleKind, Status};
 ///
 /// let mut propagator = Propagator::new(Settings {
 ///     method: Method::Auto,
 ///     kind: SampleKind::Rate,
 ///     initial: Quaternion::identity(),
-///     noise: Noise::default(),
+///     ..Settings::default()
 /// })?;
 /// // A quarter turn about z in one second.
 /// let samples: Vec<RateSample> = (0..=100)
@@ -177,9 +178,15 @@ impl Propagator {
     /// What has happened so far.
     #[must_use]
     pub fn report(&self) -> Report {
+        let report = &self.state.report;
+        let tells = match &self.engine {
+            Engine::Sliding(plan) | Engine::Commit { plan, .. } => plan.tells_error(),
+            Engine::Classical(_) => false,
+        };
         Report {
+            integration_error: tells.then(|| self.state.difference.worst(report.angle_turned)),
             integrated_secs: secs(self.state.integrated_nanos),
-            ..self.state.report
+            ..*report
         }
     }
 
@@ -204,19 +211,23 @@ impl Propagator {
         self.next = 1;
         let sample = self.trusted(sample);
         let first = self.state.report.samples == 0;
+        self.state.begin(sample.stamp.0);
         if sample.join == Join::Reset {
             self.state.reset(self.initial);
         }
         if !first {
             self.state.reset_count = self.state.reset_count.saturating_add(1);
+            let gap = secs(sample.stamp.0.saturating_sub(self.last_stamp));
             let status = if sample.join == Join::Reset {
                 self.state.report.resets += 1;
+                self.state.covariance.pass(gap);
                 Status::RESET
             } else {
                 self.state.report.holds += 1;
-                let gap = secs(sample.stamp.0.saturating_sub(self.last_stamp));
                 let [x, y, z] = self.last_rate;
-                self.state.sigma.hold(Vector3::new(x, y, z).norm(), gap);
+                self.state
+                    .covariance
+                    .hold(Vector3::new(x, y, z).norm(), gap);
                 Status::HELD
             };
             self.state.added = self.state.added.with(status);
@@ -356,22 +367,27 @@ impl Propagator {
             } else {
                 None
             };
+            let committed_at = self.state.now;
             let mut ahead = self.state.attitude;
-            let mut sigma = self.state.sigma;
+            let mut covariance = self.state.covariance;
+            let mut difference = self.state.difference;
             if newest >= self.next {
                 self.scratch.clear();
                 plan.append_steps(&self.track, self.next, newest, &mut self.scratch);
                 for (i, step) in self.scratch.iter().enumerate() {
                     ahead.turn(step.turn);
-                    sigma.integrate(self.track.spacing(self.next + i));
-                    sigma.bridge(step.gap_variance, step.gap_noise);
+                    difference.add(&ahead, step.outer);
+                    covariance.advance(step.turn, self.track.step(self.next + i));
+                    covariance.bridge(step.gap_variance, step.gap_noise);
                 }
                 if let (true, Some(step)) = (turns, self.scratch.last()) {
                     self.state.added = self.state.added.with(step.status());
                 }
             }
-            let committed = (self.state.attitude, self.state.sigma);
-            (self.state.attitude, self.state.sigma) = (ahead, sigma);
+            self.state.difference.seen(&difference);
+            let committed = (self.state.attitude, self.state.covariance);
+            (self.state.attitude, self.state.covariance) = (ahead, covariance);
+            self.state.now = self.track.stamp[newest];
             if newest >= self.next {
                 self.state.added = self.state.added.with(Status::PROVISIONAL);
                 if *finals {
@@ -379,7 +395,8 @@ impl Propagator {
                 }
             }
             self.state.output_at(&sample, rate, out);
-            (self.state.attitude, self.state.sigma) = committed;
+            (self.state.attitude, self.state.covariance) = committed;
+            self.state.now = committed_at;
         }
     }
 

@@ -14,6 +14,7 @@ const ODD: usize = 4;
 /// What each sample of a window contributes to each moment, in a run of 1s between equal spacings.
 fn response(window: usize, place: usize, increments: bool) -> (Vec<Moments<1>>, f64) {
     let mut noise_gain = 0.0;
+    let inner = lagrange::inner(window, place, increments);
     let rows = (0..window)
         .map(|i| {
             let mut unit = vec![Triple::ZERO; window];
@@ -22,17 +23,43 @@ fn response(window: usize, place: usize, increments: bool) -> (Vec<Moments<1>>, 
             let at = |i: usize, end: usize| Lanes([2.0 * i as f64 - 2.0 * end as f64 + 1.0]);
             let (m, gain) = if increments {
                 let x: Vec<Lanes<1>> = (0..=window).map(|i| at(i, place + 1)).collect();
-                lagrange::from_increments(&x, &unit, place, &Quadrature::new(window + 1))
+                lagrange::from_increments(
+                    &x,
+                    &unit,
+                    place,
+                    inner.clone(),
+                    &Quadrature::new(window + 1),
+                )
             } else {
                 let x: Vec<Lanes<1>> = (0..window).map(|i| at(i, place)).collect();
                 let (one, zero) = (Lanes([1.0]), Triple::ZERO);
-                lagrange::from_rates(&x, &mut unit, zero, one, &Quadrature::new(window))
+                lagrange::from_rates(
+                    &x,
+                    &mut unit,
+                    zero,
+                    one,
+                    inner.clone(),
+                    &Quadrature::new(window),
+                )
             };
             noise_gain = gain.0[0];
             m
         })
         .collect();
     (rows, noise_gain)
+}
+
+/// Moments about one axis, and what the outermost samples have changed.
+type Axis<const N: usize> = ([Lanes<N>; MOMENTS], Lanes<N>);
+
+#[inline(always)]
+fn moments<const N: usize>(live: usize, [x, y, z]: [Axis<N>; 3]) -> Moments<N> {
+    let triple = |x, y, z| Triple { x, y, z };
+    Moments {
+        b: std::array::from_fn(|j| triple(x.0[j], y.0[j], z.0[j])),
+        live,
+        outer: triple(x.1, y.1, z.1),
+    }
 }
 
 /// Coefficients of one pair of samples, symmetric about the interval.
@@ -42,12 +69,14 @@ struct Pair {
     right: usize,
     even: [f64; EVEN],
     odd: [f64; ODD],
+    outer: f64,
 }
 
 /// The constant map of a centred window.
 #[derive(Clone, Debug)]
 pub(crate) struct Centred {
     live: usize,
+    increments: bool,
     /// The innermost pair (of an odd window of increments: the interval's own increment, twice).
     left: usize,
     right: usize,
@@ -72,6 +101,7 @@ impl Centred {
         let odd = |i: usize| std::array::from_fn(|k| rows[i].b[2 * k + 1].x.0[0]);
         Centred {
             live: rows[0].live,
+            increments,
             left,
             right,
             inner_odd: odd(right),
@@ -81,6 +111,7 @@ impl Centred {
                     right: right + k,
                     even: even(right + k),
                     odd: odd(right + k),
+                    outer: rows[right + k].outer.x.0[0],
                 })
                 .collect(),
         }
@@ -96,21 +127,11 @@ impl Centred {
         z: &[f64],
         h: Lanes<N>,
     ) -> Moments<N> {
-        let x = self.axis(x, h);
-        let y = self.axis(y, h);
-        let z = self.axis(z, h);
-        Moments {
-            b: std::array::from_fn(|j| Triple {
-                x: x[j],
-                y: y[j],
-                z: z[j],
-            }),
-            live: self.live,
-        }
+        moments(self.live, [x, y, z].map(|v| self.axis(v, h)))
     }
 
     #[inline(always)]
-    fn axis<const N: usize>(&self, v: &[f64], h: Lanes<N>) -> [Lanes<N>; MOMENTS] {
+    fn axis<const N: usize>(&self, v: &[f64], h: Lanes<N>) -> Axis<N> {
         let at = |i: usize| -> Lanes<N> {
             let v = &v[i..i + N];
             Lanes(std::array::from_fn(|k| v[k]))
@@ -119,8 +140,12 @@ impl Centred {
         let inner = l + r;
         let slope = r - l;
         let mut even = [Lanes::<N>::ZERO; EVEN];
+        let mut outer = Lanes::<N>::ZERO;
         for pair in &self.pairs {
             let sum = (at(pair.left) + at(pair.right)) - inner;
+            if !self.increments {
+                outer = outer + sum * pair.outer;
+            }
             for k in 0..EVEN {
                 even[k] = even[k] + sum * pair.even[k];
             }
@@ -128,13 +153,17 @@ impl Centred {
         let mut odd = self.inner_odd.map(|c| slope * c);
         for pair in &self.pairs {
             let difference = at(pair.right) - at(pair.left);
+            if self.increments {
+                outer = outer + difference * pair.outer;
+            }
             for k in 0..ODD {
                 odd[k] = odd[k] + difference * pair.odd[k];
             }
         }
         // Constants have no moment but b_0: taking the inner pair off the others left all else alone.
         even[0] = even[0] + inner * 0.5;
-        std::array::from_fn(|j| h * if j % 2 == 0 { even[j / 2] } else { odd[j / 2] })
+        let b = std::array::from_fn(|j| h * if j % 2 == 0 { even[j / 2] } else { odd[j / 2] });
+        (b, outer * h)
     }
 }
 
@@ -147,7 +176,7 @@ pub(crate) struct Skewed {
     increments: bool,
     /// Noise gain of the window, as the general path gives it.
     pub(crate) gain: f64,
-    rows: Vec<[f64; MOMENTS]>,
+    rows: Vec<([f64; MOMENTS], f64)>,
 }
 
 impl Skewed {
@@ -168,7 +197,10 @@ impl Skewed {
             place,
             increments,
             gain,
-            rows: rows.iter().map(|m| m.b.map(|b| b.x.0[0])).collect(),
+            rows: rows
+                .iter()
+                .map(|m| (m.b.map(|b| b.x.0[0]), m.outer.x.0[0]))
+                .collect(),
         }
     }
 
@@ -181,21 +213,11 @@ impl Skewed {
         z: &[f64],
         h: Lanes<N>,
     ) -> Moments<N> {
-        let x = self.axis(x, h);
-        let y = self.axis(y, h);
-        let z = self.axis(z, h);
-        Moments {
-            b: std::array::from_fn(|j| Triple {
-                x: x[j],
-                y: y[j],
-                z: z[j],
-            }),
-            live: self.live,
-        }
+        moments(self.live, [x, y, z].map(|v| self.axis(v, h)))
     }
 
     #[inline(always)]
-    fn axis<const N: usize>(&self, v: &[f64], h: Lanes<N>) -> [Lanes<N>; MOMENTS] {
+    fn axis<const N: usize>(&self, v: &[f64], h: Lanes<N>) -> Axis<N> {
         let at = |i: usize| -> Lanes<N> {
             let v = &v[i..i + N];
             Lanes(std::array::from_fn(|k| v[k]))
@@ -207,13 +229,15 @@ impl Skewed {
             (at(self.place - 1) + at(self.place)) * 0.5
         };
         let mut moments = [Lanes::<N>::ZERO; MOMENTS];
-        for (i, row) in self.rows.iter().enumerate() {
+        let mut outer = Lanes::<N>::ZERO;
+        for (i, (row, own)) in self.rows.iter().enumerate() {
             let difference = at(i) - reference;
+            outer = outer + difference * *own;
             for j in 0..self.live {
                 moments[j] = moments[j] + difference * row[j];
             }
         }
         moments[0] = moments[0] + reference;
-        moments.map(|m| m * h)
+        (moments.map(|m| m * h), outer * h)
     }
 }

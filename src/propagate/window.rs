@@ -6,6 +6,7 @@
 
 mod careful;
 
+use super::difference;
 use super::lagrange::{self, POINTS, Quadrature};
 use super::lanes::{Lanes, Triple};
 use super::magnus::{self, Moments};
@@ -34,6 +35,8 @@ pub(crate) struct Step {
     pub(crate) gap_variance: f64,
     /// Seconds of white noise that bridging has added to those of the interval.
     pub(crate) gap_noise: f64,
+    /// What the outermost samples of the window have changed, rad, in the body axes at the end.
+    pub(crate) outer: [f64; 3],
     /// What the careful path did.
     pub(crate) note: Note,
 }
@@ -53,14 +56,14 @@ pub(crate) enum Note {
 
 impl Step {
     /// A rotation vector where a turn is expected, for the method that sums vectors.
-    pub(crate) fn of_vector(phi: Triple<1>) -> Self {
+    pub(crate) fn of_vector(phi: Triple<1>, note: Note) -> Self {
         let turn = Turn {
             v: phi,
             ..Turn::NONE
         };
         Step {
             angle: phi.norm(),
-            ..Step::new(turn, 0.0, Note::Ordinary)
+            ..Step::new(turn, 0.0, note)
         }
     }
 
@@ -79,6 +82,16 @@ impl Step {
         })
     }
 
+    /// With what the outermost samples have changed, unless that is no number.
+    pub(crate) fn with_outer(self, outer: Triple<1>) -> Self {
+        let outer = [outer.x.0[0], outer.y.0[0], outer.z.0[0]];
+        if outer.iter().all(|v| v.is_finite()) {
+            Step { outer, ..self }
+        } else {
+            self
+        }
+    }
+
     /// `delta` is the size of the delta angle: a turn only knows its angle up to whole turns.
     pub(crate) fn new(turn: Turn<1>, delta: f64, note: Note) -> Self {
         let angle = if delta > std::f64::consts::PI {
@@ -92,6 +105,7 @@ impl Step {
                 angle,
                 gap_variance: 0.0,
                 gap_noise: 0.0,
+                outer: [0.0; 3],
                 note,
             };
         }
@@ -100,6 +114,7 @@ impl Step {
             angle: 0.0,
             gap_variance: 0.0,
             gap_noise: 0.0,
+            outer: [0.0; 3],
             note: Note::Refused,
         }
     }
@@ -155,6 +170,11 @@ impl Plan {
             skewed: tables,
             loud,
         }
+    }
+
+    /// Whether [`Step::outer`] says how wrong the turns are.
+    pub(crate) fn tells_error(&self) -> bool {
+        difference::tells(self.window, self.order, self.increments)
     }
 
     /// Also fast for intervals whose look-ahead has not all come yet, as provisional steps need.
@@ -252,6 +272,7 @@ impl Plan {
         let turn = magnus::turn(&moments, self.order);
         // |v| = sin(a/2): the angle without trigonometry while it is small.
         let angle = small_angle(&turn, moments.b[0].size());
+        let outer = self.outer(&moments);
         for i in 0..N {
             let ok = angle.0[i] >= 0.0 && !loud[i];
             if ok {
@@ -260,15 +281,30 @@ impl Plan {
                     angle: angle.0[i],
                     gap_variance: 0.0,
                     gap_noise: 0.0,
+                    outer: [outer.x.0[i], outer.y.0[i], outer.z.0[i]],
                     note: Note::Ordinary,
                 });
             } else if loud[i] {
                 steps.push(self.careful(track, k + i));
             } else {
                 let delta = moments.b[0].lane(i).norm();
-                steps.push(Step::new(turn.lane(i), delta, Note::Ordinary));
+                let step = Step::new(turn.lane(i), delta, Note::Ordinary);
+                steps.push(step.with_outer(outer.lane(i)));
             }
         }
+    }
+
+    /// What the outermost samples have changed about the turn, rad, in the axes at its end: to first order
+    /// in the change and in half the turn.
+    #[inline(always)]
+    fn outer<const N: usize>(&self, moments: &Moments<N>) -> Triple<N> {
+        let changed = if self.increments {
+            // Only the coning changes, by b_0 x b_1 / 6; b_1 is four times the angle half-way.
+            moments.outer.cross(moments.b[0])
+        } else {
+            moments.outer
+        };
+        changed + changed.cross(moments.b[0]) * 0.5
     }
 
     /// Moments of N neighbouring intervals from equally spaced windows, the first beginning at `first`;
@@ -343,6 +379,7 @@ impl Plan {
                 &x[..=window],
                 &values[..window],
                 k - first,
+                lagrange::inner(window, k - first, true),
                 &self.quadratures[window + 1],
             )
         } else {
@@ -357,6 +394,7 @@ impl Plan {
                 &mut values[..window],
                 reference,
                 h,
+                lagrange::inner(window, inner, false),
                 &self.quadratures[window],
             )
         }

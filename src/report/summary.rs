@@ -2,6 +2,9 @@
 //!
 //! Built by the pipeline, which knows the numbers; the words are here, in one place.
 
+use crate::compare::BodyAxesFit;
+use super::stamps::Regularised;
+use crate::model::frames::EARTH_RATE;
 use crate::record::{Counts, SampleKind, Verdict};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
@@ -27,6 +30,8 @@ pub struct TopicSummary {
     pub rate_hz: Option<f64>,
     /// The clock the samples were placed on.
     pub clock: String,
+    /// What became of the stamps, where `--regularise-stamps` asked for it.
+    pub stamps: Option<Regularised>,
     /// What a sample was taken to mean.
     pub kind: SampleKind,
     /// The integrator in words.
@@ -39,6 +44,8 @@ pub struct TopicSummary {
     pub world: String,
     /// Where the initial attitude came from.
     pub initial: String,
+    /// Latitude for which the Earth's rotation was taken out, deg.
+    pub latitude_deg: Option<f64>,
     /// Bias removed, rad/s, body axes.
     pub bias: [f64; 3],
     /// Where the bias came from, with its sigma where it was estimated.
@@ -47,6 +54,8 @@ pub struct TopicSummary {
     pub noise: String,
     /// Drift to be expected from what is not known of the bias, rad/s.
     pub drift: f64,
+    /// Bound on the worst attitude error of the integration itself, rad; `None` where the method can not tell.
+    pub integration_error: Option<f64>,
     /// Gaps.
     pub gaps: Gaps,
     /// Sum of the angles of all steps, rad.
@@ -63,6 +72,8 @@ pub struct TopicSummary {
     pub final_sigma: [f64; 3],
     /// Against the recorded orientation, one row per sample kind.
     pub against: Vec<Against>,
+    /// What the recorded orientation itself is like, where one was compared with.
+    pub recorded: Option<Recorded>,
     /// Things to know, each with the flag that helps.
     pub warnings: Vec<String>,
 }
@@ -97,6 +108,19 @@ pub struct Against {
     pub p95_deg: f64,
     /// Pairs compared.
     pub pairs: usize,
+}
+
+/// A recorded orientation that was compared with.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Recorded {
+    /// Recorded attitudes that are rotations (a long log's are thinned).
+    pub usable: usize,
+    /// Recorded quadruples that are none: norm far from 1, zero, NaN.
+    pub unusable: u64,
+    /// All of them are one and the same.
+    pub constant: bool,
+    /// How its body axes lie to the gyro's; `None` = the motion does not tell.
+    pub axes: Option<BodyAxesFit>,
 }
 
 /// What one log became.
@@ -209,6 +233,9 @@ impl TopicSummary {
                 self.clock
             ),
         );
+        if let Some(stamps) = &self.stamps {
+            line(out, "stamps", &stamps.text());
+        }
         line(
             out,
             "method",
@@ -223,6 +250,17 @@ impl TopicSummary {
             ),
         );
         line(out, "bias", &self.bias_text());
+        if let Some(latitude) = self.latitude_deg {
+            line(
+                out,
+                "earth",
+                &format!(
+                    "rotation taken out for latitude {} deg, {:.3} deg/h; rates stay relative to inertial space",
+                    latitude,
+                    EARTH_RATE.to_degrees() * 3600.0
+                ),
+            );
+        }
         line(
             out,
             "turned",
@@ -252,6 +290,19 @@ impl TopicSummary {
                 significant(sz, 2),
                 significant(self.drift.to_degrees() * 3600.0, 2),
                 self.noise
+            ),
+        );
+        line(
+            out,
+            "numeric",
+            &self.integration_error.map_or_else(
+                || "integration error not estimated for this method".to_owned(),
+                |error| {
+                    format!(
+                        "integration error at most about {} deg, by a window of four samples less",
+                        significant(error.to_degrees(), 2)
+                    )
+                },
             ),
         );
         line(out, "gaps", &self.gaps.text());
@@ -348,6 +399,7 @@ impl TopicSummary {
             "duration_s": self.duration_secs,
             "rate_hz": self.rate_hz,
             "clock": self.clock,
+            "regularised_stamps": self.stamps.as_ref().map(Regularised::json),
             "sample_kind": self.kind.name(),
             "method": self.method,
             "input_axes": self.input_axes,
@@ -356,8 +408,12 @@ impl TopicSummary {
             "initial": self.initial,
             "bias_rad_s": { "x": self.bias[0], "y": self.bias[1], "z": self.bias[2],
                             "origin": self.bias_origin },
+            "earth_rate": self.latitude_deg.map(|latitude| json!({
+                "latitude_deg": latitude, "rad_s": EARTH_RATE,
+            })),
             "noise": self.noise,
             "drift_deg_per_h": self.drift.to_degrees() * 3600.0,
+            "integration_error_deg": self.integration_error.map(f64::to_degrees),
             "gaps": {
                 "bridged": self.gaps.bridged,
                 "held": self.gaps.held,
@@ -413,7 +469,7 @@ pub fn meaning(kind: SampleKind) -> &'static str {
 }
 
 /// One labelled entry; what follows its first line stands under it.
-fn line(out: &mut String, label: &str, text: &str) {
+pub(super) fn line(out: &mut String, label: &str, text: &str) {
     let mut label = label;
     for part in text.lines() {
         let _ = writeln!(out, "  {label:<8} {}", part.trim_start());

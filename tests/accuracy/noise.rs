@@ -112,10 +112,8 @@ fn noise_is_not_amplified_across_lost_samples_and_the_stated_uncertainty_covers_
                 method,
                 kind: SampleKind::Rate,
                 initial: Quaternion::assume_unit(STILL),
-                noise: Noise {
-                    arw: 1e-3 * f64::sqrt(dt),
-                    ..Noise::default()
-                },
+                noise: Noise::isotropic(1e-3 * f64::sqrt(dt), 0.0),
+                ..Settings::default()
             })
             .unwrap();
             let mut out = Vec::new();
@@ -123,7 +121,7 @@ fn noise_is_not_amplified_across_lost_samples_and_the_stated_uncertainty_covers_
             propagator.finish(&Sequential, &mut out);
             let last = out.last().unwrap();
             let [_, x, y, z] = last.q_nb.wxyz();
-            stated = last.sigma.norm_squared();
+            stated = last.covariance.sigma().norm_squared();
             4.0 * (x * x + y * y + z * z)
         };
         trapezoid += turned(Method::DcmMean);

@@ -13,14 +13,14 @@ const STEP: f64 = 5e6;
 const COUNT: usize = 12_000;
 const SINES: usize = 40;
 
-struct Log {
-    rates: Vec<RateSample>,
-    increments: Vec<RateSample>,
-    truth: Vec<[f64; 4]>,
+pub struct Log {
+    pub rates: Vec<RateSample>,
+    pub increments: Vec<RateSample>,
+    pub truth: Vec<[f64; 4]>,
 }
 
 /// The whole motion; highest frequency as a part of the sampling rate, jitter as a part of the interval.
-fn recorded(seed: u64, part_of_rate: f64, jitter: f64) -> Log {
+pub fn recorded(seed: u64, part_of_rate: f64, jitter: f64) -> Log {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut motion = BandLimited::random(seed, 2.0, part_of_rate * 1e9 / STEP, SINES).unwrap();
     let mut log = Log {

@@ -18,6 +18,7 @@ fn the_summary_in_words_has_every_line_a_user_looks_for() {
         "  turned   ",
         "  final    roll ",
         "  sigma    ",
+        "  numeric  integration error at most about ",
         "  gaps     none",
         "  lost     nothing",
         "  wrote    a.mcap",

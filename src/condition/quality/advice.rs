@@ -5,6 +5,7 @@
 
 use super::summary::{GravityAxis, QualitySummary};
 use super::{GyroAgainstGravity, Quiet};
+use crate::condition::regularise::{Lines, Uneven};
 
 /// Something to do about a recording; the text names the flag.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -53,8 +54,20 @@ pub enum Advice {
     },
     /// All stamps are zero or equal.
     StampsStandStill,
-    /// Stamps jitter by more than a tenth of the step.
+    /// Stamps jitter by more than a tenth of the step, and nobody has laid lines through them.
     StampsJitter {
+        /// 99th percentile over the median step.
+        share: f64,
+    },
+    /// Stamps jitter about straight lines. Whether the sensor samples evenly, they can not tell.
+    StampsJitterEvenly {
+        /// rms distance from the lines over the step.
+        jitter: f64,
+        /// How many lines.
+        segments: usize,
+    },
+    /// Stamps jitter, and about no line.
+    StampsUneven {
         /// 99th percentile over the median step.
         share: f64,
     },
@@ -127,6 +140,23 @@ impl std::fmt::Display for Advice {
                 "stamps jitter by {:.0} % of the step (p99): if the sensor samples evenly, --regularise-stamps",
                 share * 100.0
             ),
+            Advice::StampsJitterEvenly { jitter, segments } => {
+                write!(
+                    f,
+                    "stamps jitter by {:.1} % of the step (rms) about ",
+                    jitter * 100.0
+                )?;
+                match segments {
+                    1 => f.write_str("one constant rate")?,
+                    n => write!(f, "{n} stretches of constant rate")?,
+                }
+                f.write_str(": if a clock of its own triggers the sensor, --regularise-stamps; if it samples when it is asked, the stamps are right as they are. The stamps can not tell: --against-recorded may")
+            }
+            Advice::StampsUneven { share } => write!(
+                f,
+                "stamps jitter by {:.0} % of the step (p99) and keep no constant rate: --time log may be steadier; if no sample is missing, --time index --rate-hz HZ",
+                share * 100.0
+            ),
             Advice::ClocksDrift { ppm } => write!(
                 f,
                 "header and log time drift apart by {ppm:.0} ppm: one of the clocks is wrong; --time chooses"
@@ -152,15 +182,47 @@ pub(super) const DEGREES_ABOVE: f64 = 200.0;
 /// Rates above this that stay this even are a saturation, not a rest, in rad/s or deg/s.
 const SATURATION_FLOOR: f64 = 1.0;
 const SATURATED_SAMPLES: u64 = 5;
+/// Turning over, a sampled sine stands at its largest value for two samples at most.
+const SATURATED_RUN: u64 = 3;
 /// A rest in rad/s is below this; in deg/s, a rest is below it times 57.
 const STILL_DEVIATION: f64 = 0.025;
 /// Longest credible run of one value from a moving, quantised sensor.
 const STUCK_SAMPLES: u64 = 100;
 const DRIFT_PPM: f64 = 200.0;
+/// Part of a step, rms, above which stamp noise is worth a flag: 1750 arcsec a minute of lively motion
+/// (`attitude.md` 6.4). What carries its own intervals is nearly immune.
+const NOISY_STAMPS: f64 = 0.01;
 /// Below this correlation the accelerometer reads too much besides gravity.
 const MIN_CORRELATION: f64 = 0.7;
 /// Factors within 2.5 of a unit's belong to it; accelerations make them vary.
 const UNIT_FACTOR: f64 = 2.5;
+
+impl QualitySummary {
+    /// What lines through the stamps say, in place of what single steps do.
+    pub fn judge_lines(&mut self, found: &Result<Lines, Uneven>) {
+        let says_its_intervals = self.with_interval > 0 && self.with_interval == self.count;
+        let at = self
+            .advice
+            .iter()
+            .position(|a| matches!(a, Advice::StampsJitter { .. }));
+        let new = match (found, at.and_then(|at| self.advice.get(at))) {
+            (Ok(lines), _) if lines.jitter() >= NOISY_STAMPS && !says_its_intervals => {
+                Advice::StampsJitterEvenly {
+                    jitter: lines.jitter(),
+                    segments: lines.len(),
+                }
+            }
+            (Err(_), Some(Advice::StampsJitter { share })) => {
+                Advice::StampsUneven { share: *share }
+            }
+            _ => return,
+        };
+        match at.and_then(|at| self.advice.get_mut(at)) {
+            Some(old) => *old = new,
+            None => self.advice.push(new),
+        }
+    }
+}
 
 pub(super) fn advise(
     summary: &QualitySummary,
@@ -221,7 +283,11 @@ pub(super) fn advise(
         } else {
             stats.min
         };
-        if at.abs() > SATURATION_FLOOR * unit && stats.at_peak >= SATURATED_SAMPLES {
+        if at.abs() > SATURATION_FLOOR * unit
+            && stats.at_peak >= SATURATED_SAMPLES
+            && stats.longest_at_peak >= SATURATED_RUN
+            && stats.min < stats.max
+        {
             advice.push(Advice::Saturated {
                 axis,
                 at,
@@ -235,7 +301,8 @@ pub(super) fn advise(
             .iter()
             .enumerate()
             .any(|(i, other)| i != axis && other.longest_run * 10 < stats.longest_run);
-        if stats.longest_run >= STUCK_SAMPLES && others_move {
+        // One that never reads anything else is not there, or not turned about.
+        if stats.longest_run >= STUCK_SAMPLES && others_move && stats.min < stats.max {
             advice.push(Advice::Stuck {
                 axis,
                 samples: stats.longest_run,
@@ -256,13 +323,24 @@ pub(super) fn advise(
             ppm: offset.drift_ppm,
         });
     }
-    if summary.missing > 0 {
+    if summary.missing > 0 && lacks(summary) {
         advice.push(Advice::SamplesMissing {
             missing: summary.missing,
             longest_secs: summary.longest_gap_secs,
         });
     }
     advice
+}
+
+/// Whether the log is short of the samples its long steps seem to lack: where stamps jitter by more
+/// than half a step, a long step is made up for by short ones.
+fn lacks(summary: &QualitySummary) -> bool {
+    let Some(spacing) = &summary.spacing else {
+        return true;
+    };
+    let by_time = summary.duration_secs / spacing.median_secs.max(1e-9) + 1.0;
+    let distinct = summary.count.saturating_sub(summary.duplicates);
+    by_time - distinct as f64 > 0.5 * summary.missing as f64
 }
 
 /// The unit in which this is one g, when it is not m/s^2. Gravity is 9.78 to 9.83 m/s^2; scale and

@@ -22,8 +22,8 @@ fn direction(rng: &mut ChaCha8Rng) -> Triple<1> {
 /// Moments of sizes spread over decades, some absent: now one shape of bracket counts, now another.
 fn moments(rng: &mut ChaCha8Rng, largest: f64) -> Moments<1> {
     let mut m = Moments {
-        b: [Triple::ZERO; MOMENTS],
         live: MOMENTS,
+        ..Moments::ZERO
     };
     let top = rng.random_range(1..MOMENTS);
     for j in 0..=top {
@@ -176,6 +176,7 @@ fn local_errors_fall_with_the_third_fifth_seventh_and_ninth_power() {
                 let mut m = Moments {
                     b: shape,
                     live: MOMENTS,
+                    ..Moments::ZERO
                 };
                 for j in 0..MOMENTS {
                     m.b[j] = shape[j] * h.powi(j as i32 + 1);

@@ -1,13 +1,15 @@
 //! Steps and waiting samples -> outputs. Pure.
 
+use super::world::TurningWorld;
 use crate::model::attitude::Quaternion;
 use crate::propagate::accumulate::Accumulator;
+use crate::propagate::covariance::Covariance;
+use crate::propagate::difference::Difference;
 use crate::propagate::lanes::Triple;
 use crate::propagate::method::Method;
 use crate::propagate::report::Report;
 use crate::propagate::settings::Settings;
-use crate::propagate::sigma::Sigma;
-use crate::propagate::track::Track;
+use crate::propagate::track::{Track, secs};
 use crate::propagate::turn::Turn;
 use crate::propagate::window::{Note, Step};
 use crate::record::{AttitudeSample, RateSample, Status};
@@ -28,7 +30,12 @@ pub(super) struct State {
     pub(super) attitude: Accumulator,
     /// Sum of rotation vectors, for the method that wants it.
     sum: Option<Triple<1>>,
-    pub(super) sigma: Sigma,
+    /// What the attitude accumulated is relative to, where the world turns: then it is q_ib.
+    world: Option<TurningWorld>,
+    /// Instant of the attitude accumulated, ns.
+    pub(super) now: i64,
+    pub(super) covariance: Covariance,
+    pub(super) difference: Difference,
     /// Bits of the output being made that the propagator adds.
     pub(super) added: Status,
     pub(super) report: Report,
@@ -43,7 +50,10 @@ impl State {
         State {
             attitude: sum.map_or(Accumulator::new(initial), turned_by),
             sum,
-            sigma: Sigma::new(settings.noise),
+            world: TurningWorld::new(settings.world_rate.as_vector()),
+            now: 0,
+            covariance: Covariance::new(settings.noise),
+            difference: Difference::default(),
             added: Status::OK,
             report: Report::default(),
             reset_count: 0,
@@ -52,9 +62,41 @@ impl State {
         }
     }
 
+    /// A run begins at `stamp` with the attitude as it is: what lies between adds no rotation of the
+    /// body relative to the world.
+    pub(super) fn begin(&mut self, stamp: i64) {
+        if self.world.is_some() && self.now != stamp {
+            let q_nb = self.q_nb();
+            self.attitude = Accumulator::new(q_nb);
+            if let Some(sum) = &mut self.sum {
+                *sum = rotation_vector(q_nb);
+                // The same attitude on the other side of the sphere: a turn less about its axis.
+                let angle = sum.norm();
+                if q_nb[0] < 0.0 && angle > 0.0 {
+                    *sum = *sum * ((angle - std::f64::consts::TAU) / angle);
+                }
+            }
+        }
+        if let Some(world) = &mut self.world {
+            world.count_from(stamp);
+        }
+        self.now = stamp;
+    }
+
+    /// The attitude relative to the world, which may have turned.
+    #[inline(always)]
+    fn q_nb(&mut self) -> [f64; 4] {
+        let accumulated = self.attitude.attitude();
+        match &self.world {
+            None => accumulated,
+            Some(world) => world.attitude(self.now, &accumulated),
+        }
+    }
+
     pub(super) fn reset(&mut self, initial: [f64; 4]) {
         self.attitude.restart(initial);
-        self.sigma.reset();
+        self.covariance.restart();
+        self.difference.restart();
         if let Some(sum) = &mut self.sum {
             *sum = rotation_vector(initial);
             self.attitude = turned_by(*sum);
@@ -64,16 +106,21 @@ impl State {
     /// Turns on over interval k.
     #[inline(always)]
     pub(super) fn step(&mut self, step: &Step, track: &Track, k: usize) {
+        let mut turn = step.turn;
         match &mut self.sum {
-            None => self.attitude.turn(step.turn),
+            None => self.attitude.turn(turn),
             Some(sum) => {
-                let [_, x, y, z] = step.turn;
-                *sum = *sum + Triple::new(x, y, z);
+                let [_, x, y, z] = turn;
+                let phi = Triple::new(x, y, z);
+                *sum = *sum + phi;
                 self.attitude = turned_by(*sum);
+                turn = Turn::exp(phi).parts();
             }
         }
+        self.now = track.stamp[k];
+        self.difference.add(&self.attitude, step.outer);
         let spacing = track.spacing(k);
-        self.sigma.integrate(spacing);
+        self.covariance.advance(turn, secs(spacing));
         self.integrated_nanos = self.integrated_nanos.saturating_add(spacing);
         self.report.angle_turned += step.angle;
         self.report.largest_step = self.report.largest_step.max(step.angle);
@@ -86,7 +133,7 @@ impl State {
             Note::Reduced => self.report.reduced += 1,
             Note::Bridged => {
                 self.report.bridged += 1;
-                self.sigma.bridge(step.gap_variance, step.gap_noise);
+                self.covariance.bridge(step.gap_variance, step.gap_noise);
             }
             Note::Refused => self.report.refused += 1,
         }
@@ -134,13 +181,13 @@ impl State {
         if let Some(rate) = rate {
             self.rate = Vector3::new(rate.x.0[0], rate.y.0[0], rate.z.0[0]);
         }
-        let sigma = self.sigma.value();
+        let q_nb = self.q_nb();
         out.push(AttitudeSample {
             stamp: sample.stamp,
-            q_nb: Quaternion::assume_unit(self.attitude.attitude()),
+            q_nb: Quaternion::assume_unit(q_nb),
             rate: self.rate,
             accel: sample.accel,
-            sigma: Vector3::new(sigma, sigma, sigma),
+            covariance: self.covariance.attitude(),
             status: sample.status.with(self.added),
             reset_count: self.reset_count,
             log: sample.log,

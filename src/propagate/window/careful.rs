@@ -41,7 +41,15 @@ impl Plan {
                 Note::Ordinary
             };
             let turn = magnus::turn(&own.moments, self.order);
-            return Step::new(turn, own.moments.b[0].norm(), note);
+            let mut moments = own.moments;
+            if own.used <= if self.increments { 1 } else { 2 } && k > track.first() {
+                // No window is narrower. Two rates miss a twelfth of the second difference, one increment
+                // the coning of the first; the first difference stands for both, while there is no other.
+                let change = (track.rate(k) - track.rate(k - 1)) * track.step(k);
+                moments.outer = change * (1.0 / 12.0);
+            }
+            let outer = self.outer(&moments);
+            return Step::new(turn, own.moments.b[0].norm(), note).with_outer(outer);
         }
         let missing = self.missing(track, k);
         let cap = self.window.min(bridge_window(missing));
