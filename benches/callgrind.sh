@@ -14,7 +14,7 @@ program=target/release/examples/propagate_once
 instructions() {
     local file
     file=$(mktemp)
-    valgrind --tool=callgrind --callgrind-out-file="$file" "$program" "$@" 2>/dev/null
+    valgrind --tool=callgrind --callgrind-out-file="$file" "$program" "$@" >/dev/null 2>&1
     sed -n 's/^summary: //p' "$file"
     rm -f "$file"
 }

@@ -48,11 +48,21 @@ impl<const N: usize> Moments<N> {
 fn coning_sum<const N: usize>(m: &Moments<N>) -> Triple<N> {
     let mut sum = Triple::ZERO;
     for j in (0..m.live - 1).rev() {
-        let weight = 0.5 / ((2 * j + 1) * (2 * j + 3)) as f64;
-        sum = sum + m.b[j].cross(m.b[j + 1]) * weight;
+        sum = sum + m.b[j].cross(m.b[j + 1]) * CONING[j];
     }
     sum
 }
+
+/// Weights of the coning sum: 1/2 / ((2j + 1)(2j + 3)).
+const CONING: [f64; MOMENTS - 1] = {
+    let mut weights = [0.0; MOMENTS - 1];
+    let mut j = 0;
+    while j < MOMENTS - 1 {
+        weights[j] = 0.5 / ((2 * j + 1) * (2 * j + 3)) as f64;
+        j += 1;
+    }
+    weights
+};
 
 #[inline(always)]
 fn order4<const N: usize>(m: &Moments<N>) -> Triple<N> {

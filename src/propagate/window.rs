@@ -215,26 +215,26 @@ impl Plan {
         while k <= last {
             let path = self.path(track, k);
             let mut n = 1;
-            while n < GROUP
-                && k + n <= last
-                && path != Path::Careful
-                && self.path(track, k + n) == path
-            {
+            let slides = matches!(path, Path::Uniform | Path::General);
+            while n < GROUP && k + n <= last && slides && self.path(track, k + n) == path {
                 n += 1;
             }
-            if n == GROUP && path != Path::Careful {
-                self.group::<GROUP>(track, k, path, steps);
-                k += GROUP;
+            let first = (k + self.look_ahead + 1).wrapping_sub(self.window);
+            if n == GROUP {
+                self.group::<GROUP>(track, k, first, path, steps);
             } else {
-                for k in k..k + n {
-                    if path == Path::Careful {
-                        steps.push(self.careful(track, k));
-                    } else {
-                        self.group::<1>(track, k, path, steps);
+                for i in 0..n {
+                    match path {
+                        Path::Careful => steps.push(self.careful(track, k)),
+                        Path::Newest => {
+                            let first = track.len() - self.window;
+                            self.group::<1>(track, k, first, Path::Uniform, steps);
+                        }
+                        _ => self.group::<1>(track, k + i, first + i, path, steps),
                     }
                 }
-                k += n;
             }
+            k += n;
         }
     }
 
@@ -242,9 +242,17 @@ impl Plan {
     #[inline(always)]
     fn path(&self, track: &Track, k: usize) -> Path {
         let end = k + self.look_ahead + 1;
-        let one_sided = end > track.len() || end < self.window + track.first();
-        if one_sided || track.bridged[k] || (self.increments && track.has_hole(k)) {
+        let starting = end < self.window + track.first();
+        if starting || track.bridged[k] || (self.increments && track.has_hole(k)) {
             return Path::Careful;
+        }
+        if end > track.len() {
+            let known = track.len() >= self.window + track.first();
+            let first = track.len().saturating_sub(self.window);
+            let newest = known
+                && self.provisional_gain(k - first).is_some()
+                && track.is_uniform(first, self.window);
+            return if newest { Path::Newest } else { Path::Careful };
         }
         let first = end - self.window;
         if track.is_uniform(first, self.window) {
@@ -256,8 +264,15 @@ impl Plan {
         }
     }
 
-    fn group<const N: usize>(&self, track: &Track, k: usize, path: Path, steps: &mut Vec<Step>) {
-        let first = k + self.look_ahead + 1 - self.window;
+    /// Intervals k to k + N - 1 from sliding windows, the first beginning at `first`.
+    fn group<const N: usize>(
+        &self,
+        track: &Track,
+        k: usize,
+        first: usize,
+        path: Path,
+        steps: &mut Vec<Step>,
+    ) {
         let mut loud = [false; N];
         let moments = if path == Path::Uniform {
             self.tabulated::<N>(track, k, first)
@@ -405,6 +420,8 @@ impl Plan {
 enum Path {
     Uniform,
     General,
+    /// Equal spacings, but not all look-ahead is there: the newest window, if the method takes it.
+    Newest,
     Careful,
 }
 

@@ -41,7 +41,7 @@ fn each_method_has_its_order_on_the_top() {
         let coarse = top_error_inside(rate, method, kind);
         let fine = top_error_inside(2 * rate, method, kind);
         let found = (coarse / fine).log2();
-        println!("{method}, {}: order {found:.2}", kind.name());
+        eprintln!("{method}, {}: order {found:.2}", kind.name());
         assert!(
             (found - expected).abs() < 0.3,
             "{method}, {kind:?}: order {found:.2}, {coarse:e} and {fine:e} degrees"
@@ -96,7 +96,7 @@ fn each_method_has_its_order_on_random_smooth_motion() {
         let coarse = on_random_motion(method, kind, rate);
         let fine = on_random_motion(method, kind, 2 * rate);
         let found = (coarse / fine).log2();
-        println!(
+        eprintln!(
             "{method}, {}: order {found:.2}, {coarse:.1e} degrees",
             kind.name()
         );

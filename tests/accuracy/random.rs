@@ -157,7 +157,7 @@ fn ratios(logs: &[Log; 3], column: usize, mut judge: impl FnMut(&str, [f64; 3]))
             .each_ref()
             .map(|log| error(log, kind, method) / row[column]);
         found.sort_by(f64::total_cmp);
-        println!("column {column}: {method}, {}: {found:.3?}", kind.name());
+        eprintln!("column {column}: {method}, {}: {found:.3?}", kind.name());
         judge(
             &format!("column {column}, {method}, {}", kind.name()),
             found,
