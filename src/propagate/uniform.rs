@@ -233,7 +233,8 @@ impl Skewed {
         for (i, (row, own)) in self.rows.iter().enumerate() {
             let difference = at(i) - reference;
             outer = outer + difference * *own;
-            // Rows are zero beyond `live`: a fixed count is faster than a right one.
+            // Rows are zero beyond `live`. The fixed count unrolls: 6 to 9 % fewer instructions for `commit`,
+            // 6 % more for a causal window of 5.
             for j in 0..MOMENTS {
                 moments[j] = moments[j] + difference * row[j];
             }
