@@ -130,7 +130,7 @@ impl LiveMcap {
         let Some(layout) = self.layouts.get_mut(stream.0) else {
             return true;
         };
-        let log_time = log_time(sample);
+        let log_time = log_time(sample.log);
         let (stamp, fits) = ros_time(sample.stamp);
         let n = n as u32;
         let lane = self.chunk.lane(layout.attitude);
