@@ -271,7 +271,8 @@ impl Synthetic {
     fn one(&mut self, out: &mut Stretch) -> Result<(), MeasureError> {
         let tick = self.ticks.tick();
         // Jitter may not take the first sample to before the motion began.
-        let now = tick.instant.since(self.sampling.start).max(0) as u64;
+        let late = self.sampling.start.since(tick.instant).max(0);
+        let now = (tick.instant.since(self.sampling.start) + late) as u64;
         let mut spin = self.motion.at_nanos(now);
         spin.q_nb = spin.q_nb.same_sign_as(&self.last_q_nb);
         self.last_q_nb = spin.q_nb;
@@ -293,7 +294,7 @@ impl Synthetic {
             } else {
                 let rates = self.sampling.kind == SampleKind::Rate;
                 out.samples.push(RawSample {
-                    header: Some(tick.stamp),
+                    header: Some(Nanos(tick.stamp.0.saturating_add(late))),
                     log: at,
                     publish: at,
                     gyro: Some(gyro.into()),
