@@ -54,11 +54,7 @@ fn log(kind: SampleKind, noise: f64, jitter: bool) -> Vec<RateSample> {
 }
 
 fn run(method: Method, kind: SampleKind, samples: &[RateSample], out: &mut Vec<AttitudeSample>) {
-    let noise = Noise {
-        arw: 2.4e-4,
-        bias: 1e-3,
-        ..Noise::default()
-    };
+    let noise = Noise::isotropic(2.4e-4, 1e-3);
     let mut propagator = Propagator::new(Settings {
         method,
         kind,

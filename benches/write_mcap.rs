@@ -11,7 +11,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::time::Duration;
 use strapd::model::attitude::Quaternion;
-use strapd::record::{AttitudeSample, Nanos, Status};
+use strapd::record::{AttitudeCovariance, AttitudeSample, Nanos, Status};
 use strapd::sink::{Compression, Encoding, Flow, Options, Provenance, Sink, Stream, Target};
 
 /// A slow turn with full-entropy noise in rate and acceleration: the worst a compressor meets.
@@ -28,7 +28,9 @@ fn samples(count: usize) -> Vec<AttitudeSample> {
                 q_nb: Quaternion::assume_unit([c, 0.6 * s, 0.0, 0.8 * s]),
                 rate: Vector3::new(noise(0.01), noise(0.01), 0.1 + noise(0.01)),
                 accel: Some(Vector3::new(noise(0.1), noise(0.1), 9.8 + noise(0.1))),
-                sigma: Vector3::repeat(1e-5 * (k as f64).sqrt()),
+                covariance: AttitudeCovariance::from_sigma(Vector3::repeat(
+                    1e-5 * (k as f64).sqrt(),
+                )),
                 status: Status::OK,
                 reset_count: 0,
                 log: Nanos(stamp.0 + 150_000),

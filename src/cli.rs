@@ -2,14 +2,19 @@
 //!
 //! One file per command. Data goes to stdout, everything else to stderr.
 
+pub mod allan;
 pub mod cat;
+pub mod check;
 pub mod compare;
 pub mod estimation;
 pub mod info;
 pub mod manual;
+pub mod model;
 pub mod outputs;
 pub mod progress;
+pub mod recover;
 pub mod replay;
+pub mod simulate;
 
 use crate::error::{Error, Result};
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -27,9 +32,10 @@ use std::process::ExitCode;
   strapd info flight.mcap                      what is in it, and how good it is
   strapd replay flight.mcap -o attitude.mcap   gyro samples to attitude
   strapd compare attitude.mcap flight.mcap     how far from a recorded orientation
+  strapd simulate top -o top.mcap              a gyro whose truth is known, to try it all on
   strapd cat flight.mcap --topic /imu | head   decoded samples as NDJSON
 
-Exit codes: 0 done; 1 failed; 2 bad arguments; 3 done, but samples were lost;
+Exit codes: 0 done; 1 failed; 2 bad arguments; 3 done, but samples were lost (check: something was found);
 4 compare: a limit was exceeded."
 )]
 pub struct Cli {
@@ -111,10 +117,20 @@ pub enum Command {
     Replay(Box<replay::Replay>),
     /// What a log holds: topics, rates, clocks, frames, and what to do next
     Info(info::Info),
+    /// Everything that may spoil the attitude from a log, with the flag that helps
+    Check(check::Check),
     /// Time-aligned angle error between two attitudes
     Compare(compare::Compare),
     /// Decoded samples as NDJSON, CSV or a table
     Cat(cat::Cat),
+    /// Samples of a synthetic gyro whose true attitude is known exactly
+    Simulate(Box<simulate::Simulate>),
+    /// The model library: requests as NDJSON on stdin, answers on stdout
+    Model(model::Model),
+    /// Allan deviation of a recording at rest: noise terms, and the flags for them
+    Allan(allan::Allan),
+    /// Salvage every intact message of a damaged MCAP
+    Recover(recover::Recover),
     /// Shell completions on stdout
     Completions(manual::Completions),
     /// The manual page (roff) on stdout, or all of them into a directory
@@ -153,8 +169,13 @@ pub fn run(cli: Cli) -> Result<Outcome> {
     match cli.command {
         Command::Replay(command) => replay::run(&cli.global, &command),
         Command::Info(command) => info::run(&cli.global, &command),
+        Command::Check(command) => check::run(&cli.global, &command),
         Command::Compare(command) => compare::run(&cli.global, &command),
         Command::Cat(command) => cat::run(&cli.global, &command),
+        Command::Simulate(command) => simulate::run(&cli.global, &command),
+        Command::Model(command) => model::run(&cli.global, &command),
+        Command::Allan(command) => allan::run(&cli.global, &command),
+        Command::Recover(command) => recover::run(&cli.global, &command),
         Command::Completions(command) => manual::completions(&command),
         Command::Man(command) => manual::man(&command),
     }

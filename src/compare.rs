@@ -12,11 +12,13 @@
 //! Everything is O(n log n) in time and O(n) in memory, linear when the input is in time order.
 
 mod align;
+mod body_axes;
 mod matching;
 mod relative;
 mod statistics;
 
 pub use align::{Align, ParseAlignError};
+pub use body_axes::{BodyAxesFit, fit_body_axes};
 pub use relative::RelativeError;
 pub use statistics::{Drift, ErrorStats};
 

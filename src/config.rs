@@ -57,7 +57,6 @@ pub struct Plan {
 impl Default for Plan {
     /// What the command line's defaults say.
     fn default() -> Plan {
-        let arw_deg_per_sqrt_h = NOISE_PRESETS[0].1;
         Plan {
             topic: None,
             decode: decode::Options::default(),
@@ -75,11 +74,7 @@ impl Default for Plan {
             latitude_deg: None,
             regularise_stamps: false,
             gyro_range: None,
-            noise: Noise {
-                name: NOISE_PRESETS[0].0.to_owned(),
-                arw: arw_deg_per_sqrt_h * DEG / 60.0,
-                bias_instability: NOISE_PRESETS[0].2 * DEG / 3600.0,
-            },
+            noise: Noise::preset(&NOISE_PRESETS[0]),
             start: None,
             until: None,
         }
@@ -118,11 +113,7 @@ impl Plan {
             method: self.method,
             // Where the format decides, the kind with the wider choice: the rest is said by topic.
             kind: self.kind.unwrap_or(SampleKind::Average),
-            noise: propagate::Noise {
-                arw: self.noise.arw,
-                bias: self.noise.bias_instability,
-                ..propagate::Noise::default()
-            },
+            noise: self.noise.with_bias(self.noise.unremoved_bias()),
             ..propagate::Settings::default()
         })
         .map_err(|e| Error::Usage(e.to_string()))?;
@@ -172,15 +163,21 @@ pub enum Bias {
     Given(Vector3<f64>),
 }
 
-/// `--noise`: what the covariance is made of. 1 sigma.
+/// `--noise`: what the covariance is made of. 1 sigma, about the body axes x, y, z.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Noise {
     /// As named on the command line, for the summary.
     pub name: String,
     /// Angle random walk N, rad/sqrt(s).
-    pub arw: f64,
-    /// Bias instability B, rad/s; taken as the uncertainty of a constant bias.
-    pub bias_instability: f64,
+    pub arw: [f64; 3],
+    /// Bias instability B, rad/s; taken as the uncertainty of a constant bias that no estimate removes.
+    pub bias_instability: [f64; 3],
+    /// Rate random walk K, rad/s/sqrt(s).
+    pub rrw: [f64; 3],
+    /// Turn-on bias, rad/s: unknown as long as no bias is removed.
+    pub turn_on_bias: [f64; 3],
+    /// Uncertainty of the initial attitude, rad.
+    pub initial: [f64; 3],
 }
 
 const DEG: f64 = std::f64::consts::PI / 180.0;
@@ -195,46 +192,104 @@ pub const NOISE_PRESETS: [(&str, f64, f64); 4] = [
 ];
 
 impl Noise {
-    /// `consumer`, ..., or `arw=..,bias-instability=..` in rad/sqrt(s) and rad/s.
+    fn preset((name, arw, bias): &(&str, f64, f64)) -> Noise {
+        Noise {
+            name: (*name).to_owned(),
+            arw: [arw * DEG / 60.0; 3],
+            bias_instability: [bias * DEG / 3600.0; 3],
+            rrw: [0.0; 3],
+            turn_on_bias: [0.0; 3],
+            initial: [0.0; 3],
+        }
+    }
+
+    /// `consumer`, ..., or `arw=..` and any of `bias-instability`, `rrw`, `turn-on-bias`, `initial`,
+    /// in SI; each one number, or three joined by `/` for the body axes x, y, z.
     ///
     /// # Errors
-    /// [`Error::Usage`] for anything else.
+    /// [`Error::Usage`] naming the part that is wrong.
     pub fn parse(text: &str) -> Result<Noise> {
-        if let Some((name, arw, bias)) = NOISE_PRESETS.iter().find(|(name, ..)| *name == text) {
-            return Ok(Noise {
-                name: (*name).to_owned(),
-                arw: arw * DEG / 60.0,
-                bias_instability: bias * DEG / 3600.0,
-            });
+        if let Some(preset) = NOISE_PRESETS.iter().find(|(name, ..)| *name == text) {
+            return Ok(Noise::preset(preset));
         }
-        let mut noise = Noise {
-            name: text.to_owned(),
-            arw: f64::NAN,
-            bias_instability: 0.0,
+        let wrong = |what: String| {
+            let names: Vec<&str> = NOISE_PRESETS.iter().map(|p| p.0).collect();
+            Error::Usage(format!(
+                "--noise {text}: {what}\n  help: a preset ({}), or arw=RAD_PER_SQRT_S[,bias-instability=RAD_S][,rrw=RAD_S_PER_SQRT_S][,turn-on-bias=RAD_S][,initial=RAD], each one number or three x/y/z",
+                names.join(", ")
+            ))
         };
+        let mut given: [Option<[f64; 3]>; NOISE_KEYS.len()] = [None; NOISE_KEYS.len()];
         for part in text.split(',') {
             let (key, value) = part.split_once('=').unwrap_or((part, ""));
-            let number = value
-                .parse::<f64>()
-                .ok()
-                .filter(|v| v.is_finite() && *v >= 0.0);
-            match (key.trim(), number) {
-                ("arw", Some(v)) => noise.arw = v,
-                ("bias-instability", Some(v)) => noise.bias_instability = v,
-                _ => {
-                    noise.arw = f64::NAN;
-                    break;
-                }
+            let key = key.trim();
+            let Some((slot, _)) = given
+                .iter_mut()
+                .zip(NOISE_KEYS)
+                .find(|(_, name)| *name == key)
+            else {
+                return Err(wrong(format!(
+                    "`{key}` is no preset and no figure of noise"
+                )));
+            };
+            if slot.is_some() {
+                return Err(wrong(format!("{key} is given twice")));
             }
+            *slot = Some(by_axis(value).ok_or_else(|| {
+                wrong(format!(
+                    "{key}={value} is neither one number nor three x/y/z, from 0 up"
+                ))
+            })?);
         }
-        if noise.arw.is_nan() {
-            let names: Vec<&str> = NOISE_PRESETS.iter().map(|p| p.0).collect();
-            return Err(Error::Usage(format!(
-                "--noise {text}: not a preset and not arw=RAD_PER_SQRT_S[,bias-instability=RAD_S]\n  help: presets are {}",
-                names.join(", ")
-            )));
+        let [arw, bias_instability, rrw, turn_on_bias, initial] = given;
+        let Some(arw) = arw else {
+            return Err(wrong("arw is missing".to_owned()));
+        };
+        Ok(Noise {
+            name: text.to_owned(),
+            arw,
+            bias_instability: bias_instability.unwrap_or_default(),
+            rrw: rrw.unwrap_or_default(),
+            turn_on_bias: turn_on_bias.unwrap_or_default(),
+            initial: initial.unwrap_or_default(),
+        })
+    }
+
+    /// What is not known of the bias, rad/s, when none is removed: turn-on bias and instability.
+    #[must_use]
+    pub fn unremoved_bias(&self) -> [f64; 3] {
+        let [x, y, z] = self.turn_on_bias;
+        let [u, v, w] = self.bias_instability;
+        [x.hypot(u), y.hypot(v), z.hypot(w)]
+    }
+
+    /// What the propagator is told, when `bias` (rad/s) is not known of the bias.
+    #[must_use]
+    pub fn with_bias(&self, bias: [f64; 3]) -> propagate::Noise {
+        propagate::Noise {
+            initial: self.initial,
+            arw: self.arw,
+            bias,
+            rrw: self.rrw,
+            bias_tau: None,
         }
-        Ok(noise)
+    }
+}
+
+/// What `--noise` takes, in the order of the fields.
+const NOISE_KEYS: [&str; 5] = ["arw", "bias-instability", "rrw", "turn-on-bias", "initial"];
+
+/// One number for all axes, or three joined by `/`; finite and not negative.
+fn by_axis(text: &str) -> Option<[f64; 3]> {
+    let numbers: Option<Vec<f64>> = text
+        .split('/')
+        .map(|part| part.trim().parse::<f64>().ok())
+        .map(|v| v.filter(|v| v.is_finite() && *v >= 0.0))
+        .collect();
+    match numbers?.as_slice() {
+        [all] => Some([*all; 3]),
+        [x, y, z] => Some([*x, *y, *z]),
+        _ => None,
     }
 }
 
@@ -327,7 +382,7 @@ impl Shard {
 }
 
 /// `N` finite numbers separated by commas.
-fn numbers<const N: usize>(flag: &str, list: &str) -> Result<[f64; N]> {
+pub(crate) fn numbers<const N: usize>(flag: &str, list: &str) -> Result<[f64; N]> {
     let parsed: Option<Vec<f64>> = list
         .split(',')
         .map(|part| part.trim().parse::<f64>().ok().filter(|v| v.is_finite()))
@@ -362,19 +417,22 @@ mod tests {
     fn a_preset_is_in_radians_and_seconds() {
         // 0.84 deg/sqrt(h) = 0.014 deg/sqrt(s); 5 deg/h.
         let noise = Noise::parse("consumer").unwrap();
-        assert!((noise.arw - 0.014 * DEG).abs() < 1e-15);
-        assert!((noise.bias_instability - 5.0 * DEG / 3600.0).abs() < 1e-18);
+        assert!((noise.arw[0] - 0.014 * DEG).abs() < 1e-15);
+        assert!((noise.bias_instability[2] - 5.0 * DEG / 3600.0).abs() < 1e-18);
     }
 
     #[test]
     fn given_noise_needs_its_angle_random_walk() {
-        assert_eq!(
-            Noise::parse("arw=1e-4,bias-instability=2e-5")
-                .unwrap()
-                .bias_instability,
-            2e-5
-        );
+        let noise = Noise::parse("arw=1e-4/2e-4/3e-4,bias-instability=2e-5").unwrap();
+        assert_eq!(noise.arw, [1e-4, 2e-4, 3e-4]);
+        assert_eq!(noise.bias_instability, [2e-5; 3]);
         for bad in [
+            "arw=1/2",
+            "arw=1/2/3/4",
+            "arw=1//2",
+            "arw=1e-4,arw=1e-4",
+            "arw=1e-4,",
+            "consumer,arw=1",
             "",
             "bias-instability=1e-5",
             "arw=-1",
@@ -383,6 +441,24 @@ mod tests {
         ] {
             assert!(Noise::parse(bad).is_err(), "{bad}");
         }
+    }
+
+    #[test]
+    fn every_figure_of_noise_reaches_the_propagator() {
+        let noise = Noise::parse("arw=1,rrw=2,turn-on-bias=3/0/0,bias-instability=4,initial=5/6/7");
+        let noise = noise.unwrap();
+        // 3 and 4 are independent: 5. An estimate removes the turn-on bias, and only that.
+        assert_eq!(noise.unremoved_bias(), [5.0, 4.0, 4.0]);
+        assert_eq!(
+            noise.with_bias([8.0; 3]),
+            propagate::Noise {
+                initial: [5.0, 6.0, 7.0],
+                arw: [1.0; 3],
+                bias: [8.0; 3],
+                rrw: [2.0; 3],
+                bias_tau: None,
+            }
+        );
     }
 
     #[test]

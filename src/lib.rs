@@ -18,7 +18,7 @@
 //! | `pipeline` | the stages wired: replay, tracks, what a log holds | I/O |
 //! | [`compare`] | two attitudes -> how far apart | pure |
 //! | `config`, `report`, `cli` | arguments -> a run -> its summary | |
-//! | [`model`] | frames, attitude, rigid body, top, inertia, motions with exact truth | pure |
+//! | [`model`] | frames, attitude, rigid body, top, inertia, the youBot's arm, motions with exact truth | pure |
 //!
 //! Reading order: [`record`], `pipeline::estimator`, then one stage.
 //! Without the default feature `service` the crate is the modules with links above, on nalgebra alone.

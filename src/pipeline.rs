@@ -1,6 +1,7 @@
 //! Wires the stages: source -> decode -> condition -> propagate -> sink. I/O.
 
 pub mod against;
+pub mod check;
 mod chosen;
 pub mod estimator;
 pub mod lines;
@@ -14,10 +15,12 @@ pub mod pool;
 pub mod position;
 pub mod preparation;
 pub mod provenance;
+pub mod recover;
 pub mod replay;
 pub mod route;
 pub mod run;
 pub mod session;
+pub mod simulate;
 pub mod stamps;
 mod streamed;
 pub mod summarise;

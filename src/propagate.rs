@@ -8,6 +8,7 @@
 //!                  -> Legendre moments of the rate over it       uniform, lagrange, collocation
 //!                  -> turn, cos(a/2) - 1 and sin(a/2) axis       magnus, series
 //!                  -> attitude                                   accumulate
+//! turn, time, noise -> how well it is known                     covariance
 //! ```
 //!
 //! Every turn is a function of the samples in its window alone, and turns are accumulated in order:
@@ -24,6 +25,7 @@
 mod accumulate;
 mod classical;
 mod collocation;
+pub mod covariance;
 mod executor;
 mod lagrange;
 mod lanes;
@@ -37,15 +39,14 @@ mod settings;
 #[path = "../tests/shared_data/mod.rs"]
 #[allow(unreachable_pub, reason = "shared with the integration tests")]
 mod shared_data;
-mod sigma;
 mod track;
 mod turn;
 mod uniform;
 mod window;
 
+pub use covariance::Noise;
 pub use executor::{Executor, Sequential};
 pub use method::{LARGEST_WINDOW, Method, Order, Placement, UnknownName};
 pub use propagator::Propagator;
 pub use report::Report;
 pub use settings::{Settings, SettingsError};
-pub use sigma::Noise;

@@ -7,6 +7,10 @@
 //! Bad data never becomes an `Err`: it becomes a [`Verdict`], is counted in
 //! [`Counts`], and the run goes on.
 
+mod covariance;
+
+pub use covariance::AttitudeCovariance;
+
 use crate::model::attitude::Quaternion;
 use crate::model::frames::{Body, Nav};
 use nalgebra::Vector3;
@@ -209,8 +213,8 @@ pub struct AttitudeSample {
     pub rate: Vector3<f64>,
     /// Specific force in body axes, m/s^2, copied through.
     pub accel: Option<Vector3<f64>>,
-    /// One standard deviation about each body axis, rad.
-    pub sigma: Vector3<f64>,
+    /// Of its error, rad^2, body axes: see [`AttitudeCovariance::sigma`] for three numbers.
+    pub covariance: AttitudeCovariance,
     /// What was noticed.
     pub status: Status,
     /// How often the attitude has been reset or held so far; a reader that sees it change must not

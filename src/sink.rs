@@ -1,4 +1,4 @@
-//! AttitudeSample -> the world: MCAP, NDJSON, CSV, or nothing. I/O.
+//! AttitudeSample (and, from a synthetic gyro, RawSample) -> the world: MCAP, NDJSON, CSV, or nothing. I/O.
 //!
 //! A stage of its own because it is the only one that may block on a disk or a pipe, and the only
 //! one that knows what output looks like. Samples collect per stream; full batches of
@@ -7,6 +7,7 @@
 //! threads and not (within a stream) on how the samples were cut into calls.
 
 mod batch;
+mod copy;
 mod csv;
 mod decimate;
 mod json;
@@ -17,15 +18,16 @@ mod target;
 #[cfg(test)]
 pub(crate) mod tests;
 
+pub use copy::CopiedChannel;
 pub use decimate::Decimator;
 pub use mcap::chunk::Compression;
-pub use mcap::{Encoding, InputChannel, InputMessage};
+pub use mcap::{Attachment, Encoding, InputChannel, InputMessage};
 pub use output::Flow;
-pub use stream::{Provenance, Stream, output_topic};
+pub use stream::{Content, Provenance, Stream, output_topic};
 pub use target::{Format, Target};
 
 use crate::error::{Error, Result};
-use crate::record::{AttitudeSample, Nanos};
+use crate::record::{AttitudeSample, Nanos, RawSample};
 use batch::{Batch, Form, Slot};
 use mcap::Layout;
 use mcap::chunk::Chunk;
@@ -38,14 +40,8 @@ use std::path::PathBuf;
 /// Samples in one batch: one chunk of about 1 MiB in MCAP.
 const BATCH_SAMPLES: usize = 2048;
 
-/// Uncompressed size at which a chunk of copied messages is closed.
-const COPY_CHUNK_BYTES: usize = 1 << 20;
-
 /// Batches in flight: enough to keep every thread busy, few enough to bound memory (about 3 MB each).
 const MAX_BATCHES: usize = 16;
-
-/// Copied messages can be large; so many bytes of them are written without waiting for more.
-const MAX_QUEUED_COPIES: usize = MAX_BATCHES * COPY_CHUNK_BYTES;
 
 /// How the output is made.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -111,6 +107,8 @@ enum State {
 struct Lane {
     batch: Batch,
     last: Option<Nanos>,
+    /// The form has no place for it.
+    left_out: bool,
 }
 
 impl Sink {
@@ -126,7 +124,9 @@ impl Sink {
         streams: &[Stream],
         provenance: &Provenance,
     ) -> Result<Sink> {
-        if target.format() == Some(Format::Csv) && streams.len() > 1 {
+        let mut tables = streams.iter().filter(|s| s.content != Content::Truth);
+        let table = tables.next().map(|s| s.content);
+        if target.format() == Some(Format::Csv) && tables.next().is_some() {
             return Err(Error::Usage(format!(
                 "a CSV has no column for the topic and {} topics are estimated\n  help: choose one with --topic, or write .ndjson or .mcap",
                 streams.len()
@@ -138,11 +138,12 @@ impl Sink {
         let mut head = Vec::new();
         let form = match target.format() {
             None => Form::Null,
-            Some(Format::Ndjson) => {
-                Form::Ndjson(streams.iter().map(json::AttObject::new).collect())
-            }
+            Some(Format::Ndjson) => Form::Ndjson(streams.iter().map(json::Objects::new).collect()),
             Some(Format::Csv) => {
-                head.extend_from_slice(csv::HEADER);
+                head.extend_from_slice(match table {
+                    Some(Content::Samples(_)) => csv::RAW_HEADER,
+                    _ => csv::HEADER,
+                });
                 Form::Csv
             }
             Some(Format::Mcap) => Form::Mcap {
@@ -156,13 +157,33 @@ impl Sink {
                 compression: options.compression,
             },
         };
-        let lanes = (0..streams.len())
-            .map(|stream| Lane {
+        // A table has no rows for truth.
+        let left_out: Vec<bool> = streams
+            .iter()
+            .map(|s| matches!(form, Form::Csv) && s.content == Content::Truth)
+            .collect();
+        Sink::begin(output, form, file, &head, &left_out)
+    }
+
+    /// The sink once its head is made; writes it. `left_out`: by stream, whether nothing of it is
+    /// written.
+    fn begin(
+        output: Output,
+        form: Form,
+        file: McapFile,
+        head: &[u8],
+        left_out: &[bool],
+    ) -> Result<Sink> {
+        let lanes = left_out
+            .iter()
+            .enumerate()
+            .map(|(stream, left_out)| Lane {
                 batch: Batch {
                     stream,
                     ..Batch::default()
                 },
                 last: None,
+                left_out: *left_out,
             })
             .collect();
         let mut sink = Sink {
@@ -181,7 +202,7 @@ impl Sink {
             stamps_out_of_range: 0,
         };
         // A reader that has already hung up shows at the first sample.
-        let _ = sink.put(&head)?;
+        let _ = sink.put(head)?;
         Ok(sink)
     }
 
@@ -197,6 +218,30 @@ impl Sink {
         samples: &[AttitudeSample],
         pool: &ThreadPool,
     ) -> Result<Flow> {
+        self.take(stream, samples, |batch| &mut batch.samples, pool)
+    }
+
+    /// Takes samples of a [`Content::Samples`] stream, oldest first, as [`Sink::write`] takes
+    /// attitudes.
+    ///
+    /// # Errors
+    /// As [`Sink::write`].
+    pub fn write_raw(
+        &mut self,
+        stream: usize,
+        samples: &[RawSample],
+        pool: &ThreadPool,
+    ) -> Result<Flow> {
+        self.take(stream, samples, |batch| &mut batch.raw, pool)
+    }
+
+    fn take<T: Copy>(
+        &mut self,
+        stream: usize,
+        samples: &[T],
+        collected: fn(&mut Batch) -> &mut Vec<T>,
+        pool: &ThreadPool,
+    ) -> Result<Flow> {
         if matches!(self.form, Form::Null) {
             self.samples += samples.len() as u64;
             return Ok(Flow::Continue);
@@ -209,56 +254,19 @@ impl Sink {
             let Some(lane) = self.lanes.get_mut(stream) else {
                 return Err(Error::Usage(format!("the output has no stream {stream}")));
             };
-            let room = BATCH_SAMPLES.saturating_sub(lane.batch.samples.len());
+            if lane.left_out {
+                break;
+            }
+            let room = BATCH_SAMPLES.saturating_sub(lane.batch.len());
             let (now, later) = rest.split_at(room.min(rest.len()));
-            lane.batch.samples.extend_from_slice(now);
+            collected(&mut lane.batch).extend_from_slice(now);
             rest = later;
-            if lane.batch.samples.len() >= BATCH_SAMPLES {
+            if lane.batch.len() >= BATCH_SAMPLES {
                 self.queue_lane(stream);
                 if self.make_room(pool)? == Flow::Closed {
                     return Ok(Flow::Closed);
                 }
             }
-        }
-        Ok(Flow::Continue)
-    }
-
-    /// Declares a channel whose messages [`Sink::copy`] will bring. Anything but an MCAP has no place
-    /// for them and ignores both.
-    ///
-    /// # Errors
-    /// [`Error::Write`]; [`Error::Usage`] when there are more than MCAP can number.
-    pub fn copy_channel(&mut self, channel: &InputChannel<'_>) -> Result<CopiedChannel> {
-        if !matches!(self.form, Form::Mcap { .. }) || !self.is_open()? {
-            return Ok(CopiedChannel(0));
-        }
-        // The declaration is written at once, so it stands before every chunk that needs it.
-        let mut records = Vec::new();
-        let id = mcap::declare_copy(&mut self.file, &mut records, channel)?;
-        let _ = self.put(&records)?;
-        Ok(CopiedChannel(id))
-    }
-
-    /// Copies a message of the input.
-    ///
-    /// # Errors
-    /// [`Error::Write`].
-    pub fn copy(
-        &mut self,
-        channel: CopiedChannel,
-        message: &InputMessage<'_>,
-        pool: &ThreadPool,
-    ) -> Result<Flow> {
-        if !matches!(self.form, Form::Mcap { .. }) {
-            return Ok(Flow::Continue);
-        }
-        if !self.is_open()? {
-            return Ok(Flow::Closed);
-        }
-        mcap::copy(&mut self.copies, channel.0, message);
-        if self.copies.plain_len() >= COPY_CHUNK_BYTES {
-            self.queue_copies();
-            return self.make_room(pool);
         }
         Ok(Flow::Continue)
     }
@@ -368,7 +376,7 @@ impl Sink {
     /// Moves a stream's pending samples into the queue.
     fn queue_lane(&mut self, stream: usize) {
         let mut lane = std::mem::take(&mut self.lanes[stream]);
-        let count = lane.batch.samples.len() as u64;
+        let count = lane.batch.len() as u64;
         let next = Batch {
             stream,
             first: lane.batch.first + count,
@@ -379,30 +387,26 @@ impl Sink {
         self.samples += count;
 
         let slot = self.next_slot();
-        // The slot's old vector is emptied and goes back to the lane: no allocation per batch.
+        // The slot's old vectors are emptied and go back to the lane: no allocation per batch.
         let mut samples = std::mem::take(&mut slot.batch.samples);
+        let mut raw = std::mem::take(&mut slot.batch.raw);
         samples.clear();
+        raw.clear();
         slot.batch = lane.batch;
         self.lanes[stream] = Lane {
-            batch: Batch { samples, ..next },
+            batch: Batch {
+                samples,
+                raw,
+                ..next
+            },
             last,
+            left_out: lane.left_out,
         };
-    }
-
-    /// Moves the copied messages into the queue.
-    fn queue_copies(&mut self) {
-        let full = std::mem::take(&mut self.copies);
-        self.queued_copies += full.plain_len();
-        let slot = self.next_slot();
-        slot.batch.samples.clear();
-        let mut empty = std::mem::replace(&mut slot.chunk, full);
-        empty.clear();
-        self.copies = empty;
     }
 
     fn queue_everything(&mut self, pool: Option<&ThreadPool>) -> Result<Flow> {
         for stream in 0..self.lanes.len() {
-            if !self.lanes[stream].batch.samples.is_empty() {
+            if !self.lanes[stream].batch.is_empty() {
                 self.queue_lane(stream);
                 if self.used >= MAX_BATCHES && self.drain(pool)? == Flow::Closed {
                     return Ok(Flow::Closed);
@@ -418,7 +422,7 @@ impl Sink {
     /// Drains the queue when it is long enough for this pool.
     fn make_room(&mut self, pool: &ThreadPool) -> Result<Flow> {
         let limit = (2 * pool.current_num_threads()).clamp(2, MAX_BATCHES);
-        if self.used >= limit || self.queued_copies >= MAX_QUEUED_COPIES {
+        if self.used >= limit || self.queued_copies >= copy::MAX_QUEUED_COPIES {
             self.drain(Some(pool))
         } else {
             Ok(Flow::Continue)
@@ -466,12 +470,8 @@ impl Sink {
             slot.chunk.clear();
             Ok(Flow::Continue)
         } else {
-            self.messages += slot.batch.samples.len() as u64;
+            self.messages += slot.batch.len() as u64;
             self.put(&slot.text)
         }
     }
 }
-
-/// A channel declared by [`Sink::copy_channel`].
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct CopiedChannel(u16);

@@ -8,6 +8,8 @@ mod coning;
 mod double;
 #[path = "accuracy/gaps.rs"]
 mod gaps;
+#[path = "accuracy/live.rs"]
+mod live;
 #[path = "accuracy/noise.rs"]
 mod noise;
 #[path = "accuracy/random.rs"]
@@ -30,7 +32,7 @@ use top::Top;
 const MARGIN: usize = 24;
 const FINE: usize = 4000;
 
-fn centred(window: usize, order: Order) -> Method {
+const fn centred(window: usize, order: Order) -> Method {
     Method::Magnus {
         window,
         order,
@@ -46,7 +48,7 @@ fn causal(window: usize, order: Order) -> Method {
     }
 }
 
-fn commit(window: usize) -> Method {
+const fn commit(window: usize) -> Method {
     Method::CommitProvisional {
         window,
         order: Order::M8,

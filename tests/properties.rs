@@ -62,10 +62,11 @@ fn propagator(method: Method, kind: SampleKind) -> Propagator {
         kind,
         initial: Quaternion::assume_unit([0.5, -0.5, 0.5, 0.5]),
         noise: Noise {
-            initial: 0.01,
-            arw: 1e-3,
-            bias: 1e-3,
-            rrw: 1e-5,
+            initial: [0.01, 0.02, 0.0],
+            arw: [1e-3, 2e-3, 1e-3],
+            bias: [1e-3; 3],
+            rrw: [1e-5; 3],
+            bias_tau: None,
         },
         ..Settings::default()
     })
@@ -81,16 +82,17 @@ fn run(method: Method, kind: SampleKind, samples: &[RateSample]) -> Vec<Attitude
 }
 
 /// The bits of everything that comes out, so that -0 and 0, and NaN and NaN, are told apart.
-fn bits(out: &[AttitudeSample]) -> Vec<([u64; 10], i64, Status, u32)> {
+fn bits(out: &[AttitudeSample]) -> Vec<([u64; 16], i64, Status, u32)> {
     out.iter()
         .map(|a| {
+            let covariance = a.covariance.matrix();
             let numbers = a
                 .q_nb
                 .wxyz()
                 .into_iter()
                 .chain(a.rate.iter().copied())
-                .chain(a.sigma.iter().copied());
-            let mut bits = [0; 10];
+                .chain(covariance.iter().copied());
+            let mut bits = [0; 16];
             for (bit, number) in bits.iter_mut().zip(numbers) {
                 *bit = number.to_bits();
             }
@@ -246,7 +248,7 @@ proptest! {
                 // AttitudeSample promises 1e-15; the sum of squares rounds as much again.
                 prop_assert!((norm - 1.0).abs() < 1.5e-15, "{}: norm {:e}", method, norm - 1.0);
                 prop_assert!(a.rate.iter().all(|c| c.is_finite()), "{}", method);
-                prop_assert!(a.sigma.iter().all(|c| (0.0..=3.2).contains(c)), "{}", method);
+                prop_assert!(a.covariance.sigma().iter().all(|c| (0.0..=3.2).contains(c)), "{}", method);
                 if let (Some(b), Method::Auto) = (before, method) {
                     let dot: f64 = q.iter().zip(b).map(|(a, b)| a * b).sum();
                     // Less than half a turn since: the sign did not jump.
@@ -487,7 +489,7 @@ fn settings_that_can_not_be_are_refused_with_the_flag_that_helps() {
     }
     for arw in [-1.0, f64::NAN, f64::INFINITY] {
         let noise = Noise {
-            arw,
+            arw: [0.0, arw, 0.0],
             ..Noise::default()
         };
         assert!(refused(Settings { noise, ..settings }).contains("--noise"));

@@ -14,7 +14,7 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use strapd::model::attitude::Quaternion;
-use strapd::record::{AttitudeSample, Nanos, Status};
+use strapd::record::{AttitudeCovariance, AttitudeSample, Nanos, Status};
 use strapd::sink::{
     Compression, Encoding, Flow, InputChannel, InputMessage, Options, Provenance, Sink, Stream,
     Target, Written,
@@ -38,7 +38,9 @@ fn samples(count: usize) -> Vec<AttitudeSample> {
                 q_nb: Quaternion::assume_unit([c, 0.6 * s, 0.48 * s, 0.64 * s]),
                 rate: Vector3::new(0.6, 0.48, 0.64 + 1e-6 * t.sin()),
                 accel: (k % 7 != 0).then(|| Vector3::new(0.1 * t.cos(), 0.1 * t.sin(), 9.8)),
-                sigma: Vector3::new(1e-5, 2e-5, 3e-5) * (1.0 + t),
+                covariance: AttitudeCovariance::from_sigma(
+                    Vector3::new(1e-5, 2e-5, 3e-5) * (1.0 + t),
+                ),
                 status: if repeated == 1 {
                     Status::BRIDGED
                 } else {
@@ -574,7 +576,12 @@ fn any_sample() -> impl Strategy<Value = AttitudeSample> {
             q_nb: Quaternion::assume_unit(q),
             rate,
             accel,
-            sigma,
+            covariance: AttitudeCovariance {
+                xx: sigma.x,
+                xy: sigma.y,
+                zz: sigma.z,
+                ..AttitudeCovariance::default()
+            },
             status: Status(status),
             reset_count,
             log: Nanos(log),

@@ -4,7 +4,7 @@ use super::{Global, Outcome, print};
 use crate::compare::{Align, Comparison, ErrorStats, Stamped, compare};
 use crate::error::{Error, Result};
 use crate::pipeline::pool::Pool;
-use crate::pipeline::track;
+use crate::pipeline::track::{self, Side};
 use crate::report::summary::significant;
 use clap::Args;
 use serde_json::{Value, json};
@@ -16,6 +16,7 @@ use std::path::PathBuf;
 #[command(after_help = "Examples:
   strapd compare attitude.mcap flight.mcap                      against the orientation in the log
   strapd compare a.csv truth.ndjson --align none --max-angle 0.5 && echo good
+  strapd compare est.mcap top.mcap                              against /truth, of strapd simulate
   strapd compare out.mcap out.mcap --ref-topic /truth           two topics of one file
 
 Exit code 4 when --max-angle is exceeded.")]
@@ -59,8 +60,13 @@ pub fn run(global: &Global, args: &Compare) -> Result<Outcome> {
         ));
     }
     let pool = Pool::new(global.threads)?;
-    let estimate = track::read(&args.estimate, args.topic.as_deref(), &pool)?;
-    let reference = track::read(&args.reference, args.ref_topic.as_deref(), &pool)?;
+    let estimate = track::read(&args.estimate, Side::Estimate, args.topic.as_deref(), &pool)?;
+    let reference = track::read(
+        &args.reference,
+        Side::Reference,
+        args.ref_topic.as_deref(),
+        &pool,
+    )?;
     for problem in estimate.problems.iter().chain(&reference.problems) {
         tracing::warn!("{problem}");
     }

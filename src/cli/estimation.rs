@@ -27,7 +27,7 @@ pub struct Estimation {
     /// auto, magnus, causal, commit, dcm-left, dcm-right, dcm-mean, rotvec-sum
     #[arg(long, default_value = "auto", env = "STRAPD_METHOD")]
     pub method: String,
-    /// Samples in the window of --method magnus|causal|commit (2 to 24)
+    /// Samples in the window of --method magnus|causal|commit (2 to 24; commit: 6 rates or 5 increments)
     #[arg(long, value_name = "P")]
     pub window: Option<usize>,
     /// Order of the Magnus step of --method magnus|causal|commit: 2, 4, 6, 8 or exact
@@ -97,7 +97,11 @@ pub struct Estimation {
     /// Use a gyro whose covariance is marked -1 (absent) all the same: some drivers set it wrongly
     #[arg(long)]
     pub ignore_covariance_flag: bool,
-    /// Noise for the covariance: consumer, industrial, tactical, navigation, or arw=RAD_PER_SQRT_S[,bias-instability=RAD_S]
+    /// Noise for the covariance: consumer, industrial, tactical, navigation, or a list
+    ///
+    /// arw=RAD_PER_SQRT_S[,bias-instability=RAD_S][,rrw=RAD_S_PER_SQRT_S][,turn-on-bias=RAD_S][,initial=RAD],
+    /// each one number, or three x/y/z for the body axes. The turn-on bias counts unless a bias is removed
+    /// (--bias); initial is the uncertainty of the initial attitude.
     #[arg(long, value_name = "NOISE", default_value = "consumer")]
     pub noise: String,
     /// Skip the first seconds of the data
@@ -271,15 +275,17 @@ impl Estimation {
                 order: asked_order.unwrap_or(order),
                 placement,
             },
-            Method::CommitProvisional {
-                window,
-                order,
-                finals,
-            } => Method::CommitProvisional {
-                window: self.window.unwrap_or(window),
-                order: asked_order.unwrap_or(order),
-                finals,
-            },
+            Method::Live { order, finals } => {
+                let order = asked_order.unwrap_or(order);
+                match self.window {
+                    Some(window) => Method::CommitProvisional {
+                        window,
+                        order,
+                        finals,
+                    },
+                    None => Method::Live { order, finals },
+                }
+            }
             other if self.window.is_none() && asked_order.is_none() => other,
             _ => {
                 return Err(Error::Usage(format!(

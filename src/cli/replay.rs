@@ -90,6 +90,32 @@ pub enum CompressionArg {
     None,
 }
 
+impl From<CompressionArg> for Compression {
+    fn from(named: CompressionArg) -> Compression {
+        match named {
+            CompressionArg::Zstd => Compression::Zstd,
+            CompressionArg::Lz4 => Compression::Lz4,
+            CompressionArg::None => Compression::None,
+        }
+    }
+}
+
+/// `--speed`: `None` = as fast as possible.
+pub(super) fn speed(text: &str) -> Result<Option<f64>> {
+    if text == "max" {
+        return Ok(None);
+    }
+    text.parse::<f64>()
+        .ok()
+        .filter(|factor| factor.is_finite() && *factor > 0.0)
+        .map(Some)
+        .ok_or_else(|| {
+            Error::Usage(format!(
+                "--speed {text}: expected max, or a factor above 0 such as 1 or 0.5"
+            ))
+        })
+}
+
 /// Runs it.
 ///
 /// # Errors
@@ -152,19 +178,7 @@ impl Replay {
     /// # Errors
     /// [`Error::Usage`] for a flag that can not be.
     fn run(&self, log: &str, outputs: &[String], plan: Plan) -> Result<Run> {
-        let speed = match self.speed.as_str() {
-            "max" => None,
-            text => Some(
-                text.parse::<f64>()
-                    .ok()
-                    .filter(|factor| factor.is_finite() && *factor > 0.0)
-                    .ok_or_else(|| {
-                        Error::Usage(format!(
-                            "--speed {text}: expected max, or a factor above 0 such as 1 or 0.5"
-                        ))
-                    })?,
-            ),
-        };
+        let speed = speed(&self.speed)?;
         if self
             .out_rate
             .is_some_and(|hz| !(hz.is_finite() && hz > 0.0))
@@ -184,11 +198,7 @@ impl Replay {
                     EncodingArg::Cdr => Encoding::Cdr,
                     EncodingArg::Json => Encoding::Json,
                 },
-                compression: match self.compression {
-                    CompressionArg::Zstd => Compression::Zstd,
-                    CompressionArg::Lz4 => Compression::Lz4,
-                    CompressionArg::None => Compression::None,
-                },
+                compression: self.compression.into(),
             },
             copy_input: self.copy_input,
             out_rate: self.out_rate,

@@ -6,6 +6,8 @@
 use super::Stamped;
 use super::matching::Track;
 use super::statistics::quantile;
+use crate::model::attitude::Quaternion;
+use crate::model::frames::Body;
 use crate::record::Nanos;
 
 const INTERVAL_NANOS: i64 = 1_000_000_000;
@@ -28,10 +30,26 @@ pub(super) fn over_one_second(
     estimate: &Track<'_>,
     reference: &Track<'_>,
 ) -> Option<RelativeError> {
+    let mut errors = Vec::new();
+    each_second(estimate, reference, |truth, found| {
+        errors.push(truth.angle_to(&found));
+    });
+    Some(RelativeError {
+        count: errors.len(),
+        median: quantile(&mut errors, 0.5)?,
+        p95: quantile(&mut errors, 0.95)?,
+    })
+}
+
+/// Visits the rotations over 1 s, body to body, of the reference and of the estimate.
+pub(super) fn each_second(
+    estimate: &Track<'_>,
+    reference: &Track<'_>,
+    mut visit: impl FnMut(Quaternion<Body, Body>, Quaternion<Body, Body>),
+) {
     let mut later = Nearest::new(reference);
     let mut estimate_at_start = Nearest::new(estimate);
     let mut estimate_at_end = Nearest::new(estimate);
-    let mut errors = Vec::new();
     for (start, ref_start) in reference.rows.iter() {
         let end = Nanos(start.0.saturating_add(INTERVAL_NANOS));
         let Some((end, ref_end)) = later.find(end, 1) else {
@@ -45,13 +63,8 @@ pub(super) fn over_one_second(
         };
         let truth = ref_start.inverse() * *ref_end;
         let found = est_start.inverse() * *est_end;
-        errors.push(truth.normalised().angle_to(&found.normalised()));
+        visit(truth.normalised(), found.normalised());
     }
-    Some(RelativeError {
-        count: errors.len(),
-        median: quantile(&mut errors, 0.5)?,
-        p95: quantile(&mut errors, 0.95)?,
-    })
 }
 
 /// Nearest row to each of a rising series of instants; the earlier of two equally near.

@@ -51,6 +51,9 @@ pub struct Quality {
     no_gyro: u64,
     not_finite: u64,
     zero_rows: u64,
+    /// Of these, between two that are not.
+    lone_zero_rows: u64,
+    last_row_lone_zero: bool,
     repeated_rows: u64,
     /// Samples above [`advice::DEGREES_ABOVE`] and below nonsense.
     fast_rows: u64,
@@ -74,8 +77,11 @@ struct Axis {
     sum: f64,
     sum_squares: f64,
     count: u64,
-    /// Samples at the largest magnitude so far.
+    /// Samples at the largest magnitude so far, the longest run of them while the other axes moved,
+    /// and the run under way.
     at_peak: u64,
+    longest_at_peak: u64,
+    run_at_peak: u64,
     peak: f64,
     /// Samples in a row with this value, and the longest such run.
     run: u64,
@@ -91,13 +97,16 @@ impl Axis {
         sum_squares: 0.0,
         count: 0,
         at_peak: 0,
+        longest_at_peak: 0,
+        run_at_peak: 0,
         peak: 0.0,
         run: 0,
         longest_run: 0,
         last: f64::NAN,
     };
 
-    fn push(&mut self, v: f64) {
+    /// `held`: the whole row repeats the one before, so nothing moved.
+    fn push(&mut self, v: f64, held: bool) {
         self.min = self.min.min(v);
         self.max = self.max.max(v);
         self.sum += v;
@@ -107,8 +116,18 @@ impl Axis {
         if size > self.peak {
             self.peak = size;
             self.at_peak = 1;
+            self.run_at_peak = 1;
+            self.longest_at_peak = 1;
         } else if size == self.peak {
             self.at_peak += 1;
+            self.run_at_peak = match (v == self.last, held) {
+                (true, false) => self.run_at_peak + 1,
+                (true, true) => self.run_at_peak,
+                (false, _) => 1,
+            };
+            self.longest_at_peak = self.longest_at_peak.max(self.run_at_peak);
+        } else {
+            self.run_at_peak = 0;
         }
         self.run = if v == self.last { self.run + 1 } else { 1 };
         self.longest_run = self.longest_run.max(self.run);
@@ -197,6 +216,8 @@ impl Quality {
             no_gyro: 0,
             not_finite: 0,
             zero_rows: 0,
+            lone_zero_rows: 0,
+            last_row_lone_zero: false,
             repeated_rows: 0,
             fast_rows: 0,
             axes: [Axis::EMPTY; 3],
@@ -330,13 +351,20 @@ impl Quality {
             return None;
         }
         self.zero_rows += u64::from(gyro == [0.0; 3]);
-        self.repeated_rows += u64::from(self.previous == Some(gyro));
+        let held = self.previous == Some(gyro);
+        self.repeated_rows += u64::from(held);
+        // A zero between readings that are none, and no rest: that takes two in a row.
+        if self.last_row_lone_zero && gyro != [0.0; 3] {
+            self.lone_zero_rows += 1;
+        }
+        self.last_row_lone_zero =
+            gyro == [0.0; 3] && self.previous.is_some_and(|previous| previous != [0.0; 3]);
         self.previous = Some(gyro);
         let peak = gyro.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
         self.fast_rows +=
             u64::from((advice::DEGREES_ABOVE..=super::gate::HUGE_RATE).contains(&peak));
         for (axis, v) in self.axes.iter_mut().zip(gyro) {
-            axis.push(v);
+            axis.push(v, held);
         }
         Some(gyro)
     }

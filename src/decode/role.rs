@@ -98,13 +98,15 @@ fn rank(channel: &Channel<'_>, found: Found, stated: &Stated) -> Rank {
                 "omega",
                 "body_rate",
             ]);
-            // What drivers publish as Vector3Stamped besides rates.
+            // What drivers publish as Vector3Stamped besides rates; and the truth about them, which
+            // is no sensor.
             let other = has(&[
                 "mag", "acc", "force", "gravity", "vel", "pos", "torque", "wind", "euler", "rpy",
                 "angle", "dv", "dq", "bias", "cmd", "goal", "target", "setpoint", "temp", "field",
+                "truth",
             ]);
             match (rate, other) {
-                (true, _) if !has(&["bias", "mag", "cmd", "setpoint", "target"]) => {
+                (true, _) if !has(&["bias", "mag", "cmd", "setpoint", "target", "truth"]) => {
                     Rank::RateByTopic
                 }
                 (false, false) => Rank::Weak,

@@ -93,4 +93,18 @@ impl Motion {
             Self::HeavyBody(m) => m.delta_angle(from, to),
         }
     }
+
+    /// Acceleration of the origin of the body axes at `nanos` nanoseconds, m/s^2, navigation axes.
+    /// All of these turn about a point that stays where it is.
+    #[must_use]
+    pub fn acceleration_n(&self, nanos: u64) -> Vector3<f64> {
+        let _ = nanos;
+        match self {
+            Self::ConstantRate(_)
+            | Self::Coning(_)
+            | Self::BandLimited(_)
+            | Self::FreeBody(_)
+            | Self::HeavyBody(_) => Vector3::zeros(),
+        }
+    }
 }

@@ -5,12 +5,12 @@
 
 use super::estimator::Estimator;
 use super::preparation::{Prepared, Resolved};
-use crate::compare::{Align, Stamped, compare};
+use crate::compare::{Align, Stamped, compare, fit_body_axes};
 use crate::config::Plan;
 use crate::model::frames::World;
 use crate::propagate::{Executor, Method};
 use crate::record::{RawSample, SampleKind};
-use crate::report::summary::Against;
+use crate::report::summary::{Against, Recorded};
 
 /// Most attitudes kept per track; beyond, every second one goes, again and again, so that memory
 /// stays bounded on any log.
@@ -42,6 +42,7 @@ pub struct AgainstRecorded {
     estimators: Vec<Estimator>,
     tracks: Vec<Thinned>,
     reference: Thinned,
+    unusable: u64,
 }
 
 /// A track that halves itself when it grows too long.
@@ -112,6 +113,7 @@ impl AgainstRecorded {
             tracks: estimators.iter().map(|_| Thinned::new()).collect(),
             estimators,
             reference: Thinned::new(),
+            unusable: 0,
         })
     }
 
@@ -139,11 +141,12 @@ impl AgainstRecorded {
             Clock::Log | Clock::Index { .. } => Some(raw.log),
             Clock::Publish => Some(raw.publish),
         };
-        let attitude = raw
-            .orientation
-            .and_then(|wxyz| self.resolved.recorded_attitude(wxyz));
-        if let (Some(stamp), Some(attitude)) = (stamp, attitude) {
-            self.reference.push((stamp, attitude));
+        let Some(recorded) = raw.orientation else {
+            return;
+        };
+        match (stamp, self.resolved.recorded_attitude(recorded)) {
+            (Some(stamp), Some(attitude)) => self.reference.push((stamp, attitude)),
+            _ => self.unusable += 1,
         }
     }
 
@@ -169,6 +172,29 @@ impl AgainstRecorded {
     #[must_use]
     pub fn references(&self) -> usize {
         self.reference.entries.len()
+    }
+
+    /// What the recorded orientation itself is like; `None` when there is none at all.
+    #[must_use]
+    pub fn recorded(&self) -> Option<Recorded> {
+        let entries = &self.reference.entries;
+        let first = entries.first().map(|(_, q)| *q);
+        if entries.is_empty() && self.unusable == 0 {
+            return None;
+        }
+        // The meaning that fits best says most about the axes.
+        let best = self
+            .tracks
+            .iter()
+            .filter_map(|track| fit_body_axes(&track.entries, entries))
+            .min_by(|a, b| a.turned.total_cmp(&b.turned));
+        Some(Recorded {
+            usable: entries.len(),
+            unusable: self.unusable,
+            constant: entries.len() > 1
+                && first.is_some_and(|first| entries.iter().all(|(_, q)| *q == first)),
+            axes: best,
+        })
     }
 
     /// The errors; empty when no two recorded orientations are 1 s apart.

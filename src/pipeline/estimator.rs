@@ -36,11 +36,7 @@ impl Estimator {
             kind: resolved.kind,
             initial: prepared.initial,
             world_rate: prepared.world_rate,
-            noise: propagate::Noise {
-                arw: plan.noise.arw,
-                bias: prepared.bias_sigma,
-                ..propagate::Noise::default()
-            },
+            noise: plan.noise.with_bias(prepared.bias_sigma.into()),
         })
         .map_err(|e| e.to_string())?;
         Ok(Estimator {
@@ -136,6 +132,9 @@ impl Estimator {
         for sample in &mut self.out {
             sample.q_nb = Convention::EnuFlu.convert(to, sample.q_nb);
             sample.rate = Convention::EnuFlu.convert_body(to, sample.rate);
+            sample.covariance = sample
+                .covariance
+                .relabelled(|v| Convention::EnuFlu.convert_body(to, v));
             sample.accel = sample.accel.map(|a| Convention::EnuFlu.convert_body(to, a));
         }
     }

@@ -6,6 +6,7 @@ use super::preparation::Resolved;
 use super::route::Item;
 use super::run::{Replay, refused};
 use super::session::Found;
+use super::simulate::TRUTH_ID;
 use super::stamps::{StampPass, Stamps};
 use super::summarise;
 use super::waiting::Waiting;
@@ -173,6 +174,7 @@ fn read(
         line: Vec::new(),
     };
     let mut sensor: Option<String> = None;
+    let mut has_rates = false;
     let mut samples = Vec::new();
     let mut items = Vec::with_capacity(BATCH);
     let mut closed = false;
@@ -209,6 +211,13 @@ fn read(
                     continue;
                 }
                 let id = line.id.unwrap_or_default();
+                // An attitude carries the rate behind it, which makes it a sample where there is
+                // nothing else: not beside samples, and not when it is the truth about them.
+                let truth = id == TRUTH_ID && run.plan.topic.as_deref() != Some(TRUTH_ID);
+                if line.class == Class::Att && (has_rates || truth) {
+                    samples.clear();
+                    continue;
+                }
                 if run
                     .plan
                     .topic
@@ -218,6 +227,7 @@ fn read(
                     samples.clear();
                     continue;
                 }
+                has_rates |= line.class == Class::Rate;
                 match &sensor {
                     None => {
                         let stated = Stated {

@@ -4,11 +4,12 @@ use super::pace::Pace;
 use super::pool::Pool;
 use super::route::Copied;
 use crate::error::Result;
-use crate::record::AttitudeSample;
+use crate::record::{AttitudeSample, Nanos, RawSample};
 use crate::sink::{
     CopiedChannel, Decimator, Flow, InputChannel, InputMessage, Options, Provenance, Sink, Stream,
     Target, Written,
 };
+use rayon::ThreadPool;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -79,27 +80,47 @@ impl Outlet {
         samples: &[AttitudeSample],
         pool: &Pool,
     ) -> Result<Flow> {
-        self.kept.clear();
-        let mut rest = match self.decimators.get_mut(stream).and_then(Option::as_mut) {
-            Some(decimator) => {
-                decimator.select(samples, &mut self.kept);
-                self.kept.as_slice()
-            }
-            None => samples,
+        let Some(decimator) = self.decimators.get_mut(stream).and_then(Option::as_mut) else {
+            return self.hand_over(stream, samples, |s| s.stamp, Sink::write, pool);
         };
+        let mut kept = std::mem::take(&mut self.kept);
+        kept.clear();
+        decimator.select(samples, &mut kept);
+        let flow = self.hand_over(stream, &kept, |s| s.stamp, Sink::write, pool);
+        self.kept = kept;
+        flow
+    }
+
+    /// Hands what a gyro put out to every sink, no faster than asked.
+    ///
+    /// # Errors
+    /// As [`Sink::write_raw`].
+    pub fn write_raw(&mut self, stream: usize, samples: &[RawSample], pool: &Pool) -> Result<Flow> {
+        self.hand_over(stream, samples, |s| s.log, Sink::write_raw, pool)
+    }
+
+    fn hand_over<T>(
+        &mut self,
+        stream: usize,
+        samples: &[T],
+        due: fn(&T) -> Nanos,
+        write: fn(&mut Sink, usize, &[T], &ThreadPool) -> Result<Flow>,
+        pool: &Pool,
+    ) -> Result<Flow> {
+        let mut rest = samples;
         while let (false, Some(first)) = (self.closed, rest.first()) {
             let n = match &mut self.pace {
                 None => rest.len(),
                 Some(pace) => {
-                    pace.wait(first.stamp);
-                    pace.take(rest.iter().map(|s| s.stamp))
+                    pace.wait(due(first));
+                    pace.take(rest.iter().map(due))
                 }
             };
             let (now, later) = rest.split_at(n);
             rest = later;
             let mut flows = Vec::with_capacity(self.sinks.len());
             for (_, sink) in &mut self.sinks {
-                let mut flow = sink.write(stream, now, pool.rayon())?;
+                let mut flow = write(sink, stream, now, pool.rayon())?;
                 if self.pace.is_some() && flow == Flow::Continue {
                     flow = sink.flush(pool.rayon())?;
                 }

@@ -156,7 +156,7 @@ pub struct Prepared {
     /// Bias removed, rad/s, body axes.
     pub bias: Vector3<f64>,
     /// Its uncertainty, rad/s.
-    pub bias_sigma: f64,
+    pub bias_sigma: Vector3<f64>,
     /// Where it came from.
     pub bias_origin: String,
     /// q_nb at the first sample, ENU (or start) and FLU.
@@ -339,14 +339,18 @@ fn decide_bias(
     plan: &Plan,
     rests: &Rests,
     earth: Option<Vector3<f64>>,
-) -> Result<(Vector3<f64>, f64, String), String> {
+) -> Result<(Vector3<f64>, Vector3<f64>, String), String> {
     match plan.bias {
         Bias::None => Ok((
             Vector3::zeros(),
-            plan.noise.bias_instability,
+            plan.noise.unremoved_bias().into(),
             "none".to_owned(),
         )),
-        Bias::Given(bias) => Ok((bias, plan.noise.bias_instability, "as given".to_owned())),
+        Bias::Given(bias) => Ok((
+            bias,
+            plan.noise.bias_instability.into(),
+            "as given".to_owned(),
+        )),
         Bias::Auto => {
             let limits = Limits::default();
             let refuse = |e: NoRest| format!("--bias auto: {e}");
@@ -361,9 +365,11 @@ fn decide_bias(
                 earths = " at the start, less the Earth's rate";
             }
             let sigma = estimate.sigma.max();
+            // Known to the estimate's sigma at rest, and not stable since.
+            let instability = Vector3::from(plan.noise.bias_instability);
             Ok((
                 estimate.bias,
-                sigma.hypot(plan.noise.bias_instability),
+                estimate.sigma.zip_map(&instability, f64::hypot),
                 format!(
                     "from {:.1} s of rest{earths}, +- {sigma:.1e} rad/s",
                     estimate.secs

@@ -73,7 +73,7 @@ fn of_topic(run: &Replay, topic: &Topic) -> TopicSummary {
         bias: topic.prepared.bias.into(),
         bias_origin: topic.prepared.bias_origin.clone(),
         noise: run.plan.noise.name.clone(),
-        drift: topic.prepared.bias_sigma,
+        drift: drift(run, topic, propagation.integrated_secs),
         input_axes: topic.resolved.body.to_string(),
         gaps: Gaps {
             bridged: gaps.count.saturating_sub(gaps.not_bridged),
@@ -88,12 +88,16 @@ fn of_topic(run: &Replay, topic: &Topic) -> TopicSummary {
         undersampled: propagation.undersampled,
         final_wxyz: q.wxyz(),
         final_ypr: [angles.yaw, angles.pitch, angles.roll],
-        final_sigma: last.map_or([0.0; 3], |s| s.sigma.into()),
+        final_sigma: last.map_or([0.0; 3], |s| s.covariance.sigma().into()),
         against: topic
             .against
             .as_ref()
             .map(super::against::AgainstRecorded::rows)
             .unwrap_or_default(),
+        recorded: topic
+            .against
+            .as_ref()
+            .and_then(super::against::AgainstRecorded::recorded),
         warnings: topic.prepared.warnings.clone(),
     };
     summary.warnings.extend(topic.warnings.iter().cloned());
@@ -121,6 +125,18 @@ fn regularised(causal: bool, report: &regularise::Report, first: Nanos) -> Regul
         ambiguous: report.ambiguous,
         uneven: report.is_uneven(),
     }
+}
+
+/// What is not known of the bias at the end, about the worst axis, rad/s: what was not known at the start,
+/// and what it has wandered since.
+fn drift(run: &Replay, topic: &Topic, secs: f64) -> f64 {
+    topic
+        .prepared
+        .bias_sigma
+        .iter()
+        .zip(run.plan.noise.rrw)
+        .map(|(bias, rrw)| bias.hypot(rrw * secs.sqrt()))
+        .fold(0.0, f64::max)
 }
 
 /// The method, `auto` with what it stands for.

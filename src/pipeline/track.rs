@@ -6,6 +6,7 @@ use super::log::{Known, Log, problems, rank};
 use super::pool::Pool;
 use super::preparation::orientation_convention;
 use super::route::{Item, Route};
+use super::simulate::{TRUTH_ID, TRUTH_TOPIC};
 use super::topics;
 use crate::decode::{Options, Role};
 use crate::error::{Error, Result};
@@ -32,11 +33,21 @@ pub struct Track {
     pub problems: Vec<String>,
 }
 
+/// What a track is read for: of several attitudes in a file, the truth is one's reference and never
+/// one's estimate.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Side {
+    /// The attitude under test.
+    Estimate,
+    /// What it is held against.
+    Reference,
+}
+
 /// Reads a track by the file's extension: `.ndjson`, `.jsonl`, `.csv`, else MCAP.
 ///
 /// # Errors
 /// The file can not be read, or holds no attitude, or several and none named.
-pub fn read(path: &Path, topic: Option<&str>, pool: &Pool) -> Result<Track> {
+pub fn read(path: &Path, side: Side, topic: Option<&str>, pool: &Pool) -> Result<Track> {
     let extension = path
         .extension()
         .map(|e| e.to_string_lossy().to_ascii_lowercase());
@@ -46,15 +57,15 @@ pub fn read(path: &Path, topic: Option<&str>, pool: &Pool) -> Result<Track> {
         problems: Vec::new(),
     };
     match extension.as_deref() {
-        Some("ndjson" | "jsonl") => from_ndjson(path, topic).map(plain),
+        Some("ndjson" | "jsonl") => from_ndjson(path, side, topic).map(plain),
         Some("csv") => from_csv(path).map(plain),
-        _ => from_mcap(path, topic, pool),
+        _ => from_mcap(path, side, topic, pool),
     }
 }
 
-fn from_mcap(path: &Path, topic: Option<&str>, pool: &Pool) -> Result<Track> {
+fn from_mcap(path: &Path, side: Side, topic: Option<&str>, pool: &Pool) -> Result<Track> {
     let log = Log::open(path, pool)?;
-    let known = attitude_channel(path, &log, topic)?;
+    let known = attitude_channel(path, &log, side, topic)?;
     let decoder = known
         .decoder(&Options::default())
         .map_err(|why| Error::Unsupported {
@@ -119,7 +130,12 @@ fn in_flu(recorded: Convention, wxyz: [f64; 4]) -> [f64; 4] {
 }
 
 /// The channel to take attitudes from: the one named, else the best kind of which there is just one.
-fn attitude_channel<'l>(path: &Path, log: &'l Log, topic: Option<&str>) -> Result<&'l Known> {
+fn attitude_channel<'l>(
+    path: &Path,
+    log: &'l Log,
+    side: Side,
+    topic: Option<&str>,
+) -> Result<&'l Known> {
     if let Some(name) = topic {
         return log
             .channels
@@ -135,7 +151,7 @@ fn attitude_channel<'l>(path: &Path, log: &'l Log, topic: Option<&str>) -> Resul
         .channels
         .iter()
         .filter(|k| k.role.has_orientation && carries_orientation(k))
-        .map(|k| (goodness(&k.role, &k.channel.topic), k))
+        .map(|k| (goodness(&k.role, side, &k.channel.topic), k))
         .collect();
     all.sort_by_key(|(goodness, _)| std::cmp::Reverse(*goodness));
     match all.as_slice() {
@@ -160,9 +176,13 @@ fn attitude_channel<'l>(path: &Path, log: &'l Log, topic: Option<&str>) -> Resul
     }
 }
 
-/// An orientation of its own topic before one in an Imu, before poses of other things and `/tf`.
-fn goodness(role: &Role, topic: &str) -> u8 {
+/// The truth, for a reference, before all; an orientation of its own topic before one in an Imu, before poses of other things and `/tf`.
+fn goodness(role: &Role, side: Side, topic: &str) -> u8 {
     match rank(role) {
+        _ if topic == TRUTH_TOPIC => match side {
+            Side::Reference => 4,
+            Side::Estimate => 0,
+        },
         _ if topic.trim_start_matches('/') == "tf" || topic.ends_with("tf_static") => 0,
         0 => 3,
         1 => 1,
@@ -210,11 +230,12 @@ struct Att {
     q: Option<Q>,
 }
 
-/// Reads the `ATT` lines of an NDJSON file; `id` picks one of several streams.
+/// Reads the `ATT` lines of an NDJSON file; `id` picks one of several streams, of which the truth is
+/// taken for a reference and left for an estimate.
 ///
 /// # Errors
 /// The file can not be read, a line is not JSON or is too long, or several ids and none named.
-pub fn from_ndjson(path: &Path, id: Option<&str>) -> Result<Vec<Entry>> {
+pub fn from_ndjson(path: &Path, side: Side, id: Option<&str>) -> Result<Vec<Entry>> {
     let file = open(path)?;
     let mut reader = BufReader::new(file);
     let mut track = Vec::new();
@@ -245,17 +266,25 @@ pub fn from_ndjson(path: &Path, id: Option<&str>) -> Result<Vec<Entry>> {
         if att.class != "ATT" || id.is_some_and(|id| id != att.id) {
             continue;
         }
+        let wanted = |id: &str| (id == TRUTH_ID) == (side == Side::Reference);
         match &seen {
-            Some(first) if *first != att.id => {
-                return Err(bad_line(
-                    path,
-                    number,
-                    &format!(
-                        "attitudes of both `{first}` and `{}`; --topic ID takes one",
-                        att.id
-                    ),
-                ));
-            }
+            Some(first) if *first != att.id => match (wanted(first), wanted(&att.id)) {
+                (true, false) => continue,
+                (false, true) => {
+                    track.clear();
+                    seen = Some(att.id.clone());
+                }
+                _ => {
+                    return Err(bad_line(
+                        path,
+                        number,
+                        &format!(
+                            "attitudes of both `{first}` and `{}`; --topic ID takes one",
+                            att.id
+                        ),
+                    ));
+                }
+            },
             Some(_) => {}
             None => seen = Some(att.id.clone()),
         }
@@ -269,6 +298,8 @@ pub fn from_ndjson(path: &Path, id: Option<&str>) -> Result<Vec<Entry>> {
 #[derive(Deserialize)]
 struct Row {
     stamp_ns: i64,
+    /// Beside a sample whose stamp may be wrong: the instant the attitude is of.
+    log_ns: Option<i64>,
     w: f64,
     x: f64,
     y: f64,
@@ -283,7 +314,7 @@ pub fn from_csv(path: &Path) -> Result<Vec<Entry>> {
     csv::Reader::from_reader(BufReader::new(open(path)?))
         .deserialize::<Row>()
         .map(|row| {
-            row.map(|r| (Nanos(r.stamp_ns), [r.w, r.x, r.y, r.z]))
+            row.map(|r| (Nanos(r.log_ns.unwrap_or(r.stamp_ns)), [r.w, r.x, r.y, r.z]))
                 .map_err(|e| Error::Unsupported {
                     path: path.to_owned(),
                     what: format!("{e}\n  help: columns stamp_ns,w,x,y,z are needed"),

@@ -1,5 +1,6 @@
 //! A name on the command line -> which way to integrate. Pure.
 
+use crate::record::SampleKind;
 use std::fmt;
 use std::str::FromStr;
 
@@ -30,6 +31,14 @@ pub enum Method {
         order: Order,
         /// Whether each committed attitude is output a second time, without
         /// [`Status::PROVISIONAL`](crate::record::Status::PROVISIONAL).
+        finals: bool,
+    },
+    /// The best for a stream: [`Method::CommitProvisional`] with 6 rates or 5 increments, whose errors are
+    /// alike. [`Method::for_kind`] says which.
+    Live {
+        /// As there.
+        order: Order,
+        /// As there.
         finals: bool,
     },
     /// The rate at the start of the interval, held: the seed's `w(t_i)`. First order.
@@ -89,8 +98,7 @@ const NAMES: [(&str, Method); 11] = [
     ),
     (
         "commit",
-        Method::CommitProvisional {
-            window: 6,
+        Method::Live {
             order: Order::M8,
             finals: false,
         },
@@ -125,7 +133,7 @@ impl Method {
         match self {
             Method::Auto => "auto",
             Method::Magnus { .. } => "magnus",
-            Method::CommitProvisional { .. } => "commit",
+            Method::CommitProvisional { .. } | Method::Live { .. } => "commit",
             Method::DcmLeft => "dcm-left",
             Method::DcmRight => "dcm-right",
             Method::DcmMean => "dcm-mean",
@@ -134,6 +142,19 @@ impl Method {
             Method::Coning3 => "coning3",
             Method::Coning4 => "coning4",
             Method::Rk4 => "rk4",
+        }
+    }
+
+    /// The method itself, [`Method::Live`] with the window that suits the samples.
+    #[must_use]
+    pub fn for_kind(self, kind: SampleKind) -> Method {
+        match self {
+            Method::Live { order, finals } => Method::CommitProvisional {
+                window: if kind == SampleKind::Rate { 6 } else { 5 },
+                order,
+                finals,
+            },
+            other => other,
         }
     }
 
@@ -161,6 +182,7 @@ impl fmt::Display for Method {
             Method::CommitProvisional { window, order, .. } => {
                 write!(f, "commit (window {window}, order {})", order.name())
             }
+            Method::Live { order, .. } => write!(f, "commit (order {})", order.name()),
             other => f.write_str(other.name()),
         }
     }

@@ -10,7 +10,7 @@ use super::report::Report;
 use super::settings::{Settings, SettingsError};
 use super::track::{Track, secs};
 use super::window::{Plan, Step};
-use crate::record::{AttitudeSample, Join, Nanos, RateSample, SampleKind, Status};
+use crate::record::{AttitudeSample, Join, RateSample, SampleKind, Status};
 use nalgebra::Vector3;
 use state::{State, Waiting};
 use std::collections::VecDeque;
@@ -80,7 +80,13 @@ pub struct Propagator {
 #[derive(Debug)]
 enum Engine {
     Sliding(Box<Plan>),
-    Commit { plan: Box<Plan>, finals: bool },
+    Commit {
+        plan: Box<Plan>,
+        /// Whether finals are wanted.
+        finals: bool,
+        /// What has come out provisionally and is to come out for good.
+        open: VecDeque<Waiting>,
+    },
     Classical(Method),
 }
 
@@ -92,7 +98,8 @@ impl Propagator {
     pub fn new(settings: Settings) -> Result<Self, SettingsError> {
         let increments = settings.kind != SampleKind::Rate;
         let initial = settings.checked()?;
-        let engine = match settings.method {
+        let method = settings.method.for_kind(settings.kind);
+        let engine = match method {
             Method::Auto => {
                 let window = if increments { 15 } else { 16 };
                 let plan = plan(window, Order::Exact, Placement::Centred, increments)?;
@@ -115,11 +122,12 @@ impl Propagator {
                     plan(window, order, Placement::Centred, increments)?.with_provisional(),
                 ),
                 finals,
+                open: VecDeque::new(),
             },
             classical => Engine::Classical(classical),
         };
         Ok(Propagator {
-            method: settings.method,
+            method,
             engine,
             initial,
             track: Track::new(increments),
@@ -203,14 +211,17 @@ impl Propagator {
         }
         if !first {
             self.state.reset_count = self.state.reset_count.saturating_add(1);
+            let gap = secs(sample.stamp.0.saturating_sub(self.last_stamp));
             let status = if sample.join == Join::Reset {
                 self.state.report.resets += 1;
+                self.state.covariance.pass(gap);
                 Status::RESET
             } else {
                 self.state.report.holds += 1;
-                let gap = secs(sample.stamp.0.saturating_sub(self.last_stamp));
                 let [x, y, z] = self.last_rate;
-                self.state.sigma.hold(Vector3::new(x, y, z).norm(), gap);
+                self.state
+                    .covariance
+                    .hold(Vector3::new(x, y, z).norm(), gap);
                 Status::HELD
             };
             self.state.added = self.state.added.with(status);
@@ -340,7 +351,7 @@ impl Propagator {
     fn advance_live(&mut self, out: &mut Vec<AttitudeSample>) {
         let known = self.known(false);
         self.commit(known, out);
-        let Engine::Commit { plan, .. } = &self.engine else {
+        let Engine::Commit { plan, finals, open } = &mut self.engine else {
             return;
         };
         while let Some(Waiting { sample, turns }) = self.queue.pop_front() {
@@ -352,33 +363,36 @@ impl Propagator {
             };
             let committed_at = self.state.now;
             let mut ahead = self.state.attitude;
-            let mut sigma = self.state.sigma;
+            let mut covariance = self.state.covariance;
             if newest >= self.next {
                 self.scratch.clear();
                 plan.append_steps(&self.track, self.next, newest, &mut self.scratch);
                 for (i, step) in self.scratch.iter().enumerate() {
                     ahead.turn(step.turn);
-                    sigma.integrate(self.track.spacing(self.next + i));
-                    sigma.bridge(step.gap_variance, step.gap_noise);
+                    covariance.advance(step.turn, self.track.step(self.next + i));
+                    covariance.bridge(step.gap_variance, step.gap_noise);
                 }
                 if let (true, Some(step)) = (turns, self.scratch.last()) {
                     self.state.added = self.state.added.with(step.status());
                 }
             }
-            let committed = (self.state.attitude, self.state.sigma);
-            (self.state.attitude, self.state.sigma) = (ahead, sigma);
+            let committed = (self.state.attitude, self.state.covariance);
+            (self.state.attitude, self.state.covariance) = (ahead, covariance);
             self.state.now = self.track.stamp[newest];
             if newest >= self.next {
                 self.state.added = self.state.added.with(Status::PROVISIONAL);
+                if *finals {
+                    open.push_back(Waiting { sample, turns });
+                }
             }
             self.state.output_at(&sample, rate, out);
-            (self.state.attitude, self.state.sigma) = committed;
+            (self.state.attitude, self.state.covariance) = committed;
             self.state.now = committed_at;
         }
     }
 
     fn commit(&mut self, known: usize, out: &mut Vec<AttitudeSample>) {
-        let Engine::Commit { plan, finals } = &self.engine else {
+        let Engine::Commit { plan, finals, open } = &mut self.engine else {
             return;
         };
         if known <= self.next {
@@ -390,27 +404,18 @@ impl Propagator {
             let k = self.next;
             self.next += 1;
             self.state.step(step, &self.track, k);
-            // Without look-ahead a step is committed before its sample is output: what was noticed is
-            // for that output. Otherwise it was said with the provisional one.
-            let kept = match plan.look_ahead {
-                0 => self.state.added,
-                _ => Status::OK,
-            };
-            if *finals {
-                let stamp = Nanos(self.track.stamp[k]);
-                let sample = RateSample {
-                    stamp,
-                    start: stamp,
-                    value: Vector3::zeros(),
-                    accel: None,
-                    join: Join::Continuous,
-                    status: Status::OK,
-                    log: stamp,
-                };
-                self.state.output_at(&sample, Some(self.track.rate(k)), out);
-                self.state.report.samples -= 1;
+            if !self.queue.is_empty() && k + 1 == self.track.len() {
+                // Without look-ahead the newest is final at once, and its output is still to come.
+                break;
             }
-            self.state.added = kept;
+            if *finals {
+                // The second output of the same samples: they count once.
+                let counted = self.state.report.samples;
+                self.state.emit(open, &self.track, k, out);
+                self.state.report.samples = counted;
+            } else {
+                self.state.added = Status::OK;
+            }
         }
     }
 }

@@ -1,7 +1,7 @@
 //! What a run of the propagator is to do -> checked once. Pure.
 
+use super::covariance::Noise;
 use super::method::Method;
-use super::sigma::Noise;
 use crate::model::attitude::Quaternion;
 use crate::model::frames::{Body, In, Nav};
 use crate::record::SampleKind;

@@ -165,6 +165,12 @@ impl Plan {
         self
     }
 
+    /// Noise gain of a full window when the interval at `place` of it is a provisional step.
+    fn provisional_gain(&self, place: usize) -> Option<f64> {
+        let table = self.skewed.get(place).and_then(Option::as_ref)?;
+        (place > self.nominal()).then_some(table.gain)
+    }
+
     /// Place of an interval in its window when nothing is in the way.
     fn nominal(&self) -> usize {
         self.window - 1 - self.look_ahead

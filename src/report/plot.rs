@@ -95,8 +95,8 @@ impl fmt::Display for PlotError {
 
 impl std::error::Error for PlotError {}
 
-/// Told apart by people with any colour vision (Okabe and Ito 2008), black first, yellow left out.
-const PALETTE: [RGBColor; 7] = [
+/// Told apart by people with any colour vision (Okabe and Ito 2008), black first, grey for yellow.
+const PALETTE: [RGBColor; 8] = [
     RGBColor(0, 0, 0),
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -104,7 +104,12 @@ const PALETTE: [RGBColor; 7] = [
     RGBColor(204, 121, 167),
     RGBColor(86, 180, 233),
     RGBColor(230, 159, 0),
+    RGBColor(140, 140, 140),
 ];
+
+/// Of the legend: width of a letter and height of a row, pixels.
+const LETTER: f64 = 7.2;
+const ROW: i32 = 20;
 
 impl Chart {
     /// The chart as SVG text.
@@ -119,24 +124,39 @@ impl Chart {
         };
         let mut text = String::new();
         {
-            let area = SVGBackend::with_string(&mut text, (width, height)).into_drawing_area();
-            let drawn = area.fill(&WHITE).map_err(|e| e.to_string()).and_then(|()| {
-                let (x, y) = if self.equal {
-                    // What the margins and labels below leave of the picture.
-                    widened(x, y, f64::from(width) - 96.0, f64::from(height) - 104.0)
-                } else {
-                    (x, y)
-                };
-                match (self.x.log, self.y.log) {
-                    (false, false) => self.draw(&area, x.0..x.1, y.0..y.1),
-                    (true, false) => self.draw(&area, (x.0..x.1).log_scale(), y.0..y.1),
-                    (false, true) => self.draw(&area, x.0..x.1, (y.0..y.1).log_scale()),
-                    (true, true) => {
-                        self.draw(&area, (x.0..x.1).log_scale(), (y.0..y.1).log_scale())
-                    }
-                }?;
-                area.present().map_err(|e| e.to_string())
-            });
+            let whole = SVGBackend::with_string(&mut text, (width, height)).into_drawing_area();
+            let beside = self.legend_width().min(width / 2);
+            let (area, legend) = whole.split_horizontally(width - beside);
+            let drawn = whole
+                .fill(&WHITE)
+                .map_err(|e| e.to_string())
+                .and_then(|()| {
+                    self.draw_legend(&legend)?;
+                    let (x, y) = if self.equal {
+                        // What the margins and labels below leave of the picture.
+                        let pixels = f64::from(width - beside) - 96.0;
+                        widened(x, y, pixels, f64::from(height) - 104.0)
+                    } else {
+                        (x, y)
+                    };
+                    let largest = |(low, high): (f64, f64), axis: &Axis| {
+                        if axis.log {
+                            0.0
+                        } else {
+                            low.abs().max(high.abs())
+                        }
+                    };
+                    let ends = (largest(x, &self.x), largest(y, &self.y));
+                    match (self.x.log, self.y.log) {
+                        (false, false) => self.draw(&area, x.0..x.1, y.0..y.1, ends),
+                        (true, false) => self.draw(&area, (x.0..x.1).log_scale(), y.0..y.1, ends),
+                        (false, true) => self.draw(&area, x.0..x.1, (y.0..y.1).log_scale(), ends),
+                        (true, true) => {
+                            self.draw(&area, (x.0..x.1).log_scale(), (y.0..y.1).log_scale(), ends)
+                        }
+                    }?;
+                    whole.present().map_err(|e| e.to_string())
+                });
             drawn.map_err(PlotError)?;
         }
         Ok(text)
@@ -184,11 +204,54 @@ impl Chart {
         fits(*x, &self.x) && fits(*y, &self.y)
     }
 
+    /// Columns of pixels to the right of the chart for the names of its series.
+    fn legend_width(&self) -> u32 {
+        let longest = self.series.iter().map(|s| s.name.chars().count()).max();
+        match longest.unwrap_or(0) {
+            0 => 0,
+            letters => (letters as f64 * LETTER) as u32 + 48,
+        }
+    }
+
+    /// The names of the series, each behind a piece of its line.
+    fn draw_legend(
+        &self,
+        area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>,
+    ) -> Result<(), String> {
+        let say = |e: DrawingAreaErrorKind<std::io::Error>| e.to_string();
+        let middle = Pos::new(HPos::Left, VPos::Center);
+        let text = ("sans-serif", 13)
+            .into_font()
+            .into_text_style(area)
+            .pos(middle);
+        let named = self.series.iter().enumerate();
+        for (row, (i, series)) in named.filter(|(_, s)| !s.name.is_empty()).enumerate() {
+            let y = 52 + ROW * row as i32;
+            let color = PALETTE[series.color.unwrap_or(i) % PALETTE.len()];
+            let pieces: &[(i32, i32)] = match series.look {
+                Look::Line | Look::Marked => &[(0, 24)],
+                Look::Dashed => &[(0, 6), (9, 15), (18, 24)],
+                Look::Dots => &[],
+            };
+            for (from, to) in pieces {
+                let line = PathElement::new([(*from, y), (*to, y)], color.stroke_width(2));
+                area.draw(&line).map_err(say)?;
+            }
+            if matches!(series.look, Look::Marked | Look::Dots) {
+                area.draw(&Circle::new((12, y), 3, color.filled()))
+                    .map_err(say)?;
+            }
+            area.draw_text(&series.name, &text, (32, y)).map_err(say)?;
+        }
+        Ok(())
+    }
+
     fn draw<'a, X, Y>(
         &self,
         area: &DrawingArea<SVGBackend<'a>, plotters::coord::Shift>,
         x: X,
         y: Y,
+        ends: (f64, f64),
     ) -> Result<(), String>
     where
         X: AsRangedCoord<Value = f64>,
@@ -222,8 +285,8 @@ impl Chart {
             .label_style(("sans-serif", 13))
             .x_desc(self.x.label.as_str())
             .y_desc(self.y.label.as_str())
-            .x_label_formatter(&number)
-            .y_label_formatter(&number)
+            .x_label_formatter(&|value| number(*value, ends.0))
+            .y_label_formatter(&|value| number(*value, ends.1))
             .draw()
             .map_err(say)?;
         for (i, series) in self.series.iter().enumerate() {
@@ -249,33 +312,6 @@ impl Chart {
                     chart.draw_series(dots).map_err(say)?;
                 }
             }
-            if !series.name.is_empty() {
-                // An empty series carries the row of the legend.
-                let row = chart
-                    .draw_series(std::iter::empty::<Circle<(f64, f64), i32>>())
-                    .map_err(say)?
-                    .label(series.name.as_str());
-                let look = series.look;
-                row.legend(move |(x, y)| {
-                    let ends = if look == Look::Dashed {
-                        [(x, y), (x + 8, y)]
-                    } else {
-                        [(x, y), (x + 18, y)]
-                    };
-                    let thick = if look == Look::Dots { 5 } else { 2 };
-                    PathElement::new(ends, color.stroke_width(thick))
-                });
-            }
-        }
-        if self.series.iter().any(|s| !s.name.is_empty()) {
-            chart
-                .configure_series_labels()
-                .position(SeriesLabelPosition::UpperLeft)
-                .background_style(WHITE.mix(0.85))
-                .border_style(RGBColor(204, 204, 204))
-                .label_font(("sans-serif", 13))
-                .draw()
-                .map_err(say)?;
         }
         Ok(())
     }
@@ -291,13 +327,13 @@ fn widened(x: (f64, f64), y: (f64, f64), width: f64, height: f64) -> ((f64, f64)
     (around(x, width), around(y, height))
 }
 
-/// A number beside an axis: short, and in powers of ten where it is very small or large.
-#[expect(
-    clippy::trivially_copy_pass_by_ref,
-    reason = "the form plotters asks for"
-)]
-fn number(value: &f64) -> String {
+/// A number beside an axis whose largest is `largest` (0: logarithmic): short, in powers of ten where it is very small
+/// or large, and zero where it is zero but for rounding.
+fn number(value: f64, largest: f64) -> String {
     let size = value.abs();
+    if size < 1e-12 * largest {
+        return "0".to_owned();
+    }
     if size == 0.0 || (1e-3..1e5).contains(&size) {
         let text = format!("{value:.4}");
         text.trim_end_matches('0').trim_end_matches('.').to_owned()
@@ -333,7 +369,11 @@ mod tests {
         for word in ["error &amp; rate", "rate, Hz", "error, deg", "auto"] {
             assert!(svg.contains(word), "{word} in {svg}");
         }
-        assert_eq!(svg.matches("<circle").count(), 3);
+        assert_eq!(
+            svg.matches("<circle").count(),
+            3 + 1,
+            "three points, one in the legend"
+        );
         assert_eq!(svg, chart().svg().unwrap(), "the same bytes again");
     }
 
@@ -380,7 +420,17 @@ mod tests {
             (1e5, "1e5"),
             (250.0, "250"),
         ] {
-            assert_eq!(number(&value), text);
+            assert_eq!(number(value, value.abs()), text);
         }
+        assert_eq!(
+            number(2.22e-16, 1.0),
+            "0",
+            "a tick that missed zero by a rounding"
+        );
+        assert_eq!(
+            number(1e-14, 0.0),
+            "1e-14",
+            "but small numbers on a logarithmic axis are not"
+        );
     }
 }

@@ -3,6 +3,7 @@
 //! Built by the pipeline, which knows the numbers; the words are here, in one place.
 
 use super::stamps::Regularised;
+use crate::compare::BodyAxesFit;
 use crate::model::frames::EARTH_RATE;
 use crate::record::{Counts, SampleKind, Verdict};
 use serde_json::{Value, json};
@@ -69,6 +70,8 @@ pub struct TopicSummary {
     pub final_sigma: [f64; 3],
     /// Against the recorded orientation, one row per sample kind.
     pub against: Vec<Against>,
+    /// What the recorded orientation itself is like, where one was compared with.
+    pub recorded: Option<Recorded>,
     /// Things to know, each with the flag that helps.
     pub warnings: Vec<String>,
 }
@@ -103,6 +106,19 @@ pub struct Against {
     pub p95_deg: f64,
     /// Pairs compared.
     pub pairs: usize,
+}
+
+/// A recorded orientation that was compared with.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Recorded {
+    /// Recorded attitudes that are rotations (a long log's are thinned).
+    pub usable: usize,
+    /// Recorded quadruples that are none: norm far from 1, zero, NaN.
+    pub unusable: u64,
+    /// All of them are one and the same.
+    pub constant: bool,
+    /// How its body axes lie to the gyro's; `None` = the motion does not tell.
+    pub axes: Option<BodyAxesFit>,
 }
 
 /// What one log became.
@@ -437,7 +453,7 @@ pub fn meaning(kind: SampleKind) -> &'static str {
 }
 
 /// One labelled entry; what follows its first line stands under it.
-fn line(out: &mut String, label: &str, text: &str) {
+pub(super) fn line(out: &mut String, label: &str, text: &str) {
     let mut label = label;
     for part in text.lines() {
         let _ = writeln!(out, "  {label:<8} {}", part.trim_start());

@@ -4,10 +4,10 @@
 //! becomes depends on nothing but the batch.
 
 use super::csv;
-use super::json::AttObject;
+use super::json::Objects;
 use super::mcap::Layout;
 use super::mcap::chunk::{Chunk, Compression};
-use crate::record::{AttitudeSample, Nanos};
+use crate::record::{AttitudeSample, Nanos, RawSample};
 
 /// A run of samples of one stream, with what of its past their messages depend on.
 #[derive(Debug, Default)]
@@ -18,6 +18,18 @@ pub(super) struct Batch {
     /// Stamp of the sample before.
     pub(super) previous: Option<Nanos>,
     pub(super) samples: Vec<AttitudeSample>,
+    /// In their place for a stream of what a gyro puts out.
+    pub(super) raw: Vec<RawSample>,
+}
+
+impl Batch {
+    pub(super) fn len(&self) -> usize {
+        self.samples.len() + self.raw.len()
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
 }
 
 /// How a batch becomes bytes.
@@ -27,7 +39,7 @@ pub(super) enum Form {
         layout: Layout,
         compression: Compression,
     },
-    Ndjson(Vec<AttObject>),
+    Ndjson(Vec<Objects>),
     Csv,
     Null,
 }
@@ -52,22 +64,22 @@ impl Slot {
                 compression,
             } => {
                 // Without samples the chunk holds copied messages.
-                if !self.batch.samples.is_empty() {
+                if !self.batch.is_empty() {
                     layout.fill(&mut self.chunk, &self.batch);
                 }
                 self.outcome = self.chunk.seal(*compression).err();
             }
             Form::Ndjson(objects) => {
-                if let Some(object) = objects.get(self.batch.stream) {
-                    for (seq, sample) in (self.batch.first..).zip(&self.batch.samples) {
-                        object.push(&mut self.text, seq, sample);
-                        self.text.push(b'\n');
-                    }
+                if let Some(objects) = objects.get(self.batch.stream) {
+                    objects.push(&mut self.text, &self.batch);
                 }
             }
             Form::Csv => {
                 for sample in &self.batch.samples {
                     csv::push_row(&mut self.text, sample);
+                }
+                for sample in &self.batch.raw {
+                    csv::push_raw_row(&mut self.text, sample);
                 }
             }
             Form::Null => {}

@@ -1,18 +1,43 @@
 //! AttitudeSample -> a CSV row. Pure.
 
 use super::json::{push_f64, push_i64, push_status};
-use crate::record::AttitudeSample;
+use crate::record::{AttitudeSample, RawSample};
 
 /// The first row. Angles in degrees, rates in rad/s, stamps in nanoseconds; roll, pitch and yaw are
 /// turned about z, then y, then x (ZYX).
 pub(super) const HEADER: &[u8] = b"stamp_ns,w,x,y,z,roll_deg,pitch_deg,yaw_deg,wx,wy,wz,sigma_x_deg,sigma_y_deg,sigma_z_deg,status\n";
+
+/// The first row over samples of a gyro. Rates in rad/s (delta angles in rad), specific force in
+/// m/s^2; `w,x,y,z` is the orientation that goes with the sample, where there is one.
+pub(super) const RAW_HEADER: &[u8] =
+    b"stamp_ns,log_ns,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z,w,x,y,z,interval_ns\n";
+
+/// Appends one row with its line end; what is absent is an empty cell.
+pub(super) fn push_raw_row(out: &mut Vec<u8>, sample: &RawSample) {
+    push_i64(out, sample.header.unwrap_or(sample.log).0);
+    out.push(b',');
+    push_i64(out, sample.log.0);
+    let vectors = [sample.gyro, sample.accel].map(|v| v.map_or([None; 3], |v| v.map(Some)));
+    let orientation = sample.orientation.map_or([None; 4], |q| q.map(Some));
+    for value in vectors.into_iter().flatten().chain(orientation) {
+        out.push(b',');
+        if let Some(value) = value {
+            push_number(out, value);
+        }
+    }
+    out.push(b',');
+    if let Some(interval) = sample.interval_nanos {
+        push_i64(out, interval);
+    }
+    out.push(b'\n');
+}
 
 /// Appends one row with its line end. Several status names are joined by `|`.
 pub(super) fn push_row(out: &mut Vec<u8>, sample: &AttitudeSample) {
     push_i64(out, sample.stamp.0);
     let q = sample.q_nb.wxyz();
     let [roll, pitch, yaw] = roll_pitch_yaw(q).map(f64::to_degrees);
-    let sigma = sample.sigma.map(f64::to_degrees);
+    let sigma = sample.covariance.sigma().map(f64::to_degrees);
     let numbers = q
         .into_iter()
         .chain([roll, pitch, yaw])
@@ -76,7 +101,7 @@ fn half_turn(angle: f64) -> f64 {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use crate::record::{Nanos, Status};
+    use crate::record::{AttitudeCovariance, Nanos, Status};
     use crate::sink::tests::sample;
     use nalgebra::{UnitQuaternion, Vector3};
 
@@ -129,7 +154,7 @@ mod tests {
     #[test]
     fn a_row_has_a_value_under_every_heading() {
         let mut s = sample(Nanos(1_700_000_000_000_000_001));
-        s.sigma = Vector3::new(f64::NAN, f64::INFINITY, 0.0);
+        s.covariance = AttitudeCovariance::from_sigma(Vector3::new(f64::NAN, f64::INFINITY, 0.0));
         s.status = Status::HELD.with(Status::SATURATED);
         let mut out = HEADER.to_vec();
         push_row(&mut out, &s);

@@ -4,8 +4,9 @@
 //! copies and ten floats. Floats are the shortest decimals that read back to the same bits.
 //! JSON has no NaN: what is not finite is `null`.
 
-use super::stream::Stream;
-use crate::record::{AttitudeSample, Nanos};
+use super::batch::Batch;
+use super::stream::{Content, Stream};
+use crate::record::{AttitudeSample, Nanos, RawSample, SampleKind};
 use serde_json::ser::{CompactFormatter, Formatter};
 
 /// Appends the shortest decimal that reads back to the same bits, or `null`.
@@ -53,6 +54,85 @@ fn push_stamp(out: &mut Vec<u8>, stamp: Nanos) {
     out.push(b'}');
 }
 
+/// The lines of one stream.
+#[derive(Debug)]
+pub(super) enum Objects {
+    Att(AttObject),
+    Rate(RateObject),
+}
+
+impl Objects {
+    pub(super) fn new(stream: &Stream) -> Objects {
+        match stream.content {
+            Content::Attitude | Content::Truth => Objects::Att(AttObject::new(stream)),
+            Content::Samples(kind) => Objects::Rate(RateObject::new(stream, kind)),
+        }
+    }
+
+    /// Appends a line a sample.
+    pub(super) fn push(&self, out: &mut Vec<u8>, batch: &Batch) {
+        match self {
+            Objects::Att(object) => {
+                for (seq, sample) in (batch.first..).zip(&batch.samples) {
+                    object.push(out, seq, sample);
+                    out.push(b'\n');
+                }
+            }
+            Objects::Rate(object) => {
+                for (seq, sample) in (batch.first..).zip(&batch.raw) {
+                    object.push(out, seq, sample);
+                    out.push(b'\n');
+                }
+            }
+        }
+    }
+}
+
+/// The `RATE` object of one stream: what is absent is left out. Rate in rad/s (a delta angle in
+/// rad), specific force in m/s^2.
+#[derive(Debug)]
+pub(super) struct RateObject {
+    head: Vec<u8>,
+    kind: Vec<u8>,
+}
+
+impl RateObject {
+    pub(super) fn new(stream: &Stream, kind: SampleKind) -> RateObject {
+        let mut head = b"{\"class\":\"RATE\",\"id\":".to_vec();
+        push_string(&mut head, &stream.id);
+        head.extend_from_slice(b",\"seq\":");
+        let mut named = Vec::new();
+        if kind != SampleKind::default() {
+            named.extend_from_slice(b",\"sample_kind\":");
+            push_string(&mut named, kind.name());
+        }
+        RateObject { head, kind: named }
+    }
+
+    /// Appends the object, without a line end.
+    pub(super) fn push(&self, out: &mut Vec<u8>, seq: u64, sample: &RawSample) {
+        out.extend_from_slice(&self.head);
+        push_u64(out, seq);
+        out.extend_from_slice(b",\"stamp\":");
+        push_stamp(out, sample.header.unwrap_or(sample.log));
+        for (name, vector) in [
+            (&b",\"gyro\":"[..], sample.gyro),
+            (b",\"accel\":", sample.accel),
+        ] {
+            if let Some(vector) = vector {
+                out.extend_from_slice(name);
+                push_array3(out, vector);
+            }
+        }
+        if let Some(interval) = sample.interval_nanos {
+            out.extend_from_slice(b",\"dt_ns\":");
+            push_i64(out, interval);
+        }
+        out.extend_from_slice(&self.kind);
+        out.push(b'}');
+    }
+}
+
 /// The `ATT` object of one stream, everything constant laid out beforehand.
 #[derive(Debug)]
 pub(super) struct AttObject {
@@ -97,7 +177,7 @@ impl AttObject {
         out.extend_from_slice(&self.labels);
         push_array3(out, sample.rate.into());
         out.extend_from_slice(b",\"sigma_deg\":");
-        push_array3(out, sample.sigma.map(f64::to_degrees).into());
+        push_array3(out, sample.covariance.sigma().map(f64::to_degrees).into());
         out.extend_from_slice(b",\"status\":[");
         push_status(out, sample, b"\"", b",");
         out.extend_from_slice(b"],\"reset\":");
@@ -162,7 +242,7 @@ impl FrameTransform {
 mod tests {
     use super::*;
     use crate::model::attitude::Quaternion;
-    use crate::record::Status;
+    use crate::record::{AttitudeCovariance, Status};
     use crate::sink::tests::sample;
     use nalgebra::Vector3;
 
@@ -179,7 +259,8 @@ mod tests {
         let mut s = sample(Nanos(1_700_000_000_005_000_000));
         s.q_nb = Quaternion::identity();
         s.rate = Vector3::new(0.01, 0.0, -0.2);
-        s.sigma = Vector3::new(0.5, 1.0, 2.0).map(f64::to_radians);
+        let sigma = Vector3::new(0.5, 1.0, 2.0).map(f64::to_radians);
+        s.covariance = AttitudeCovariance::from_sigma(sigma);
         let expected = concat!(
             r#"{"class":"ATT","id":"imu0","seq":17,"stamp":{"sec":1700000000,"nsec":5000000},"#,
             r#""q":{"w":1.0,"x":0.0,"y":0.0,"z":0.0},"rotates":"sensor_to_world","world":"start","#,

@@ -1,4 +1,4 @@
-//! AttitudeSample -> MCAP: which channels a stream becomes, and its samples as chunks. Pure.
+//! Samples -> MCAP: which channels a stream becomes, and its samples as chunks. Pure.
 //!
 //! A stage of its own because this is where a sample takes the form other programs read. Chunks are
 //! cut at fixed sample counts and filled independently of each other, so any number of threads, and
@@ -12,9 +12,9 @@ mod schemas;
 
 use super::batch::Batch;
 use super::json::{AttObject, FrameTransform};
-use super::stream::{Provenance, Stream, child_frames, parent_frame};
+use super::stream::{Content, Provenance, Stream, child_frames, parent_frame};
 use crate::error::{Error, Result};
-use crate::record::AttitudeSample;
+use crate::record::Nanos;
 use chunk::Chunk;
 use file::McapFile;
 use std::collections::BTreeMap;
@@ -80,8 +80,23 @@ pub struct InputMessage<'a> {
     pub data: &'a [u8],
 }
 
+/// A file carried inside another log, for a copy of it.
+#[derive(Clone, Copy, Debug)]
+pub struct Attachment<'a> {
+    /// When it was recorded, ns.
+    pub log_time: u64,
+    /// When it was made, ns.
+    pub create_time: u64,
+    /// Its name.
+    pub name: &'a str,
+    /// Its media type.
+    pub media_type: &'a str,
+    /// Its bytes.
+    pub data: &'a [u8],
+}
+
 /// How each stream's samples become messages.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Layout {
     streams: Vec<Messages>,
 }
@@ -99,6 +114,16 @@ enum Messages {
         att: AttObject,
         transform: u16,
         frame_transform: FrameTransform,
+    },
+    Samples {
+        channel: u16,
+        imu: cdr::Imu,
+    },
+    Truth {
+        attitude: u16,
+        quaternion: cdr::Stamped<4>,
+        rate: u16,
+        vector: cdr::Stamped<3>,
     },
 }
 
@@ -152,17 +177,68 @@ impl Layout {
         };
         let attitudes = streams
             .iter()
-            .map(|stream| declare(&stream.output_topic, attitude_schema))
+            .map(|stream| match stream.content {
+                Content::Attitude => declare(&stream.output_topic, attitude_schema),
+                _ if encoding == Encoding::Json => Err(only_attitudes_are_json()),
+                Content::Samples(_) => declare(
+                    &stream.output_topic,
+                    ["sensor_msgs/msg/Imu", "ros2msg", schemas::IMU],
+                ),
+                Content::Truth => declare(
+                    &stream.output_topic,
+                    [
+                        "geometry_msgs/msg/QuaternionStamped",
+                        "ros2msg",
+                        schemas::QUATERNION_STAMPED,
+                    ],
+                ),
+            })
             .collect::<Result<Vec<u16>>>()?;
-        let transform = declare(TF_TOPIC, transform_schema)?;
+        let rates = streams
+            .iter()
+            .map(|stream| match stream.content {
+                Content::Truth => declare(
+                    &format!("{}/rate", stream.output_topic),
+                    [
+                        "geometry_msgs/msg/Vector3Stamped",
+                        "ros2msg",
+                        schemas::VECTOR3_STAMPED,
+                    ],
+                ),
+                Content::Attitude | Content::Samples(_) => Ok(0),
+            })
+            .collect::<Result<Vec<u16>>>()?;
+        let transform = if streams.iter().any(|s| s.content == Content::Attitude) {
+            declare(TF_TOPIC, transform_schema)?
+        } else {
+            0
+        };
 
         let children = child_frames(streams);
         let streams = streams
             .iter()
             .zip(attitudes)
+            .zip(rates)
             .zip(&children)
-            .map(|((stream, attitude), child)| {
+            .map(|(((stream, attitude), rate), child)| {
                 let parent = parent_frame(stream);
+                match stream.content {
+                    Content::Samples(_) => {
+                        return Messages::Samples {
+                            channel: attitude,
+                            imu: cdr::Imu::new(attitude, &stream.frame_id),
+                        };
+                    }
+                    Content::Truth => {
+                        return Messages::Truth {
+                            attitude,
+                            quaternion: cdr::Stamped::new(attitude, &parent),
+                            rate,
+                            vector: cdr::Stamped::new(rate, &stream.frame_id),
+                        };
+                    }
+                    Content::Attitude => {}
+                }
                 match encoding {
                     Encoding::Cdr => Messages::Cdr {
                         attitude,
@@ -201,7 +277,7 @@ impl Layout {
                     .plain
                     .reserve(batch.samples.len() * (imu.len() + tf.len()));
                 for (n, sample) in (batch.first..).zip(&batch.samples) {
-                    let log_time = log_time(sample);
+                    let log_time = log_time(sample.log);
                     let (stamp, fits) = cdr::ros_time(sample.stamp);
                     chunk.stamps_out_of_range += u64::from(!fits);
                     chunk.note(attitude, log_time);
@@ -220,7 +296,7 @@ impl Layout {
             } => {
                 let mut text = Vec::new();
                 for (n, sample) in (batch.first..).zip(&batch.samples) {
-                    let log_time = log_time(sample);
+                    let log_time = log_time(sample.log);
                     text.clear();
                     att.push(&mut text, n, sample);
                     chunk.push(*attitude, n as u32, log_time, log_time, &text);
@@ -229,6 +305,39 @@ impl Layout {
                         frame_transform.push(&mut text, sample);
                         chunk.push(*transform, n as u32, log_time, log_time, &text);
                     }
+                }
+            }
+            Messages::Samples { channel, imu } => {
+                let lane = chunk.lane(*channel);
+                chunk.plain.reserve(batch.raw.len() * imu.len());
+                for (n, sample) in (batch.first..).zip(&batch.raw) {
+                    let log_time = log_time(sample.log);
+                    let (stamp, fits) = cdr::ros_time(sample.header.unwrap_or(sample.log));
+                    chunk.stamps_out_of_range += u64::from(!fits);
+                    chunk.note(lane, log_time);
+                    imu.append_raw(&mut chunk.plain, n as u32, log_time, stamp, sample);
+                }
+            }
+            Messages::Truth {
+                attitude,
+                quaternion,
+                rate,
+                vector,
+            } => {
+                let (attitude, rate) = (chunk.lane(*attitude), chunk.lane(*rate));
+                chunk
+                    .plain
+                    .reserve(batch.samples.len() * (quaternion.len() + vector.len()));
+                for (n, sample) in (batch.first..).zip(&batch.samples) {
+                    let log_time = log_time(sample.log);
+                    let (stamp, fits) = cdr::ros_time(sample.stamp);
+                    chunk.stamps_out_of_range += u64::from(!fits);
+                    let [w, x, y, z] = sample.q_nb.wxyz();
+                    chunk.note(attitude, log_time);
+                    quaternion.append(&mut chunk.plain, n as u32, log_time, stamp, [x, y, z, w]);
+                    chunk.note(rate, log_time);
+                    let w_nb_b = sample.rate.into();
+                    vector.append(&mut chunk.plain, n as u32, log_time, stamp, w_nb_b);
                 }
             }
         }
@@ -269,10 +378,17 @@ pub(super) fn copy(chunk: &mut Chunk, channel: u16, message: &InputMessage<'_>) 
 }
 
 /// MCAP times are unsigned: what was logged before 1970 was logged at its beginning.
-fn log_time(sample: &AttitudeSample) -> u64 {
-    sample.log.0.max(0) as u64
+fn log_time(log: Nanos) -> u64 {
+    log.0.max(0) as u64
+}
+
+fn only_attitudes_are_json() -> Error {
+    Error::Usage(
+        "only attitudes are written to MCAP as JSON\n  help: --encoding cdr, or write .ndjson"
+            .to_owned(),
+    )
 }
 
 fn too_many_channels() -> Error {
-    Error::Usage("an MCAP file holds at most 65535 channels and schemas\n  help: without --copy-input only the attitude is written".to_owned())
+    Error::Usage("an MCAP file holds at most 65535 channels and schemas\n  help: a copy of this log (--copy-input, recover) does not fit into one".to_owned())
 }

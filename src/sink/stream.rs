@@ -1,5 +1,6 @@
 //! What an output stream is called: topics, frames, labels. Pure.
 
+use crate::record::SampleKind;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The longest topic or frame written, in bytes. A hostile log can carry a name of 60 MB; it would
@@ -9,9 +10,28 @@ const MAX_NAME_BYTES: usize = 255;
 /// The frame a nameless sensor gets: tf2 refuses an empty child.
 const NAMELESS_FRAME: &str = "body";
 
+/// What the samples of a stream are, and so which messages they become.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Content {
+    /// Estimated attitude ([`Sink::write`](super::Sink::write)): `sensor_msgs/msg/Imu` and `/tf`;
+    /// `ATT` objects; rows.
+    #[default]
+    Attitude,
+    /// What a gyro puts out ([`Sink::write_raw`](super::Sink::write_raw)): `sensor_msgs/msg/Imu`
+    /// whose orientation is marked absent; `RATE` objects; rows in which a recorded orientation
+    /// stands beside the sample.
+    Samples(SampleKind),
+    /// The attitude and rate that truly were ([`Sink::write`](super::Sink::write)):
+    /// `geometry_msgs/msg/QuaternionStamped` and, on the topic with `/rate` behind it,
+    /// `geometry_msgs/msg/Vector3Stamped`; `ATT` objects. A CSV has no place for it.
+    Truth,
+}
+
 /// One estimated topic and what its output is called.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Stream {
+    /// What its samples are.
+    pub content: Content,
     /// `id` of the `ATT` object: the input topic, unless something shorter is unambiguous.
     pub id: String,
     /// Where the samples came from.
@@ -35,6 +55,7 @@ impl Stream {
     #[must_use]
     pub fn new(input_topic: &str, frame_id: &str) -> Stream {
         Stream {
+            content: Content::Attitude,
             id: input_topic.to_owned(),
             input_topic: input_topic.to_owned(),
             output_topic: output_topic(input_topic, &BTreeSet::new()),
@@ -49,6 +70,7 @@ impl Stream {
     /// The same with every name cut to what can safely be repeated in each message.
     pub(super) fn bounded(&self) -> Stream {
         Stream {
+            content: self.content,
             id: bounded(&self.id),
             input_topic: bounded(&self.input_topic),
             output_topic: bounded(&self.output_topic),

@@ -68,7 +68,7 @@ impl Target {
             return Err(Error::Usage(
                 if SOCKET_SCHEMES.contains(&scheme.to_ascii_lowercase().as_str()) {
                     format!(
-                        "-o {text}: replay does not write to sockets yet\n  help: write NDJSON to standard output with `-o -` and pipe it; {KNOWN}"
+                        "-o {text}: this command does not write to sockets yet\n  help: write NDJSON to standard output with `-o -` and pipe it; {KNOWN}"
                     )
                 } else {
                     format!("-o {text}: unknown scheme `{scheme}`\n  help: {KNOWN}")

@@ -1,7 +1,7 @@
 //! Samples the tests of this stage share.
 
 use crate::model::attitude::Quaternion;
-use crate::record::{AttitudeSample, Nanos, Status};
+use crate::record::{AttitudeCovariance, AttitudeSample, Nanos, Status};
 use nalgebra::Vector3;
 
 /// A sample with nothing special about it.
@@ -11,7 +11,7 @@ pub(crate) fn sample(stamp: Nanos) -> AttitudeSample {
         q_nb: Quaternion::assume_unit([0.5, -0.5, 0.5, 0.5]),
         rate: Vector3::new(0.1, -0.2, 0.3),
         accel: Some(Vector3::new(0.0, 0.1, 9.8)),
-        sigma: Vector3::new(1e-3, 2e-3, 3e-3),
+        covariance: AttitudeCovariance::from_sigma(Vector3::new(1e-3, 2e-3, 3e-3)),
         status: Status::OK,
         reset_count: 0,
         log: stamp,

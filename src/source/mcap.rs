@@ -10,11 +10,13 @@
 //! ```
 //!
 //! [`walk()`] reads a log once, in parallel, and hands over decoded items ordered by log time, then place
-//! in the file; [`survey()`] says what is in it; [`list()`] gives every record. Memory is bounded by
+//! in the file; [`salvage()`] is the same walk for a copy; [`survey()`] says what is in it; [`list()`] gives
+//! every record. Memory is bounded by
 //! [`WalkOptions::in_flight`] and the largest chunk, whatever the size of the file.
 //!
 //! Layouts: MCAP specification, <https://mcap.dev/spec>.
 
+mod attached;
 mod block;
 mod bytes;
 mod channels;
@@ -36,7 +38,7 @@ pub use block::Compression;
 pub use channels::{Channel, Schema};
 pub use list::{Listed, list};
 pub use messages::{Message, Tally};
-pub use order::Lookahead;
+pub use order::{Lookahead, Order};
 pub use problem::{Problem, ProblemKind, Problems};
 pub use record::{
     AttachmentIndex, AttachmentRecord, ChannelRecord, ChunkHead, ChunkIndex, Footer, MAGIC,
@@ -44,7 +46,7 @@ pub use record::{
 };
 pub use scan::Facts;
 pub use survey::{ChannelSurvey, Survey, survey};
-pub use walk::{WalkOptions, WalkReport, walk};
+pub use walk::{WalkOptions, WalkReport, salvage, walk};
 
 use crate::error::{Error, Result};
 use std::fs::File;

@@ -73,7 +73,7 @@ fn short_gaps_are_bridged_with_the_order_they_support() {
 fn a_gap_makes_the_attitude_less_certain_and_a_longer_one_more_so() {
     let sigma = |missing| {
         let (_, out) = error(SampleKind::Rate, missing, Method::Auto);
-        out.last().unwrap().sigma.x
+        out.last().unwrap().covariance.sigma().x
     };
     // The noise of these tests is zero: what remains is the gap's own uncertainty.
     assert!(sigma(1) > 0.0);
@@ -100,7 +100,7 @@ fn a_held_gap_adds_no_rotation_and_a_reset_goes_back() {
             assert_eq!(out[gap].q_nb, out[gap - 1].q_nb, "{method}, {kind:?}");
             assert!(out[gap].status.has(Status::HELD) && !out[gap - 1].status.has(Status::HELD));
             assert_eq!((out[gap - 1].reset_count, out[gap].reset_count), (0, 1));
-            assert!(out[gap].sigma.x > out[gap - 1].sigma.x);
+            assert!(out[gap].covariance.sigma().x > out[gap - 1].covariance.sigma().x);
 
             let (samples, _) = with_gap(kind, 7, Join::Reset);
             let out = propagate(method, kind, initial, &samples);

@@ -1,80 +1,17 @@
-//! Random band-limited motion, 200 Hz, 2 rad/s rms per axis, 60 s, of `attitude.md` 6.3: with jittered
-//! sampling and lost samples. Truth by Runge-Kutta on sixteenths of each interval.
+//! Random band-limited motion, 200 Hz, 2 rad/s rms per axis, 60 s, of `attitude.md` 6.3: equal spacings (U),
+//! true sampling jitter (J), and jitter with lost samples (D). Truth by power series (`model::motion`).
 
-use crate::run::{ARCSEC, product, propagate, sample, worst_inside};
+use crate::run::{ARCSEC, propagate, sample, worst_inside};
+use crate::{centred, commit};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use std::f64::consts::TAU;
-use strapd::propagate::{Method, Order, Placement};
+use strapd::model::motion::BandLimited;
+use strapd::propagate::{Method, Order};
 use strapd::record::{Join, RateSample, SampleKind};
 
-const RATE_HZ: f64 = 200.0;
-const SECONDS: f64 = 60.0;
-const TONES: usize = 40;
-
-struct Motion {
-    /// Per axis: amplitude rad/s, angular frequency, phase.
-    tones: [[(f64, f64, f64); TONES]; 3],
-}
-
-impl Motion {
-    fn new(rng: &mut ChaCha8Rng, part_of_rate: f64) -> Self {
-        let amplitude = 2.0 * (2.0 / TONES as f64).sqrt();
-        let mut tone = || {
-            let f = rng.random_range(0.02..1.0) * part_of_rate * RATE_HZ;
-            (amplitude, TAU * f, rng.random_range(0.0..TAU))
-        };
-        Motion {
-            tones: std::array::from_fn(|_| std::array::from_fn(|_| tone())),
-        }
-    }
-
-    fn rate(&self, t: f64) -> [f64; 3] {
-        std::array::from_fn(|axis| {
-            let tones = &self.tones[axis];
-            tones.iter().map(|(a, w, p)| a * (w * t + p).sin()).sum()
-        })
-    }
-
-    /// Integral of the rate from `a` to `b`; as a product, so that nothing cancels.
-    fn increment(&self, a: f64, b: f64) -> [f64; 3] {
-        std::array::from_fn(|axis| {
-            let tones = &self.tones[axis];
-            tones
-                .iter()
-                .map(|(size, w, p)| {
-                    let (middle, half) = (0.5 * w * (a + b) + p, 0.5 * w * (b - a));
-                    size / w * 2.0 * middle.sin() * half.sin()
-                })
-                .sum()
-        })
-    }
-
-    /// The attitude at `b`, given that at `a`.
-    fn turn(&self, mut q: [f64; 4], a: f64, b: f64) -> [f64; 4] {
-        const PIECES: usize = 16;
-        let h = (b - a) / PIECES as f64;
-        let slope = |q: [f64; 4], [x, y, z]: [f64; 3]| product(q, [0.0, 0.5 * x, 0.5 * y, 0.5 * z]);
-        let plus = |q: [f64; 4], k: [f64; 4], h: f64| -> [f64; 4] {
-            std::array::from_fn(|i| q[i] + h * k[i])
-        };
-        let mut start = self.rate(a);
-        for piece in 0..PIECES {
-            let t = a + piece as f64 * h;
-            let (middle, end) = (self.rate(t + 0.5 * h), self.rate(t + h));
-            let k1 = slope(q, start);
-            let k2 = slope(plus(q, k1, 0.5 * h), middle);
-            let k3 = slope(plus(q, k2, 0.5 * h), middle);
-            let k4 = slope(plus(q, k3, h), end);
-            for i in 0..4 {
-                q[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
-            }
-            start = end;
-        }
-        let norm = q.iter().map(|c| c * c).sum::<f64>().sqrt();
-        q.map(|c| c / norm)
-    }
-}
+const STEP: f64 = 5e6;
+const COUNT: usize = 12_000;
+const SINES: usize = 40;
 
 struct Log {
     rates: Vec<RateSample>,
@@ -82,46 +19,59 @@ struct Log {
     truth: Vec<[f64; 4]>,
 }
 
-/// Sampled with true jitter of up to a fifth of the interval to either side, a part of the samples lost.
-fn log(seed: u64, part_of_rate: f64, lost: f64, join: Join) -> Log {
+/// The whole motion; highest frequency as a part of the sampling rate, jitter as a part of the interval.
+fn recorded(seed: u64, part_of_rate: f64, jitter: f64) -> Log {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let motion = Motion::new(&mut rng, part_of_rate);
-    let step = 1e9 / RATE_HZ;
+    let mut motion = BandLimited::random(seed, 2.0, part_of_rate * 1e9 / STEP, SINES).unwrap();
     let mut log = Log {
         rates: vec![],
         increments: vec![],
         truth: vec![],
     };
-    let mut q = [1.0, 0.0, 0.0, 0.0];
-    let (mut before, mut after_loss) = (0, false);
-    for k in 0..(SECONDS * RATE_HZ) as i64 {
-        let stamp = (step * (k as f64 + rng.random_range(-0.2..0.2))) as i64;
-        let (a, b) = (before as f64 * 1e-9, stamp as f64 * 1e-9);
-        q = if k == 0 { q } else { motion.turn(q, a, b) };
-        let is_lost = k > 40 && rng.random_range(0.0..1.0) < lost;
-        if !is_lost {
-            let mut rate = sample(stamp, stamp, motion.rate(b));
-            let mut increment = sample(before, stamp, motion.increment(a, b));
-            if k == 0 {
-                increment.start = increment.stamp;
-            }
-            if after_loss {
-                (rate.join, increment.join) = (join, join);
-            }
-            log.rates.push(rate);
-            log.increments.push(increment);
-            log.truth.push(q);
-        }
-        (before, after_loss) = (stamp, is_lost);
+    let mut before = 0;
+    for k in 0..COUNT {
+        let place = (k + 1) as f64 + jitter * rng.random_range(-1.0..1.0);
+        let stamp = (STEP * place) as i64;
+        let spin = motion.at_nanos(stamp as u64);
+        let increment = motion.delta_angle(before as u64, stamp as u64);
+        let start = if k == 0 { stamp } else { before };
+        log.rates.push(sample(stamp, stamp, spin.w_nb_b.into()));
+        log.increments.push(sample(start, stamp, increment.into()));
+        log.truth.push(spin.q_nb.wxyz());
+        before = stamp;
     }
     log
 }
 
-const fn centred(window: usize) -> Method {
-    Method::Magnus {
-        window,
-        order: Order::Exact,
-        placement: Placement::Centred,
+impl Log {
+    /// One in a hundred lost, two in a row or not; what comes after a loss says so, or does not.
+    fn with_losses(&self, seed: u64, in_a_row: bool, join: Join) -> Log {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x10_55);
+        let mut lost = false;
+        let kept: Vec<usize> = (0..self.truth.len())
+            .filter(|&k| {
+                lost = rng.random_range(0.0..1.0) < 0.01 && k > 40 && (in_a_row || !lost);
+                !lost
+            })
+            .collect();
+        let of = |samples: &[RateSample]| {
+            let mut before = 0;
+            kept.iter()
+                .map(|&k| {
+                    let mut sample = samples[k];
+                    if k > before + 1 {
+                        sample.join = join;
+                    }
+                    before = k;
+                    sample
+                })
+                .collect()
+        };
+        Log {
+            rates: of(&self.rates),
+            increments: of(&self.increments),
+            truth: kept.iter().map(|&k| self.truth[k]).collect(),
+        }
     }
 }
 
@@ -134,66 +84,135 @@ fn error(log: &Log, kind: SampleKind, method: Method) -> f64 {
     worst_inside(&out, |i| log.truth[i], 24) * ARCSEC
 }
 
-/// The table's greatest error, arc seconds: part of the rate, method, jittered, and with losses.
-const TABLE: [(f64, SampleKind, Method, f64, f64); 12] = [
-    (0.05, SampleKind::Rate, centred(8), 0.0032, 0.019),
-    (0.05, SampleKind::Rate, Method::Auto, 1.2e-7, 7.3e-7),
-    (0.05, SampleKind::DeltaAngle, centred(5), 0.14, 8.7),
-    (0.05, SampleKind::DeltaAngle, centred(7), 0.0024, 0.2),
-    (0.05, SampleKind::DeltaAngle, centred(9), 7.5e-5, f64::NAN),
-    (0.05, SampleKind::Rate, commit(6), 0.21, 1.0),
-    (0.1, SampleKind::Rate, centred(8), 0.73, 3.7),
-    (0.1, SampleKind::Rate, Method::Auto, 3.2e-5, 4.1e-4),
-    (0.1, SampleKind::DeltaAngle, centred(5), 1.5, 210.0),
-    (0.1, SampleKind::DeltaAngle, centred(7), 0.11, 17.0),
-    (0.1, SampleKind::DeltaAngle, centred(9), 0.0088, f64::NAN),
-    (0.1, SampleKind::Rate, commit(6), 8.9, 56.0),
-];
+/// The table's rows: greatest error in arc seconds with highest frequencies of .02, .05, .1, .2 of the sampling
+/// rate (U), .05, .1 (J) and .05, .1 (D). NaN: no figure, or one of the table's own rounding.
+const TABLE: [(SampleKind, Method, [f64; 8]); 11] = {
+    const RATE: SampleKind = SampleKind::Rate;
+    const DELTA: SampleKind = SampleKind::DeltaAngle;
+    const NONE: f64 = f64::NAN;
+    const M8: Order = Order::M8;
+    [
+        (
+            RATE,
+            commit(6),
+            [1.8e-3, 0.15, 2.8, 120.0, 0.21, 8.9, 1.0, 56.0],
+        ),
+        (
+            RATE,
+            commit(8),
+            [5.7e-6, 0.0031, 0.62, 110.0, 0.0055, 1.7, 0.07, 16.0],
+        ),
+        (
+            RATE,
+            centred(8, M8),
+            [5.5e-6, 0.0025, 0.14, 14.0, 0.0032, 0.73, 0.019, 3.7],
+        ),
+        (
+            RATE,
+            centred(12, M8),
+            [NONE, 8.9e-7, 8.2e-4, 1.0, 1.2e-6, 4.9e-3, 1.2e-5, 0.041],
+        ),
+        (
+            RATE,
+            centred(16, M8),
+            [NONE, 5.1e-8, 5.3e-6, 0.08, 1.2e-7, 3.2e-5, 7.3e-7, 4.1e-4],
+        ),
+        (
+            RATE,
+            Method::Auto,
+            [NONE, 5.1e-8, 5.3e-6, 0.08, 1.2e-7, 3.2e-5, 7.3e-7, 4.1e-4],
+        ),
+        (
+            DELTA,
+            commit(5),
+            [NONE, 0.13, 1.4, 27.0, 0.14, 1.5, 9.3, 230.0],
+        ),
+        (
+            DELTA,
+            commit(7),
+            [NONE, 0.0023, 0.11, 7.2, 0.0025, 0.12, 0.21, 21.0],
+        ),
+        (
+            DELTA,
+            centred(5, M8),
+            [NONE, 0.13, 1.4, 27.0, 0.14, 1.5, 8.7, 210.0],
+        ),
+        (
+            DELTA,
+            centred(7, M8),
+            [NONE, 0.0023, 0.10, 7.0, 0.0024, 0.11, 0.2, 17.0],
+        ),
+        (
+            DELTA,
+            centred(9, M8),
+            [NONE, 5.8e-5, 0.0079, 1.9, 7.5e-5, 0.0088, 0.0046, 1.5],
+        ),
+    ]
+};
 
-const fn commit(window: usize) -> Method {
-    Method::CommitProvisional {
-        window,
-        order: Order::M8,
-        finals: false,
-    }
-}
-
-#[test]
-fn jittered_sampling_and_lost_samples_cost_what_the_table_says() {
-    // The greatest error of 60 s hangs on where fast motion and losses meet, above all two losses in a
-    // row: one seed gives three times another's. The theory had one draw; the median of three of ours is
-    // within 2.3 of it throughout. A lower order would be off by fifty.
-    const CHANCE: f64 = 2.5;
-    // Truth's Runge-Kutta leaves this much in 60 s, found by halving its step, arc seconds.
-    const TRUTH: f64 = 2e-4;
-    for part in [0.05, 0.1] {
-        let logs = |lost| [1, 2, 3].map(|seed| log(seed, part, lost, Join::Continuous));
-        let (jittered, lossy) = (logs(0.0), logs(0.01));
-        for (_, kind, method, expected, expected_lossy) in
-            TABLE.into_iter().filter(|row| row.0 == part)
-        {
-            for (logs, expected) in [(&jittered, expected), (&lossy, expected_lossy)] {
-                let mut found = logs.each_ref().map(|log| error(log, kind, method));
-                found.sort_by(f64::total_cmp);
-                // NaN: nine increments of which one is missing are fewer than the table's.
-                assert!(
-                    expected.is_nan() || found[1] < CHANCE * expected + TRUTH,
-                    "{part}, {method}, {kind:?}: {found:?}, table {expected}"
-                );
-            }
-        }
-    }
-}
-
-#[test]
-fn marking_lost_samples_costs_the_order_of_the_policy_and_no_more() {
-    let log = log(1, 0.05, 0.01, Join::Bridge);
-    // One or two missing: eight samples (attitude.md 6.4), so the row of eight centred ones, 0.019.
-    for kind in [SampleKind::Rate, SampleKind::DeltaAngle] {
-        let found = error(&log, kind, Method::Auto);
-        assert!(
-            (1e-3..0.05).contains(&found),
-            "{kind:?}: {found:.2e} arcsec"
+/// Errors of three seeds over the table's figure, sorted, row by row of one column.
+fn ratios(logs: &[Log; 3], column: usize, mut judge: impl FnMut(&str, [f64; 3])) {
+    for (kind, method, row) in TABLE.into_iter().filter(|row| !row.2[column].is_nan()) {
+        let mut found = logs
+            .each_ref()
+            .map(|log| error(log, kind, method) / row[column]);
+        found.sort_by(f64::total_cmp);
+        println!("column {column}: {method}, {}: {found:.3?}", kind.name());
+        judge(
+            &format!("column {column}, {method}, {}", kind.name()),
+            found,
         );
     }
+}
+
+const SEEDS: [u64; 3] = [1, 2, 3];
+
+fn each_within_twice_the_table(logs: &[Log; 3], column: usize) {
+    ratios(logs, column, |row, found| {
+        assert!(found[2] < 2.0, "{row}: {found:.2?} of the table");
+    });
+}
+
+#[test]
+fn equal_spacings_cost_what_the_table_says_on_random_motion() {
+    for (column, part) in [(1, 0.05), (2, 0.1)] {
+        each_within_twice_the_table(&SEEDS.map(|seed| recorded(seed, part, 0.0)), column);
+    }
+}
+
+#[test]
+#[ignore = "two more columns of the same table, 8 s"]
+fn the_slowest_and_the_fastest_random_motion_cost_what_the_table_says() {
+    for (column, part) in [(0, 0.02), (3, 0.2)] {
+        each_within_twice_the_table(&SEEDS.map(|seed| recorded(seed, part, 0.0)), column);
+    }
+}
+
+/// Jittered (column), with losses one by one and with losses as they fall (column + 2).
+fn jitter_and_losses(column: usize, part: f64) {
+    let jittered = SEEDS.map(|seed| recorded(seed, part, 0.2));
+    each_within_twice_the_table(&jittered, column);
+    let lossy = |in_a_row, join| {
+        let mut seeds = SEEDS.into_iter();
+        jittered
+            .each_ref()
+            .map(|log| log.with_losses(seeds.next().unwrap(), in_a_row, join))
+    };
+    // Every seed, while losses come one by one. Marked as the conditioner marks them: that costs nothing.
+    each_within_twice_the_table(&lossy(false, Join::Bridge), column + 2);
+    // Twelve thousand samples lose two in a row about once. Across that gap the error is some three times
+    // that of one lost, and a greatest error is what it is there: the table is of one draw, so the median.
+    ratios(&lossy(true, Join::Continuous), column + 2, |row, found| {
+        assert!(found[1] < 2.0, "{row}: {found:.2?} of the table");
+    });
+}
+
+#[test]
+fn jitter_and_losses_cost_what_the_table_says_at_a_twentieth_of_the_rate() {
+    jitter_and_losses(4, 0.05);
+}
+
+#[test]
+fn jitter_and_losses_cost_what_the_table_says_at_a_tenth_of_the_rate() {
+    jitter_and_losses(5, 0.1);
 }

@@ -3,7 +3,15 @@
 use crate::{names, strapd};
 use std::process::Command;
 
-const COMMANDS: [&str; 6] = ["replay", "info", "compare", "cat", "completions", "man"];
+const COMMANDS: [&str; 7] = [
+    "replay",
+    "info",
+    "compare",
+    "cat",
+    "model",
+    "completions",
+    "man",
+];
 
 #[test]
 fn completions_for_every_shell_know_every_command() {

@@ -158,8 +158,10 @@ fn a_clipped_and_a_stuck_axis_are_found() {
     let raw: Vec<RawSample> = (0..4000)
         .map(|n| {
             let x = 50.0 * (n as f64 * 0.013).sin();
+            // Dies after a thousand samples.
+            let z = 0.001 * n.min(1000) as f64;
             RawSample {
-                gyro: Some([x.clamp(-34.9, 34.9), (n as f64 * 0.007).cos(), 0.125]),
+                gyro: Some([x.clamp(-34.9, 34.9), (n as f64 * 0.007).cos(), z]),
                 ..sample(n)
             }
         })
@@ -174,7 +176,38 @@ fn a_clipped_and_a_stuck_axis_are_found() {
         Advice::Stuck { axis, samples } => Some((*axis, *samples)),
         _ => None,
     });
-    assert_eq!(stuck, Some((2, 4000)));
+    assert_eq!(stuck, Some((2, 3000)));
+}
+
+#[test]
+fn exact_data_is_neither_clipped_nor_stuck_nor_short_of_samples() {
+    // A coning body: two axes swing to the same largest value again and again, the third is constant;
+    // stamps that jitter by a third of a step without one missing.
+    let found = summary(
+        &(0..2000)
+            .map(|n| {
+                let phase = std::f64::consts::TAU * (n % 40) as f64 / 40.0;
+                let jitter = [0, 3_000_000, -3_000_000, 2_000_000][n as usize % 4];
+                let stamp = sample(n).header.map(|Nanos(t)| Nanos(t + jitter));
+                RawSample {
+                    gyro: Some([3.0 * phase.cos(), 3.0 * phase.sin(), -0.25]),
+                    header: stamp,
+                    ..sample(n)
+                }
+            })
+            .collect::<Vec<_>>(),
+    );
+    assert!(
+        found.missing > 0,
+        "steps of 15 ms look like gaps: {found:?}"
+    );
+    let wrong = |a: &&Advice| {
+        matches!(
+            a,
+            Advice::Saturated { .. } | Advice::Stuck { .. } | Advice::SamplesMissing { .. }
+        )
+    };
+    assert_eq!(found.advice.iter().find(wrong), None);
 }
 
 #[test]

@@ -150,11 +150,11 @@ impl std::fmt::Display for Advice {
                     1 => f.write_str("one constant rate")?,
                     n => write!(f, "{n} stretches of constant rate")?,
                 }
-                f.write_str(": if a clock of its own triggers the sensor, --regularise-stamps; if it samples when it is asked, the stamps are right as they are. The stamps can not tell: --against-recorded may")
+                f.write_str(": if a clock of its own triggers the sensor, --regularise-stamps; if it samples when it is asked, the stamps are right as they are. They can not tell which; --against-recorded may")
             }
             Advice::StampsUneven { share } => write!(
                 f,
-                "stamps jitter by {:.0} % of the step (p99) and keep no constant rate: --time log may be steadier; if no sample is missing, --time index --rate-hz HZ",
+                "stamps jitter by {:.0} % of the step (p99) and keep no constant rate: if the recorder's clock is steadier, --time log; if no sample is missing, --time index --rate-hz HZ",
                 share * 100.0
             ),
             Advice::ClocksDrift { ppm } => write!(
@@ -182,6 +182,8 @@ pub(super) const DEGREES_ABOVE: f64 = 200.0;
 /// Rates above this that stay this even are a saturation, not a rest, in rad/s or deg/s.
 const SATURATION_FLOOR: f64 = 1.0;
 const SATURATED_SAMPLES: u64 = 5;
+/// Turning over, a sampled sine stands at its largest value for two samples at most.
+const SATURATED_RUN: u64 = 3;
 /// A rest in rad/s is below this; in deg/s, a rest is below it times 57.
 const STILL_DEVIATION: f64 = 0.025;
 /// Longest credible run of one value from a moving, quantised sensor.
@@ -281,7 +283,11 @@ pub(super) fn advise(
         } else {
             stats.min
         };
-        if at.abs() > SATURATION_FLOOR * unit && stats.at_peak >= SATURATED_SAMPLES {
+        if at.abs() > SATURATION_FLOOR * unit
+            && stats.at_peak >= SATURATED_SAMPLES
+            && stats.longest_at_peak >= SATURATED_RUN
+            && stats.min < stats.max
+        {
             advice.push(Advice::Saturated {
                 axis,
                 at,
@@ -295,7 +301,8 @@ pub(super) fn advise(
             .iter()
             .enumerate()
             .any(|(i, other)| i != axis && other.longest_run * 10 < stats.longest_run);
-        if stats.longest_run >= STUCK_SAMPLES && others_move {
+        // One that never reads anything else is not there, or not turned about.
+        if stats.longest_run >= STUCK_SAMPLES && others_move && stats.min < stats.max {
             advice.push(Advice::Stuck {
                 axis,
                 samples: stats.longest_run,
@@ -316,13 +323,24 @@ pub(super) fn advise(
             ppm: offset.drift_ppm,
         });
     }
-    if summary.missing > 0 {
+    if summary.missing > 0 && lacks(summary) {
         advice.push(Advice::SamplesMissing {
             missing: summary.missing,
             longest_secs: summary.longest_gap_secs,
         });
     }
     advice
+}
+
+/// Whether the log is short of the samples its long steps seem to lack: where stamps jitter by more
+/// than half a step, a long step is made up for by short ones.
+fn lacks(summary: &QualitySummary) -> bool {
+    let Some(spacing) = &summary.spacing else {
+        return true;
+    };
+    let by_time = summary.duration_secs / spacing.median_secs.max(1e-9) + 1.0;
+    let distinct = summary.count.saturating_sub(summary.duplicates);
+    by_time - distinct as f64 > 0.5 * summary.missing as f64
 }
 
 /// The unit in which this is one g, when it is not m/s^2. Gravity is 9.78 to 9.83 m/s^2; scale and

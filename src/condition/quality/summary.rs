@@ -53,6 +53,8 @@ pub struct AxisStats {
     pub rms: f64,
     /// How often the largest magnitude occurs.
     pub at_peak: u64,
+    /// Longest run of samples at that magnitude while the other axes moved.
+    pub longest_at_peak: u64,
     /// Longest run of one and the same value.
     pub longest_run: u64,
 }
@@ -108,6 +110,8 @@ pub struct QualitySummary {
     pub not_finite: u64,
     /// Samples with a gyro of exactly (0, 0, 0).
     pub zero_rows: u64,
+    /// Of these, alone between two that are not.
+    pub lone_zero_rows: u64,
     /// Samples with exactly their predecessor's gyro.
     pub repeated_rows: u64,
     /// x, y, z.
@@ -161,6 +165,7 @@ pub(super) fn summarise(quality: &Quality) -> QualitySummary {
         no_gyro: quality.no_gyro,
         not_finite: quality.not_finite,
         zero_rows: quality.zero_rows,
+        lone_zero_rows: quality.lone_zero_rows,
         repeated_rows: quality.repeated_rows,
         axes: quality.axes.map(axis),
         with_accel: quality.accel_count,
@@ -224,6 +229,7 @@ fn axis(axis: Axis) -> AxisStats {
         mean: axis.sum / n,
         rms: (axis.sum_squares / n).sqrt(),
         at_peak: axis.at_peak,
+        longest_at_peak: axis.longest_at_peak,
         longest_run: axis.longest_run,
     }
 }

@@ -3,12 +3,12 @@
 use super::world::TurningWorld;
 use crate::model::attitude::Quaternion;
 use crate::propagate::accumulate::Accumulator;
+use crate::propagate::covariance::Covariance;
 use crate::propagate::lanes::Triple;
 use crate::propagate::method::Method;
 use crate::propagate::report::Report;
 use crate::propagate::settings::Settings;
-use crate::propagate::sigma::Sigma;
-use crate::propagate::track::Track;
+use crate::propagate::track::{Track, secs};
 use crate::propagate::turn::Turn;
 use crate::propagate::window::{Note, Step};
 use crate::record::{AttitudeSample, RateSample, Status};
@@ -33,7 +33,7 @@ pub(super) struct State {
     world: Option<TurningWorld>,
     /// Instant of the attitude accumulated, ns.
     pub(super) now: i64,
-    pub(super) sigma: Sigma,
+    pub(super) covariance: Covariance,
     /// Bits of the output being made that the propagator adds.
     pub(super) added: Status,
     pub(super) report: Report,
@@ -50,7 +50,7 @@ impl State {
             sum,
             world: TurningWorld::new(settings.world_rate.as_vector()),
             now: 0,
-            sigma: Sigma::new(settings.noise),
+            covariance: Covariance::new(settings.noise),
             added: Status::OK,
             report: Report::default(),
             reset_count: 0,
@@ -92,7 +92,7 @@ impl State {
 
     pub(super) fn reset(&mut self, initial: [f64; 4]) {
         self.attitude.restart(initial);
-        self.sigma.reset();
+        self.covariance.restart();
         if let Some(sum) = &mut self.sum {
             *sum = rotation_vector(initial);
             self.attitude = turned_by(*sum);
@@ -102,17 +102,20 @@ impl State {
     /// Turns on over interval k.
     #[inline(always)]
     pub(super) fn step(&mut self, step: &Step, track: &Track, k: usize) {
+        let mut turn = step.turn;
         match &mut self.sum {
-            None => self.attitude.turn(step.turn),
+            None => self.attitude.turn(turn),
             Some(sum) => {
-                let [_, x, y, z] = step.turn;
-                *sum = *sum + Triple::new(x, y, z);
+                let [_, x, y, z] = turn;
+                let phi = Triple::new(x, y, z);
+                *sum = *sum + phi;
                 self.attitude = turned_by(*sum);
+                turn = Turn::exp(phi).parts();
             }
         }
         self.now = track.stamp[k];
         let spacing = track.spacing(k);
-        self.sigma.integrate(spacing);
+        self.covariance.advance(turn, secs(spacing));
         self.integrated_nanos = self.integrated_nanos.saturating_add(spacing);
         self.report.angle_turned += step.angle;
         self.report.largest_step = self.report.largest_step.max(step.angle);
@@ -125,7 +128,7 @@ impl State {
             Note::Reduced => self.report.reduced += 1,
             Note::Bridged => {
                 self.report.bridged += 1;
-                self.sigma.bridge(step.gap_variance, step.gap_noise);
+                self.covariance.bridge(step.gap_variance, step.gap_noise);
             }
             Note::Refused => self.report.refused += 1,
         }
@@ -173,14 +176,13 @@ impl State {
         if let Some(rate) = rate {
             self.rate = Vector3::new(rate.x.0[0], rate.y.0[0], rate.z.0[0]);
         }
-        let sigma = self.sigma.value();
         let q_nb = self.q_nb();
         out.push(AttitudeSample {
             stamp: sample.stamp,
             q_nb: Quaternion::assume_unit(q_nb),
             rate: self.rate,
             accel: sample.accel,
-            sigma: Vector3::new(sigma, sigma, sigma),
+            covariance: self.covariance.attitude(),
             status: sample.status.with(self.added),
             reset_count: self.reset_count,
             log: sample.log,

@@ -4,7 +4,7 @@
 use super::{Note, Plan, Step};
 use crate::propagate::collocation;
 use crate::propagate::magnus::{self, Moments};
-use crate::propagate::method::Placement;
+use crate::propagate::method::{LARGEST_WINDOW, Placement};
 use crate::propagate::track::Track;
 
 /// Moments, and what is known about them.
@@ -45,6 +45,7 @@ impl Plan {
         }
         let missing = self.missing(track, k);
         let cap = self.window.min(bridge_window(missing));
+        let mut noise = bridge_noise(missing);
         let (turn, delta, change) = if hole {
             let gap = self.settle(track, k, cap, Target::Hole);
             let own = self.settle(track, k, self.window, Target::Interval);
@@ -60,6 +61,10 @@ impl Plan {
         } else {
             let own = self.settle(track, k, cap, Target::Bridge);
             let turn = magnus::turn(&own.moments, self.order);
+            if own.used > QUIET_BRIDGE {
+                // The mid-interval gain bounds that of the rate over the gap, of `missing + 1` spacings.
+                noise = noise.max(own.gain * (missing + 1.0));
+            }
             (turn, own.moments.b[0].norm(), own.change)
         };
         let mut step = Step::new(turn, delta, Note::Bridged);
@@ -70,7 +75,7 @@ impl Plan {
             } else {
                 0.0
             };
-            step.gap_noise = track.step(k) * bridge_noise(missing);
+            step.gap_noise = track.step(k) * noise;
         }
         step
     }
@@ -114,9 +119,19 @@ impl Plan {
         if target == Target::Hole || (self.increments && self.beside_hole(track, k)) {
             cap = cap.min(collocation::UNKNOWNS);
         }
-        let cap = self.place(track, k, cap, target).1;
+        let (first, cap) = self.place(track, k, cap, target);
         let full = self.over(track, k, cap, target);
-        if full.gain <= self.loud && target == Target::Interval {
+        // A provisional step is one-sided by its nature, and gone with the next samples.
+        let provisional = if cap == self.window {
+            self.provisional_gain(k - first)
+        } else {
+            None
+        };
+        let (loud, shrinking) = match provisional {
+            Some(gain) => (self.loud.max(1.5 * gain), 0.9),
+            None => (self.loud, 0.5),
+        };
+        if full.gain <= loud && target == Target::Interval {
             return full;
         }
         // A bridge of two samples still wants to know what four would have said.
@@ -127,8 +142,10 @@ impl Plan {
         };
         let sizes = (smallest..probe).step_by(2).chain([probe]);
         let variation = self.variation(track, k, smallest + 2, target);
-        // The first moment itself, which one increment does not know, is half of what rates vary by.
-        let (mut before, mut last) = (0.0, 2.0 * variation);
+        // The first moment itself, which one increment does not know: at the edge of three equal spacings up
+        // to 1.25 times what rates vary by, among jittered ones 2. Its noise moves no delta angle.
+        let unknown = if smallest == 1 { 4.0 } else { 2.0 };
+        let (mut before, mut last) = (0.0, unknown * variation);
         let mut best: Option<Settled> = None;
         for size in sizes {
             let mut this = if size == cap {
@@ -139,7 +156,7 @@ impl Plan {
             if let Some(best) = best {
                 let moved = |j: usize| (this.moments.b[j] - best.moments.b[j]).norm();
                 let (change, turned) = (moved(0) + moved(1), moved(0));
-                let shrank = change <= 0.5 * f64::max(last, 0.25 * before);
+                let shrank = change <= shrinking * f64::max(last, 0.25 * before);
                 if !shrank || size > cap {
                     // What this size would have changed is what is not known.
                     // Two samples leave open all the rate is seen to vary by.
@@ -228,11 +245,15 @@ impl Plan {
     }
 }
 
-/// The window for a gap of `missing` samples (attitude.md 6.4): high order wins across short gaps and
-/// loses across long ones.
+/// Largest window [`bridge_noise`] has a figure for.
+const QUIET_BRIDGE: usize = 8;
+
+/// The largest window for a gap of `missing` samples (attitude.md 6.4): high order wins across short gaps
+/// and loses across long ones. Across one or two missing samples a full window of 16 is hardly louder
+/// than one of 8 (2.6 against 1.6 for one), so there the data alone decide, see `settle`.
 fn bridge_window(missing: f64) -> usize {
     match missing {
-        m if m < 2.5 => 8,
+        m if m < 2.5 => LARGEST_WINDOW,
         m if m < 4.5 => 6,
         m if m < 8.5 => 4,
         _ => 2,

@@ -1,10 +1,11 @@
-//! AttitudeSample -> `sensor_msgs/msg/Imu` and `tf2_msgs/msg/TFMessage` message records in CDR. Pure.
+//! Samples -> `sensor_msgs/msg/Imu`, `tf2_msgs/msg/TFMessage`, `geometry_msgs/msg/QuaternionStamped` and
+//! `geometry_msgs/msg/Vector3Stamped` message records in CDR. Pure.
 //!
 //! Within a stream only numbers change from message to message, always at the same places. So each
 //! stream lays its record out once and then copies and patches it: about 30 ns a message.
 
 use super::record::{MESSAGE_HEAD, message_head};
-use crate::record::{AttitudeSample, Nanos};
+use crate::record::{AttitudeSample, Nanos, RawSample};
 
 /// Where the numbers of a message record begin, and the record with zeros in their places.
 #[derive(Debug)]
@@ -128,9 +129,9 @@ impl Imu {
         self.0.record.len()
     }
 
-    /// Appends the record. Covariances as REP-145 reads them: ours of the orientation on the
-    /// diagonal (zeros when it is not finite: unknown), of the rate unknown, of an absent
-    /// acceleration -1.
+    /// Appends the record. Covariances as REP-145 reads them: ours of the orientation, about the fixed
+    /// axes of the world (`docs/conventions.md`; zeros when it is not finite: unknown), of the rate
+    /// unknown, of an absent acceleration -1.
     pub(super) fn append(
         &self,
         out: &mut Vec<u8>,
@@ -142,17 +143,69 @@ impl Imu {
         let numbers = self.0.append(out, sequence, log_time, stamp);
         let [w, x, y, z] = sample.q_nb.wxyz();
         put(numbers, 0, [x, y, z, w]);
-        let variance = sample.sigma.component_mul(&sample.sigma);
-        if variance.iter().all(|v| v.is_finite()) {
-            for axis in 0..3 {
-                put(numbers, 4 + 4 * axis, [variance[axis]]);
-            }
+        let p = sample.covariance.in_navigation_axes(&sample.q_nb);
+        if p.iter().all(|v| v.is_finite()) {
+            // Symmetric: columns are rows.
+            put::<9>(numbers, 4, std::array::from_fn(|i| p[i]));
         }
         put(numbers, 13, sample.rate.into());
         match sample.accel {
             Some(accel) => put(numbers, 25, accel.into()),
             None => put(numbers, 28, [-1.0]),
         }
+    }
+
+    /// Appends the record of what a sensor put out: no orientation, covariances unknown; a rate or
+    /// specific force that is absent is marked so.
+    pub(super) fn append_raw(
+        &self,
+        out: &mut Vec<u8>,
+        sequence: u32,
+        log_time: u64,
+        stamp: [u8; 8],
+        sample: &RawSample,
+    ) {
+        let numbers = self.0.append(out, sequence, log_time, stamp);
+        // REP-145: a quaternion of no rotation, and a covariance that says it is none.
+        put(numbers, 3, [1.0, -1.0]);
+        for (vector, at) in [(sample.gyro, 13), (sample.accel, 25)] {
+            match vector {
+                Some(vector) => put(numbers, at, vector),
+                None => put(numbers, at + 3, [-1.0]),
+            }
+        }
+    }
+}
+
+/// A header and `N` numbers: `geometry_msgs/msg/QuaternionStamped` (x, y, z, w) and
+/// `geometry_msgs/msg/Vector3Stamped` of one stream.
+#[derive(Debug)]
+pub(super) struct Stamped<const N: usize>(Template);
+
+impl<const N: usize> Stamped<N> {
+    pub(super) fn new(channel: u16, frame_id: &str) -> Self {
+        let mut cdr = Cdr::new();
+        let stamp = cdr.stamp();
+        cdr.string(frame_id);
+        let numbers = cdr.numbers(N);
+        Stamped(Template::new(channel, cdr, stamp, numbers))
+    }
+
+    /// Bytes of one message record.
+    pub(super) fn len(&self) -> usize {
+        self.0.record.len()
+    }
+
+    /// Appends the record.
+    pub(super) fn append(
+        &self,
+        out: &mut Vec<u8>,
+        sequence: u32,
+        log_time: u64,
+        stamp: [u8; 8],
+        values: [f64; N],
+    ) {
+        put(self.0.append(out, sequence, log_time, stamp), 0, values);
     }
 }
 
@@ -196,6 +249,7 @@ impl Tf {
 mod tests {
     use super::*;
     use crate::model::attitude::Quaternion;
+    use crate::record::AttitudeCovariance;
     use crate::sink::tests::sample;
     use nalgebra::Vector3;
 
@@ -211,10 +265,17 @@ mod tests {
             let base = 4 + (12 + n + 1).next_multiple_of(8);
             assert_eq!(imu.len() - MESSAGE_HEAD, base + 296, "{n}");
             let mut s = sample(Nanos(5_000_000_007));
-            s.q_nb = Quaternion::assume_unit([0.1, 0.2, 0.3, 0.4]);
+            // A quarter turn about z: body x is world y, body y is world -x.
+            let half = std::f64::consts::FRAC_1_SQRT_2;
+            s.q_nb = Quaternion::assume_unit([half, 0.0, 0.0, half]);
             s.rate = Vector3::new(1.0, 2.0, 3.0);
             s.accel = Some(Vector3::new(4.0, 5.0, 6.0));
-            s.sigma = Vector3::new(7.0, 8.0, 9.0);
+            s.covariance = AttitudeCovariance {
+                xy: 1.0,
+                xz: 2.0,
+                yz: 3.0,
+                ..AttitudeCovariance::from_sigma(Vector3::new(7.0, 8.0, 9.0))
+            };
             let mut out = Vec::new();
             imu.append(&mut out, 0, 0, ros_time(s.stamp).0, &s);
             let m = &out[MESSAGE_HEAD..];
@@ -222,9 +283,12 @@ mod tests {
             assert_eq!(m[12..16], (n as u32 + 1).to_le_bytes());
             assert_eq!(m[16 + n], 0);
             let xyzw: Vec<f64> = (0..4).map(|i| f64_at(m, base + 8 * i)).collect();
-            assert_eq!(xyzw, [0.2, 0.3, 0.4, 0.1]);
+            assert_eq!(xyzw, [0.0, 0.0, half, half]);
             let covariance: Vec<f64> = (0..9).map(|i| f64_at(m, base + 32 + 8 * i)).collect();
-            assert_eq!(covariance, [49.0, 0., 0., 0., 64.0, 0., 0., 0., 81.0]);
+            let expected = [64.0, -1.0, -3.0, -1.0, 49.0, 2.0, -3.0, 2.0, 81.0];
+            for (found, expected) in covariance.iter().zip(expected) {
+                assert!((found - expected).abs() < 1e-13, "{covariance:?}");
+            }
             assert_eq!(f64_at(m, base + 104), 1.0);
             assert_eq!(f64_at(m, base + 120), 3.0);
             assert_eq!(f64_at(m, base + 200), 4.0);
@@ -237,7 +301,7 @@ mod tests {
         let imu = Imu::new(1, "");
         let mut s = sample(Nanos(0));
         s.accel = None;
-        s.sigma = Vector3::new(f64::NAN, 1.0, 1.0);
+        s.covariance = AttitudeCovariance::from_sigma(Vector3::new(f64::NAN, 1.0, 1.0));
         let mut out = Vec::new();
         imu.append(&mut out, 0, 0, [0; 8], &s);
         let m = &out[MESSAGE_HEAD..];

@@ -3,10 +3,11 @@
 //! Keeps what the summary at the end needs. Schemas and channels stand outside the chunks, before
 //! the first message that uses them: a damaged or lost chunk takes only its own messages with it.
 
+use super::Attachment;
 use super::chunk::{Chunk, Compression};
 use super::record::{
-    Body, CHANNEL, CHUNK_INDEX, Channel, DATA_END, FOOTER, HEADER, MAGIC, METADATA, METADATA_INDEX,
-    PREFIX, SCHEMA, STATISTICS, SUMMARY_OFFSET, Schema,
+    ATTACHMENT, ATTACHMENT_INDEX, Body, CHANNEL, CHUNK_INDEX, Channel, DATA_END, FOOTER, HEADER,
+    MAGIC, METADATA, METADATA_INDEX, PREFIX, SCHEMA, STATISTICS, SUMMARY_OFFSET, Schema,
 };
 
 use std::collections::BTreeMap;
@@ -23,6 +24,8 @@ pub(in crate::sink) struct McapFile {
     chunks: u32,
     /// Chunk index records, ready for the summary.
     chunk_index: Vec<u8>,
+    attachments: u32,
+    attachment_index: Vec<u8>,
     metadata: u32,
     metadata_index: Vec<u8>,
 }
@@ -40,7 +43,7 @@ impl McapFile {
     }
 
     /// The magic and the header.
-    pub(super) fn push_header(&self, out: &mut Vec<u8>, profile: &str) {
+    pub(in crate::sink) fn push_header(&self, out: &mut Vec<u8>, profile: &str) {
         out.extend_from_slice(MAGIC);
         Body::begin(out, HEADER)
             .string(profile)
@@ -49,7 +52,7 @@ impl McapFile {
     }
 
     /// A metadata record, `out` being what is written next.
-    pub(super) fn push_metadata(
+    pub(in crate::sink) fn push_metadata(
         &mut self,
         out: &mut Vec<u8>,
         name: &str,
@@ -57,11 +60,43 @@ impl McapFile {
     ) {
         let at = out.len();
         Body::begin(out, METADATA).string(name).strings(map).end();
-        self.metadata += 1;
+        self.metadata = self.metadata.saturating_add(1);
         Body::begin(&mut self.metadata_index, METADATA_INDEX)
             .u64(self.offset + at as u64)
             .u64((out.len() - at) as u64)
             .string(name)
+            .end();
+    }
+
+    /// An attachment record, `out` being what is written next.
+    pub(in crate::sink) fn push_attachment(
+        &mut self,
+        out: &mut Vec<u8>,
+        attachment: &Attachment<'_>,
+    ) {
+        let at = out.len();
+        Body::begin(out, ATTACHMENT)
+            .u64(attachment.log_time)
+            .u64(attachment.create_time)
+            .string(attachment.name)
+            .string(attachment.media_type)
+            .u64(attachment.data.len() as u64)
+            .bytes(attachment.data)
+            .u32(0)
+            .end();
+        // The checksum covers the body up to itself.
+        let covered = out.len() - 4;
+        let crc = crc32fast::hash(&out[at + PREFIX..covered]);
+        out[covered..].copy_from_slice(&crc.to_le_bytes());
+        self.attachments = self.attachments.saturating_add(1);
+        Body::begin(&mut self.attachment_index, ATTACHMENT_INDEX)
+            .u64(self.offset + at as u64)
+            .u64((out.len() - at) as u64)
+            .u64(attachment.log_time)
+            .u64(attachment.create_time)
+            .u64(attachment.data.len() as u64)
+            .string(attachment.name)
+            .string(attachment.media_type)
             .end();
     }
 
@@ -176,6 +211,9 @@ impl McapFile {
         group(&mut out, CHUNK_INDEX, &|out| {
             out.extend_from_slice(&self.chunk_index);
         });
+        group(&mut out, ATTACHMENT_INDEX, &|out| {
+            out.extend_from_slice(&self.attachment_index);
+        });
         group(&mut out, METADATA_INDEX, &|out| {
             out.extend_from_slice(&self.metadata_index);
         });
@@ -210,7 +248,7 @@ impl McapFile {
             .u64(self.messages())
             .u16(self.schemas.len() as u16)
             .u32(self.channels.len() as u32)
-            .u32(0)
+            .u32(self.attachments)
             .u32(self.metadata)
             .u32(self.chunks)
             .u64(start)

@@ -75,6 +75,24 @@ pub(super) const TF_MESSAGE: &str = concat!(
     header!(), vector!(), quaternion!(),
 );
 
+/// `geometry_msgs/msg/QuaternionStamped`, as `ros2msg`.
+#[rustfmt::skip]
+pub(super) const QUATERNION_STAMPED: &str = concat!(
+    "# Rotates body components to components of frame_id.\n",
+    "std_msgs/Header header\n",
+    "geometry_msgs/Quaternion quaternion\n",
+    header!(), quaternion!(),
+);
+
+/// `geometry_msgs/msg/Vector3Stamped`, as `ros2msg`.
+#[rustfmt::skip]
+pub(super) const VECTOR3_STAMPED: &str = concat!(
+    "# Along the axes of frame_id.\n",
+    "std_msgs/Header header\n",
+    "geometry_msgs/Vector3 vector\n",
+    header!(), vector!(),
+);
+
 /// `foxglove.FrameTransform`, as `jsonschema`.
 pub(super) const FRAME_TRANSFORM: &str = r#"{"title":"foxglove.FrameTransform","description":"Orientation of the child frame in the parent frame","type":"object","properties":{"timestamp":{"type":"object","title":"time","properties":{"sec":{"type":"integer"},"nsec":{"type":"integer","minimum":0,"maximum":999999999}},"required":["sec","nsec"]},"parent_frame_id":{"type":"string"},"child_frame_id":{"type":"string"},"translation":{"type":"object","title":"foxglove.Vector3","properties":{"x":{"type":"number"},"y":{"type":"number"},"z":{"type":"number"}},"required":["x","y","z"]},"rotation":{"type":"object","title":"foxglove.Quaternion","properties":{"x":{"type":"number"},"y":{"type":"number"},"z":{"type":"number"},"w":{"type":"number"}},"required":["x","y","z","w"]}},"required":["timestamp","parent_frame_id","child_frame_id","translation","rotation"]}"#;
 

@@ -56,6 +56,8 @@ pub(super) struct Block {
 pub(super) enum Kind {
     /// Unchunked records, one after another; their framing has been checked.
     Run,
+    /// The body of one record that a copy takes along: header, attachment, metadata.
+    Attached { opcode: u8 },
     Chunk {
         compression: Compression,
         /// Unpacked size as declared, within the limit.
@@ -92,10 +94,18 @@ impl Block {
         }
     }
 
+    /// Bytes of it as they lie in the file.
+    pub(super) fn packed(&self) -> usize {
+        match &self.payload {
+            Payload::At { len, .. } => *len,
+            Payload::Held(held) => held.range.len(),
+        }
+    }
+
     pub(super) fn indexed(&self) -> Option<u64> {
         match self.kind {
             Kind::Chunk { indexed, .. } => indexed,
-            Kind::Run => None,
+            Kind::Run | Kind::Attached { .. } => None,
         }
     }
 }

@@ -7,7 +7,7 @@ use super::block::Buffers;
 use super::bytes::{HEAD, head_at};
 use super::problem::{ProblemKind, Problems};
 use super::record::Record;
-use super::scan::{Item, Scanner};
+use super::scan::{Besides, Item, Scanner};
 use super::workers::place;
 use super::{Facts, Reader, read_error};
 use crate::error::Result;
@@ -36,7 +36,7 @@ pub fn list(
     mut visit: impl FnMut(Listed<'_>) -> ControlFlow<()>,
 ) -> Result<(Facts, Problems)> {
     let name = reader.name().to_owned();
-    let mut scanner = Scanner::new(reader.input, reader.limits, true);
+    let mut scanner = Scanner::new(reader.input, reader.limits, Besides::Everything);
     let mut buffers = Buffers::default();
     let mut problems = Problems::default();
     loop {

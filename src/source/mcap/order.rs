@@ -18,6 +18,15 @@ pub struct Lookahead {
     pub held_bytes: usize,
 }
 
+impl Lookahead {
+    /// Every block is let go at once.
+    pub(super) const NONE: Lookahead = Lookahead {
+        blocks: 0,
+        bytes: 0,
+        held_bytes: 0,
+    };
+}
+
 impl Default for Lookahead {
     fn default() -> Self {
         Lookahead {
@@ -26,6 +35,16 @@ impl Default for Lookahead {
             held_bytes: 8 << 20,
         }
     }
+}
+
+/// In which order items are delivered.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Order {
+    /// By log time, then place in the file, as far as the look-ahead reaches.
+    #[default]
+    LogTime,
+    /// By place in the file.
+    File,
 }
 
 /// Items and the log time of each.

@@ -142,6 +142,13 @@ pub enum ProblemKind {
         /// Messages found.
         found: u64,
     },
+    /// An attachment or metadata record that can not be used; met only where these are copied.
+    Attached {
+        /// "attachment" or "metadata".
+        what: &'static str,
+        /// Why.
+        why: &'static str,
+    },
     /// The summary at the end can not be used; nothing is lost by that.
     BadSummary {
         /// Why.
@@ -158,6 +165,7 @@ impl ProblemKind {
             ProblemKind::Redefined { .. }
                 | ProblemKind::DefinedBySummary { .. }
                 | ProblemKind::MissingSchema { .. }
+                | ProblemKind::Attached { .. }
                 | ProblemKind::BadSummary { .. }
         )
     }
@@ -264,6 +272,7 @@ impl fmt::Display for ProblemKind {
                     "the statistics count {claimed} messages, {found} were found"
                 )
             }
+            ProblemKind::Attached { what, why } => write!(f, "{what} record skipped: {why}"),
             ProblemKind::BadSummary { why } => write!(f, "the summary can not be used: {why}"),
         }
     }
@@ -287,6 +296,7 @@ pub struct Problems {
     total: u64,
     losses: u64,
     messages: u64,
+    skipped: u64,
 }
 
 impl Problems {
@@ -294,6 +304,11 @@ impl Problems {
         self.total += 1;
         self.losses += u64::from(kind.is_loss());
         self.messages = self.messages.saturating_add(messages.unwrap_or(0));
+        match &kind {
+            ProblemKind::Garbage { skipped } => self.skip(*skipped),
+            ProblemKind::Truncated { have, .. } => self.skip(*have),
+            _ => {}
+        }
         if self.first.len() < KEPT {
             self.first.push(Problem {
                 offset,
@@ -303,10 +318,16 @@ impl Problems {
         }
     }
 
+    /// Bytes the last problem made unusable, where its own fields do not say.
+    pub(super) fn skip(&mut self, bytes: u64) {
+        self.skipped = self.skipped.saturating_add(bytes);
+    }
+
     pub(super) fn merge(&mut self, other: Problems) {
         self.total += other.total;
         self.losses += other.losses;
         self.messages = self.messages.saturating_add(other.messages);
+        self.skipped = self.skipped.saturating_add(other.skipped);
         self.first.extend(other.first);
         self.first.sort_by_key(|p| p.offset);
         self.first.truncate(KEPT);
@@ -334,6 +355,12 @@ impl Problems {
     #[must_use]
     pub fn messages_lost(&self) -> u64 {
         self.messages
+    }
+
+    /// Bytes of the file that were not used because of them; inside a chunk, of its unpacked records.
+    #[must_use]
+    pub fn bytes_skipped(&self) -> u64 {
+        self.skipped
     }
 
     /// Whether nothing was wrong.

@@ -45,11 +45,21 @@ pub struct Facts {
     pub attachments: u64,
 }
 
+/// What is handed out besides blocks of messages.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Besides {
+    Nothing,
+    /// What a copy takes along, as blocks of its own: header, attachments, metadata.
+    Attached,
+    /// Every record, as [`Item::Other`].
+    Everything,
+}
+
 /// The next thing in the log.
 #[derive(Debug)]
 pub(super) enum Item {
     Block(Block),
-    /// A record that is neither chunk, message nor definition; only when asked for.
+    /// A record that is neither chunk, message nor definition; only for [`Besides::Everything`].
     Other {
         opcode: u8,
         offset: u64,
@@ -72,8 +82,7 @@ pub(super) struct Scanner {
     tape: Tape,
     limits: Limits,
     section: Section,
-    /// Hand out every record ([`Item::Other`]).
-    everything: bool,
+    besides: Besides,
     /// The last record that was skipped on the word of its length alone, for going back to
     /// when what follows it is garbage.
     trusted: Option<u64>,
@@ -94,7 +103,7 @@ pub(super) struct Scanner {
 
 impl Scanner {
     /// Starts behind the magic, which has been checked.
-    pub(super) fn new(input: Input, limits: Limits, everything: bool) -> Self {
+    pub(super) fn new(input: Input, limits: Limits, besides: Besides) -> Self {
         let start = MAGIC.len() as u64;
         let mut tape = Tape::new(input, start);
         tape.seek(start);
@@ -104,7 +113,7 @@ impl Scanner {
             tape,
             limits,
             section: Section::Data,
-            everything,
+            besides,
             trusted: None,
             crc: Some(crc),
             done: false,
@@ -271,6 +280,7 @@ impl Scanner {
                     },
                     None,
                 );
+                self.problems.skip(total);
                 self.pass_over(total)?;
                 return Ok(None);
             }
@@ -289,10 +299,23 @@ impl Scanner {
             _ => {}
         }
         let small = opcode == op::METADATA && length <= METADATA_READ;
+        let attached = self.besides == Besides::Attached
+            && matches!(opcode, op::HEADER | op::ATTACHMENT | op::METADATA);
         let wanted = small
-            || self.everything
+            || attached
+            || self.besides == Besides::Everything
             || matches!(opcode, op::HEADER | op::DATA_END | op::STATISTICS);
-        if !wanted || length > self.limits.record {
+        let limit = self.limits.record;
+        if !wanted || length > limit {
+            if attached {
+                let kind = ProblemKind::RecordTooLong {
+                    opcode,
+                    length,
+                    limit,
+                };
+                self.problems.add(at, kind, None);
+                self.problems.skip(total);
+            }
             self.pass_over(total)?;
             return Ok(None);
         }
@@ -331,7 +354,7 @@ impl Scanner {
             }
             _ => {}
         }
-        if !self.everything {
+        if !attached && self.besides != Besides::Everything {
             self.pass_over(total)?;
             return Ok(None);
         }
@@ -339,10 +362,18 @@ impl Scanner {
         self.trusted = Some(at);
         let mut body = self.tape.hand_out(all);
         body.range.start += HEAD;
-        Ok(Some(Item::Other {
-            opcode,
-            offset: at,
-            body,
+        Ok(Some(if attached {
+            Item::Block(Block {
+                offset: at,
+                kind: Kind::Attached { opcode },
+                payload: Payload::Held(body),
+            })
+        } else {
+            Item::Other {
+                opcode,
+                offset: at,
+                body,
+            }
         }))
     }
 

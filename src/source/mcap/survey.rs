@@ -8,7 +8,7 @@ use super::channels::{Channel, Table};
 use super::messages::Tally;
 use super::problem::{ProblemKind, Problems};
 use super::record::op;
-use super::scan::{Facts, Scanner};
+use super::scan::{Besides, Facts, Scanner};
 use super::summary::{self, Summary};
 use super::tape::Input;
 use super::walk::{WalkOptions, walk};
@@ -165,7 +165,7 @@ fn header(reader: &Reader) -> Result<Facts> {
         return Ok(Facts::default());
     };
     let name = again.name().to_owned();
-    let mut scanner = Scanner::new(again.input, again.limits, true);
+    let mut scanner = Scanner::new(again.input, again.limits, Besides::Everything);
     scanner.next().map_err(|e| read_error(&name, 0, e))?;
     Ok(Facts {
         profile: scanner.facts.profile,

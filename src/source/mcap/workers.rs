@@ -7,7 +7,7 @@
 use super::block::{Block, Buffers, Kind};
 use super::channels::{NONE, Table};
 use super::messages::{Message, Met, Place, Stop, Tally, pass};
-use super::order::Batch;
+use super::order::{Batch, Order};
 use super::problem::ProblemKind;
 use std::collections::BTreeMap;
 use std::io;
@@ -32,6 +32,7 @@ pub(super) struct Shared<T, D, M> {
     pub(super) table: RwLock<Table<D>>,
     pub(super) map: M,
     pub(super) cancelled: AtomicBool,
+    order: Order,
     benches: Mutex<Vec<Bench>>,
     batches: Mutex<Vec<Batch<T>>>,
 }
@@ -42,11 +43,12 @@ fn lock<X>(mutex: &Mutex<X>) -> MutexGuard<'_, X> {
 }
 
 impl<T, D, M> Shared<T, D, M> {
-    pub(super) fn new(table: Table<D>, map: M) -> Self {
+    pub(super) fn new(table: Table<D>, map: M, order: Order) -> Self {
         Shared {
             table: RwLock::new(table),
             map,
             cancelled: AtomicBool::new(false),
+            order,
             benches: Mutex::default(),
             batches: Mutex::default(),
         }
@@ -64,6 +66,13 @@ impl<T, D, M> Shared<T, D, M> {
 
     pub(super) fn batch(&self) -> Batch<T> {
         lock(&self.batches).pop().unwrap_or_default()
+    }
+
+    /// Brings a block's batch into the order asked for.
+    pub(super) fn arrange(&self, batch: &mut Batch<T>) {
+        if self.order == Order::LogTime {
+            batch.sort();
+        }
     }
 
     pub(super) fn put_batch(&self, mut batch: Batch<T>) {
@@ -121,7 +130,8 @@ pub(super) enum Done<T> {
     Walked {
         batch: Batch<T>,
         findings: Findings,
-        fault: Option<ProblemKind>,
+        /// What ended the pass early, and bytes of the block behind it.
+        fault: Option<(ProblemKind, u64)>,
     },
     /// The block can not be used.
     Bad(ProblemKind),
@@ -144,7 +154,8 @@ where
 {
     /// Does a block as far as the table allows.
     pub(super) fn work(&self, block: &Block) -> Done<T> {
-        if self.cancelled.load(Ordering::Relaxed) {
+        // What is attached goes to the caller, between the blocks around it.
+        if self.cancelled.load(Ordering::Relaxed) || matches!(block.kind, Kind::Attached { .. }) {
             return Done::InOrder;
         }
         let mut bench = self.bench();
@@ -165,15 +176,16 @@ where
                     )
                 });
                 let fault = match stop {
-                    Stop::Broken { at, length } => Some(ProblemKind::InnerRecord {
-                        at: at as u64,
-                        length,
-                    }),
+                    Stop::Broken { at, length } => {
+                        let unread = records.len().saturating_sub(at) as u64;
+                        let at = at as u64;
+                        Some((ProblemKind::InnerRecord { at, length }, unread))
+                    }
                     _ => None,
                 };
                 match stop {
                     Stop::End | Stop::Broken { .. } => {
-                        batch.sort();
+                        self.arrange(&mut batch);
                         Done::Walked {
                             batch,
                             findings: Findings::of(&mut bench.met),

@@ -9,7 +9,7 @@ use super::super::problem::ProblemKind;
 use super::super::record::{ChunkHead, op};
 use super::super::resync;
 use super::super::tape::Input;
-use super::{Item, PEEK, SLACK, Scanner, Section};
+use super::{Besides, Item, PEEK, SLACK, Scanner, Section};
 use std::io;
 use std::sync::Arc;
 
@@ -73,6 +73,7 @@ impl Scanner {
                 limit,
             });
             self.problems.add(at, kind, messages);
+            self.problems.skip(total);
             return Ok(None);
         };
         self.peek = if total < SMALL { PEEK_SMALL } else { PEEK };
@@ -141,8 +142,10 @@ impl Scanner {
         self.trusted = None;
         if read_on {
             self.tape.skip(start)?;
-        } else if !resync::next_chunk(&mut self.tape, at + 1, self.limits.record)? {
-            self.done = true;
+        } else {
+            self.done = !resync::next_chunk(&mut self.tape, at + 1, self.limits.record)?;
+            let skipped = self.tape.position().saturating_sub(at);
+            self.problems.skip(skipped);
         }
         Ok(None)
     }
@@ -158,7 +161,7 @@ impl Scanner {
                 return Ok(messages);
             };
             let total = length.saturating_add(HEAD as u64);
-            if self.everything || !self.tape.may_have(total) {
+            if self.besides == Besides::Everything || !self.tape.may_have(total) {
                 return Ok(messages);
             }
             messages = Some(

@@ -1,0 +1,212 @@
+//! `strapd allan FILE`: a recording at rest -> Allan deviation, noise terms, the flags for them. I/O.
+
+mod gather;
+mod outputs;
+mod words;
+
+use super::estimation::{KindArg, TimeArg, UnitArg};
+use super::{Global, Outcome, print};
+use crate::condition::{Clock, GyroUnit};
+use crate::config::Plan;
+use crate::decode::Options;
+use crate::error::{Error, Result};
+use crate::model::allan::{AllanFit, Point, cluster_sizes, deviation, fit};
+use crate::pipeline::pool::Pool;
+use crate::record::SampleKind;
+use clap::Args;
+use gather::Gathered;
+use std::path::PathBuf;
+
+/// Allan deviation of a recording at rest: angle random walk, bias instability, rate random walk,
+/// quantisation, ramp
+#[derive(Args, Debug)]
+#[command(after_help = "Examples:
+  strapd allan rest.mcap                          a table, and the --noise flags for it
+  strapd allan rest.mcap --plot allan.svg         the three axes and what was fitted
+  strapd allan rest.mcap --start 600 --json       after ten minutes of warming up
+
+Record for at least nine times the longest time that matters, the sensor fixed and warm.
+At most 8 million angles are held (200 MB); a longer record is thinned, which is said.")]
+pub struct Allan {
+    /// An MCAP file
+    #[arg(value_name = "FILE")]
+    pub file: PathBuf,
+    /// IMU topic; needed only when a log has several
+    #[arg(long, value_name = "NAME")]
+    pub topic: Option<String>,
+    /// Where a value lies in the message: ROLE=PATH, as in replay
+    #[arg(long = "field", value_name = "ROLE=PATH")]
+    pub fields: Vec<String>,
+    /// Use a gyro whose covariance is marked -1 (absent) all the same
+    #[arg(long)]
+    pub ignore_covariance_flag: bool,
+    /// Which clock the samples are placed on; `index` needs --rate-hz
+    #[arg(long, value_enum, default_value = "header", env = "STRAPD_TIME")]
+    pub time: TimeArg,
+    /// Sample rate for --time index
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    pub rate_hz: Option<f64>,
+    /// What a sample means in time [default: rate, unless the format says otherwise]
+    #[arg(long, value_enum, env = "STRAPD_SAMPLE_KIND")]
+    pub sample_kind: Option<KindArg>,
+    /// Unit of the recorded rates [default: rad, unless the format says otherwise]
+    #[arg(long, value_enum, env = "STRAPD_GYRO_UNIT")]
+    pub gyro_unit: Option<UnitArg>,
+    /// Longest run of missing samples that is filled with a straight line, in seconds; at longer
+    /// ones the record is split
+    #[arg(
+        long,
+        value_name = "SECS",
+        default_value_t = 0.5,
+        allow_negative_numbers = true
+    )]
+    pub max_gap: f64,
+    /// Skip the first seconds of the data
+    #[arg(long, value_name = "SECS", allow_negative_numbers = true)]
+    pub start: Option<f64>,
+    /// Stop after this many seconds of the data
+    #[arg(long, value_name = "SECS", allow_negative_numbers = true)]
+    pub until: Option<f64>,
+    /// Write the curves and the fits as a chart
+    #[arg(long, value_name = "FILE.svg")]
+    pub plot: Option<PathBuf>,
+    /// Write the curves and the fits as a table, rad/s
+    #[arg(long, value_name = "FILE.csv")]
+    pub csv: Option<PathBuf>,
+    /// Replace output files that exist
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// Cluster sizes a decade.
+const PER_DECADE: u32 = 12;
+
+/// One axis's curve and fit; rad/s.
+struct Axis {
+    name: &'static str,
+    points: Vec<Point>,
+    /// `None` = the axis is stuck.
+    fit: Option<AllanFit>,
+}
+
+/// Runs it.
+///
+/// # Errors
+/// The log can not be read, holds no rate, or too few samples; an output exists.
+pub fn run(global: &Global, args: &Allan) -> Result<Outcome> {
+    let plan = args.plan()?;
+    for path in [&args.plot, &args.csv].into_iter().flatten() {
+        outputs::check(path, &args.file, args.force)?;
+    }
+    let pool = Pool::new(global.threads)?;
+    let gathered = gather::gather(&args.file, &plan, &pool)?;
+    let axes = analyse(&gathered).map_err(|what| Error::Topic {
+        path: args.file.clone(),
+        topic: gathered.topic.clone(),
+        what,
+    })?;
+    for warning in gathered.warnings().iter().chain(&words::doubts(&axes)) {
+        tracing::warn!("{warning}");
+    }
+    if let Some(path) = &args.plot {
+        let chart = outputs::chart(&gathered.topic, &axes);
+        let svg = chart.svg().map_err(|e| Error::Topic {
+            path: args.file.clone(),
+            topic: gathered.topic.clone(),
+            what: e.to_string(),
+        })?;
+        outputs::write(path, &svg)?;
+    }
+    if let Some(path) = &args.csv {
+        outputs::write(path, &outputs::table(&axes))?;
+    }
+    if global.json {
+        print(&format!("{}\n", words::json(&gathered, &axes)))?;
+    } else if !global.quiet {
+        print(&words::text(&args.file, &gathered, &axes))?;
+    }
+    Ok(if gathered.is_lossy() {
+        Outcome::Lossy
+    } else {
+        Outcome::Done
+    })
+}
+
+/// The curves and fits of the three axes.
+fn analyse(gathered: &Gathered) -> std::result::Result<Vec<Axis>, String> {
+    let record = &gathered.record;
+    let interval = gathered.interval;
+    // Rates were summed in units of the sampling interval.
+    let unit = match gathered.resolved.kind {
+        SampleKind::DeltaAngle => 1.0,
+        SampleKind::Rate | SampleKind::Average => interval,
+    };
+    let spread = record.spread();
+    ["x", "y", "z"]
+        .into_iter()
+        .enumerate()
+        .map(|(axis, name)| {
+            let pieces = record.pieces(axis);
+            let longest = pieces.iter().map(|p| p.len()).max().unwrap_or(0);
+            let mut points = deviation(
+                &pieces,
+                interval * record.stride() as f64,
+                &cluster_sizes(longest, PER_DECADE),
+            )
+            .map_err(|e| {
+                format!("{e}\n  help: a longer record; --max-gap SECS fills longer gaps")
+            })?;
+            points.iter_mut().for_each(|p| p.sigma *= unit);
+            let stuck = spread[axis] <= 0.0;
+            Ok(Axis {
+                name,
+                fit: if stuck { None } else { fit(&points) },
+                points,
+            })
+        })
+        .collect()
+}
+
+impl Allan {
+    /// The flags as a plan: what replay's of the same names mean.
+    fn plan(&self) -> Result<Plan> {
+        let clock = match (self.time, self.rate_hz) {
+            (TimeArg::Index, Some(rate_hz)) => Clock::Index { rate_hz },
+            (TimeArg::Index, None) => {
+                return Err(Error::Usage(
+                    "--time index: the sample rate is needed too\n  help: --rate-hz HZ".to_owned(),
+                ));
+            }
+            (_, Some(_)) => {
+                return Err(Error::Usage(
+                    "--rate-hz: only --time index uses it\n  help: --time index --rate-hz HZ"
+                        .to_owned(),
+                ));
+            }
+            (TimeArg::Header, None) => Clock::Header,
+            (TimeArg::Log, None) => Clock::Log,
+            (TimeArg::Publish, None) => Clock::Publish,
+        };
+        let plan = Plan {
+            topic: self.topic.clone(),
+            decode: Options {
+                fields: self
+                    .fields
+                    .iter()
+                    .map(|f| f.parse().map_err(|e| Error::Usage(format!("--field: {e}"))))
+                    .collect::<Result<_>>()?,
+                ignore_covariance_flag: self.ignore_covariance_flag,
+                ..Options::default()
+            },
+            kind: self.sample_kind.map(SampleKind::from),
+            unit: self.gyro_unit.map(GyroUnit::from),
+            clock,
+            max_gap_secs: self.max_gap,
+            start: self.start,
+            until: self.until,
+            ..Plan::default()
+        };
+        plan.check()?;
+        Ok(plan)
+    }
+}

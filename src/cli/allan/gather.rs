@@ -1,0 +1,421 @@
+//! One topic of a log -> angles at even intervals, and what was wrong with them. I/O.
+
+use crate::condition::stillness::{Limits, Rests, Stillness};
+use crate::condition::{ClockWarning, Conditioner, Report, choose_clock};
+use crate::config::Plan;
+use crate::error::{Error, Result};
+use crate::model::allan::AngleRecord;
+use crate::pipeline::log::{Log, described, problems};
+use crate::pipeline::pool::Pool;
+use crate::pipeline::preparation::Resolved;
+use crate::pipeline::route::{Item, Route};
+use crate::record::{Join, Nanos, RateSample, RawSample, SampleKind};
+use crate::report::summary::significant;
+use crate::source::mcap::{self, WalkOptions};
+use nalgebra::Vector3;
+use std::ops::ControlFlow;
+use std::path::Path;
+
+/// Angles held at most: 24 bytes each, 200 MB.
+const CAPACITY: usize = 1 << 23;
+/// Samples that tell which clock moves.
+const FEW: usize = 512;
+/// A record at rest for less than this part of its length is said to move.
+const RESTING: f64 = 0.95;
+/// A rest worth naming, s.
+const USEFUL: f64 = 10.0;
+/// Spread of the intervals, as a part of their mean, from which stamps are said to be uneven.
+const UNEVEN: f64 = 0.05;
+
+/// A record and what is known about it.
+pub(super) struct Gathered {
+    pub(super) topic: String,
+    pub(super) described: String,
+    pub(super) resolved: Resolved,
+    /// Angles; of rates in units of `interval`.
+    pub(super) record: AngleRecord,
+    /// Mean sampling interval where samples follow each other, s.
+    pub(super) interval: f64,
+    /// Root mean square of its variation, s.
+    pub(super) unevenness: f64,
+    /// From the first stamp to the last, s.
+    pub(super) secs: f64,
+    /// Missing samples replaced by a straight line, and in how many places.
+    pub(super) filled: u64,
+    pub(super) bridges: u64,
+    /// Places where the record was split.
+    pub(super) splits: u64,
+    pub(super) rests: Rests,
+    pub(super) report: Report,
+    pub(super) undecodable: u64,
+    /// `--start`, s.
+    skipped: f64,
+    notes: Vec<String>,
+    lost_in_file: bool,
+}
+
+/// Decodes, conditions and gathers the topic chosen.
+///
+/// # Errors
+/// The log can not be read, no topic or several, or a topic without a rate.
+pub(super) fn gather(path: &Path, plan: &Plan, pool: &Pool) -> Result<Gathered> {
+    let log = Log::open(path, pool)?;
+    if plan.topic.as_deref() == Some("all") {
+        return Err(Error::Usage(
+            "--topic all: one topic at a time\n  help: --topic NAME".to_owned(),
+        ));
+    }
+    let choice = log.choose(path, plan.topic.as_deref())?;
+    let topic = choice.topics.into_iter().next().unwrap_or_default();
+    let unsupported = |what: String| Error::Unsupported {
+        path: path.to_owned(),
+        what,
+    };
+    let mut decoders = Vec::new();
+    for known in log.channels.iter().filter(|k| k.channel.topic == topic) {
+        let decoder = known
+            .decoder(&plan.decode)
+            .map_err(|why| unsupported(why.to_string()))?;
+        decoders.push((known.channel.clone(), decoder));
+    }
+    let Some((channel, decoder)) = decoders.first() else {
+        return Err(unsupported(format!("{topic}: no channel of it")));
+    };
+    if !decoder.stated().has_gyro {
+        return Err(unsupported(format!(
+            "{topic} ({}): carries no body rate\n  help: --field gyro=PATH names one",
+            described(channel)
+        )));
+    }
+    let mut gathering = Gathering::new(plan, Resolved::new(plan, decoder.stated()));
+    let described = described(channel);
+    let mut failure = None;
+    let reader = log.reader().map_or_else(|| mcap::Reader::open(path), Ok)?;
+    let walked = mcap::walk(
+        reader,
+        &WalkOptions {
+            pool: Some(pool.rayon()),
+            ..WalkOptions::default()
+        },
+        |met| {
+            decoders
+                .iter()
+                .find(|(known, _)| known.id == met.id && known.topic == met.topic)
+                .map(|(_, decoder)| Route::samples(decoder.clone(), 0))
+        },
+        Route::map,
+        |items| {
+            for item in items.drain(..) {
+                let taken = match item {
+                    Item::Sample(_, raw) => gathering.take(raw),
+                    Item::Undecodable(..) => {
+                        gathering.undecodable();
+                        Ok(())
+                    }
+                    Item::Reference(_) | Item::Copy(_) => Ok(()),
+                };
+                if let Err(what) = taken {
+                    failure = Some(what);
+                    return ControlFlow::Break(());
+                }
+            }
+            ControlFlow::Continue(())
+        },
+    )?;
+    let fails = |what| Error::Topic {
+        path: path.to_owned(),
+        topic: topic.clone(),
+        what,
+    };
+    if let Some(what) = failure {
+        return Err(fails(what));
+    }
+    let mut notes: Vec<String> = choice.note.into_iter().collect();
+    notes.extend(problems(&walked.survey));
+    gathering
+        .finish(
+            topic.clone(),
+            described,
+            notes,
+            walked.survey.problems.losses() > 0,
+        )
+        .map_err(fails)
+}
+
+/// A record being gathered.
+struct Gathering {
+    plan: Plan,
+    resolved: Resolved,
+    first: Vec<RawSample>,
+    running: Option<Conditioner>,
+    conditioned: Vec<RateSample>,
+    notes: Vec<String>,
+    record: AngleRecord,
+    detector: Stillness,
+    last: Option<(Nanos, Vector3<f64>)>,
+    begin: Option<Nanos>,
+    /// Intervals between samples that follow each other: how many, their sum, and the sum of the
+    /// squares of what they differ from the first, ns.
+    steps: u64,
+    step_sum: i128,
+    step_first: i64,
+    step_squares: f64,
+    filled: u64,
+    bridges: u64,
+    splits: u64,
+    undecodable: u64,
+}
+
+impl Gathering {
+    fn new(plan: &Plan, resolved: Resolved) -> Gathering {
+        Gathering {
+            plan: plan.clone(),
+            detector: Stillness::new(resolved.kind, Limits::default()),
+            resolved,
+            first: Vec::new(),
+            running: None,
+            conditioned: Vec::new(),
+            notes: Vec::new(),
+            record: AngleRecord::new(CAPACITY),
+            last: None,
+            begin: None,
+            steps: 0,
+            step_sum: 0,
+            step_first: 0,
+            step_squares: 0.0,
+            filled: 0,
+            bridges: 0,
+            splits: 0,
+            undecodable: 0,
+        }
+    }
+
+    fn take(&mut self, raw: RawSample) -> std::result::Result<(), String> {
+        match &mut self.running {
+            Some(conditioner) => {
+                conditioner.push(std::slice::from_ref(&raw), &mut self.conditioned);
+                self.drain();
+            }
+            None => {
+                self.first.push(raw);
+                if self.first.len() >= FEW {
+                    self.begin()?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn undecodable(&mut self) {
+        self.undecodable += 1;
+        if let Some(conditioner) = &mut self.running {
+            conditioner.push_undecodable(1);
+        }
+    }
+
+    fn begin(&mut self) -> std::result::Result<(), String> {
+        let first = std::mem::take(&mut self.first);
+        let (clock, warning) = choose_clock(&first, self.plan.clock);
+        if let Some(fatal @ ClockWarning::NoneMoves) = warning {
+            return Err(fatal.to_string());
+        }
+        self.notes.extend(warning.map(|w| w.to_string()));
+        let settings = self
+            .resolved
+            .conditioning(&self.plan, clock, Vector3::zeros());
+        let mut conditioner = Conditioner::new(&settings).map_err(|e| e.to_string())?;
+        conditioner.push(&first, &mut self.conditioned);
+        self.running = Some(conditioner);
+        self.drain();
+        Ok(())
+    }
+
+    fn drain(&mut self) {
+        let spacing = self
+            .running
+            .as_ref()
+            .and_then(|c| c.report().spacing_nanos)
+            .unwrap_or(0);
+        let mut samples = std::mem::take(&mut self.conditioned);
+        for sample in samples.drain(..) {
+            self.detector.push(&sample);
+            self.add(&sample, spacing);
+        }
+        self.conditioned = samples;
+    }
+
+    fn add(&mut self, sample: &RateSample, spacing: i64) {
+        self.begin.get_or_insert(sample.stamp);
+        let value = match self.resolved.kind {
+            SampleKind::Rate | SampleKind::DeltaAngle => sample.value,
+            SampleKind::Average => {
+                let secs = sample.stamp.secs_since(sample.start);
+                if secs <= 0.0 {
+                    return;
+                }
+                sample.value / secs
+            }
+        };
+        match (sample.join, self.last) {
+            (Join::Continuous, Some((last, _))) => {
+                let step = sample.stamp.since(last);
+                if self.steps == 0 {
+                    self.step_first = step;
+                }
+                self.steps += 1;
+                self.step_sum += i128::from(step);
+                self.step_squares += ((step - self.step_first) as f64).powi(2);
+            }
+            (Join::Bridge, Some((last, before))) => {
+                let step = sample.stamp.since(last);
+                let missing = if spacing > 0 {
+                    ((step + spacing / 2) / spacing - 1).max(0)
+                } else {
+                    0
+                };
+                self.bridges += 1;
+                self.filled += missing as u64;
+                for k in 1..=missing {
+                    let part = k as f64 / (missing + 1) as f64;
+                    self.record.push(&(before + (value - before) * part));
+                }
+            }
+            (Join::Start, _) | (_, None) => {}
+            (Join::Hold | Join::Reset, Some(_)) => {
+                self.splits += 1;
+                self.record.split();
+            }
+        }
+        self.record.push(&value);
+        self.last = Some((sample.stamp, value));
+    }
+
+    fn finish(
+        mut self,
+        topic: String,
+        described: String,
+        mut notes: Vec<String>,
+        lost_in_file: bool,
+    ) -> std::result::Result<Gathered, String> {
+        if self.running.is_none() {
+            self.begin()?;
+        }
+        let mut report = Report::default();
+        if let Some(mut conditioner) = self.running.take() {
+            conditioner.finish(&mut self.conditioned);
+            report = conditioner.report().clone();
+            self.running = Some(conditioner);
+        }
+        self.drain();
+        notes.append(&mut self.notes);
+        let steps = self.steps.max(1) as f64;
+        let mean = self.step_sum as f64 / steps;
+        let off = mean - self.step_first as f64;
+        Ok(Gathered {
+            topic,
+            described,
+            resolved: self.resolved,
+            record: self.record,
+            interval: mean * 1e-9,
+            unevenness: (self.step_squares / steps - off * off).max(0.0).sqrt() * 1e-9,
+            secs: self
+                .begin
+                .zip(self.last)
+                .map_or(0.0, |(begin, (end, _))| end.secs_since(begin)),
+            filled: self.filled,
+            bridges: self.bridges,
+            splits: self.splits,
+            rests: self.detector.finish(),
+            report,
+            undecodable: self.undecodable,
+            skipped: self.plan.start.unwrap_or(0.0),
+            notes,
+            lost_in_file,
+        })
+    }
+}
+
+impl Gathered {
+    /// Whether samples were lost.
+    pub(super) fn is_lossy(&self) -> bool {
+        self.lost_in_file || self.undecodable > 0 || self.report.counts.lost() > 0
+    }
+
+    /// Seconds at rest, of which the detector's last window may be cut short.
+    pub(super) fn resting(&self) -> f64 {
+        if self.rests.secs > 0.0 {
+            (self.rests.secs + Limits::default().window_secs).min(self.secs)
+        } else {
+            0.0
+        }
+    }
+
+    /// Whether it moved, so that what was fitted is motion and no noise.
+    pub(super) fn moved(&self) -> bool {
+        self.resting() < RESTING * self.secs
+    }
+
+    /// What is to be known before the numbers are believed.
+    pub(super) fn warnings(&self) -> Vec<String> {
+        let mut all = self.notes.clone();
+        if self.moved() {
+            all.push(self.moving());
+        }
+        if self.bridges > 0 {
+            all.push(format!(
+                "{} missing samples in {} places were filled with straight lines\n  help: --max-gap 0 splits the record there instead",
+                self.filled, self.bridges
+            ));
+        }
+        if self.splits > 0 {
+            all.push(format!(
+                "{} gaps split the record; no cluster reaches across one, so the longest times are lost",
+                self.splits
+            ));
+        }
+        if self.record.stride() > 1 {
+            all.push(format!(
+                "{} samples are more than the {CAPACITY} angles held: every {}th was kept, and the curve begins at {} s",
+                self.record.count(),
+                self.record.stride(),
+                significant(self.record.stride() as f64 * self.interval, 3)
+            ));
+        }
+        if self.unevenness > UNEVEN * self.interval {
+            all.push(format!(
+                "the stamps are uneven (rms {} of {} ms): samples were taken as evenly spaced",
+                significant(self.unevenness * 1e3, 3),
+                significant(self.interval * 1e3, 5)
+            ));
+        }
+        let lost = self.report.counts.lost() + self.undecodable;
+        if lost > 0 {
+            all.push(format!("{lost} samples could not be used"));
+        }
+        all
+    }
+
+    /// How much it moved, and which part did not.
+    fn moving(&self) -> String {
+        let said = format!(
+            "the sensor moved: at rest for {:.1} of {:.1} s, and motion looks like noise",
+            self.resting(),
+            self.secs
+        );
+        let longest = self
+            .rests
+            .kept
+            .iter()
+            .max_by(|a, b| a.secs().total_cmp(&b.secs()));
+        match (longest.filter(|r| r.secs() >= USEFUL), self.rests.first) {
+            (Some(rest), Some(begin)) => format!(
+                "{said}\n  help: its longest rest is --start {:.1} --until {:.1}",
+                self.skipped + rest.start.secs_since(begin),
+                self.skipped + rest.end.secs_since(begin)
+            ),
+            _ => format!(
+                "{said}\n  help: record the sensor fixed to something heavy; if the rates look too large, --gyro-unit deg"
+            ),
+        }
+    }
+}

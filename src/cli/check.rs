@@ -1,0 +1,116 @@
+//! `strapd check FILE`: every finding about a log, with the flag that helps. I/O.
+
+use super::{Global, Outcome, print};
+use crate::decode::{Options, printable};
+use crate::error::{Error, Result};
+use crate::pipeline::check::{Checked, check};
+use crate::pipeline::pool::Pool;
+use crate::report::findings::{Finding, Severity, findings};
+use clap::Args;
+use serde_json::json;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Everything that may spoil the attitude from a log: stamps, gaps, units, axes, bias, bad samples.
+#[derive(Args, Debug)]
+#[command(after_help = "Examples:
+  strapd check flight.mcap
+  strapd check flight.mcap --json | jq '.findings[] | select(.severity != \"note\")'
+
+Exit codes: 0 nothing found; 3 errors or warnings found. Notes alone are no finding.")]
+pub struct Check {
+    /// An MCAP file
+    #[arg(value_name = "FILE")]
+    pub file: PathBuf,
+    /// Only this topic, though it be not obviously an IMU's
+    #[arg(long, value_name = "NAME")]
+    pub topic: Option<String>,
+    /// Where a value lies in the message: ROLE=PATH, as in replay
+    #[arg(long = "field", value_name = "ROLE=PATH")]
+    pub fields: Vec<String>,
+}
+
+/// Runs it.
+///
+/// # Errors
+/// The log can not be read, or the topic named is not in it.
+pub fn run(global: &Global, args: &Check) -> Result<Outcome> {
+    let pool = Pool::new(global.threads)?;
+    let options = Options {
+        fields: args
+            .fields
+            .iter()
+            .map(|f| f.parse().map_err(|e| Error::Usage(format!("--field: {e}"))))
+            .collect::<Result<_>>()?,
+        ..Options::default()
+    };
+    let checked = check(&args.file, args.topic.as_deref(), &options, &pool)?;
+    let found = findings(&checked);
+    let worst = found.iter().map(|f| f.severity).max();
+    if global.json {
+        let value = json!({
+            "file": args.file.display().to_string(),
+            "findings": found.iter().map(Finding::json).collect::<Vec<_>>(),
+            "worst": worst.map(Severity::name),
+        });
+        print(&format!("{value}\n"))?;
+    } else {
+        print(&text(&args.file, &checked, &found))?;
+    }
+    Ok(if worst > Some(Severity::Note) {
+        Outcome::Lossy
+    } else {
+        Outcome::Done
+    })
+}
+
+fn text(file: &Path, checked: &Checked, found: &[Finding]) -> String {
+    let mut out = String::new();
+    let topics: Vec<String> = checked
+        .topics
+        .iter()
+        .map(|t| {
+            format!(
+                "{} ({} samples)",
+                printable(&t.looked.topic),
+                t.looked.quality.count
+            )
+        })
+        .collect();
+    let _ = writeln!(out, "{}  {}", file.display(), topics.join(", "));
+    for finding in found {
+        let topic = if checked.topics.len() > 1 && !finding.topic.is_empty() {
+            format!("{}: ", printable(&finding.topic))
+        } else {
+            String::new()
+        };
+        let _ = writeln!(
+            out,
+            "  {:<8} {:<22} {topic}{}",
+            finding.severity.name(),
+            finding.code,
+            finding.what
+        );
+        let advice = match (finding.advice.as_str(), finding.flags.as_str()) {
+            ("", "") => continue,
+            (advice, "") => advice.to_owned(),
+            ("", flags) => flags.to_owned(),
+            (advice, flags) => format!("{advice}: {flags}"),
+        };
+        let _ = writeln!(out, "  {:<31} -> {advice}", "");
+    }
+    let count = |severity| found.iter().filter(|f| f.severity == severity).count();
+    let _ = writeln!(
+        out,
+        "{}",
+        match (count(Severity::Error), count(Severity::Warning)) {
+            (0, 0) => "nothing wrong was found".to_owned(),
+            (errors, warnings) => format!(
+                "{errors} error{}, {warnings} warning{}",
+                if errors == 1 { "" } else { "s" },
+                if warnings == 1 { "" } else { "s" }
+            ),
+        }
+    );
+    out
+}

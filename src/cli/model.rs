@@ -1,0 +1,50 @@
+//! `strapd model top|inertia`: the model library at the command line, JSON in and out. I/O.
+//!
+//! Each model is a subcommand and a file. As a filter (`filter`) a model answers one JSON object per
+//! line of standard input; what people ask with flags is answered as text.
+
+mod filter;
+mod inertia;
+mod top;
+pub(crate) mod top_flags;
+
+use super::{Global, Outcome};
+use crate::error::Result;
+use clap::{Args, Subcommand};
+
+/// The model library: requests as NDJSON on stdin, answers on stdout.
+#[derive(Args, Debug)]
+#[command(
+    after_help = "Every request is a JSON object on one line; the answers come in order, one line each.
+What can not be answered becomes {\"error\": \"...\"} on its line, and the exit code is 3.
+SI units and radians.
+
+Examples:
+  strapd model top --compare                   the tables of docs/top.md, run now
+  strapd model inertia < requests.ndjson > answers.ndjson"
+)]
+pub struct Model {
+    /// Which model
+    #[command(subcommand)]
+    pub which: Which,
+}
+
+/// The models.
+#[derive(Subcommand, Debug)]
+pub enum Which {
+    /// The symmetric top: its cases, and how well each method finds its attitude
+    Top(Box<top::Top>),
+    /// Mass, centre of gravity, inertia -> 6x6 matrices, Coriolis forces, acceleration
+    Inertia(inertia::Inertia),
+}
+
+/// Runs it.
+///
+/// # Errors
+/// Standard input or output fails; flags that can not be.
+pub fn run(global: &Global, args: &Model) -> Result<Outcome> {
+    match &args.which {
+        Which::Top(command) => top::run(global, command),
+        Which::Inertia(command) => inertia::run(command),
+    }
+}

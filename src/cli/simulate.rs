@@ -1,0 +1,114 @@
+//! `strapd simulate MOTION -o SINK...`: a synthetic gyro with exact truth. I/O.
+//!
+//! A motion is a subcommand, a file of flags and a row in [`Simulate::made`].
+
+mod coning;
+mod random;
+mod rigid_body;
+mod sampling;
+mod top;
+
+use super::progress::Reporter;
+use super::{Global, Outcome, outputs, print};
+use crate::error::{Error, Result};
+use crate::model::motion::Motion;
+use crate::pipeline::pool::Pool;
+use crate::pipeline::simulate;
+use clap::{Args, Subcommand};
+use sampling::Common;
+use std::io::Write;
+
+/// Samples of a synthetic gyro whose true attitude is known exactly.
+#[derive(Args, Debug)]
+#[command(after_help = "Examples:
+  strapd simulate top -o top.mcap                        the seed's top, cusped, 2000 Hz
+  strapd simulate top --case looping --duration 60 -o top.ndjson
+  strapd simulate coning --half-angle-deg 1 --frequency-hz 10 --rate-hz 400 -o coning.mcap
+  strapd simulate top -o truth.mcap -o - | strapd replay - -o est.mcap \\
+    && strapd compare est.mcap truth.mcap                how good is the integration?")]
+pub struct Simulate {
+    /// Which motion
+    #[command(subcommand)]
+    pub motion: Which,
+}
+
+/// The motions.
+#[derive(Subcommand, Debug)]
+pub enum Which {
+    /// A heavy symmetric top on a fixed pivot: spins, precesses, nods
+    Top(top::Top),
+    /// Any rigid body about a fixed point, free or under gravity
+    RigidBody(rigid_body::RigidBody),
+    /// The axis runs round a cone: the worst case of attitude integration
+    Coning(coning::Coning),
+    /// Sums of sines about each axis, up to a highest frequency
+    Random(random::Random),
+}
+
+/// A motion, and what is to be said about it.
+#[derive(Debug)]
+struct Made {
+    motion: Motion,
+    /// m/s^2, downwards, where the motion itself depends on it.
+    gravity: Option<f64>,
+    /// What was asked for, as it will stand in the metadata.
+    parameters: Vec<(String, String)>,
+    /// Things to know about it.
+    notes: Vec<String>,
+}
+
+impl Simulate {
+    /// Name, common flags and motion.
+    fn made(&self) -> Result<(&'static str, &Common, Made)> {
+        Ok(match &self.motion {
+            Which::Top(m) => ("top", &m.common, m.made()?),
+            Which::RigidBody(m) => ("rigid-body", &m.common, m.made()?),
+            Which::Coning(m) => ("coning", &m.common, m.made()?),
+            Which::Random(m) => ("random", &m.common, m.made()?),
+        })
+    }
+}
+
+/// Runs it.
+///
+/// # Errors
+/// Flags that can not be; outputs that can not be written.
+pub fn run(global: &Global, args: &Simulate) -> Result<Outcome> {
+    let (name, common, made) = args.made()?;
+    let on_stdout = common.outputs.iter().any(|o| o == "-");
+    if global.json && on_stdout {
+        return Err(Error::Usage(
+            "--json and -o - would both write to stdout\n  help: give the samples a file name"
+                .to_owned(),
+        ));
+    }
+    outputs::check_distinct(&common.outputs, &[name.to_owned()])?;
+    let pool = Pool::new(global.threads)?;
+    let simulation = common.simulation(name, made)?;
+    let mut reporter = Reporter::new(global, name);
+    let result = simulate::run(simulation, &pool, &mut |position| reporter.update(position));
+    reporter.finish();
+    let summary = result?;
+    if summary.reader_gone {
+        return Ok(Outcome::Done);
+    }
+    if global.quiet {
+        for warning in summary.warnings() {
+            tracing::warn!("{name}: {warning}");
+        }
+    } else if global.json || on_stdout {
+        // A stderr that is gone leaves nobody to tell.
+        let _ = std::io::stderr().write_all(summary.text().as_bytes());
+    } else {
+        print(&summary.text())?;
+    }
+    if global.json {
+        print(&format!("{}\n", summary.json()))?;
+    }
+    Ok(Outcome::Done)
+}
+
+/// A flag's value as it stands in the metadata.
+fn parameter(name: &str, value: impl std::fmt::Display) -> (String, String) {
+    (name.to_owned(), value.to_string())
+}

@@ -1,0 +1,295 @@
+//! The flags every motion takes: how it is sampled, where the samples go. Pure.
+
+use super::{Made, parameter};
+use crate::cli::estimation::KindArg;
+use crate::cli::replay::CompressionArg;
+use crate::error::{Error, Result};
+use crate::model::imu_error::{ImuError, StampError};
+use crate::pipeline::simulate::Simulation;
+use crate::record::{Nanos, SampleKind};
+use crate::sink::{Options, Target};
+use crate::source::synthetic::{Sampling, Synthetic};
+use clap::Args;
+
+/// Gravity where the motion does not say otherwise: standard gravity.
+const GRAVITY: f64 = 9.80665;
+
+/// How a motion is sampled, and where the samples go.
+#[derive(Args, Debug, Clone)]
+#[command(next_help_heading = "Sampling")]
+pub struct Common {
+    /// Where the samples go: .mcap, .ndjson or .csv, - (NDJSON on stdout), null: (nowhere). May be
+    /// given several times
+    #[arg(
+        short,
+        long = "output",
+        value_name = "SINK",
+        required = true,
+        help_heading = "Output"
+    )]
+    pub outputs: Vec<String>,
+    /// Replace outputs that exist
+    #[arg(long, help_heading = "Output")]
+    pub force: bool,
+    /// Compression of MCAP outputs
+    #[arg(long, value_enum, default_value = "zstd", help_heading = "Output")]
+    pub compression: CompressionArg,
+    /// How fast: max, or a factor of data time such as 1 or 0.5
+    #[arg(
+        long,
+        value_name = "FACTOR",
+        default_value = "max",
+        help_heading = "Output"
+    )]
+    pub speed: String,
+    /// Samples a second
+    #[arg(
+        long,
+        value_name = "HZ",
+        default_value_t = 2000.0,
+        allow_negative_numbers = true
+    )]
+    pub rate_hz: f64,
+    /// Seconds from the first sample to the last
+    #[arg(
+        long,
+        value_name = "SECS",
+        default_value_t = 10.0,
+        allow_negative_numbers = true
+    )]
+    pub duration: f64,
+    /// What a sample is: the rate at its stamp, the mean over the interval that ends at its stamp, or
+    /// the integral over it
+    #[arg(long, value_enum, default_value = "rate")]
+    pub sample_kind: KindArg,
+    /// Seed of everything random; the same seed gives the same bytes
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// Errors of the sensor: none, a preset (consumer_mems, industrial_mems, tactical, navigation, ...),
+    /// or terms in the units of data sheets: arw=0.15,bias-instability=0.5,...
+    #[arg(
+        long,
+        value_name = "NOISE",
+        default_value = "none",
+        help_heading = "Errors"
+    )]
+    pub noise: String,
+    /// Samples are taken up to this part of an interval early or late, and the stamps say so
+    #[arg(
+        long,
+        value_name = "PART",
+        default_value_t = 0.0,
+        allow_negative_numbers = true,
+        help_heading = "Errors"
+    )]
+    pub jitter: f64,
+    /// Stamps are wrong by this part of an interval (1 sigma)
+    #[arg(
+        long,
+        value_name = "PART",
+        default_value_t = 0.0,
+        allow_negative_numbers = true,
+        help_heading = "Errors"
+    )]
+    pub stamp_jitter: f64,
+    /// Added to every stamp, seconds
+    #[arg(
+        long,
+        value_name = "SECS",
+        default_value = "0",
+        allow_hyphen_values = true,
+        help_heading = "Errors"
+    )]
+    pub stamp_offset: String,
+    /// The sensor's clock runs fast by this many millionths
+    #[arg(
+        long,
+        value_name = "PPM",
+        default_value_t = 0.0,
+        allow_negative_numbers = true,
+        help_heading = "Errors"
+    )]
+    pub stamp_drift: f64,
+    /// Part of the samples that is lost
+    #[arg(
+        long,
+        value_name = "PART",
+        default_value_t = 0.0,
+        allow_negative_numbers = true,
+        help_heading = "Errors"
+    )]
+    pub drop: f64,
+    /// Mean length of a run of lost samples
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 1.0,
+        allow_negative_numbers = true,
+        help_heading = "Errors"
+    )]
+    pub burst: f64,
+    /// Stamp of the first instant, seconds since 1970 (up to nine decimals)
+    #[arg(
+        long,
+        value_name = "SECS",
+        default_value = "1700000000",
+        allow_hyphen_values = true
+    )]
+    pub start_stamp: String,
+    /// frame_id of the sensor
+    #[arg(long, value_name = "FRAME", default_value = "imu_link")]
+    pub frame_id: String,
+}
+
+impl Common {
+    /// The simulation of this motion.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] naming the flag.
+    pub(super) fn simulation(&self, name: &str, made: Made) -> Result<Simulation> {
+        let kind = SampleKind::from(self.sample_kind);
+        let start = stamp("--start-stamp", &self.start_stamp)?;
+        let error = ImuError::parse(&self.noise)
+            .map_err(|e| Error::Usage(format!("--noise {}: {e}", self.noise)))?;
+        let stamps = self.stamps()?;
+        let gravity = made.gravity.unwrap_or(GRAVITY);
+        let sampling = Sampling {
+            rate_hz: self.rate_hz,
+            duration_secs: self.duration,
+            kind,
+            start,
+            gravity,
+            error,
+            stamps,
+            seed: self.seed,
+        };
+        let source = Synthetic::new(made.motion, sampling)
+            .map_err(|e| Error::Usage(format!("simulate {name}: {e}")))?;
+        let mut parameters = made.parameters;
+        parameters.extend([
+            parameter("gravity_m_s2", gravity),
+            parameter("rate_hz", self.rate_hz),
+            parameter("duration_s", self.duration),
+            parameter("seed", self.seed),
+            parameter("start_stamp_ns", start.0),
+            parameter("noise", error.text()),
+        ]);
+        for (name, value, plain) in [
+            ("jitter", stamps.sampling_jitter, 0.0),
+            ("stamp_jitter", stamps.stamp_jitter, 0.0),
+            ("stamp_offset_ns", stamps.offset_nanos as f64, 0.0),
+            ("stamp_drift_ppm", stamps.drift_ppm, 0.0),
+            ("drop", stamps.drop_probability, 0.0),
+            ("burst", stamps.burst_length, 1.0),
+        ] {
+            if value != plain {
+                parameters.push(parameter(name, value));
+            }
+        }
+        if let Some(sensor) = source.sensor() {
+            let bias = sensor.constants().bias;
+            if bias.amax() > 0.0 {
+                let text = format!("{},{},{}", bias.x, bias.y, bias.z);
+                parameters.push(parameter("unit_bias_rad_s", text));
+            }
+        }
+        Ok(Simulation {
+            name: name.to_owned(),
+            source,
+            kind,
+            rate_hz: self.rate_hz,
+            frame_id: self.frame_id.clone(),
+            targets: self
+                .outputs
+                .iter()
+                .map(|o| Target::parse(o))
+                .collect::<Result<_>>()?,
+            options: Options {
+                force: self.force,
+                compression: self.compression.into(),
+                ..Options::default()
+            },
+            speed: crate::cli::replay::speed(&self.speed)?,
+            parameters,
+            notes: made.notes,
+        })
+    }
+}
+
+impl Common {
+    fn stamps(&self) -> Result<StampError> {
+        let stamps = StampError {
+            offset_nanos: stamp("--stamp-offset", &self.stamp_offset)?.0,
+            drift_ppm: self.stamp_drift,
+            sampling_jitter: self.jitter,
+            stamp_jitter: self.stamp_jitter,
+            drop_probability: self.drop,
+            burst_length: self.burst,
+        };
+        stamps.check().map_err(|e| {
+            Error::Usage(format!(
+                "{e}\n  help: --stamp-drift, --jitter, --stamp-jitter, --drop, --burst"
+            ))
+        })?;
+        Ok(stamps)
+    }
+}
+
+/// Decimal seconds as whole nanoseconds: through a float today's epoch would lose 2e-7 s.
+fn stamp(flag: &str, text: &str) -> Result<Nanos> {
+    let parsed = || {
+        let (sign, digits) = match text.strip_prefix('-') {
+            Some(rest) => (-1, rest),
+            None => (1, text),
+        };
+        let (secs, rest) = digits.split_once('.').unwrap_or((digits, ""));
+        let all_digits = |s: &str| s.bytes().all(|b| b.is_ascii_digit());
+        if secs.is_empty() || rest.len() > 9 || !all_digits(secs) || !all_digits(rest) {
+            return None;
+        }
+        let nanos: i64 = format!("{rest:0<9}").parse().ok()?;
+        let whole = secs.parse::<i64>().ok()?.checked_mul(1_000_000_000)?;
+        Some(Nanos(sign * whole.checked_add(nanos)?))
+    };
+    parsed().ok_or_else(|| {
+        Error::Usage(format!(
+            "{flag} {text}: seconds with up to nine decimals are needed, at most 292 years"
+        ))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn a_start_stamp_is_exact_to_the_nanosecond() {
+        for (text, nanos) in [
+            ("0", 0),
+            ("1700000000.000000001", 1_700_000_000_000_000_001),
+            ("1.5", 1_500_000_000),
+            ("-0.000000001", -1),
+            ("9223372036.854775807", i64::MAX),
+        ] {
+            assert_eq!(
+                stamp("--start-stamp", text).unwrap(),
+                Nanos(nanos),
+                "{text}"
+            );
+        }
+        for bad in [
+            "",
+            "-",
+            "1e9",
+            "1.0000000001",
+            "9223372037",
+            "now",
+            "nan",
+            "1.-5",
+            "--1",
+        ] {
+            assert!(stamp("--start-stamp", bad).is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,357 @@
+//! Time -> joints: sinusoids, rests joined by smooth legs, knots. Pure.
+
+use super::error::bounded;
+use super::joints::{JOINTS, SeedJoints, SeedMotion};
+use super::limits::Limits;
+use super::{Arm, ArmError};
+
+mod knots;
+
+/// `c + A sin(w t + p)` with its derivatives.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct Sinusoid {
+    /// c
+    pub centre: f64,
+    /// A
+    pub amplitude: f64,
+    /// w, rad/s
+    pub angular_frequency: f64,
+    /// p, rad
+    pub phase: f64,
+}
+
+impl Sinusoid {
+    /// Value, first and second derivative at `secs`.
+    #[must_use]
+    pub fn at(&self, secs: f64) -> [f64; 3] {
+        let w = self.angular_frequency;
+        let (s, c) = (w * secs + self.phase).sin_cos();
+        let a = self.amplitude;
+        [self.centre + a * s, a * w * c, -a * w * w * s]
+    }
+
+    /// The same curve, `factor` times as slow.
+    #[must_use]
+    pub fn slowed(&self, factor: f64) -> Self {
+        Self {
+            angular_frequency: self.angular_frequency / factor,
+            ..*self
+        }
+    }
+
+    pub(super) fn checked(self, what: &'static str) -> Result<Self, ArmError> {
+        let Self {
+            centre,
+            amplitude,
+            angular_frequency,
+            phase,
+        } = self;
+        bounded(what, [centre, amplitude, phase], 1e4)?;
+        bounded(what, [angular_frequency], 1e3)?;
+        Ok(self)
+    }
+}
+
+/// The way from one rest to the next: `s(x) = 10 x^3 - 15 x^4 + 6 x^5`, least jerk, rate and
+/// acceleration zero at both ends. Fraction of the way and its two derivatives over `duration` s.
+pub(super) fn rest_to_rest(secs: f64, duration: f64) -> [f64; 3] {
+    let x = (secs / duration).clamp(0.0, 1.0);
+    let y = 1.0 - x;
+    [
+        x * x * x * (10.0 - x * (15.0 - 6.0 * x)),
+        30.0 * x * x * y * y / duration,
+        60.0 * x * y * (1.0 - 2.0 * x) / (duration * duration),
+    ]
+}
+
+/// Peak of the derivative of [`rest_to_rest`] over one second.
+pub(super) const PEAK: f64 = 15.0 / 8.0;
+
+/// One leg of a path: to these joints in so many seconds.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Leg {
+    /// Where it ends.
+    pub to: SeedJoints,
+    /// How long it takes, s.
+    pub duration: f64,
+}
+
+/// A path in joint space, parametrised by time from zero.
+#[derive(Clone, PartialEq, Debug)]
+pub enum JointPath {
+    /// Each joint by itself.
+    Sinusoids([Sinusoid; JOINTS]),
+    /// From rest to rest; it stays at the last.
+    Legs {
+        /// Where it starts.
+        from: SeedJoints,
+        /// In order.
+        legs: Vec<Leg>,
+    },
+    /// Joints, rates and accelerations at equal intervals; polynomials of fifth degree between.
+    Knots {
+        /// Interval, s.
+        step: f64,
+        /// The first is at zero.
+        knots: Vec<SeedMotion>,
+    },
+}
+
+impl JointPath {
+    /// Five sinusoids.
+    ///
+    /// # Errors
+    /// [`ArmError::NotFinite`]; [`ArmError::TooLarge`] beyond 1e4 rad or 1e3 rad/s.
+    pub fn sinusoids(joints: [Sinusoid; JOINTS]) -> Result<Self, ArmError> {
+        for joint in joints {
+            joint.checked("sinusoid of a joint")?;
+        }
+        Ok(Self::Sinusoids(joints))
+    }
+
+    /// Legs of given durations.
+    ///
+    /// # Errors
+    /// A duration below a millisecond or above 1e9 s.
+    pub fn legs(from: SeedJoints, legs: Vec<Leg>) -> Result<Self, ArmError> {
+        for leg in &legs {
+            bounded("duration of a leg (s)", [leg.duration], 1e9)?;
+            if leg.duration < 1e-3 {
+                return Err(ArmError::Impossible {
+                    what: "a leg must last at least a millisecond (s)",
+                    value: leg.duration,
+                });
+            }
+        }
+        Ok(Self::Legs { from, legs })
+    }
+
+    /// Through the given joints, resting at each, each leg as fast as the arm's fastest rates allow.
+    ///
+    /// # Errors
+    /// As [`JointPath::legs`].
+    pub fn through(arm: &Arm, points: &[SeedJoints]) -> Result<Self, ArmError> {
+        let fastest = arm.parameters().fastest;
+        let Some((first, rest)) = points.split_first() else {
+            return Err(ArmError::Impossible {
+                what: "a path needs at least one point",
+                value: 0.0,
+            });
+        };
+        let mut before = *first;
+        let mut legs = Vec::with_capacity(rest.len());
+        for to in rest {
+            let mut duration = 1e-3_f64;
+            for ((a, b), limit) in before.angles().iter().zip(to.angles()).zip(fastest) {
+                duration = duration.max(PEAK * (b - a).abs() / limit);
+            }
+            legs.push(Leg { to: *to, duration });
+            before = *to;
+        }
+        Self::legs(*first, legs)
+    }
+
+    /// Knots every `step` seconds.
+    ///
+    /// # Errors
+    /// A step below a microsecond or above 1000 s; no knots.
+    pub fn knots(step: f64, knots: Vec<SeedMotion>) -> Result<Self, ArmError> {
+        bounded("interval between knots (s)", [step], 1e3)?;
+        if step < 1e-6 || knots.is_empty() {
+            return Err(ArmError::Impossible {
+                what: "knots must be at least one, and a microsecond apart (s)",
+                value: step,
+            });
+        }
+        Ok(Self::Knots { step, knots })
+    }
+
+    /// Default motion of the simulator: every joint swings between its stops, none above 90 deg/s.
+    #[must_use]
+    pub fn demonstration() -> Self {
+        let swing = |centre, amplitude, angular_frequency, phase| Sinusoid {
+            centre,
+            amplitude,
+            angular_frequency,
+            phase,
+        };
+        Self::Sinusoids([
+            swing(0.0, 1.1, 0.7, 0.0),
+            swing(-0.3, 0.35, 1.1, 0.4),
+            swing(0.6, 0.5, 1.3, 1.0),
+            swing(1.4, 0.6, 0.9, -0.5),
+            swing(0.0, 1.6, 0.8, 0.2),
+        ])
+    }
+
+    /// Length in s; `None` for a path without end.
+    #[must_use]
+    pub fn duration(&self) -> Option<f64> {
+        match self {
+            Self::Sinusoids(_) => None,
+            Self::Legs { legs, .. } => Some(legs.iter().map(|leg| leg.duration).sum()),
+            Self::Knots { step, knots } => Some(step * (knots.len() - 1) as f64),
+        }
+    }
+
+    /// Joints, rates and accelerations at `secs`; before the start and after the end it rests.
+    ///
+    /// # Errors
+    /// [`ArmError::NotFinite`] time; [`ArmError::TooLarge`] beyond 1e9 s.
+    pub fn at(&self, secs: f64) -> Result<SeedMotion, ArmError> {
+        bounded("time on the path (s)", [secs], 1e9)?;
+        let motion = self.motion(secs);
+        SeedMotion::new(
+            SeedJoints::new(motion.q().angles())?,
+            motion.qd(),
+            motion.qdd(),
+        )
+    }
+
+    /// As [`JointPath::at`] for a finite time, without a look at the size of the numbers.
+    pub(super) fn motion(&self, secs: f64) -> SeedMotion {
+        match self {
+            Self::Sinusoids(joints) => {
+                let (mut q, mut qd, mut qdd) = ([0.0; JOINTS], [0.0; JOINTS], [0.0; JOINTS]);
+                for (i, joint) in joints.iter().enumerate() {
+                    [q[i], qd[i], qdd[i]] = joint.at(secs);
+                }
+                SeedMotion::computed(q, qd, qdd)
+            }
+            Self::Knots { step, knots } => knots::at(*step, knots, secs),
+            Self::Legs { from, legs } => {
+                let mut start = 0.0;
+                let mut before = *from;
+                for leg in legs {
+                    if secs < start + leg.duration {
+                        return along(&before, leg, secs - start);
+                    }
+                    start += leg.duration;
+                    before = leg.to;
+                }
+                before.at_rest()
+            }
+        }
+    }
+
+    /// Whether no joint ever passes its stop.
+    ///
+    /// # Errors
+    /// [`ArmError::Limit`] with the joint and the farthest it goes; for knots also the time.
+    pub fn check(&self, limits: &Limits) -> Result<(), ArmError> {
+        match self {
+            Self::Sinusoids(joints) => {
+                for side in [1.0, -1.0] {
+                    let farthest = joints.map(|j| {
+                        if j.angular_frequency == 0.0 {
+                            return j.centre + j.amplitude * j.phase.sin();
+                        }
+                        j.centre + j.amplitude.abs() * side
+                    });
+                    limits.check(&SeedJoints::new(farthest)?)?;
+                }
+                Ok(())
+            }
+            // Between two points every joint stays between its two angles.
+            Self::Legs { from, legs } => {
+                limits.check(from)?;
+                legs.iter().try_for_each(|leg| limits.check(&leg.to))
+            }
+            Self::Knots { step, knots } => {
+                for (knot, i) in knots.iter().zip(0_u32..) {
+                    limits.check(knot.q()).map_err(|why| ArmError::Path {
+                        secs: step * f64::from(i),
+                        why: Box::new(why),
+                    })?;
+                }
+                Ok(())
+            }
+        }
+    }
+
+    /// The fastest each joint ever moves, rad/s; exact but for knots, of which it knows the knots.
+    #[must_use]
+    pub fn peak_rates(&self) -> [f64; JOINTS] {
+        match self {
+            Self::Sinusoids(joints) => {
+                joints.map(|joint| (joint.amplitude * joint.angular_frequency).abs())
+            }
+            Self::Legs { from, legs } => {
+                let mut peaks = [0.0_f64; JOINTS];
+                let mut before = from.angles();
+                for leg in legs {
+                    let to = leg.to.angles();
+                    for ((peak, a), b) in peaks.iter_mut().zip(before).zip(to) {
+                        *peak = peak.max(PEAK * (b - a).abs() / leg.duration);
+                    }
+                    before = to;
+                }
+                peaks
+            }
+            Self::Knots { knots, .. } => knots.iter().fold([0.0; JOINTS], |mut peaks, knot| {
+                for (peak, rate) in peaks.iter_mut().zip(knot.qd()) {
+                    *peak = rate.abs().max(*peak);
+                }
+                peaks
+            }),
+        }
+    }
+
+    /// The same path, `factor` times as slow.
+    ///
+    /// # Errors
+    /// A factor that is not above zero and finite, or takes the path out of what [`JointPath::legs`] and
+    /// [`JointPath::sinusoids`] accept.
+    pub fn slowed(&self, factor: f64) -> Result<Self, ArmError> {
+        bounded("slow-down factor", [factor], 1e9)?;
+        if factor <= 0.0 {
+            return Err(ArmError::Impossible {
+                what: "a slow-down factor must be above zero",
+                value: factor,
+            });
+        }
+        match self {
+            Self::Sinusoids(joints) => Self::sinusoids(joints.map(|joint| joint.slowed(factor))),
+            Self::Legs { from, legs } => {
+                let mut legs = legs.clone();
+                for leg in &mut legs {
+                    leg.duration *= factor;
+                }
+                Self::legs(*from, legs)
+            }
+            Self::Knots { step, knots } => {
+                let slow = |knot: &SeedMotion| {
+                    let qd = knot.qd().map(|w| w / factor);
+                    let qdd = knot.qdd().map(|a| a / (factor * factor));
+                    SeedMotion::new(*knot.q(), qd, qdd)
+                };
+                let knots: Result<Vec<_>, _> = knots.iter().map(slow).collect();
+                Self::knots(step * factor, knots?)
+            }
+        }
+    }
+
+    /// Slowed as much as the arm's fastest rates ask, and by how much.
+    ///
+    /// # Errors
+    /// As [`JointPath::slowed`].
+    pub fn within_rates(&self, arm: &Arm) -> Result<(Self, f64), ArmError> {
+        let mut factor = 1.0_f64;
+        for (peak, limit) in self.peak_rates().into_iter().zip(arm.parameters().fastest) {
+            factor = factor.max(peak / limit);
+        }
+        Ok((self.slowed(factor)?, factor))
+    }
+}
+
+/// A leg, `secs` after its start.
+fn along(from: &SeedJoints, leg: &Leg, secs: f64) -> SeedMotion {
+    let [s, sd, sdd] = rest_to_rest(secs, leg.duration);
+    let start = from.angles();
+    let (mut q, mut qd, mut qdd) = (start, [0.0; JOINTS], [0.0; JOINTS]);
+    for (i, (a, b)) in start.into_iter().zip(leg.to.angles()).enumerate() {
+        let way = b - a;
+        (q[i], qd[i], qdd[i]) = (a + way * s, way * sd, way * sdd);
+    }
+    SeedMotion::computed(q, qd, qdd)
+}

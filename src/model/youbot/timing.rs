@@ -1,0 +1,20 @@
+//! A motion faster than the joints -> by how much to stretch time. Pure.
+
+use super::Arm;
+use super::joints::SeedMotion;
+
+/// The factor k >= 1 by which a path must be slowed so that no joint exceeds its fastest rate: time
+/// runs k times as long, rates fall by k, accelerations by k^2, the path stays.
+///
+/// Knows only the instants it is shown: sample finely, or use [`super::JointPath::peak_rates`].
+#[must_use]
+pub fn slow_down_factor<'a>(arm: &Arm, motions: impl IntoIterator<Item = &'a SeedMotion>) -> f64 {
+    let fastest = arm.parameters().fastest;
+    let mut factor = 1.0_f64;
+    for motion in motions {
+        for (qd, limit) in motion.qd().iter().zip(fastest) {
+            factor = factor.max(qd.abs() / limit);
+        }
+    }
+    factor
+}

@@ -1,0 +1,186 @@
+//! A recorded orientation, and what it says about the samples -> findings. Pure.
+
+use super::{Finding, Severity};
+use crate::compare::BodyAxesFit;
+use crate::pipeline::check::CheckedTopic;
+use crate::report::summary::{Against, Recorded, significant};
+use serde_json::json;
+
+/// A meaning is better when its median error is below this share of the other's.
+const CLEARLY: f64 = 0.95;
+/// Other axes explain an error when they leave less than this share of it.
+const EXPLAINED: f64 = 0.4;
+/// Errors over 1 s below this need no explanation, rad (2 degrees).
+const SMALL: f64 = 0.035;
+/// An orientation that misses the motion by this share of it does not follow the gyro.
+const ANOTHER_MOTION: f64 = 0.5;
+
+pub(super) fn find(topic: &CheckedTopic, out: &mut Vec<Finding>) {
+    let Ok(summary) = &topic.replayed else {
+        return;
+    };
+    let Some(recorded) = &summary.recorded else {
+        if !topic.looked.kind_stated {
+            out.push(meaning_unknown());
+        }
+        return;
+    };
+    let trusted = is_truth(recorded, out);
+    let used = summary.kind.name();
+    match best_meaning(&summary.against) {
+        Some(best) if trusted => meaning(&summary.against, best, used, out),
+        _ if !topic.looked.kind_stated => out.push(meaning_unknown()),
+        _ => {}
+    }
+}
+
+fn meaning_unknown() -> Finding {
+    Finding::new(
+        Severity::Note,
+        "sample-kind-unknown",
+        "nothing says whether a sample is the rate at its stamp or the mean over its interval; it is taken as the rate",
+    )
+    .advise("the sensor's manual says it; it matters more than the integrator")
+    .flags("--sample-kind rate|average|delta-angle")
+}
+
+fn best_meaning(rows: &[Against]) -> Option<&Against> {
+    rows.iter()
+        .min_by(|a, b| a.median_deg.total_cmp(&b.median_deg))
+}
+
+/// Which meaning of a sample fits, when it is clearly not the one used.
+fn meaning(rows: &[Against], best: &Against, used: &str, out: &mut Vec<Finding>) {
+    let Some(current) = rows.iter().find(|r| r.kind == used) else {
+        return;
+    };
+    if best.median_deg >= CLEARLY * current.median_deg {
+        return;
+    }
+    let flags = match best.kind {
+        "held" => "--method dcm-left".to_owned(),
+        kind => format!("--sample-kind {kind}"),
+    };
+    out.push(
+        Finding::new(
+            Severity::Warning,
+            "sample-kind",
+            format!(
+                "taken as {used}, the samples miss the recorded orientation by {} deg over 1 s (median); as {}, by {} deg",
+                significant(current.median_deg, 3),
+                best.meaning,
+                significant(best.median_deg, 3)
+            ),
+        )
+        .with(
+            "median_deg",
+            json!(
+                rows.iter()
+                    .map(|r| (r.kind.to_owned(), json!(r.median_deg)))
+                    .collect::<serde_json::Map<_, _>>()
+            ),
+        )
+        .with("pairs", best.pairs)
+        .advise("take them so")
+        .flags(flags),
+    );
+}
+
+/// Whether the recorded orientation can be a reference; what is wrong with it is said.
+fn is_truth(recorded: &Recorded, out: &mut Vec<Finding>) -> bool {
+    if recorded.unusable > 0 {
+        out.push(
+            Finding::new(
+                Severity::Warning,
+                "orientation-invalid",
+                format!(
+                    "{} recorded orientations are no rotation (zero, NaN, or far from norm 1)",
+                    recorded.unusable
+                ),
+            )
+            .with("count", recorded.unusable)
+            .with("usable", recorded.usable)
+            .advise("they are left out of comparisons; do not start from one"),
+        );
+    }
+    if recorded.constant {
+        out.push(
+            Finding::new(
+                Severity::Warning,
+                "orientation-constant",
+                format!(
+                    "all {} recorded orientations are the same: the field is not filled",
+                    recorded.usable
+                ),
+            )
+            .with("count", recorded.usable)
+            .advise("it is no reference"),
+        );
+        return false;
+    }
+    recorded.axes.is_none_or(|fit| axes_agree(&fit, out))
+}
+
+fn axes_agree(fit: &BodyAxesFit, out: &mut Vec<Finding>) -> bool {
+    if fit.as_recorded < SMALL {
+        return true;
+    }
+    let [w, x, y, z] = fit.turn.wxyz();
+    let deg = f64::to_degrees;
+    let evidence = |finding: Finding| {
+        finding
+            .with("pairs", fit.pairs)
+            .with("median_turn_deg", deg(fit.median_turn))
+            .with("as_recorded_deg", deg(fit.as_recorded))
+            .with("turned_deg", deg(fit.turned))
+            .with("turn_wxyz", json!([w, x, y, z]))
+    };
+    if fit.inverse {
+        out.push(evidence(
+            Finding::new(
+                Severity::Warning,
+                "orientation-inverse",
+                format!(
+                    "the recorded orientation follows the gyro only as its inverse ({} deg over 1 s instead of {}): it takes world to body, or its numbers are in another order",
+                    significant(deg(fit.turned), 3),
+                    significant(deg(fit.as_recorded), 3)
+                ),
+            )
+            .advise("invert it where it was written; docs/conventions.md lists who means what"),
+        ));
+        return false;
+    }
+    if fit.turned < EXPLAINED * fit.as_recorded {
+        out.push(evidence(
+            Finding::new(
+                Severity::Warning,
+                "orientation-other-axes",
+                format!(
+                    "the recorded orientation is that of other body axes, turned by {:.1} deg (q w {w:.4} x {x:.4} y {y:.4} z {z:.4}) from the gyro's: {} deg over 1 s as recorded, {} deg with the turn",
+                    deg(2.0 * w.abs().min(1.0).acos()),
+                    significant(deg(fit.as_recorded), 3),
+                    significant(deg(fit.turned), 3)
+                ),
+            )
+            .advise("state the gyro's axes, or its mounting")
+            .flags(format!("--mount q={w:.6},{x:.6},{y:.6},{z:.6}")),
+        ));
+        return false;
+    }
+    if fit.as_recorded > ANOTHER_MOTION * fit.median_turn {
+        out.push(evidence(
+            Finding::new(
+                Severity::Warning,
+                "orientation-unrelated",
+                format!(
+                    "the recorded orientation does not follow the gyro: {} deg of error over 1 s, of {} deg turned",
+                    significant(deg(fit.as_recorded), 3),
+                    significant(deg(fit.median_turn), 3)
+                ),
+            )
+            .advise("it is no truth for these samples, or their clocks differ"),
+        ));
+        return false;
+    }
+    true
+}

@@ -1,0 +1,115 @@
+//! Each term's measured curve lies on its theory.
+
+use super::{at_rest, curve};
+use strapd::model::allan::variance;
+use strapd::model::imu_error::ImuError;
+use strapd::record::SampleKind::{self, Average, DeltaAngle, Rate};
+
+const STEP: i64 = 10_000_000;
+
+/// Mean over the axes of measured / theoretical variance within `taus`, and the standard error of one
+/// point's mean as `Point::error` states it.
+fn ratios(
+    error: &ImuError,
+    kind: SampleKind,
+    n: usize,
+    taus: [f64; 2],
+    rate: f64,
+) -> Vec<(f64, f64, f64)> {
+    let record = at_rest(error, kind, STEP, n, 7, rate);
+    let curves = [0, 1, 2].map(|axis| curve(&record, axis, STEP));
+    (0..curves[0].len())
+        .map(|k| {
+            let tau = curves[0][k].tau;
+            let mean = curves.iter().map(|c| c[k].sigma.powi(2)).sum::<f64>() / 3.0;
+            (
+                tau,
+                mean / variance(error, tau),
+                2.0 * curves[0][k].error / 3f64.sqrt(),
+            )
+        })
+        .filter(|(tau, ..)| *tau >= taus[0] && *tau <= taus[1])
+        .collect()
+}
+
+/// Every point within four of its standard errors of the theory, and `slack` beside them.
+fn holds(text: &str, kind: SampleKind, n: usize, taus: [f64; 2], rate: f64, slack: f64) {
+    let error = ImuError::parse(text).unwrap();
+    let points = ratios(&error, kind, n, taus, rate);
+    assert!(points.len() > 10, "{text}: {} points", points.len());
+    for (tau, ratio, sigma) in points {
+        assert!(
+            (ratio - 1.0).abs() < 4.0 * sigma + slack,
+            "{text} {}: at {tau} s the variance is {ratio} of the theory's, +- {sigma}",
+            kind.name()
+        );
+    }
+}
+
+#[test]
+fn white_noise_falls_with_the_root_of_tau_for_every_sample_kind() {
+    for kind in [Rate, Average, DeltaAngle] {
+        holds("arw=0.3", kind, 40_000, [0.0, 1e9], 0.0, 0.0);
+    }
+}
+
+#[test]
+fn a_random_walk_of_the_rate_rises_with_the_root_of_tau() {
+    // From ten samples on: below, the steps of the walk show.
+    for kind in [Rate, DeltaAngle] {
+        holds("rrw=2", kind, 40_000, [0.1, 1e9], 0.0, 0.01);
+    }
+}
+
+#[test]
+fn a_ramp_rises_with_tau() {
+    holds("rate-ramp=1000", Rate, 20_000, [0.1, 1e9], 0.0, 0.0);
+    holds("rate-ramp=1000", DeltaAngle, 20_000, [0.0, 1e9], 0.0, 1e-6);
+}
+
+#[test]
+fn quantisation_falls_with_tau() {
+    // Noise of half a step a sample makes the remainders independent, as the theory has them.
+    for kind in [Rate, Average, DeltaAngle] {
+        holds(
+            "arw=0.5,quantization=2",
+            kind,
+            40_000,
+            [0.0, 1e9],
+            0.012_345,
+            0.01,
+        );
+    }
+}
+
+#[test]
+fn a_gauss_markov_bias_has_its_hump() {
+    holds("gm-sigma=10,gm-tau=2", Rate, 60_000, [0.2, 1e9], 0.0, 0.02);
+}
+
+#[test]
+fn flicker_has_a_floor() {
+    // Away from the shortest correlation time, where the floor is being reached.
+    holds("bias-instability=5", Rate, 60_000, [0.3, 60.0], 0.0, 0.05);
+    // Slow parts drawn at knots and fast ones at each sample give the same floor.
+    holds(
+        "bias-instability=5,flicker-tau-min=0.01,flicker-tau-max=1000",
+        Average,
+        60_000,
+        [0.3, 60.0],
+        0.0,
+        0.05,
+    );
+}
+
+#[test]
+fn terms_add_up() {
+    holds(
+        "arw=0.05,bias-instability=40,rrw=300",
+        Rate,
+        60_000,
+        [0.1, 1e9],
+        0.0,
+        0.03,
+    );
+}

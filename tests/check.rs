@@ -1,0 +1,41 @@
+//! Promise: `strapd check` finds what is wrong with a log, invents nothing, and its advice helps.
+
+#![cfg(feature = "service")]
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
+#[path = "check/faults.rs"]
+mod faults;
+mod made_logs;
+#[path = "check/recordings.rs"]
+mod recordings;
+mod replays;
+#[allow(unreachable_pub)]
+mod shared_data;
+
+use std::path::Path;
+use strapd::decode::Options;
+use strapd::pipeline::check::check;
+use strapd::pipeline::pool::Pool;
+use strapd::report::findings::{Finding, Severity, findings};
+
+fn found(path: &Path) -> Vec<Finding> {
+    let pool = Pool::new(2).unwrap();
+    findings(&check(path, None, &Options::default(), &pool).unwrap())
+}
+
+/// The codes of errors and warnings, each once, sorted.
+fn codes(found: &[Finding]) -> Vec<&'static str> {
+    let mut codes: Vec<_> = found
+        .iter()
+        .filter(|f| f.severity > Severity::Note)
+        .map(|f| f.code)
+        .collect();
+    codes.sort_unstable();
+    codes.dedup();
+    codes
+}
+
+fn notes(found: &[Finding]) -> Vec<&'static str> {
+    let is_note = |f: &&Finding| f.severity == Severity::Note;
+    found.iter().filter(is_note).map(|f| f.code).collect()
+}
