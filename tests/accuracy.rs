@@ -14,6 +14,8 @@ mod live;
 mod integration_error;
 #[path = "accuracy/noise.rs"]
 mod noise;
+#[path = "accuracy/orders.rs"]
+mod orders;
 #[path = "accuracy/peers.rs"]
 mod peers;
 #[path = "accuracy/random.rs"]
@@ -44,7 +46,7 @@ const fn centred(window: usize, order: Order) -> Method {
     }
 }
 
-fn causal(window: usize, order: Order) -> Method {
+const fn causal(window: usize, order: Order) -> Method {
     Method::Magnus {
         window,
         order,

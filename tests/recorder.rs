@@ -20,7 +20,7 @@ use strapd::model::attitude::Quaternion;
 use strapd::pipeline::pool::Pool;
 use strapd::pipeline::recover::{Recover, Recovered, run};
 use strapd::pipeline::run::Source;
-use strapd::record::{AttitudeSample, Nanos, RawSample, Status};
+use strapd::record::{AttitudeCovariance, AttitudeSample, Nanos, RawSample, Status};
 use strapd::sink::{Options, Target};
 
 /// Sample `k` of a sensor that sends `rate_hz` a second. Its last digits differ from sample to sample, so
@@ -47,7 +47,7 @@ fn attitude(raw: &RawSample) -> AttitudeSample {
         q_nb: Quaternion::assume_unit([(0.5 * x).cos(), (0.5 * x).sin(), 0.0, 0.0]),
         rate: Vector3::new(x, y, z),
         accel: raw.accel.map(Vector3::from),
-        sigma: Vector3::new(1e-5, 2e-5, 3e-5),
+        covariance: AttitudeCovariance::from_sigma(Vector3::new(1e-5, 2e-5, 3e-5)),
         status: Status::OK,
         reset_count: 0,
         log: raw.log,

@@ -18,7 +18,11 @@ fn clean(seed: u64) -> Vec<ImuSample> {
             let spin = motion.at_nanos((moving * step) as u64);
             let q = (first.inverse() * spin.q_nb).normalised();
             let up = q.to_dcm().as_matrix().transpose() * nalgebra::Vector3::z();
-            let gyro = if k < still { [0.0; 3] } else { spin.w_nb_b.into() };
+            let gyro = if k < still {
+                [0.0; 3]
+            } else {
+                spin.w_nb_b.into()
+            };
             ImuSample {
                 stamp: START + k * step,
                 orientation: Some(q.wxyz()),
