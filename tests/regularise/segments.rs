@@ -34,7 +34,7 @@ fn noisy(seed: u64, n: i64, step: f64, sigma: f64) -> impl Iterator<Item = i64> 
 
 #[test]
 fn an_even_clock_is_one_segment_whatever_its_jitter() {
-    for seed in 0..10 {
+    for seed in 0..4 {
         for sigma in [0.0, 1e-6, 1e-3, 0.02, 0.1, 0.12] {
             let samples = rates(noisy(seed, 20_000, STEP as f64, sigma));
             let lines = lines(&samples);
