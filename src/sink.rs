@@ -9,7 +9,7 @@
 mod batch;
 mod csv;
 mod decimate;
-mod json;
+pub(crate) mod json;
 mod mcap;
 mod output;
 mod stream;
