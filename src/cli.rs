@@ -4,6 +4,7 @@
 
 pub mod cat;
 pub mod compare;
+pub mod config;
 pub mod estimation;
 pub mod info;
 pub mod manual;
@@ -112,6 +113,8 @@ pub enum Command {
     Replay(Box<replay::Replay>),
     /// Samples in over sockets, attitude out to whoever watches
     Serve(Box<serve::Serve>),
+    /// Look at a configuration file of `serve`
+    Config(config::Config),
     /// What a log holds: topics, rates, clocks, frames, and what to do next
     Info(info::Info),
     /// Time-aligned angle error between two attitudes
@@ -156,6 +159,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
     match cli.command {
         Command::Replay(command) => replay::run(&cli.global, &command),
         Command::Serve(command) => serve::run(&cli.global, &command),
+        Command::Config(command) => config::run(&command),
         Command::Info(command) => info::run(&cli.global, &command),
         Command::Compare(command) => compare::run(&cli.global, &command),
         Command::Cat(command) => cat::run(&cli.global, &command),

@@ -41,6 +41,7 @@ use hub::Hub;
 use limits::Limits;
 use listen::{Context, Listener};
 use shutdown::Shutdown;
+use std::collections::BTreeMap;
 use std::future::Future;
 use std::sync::Arc;
 use tap::Tap;
@@ -49,8 +50,11 @@ use tokio::sync::Semaphore;
 /// What a daemon is to do.
 #[derive(Debug, Default)]
 pub struct Settings {
-    /// How samples are understood and integrated, for every sensor.
+    /// How samples are understood and integrated. Its `--field` paths hold for every sensor: a line is
+    /// read before it is known whose it is.
     pub plan: Plan,
+    /// For sensors that are understood in another way, by `id`.
+    pub plans: BTreeMap<String, Plan>,
     /// Where to listen.
     pub listen: Vec<Listen>,
     /// The bounds.
@@ -74,32 +78,43 @@ pub struct Server {
     bound: Vec<Listen>,
 }
 
+impl Settings {
+    /// Checks what can be judged without binding anything.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] when a plan is none for live streams, or an address is open to others and no
+    /// token is asked for.
+    pub fn check(self) -> Result<()> {
+        for listen in &self.listen {
+            check_reach(listen, &self)?;
+        }
+        Hub::new(self).map(|_| ())
+    }
+}
+
 impl Server {
     /// Listens on everything, or on nothing.
     ///
     /// # Errors
     /// [`Error::Usage`] when the plan is none for live streams or an address is open to others and
     /// no token is asked for; [`Error::Bind`].
-    pub async fn bind(settings: Settings) -> Result<Server> {
+    pub async fn bind(mut settings: Settings) -> Result<Server> {
         for listen in &settings.listen {
             check_reach(listen, &settings)?;
         }
-        let hub = Hub::new(
-            &settings.plan,
-            settings.limits,
-            settings.token,
-            settings.tap,
-        )?;
+        let listen = std::mem::take(&mut settings.listen);
+        let web = std::mem::take(&mut settings.web);
+        let hub = Hub::new(settings)?;
         let mut listeners = Vec::new();
         let mut bound = Vec::new();
-        for listen in &settings.listen {
+        for listen in &listen {
             let (listener, address) = Listener::bind(listen).await?;
             listeners.push(listener);
             bound.push(address);
         }
         Ok(Server {
             hub: Arc::new(hub),
-            web: Arc::new(settings.web),
+            web: Arc::new(web),
             listeners,
             bound,
         })

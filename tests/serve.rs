@@ -13,6 +13,8 @@ mod serve {
 
     mod admission;
     mod bad_lines;
+    mod config;
+    mod documentation;
     mod limits;
     mod operations;
     mod same_bytes;

@@ -9,6 +9,7 @@ use crate::serve::limits::Limits;
 use crate::serve::shutdown::{self, Signals};
 use crate::serve::{Server, Settings, listen};
 use clap::Args;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 
@@ -32,6 +33,9 @@ pub struct Serve {
     /// [default: tcp-listen://127.0.0.1:4550 and ws-listen://127.0.0.1:8765]
     #[arg(long, value_name = "URI")]
     pub listen: Vec<String>,
+    /// Take what is not given as a flag or in the environment from this TOML file
+    #[arg(long, value_name = "FILE", env = "STRAPD_CONFIG")]
+    pub config: Option<PathBuf>,
     #[command(flatten)]
     #[allow(missing_docs)]
     pub estimation: Estimation,
@@ -64,7 +68,10 @@ pub fn run(global: &Global, args: &Serve) -> Result<Outcome> {
             "serve {other}: only - (standard input) is a source\n  help: --listen waits for senders; strapd replay reads a log"
         )));
     }
-    let settings = args.settings()?;
+    let settings = match &args.config {
+        Some(file) => super::config::layered(file, std::env::args_os().collect())?.settings()?,
+        None => args.settings()?,
+    };
     let mut builder = tokio::runtime::Builder::new_multi_thread();
     if global.threads > 0 {
         builder.worker_threads(global.threads);
@@ -120,7 +127,7 @@ impl Serve {
     ///
     /// # Errors
     /// [`Error::Usage`] naming the flag; the token file can not be read.
-    fn settings(&self) -> Result<Settings> {
+    pub(crate) fn settings(&self) -> Result<Settings> {
         let given: Vec<&str> = if self.listen.is_empty() {
             DEFAULTS.to_vec()
         } else {
@@ -128,6 +135,7 @@ impl Serve {
         };
         Ok(Settings {
             plan: self.estimation.plan()?,
+            plans: BTreeMap::new(),
             listen: given
                 .into_iter()
                 .map(Listen::parse)

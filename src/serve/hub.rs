@@ -5,6 +5,7 @@
 //! the clients' outboxes. Sensors run side by side on as many cores as there are; within one the
 //! order is that of its lock.
 
+use super::Settings;
 use super::admission::Token;
 use super::limits::Limits;
 use super::stream::{SensorStream, live_plan};
@@ -12,7 +13,7 @@ use super::subscriber::{Chunk, Outbox};
 use super::tap::{Tap, Tapped};
 use super::wire::{self, Fault};
 use crate::config::Plan;
-use crate::decode::{Line, LineDecoder};
+use crate::decode::{Line, LineDecoder, printable};
 use crate::error::{Error, Result};
 use crate::record::{Nanos, RawSample};
 use bytes::Bytes;
@@ -30,6 +31,8 @@ const CHUNK_BYTES: usize = 16 << 10;
 #[derive(Debug)]
 pub struct Hub {
     plan: Plan,
+    /// Plans of sensors that have their own, by `id`.
+    plans: BTreeMap<String, Plan>,
     decoder: LineDecoder,
     limits: Limits,
     token: Option<Token>,
@@ -138,16 +141,26 @@ impl Hub {
     ///
     /// # Errors
     /// [`Error::Usage`] when the plan is none for live streams.
-    pub fn new(plan: &Plan, limits: Limits, token: Option<Token>, tap: Option<Tap>) -> Result<Hub> {
-        let plan = live_plan(plan).map_err(Error::Usage)?;
+    pub fn new(settings: Settings) -> Result<Hub> {
+        let plan = live_plan(&settings.plan).map_err(Error::Usage)?;
+        let plans = settings
+            .plans
+            .iter()
+            .map(|(id, plan)| {
+                let live = live_plan(plan)
+                    .map_err(|what| Error::Usage(format!("sensor {}: {what}", printable(id))))?;
+                Ok((printable(id), live))
+            })
+            .collect::<Result<_>>()?;
         // No secret: it only tells a reader that the daemon was restarted.
         let session = RandomState::new().hash_one(std::process::id()) as u32;
         Ok(Hub {
             decoder: LineDecoder::new(&plan.decode),
             plan,
-            limits,
-            token,
-            tap,
+            plans,
+            limits: settings.limits,
+            token: settings.token,
+            tap: settings.tap,
             session: format!("{session:08x}"),
             started: Instant::now(),
             stopping: AtomicBool::new(false),
@@ -157,6 +170,10 @@ impl Hub {
             next_client: AtomicU64::new(1),
             counters: Counters::default(),
         })
+    }
+
+    fn plan_of(&self, id: &str) -> &Plan {
+        self.plans.get(id).unwrap_or(&self.plan)
     }
 
     /// The bounds.
@@ -259,7 +276,7 @@ impl Hub {
         }
         let id: Arc<str> = id.into();
         let first = run.samples.first().copied().unwrap_or_default();
-        let stream = SensorStream::new(&self.plan, id.clone(), run.head, &first)?;
+        let stream = SensorStream::new(self.plan_of(&id), id.clone(), run.head, &first)?;
         let sensor = Arc::new(Mutex::new(Sensor {
             stream,
             owner: None,
@@ -294,7 +311,7 @@ impl Hub {
             }
             _ => sensor.owner = Some(run.client),
         }
-        if !sensor.stream.agrees(&self.plan, run.head) {
+        if !sensor.stream.agrees(self.plan_of(&id), run.head) {
             return Err(refuse(
                 "meaning_changed",
                 "`sample_kind` or unit is another than in this sensor's first sample; give it another `id`".to_owned(),

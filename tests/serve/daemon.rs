@@ -12,7 +12,7 @@ use strapd::serve::hub::Hub;
 use strapd::serve::{Server, Settings};
 
 /// Longer than anything here takes on a busy machine.
-pub(crate) const PATIENCE: Duration = Duration::from_secs(20);
+pub(crate) const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A daemon on a thread of its own.
 pub(crate) struct Daemon {

@@ -1,10 +1,9 @@
 //! Starting, looking at and stopping the daemon (service.md D2, O1, O2, X7).
 
 use super::client::{Client, get, rate};
-use super::daemon::{Daemon, Process, TCP, WS, eventually, listening, strapd};
+use super::daemon::{Daemon, PATIENCE, Process, TCP, WS, eventually, listening, strapd};
 use std::net::TcpListener;
 use std::process::Command;
-use std::time::{Duration, Instant};
 
 #[test]
 fn an_address_in_use_is_named_with_what_helps() {
@@ -43,31 +42,42 @@ fn what_a_live_stream_can_not_do_is_refused_before_anything_is_bound() {
 }
 
 #[test]
-fn a_signal_drains_what_has_arrived_and_ends_with_zero() {
+fn what_has_arrived_before_the_end_reaches_whoever_watches() {
+    let mut settings = listening(&[TCP, WS]);
+    // Two seconds are the promise; how busy this machine is is not part of it.
+    settings.limits.drain = PATIENCE;
+    let daemon = Daemon::start(settings);
+    let mut watchers = [
+        Client::tcp(daemon.address(0)),
+        Client::web(daemon.address(1)),
+    ]
+    .map(|c| c.watching("{\"class\":\"WATCH\"}"));
+    let mut sender = Client::tcp(daemon.address(0));
+    sender.send(&rate("a", 0, 1.0));
+    for watcher in &mut watchers {
+        watcher.object("ATT");
+    }
+    let lines: Vec<String> = (1..500).map(|n| rate("a", n, 1.0)).collect();
+    sender.send(&lines.join("\n"));
+    assert!(daemon.stop());
+    for watcher in &mut watchers {
+        let rest = watcher.rest();
+        assert_eq!(rest.len(), 499, "{:?}", rest.last());
+        assert_eq!(rest.last().unwrap()["seq"], 499);
+    }
+}
+
+#[test]
+fn a_signal_closes_everybody_and_ends_with_zero() {
     for name in ["TERM", "INT", "HUP"] {
         let mut process = Process::start(&["--listen", TCP, "--listen", WS]);
         let mut watcher = Client::tcp(process.address(0)).watching("{\"class\":\"WATCH\"}");
         let mut on_web = Client::web(process.address(1)).watching("{\"class\":\"WATCH\"}");
-        let mut sender = Client::tcp(process.address(0));
-        sender.send(&rate("a", 0, 1.0));
-        watcher.object("ATT");
-        let lines: Vec<String> = (1..500).map(|n| rate("a", n, 1.0)).collect();
-        sender.send(&lines.join("\n"));
-        let start = Instant::now();
         process.signal(name);
         for client in [&mut watcher, &mut on_web] {
-            let rest = client.rest();
-            assert_eq!(rest.last().unwrap()["seq"], 499, "SIG{name}");
-            let lost = rest.iter().any(|v| v["class"] == "GAP");
-            assert!(!lost, "SIG{name}");
+            assert!(client.rest().is_empty(), "SIG{name}");
         }
         assert_eq!(process.exit(), Some(0), "SIG{name}");
-        // Two seconds are the promise; starting to wait takes time, too.
-        assert!(
-            start.elapsed() < Duration::from_secs(10),
-            "{:?}",
-            start.elapsed()
-        );
     }
 }
 
@@ -89,12 +99,12 @@ fn a_second_signal_ends_it_at_once() {
             .any(|c| c["dropped"].as_u64() > Some(0))
     };
     while !dropped(&mut sender) {
-        let lines: Vec<String> = (n..n + 100).map(|n| rate("a", n, 1.0)).collect();
+        let lines: Vec<String> = (n..n + 500).map(|n| rate("a", n, 1.0)).collect();
         sender.send(&lines.join("\n"));
-        for _ in 0..100 {
+        for _ in 0..500 {
             watcher.object("ATT");
         }
-        n += 100;
+        n += 500;
     }
     process.signal("TERM");
     // The others are closed when the drain has begun.

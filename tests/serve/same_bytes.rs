@@ -28,17 +28,23 @@ fn output(args: &[&str], input: &[u8]) -> Vec<u8> {
     output.stdout
 }
 
-/// Sends lines a few at a time and reads as many attitudes: nothing is dropped on either side.
+/// Lines sent before as many attitudes are read: an outbox holds them all, so nothing is dropped on
+/// either side, and the two sides seldom wait for each other.
+const ROUND: usize = 400;
+
+/// Sends lines, `piece` of them at once, and reads as many attitudes.
 fn through(
     sender: &mut dyn FnMut(&[u8]),
     lines: &[&[u8]],
     watcher: &mut Client,
-    batch: usize,
+    piece: usize,
 ) -> Vec<u8> {
     let mut out = Vec::new();
-    for some in lines.chunks(batch) {
-        sender(&some.concat());
-        for _ in some {
+    for round in lines.chunks(ROUND) {
+        for some in round.chunks(piece) {
+            sender(&some.concat());
+        }
+        for _ in round {
             out.extend_from_slice(watcher.line().unwrap().as_bytes());
             out.push(b'\n');
         }
@@ -61,9 +67,9 @@ fn check(log: &Path) {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("s");
     let unix = format!("unix-listen://{}", path.display());
-    for (way, batch) in [
+    for (way, piece) in [
         ("tcp", 1),
-        ("tcp", 100),
+        ("tcp", ROUND),
         ("udp", 20),
         ("web", 7),
         ("unix", 64),
@@ -82,8 +88,8 @@ fn check(log: &Path) {
             "web" => Client::web(daemon.address(2)),
             _ => Client::unix(&path),
         };
-        let got = through(&mut |b| sender.send_bytes(b), &lines, &mut watcher, batch);
-        assert!(got == expected, "{name} over {way} in batches of {batch}");
+        let got = through(&mut |b| sender.send_bytes(b), &lines, &mut watcher, piece);
+        assert!(got == expected, "{name} over {way}, {piece} at once");
     }
 
     let mut process = Process::start(&["-", "--listen", TCP, "--threads", "1"]);
