@@ -8,10 +8,10 @@ mod coning;
 mod double;
 #[path = "accuracy/gaps.rs"]
 mod gaps;
-#[path = "accuracy/live.rs"]
-mod live;
 #[path = "accuracy/integration_error.rs"]
 mod integration_error;
+#[path = "accuracy/live.rs"]
+mod live;
 #[path = "accuracy/noise.rs"]
 mod noise;
 #[path = "accuracy/orders.rs"]
