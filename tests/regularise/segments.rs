@@ -161,6 +161,22 @@ fn a_few_stamps_far_off_do_not_bend_the_line() {
 }
 
 #[test]
+fn a_late_burst_at_the_start_does_not_tilt_the_first_line() {
+    let mut stamps: Vec<i64> = noisy(1, 4000, STEP as f64, 0.002).collect();
+    // Four delivered together, at the end of the samples a segment is opened with.
+    for (k, late) in [(27, 3.7), (28, 2.75), (29, 1.8), (30, 0.85)] {
+        stamps[k] += (late * STEP as f64) as i64;
+    }
+    let samples = rates(stamps);
+    let (even, report) = offline(&samples, SampleKind::Rate);
+    assert_eq!((report.segments, report.ambiguous), (1, 4), "{report:?}");
+    for (k, new) in even.iter().enumerate() {
+        let off = new.stamp.0 - START - k as i64 * STEP;
+        assert!(off.abs() < STEP / 3000, "{k}: {off} ns");
+    }
+}
+
+#[test]
 fn few_samples_keep_their_stamps() {
     for n in 0..3 {
         let samples = rates((0..n).map(|k| k * STEP));
