@@ -13,7 +13,7 @@
 //! | [`subscriber`] | attitudes -> what one client gets, bounded | locks |
 //! | [`tap`] | what goes through -> a recorder | a channel |
 //! | [`limits`], [`admission`] | every bound; who may come in | pure |
-//! | [`listen`], [`http`] | sockets | I/O |
+//! | [`listen`], `http` | sockets | I/O |
 //! | [`shutdown`] | signals -> an orderly end | I/O |
 //!
 //! The wire is described in `docs/protocol.md`.
