@@ -14,7 +14,7 @@
 //! | [`tap`] | what goes through -> a recorder | a channel |
 //! | [`recorder`] | samples and attitudes -> MCAP files that survive | I/O |
 //! | [`limits`], [`admission`] | every bound; who may come in | pure |
-//! | [`listen`], [`http`] | sockets | I/O |
+//! | [`listen`], `http` | sockets | I/O |
 //! | [`shutdown`] | signals -> an orderly end | I/O |
 //!
 //! The wire is described in `docs/protocol.md`.

@@ -50,7 +50,7 @@ pub struct Serve {
     /// Listen where others can reach it without asking for a token
     #[arg(long, help_heading = "Admission")]
     pub allow_insecure_remote: bool,
-    /// Let pages of this origin (https://example.org) connect. May be given several times
+    /// Let pages of this origin, such as `https://example.org`, connect. May be given several times
     #[arg(long, value_name = "ORIGIN", help_heading = "Admission")]
     pub allow_origin: Vec<String>,
     /// A name this machine is called in HTTP requests. May be given several times

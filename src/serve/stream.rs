@@ -124,7 +124,7 @@ impl SensorStream {
     }
 
     /// Takes samples in the order they came. The attitudes they give come from
-    /// [`SensorStream::attitudes`].
+    /// `attitudes`.
     pub fn take(&mut self, seq: Option<u64>, samples: &[RawSample]) {
         if let Some(seq) = seq {
             if let Some(expected) = self.expected

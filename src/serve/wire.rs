@@ -271,7 +271,7 @@ pub fn error(fault: &Fault, number: u64, near: &[u8], suppressed: u64) -> Bytes 
     line(&answer)
 }
 
-/// The beginning of a hostile line, fit for a terminal: at most [`MAX_NEAR`] bytes.
+/// The beginning of a hostile line, fit for a terminal: at most 64 bytes.
 #[must_use]
 pub fn snippet(bytes: &[u8]) -> String {
     let head = bytes.get(..bytes.len().min(MAX_NEAR)).unwrap_or_default();
