@@ -84,7 +84,7 @@ fn workspace() -> Chart {
             },
             pose("upright: q = 0, 0, 0, 90, 0", [0.0, 0.0, 0.0, 90.0, 0.0], 0),
             pose(
-                "at the floor, gripper down",
+                "gripper down, below the plane",
                 [0.0, -65.0, -75.0, 50.0, 0.0],
                 2,
             ),
