@@ -164,7 +164,8 @@ fn lost_samples_are_counted_and_their_truth_is_not_lost() {
         samples > arrived,
         "truth at the lost samples too: {samples}"
     );
-    assert!(error < 0.1, "{error} deg");
+    // 5 % of 20 s at 1.7 rad/s went by unseen, 99 degrees; bridges find all but a hundredth of them.
+    assert!(error < 1.0, "{error} deg");
 }
 
 #[test]
