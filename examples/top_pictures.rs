@@ -4,6 +4,9 @@
 //! service's integrator on gyro samples and by the differential equation of the Euler angles; the
 //! error over time for each method; the error over the sample rate.
 
+// Says what it wrote.
+#![allow(clippy::print_stdout)]
+
 use std::path::Path;
 use strapd::model::attitude::Quaternion;
 use strapd::model::frames::{Body, In, Nav};
