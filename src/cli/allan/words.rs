@@ -76,7 +76,8 @@ fn for_replay(gathered: &Gathered, axes: &[Axis]) -> Option<String> {
         .map(|a| a.fit.as_ref().map(AllanFit::error))
         .collect();
     let errors = errors.filter(|e| !gathered.moved() && e.iter().all(|e| e.arw > 0.0))?;
-    let keys: [(&str, fn(&ImuError) -> f64); 3] = [
+    type Figure = fn(&ImuError) -> f64;
+    let keys: [(&str, Figure); 3] = [
         ("arw", |e| e.arw),
         ("bias-instability", |e| e.bias_instability),
         ("rrw", |e| e.rrw),

@@ -338,6 +338,10 @@ fn lacks(summary: &QualitySummary) -> bool {
     let Some(spacing) = &summary.spacing else {
         return true;
     };
+    // Then a step and a half is a gap and nothing else.
+    if spacing.jitter_p99_secs < 0.3 * spacing.median_secs {
+        return true;
+    }
     let by_time = summary.duration_secs / spacing.median_secs.max(1e-9) + 1.0;
     let distinct = summary.count.saturating_sub(summary.duplicates);
     by_time - distinct as f64 > 0.5 * summary.missing as f64

@@ -137,7 +137,7 @@ fn counted(topic: &CheckedTopic, out: &mut Vec<Finding>) {
     let repeated = q.repeated_rows.saturating_sub(q.duplicates);
     // A rest, or a steady turn, without noise repeats itself for long; a sensor read too often does not.
     let longest = q.axes.iter().map(|a| a.longest_run).max().unwrap_or(0);
-    if repeated as f64 > REPEATED_SHARE * total as f64 && longest < LONG_RUN {
+    if repeated as f64 > REPEATED_SHARE * total as f64 && longest < LONG_RUN && total >= LONG_RUN {
         add(
             repeated,
             Warning,
