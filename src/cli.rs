@@ -11,6 +11,7 @@ pub mod outputs;
 pub mod progress;
 pub mod recover;
 pub mod replay;
+pub mod serve;
 
 use crate::error::{Error, Result};
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -110,6 +111,8 @@ pub enum Progress {
 pub enum Command {
     /// Turn recorded gyro samples into attitude
     Replay(Box<replay::Replay>),
+    /// Samples in over sockets, attitude out to whoever watches
+    Serve(Box<serve::Serve>),
     /// What a log holds: topics, rates, clocks, frames, and what to do next
     Info(info::Info),
     /// Time-aligned angle error between two attitudes
@@ -155,6 +158,7 @@ impl From<Outcome> for ExitCode {
 pub fn run(cli: Cli) -> Result<Outcome> {
     match cli.command {
         Command::Replay(command) => replay::run(&cli.global, &command),
+        Command::Serve(command) => serve::run(&cli.global, &command),
         Command::Info(command) => info::run(&cli.global, &command),
         Command::Compare(command) => compare::run(&cli.global, &command),
         Command::Cat(command) => cat::run(&cli.global, &command),
