@@ -11,8 +11,7 @@
 //! | [`session`] | one client's lines -> hub, answers | sans-I/O |
 //! | [`hub`] | samples -> attitudes -> outboxes | locks |
 //! | [`subscriber`] | attitudes -> what one client gets, bounded | locks |
-//! | [`tap`] | what goes through -> a recorder | a channel |
-//! | [`recorder`] | samples and attitudes -> MCAP files that survive | I/O |
+//! | [`recorder`] | what goes through -> MCAP files that survive a crash | a queue; I/O on threads of its own |
 //! | [`limits`], [`admission`] | every bound; who may come in | pure |
 //! | [`listen`], `http` | sockets | I/O |
 //! | [`shutdown`] | signals -> an orderly end | I/O |
@@ -32,7 +31,6 @@ pub mod session;
 pub mod shutdown;
 pub mod stream;
 pub mod subscriber;
-pub mod tap;
 pub mod wire;
 
 use crate::config::Plan;
@@ -46,7 +44,6 @@ use shutdown::Shutdown;
 use std::collections::BTreeMap;
 use std::future::Future;
 use std::sync::Arc;
-use tap::Tap;
 use tokio::sync::Semaphore;
 
 /// What a daemon is to do.
@@ -67,8 +64,8 @@ pub struct Settings {
     pub allow_insecure_remote: bool,
     /// Which names and pages may use HTTP.
     pub web: Web,
-    /// Where everything that goes through is handed to a recorder.
-    pub tap: Option<Tap>,
+    /// Who records everything that goes through.
+    pub recorder: Option<recorder::Handle>,
 }
 
 /// A daemon that listens, and serves when it is [run](Server::run).

@@ -255,6 +255,11 @@ fn inherit(argv: &mut Vec<OsString>, matches: &ArgMatches, arg: &clap::Arg) {
 }
 
 impl Layered {
+    /// The command line with the file under it.
+    pub(super) fn serve(&self) -> &Serve {
+        &self.serve
+    }
+
     /// The settings of the daemon.
     ///
     /// # Errors

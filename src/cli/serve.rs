@@ -1,13 +1,16 @@
 //! `strapd serve`: samples over sockets -> attitudes over sockets. I/O.
 
+use super::config::Layered;
 use super::estimation::Estimation;
 use super::{Global, Outcome};
 use crate::error::{Error, Result};
 use crate::serve::address::{DEFAULTS, Listen};
 use crate::serve::admission::{Token, Web};
 use crate::serve::limits::Limits;
+use crate::serve::recorder::{self, Recorder, Split};
 use crate::serve::shutdown::{self, Signals};
 use crate::serve::{Server, Settings, listen};
+use crate::sink::{Format, Target};
 use clap::Args;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -39,6 +42,28 @@ pub struct Serve {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub estimation: Estimation,
+    /// Record what comes in and the attitudes to this MCAP file
+    #[arg(long, value_name = "FILE", help_heading = "Recording")]
+    pub record: Option<PathBuf>,
+    /// Go on in a new file after this size or time (512MiB, 10min); files are numbered
+    #[arg(
+        long,
+        value_name = "SIZE|TIME",
+        requires = "record",
+        help_heading = "Recording"
+    )]
+    pub record_split: Option<String>,
+    /// Stop recording, and go on serving, with less than this free on the disk
+    #[arg(
+        long,
+        value_name = "SIZE",
+        default_value = "256MiB",
+        help_heading = "Recording"
+    )]
+    pub min_free: String,
+    /// Replace the recording if it exists
+    #[arg(long, requires = "record", help_heading = "Recording")]
+    pub force: bool,
     /// Ask every client for the token in this file (first line, mode 0600)
     #[arg(
         long,
@@ -68,10 +93,17 @@ pub fn run(global: &Global, args: &Serve) -> Result<Outcome> {
             "serve {other}: only - (standard input) is a source\n  help: --listen waits for senders; strapd replay reads a log"
         )));
     }
-    let settings = match &args.config {
-        Some(file) => super::config::layered(file, std::env::args_os().collect())?.settings()?,
+    let layered = match &args.config {
+        Some(file) => Some(super::config::layered(file, std::env::args_os().collect())?),
+        None => None,
+    };
+    let mut settings = match &layered {
+        Some(layered) => layered.settings()?,
         None => args.settings()?,
     };
+    let args = layered.as_ref().map_or(args, Layered::serve);
+    let recorder = args.recording()?.map(Recorder::start).transpose()?;
+    settings.recorder = recorder.as_ref().map(Recorder::handle);
     let mut builder = tokio::runtime::Builder::new_multi_thread();
     if global.threads > 0 {
         builder.worker_threads(global.threads);
@@ -85,7 +117,23 @@ pub fn run(global: &Global, args: &Serve) -> Result<Outcome> {
     let outcome = runtime.block_on(serve(settings, has_stdin));
     // A thread that waits for standard input would otherwise be waited for.
     runtime.shutdown_background();
-    outcome
+    let Some(status) = recorder.map(Recorder::finish) else {
+        return outcome;
+    };
+    tracing::info!(
+        "recorded {} samples and {} attitudes in {} files, {} bytes",
+        status.samples,
+        status.attitudes,
+        status.files.len(),
+        status.bytes
+    );
+    outcome.map(|done| {
+        if status.is_lossy() {
+            Outcome::Lossy
+        } else {
+            done
+        }
+    })
 }
 
 async fn serve(settings: Settings, has_stdin: bool) -> Result<Outcome> {
@@ -123,6 +171,50 @@ async fn serve(settings: Settings, has_stdin: bool) -> Result<Outcome> {
 }
 
 impl Serve {
+    /// How to record, if at all.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] naming the flag.
+    fn recording(&self) -> Result<Option<recorder::Settings>> {
+        let named = |flag: &str, error: Error| Error::Usage(format!("--{flag}: {error}"));
+        // `0` alone is no size with a unit, and the only one that needs none.
+        let min_free = match self.min_free.as_str() {
+            "0" => 0,
+            text => match text.parse::<Split>() {
+                Ok(Split::Bytes(bytes)) => bytes,
+                _ => {
+                    return Err(Error::Usage(format!(
+                        "--min-free {text}: expected a size such as 256MiB or 1GB, or 0"
+                    )));
+                }
+            },
+        };
+        let Some(path) = &self.record else {
+            return Ok(None);
+        };
+        if Target::from_path(path)?.format() != Some(Format::Mcap) {
+            return Err(Error::Usage(format!(
+                "--record {}: a recording is an MCAP file\n  help: give it a name that ends in .mcap",
+                path.display()
+            )));
+        }
+        let mut settings = recorder::Settings::new(path);
+        settings.force = self.force;
+        settings.min_free = min_free;
+        settings.split = match &self.record_split {
+            Some(text) => Some(text.parse().map_err(|e| named("record-split", e))?),
+            None => None,
+        };
+        let command: Vec<String> = std::env::args().collect();
+        settings.provenance.metadata = [
+            ("version", env!("CARGO_PKG_VERSION").to_owned()),
+            ("command", command.join(" ")),
+        ]
+        .map(|(key, value)| (key.to_owned(), value))
+        .into();
+        Ok(Some(settings))
+    }
+
     /// The arguments, checked.
     ///
     /// # Errors
@@ -147,7 +239,7 @@ impl Serve {
                 hosts: self.allow_host.clone(),
                 origins: self.allow_origin.clone(),
             },
-            tap: None,
+            recorder: None,
         })
     }
 }

@@ -8,9 +8,9 @@
 use super::Settings;
 use super::admission::Token;
 use super::limits::Limits;
+use super::recorder::Handle;
 use super::stream::{SensorStream, live_plan};
 use super::subscriber::{Chunk, Outbox};
-use super::tap::{Tap, Tapped};
 use super::wire::{self, Fault};
 use crate::config::Plan;
 use crate::decode::{Line, LineDecoder, printable};
@@ -36,7 +36,7 @@ pub struct Hub {
     decoder: LineDecoder,
     limits: Limits,
     token: Option<Token>,
-    tap: Option<Tap>,
+    recorder: Option<Handle>,
     session: String,
     started: Instant,
     stopping: AtomicBool,
@@ -160,7 +160,7 @@ impl Hub {
             plans,
             limits: settings.limits,
             token: settings.token,
-            tap: settings.tap,
+            recorder: settings.recorder,
             session: format!("{session:08x}"),
             started: Instant::now(),
             stopping: AtomicBool::new(false),
@@ -324,12 +324,8 @@ impl Hub {
             sensor.stream.take(*seq, now);
             (rest, from) = (later, *end);
         }
-        if let Some(tap) = &self.tap {
-            tap.send(Tapped::Samples {
-                id: id.clone(),
-                received: run.received,
-                samples: run.samples.to_vec(),
-            });
+        if let Some(recorder) = &self.recorder {
+            recorder.input(&id, run.samples.to_vec());
         }
         count(&self.counters.samples, run.samples.len());
         self.deliver(&mut sensor, &id, text);
@@ -381,12 +377,8 @@ impl Hub {
                 .outbox
                 .offer(id, attitudes, &mut encoded, &encode, first_seq);
         }
-        if let Some(tap) = &self.tap {
-            tap.send(Tapped::Attitudes {
-                id: id.clone(),
-                first_seq,
-                attitudes: attitudes.to_vec(),
-            });
+        if let Some(recorder) = &self.recorder {
+            recorder.attitude(id, first_seq, attitudes.to_vec());
         }
     }
 
@@ -407,16 +399,21 @@ impl Hub {
                 })
             })
             .collect();
+        let recording = self.recorder.as_ref().map(Handle::status);
         let counters: serde_json::Map<_, _> = self
             .counters
             .named()
             .into_iter()
-            .chain([("unrecorded", self.tap.as_ref().map_or(0, Tap::lost))])
+            .chain([("unrecorded", recording.as_ref().map_or(0, |r| r.unrecorded))])
             .map(|(name, value)| (name.to_owned(), value.into()))
             .collect();
         wire::status(serde_json::json!({
             "session": self.session, "uptime_s": self.uptime_secs(),
             "sources": sources, "clients": clients, "counters": counters,
+            "recording": recording.map(|r| serde_json::json!({
+                "file": r.files.last().map(|f| f.display().to_string()), "files": r.files.len(),
+                "bytes": r.bytes, "samples": r.samples, "attitudes": r.attitudes, "stopped": r.stopped,
+            })),
         }))
     }
 
