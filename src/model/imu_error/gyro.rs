@@ -96,7 +96,8 @@ impl std::error::Error for MeasureError {}
 /// Beyond any motion; what is below does not overflow on its way through.
 const FASTEST: f64 = 1e9;
 
-/// A running sensor. Constant memory; about 0.1 us a reading with a preset's noise.
+/// A running sensor. Constant memory; about 0.2 us (2300 instructions) a reading with
+/// a preset's noise.
 #[derive(Clone, Debug)]
 pub struct GyroModel {
     error: ImuError,
@@ -168,6 +169,8 @@ impl GyroModel {
     ///
     /// # Errors
     /// An interval without length or before the last one's end, or a truth that can not be.
+    // Inlined whole into a caller's loops at link time, LLVM 22 spends minutes in constraint elimination.
+    #[inline(never)]
     pub fn measure(
         &mut self,
         from: Nanos,
