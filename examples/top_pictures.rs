@@ -4,6 +4,9 @@
 //! service's integrator on gyro samples and by the differential equation of the Euler angles; the
 //! error over time for each method; the error over the sample rate.
 
+// Says what it wrote.
+#![allow(clippy::print_stdout)]
+
 use std::path::Path;
 use strapd::model::attitude::Quaternion;
 use strapd::model::frames::{Body, In, Nav};
@@ -153,10 +156,7 @@ fn path_of_the_axis(case: Case) -> Result<Chart, Failure> {
         color: Some(color),
     };
     Ok(Chart {
-        title: format!(
-            "{}: path of the axis, 1.2 s, seen from 65 deg above",
-            case.name()
-        ),
+        title: format!("{}: path of the axis, 1.2 s", case.name()),
         x: Axis {
             range: Some((-1.05, 1.05)),
             ..Axis::linear("east")
@@ -182,7 +182,7 @@ fn path_of_the_axis(case: Case) -> Result<Chart, Failure> {
             line("Euler-angle equations", locus(&angles, 6), Look::Dashed, 0),
         ],
         equal: true,
-        size: (560, 680),
+        size: (860, 640),
     })
 }
 

@@ -1,4 +1,4 @@
-//! The pictures of `docs/youbot.md`, computed: `cargo run --example youbot_pictures -- docs/pictures`.
+//! Draws the computed pictures of `docs/youbot.md` into `docs/pictures`: `cargo run --example youbot_pictures`.
 //!
 //! - `youbot-workspace.svg`: where the tool point can be, from the side, and three poses of the arm;
 //! - `youbot-path.svg`: joints of the simulator's own motion.
@@ -11,16 +11,11 @@ use strapd::model::youbot::{Arm, JointPath, SeedJoints};
 use strapd::report::plot::{Axis, Chart, Look, Series};
 
 fn main() {
-    let folder = std::env::args()
-        .nth(1)
-        .unwrap_or_else(|| "docs/pictures".to_owned());
-    for (name, chart) in [
-        ("youbot-workspace.svg", workspace()),
-        ("youbot-path.svg", path()),
-    ] {
-        let path = Path::new(&folder).join(name);
-        std::fs::write(&path, chart.svg().unwrap()).unwrap();
-        println!("{}", path.display());
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/pictures");
+    for (name, chart) in [("youbot-workspace", workspace()), ("youbot-path", path())] {
+        let svg = chart.svg().unwrap();
+        println!("{name}.svg  {} bytes", svg.len());
+        std::fs::write(folder.join(format!("{name}.svg")), svg).unwrap();
     }
 }
 
@@ -89,7 +84,7 @@ fn workspace() -> Chart {
             },
             pose("upright: q = 0, 0, 0, 90, 0", [0.0, 0.0, 0.0, 90.0, 0.0], 0),
             pose(
-                "at the floor, gripper down",
+                "gripper down, below the plane",
                 [0.0, -65.0, -75.0, 50.0, 0.0],
                 2,
             ),

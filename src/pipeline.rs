@@ -7,7 +7,7 @@ pub mod estimator;
 pub mod lines;
 pub mod log;
 pub mod look;
-mod opening;
+pub(crate) mod opening;
 pub mod outlet;
 pub mod pace;
 mod passes;

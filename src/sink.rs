@@ -10,7 +10,7 @@ mod batch;
 mod copy;
 mod csv;
 mod decimate;
-mod json;
+pub(crate) mod json;
 mod mcap;
 mod output;
 mod size_limit;

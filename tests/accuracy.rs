@@ -1,5 +1,6 @@
 //! How far from truth the propagator is, in degrees and arc seconds, against motions known otherwise.
 //! The tables are those of `attitude.md` 6 and `top.md` 4.
+#![allow(clippy::print_stdout, reason = "figures, with --nocapture")]
 #![allow(clippy::unwrap_used, clippy::expect_used, unreachable_pub)]
 
 #[path = "accuracy/coning.rs"]

@@ -129,7 +129,7 @@ fn a_body_at_rest_stays_at_rest_for_ten_minutes() {
     let samples = at_rest(60_001, SampleKind::Rate, &pose(), w_ie());
     let out = run(settings(Method::Auto, SampleKind::Rate, w_ie()), &samples);
     let found = worst(&out, |_| pose());
-    // Measured 4.6e-11: a few roundings of one product. Left multiplication step by step has 2.9e-7.
+    // A few roundings of one product. Left multiplication step by step has 2.9e-7.
     assert!(found < 2e-10, "{found:.2e} arcsec");
 }
 

@@ -99,8 +99,8 @@ pub struct Estimation {
     pub ignore_covariance_flag: bool,
     /// Noise for the covariance: consumer, industrial, tactical, navigation, or a list
     ///
-    /// arw=RAD_PER_SQRT_S[,bias-instability=RAD_S][,rrw=RAD_S_PER_SQRT_S][,turn-on-bias=RAD_S][,initial=RAD],
-    /// each one number, or three x/y/z for the body axes. The turn-on bias counts unless a bias is removed
+    /// arw=RAD_PER_SQRT_S and any of bias-instability=RAD_S, rrw=RAD_S_PER_SQRT_S, turn-on-bias=RAD_S and
+    /// initial=RAD, with commas between; each one number, or three x/y/z for the body axes. The turn-on bias counts unless a bias is removed
     /// (--bias); initial is the uncertainty of the initial attitude.
     #[arg(long, value_name = "NOISE", default_value = "consumer")]
     pub noise: String,

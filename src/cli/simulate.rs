@@ -1,6 +1,6 @@
 //! `strapd simulate MOTION -o SINK...`: a synthetic gyro with exact truth. I/O.
 //!
-//! A motion is a subcommand, a file of flags and a row in [`Simulate::made`].
+//! A motion is a subcommand, a file of flags and a row in `Simulate::made`.
 
 mod coning;
 mod random;

@@ -128,6 +128,13 @@ impl Default for ImuError {
     }
 }
 
+/// Smallest range, rad/s, and bandwidth, Hz.
+const LEAST_PASSED: f64 = 1e-6;
+/// Smallest step of an output, rad or rad/s: an f64 of a whole turn has no finer ones.
+const FINEST: f64 = 1e-15;
+/// Shortest correlation time of flicker, s.
+const SHORTEST: f64 = 1e-9;
+
 /// A set of sizes that no sensor can have, or text that names none.
 #[derive(Clone, PartialEq, Debug)]
 pub struct ImuErrorFault(pub(super) String);
@@ -165,8 +172,17 @@ impl ImuError {
             }
         }
         for (key, value) in [("range", self.range), ("bandwidth_hz", self.bandwidth_hz)] {
-            if value.is_some_and(|v| v <= 0.0) {
-                return fault(format!("{key}=0: nothing would come through; leave it out"));
+            if value.is_some_and(|v| v < LEAST_PASSED) {
+                return fault(format!(
+                    "{key}: so little that nothing would come through; leave it out"
+                ));
+            }
+        }
+        for (key, step) in [("quantization", self.quantization), ("lsb", self.lsb)] {
+            if step > 0.0 && step < FINEST {
+                return fault(format!(
+                    "{key}: finer than {FINEST} rad is no step; leave it out"
+                ));
             }
         }
         if self.bandwidth_hz.is_some() && self.damping < 0.05 {
@@ -187,10 +203,10 @@ impl ImuError {
             );
         }
         if let Some([least, most]) = self.flicker_tau
-            && !(least > 0.0 && least < most && most <= 1e9)
+            && !(least >= SHORTEST && least < most && most <= 1e9)
         {
             return fault(format!(
-                "flicker_tau_min={least}, flicker_tau_max={most}: both are needed, 0 < min < max <= 1e9 s"
+                "flicker_tau_min={least}, flicker_tau_max={most}: both are needed, 1e-9 <= min < max <= 1e9 s"
             ));
         }
         Ok(())

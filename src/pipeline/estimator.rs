@@ -31,6 +31,32 @@ impl Estimator {
     /// In words, with the flag that helps: settings that can not be.
     pub fn new(plan: &Plan, resolved: &Resolved, prepared: &Prepared) -> Result<Estimator, String> {
         let settings = resolved.conditioning(plan, prepared.clock, prepared.bias);
+        Estimator::with(plan, resolved, prepared, &settings)
+    }
+
+    /// The same for a live stream: no sample waits for its successors, so one that comes late is
+    /// dropped and counted.
+    ///
+    /// # Errors
+    /// As [`Estimator::new`].
+    pub fn live(
+        plan: &Plan,
+        resolved: &Resolved,
+        prepared: &Prepared,
+    ) -> Result<Estimator, String> {
+        let settings = condition::Settings {
+            reorder_window: condition::Settings::LIVE_WINDOW,
+            ..resolved.conditioning(plan, prepared.clock, prepared.bias)
+        };
+        Estimator::with(plan, resolved, prepared, &settings)
+    }
+
+    fn with(
+        plan: &Plan,
+        resolved: &Resolved,
+        prepared: &Prepared,
+        settings: &condition::Settings,
+    ) -> Result<Estimator, String> {
         let propagator = Propagator::new(propagate::Settings {
             method: plan.method,
             kind: resolved.kind,
@@ -40,7 +66,7 @@ impl Estimator {
         })
         .map_err(|e| e.to_string())?;
         Ok(Estimator {
-            conditioner: Conditioner::new(&settings).map_err(|e| e.to_string())?,
+            conditioner: Conditioner::new(settings).map_err(|e| e.to_string())?,
             regulariser: prepared.stamps.regulariser(resolved.kind)?,
             propagator,
             world: prepared.world,

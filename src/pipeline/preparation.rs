@@ -327,6 +327,49 @@ impl Preparation {
     }
 }
 
+/// Decides from the first sample alone, for a live stream: its attitude must not wait. The clock is
+/// the one asked for, and another never takes its place.
+///
+/// # Errors
+/// In words: what only rest can tell was asked for, or the sample carries no orientation to begin with.
+pub fn at_once(plan: &Plan, resolved: &Resolved, first: &RawSample) -> Result<Prepared, String> {
+    if needs_rest(plan) {
+        return Err("--bias auto and --init gravity look for rest before the first attitude, and a live stream waits for nothing\n  help: measure once (`strapd info LOG` shows the bias) and give --bias x,y,z; --init rpy=roll,pitch,yaw or identity".to_owned());
+    }
+    let rests = Rests::default();
+    let mut warnings = Vec::new();
+    let (initial, initial_origin, world) = decide_initial(
+        plan,
+        resolved,
+        std::slice::from_ref(first),
+        &rests,
+        &mut warnings,
+    )?;
+    let earth = plan.latitude_deg.map(|deg| Earth::at(deg.to_radians()));
+    let (bias, bias_sigma, bias_origin) =
+        decide_bias(plan, &rests, earth.map(|e| e.felt_by(&initial)))?;
+    warnings.extend(earth.and_then(|e| e.heading_warning(plan.initial)));
+    let stamps = if plan.regularise_stamps {
+        Stamps::Causal {
+            states_interval: first.interval_nanos.is_some(),
+        }
+    } else {
+        Stamps::AsRecorded
+    };
+    Ok(Prepared {
+        clock: plan.clock,
+        bias,
+        bias_sigma,
+        bias_origin,
+        initial,
+        initial_origin,
+        world_rate: earth.map_or_else(|| In::assume(Vector3::zeros()), |e| e.w_ie),
+        world,
+        stamps,
+        warnings,
+    })
+}
+
 /// Whether the plan asks for something only rest can tell.
 fn needs_rest(plan: &Plan) -> bool {
     plan.bias == Bias::Auto || plan.initial == Initial::Gravity

@@ -2,8 +2,8 @@
 //!
 //! Built by the pipeline, which knows the numbers; the words are here, in one place.
 
-use crate::compare::BodyAxesFit;
 use super::stamps::Regularised;
+use crate::compare::BodyAxesFit;
 use crate::model::frames::EARTH_RATE;
 use crate::record::{Counts, SampleKind, Verdict};
 use serde_json::{Value, json};

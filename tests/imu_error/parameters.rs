@@ -91,6 +91,10 @@ fn what_can_not_be_is_refused_by_name() {
         ("bandwidth_hz=0", "nothing would come through"),
         ("bandwidth_hz=100,damping=0", "rings"),
         ("flicker_tau_min=1", "both are needed"),
+        ("bandwidth_hz=1e-9", "nothing would come through"),
+        ("lsb=1e-30", "is no step"),
+        ("quantization=1e-30", "is no step"),
+        ("flicker_tau_min=1e-12,flicker_tau_max=1", "both are needed"),
         ("flicker_tau_min=2,flicker_tau_max=1", "min < max"),
     ] {
         let refused = ImuError::parse(text).unwrap_err().to_string();

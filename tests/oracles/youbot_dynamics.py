@@ -101,7 +101,7 @@ def ask(strapd, question, requests):
 def compare(strapd, preset, convention, count, worst):
     m = model(preset)
     data = m.createData()
-    tool = m.getFrameId("tool")
+    tool = m.getFrameId("tool", pin.FrameType.BODY)
     rng = np.random.default_rng(7)
     low = np.radians([-169, -90, -146, -12.5, -167.5])
     high = np.radians([169, 65, 151, 192.5, 167.5])

@@ -88,10 +88,11 @@ fn an_mcap_has_samples_truth_and_its_parameters_where_they_are_documented() {
         (a / 2.0).sin() * s,
     ];
     let vector = third(topics[2]);
-    for i in 0..3 {
+    for (i, right) in rate.iter().enumerate() {
+        let found = f64_at(imu, 28 + 104 + 8 * i);
         // Roundings of numbers of the size of the rate, 19 rad/s.
-        assert!((f64_at(imu, 28 + 104 + 8 * i) - rate[i]).abs() < 2e-14);
-        assert_eq!(f64_at(imu, 28 + 104 + 8 * i), f64_at(vector, 28 + 8 * i));
+        assert!((found - right).abs() < 2e-14, "{found} {right}");
+        assert_eq!(found, f64_at(vector, 28 + 8 * i));
     }
     for (found, right) in q.iter().zip(expected) {
         assert!((found - right).abs() < 1e-15, "{q:?} {expected:?}");

@@ -65,7 +65,7 @@ fn what_can_not_be_is_refused_with_its_numbers_and_leaves_nothing() {
         ("random --drop 0.9 --burst 1", &["burst"]),
         ("random --jitter 0.6", &["jitter", "0.499"]),
         ("random --speed 0", &["--speed"]),
-        ("gyroscope", &["gyroscope", "rigid-body"]),
+        ("gyroscope", &["gyroscope", "simulate"]),
     ] {
         strapd(at, &format!("simulate {flags} -o a.mcap")).refused(2, words);
     }
@@ -96,7 +96,7 @@ fn what_is_possible_but_hardly_meant_is_said() {
         ("top --case sleeping --spin-hz 5", "11.1"),
         ("top --noise low,range=100", "end of the sensor's range"),
         ("coning --start-stamp 3000000000 -o far.mcap", "2038"),
-        ("random --rms 200 --f-max 20 --rate-hz 50", "half a turn"),
+        ("random --rms 200 --f-max 20 --rate-hz 130", "half a turn"),
     ] {
         let ran = strapd(at, &format!("simulate {flags} -o null:"));
         assert!(ran.done().out.contains(word), "{flags}: {}", ran.out);

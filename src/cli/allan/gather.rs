@@ -22,6 +22,8 @@ const CAPACITY: usize = 1 << 23;
 const FEW: usize = 512;
 /// A record at rest for less than this part of its length is said to move.
 const RESTING: f64 = 0.95;
+/// Missing samples filled in one place; more of them split the record whatever `--max-gap` says.
+const FILLED_AT_ONCE: i64 = 100_000;
 /// A rest worth naming, s.
 const USEFUL: f64 = 10.0;
 /// Spread of the intervals, as a part of their mean, from which stamps are said to be uneven.
@@ -269,10 +271,17 @@ impl Gathering {
             (Join::Bridge, Some((last, before))) => {
                 let step = sample.stamp.since(last);
                 let missing = if spacing > 0 {
-                    ((step + spacing / 2) / spacing - 1).max(0)
+                    (step.saturating_add(spacing / 2) / spacing - 1).max(0)
                 } else {
                     0
                 };
+                if missing > FILLED_AT_ONCE {
+                    self.splits += 1;
+                    self.record.split();
+                    self.record.push(&value);
+                    self.last = Some((sample.stamp, value));
+                    return;
+                }
                 self.bridges += 1;
                 self.filled += missing as u64;
                 for k in 1..=missing {

@@ -76,17 +76,16 @@ fn for_replay(gathered: &Gathered, axes: &[Axis]) -> Option<String> {
         .map(|a| a.fit.as_ref().map(AllanFit::error))
         .collect();
     let errors = errors.filter(|e| !gathered.moved() && e.iter().all(|e| e.arw > 0.0))?;
-    let keys: [(&str, fn(&ImuError) -> f64); 3] = [
-        ("arw", |e| e.arw),
-        ("bias-instability", |e| e.bias_instability),
-        ("rrw", |e| e.rrw),
-    ];
-    let parts: Vec<String> = keys
-        .iter()
-        .filter(|(_, of)| errors.iter().any(|e| of(e) > 0.0))
-        .map(|(key, of)| {
-            let values: Vec<String> = errors.iter().map(|e| format!("{:.3e}", of(e))).collect();
-            format!("{key}={}", values.join("/"))
+    let parts: Vec<String> = ["arw", "bias_instability", "rrw"]
+        .into_iter()
+        .filter_map(term)
+        .filter(|t| errors.iter().any(|e| (t.read)(e) > 0.0))
+        .map(|t| {
+            let values: Vec<String> = errors
+                .iter()
+                .map(|e| format!("{:.3e}", (t.read)(e)))
+                .collect();
+            format!("{}={}", t.key.replace('_', "-"), values.join("/"))
         })
         .collect();
     Some(parts.join(","))

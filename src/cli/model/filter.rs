@@ -141,6 +141,10 @@ fn next_line(input: &mut impl BufRead, line: &mut Vec<u8>) -> Result<(usize, boo
 
 /// The request, or what of it was not understood and where.
 fn request<R: DeserializeOwned>(line: &[u8]) -> std::result::Result<R, String> {
+    // An array would be taken for the fields in their order.
+    if line.trim_ascii_start().first() == Some(&b'[') {
+        return Err("column 1: a request is one JSON object".to_owned());
+    }
     serde_json::from_slice(line).map_err(|e| {
         // A request is one line: which one is said by the caller.
         let text = e.to_string();

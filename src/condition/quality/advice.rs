@@ -150,11 +150,11 @@ impl std::fmt::Display for Advice {
                     1 => f.write_str("one constant rate")?,
                     n => write!(f, "{n} stretches of constant rate")?,
                 }
-                f.write_str(": if a clock of its own triggers the sensor, --regularise-stamps; if it samples when it is asked, the stamps are right as they are. The stamps can not tell: --against-recorded may")
+                f.write_str(": if a clock of its own triggers the sensor, --regularise-stamps; if it samples when it is asked, the stamps are right as they are. They can not tell which; --against-recorded may")
             }
             Advice::StampsUneven { share } => write!(
                 f,
-                "stamps jitter by {:.0} % of the step (p99) and keep no constant rate: --time log may be steadier; if no sample is missing, --time index --rate-hz HZ",
+                "stamps jitter by {:.0} % of the step (p99) and keep no constant rate: if the recorder's clock is steadier, --time log; if no sample is missing, --time index --rate-hz HZ",
                 share * 100.0
             ),
             Advice::ClocksDrift { ppm } => write!(
@@ -338,6 +338,10 @@ fn lacks(summary: &QualitySummary) -> bool {
     let Some(spacing) = &summary.spacing else {
         return true;
     };
+    // Then a step and a half is a gap and nothing else.
+    if spacing.jitter_p99_secs < 0.3 * spacing.median_secs {
+        return true;
+    }
     let by_time = summary.duration_secs / spacing.median_secs.max(1e-9) + 1.0;
     let distinct = summary.count.saturating_sub(summary.duplicates);
     by_time - distinct as f64 > 0.5 * summary.missing as f64

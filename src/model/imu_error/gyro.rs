@@ -62,7 +62,7 @@ pub enum MeasureError {
         /// Where the one before ended.
         last: Nanos,
     },
-    /// The truth is not finite.
+    /// The truth is not finite, or beyond 1e9 in SI units.
     Truth {
         /// The end of the interval.
         to: Nanos,
@@ -82,14 +82,22 @@ impl fmt::Display for MeasureError {
                 "a sampling interval that begins at {} ns, before the last one ended ({} ns)",
                 from.0, last.0
             ),
-            Self::Truth { to } => write!(f, "the motion at {} ns is not a finite number", to.0),
+            Self::Truth { to } => write!(
+                f,
+                "the motion at {} ns is not a number below {FASTEST:e}",
+                to.0
+            ),
         }
     }
 }
 
 impl std::error::Error for MeasureError {}
 
-/// A running sensor. Constant memory; about 0.1 us a reading with a preset's noise.
+/// Beyond any motion; what is below does not overflow on its way through.
+const FASTEST: f64 = 1e9;
+
+/// A running sensor. Constant memory; about 0.2 us (2300 instructions) a reading with
+/// a preset's noise.
 #[derive(Clone, Debug)]
 pub struct GyroModel {
     error: ImuError,
@@ -160,7 +168,9 @@ impl GyroModel {
     /// out between two intervals passes for the drift, but is not integrated.
     ///
     /// # Errors
-    /// An interval without length or before the last one's end, or a truth that is not finite.
+    /// An interval without length or before the last one's end, or a truth that can not be.
+    // Inlined whole into a caller's loops at link time, LLVM 22 spends minutes in constraint elimination.
+    #[inline(never)]
     pub fn measure(
         &mut self,
         from: Nanos,
@@ -171,14 +181,14 @@ impl GyroModel {
         if nanos <= 0 {
             return Err(MeasureError::Interval { from, to });
         }
-        let finite = truth
+        let possible = truth
             .rate
             .iter()
             .chain(truth.delta_angle.iter())
             .chain(truth.specific_force.iter())
             .chain([&truth.temperature])
-            .all(|v| v.is_finite());
-        if !finite {
+            .all(|v| v.abs() <= FASTEST);
+        if !possible {
             return Err(MeasureError::Truth { to });
         }
         let secs = nanos as f64 * 1e-9;

@@ -48,6 +48,8 @@ fn objects(out: &mut String, items: &[Value]) {
         let longest = cells.iter().map(|c| c.chars().count()).max();
         longest.unwrap_or(0).max(name.len())
     };
+    // Time and labels first, whatever their names.
+    columns.sort_by_key(width);
     let widths: Vec<usize> = columns.iter().map(width).collect();
     let mut line = |cells: &mut dyn Iterator<Item = &str>| {
         let mut text = String::from("  ");

@@ -7,7 +7,6 @@ use crate::model::dh::Transform;
 use crate::model::frames::{Dcm, In};
 use crate::model::youbot::{
     ArmError, Gripper, ImuMount, JointPath, SeedJoints, Sinusoid, ToolPath, ToolTrack,
-    slow_down_factor,
 };
 use nalgebra::Vector3;
 use serde::Deserialize;
@@ -165,11 +164,7 @@ fn path(
         Ok(JointPath::demonstration())
     }
     .map_err(|e| refusal(&e))?;
-    if request.slow_down {
-        joints.within_rates(arm).map_err(|e| refusal(&e))
-    } else {
-        Ok((joints, 1.0))
-    }
+    slowed(request, setting, joints)
 }
 
 fn sinusoid(swing: Swing, unit: Unit) -> Sinusoid {
@@ -206,14 +201,19 @@ fn tool(
     let refused = |e: ArmError| refusal(&e);
     let track = ToolTrack::new(setting.arm, path, &start).map_err(refused)?;
     let joints = track.joint_path(duration).map_err(refused)?;
+    slowed(request, setting, joints)
+}
+
+/// As slow as was asked for, and by how much.
+fn slowed(
+    request: &Request,
+    setting: &Setting,
+    joints: JointPath,
+) -> Result<(JointPath, f64), Refusal> {
     if !request.slow_down {
         return Ok((joints, 1.0));
     }
-    let JointPath::Knots { knots, .. } = &joints else {
-        return Ok((joints, 1.0));
-    };
-    let factor = slow_down_factor(&setting.arm, knots);
-    Ok((joints.slowed(factor).map_err(refused)?, factor))
+    joints.within_rates(&setting.arm).map_err(|e| refusal(&e))
 }
 
 pub(super) fn answer(request: &Request, unit: Unit) -> Answer {
