@@ -21,7 +21,7 @@ instructions() {
 
 echo "| method | $(printf '%s | ' "$@" | sed 's/ $//')"
 echo "|$(printf -- '---|%.0s' "" "$@")"
-for method in $("$program"); do
+"$program" | while read -r method; do
     row="| $method |"
     for input in "$@"; do
         some=$(instructions "$method" "$input" 4)

@@ -1,5 +1,5 @@
-//! Nanoseconds per sample of every method, single core, samples in and attitudes out; at last their ratios to one
-//! exponential a sample, measured in turn.
+//! Nanoseconds per sample of every method, single core, samples in and attitudes out; at last their ratios to a
+//! bare exponential a sample, measured in turn.
 #![allow(
     missing_docs,
     clippy::unwrap_used,
@@ -57,7 +57,7 @@ fn ratios(_: &mut Criterion) {
                 row[round] = start.elapsed().as_secs_f64();
             }
         }
-        println!("\n| {name} | ns per sample | of dcm-right's |\n|---|---|---|");
+        println!("\n| {name} | ns per sample | of the bare exponential's |\n|---|---|---|");
         let median = |mut values: [f64; ROUNDS]| {
             values.sort_by(f64::total_cmp);
             values[ROUNDS / 2]

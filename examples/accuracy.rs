@@ -65,6 +65,9 @@ fn main() -> Result<(), Failure> {
     Ok(())
 }
 
+/// Degrees beyond which the angle between two attitudes no longer grows with the error.
+const WRAPPED: f64 = 110.0;
+
 fn heading(title: &str, columns: &[String]) {
     println!("## {title}\n\n| | {} |", columns.join(" | "));
     println!("|{}", "---|".repeat(columns.len() + 1));
@@ -106,7 +109,11 @@ fn top_table(kind: SampleKind, contenders: &[Contender], amount: Amount) -> Resu
         for run in &runs {
             let whole = run.error(who, kind, 0)?.to_degrees();
             let inside = run.error(who, kind, MARGIN)?.to_degrees();
-            write!(text, " {whole:.1e} ({inside:.1e}) |")?;
+            if whole < WRAPPED {
+                write!(text, " {whole:.1e} ({inside:.1e}) |")?;
+            } else {
+                text.push_str(" - |");
+            }
         }
         println!("{text}");
     }
@@ -147,8 +154,7 @@ fn coning_table(kind: SampleKind, contenders: &[Contender], amount: Amount) -> R
             who,
             runs.iter().map(|run| {
                 let error = arcsec(run.error(who, kind, MARGIN)?);
-                // Beyond 110 degrees an angle says nothing.
-                Ok((error < 110.0 * 3600.0).then_some(error))
+                Ok((error < WRAPPED * 3600.0).then_some(error))
             }),
         )?;
     }

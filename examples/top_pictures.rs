@@ -4,6 +4,9 @@
 //! service's integrator on gyro samples and by the differential equation of the Euler angles; the
 //! error over time for each method; the error over the sample rate.
 
+// Says what it wrote.
+#![allow(clippy::print_stdout)]
+
 use std::path::Path;
 use strapd::model::attitude::Quaternion;
 use strapd::model::frames::{Body, In, Nav};
@@ -60,6 +63,7 @@ fn propagated(method: Method, truth: &[Spin], rate_hz: f64) -> Result<Vec<Attitu
         kind: SampleKind::Rate,
         initial: truth.first().ok_or("no samples")?.q_nb,
         noise: Noise::default(),
+        ..Settings::default()
     })?;
     let samples: Vec<RateSample> = truth
         .iter()
@@ -152,10 +156,7 @@ fn path_of_the_axis(case: Case) -> Result<Chart, Failure> {
         color: Some(color),
     };
     Ok(Chart {
-        title: format!(
-            "{}: path of the axis, 1.2 s, seen from 65 deg above",
-            case.name()
-        ),
+        title: format!("{}: path of the axis, 1.2 s", case.name()),
         x: Axis {
             range: Some((-1.05, 1.05)),
             ..Axis::linear("east")
@@ -181,7 +182,7 @@ fn path_of_the_axis(case: Case) -> Result<Chart, Failure> {
             line("Euler-angle equations", locus(&angles, 6), Look::Dashed, 0),
         ],
         equal: true,
-        size: (560, 600),
+        size: (860, 640),
     })
 }
 
@@ -217,8 +218,7 @@ fn attitudes(
 
 fn error_over_time() -> Result<Chart, Failure> {
     let (top, start, truth) = truth(Case::Cusped, RATE_HZ)?;
-    let compared: [Compared; 8] = [
-        ("live, w(t_i)", How::Top(TopMethod::Live(HeldRate::Left))),
+    let compared: [Compared; 7] = [
         (
             "live, w(t_i+1): the seed's",
             How::Top(TopMethod::Live(HeldRate::Right)),
@@ -250,11 +250,11 @@ fn error_over_time() -> Result<Chart, Failure> {
     Ok(Chart {
         title: "cusped top, 2000 Hz: error of the attitude".to_owned(),
         x: Axis {
-            range: Some((0.0, 1.9)),
+            range: Some((0.0, 1.2)),
             ..Axis::linear("time, s")
         },
         y: Axis {
-            range: Some((1e-14, 1e2)),
+            range: Some((1e-14, 1e3)),
             ..Axis::log("error, deg")
         },
         series,
@@ -297,7 +297,7 @@ fn error_over_rate() -> Result<Chart, Failure> {
     Ok(Chart {
         title: "cusped top, 20 turns a second: largest error over 1.2 s".to_owned(),
         x: Axis {
-            range: Some((20.0, 15000.0)),
+            range: Some((150.0, 15000.0)),
             ..Axis::log("sample rate, Hz")
         },
         y: Axis {

@@ -6,6 +6,7 @@ pub mod allan;
 pub mod cat;
 pub mod check;
 pub mod compare;
+pub mod config;
 pub mod estimation;
 pub mod info;
 pub mod manual;
@@ -14,6 +15,7 @@ pub mod outputs;
 pub mod progress;
 pub mod recover;
 pub mod replay;
+pub mod serve;
 pub mod simulate;
 
 use crate::error::{Error, Result};
@@ -115,6 +117,10 @@ pub enum Progress {
 pub enum Command {
     /// Turn recorded gyro samples into attitude
     Replay(Box<replay::Replay>),
+    /// Samples in over sockets, attitude out to whoever watches
+    Serve(Box<serve::Serve>),
+    /// Look at a configuration file of `serve`
+    Config(config::Config),
     /// What a log holds: topics, rates, clocks, frames, and what to do next
     Info(info::Info),
     /// Everything that may spoil the attitude from a log, with the flag that helps
@@ -168,6 +174,8 @@ impl From<Outcome> for ExitCode {
 pub fn run(cli: Cli) -> Result<Outcome> {
     match cli.command {
         Command::Replay(command) => replay::run(&cli.global, &command),
+        Command::Serve(command) => serve::run(&cli.global, &command),
+        Command::Config(command) => config::run(&command),
         Command::Info(command) => info::run(&cli.global, &command),
         Command::Check(command) => check::run(&cli.global, &command),
         Command::Compare(command) => compare::run(&cli.global, &command),

@@ -32,6 +32,7 @@
 
 mod clock;
 mod gate;
+mod histogram;
 mod order;
 mod report;
 mod settings;
@@ -39,6 +40,7 @@ mod spacing;
 mod timing;
 
 pub mod quality;
+pub mod regularise;
 pub mod stillness;
 
 pub use clock::{Clock, ClockWarning, choose_clock};

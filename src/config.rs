@@ -39,6 +39,11 @@ pub struct Plan {
     pub max_gap_secs: f64,
     /// `--on-gap`.
     pub on_gap: OnGap,
+    /// `--earth-rate`: latitude of a fixed site whose turning with the Earth is taken out. In degrees,
+    /// as given, so that it is repeated as given.
+    pub latitude_deg: Option<f64>,
+    /// `--regularise-stamps`.
+    pub regularise_stamps: bool,
     /// `--gyro-range`, rad/s.
     pub gyro_range: Option<f64>,
     /// `--noise`.
@@ -66,6 +71,8 @@ impl Default for Plan {
             bias: Bias::None,
             max_gap_secs: 0.5,
             on_gap: OnGap::Hold,
+            latitude_deg: None,
+            regularise_stamps: false,
             gyro_range: None,
             noise: Noise::preset(&NOISE_PRESETS[0]),
             start: None,
@@ -96,14 +103,39 @@ impl Plan {
         conditioning
             .validate()
             .map_err(|e| Error::Usage(e.to_string()))?;
+        self.check_earth_rate()?;
+        if self.regularise_stamps && matches!(self.clock, Clock::Index { .. }) {
+            return Err(Error::Usage(
+                "--regularise-stamps: the stamps of --time index are even already\n  help: leave one of the two out".to_owned(),
+            ));
+        }
         Propagator::new(propagate::Settings {
             method: self.method,
             // Where the format decides, the kind with the wider choice: the rest is said by topic.
             kind: self.kind.unwrap_or(SampleKind::Average),
             initial: Quaternion::identity(),
             noise: self.noise.with_bias(self.noise.unremoved_bias()),
+            ..propagate::Settings::default()
         })
         .map_err(|e| Error::Usage(e.to_string()))?;
+        Ok(())
+    }
+
+    /// `--earth-rate` needs a latitude that is one, and a world in which the Earth's axis has a place.
+    fn check_earth_rate(&self) -> Result<()> {
+        let Some(latitude) = self.latitude_deg else {
+            return Ok(());
+        };
+        if !(-90.0..=90.0).contains(&latitude) {
+            return Err(Error::Usage(format!(
+                "--earth-rate {latitude}: a latitude lies between -90 and 90 degrees, north positive"
+            )));
+        }
+        if self.world == World::Start {
+            return Err(Error::Usage(
+                "--earth-rate: in --world start nobody knows where north and up are, and so not how the Earth turns\n  help: --world enu (or ned, nwu) with --init first-orientation, q=w,x,y,z, rpy=roll,pitch,yaw, or gravity where the heading is 0".to_owned(),
+            ));
+        }
         Ok(())
     }
 }

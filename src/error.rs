@@ -112,9 +112,29 @@ pub enum Error {
         /// What, why, and the flag that helps.
         what: String,
     },
+    /// An address can not be listened on.
+    #[error("cannot listen on {address}: {source}{}", bind_help(source))]
+    Bind {
+        /// Where.
+        address: String,
+        /// Why.
+        source: std::io::Error,
+    },
     /// A combination of arguments that can not be.
     #[error("{0}")]
     Usage(String),
+}
+
+fn bind_help(source: &std::io::Error) -> &'static str {
+    match source.kind() {
+        std::io::ErrorKind::AddrInUse => {
+            "\n  help: is another strapd running there? --listen takes another address; port 0 takes a free port and shows it"
+        }
+        std::io::ErrorKind::PermissionDenied => {
+            "\n  help: ports below 1024 need a privilege; take a higher one"
+        }
+        _ => "",
+    }
 }
 
 /// Result of a run.

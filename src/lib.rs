@@ -16,6 +16,7 @@
 //! | [`propagate`] | rates -> attitude: the hot loop | pure |
 //! | `sink` | attitude -> MCAP, NDJSON, CSV | I/O |
 //! | `pipeline` | the stages wired: replay, tracks, what a log holds | I/O |
+//! | `serve` | the daemon: samples in over sockets, attitude out | I/O |
 //! | [`compare`] | two attitudes -> how far apart | pure |
 //! | `config`, `report`, `cli` | arguments -> a run -> its summary | |
 //! | [`model`] | frames, attitude, rigid body, top, inertia, the youBot's arm, motions with exact truth | pure |
@@ -41,6 +42,8 @@ pub mod error;
 pub mod pipeline;
 #[cfg(feature = "service")]
 pub mod report;
+#[cfg(feature = "service")]
+pub mod serve;
 #[cfg(feature = "service")]
 pub mod sink;
 #[cfg(feature = "service")]

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     let cli = strapd::cli::Cli::parse();
     strapd::cli::start_diagnostics(&cli.global);
+    strapd::sink::make_size_limit_an_error();
     match strapd::cli::run(cli) {
         Ok(outcome) => outcome.into(),
         Err(error) if error.is_broken_pipe() => ExitCode::SUCCESS,

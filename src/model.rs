@@ -11,7 +11,7 @@ pub mod frames;
 pub mod imu_error;
 pub mod inertia;
 pub mod motion;
-mod quaternion_kernel;
+pub(crate) mod quaternion_kernel;
 pub mod rigid_body;
 pub mod top;
 pub mod youbot;

@@ -208,6 +208,8 @@ pub struct AttitudeSample {
     /// sample before.
     pub q_nb: Quaternion<Nav, Body>,
     /// Bias-corrected body rate in rad/s: the sample itself, or the increment divided by its interval.
+    /// What a gyro measures: relative to inertial space (w_ib), Earth's rotation included, also where
+    /// `q_nb` is relative to a world that turns with it.
     pub rate: Vector3<f64>,
     /// Specific force in body axes, m/s^2, copied through.
     pub accel: Option<Vector3<f64>>,

@@ -3,4 +3,5 @@
 pub mod findings;
 pub mod plot;
 pub mod simulation;
+pub mod stamps;
 pub mod summary;

@@ -10,9 +10,10 @@ mod batch;
 mod copy;
 mod csv;
 mod decimate;
-mod json;
+pub(crate) mod json;
 mod mcap;
 mod output;
+mod size_limit;
 mod stream;
 mod target;
 #[cfg(test)]
@@ -21,8 +22,11 @@ pub(crate) mod tests;
 pub use copy::CopiedChannel;
 pub use decimate::Decimator;
 pub use mcap::chunk::Compression;
+pub use mcap::live::{LiveMcap, LiveStream};
 pub use mcap::{Attachment, Encoding, InputChannel, InputMessage};
 pub use output::Flow;
+pub(crate) use output::sync_directory;
+pub use size_limit::make_size_limit_an_error;
 pub use stream::{Content, Provenance, Stream, output_topic};
 pub use target::{Format, Target};
 

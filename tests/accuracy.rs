@@ -1,5 +1,6 @@
 //! How far from truth the propagator is, in degrees and arc seconds, against motions known otherwise.
 //! The tables are those of `attitude.md` 6 and `top.md` 4.
+#![allow(clippy::print_stdout, reason = "figures, with --nocapture")]
 #![allow(clippy::unwrap_used, clippy::expect_used, unreachable_pub)]
 
 #[path = "accuracy/coning.rs"]
@@ -8,12 +9,14 @@ mod coning;
 mod double;
 #[path = "accuracy/gaps.rs"]
 mod gaps;
-#[path = "accuracy/live.rs"]
-mod live;
 #[path = "accuracy/integration_error.rs"]
 mod integration_error;
+#[path = "accuracy/live.rs"]
+mod live;
 #[path = "accuracy/noise.rs"]
 mod noise;
+#[path = "accuracy/orders.rs"]
+mod orders;
 #[path = "accuracy/peers.rs"]
 mod peers;
 #[path = "accuracy/random.rs"]
@@ -44,7 +47,7 @@ const fn centred(window: usize, order: Order) -> Method {
     }
 }
 
-fn causal(window: usize, order: Order) -> Method {
+const fn causal(window: usize, order: Order) -> Method {
     Method::Magnus {
         window,
         order,

@@ -1,4 +1,5 @@
 //! Allan deviation: against theory, against what was put in, and at its limits.
+#![allow(clippy::print_stdout, reason = "figures, with --nocapture")]
 #![cfg(feature = "random")]
 #![allow(clippy::unwrap_used)]
 

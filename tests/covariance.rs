@@ -89,7 +89,6 @@ fn a_wandering_bias_and_unequal_axes_are_the_finely_cut_recursion_within_what_is
     for (name, noise) in [("rrw", rrw), ("unequal", unequal), ("decaying", decaying)] {
         for (angle, allowed) in [(0.01, 1e-5), (0.1, 1e-4), (1.0, 1e-3)] {
             let found = compare(noise, angle, 400, 40);
-            println!("{name} {angle}: {found:e}");
             // A share of what the steps add, up to a^2/3 each; over many it is less.
             assert!(found < allowed, "{name}, {angle} rad a step: {found:e}");
         }
@@ -99,14 +98,14 @@ fn a_wandering_bias_and_unequal_axes_are_the_finely_cut_recursion_within_what_is
 #[test]
 fn a_bias_that_forgets_ends_where_a_gauss_markov_process_does() {
     let (k, tau) = (2e-3, 0.5);
-    for h in [1e-4, 0.01, 0.3, 5.0, 1e9] {
+    for h in [1e-4_f64, 0.01, 0.3, 5.0, 1e9] {
         let mut covariance = Covariance::new(Noise {
             bias: [0.1; 3],
             rrw: [k; 3],
             bias_tau: Some(tau),
             ..Noise::default()
         });
-        let steps = (20.0 / h as f64).ceil() as usize;
+        let steps = (20.0 / h).ceil() as usize;
         for _ in 0..steps {
             covariance.step(RotationVector(Vector3::zeros()), h);
         }
@@ -181,6 +180,7 @@ fn a_reset_forgets_the_attitudes_error_and_not_what_is_unknown_of_the_bias() {
         kind: SampleKind::Rate,
         initial: Quaternion::identity(),
         noise,
+        ..Settings::default()
     })
     .unwrap();
     let at = |secs: i64, join| RateSample {
@@ -242,6 +242,7 @@ fn pushed(
         kind: SampleKind::Rate,
         initial: Quaternion::identity(),
         noise,
+        ..Settings::default()
     })
     .unwrap();
     let mut out = Vec::new();

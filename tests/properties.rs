@@ -3,6 +3,7 @@
 
 use proptest::prelude::*;
 use strapd::model::attitude::Quaternion;
+use strapd::model::frames::In;
 use strapd::propagate::{
     Executor, Method, Noise, Order, Placement, Propagator, Sequential, Settings,
 };
@@ -67,6 +68,7 @@ fn propagator(method: Method, kind: SampleKind) -> Propagator {
             rrw: [1e-5; 3],
             bias_tau: None,
         },
+        ..Settings::default()
     })
     .unwrap()
 }
@@ -465,12 +467,7 @@ fn more_than_half_a_turn_in_a_step_is_said() {
 
 #[test]
 fn settings_that_can_not_be_are_refused_with_the_flag_that_helps() {
-    let settings = Settings {
-        method: Method::Auto,
-        kind: SampleKind::Rate,
-        initial: Quaternion::identity(),
-        noise: Noise::default(),
-    };
+    let settings = Settings::default();
     let refused = |settings: Settings| Propagator::new(settings).unwrap_err().to_string();
     for window in [0, 1, 25, usize::MAX] {
         let method = Method::Magnus {
@@ -496,6 +493,12 @@ fn settings_that_can_not_be_are_refused_with_the_flag_that_helps() {
             ..Noise::default()
         };
         assert!(refused(Settings { noise, ..settings }).contains("--noise"));
+        let world_rate = In::assume([0.0, 20.0 * arw, 0.0].into());
+        let turning = Settings {
+            world_rate,
+            ..settings
+        };
+        assert!(refused(turning).contains("--earth-rate"));
     }
     let unknown = "qauternion".parse::<Method>().unwrap_err().to_string();
     assert!(unknown.contains("`qauternion`") && unknown.contains("auto, magnus, commit"));

@@ -74,7 +74,7 @@ def main():
         print(f"| {package} {name} | {version(package)} | {apart:.1e} | {error:.4f} |")
     error = np.degrees((truth.inv() * ours).magnitude().max())
     print(f"| our version | | | {error:.4f} |")
-    sys.exit(worst > SAME)
+    sys.exit(int(worst > SAME))
 
 
 if __name__ == "__main__":

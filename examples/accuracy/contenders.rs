@@ -66,6 +66,7 @@ impl Contender {
             kind,
             initial: start,
             noise: Noise::default(),
+            ..Settings::default()
         })?;
         let mut out = Vec::new();
         propagator.push(samples, &Sequential, &mut out);

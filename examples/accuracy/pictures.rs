@@ -53,7 +53,7 @@ fn shown(kind: SampleKind) -> Result<Vec<(Contender, &'static str)>, Failure> {
         .collect()
 }
 
-/// One line for each contender, one point for each run.
+/// One line for each contender, one point for each run. The axes leave room above for the legend.
 fn lines(
     kind: SampleKind,
     runs: &[(f64, Vec<Run>)],
@@ -63,8 +63,10 @@ fn lines(
 ) -> Result<Vec<Series>, Failure> {
     shown(kind)?
         .into_iter()
-        .map(|(who, words)| {
+        .enumerate()
+        .map(|(i, (who, words))| {
             let mut points = Vec::new();
+            let mut followed = true;
             for (x, seeds) in runs {
                 let mut errors = Vec::new();
                 for run in seeds {
@@ -72,14 +74,16 @@ fn lines(
                 }
                 errors.sort_by(f64::total_cmp);
                 let median = errors[errors.len() / 2];
-                // Beyond this the angle between two attitudes no longer grows with the error.
-                points.push([*x, if median < most { median } else { f64::NAN }]);
+                // Beyond this the angle between two attitudes no longer grows with the error: the line ends.
+                followed &= median < most;
+                points.push([*x, if followed { median } else { f64::NAN }]);
             }
             Ok(Series {
                 name: words.to_owned(),
                 points,
                 look: Look::Marked,
-                ..Series::default()
+                // The same in every picture.
+                color: Some(i),
             })
         })
         .collect()
@@ -116,7 +120,7 @@ pub fn coning(degrees: f64, kind: SampleKind, amount: Amount) -> Result<Picture,
         ),
         x: Axis::log("cone frequency / sampling frequency"),
         y: Axis {
-            range: Some((1e-11, 1e6)),
+            range: Some((1e-11, 1e12)),
             ..Axis::log("greatest error, arcsec")
         },
         series: lines(kind, &runs, MARGIN, arcsec, wrapped)?,
@@ -147,7 +151,7 @@ pub fn top(kind: SampleKind, amount: Amount) -> Result<Picture, Failure> {
         title: format!("Spinning top, 1.2 s, {}, away from the ends", words(kind)),
         x: Axis::log("sampling rate, Hz"),
         y: Axis {
-            range: Some((1e-14, 1e6)),
+            range: Some((1e-14, 1e10)),
             ..Axis::log("greatest error, degrees")
         },
         series: lines(kind, &runs, MARGIN, f64::to_degrees, 110.0)?,
@@ -194,7 +198,7 @@ pub fn jitter(lost: f64, amount: Amount) -> Result<Picture, Failure> {
         ),
         x: Axis::linear("jitter of the sampling instants, % of the interval, either way"),
         y: Axis {
-            range: Some((1e-10, 1e8)),
+            range: Some((1e-10, 1e12)),
             ..Axis::log("greatest error, arcsec")
         },
         series,

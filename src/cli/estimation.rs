@@ -83,6 +83,14 @@ pub struct Estimation {
     /// Beyond that: hold the attitude, bridge all the same, or reset to the initial attitude
     #[arg(long, value_enum, default_value = "hold")]
     pub on_gap: OnGapArg,
+    /// Take out the Earth's rotation at a fixed site, exactly: its latitude in degrees, north positive.
+    /// Needs --world enu, ned or nwu and a known heading
+    #[arg(long, value_name = "LAT_DEG", allow_negative_numbers = true)]
+    pub earth_rate: Option<f64>,
+    /// Replace stamps that jitter by evenly spaced ones: a straight line through the stamps of each
+    /// stretch of constant rate (a stream: a causal tracker). Only for a sensor that samples evenly
+    #[arg(long)]
+    pub regularise_stamps: bool,
     /// Full scale of the gyro in rad/s: samples at or beyond it are marked saturated
     #[arg(long, value_name = "RAD_S", allow_negative_numbers = true)]
     pub gyro_range: Option<f64>,
@@ -91,8 +99,8 @@ pub struct Estimation {
     pub ignore_covariance_flag: bool,
     /// Noise for the covariance: consumer, industrial, tactical, navigation, or a list
     ///
-    /// arw=RAD_PER_SQRT_S[,bias-instability=RAD_S][,rrw=RAD_S_PER_SQRT_S][,turn-on-bias=RAD_S][,initial=RAD],
-    /// each one number, or three x/y/z for the body axes. The turn-on bias counts unless a bias is removed
+    /// arw=RAD_PER_SQRT_S and any of bias-instability=RAD_S, rrw=RAD_S_PER_SQRT_S, turn-on-bias=RAD_S and
+    /// initial=RAD, with commas between; each one number, or three x/y/z for the body axes. The turn-on bias counts unless a bias is removed
     /// (--bias); initial is the uncertainty of the initial attitude.
     #[arg(long, value_name = "NOISE", default_value = "consumer")]
     pub noise: String,
@@ -230,6 +238,8 @@ impl Estimation {
             bias: Bias::parse(&self.bias)?,
             max_gap_secs: self.max_gap,
             on_gap: self.on_gap.into(),
+            latitude_deg: self.earth_rate,
+            regularise_stamps: self.regularise_stamps,
             gyro_range: self.gyro_range,
             noise: Noise::parse(&self.noise)?,
             start: self.start,

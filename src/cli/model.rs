@@ -1,4 +1,4 @@
-//! `strapd model top|inertia`: the model library at the command line, JSON in and out. I/O.
+//! `strapd model top|inertia|youbot`: the model library at the command line, JSON in and out. I/O.
 //!
 //! Each model is a subcommand and a file. As a filter (`filter`) a model answers one JSON object per
 //! line of standard input; what people ask with flags is answered as text.
@@ -7,6 +7,7 @@ mod filter;
 mod inertia;
 mod top;
 pub(crate) mod top_flags;
+pub(crate) mod youbot;
 
 use super::{Global, Outcome};
 use crate::error::Result;
@@ -34,6 +35,8 @@ pub struct Model {
 pub enum Which {
     /// The symmetric top: its cases, and how well each method finds its attitude
     Top(Box<top::Top>),
+    /// The KUKA youBot's arm: kinematics, forces, paths
+    Youbot(youbot::Youbot),
     /// Mass, centre of gravity, inertia -> 6x6 matrices, Coriolis forces, acceleration
     Inertia(inertia::Inertia),
 }
@@ -46,5 +49,6 @@ pub fn run(global: &Global, args: &Model) -> Result<Outcome> {
     match &args.which {
         Which::Top(command) => top::run(global, command),
         Which::Inertia(command) => inertia::run(command),
+        Which::Youbot(command) => youbot::run(command),
     }
 }

@@ -1,12 +1,13 @@
 //! `strapd simulate MOTION -o SINK...`: a synthetic gyro with exact truth. I/O.
 //!
-//! A motion is a subcommand, a file of flags and a row in [`Simulate::made`].
+//! A motion is a subcommand, a file of flags and a row in `Simulate::made`.
 
 mod coning;
 mod random;
 mod rigid_body;
 mod sampling;
 mod top;
+mod youbot;
 
 use super::progress::Reporter;
 use super::{Global, Outcome, outputs, print};
@@ -41,6 +42,8 @@ pub enum Which {
     RigidBody(rigid_body::RigidBody),
     /// The axis runs round a cone: the worst case of attitude integration
     Coning(coning::Coning),
+    /// An IMU on the gripper of the KUKA youBot's arm
+    Youbot(youbot::Youbot),
     /// Sums of sines about each axis, up to a highest frequency
     Random(random::Random),
 }
@@ -64,6 +67,7 @@ impl Simulate {
             Which::Top(m) => ("top", &m.common, m.made()?),
             Which::RigidBody(m) => ("rigid-body", &m.common, m.made()?),
             Which::Coning(m) => ("coning", &m.common, m.made()?),
+            Which::Youbot(m) => ("youbot", &m.common, m.made()?),
             Which::Random(m) => ("random", &m.common, m.made()?),
         })
     }

@@ -5,7 +5,6 @@
 
 mod advice;
 mod gravity;
-mod histogram;
 mod summary;
 
 pub use advice::Advice;
@@ -13,9 +12,9 @@ pub use gravity::GyroAgainstGravity;
 pub use summary::{AxisStats, GravityAxis, OffsetStats, QualitySummary, SpacingStats};
 
 use super::clock::Clock;
+use super::histogram::Histogram;
 use crate::record::{Nanos, RawSample};
 use gravity::GravityTrack;
-use histogram::Histogram;
 use nalgebra::Vector3;
 
 /// Samples from which the step is learnt that jitter is measured against.

@@ -9,7 +9,7 @@
 
 mod estimate;
 
-pub use estimate::{BiasEstimate, NoRest, accel_at_start, estimate_bias, level};
+pub use estimate::{BiasEstimate, NoRest, accel_at_start, estimate_bias, level, rest_at_start};
 
 use crate::record::{Join, Nanos, RateSample, SampleKind};
 use nalgebra::Vector3;
@@ -78,6 +78,18 @@ pub struct Rest {
 }
 
 impl Rest {
+    /// As if it were the only one.
+    #[must_use]
+    pub fn alone(&self) -> Rests {
+        Rests {
+            kept: vec![*self],
+            count: 1,
+            secs: self.secs(),
+            first: Some(self.start),
+            stillest: None,
+        }
+    }
+
     /// How long it lasted, s.
     #[must_use]
     pub fn secs(&self) -> f64 {

@@ -40,9 +40,10 @@ mod worlds;
 
 pub use axes::{AxisMap, AxisMapError, BodyAxes};
 pub use worlds::{
-    Convention, ParseWorldError, World, enu_flu_from_ned_frd, enu_flu_from_nwu_flu, enu_from_ned,
-    flu_from_frd, frd_from_flu, ned_frd_from_enu_flu, ned_frd_from_nwu_flu, ned_from_enu,
-    nwu_flu_from_enu_flu, nwu_flu_from_ned_frd,
+    Convention, EARTH_RATE, ParseWorldError, World, earth_rate, enu_flu_from_ned_frd,
+    enu_flu_from_nwu_flu, enu_from_ned, enu_from_nwu, flu_from_frd, frd_from_flu,
+    ned_frd_from_enu_flu, ned_frd_from_nwu_flu, ned_from_enu, nwu_flu_from_enu_flu,
+    nwu_flu_from_ned_frd, nwu_from_enu,
 };
 
 use nalgebra::{Matrix3, Vector3};

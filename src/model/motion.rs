@@ -12,6 +12,7 @@
 //! | [`BandLimited`] | power series in 32 digits | closed form |
 //! | [`FreeBody`] | Jacobi's functions | closed form |
 //! | [`HeavyBody`] (the top) | power series in 32 digits | power series |
+//! | [`Gripper`] (the youBot's arm) | closed form | Gauss's rule to rounding |
 //!
 //! Time is integer nanoseconds since the start.
 
@@ -24,6 +25,7 @@ pub use coning::{Coning, ConstantRate};
 pub use free_body::FreeBody;
 
 use super::rigid_body::{HeavyBody, Spin};
+use super::youbot::Gripper;
 use nalgebra::Vector3;
 use std::fmt;
 
@@ -69,6 +71,8 @@ pub enum Motion {
     FreeBody(Box<FreeBody>),
     /// A top, or any body about a fixed point under gravity.
     HeavyBody(Box<HeavyBody>),
+    /// An IMU on the gripper of the youBot's arm.
+    Gripper(Box<Gripper>),
 }
 
 impl Motion {
@@ -80,6 +84,7 @@ impl Motion {
             Self::BandLimited(m) => m.at_nanos(nanos),
             Self::FreeBody(m) => m.at_nanos(nanos),
             Self::HeavyBody(m) => m.at_nanos(nanos),
+            Self::Gripper(m) => m.at_nanos(nanos),
         }
     }
 
@@ -91,15 +96,16 @@ impl Motion {
             Self::BandLimited(m) => m.delta_angle(from, to),
             Self::FreeBody(m) => m.delta_angle(from, to),
             Self::HeavyBody(m) => m.delta_angle(from, to),
+            Self::Gripper(m) => m.delta_angle(from, to).0,
         }
     }
 
     /// Acceleration of the origin of the body axes at `nanos` nanoseconds, m/s^2, navigation axes.
-    /// All of these turn about a point that stays where it is.
+    /// All but the gripper turn about a point that stays where it is.
     #[must_use]
     pub fn acceleration_n(&self, nanos: u64) -> Vector3<f64> {
-        let _ = nanos;
         match self {
+            Self::Gripper(m) => *m.acceleration(nanos).as_vector(),
             Self::ConstantRate(_)
             | Self::Coning(_)
             | Self::BandLimited(_)

@@ -80,6 +80,11 @@ impl Thinned {
     }
 }
 
+/// The kinds samples are taken for.
+pub(super) fn kinds() -> impl Iterator<Item = SampleKind> {
+    MEANINGS.iter().map(|(_, _, kind, _)| *kind)
+}
+
 impl AgainstRecorded {
     /// For samples understood as `resolved`, but for their meaning.
     ///

@@ -4,6 +4,7 @@
 //! does no I/O.
 
 use super::preparation::{Prepared, Resolved};
+use crate::condition::regularise::{self, Regulariser};
 use crate::condition::{self, Conditioner};
 use crate::config::Plan;
 use crate::model::frames::{Convention, World};
@@ -14,9 +15,12 @@ use crate::record::{AttitudeSample, RateSample, RawSample};
 #[derive(Debug)]
 pub struct Estimator {
     conditioner: Conditioner,
+    regulariser: Option<Regulariser>,
     propagator: Propagator,
     world: World,
     rates: Vec<RateSample>,
+    /// The same with their new stamps.
+    even: Vec<RateSample>,
     out: Vec<AttitudeSample>,
 }
 
@@ -27,18 +31,47 @@ impl Estimator {
     /// In words, with the flag that helps: settings that can not be.
     pub fn new(plan: &Plan, resolved: &Resolved, prepared: &Prepared) -> Result<Estimator, String> {
         let settings = resolved.conditioning(plan, prepared.clock, prepared.bias);
+        Estimator::with(plan, resolved, prepared, &settings)
+    }
+
+    /// The same for a live stream: no sample waits for its successors, so one that comes late is
+    /// dropped and counted.
+    ///
+    /// # Errors
+    /// As [`Estimator::new`].
+    pub fn live(
+        plan: &Plan,
+        resolved: &Resolved,
+        prepared: &Prepared,
+    ) -> Result<Estimator, String> {
+        let settings = condition::Settings {
+            reorder_window: condition::Settings::LIVE_WINDOW,
+            ..resolved.conditioning(plan, prepared.clock, prepared.bias)
+        };
+        Estimator::with(plan, resolved, prepared, &settings)
+    }
+
+    fn with(
+        plan: &Plan,
+        resolved: &Resolved,
+        prepared: &Prepared,
+        settings: &condition::Settings,
+    ) -> Result<Estimator, String> {
         let propagator = Propagator::new(propagate::Settings {
             method: plan.method,
             kind: resolved.kind,
             initial: prepared.initial,
+            world_rate: prepared.world_rate,
             noise: plan.noise.with_bias(prepared.bias_sigma.into()),
         })
         .map_err(|e| e.to_string())?;
         Ok(Estimator {
-            conditioner: Conditioner::new(&settings).map_err(|e| e.to_string())?,
+            conditioner: Conditioner::new(settings).map_err(|e| e.to_string())?,
+            regulariser: prepared.stamps.regulariser(resolved.kind)?,
             propagator,
             world: prepared.world,
             rates: Vec::new(),
+            even: Vec::new(),
             out: Vec::new(),
         })
     }
@@ -58,8 +91,7 @@ impl Estimator {
     /// The attitudes that are known by now. Their bits do not depend on when they are asked for.
     pub fn attitudes(&mut self, exec: &impl Executor) -> &[AttitudeSample] {
         self.out.clear();
-        self.propagator.push(&self.rates, exec, &mut self.out);
-        self.rates.clear();
+        self.propagate(exec);
         self.relabel();
         &self.out
     }
@@ -68,17 +100,40 @@ impl Estimator {
     pub fn finish(&mut self, exec: &impl Executor) -> &[AttitudeSample] {
         self.out.clear();
         self.conditioner.finish(&mut self.rates);
-        self.propagator.push(&self.rates, exec, &mut self.out);
+        self.propagate(exec);
+        if let Some(regulariser) = &mut self.regulariser {
+            regulariser.finish(&mut self.even);
+            self.propagator.push(&self.even, exec, &mut self.out);
+            self.even.clear();
+        }
         self.propagator.finish(exec, &mut self.out);
-        self.rates.clear();
         self.relabel();
         &self.out
+    }
+
+    fn propagate(&mut self, exec: &impl Executor) {
+        match &mut self.regulariser {
+            None => self.propagator.push(&self.rates, exec, &mut self.out),
+            Some(regulariser) => {
+                regulariser.push(&self.rates, &mut self.even);
+                self.propagator.push(&self.even, exec, &mut self.out);
+                self.even.clear();
+            }
+        }
+        self.rates.clear();
     }
 
     /// What conditioning did.
     #[must_use]
     pub fn conditioning(&self) -> &condition::Report {
         self.conditioner.report()
+    }
+
+    /// What became of the stamps, where they were regularised: whether causally, and how.
+    #[must_use]
+    pub fn regularising(&self) -> Option<(bool, regularise::Report)> {
+        let regulariser = self.regulariser.as_ref()?;
+        Some((regulariser.is_causal(), regulariser.report()))
     }
 
     /// What propagation did.

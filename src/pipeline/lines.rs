@@ -7,6 +7,7 @@ use super::route::Item;
 use super::run::{Replay, refused};
 use super::session::Found;
 use super::simulate::TRUTH_ID;
+use super::stamps::{StampPass, Stamps};
 use super::summarise;
 use super::waiting::Waiting;
 use crate::decode::{Class, LineDecoder, MAX_LINE, Stated};
@@ -54,19 +55,119 @@ pub fn open(path: &Path) -> Result<File> {
     Ok(file)
 }
 
-/// Replays lines.
+/// Replays lines; `stamps` is what [`stamps`] found.
 ///
 /// # Errors
 /// As [`super::replay::run`]; several sensors in one stream and none named.
 pub fn replay(
     run: &Replay,
-    mut input: BufReader<impl Read>,
+    input: BufReader<impl Read>,
+    stamps: Option<Stamps>,
     pool: &Pool,
     watch: &mut dyn FnMut(&Position),
 ) -> Result<RunSummary> {
     let path = run.source.name();
+    let mut running = Running {
+        waiting: Waiting::new(run, &path, stamps),
+        pool,
+        watch,
+    };
+    read(run, input, &path, &mut running)?;
+    let ended = running.waiting.into_session(pool)?.finish(pool)?;
+    Ok(summarise::run(run, ended, &Survey::default()))
+}
+
+/// Reads a file of lines for its stamps alone, where these are to be regularised.
+///
+/// # Errors
+/// As [`replay`]; there is no constant rate.
+pub fn stamps(run: &Replay, input: BufReader<impl Read>) -> Result<Option<Stamps>> {
+    if !run.plan.regularise_stamps {
+        return Ok(None);
+    }
+    let path = run.source.name();
+    let mut looking = Looking {
+        run,
+        path: &path,
+        pass: None,
+    };
+    read(run, input, &path, &mut looking)?;
+    let Some((name, pass)) = looking.pass else {
+        return Ok(None);
+    };
+    let found = pass.finish().map_err(|what| refused(&path, &name, what))?;
+    Ok(Some(found))
+}
+
+/// Whoever takes what is read from lines.
+trait Taker {
+    /// The sensor is known.
+    fn meet(&mut self, found: Found, stream: Stream) -> Result<()>;
+    /// The next items.
+    fn take(&mut self, items: &mut Vec<Item>) -> Result<Flow>;
+    /// The next line may be long in coming.
+    fn pause(&mut self) -> Result<()>;
+}
+
+/// A run.
+struct Running<'r, 'w> {
+    waiting: Waiting<'r>,
+    pool: &'r Pool,
+    watch: &'w mut dyn FnMut(&Position),
+}
+
+impl Taker for Running<'_, '_> {
+    fn meet(&mut self, found: Found, stream: Stream) -> Result<()> {
+        self.waiting.meet(&mut Some((found, stream)))
+    }
+
+    fn take(&mut self, items: &mut Vec<Item>) -> Result<Flow> {
+        let flow = self.waiting.consume(items.drain(..), self.pool)?;
+        (self.watch)(&self.waiting.position());
+        Ok(flow)
+    }
+
+    fn pause(&mut self) -> Result<()> {
+        self.waiting.flush_to_readers(self.pool)
+    }
+}
+
+/// A pass for the stamps.
+struct Looking<'r> {
+    run: &'r Replay,
+    path: &'r Path,
+    pass: Option<(String, StampPass)>,
+}
+
+impl Taker for Looking<'_> {
+    fn meet(&mut self, found: Found, _: Stream) -> Result<()> {
+        self.pass = StampPass::new(self.run, &found.resolved).map(|pass| (found.name, pass));
+        Ok(())
+    }
+
+    fn take(&mut self, items: &mut Vec<Item>) -> Result<Flow> {
+        for item in items.drain(..) {
+            if let (Item::Sample(_, raw), Some((name, pass))) = (item, &mut self.pass) {
+                pass.push(&raw)
+                    .map_err(|what| refused(self.path, name, what))?;
+            }
+        }
+        Ok(Flow::Continue)
+    }
+
+    fn pause(&mut self) -> Result<()> {
+        Ok(())
+    }
+}
+
+/// Reads lines to their end, or until nobody wants them.
+fn read(
+    run: &Replay,
+    mut input: BufReader<impl Read>,
+    path: &Path,
+    taker: &mut impl Taker,
+) -> Result<()> {
     let decoder = LineDecoder::new(&run.plan.decode);
-    let mut waiting = Waiting::new(run, &path);
     let mut lines = Lines {
         number: 0,
         offset: 0,
@@ -77,16 +178,16 @@ pub fn replay(
     let mut samples = Vec::new();
     let mut items = Vec::with_capacity(BATCH);
     let mut closed = false;
-    while !closed && lines.next(&mut input, &path)? {
+    while !closed && lines.next(&mut input, path)? {
         if lines.is_blank() {
             continue;
         }
         // A line has no time but the one in it.
         let received = Nanos(0);
         match decoder.decode(&lines.line, received, &mut samples) {
-            Err(why) if waiting.is_idle() => {
+            Err(why) if sensor.is_none() => {
                 return Err(Error::Unsupported {
-                    path,
+                    path: path.to_owned(),
                     what: format!(
                         "line {}: {why}\n  help: one JSON object per line, with gyro and stamp; or an MCAP",
                         lines.number
@@ -104,8 +205,8 @@ pub fn replay(
                 if !is_sample && samples.iter().all(|s| s.gyro.is_none()) {
                     // Attitudes, status and the like between the samples.
                     samples.clear();
-                    if waiting.is_idle() && lines.number > PATIENCE {
-                        return Err(nothing(&path));
+                    if sensor.is_none() && lines.number > PATIENCE {
+                        return Err(nothing(path));
                     }
                     continue;
                 }
@@ -134,12 +235,13 @@ pub fn replay(
                             gyro_unit: line.gyro_unit,
                             ..Stated::default()
                         };
-                        waiting.meet(&mut Some(met(run, &id, &stated)))?;
+                        let (found, stream) = met(run, &id, &stated);
+                        taker.meet(found, stream)?;
                         sensor = Some(id);
                     }
                     Some(first) if *first != id => {
                         return Err(refused(
-                            &path,
+                            path,
                             first,
                             format!(
                                 "line {}: samples of another sensor, `{id}`\n  help: --topic ID takes one of them",
@@ -166,19 +268,17 @@ pub fn replay(
         // out first.
         let may_wait = input.buffer().is_empty();
         if items.len() >= BATCH || may_wait {
-            closed = waiting.consume(items.drain(..), pool)? == Flow::Closed;
-            watch(&waiting.position());
+            closed = taker.take(&mut items)? == Flow::Closed;
         }
         if may_wait {
-            waiting.flush_to_readers(pool)?;
+            taker.pause()?;
         }
     }
-    if waiting.is_idle() {
-        return Err(nothing(&path));
+    if sensor.is_none() {
+        return Err(nothing(path));
     }
-    let _ = waiting.consume(items.into_iter(), pool)?;
-    let ended = waiting.into_session(pool)?.finish(pool)?;
-    Ok(summarise::run(run, ended, &Survey::default()))
+    let _ = taker.take(&mut items)?;
+    Ok(())
 }
 
 fn nothing(path: &Path) -> Error {

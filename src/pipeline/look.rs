@@ -4,12 +4,14 @@
 //! anyone leaps.
 
 use super::log::{Known, Log, described, rank};
+use super::passes::{Conditioned, FEW};
 use super::pool::Pool;
-use super::preparation::{Resolved, RestPass};
+use super::preparation::Resolved;
 use super::route::{Item, Route};
 use super::topics::PICKED_UNNAMED;
 use crate::condition::quality::{Quality, QualitySummary};
-use crate::condition::stillness::{self, Limits, Rests};
+use crate::condition::regularise;
+use crate::condition::stillness::{self, Limits, Rests, Stillness};
 use crate::condition::{Clock, choose_clock};
 use crate::config::Plan;
 use crate::decode::{self, Options};
@@ -46,9 +48,6 @@ pub struct Looked {
     pub clock_warning: Option<String>,
 }
 
-/// Samples that tell which clock moves.
-const FEW: usize = 512;
-
 /// A topic being looked at.
 struct Look {
     topic: String,
@@ -59,13 +58,18 @@ struct Look {
     first: Vec<RawSample>,
     clock: Option<(Clock, Option<String>)>,
     quality: Quality,
-    rest: RestPass,
+    conditioned: Conditioned,
+    stillness: Stillness,
+    stamps: regularise::Survey,
     undecodable: u64,
 }
 
 impl Look {
     fn take(&mut self, raw: &RawSample) -> std::result::Result<(), String> {
-        self.rest.push(std::slice::from_ref(raw))?;
+        self.conditioned.push(std::slice::from_ref(raw), |sample| {
+            self.stillness.push(sample);
+            self.stamps.push(sample);
+        })?;
         if self.clock.is_some() {
             self.quality.push(raw);
             return Ok(());
@@ -89,14 +93,20 @@ impl Look {
             self.settle();
         }
         let (clock, clock_warning) = self.clock.unwrap_or((Clock::Header, None));
-        let rests = self.rest.finish()?;
+        self.conditioned.finish(|sample| {
+            self.stillness.push(sample);
+            self.stamps.push(sample);
+        })?;
+        let rests = self.stillness.finish();
+        let mut quality = self.quality.summary();
+        quality.judge_lines(&self.stamps.finish());
         Ok(Looked {
             topic: self.topic,
             described: self.described,
             frame: self.frame,
             resolved: self.resolved,
             kind_stated: self.kind_stated,
-            quality: self.quality.summary(),
+            quality,
             bias: stillness::estimate_bias(&rests, &Limits::default()).ok(),
             rests,
             undecodable: self.undecodable,
@@ -211,7 +221,9 @@ fn begin(known: &Known, decoder: &decode::Decoder) -> Look {
         first: Vec::new(),
         clock: None,
         quality: Quality::new(Clock::Header),
-        rest: RestPass::new(&plan, &resolved),
+        conditioned: Conditioned::new(&plan, &resolved),
+        stillness: Stillness::new(resolved.kind, Limits::default()),
+        stamps: regularise::Survey::new(),
         resolved,
         undecodable: 0,
     }

@@ -13,7 +13,7 @@ use crate::sink::Stream;
 use std::path::{Path, PathBuf};
 
 /// The output's labels: frames and axes as they will be in the numbers.
-pub(super) fn labelled(
+pub(crate) fn labelled(
     mut stream: Stream,
     plan: &Plan,
     resolved: &Resolved,

@@ -3,17 +3,17 @@
 //! Apart from the estimator because it is all about what is not known yet: when enough has been
 //! seen, and what to say when it can not be known.
 
-use crate::condition::stillness::{self, Limits, NoRest, Rests, Stillness};
-use crate::condition::{Clock, ClockWarning, Conditioner, GyroUnit, Settings, choose_clock};
+use super::passes::{FEW, RestPass};
+use super::stamps::{StampPass, Stamps};
+use crate::condition::stillness::{self, Limits, NoRest, Rests};
+use crate::condition::{Clock, ClockWarning, GyroUnit, Settings, choose_clock};
 use crate::config::{Bias, Initial, Plan};
 use crate::decode::{self, Stated};
 use crate::model::attitude::{Quaternion, YawPitchRoll};
-use crate::model::frames::{Body, BodyAxes, Convention, Nav, Sensor, World};
-use crate::record::{Nanos, RateSample, RawSample, SampleKind};
+use crate::model::frames::{Body, BodyAxes, Convention, EARTH_RATE, In, Nav, Sensor, World};
+use crate::record::{Nanos, RawSample, SampleKind};
 use nalgebra::{Matrix3, Vector3};
 
-/// Samples that tell the clock and hold the first orientation.
-const FEW: usize = 512;
 /// Samples, and seconds of data, in which rest is sought when the log can not be read twice.
 const MANY: usize = 200_000;
 const REST_SECS: f64 = 60.0;
@@ -163,8 +163,12 @@ pub struct Prepared {
     pub initial: Quaternion<Nav, Body>,
     /// Where it came from.
     pub initial_origin: String,
+    /// w_ie in ENU, rad/s; zero where the Earth is not taken out.
+    pub world_rate: In<Nav>,
     /// The world of the output.
     pub world: World,
+    /// What becomes of the stamps.
+    pub stamps: Stamps,
     /// Things to know.
     pub warnings: Vec<String>,
 }
@@ -188,6 +192,9 @@ pub struct Preparation {
     taken: usize,
     last: Option<RawSample>,
     rest: Option<RestPass>,
+    stamps: Option<StampPass>,
+    /// What a pass before this one found.
+    known: Option<Stamps>,
 }
 
 impl Preparation {
@@ -202,7 +209,21 @@ impl Preparation {
             taken: 0,
             last: None,
             rest: needs_rest(plan).then(|| RestPass::new(plan, resolved)),
+            stamps: None,
+            known: None,
         }
+    }
+
+    /// The same with a look at the stamps, as in [`StampPass::new`].
+    #[must_use]
+    pub fn with_stamps(self, stamps: Option<StampPass>) -> Preparation {
+        Preparation { stamps, ..self }
+    }
+
+    /// The same with stamps that were looked at before.
+    #[must_use]
+    pub fn with_known_stamps(self, known: Option<Stamps>) -> Preparation {
+        Preparation { known, ..self }
     }
 
     /// Takes the next sample.
@@ -215,6 +236,12 @@ impl Preparation {
         }
         self.taken += 1;
         self.last = Some(*raw);
+        // Of a stream, the beginning: enough to see that there is no constant rate.
+        if let Some(pass) = &mut self.stamps
+            && (self.patience == Patience::WholeLog || self.taken <= FEW)
+        {
+            pass.push(raw)?;
+        }
         match &mut self.rest {
             Some(rest) => rest.push(std::slice::from_ref(raw)),
             None => Ok(()),
@@ -232,15 +259,15 @@ impl Preparation {
         };
         let secs =
             |a: Option<Nanos>, b: Option<Nanos>| a.zip(b).map_or(0.0, |(a, b)| b.secs_since(a));
-        self.rest.is_some()
-            && match self.patience {
-                Patience::WholeLog => true,
-                Patience::FirstMinute => {
-                    self.taken < MANY
-                        && secs(first.header, last.header) < REST_SECS
-                        && last.log.secs_since(first.log) < REST_SECS
-                }
+        match self.patience {
+            Patience::WholeLog => self.rest.is_some() || self.stamps.is_some(),
+            Patience::FirstMinute => {
+                self.rest.is_some()
+                    && self.taken < MANY
+                    && secs(first.header, last.header) < REST_SECS
+                    && last.log.secs_since(first.log) < REST_SECS
             }
+        }
     }
 
     /// Decides from what was taken.
@@ -251,19 +278,40 @@ impl Preparation {
         let Preparation {
             plan,
             resolved,
+            patience,
             first,
             rest,
+            stamps,
+            known,
             ..
         } = self;
+        let is_known = known.is_some();
         let (clock, warning) = choose_clock(&first, plan.clock);
         if let Some(fatal @ ClockWarning::NoneMoves) = warning {
             return Err(fatal.to_string());
         }
         let mut warnings: Vec<String> = warning.iter().map(ToString::to_string).collect();
         let rests = rest.map_or_else(|| Ok(Rests::default()), RestPass::finish)?;
-        let (bias, bias_sigma, bias_origin) = decide_bias(&plan, &rests)?;
         let (initial, initial_origin, world) =
             decide_initial(&plan, &resolved, &first, &rests, &mut warnings)?;
+        let earth = plan.latitude_deg.map(|deg| Earth::at(deg.to_radians()));
+        let (bias, bias_sigma, bias_origin) =
+            decide_bias(&plan, &rests, earth.map(|e| e.felt_by(&initial)))?;
+        let found = stamps.map(StampPass::finish).transpose()?;
+        let stamps = match (known.or(found), patience) {
+            (None, _) => Stamps::AsRecorded,
+            (
+                Some(Stamps::OnLines {
+                    states_interval, ..
+                }),
+                Patience::FirstMinute,
+            ) if !is_known => {
+                warnings.push("--regularise-stamps: this stream can be read only once, so each stamp was filtered by those before it; a file is fitted as a whole, which is more accurate and gives other numbers".to_owned());
+                Stamps::Causal { states_interval }
+            }
+            (Some(stamps), _) => stamps,
+        };
+        warnings.extend(earth.and_then(|e| e.heading_warning(plan.initial)));
         Ok(Prepared {
             clock,
             bias,
@@ -271,10 +319,55 @@ impl Preparation {
             bias_origin,
             initial,
             initial_origin,
+            world_rate: earth.map_or_else(|| In::assume(Vector3::zeros()), |e| e.w_ie),
             world,
+            stamps,
             warnings,
         })
     }
+}
+
+/// Decides from the first sample alone, for a live stream: its attitude must not wait. The clock is
+/// the one asked for, and another never takes its place.
+///
+/// # Errors
+/// In words: what only rest can tell was asked for, or the sample carries no orientation to begin with.
+pub fn at_once(plan: &Plan, resolved: &Resolved, first: &RawSample) -> Result<Prepared, String> {
+    if needs_rest(plan) {
+        return Err("--bias auto and --init gravity look for rest before the first attitude, and a live stream waits for nothing\n  help: measure once (`strapd info LOG` shows the bias) and give --bias x,y,z; --init rpy=roll,pitch,yaw or identity".to_owned());
+    }
+    let rests = Rests::default();
+    let mut warnings = Vec::new();
+    let (initial, initial_origin, world) = decide_initial(
+        plan,
+        resolved,
+        std::slice::from_ref(first),
+        &rests,
+        &mut warnings,
+    )?;
+    let earth = plan.latitude_deg.map(|deg| Earth::at(deg.to_radians()));
+    let (bias, bias_sigma, bias_origin) =
+        decide_bias(plan, &rests, earth.map(|e| e.felt_by(&initial)))?;
+    warnings.extend(earth.and_then(|e| e.heading_warning(plan.initial)));
+    let stamps = if plan.regularise_stamps {
+        Stamps::Causal {
+            states_interval: first.interval_nanos.is_some(),
+        }
+    } else {
+        Stamps::AsRecorded
+    };
+    Ok(Prepared {
+        clock: plan.clock,
+        bias,
+        bias_sigma,
+        bias_origin,
+        initial,
+        initial_origin,
+        world_rate: earth.map_or_else(|| In::assume(Vector3::zeros()), |e| e.w_ie),
+        world,
+        stamps,
+        warnings,
+    })
 }
 
 /// Whether the plan asks for something only rest can tell.
@@ -282,7 +375,14 @@ fn needs_rest(plan: &Plan) -> bool {
     plan.bias == Bias::Auto || plan.initial == Initial::Gravity
 }
 
-fn decide_bias(plan: &Plan, rests: &Rests) -> Result<(Vector3<f64>, Vector3<f64>, String), String> {
+/// `earth` is what the gyro feels of the Earth's rotation at the initial attitude, rad/s, where that is
+/// taken out: then it is no bias, and only a rest at the start, where the attitude is known, can tell
+/// the two apart.
+fn decide_bias(
+    plan: &Plan,
+    rests: &Rests,
+    earth: Option<Vector3<f64>>,
+) -> Result<(Vector3<f64>, Vector3<f64>, String), String> {
     match plan.bias {
         Bias::None => Ok((
             Vector3::zeros(),
@@ -295,15 +395,28 @@ fn decide_bias(plan: &Plan, rests: &Rests) -> Result<(Vector3<f64>, Vector3<f64>
             "as given".to_owned(),
         )),
         Bias::Auto => {
-            let estimate = stillness::estimate_bias(rests, &Limits::default())
-                .map_err(|e| format!("--bias auto: {e}"))?;
+            let limits = Limits::default();
+            let refuse = |e: NoRest| format!("--bias auto: {e}");
+            let mut estimate = stillness::estimate_bias(rests, &limits).map_err(refuse)?;
+            let mut earths = "";
+            if let Some(earth) = earth {
+                let first = stillness::rest_at_start(rests, &limits)
+                    .map_err(|e| not_at_start(&e))?
+                    .alone();
+                estimate = stillness::estimate_bias(&first, &limits).map_err(refuse)?;
+                estimate.bias -= earth;
+                earths = " at the start, less the Earth's rate";
+            }
             let sigma = estimate.sigma.max();
             // Known to the estimate's sigma at rest, and not stable since.
             let instability = Vector3::from(plan.noise.bias_instability);
             Ok((
                 estimate.bias,
                 estimate.sigma.zip_map(&instability, f64::hypot),
-                format!("from {:.1} s of rest, +- {sigma:.1e} rad/s", estimate.secs),
+                format!(
+                    "from {:.1} s of rest{earths}, +- {sigma:.1e} rad/s",
+                    estimate.secs
+                ),
             ))
         }
     }
@@ -371,6 +484,54 @@ fn decide_initial(
     }
 }
 
+/// The Earth at a fixed site.
+#[derive(Clone, Copy, Debug)]
+struct Earth {
+    latitude: f64,
+    /// In ENU, where everything is computed.
+    w_ie: In<Nav>,
+}
+
+impl Earth {
+    fn at(latitude: f64) -> Earth {
+        Earth {
+            latitude,
+            w_ie: Convention::EnuFlu.earth_rate(latitude),
+        }
+    }
+
+    /// C_nb^T w_ie: what a gyro at rest in this attitude reads of it, rad/s.
+    fn felt_by(self, q_nb: &Quaternion<Nav, Body>) -> Vector3<f64> {
+        *(q_nb.to_dcm().transpose() * self.w_ie).as_vector()
+    }
+
+    /// What it means that nobody said where the body heads.
+    fn heading_warning(self, initial: Initial) -> Option<String> {
+        let why = match initial {
+            Initial::Gravity => "--init gravity knows no heading, 0 was taken",
+            Initial::Identity => "--init identity has heading 0",
+            Initial::FirstOrientation | Initial::Given(_) => return None,
+        };
+        let deg_per_h = |w: f64| w.to_degrees() * 3600.0;
+        let level = deg_per_h(EARTH_RATE * self.latitude.cos().abs());
+        Some(format!(
+            "--earth-rate: {why}: a heading off by 10 degrees leaves {:.1} deg/h of the Earth's rotation, any other at most {:.1} (where nothing taken out leaves {:.1})\n  help: --init first-orientation, q=w,x,y,z or rpy=roll,pitch,yaw states it",
+            2.0 * level * 5_f64.to_radians().sin(),
+            2.0 * level,
+            deg_per_h(EARTH_RATE),
+        ))
+    }
+}
+
+/// Why `--bias auto` with `--earth-rate` can not be.
+fn not_at_start(why: &NoRest) -> String {
+    let said = why.to_string();
+    let why = said.lines().next().unwrap_or_default();
+    format!(
+        "--bias auto with --earth-rate: {why}; only at the start is the attitude known, and without it a bias and the Earth's rotation are the same\n  help: --start SECS begins at a rest, --bias x,y,z (rad/s) gives the bias"
+    )
+}
+
 /// Why `--init gravity` can not be. The reasons are those of a bias, the ways out are not.
 fn not_level(why: &NoRest) -> String {
     let said = format!("--init gravity: {why}");
@@ -382,85 +543,5 @@ fn not_level(why: &NoRest) -> String {
             )
         }
         NoRest::NotAtStart { .. } | NoRest::NoAccel => said,
-    }
-}
-
-/// A pass over samples that only looks for rest.
-#[derive(Debug)]
-pub struct RestPass {
-    plan: Plan,
-    resolved: Resolved,
-    gathered: Vec<RawSample>,
-    running: Option<Conditioner>,
-    detector: Stillness,
-    rates: Vec<RateSample>,
-}
-
-impl RestPass {
-    /// For samples understood as `resolved`.
-    #[must_use]
-    pub fn new(plan: &Plan, resolved: &Resolved) -> RestPass {
-        RestPass {
-            plan: plan.clone(),
-            resolved: resolved.clone(),
-            gathered: Vec::new(),
-            running: None,
-            detector: Stillness::new(resolved.kind, Limits::default()),
-            rates: Vec::new(),
-        }
-    }
-
-    /// Takes samples.
-    ///
-    /// # Errors
-    /// In words, when the settings do not fit.
-    pub fn push(&mut self, raw: &[RawSample]) -> Result<(), String> {
-        match &mut self.running {
-            Some(conditioner) => {
-                conditioner.push(raw, &mut self.rates);
-                self.detect();
-            }
-            None => {
-                self.gathered.extend_from_slice(raw);
-                if self.gathered.len() >= FEW {
-                    self.begin()?;
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// What was found.
-    ///
-    /// # Errors
-    /// As [`RestPass::push`].
-    pub fn finish(mut self) -> Result<Rests, String> {
-        if self.running.is_none() {
-            self.begin()?;
-        }
-        if let Some(conditioner) = &mut self.running {
-            conditioner.finish(&mut self.rates);
-        }
-        self.detect();
-        Ok(self.detector.finish())
-    }
-
-    fn begin(&mut self) -> Result<(), String> {
-        let gathered = std::mem::take(&mut self.gathered);
-        let (clock, _) = choose_clock(&gathered, self.plan.clock);
-        let settings = self
-            .resolved
-            .conditioning(&self.plan, clock, Vector3::zeros());
-        let mut conditioner = Conditioner::new(&settings).map_err(|e| e.to_string())?;
-        conditioner.push(&gathered, &mut self.rates);
-        self.running = Some(conditioner);
-        self.detect();
-        Ok(())
-    }
-
-    fn detect(&mut self) {
-        for sample in self.rates.drain(..) {
-            self.detector.push(&sample);
-        }
     }
 }

@@ -5,6 +5,7 @@ use super::preparation::Prepared;
 use super::run::{Replay, Source};
 use super::session::Found;
 use crate::error::{Error, Result};
+use crate::model::frames::EARTH_RATE;
 use crate::sink::{Provenance, Stream, Target};
 use sha2::{Digest, Sha256};
 use std::fs::File;
@@ -54,6 +55,9 @@ pub fn of(
         put(key("gyro_unit"), found.resolved.unit.name().to_owned());
         put(key("input_axes"), found.resolved.body.to_string());
         put(key("clock"), prepared.clock.name().to_owned());
+        if let Some(words) = prepared.stamps.words(found.resolved.kind) {
+            put(key("stamps"), words);
+        }
         put(key("rotates"), stream.rotates.clone());
         put(key("world"), stream.world_axes.clone());
         put(key("body"), stream.body_axes.clone());
@@ -61,6 +65,15 @@ pub fn of(
             key("initial"),
             format!("{} (w {w}, x {x}, y {y}, z {z})", prepared.initial_origin),
         );
+        if let Some(latitude) = run.plan.latitude_deg {
+            put(
+                key("earth_rate"),
+                format!(
+                    "taken out for latitude {} deg, {EARTH_RATE} rad/s; rates stay relative to inertial space",
+                    latitude
+                ),
+            );
+        }
         put(
             key("bias_rad_s"),
             format!("{} (x {bx}, y {by}, z {bz})", prepared.bias_origin),

@@ -1,7 +1,7 @@
 //! A recorded log -> attitude, end to end. I/O.
 //!
-//! A file is read twice: once as far as is needed to know clock, bias and initial attitude, then
-//! to integrate. A stream is read once; its first samples wait until these are known.
+//! A file is read twice: once as far as is needed to know clock, bias, initial attitude and lines
+//! through stamps, then to integrate. A stream is read once; its first samples wait until these are known.
 
 use super::chosen::{Chosen, choose, find, reference, route};
 use super::log::Log;
@@ -12,6 +12,7 @@ use super::preparation::{Patience, Preparation, Prepared};
 use super::route::{Item, Route};
 use super::run::{Replay, Source, refused};
 use super::session::Found;
+use super::stamps::StampPass;
 use super::summarise;
 use super::{lines, streamed};
 use crate::error::{Error, Result};
@@ -33,7 +34,12 @@ pub fn run(run: &Replay, pool: &Pool, watch: &mut dyn FnMut(&Position)) -> Resul
     let mut summary = match &run.source {
         Source::File(path) if is_lines(path) => {
             let file = lines::open(path)?;
-            lines::replay(run, BufReader::new(file), pool, watch)?
+            let stamps = if path.is_file() {
+                lines::stamps(run, BufReader::new(lines::open(path)?))?
+            } else {
+                None
+            };
+            lines::replay(run, BufReader::new(file), stamps, pool, watch)?
         }
         Source::File(path) if is_pipe(path) => {
             let pipe = lines::open(path)?;
@@ -87,7 +93,8 @@ fn piped(
         let reader = Reader::from_stream(run.source.name(), Box::new(whole))?;
         streamed::replay(run, reader, pool, watch)
     } else {
-        lines::replay(run, BufReader::with_capacity(1 << 16, whole), pool, watch)
+        let input = BufReader::with_capacity(1 << 16, whole);
+        lines::replay(run, input, None, pool, watch)
     }
 }
 
@@ -167,7 +174,10 @@ fn prepare(
 ) -> Result<Vec<Prepared>> {
     let mut preparations: Vec<Preparation> = chosen
         .iter()
-        .map(|c| Preparation::new(&run.plan, &c.found.resolved, Patience::WholeLog))
+        .map(|c| {
+            Preparation::new(&run.plan, &c.found.resolved, Patience::WholeLog)
+                .with_stamps(StampPass::new(run, &c.found.resolved))
+        })
         .collect();
     let mut failure = None;
     mcap::walk(

@@ -31,7 +31,7 @@ pub(super) fn replay(
     watch: &mut dyn FnMut(&Position),
 ) -> Result<RunSummary> {
     let path = run.source.name();
-    let mut waiting = Waiting::new(run, &path);
+    let mut waiting = Waiting::new(run, &path, None);
     let mut failure = None;
     let picked = std::cell::RefCell::new(Picked::default());
     let report = mcap::walk(

@@ -3,9 +3,11 @@
 use super::lines;
 use super::run::Replay;
 use super::session::{Ended, Topic};
+use crate::condition::regularise;
 use crate::model::attitude::Quaternion;
 use crate::propagate::Method;
 use crate::record::{Nanos, SampleKind, Verdict};
+use crate::report::stamps::{Regularised, Segment};
 use crate::report::summary::{Gaps, RunSummary, TopicSummary, significant};
 use crate::source::mcap::Survey;
 use std::sync::atomic::Ordering;
@@ -58,11 +60,16 @@ fn of_topic(run: &Replay, topic: &Topic) -> TopicSummary {
             .filter(|n| *n > 0)
             .map(|n| 1e9 / n as f64),
         clock: topic.prepared.clock.name().to_owned(),
+        stamps: topic
+            .estimator
+            .regularising()
+            .map(|(causal, report)| regularised(causal, &report, first)),
         kind: topic.resolved.kind,
         method: method_words(topic),
         body,
         world,
         initial: topic.prepared.initial_origin.clone(),
+        latitude_deg: run.plan.latitude_deg,
         bias: topic.prepared.bias.into(),
         bias_origin: topic.prepared.bias_origin.clone(),
         noise: run.plan.noise.name.clone(),
@@ -109,6 +116,28 @@ fn drift(run: &Replay, topic: &Topic, secs: f64) -> f64 {
         .zip(run.plan.noise.rrw)
         .map(|(bias, rrw)| bias.hypot(rrw * secs.sqrt()))
         .fold(0.0, f64::max)
+}
+
+fn regularised(causal: bool, report: &regularise::Report, first: Nanos) -> Regularised {
+    Regularised {
+        causal,
+        segments: report.segments,
+        kept: report
+            .kept
+            .iter()
+            .map(|s| Segment {
+                from_secs: s.start.secs_since(first),
+                samples: s.samples,
+                rate_hz: s.rate_hz,
+            })
+            .collect(),
+        rms_nanos: report.rms_nanos,
+        p99_nanos: report.p99_nanos,
+        max_nanos: report.max_nanos,
+        jitter: report.jitter,
+        ambiguous: report.ambiguous,
+        uneven: report.is_uneven(),
+    }
 }
 
 /// The method, `auto` with what it stands for.
@@ -183,6 +212,9 @@ fn warnings(topic: &Topic, summary: &TopicSummary) -> Vec<String> {
         said.push(format!(
             "{restamped} samples shared their stamp with another and were given one of their own between their neighbours"
         ));
+    }
+    if summary.stamps.as_ref().is_some_and(|stamps| stamps.uneven) {
+        said.push("--regularise-stamps: there was no constant rate in this stream: leave it out, or --time index --rate-hz HZ".to_owned());
     }
     if topic.estimator.conditioning().saturated > 0 {
         said.push(format!(

@@ -8,6 +8,7 @@ use super::preparation::{Patience, Preparation};
 use super::route::Item;
 use super::run::{Replay, refused};
 use super::session::{Found, Session};
+use super::stamps::{StampPass, Stamps};
 use super::topics;
 use crate::error::{Error, Result};
 use crate::sink::{Flow, Stream};
@@ -17,16 +18,19 @@ use std::path::Path;
 pub(super) struct Waiting<'r> {
     run: &'r Replay,
     path: &'r Path,
+    /// What a pass over the file found, where it is one.
+    stamps: Option<Stamps>,
     gathering: Option<(Found, Stream, Preparation)>,
     held: Vec<Item>,
     session: Option<Session>,
 }
 
 impl<'r> Waiting<'r> {
-    pub(super) fn new(run: &'r Replay, path: &'r Path) -> Waiting<'r> {
+    pub(super) fn new(run: &'r Replay, path: &'r Path, stamps: Option<Stamps>) -> Waiting<'r> {
         Waiting {
             run,
             path,
+            stamps,
             gathering: None,
             held: Vec::new(),
             session: None,
@@ -38,6 +42,10 @@ impl<'r> Waiting<'r> {
         if let Some((found, stream)) = found.take() {
             let preparation =
                 Preparation::new(&self.run.plan, &found.resolved, Patience::FirstMinute);
+            let preparation = match self.stamps.take() {
+                None => preparation.with_stamps(StampPass::new(self.run, &found.resolved)),
+                known => preparation.with_known_stamps(known),
+            };
             self.gathering = Some((found, stream, preparation));
         }
         Ok(())

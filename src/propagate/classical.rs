@@ -31,6 +31,11 @@ pub(crate) fn step(method: Method, track: &Track, k: usize) -> Step {
     } else {
         track.rate(k - 1)
     };
+    let note = if track.bridged[k] || (track.increments && track.has_hole(k)) {
+        Note::Bridged
+    } else {
+        Note::Ordinary
+    };
     let turn = match method {
         Method::DcmLeft => Turn::exp(left * h),
         Method::DcmMean => Turn::exp((left + right) * (0.5 * h)),
@@ -45,15 +50,10 @@ pub(crate) fn step(method: Method, track: &Track, k: usize) -> Step {
             } else {
                 left * h
             };
-            return Step::of_vector(phi);
+            return Step::of_vector(phi, note);
         }
         // The others are no classical methods; the end rate is what `dcm-right` means.
         _ => Turn::exp(right * h),
-    };
-    let note = if track.bridged[k] || (track.increments && track.has_hole(k)) {
-        Note::Bridged
-    } else {
-        Note::Ordinary
     };
     Step::new(turn, right.norm() * h, note)
 }

@@ -15,7 +15,7 @@
 //! recursion of the 3x3 blocks; the 3x3 of the bias itself stays diagonal always.
 //!
 //! # Accuracy
-//! Exact for a rate constant over each step and noise equal about all axes: within 1e-12 of the plain
+//! Exact for a rate constant over each step and noise equal about all axes: within 1e-11 of the plain
 //! 6x6 recursion. White noise that differs between the axes is taken at the ends of a step (the trapezoid
 //! rule): up to a^2/3 of the difference over a step of a rad, and less over many. The wander of the bias
 //! within one step is taken along the mean axes of the step: up to a^2/4 of the share of one step.

@@ -1,6 +1,7 @@
 //! The stream: runs, breaks, outputs in order. Pure.
 
 mod state;
+mod world;
 
 use super::classical;
 use super::executor::Executor;
@@ -27,14 +28,14 @@ const LARGEST: f64 = 1e3;
 /// # Example
 /// ```
 /// use strapd::model::attitude::Quaternion;
-/// use strapd::propagate::{Method, Noise, Propagator, Sequential, Settings};
+/// use strapd::propagate::{Method, Propagator, Sequential, Settings};
 /// use strapd::record::{Join, Nanos, RateSample, SampleKind, Status};
 ///
 /// let mut propagator = Propagator::new(Settings {
 ///     method: Method::Auto,
 ///     kind: SampleKind::Rate,
 ///     initial: Quaternion::identity(),
-///     noise: Noise::default(),
+///     ..Settings::default()
 /// })?;
 /// // A quarter turn about z in one second.
 /// let samples: Vec<RateSample> = (0..=100)
@@ -210,6 +211,7 @@ impl Propagator {
         self.next = 1;
         let sample = self.trusted(sample);
         let first = self.state.report.samples == 0;
+        self.state.begin(sample.stamp.0);
         if sample.join == Join::Reset {
             self.state.reset(self.initial);
         }
@@ -365,6 +367,7 @@ impl Propagator {
             } else {
                 None
             };
+            let committed_at = self.state.now;
             let mut ahead = self.state.attitude;
             let mut covariance = self.state.covariance;
             let mut difference = self.state.difference;
@@ -384,6 +387,7 @@ impl Propagator {
             self.state.difference.seen(&difference);
             let committed = (self.state.attitude, self.state.covariance);
             (self.state.attitude, self.state.covariance) = (ahead, covariance);
+            self.state.now = self.track.stamp[newest];
             if newest >= self.next {
                 self.state.added = self.state.added.with(Status::PROVISIONAL);
                 if *finals {
@@ -392,6 +396,7 @@ impl Propagator {
             }
             self.state.output_at(&sample, rate, out);
             (self.state.attitude, self.state.covariance) = committed;
+            self.state.now = committed_at;
         }
     }
 

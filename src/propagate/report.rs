@@ -25,7 +25,7 @@ pub struct Report {
     pub stalled: u64,
     /// Intervals whose turn came out not finite and was left out.
     pub refused: u64,
-    /// A bound on the worst attitude error the integration itself has made since the last reset, rad: by
+    /// A bound on the worst attitude error the integration itself has made so far, rad: by
     /// how much a window of four samples less would have come out differently, and rounding. What bridges
     /// and holds may hide is not in it but in the covariance. `None` where the method has no narrower window
     /// to be held against: fewer than six rates or five increments, an order its own truncation limits, and

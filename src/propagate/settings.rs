@@ -3,8 +3,9 @@
 use super::covariance::Noise;
 use super::method::Method;
 use crate::model::attitude::Quaternion;
-use crate::model::frames::{Body, Nav};
+use crate::model::frames::{Body, In, Nav};
 use crate::record::SampleKind;
+use nalgebra::Vector3;
 use std::fmt;
 
 /// What a propagator is to do.
@@ -16,6 +17,10 @@ pub struct Settings {
     pub kind: SampleKind,
     /// Attitude at the first sample, and after a reset.
     pub initial: Quaternion<Nav, Body>,
+    /// Rate of the world relative to inertial space, w_in^n in rad/s, constant: Earth's for a fixed
+    /// site ([`Convention::earth_rate`](crate::model::frames::Convention::earth_rate)). Zero for a
+    /// world that stands still, which changes no bit of the result.
+    pub world_rate: In<Nav>,
     /// For the uncertainty that goes with every attitude; zeros for none.
     pub noise: Noise,
 }
@@ -37,6 +42,11 @@ pub enum SettingsError {
     Initial {
         /// Its `[w, x, y, z]`.
         wxyz: [f64; 4],
+    },
+    /// The world's rate is not finite, or faster than anything turns.
+    WorldRate {
+        /// w_in^n, rad/s.
+        rate: [f64; 3],
     },
     /// A noise figure is negative, not finite, or absurd.
     Noise {
@@ -62,6 +72,10 @@ impl fmt::Display for SettingsError {
                 f,
                 "the initial attitude {wxyz:?} (w, x, y, z) is not a unit quaternion\n  help: --init q=w,x,y,z with norm 1"
             ),
+            SettingsError::WorldRate { rate } => write!(
+                f,
+                "the world can not turn at {rate:?} rad/s\n  help: --earth-rate takes a latitude in degrees, -90 to 90"
+            ),
             SettingsError::Noise { name, value } => write!(
                 f,
                 "noise {name} = {value} can not be\n  help: --noise takes numbers from 0 up, in SI units"
@@ -72,6 +86,22 @@ impl fmt::Display for SettingsError {
 
 impl std::error::Error for SettingsError {}
 
+impl Default for Settings {
+    /// Rates, the default method, from identity, no noise, a world that stands still.
+    fn default() -> Self {
+        Settings {
+            method: Method::Auto,
+            kind: SampleKind::Rate,
+            initial: Quaternion::identity(),
+            world_rate: In::assume(Vector3::zeros()),
+            noise: Noise::default(),
+        }
+    }
+}
+
+/// Fastest world, rad/s: a turntable is no world, but a test may put one on it.
+const FASTEST_WORLD: f64 = 10.0;
+
 impl Settings {
     /// The initial attitude, to the last bit of norm 1.
     pub(crate) fn checked(&self) -> Result<[f64; 4], SettingsError> {
@@ -79,6 +109,12 @@ impl Settings {
         let norm = wxyz.iter().map(|c| c * c).sum::<f64>().sqrt();
         if (norm - 1.0).abs() > 1e-6 || norm.is_nan() {
             return Err(SettingsError::Initial { wxyz });
+        }
+        let rate = self.world_rate.as_vector();
+        if !rate.iter().all(|w| w.abs() <= FASTEST_WORLD) {
+            return Err(SettingsError::WorldRate {
+                rate: (*rate).into(),
+            });
         }
         if let Some((name, value)) = self.noise.fault() {
             return Err(SettingsError::Noise { name, value });

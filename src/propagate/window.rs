@@ -56,14 +56,14 @@ pub(crate) enum Note {
 
 impl Step {
     /// A rotation vector where a turn is expected, for the method that sums vectors.
-    pub(crate) fn of_vector(phi: Triple<1>) -> Self {
+    pub(crate) fn of_vector(phi: Triple<1>, note: Note) -> Self {
         let turn = Turn {
             v: phi,
             ..Turn::NONE
         };
         Step {
             angle: phi.norm(),
-            ..Step::new(turn, 0.0, Note::Ordinary)
+            ..Step::new(turn, 0.0, note)
         }
     }
 

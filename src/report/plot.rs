@@ -344,6 +344,7 @@ fn number(value: f64, largest: f64) -> String {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 

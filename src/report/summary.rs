@@ -2,7 +2,9 @@
 //!
 //! Built by the pipeline, which knows the numbers; the words are here, in one place.
 
+use super::stamps::Regularised;
 use crate::compare::BodyAxesFit;
+use crate::model::frames::EARTH_RATE;
 use crate::record::{Counts, SampleKind, Verdict};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
@@ -28,6 +30,8 @@ pub struct TopicSummary {
     pub rate_hz: Option<f64>,
     /// The clock the samples were placed on.
     pub clock: String,
+    /// What became of the stamps, where `--regularise-stamps` asked for it.
+    pub stamps: Option<Regularised>,
     /// What a sample was taken to mean.
     pub kind: SampleKind,
     /// The integrator in words.
@@ -40,6 +44,8 @@ pub struct TopicSummary {
     pub world: String,
     /// Where the initial attitude came from.
     pub initial: String,
+    /// Latitude for which the Earth's rotation was taken out, deg.
+    pub latitude_deg: Option<f64>,
     /// Bias removed, rad/s, body axes.
     pub bias: [f64; 3],
     /// Where the bias came from, with its sigma where it was estimated.
@@ -227,6 +233,9 @@ impl TopicSummary {
                 self.clock
             ),
         );
+        if let Some(stamps) = &self.stamps {
+            line(out, "stamps", &stamps.text());
+        }
         line(
             out,
             "method",
@@ -241,6 +250,17 @@ impl TopicSummary {
             ),
         );
         line(out, "bias", &self.bias_text());
+        if let Some(latitude) = self.latitude_deg {
+            line(
+                out,
+                "earth",
+                &format!(
+                    "rotation taken out for latitude {} deg, {:.3} deg/h; rates stay relative to inertial space",
+                    latitude,
+                    EARTH_RATE.to_degrees() * 3600.0
+                ),
+            );
+        }
         line(
             out,
             "turned",
@@ -379,6 +399,7 @@ impl TopicSummary {
             "duration_s": self.duration_secs,
             "rate_hz": self.rate_hz,
             "clock": self.clock,
+            "regularised_stamps": self.stamps.as_ref().map(Regularised::json),
             "sample_kind": self.kind.name(),
             "method": self.method,
             "input_axes": self.input_axes,
@@ -387,6 +408,9 @@ impl TopicSummary {
             "initial": self.initial,
             "bias_rad_s": { "x": self.bias[0], "y": self.bias[1], "z": self.bias[2],
                             "origin": self.bias_origin },
+            "earth_rate": self.latitude_deg.map(|latitude| json!({
+                "latitude_deg": latitude, "rad_s": EARTH_RATE,
+            })),
             "noise": self.noise,
             "drift_deg_per_h": self.drift.to_degrees() * 3600.0,
             "integration_error_deg": self.integration_error.map(f64::to_degrees),

@@ -135,13 +135,13 @@ impl RateObject {
 
 /// The `ATT` object of one stream, everything constant laid out beforehand.
 #[derive(Debug)]
-pub(super) struct AttObject {
+pub(crate) struct AttObject {
     head: Vec<u8>,
     labels: Vec<u8>,
 }
 
 impl AttObject {
-    pub(super) fn new(stream: &Stream) -> AttObject {
+    pub(crate) fn new(stream: &Stream) -> AttObject {
         let mut head = b"{\"class\":\"ATT\",\"id\":".to_vec();
         push_string(&mut head, &stream.id);
         head.extend_from_slice(b",\"seq\":");
@@ -159,7 +159,7 @@ impl AttObject {
     }
 
     /// Appends the object, without a line end. Rate in rad/s, sigma in degrees.
-    pub(super) fn push(&self, out: &mut Vec<u8>, seq: u64, sample: &AttitudeSample) {
+    pub(crate) fn push(&self, out: &mut Vec<u8>, seq: u64, sample: &AttitudeSample) {
         out.extend_from_slice(&self.head);
         push_u64(out, seq);
         out.extend_from_slice(b",\"stamp\":");

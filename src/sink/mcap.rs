@@ -7,6 +7,7 @@
 pub(super) mod cdr;
 pub(super) mod chunk;
 pub(super) mod file;
+pub(super) mod live;
 pub(super) mod record;
 mod schemas;
 
@@ -136,25 +137,7 @@ impl Layout {
         streams: &[Stream],
         provenance: &Provenance,
     ) -> Result<Layout> {
-        file.push_header(
-            out,
-            match encoding {
-                Encoding::Cdr => "ros2",
-                Encoding::Json => "",
-            },
-        );
-        file.push_metadata(out, "strapd", &provenance.metadata);
-        let qos = |out: &mut Vec<u8>, file: &mut McapFile| match encoding {
-            Encoding::Cdr => {
-                let (key, value) = schemas::ROSBAG2_FORM;
-                let form = BTreeMap::from([(key.to_owned(), value.to_owned())]);
-                file.push_metadata(out, "rosbag2", &form);
-                let key = "offered_qos_profiles".to_owned();
-                BTreeMap::from([(key, schemas::OFFERED_QOS.to_owned())])
-            }
-            Encoding::Json => BTreeMap::new(),
-        };
-        let metadata = qos(out, file);
+        let metadata = push_head(file, out, encoding, provenance);
         let mut declare = |topic: &str, schema: [&str; 3]| {
             let [name, form, text] = schema;
             file.schema(out, name, form, text.as_bytes())
@@ -162,10 +145,7 @@ impl Layout {
                 .ok_or_else(too_many_channels)
         };
         let (attitude_schema, transform_schema) = match encoding {
-            Encoding::Cdr => (
-                ["sensor_msgs/msg/Imu", "ros2msg", schemas::IMU],
-                ["tf2_msgs/msg/TFMessage", "ros2msg", schemas::TF_MESSAGE],
-            ),
+            Encoding::Cdr => (IMU_SCHEMA, TF_SCHEMA),
             Encoding::Json => (
                 ["strapd.Attitude", "jsonschema", schemas::ATTITUDE],
                 [
@@ -341,6 +321,35 @@ impl Layout {
                 }
             }
         }
+    }
+}
+
+/// Name, encoding and text of our ROS 2 types.
+const IMU_SCHEMA: [&str; 3] = ["sensor_msgs/msg/Imu", "ros2msg", schemas::IMU];
+const TF_SCHEMA: [&str; 3] = ["tf2_msgs/msg/TFMessage", "ros2msg", schemas::TF_MESSAGE];
+
+/// Writes the header and what is known about the run; returns the metadata of our channels.
+fn push_head(
+    file: &mut McapFile,
+    out: &mut Vec<u8>,
+    encoding: Encoding,
+    provenance: &Provenance,
+) -> BTreeMap<String, String> {
+    let profile = match encoding {
+        Encoding::Cdr => "ros2",
+        Encoding::Json => "",
+    };
+    file.push_header(out, profile);
+    file.push_metadata(out, "strapd", &provenance.metadata);
+    match encoding {
+        Encoding::Cdr => {
+            let (key, value) = schemas::ROSBAG2_FORM;
+            let form = BTreeMap::from([(key.to_owned(), value.to_owned())]);
+            file.push_metadata(out, "rosbag2", &form);
+            let key = "offered_qos_profiles".to_owned();
+            BTreeMap::from([(key, schemas::OFFERED_QOS.to_owned())])
+        }
+        Encoding::Json => BTreeMap::new(),
     }
 }
 

@@ -299,7 +299,7 @@ impl From<io::Error> for PartError {
 }
 
 /// A renamed file survives a power cut only when its directory is on the disk too.
-fn sync_directory(file: &Path) -> io::Result<()> {
+pub(crate) fn sync_directory(file: &Path) -> io::Result<()> {
     #[cfg(unix)]
     {
         let parent = match file.parent() {

@@ -146,6 +146,12 @@ pub struct Noticed {
     pub fastest: f64,
 }
 
+/// What the sensor reads at an instant: rate or delta angle, and specific force.
+struct Reading {
+    gyro: Vector3<f64>,
+    force_b: Vector3<f64>,
+}
+
 /// A motion being sampled.
 #[derive(Clone, Debug)]
 pub struct Synthetic {
@@ -271,7 +277,8 @@ impl Synthetic {
     fn one(&mut self, out: &mut Stretch) -> Result<(), MeasureError> {
         let tick = self.ticks.tick();
         // Jitter may not take the first sample to before the motion began.
-        let now = tick.instant.since(self.sampling.start).max(0) as u64;
+        let late = self.sampling.start.since(tick.instant).max(0);
+        let now = (tick.instant.since(self.sampling.start) + late) as u64;
         let mut spin = self.motion.at_nanos(now);
         spin.q_nb = spin.q_nb.same_sign_as(&self.last_q_nb);
         self.last_q_nb = spin.q_nb;
@@ -287,17 +294,17 @@ impl Synthetic {
             self.motion.acceleration_n(now) + Vector3::new(0.0, 0.0, self.sampling.gravity),
         );
         let force_b = *(spin.q_nb.inverse() * held_n).as_vector();
-        if let Some((gyro, accel)) = self.measured(at, now, &spin, &force_b)? {
+        if let Some(read) = self.measured(at, now, &spin, &force_b)? {
             if tick.dropped {
                 self.noticed.dropped += 1;
             } else {
                 let rates = self.sampling.kind == SampleKind::Rate;
                 out.samples.push(RawSample {
-                    header: Some(tick.stamp),
+                    header: Some(Nanos(tick.stamp.0.saturating_add(late))),
                     log: at,
                     publish: at,
-                    gyro: Some(gyro.into()),
-                    accel: Some(accel.into()),
+                    gyro: Some(read.gyro.into()),
+                    accel: Some(read.force_b.into()),
                     orientation: Some(spin.q_nb.wxyz()),
                     interval_nanos: (!rates).then_some((now - self.before) as i64),
                 });
@@ -309,7 +316,7 @@ impl Synthetic {
         Ok(())
     }
 
-    /// What the sensor reads at `now`: rate (or delta angle) and specific force. `None` for the
+    /// What the sensor reads at `now`. `None` for the
     /// interval before the start.
     fn measured(
         &mut self,
@@ -317,14 +324,17 @@ impl Synthetic {
         now: u64,
         spin: &Spin,
         force_b: &Vector3<f64>,
-    ) -> Result<Option<(Vector3<f64>, Vector3<f64>)>, MeasureError> {
+    ) -> Result<Option<Reading>, MeasureError> {
         let rates = self.sampling.kind == SampleKind::Rate;
         let first = self.next == 0;
         if first && !rates {
             return Ok(None);
         }
         if self.sensor.is_none() && rates {
-            return Ok(Some((spin.w_nb_b, *force_b)));
+            return Ok(Some(Reading {
+                gyro: spin.w_nb_b,
+                force_b: *force_b,
+            }));
         }
         // A rate at the start has no interval before it: as if the body had come at this rate.
         let nanos = if first {
@@ -343,7 +353,10 @@ impl Synthetic {
                 SampleKind::DeltaAngle => delta_angle,
                 SampleKind::Average | SampleKind::Rate => delta_angle / secs,
             };
-            return Ok(Some((gyro, *force_b)));
+            return Ok(Some(Reading {
+                gyro,
+                force_b: *force_b,
+            }));
         };
         let truth = imu_error::Truth {
             rate: spin.w_nb_b,
@@ -354,6 +367,9 @@ impl Synthetic {
         let from = Nanos(at.0.saturating_sub(nanos as i64));
         let read = sensor.measure(from, at, &truth)?;
         self.noticed.saturated += u64::from(read.saturated);
-        Ok(Some((read.gyro, read.specific_force)))
+        Ok(Some(Reading {
+            gyro: read.gyro,
+            force_b: read.specific_force,
+        }))
     }
 }

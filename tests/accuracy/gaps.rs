@@ -1,8 +1,9 @@
 //! Missing samples: what is integrated across, what is held, and what the output says about it.
 
+use crate::causal;
 use crate::coning::Coning;
 use crate::run::{ARCSEC, angle_degrees, propagate, propagator, sample, worst};
-use strapd::propagate::{Method, Sequential};
+use strapd::propagate::{Method, Order, Sequential};
 use strapd::record::{AttitudeSample, Join, RateSample, SampleKind, Status};
 
 /// One cone in 20 samples: an ordinary fast motion for its sampling rate.
@@ -67,6 +68,13 @@ fn short_gaps_are_bridged_with_the_order_they_support() {
             );
         }
     }
+}
+
+#[test]
+fn a_window_of_three_bridges_with_three() {
+    let [two, three] = [2, 3].map(|window| error(SampleKind::Rate, 1, causal(window, Order::M6)).0);
+    // Quadratic against linear over a tenth of a turn of the cone.
+    assert!(three < 0.5 * two, "{three:e} of {two:e} arcsec");
 }
 
 #[test]

@@ -74,9 +74,6 @@ fn check(
         let (own, reported) = errors(wide, kind, samples, &truth);
         let (narrower, _) = errors(narrow, kind, samples, &truth);
         let reported = reported.unwrap();
-        println!(
-            "{what}, {kind:?}, {wide}: true {own:.2e}, reported {reported:.2e}, narrower {narrower:.2e}"
-        );
         assert!(
             reported >= own - uncertain,
             "{what}, {kind:?}, {wide}: {reported:e} but {own:e}"

@@ -113,6 +113,7 @@ fn noise_is_not_amplified_across_lost_samples_and_the_stated_uncertainty_covers_
                 kind: SampleKind::Rate,
                 initial: Quaternion::assume_unit(STILL),
                 noise: Noise::isotropic(1e-3 * f64::sqrt(dt), 0.0),
+                ..Settings::default()
             })
             .unwrap();
             let mut out = Vec::new();

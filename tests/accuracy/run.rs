@@ -1,7 +1,7 @@
 //! Samples -> attitudes through the public door, and how far they are from truth.
 
 use strapd::model::attitude::Quaternion;
-use strapd::propagate::{Method, Noise, Propagator, Sequential, Settings};
+use strapd::propagate::{Method, Propagator, Sequential, Settings};
 use strapd::record::{AttitudeSample, Join, Nanos, RateSample, SampleKind, Status};
 
 pub const ARCSEC: f64 = 3600.0;
@@ -23,7 +23,7 @@ pub fn propagator(method: Method, kind: SampleKind, initial: [f64; 4]) -> Propag
         method,
         kind,
         initial: Quaternion::assume_unit(initial),
-        noise: Noise::default(),
+        ..Settings::default()
     })
     .unwrap()
 }

@@ -235,3 +235,51 @@ fn cat_prints_every_sample_in_three_forms_and_stops_where_told() {
     assert_eq!(first["gyro"][2].as_f64(), Some(sample.gyro[2]));
     assert_eq!(first["stamp"]["sec"], 1_700_000_000);
 }
+
+#[test]
+fn every_figure_of_noise_is_in_the_sigma_of_the_summary() {
+    let dir = bench();
+    let ran = |noise: &str| {
+        let command = format!("replay log.mcap -o null: --json --noise {noise}");
+        let json = strapd(dir.path(), &command).done().json();
+        let topic = &json["topics"][0];
+        let sigma = topic["final"]["sigma_deg"].as_array().unwrap();
+        let squared: f64 = sigma.iter().map(|s| s.as_f64().unwrap().powi(2)).sum();
+        (squared, topic["drift_deg_per_h"].as_f64().unwrap())
+    };
+    // However the body turned, the sum of the variances is that of the start.
+    let (squared, drift) = ran("arw=0,initial=0.01/0.02/0.02");
+    assert!(
+        (squared.sqrt() - 0.03f64.to_degrees()).abs() < 1e-9,
+        "{squared}"
+    );
+    assert_eq!(drift, 0.0);
+    // A bias that walks from nothing: K sqrt(t) of it after the 2.99 s of the log.
+    let (squared, drift) = ran("arw=0,rrw=1e-3");
+    let walked = 1e-3 * 2.99f64.sqrt();
+    assert!(
+        (drift / (walked.to_degrees() * 3600.0) - 1.0).abs() < 1e-9,
+        "{drift}"
+    );
+    // At most K^2 t^3 / 3 about each axis, as if it had not turned; it turned by less than one.
+    let still = 1e-6f64 * 2.99f64.powi(3) * (180.0 / std::f64::consts::PI).powi(2);
+    assert!(
+        squared <= still * (1.0 + 1e-9) && squared > 0.2 * still,
+        "{squared} {still}"
+    );
+    let (_, drift) = ran("arw=0,turn-on-bias=3e-4/0/0,bias-instability=4e-4/0/0");
+    assert!(
+        (drift / (5e-4f64.to_degrees() * 3600.0) - 1.0).abs() < 1e-9,
+        "{drift}"
+    );
+    let json = strapd(dir.path(), "replay log.mcap -o null: --json")
+        .done()
+        .json();
+    let error = json["topics"][0]["integration_error_deg"].as_f64().unwrap();
+    assert!(error > 0.0 && error < 1.0, "{error}");
+    let coarse = strapd(
+        dir.path(),
+        "replay log.mcap -o null: --json --method dcm-left",
+    );
+    assert!(coarse.done().json()["topics"][0]["integration_error_deg"].is_null());
+}

@@ -108,6 +108,7 @@ fn propagated(flight: &Flight, method: Method, noise: &Noise) -> Vec<AttitudeSam
         kind: SampleKind::DeltaAngle,
         initial: flight.initial,
         noise: *noise,
+        ..Settings::default()
     })
     .unwrap();
     let none = Vector3::zeros();
@@ -148,7 +149,6 @@ fn normalised_3(seed: u64, steps: usize, method: Method, noise: &Noise) -> f64 {
 /// time in two thousand (3.5 standard deviations).
 fn assert_consistent(mean: f64, freedom: f64, count: u64) {
     let allowed = 3.5 * (2.0 * freedom / count as f64).sqrt();
-    println!("{mean} of {freedom} +- {allowed}");
     assert!(
         (mean - freedom).abs() < allowed,
         "{mean} of {freedom} +- {allowed}"
@@ -226,7 +226,6 @@ fn with_known_white_noise_the_errors_lie_within_three_sigma() {
         }
     }
     let part = inside as f64 / all as f64;
-    println!("{part}");
     // 99.7 % of normal numbers; errors along one run go together, so 40 runs scatter. And not all: that
     // would be a sigma too large.
     assert!((0.95..0.99999).contains(&part), "{part}");

@@ -160,7 +160,8 @@ fn constant_errors_have_the_spread_of_their_sizes() {
         .collect();
     let range = error.range.unwrap();
     type Drawn = strapd::model::imu_error::ConstantErrors;
-    let values: [(&str, f64, fn(&Drawn) -> f64); 8] = [
+    type Value = fn(&Drawn) -> f64;
+    let values: [(&str, f64, Value); 8] = [
         ("bias", error.turn_on_bias, |u| u.bias.y),
         ("scale", error.scale, |u| u.sensitivity[(2, 2)] - 1.0),
         ("misalignment", error.misalignment, |u| {

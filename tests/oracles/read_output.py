@@ -13,6 +13,7 @@ import json
 import sys
 from pathlib import Path
 
+import numpy as np
 from mcap.reader import NonSeekingReader, make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
@@ -77,7 +78,8 @@ def from_ros(topic, message):
         close(xyz(t.transform.translation), [0, 0, 0], "translation")
         return topic, ros_stamp(t.header), wxyz(t.transform.rotation), None
     covariance = list(message.orientation_covariance)
-    if covariance[1:4] != [0] * 3 or not covariance[0] > 0:
+    matrix = np.array(covariance).reshape(3, 3)
+    if (matrix != matrix.T).any() or not (np.linalg.eigvalsh(matrix) > 0).all():
         sys.exit(f"orientation covariance {covariance}")
     absent = message.linear_acceleration_covariance[0] == -1
     if absent != (xyz(message.linear_acceleration) == [0, 0, 0]):

@@ -64,6 +64,7 @@ fn propagated(imu: &Gripper, rate_hz: u64, kind: SampleKind) -> f64 {
         kind,
         initial: truth(0),
         noise: Noise::default(),
+        ..Settings::default()
     })
     .unwrap();
     let mut out = Vec::new();

@@ -271,7 +271,7 @@ fn paths_meet_the_base_axis_and_the_stops_with_a_reason() {
         ToolPath::line([0.2, 0.0, 0.4, 2.0, 0.0], [-0.2, 0.0, 0.4, 2.0, 0.0], 2.0).unwrap();
     assert!(matches!(
         through.at(1.0),
-        Err(ArmError::Singular(Singularity::Base { .. }))
+        Err(ArmError::Singular(Singularity::Path { .. }))
     ));
     let swing = JointPath::sinusoids(
         [Sinusoid {
@@ -338,6 +338,13 @@ fn knots_meet_the_path_they_were_taken_from() {
         worst[0] < 1e-13 && worst[1] < 1e-11 && worst[2] < 1e-8,
         "{worst:?}"
     );
+    // Its fastest rates are those between the knots too.
+    let (fast, factor) = path.slowed(0.1).unwrap().within_rates(track.arm()).unwrap();
+    let dense = (0..20_000).map(|i| fast.at(0.7e-4 * factor * f64::from(i)).unwrap());
+    let most = dense
+        .flat_map(|m| m.qd())
+        .fold(0.0_f64, |m, w| m.max(w.abs()));
+    assert!((most / FRAC_PI_2 - 1.0).abs() < 1e-5, "{most}");
     // Slow, it is the same path later; outside it stands.
     let slow = path.slowed(2.0).unwrap();
     let (a, b) = (path.at(1.234).unwrap(), slow.at(2.468).unwrap());

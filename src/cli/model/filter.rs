@@ -39,6 +39,17 @@ impl From<String> for Refusal {
 pub(super) fn run<R: DeserializeOwned>(
     answer: impl FnMut(R) -> std::result::Result<Value, Refusal>,
 ) -> Result<Outcome> {
+    run_as(answer, |value: &Value| value.to_string())
+}
+
+/// As [`run`], with answers written otherwise than as a line of JSON.
+///
+/// # Errors
+/// As [`run`].
+pub(super) fn run_as<R: DeserializeOwned>(
+    answer: impl FnMut(R) -> std::result::Result<Value, Refusal>,
+    write: impl Fn(&Value) -> String,
+) -> Result<Outcome> {
     let input = std::io::stdin();
     if input.is_terminal() {
         tracing::info!("reading requests: one JSON object a line, Ctrl-D ends them");
@@ -47,6 +58,7 @@ pub(super) fn run<R: DeserializeOwned>(
         &mut BufReader::with_capacity(1 << 16, input),
         &mut std::io::stdout().lock(),
         answer,
+        write,
     )?;
     if refused > 0 {
         tracing::warn!("{refused} requests were refused; each says why on its line");
@@ -60,6 +72,7 @@ fn answer_all<R: DeserializeOwned>(
     input: &mut BufReader<impl Read>,
     out: &mut impl Write,
     mut answer: impl FnMut(R) -> std::result::Result<Value, Refusal>,
+    write: impl Fn(&Value) -> String,
 ) -> Result<u64> {
     let mut line = Vec::new();
     let mut written = Vec::new();
@@ -88,7 +101,7 @@ fn answer_all<R: DeserializeOwned>(
             }
             value
         });
-        written.extend_from_slice(value.to_string().as_bytes());
+        written.extend_from_slice(write(&value).as_bytes());
         written.push(b'\n');
         // Whoever asks one thing at a time waits for its answer; a file of requests does not.
         if input.buffer().is_empty() || written.len() > 1 << 16 {
@@ -128,6 +141,10 @@ fn next_line(input: &mut impl BufRead, line: &mut Vec<u8>) -> Result<(usize, boo
 
 /// The request, or what of it was not understood and where.
 fn request<R: DeserializeOwned>(line: &[u8]) -> std::result::Result<R, String> {
+    // An array would be taken for the fields in their order.
+    if line.trim_ascii_start().first() == Some(&b'[') {
+        return Err("column 1: a request is one JSON object".to_owned());
+    }
     serde_json::from_slice(line).map_err(|e| {
         // A request is one line: which one is said by the caller.
         let text = e.to_string();
@@ -171,12 +188,17 @@ mod tests {
 
     fn answers(input: &[u8]) -> (Vec<Value>, u64) {
         let mut out = Vec::new();
-        let refused = answer_all(&mut BufReader::new(input), &mut out, |r: Root| {
-            if r.of < 0.0 {
-                return Err(format!("{} has no root", r.of).into());
-            }
-            Ok(json!({ "root": r.of.sqrt(), "inverse": 1.0 / r.of }))
-        })
+        let refused = answer_all(
+            &mut BufReader::new(input),
+            &mut out,
+            |r: Root| {
+                if r.of < 0.0 {
+                    return Err(format!("{} has no root", r.of).into());
+                }
+                Ok(json!({ "root": r.of.sqrt(), "inverse": 1.0 / r.of }))
+            },
+            Value::to_string,
+        )
         .unwrap();
         let lines = String::from_utf8(out).unwrap();
         let answers = lines.lines().map(|l| serde_json::from_str(l).unwrap());

@@ -5,6 +5,7 @@
 
 use super::summary::{GravityAxis, QualitySummary};
 use super::{GyroAgainstGravity, Quiet};
+use crate::condition::regularise::{Lines, Uneven};
 
 /// Something to do about a recording; the text names the flag.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -53,8 +54,20 @@ pub enum Advice {
     },
     /// All stamps are zero or equal.
     StampsStandStill,
-    /// Stamps jitter by more than a tenth of the step.
+    /// Stamps jitter by more than a tenth of the step, and nobody has laid lines through them.
     StampsJitter {
+        /// 99th percentile over the median step.
+        share: f64,
+    },
+    /// Stamps jitter about straight lines. Whether the sensor samples evenly, they can not tell.
+    StampsJitterEvenly {
+        /// rms distance from the lines over the step.
+        jitter: f64,
+        /// How many lines.
+        segments: usize,
+    },
+    /// Stamps jitter, and about no line.
+    StampsUneven {
         /// 99th percentile over the median step.
         share: f64,
     },
@@ -127,6 +140,23 @@ impl std::fmt::Display for Advice {
                 "stamps jitter by {:.0} % of the step (p99): if the sensor samples evenly, --regularise-stamps",
                 share * 100.0
             ),
+            Advice::StampsJitterEvenly { jitter, segments } => {
+                write!(
+                    f,
+                    "stamps jitter by {:.1} % of the step (rms) about ",
+                    jitter * 100.0
+                )?;
+                match segments {
+                    1 => f.write_str("one constant rate")?,
+                    n => write!(f, "{n} stretches of constant rate")?,
+                }
+                f.write_str(": if a clock of its own triggers the sensor, --regularise-stamps; if it samples when it is asked, the stamps are right as they are. They can not tell which; --against-recorded may")
+            }
+            Advice::StampsUneven { share } => write!(
+                f,
+                "stamps jitter by {:.0} % of the step (p99) and keep no constant rate: if the recorder's clock is steadier, --time log; if no sample is missing, --time index --rate-hz HZ",
+                share * 100.0
+            ),
             Advice::ClocksDrift { ppm } => write!(
                 f,
                 "header and log time drift apart by {ppm:.0} ppm: one of the clocks is wrong; --time chooses"
@@ -159,10 +189,40 @@ const STILL_DEVIATION: f64 = 0.025;
 /// Longest credible run of one value from a moving, quantised sensor.
 const STUCK_SAMPLES: u64 = 100;
 const DRIFT_PPM: f64 = 200.0;
+/// Part of a step, rms, above which stamp noise is worth a flag: 1750 arcsec a minute of lively motion
+/// (`attitude.md` 6.4). What carries its own intervals is nearly immune.
+const NOISY_STAMPS: f64 = 0.01;
 /// Below this correlation the accelerometer reads too much besides gravity.
 const MIN_CORRELATION: f64 = 0.7;
 /// Factors within 2.5 of a unit's belong to it; accelerations make them vary.
 const UNIT_FACTOR: f64 = 2.5;
+
+impl QualitySummary {
+    /// What lines through the stamps say, in place of what single steps do.
+    pub fn judge_lines(&mut self, found: &Result<Lines, Uneven>) {
+        let says_its_intervals = self.with_interval > 0 && self.with_interval == self.count;
+        let at = self
+            .advice
+            .iter()
+            .position(|a| matches!(a, Advice::StampsJitter { .. }));
+        let new = match (found, at.and_then(|at| self.advice.get(at))) {
+            (Ok(lines), _) if lines.jitter() >= NOISY_STAMPS && !says_its_intervals => {
+                Advice::StampsJitterEvenly {
+                    jitter: lines.jitter(),
+                    segments: lines.len(),
+                }
+            }
+            (Err(_), Some(Advice::StampsJitter { share })) => {
+                Advice::StampsUneven { share: *share }
+            }
+            _ => return,
+        };
+        match at.and_then(|at| self.advice.get_mut(at)) {
+            Some(old) => *old = new,
+            None => self.advice.push(new),
+        }
+    }
+}
 
 pub(super) fn advise(
     summary: &QualitySummary,
@@ -278,6 +338,10 @@ fn lacks(summary: &QualitySummary) -> bool {
     let Some(spacing) = &summary.spacing else {
         return true;
     };
+    // Then a step and a half is a gap and nothing else.
+    if spacing.jitter_p99_secs < 0.3 * spacing.median_secs {
+        return true;
+    }
     let by_time = summary.duration_secs / spacing.median_secs.max(1e-9) + 1.0;
     let distinct = summary.count.saturating_sub(summary.duplicates);
     by_time - distinct as f64 > 0.5 * summary.missing as f64

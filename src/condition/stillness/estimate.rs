@@ -137,6 +137,17 @@ pub fn estimate_bias(rests: &Rests, limits: &Limits) -> Result<BiasEstimate, NoR
 /// (the attitude is wanted at the first sample, and must not have changed since),
 /// [`NoRest::NoAccel`] without an accelerometer.
 pub fn accel_at_start(rests: &Rests, limits: &Limits) -> Result<Vector3<f64>, NoRest> {
+    rest_at_start(rests, limits)?
+        .mean_accel
+        .ok_or(NoRest::NoAccel)
+}
+
+/// The rest the stream begins with: the only one whose attitude is known before anything is
+/// integrated.
+///
+/// # Errors
+/// [`NoRest::Moving`] without a rest, [`NoRest::NotAtStart`] when the body moves in the first window.
+pub fn rest_at_start<'r>(rests: &'r Rests, limits: &Limits) -> Result<&'r Rest, NoRest> {
     let (Some(rest), Some(first)) = (rests.kept.first(), rests.first) else {
         return Err(NoRest::Moving {
             stillest: rests.stillest,
@@ -147,7 +158,7 @@ pub fn accel_at_start(rests: &Rests, limits: &Limits) -> Result<Vector3<f64>, No
     if first_rest_secs > 0.1 {
         return Err(NoRest::NotAtStart { first_rest_secs });
     }
-    rest.mean_accel.ok_or(NoRest::NoAccel)
+    Ok(rest)
 }
 
 /// Level attitude q_nb from the specific force at rest; yaw 0. `None` when it has no direction.

@@ -4,7 +4,7 @@
 //! into ENU and leaving the body FRD is the classic bug (microstrain_mips#4, vectornav#146,
 //! mavros#216), so a world without its body has no function here.
 
-use super::{Enu, Flu, Frd, In, Ned, Nwu, quoted};
+use super::{Enu, Flu, Frd, In, Nav, Ned, Nwu, quoted};
 use crate::model::attitude::Quaternion;
 use nalgebra::Vector3;
 use std::f64::consts::FRAC_1_SQRT_2;
@@ -187,4 +187,45 @@ pub fn enu_from_ned(v: In<Ned>) -> In<Enu> {
 pub fn ned_from_enu(v: In<Enu>) -> In<Ned> {
     let v = v.as_vector();
     In::assume(Vector3::new(v.y, v.x, -v.z))
+}
+
+/// A world vector from NWU to ENU: `(-y, x, z)`, exact.
+#[must_use]
+pub fn enu_from_nwu(v: In<Nwu>) -> In<Enu> {
+    let v = v.as_vector();
+    In::assume(Vector3::new(-v.y, v.x, v.z))
+}
+
+/// A world vector from ENU to NWU: `(y, -x, z)`, exact.
+#[must_use]
+pub fn nwu_from_enu(v: In<Enu>) -> In<Nwu> {
+    let v = v.as_vector();
+    In::assume(Vector3::new(v.y, -v.x, v.z))
+}
+
+/// Rate of the Earth relative to inertial space, rad/s.
+///
+/// # Source
+/// WGS 84 (NIMA TR8350.2, 3rd edition, table 3.1): 7292115e-11 rad/s.
+pub const EARTH_RATE: f64 = 7.292_115e-5;
+
+/// Earth's rate w_ie at a latitude (rad, positive north), resolved in NED: `[cos L, 0, -sin L]` of
+/// [`EARTH_RATE`], rad/s.
+#[must_use]
+pub fn earth_rate(latitude: f64) -> In<Ned> {
+    let (sin, cos) = latitude.sin_cos();
+    In::assume(Vector3::new(EARTH_RATE * cos, 0.0, -EARTH_RATE * sin))
+}
+
+impl Convention {
+    /// [`earth_rate`] in this convention's world axes.
+    #[must_use]
+    pub fn earth_rate(self, latitude: f64) -> In<Nav> {
+        let ned = earth_rate(latitude);
+        In::assume(match self {
+            Convention::NedFrd => *ned.as_vector(),
+            Convention::EnuFlu => *enu_from_ned(ned).as_vector(),
+            Convention::NwuFlu => *nwu_from_enu(enu_from_ned(ned)).as_vector(),
+        })
+    }
 }

@@ -92,9 +92,13 @@ struct Segment {
 }
 
 impl Segment {
-    fn new(rates: &Rates, start: State) -> Self {
-        let mut low = Box::new(Series::<DoubleDouble>::zero());
-        let mut all = Box::new(Series::<f64>::zero());
+    /// In the memory of a segment that is no longer needed, where there is one: every coefficient
+    /// that is read is written first, and which these are depends on the kind of rates alone.
+    fn new(rates: &Rates, start: State, spent: Option<Segment>) -> Self {
+        let (mut low, mut all) = match spent {
+            Some(segment) => (segment.low, segment.all),
+            None => (Box::new(Series::zero()), Box::new(Series::zero())),
+        };
         for i in 0..4 {
             low.q[i][0] = start.q[i];
         }
@@ -287,7 +291,7 @@ impl Trajectory {
             w: [w.x, w.y, w.z].map(DoubleDouble::from),
             theta: [DoubleDouble::ZERO; 3],
         };
-        let current = Segment::new(&rates, initial);
+        let current = Segment::new(&rates, initial, None);
         Self {
             rates,
             initial,
@@ -299,21 +303,23 @@ impl Trajectory {
     /// The segment t lies in, and how far into it.
     fn segment(&mut self, t: DoubleDouble) -> (&Segment, f64) {
         let into = |s: &Segment| (t - s.start.t).to_f64();
-        if into(&self.current) < 0.0 {
+        let mut dt = into(&self.current);
+        if dt < 0.0 {
             if let Some(previous) = &self.previous
                 && into(previous) >= 0.0
             {
                 let dt = into(previous);
                 return (self.previous.as_ref().unwrap_or(&self.current), dt);
             }
-            self.current = Segment::new(&self.rates, self.initial);
-            self.previous = None;
+            self.current = Segment::new(&self.rates, self.initial, self.previous.take());
+            dt = into(&self.current);
         }
-        while into(&self.current) >= self.current.length {
-            let next = Segment::new(&self.rates, self.current.end());
+        while dt >= self.current.length {
+            let end = self.current.end();
+            let next = Segment::new(&self.rates, end, self.previous.take());
             self.previous = Some(std::mem::replace(&mut self.current, next));
+            dt = into(&self.current);
         }
-        let dt = into(&self.current);
         (&self.current, dt)
     }
 

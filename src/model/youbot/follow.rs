@@ -224,7 +224,7 @@ impl ToolPath {
         let square = x[0] * x[0] + y[0] * y[0];
         let distance = square.sqrt();
         if distance < 1e-6 {
-            return Err(ArmError::Singular(Singularity::Base { measure: distance }));
+            return Err(ArmError::Singular(Singularity::Path { distance }));
         }
         let (s1, c1) = (y[0] / distance, x[0] / distance);
         // theta1 = atan2(y, x)
@@ -274,9 +274,15 @@ impl ToolTrack {
     /// # Errors
     /// As [`ToolTrack::at`] at time zero.
     pub fn new(arm: Arm, path: ToolPath, start: &SeedJoints) -> Result<Self, ArmError> {
-        let first = path.at(0.0)?.t_base_tool;
-        let found = arm.inverse(&first, exact(), Some(start))?;
-        let q = found.nearest(start)?.q;
+        let nearest = || {
+            let first = path.at(0.0)?.t_base_tool;
+            let found = arm.inverse(&first, exact(), Some(start))?;
+            Ok((first, found.nearest(start)?.q))
+        };
+        let (first, q) = nearest().map_err(|why| ArmError::Path {
+            secs: 0.0,
+            why: Box::new(why),
+        })?;
         let track = Self {
             arm,
             path,
@@ -337,9 +343,9 @@ impl ToolTrack {
     /// paths of a few rad/s, and as smooth.
     ///
     /// # Errors
-    /// As [`ToolTrack::at`]; more than 1e7 knots.
+    /// As [`ToolTrack::at`]; longer than 1e4 s (a million knots).
     pub fn joint_path(&self, secs: f64) -> Result<JointPath, ArmError> {
-        bounded("duration of a gripper path (s)", [secs], 1e5)?;
+        bounded("duration of a gripper path (s)", [secs], 1e4)?;
         let count = (secs / 0.01).ceil().max(1.0);
         let step = secs / count;
         let count = count as u32;

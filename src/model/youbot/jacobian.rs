@@ -12,8 +12,8 @@ use std::fmt;
 /// rates are not computed: a velocity of 1 mm/s would ask for a million rad/s.
 const SINGULAR: f64 = 1e-9;
 
-/// Where the five joints lose a direction. These two are all there are:
-/// `det(J^T J) = (a2 a3 sin th3)^2 (rho^2 + a_r^2)`.
+/// Where the five joints lose a direction. The first two are all there are,
+/// `det(J^T J) = (a2 a3 sin th3)^2 (rho^2 + a_r^2)`; the third is a path's own.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
 pub enum Singularity {
@@ -27,6 +27,11 @@ pub enum Singularity {
         /// Distance from the axis (m) and sine of the approach's angle to the vertical, as one length.
         measure: f64,
     },
+    /// A path of the gripper that gives theta1 by its tool point meets the base axis.
+    Path {
+        /// Distance from the axis, m.
+        distance: f64,
+    },
 }
 
 impl fmt::Display for Singularity {
@@ -38,6 +43,10 @@ impl fmt::Display for Singularity {
             Self::Base { measure } => write!(
                 f,
                 "the tool point is on the base axis with vertical approach (measure {measure:.1e})"
+            ),
+            Self::Path { distance } => write!(
+                f,
+                "the path meets the base axis (distance {distance:.1e} m), where joint 1 would jump"
             ),
         }
     }

@@ -1,5 +1,6 @@
 //! Steps and waiting samples -> outputs. Pure.
 
+use super::world::TurningWorld;
 use crate::model::attitude::Quaternion;
 use crate::propagate::accumulate::Accumulator;
 use crate::propagate::covariance::Covariance;
@@ -29,6 +30,10 @@ pub(super) struct State {
     pub(super) attitude: Accumulator,
     /// Sum of rotation vectors, for the method that wants it.
     sum: Option<Triple<1>>,
+    /// What the attitude accumulated is relative to, where the world turns: then it is q_ib.
+    world: Option<TurningWorld>,
+    /// Instant of the attitude accumulated, ns.
+    pub(super) now: i64,
     pub(super) covariance: Covariance,
     pub(super) difference: Difference,
     /// Bits of the output being made that the propagator adds.
@@ -45,6 +50,8 @@ impl State {
         State {
             attitude: sum.map_or(Accumulator::new(initial), turned_by),
             sum,
+            world: TurningWorld::new(settings.world_rate.as_vector()),
+            now: 0,
             covariance: Covariance::new(settings.noise),
             difference: Difference::default(),
             added: Status::OK,
@@ -52,6 +59,37 @@ impl State {
             reset_count: 0,
             rate: Vector3::zeros(),
             integrated_nanos: 0,
+        }
+    }
+
+    /// A run begins at `stamp` with the attitude as it is: what lies between adds no rotation of the
+    /// body relative to the world.
+    pub(super) fn begin(&mut self, stamp: i64) {
+        if self.world.is_some() && self.now != stamp {
+            let q_nb = self.q_nb();
+            self.attitude = Accumulator::new(q_nb);
+            if let Some(sum) = &mut self.sum {
+                *sum = rotation_vector(q_nb);
+                // The same attitude on the other side of the sphere: a turn less about its axis.
+                let angle = sum.norm();
+                if q_nb[0] < 0.0 && angle > 0.0 {
+                    *sum = *sum * ((angle - std::f64::consts::TAU) / angle);
+                }
+            }
+        }
+        if let Some(world) = &mut self.world {
+            world.count_from(stamp);
+        }
+        self.now = stamp;
+    }
+
+    /// The attitude relative to the world, which may have turned.
+    #[inline(always)]
+    fn q_nb(&mut self) -> [f64; 4] {
+        let accumulated = self.attitude.attitude();
+        match &self.world {
+            None => accumulated,
+            Some(world) => world.attitude(self.now, &accumulated),
         }
     }
 
@@ -79,6 +117,7 @@ impl State {
                 turn = Turn::exp(phi).parts();
             }
         }
+        self.now = track.stamp[k];
         self.difference.add(&self.attitude, step.outer);
         let spacing = track.spacing(k);
         self.covariance.advance(turn, secs(spacing));
@@ -142,9 +181,10 @@ impl State {
         if let Some(rate) = rate {
             self.rate = Vector3::new(rate.x.0[0], rate.y.0[0], rate.z.0[0]);
         }
+        let q_nb = self.q_nb();
         out.push(AttitudeSample {
             stamp: sample.stamp,
-            q_nb: Quaternion::assume_unit(self.attitude.attitude()),
+            q_nb: Quaternion::assume_unit(q_nb),
             rate: self.rate,
             accel: sample.accel,
             covariance: self.covariance.attitude(),

@@ -143,12 +143,9 @@ impl Plan {
             return full;
         }
         // A bridge of two samples still wants to know what four would have said.
-        let probe = if target == Target::Interval {
-            cap
-        } else {
-            cap.max(smallest + 2)
-        };
-        let sizes = (smallest..probe).step_by(2).chain([probe]);
+        let probe = smallest + 2;
+        let probe = (target != Target::Interval && probe > cap).then_some(probe);
+        let sizes = (smallest..cap).step_by(2).chain([cap]).chain(probe);
         let variation = self.variation(track, k, smallest + 2, target);
         // The first moment itself, which one increment does not know: at the edge of three equal spacings up
         // to 1.25 times what rates vary by, among jittered ones 2. Its noise moves no delta angle.

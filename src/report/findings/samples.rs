@@ -137,7 +137,7 @@ fn counted(topic: &CheckedTopic, out: &mut Vec<Finding>) {
     let repeated = q.repeated_rows.saturating_sub(q.duplicates);
     // A rest, or a steady turn, without noise repeats itself for long; a sensor read too often does not.
     let longest = q.axes.iter().map(|a| a.longest_run).max().unwrap_or(0);
-    if repeated as f64 > REPEATED_SHARE * total as f64 && longest < LONG_RUN {
+    if repeated as f64 > REPEATED_SHARE * total as f64 && longest < LONG_RUN && total >= LONG_RUN {
         add(
             repeated,
             Warning,
@@ -173,6 +173,7 @@ fn advised(topic: &CheckedTopic, advice: &Advice) -> Option<Finding> {
     // The flag is said apart from what was seen.
     let what = text
         .split_once(": --")
+        .or_else(|| text.split_once(": if "))
         .map_or(text.as_str(), |(what, _)| what)
         .to_owned();
     let stated_frd = topic.looked.resolved.body == BodyAxes::Frd;
@@ -229,6 +230,15 @@ fn advised(topic: &CheckedTopic, advice: &Advice) -> Option<Finding> {
             )
             .advise("if the sensor samples evenly and only its stamps jitter, straighten them; if it samples unevenly, keep them")
             .flags("--regularise-stamps"),
+        Advice::StampsJitterEvenly { jitter, segments } => finding(Warning, "jitter")
+            .with("rms_share_of_step", jitter)
+            .with("segments_of_constant_rate", segments)
+            .advise("if a clock of its own triggers the sensor, straighten its stamps; if it samples when it is asked, keep them: they can not tell, --against-recorded may")
+            .flags("--regularise-stamps"),
+        Advice::StampsUneven { share } => finding(Warning, "jitter")
+            .with("p99_share_of_step", share)
+            .advise("the stamps keep no constant rate: another clock may be steadier; if no sample is missing, number them")
+            .flags("--time log, or --time index --rate-hz HZ"),
         Advice::ClocksDrift { ppm } => finding(Warning, "clock-drift")
             .with("ppm", ppm)
             .advise("one of the clocks is wrong by as much, and so is every angle")

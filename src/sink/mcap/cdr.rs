@@ -209,6 +209,36 @@ impl<const N: usize> Stamped<N> {
     }
 }
 
+impl Imu {
+    /// Appends an input sample as it was received, with its own clocks; what it lacks is marked as
+    /// absent (REP-145: -1 as the covariance's first element), what it has is of unknown covariance.
+    pub(super) fn append_input(
+        &self,
+        out: &mut Vec<u8>,
+        sequence: u32,
+        times: [u64; 2],
+        stamp: [u8; 8],
+        sample: &RawSample,
+    ) {
+        let start = out.len();
+        let [log_time, publish_time] = times;
+        let numbers = self.0.append(out, sequence, log_time, stamp);
+        match sample.orientation {
+            Some([w, x, y, z]) => put(numbers, 0, [x, y, z, w]),
+            None => put(numbers, 4, [-1.0]),
+        }
+        match sample.gyro {
+            Some(gyro) => put(numbers, 13, gyro),
+            None => put(numbers, 16, [-1.0]),
+        }
+        match sample.accel {
+            Some(accel) => put(numbers, 25, accel),
+            None => put(numbers, 28, [-1.0]),
+        }
+        out[start + 23..start + 31].copy_from_slice(&publish_time.to_le_bytes());
+    }
+}
+
 /// `tf2_msgs/msg/TFMessage` of one stream: one transform, no translation.
 #[derive(Debug)]
 pub(super) struct Tf(Template);

@@ -242,6 +242,15 @@ impl McapFile {
         out
     }
 
+    /// The shortest end there can be, without a summary: for a disk that has no room for one.
+    pub(super) fn shortest_closing() -> Vec<u8> {
+        let mut out = Vec::new();
+        Body::begin(&mut out, DATA_END).u32(0).end();
+        Body::begin(&mut out, FOOTER).u64(0).u64(0).u32(0).end();
+        out.extend_from_slice(MAGIC);
+        out
+    }
+
     fn push_statistics(&self, out: &mut Vec<u8>) {
         let (start, end) = self.times.unwrap_or_default();
         Body::begin(out, STATISTICS)

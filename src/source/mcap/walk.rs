@@ -82,7 +82,7 @@ pub struct WalkReport {
 /// has: its size and the definitions in its summary).
 ///
 /// # Errors
-/// [`Error::Read`] when the input itself fails. Damage is no error: see [`Survey::problems`].
+/// [`Error::Read`](crate::error::Error::Read) when the input itself fails. Damage is no error: see [`Survey::problems`].
 ///
 /// # Panics
 /// Passes on a panic of `map`.
@@ -117,7 +117,7 @@ where
 /// the question about a channel (`select`), but for the items of the block that defines it.
 ///
 /// # Errors
-/// [`Error::Read`] when the input itself fails.
+/// [`Error::Read`](crate::error::Error::Read) when the input itself fails.
 ///
 /// # Panics
 /// Passes on a panic of `map`.

@@ -182,6 +182,7 @@ pub(super) fn propagated(
             .first()
             .map_or(Quaternion::identity(), |(_, spin)| spin.q_nb),
         noise: Noise::default(),
+        ..Settings::default()
     })
     .map_err(|e| e.to_string())?;
     let samples: Vec<RateSample> = truth
@@ -205,10 +206,19 @@ pub(super) fn propagated(
     propagator.push(&samples, &Sequential, &mut found);
     propagator.finish(&Sequential, &mut found);
     // What was turned since the first sample looked at: the ends of a run have no centred window.
-    let since = |k: usize| truth[margin].1.q_nb * found[margin].q_nb.inverse() * found[k].q_nb;
+    let pairs = || {
+        let n = truth.len().min(found.len()).saturating_sub(2 * margin);
+        let truths = truth.iter().map(|(_, spin)| spin.q_nb);
+        let estimates = found.iter().map(|a| a.q_nb);
+        truths.zip(estimates).skip(margin).take(n)
+    };
     let mut worst = Worst::default();
-    for k in margin..truth.len().min(found.len()).saturating_sub(margin) {
-        let turned = truth[k].1.q_nb.inverse() * since(k);
+    let Some((q_true, q_found)) = pairs().next() else {
+        return Ok(worst);
+    };
+    let from_found = q_true * q_found.inverse();
+    for (q_true, q_found) in pairs() {
+        let turned = q_true.inverse() * from_found * q_found;
         let [w, x, y, z] = turned.wxyz();
         let (tilt, twist) = (x.hypot(y), w.hypot(z));
         worst.axis = worst.axis.max(2.0 * tilt.atan2(twist));
@@ -218,6 +228,8 @@ pub(super) fn propagated(
     Ok(worst)
 }
 
+/// A method for each rate that can be held.
+type OfHeld = fn(HeldRate) -> TopMethod;
+
 /// The columns of the table of methods, in its order.
-pub(super) const HELD: [(&str, fn(HeldRate) -> TopMethod); 2] =
-    [("live", TopMethod::Live), ("gyro", TopMethod::Gyro)];
+pub(super) const HELD: [(&str, OfHeld); 2] = [("live", TopMethod::Live), ("gyro", TopMethod::Gyro)];

@@ -1,0 +1,321 @@
+//! A TOML file -> arguments of `strapd serve`; `strapd config check|show`. I/O.
+//!
+//! The file's keys are the long flags, so there is one list of settings and one parser of their
+//! values. Flag before environment before file before default; `[sensor.ID]` holds the estimation
+//! flags of one sensor.
+
+use super::estimation::Estimation;
+use super::serve::Serve;
+use super::{Cli, Command, Outcome, print};
+use crate::error::{Error, Result};
+use crate::serve::Settings;
+use clap::parser::ValueSource;
+use clap::{ArgAction, ArgMatches, Args, CommandFactory, FromArgMatches, Parser, Subcommand};
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use toml::{Table, Value};
+
+/// A larger file is no configuration.
+const MAX_BYTES: u64 = 1 << 20;
+
+/// Look at a configuration file of `serve`.
+#[derive(Args, Debug)]
+pub struct Config {
+    /// What to do.
+    #[command(subcommand)]
+    pub action: Action,
+}
+
+/// `strapd config ...`.
+#[derive(Subcommand, Debug)]
+pub enum Action {
+    /// Say whether `strapd serve --config FILE` would start (addresses are not tried)
+    Check {
+        /// The file
+        file: PathBuf,
+    },
+    /// The settings that would hold, as TOML, each with where it comes from
+    Show {
+        /// The file
+        file: PathBuf,
+    },
+}
+
+/// Estimation flags alone, for one sensor.
+#[derive(Parser, Debug)]
+#[command(name = "sensor")]
+struct Sensor {
+    #[command(flatten)]
+    estimation: Estimation,
+}
+
+/// The arguments of a run with what a file adds.
+#[derive(Debug)]
+pub struct Layered {
+    serve: Box<Serve>,
+    matches: ArgMatches,
+    from_file: Vec<String>,
+    sensors: Vec<(String, Estimation, Vec<OsString>)>,
+}
+
+/// Runs it.
+///
+/// # Errors
+/// The file can not be read, or does not fit.
+pub fn run(args: &Config) -> Result<Outcome> {
+    let argv = |file: &Path| {
+        ["strapd", "serve", "--config"]
+            .iter()
+            .map(OsString::from)
+            .chain([file.into()])
+            .collect()
+    };
+    match &args.action {
+        Action::Check { file } => {
+            layered(file, argv(file))?.settings()?.check()?;
+            print(&format!("{}: in order\n", file.display()))?;
+        }
+        Action::Show { file } => print(&layered(file, argv(file))?.show())?,
+    }
+    Ok(Outcome::Done)
+}
+
+/// Reads `file` into what `argv` (of `strapd serve`) leaves open.
+///
+/// # Errors
+/// [`Error::Open`], [`Error::Usage`] naming file and key.
+pub fn layered(file: &Path, argv: Vec<OsString>) -> Result<Layered> {
+    let mut table = read(file)?;
+    let sensors = match table.remove("sensor") {
+        None => Table::new(),
+        Some(Value::Table(sensors)) => sensors,
+        Some(_) => return Err(bad(file, "`sensor` is no table; expected [sensor.ID]")),
+    };
+    let command = Cli::command();
+    let parse = |argv: &[OsString]| command.clone().try_get_matches_from(argv);
+    let first = parse(&argv).map_err(|e| bad(file, &e.to_string()))?;
+    let first = subcommand(file, &first)?;
+    let serve = Serve::augment_args(clap::Command::new("serve"));
+    let mut whole = argv;
+    let from_file = extend(&mut whole, file, "", &serve, &table, Some(&first))?;
+    let matches = parse(&whole).map_err(|e| bad(file, &e.to_string()))?;
+    let Ok(Cli {
+        command: Command::Serve(args),
+        ..
+    }) = Cli::from_arg_matches(&matches)
+    else {
+        return Err(bad(file, "is for strapd serve"));
+    };
+    let matches = subcommand(file, &matches)?;
+    let sensors = sensors
+        .into_iter()
+        .map(|(id, value)| {
+            let name = format!("[sensor.{id}]");
+            let Value::Table(own) = value else {
+                return Err(bad(file, &format!("{name} is no table")));
+            };
+            let known = Sensor::command();
+            let mut argv = vec![OsString::from("sensor")];
+            extend(&mut argv, file, &name, &known, &own, Some(&first))?;
+            let added = argv.len();
+            // What holds for all holds for this one where it says nothing else.
+            for arg in known.get_arguments() {
+                let key = arg.get_long().unwrap_or_default();
+                if !own.contains_key(key) || is_given(&first, arg.get_id().as_str()) {
+                    inherit(&mut argv, &matches, arg);
+                }
+            }
+            let parsed =
+                Sensor::try_parse_from(&argv).map_err(|e| bad(file, &format!("{name}: {e}")))?;
+            argv.truncate(added);
+            Ok((id, parsed.estimation, argv.split_off(1)))
+        })
+        .collect::<Result<_>>()?;
+    Ok(Layered {
+        serve: args,
+        matches,
+        from_file,
+        sensors,
+    })
+}
+
+fn bad(file: &Path, what: &str) -> Error {
+    Error::Usage(format!("--config {}: {}", file.display(), what.trim_end()))
+}
+
+fn read(file: &Path) -> Result<Table> {
+    let open = |source| Error::Open {
+        path: file.to_owned(),
+        source,
+    };
+    let metadata = std::fs::metadata(file).map_err(open)?;
+    if !metadata.is_file() || metadata.len() > MAX_BYTES {
+        return Err(bad(file, "is no text file of a sensible size"));
+    }
+    let text = std::fs::read_to_string(file).map_err(open)?;
+    text.parse::<Table>().map_err(|e| bad(file, &e.to_string()))
+}
+
+fn subcommand(file: &Path, matches: &ArgMatches) -> Result<ArgMatches> {
+    matches
+        .subcommand_matches("serve")
+        .cloned()
+        .ok_or_else(|| bad(file, "is for strapd serve"))
+}
+
+/// Whether a value was given as a flag or in the environment.
+fn is_given(matches: &ArgMatches, id: &str) -> bool {
+    matches!(
+        matches.value_source(id),
+        Some(ValueSource::CommandLine | ValueSource::EnvVariable)
+    )
+}
+
+/// Adds the keys of `table` to the arguments, but for those `given` already; returns those added.
+fn extend(
+    argv: &mut Vec<OsString>,
+    file: &Path,
+    place: &str,
+    known: &clap::Command,
+    table: &Table,
+    given: Option<&ArgMatches>,
+) -> Result<Vec<String>> {
+    let mut added = Vec::new();
+    for (key, value) in table {
+        let arg = known
+            .get_arguments()
+            .find(|a| a.get_long() == Some(key) && key != "config")
+            .ok_or_else(|| {
+                let names: Vec<&str> = known
+                    .get_arguments()
+                    .filter_map(clap::Arg::get_long)
+                    .collect();
+                bad(
+                    file,
+                    &format!(
+                        "{place} unknown key `{key}`\n  help: the keys are the long flags: {}",
+                        names.join(", ")
+                    ),
+                )
+            })?;
+        if given.is_some_and(|m| is_given(m, arg.get_id().as_str())) {
+            continue;
+        }
+        let values = match value {
+            Value::Array(all) => all.iter().collect(),
+            one => vec![one],
+        };
+        for value in values {
+            let text = match value {
+                Value::Boolean(set) if matches!(arg.get_action(), ArgAction::SetTrue) => {
+                    if *set {
+                        argv.push(format!("--{key}").into());
+                    }
+                    continue;
+                }
+                Value::String(text) => text.clone(),
+                Value::Integer(n) => n.to_string(),
+                Value::Float(x) => x.to_string(),
+                other => {
+                    return Err(bad(
+                        file,
+                        &format!(
+                            "{place} `{key}` is a {}, which no flag takes",
+                            other.type_str()
+                        ),
+                    ));
+                }
+            };
+            argv.push(format!("--{key}={text}").into());
+        }
+        added.push(arg.get_id().to_string());
+    }
+    Ok(added)
+}
+
+/// Adds an argument as it holds for all sensors, unless that is the default.
+fn inherit(argv: &mut Vec<OsString>, matches: &ArgMatches, arg: &clap::Arg) {
+    let (Some(key), id) = (arg.get_long(), arg.get_id().as_str()) else {
+        return;
+    };
+    if !is_given(matches, id) {
+        return;
+    }
+    if matches!(arg.get_action(), ArgAction::SetTrue) {
+        if matches.get_flag(id) {
+            argv.push(format!("--{key}").into());
+        }
+        return;
+    }
+    for value in matches.get_raw(id).into_iter().flatten() {
+        let mut whole = OsString::from(format!("--{key}="));
+        whole.push(value);
+        argv.push(whole);
+    }
+}
+
+impl Layered {
+    /// The command line with the file under it.
+    pub(super) fn serve(&self) -> &Serve {
+        &self.serve
+    }
+
+    /// The settings of the daemon.
+    ///
+    /// # Errors
+    /// As for flags.
+    pub fn settings(&self) -> Result<Settings> {
+        let mut settings = self.serve.settings()?;
+        for (id, estimation, _) in &self.sensors {
+            settings.plans.insert(id.clone(), estimation.plan()?);
+        }
+        Ok(settings)
+    }
+
+    /// The settings as TOML with their origins.
+    fn show(&self) -> String {
+        let mut out = String::new();
+        let known = Serve::augment_args(clap::Command::new("serve"));
+        for arg in known.get_arguments() {
+            let (Some(key), id) = (arg.get_long(), arg.get_id().as_str()) else {
+                continue;
+            };
+            let origin = match self.matches.value_source(id) {
+                _ if key == "config" => continue,
+                _ if self.from_file.iter().any(|k| k == id) => "file",
+                Some(ValueSource::CommandLine) => "flag",
+                Some(ValueSource::EnvVariable) => "environment",
+                _ => "default",
+            };
+            let is_switch = matches!(arg.get_action(), ArgAction::SetTrue);
+            let values: Vec<String> = self
+                .matches
+                .get_raw(id)
+                .into_iter()
+                .flatten()
+                .map(|v| v.to_string_lossy().into_owned())
+                .collect();
+            let line = match values.as_slice() {
+                _ if is_switch => format!("{key} = {}", self.matches.get_flag(id)),
+                [] => format!("# {key} is not set"),
+                [one] if !matches!(arg.get_action(), ArgAction::Append) => {
+                    format!("{key} = {}", Value::from(one.as_str()))
+                }
+                several => format!("{key} = {}", Value::from(several.to_vec())),
+            };
+            out.push_str(&format!("{line:<48} # {origin}\n"));
+        }
+        for (id, _, own) in &self.sensors {
+            out.push_str(&format!("\n[sensor.{}]\n", Value::from(id.as_str())));
+            for flag in own {
+                let flag = flag.to_string_lossy();
+                let (key, value) = flag.trim_start_matches('-').split_once('=').map_or_else(
+                    || (flag.trim_start_matches('-'), Value::Boolean(true)),
+                    |(key, value)| (key, Value::from(value)),
+                );
+                out.push_str(&format!("{:<48} # file\n", format!("{key} = {value}")));
+            }
+        }
+        out
+    }
+}

@@ -1,0 +1,245 @@
+//! `strapd serve`: samples over sockets -> attitudes over sockets. I/O.
+
+use super::config::Layered;
+use super::estimation::Estimation;
+use super::{Global, Outcome};
+use crate::error::{Error, Result};
+use crate::serve::address::{DEFAULTS, Listen};
+use crate::serve::admission::{Token, Web};
+use crate::serve::limits::Limits;
+use crate::serve::recorder::{self, Recorder, Split};
+use crate::serve::shutdown::{self, Signals};
+use crate::serve::{Server, Settings, listen};
+use crate::sink::{Format, Target};
+use clap::Args;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+
+/// Samples in over sockets, attitude out to whoever watches.
+#[derive(Args, Debug)]
+#[command(after_help = "Examples:
+  strapd serve                                           TCP on 127.0.0.1:4550, WebSocket and HTTP on 127.0.0.1:8765
+  strapd serve --listen tcp-listen://127.0.0.1:0         a free port, named in the ready line
+  strapd cat flight.mcap | strapd serve -                lines on standard input, too
+
+Talk to it:
+  echo '{\"class\":\"RATE\",\"id\":\"imu0\",\"stamp\":{\"sec\":1,\"nsec\":0},\"gyro\":[0.1,0,0]}' | nc 127.0.0.1 4550
+  echo '{\"class\":\"WATCH\"}' | nc 127.0.0.1 4550             attitudes as they come
+  curl 127.0.0.1:8765/metrics")]
+pub struct Serve {
+    /// - reads samples from standard input as well
+    #[arg(value_name = "SOURCE")]
+    pub sources: Vec<String>,
+    /// Where to listen: tcp-listen://HOST:PORT, udp-listen://HOST:PORT, ws-listen://HOST:PORT (with
+    /// HTTP), unix-listen:///PATH. May be given several times; port 0 takes a free one
+    /// [default: tcp-listen://127.0.0.1:4550 and ws-listen://127.0.0.1:8765]
+    #[arg(long, value_name = "URI")]
+    pub listen: Vec<String>,
+    /// Take what is not given as a flag or in the environment from this TOML file
+    #[arg(long, value_name = "FILE", env = "STRAPD_CONFIG")]
+    pub config: Option<PathBuf>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub estimation: Estimation,
+    /// Record what comes in and the attitudes to this MCAP file
+    #[arg(long, value_name = "FILE", help_heading = "Recording")]
+    pub record: Option<PathBuf>,
+    /// Go on in a new file after this size or time (512MiB, 10min); files are numbered
+    #[arg(
+        long,
+        value_name = "SIZE|TIME",
+        requires = "record",
+        help_heading = "Recording"
+    )]
+    pub record_split: Option<String>,
+    /// Stop recording, and go on serving, with less than this free on the disk
+    #[arg(
+        long,
+        value_name = "SIZE",
+        default_value = "256MiB",
+        help_heading = "Recording"
+    )]
+    pub min_free: String,
+    /// Replace the recording if it exists
+    #[arg(long, requires = "record", help_heading = "Recording")]
+    pub force: bool,
+    /// Ask every client for the token in this file (first line, mode 0600)
+    #[arg(
+        long,
+        value_name = "FILE",
+        help_heading = "Admission",
+        env = "STRAPD_TOKEN_FILE"
+    )]
+    pub token_file: Option<PathBuf>,
+    /// Listen where others can reach it without asking for a token
+    #[arg(long, help_heading = "Admission")]
+    pub allow_insecure_remote: bool,
+    /// Let pages of this origin, such as `https://example.org`, connect. May be given several times
+    #[arg(long, value_name = "ORIGIN", help_heading = "Admission")]
+    pub allow_origin: Vec<String>,
+    /// A name this machine is called in HTTP requests. May be given several times
+    #[arg(long, value_name = "HOST", help_heading = "Admission")]
+    pub allow_host: Vec<String>,
+}
+
+/// Runs it until a signal.
+///
+/// # Errors
+/// An address can not be listened on, or the arguments can not be.
+pub fn run(global: &Global, args: &Serve) -> Result<Outcome> {
+    if let Some(other) = args.sources.iter().find(|s| *s != "-") {
+        return Err(Error::Usage(format!(
+            "serve {other}: only - (standard input) is a source\n  help: --listen waits for senders; strapd replay reads a log"
+        )));
+    }
+    let layered = match &args.config {
+        Some(file) => Some(super::config::layered(file, std::env::args_os().collect())?),
+        None => None,
+    };
+    let mut settings = match &layered {
+        Some(layered) => layered.settings()?,
+        None => args.settings()?,
+    };
+    let args = layered.as_ref().map_or(args, Layered::serve);
+    let recorder = args.recording()?.map(Recorder::start).transpose()?;
+    settings.recorder = recorder.as_ref().map(Recorder::handle);
+    let mut builder = tokio::runtime::Builder::new_multi_thread();
+    if global.threads > 0 {
+        builder.worker_threads(global.threads);
+    }
+    let runtime = builder
+        .thread_name("strapd-serve")
+        .enable_all()
+        .build()
+        .map_err(|e| Error::Usage(format!("--threads {}: {e}", global.threads)))?;
+    let has_stdin = !args.sources.is_empty();
+    let outcome = runtime.block_on(serve(settings, has_stdin));
+    // A thread that waits for standard input would otherwise be waited for.
+    runtime.shutdown_background();
+    let Some(status) = recorder.map(Recorder::finish) else {
+        return outcome;
+    };
+    tracing::info!(
+        "recorded {} samples and {} attitudes in {} files, {} bytes",
+        status.samples,
+        status.attitudes,
+        status.files.len(),
+        status.bytes
+    );
+    outcome.map(|done| {
+        if status.is_lossy() {
+            Outcome::Lossy
+        } else {
+            done
+        }
+    })
+}
+
+async fn serve(settings: Settings, has_stdin: bool) -> Result<Outcome> {
+    // Signals first: from the ready line on, one drains.
+    let signals = Signals::new().map_err(|e| Error::Usage(format!("signals: {e}")))?;
+    let server = Server::bind(settings).await?;
+    let addresses: Vec<String> = server.addresses().iter().map(ToString::to_string).collect();
+    let hub = server.hub().clone();
+    tracing::info!(session = hub.session(), "ready {}", addresses.join(" "));
+    // Nobody may have started us that wants to know.
+    let _ = sd_notify::notify(&[sd_notify::NotifyState::Ready]);
+    if has_stdin {
+        let hub = hub.clone();
+        std::thread::spawn(move || listen::read_stdin(&hub, std::io::stdin().lock()));
+    }
+    let drained = server
+        .run(async {
+            let signal = shutdown::first(signals).await;
+            tracing::info!("{}: shutting down", signal.name());
+            let _ = sd_notify::notify(&[sd_notify::NotifyState::Stopping]);
+        })
+        .await;
+    if !drained {
+        tracing::warn!("not everything could be sent in time");
+    }
+    let of = |n: &std::sync::atomic::AtomicU64| n.load(Ordering::Relaxed);
+    tracing::info!(
+        "served {:.1} s: {} samples in, {} attitudes, {} bad lines",
+        hub.uptime_secs(),
+        of(&hub.counters.samples),
+        of(&hub.counters.attitudes),
+        of(&hub.counters.faults)
+    );
+    Ok(Outcome::Done)
+}
+
+impl Serve {
+    /// How to record, if at all.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] naming the flag.
+    fn recording(&self) -> Result<Option<recorder::Settings>> {
+        let named = |flag: &str, error: Error| Error::Usage(format!("--{flag}: {error}"));
+        // `0` alone is no size with a unit, and the only one that needs none.
+        let min_free = match self.min_free.as_str() {
+            "0" => 0,
+            text => match text.parse::<Split>() {
+                Ok(Split::Bytes(bytes)) => bytes,
+                _ => {
+                    return Err(Error::Usage(format!(
+                        "--min-free {text}: expected a size such as 256MiB or 1GB, or 0"
+                    )));
+                }
+            },
+        };
+        let Some(path) = &self.record else {
+            return Ok(None);
+        };
+        if Target::from_path(path)?.format() != Some(Format::Mcap) {
+            return Err(Error::Usage(format!(
+                "--record {}: a recording is an MCAP file\n  help: give it a name that ends in .mcap",
+                path.display()
+            )));
+        }
+        let mut settings = recorder::Settings::new(path);
+        settings.force = self.force;
+        settings.min_free = min_free;
+        settings.split = match &self.record_split {
+            Some(text) => Some(text.parse().map_err(|e| named("record-split", e))?),
+            None => None,
+        };
+        let command: Vec<String> = std::env::args().collect();
+        settings.provenance.metadata = [
+            ("version", env!("CARGO_PKG_VERSION").to_owned()),
+            ("command", command.join(" ")),
+        ]
+        .map(|(key, value)| (key.to_owned(), value))
+        .into();
+        Ok(Some(settings))
+    }
+
+    /// The arguments, checked.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] naming the flag; the token file can not be read.
+    pub(crate) fn settings(&self) -> Result<Settings> {
+        let given: Vec<&str> = if self.listen.is_empty() {
+            DEFAULTS.to_vec()
+        } else {
+            self.listen.iter().map(String::as_str).collect()
+        };
+        Ok(Settings {
+            plan: self.estimation.plan()?,
+            plans: BTreeMap::new(),
+            listen: given
+                .into_iter()
+                .map(Listen::parse)
+                .collect::<Result<_>>()?,
+            limits: Limits::default(),
+            token: self.token_file.as_deref().map(Token::read).transpose()?,
+            allow_insecure_remote: self.allow_insecure_remote,
+            web: Web {
+                hosts: self.allow_host.clone(),
+                origins: self.allow_origin.clone(),
+            },
+            recorder: None,
+        })
+    }
+}

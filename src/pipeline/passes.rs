@@ -1,0 +1,121 @@
+//! A pass over samples before the first is integrated. Pure.
+//!
+//! Apart from the preparation because it decides, and a pass only looks: at samples conditioned as in
+//! the run, with no bias taken out, on the clock the first of them choose.
+
+use super::preparation::Resolved;
+use crate::condition::stillness::{Limits, Rests, Stillness};
+use crate::condition::{Conditioner, choose_clock};
+use crate::config::Plan;
+use crate::record::{RateSample, RawSample};
+use nalgebra::Vector3;
+
+/// Samples that tell the clock and hold the first orientation.
+pub(super) const FEW: usize = 512;
+
+/// Samples as the run will condition them.
+#[derive(Debug)]
+pub(super) struct Conditioned {
+    plan: Plan,
+    resolved: Resolved,
+    gathered: Vec<RawSample>,
+    running: Option<Conditioner>,
+    rates: Vec<RateSample>,
+}
+
+impl Conditioned {
+    pub(super) fn new(plan: &Plan, resolved: &Resolved) -> Conditioned {
+        Conditioned {
+            plan: plan.clone(),
+            resolved: resolved.clone(),
+            gathered: Vec::new(),
+            running: None,
+            rates: Vec::new(),
+        }
+    }
+
+    /// Takes samples; those that are conditioned are handed on.
+    pub(super) fn push(
+        &mut self,
+        raw: &[RawSample],
+        take: impl FnMut(&RateSample),
+    ) -> Result<(), String> {
+        match &mut self.running {
+            Some(conditioner) => conditioner.push(raw, &mut self.rates),
+            None => {
+                self.gathered.extend_from_slice(raw);
+                if self.gathered.len() >= FEW {
+                    self.begin()?;
+                }
+            }
+        }
+        self.hand_on(take);
+        Ok(())
+    }
+
+    pub(super) fn finish(&mut self, take: impl FnMut(&RateSample)) -> Result<(), String> {
+        if self.running.is_none() {
+            self.begin()?;
+        }
+        if let Some(conditioner) = &mut self.running {
+            conditioner.finish(&mut self.rates);
+        }
+        self.hand_on(take);
+        Ok(())
+    }
+
+    fn begin(&mut self) -> Result<(), String> {
+        let gathered = std::mem::take(&mut self.gathered);
+        let (clock, _) = choose_clock(&gathered, self.plan.clock);
+        let settings = self
+            .resolved
+            .conditioning(&self.plan, clock, Vector3::zeros());
+        let mut conditioner = Conditioner::new(&settings).map_err(|e| e.to_string())?;
+        conditioner.push(&gathered, &mut self.rates);
+        self.running = Some(conditioner);
+        Ok(())
+    }
+
+    fn hand_on(&mut self, mut take: impl FnMut(&RateSample)) {
+        self.rates.drain(..).for_each(|sample| take(&sample));
+    }
+}
+
+/// A pass over samples that only looks for rest.
+#[derive(Debug)]
+pub(super) struct RestPass {
+    conditioned: Conditioned,
+    detector: Stillness,
+}
+
+impl RestPass {
+    /// For samples understood as `resolved`.
+    pub(super) fn new(plan: &Plan, resolved: &Resolved) -> RestPass {
+        RestPass {
+            conditioned: Conditioned::new(plan, resolved),
+            detector: Stillness::new(resolved.kind, Limits::default()),
+        }
+    }
+
+    /// Takes samples.
+    ///
+    /// # Errors
+    /// In words, when the settings do not fit.
+    pub(super) fn push(&mut self, raw: &[RawSample]) -> Result<(), String> {
+        let RestPass {
+            conditioned,
+            detector,
+        } = self;
+        conditioned.push(raw, |sample| detector.push(sample))
+    }
+
+    /// What was found.
+    ///
+    /// # Errors
+    /// As [`RestPass::push`].
+    pub(super) fn finish(mut self) -> Result<Rests, String> {
+        self.conditioned
+            .finish(|sample| self.detector.push(sample))?;
+        Ok(self.detector.finish())
+    }
+}

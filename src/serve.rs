@@ -1,0 +1,167 @@
+//! Samples over sockets -> attitudes over sockets: the daemon. I/O.
+//!
+//! ```text
+//! listen (sockets -> bytes) -> session (lines) -> hub (one estimator a sensor) -> outbox (a client's bytes)
+//! ```
+//!
+//! | file | arrow | |
+//! |---|---|---|
+//! | [`framing`], [`wire`] | bytes -> lines -> requests; answers -> lines | pure |
+//! | [`stream`] | samples of one sensor -> attitudes | pure |
+//! | [`session`] | one client's lines -> hub, answers | sans-I/O |
+//! | [`hub`] | samples -> attitudes -> outboxes | locks |
+//! | [`subscriber`] | attitudes -> what one client gets, bounded | locks |
+//! | [`recorder`] | what goes through -> MCAP files that survive a crash | a queue; I/O on threads of its own |
+//! | [`limits`], [`admission`] | every bound; who may come in | pure |
+//! | [`listen`], `http` | sockets | I/O |
+//! | [`shutdown`] | signals -> an orderly end | I/O |
+//!
+//! The wire is described in `docs/protocol.md`.
+
+pub mod address;
+pub mod admission;
+pub mod framing;
+mod http;
+pub mod hub;
+pub mod limits;
+pub mod listen;
+mod quiet;
+pub mod recorder;
+pub mod session;
+pub mod shutdown;
+pub mod stream;
+pub mod subscriber;
+pub mod wire;
+
+use crate::config::Plan;
+use crate::error::{Error, Result};
+use address::Listen;
+use admission::{Token, Web, is_loopback};
+use hub::Hub;
+use limits::Limits;
+use listen::{Context, Listener};
+use shutdown::Shutdown;
+use std::collections::BTreeMap;
+use std::future::Future;
+use std::sync::Arc;
+use tokio::sync::Semaphore;
+
+/// What a daemon is to do.
+#[derive(Debug, Default)]
+pub struct Settings {
+    /// How samples are understood and integrated. Its `--field` paths hold for every sensor: a line is
+    /// read before it is known whose it is.
+    pub plan: Plan,
+    /// For sensors that are understood in another way, by `id`.
+    pub plans: BTreeMap<String, Plan>,
+    /// Where to listen.
+    pub listen: Vec<Listen>,
+    /// The bounds.
+    pub limits: Limits,
+    /// What clients must show.
+    pub token: Option<Token>,
+    /// Listen beyond loopback without a token all the same.
+    pub allow_insecure_remote: bool,
+    /// Which names and pages may use HTTP.
+    pub web: Web,
+    /// Who records everything that goes through.
+    pub recorder: Option<recorder::Handle>,
+}
+
+/// A daemon that listens, and serves when it is [run](Server::run).
+#[derive(Debug)]
+pub struct Server {
+    hub: Arc<Hub>,
+    web: Arc<Web>,
+    listeners: Vec<Listener>,
+    bound: Vec<Listen>,
+}
+
+impl Settings {
+    /// Checks what can be judged without binding anything.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] when a plan is none for live streams, or an address is open to others and no
+    /// token is asked for.
+    pub fn check(self) -> Result<()> {
+        for listen in &self.listen {
+            check_reach(listen, &self)?;
+        }
+        Hub::new(self).map(|_| ())
+    }
+}
+
+impl Server {
+    /// Listens on everything, or on nothing.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] when the plan is none for live streams or an address is open to others and
+    /// no token is asked for; [`Error::Bind`].
+    pub async fn bind(mut settings: Settings) -> Result<Server> {
+        for listen in &settings.listen {
+            check_reach(listen, &settings)?;
+        }
+        let listen = std::mem::take(&mut settings.listen);
+        let web = std::mem::take(&mut settings.web);
+        let hub = Hub::new(settings)?;
+        let mut listeners = Vec::new();
+        let mut bound = Vec::new();
+        for listen in &listen {
+            let (listener, address) = Listener::bind(listen).await?;
+            listeners.push(listener);
+            bound.push(address);
+        }
+        Ok(Server {
+            hub: Arc::new(hub),
+            web: Arc::new(web),
+            listeners,
+            bound,
+        })
+    }
+
+    /// Where it listens, with real ports.
+    #[must_use]
+    pub fn addresses(&self) -> &[Listen] {
+        &self.bound
+    }
+
+    /// Its middle.
+    #[must_use]
+    pub fn hub(&self) -> &Arc<Hub> {
+        &self.hub
+    }
+
+    /// Serves until `stop` ends, then drains: what has arrived is worked on, what waits is sent, for
+    /// no longer than [`Limits::drain`]. Says whether everything ended in that time.
+    pub async fn run(self, stop: impl Future<Output = ()>) -> bool {
+        let shutdown = Shutdown::default();
+        let places = Arc::new(Semaphore::new(self.hub.limits().connections));
+        for listener in self.listeners {
+            let context = Context {
+                hub: self.hub.clone(),
+                web: self.web.clone(),
+                places: places.clone(),
+                running: shutdown.running(),
+            };
+            tokio::spawn(listener.serve(context));
+        }
+        stop.await;
+        self.hub.stop();
+        let limit = self.hub.limits().drain;
+        let drained = tokio::time::timeout(limit, shutdown.drain(limit / 2)).await;
+        drained.is_ok()
+    }
+}
+
+/// Refuses an address others can reach, unless clients must show a token.
+fn check_reach(listen: &Listen, settings: &Settings) -> Result<()> {
+    let is_open = listen.ip().is_some_and(|ip| !is_loopback(ip));
+    // A datagram shows no token that others on the way could not read and send again.
+    let is_guarded = settings.token.is_some() && !matches!(listen, Listen::Udp(_));
+    if is_open && !is_guarded && !settings.allow_insecure_remote {
+        return Err(Error::Usage(format!(
+            "--listen {listen}: others can reach this address, and nothing keeps them out\n  help: --token-file FILE asks clients for a token (not over UDP); --allow-insecure-remote listens all the same; 127.0.0.1 is this machine alone"
+        )));
+    }
+    Ok(())
+}

@@ -1,0 +1,107 @@
+//! The word after `--listen` -> what to listen on. Pure but for looking up a host's name.
+
+use crate::error::{Error, Result};
+use std::net::{IpAddr, SocketAddr, ToSocketAddrs};
+use std::path::PathBuf;
+
+/// Something to listen on.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Listen {
+    /// Lines over TCP.
+    Tcp(SocketAddr),
+    /// Lines in datagrams; samples in only.
+    Udp(SocketAddr),
+    /// Lines over a Unix socket.
+    Unix(PathBuf),
+    /// WebSocket, with `/healthz` and `/metrics` beside it.
+    WebSocket(SocketAddr),
+}
+
+/// What `strapd serve` listens on when nothing is said.
+pub const DEFAULTS: [&str; 2] = ["tcp-listen://127.0.0.1:4550", "ws-listen://127.0.0.1:8765"];
+
+const KNOWN: &str = "known: tcp-listen://HOST:PORT, udp-listen://HOST:PORT, ws-listen://HOST:PORT (and HTTP), unix-listen:///PATH; port 0 takes a free one";
+
+impl Listen {
+    /// Reads what the user wrote. A host left out is 127.0.0.1.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with what is known.
+    pub fn parse(text: &str) -> Result<Listen> {
+        let refuse = |what: &str| Error::Usage(format!("--listen {text}: {what}\n  help: {KNOWN}"));
+        let (scheme, rest) = text.split_once("://").ok_or_else(|| refuse("no scheme"))?;
+        let address = || -> Result<SocketAddr> {
+            let rest = rest.strip_suffix('/').unwrap_or(rest);
+            let full = if rest.starts_with(':') {
+                format!("127.0.0.1{rest}")
+            } else {
+                rest.to_owned()
+            };
+            let mut found = full
+                .to_socket_addrs()
+                .map_err(|e| refuse(&format!("no address with a port: {e}")))?;
+            found
+                .next()
+                .ok_or_else(|| refuse("the host has no address"))
+        };
+        match scheme {
+            "tcp-listen" => address().map(Listen::Tcp),
+            "udp-listen" => address().map(Listen::Udp),
+            "ws-listen" | "http-listen" => address().map(Listen::WebSocket),
+            "unix-listen" if rest.starts_with('/') => Ok(Listen::Unix(PathBuf::from(rest))),
+            "unix-listen" => Err(refuse("an absolute path is needed")),
+            _ => Err(refuse("unknown scheme")),
+        }
+    }
+
+    /// The address others could reach, if it is one.
+    #[must_use]
+    pub fn ip(&self) -> Option<IpAddr> {
+        match self {
+            Listen::Tcp(a) | Listen::Udp(a) | Listen::WebSocket(a) => Some(a.ip()),
+            Listen::Unix(_) => None,
+        }
+    }
+}
+
+impl std::fmt::Display for Listen {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Listen::Tcp(a) => write!(f, "tcp-listen://{a}"),
+            Listen::Udp(a) => write!(f, "udp-listen://{a}"),
+            Listen::WebSocket(a) => write!(f, "ws-listen://{a}"),
+            Listen::Unix(path) => write!(f, "unix-listen://{}", path.display()),
+        }
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_listened_on_is_written_as_it_is_read() {
+        for text in [
+            "tcp-listen://127.0.0.1:4550",
+            "udp-listen://[::1]:9",
+            "ws-listen://0.0.0.0:8765",
+            "unix-listen:///run/strapd.sock",
+        ] {
+            assert_eq!(Listen::parse(text).unwrap().to_string(), text);
+        }
+        let local = Listen::parse("tcp-listen://:7").unwrap();
+        assert!(local.ip().unwrap().is_loopback());
+        for text in [
+            "",
+            "4550",
+            "tcp://1.2.3.4:5",
+            "tcp-listen://1.2.3.4",
+            "unix-listen://x",
+            "tcp-listen://1.2.3.4:99999",
+        ] {
+            let said = Listen::parse(text).unwrap_err().to_string();
+            assert!(said.contains("known: tcp-listen"), "{text}: {said}");
+        }
+    }
+}

@@ -1,0 +1,194 @@
+//! Who may listen where, who may connect, who may speak. Pure but for reading the token file.
+//!
+//! A gyro stream looks harmless, but a page in any browser can reach loopback: so names and
+//! origins are checked, and beyond loopback a token is needed.
+
+use super::limits::Allowance;
+use super::wire::Fault;
+use crate::error::{Error, Result};
+use sha2::{Digest, Sha256};
+use std::net::IpAddr;
+use std::path::Path;
+use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
+use subtle::ConstantTimeEq;
+
+/// Wrong tokens a second, over all clients.
+const FAILURES_PER_SECOND: u32 = 5;
+/// A token shorter than this can be guessed.
+const MIN_TOKEN: usize = 16;
+/// A file longer than this is no token.
+const MAX_TOKEN: u64 = 4096;
+
+/// The token clients must show. Only its hash is kept.
+pub struct Token {
+    hash: [u8; 32],
+    failures: Mutex<Allowance>,
+}
+
+impl std::fmt::Debug for Token {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Token(..)")
+    }
+}
+
+impl Token {
+    /// From text.
+    #[must_use]
+    pub fn new(token: &str) -> Token {
+        Token {
+            hash: Sha256::digest(token.as_bytes()).into(),
+            failures: Mutex::new(Allowance::new(FAILURES_PER_SECOND)),
+        }
+    }
+
+    /// The first line of a file that nobody but its owner can read.
+    ///
+    /// # Errors
+    /// It can not be read, others can read it, or it holds no token of 16 bytes.
+    pub fn read(path: &Path) -> Result<Token> {
+        let open = |source| Error::Open {
+            path: path.to_owned(),
+            source,
+        };
+        let refuse =
+            |what: String| Error::Usage(format!("--token-file {}: {what}", path.display()));
+        let metadata = std::fs::metadata(path).map_err(open)?;
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            let mode = metadata.permissions().mode() & 0o777;
+            if mode & 0o077 != 0 {
+                return Err(refuse(format!(
+                    "others can read it (mode {mode:o})\n  help: chmod 600 {}",
+                    path.display()
+                )));
+            }
+        }
+        if !metadata.is_file() || metadata.len() > MAX_TOKEN {
+            return Err(refuse("is no file of one short line".to_owned()));
+        }
+        let text = std::fs::read_to_string(path).map_err(open)?;
+        let token = text.lines().next().unwrap_or_default().trim();
+        if token.len() < MIN_TOKEN {
+            return Err(refuse(format!(
+                "holds {} bytes, a token has at least {MIN_TOKEN}\n  help: head -c 32 /dev/urandom | base64 > FILE",
+                token.len()
+            )));
+        }
+        Ok(Token::new(token))
+    }
+
+    /// Whether this is it. The time taken does not depend on what is right of it, and only so many
+    /// wrong ones are judged a second.
+    ///
+    /// # Errors
+    /// The fault to answer with.
+    pub fn judge(&self, shown: &str, now: Instant) -> std::result::Result<(), Fault> {
+        let hash: [u8; 32] = Sha256::digest(shown.as_bytes()).into();
+        let right = bool::from(hash.ct_eq(&self.hash));
+        // A right one among many wrong ones must wait, too: else the answer would tell.
+        let mut failures = self.failures.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut after = *failures;
+        if after.take(now).is_none() {
+            *failures = after;
+            return Err(Fault::new(
+                "too_many_attempts",
+                "too many wrong tokens in the last second; try again",
+            ));
+        }
+        if right {
+            return Ok(());
+        }
+        *failures = after;
+        Err(Fault::new("unauthorised", "the token is wrong"))
+    }
+}
+
+/// Whether an address is reached from this machine alone.
+#[must_use]
+pub fn is_loopback(ip: IpAddr) -> bool {
+    match ip {
+        IpAddr::V4(ip) => ip.is_loopback(),
+        IpAddr::V6(ip) => {
+            ip.is_loopback() || ip.to_ipv4_mapped().is_some_and(|ip| ip.is_loopback())
+        }
+    }
+}
+
+/// The names a browser may use for us, and the pages that may talk to us.
+#[derive(Clone, Debug, Default)]
+pub struct Web {
+    /// `--allow-host`: names beside loopback's and the bound address.
+    pub hosts: Vec<String>,
+    /// `--allow-origin`: origins beside those served from here.
+    pub origins: Vec<String>,
+}
+
+impl Web {
+    /// Whether a request may be answered: `host` and `origin` are its headers, `bound` the address
+    /// it came in at.
+    ///
+    /// # Errors
+    /// What is not allowed, in words.
+    pub fn admit(
+        &self,
+        bound: IpAddr,
+        host: Option<&str>,
+        origin: Option<&str>,
+    ) -> std::result::Result<(), String> {
+        let Some(host) = host else {
+            return Err("the request names no Host".to_owned());
+        };
+        let name = host_name(host).unwrap_or_default();
+        let is_bound = name
+            .parse::<IpAddr>()
+            .is_ok_and(|ip| ip == bound && !ip.is_unspecified());
+        let known = ["localhost", "127.0.0.1", "::1"]
+            .iter()
+            .any(|known| name.eq_ignore_ascii_case(known))
+            || is_bound
+            // A name given without port is allowed at any.
+            || self
+                .hosts
+                .iter()
+                .any(|a| a.eq_ignore_ascii_case(host) || a.eq_ignore_ascii_case(name));
+        if !known {
+            return Err("this Host is not one of ours; --allow-host NAME allows it".to_owned());
+        }
+        match origin {
+            None => Ok(()),
+            Some(origin) if self.origins.iter().any(|o| o.eq_ignore_ascii_case(origin)) => Ok(()),
+            Some(origin) => {
+                let authority = origin
+                    .split_once("://")
+                    .filter(|(scheme, _)| matches!(*scheme, "http" | "https"))
+                    .map(|(_, authority)| authority);
+                if authority.is_some_and(|a| a.eq_ignore_ascii_case(host)) {
+                    Ok(())
+                } else {
+                    Err(
+                        "pages of this Origin may not connect; --allow-origin ORIGIN allows them"
+                            .to_owned(),
+                    )
+                }
+            }
+        }
+    }
+}
+
+/// Host without port and brackets; `None` when it is neither name nor address.
+fn host_name(host: &str) -> Option<&str> {
+    if let Some(rest) = host.strip_prefix('[') {
+        let (name, port) = rest.split_once(']')?;
+        return (port.is_empty() || is_port(port.strip_prefix(':')?)).then_some(name);
+    }
+    match host.split_once(':') {
+        None => Some(host),
+        Some((name, port)) => is_port(port).then_some(name),
+    }
+}
+
+fn is_port(text: &str) -> bool {
+    !text.is_empty() && text.len() <= 5 && text.bytes().all(|b| b.is_ascii_digit())
+}

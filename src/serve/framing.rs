@@ -1,0 +1,201 @@
+//! Bytes as they come -> lines. Pure, sans-I/O.
+//!
+//! Apart from the sockets because every transport cuts its bytes elsewhere: a line may come in one
+//! piece, byte by byte, or with a thousand others. Holds at most one unfinished line of
+//! [`MAX_LINE`] bytes, whatever is sent.
+
+use crate::decode::MAX_LINE;
+use memchr::memchr;
+
+/// What was found in the bytes.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Framed<'a> {
+    /// A line with its number, from 1; without line end, not blank.
+    Line(u64, &'a [u8]),
+    /// A line grew over the limit; the rest of it is skipped. Said once per line, with how it begins.
+    TooLong(u64, &'a [u8]),
+}
+
+/// Cuts a stream of bytes into lines.
+#[derive(Debug, Default)]
+pub struct Framer {
+    /// The beginning of a line whose end has not come.
+    partial: Vec<u8>,
+    /// Whether the rest of an over-long line is being skipped.
+    skipping: bool,
+    /// Lines ended so far.
+    ended: u64,
+}
+
+impl Framer {
+    /// At the start of a stream.
+    #[must_use]
+    pub fn new() -> Framer {
+        Framer::default()
+    }
+
+    /// Lines ended so far, blank and over-long ones included.
+    #[must_use]
+    pub fn ended(&self) -> u64 {
+        self.ended
+    }
+
+    /// Takes the next bytes of the stream and hands over what they complete. `take` answers whether
+    /// to go on; when it does not, the rest is dropped.
+    pub fn feed(&mut self, mut bytes: &[u8], take: &mut impl FnMut(Framed<'_>) -> bool) {
+        while let Some(end) = memchr(b'\n', bytes) {
+            let (line, rest) = bytes.split_at(end);
+            bytes = rest.get(1..).unwrap_or_default();
+            let goes_on = if self.partial.is_empty() {
+                self.end_line(line, take)
+            } else {
+                self.grow(line, take) && {
+                    let whole = std::mem::take(&mut self.partial);
+                    let goes_on = self.end_line(&whole, take);
+                    self.partial = whole;
+                    self.partial.clear();
+                    goes_on
+                }
+            };
+            if !goes_on {
+                return;
+            }
+        }
+        if !bytes.is_empty() {
+            let _ = self.grow(bytes, take);
+        } else if self.partial.is_empty() {
+            // Nothing is held between lines: an idle connection costs no buffer.
+            self.partial = Vec::new();
+        }
+    }
+
+    /// The stream, or the datagram, has ended: what is unfinished is a line.
+    pub fn finish(&mut self, take: &mut impl FnMut(Framed<'_>) -> bool) {
+        let whole = std::mem::take(&mut self.partial);
+        if !whole.is_empty() || self.skipping {
+            let _ = self.end_line(&whole, take);
+        }
+    }
+
+    /// Adds to the unfinished line, or gives it up when it grows over the limit. Says whether to go on.
+    fn grow(&mut self, more: &[u8], take: &mut impl FnMut(Framed<'_>) -> bool) -> bool {
+        if self.skipping {
+            return true;
+        }
+        let room = (MAX_LINE + 1).saturating_sub(self.partial.len());
+        self.partial
+            .extend_from_slice(more.get(..room.min(more.len())).unwrap_or_default());
+        if self.partial.len() <= MAX_LINE {
+            return true;
+        }
+        // One byte more may be the carriage return before the line feed.
+        if more.len() <= room && self.partial.last() == Some(&b'\r') {
+            return true;
+        }
+        self.skipping = true;
+        let beginning = std::mem::take(&mut self.partial);
+        take(Framed::TooLong(self.ended + 1, &beginning))
+    }
+
+    fn end_line(&mut self, line: &[u8], take: &mut impl FnMut(Framed<'_>) -> bool) -> bool {
+        self.ended += 1;
+        if std::mem::take(&mut self.skipping) {
+            return true;
+        }
+        let line = line.strip_suffix(b"\r").unwrap_or(line);
+        if line.len() > MAX_LINE {
+            return take(Framed::TooLong(self.ended, line));
+        }
+        if line.iter().all(u8::is_ascii_whitespace) {
+            return true;
+        }
+        take(Framed::Line(self.ended, line))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(PartialEq, Eq, Debug, Clone)]
+    enum Seen {
+        Line(u64, Vec<u8>),
+        TooLong(u64),
+    }
+
+    fn collect(framer: &mut Framer, pieces: impl Iterator<Item = Vec<u8>>) -> Vec<Seen> {
+        let mut seen = Vec::new();
+        let mut take = |framed: Framed<'_>| {
+            seen.push(match framed {
+                Framed::Line(n, line) => Seen::Line(n, line.to_vec()),
+                Framed::TooLong(n, _) => Seen::TooLong(n),
+            });
+            true
+        };
+        for piece in pieces {
+            framer.feed(&piece, &mut take);
+            assert!(framer.partial.len() <= MAX_LINE + 1);
+        }
+        framer.finish(&mut take);
+        seen
+    }
+
+    fn in_pieces(bytes: &[u8], size: usize) -> Vec<Seen> {
+        let pieces: Vec<Vec<u8>> = bytes.chunks(size).map(<[u8]>::to_vec).collect();
+        collect(&mut Framer::new(), pieces.into_iter())
+    }
+
+    #[test]
+    fn lines_do_not_depend_on_how_the_bytes_were_cut() {
+        let mut bytes = b"one\r\n\n  \r\ntwo\nthree\r\r\n".to_vec();
+        bytes.extend(std::iter::repeat_n(b'x', MAX_LINE));
+        bytes.extend_from_slice(b"\r\n");
+        bytes.extend(std::iter::repeat_n(b'y', MAX_LINE + 1));
+        bytes.extend_from_slice(b"\nafter\nunfinished");
+        let whole = in_pieces(&bytes, bytes.len());
+        assert_eq!(
+            whole,
+            [
+                Seen::Line(1, b"one".to_vec()),
+                Seen::Line(4, b"two".to_vec()),
+                Seen::Line(5, b"three\r".to_vec()),
+                Seen::Line(6, vec![b'x'; MAX_LINE]),
+                Seen::TooLong(7),
+                Seen::Line(8, b"after".to_vec()),
+                Seen::Line(9, b"unfinished".to_vec()),
+            ]
+        );
+        for size in [1, 2, 3, 7, 4096, MAX_LINE, MAX_LINE + 1, MAX_LINE + 2] {
+            assert!(in_pieces(&bytes, size) == whole, "pieces of {size}");
+        }
+    }
+
+    #[test]
+    fn a_line_without_end_is_reported_once_and_holds_no_memory() {
+        let mut framer = Framer::new();
+        let seen = collect(&mut framer, (0..1000).map(|_| vec![b'a'; 10_000]));
+        assert_eq!(seen, [Seen::TooLong(1)]);
+        assert_eq!(framer.partial.capacity(), 0);
+    }
+
+    #[test]
+    fn between_lines_nothing_is_held() {
+        let mut framer = Framer::new();
+        let mut take = |_: Framed<'_>| true;
+        framer.feed(b"a half", &mut take);
+        framer.feed(b" line\n", &mut take);
+        assert_eq!(framer.partial.capacity(), 0);
+        assert_eq!(framer.ended(), 1);
+    }
+
+    #[test]
+    fn a_taker_that_has_enough_gets_no_more() {
+        let mut framer = Framer::new();
+        let mut count = 0;
+        framer.feed(b"a\nb\nc\n", &mut |_| {
+            count += 1;
+            count < 2
+        });
+        assert_eq!(count, 2);
+    }
+}

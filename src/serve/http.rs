@@ -1,0 +1,182 @@
+//! HTTP requests -> state of the daemon, or a WebSocket. I/O.
+
+use super::hub::Hub;
+use super::listen::{Connection, websocket};
+use crate::record::Verdict;
+use axum::Router;
+use axum::body::Body;
+use axum::extract::Extension;
+use axum::extract::ws::WebSocketUpgrade;
+use axum::http::{HeaderValue, Response, StatusCode, header};
+use axum::routing::get;
+use std::fmt::Write;
+
+/// Everything that is answered.
+pub(crate) fn router() -> Router {
+    Router::new()
+        .route("/", get(upgrade))
+        .route("/ws", get(upgrade))
+        .route("/healthz", get(health))
+        .route("/metrics", get(metrics))
+        .fallback(|| async {
+            refusal(
+                StatusCode::NOT_FOUND,
+                "not_found",
+                "there are /ws, /healthz and /metrics",
+            )
+        })
+}
+
+async fn upgrade(
+    Extension(connection): Extension<Connection>,
+    upgrade: Result<WebSocketUpgrade, axum::extract::ws::rejection::WebSocketUpgradeRejection>,
+) -> Response<Body> {
+    match upgrade {
+        Ok(upgrade) => upgrade
+            .max_message_size(websocket::MAX_MESSAGE)
+            .max_frame_size(websocket::MAX_MESSAGE)
+            .read_buffer_size(websocket::READ_BUFFER)
+            .write_buffer_size(websocket::WRITE_BUFFER)
+            .max_write_buffer_size(websocket::MAX_WRITE_BUFFER)
+            .on_upgrade(move |socket| websocket::converse(socket, connection)),
+        Err(_) => refusal(
+            StatusCode::UPGRADE_REQUIRED,
+            "upgrade_required",
+            "this is a WebSocket; docs/protocol.md says how to talk to it",
+        ),
+    }
+}
+
+/// Whether samples are taken: 200, or 503 while shutting down.
+async fn health(Extension(connection): Extension<Connection>) -> Response<Body> {
+    if connection.hub.is_stopping() {
+        return response(
+            StatusCode::SERVICE_UNAVAILABLE,
+            "text/plain; charset=utf-8",
+            "stopping\n".to_owned(),
+        );
+    }
+    response(
+        StatusCode::OK,
+        "text/plain; charset=utf-8",
+        "ok\n".to_owned(),
+    )
+}
+
+async fn metrics(Extension(connection): Extension<Connection>) -> Response<Body> {
+    if connection.hub.token().is_some() && !connection.trusted {
+        return refusal(
+            StatusCode::UNAUTHORIZED,
+            "unauthorised",
+            "Authorization: Bearer TOKEN is needed",
+        );
+    }
+    response(
+        StatusCode::OK,
+        "text/plain; version=0.0.4; charset=utf-8",
+        exposition(&connection.hub),
+    )
+}
+
+/// The counters as Prometheus text, written here: a dozen numbers need no registry.
+fn exposition(hub: &Hub) -> String {
+    let mut out = String::new();
+    let family = |out: &mut String, name: &str, kind: &str, help: &str| {
+        // A String takes every write.
+        let _ = write!(
+            out,
+            "# HELP strapd_{name} {help}\n# TYPE strapd_{name} {kind}\n"
+        );
+    };
+    family(&mut out, "uptime_seconds", "gauge", "Since the start.");
+    let _ = writeln!(out, "strapd_uptime_seconds {}", hub.uptime_secs());
+    family(&mut out, "connections", "gauge", "Clients connected.");
+    let _ = writeln!(out, "strapd_connections {}", hub.connected());
+    for (name, value) in hub.counters.named() {
+        family(
+            &mut out,
+            &format!("{name}_total"),
+            "counter",
+            "Since the start.",
+        );
+        let _ = writeln!(out, "strapd_{name}_total {value}");
+    }
+    let (mut queued, mut dropped) = (0, 0);
+    hub.each_client(|client| {
+        let level = client.outbox.level();
+        queued += level.queued;
+        dropped += level.dropped;
+    });
+    family(
+        &mut out,
+        "queued_bytes",
+        "gauge",
+        "Attitudes waiting for clients.",
+    );
+    let _ = writeln!(out, "strapd_queued_bytes {queued}");
+    family(
+        &mut out,
+        "dropped_attitudes",
+        "gauge",
+        "Attitudes the clients now connected were too slow for.",
+    );
+    let _ = writeln!(out, "strapd_dropped_attitudes {dropped}");
+    family(
+        &mut out,
+        "sensor_samples_total",
+        "counter",
+        "Samples by sensor and verdict.",
+    );
+    hub.each_sensor(|sensor| {
+        let id = label(sensor.id());
+        for verdict in Verdict::ALL {
+            let n = sensor.conditioning().counts.get(verdict);
+            if n > 0 {
+                let _ = writeln!(
+                    out,
+                    "strapd_sensor_samples_total{{id=\"{id}\",verdict=\"{}\"}} {n}",
+                    verdict.name()
+                );
+            }
+        }
+    });
+    family(&mut out, "sensor_gaps_total", "counter", "Gaps by sensor.");
+    hub.each_sensor(|sensor| {
+        let n = sensor.conditioning().gaps.count;
+        let _ = writeln!(
+            out,
+            "strapd_sensor_gaps_total{{id=\"{}\"}} {n}",
+            label(sensor.id())
+        );
+    });
+    out
+}
+
+/// A label's value; names come from outside.
+fn label(text: &str) -> String {
+    text.replace('\\', "\\\\")
+        .replace('"', "\\\"")
+        .replace('\n', "\\n")
+}
+
+/// An answer that says no, as JSON.
+pub(crate) fn refusal(status: StatusCode, code: &str, message: &str) -> Response<Body> {
+    let text = serde_json::json!({"class": "ERROR", "code": code, "message": message});
+    response(status, "application/json", format!("{text}\n"))
+}
+
+fn response(status: StatusCode, kind: &'static str, text: String) -> Response<Body> {
+    let mut response = Response::new(Body::from(text));
+    *response.status_mut() = status;
+    for (name, value) in [
+        (header::CONTENT_TYPE, kind),
+        (header::CACHE_CONTROL, "no-store"),
+        (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+        (header::CONTENT_SECURITY_POLICY, "default-src 'self'"),
+    ] {
+        response
+            .headers_mut()
+            .insert(name, HeaderValue::from_static(value));
+    }
+    response
+}

@@ -1,0 +1,466 @@
+//! Samples by sensor -> attitudes to every client that watches. Pure but for locks; reads no clock.
+//!
+//! There is no task between: the task that has read a chunk from a socket locks the sensor the
+//! samples are of, runs decode -> condition -> propagate -> encode on it, and leaves the bytes in
+//! the clients' outboxes. Sensors run side by side on as many cores as there are; within one the
+//! order is that of its lock.
+
+use super::Settings;
+use super::admission::Token;
+use super::limits::Limits;
+use super::recorder::Handle;
+use super::stream::{SensorStream, live_plan};
+use super::subscriber::{Chunk, Outbox};
+use super::wire::{self, Fault};
+use crate::config::Plan;
+use crate::decode::{Line, LineDecoder, printable};
+use crate::error::{Error, Result};
+use crate::record::{Nanos, RawSample};
+use bytes::Bytes;
+use std::collections::BTreeMap;
+use std::hash::{BuildHasher, RandomState};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
+use std::time::Instant;
+
+/// Bytes of one shared chunk of attitudes, about: small beside an outbox, so that little is dropped
+/// at once.
+const CHUNK_BYTES: usize = 16 << 10;
+
+/// The middle of the daemon.
+#[derive(Debug)]
+pub struct Hub {
+    plan: Plan,
+    /// Plans of sensors that have their own, by `id`.
+    plans: BTreeMap<String, Plan>,
+    decoder: LineDecoder,
+    limits: Limits,
+    token: Option<Token>,
+    recorder: Option<Handle>,
+    session: String,
+    started: Instant,
+    stopping: AtomicBool,
+    sensors: RwLock<BTreeMap<Arc<str>, Arc<Mutex<Sensor>>>>,
+    clients: RwLock<BTreeMap<u64, Arc<Client>>>,
+    watchers: RwLock<Arc<[Arc<Client>]>>,
+    next_client: AtomicU64,
+    /// What was counted.
+    pub counters: Counters,
+}
+
+/// A sensor and the client it comes from.
+#[derive(Debug)]
+pub struct Sensor {
+    stream: SensorStream,
+    /// Only one may send a sensor's samples at a time: two gyros in one attitude are no attitude.
+    owner: Option<u64>,
+}
+
+/// One connection.
+#[derive(Debug)]
+pub struct Client {
+    /// Its number.
+    pub number: u64,
+    /// Who it is, for people.
+    pub peer: String,
+    /// What waits for it.
+    pub outbox: Outbox,
+    since: Instant,
+}
+
+/// Totals since the start.
+#[derive(Debug, Default)]
+pub struct Counters {
+    /// Connections accepted.
+    pub accepted: AtomicU64,
+    /// Connections refused: too many, or not allowed.
+    pub refused: AtomicU64,
+    /// Failed accepts.
+    pub accept_failures: AtomicU64,
+    /// Connections closed by us for what they did or did not do.
+    pub closed: AtomicU64,
+    /// Lines received.
+    pub lines: AtomicU64,
+    /// Bytes received.
+    pub bytes_in: AtomicU64,
+    /// Bytes sent.
+    pub bytes_out: AtomicU64,
+    /// Lines answered with an error, said or suppressed.
+    pub faults: AtomicU64,
+    /// Samples received.
+    pub samples: AtomicU64,
+    /// Samples refused before any estimator saw them.
+    pub refused_samples: AtomicU64,
+    /// Attitudes made.
+    pub attitudes: AtomicU64,
+}
+
+impl Counters {
+    /// Name and value of each, in a fixed order.
+    #[must_use]
+    pub fn named(&self) -> [(&'static str, u64); 11] {
+        let of = |n: &AtomicU64| n.load(Ordering::Relaxed);
+        [
+            ("connections_accepted", of(&self.accepted)),
+            ("connections_refused", of(&self.refused)),
+            ("accept_failures", of(&self.accept_failures)),
+            ("connections_closed", of(&self.closed)),
+            ("lines", of(&self.lines)),
+            ("bytes_in", of(&self.bytes_in)),
+            ("bytes_out", of(&self.bytes_out)),
+            ("faults", of(&self.faults)),
+            ("samples", of(&self.samples)),
+            ("samples_refused", of(&self.refused_samples)),
+            ("attitudes", of(&self.attitudes)),
+        ]
+    }
+}
+
+/// Adds to a counter.
+pub fn count(counter: &AtomicU64, n: usize) {
+    counter.fetch_add(n as u64, Ordering::Relaxed);
+}
+
+/// Samples of one sensor from one client that came together.
+#[derive(Debug)]
+pub struct Run<'a> {
+    /// From whom.
+    pub client: u64,
+    /// What the first of their lines said.
+    pub head: &'a Line,
+    /// When they were received.
+    pub received: Nanos,
+    /// The sender's number of each line, and where its samples end.
+    pub lines: &'a [(Option<u64>, usize)],
+    /// The samples.
+    pub samples: &'a [RawSample],
+}
+
+impl Hub {
+    /// With nobody connected.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] when the plan is none for live streams.
+    pub fn new(settings: Settings) -> Result<Hub> {
+        let plan = live_plan(&settings.plan).map_err(Error::Usage)?;
+        let plans = settings
+            .plans
+            .iter()
+            .map(|(id, plan)| {
+                let live = live_plan(plan)
+                    .map_err(|what| Error::Usage(format!("sensor {}: {what}", printable(id))))?;
+                Ok((printable(id), live))
+            })
+            .collect::<Result<_>>()?;
+        // No secret: it only tells a reader that the daemon was restarted.
+        let session = RandomState::new().hash_one(std::process::id()) as u32;
+        Ok(Hub {
+            decoder: LineDecoder::new(&plan.decode),
+            plan,
+            plans,
+            limits: settings.limits,
+            token: settings.token,
+            recorder: settings.recorder,
+            session: format!("{session:08x}"),
+            started: Instant::now(),
+            stopping: AtomicBool::new(false),
+            sensors: RwLock::default(),
+            clients: RwLock::default(),
+            watchers: RwLock::new(Arc::from([])),
+            next_client: AtomicU64::new(1),
+            counters: Counters::default(),
+        })
+    }
+
+    fn plan_of(&self, id: &str) -> &Plan {
+        self.plans.get(id).unwrap_or(&self.plan)
+    }
+
+    /// The bounds.
+    #[must_use]
+    pub fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
+    /// The token clients must show, if there is one.
+    #[must_use]
+    pub fn token(&self) -> Option<&Token> {
+        self.token.as_ref()
+    }
+
+    /// What reads the lines.
+    #[must_use]
+    pub fn decoder(&self) -> &LineDecoder {
+        &self.decoder
+    }
+
+    /// Names this run of the daemon.
+    #[must_use]
+    pub fn session(&self) -> &str {
+        &self.session
+    }
+
+    /// From now on it is shutting down.
+    pub fn stop(&self) {
+        self.stopping.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether it is shutting down.
+    #[must_use]
+    pub fn is_stopping(&self) -> bool {
+        self.stopping.load(Ordering::Relaxed)
+    }
+
+    /// Somebody has connected.
+    pub fn join(&self, peer: String) -> Arc<Client> {
+        let client = Arc::new(Client {
+            number: self.next_client.fetch_add(1, Ordering::Relaxed),
+            peer,
+            outbox: Outbox::new(),
+            since: Instant::now(),
+        });
+        write(&self.clients).insert(client.number, client.clone());
+        client
+    }
+
+    /// It has gone; its sensors may be sent by others.
+    pub fn leave(&self, client: &Client, owned: &[Arc<Mutex<Sensor>>]) {
+        write(&self.clients).remove(&client.number);
+        self.watch_changed();
+        for sensor in owned {
+            let mut sensor = lock(sensor);
+            if sensor.owner == Some(client.number) {
+                sensor.owner = None;
+            }
+        }
+    }
+
+    /// Somebody started or stopped watching.
+    pub fn watch_changed(&self) {
+        // The list is made under its own lock, so that the last one made is the newest.
+        let mut watchers = write(&self.watchers);
+        *watchers = read(&self.clients)
+            .values()
+            .filter(|c| c.outbox.level().watching)
+            .cloned()
+            .collect();
+    }
+
+    /// How many are connected.
+    #[must_use]
+    pub fn connected(&self) -> usize {
+        read(&self.clients).len()
+    }
+
+    /// The sensor a run is of; begun by its first sample.
+    ///
+    /// # Errors
+    /// The fault to answer with.
+    pub fn sensor(
+        &self,
+        id: &str,
+        run: &Run<'_>,
+    ) -> std::result::Result<Arc<Mutex<Sensor>>, Fault> {
+        if let Some(sensor) = read(&self.sensors).get(id) {
+            return Ok(sensor.clone());
+        }
+        let mut sensors = write(&self.sensors);
+        if let Some(sensor) = sensors.get(id) {
+            return Ok(sensor.clone());
+        }
+        if sensors.len() >= self.limits.sensors {
+            return Err(Fault::new(
+                "too_many_sensors",
+                format!("there are {} sensors already", sensors.len()),
+            ));
+        }
+        let id: Arc<str> = id.into();
+        let first = run.samples.first().copied().unwrap_or_default();
+        let stream = SensorStream::new(self.plan_of(&id), id.clone(), run.head, &first)?;
+        let sensor = Arc::new(Mutex::new(Sensor {
+            stream,
+            owner: None,
+        }));
+        sensors.insert(id, sensor.clone());
+        Ok(sensor)
+    }
+
+    /// Takes samples of a sensor and gives its attitudes to whoever watches. What the sender should
+    /// hear of them comes back; `text` is room for encoding.
+    ///
+    /// # Errors
+    /// The fault to answer with; none of the samples was used.
+    pub fn publish(
+        &self,
+        sensor: &Mutex<Sensor>,
+        run: &Run<'_>,
+        text: &mut Vec<u8>,
+    ) -> std::result::Result<Vec<Fault>, Fault> {
+        let mut sensor = lock(sensor);
+        let id = sensor.stream.id().clone();
+        let refuse = |code, what: String| Fault {
+            id: Some(id.to_string()),
+            ..Fault::new(code, what)
+        };
+        match sensor.owner {
+            Some(owner) if owner != run.client => {
+                return Err(refuse(
+                    "id_in_use",
+                    "another connection sends the samples of this sensor; give this one an `id` of its own".to_owned(),
+                ));
+            }
+            _ => sensor.owner = Some(run.client),
+        }
+        if !sensor.stream.agrees(self.plan_of(&id), run.head) {
+            return Err(refuse(
+                "meaning_changed",
+                "`sample_kind` or unit is another than in this sensor's first sample; give it another `id`".to_owned(),
+            ));
+        }
+        let mut rest = run.samples;
+        let mut from = 0;
+        for (seq, end) in run.lines {
+            let (now, later) = rest.split_at(end.saturating_sub(from).min(rest.len()));
+            sensor.stream.take(*seq, now);
+            (rest, from) = (later, *end);
+        }
+        if let Some(recorder) = &self.recorder {
+            recorder.input(&id, run.samples.to_vec());
+        }
+        count(&self.counters.samples, run.samples.len());
+        self.deliver(&mut sensor, &id, text);
+        Ok(sensor.stream.news())
+    }
+
+    /// A line that could not be read stood among the samples of this sensor.
+    pub fn undecodable(&self, sensor: &Mutex<Sensor>, client: u64) {
+        let mut sensor = lock(sensor);
+        if sensor.owner == Some(client) {
+            sensor.stream.take_undecodable();
+        }
+    }
+
+    /// Attitudes that are ready -> outboxes.
+    fn deliver(&self, sensor: &mut Sensor, id: &Arc<str>, text: &mut Vec<u8>) {
+        let (first_seq, attitudes, object) = sensor.stream.attitudes();
+        if attitudes.is_empty() {
+            return;
+        }
+        count(&self.counters.attitudes, attitudes.len());
+        let encode = |out: &mut Vec<u8>, seq: u64, sample: &_| {
+            object.push(out, seq, sample);
+            out.push(b'\n');
+        };
+        let mut shared: Option<Vec<Chunk>> = None;
+        let mut encoded = || {
+            let chunks = shared.get_or_insert_with(|| {
+                let mut chunks = Vec::new();
+                let mut from = first_seq;
+                text.clear();
+                for (seq, sample) in (first_seq..).zip(attitudes) {
+                    encode(text, seq, sample);
+                    if text.len() >= CHUNK_BYTES {
+                        chunks.push(chunk(id, from, seq + 1, text));
+                        from = seq + 1;
+                    }
+                }
+                if !text.is_empty() {
+                    chunks.push(chunk(id, from, first_seq + attitudes.len() as u64, text));
+                }
+                chunks
+            });
+            chunks.clone()
+        };
+        let watchers = read(&self.watchers).clone();
+        for client in &*watchers {
+            client
+                .outbox
+                .offer(id, attitudes, &mut encoded, &encode, first_seq);
+        }
+        if let Some(recorder) = &self.recorder {
+            recorder.attitude(id, first_seq, attitudes.to_vec());
+        }
+    }
+
+    /// The state of everything, for `STATUS`.
+    #[must_use]
+    pub fn status(&self) -> Bytes {
+        let sensors: Vec<_> = read(&self.sensors).values().cloned().collect();
+        let sources: Vec<_> = sensors.iter().map(|s| lock(s).stream.status()).collect();
+        let clients: Vec<_> = read(&self.clients)
+            .values()
+            .map(|client| {
+                let level = client.outbox.level();
+                serde_json::json!({
+                    "client": client.number, "peer": client.peer,
+                    "since_s": client.since.elapsed().as_secs_f64(),
+                    "watching": level.watching, "queued_bytes": level.queued,
+                    "sent": level.sent, "dropped": level.dropped,
+                })
+            })
+            .collect();
+        let recording = self.recorder.as_ref().map(Handle::status);
+        let counters: serde_json::Map<_, _> = self
+            .counters
+            .named()
+            .into_iter()
+            .chain([("unrecorded", recording.as_ref().map_or(0, |r| r.unrecorded))])
+            .map(|(name, value)| (name.to_owned(), value.into()))
+            .collect();
+        wire::status(serde_json::json!({
+            "session": self.session, "uptime_s": self.uptime_secs(),
+            "sources": sources, "clients": clients, "counters": counters,
+            "recording": recording.map(|r| serde_json::json!({
+                "file": r.files.last().map(|f| f.display().to_string()), "files": r.files.len(),
+                "bytes": r.bytes, "samples": r.samples, "attitudes": r.attitudes, "stopped": r.stopped,
+            })),
+        }))
+    }
+
+    /// Seconds since the start.
+    #[must_use]
+    pub fn uptime_secs(&self) -> f64 {
+        self.started.elapsed().as_secs_f64()
+    }
+
+    /// Every sensor's report, by name, for the metrics.
+    pub fn each_sensor(&self, mut tell: impl FnMut(&SensorStream)) {
+        let sensors: Vec<_> = read(&self.sensors).values().cloned().collect();
+        for sensor in sensors {
+            tell(&lock(&sensor).stream);
+        }
+    }
+
+    /// Every client's outbox, for the metrics.
+    pub fn each_client(&self, mut tell: impl FnMut(&Client)) {
+        for client in read(&self.clients).values() {
+            tell(client);
+        }
+    }
+}
+
+/// Empties `text` into a chunk of the attitudes `from..until`.
+fn chunk(id: &Arc<str>, from: u64, until: u64, text: &mut Vec<u8>) -> Chunk {
+    let bytes = Bytes::copy_from_slice(text);
+    text.clear();
+    Chunk {
+        id: id.clone(),
+        first_seq: from,
+        count: until - from,
+        bytes,
+    }
+}
+
+// Nothing that is locked here is left half changed by a panic elsewhere.
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn read<T>(lock: &RwLock<T>) -> std::sync::RwLockReadGuard<'_, T> {
+    lock.read().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn write<T>(lock: &RwLock<T>) -> std::sync::RwLockWriteGuard<'_, T> {
+    lock.write().unwrap_or_else(PoisonError::into_inner)
+}

@@ -1,0 +1,190 @@
+//! Sockets -> sessions. I/O.
+//!
+//! One file per transport; the conversation is the same over all ([`super::session`]).
+
+mod duplex;
+mod stdin;
+mod tcp;
+mod udp;
+pub(crate) mod websocket;
+
+#[cfg(unix)]
+mod unix;
+
+use super::address::Listen;
+use super::admission::Web;
+use super::hub::{Hub, count};
+use super::limits::Backoff;
+use super::session::Scratch;
+use super::shutdown::Running;
+use super::wire::{self, Fault};
+use crate::error::{Error, Result};
+use crate::record::Nanos;
+use bytes::Bytes;
+use std::cell::RefCell;
+use std::future::Future;
+use std::io;
+use std::sync::Arc;
+use std::time::{SystemTime, UNIX_EPOCH};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+
+pub use stdin::read as read_stdin;
+pub(crate) use websocket::Connection;
+
+/// Most bytes taken from a socket at once.
+const READ: usize = 16 << 10;
+
+/// Something that is listened on.
+#[derive(Debug)]
+pub enum Listener {
+    /// Lines over TCP.
+    Tcp(tokio::net::TcpListener),
+    /// Lines in datagrams.
+    Udp(tokio::net::UdpSocket),
+    /// WebSocket and HTTP.
+    WebSocket(tokio::net::TcpListener),
+    /// Lines over a Unix socket.
+    #[cfg(unix)]
+    Unix(unix::Bound),
+}
+
+/// What every listener needs.
+#[derive(Clone, Debug)]
+pub struct Context {
+    /// The hub.
+    pub hub: Arc<Hub>,
+    /// Who may connect over HTTP.
+    pub web: Arc<Web>,
+    /// A permit for each connection.
+    pub places: Arc<Semaphore>,
+    /// Lives as long as the task.
+    pub running: Running,
+}
+
+impl Listener {
+    /// Begins to listen, and says where: port 0 has become a real one.
+    ///
+    /// # Errors
+    /// [`Error::Bind`].
+    pub async fn bind(listen: &Listen) -> Result<(Listener, Listen)> {
+        let fail = |source| Error::Bind {
+            address: listen.to_string(),
+            source,
+        };
+        match listen {
+            Listen::Tcp(address) => {
+                let listener = tokio::net::TcpListener::bind(address).await.map_err(fail)?;
+                let bound = Listen::Tcp(listener.local_addr().map_err(fail)?);
+                Ok((Listener::Tcp(listener), bound))
+            }
+            Listen::WebSocket(address) => {
+                let listener = tokio::net::TcpListener::bind(address).await.map_err(fail)?;
+                let bound = Listen::WebSocket(listener.local_addr().map_err(fail)?);
+                Ok((Listener::WebSocket(listener), bound))
+            }
+            Listen::Udp(address) => {
+                let socket = tokio::net::UdpSocket::bind(address).await.map_err(fail)?;
+                let bound = Listen::Udp(socket.local_addr().map_err(fail)?);
+                Ok((Listener::Udp(socket), bound))
+            }
+            #[cfg(unix)]
+            Listen::Unix(path) => {
+                let bound = unix::Bound::new(path).map_err(fail)?;
+                Ok((Listener::Unix(bound), listen.clone()))
+            }
+            #[cfg(not(unix))]
+            Listen::Unix(_) => Err(fail(io::ErrorKind::Unsupported.into())),
+        }
+    }
+
+    /// Serves until the daemon ends.
+    pub async fn serve(self, context: Context) {
+        match self {
+            Listener::Tcp(listener) => tcp::serve(listener, context).await,
+            Listener::Udp(socket) => udp::serve(socket, context).await,
+            Listener::WebSocket(listener) => websocket::serve(listener, context).await,
+            #[cfg(unix)]
+            Listener::Unix(bound) => unix::serve(bound, context).await,
+        }
+    }
+}
+
+/// Accepts until the daemon ends. A connection that finds no place is handed to `refuse`. An accept
+/// that fails (too many open files, mostly) is tried again, ever more slowly.
+async fn accept<S, A: Future<Output = io::Result<S>>>(
+    context: Context,
+    mut next: impl FnMut() -> A,
+    mut serve: impl FnMut(S, Context, OwnedSemaphorePermit),
+    mut refuse: impl FnMut(S, Context),
+) {
+    let mut backoff = Backoff::default();
+    let mut running = context.running.clone();
+    loop {
+        let accepted = tokio::select! {
+            accepted = next() => accepted,
+            () = running.asked() => return,
+        };
+        match accepted {
+            Ok(stream) => {
+                backoff.worked();
+                if let Ok(place) = context.places.clone().try_acquire_owned() {
+                    count(&context.hub.counters.accepted, 1);
+                    serve(stream, context.clone(), place);
+                } else {
+                    count(&context.hub.counters.refused, 1);
+                    refuse(stream, context.clone());
+                }
+            }
+            Err(why) => {
+                let wait = backoff.failed();
+                count(&context.hub.counters.accept_failures, 1);
+                super::quiet::warn(
+                    "accept",
+                    &format!("cannot accept a connection: {why}; trying again in {wait:?}"),
+                );
+                tokio::select! {
+                    () = tokio::time::sleep(wait) => {}
+                    () = running.asked() => return,
+                }
+            }
+        }
+    }
+}
+
+/// What a client without a place is told.
+fn too_many_clients(hub: &Hub) -> Bytes {
+    let fault = Fault::new(
+        "too_many_clients",
+        format!(
+            "{} connections are served already",
+            hub.limits().connections
+        ),
+    );
+    wire::error(&fault, 0, &[], 0)
+}
+
+/// Now, as the log time of what was just received.
+fn now() -> Nanos {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    Nanos(since.map_or(0, |d| i64::try_from(d.as_nanos()).unwrap_or(i64::MAX)))
+}
+
+/// Room for one read and the work on it. It belongs to the thread: between reading and the next
+/// `await` nobody else uses it, and a client that sends nothing holds none.
+#[derive(Debug)]
+struct Room {
+    bytes: Vec<u8>,
+    scratch: Scratch,
+}
+
+thread_local! {
+    static ROOM: RefCell<Room> = RefCell::new(Room {
+        bytes: vec![0; READ],
+        scratch: Scratch::default(),
+    });
+}
+
+/// Works in this thread's room.
+fn in_room<T>(work: impl FnOnce(&mut [u8], &mut Scratch) -> T) -> T {
+    ROOM.with_borrow_mut(|room| work(&mut room.bytes, &mut room.scratch))
+}

@@ -1,0 +1,73 @@
+//! Datagrams -> sessions. I/O.
+//!
+//! Samples in only: whoever answers datagrams can be made to shout at somebody else. What is wrong
+//! is counted and shows in `STATUS`.
+
+use super::{Context, in_room, now};
+use crate::serve::session::Session;
+use std::collections::HashMap;
+use std::collections::VecDeque;
+use std::net::SocketAddr;
+use tokio::net::UdpSocket;
+use tokio::time::{Instant, MissedTickBehavior, interval};
+
+/// Senders remembered at once.
+const MAX_SENDERS: usize = 256;
+/// Longest datagram there is.
+const MAX_DATAGRAM: usize = 65_536;
+
+struct Sender {
+    session: Session,
+    heard: Instant,
+}
+
+pub(super) async fn serve(socket: UdpSocket, context: Context) {
+    let Context {
+        hub, mut running, ..
+    } = context;
+    let silence = hub.limits().sender_silence;
+    let mut senders: HashMap<SocketAddr, Sender> = HashMap::new();
+    let mut buffer = vec![0; MAX_DATAGRAM];
+    let mut unheard = VecDeque::new();
+    let mut tick = interval(silence / 4);
+    tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    loop {
+        tokio::select! {
+            ready = socket.readable() => {
+                if ready.is_err() {
+                    return;
+                }
+                // An error is an answer to nobody's question (a port that was closed), or none.
+                let Ok((n, peer)) = socket.try_recv_from(&mut buffer) else { continue };
+                if senders.len() >= MAX_SENDERS && !senders.contains_key(&peer) {
+                    crate::serve::hub::count(&hub.counters.refused, 1);
+                    continue;
+                }
+                let sender = senders.entry(peer).or_insert_with(|| Sender {
+                    session: Session::new(&hub, format!("udp://{peer}"), false),
+                    heard: Instant::now(),
+                });
+                sender.heard = Instant::now();
+                let datagram = buffer.get(..n).unwrap_or_default();
+                in_room(|_, scratch| sender.session.message(datagram, now(), scratch));
+                let client = sender.session.client();
+                client.outbox.watch(None);
+                client.outbox.take(usize::MAX, &mut unheard);
+                unheard.clear();
+                if sender.session.end().is_some() {
+                    senders.remove(&peer);
+                }
+            }
+            _ = tick.tick() => senders.retain(|_, s| s.heard.elapsed() < silence),
+            () = running.asked() => {
+                while let Ok((n, peer)) = socket.try_recv_from(&mut buffer) {
+                    if let Some(sender) = senders.get_mut(&peer) {
+                        let datagram = buffer.get(..n).unwrap_or_default();
+                        in_room(|_, scratch| sender.session.message(datagram, now(), scratch));
+                    }
+                }
+                return;
+            }
+        }
+    }
+}

@@ -1,0 +1,72 @@
+//! Unix socket -> sessions. I/O.
+
+use super::duplex::{self, Duplex};
+use super::{Context, accept};
+use std::future::Future;
+use std::io::{self, IoSlice};
+use std::os::unix::fs::{FileTypeExt, PermissionsExt};
+use std::path::{Path, PathBuf};
+use tokio::net::{UnixListener, UnixStream};
+
+/// A socket in the file system; its name goes when it does.
+#[derive(Debug)]
+pub struct Bound {
+    listener: UnixListener,
+    path: PathBuf,
+}
+
+impl Bound {
+    /// Listens at `path`, for the user who runs the daemon alone. The name left behind by a daemon
+    /// that was killed is taken over; one that answers is not.
+    pub(super) fn new(path: &Path) -> io::Result<Bound> {
+        let is_left_behind = std::fs::symlink_metadata(path)
+            .is_ok_and(|m| m.file_type().is_socket())
+            && std::os::unix::net::UnixStream::connect(path)
+                .is_err_and(|e| e.kind() == io::ErrorKind::ConnectionRefused);
+        if is_left_behind {
+            std::fs::remove_file(path)?;
+        }
+        let listener = UnixListener::bind(path)?;
+        std::fs::set_permissions(path, std::fs::Permissions::from_mode(0o600))?;
+        Ok(Bound {
+            listener,
+            path: path.to_owned(),
+        })
+    }
+}
+
+impl Drop for Bound {
+    fn drop(&mut self) {
+        // Somebody may have tidied up already.
+        let _ = std::fs::remove_file(&self.path);
+    }
+}
+
+impl Duplex for UnixStream {
+    fn readable(&self) -> impl Future<Output = io::Result<()>> + Send {
+        UnixStream::readable(self)
+    }
+    fn writable(&self) -> impl Future<Output = io::Result<()>> + Send {
+        UnixStream::writable(self)
+    }
+    fn try_read(&self, buffer: &mut [u8]) -> io::Result<usize> {
+        UnixStream::try_read(self, buffer)
+    }
+    fn try_write(&self, parts: &[IoSlice<'_>]) -> io::Result<usize> {
+        self.try_write_vectored(parts)
+    }
+    fn end(&self) {
+        duplex::shut(&socket2::SockRef::from(self));
+    }
+}
+
+pub(super) async fn serve(bound: Bound, context: Context) {
+    let peer = format!("unix://{}", bound.path.display());
+    accept(
+        context,
+        || bound.listener.accept(),
+        |(stream, _), context, place| duplex::spawn(stream, peer.clone(), context, place),
+        |(stream, _), context| duplex::spawn_dismissal(stream, &context),
+    )
+    .await;
+}

@@ -1,0 +1,295 @@
+//! WebSocket -> sessions, HTTP -> `/healthz`, `/metrics`. I/O.
+//!
+//! One message is one line or several; every answer and attitude is a message of its own, so that a
+//! page can hand it to `JSON.parse` as it is.
+
+use super::{Context, accept, in_room, now, tcp, too_many_clients};
+use crate::serve::admission::Web;
+use crate::serve::http;
+use crate::serve::hub::{Hub, count};
+use crate::serve::session::Session;
+use crate::serve::shutdown::Running;
+use axum::body::Body;
+use axum::extract::ws::{Message, Utf8Bytes, WebSocket};
+use axum::http::{Request, Response, StatusCode, header};
+use bytes::Bytes;
+use futures_util::{SinkExt, Stream, StreamExt};
+use hyper::body::Incoming;
+use hyper_util::rt::{TokioIo, TokioTimer};
+use memchr::memchr_iter;
+use std::collections::VecDeque;
+use std::future::poll_fn;
+use std::net::IpAddr;
+use std::pin::{Pin, pin};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::task::Poll;
+use tokio::net::TcpListener;
+use tokio::sync::OwnedSemaphorePermit;
+use tokio::time::{Instant, MissedTickBehavior, interval_at, timeout};
+
+/// Longest message that is read: a line that is too long is still answered, up to here.
+pub(crate) const MAX_MESSAGE: usize = 128 << 10;
+/// Room for reading from one client.
+pub(crate) const READ_BUFFER: usize = 4 << 10;
+/// Bytes gathered for one write.
+pub(crate) const WRITE_BUFFER: usize = 16 << 10;
+/// Most bytes waiting for one write.
+pub(crate) const MAX_WRITE_BUFFER: usize = 512 << 10;
+/// Attitudes taken from the outbox at once.
+const TAKE: usize = 64 << 10;
+
+/// One HTTP connection, handed to what answers its requests.
+#[derive(Clone, Debug)]
+pub(crate) struct Connection {
+    pub(crate) hub: Arc<Hub>,
+    pub(crate) peer: String,
+    /// The client has shown the token with the request.
+    pub(crate) trusted: bool,
+    pub(crate) running: Running,
+    /// Held as long as the connection, or the WebSocket it becomes, lives.
+    pub(crate) _place: Arc<OwnedSemaphorePermit>,
+}
+
+pub(super) async fn serve(listener: TcpListener, context: Context) {
+    let router = http::router();
+    let bound = listener
+        .local_addr()
+        .map_or(IpAddr::from([127, 0, 0, 1]), |a| a.ip());
+    accept(
+        context,
+        || listener.accept(),
+        |(stream, peer), context, place| {
+            tcp::prepare(&stream);
+            let connection = Connection {
+                hub: context.hub.clone(),
+                peer: format!("ws://{peer}"),
+                trusted: false,
+                running: context.running.clone(),
+                _place: Arc::new(place),
+            };
+            let (router, web) = (router.clone(), context.web.clone());
+            let service = hyper::service::service_fn(move |request: Request<Incoming>| {
+                answer(request, router.clone(), web.clone(), bound, connection.clone())
+            });
+            let first_line = context.hub.limits().first_line;
+            let mut running = context.running.clone();
+            tokio::spawn(async move {
+                let mut serving = pin!(
+                    hyper::server::conn::http1::Builder::new()
+                        .timer(TokioTimer::new())
+                        .header_read_timeout(first_line)
+                        .max_buf_size(MAX_MESSAGE)
+                        .serve_connection(TokioIo::new(stream), service)
+                        .with_upgrades()
+                );
+                // What the peer does wrong is its own loss.
+                tokio::select! {
+                    _ = serving.as_mut() => {}
+                    () = running.asked() => {
+                        serving.as_mut().graceful_shutdown();
+                        let _ = serving.await;
+                    }
+                }
+            });
+        },
+        |(stream, _), context| {
+            let words = too_many_clients(&context.hub);
+            let running = context.running.clone();
+            tokio::spawn(async move {
+                let head = format!(
+                    "HTTP/1.1 503 Service Unavailable\r\nContent-Type: application/json\r\nContent-Length: {}\r\nConnection: close\r\n\r\n",
+                    words.len()
+                );
+                let whole = [head.as_bytes(), &words].concat();
+                super::duplex::dismiss(stream, whole.into()).await;
+                drop(running);
+            });
+        },
+    )
+    .await;
+}
+
+/// Checks who asks, then lets the router answer.
+async fn answer(
+    mut request: Request<Incoming>,
+    router: axum::Router,
+    web: Arc<Web>,
+    bound: IpAddr,
+    mut connection: Connection,
+) -> Result<Response<Body>, std::convert::Infallible> {
+    use hyper::service::Service;
+    let text = |name: header::HeaderName| {
+        // Two of them, or one that is no text, is nobody we know.
+        let mut values = request.headers().get_all(name).iter();
+        match (values.next(), values.next()) {
+            (None, _) => None,
+            (Some(one), None) => Some(one.to_str().unwrap_or("?").to_owned()),
+            _ => Some("?".to_owned()),
+        }
+    };
+    if let Err(why) = web.admit(
+        bound,
+        text(header::HOST).as_deref(),
+        text(header::ORIGIN).as_deref(),
+    ) {
+        count(&connection.hub.counters.refused, 1);
+        return Ok(http::refusal(StatusCode::FORBIDDEN, "forbidden", &why));
+    }
+    if let (Some(token), Some(shown)) = (connection.hub.token(), text(header::AUTHORIZATION)) {
+        let shown = shown.strip_prefix("Bearer ").unwrap_or_default();
+        match token.judge(shown, std::time::Instant::now()) {
+            Ok(()) => connection.trusted = true,
+            Err(fault) => {
+                count(&connection.hub.counters.refused, 1);
+                return Ok(http::refusal(
+                    StatusCode::UNAUTHORIZED,
+                    fault.code,
+                    &fault.message,
+                ));
+            }
+        }
+    }
+    request.extensions_mut().insert(connection);
+    let service = hyper_util::service::TowerToHyperService::new(router);
+    service.call(request).await
+}
+
+/// Serves one WebSocket to the end of its conversation.
+pub(crate) async fn converse(socket: WebSocket, connection: Connection) {
+    let Connection {
+        hub,
+        peer,
+        trusted,
+        mut running,
+        _place,
+    } = connection;
+    let limits = *hub.limits();
+    let mut session = Session::new(&hub, peer, trusted);
+    let client = session.client().clone();
+    let (mut sink, mut stream) = socket.split();
+    let closing = AtomicBool::new(false);
+
+    let reader = async {
+        let opened = Instant::now();
+        loop {
+            let patience = if session.has_spoken() {
+                limits.ping * 2 + limits.ping / 3
+            } else {
+                limits.first_line.saturating_sub(opened.elapsed())
+            };
+            let message = tokio::select! {
+                message = timeout(patience, stream.next()) => message,
+                () = running.asked() => {
+                    // What has arrived is still taken.
+                    while let Some(Ok(message)) = ready(&mut stream).await {
+                        take(&mut session, &message);
+                    }
+                    running.has_read();
+                    running.asked_to_send().await;
+                    return None;
+                }
+            };
+            match message {
+                Err(_) => return Some("nothing was heard from it for too long"),
+                Ok(None | Some(Err(_))) => return None,
+                Ok(Some(Ok(Message::Close(_)))) => return None,
+                Ok(Some(Ok(message))) => take(&mut session, &message),
+            }
+            if session.end().is_some() {
+                return Some("bad lines or no token");
+            }
+        }
+    };
+
+    let writer = async {
+        let mut pings = interval_at(Instant::now() + limits.ping, limits.ping);
+        pings.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let mut parts = VecDeque::new();
+        loop {
+            let attitudes = client.outbox.take(TAKE, &mut parts);
+            if parts.is_empty() {
+                if closing.load(Ordering::Acquire) {
+                    return None;
+                }
+                tokio::select! {
+                    () = client.outbox.filled() => {}
+                    _ = pings.tick() => {
+                        let ping = sink.send(Message::Ping(Bytes::new()));
+                        if !matches!(timeout(limits.no_progress, ping).await, Ok(Ok(()))) {
+                            return Some("it took nothing for too long");
+                        }
+                    }
+                }
+                continue;
+            }
+            if client.outbox.full().is_some() {
+                return Some("it does not read the replies to what it sends");
+            }
+            let bytes: usize = parts.iter().map(Bytes::len).sum();
+            let sending = async {
+                for part in parts.drain(..) {
+                    for line in lines(&part) {
+                        // Everything we say is JSON, and so UTF-8.
+                        let text = Utf8Bytes::try_from(line).unwrap_or_default();
+                        sink.feed(Message::Text(text)).await?;
+                    }
+                }
+                sink.flush().await
+            };
+            match timeout(limits.no_progress, sending).await {
+                Ok(Ok(())) => {
+                    client.outbox.written(attitudes);
+                    count(&hub.counters.bytes_out, bytes);
+                }
+                Ok(Err(_)) => return None,
+                Err(_) => return Some("it took nothing for too long"),
+            }
+        }
+    };
+
+    let mut writer = Box::pin(writer);
+    let reason = tokio::select! {
+        reason = reader => {
+            closing.store(true, Ordering::Release);
+            client.outbox.nudge();
+            reason.or(timeout(limits.drain, &mut writer).await.ok().flatten())
+        }
+        reason = &mut writer => reason,
+    };
+    drop(writer);
+    drop(session);
+    let _ = timeout(limits.drain, sink.close()).await;
+    if let Some(reason) = reason {
+        count(&hub.counters.closed, 1);
+        tracing::debug!("{}: closed: {reason}", client.peer);
+    }
+}
+
+fn take(session: &mut Session, message: &Message) {
+    let bytes: &[u8] = match message {
+        Message::Text(text) => text.as_bytes(),
+        Message::Binary(bytes) => bytes,
+        Message::Ping(_) | Message::Pong(_) | Message::Close(_) => return,
+    };
+    in_room(|_, scratch| session.message(bytes, now(), scratch));
+}
+
+/// The next item if it is there already.
+async fn ready<S: Stream + Unpin>(stream: &mut S) -> Option<S::Item> {
+    poll_fn(|cx| match Pin::new(&mut *stream).poll_next(cx) {
+        Poll::Ready(item) => Poll::Ready(item),
+        Poll::Pending => Poll::Ready(None),
+    })
+    .await
+}
+
+/// The lines of a chunk, without their ends; they share its memory.
+fn lines(chunk: &Bytes) -> impl Iterator<Item = Bytes> {
+    let mut from = 0;
+    memchr_iter(b'\n', chunk).map(move |end| {
+        let line = chunk.slice(from..end);
+        from = end + 1;
+        line
+    })
+}

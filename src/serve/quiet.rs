@@ -1,0 +1,56 @@
+//! What repeats -> one log line for each cause in ten seconds, with how many were not said. I/O.
+
+use std::collections::HashMap;
+use std::sync::{LazyLock, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Between two lines of one cause.
+const INTERVAL: Duration = Duration::from_secs(10);
+
+/// When each cause was said last, and how often it was not since.
+static SAID: LazyLock<Mutex<HashMap<&'static str, (Instant, u64)>>> = LazyLock::new(Mutex::default);
+
+/// Warns, unless the same cause was warned of just now.
+pub(super) fn warn(cause: &'static str, what: &str) {
+    if let Some(suppressed) = due(cause, Instant::now()) {
+        match suppressed {
+            0 => tracing::warn!("{what}"),
+            n => tracing::warn!("{what} (and {n} more like it since)"),
+        }
+    }
+}
+
+fn due(cause: &'static str, now: Instant) -> Option<u64> {
+    let mut said = SAID.lock().unwrap_or_else(PoisonError::into_inner);
+    match said.get_mut(cause) {
+        Some((last, suppressed)) if now.saturating_duration_since(*last) < INTERVAL => {
+            *suppressed += 1;
+            None
+        }
+        Some((last, suppressed)) => {
+            *last = now;
+            Some(std::mem::take(suppressed))
+        }
+        None => {
+            said.insert(cause, (now, 0));
+            Some(0)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_line_in_ten_seconds_for_each_cause() {
+        let start = Instant::now();
+        assert_eq!(due("test a", start), Some(0));
+        assert_eq!(due("test b", start), Some(0));
+        for n in 1..10 {
+            assert_eq!(due("test a", start + Duration::from_secs(n)), None);
+        }
+        assert_eq!(due("test a", start + Duration::from_secs(10)), Some(9));
+        assert_eq!(due("test a", start + Duration::from_secs(11)), None);
+    }
+}

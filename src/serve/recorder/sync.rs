@@ -1,0 +1,66 @@
+//! "Up to here" -> durable, on a thread that may wait. I/O.
+//!
+//! A stage of its own because a sync can take seconds on a busy disk, while chunks go on being written.
+
+use super::Shared;
+use std::fs::File;
+use std::sync::Arc;
+use std::sync::mpsc::{SyncSender, sync_channel};
+use std::thread::JoinHandle;
+
+/// A file, how much of it there is, and where the outcome goes.
+type Request = (Arc<File>, u64);
+
+/// The thread's end.
+#[derive(Debug)]
+pub(super) struct Syncer {
+    sender: Option<SyncSender<Request>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Syncer {
+    pub(super) fn start(shared: Arc<Shared>) -> std::io::Result<Syncer> {
+        // One waits while one is under way; more would sync the same again.
+        let (sender, receiver) = sync_channel::<Request>(1);
+        let thread = std::thread::Builder::new()
+            .name("strapd-sync".to_owned())
+            .spawn(move || {
+                for (file, bytes) in receiver {
+                    let outcome = file.sync_data();
+                    let mut status = shared.status();
+                    match outcome {
+                        Ok(()) => {
+                            status.syncs += 1;
+                            status.synced = bytes;
+                        }
+                        Err(e) => {
+                            status
+                                .stopped
+                                .get_or_insert(format!("the disk did not sync: {e}"));
+                        }
+                    }
+                }
+            })?;
+        Ok(Syncer {
+            sender: Some(sender),
+            thread: Some(thread),
+        })
+    }
+
+    /// Asks for a sync; `false` when the last ones are not done.
+    pub(super) fn request(&self, file: &Arc<File>, bytes: u64) -> bool {
+        self.sender
+            .as_ref()
+            .is_some_and(|s| s.try_send((file.clone(), bytes)).is_ok())
+    }
+}
+
+impl Drop for Syncer {
+    fn drop(&mut self) {
+        self.sender = None;
+        if let Some(thread) = self.thread.take() {
+            // A panic there has been said by the thread itself.
+            let _ = thread.join();
+        }
+    }
+}

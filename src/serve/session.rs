@@ -1,0 +1,304 @@
+//! One client's bytes -> samples to the hub, answers to its outbox. Sans-I/O.
+//!
+//! Apart from the transports because a conversation is the same over all of them, and apart from
+//! the hub because it remembers what only matters to one client: which sensor it sent last, how
+//! many lines in a row were bad, whether it has shown the token.
+
+use super::framing::{Framed, Framer};
+use super::hub::{Client, Hub, Run, Sensor, count};
+use super::limits::Allowance;
+use super::stream::NAMELESS;
+use super::wire::{self, Fault, Message};
+use crate::decode::Line;
+use crate::record::{Nanos, RawSample};
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::{Arc, Mutex};
+use std::time::Instant;
+
+/// Errors said at once before they are thinned.
+const BURST: u32 = 64;
+/// Unknown classes remembered, so that each is said once.
+const MAX_TOLD: usize = 32;
+/// Sensors one client may send.
+const MAX_OWNED: usize = 256;
+
+/// Room for the work on one chunk of bytes; one per thread, so that an idle client holds none.
+#[derive(Debug, Default)]
+pub struct Scratch {
+    samples: Vec<RawSample>,
+    lines: Vec<(Option<u64>, usize)>,
+    head: Option<Line>,
+    text: Vec<u8>,
+}
+
+/// Why a conversation was ended.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum End {
+    /// Too many bad lines in a row.
+    TooManyErrors,
+    /// No token, or a wrong one.
+    Unauthorised,
+}
+
+/// One conversation.
+#[derive(Debug)]
+pub struct Session {
+    hub: Arc<Hub>,
+    client: Arc<Client>,
+    framer: Framer,
+    authorised: bool,
+    errors_in_a_row: u32,
+    errors: Allowance,
+    told: BTreeSet<String>,
+    /// The sensors it sends.
+    owned: BTreeMap<String, Arc<Mutex<Sensor>>>,
+    /// The one it sent last.
+    last: Option<Arc<Mutex<Sensor>>>,
+    end: Option<End>,
+}
+
+impl Session {
+    /// Somebody has connected, who need not show a token when `trusted`. Greets.
+    #[must_use]
+    pub fn new(hub: &Arc<Hub>, peer: String, trusted: bool) -> Session {
+        let client = hub.join(peer);
+        client.outbox.reply(wire::version(hub.session()));
+        Session {
+            authorised: trusted || hub.token().is_none(),
+            hub: hub.clone(),
+            client,
+            framer: Framer::new(),
+            errors_in_a_row: 0,
+            errors: Allowance::new(BURST),
+            told: BTreeSet::new(),
+            owned: BTreeMap::new(),
+            last: None,
+            end: None,
+        }
+    }
+
+    /// The client, with its outbox.
+    #[must_use]
+    pub fn client(&self) -> &Arc<Client> {
+        &self.client
+    }
+
+    /// The hub.
+    #[must_use]
+    pub fn hub(&self) -> &Arc<Hub> {
+        &self.hub
+    }
+
+    /// Whether a first line has come.
+    #[must_use]
+    pub fn has_spoken(&self) -> bool {
+        self.framer.ended() > 0
+    }
+
+    /// Why it is over, if it is. What waits in the outbox may still be sent.
+    #[must_use]
+    pub fn end(&self) -> Option<End> {
+        self.end
+    }
+
+    /// The next bytes of the stream, received at `received`.
+    pub fn bytes(&mut self, bytes: &[u8], received: Nanos, scratch: &mut Scratch) {
+        self.feed(bytes, false, received, scratch);
+    }
+
+    /// A datagram or message: its end ends its last line.
+    pub fn message(&mut self, bytes: &[u8], received: Nanos, scratch: &mut Scratch) {
+        self.feed(bytes, true, received, scratch);
+    }
+
+    /// The stream has ended: what is unfinished is a line.
+    pub fn finish(&mut self, received: Nanos, scratch: &mut Scratch) {
+        self.feed(&[], true, received, scratch);
+    }
+
+    fn feed(&mut self, bytes: &[u8], whole: bool, received: Nanos, scratch: &mut Scratch) {
+        count(&self.hub.counters.bytes_in, bytes.len());
+        let mut framer = std::mem::take(&mut self.framer);
+        let before = framer.ended();
+        let mut take = |framed: Framed<'_>| {
+            match framed {
+                Framed::Line(number, line) => self.line(number, line, received, scratch),
+                Framed::TooLong(number, head) => {
+                    self.bad(&wire::too_long(), number, head, received, scratch);
+                }
+            }
+            self.end.is_none()
+        };
+        framer.feed(bytes, &mut take);
+        if whole {
+            framer.finish(&mut take);
+        }
+        count(&self.hub.counters.lines, (framer.ended() - before) as usize);
+        self.framer = framer;
+        self.flush(received, scratch, usize::MAX);
+    }
+
+    fn line(&mut self, number: u64, line: &[u8], received: Nanos, scratch: &mut Scratch) {
+        let before = scratch.samples.len();
+        match wire::read(self.hub.decoder(), line, received, &mut scratch.samples) {
+            Ok(Message::Auth(token)) => self.authorise(&token, number),
+            Ok(_) | Err(_) if !self.authorised => {
+                scratch.samples.truncate(before);
+                let fault = Fault::new(
+                    "unauthorised",
+                    "the first line must be {\"class\":\"AUTH\",\"token\":\"...\"}",
+                );
+                self.refuse(&fault, number);
+            }
+            Ok(Message::Samples(head)) => {
+                self.errors_in_a_row = 0;
+                let goes_on = scratch.head.as_ref().is_some_and(|run| {
+                    run.id == head.id
+                        && (run.sample_kind, run.gyro_unit) == (head.sample_kind, head.gyro_unit)
+                });
+                if !goes_on {
+                    self.flush(received, scratch, before);
+                }
+                scratch.lines.push((head.seq, scratch.samples.len()));
+                scratch.head.get_or_insert(head);
+            }
+            Ok(Message::Watch(filter)) => {
+                self.errors_in_a_row = 0;
+                self.flush(received, scratch, usize::MAX);
+                // The answer comes before the first attitude.
+                self.client.outbox.reply(wire::watching(filter.as_ref()));
+                self.client.outbox.watch(filter);
+                self.hub.watch_changed();
+            }
+            Ok(Message::Poll) => {
+                self.errors_in_a_row = 0;
+                self.flush(received, scratch, usize::MAX);
+                self.client.outbox.reply(self.hub.status());
+            }
+            Err(fault) if fault.code == "unknown_class" => {
+                // Somebody newer than this daemon: said once, never held against it.
+                if self.told.len() < MAX_TOLD && self.told.insert(fault.message.clone()) {
+                    self.say(&fault, number, line);
+                }
+            }
+            Err(fault) => self.bad(&fault, number, line, received, scratch),
+        }
+    }
+
+    /// A line that is no good: said, counted, and after too many in a row the end.
+    fn bad(
+        &mut self,
+        fault: &Fault,
+        number: u64,
+        line: &[u8],
+        received: Nanos,
+        scratch: &mut Scratch,
+    ) {
+        self.flush(received, scratch, usize::MAX);
+        if let Some(sensor) = &self.last {
+            self.hub.undecodable(sensor, self.client.number);
+        }
+        self.say(fault, number, line);
+        self.errors_in_a_row += 1;
+        if self.errors_in_a_row > self.hub.limits().errors_in_a_row {
+            let fault = Fault::new(
+                "too_many_errors",
+                format!(
+                    "{} bad lines in a row; the connection is closed",
+                    self.errors_in_a_row
+                ),
+            );
+            self.client
+                .outbox
+                .reply(wire::error(&fault, number, &[], 0));
+            self.end = Some(End::TooManyErrors);
+        }
+    }
+
+    fn say(&mut self, fault: &Fault, number: u64, near: &[u8]) {
+        count(&self.hub.counters.faults, 1);
+        if let Some(suppressed) = self.errors.take(Instant::now()) {
+            self.client
+                .outbox
+                .reply(wire::error(fault, number, near, suppressed));
+        }
+    }
+
+    fn authorise(&mut self, token: &str, number: u64) {
+        self.errors_in_a_row = 0;
+        match self.hub.token() {
+            Some(expected) if !self.authorised => match expected.judge(token, Instant::now()) {
+                Ok(()) => self.authorised = true,
+                Err(fault) => self.refuse(&fault, number),
+            },
+            _ => {}
+        }
+    }
+
+    fn refuse(&mut self, fault: &Fault, number: u64) {
+        count(&self.hub.counters.faults, 1);
+        // Nothing of the line is repeated: it may hold a token with a slip.
+        self.client.outbox.reply(wire::error(fault, number, &[], 0));
+        self.end = Some(End::Unauthorised);
+    }
+
+    /// Hands the first `until` samples gathered to the hub: a run of one sensor.
+    fn flush(&mut self, received: Nanos, scratch: &mut Scratch, until: usize) {
+        let Some(head) = scratch.head.take() else {
+            return;
+        };
+        let until = until.min(scratch.samples.len());
+        let run = Run {
+            client: self.client.number,
+            head: &head,
+            received,
+            lines: &scratch.lines,
+            samples: scratch.samples.get(..until).unwrap_or_default(),
+        };
+        let id = head
+            .id
+            .as_deref()
+            .filter(|id| !id.is_empty())
+            .unwrap_or(NAMELESS);
+        let news = self.sensor(id, &run).and_then(|sensor| {
+            let news = self.hub.publish(&sensor, &run, &mut scratch.text);
+            self.last = news.is_ok().then_some(sensor);
+            news
+        });
+        match news {
+            Ok(news) => {
+                for fault in news {
+                    self.say(&fault, 0, &[]);
+                }
+            }
+            Err(fault) => {
+                count(&self.hub.counters.refused_samples, run.samples.len());
+                self.say(&fault, 0, &[]);
+            }
+        }
+        scratch.samples.drain(..until);
+        scratch.lines.clear();
+    }
+
+    fn sensor(&mut self, id: &str, run: &Run<'_>) -> Result<Arc<Mutex<Sensor>>, Fault> {
+        if let Some(sensor) = self.owned.get(id) {
+            return Ok(sensor.clone());
+        }
+        if self.owned.len() >= MAX_OWNED {
+            return Err(Fault::new(
+                "too_many_sensors",
+                format!("one connection sends at most {MAX_OWNED} sensors"),
+            ));
+        }
+        let sensor = self.hub.sensor(id, run)?;
+        self.owned.insert(id.to_owned(), sensor.clone());
+        Ok(sensor)
+    }
+}
+
+impl Drop for Session {
+    fn drop(&mut self) {
+        let owned: Vec<_> = std::mem::take(&mut self.owned).into_values().collect();
+        self.hub.leave(&self.client, &owned);
+    }
+}

@@ -1,0 +1,197 @@
+//! Signals -> an orderly end. I/O.
+
+use std::time::Duration;
+use tokio::sync::{mpsc, watch};
+use tokio::time::timeout;
+
+/// Tells every task that it is time to end, and waits until they have.
+///
+/// In two steps, so that what has arrived still reaches whoever watches: first everybody reads what
+/// is there, then everybody sends what waits.
+#[derive(Debug)]
+pub struct Shutdown {
+    step: watch::Sender<Step>,
+    reading: (mpsc::Sender<()>, mpsc::Receiver<()>),
+    working: (mpsc::Sender<()>, mpsc::Receiver<()>),
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+enum Step {
+    Serve,
+    Read,
+    Send,
+}
+
+/// A task's end of it. While one exists, its task counts as running.
+#[derive(Clone, Debug)]
+pub struct Running {
+    step: watch::Receiver<Step>,
+    reading: Option<mpsc::Sender<()>>,
+    _working: mpsc::Sender<()>,
+}
+
+impl Default for Shutdown {
+    fn default() -> Shutdown {
+        Shutdown {
+            step: watch::Sender::new(Step::Serve),
+            reading: mpsc::channel(1),
+            working: mpsc::channel(1),
+        }
+    }
+}
+
+impl Shutdown {
+    /// For a task that starts.
+    #[must_use]
+    pub fn running(&self) -> Running {
+        Running {
+            step: self.step.subscribe(),
+            reading: Some(self.reading.0.clone()),
+            _working: self.working.0.clone(),
+        }
+    }
+
+    /// Asks every task to read what has arrived, for no longer than `reading`, then to send what
+    /// waits and end, and waits for the last.
+    pub async fn drain(self, reading: Duration) {
+        let Shutdown {
+            step,
+            reading: (reader, mut read),
+            working: (worker, mut worked),
+        } = self;
+        drop((reader, worker));
+        step.send_replace(Step::Read);
+        // Nothing is ever sent: it ends when the last sender has gone.
+        let _ = timeout(reading, read.recv()).await;
+        step.send_replace(Step::Send);
+        let _ = worked.recv().await;
+    }
+}
+
+impl Running {
+    /// Until it is time to end: then read what is there and call [`Running::has_read`].
+    pub async fn asked(&mut self) {
+        self.reached(Step::Read).await;
+    }
+
+    /// Everything that had arrived was read.
+    pub fn has_read(&mut self) {
+        self.reading = None;
+    }
+
+    /// Until everybody has read: then send what waits and end.
+    pub async fn asked_to_send(&mut self) {
+        self.reached(Step::Send).await;
+    }
+
+    /// [`Running::asked`], or [`Running::asked_to_send`] for a task that was `asked` already.
+    pub async fn asked_further(&mut self, asked: bool) {
+        self.reached(if asked { Step::Send } else { Step::Read })
+            .await;
+    }
+
+    async fn reached(&mut self, wanted: Step) {
+        // An error means that the daemon has gone altogether.
+        let _ = self.step.wait_for(|step| *step >= wanted).await;
+    }
+}
+
+/// What ended the daemon.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Signal {
+    /// Ctrl-C.
+    Interrupt,
+    /// From a service manager.
+    Terminate,
+    /// The terminal has gone.
+    HangUp,
+}
+
+impl Signal {
+    /// Its name.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Signal::Interrupt => "SIGINT",
+            Signal::Terminate => "SIGTERM",
+            Signal::HangUp => "SIGHUP",
+        }
+    }
+
+    /// The exit code of a process that obeys it at once.
+    #[must_use]
+    pub fn exit_code(self) -> i32 {
+        match self {
+            Signal::HangUp => 129,
+            Signal::Interrupt => 130,
+            Signal::Terminate => 143,
+        }
+    }
+}
+
+/// The signals as they come.
+#[cfg(unix)]
+#[derive(Debug)]
+pub struct Signals {
+    interrupt: tokio::signal::unix::Signal,
+    terminate: tokio::signal::unix::Signal,
+    hang_up: tokio::signal::unix::Signal,
+}
+
+#[cfg(unix)]
+impl Signals {
+    /// Starts to listen to them.
+    ///
+    /// # Errors
+    /// The operating system refuses.
+    pub fn new() -> std::io::Result<Signals> {
+        use tokio::signal::unix::{SignalKind, signal};
+        Ok(Signals {
+            interrupt: signal(SignalKind::interrupt())?,
+            terminate: signal(SignalKind::terminate())?,
+            hang_up: signal(SignalKind::hangup())?,
+        })
+    }
+
+    /// The next one.
+    pub async fn next(&mut self) -> Signal {
+        tokio::select! {
+            _ = self.interrupt.recv() => Signal::Interrupt,
+            _ = self.terminate.recv() => Signal::Terminate,
+            _ = self.hang_up.recv() => Signal::HangUp,
+        }
+    }
+}
+
+/// Where there is only Ctrl-C.
+#[cfg(not(unix))]
+#[derive(Debug)]
+pub struct Signals;
+
+#[cfg(not(unix))]
+impl Signals {
+    /// Starts to listen to them.
+    ///
+    /// # Errors
+    /// Never.
+    pub fn new() -> std::io::Result<Signals> {
+        Ok(Signals)
+    }
+
+    /// The next one.
+    pub async fn next(&mut self) -> Signal {
+        // An error leaves nothing to wait for.
+        let _ = tokio::signal::ctrl_c().await;
+        Signal::Interrupt
+    }
+}
+
+/// The first signal; from then on a second one ends the process.
+pub async fn first(mut signals: Signals) -> Signal {
+    let first = signals.next().await;
+    tokio::spawn(async move {
+        let second = signals.next().await;
+        std::process::exit(second.exit_code());
+    });
+    first
+}

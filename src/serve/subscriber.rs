@@ -1,0 +1,388 @@
+//! Encoded attitudes and replies -> the bytes one client gets, bounded. Pure but for the lock.
+//!
+//! A stage of its own because this is where a slow reader stops being anybody else's matter: its
+//! queue has a cap, the oldest attitudes give way, what gave way is counted and said (`GAP`), and
+//! replies (`STATUS`, `ERROR`, ...) are never dropped: when too many wait, the client is closed.
+
+use super::wire;
+use crate::record::AttitudeSample;
+use crate::sink::Decimator;
+use bytes::Bytes;
+use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use tokio::sync::Notify;
+
+/// Most bytes of attitudes waiting for one client, what is being written included.
+pub const MAX_QUEUED: usize = 256 << 10;
+/// Most replies waiting for one client.
+pub const MAX_CONTROL: usize = 64;
+/// Most bytes of replies waiting for one client, once there is more than one.
+const MAX_CONTROL_BYTES: usize = 1 << 20;
+
+/// Attitudes of one stream, encoded once and shared by every client that takes them all.
+#[derive(Clone, Debug)]
+pub struct Chunk {
+    /// Whose.
+    pub id: Arc<str>,
+    /// Number of the first in its stream.
+    pub first_seq: u64,
+    /// How many.
+    pub count: u64,
+    /// Whole lines.
+    pub bytes: Bytes,
+}
+
+/// What a client asked for with `WATCH`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Filter {
+    /// Sensors; `None` = all.
+    pub ids: Option<BTreeSet<String>>,
+    /// At most this many attitudes a second of each.
+    pub rate_hz: Option<f64>,
+}
+
+/// Attitudes that were dropped, to be said.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Dropped {
+    /// How many.
+    pub count: u64,
+    /// Number of the first.
+    pub first_seq: u64,
+    /// Number of the last.
+    pub last_seq: u64,
+}
+
+/// Why a client was told nothing more.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Full {
+    /// More replies waited than may wait.
+    Control,
+}
+
+/// Everything that waits for one client.
+#[derive(Debug, Default)]
+pub struct Outbox {
+    state: Mutex<State>,
+    wake: Notify,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    control: VecDeque<Bytes>,
+    control_bytes: usize,
+    data: VecDeque<Chunk>,
+    /// Bytes of `data` and of what was taken and is not yet written.
+    queued: usize,
+    gaps: BTreeMap<Arc<str>, Dropped>,
+    watch: Option<Filter>,
+    decimators: HashMap<Arc<str>, Option<Decimator>>,
+    full: Option<Full>,
+    dropped: u64,
+    sent: u64,
+}
+
+/// What a client's outbox holds, for `STATUS`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Level {
+    /// Whether attitudes are sent to it.
+    pub watching: bool,
+    /// Bytes of attitudes waiting.
+    pub queued: usize,
+    /// Attitudes sent so far.
+    pub sent: u64,
+    /// Attitudes dropped so far.
+    pub dropped: u64,
+}
+
+impl Outbox {
+    /// Empty, watching nothing.
+    #[must_use]
+    pub fn new() -> Outbox {
+        Outbox::default()
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        // Every change of the state is whole before anything in it could panic.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Starts or stops the attitudes.
+    pub fn watch(&self, filter: Option<Filter>) {
+        let mut state = self.state();
+        state.decimators.clear();
+        state.watch = filter;
+    }
+
+    /// Queues a reply (whole lines). A client with too many of them waiting is closed instead.
+    pub fn reply(&self, line: Bytes) {
+        let mut state = self.state();
+        let over = state.control.len() >= MAX_CONTROL
+            || (!state.control.is_empty() && state.control_bytes + line.len() > MAX_CONTROL_BYTES);
+        if over {
+            state.full = Some(Full::Control);
+        } else {
+            state.control_bytes += line.len();
+            state.control.push_back(line);
+        }
+        drop(state);
+        self.wake.notify_one();
+    }
+
+    /// Offers attitudes of stream `id`, in order; `shared` gives them encoded, and is asked only when
+    /// the client takes them all. `encode` encodes those a client takes of them.
+    pub fn offer(
+        &self,
+        id: &Arc<str>,
+        samples: &[AttitudeSample],
+        shared: &mut dyn FnMut() -> Vec<Chunk>,
+        encode: &dyn Fn(&mut Vec<u8>, u64, &AttitudeSample),
+        first_seq: u64,
+    ) {
+        let mut state = self.state();
+        let Some(filter) = &state.watch else { return };
+        if filter.ids.as_ref().is_some_and(|ids| !ids.contains(&**id)) {
+            return;
+        }
+        match filter.rate_hz {
+            None => {
+                for chunk in shared() {
+                    state.push(chunk);
+                }
+            }
+            Some(rate_hz) => {
+                let decimator = state
+                    .decimators
+                    .entry(id.clone())
+                    .or_insert_with(|| Decimator::new(rate_hz));
+                let mut bytes = Vec::new();
+                let (mut first, mut count) = (0, 0);
+                for (seq, sample) in (first_seq..).zip(samples) {
+                    let kept = match decimator {
+                        Some(decimator) => decimator.keep(sample),
+                        None => Some(*sample),
+                    };
+                    if let Some(kept) = kept {
+                        if count == 0 {
+                            first = seq;
+                        }
+                        count += 1;
+                        encode(&mut bytes, seq, &kept);
+                    }
+                }
+                if count == 0 {
+                    return;
+                }
+                state.push(Chunk {
+                    id: id.clone(),
+                    first_seq: first,
+                    count,
+                    bytes: bytes.into(),
+                });
+            }
+        }
+        drop(state);
+        self.wake.notify_one();
+    }
+
+    /// Moves up to about `most` bytes out: replies first, then what was dropped, then attitudes.
+    /// Returns how many bytes of attitudes are among them; give them back to [`Outbox::written`].
+    pub fn take(&self, most: usize, out: &mut VecDeque<Bytes>) -> usize {
+        let mut state = self.state();
+        out.extend(state.control.drain(..));
+        state.control_bytes = 0;
+        for (id, dropped) in std::mem::take(&mut state.gaps) {
+            out.push_back(wire::gap(&id, &dropped));
+        }
+        let mut taken = 0;
+        while taken < most
+            && let Some(chunk) = state.data.pop_front()
+        {
+            taken += chunk.bytes.len();
+            state.sent += chunk.count;
+            out.push_back(chunk.bytes);
+        }
+        taken
+    }
+
+    /// This many bytes of attitudes have left.
+    pub fn written(&self, bytes: usize) {
+        let mut state = self.state();
+        state.queued = state.queued.saturating_sub(bytes);
+    }
+
+    /// Whether anything waits.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        let state = self.state();
+        state.control.is_empty() && state.data.is_empty() && state.gaps.is_empty()
+    }
+
+    /// Why the client must be closed, if it must.
+    #[must_use]
+    pub fn full(&self) -> Option<Full> {
+        self.state().full
+    }
+
+    /// What it holds.
+    #[must_use]
+    pub fn level(&self) -> Level {
+        let state = self.state();
+        Level {
+            watching: state.watch.is_some(),
+            queued: state.queued,
+            sent: state.sent,
+            dropped: state.dropped,
+        }
+    }
+
+    /// Wakes whoever waits in [`Outbox::filled`], though nothing was queued.
+    pub fn nudge(&self) {
+        self.wake.notify_one();
+    }
+
+    /// Until something is queued.
+    pub async fn filled(&self) {
+        self.wake.notified().await;
+    }
+}
+
+impl State {
+    fn push(&mut self, chunk: Chunk) {
+        self.queued += chunk.bytes.len();
+        self.data.push_back(chunk);
+        while self.queued > MAX_QUEUED
+            && let Some(oldest) = self.data.pop_front()
+        {
+            self.queued -= oldest.bytes.len();
+            self.dropped += oldest.count;
+            let last_seq = oldest.first_seq + oldest.count.saturating_sub(1);
+            let dropped = self.gaps.entry(oldest.id).or_insert(Dropped {
+                count: 0,
+                first_seq: oldest.first_seq,
+                last_seq,
+            });
+            dropped.count += oldest.count;
+            dropped.last_seq = last_seq;
+        }
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::record::Nanos;
+    use crate::sink::tests::sample;
+
+    fn chunk(id: &str, first_seq: u64, size: usize) -> Chunk {
+        Chunk {
+            id: id.into(),
+            first_seq,
+            count: 10,
+            bytes: vec![b'x'; size].into(),
+        }
+    }
+
+    fn offer(outbox: &Outbox, chunk: &Chunk) {
+        outbox.offer(
+            &chunk.id,
+            &[],
+            &mut || vec![chunk.clone()],
+            &|_, _, _| {},
+            chunk.first_seq,
+        );
+    }
+
+    fn texts(taken: &VecDeque<Bytes>) -> Vec<String> {
+        taken
+            .iter()
+            .map(|b| String::from_utf8_lossy(b).into_owned())
+            .collect()
+    }
+
+    #[test]
+    fn the_oldest_give_way_and_are_counted_by_sensor_before_the_next_data() {
+        let outbox = Outbox::new();
+        outbox.watch(Some(Filter::default()));
+        for n in 0..20 {
+            offer(
+                &outbox,
+                &chunk(if n % 2 == 0 { "a" } else { "b" }, n / 2 * 10, 32 << 10),
+            );
+        }
+        // 8 of 32 KiB fit.
+        let level = outbox.level();
+        assert_eq!((level.queued, level.dropped), (256 << 10, 120));
+        let mut out = VecDeque::new();
+        let taken = outbox.take(usize::MAX, &mut out);
+        assert_eq!(taken, 256 << 10);
+        let said: Vec<serde_json::Value> = texts(&out)
+            .iter()
+            .filter_map(|t| serde_json::from_str(t).ok())
+            .collect();
+        assert_eq!(said.len(), 2);
+        for (gap, id) in said.iter().zip(["a", "b"]) {
+            assert_eq!(gap["class"], "GAP");
+            assert_eq!(gap["id"], id);
+            assert_eq!(gap["dropped"], 60);
+            assert_eq!(
+                (&gap["first_seq"], &gap["last_seq"]),
+                (&0.into(), &59.into())
+            );
+        }
+        // What is being written still counts.
+        offer(&outbox, &chunk("a", 100, 1));
+        assert_eq!(outbox.level().dropped, 130);
+        outbox.written(taken);
+        assert_eq!(outbox.level().queued, 0);
+    }
+
+    #[test]
+    fn replies_are_never_dropped_and_one_too_many_closes() {
+        let outbox = Outbox::new();
+        outbox.watch(Some(Filter::default()));
+        for _ in 0..100 {
+            offer(&outbox, &chunk("a", 0, 32 << 10));
+        }
+        for n in 0..MAX_CONTROL {
+            outbox.reply(Bytes::from(n.to_string()));
+            assert_eq!(outbox.full(), None, "{n}");
+        }
+        let mut out = VecDeque::new();
+        outbox.take(0, &mut out);
+        assert_eq!(
+            texts(&out)[..MAX_CONTROL],
+            (0..MAX_CONTROL).map(|n| n.to_string()).collect::<Vec<_>>()[..]
+        );
+        for _ in 0..=MAX_CONTROL {
+            outbox.reply(Bytes::new());
+        }
+        assert_eq!(outbox.full(), Some(Full::Control));
+    }
+
+    #[test]
+    fn a_client_gets_the_sensors_and_the_rate_it_asked_for() {
+        let outbox = Outbox::new();
+        outbox.watch(Some(Filter {
+            ids: Some(["a".to_owned()].into()),
+            rate_hz: Some(10.0),
+        }));
+        let samples: Vec<_> = (0..100).map(|k| sample(Nanos(k * 10_000_000))).collect();
+        for id in ["a", "b"] {
+            outbox.offer(
+                &id.into(),
+                &samples,
+                &mut || unreachable!("not all are taken"),
+                &|out, seq, _| out.extend_from_slice(format!("{id}{seq}\n").as_bytes()),
+                0,
+            );
+        }
+        let mut out = VecDeque::new();
+        outbox.take(usize::MAX, &mut out);
+        let expected: String = (0..10).map(|k| format!("a{}\n", k * 10)).collect();
+        assert_eq!(texts(&out), [expected]);
+        outbox.watch(None);
+        offer(&outbox, &chunk("a", 0, 10));
+        assert!(outbox.is_empty());
+    }
+}

@@ -1,0 +1,377 @@
+//! One line -> what it asks for; what is to be said -> one line. Pure.
+//!
+//! Samples go through the same [`LineDecoder`] as a replay of lines, attitudes through the same
+//! encoder as its output: here are only the objects of the conversation around them
+//! (`docs/protocol.md`).
+
+use super::subscriber::{Dropped, Filter, MAX_QUEUED};
+use crate::decode::{Class, Line, LineDecoder, MAX_LINE, Undecodable, printable};
+use crate::record::{Nanos, RawSample};
+use bytes::Bytes;
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+/// Version of the protocol.
+pub const PROTO: u32 = 1;
+/// Most bytes of a bad line that are repeated in the answer.
+const MAX_NEAR: usize = 64;
+/// Longest name of a sensor, in bytes.
+pub const MAX_ID: usize = 255;
+
+/// What a line asks for.
+#[derive(Debug, PartialEq)]
+pub enum Message {
+    /// Samples of one sensor: they are in the buffer given.
+    Samples(Line),
+    /// Start (or with `None` stop) the attitudes.
+    Watch(Option<Filter>),
+    /// Tell the state.
+    Poll,
+    /// Here is the token.
+    Auth(String),
+}
+
+/// What is wrong with a line.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Fault {
+    /// A name for programs.
+    pub code: &'static str,
+    /// A sentence for people.
+    pub message: String,
+    /// Byte of the line, from 1.
+    pub column: Option<u64>,
+    /// Which sensor, where one is concerned.
+    pub id: Option<String>,
+}
+
+impl Fault {
+    /// Without a place.
+    #[must_use]
+    pub fn new(code: &'static str, message: impl Into<String>) -> Fault {
+        Fault {
+            code,
+            message: message.into(),
+            ..Fault::default()
+        }
+    }
+}
+
+#[derive(Deserialize)]
+struct WatchObject {
+    #[serde(default = "yes")]
+    enable: bool,
+    streams: Option<Vec<String>>,
+    id: Option<Ids>,
+    ids: Option<Ids>,
+    rate_hz: Option<f64>,
+}
+
+#[derive(Deserialize)]
+struct AuthObject {
+    token: String,
+}
+
+/// One name or several.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Ids {
+    One(String),
+    Several(Vec<String>),
+}
+
+fn yes() -> bool {
+    true
+}
+
+/// Reads one line; samples are appended to `samples`, and only where the answer is
+/// [`Message::Samples`].
+///
+/// # Errors
+/// The [`Fault`] to answer with.
+pub fn read(
+    decoder: &LineDecoder,
+    line: &[u8],
+    received: Nanos,
+    samples: &mut Vec<RawSample>,
+) -> Result<Message, Fault> {
+    let before = samples.len();
+    let head = decoder
+        .decode(line, received, samples)
+        .map_err(|why| undecodable(&why))?;
+    let has_rate = samples
+        .get(before..)
+        .is_some_and(|new| new.iter().any(|s| s.gyro.is_some()));
+    let class = match &head.class {
+        // A sample of our own whose rate is null was one with NaN: it is counted, not passed over.
+        Class::Rate if samples.len() > before => return Ok(Message::Samples(head)),
+        Class::None | Class::Imu if has_rate => return Ok(Message::Samples(head)),
+        Class::Other(class) => Some(class.clone()),
+        Class::Att => Some("ATT".to_owned()),
+        Class::None | Class::Imu | Class::Rate => None,
+    };
+    samples.truncate(before);
+    match class.as_deref() {
+        Some("WATCH") => watch(line).map(Message::Watch),
+        Some("POLL") => Ok(Message::Poll),
+        Some("AUTH") => {
+            object::<AuthObject>(line, "bad_auth", "{\"class\":\"AUTH\",\"token\":\"...\"}")
+                .map(|auth| Message::Auth(auth.token))
+        }
+        Some(other) => Err(Fault::new(
+            "unknown_class",
+            format!("class `{other}` is none a client sends; known: RATE, WATCH, POLL, AUTH"),
+        )),
+        None => Err(Fault::new(
+            "no_rate",
+            "the line holds no body rate and no class; expected like {\"class\":\"RATE\",\"id\":\"imu0\",\"stamp\":{\"sec\":1,\"nsec\":0},\"gyro\":[0.1,0,0]}",
+        )),
+    }
+}
+
+fn object<'a, T: Deserialize<'a>>(
+    line: &'a [u8],
+    code: &'static str,
+    expected: &str,
+) -> Result<T, Fault> {
+    serde_json::from_slice(line).map_err(|why| {
+        let what = why.to_string();
+        // Its line is the first of one: the caller knows which of all it is.
+        let what = what.split(" at line ").next().unwrap_or_default();
+        Fault {
+            column: Some(why.column() as u64),
+            ..Fault::new(code, format!("{}; expected {expected}", printable(what)))
+        }
+    })
+}
+
+fn watch(line: &[u8]) -> Result<Option<Filter>, Fault> {
+    let bad = |message: String| Fault::new("bad_watch", message);
+    let asked: WatchObject = object(
+        line,
+        "bad_watch",
+        "like {\"class\":\"WATCH\",\"enable\":true,\"streams\":[\"ATT\"],\"ids\":[\"imu0\"],\"rate_hz\":50}",
+    )?;
+    if let Some(other) = asked.streams.iter().flatten().find(|s| *s != "ATT") {
+        return Err(bad(format!(
+            "there is no stream `{}`; there is: ATT",
+            printable(other)
+        )));
+    }
+    if let Some(rate_hz) = asked.rate_hz
+        && crate::sink::Decimator::new(rate_hz).is_none()
+    {
+        return Err(bad(format!("rate_hz {rate_hz} is not a rate above 0")));
+    }
+    let nothing = asked.streams.as_ref().is_some_and(Vec::is_empty);
+    Ok((asked.enable && !nothing).then(|| Filter {
+        ids: asked.ids.or(asked.id).map(|ids| match ids {
+            Ids::One(id) => [printable(&id)].into(),
+            Ids::Several(ids) => ids.iter().map(|id| printable(id)).collect(),
+        }),
+        rate_hz: asked.rate_hz,
+    }))
+}
+
+/// The fault of a line that can not be decoded.
+#[must_use]
+pub fn undecodable(why: &Undecodable) -> Fault {
+    match why {
+        Undecodable::Json { offset, what } => Fault {
+            column: Some(offset + 1),
+            ..Fault::new("bad_json", format!("{what}, at column {}", offset + 1))
+        },
+        Undecodable::LongLine { .. } => too_long(),
+        other => Fault::new("undecodable", other.to_string()),
+    }
+}
+
+/// The fault of a line that is too long.
+#[must_use]
+pub fn too_long() -> Fault {
+    Fault::new(
+        "line_too_long",
+        format!("a line of more than {MAX_LINE} bytes; it is skipped up to its end"),
+    )
+}
+
+fn line(value: &Value) -> Bytes {
+    let mut text = value.to_string();
+    text.push('\n');
+    text.into()
+}
+
+/// The greeting.
+#[must_use]
+pub fn version(session: &str) -> Bytes {
+    line(&json!({
+        "class": "VERSION", "proto": PROTO, "release": env!("CARGO_PKG_VERSION"),
+        "session": session, "max_line": MAX_LINE,
+    }))
+}
+
+/// The answer to `WATCH`.
+#[must_use]
+pub fn watching(filter: Option<&Filter>) -> Bytes {
+    let mut answer = json!({"class": "WATCH", "enable": filter.is_some()});
+    if let (Some(filter), Some(fields)) = (filter, answer.as_object_mut()) {
+        fields.insert("streams".into(), json!(["ATT"]));
+        fields.insert("queue_bytes".into(), json!(MAX_QUEUED));
+        fields.insert("policy".into(), json!("drop_oldest"));
+        if let Some(ids) = &filter.ids {
+            fields.insert("ids".into(), json!(ids));
+        }
+        if let Some(rate_hz) = filter.rate_hz {
+            fields.insert("rate_hz".into(), json!(rate_hz));
+        }
+    }
+    line(&answer)
+}
+
+/// The notice that attitudes of `id` were dropped.
+#[must_use]
+pub fn gap(id: &str, dropped: &Dropped) -> Bytes {
+    line(&json!({
+        "class": "GAP", "id": id, "dropped": dropped.count,
+        "first_seq": dropped.first_seq, "last_seq": dropped.last_seq,
+    }))
+}
+
+/// The state; `fields` are those of the hub.
+#[must_use]
+pub fn status(fields: Value) -> Bytes {
+    let mut fields = fields;
+    if let Some(object) = fields.as_object_mut() {
+        object.insert("class".into(), json!("STATUS"));
+    }
+    line(&fields)
+}
+
+/// What was wrong: with line `number` (0 = none), which begins like `near`; `suppressed` more were
+/// not said since the last.
+#[must_use]
+pub fn error(fault: &Fault, number: u64, near: &[u8], suppressed: u64) -> Bytes {
+    let mut answer = json!({"class": "ERROR", "code": fault.code, "message": fault.message});
+    if let Some(fields) = answer.as_object_mut() {
+        if let Some(id) = &fault.id {
+            fields.insert("id".into(), json!(id));
+        }
+        if number > 0 {
+            fields.insert("line".into(), json!(number));
+        }
+        if let Some(column) = fault.column {
+            fields.insert("column".into(), json!(column));
+        }
+        if !near.is_empty() {
+            fields.insert("near".into(), json!(snippet(near)));
+        }
+        if suppressed > 0 {
+            fields.insert("suppressed".into(), json!(suppressed));
+        }
+    }
+    line(&answer)
+}
+
+/// The beginning of a hostile line, fit for a terminal: at most 64 bytes.
+#[must_use]
+pub fn snippet(bytes: &[u8]) -> String {
+    let head = bytes.get(..bytes.len().min(MAX_NEAR)).unwrap_or_default();
+    let mut out = String::new();
+    for c in String::from_utf8_lossy(head).chars() {
+        let escaped = printable(c.encode_utf8(&mut [0; 4]));
+        if out.len() + escaped.len() > MAX_NEAR {
+            break;
+        }
+        out.push_str(&escaped);
+    }
+    out
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    fn ask(text: &str) -> Result<Message, Fault> {
+        let mut samples = Vec::new();
+        let read = read(
+            &LineDecoder::default(),
+            text.as_bytes(),
+            Nanos(7),
+            &mut samples,
+        );
+        let is_sample = matches!(read, Ok(Message::Samples(_)));
+        assert_eq!(is_sample, !samples.is_empty(), "{text}: {samples:?}");
+        read
+    }
+
+    #[test]
+    fn a_line_is_a_sample_or_a_request_or_a_fault() {
+        for text in [
+            r#"{"class":"RATE","gyro":[1,2,3],"stamp":{"sec":1,"nsec":0}}"#,
+            r#"{"class":"RATE","gyro":null}"#,
+            r#"{"gyro":[1,2,3]}"#,
+            r#"{"class":"IMU","gyro_x":1,"gyro_y":2,"gyro_z":3}"#,
+        ] {
+            assert!(matches!(ask(text), Ok(Message::Samples(_))), "{text}");
+        }
+        assert_eq!(ask(r#"{"class":"POLL"}"#), Ok(Message::Poll));
+        assert_eq!(
+            ask(r#"{"class":"AUTH","token":"x"}"#),
+            Ok(Message::Auth("x".to_owned()))
+        );
+        for (text, code) in [
+            (
+                r#"{"class":"ATT","rate":[1,2,3],"q":{"w":1,"x":0,"y":0,"z":0}}"#,
+                "unknown_class",
+            ),
+            (r#"{"class":"EXEC"}"#, "unknown_class"),
+            (r#"{"a":1}"#, "no_rate"),
+            (r#"{"class":"AUTH"}"#, "bad_auth"),
+            (r#"{"class":"WATCH","streams":["POSE"]}"#, "bad_watch"),
+            (r#"{"class":"WATCH","rate_hz":0}"#, "bad_watch"),
+            (r#"{"class":"WATCH","rate_hz":"fast"}"#, "bad_watch"),
+            ("nonsense", "bad_json"),
+        ] {
+            assert_eq!(ask(text).unwrap_err().code, code, "{text}");
+        }
+    }
+
+    #[test]
+    fn watch_names_sensors_and_rate_and_can_be_ended() {
+        let filter = |text: &str| match ask(text) {
+            Ok(Message::Watch(filter)) => filter,
+            other => unreachable!("{other:?}"),
+        };
+        assert_eq!(filter(r#"{"class":"WATCH"}"#), Some(Filter::default()));
+        assert_eq!(filter(r#"{"class":"WATCH","enable":false}"#), None);
+        assert_eq!(filter(r#"{"class":"WATCH","streams":[]}"#), None);
+        assert_eq!(
+            filter(r#"{"class":"WATCH","id":"a","rate_hz":50,"from":"now","x":[]}"#),
+            Some(Filter {
+                ids: Some(["a".to_owned()].into()),
+                rate_hz: Some(50.0)
+            })
+        );
+    }
+
+    #[test]
+    fn a_fault_names_its_line_and_column_and_repeats_little_of_it() {
+        let bad = b"{\"class\":\"RATE\" \"gyro\":1}\x1b[31m";
+        let mut none = Vec::new();
+        let fault = read(&LineDecoder::default(), bad, Nanos(0), &mut none).unwrap_err();
+        let said: Value = serde_json::from_slice(&error(&fault, 42, bad, 3)).unwrap();
+        assert_eq!(said["class"], "ERROR");
+        assert_eq!(said["code"], "bad_json");
+        assert_eq!(said["line"], 42);
+        assert_eq!(said["column"], 17);
+        assert_eq!(said["suppressed"], 3);
+        assert!(!said["near"].as_str().unwrap().contains('\x1b'));
+        for hostile in [
+            vec![0x1b; 70_000],
+            vec![0xff; 100],
+            "é\u{202e}".repeat(99).into_bytes(),
+        ] {
+            assert!(snippet(&hostile).len() <= MAX_NEAR);
+        }
+    }
+}

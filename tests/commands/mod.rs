@@ -1,0 +1,69 @@
+//! The binary, run in a directory, and how it ended.
+#![allow(dead_code, unreachable_pub, clippy::unwrap_used, clippy::expect_used)]
+
+use std::path::Path;
+
+/// How a command ended.
+#[derive(Debug)]
+pub struct Ran {
+    pub code: Option<i32>,
+    pub out: String,
+    pub err: String,
+}
+
+/// `strapd` in `dir` with these arguments, split at spaces, and this on its standard input.
+pub fn strapd_fed(dir: &Path, arguments: &str, stdin: impl Into<Vec<u8>>) -> Ran {
+    let output = assert_cmd::Command::cargo_bin("strapd")
+        .unwrap()
+        .current_dir(dir)
+        // The user's own settings must not decide a test.
+        .env_remove("STRAPD_TIME")
+        .env_remove("STRAPD_SAMPLE_KIND")
+        .env_remove("STRAPD_LOG")
+        .env("NO_COLOR", "1")
+        .args(arguments.split_whitespace())
+        .write_stdin(stdin)
+        .timeout(std::time::Duration::from_secs(120))
+        .output()
+        .unwrap();
+    Ran {
+        code: output.status.code(),
+        out: String::from_utf8(output.stdout).unwrap(),
+        err: String::from_utf8(output.stderr).unwrap(),
+    }
+}
+
+pub fn strapd(dir: &Path, arguments: &str) -> Ran {
+    strapd_fed(dir, arguments, "")
+}
+
+impl Ran {
+    #[track_caller]
+    pub fn done(&self) -> &Ran {
+        assert_eq!(self.code, Some(0), "{self:?}");
+        self
+    }
+
+    /// Ended with `code` and an error that says each of these.
+    #[track_caller]
+    pub fn refused(&self, code: i32, words: &[&str]) {
+        assert_eq!(self.code, Some(code), "{self:?}");
+        assert!(self.err.contains("error: "), "{self:?}");
+        assert!(!self.err.contains("panicked"), "{self:?}");
+        for word in words {
+            assert!(self.err.contains(word), "`{word}` is missing: {}", self.err);
+        }
+    }
+
+    #[track_caller]
+    pub fn json(&self) -> serde_json::Value {
+        serde_json::from_str(&self.done().out).unwrap_or_else(|e| panic!("{e}: {self:?}"))
+    }
+
+    /// One JSON object a line.
+    #[track_caller]
+    pub fn lines(&self) -> Vec<serde_json::Value> {
+        let read = |line| serde_json::from_str(line).unwrap_or_else(|e| panic!("{e}: {line}"));
+        self.out.lines().map(read).collect()
+    }
+}

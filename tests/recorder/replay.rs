@@ -1,0 +1,158 @@
+//! What was recorded replays to the attitude of what was received; and what recording costs in size.
+
+use super::{assert_whole, attitude, sample};
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+use strapd::config::Plan;
+use strapd::pipeline::log::Log;
+use strapd::pipeline::pool::Pool;
+use strapd::pipeline::replay::run;
+use strapd::pipeline::route::{Item, Route};
+use strapd::pipeline::run::{Replay, Source};
+use strapd::record::RawSample;
+use strapd::serve::recorder::{Recorder, Settings};
+use strapd::sink::{Options, Target};
+use strapd::source::mcap::{WalkOptions, walk};
+
+/// The samples of a fixture, decoded as `replay` decodes them.
+fn samples(path: &Path) -> Vec<RawSample> {
+    let log = Log::open(path, &Pool::new(1).unwrap()).unwrap();
+    let topic = log.choose(path, None).unwrap().topics.remove(0);
+    let known = log
+        .channels
+        .iter()
+        .find(|k| k.channel.topic == topic)
+        .unwrap();
+    let decoder = known.decoder(&Default::default()).unwrap();
+    let mut all = Vec::new();
+    walk(
+        log.reader().unwrap(),
+        &WalkOptions::default(),
+        |channel| (channel.topic == topic).then(|| Route::samples(decoder.clone(), 0)),
+        Route::map,
+        |items| {
+            for item in items.drain(..) {
+                if let Item::Sample(_, raw) = item {
+                    all.push(raw);
+                }
+            }
+            ControlFlow::Continue(())
+        },
+    )
+    .unwrap();
+    all
+}
+
+/// The lines of the NDJSON a replay of `path` gives, without what names the stream.
+fn attitudes(path: &Path, topic: Option<&str>, out: &Path) -> Vec<serde_json::Value> {
+    let replay = Replay {
+        source: Source::File(path.to_owned()),
+        targets: vec![Target::parse(out.to_str().unwrap()).unwrap()],
+        plan: Plan {
+            topic: topic.map(str::to_owned),
+            ..Plan::default()
+        },
+        options: Options {
+            force: true,
+            ..Options::default()
+        },
+        copy_input: false,
+        out_rate: None,
+        speed: None,
+        against: None,
+        command: "test".to_owned(),
+    };
+    run(&replay, &Pool::new(1).unwrap(), &mut |_| {}).unwrap();
+    std::fs::read_to_string(out)
+        .unwrap()
+        .lines()
+        .map(|line| {
+            let mut line: serde_json::Value = serde_json::from_str(line).unwrap();
+            line.as_object_mut().unwrap().remove("id");
+            line
+        })
+        .collect()
+}
+
+#[test]
+fn a_recording_replays_to_the_same_attitude_bit_for_bit() {
+    let dir = tempfile::tempdir().unwrap();
+    for name in ["xsens_mti.mcap", "ximu3.mcap", "coning_jitter.mcap"] {
+        let fixture = PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+            .join("fixtures")
+            .join(name);
+        let path = dir.path().join(name);
+        let mut settings = Settings::new(&path);
+        settings.min_free = 0;
+        settings.flush_every = Duration::from_millis(1);
+        let recorder = Recorder::start(settings).unwrap();
+        let (handle, id) = (recorder.handle(), Arc::from("imu"));
+        let samples = samples(&fixture);
+        assert!(samples.len() > 400, "{name}");
+        for (k, batch) in samples.chunks(7).enumerate() {
+            handle.input(&id, batch.to_vec());
+            // Other attitudes than a replay gives: they must not be taken for samples.
+            let made = batch.iter().map(|_| attitude(&sample(0, 200))).collect();
+            handle.attitude(&id, 7 * k as u64, made);
+        }
+        let status = recorder.finish();
+        assert!(!status.is_lossy(), "{name}: {status:?}");
+        assert_eq!(status.samples, samples.len() as u64);
+        assert_whole(&path);
+        let out = dir.path().join("out.ndjson");
+        // The recording holds two Imu topics, the samples and the attitudes made of them live.
+        let expected = attitudes(&fixture, None, &out);
+        let found = attitudes(&path, Some(super::RAW), &out);
+        assert_eq!(found.len(), expected.len(), "{name}");
+        assert!(
+            found == expected,
+            "{name}: {} and {}",
+            expected[9],
+            found[9]
+        );
+    }
+}
+
+#[test]
+fn a_chunk_every_two_hundred_milliseconds_costs_half_a_kilobyte_each() {
+    // By the clock of the data, not of the wall: the recorder is given a chunk's worth of samples and
+    // as long as it wants to write them.
+    let dir = tempfile::tempdir().unwrap();
+    let size = |rate_hz: u64, per_chunk: u64| {
+        let path = dir.path().join(format!("{rate_hz}-{per_chunk}.mcap"));
+        let provenance = Default::default();
+        let mut live = strapd::sink::LiveMcap::new(Default::default(), &provenance).unwrap();
+        let stream = live
+            .stream(&strapd::serve::recorder::stream_of("imu"))
+            .unwrap();
+        let mut bytes = 0;
+        for k in 0..60 * rate_hz {
+            let raw = sample(k, rate_hz);
+            live.input(stream, k, &raw);
+            live.attitude(stream, k, &attitude(&raw));
+            if (k + 1) % per_chunk == 0 {
+                bytes += live.seal(&path).unwrap().len();
+                live.booked();
+            }
+        }
+        bytes += live.seal(&path).unwrap().len();
+        live.booked();
+        (bytes + live.closings()[0].len()) as f64
+    };
+    // The default of others' writers: chunks of 1 MiB, here 1380 samples of 760 bytes.
+    for rate_hz in [200, 1000] {
+        let (often, seldom) = (size(rate_hz, rate_hz / 5), size(rate_hz, 1380));
+        let more_chunks = (300 - 60 * rate_hz / 1380) as f64;
+        let each = (often - seldom) / more_chunks;
+        let percent = 100.0 * (often / seldom - 1.0);
+        eprintln!("{rate_hz} Hz: {each:.0} bytes a chunk, {percent:.2} % in all");
+        // Heads, index and the first message, which the compressor has seen nothing like: the same at
+        // any rate, so it is a share of the size that falls with the rate.
+        assert!(
+            (100.0..=512.0).contains(&each),
+            "{rate_hz} Hz: {each} bytes a chunk"
+        );
+    }
+}

@@ -1,0 +1,24 @@
+//! Promise: what goes in over a socket comes out as attitude over a socket, the same bits as from a
+//! file; what is wrong is answered, counted and never stops anybody else (service.md 6).
+//!
+//! Real sockets on loopback, port 0, every wait bounded.
+
+#![cfg(all(feature = "service", unix))]
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
+mod made_logs;
+mod serve {
+    pub(crate) mod client;
+    pub(crate) mod daemon;
+
+    mod admission;
+    mod bad_lines;
+    mod config;
+    mod documentation;
+    mod limits;
+    mod operations;
+    mod recording;
+    mod same_bytes;
+    mod slow_readers;
+    mod transports;
+}

@@ -1,0 +1,280 @@
+//! Who may come in (service.md X1 to X4).
+
+use super::client::{Client, get, rate};
+use super::daemon::{Daemon, TCP, UDP, WS, listening, strapd};
+use std::net::IpAddr;
+use std::os::unix::fs::PermissionsExt;
+use std::process::Command;
+use strapd::serve::admission::{Token, Web};
+
+const SECRET: &str = "correct horse battery";
+
+#[test]
+fn hosts_and_origins_are_admitted_by_list_in_every_combination() {
+    let web = Web {
+        hosts: vec!["robot.local".to_owned(), "lab.example:8765".to_owned()],
+        origins: vec!["https://viewer.example".to_owned()],
+    };
+    let bound: IpAddr = [192, 168, 1, 7].into();
+    let good_hosts = [
+        "localhost",
+        "127.0.0.1",
+        "[::1]",
+        "LOCALHOST",
+        "192.168.1.7",
+        "robot.local",
+    ];
+    let bad_hosts = [
+        "evil.example",
+        "localhost.evil.example",
+        "127.0.0.1.evil.example",
+        "robot.local.evil",
+        "xrobot.local",
+        "192.168.1.8",
+        "127.0.0.2",
+        "0.0.0.0",
+        "",
+        "[::1",
+        "[::2]",
+        "localhost:80:80",
+        "localhost:",
+        "localhost:8x",
+        "localhost@evil.example",
+        "127.1",
+        "lab.example",
+        "lab.example:1",
+        "?",
+    ];
+    let ports = ["", ":8765", ":80"];
+    let mut pairs = 0;
+    let mut check = |host: &str, origin: Option<&str>, allowed: bool| {
+        pairs += 1;
+        assert_eq!(
+            web.admit(bound, Some(host), origin).is_ok(),
+            allowed,
+            "Host {host}, Origin {origin:?}"
+        );
+    };
+    let hosts = good_hosts
+        .iter()
+        .flat_map(|h| ports.iter().map(move |p| (format!("{h}{p}"), true)))
+        .chain([("lab.example:8765".to_owned(), true)])
+        .chain(bad_hosts.iter().map(|h| ((*h).to_owned(), false)));
+    for (host, is_ours) in hosts {
+        check(&host, None, is_ours);
+        check(&host, Some("https://viewer.example"), is_ours);
+        for scheme in ["http", "https"] {
+            check(&host, Some(&format!("{scheme}://{host}")), is_ours);
+        }
+        for origin in [
+            "null",
+            "",
+            "file://",
+            "https://evil.example",
+            "http://viewer.example",
+            "https://viewer.example.evil",
+            "https://viewer.example:8443",
+            "http://localhost:1",
+            "http://127.0.0.1:9999",
+            "ftp://localhost",
+            "chrome-extension://abc",
+        ] {
+            check(&host, Some(origin), false);
+        }
+        check(&host, Some(&format!("http://{host}.evil")), false);
+        check(&host, Some(&format!("http://evil@{host}")), false);
+        check(&host, Some(&format!("gopher://{host}")), false);
+    }
+    assert!(pairs > 600, "{pairs}");
+    assert!(web.admit(bound, None, None).is_err(), "no Host at all");
+    // Bound to every address, the address is none of ours by itself.
+    assert!(
+        Web::default()
+            .admit([0, 0, 0, 0].into(), Some("0.0.0.0"), None)
+            .is_err()
+    );
+}
+
+#[test]
+fn a_page_from_elsewhere_gets_neither_numbers_nor_a_web_socket() {
+    let daemon = Daemon::start(listening(&[WS]));
+    let address = daemon.address(0);
+    let host = address.to_string();
+    let upgrade = [
+        ("Upgrade", "websocket"),
+        ("Sec-WebSocket-Version", "13"),
+        ("Sec-WebSocket-Key", "dGhlIHNhbXBsZSBub25jZQ=="),
+    ];
+    for path in ["/healthz", "/metrics", "/ws", "/"] {
+        // A rebound name, a foreign page, two Hosts, none.
+        for headers in [
+            vec![("Host", "evil.example")],
+            vec![("Host", &*host), ("Origin", "https://evil.example")],
+            vec![("Host", &*host), ("Origin", "null")],
+            vec![("Host", &*host), ("Host", "localhost")],
+            vec![],
+        ] {
+            let headers: Vec<_> = headers.into_iter().chain(upgrade).collect();
+            let (status, body) = get(address, path, &headers);
+            assert!(
+                matches!(status, 400 | 403),
+                "{path} {headers:?}: {status} {body}"
+            );
+        }
+    }
+    let (status, body) = get(address, "/healthz", &[("Host", &host)]);
+    assert_eq!((status, &*body), (200, "ok\n"));
+    let (status, _) = get(address, "/ws", &[("Host", &host)]);
+    assert_eq!(status, 426);
+    let (status, _) = get(address, "/../etc/passwd", &[("Host", &host)]);
+    assert_eq!(status, 404);
+    // A page served from here would have this origin.
+    let origin = format!("http://{host}");
+    let (status, _) = get(address, "/metrics", &[("Host", &host), ("Origin", &origin)]);
+    assert_eq!(status, 200);
+}
+
+fn guarded() -> Daemon {
+    let mut settings = listening(&[TCP, WS, UDP]);
+    settings.token = Some(Token::new(SECRET));
+    Daemon::start(settings)
+}
+
+#[test]
+fn nobody_is_heard_before_the_token() {
+    let daemon = guarded();
+    let auth = format!("{{\"class\":\"AUTH\",\"token\":\"{SECRET}\"}}");
+    let mut right = Client::tcp(daemon.address(0));
+    right.send(&auth);
+    let mut right = right.watching("{\"class\":\"WATCH\"}");
+    for first in [
+        "{\"class\":\"WATCH\"}".to_owned(),
+        "{\"class\":\"POLL\"}".to_owned(),
+        rate("evil", 0, 1.0),
+        "{\"class\":\"AUTH\",\"token\":\"correct horse batterY\"}".to_owned(),
+        "{\"class\":\"AUTH\"}".to_owned(),
+        "garbage".to_owned(),
+    ] {
+        for mut client in [
+            Client::tcp(daemon.address(0)),
+            Client::web(daemon.address(1)),
+        ] {
+            client.object("VERSION");
+            client.send(&first);
+            let said = client.object("ERROR");
+            assert!(
+                ["unauthorised", "too_many_attempts"].contains(&said["code"].as_str().unwrap()),
+                "{first}: {said}"
+            );
+            assert!(!said.to_string().contains("horse"), "{said}");
+            assert_eq!(client.line(), None, "{first}");
+        }
+    }
+    let mut udp = Client::udp(daemon.address(2));
+    udp.send(&rate("evil", 0, 1.0));
+    right.send(&rate("good", 0, 1.0));
+    assert_eq!(right.object("ATT")["id"], "good");
+    let status = daemon.status();
+    assert_eq!(status["sources"].as_array().unwrap().len(), 1, "{status}");
+}
+
+#[test]
+fn over_http_the_token_is_a_bearer() {
+    let daemon = guarded();
+    let host = daemon.address(1).to_string();
+    let ask = |path: &str, token: Option<&str>| {
+        let bearer = token.map(|t| format!("Bearer {t}"));
+        let mut headers = vec![("Host", &*host)];
+        headers.extend(bearer.as_deref().map(|b| ("Authorization", b)));
+        get(daemon.address(1), path, &headers).0
+    };
+    assert_eq!(ask("/healthz", None), 200);
+    assert_eq!(ask("/metrics", None), 401);
+    assert_eq!(ask("/metrics", Some(SECRET)), 200);
+    assert_eq!(ask("/metrics", Some("wrong")), 401);
+}
+
+#[test]
+fn tokens_can_not_be_tried_fast() {
+    let token = Token::new(SECRET);
+    let start = std::time::Instant::now();
+    let code = |shown: &str, at: u64| {
+        token
+            .judge(shown, start + std::time::Duration::from_secs(at))
+            .err()
+            .map(|fault| fault.code)
+    };
+    assert_eq!(code(SECRET, 0), None);
+    for _ in 0..5 {
+        assert_eq!(code("wrong", 0), Some("unauthorised"));
+    }
+    assert_eq!(code("wrong", 0), Some("too_many_attempts"));
+    assert_eq!(
+        code(SECRET, 0),
+        Some("too_many_attempts"),
+        "the answer tells nothing"
+    );
+    assert_eq!(code(SECRET, 2), None);
+}
+
+/// What `strapd serve ARGS`, which must not start, says and ends with.
+fn refused(args: &[&str]) -> (Option<i32>, String) {
+    let output = Command::new(strapd())
+        .arg("serve")
+        .args(args)
+        .output()
+        .unwrap();
+    (
+        output.status.code(),
+        String::from_utf8(output.stderr).unwrap(),
+    )
+}
+
+#[test]
+fn an_address_others_can_reach_needs_a_token() {
+    for uri in [
+        "tcp-listen://0.0.0.0:0",
+        "ws-listen://0.0.0.0:0",
+        "udp-listen://0.0.0.0:0",
+        "tcp-listen://[::]:0",
+    ] {
+        let (code, said) = refused(&["--listen", uri]);
+        assert_eq!(code, Some(2), "{uri}: {said}");
+        assert!(said.contains("--allow-insecure-remote"), "{said}");
+    }
+    for (uri, guarded) in [
+        ("tcp-listen://0.0.0.0:0", true),
+        ("udp-listen://0.0.0.0:0", false),
+    ] {
+        let mut settings = listening(&[uri]);
+        settings.token = Some(Token::new(SECRET));
+        let bound = tokio::runtime::Builder::new_current_thread()
+            .enable_all()
+            .build()
+            .unwrap()
+            .block_on(strapd::serve::Server::bind(settings));
+        assert_eq!(bound.is_ok(), guarded, "{uri}");
+    }
+}
+
+#[test]
+fn a_token_file_others_can_read_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("token");
+    for (mode, text, complaint) in [
+        (0o644, SECRET, "chmod 600"),
+        (0o640, SECRET, "chmod 600"),
+        (0o600, "short\n", "at least 16"),
+        (0o600, "", "at least 16"),
+    ] {
+        std::fs::write(&path, text).unwrap();
+        std::fs::set_permissions(&path, std::fs::Permissions::from_mode(mode)).unwrap();
+        let (code, said) = refused(&["--token-file", path.to_str().unwrap(), "--listen", TCP]);
+        assert_eq!(code, Some(2), "{mode:o}: {said}");
+        assert!(said.contains(complaint), "{said}");
+        assert!(text.is_empty() || !said.contains(text.trim()), "{said}");
+    }
+    let missing = dir.path().join("none");
+    let (code, _) = refused(&["--token-file", missing.to_str().unwrap(), "--listen", TCP]);
+    assert_eq!(code, Some(1));
+}

@@ -1,0 +1,229 @@
+//! What is wrong is answered with line and column, counted, and stops nobody (service.md I4, T6).
+
+use super::client::{Client, rate};
+use super::daemon::{Daemon, eventually};
+use serde_json::{Value, json};
+
+/// The state of one sensor, once it has taken `samples` samples.
+fn source(daemon: &Daemon, id: &str, samples: u64) -> Value {
+    let mut found = Value::Null;
+    eventually(&format!("{samples} samples of {id}"), || {
+        let status = daemon.status();
+        let sources = status["sources"].as_array().unwrap();
+        found = sources
+            .iter()
+            .find(|s| s["id"] == id)
+            .cloned()
+            .unwrap_or_default();
+        found["samples"] == samples
+    });
+    found
+}
+
+#[test]
+fn a_bad_line_is_answered_with_its_place_and_the_next_one_counts() {
+    let daemon = Daemon::tcp();
+    let mut client = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");
+    client.send(&rate("a", 0, 1.0));
+    client.object("ATT");
+    // Line 1 was WATCH, line 2 the sample.
+    for (number, (line, code, column)) in (3..).zip([
+        ("{\"class\":\"RATE\" \"gyro\":1}", "bad_json", json!(17)),
+        ("nonsense\x1b[31m", "bad_json", json!(1)),
+        ("{\"a\":1}", "no_rate", Value::Null),
+        (
+            "{\"class\":\"WATCH\",\"rate_hz\":-1}",
+            "bad_watch",
+            Value::Null,
+        ),
+        ("{\"class\":\"AUTH\",\"token\":7}", "bad_auth", json!(25)),
+    ]) {
+        client.send(line);
+        let error = client.object("ERROR");
+        assert_eq!(error["code"], code, "{error}");
+        assert_eq!(error["line"], number, "{error}");
+        assert_eq!(error["column"], column, "{error}");
+        assert!(error["near"].as_str().unwrap().len() <= 64, "{error}");
+        assert!(!error["near"].as_str().unwrap().contains('\x1b'), "{error}");
+    }
+    client.send(&rate("a", 1, 1.0));
+    let att = client.object("ATT");
+    assert_eq!(att["seq"], 1);
+    assert_eq!(att["status"], json!(["rejected-before", "provisional"]));
+    assert_eq!(source(&daemon, "a", 7)["counts"]["undecodable"], 5);
+}
+
+#[test]
+fn a_line_that_is_too_long_is_answered_once_and_skipped_to_its_end() {
+    let daemon = Daemon::tcp();
+    let mut client = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");
+    let padded = |length: usize| {
+        let line = rate("a", 0, 1.0);
+        format!("{line}{}", " ".repeat(length - line.len()))
+    };
+    client.send(&padded(64 << 10));
+    client.object("ATT");
+    client.send(&padded((64 << 10) + 1));
+    client.send(&"x".repeat(1 << 20));
+    client.send(&rate("a", 1, 1.0));
+    for line in [3, 4] {
+        let error = client.object("ERROR");
+        assert_eq!(
+            (&error["code"], &error["line"]),
+            (&json!("line_too_long"), &json!(line))
+        );
+    }
+    assert_eq!(client.object("ATT")["seq"], 1);
+}
+
+#[test]
+fn twenty_one_bad_lines_in_a_row_close_the_connection_with_a_reason() {
+    let daemon = Daemon::tcp();
+    let mut patient = Client::tcp(daemon.address(0));
+    patient.object("VERSION");
+    for round in 0..3 {
+        for _ in 0..20 {
+            patient.send("x");
+            assert_eq!(patient.object("ERROR")["code"], "bad_json");
+        }
+        // One good line makes up for twenty bad ones.
+        patient.send(&rate("a", round, 1.0));
+    }
+    // ... and what repeats is thinned: 64 were said, so these may not be.
+    let mut other = Client::tcp(daemon.address(0));
+    other.send_bytes(&b"x\n".repeat(500));
+    let said = other.rest();
+    assert_eq!(said.len(), 1 + 21 + 1, "greeting, errors, reason");
+    assert_eq!(said.last().unwrap()["code"], "too_many_errors");
+    eventually("the close to be counted", || {
+        daemon.status()["counters"]["connections_closed"] == 1
+    });
+    patient.send("{\"class\":\"POLL\"}");
+    patient.next_of("STATUS");
+}
+
+#[test]
+fn an_unknown_class_is_said_once_and_held_against_nobody() {
+    let daemon = Daemon::tcp();
+    let mut client = Client::tcp(daemon.address(0));
+    client.object("VERSION");
+    for _ in 0..50 {
+        client.send("{\"class\":\"TPV\",\"lat\":48.1}");
+    }
+    client.send("{\"class\":\"POLL\"}");
+    assert_eq!(client.object("ERROR")["code"], "unknown_class");
+    assert_eq!(client.object("STATUS")["class"], "STATUS");
+}
+
+#[test]
+fn bad_samples_follow_the_rules_of_conditioning_and_are_said_once_each() {
+    let daemon = Daemon::tcp();
+    let mut client = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");
+    let at = |n: u64, gyro: &str| {
+        format!(
+            "{{\"class\":\"RATE\",\"id\":\"a\",\"stamp\":{{\"sec\":9,\"nsec\":{}}},\"gyro\":{gyro}}}",
+            n * 1_000_000
+        )
+    };
+    let good = "[0.1,0,0]";
+    for line in [
+        at(0, good),
+        at(1, "null"),
+        at(2, "[NaN,0,0]"),
+        at(3, "[1e300,0,0]"),
+        at(4, good),
+        at(4, good),
+        at(5, good),
+        at(2, "[0.2,0,0]"),
+        "{\"class\":\"RATE\",\"id\":\"a\",\"gyro\":[0.1,0,0]}".to_owned(),
+        at(6, good),
+        at(6, "[NaN,0,0]"),
+        // A second later: held, not turned through.
+        at(999, good),
+    ] {
+        client.send(&line);
+    }
+    client.send("{\"class\":\"POLL\"}");
+    let mut attitudes = Vec::new();
+    let mut errors = Vec::new();
+    let mut status = Value::Null;
+    // Replies overtake attitudes.
+    while status.is_null() || attitudes.len() < 5 {
+        let value: Value = serde_json::from_str(&client.line().unwrap()).unwrap();
+        match value["class"].as_str().unwrap() {
+            "ATT" => attitudes.push(value),
+            "ERROR" => errors.push(value["code"].as_str().unwrap().to_owned()),
+            _ => status = value,
+        }
+    }
+    errors.sort();
+    assert_eq!(
+        errors,
+        ["huge", "late", "no_gyro", "no_stamp", "not_finite"]
+    );
+    let source = &status["sources"][0];
+    assert_eq!(
+        source["counts"],
+        json!({"accepted": 5, "huge": 1, "late": 1, "no_gyro": 1, "no_stamp": 1, "not_finite": 2, "repeated": 1})
+    );
+    assert_eq!(source["lost"], 6);
+    assert_eq!(source["not_bridged"], 1);
+    assert_eq!(source["reset"], 1);
+    let stamps: Vec<u64> = attitudes
+        .iter()
+        .map(|a| a["stamp"]["nsec"].as_u64().unwrap() / 1_000_000)
+        .collect();
+    assert_eq!(stamps, [0, 4, 5, 6, 999]);
+    let last = attitudes.last().unwrap();
+    assert!(last["status"].to_string().contains("held"), "{last}");
+    // A tenth of a radian a second for six milliseconds, and nothing across the gap.
+    let x = last["q"]["x"].as_f64().unwrap();
+    assert!((x - 0.3e-3_f64.sin()).abs() < 1e-15, "{last}");
+}
+
+#[test]
+fn lines_in_single_bytes_count_as_lines() {
+    let daemon = Daemon::tcp();
+    let mut client = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");
+    for n in 0..3 {
+        for byte in format!("{}\r\n", rate("é", n, 1.0)).as_bytes() {
+            client.send_bytes(std::slice::from_ref(byte));
+        }
+        assert_eq!(client.object("ATT")["seq"], n);
+    }
+}
+
+#[test]
+fn two_connections_never_feed_one_attitude_and_the_second_takes_over_from_one_that_left() {
+    let daemon = Daemon::tcp();
+    let mut watcher = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");
+    let mut first = Client::tcp(daemon.address(0));
+    first.send(&rate("a", 0, 1.0));
+    watcher.object("ATT");
+    let mut second = Client::tcp(daemon.address(0));
+    second.object("VERSION");
+    second.send(&rate("a", 1, 9.0));
+    assert_eq!(second.object("ERROR")["code"], "id_in_use");
+    second.send(&rate("b", 0, 1.0));
+    assert_eq!(watcher.object("ATT")["id"], "b");
+    drop(first);
+    eventually("the first to leave", || daemon.hub.connected() == 2);
+    second.send(&rate("a", 2, 1.0));
+    let att = watcher.object("ATT");
+    assert_eq!((&att["id"], &att["seq"]), (&json!("a"), &json!(1)));
+    assert_eq!(daemon.status()["counters"]["samples_refused"], 1);
+}
+
+#[test]
+fn a_sensor_that_changes_its_meaning_is_refused_and_missing_numbers_are_counted() {
+    let daemon = Daemon::tcp();
+    let mut client = Client::tcp(daemon.address(0));
+    client.object("VERSION");
+    client.send(&rate("a", 0, 1.0));
+    client.send(&rate("a", 5, 1.0));
+    client.send("{\"class\":\"RATE\",\"id\":\"a\",\"sample_kind\":\"delta-angle\",\"stamp\":{\"sec\":1700000000,\"nsec\":6000000},\"gyro\":[1,0,0]}");
+    assert_eq!(client.object("ERROR")["code"], "meaning_changed");
+    let source = source(&daemon, "a", 2);
+    assert_eq!(source["missing"], 4);
+    assert_eq!(source["sample_kind"], "rate");
+}

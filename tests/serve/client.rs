@@ -1,0 +1,189 @@
+//! Clients that read with patience and no more.
+
+use super::daemon::PATIENCE;
+use serde_json::Value;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::{SocketAddr, TcpStream, UdpSocket};
+use std::os::unix::net::UnixStream;
+use std::path::Path;
+use tungstenite::stream::MaybeTlsStream;
+use tungstenite::{Message, WebSocket};
+
+/// Somebody at the other end of a socket.
+pub(crate) struct Client {
+    link: Link,
+}
+
+enum Link {
+    Tcp(BufReader<TcpStream>),
+    Unix(BufReader<UnixStream>),
+    Web(Box<WebSocket<MaybeTlsStream<TcpStream>>>),
+    Udp(UdpSocket),
+}
+
+impl Client {
+    pub(crate) fn tcp(address: SocketAddr) -> Client {
+        let stream = TcpStream::connect(address).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        stream.set_nodelay(true).unwrap();
+        Client {
+            link: Link::Tcp(BufReader::new(stream)),
+        }
+    }
+
+    pub(crate) fn unix(path: &Path) -> Client {
+        let stream = UnixStream::connect(path).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        Client {
+            link: Link::Unix(BufReader::new(stream)),
+        }
+    }
+
+    pub(crate) fn web(address: SocketAddr) -> Client {
+        let stream = TcpStream::connect(address).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        let (socket, _) =
+            tungstenite::client(format!("ws://{address}/ws"), MaybeTlsStream::Plain(stream))
+                .unwrap();
+        Client {
+            link: Link::Web(Box::new(socket)),
+        }
+    }
+
+    /// Sends only.
+    pub(crate) fn udp(address: SocketAddr) -> Client {
+        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+        socket.connect(address).unwrap();
+        Client {
+            link: Link::Udp(socket),
+        }
+    }
+
+    /// Greeted, watching what `request` says.
+    pub(crate) fn watching(mut self, request: &str) -> Client {
+        self.send(request);
+        let answer = self.next_of("WATCH");
+        assert_eq!(answer["enable"], true, "{answer}");
+        self
+    }
+
+    pub(crate) fn send(&mut self, text: &str) {
+        self.send_bytes(format!("{text}\n").as_bytes());
+    }
+
+    pub(crate) fn send_bytes(&mut self, bytes: &[u8]) {
+        match &mut self.link {
+            Link::Tcp(s) => s.get_mut().write_all(bytes).unwrap(),
+            Link::Unix(s) => s.get_mut().write_all(bytes).unwrap(),
+            Link::Web(s) => s
+                .send(Message::text(String::from_utf8_lossy(bytes).into_owned()))
+                .unwrap(),
+            Link::Udp(s) => assert_eq!(s.send(bytes).unwrap(), bytes.len()),
+        }
+    }
+
+    /// Sends unless the daemon has closed.
+    pub(crate) fn try_send(&mut self, bytes: &[u8]) -> bool {
+        match &mut self.link {
+            Link::Tcp(s) => s.get_mut().write_all(bytes).is_ok(),
+            _ => unreachable!("asked of TCP only"),
+        }
+    }
+
+    /// The next line, without its end; `None` when the daemon has closed.
+    pub(crate) fn line(&mut self) -> Option<String> {
+        let mut line = String::new();
+        let read = match &mut self.link {
+            Link::Tcp(s) => s.read_line(&mut line),
+            Link::Unix(s) => s.read_line(&mut line),
+            Link::Web(s) => loop {
+                match s.read() {
+                    Ok(Message::Text(text)) => return Some(text.as_str().to_owned()),
+                    Ok(Message::Close(_)) => return None,
+                    Ok(_) => {}
+                    Err(e) => {
+                        assert!(!is_late(&e), "nothing came");
+                        return None;
+                    }
+                }
+            },
+            Link::Udp(_) => unreachable!("nobody answers datagrams"),
+        };
+        match read {
+            Ok(0) => None,
+            Ok(_) => Some(line.trim_end_matches('\n').to_owned()),
+            Err(e) if e.kind() == std::io::ErrorKind::ConnectionReset => None,
+            Err(e) => unreachable!("nothing came: {e}"),
+        }
+    }
+
+    /// The next object of a class; others are passed over.
+    pub(crate) fn next_of(&mut self, class: &str) -> Value {
+        loop {
+            let line = self
+                .line()
+                .unwrap_or_else(|| unreachable!("closed before {class}"));
+            let value: Value = serde_json::from_str(&line).unwrap();
+            if value["class"] == class {
+                return value;
+            }
+        }
+    }
+
+    /// The next line, which must be of this class.
+    pub(crate) fn object(&mut self, class: &str) -> Value {
+        let line = self
+            .line()
+            .unwrap_or_else(|| unreachable!("closed before {class}"));
+        let value: Value = serde_json::from_str(&line).unwrap();
+        assert_eq!(value["class"], class, "{line}");
+        value
+    }
+
+    /// Everything up to the close.
+    pub(crate) fn rest(&mut self) -> Vec<Value> {
+        std::iter::from_fn(|| self.line())
+            .map(|line| serde_json::from_str(&line).unwrap())
+            .collect()
+    }
+
+    /// Says that nothing more will be sent.
+    pub(crate) fn shut(&mut self) {
+        match &mut self.link {
+            Link::Tcp(s) => s.get_mut().shutdown(std::net::Shutdown::Write).unwrap(),
+            Link::Unix(s) => s.get_mut().shutdown(std::net::Shutdown::Write).unwrap(),
+            Link::Web(s) => s.close(None).unwrap(),
+            Link::Udp(_) => {}
+        }
+    }
+}
+
+fn is_late(error: &tungstenite::Error) -> bool {
+    matches!(error, tungstenite::Error::Io(e) if matches!(e.kind(), std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut))
+}
+
+/// A sample line: sensor, number, milliseconds, rate about x.
+pub(crate) fn rate(id: &str, n: u64, rate: f64) -> String {
+    format!(
+        "{{\"class\":\"RATE\",\"id\":\"{id}\",\"seq\":{n},\"stamp\":{{\"sec\":{},\"nsec\":{}}},\"gyro\":[{rate},0,0]}}",
+        1_700_000_000 + n / 1000,
+        n % 1000 * 1_000_000
+    )
+}
+
+/// An HTTP answer: its status and its body.
+pub(crate) fn get(address: SocketAddr, path: &str, headers: &[(&str, &str)]) -> (u16, String) {
+    let mut stream = TcpStream::connect(address).unwrap();
+    stream.set_read_timeout(Some(PATIENCE)).unwrap();
+    let mut request = format!("GET {path} HTTP/1.1\r\nConnection: close\r\n");
+    for (name, value) in headers {
+        request.push_str(&format!("{name}: {value}\r\n"));
+    }
+    request.push_str("\r\n");
+    stream.write_all(request.as_bytes()).unwrap();
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).unwrap();
+    let status = answer.split(' ').nth(1).unwrap().parse().unwrap();
+    let body = answer.split_once("\r\n\r\n").map_or("", |(_, body)| body);
+    (status, body.to_owned())
+}

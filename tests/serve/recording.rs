@@ -1,0 +1,93 @@
+//! `--record`: what came in is in the file, and replays to what went out.
+
+use super::client::{Client, rate};
+use super::daemon::{Process, TCP};
+
+#[test]
+fn everything_sent_before_sigterm_is_in_the_recording_with_its_attitudes() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("a.mcap");
+    let record = [
+        "--listen",
+        TCP,
+        "--min-free",
+        "0",
+        "--record",
+        path.to_str().unwrap(),
+    ];
+    let mut process = Process::start(&record);
+    let mut sender = Client::tcp(process.address(0));
+    let mut watcher = Client::tcp(process.address(0)).watching("{\"class\":\"WATCH\"}");
+    let lines: Vec<String> = (0..500).map(|n| rate("imu0", n, 1.0)).collect();
+    sender.send(&lines.join("\n"));
+    let mut sent = Vec::new();
+    for _ in 0..500 {
+        sent.push(watcher.object("ATT"));
+    }
+    process.signal("TERM");
+    assert_eq!(process.exit(), Some(0));
+    let bytes = std::fs::read(&path).unwrap();
+    let stats = mcap::Summary::read(&bytes)
+        .unwrap()
+        .expect("a summary")
+        .stats
+        .unwrap();
+    assert_eq!(stats.message_count, 1500, "sample, attitude, transform");
+    let (mut samples, mut attitudes) = (0, Vec::new());
+    for message in mcap::MessageStream::new(&bytes).unwrap() {
+        let message = message.unwrap();
+        assert!(
+            message.log_time > 1_600_000_000_000_000_000,
+            "received today"
+        );
+        match message.channel.topic.as_str() {
+            "imu0/data_raw" => samples += 1,
+            "imu0/data" => attitudes.push(message.data.to_vec()),
+            _ => {}
+        }
+    }
+    assert_eq!(samples, 500);
+    // Behind the encapsulation, stamp and "imu0": x, y, z, w on a multiple of eight.
+    let recorded = |data: &[u8], i: usize| {
+        f64::from_le_bytes(data[28 + 8 * i..36 + 8 * i].try_into().unwrap())
+    };
+    for (att, data) in sent.iter().zip(&attitudes) {
+        for (i, name) in ["x", "y", "z", "w"].iter().enumerate() {
+            assert_eq!(att["q"][name].as_f64().unwrap(), recorded(data, i), "{att}");
+        }
+    }
+    assert_eq!(attitudes.len(), sent.len());
+}
+
+#[test]
+fn a_recording_that_can_not_begin_is_said_before_anything_listens() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("a.mcap");
+    std::fs::write(&path, b"precious").unwrap();
+    let path = path.to_str().unwrap();
+    for (args, code, word) in [
+        (vec!["--record", path], 1, "--force"),
+        (vec!["--record", "x.csv"], 2, ".mcap"),
+        (
+            vec!["--record", path, "--record-split", "7 parsecs"],
+            2,
+            "--record-split",
+        ),
+        (
+            vec!["--record", path, "--min-free", "lots"],
+            2,
+            "--min-free",
+        ),
+    ] {
+        let output = std::process::Command::new(super::daemon::strapd())
+            .args(["serve", "--listen", TCP])
+            .args(&args)
+            .current_dir(dir.path())
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(code), "{args:?}: {said}");
+        assert!(said.contains(word), "{args:?}: {said}");
+    }
+    assert_eq!(std::fs::read(path).unwrap(), b"precious");
+}

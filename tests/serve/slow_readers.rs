@@ -1,0 +1,139 @@
+//! A reader that does not read is nobody else's matter (service.md 6.2 M3, M5).
+
+use super::client::{Client, rate};
+use super::daemon::{Daemon, PATIENCE, TCP, eventually, listening};
+use std::time::Duration;
+use strapd::serve::limits::Limits;
+
+/// More than the buffers of two sockets on loopback and an outbox hold.
+const ENOUGH: u64 = 200_000;
+
+fn with_patience(no_progress: Duration) -> Daemon {
+    let mut settings = listening(&[TCP]);
+    settings.limits = Limits {
+        no_progress,
+        ..Limits::default()
+    };
+    Daemon::start(settings)
+}
+
+/// Sends samples up to number `until`; the healthy watcher loses none of their attitudes.
+fn send(sender: &mut Client, healthy: &mut Client, n: &mut u64, until: u64) {
+    while *n < until {
+        let some = (until - *n).min(500);
+        let lines: Vec<String> = (*n..*n + some).map(|n| rate("a", n, 0.5)).collect();
+        sender.send(&lines.join("\n"));
+        for seq in *n..*n + some {
+            assert_eq!(healthy.object("ATT")["seq"], seq);
+        }
+        *n += some;
+    }
+}
+
+#[test]
+fn a_stalled_reader_is_told_what_it_lost_while_others_lose_nothing() {
+    let daemon = with_patience(PATIENCE);
+    let mut stalled = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");
+    let mut healthy = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");
+    let mut sender = Client::tcp(daemon.address(0));
+    let dropped = || {
+        let status = daemon.status();
+        let clients = status["clients"].as_array().unwrap().clone();
+        assert!(
+            clients
+                .iter()
+                .all(|c| c["queued_bytes"].as_u64() <= Some(256 << 10))
+        );
+        clients.iter().filter_map(|c| c["dropped"].as_u64()).max()
+    };
+    let mut until = 0;
+    while dropped() == Some(0) {
+        assert!(until < ENOUGH, "it holds more than it should");
+        let mut n = until;
+        until += 2000;
+        send(&mut sender, &mut healthy, &mut n, until);
+    }
+    let (mut next, mut lost) = (0, 0);
+    while next < until {
+        let value: serde_json::Value = serde_json::from_str(&stalled.line().unwrap()).unwrap();
+        if value["class"] == "GAP" {
+            assert_eq!(value["id"], "a");
+            assert_eq!(value["first_seq"], next, "what came before is whole");
+            next = value["last_seq"].as_u64().unwrap() + 1;
+            lost += value["dropped"].as_u64().unwrap();
+        } else {
+            assert_eq!(value["seq"], next, "no loss without a notice");
+            next += 1;
+        }
+    }
+    assert_eq!(dropped(), Some(lost));
+}
+
+#[test]
+fn a_reader_that_takes_nothing_is_closed_and_others_never_notice() {
+    // Long enough that a healthy reader on a busy machine is not taken for one that stalls.
+    let daemon = with_patience(Duration::from_secs(3));
+    let _stalled = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");
+    let mut healthy = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");
+    let mut sender = Client::tcp(daemon.address(0));
+    let mut n = 0;
+    eventually("the stalled reader to be closed", || {
+        let until = n + 2000;
+        send(&mut sender, &mut healthy, &mut n, until);
+        daemon.hub.connected() == 2
+    });
+    eventually("the close to be counted", || {
+        daemon.status()["counters"]["connections_closed"] == 1
+    });
+}
+
+#[test]
+fn replies_are_never_dropped_and_whoever_asks_without_reading_is_closed() {
+    let daemon = with_patience(Duration::from_millis(1500));
+    let mut asker = Client::tcp(daemon.address(0));
+    asker.object("VERSION");
+    for _ in 0..200 {
+        asker.send("{\"class\":\"POLL\"}");
+        asker.object("STATUS");
+    }
+    drop(asker);
+    let mut rude = Client::tcp(daemon.address(0));
+    rude.object("VERSION");
+    eventually("the rude one alone", || daemon.hub.connected() == 1);
+    let sender = std::thread::spawn(move || {
+        let request = "{\"class\":\"POLL\"}\n".repeat(1000);
+        while rude.try_send(request.as_bytes()) {}
+    });
+    eventually("the rude one to be closed", || daemon.hub.connected() == 0);
+    sender.join().unwrap();
+    eventually("the close to be counted", || {
+        daemon.status()["counters"]["connections_closed"] == 1
+    });
+}
+
+#[test]
+fn a_watcher_gets_the_sensors_and_the_rate_it_asked_for() {
+    let daemon = Daemon::tcp();
+    let mut all = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");
+    let mut some = Client::tcp(daemon.address(0))
+        .watching("{\"class\":\"WATCH\",\"ids\":[\"a\"],\"rate_hz\":100}");
+    let mut sender = Client::tcp(daemon.address(0));
+    let lines: Vec<String> = (0..200)
+        .flat_map(|n| ["a", "b"].map(|id| rate(id, n, 0.5)))
+        .collect();
+    sender.send(&lines.join("\n"));
+    for _ in 0..400 {
+        all.object("ATT");
+    }
+    for n in 0..20 {
+        let att = some.object("ATT");
+        assert_eq!((&att["id"], &att["seq"]), (&"a".into(), &(10 * n).into()));
+    }
+    // Ended, it hears no more but its answer.
+    some.send("{\"class\":\"WATCH\",\"enable\":false}");
+    assert_eq!(some.object("WATCH")["enable"], false);
+    sender.send(&rate("a", 210, 0.5));
+    all.object("ATT");
+    some.send("{\"class\":\"POLL\"}");
+    some.object("STATUS");
+}

@@ -1,0 +1,27 @@
+//! Promise: a synthetic log has the truth in it, replay finds it to rounding, and what a sensor's
+//! errors make of it stays within what replay says of itself.
+
+#![cfg(feature = "service")]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout)]
+
+mod commands;
+#[path = "simulate/errors.rs"]
+mod errors;
+#[path = "simulate/layout.rs"]
+mod layout;
+#[path = "simulate/refused.rs"]
+mod refused;
+mod replays;
+#[path = "simulate/truth.rs"]
+mod truth;
+
+use std::path::Path;
+
+/// Largest error in degrees of `estimate` against `reference`, and how many attitudes were compared.
+fn largest_error(dir: &Path, estimate: &str, reference: &str) -> (f64, u64) {
+    let result = commands::strapd(dir, &format!("compare {estimate} {reference} --json")).json();
+    (
+        result["total"]["max_deg"].as_f64().unwrap(),
+        result["samples"].as_u64().unwrap(),
+    )
+}
