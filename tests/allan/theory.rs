@@ -103,6 +103,39 @@ fn flicker_has_a_floor() {
 }
 
 #[test]
+fn a_slow_part_of_the_flicker_is_a_continuous_gauss_markov_process() {
+    // One correlation time, 10 s: drawn at knots a third of a second apart.
+    let text = "bias-instability=5,flicker-tau-min=10,flicker-tau-max=11";
+    let error = ImuError::parse(text).unwrap();
+    // Its variance: (B^2 / pi) ln sqrt(10).
+    let sigma = error.bias_instability * (10f64.ln() / 2.0 / std::f64::consts::PI).sqrt();
+    let alike = ImuError {
+        gm_sigma: sigma,
+        gm_tau: 10.0,
+        ..ImuError::default()
+    };
+    let record = at_rest(&error, Rate, STEP, 200_000, 2, 0.0);
+    for axis in 0..3 {
+        let angles = record.pieces(axis)[0];
+        // Between knots the bias moves by a thirtieth part of sigma sqrt(2 / 30), and never jumps.
+        let most = angles
+            .windows(3)
+            .map(|w| ((w[2] - 2.0 * w[1] + w[0]) / 0.01).abs())
+            .fold(0.0, f64::max);
+        assert!(most < 6.0 * 0.26 / 33.0 * sigma, "{}", most / sigma);
+        for p in curve(&record, axis, STEP).iter().filter(|p| p.tau > 1.0) {
+            let ratio = p.sigma.powi(2) / variance(&alike, p.tau);
+            assert!(
+                (ratio - 1.0).abs() < 8.0 * p.error + 0.02,
+                "at {} s: {ratio} +- {}",
+                p.tau,
+                2.0 * p.error
+            );
+        }
+    }
+}
+
+#[test]
 fn terms_add_up() {
     holds(
         "arw=0.05,bias-instability=40,rrw=300",

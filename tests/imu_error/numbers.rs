@@ -121,6 +121,37 @@ fn a_term_does_not_change_what_another_draws() {
     }
 }
 
+/// Correlation of two series of the same length, about zero.
+fn correlation(a: &[f64], b: &[f64]) -> f64 {
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    dot(a, b) / (dot(a, a) * dot(b, b)).sqrt()
+}
+
+#[test]
+fn terms_do_not_share_their_draws() {
+    let n = 20_000;
+    let x = |text: &str| -> Vec<f64> {
+        rest(&mut sensor(text, Rate, 11), 10_000_000, n)
+            .iter()
+            .map(|v| v.x)
+            .collect()
+    };
+    let steps = |v: Vec<f64>| -> Vec<f64> { v.windows(2).map(|w| w[1] - w[0]).collect() };
+    let white = x("arw=0.3");
+    // What a random walk and a fast Gauss-Markov bias add at each sample.
+    let walk = steps(x("rrw=60"));
+    let markov = steps(x("gm-sigma=10,gm-tau=1"));
+    let later = white.get(1..).unwrap_or_default();
+    for (name, a, b) in [
+        ("white and walk", later, &walk[..]),
+        ("white and markov", later, &markov),
+        ("walk and markov", &walk, &markov),
+    ] {
+        let found = correlation(a, b);
+        assert!(found.abs() < 5.0 / f64::sqrt(n as f64), "{name}: {found}");
+    }
+}
+
 #[test]
 fn constant_errors_have_the_spread_of_their_sizes() {
     let error = ImuError::parse(ALL).unwrap();
