@@ -97,8 +97,11 @@ impl Listener {
         }
     }
 
-    /// Serves until the daemon ends.
+    /// Serves until the daemon ends. It counts as running until its address is free again: who waits
+    /// for the end may bind it at once.
     pub async fn serve(self, context: Context) {
+        let mut until_free = context.running.clone();
+        until_free.has_read();
         match self {
             Listener::Tcp(listener) => tcp::serve(listener, context).await,
             Listener::Udp(socket) => udp::serve(socket, context).await,
@@ -106,6 +109,7 @@ impl Listener {
             #[cfg(unix)]
             Listener::Unix(bound) => unix::serve(bound, context).await,
         }
+        drop(until_free);
     }
 }
 
