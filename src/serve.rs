@@ -14,6 +14,7 @@
 //! | [`recorder`] | what goes through -> MCAP files that survive a crash | a queue; I/O on threads of its own |
 //! | [`limits`], [`admission`] | every bound; who may come in | pure |
 //! | [`listen`], `http` | sockets | I/O |
+//! | `page` | what a browser gets | pure |
 //! | [`shutdown`] | signals -> an orderly end | I/O |
 //!
 //! The wire is described in `docs/protocol.md`.
@@ -25,6 +26,7 @@ mod http;
 pub mod hub;
 pub mod limits;
 pub mod listen;
+mod page;
 mod quiet;
 pub mod recorder;
 pub mod session;
