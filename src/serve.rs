@@ -14,7 +14,7 @@
 //! | [`recorder`] | what goes through -> MCAP files that survive a crash | a queue; I/O on threads of its own |
 //! | [`limits`], [`admission`] | every bound; who may come in | pure |
 //! | [`listen`], `http` | sockets | I/O |
-//! | `page` | what a browser gets | pure |
+//! | `page`, `top` | what a browser gets | pure |
 //! | [`shutdown`] | signals -> an orderly end | I/O |
 //!
 //! The wire is described in `docs/protocol.md`.
@@ -33,6 +33,7 @@ pub mod session;
 pub mod shutdown;
 pub mod stream;
 pub mod subscriber;
+mod top;
 pub mod wire;
 
 use crate::config::Plan;

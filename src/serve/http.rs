@@ -2,7 +2,7 @@
 
 use super::hub::Hub;
 use super::listen::{Connection, websocket};
-use super::page;
+use super::{page, top};
 use crate::record::Verdict;
 use axum::Router;
 use axum::body::Body;
@@ -20,11 +20,12 @@ pub(crate) fn router() -> Router {
         .route("/healthz", get(health))
         .route("/metrics", get(metrics))
         .merge(page::router())
+        .route("/model/top", get(top::answer))
         .fallback(|| async {
             refusal(
                 StatusCode::NOT_FOUND,
                 "not_found",
-                "there are /, /ws, /healthz and /metrics",
+                "there are /, /top, /ws, /healthz and /metrics",
             )
         })
 }
