@@ -4,8 +4,8 @@
 //! because they are made here.
 
 use crate::model::attitude::Quaternion;
-use crate::model::quaternion_kernel as quat;
 use crate::model::frames::{Body, Nav};
+use crate::model::quaternion_kernel as quat;
 use crate::model::rigid_body::Spin;
 use crate::model::top::{Case, EulerState, SymmetricTop, TopMethod, TopRun, compare};
 use crate::propagate::{Method, Noise, Propagator, Sequential, Settings};
@@ -241,8 +241,8 @@ impl Course {
             let found = match how {
                 How::Top(method) => {
                     let fail = |e| format!("{}: {e}", method.name());
-                    let mut run = TopRun::new(*method, &self.top, &self.start, self.rate_hz)
-                        .map_err(fail)?;
+                    let mut run =
+                        TopRun::new(*method, &self.top, &self.start, self.rate_hz).map_err(fail)?;
                     std::iter::once(Ok(self.start.spin().q_nb))
                         .chain((0..last).map(|_| run.advance()))
                         .collect::<Result<_, _>>()
@@ -277,10 +277,7 @@ impl Course {
 pub fn propagated(method: Method, truth: &[(Nanos, Spin)], margin: usize) -> Result<Worst, String> {
     let found = attitudes(method, truth)?;
     // What was turned since the first sample looked at: the ends of a run have no centred window.
-    let n = truth
-        .len()
-        .min(found.len())
-        .saturating_sub(2 * margin);
+    let n = truth.len().min(found.len()).saturating_sub(2 * margin);
     let pairs = || {
         let truths = truth.iter().map(|(_, spin)| spin.q_nb);
         truths.zip(found.iter().copied()).skip(margin).take(n)

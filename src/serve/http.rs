@@ -72,11 +72,7 @@ async fn health(Extension(connection): Extension<Connection>) -> Response<Body> 
             "stopping\n",
         );
     }
-    response(
-        StatusCode::OK,
-        "text/plain; charset=utf-8",
-        "ok\n",
-    )
+    response(StatusCode::OK, "text/plain; charset=utf-8", "ok\n")
 }
 
 async fn metrics(Extension(connection): Extension<Connection>) -> Response<Body> {

@@ -38,16 +38,25 @@ const ASSETS: &[(&str, &str, &str)] = assets![
     "quaternion.js" SCRIPT,
     "sensor.js" SCRIPT,
     "surface.js" SCRIPT,
+    "top.js" SCRIPT,
+    "topview.js" SCRIPT,
 ];
 
 /// What the pages are made of.
 pub(super) fn router() -> Router {
-    Router::new().route("/page/{name}", get(asset))
+    Router::new()
+        .route("/page/{name}", get(asset))
+        .route("/top", get(top))
 }
 
 /// The live page.
 pub(super) fn live() -> Response<Body> {
     response(StatusCode::OK, HTML, include_str!("../web/live.html"))
+}
+
+/// The interactive top.
+async fn top() -> Response<Body> {
+    response(StatusCode::OK, HTML, include_str!("../web/top.html"))
 }
 
 async fn asset(Path(name): Path<String>) -> Response<Body> {
@@ -65,10 +74,14 @@ async fn asset(Path(name): Path<String>) -> Response<Body> {
 mod tests {
     use super::*;
 
+    const PAGES: [&str; 2] = [
+        include_str!("../web/live.html"),
+        include_str!("../web/top.html"),
+    ];
+
     #[test]
     fn the_pages_are_small_and_ask_nobody_else() {
-        let pages = [include_str!("../web/live.html")];
-        let texts = || ASSETS.iter().map(|(.., text)| *text).chain(pages);
+        let texts = || ASSETS.iter().map(|(.., text)| *text).chain(PAGES);
         let bytes: usize = texts().map(str::len).sum();
         assert!(bytes <= 150_000, "{bytes} bytes");
         for text in texts() {
@@ -86,8 +99,7 @@ mod tests {
 
     #[test]
     fn every_part_a_page_names_is_there() {
-        let pages = [include_str!("../web/live.html")];
-        for page in pages {
+        for page in PAGES {
             let named = page.split("\"/page/").skip(1);
             for name in named.filter_map(|rest| rest.split('"').next()) {
                 assert!(ASSETS.iter().any(|(known, ..)| *known == name), "{name}");

@@ -262,11 +262,7 @@ pub(super) async fn answer(
         request.answer()
     });
     match work.await {
-        Ok(Ok(found)) => response(
-            StatusCode::OK,
-            "application/json",
-            format!("{found}\n"),
-        ),
+        Ok(Ok(found)) => response(StatusCode::OK, "application/json", format!("{found}\n")),
         Ok(Err(why)) => refusal(StatusCode::BAD_REQUEST, "bad_request", &why),
         Err(_) => refusal(
             StatusCode::INTERNAL_SERVER_ERROR,

@@ -6,7 +6,7 @@ import { FONT } from "./surface.js";
 // From behind, from the right, from above; degrees.
 export const HOME = { azimuth: -125, elevation: 24 };
 // Length of an axis as a part of the smaller side of the canvas.
-const SCALE = 0.36;
+const SCALE = 0.4;
 const BOX = [0.46, 0.3, 0.085];
 const LIGHT = [-0.35, -0.45, 0.82];
 const FACES = [0, 1, 2].flatMap((axis) => [1, -1].map((side) => ({ axis, side })));
@@ -113,7 +113,7 @@ export class Scene {
     context.textBaseline = "middle";
     names.forEach((name, axis) => {
       const v = [0, 0, 0];
-      v[axis] = 1.22;
+      v[axis] = 1.18;
       const [x, y] = this.project(v);
       context.fillText(name, x, y);
     });

@@ -2,7 +2,7 @@
 
 import { demonstration, LAST } from "./demonstration.js";
 import { Link } from "./link.js";
-import { HERTZ, measure, say, whole } from "./numbers.js";
+import { say, whole } from "./numbers.js";
 import { Playback } from "./playback.js";
 import { rollPitchYaw } from "./quaternion.js";
 import { Sensor } from "./sensor.js";
@@ -72,7 +72,7 @@ function sensor(id) {
     left.add(id);
     return null;
   }
-  const made = new Sensor(id, parts.template, touch);
+  const made = new Sensor(id, parts.template, touch, () => draw(performance.now()));
   sensors.set(id, made);
   // By name, but truth last: it is what the others are held against.
   const order = [...sensors.values()].sort(
@@ -155,7 +155,7 @@ function told(now) {
   const elapsed = (at - statusAt) / 1000;
   const sum = (list, field) => list.reduce((total, each) => total + (each[field] ?? 0), 0);
   const rate = before ? Math.max(0, sum(now.sources, "samples") - sum(before.sources, "samples")) / elapsed : NaN;
-  say(parts.total, measure(rate, HERTZ));
+  say(parts.total, Number.isFinite(rate) ? `${whole(Math.round(rate))} Hz` : "–");
   say(parts.clients, whole(now.clients.length));
   const dropped = sum(now.clients, "dropped");
   say(parts.dropped, whole(dropped));
@@ -206,7 +206,7 @@ function freeze() {
 function draw(now) {
   for (const each of sensors.values()) {
     each.compare();
-    if (!each.dirty && !(each.stale && now - each.shownAt > 100)) continue;
+    if (!each.surfaces || (!each.dirty && !(each.stale && now - each.shownAt > 100))) continue;
     each.dirty = false;
     each.draw(colours, seconds, now);
     if (!each.last) continue;
@@ -222,7 +222,7 @@ let drawnAt = -Infinity;
 function tick(now) {
   requestAnimationFrame(tick);
   // A little early rather than a whole frame late.
-  if (still || now - drawnAt < FRAME - 4) return;
+  if (now - drawnAt < FRAME - 4) return;
   const some = [...sensors.values()];
   if (dirty || some.some((each) => each.stale)) {
     dirty = false;
@@ -230,7 +230,7 @@ function tick(now) {
     draw(now);
     frames++;
   }
-  if (now - framesAt >= 1000) {
+  if (now - framesAt >= 1000 && !still) {
     fps = ((frames - (tick.before ?? 0)) * 1000) / (now - framesAt);
     [framesAt, tick.before] = [now, frames];
     say(parts.fps, fps.toFixed(0));

@@ -21,13 +21,13 @@ export function say(element, text) {
 // Three or four digits of a quantity that is not negative, with its unit.
 export function measure(value, units) {
   if (!Number.isFinite(value)) return "–";
+  if (value < 1e-9) return `0 ${units[0][1]}`;
   const [factor, unit] = units.find(([f]) => value >= f) ?? units.at(-1);
   const scaled = value / factor;
   return `${scaled >= 100 ? scaled.toFixed(0) : scaled >= 10 ? scaled.toFixed(1) : scaled.toFixed(2)} ${unit}`;
 }
 
 export const SECONDS = [[1, "s"], [1e-3, "ms"], [1e-6, "µs"], [1e-9, "ns"]];
-export const HERTZ = [[1e3, "kHz"], [0, "Hz"]];
 
 export function whole(value) {
   return Number.isFinite(value) ? value.toLocaleString("en").replaceAll(",", "\u2009") : "–";

@@ -17,7 +17,8 @@ const READABLE = 100;
 const STEPS = 512;
 
 export class Sensor {
-  constructor(id, template, moved) {
+  // moved(): draw soon; resized(): draw at once, a canvas that changes its size is empty.
+  constructor(id, template, moved, resized) {
     this.id = id;
     this.history = new History();
     this.view = { camera: new Camera(), yaw: 0 };
@@ -34,6 +35,10 @@ export class Sensor {
       this.dirty = true;
       moved();
     };
+    this.resized = () => {
+      this.dirty = true;
+      resized();
+    };
     this.parts.against.addEventListener("change", () => {
       this.chosen = this.parts.against.value;
       this.forgetErrors();
@@ -44,10 +49,11 @@ export class Sensor {
 
   // Once it is on the page, where its canvases have a size.
   placed() {
-    this.surfaces = {};
+    const surfaces = {};
     for (const name of ["body", "horizon", "rates", "angles", "errors"]) {
-      this.surfaces[name] = new Surface(this.parts[name], this.moved);
+      surfaces[name] = new Surface(this.parts[name], this.resized);
     }
+    this.surfaces = surfaces;
     steer(this.parts.body, this.view.camera, this.moved);
   }
 
@@ -262,7 +268,7 @@ export class Sensor {
     const part = this.thinning;
     say(
       parts.thinning,
-      !last ? "" : part < 1.0005 ? "every sample" : `1 of ${part < 10 ? part.toFixed(1) : part.toFixed(0)} samples`,
+      !last ? "" : part < 1.0005 ? "every sample" : `1 of ${Number(part.toFixed(part < 10 ? 1 : 0))} samples`,
     );
     parts.thinning.title =
       part < 1.0005
