@@ -90,13 +90,13 @@ fn a_sensor_at_8_khz_is_drawn_smoothly_in_bounded_memory() {
     });
     assert!(smooth, "{tries:?}");
 
-    let mut heap = |browser: &mut Browser| {
+    let heap = |browser: &mut Browser| {
         browser.call("HeapProfiler.collectGarbage", json!({}));
         let usage = browser.call("Runtime.getHeapUsage", json!({}));
         (Instant::now(), usage["usedSize"].as_f64().unwrap())
     };
     // What was compiled and cached on the way is not growth: the lowest of a few at either end.
-    let mut lowest = |browser: &mut Browser| {
+    let lowest = |browser: &mut Browser| {
         let mut found: Vec<_> = (0..4)
             .map(|_| {
                 std::thread::sleep(Duration::from_millis(500));
