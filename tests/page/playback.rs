@@ -6,6 +6,7 @@ use serde_json::{Value, json};
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex};
 
 /// Pages from a real daemon, the WebSocket made up. What the page says comes out at one end, what is
 /// put in at the other is said to it.
@@ -14,21 +15,21 @@ fn made_up(real: SocketAddr) -> (SocketAddr, Receiver<Value>, Sender<Value>) {
     let address = listener.local_addr().unwrap();
     let (tell, told) = channel();
     let (say, said) = channel::<Value>();
-    let mut said = Some(said);
+    let said = Arc::new(Mutex::new(Some(said)));
     std::thread::spawn(move || {
         for stream in listener.incoming() {
-            let stream = stream.unwrap();
-            let mut head = [0; 2048];
-            let n = stream.peek(&mut head).unwrap_or(0);
-            let is_socket = String::from_utf8_lossy(&head[..n])
-                .to_lowercase()
-                .contains("upgrade: websocket");
-            if !is_socket {
-                std::thread::spawn(move || passed_on(stream, real));
-            } else if let Some(said) = said.take() {
-                let tell = tell.clone();
-                std::thread::spawn(move || converse(stream, &tell, &said));
-            }
+            let (stream, tell, said) = (stream.unwrap(), tell.clone(), said.clone());
+            // A browser connects ahead of what it has to say.
+            std::thread::spawn(move || {
+                let mut head = [0; 2048];
+                let n = stream.peek(&mut head).unwrap_or(0);
+                let head = String::from_utf8_lossy(&head[..n]).to_lowercase();
+                if !head.contains("upgrade: websocket") {
+                    passed_on(stream, real);
+                } else if let Some(said) = said.lock().unwrap().take() {
+                    converse(stream, &tell, &said);
+                }
+            });
         }
     });
     (address, told, say)
