@@ -216,6 +216,7 @@ function draw(now) {
       q: each.last.q, rpy: rollPitchYaw(each.last.q), seq: each.last.seq, stamp: each.last.stamp,
       error: each.error, worst: each.worst, tips: each.tips, centre: each.centre, scale: each.scale,
       camera: { ...each.view.camera }, points: each.history.total, dropped: each.dropped,
+      plotted: each.plotted,
     };
   }
 }

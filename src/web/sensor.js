@@ -225,8 +225,9 @@ export class Sensor {
     drawHorizon(surfaces.horizon, colours, seen, world, heading);
     const axes = [colours.x, colours.y, colours.z];
     const common = { seconds, strokes: axes };
-    drawPlot(surfaces.rates, colours, history, { ...common, series: history.rate, scale: this.scales.rate });
+    const points = drawPlot(surfaces.rates, colours, history, { ...common, series: history.rate, scale: this.scales.rate });
     drawPlot(surfaces.angles, colours, history, { ...common, series: history.angle, scale: this.scales.angle, wraps: true });
+    this.plotted = { points, width: surfaces.rates.width };
     if (this.against) {
       drawPlot(surfaces.errors, colours, history, {
         seconds, strokes: [colours.error], series: [history.error], scale: this.scales.error,
