@@ -12,6 +12,7 @@
 //! | [`hub`] | samples -> attitudes -> outboxes | locks |
 //! | [`subscriber`] | attitudes -> what one client gets, bounded | locks |
 //! | [`recorder`] | what goes through -> MCAP files that survive a crash | a queue; I/O on threads of its own |
+//! | [`state`] | attitudes <-> the file a restarted daemon goes on from | I/O |
 //! | [`limits`], [`admission`] | every bound; who may come in | pure |
 //! | [`listen`], `http` | sockets | I/O |
 //! | [`shutdown`] | signals -> an orderly end | I/O |
@@ -29,6 +30,7 @@ mod quiet;
 pub mod recorder;
 pub mod session;
 pub mod shutdown;
+pub mod state;
 pub mod stream;
 pub mod subscriber;
 pub mod wire;
@@ -66,6 +68,8 @@ pub struct Settings {
     pub web: Web,
     /// Who records everything that goes through.
     pub recorder: Option<recorder::Handle>,
+    /// The attitudes sensors had before the daemon was restarted.
+    pub saved: state::Sensors,
 }
 
 /// A daemon that listens, and serves when it is [run](Server::run).

@@ -20,5 +20,6 @@ mod serve {
     mod recording;
     mod same_bytes;
     mod slow_readers;
+    mod state;
     mod transports;
 }

@@ -6,15 +6,20 @@ use super::{Global, Outcome};
 use crate::error::{Error, Result};
 use crate::serve::address::{DEFAULTS, Listen};
 use crate::serve::admission::{Token, Web};
+use crate::serve::hub::Hub;
 use crate::serve::limits::Limits;
 use crate::serve::recorder::{self, Recorder, Split};
 use crate::serve::shutdown::{self, Signals};
+use crate::serve::state::{self, StateFile};
 use crate::serve::{Server, Settings, listen};
 use crate::sink::{Format, Target};
 use clap::Args;
 use std::collections::BTreeMap;
+use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
 /// Samples in over sockets, attitude out to whoever watches.
 #[derive(Args, Debug)]
@@ -64,6 +69,10 @@ pub struct Serve {
     /// Replace the recording if it exists
     #[arg(long, requires = "record", help_heading = "Recording")]
     pub force: bool,
+    /// Go on from the attitudes in this file, and keep it no more than a second behind: a restart
+    /// loses no heading
+    #[arg(long, value_name = "FILE")]
+    pub state: Option<PathBuf>,
     /// Ask every client for the token in this file (first line, mode 0600)
     #[arg(
         long,
@@ -104,6 +113,14 @@ pub fn run(global: &Global, args: &Serve) -> Result<Outcome> {
     let args = layered.as_ref().map_or(args, Layered::serve);
     let recorder = args.recording()?.map(Recorder::start).transpose()?;
     settings.recorder = recorder.as_ref().map(Recorder::handle);
+    let state = match &args.state {
+        Some(path) => {
+            let (file, saved) = StateFile::open(path)?;
+            settings.saved = saved;
+            Some(Arc::new(Mutex::new(file)))
+        }
+        None => None,
+    };
     let mut builder = tokio::runtime::Builder::new_multi_thread();
     if global.threads > 0 {
         builder.worker_threads(global.threads);
@@ -114,7 +131,7 @@ pub fn run(global: &Global, args: &Serve) -> Result<Outcome> {
         .build()
         .map_err(|e| Error::Usage(format!("--threads {}: {e}", global.threads)))?;
     let has_stdin = !args.sources.is_empty();
-    let outcome = runtime.block_on(serve(settings, has_stdin));
+    let outcome = runtime.block_on(serve(settings, has_stdin, state));
     // A thread that waits for standard input would otherwise be waited for.
     runtime.shutdown_background();
     let Some(status) = recorder.map(Recorder::finish) else {
@@ -136,7 +153,11 @@ pub fn run(global: &Global, args: &Serve) -> Result<Outcome> {
     })
 }
 
-async fn serve(settings: Settings, has_stdin: bool) -> Result<Outcome> {
+async fn serve(
+    settings: Settings,
+    has_stdin: bool,
+    state: Option<Arc<Mutex<StateFile>>>,
+) -> Result<Outcome> {
     // Signals first: from the ready line on, one drains.
     let signals = Signals::new().map_err(|e| Error::Usage(format!("signals: {e}")))?;
     let server = Server::bind(settings).await?;
@@ -145,19 +166,32 @@ async fn serve(settings: Settings, has_stdin: bool) -> Result<Outcome> {
     tracing::info!(session = hub.session(), "ready {}", addresses.join(" "));
     // Nobody may have started us that wants to know.
     let _ = sd_notify::notify(&[sd_notify::NotifyState::Ready]);
+    tokio::spawn(pat_the_watchdog());
+    let keeping = state
+        .clone()
+        .map(|file| tokio::spawn(state::keep(file, hub.clone())));
     if has_stdin {
         let hub = hub.clone();
         std::thread::spawn(move || listen::read_stdin(&hub, std::io::stdin().lock()));
     }
     let drained = server
         .run(async {
-            let signal = shutdown::first(signals).await;
+            let reopened = hub.clone();
+            let signal = shutdown::first(signals, move || reopen(&reopened)).await;
             tracing::info!("{}: shutting down", signal.name());
             let _ = sd_notify::notify(&[sd_notify::NotifyState::Stopping]);
         })
         .await;
     if !drained {
         tracing::warn!("not everything could be sent in time");
+    }
+    if let Some(keeping) = keeping {
+        keeping.abort();
+    }
+    if let Some(file) = state {
+        let hub = hub.clone();
+        // Behind whatever save is still under way.
+        let _ = tokio::task::spawn_blocking(move || state::save(&file, &hub)).await;
     }
     let of = |n: &std::sync::atomic::AtomicU64| n.load(Ordering::Relaxed);
     tracing::info!(
@@ -168,6 +202,28 @@ async fn serve(settings: Settings, has_stdin: bool) -> Result<Outcome> {
         of(&hub.counters.faults)
     );
     Ok(Outcome::Done)
+}
+
+/// Tells a service manager that asks for it that the runtime still turns.
+async fn pat_the_watchdog() {
+    let Some(limit) = sd_notify::watchdog_enabled().filter(|limit| !limit.is_zero()) else {
+        return;
+    };
+    let mut tick = tokio::time::interval((limit / 2).max(Duration::from_millis(1)));
+    loop {
+        tick.tick().await;
+        let _ = sd_notify::notify(&[sd_notify::NotifyState::Watchdog]);
+    }
+}
+
+/// A hang-up: the wish to go on in a new file, as of a log rotation. In a terminal it means that the
+/// terminal has gone, and the daemon goes with it.
+fn reopen(hub: &Hub) -> bool {
+    let reopens = !std::io::stderr().is_terminal() && hub.reopen_recording();
+    if reopens {
+        tracing::info!("SIGHUP: the recording goes on in a new file");
+    }
+    reopens
 }
 
 impl Serve {
@@ -240,6 +296,7 @@ impl Serve {
                 origins: self.allow_origin.clone(),
             },
             recorder: None,
+            saved: state::Sensors::new(),
         })
     }
 }

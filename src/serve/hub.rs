@@ -9,6 +9,7 @@ use super::Settings;
 use super::admission::Token;
 use super::limits::Limits;
 use super::recorder::Handle;
+use super::state::Sensors;
 use super::stream::{SensorStream, live_plan};
 use super::subscriber::{Chunk, Outbox};
 use super::wire::{self, Fault};
@@ -43,6 +44,10 @@ pub struct Hub {
     sensors: RwLock<BTreeMap<Arc<str>, Arc<Mutex<Sensor>>>>,
     clients: RwLock<BTreeMap<u64, Arc<Client>>>,
     watchers: RwLock<Arc<[Arc<Client>]>>,
+    /// Attitudes of before the start, of sensors that have not come back yet.
+    saved: Mutex<Sensors>,
+    /// How saving attitudes went the last time; `None` when they are not saved.
+    state: Mutex<Option<StateStatus>>,
     next_client: AtomicU64,
     /// What was counted.
     pub counters: Counters,
@@ -54,6 +59,13 @@ pub struct Sensor {
     stream: SensorStream,
     /// Only one may send a sensor's samples at a time: two gyros in one attitude are no attitude.
     owner: Option<u64>,
+}
+
+/// How the attitudes were saved last.
+#[derive(Debug)]
+struct StateStatus {
+    saved: Option<Instant>,
+    failed: Option<String>,
 }
 
 /// One connection.
@@ -167,6 +179,8 @@ impl Hub {
             sensors: RwLock::default(),
             clients: RwLock::default(),
             watchers: RwLock::new(Arc::from([])),
+            saved: Mutex::new(settings.saved),
+            state: Mutex::default(),
             next_client: AtomicU64::new(1),
             counters: Counters::default(),
         })
@@ -276,7 +290,14 @@ impl Hub {
         }
         let id: Arc<str> = id.into();
         let first = run.samples.first().copied().unwrap_or_default();
-        let stream = SensorStream::new(self.plan_of(&id), id.clone(), run.head, &first)?;
+        let mut saved = lock(&self.saved);
+        let last = saved.get(&*id);
+        let stream = SensorStream::new(self.plan_of(&id), id.clone(), run.head, &first, last)?;
+        saved.remove(&*id);
+        drop(saved);
+        if let Some(recorder) = &self.recorder {
+            recorder.declare(stream.recorded());
+        }
         let sensor = Arc::new(Mutex::new(Sensor {
             stream,
             owner: None,
@@ -410,11 +431,57 @@ impl Hub {
         wire::status(serde_json::json!({
             "session": self.session, "uptime_s": self.uptime_secs(),
             "sources": sources, "clients": clients, "counters": counters,
+            "state": lock(&self.state).as_ref().map(|s| serde_json::json!({
+                "saved_s_ago": s.saved.map(|t| t.elapsed().as_secs_f64()), "failed": s.failed,
+            })),
             "recording": recording.map(|r| serde_json::json!({
                 "file": r.files.last().map(|f| f.display().to_string()), "files": r.files.len(),
                 "bytes": r.bytes, "samples": r.samples, "attitudes": r.attitudes, "stopped": r.stopped,
             })),
         }))
+    }
+
+    /// The last attitude of every sensor, also of those that have not come back since the start; no
+    /// more than there may be sensors.
+    #[must_use]
+    pub fn saved(&self) -> Sensors {
+        let sensors: Vec<_> = read(&self.sensors).values().cloned().collect();
+        let mut all: Sensors = sensors
+            .iter()
+            .filter_map(|sensor| {
+                let sensor = lock(sensor);
+                let last = sensor.stream.saved()?;
+                Some((sensor.stream.id().to_string(), last))
+            })
+            .collect();
+        let room = self.limits.sensors.saturating_sub(all.len());
+        let absent = lock(&self.saved);
+        all.extend(
+            absent
+                .iter()
+                .take(room)
+                .map(|(id, s)| (id.clone(), s.clone())),
+        );
+        all
+    }
+
+    /// The attitudes were saved, or why not.
+    pub(super) fn state_saved(&self, failed: Option<String>) {
+        let mut state = lock(&self.state);
+        let before = state.as_ref().and_then(|s| s.saved);
+        let saved = match failed {
+            None => Some(Instant::now()),
+            Some(_) => before,
+        };
+        *state = Some(StateStatus { saved, failed });
+    }
+
+    /// Ends the recording's file and goes on in a new one; `false` when there is no recording.
+    pub fn reopen_recording(&self) -> bool {
+        if let Some(recorder) = &self.recorder {
+            recorder.reopen();
+        }
+        self.recorder.is_some()
     }
 
     /// Seconds since the start.

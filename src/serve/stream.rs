@@ -12,6 +12,8 @@ use crate::pipeline::opening::labelled;
 use crate::pipeline::preparation::{Prepared, Resolved, at_once};
 use crate::propagate::{Method, Sequential};
 use crate::record::{AttitudeSample, Nanos, RawSample, SampleKind, Verdict};
+use crate::serve::recorder::stream_of;
+use crate::serve::state::Saved;
 use crate::serve::wire::Fault;
 use crate::sink;
 use crate::sink::json::AttObject;
@@ -70,7 +72,7 @@ pub fn live_plan(plan: &Plan) -> Result<Plan, String> {
 
 impl SensorStream {
     /// For the sensor `id`, whose first line says `stated` and brings `first`. `plan` is a
-    /// [`live_plan`].
+    /// [`live_plan`]. It goes on from `saved`, where there is such.
     ///
     /// # Errors
     /// The fault to answer with: the samples do not fit the plan.
@@ -79,6 +81,7 @@ impl SensorStream {
         id: Arc<str>,
         stated: &Line,
         first: &RawSample,
+        saved: Option<&Saved>,
     ) -> Result<SensorStream, Fault> {
         let fault = |what: String| Fault {
             id: Some(id.to_string()),
@@ -90,9 +93,18 @@ impl SensorStream {
             ..Stated::default()
         };
         let resolved = Resolved::new(plan, &stated);
-        let prepared = at_once(plan, &resolved, first).map_err(fault)?;
-        let estimator = Estimator::live(plan, &resolved, &prepared).map_err(fault)?;
-        let labels = labelled(sink::Stream::new(&id, ""), plan, &resolved, &prepared);
+        let mut prepared = at_once(plan, &resolved, first).map_err(fault)?;
+        let mut estimator = Estimator::live(plan, &resolved, &prepared).map_err(fault)?;
+        let labels = labelled(stream_of(&id), plan, &resolved, &prepared);
+        if let Some(saved) = saved {
+            let resumed = saved
+                .attitude(&labels)
+                .and_then(|last| estimator.resume(&last));
+            match resumed {
+                Ok(()) => "as saved before the restart".clone_into(&mut prepared.initial_origin),
+                Err(why) => prepared.warnings.push(why),
+            }
+        }
         Ok(SensorStream {
             object: AttObject::new(&labels),
             id,
@@ -121,6 +133,18 @@ impl SensorStream {
         let kind = plan.kind.or(line.sample_kind).unwrap_or(self.kind);
         let unit = plan.unit.or(line.gyro_unit).unwrap_or(self.unit);
         (kind, unit) == (self.kind, self.unit)
+    }
+
+    /// What a recording calls it.
+    #[must_use]
+    pub fn recorded(&self) -> sink::Stream {
+        self.labels.clone()
+    }
+
+    /// What a daemon after this one needs to go on; `None` before the first attitude.
+    #[must_use]
+    pub fn saved(&self) -> Option<Saved> {
+        Some(Saved::new(self.last.as_ref()?, &self.labels))
     }
 
     /// Takes samples in the order they came. The attitudes they give come from
