@@ -70,6 +70,9 @@ pub struct Settings {
     pub recorder: Option<recorder::Handle>,
     /// The attitudes sensors had before the daemon was restarted.
     pub saved: state::Sensors,
+    /// Sockets a service manager has opened.
+    #[cfg(unix)]
+    pub passed: listen::Passed,
 }
 
 /// A daemon that listens, and serves when it is [run](Server::run).
@@ -89,7 +92,7 @@ impl Settings {
     /// token is asked for.
     pub fn check(self) -> Result<()> {
         for listen in &self.listen {
-            check_reach(listen, &self)?;
+            Reach::of(&self).check(listen)?;
         }
         Hub::new(self).map(|_| ())
     }
@@ -103,15 +106,25 @@ impl Server {
     /// no token is asked for; [`Error::Bind`].
     pub async fn bind(mut settings: Settings) -> Result<Server> {
         for listen in &settings.listen {
-            check_reach(listen, &settings)?;
+            Reach::of(&settings).check(listen)?;
         }
         let listen = std::mem::take(&mut settings.listen);
+        let reach = Reach::of(&settings);
+        #[cfg(unix)]
+        let mut passed = std::mem::take(&mut settings.passed);
         let web = std::mem::take(&mut settings.web);
         let hub = Hub::new(settings)?;
         let mut listeners = Vec::new();
         let mut bound = Vec::new();
         for listen in &listen {
-            let (listener, address) = Listener::bind(listen).await?;
+            let (listener, address) = Listener::bind(
+                listen,
+                #[cfg(unix)]
+                &mut passed,
+            )
+            .await?;
+            // Where a socket that was passed listens is known only now.
+            reach.check(&address)?;
             listeners.push(listener);
             bound.push(address);
         }
@@ -157,15 +170,31 @@ impl Server {
     }
 }
 
-/// Refuses an address others can reach, unless clients must show a token.
-fn check_reach(listen: &Listen, settings: &Settings) -> Result<()> {
-    let is_open = listen.ip().is_some_and(|ip| !is_loopback(ip));
-    // A datagram shows no token that others on the way could not read and send again.
-    let is_guarded = settings.token.is_some() && !matches!(listen, Listen::Udp(_));
-    if is_open && !is_guarded && !settings.allow_insecure_remote {
-        return Err(Error::Usage(format!(
-            "--listen {listen}: others can reach this address, and nothing keeps them out\n  help: --token-file FILE asks clients for a token (not over UDP); --allow-insecure-remote listens all the same; 127.0.0.1 is this machine alone"
-        )));
+/// Who may reach us.
+#[derive(Clone, Copy, Debug)]
+struct Reach {
+    has_token: bool,
+    allow_insecure_remote: bool,
+}
+
+impl Reach {
+    fn of(settings: &Settings) -> Reach {
+        Reach {
+            has_token: settings.token.is_some(),
+            allow_insecure_remote: settings.allow_insecure_remote,
+        }
     }
-    Ok(())
+
+    /// Refuses an address others can reach, unless clients must show a token.
+    fn check(self, listen: &Listen) -> Result<()> {
+        let is_open = listen.ip().is_some_and(|ip| !is_loopback(ip));
+        // A datagram shows no token that others on the way could not read and send again.
+        let is_guarded = self.has_token && !matches!(listen, Listen::Udp(_));
+        if is_open && !is_guarded && !self.allow_insecure_remote {
+            return Err(Error::Usage(format!(
+                "--listen {listen}: others can reach this address, and nothing keeps them out\n  help: --token-file FILE asks clients for a token (not over UDP); --allow-insecure-remote listens all the same; 127.0.0.1 is this machine alone"
+            )));
+        }
+        Ok(())
+    }
 }

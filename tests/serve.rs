@@ -17,6 +17,7 @@ mod serve {
     mod documentation;
     mod limits;
     mod operations;
+    mod packaging;
     mod recording;
     mod same_bytes;
     mod slow_readers;

@@ -297,6 +297,8 @@ impl Serve {
             },
             recorder: None,
             saved: state::Sensors::new(),
+            #[cfg(unix)]
+            passed: listen::Passed::from_env(),
         })
     }
 }

@@ -14,6 +14,10 @@ fn everything_sent_before_sigterm_is_in_the_recording_with_its_attitudes() {
         "0",
         "--record",
         path.to_str().unwrap(),
+        "--world",
+        "ned",
+        "--body",
+        "frd",
     ];
     let mut process = Process::start(&record);
     let mut sender = Client::tcp(process.address(0));
@@ -33,6 +37,19 @@ fn everything_sent_before_sigterm_is_in_the_recording_with_its_attitudes() {
         .stats
         .unwrap();
     assert_eq!(stats.message_count, 1500, "sample, attitude, transform");
+    let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+    let of = |topic: &str, key: &str| {
+        let channel = summary.channels.values().find(|c| c.topic == topic);
+        channel.unwrap().metadata.get(key).cloned()
+    };
+    for (key, value) in [
+        ("world", "ned"),
+        ("body", "frd"),
+        ("rotates", "sensor_to_world"),
+    ] {
+        assert_eq!(of("imu0/data", key).as_deref(), Some(value));
+        assert_eq!(of("imu0/data_raw", key), None);
+    }
     let (mut samples, mut attitudes) = (0, Vec::new());
     for message in mcap::MessageStream::new(&bytes).unwrap() {
         let message = message.unwrap();
