@@ -15,6 +15,8 @@ mod serve {
     mod bad_lines;
     mod config;
     mod documentation;
+    mod faults;
+    mod frames;
     mod limits;
     mod operations;
     mod packaging;

@@ -19,6 +19,9 @@ use crate::sink;
 use crate::sink::json::AttObject;
 use std::sync::Arc;
 
+/// Numbers a sample may come behind its turn. Further back, the sender counts anew.
+const OVERTAKEN: u64 = 64;
+
 /// The name of a sensor that gives none.
 pub const NAMELESS: &str = "imu";
 
@@ -36,7 +39,7 @@ pub struct SensorStream {
     next_seq: u64,
     /// The sender's number expected next.
     expected: Option<u64>,
-    /// Samples that by the sender's numbers were sent and never came.
+    /// Samples that by the sender's numbers did not come in their turn: never, or late.
     missing: u64,
     last: Option<AttitudeSample>,
     /// Verdicts that were said once, as bits.
@@ -151,12 +154,12 @@ impl SensorStream {
     /// `attitudes`.
     pub fn take(&mut self, seq: Option<u64>, samples: &[RawSample]) {
         if let Some(seq) = seq {
-            if let Some(expected) = self.expected
-                && seq > expected
-            {
-                self.missing = self.missing.saturating_add(seq - expected);
+            let expected = self.expected.unwrap_or(seq);
+            self.missing = self.missing.saturating_add(seq.saturating_sub(expected));
+            // One that was overtaken, or came twice, is no new beginning.
+            if seq >= expected || expected - seq > OVERTAKEN {
+                self.expected = Some(seq.saturating_add(1));
             }
-            self.expected = Some(seq.saturating_add(1));
         }
         for raw in samples {
             self.estimator.take(raw);
