@@ -8,6 +8,8 @@
 //! |---|---|---|
 //! | [`framing`], [`wire`] | bytes -> lines -> requests; answers -> lines | pure |
 //! | [`stream`] | samples of one sensor -> attitudes | pure |
+//! | [`channel`] | a stream as clients know it | pure |
+//! | [`cast`], [`playback`] | a replay or simulation served in place of sensors, and who moves it | I/O; locks |
 //! | [`session`] | one client's lines -> hub, answers | sans-I/O |
 //! | [`hub`] | samples -> attitudes -> outboxes | locks |
 //! | [`subscriber`] | attitudes -> what one client gets, bounded | locks |
@@ -20,11 +22,14 @@
 
 pub mod address;
 pub mod admission;
+pub mod cast;
+pub mod channel;
 pub mod framing;
 mod http;
 pub mod hub;
 pub mod limits;
 pub mod listen;
+pub mod playback;
 mod quiet;
 pub mod recorder;
 pub mod session;
@@ -66,6 +71,8 @@ pub struct Settings {
     pub web: Web,
     /// Who records everything that goes through.
     pub recorder: Option<recorder::Handle>,
+    /// The replay that is served; no samples are taken then.
+    pub playback: Option<Arc<playback::Playback>>,
 }
 
 /// A daemon that listens, and serves when it is [run](Server::run).
@@ -159,8 +166,13 @@ fn check_reach(listen: &Listen, settings: &Settings) -> Result<()> {
     // A datagram shows no token that others on the way could not read and send again.
     let is_guarded = settings.token.is_some() && !matches!(listen, Listen::Udp(_));
     if is_open && !is_guarded && !settings.allow_insecure_remote {
+        let flag = if settings.playback.is_some() {
+            "-o"
+        } else {
+            "--listen"
+        };
         return Err(Error::Usage(format!(
-            "--listen {listen}: others can reach this address, and nothing keeps them out\n  help: --token-file FILE asks clients for a token (not over UDP); --allow-insecure-remote listens all the same; 127.0.0.1 is this machine alone"
+            "{flag} {listen}: others can reach this address, and nothing keeps them out\n  help: --token-file FILE asks clients for a token (not over UDP); --allow-insecure-remote listens all the same; 127.0.0.1 is this machine alone"
         )));
     }
     Ok(())

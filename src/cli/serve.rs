@@ -1,18 +1,16 @@
 //! `strapd serve`: samples over sockets -> attitudes over sockets. I/O.
 
+use super::admission::Admission;
 use super::config::Layered;
 use super::estimation::Estimation;
 use super::{Global, Outcome};
 use crate::error::{Error, Result};
 use crate::serve::address::{DEFAULTS, Listen};
-use crate::serve::admission::{Token, Web};
-use crate::serve::limits::Limits;
 use crate::serve::recorder::{self, Recorder, Split};
 use crate::serve::shutdown::{self, Signals};
 use crate::serve::{Server, Settings, listen};
 use crate::sink::{Format, Target};
 use clap::Args;
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 
@@ -64,23 +62,9 @@ pub struct Serve {
     /// Replace the recording if it exists
     #[arg(long, requires = "record", help_heading = "Recording")]
     pub force: bool,
-    /// Ask every client for the token in this file (first line, mode 0600)
-    #[arg(
-        long,
-        value_name = "FILE",
-        help_heading = "Admission",
-        env = "STRAPD_TOKEN_FILE"
-    )]
-    pub token_file: Option<PathBuf>,
-    /// Listen where others can reach it without asking for a token
-    #[arg(long, help_heading = "Admission")]
-    pub allow_insecure_remote: bool,
-    /// Let pages of this origin, such as `https://example.org`, connect. May be given several times
-    #[arg(long, value_name = "ORIGIN", help_heading = "Admission")]
-    pub allow_origin: Vec<String>,
-    /// A name this machine is called in HTTP requests. May be given several times
-    #[arg(long, value_name = "HOST", help_heading = "Admission")]
-    pub allow_host: Vec<String>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub admission: Admission,
 }
 
 /// Runs it until a signal.
@@ -225,21 +209,13 @@ impl Serve {
         } else {
             self.listen.iter().map(String::as_str).collect()
         };
-        Ok(Settings {
+        self.admission.apply(Settings {
             plan: self.estimation.plan()?,
-            plans: BTreeMap::new(),
             listen: given
                 .into_iter()
                 .map(Listen::parse)
                 .collect::<Result<_>>()?,
-            limits: Limits::default(),
-            token: self.token_file.as_deref().map(Token::read).transpose()?,
-            allow_insecure_remote: self.allow_insecure_remote,
-            web: Web {
-                hosts: self.allow_host.clone(),
-                origins: self.allow_origin.clone(),
-            },
-            recorder: None,
+            ..Settings::default()
         })
     }
 }

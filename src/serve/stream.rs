@@ -12,9 +12,9 @@ use crate::pipeline::opening::labelled;
 use crate::pipeline::preparation::{Prepared, Resolved, at_once};
 use crate::propagate::{Method, Sequential};
 use crate::record::{AttitudeSample, Nanos, RawSample, SampleKind, Verdict};
+use crate::serve::channel::Channel;
+use crate::serve::recorder::stream_of;
 use crate::serve::wire::Fault;
-use crate::sink;
-use crate::sink::json::AttObject;
 use std::sync::Arc;
 
 /// The name of a sensor that gives none.
@@ -25,8 +25,7 @@ pub const NAMELESS: &str = "imu";
 pub struct SensorStream {
     id: Arc<str>,
     estimator: Estimator,
-    labels: sink::Stream,
-    object: AttObject,
+    channel: Arc<Channel>,
     kind: SampleKind,
     unit: GyroUnit,
     prepared: Prepared,
@@ -92,12 +91,11 @@ impl SensorStream {
         let resolved = Resolved::new(plan, &stated);
         let prepared = at_once(plan, &resolved, first).map_err(fault)?;
         let estimator = Estimator::live(plan, &resolved, &prepared).map_err(fault)?;
-        let labels = labelled(sink::Stream::new(&id, ""), plan, &resolved, &prepared);
+        let labels = labelled(stream_of(&id), plan, &resolved, &prepared);
         Ok(SensorStream {
-            object: AttObject::new(&labels),
+            channel: Arc::new(Channel::new(&labels)),
             id,
             estimator,
-            labels,
             kind: resolved.kind,
             unit: resolved.unit,
             prepared,
@@ -107,6 +105,12 @@ impl SensorStream {
             last: None,
             told: 0,
         })
+    }
+
+    /// As clients know it.
+    #[must_use]
+    pub fn channel(&self) -> &Arc<Channel> {
+        &self.channel
     }
 
     /// Its name.
@@ -145,12 +149,12 @@ impl SensorStream {
     }
 
     /// The attitudes of what was taken, and the number of the first.
-    pub(crate) fn attitudes(&mut self) -> (u64, &[AttitudeSample], &AttObject) {
+    pub(crate) fn attitudes(&mut self) -> (u64, &[AttitudeSample], &Arc<Channel>) {
         let first = self.next_seq;
         let attitudes = self.estimator.attitudes(&Sequential);
         self.next_seq += attitudes.len() as u64;
         self.last = attitudes.last().copied().or(self.last);
-        (first, attitudes, &self.object)
+        (first, attitudes, &self.channel)
     }
 
     /// The kinds of loss that have happened for the first time since this was asked last.
@@ -207,8 +211,8 @@ impl SensorStream {
             "sample_kind": self.kind.name(),
             "gyro_unit": self.unit.name(),
             "method": self.estimator.method().name(),
-            "world": self.labels.world_axes,
-            "body": self.labels.body_axes,
+            "world": self.channel.stream().world_axes,
+            "body": self.channel.stream().body_axes,
             "initial": self.prepared.initial_origin,
             "bias": self.prepared.bias_origin,
             "warnings": self.prepared.warnings,
