@@ -8,6 +8,8 @@
 //! |---|---|---|
 //! | [`framing`], [`wire`] | bytes -> lines -> requests; answers -> lines | pure |
 //! | [`stream`] | samples of one sensor -> attitudes | pure |
+//! | [`channel`] | a stream as clients know it | pure |
+//! | [`cast`], [`playback`] | a replay or simulation served in place of sensors, and who moves it | I/O; locks |
 //! | [`session`] | one client's lines -> hub, answers | sans-I/O |
 //! | [`hub`] | samples -> attitudes -> outboxes | locks |
 //! | [`subscriber`] | attitudes -> what one client gets, bounded | locks |
@@ -21,11 +23,14 @@
 
 pub mod address;
 pub mod admission;
+pub mod cast;
+pub mod channel;
 pub mod framing;
 mod http;
 pub mod hub;
 pub mod limits;
 pub mod listen;
+pub mod playback;
 mod quiet;
 pub mod recorder;
 pub mod session;
@@ -73,6 +78,8 @@ pub struct Settings {
     /// Sockets a service manager has opened.
     #[cfg(unix)]
     pub passed: listen::Passed,
+    /// The replay that is served; no samples are taken then.
+    pub playback: Option<Arc<playback::Playback>>,
 }
 
 /// A daemon that listens, and serves when it is [run](Server::run).
@@ -175,6 +182,8 @@ impl Server {
 struct Reach {
     has_token: bool,
     allow_insecure_remote: bool,
+    /// How an address is given.
+    flag: &'static str,
 }
 
 impl Reach {
@@ -182,6 +191,10 @@ impl Reach {
         Reach {
             has_token: settings.token.is_some(),
             allow_insecure_remote: settings.allow_insecure_remote,
+            flag: match settings.playback {
+                Some(_) => "-o",
+                None => "--listen",
+            },
         }
     }
 
@@ -192,7 +205,8 @@ impl Reach {
         let is_guarded = self.has_token && !matches!(listen, Listen::Udp(_));
         if is_open && !is_guarded && !self.allow_insecure_remote {
             return Err(Error::Usage(format!(
-                "--listen {listen}: others can reach this address, and nothing keeps them out\n  help: --token-file FILE asks clients for a token (not over UDP); --allow-insecure-remote listens all the same; 127.0.0.1 is this machine alone"
+                "{} {listen}: others can reach this address, and nothing keeps them out\n  help: --token-file FILE asks clients for a token (not over UDP); --allow-insecure-remote listens all the same; 127.0.0.1 is this machine alone",
+                self.flag
             )));
         }
         Ok(())

@@ -1,20 +1,18 @@
 //! `strapd serve`: samples over sockets -> attitudes over sockets. I/O.
 
+use super::admission::Admission;
 use super::config::Layered;
 use super::estimation::Estimation;
 use super::{Global, Outcome};
 use crate::error::{Error, Result};
 use crate::serve::address::{DEFAULTS, Listen};
-use crate::serve::admission::{Token, Web};
 use crate::serve::hub::Hub;
-use crate::serve::limits::Limits;
 use crate::serve::recorder::{self, Recorder, Split};
 use crate::serve::shutdown::{self, Signals};
 use crate::serve::state::{self, StateFile};
 use crate::serve::{Server, Settings, listen};
 use crate::sink::{Format, Target};
 use clap::Args;
-use std::collections::BTreeMap;
 use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
@@ -73,23 +71,9 @@ pub struct Serve {
     /// loses no heading
     #[arg(long, value_name = "FILE")]
     pub state: Option<PathBuf>,
-    /// Ask every client for the token in this file (first line, mode 0600)
-    #[arg(
-        long,
-        value_name = "FILE",
-        help_heading = "Admission",
-        env = "STRAPD_TOKEN_FILE"
-    )]
-    pub token_file: Option<PathBuf>,
-    /// Listen where others can reach it without asking for a token
-    #[arg(long, help_heading = "Admission")]
-    pub allow_insecure_remote: bool,
-    /// Let pages of this origin, such as `https://example.org`, connect. May be given several times
-    #[arg(long, value_name = "ORIGIN", help_heading = "Admission")]
-    pub allow_origin: Vec<String>,
-    /// A name this machine is called in HTTP requests. May be given several times
-    #[arg(long, value_name = "HOST", help_heading = "Admission")]
-    pub allow_host: Vec<String>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub admission: Admission,
 }
 
 /// Runs it until a signal.
@@ -281,24 +265,15 @@ impl Serve {
         } else {
             self.listen.iter().map(String::as_str).collect()
         };
-        Ok(Settings {
+        self.admission.apply(Settings {
             plan: self.estimation.plan()?,
-            plans: BTreeMap::new(),
             listen: given
                 .into_iter()
                 .map(Listen::parse)
                 .collect::<Result<_>>()?,
-            limits: Limits::default(),
-            token: self.token_file.as_deref().map(Token::read).transpose()?,
-            allow_insecure_remote: self.allow_insecure_remote,
-            web: Web {
-                hosts: self.allow_host.clone(),
-                origins: self.allow_origin.clone(),
-            },
-            recorder: None,
-            saved: state::Sensors::new(),
             #[cfg(unix)]
             passed: listen::Passed::from_env(),
+            ..Settings::default()
         })
     }
 }

@@ -64,7 +64,15 @@ impl Listen {
     /// # Errors
     /// [`Error::Usage`] with what is known.
     pub fn parse(text: &str) -> Result<Listen> {
-        let refuse = |what: &str| Error::Usage(format!("--listen {text}: {what}\n  help: {KNOWN}"));
+        Listen::parse_from("--listen", text)
+    }
+
+    /// The same, written behind another flag.
+    ///
+    /// # Errors
+    /// As [`Listen::parse`].
+    pub fn parse_from(flag: &str, text: &str) -> Result<Listen> {
+        let refuse = |what: &str| Error::Usage(format!("{flag} {text}: {what}\n  help: {KNOWN}"));
         let (scheme, rest) = text.split_once("://").ok_or_else(|| refuse("no scheme"))?;
         let address = || -> Result<SocketAddr> {
             let rest = rest.strip_suffix('/').unwrap_or(rest);

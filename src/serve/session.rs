@@ -62,9 +62,13 @@ impl Session {
     #[must_use]
     pub fn new(hub: &Arc<Hub>, peer: String, trusted: bool) -> Session {
         let client = hub.join(peer);
-        client.outbox.reply(wire::version(hub.session()));
+        client.outbox.reply(wire::version(&hub.session()));
+        let authorised = trusted || hub.token().is_none();
+        if let Some(place) = hub.place().filter(|_| authorised) {
+            client.outbox.reply(place);
+        }
         Session {
-            authorised: trusted || hub.token().is_none(),
+            authorised,
             hub: hub.clone(),
             client,
             framer: Framer::new(),
@@ -150,6 +154,18 @@ impl Session {
                 );
                 self.refuse(&fault, number);
             }
+            Ok(Message::Samples(_)) if !self.hub.takes_samples() => {
+                count(
+                    &self.hub.counters.refused_samples,
+                    scratch.samples.len() - before,
+                );
+                scratch.samples.truncate(before);
+                let fault = Fault::new(
+                    "samples_not_taken",
+                    "this is a replay or a simulation: it has its own samples; strapd serve takes yours",
+                );
+                self.bad(&fault, number, line, received, scratch);
+            }
             Ok(Message::Samples(head)) => {
                 self.errors_in_a_row = 0;
                 let goes_on = scratch.head.as_ref().is_some_and(|run| {
@@ -165,8 +181,18 @@ impl Session {
             Ok(Message::Watch(filter)) => {
                 self.errors_in_a_row = 0;
                 self.flush(received, scratch, usize::MAX);
+                let offered = self.hub.classes();
+                let absent = filter.iter().flat_map(|f| &f.classes).flatten();
+                if let Some(class) = absent.copied().find(|c| !offered.contains(c)) {
+                    let fault = Fault::new(
+                        "bad_watch",
+                        format!("there is no stream `{}` here; there is: ATT", class.name()),
+                    );
+                    return self.bad(&fault, number, line, received, scratch);
+                }
                 // The answer comes before the first attitude.
-                self.client.outbox.reply(wire::watching(filter.as_ref()));
+                let answer = wire::watching(filter.as_ref(), &offered);
+                self.client.outbox.reply(answer);
                 self.client.outbox.watch(filter);
                 self.hub.watch_changed();
             }
@@ -174,6 +200,19 @@ impl Session {
                 self.errors_in_a_row = 0;
                 self.flush(received, scratch, usize::MAX);
                 self.client.outbox.reply(self.hub.status());
+            }
+            Ok(Message::Playback(action)) => {
+                self.errors_in_a_row = 0;
+                self.flush(received, scratch, usize::MAX);
+                match self.hub.control(self.client.number, action) {
+                    Ok(()) => {
+                        if let Some(place) = self.hub.place() {
+                            self.client.outbox.reply(place);
+                        }
+                    }
+                    // Well said, if in vain: not held against it.
+                    Err(fault) => self.say(&fault, number, line),
+                }
             }
             Err(fault) if fault.code == "unknown_class" => {
                 // Somebody newer than this daemon: said once, never held against it.
@@ -228,7 +267,12 @@ impl Session {
         self.errors_in_a_row = 0;
         match self.hub.token() {
             Some(expected) if !self.authorised => match expected.judge(token, Instant::now()) {
-                Ok(()) => self.authorised = true,
+                Ok(()) => {
+                    self.authorised = true;
+                    if let Some(place) = self.hub.place() {
+                        self.client.outbox.reply(place);
+                    }
+                }
                 Err(fault) => self.refuse(&fault, number),
             },
             _ => {}

@@ -12,11 +12,10 @@ use crate::pipeline::opening::labelled;
 use crate::pipeline::preparation::{Prepared, Resolved, at_once};
 use crate::propagate::{Method, Sequential};
 use crate::record::{AttitudeSample, Nanos, RawSample, SampleKind, Verdict};
+use crate::serve::channel::Channel;
 use crate::serve::recorder::stream_of;
 use crate::serve::state::Saved;
 use crate::serve::wire::Fault;
-use crate::sink;
-use crate::sink::json::AttObject;
 use std::sync::Arc;
 
 /// Numbers a sample may come behind its turn. Further back, the sender counts anew.
@@ -30,8 +29,7 @@ pub const NAMELESS: &str = "imu";
 pub struct SensorStream {
     id: Arc<str>,
     estimator: Estimator,
-    labels: sink::Stream,
-    object: AttObject,
+    channel: Arc<Channel>,
     kind: SampleKind,
     unit: GyroUnit,
     prepared: Prepared,
@@ -109,10 +107,9 @@ impl SensorStream {
             }
         }
         Ok(SensorStream {
-            object: AttObject::new(&labels),
+            channel: Arc::new(Channel::new(&labels)),
             id,
             estimator,
-            labels,
             kind: resolved.kind,
             unit: resolved.unit,
             prepared,
@@ -122,6 +119,12 @@ impl SensorStream {
             last: None,
             told: 0,
         })
+    }
+
+    /// As clients know it.
+    #[must_use]
+    pub fn channel(&self) -> &Arc<Channel> {
+        &self.channel
     }
 
     /// Its name.
@@ -140,14 +143,14 @@ impl SensorStream {
 
     /// What a recording calls it.
     #[must_use]
-    pub fn recorded(&self) -> sink::Stream {
-        self.labels.clone()
+    pub fn recorded(&self) -> crate::sink::Stream {
+        self.channel.stream().clone()
     }
 
     /// What a daemon after this one needs to go on; `None` before the first attitude.
     #[must_use]
     pub fn saved(&self) -> Option<Saved> {
-        Some(Saved::new(self.last.as_ref()?, &self.labels))
+        Some(Saved::new(self.last.as_ref()?, self.channel.stream()))
     }
 
     /// Takes samples in the order they came. The attitudes they give come from
@@ -172,12 +175,12 @@ impl SensorStream {
     }
 
     /// The attitudes of what was taken, and the number of the first.
-    pub(crate) fn attitudes(&mut self) -> (u64, &[AttitudeSample], &AttObject) {
+    pub(crate) fn attitudes(&mut self) -> (u64, &[AttitudeSample], &Arc<Channel>) {
         let first = self.next_seq;
         let attitudes = self.estimator.attitudes(&Sequential);
         self.next_seq += attitudes.len() as u64;
         self.last = attitudes.last().copied().or(self.last);
-        (first, attitudes, &self.object)
+        (first, attitudes, &self.channel)
     }
 
     /// The kinds of loss that have happened for the first time since this was asked last.
@@ -234,8 +237,8 @@ impl SensorStream {
             "sample_kind": self.kind.name(),
             "gyro_unit": self.unit.name(),
             "method": self.estimator.method().name(),
-            "world": self.labels.world_axes,
-            "body": self.labels.body_axes,
+            "world": self.channel.stream().world_axes,
+            "body": self.channel.stream().body_axes,
             "initial": self.prepared.initial_origin,
             "bias": self.prepared.bias_origin,
             "warnings": self.prepared.warnings,

@@ -128,6 +128,11 @@ impl Process {
         Process::spawn(command, args)
     }
 
+    /// `strapd COMMAND ARGS`, another command that listens.
+    pub(crate) fn of(args: &[&str]) -> Process {
+        Process::spawn(Command::new(strapd()), args)
+    }
+
     /// The same after a command of the shell, such as a limit.
     pub(crate) fn start_limited(limit: &str, args: &[&str]) -> Process {
         let mut command = Command::new("sh");
