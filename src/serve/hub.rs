@@ -7,13 +7,14 @@
 
 use super::Settings;
 use super::admission::Token;
+use super::connect::Outgoing;
 use super::limits::Limits;
 use super::recorder::Handle;
 use super::stream::{SensorStream, live_plan};
 use super::subscriber::{Chunk, Outbox};
 use super::wire::{self, Fault};
 use crate::config::Plan;
-use crate::decode::{Line, LineDecoder, printable};
+use crate::decode::{self, Line, LineDecoder, printable};
 use crate::error::{Error, Result};
 use crate::record::{Nanos, RawSample};
 use bytes::Bytes;
@@ -37,6 +38,7 @@ pub struct Hub {
     limits: Limits,
     token: Option<Token>,
     recorder: Option<Handle>,
+    outgoing: Vec<Arc<Outgoing>>,
     session: String,
     started: Instant,
     stopping: AtomicBool,
@@ -161,6 +163,11 @@ impl Hub {
             limits: settings.limits,
             token: settings.token,
             recorder: settings.recorder,
+            outgoing: settings
+                .sources
+                .into_iter()
+                .map(|source| Arc::new(Outgoing::new(source)))
+                .collect(),
             session: format!("{session:08x}"),
             started: Instant::now(),
             stopping: AtomicBool::new(false),
@@ -192,6 +199,18 @@ impl Hub {
     #[must_use]
     pub fn decoder(&self) -> &LineDecoder {
         &self.decoder
+    }
+
+    /// How lines are read.
+    #[must_use]
+    pub fn decode_options(&self) -> &decode::Options {
+        &self.plan.decode
+    }
+
+    /// The sources it connects to.
+    #[must_use]
+    pub fn outgoing(&self) -> &[Arc<Outgoing>] {
+        &self.outgoing
     }
 
     /// Names this run of the daemon.
@@ -399,6 +418,7 @@ impl Hub {
                 })
             })
             .collect();
+        let outgoing: Vec<_> = self.outgoing.iter().map(|o| o.status()).collect();
         let recording = self.recorder.as_ref().map(Handle::status);
         let counters: serde_json::Map<_, _> = self
             .counters
@@ -409,7 +429,7 @@ impl Hub {
             .collect();
         wire::status(serde_json::json!({
             "session": self.session, "uptime_s": self.uptime_secs(),
-            "sources": sources, "clients": clients, "counters": counters,
+            "sources": sources, "outgoing": outgoing, "clients": clients, "counters": counters,
             "recording": recording.map(|r| serde_json::json!({
                 "file": r.files.last().map(|f| f.display().to_string()), "files": r.files.len(),
                 "bytes": r.bytes, "samples": r.samples, "attitudes": r.attitudes, "stopped": r.stopped,
