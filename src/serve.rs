@@ -17,6 +17,7 @@
 //! | [`state`] | attitudes <-> the file a restarted daemon goes on from | I/O |
 //! | [`limits`], [`admission`] | every bound; who may come in | pure |
 //! | [`listen`], `http` | sockets | I/O |
+//! | [`source`], [`connect`], [`upstream`] | sockets others listen on | I/O |
 //! | [`shutdown`] | signals -> an orderly end | I/O |
 //!
 //! The wire is described in `docs/protocol.md`.
@@ -25,6 +26,7 @@ pub mod address;
 pub mod admission;
 pub mod cast;
 pub mod channel;
+pub mod connect;
 pub mod framing;
 mod http;
 pub mod hub;
@@ -35,9 +37,11 @@ mod quiet;
 pub mod recorder;
 pub mod session;
 pub mod shutdown;
+pub mod source;
 pub mod state;
 pub mod stream;
 pub mod subscriber;
+pub mod upstream;
 pub mod wire;
 
 use crate::config::Plan;
@@ -48,6 +52,7 @@ use hub::Hub;
 use limits::Limits;
 use listen::{Context, Listener};
 use shutdown::Shutdown;
+use source::Source;
 use std::collections::BTreeMap;
 use std::future::Future;
 use std::sync::Arc;
@@ -63,6 +68,8 @@ pub struct Settings {
     pub plans: BTreeMap<String, Plan>,
     /// Where to listen.
     pub listen: Vec<Listen>,
+    /// Where to connect for samples.
+    pub sources: Vec<Source>,
     /// The bounds.
     pub limits: Limits,
     /// What clients must show.
@@ -168,6 +175,10 @@ impl Server {
                 running: shutdown.running(),
             };
             tokio::spawn(listener.serve(context));
+        }
+        for outgoing in self.hub.outgoing() {
+            let task = connect::keep(outgoing.clone(), self.hub.clone(), shutdown.running());
+            tokio::spawn(task);
         }
         stop.await;
         self.hub.stop();

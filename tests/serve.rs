@@ -14,6 +14,7 @@ mod serve {
     mod admission;
     mod bad_lines;
     mod config;
+    mod connecting;
     mod documentation;
     mod faults;
     mod frames;

@@ -4,11 +4,13 @@ use super::admission::Admission;
 use super::config::Layered;
 use super::estimation::Estimation;
 use super::{Global, Outcome};
+use crate::client::remote::Remote;
 use crate::error::{Error, Result};
 use crate::serve::address::{DEFAULTS, Listen};
 use crate::serve::hub::Hub;
 use crate::serve::recorder::{self, Recorder, Split};
 use crate::serve::shutdown::{self, Signals};
+use crate::serve::source::Source;
 use crate::serve::state::{self, StateFile};
 use crate::serve::{Server, Settings, listen};
 use crate::sink::{Format, Target};
@@ -19,19 +21,25 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+/// Most sources connected to.
+const MAX_SOURCES: usize = 64;
+
 /// Samples in over sockets, attitude out to whoever watches.
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:
   strapd serve                                           TCP on 127.0.0.1:4550, WebSocket and HTTP on 127.0.0.1:8765
   strapd serve --listen tcp-listen://127.0.0.1:0         a free port, named in the ready line
   strapd cat flight.mcap | strapd serve -                lines on standard input, too
+  strapd serve tcp://imu.local:7000?id=imu0              samples from somebody who listens, for as long as it takes
+  strapd serve 'ws://phone:8080/sensor/connect?type=android.sensor.gyroscope&id=phone'
 
 Talk to it:
   echo '{\"class\":\"RATE\",\"id\":\"imu0\",\"stamp\":{\"sec\":1,\"nsec\":0},\"gyro\":[0.1,0,0]}' | nc 127.0.0.1 4550
   echo '{\"class\":\"WATCH\"}' | nc 127.0.0.1 4550             attitudes as they come
   curl 127.0.0.1:8765/metrics")]
 pub struct Serve {
-    /// - reads samples from standard input as well
+    /// Where else samples come from: tcp://HOST:PORT, ws://HOST:PORT/PATH, unix:///PATH (connected to, and
+    /// again whenever lost; ?id=NAME names the sensor), or - for standard input
     #[arg(value_name = "SOURCE")]
     pub sources: Vec<String>,
     /// Where to listen: tcp-listen://HOST:PORT, udp-listen://HOST:PORT, ws-listen://HOST:PORT (with
@@ -81,11 +89,6 @@ pub struct Serve {
 /// # Errors
 /// An address can not be listened on, or the arguments can not be.
 pub fn run(global: &Global, args: &Serve) -> Result<Outcome> {
-    if let Some(other) = args.sources.iter().find(|s| *s != "-") {
-        return Err(Error::Usage(format!(
-            "serve {other}: only - (standard input) is a source\n  help: --listen waits for senders; strapd replay reads a log"
-        )));
-    }
     let layered = match &args.config {
         Some(file) => Some(super::config::layered(file, std::env::args_os().collect())?),
         None => None,
@@ -114,7 +117,7 @@ pub fn run(global: &Global, args: &Serve) -> Result<Outcome> {
         .enable_all()
         .build()
         .map_err(|e| Error::Usage(format!("--threads {}: {e}", global.threads)))?;
-    let has_stdin = !args.sources.is_empty();
+    let has_stdin = args.sources.iter().any(|s| s == "-");
     let outcome = runtime.block_on(serve(settings, has_stdin, state));
     // A thread that waits for standard input would otherwise be waited for.
     runtime.shutdown_background();
@@ -255,6 +258,33 @@ impl Serve {
         Ok(Some(settings))
     }
 
+    /// The sources to connect to.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] naming the source.
+    fn outgoing(&self) -> Result<Vec<Source>> {
+        let mut sources: Vec<Source> = Vec::new();
+        for text in self.sources.iter().filter(|s| *s != "-") {
+            if !Remote::is_meant(text) {
+                return Err(Error::Usage(format!(
+                    "serve {text}: is no source of a daemon; known: tcp://HOST:PORT, ws://HOST:PORT/PATH, unix:///PATH, -\n  help: --listen waits for senders; strapd replay reads a log"
+                )));
+            }
+            let source = Source::parse(text)?;
+            if sources.iter().any(|s| s.remote == source.remote) {
+                return Err(Error::Usage(format!("serve {text}: is given twice")));
+            }
+            sources.push(source);
+        }
+        if sources.len() > MAX_SOURCES {
+            return Err(Error::Usage(format!(
+                "serve: {} sources, at most {MAX_SOURCES} can be connected to",
+                sources.len()
+            )));
+        }
+        Ok(sources)
+    }
+
     /// The arguments, checked.
     ///
     /// # Errors
@@ -271,6 +301,7 @@ impl Serve {
                 .into_iter()
                 .map(Listen::parse)
                 .collect::<Result<_>>()?,
+            sources: self.outgoing()?,
             #[cfg(unix)]
             passed: listen::Passed::from_env(),
             ..Settings::default()

@@ -149,6 +149,7 @@ fn exposition(hub: &Hub) -> String {
             label(sensor.id())
         );
     });
+    super::connect::exposition(&mut out, hub);
     out
 }
 

@@ -8,6 +8,7 @@
 use super::Settings;
 use super::admission::Token;
 use super::channel::{Channel, Items};
+use super::connect::Outgoing;
 use super::limits::Limits;
 use super::playback::{Action, Playback};
 use super::recorder::Handle;
@@ -16,7 +17,7 @@ use super::stream::{SensorStream, live_plan};
 use super::subscriber::{Chunk, Class, Outbox};
 use super::wire::{self, Fault};
 use crate::config::Plan;
-use crate::decode::{Line, LineDecoder, printable};
+use crate::decode::{self, Line, LineDecoder, printable};
 use crate::error::{Error, Result};
 use crate::record::{Nanos, RawSample};
 use crate::sink::Profile;
@@ -39,6 +40,7 @@ pub struct Hub {
     recorder: Option<Handle>,
     /// The replay it serves, which is then its only source.
     playback: Option<Arc<Playback>>,
+    outgoing: Vec<Arc<Outgoing>>,
     session: String,
     started: Instant,
     stopping: AtomicBool,
@@ -178,6 +180,11 @@ impl Hub {
             token: settings.token,
             recorder: settings.recorder,
             playback: settings.playback,
+            outgoing: settings
+                .sources
+                .into_iter()
+                .map(|source| Arc::new(Outgoing::new(source)))
+                .collect(),
             session: format!("{session:08x}"),
             started: Instant::now(),
             stopping: AtomicBool::new(false),
@@ -212,6 +219,18 @@ impl Hub {
     #[must_use]
     pub fn decoder(&self) -> &LineDecoder {
         &self.decoder
+    }
+
+    /// How lines are read.
+    #[must_use]
+    pub fn decode_options(&self) -> &decode::Options {
+        &self.plan.decode
+    }
+
+    /// The sources it connects to.
+    #[must_use]
+    pub fn outgoing(&self) -> &[Arc<Outgoing>] {
+        &self.outgoing
     }
 
     /// Names this run of the daemon; a replay that begins anew gets another name.
@@ -507,6 +526,7 @@ impl Hub {
                 })
             })
             .collect();
+        let outgoing: Vec<_> = self.outgoing.iter().map(|o| o.status()).collect();
         let recording = self.recorder.as_ref().map(Handle::status);
         let counters: serde_json::Map<_, _> = self
             .counters
@@ -517,7 +537,7 @@ impl Hub {
             .collect();
         wire::status(serde_json::json!({
             "session": self.session, "uptime_s": self.uptime_secs(),
-            "sources": sources, "clients": clients, "counters": counters,
+            "sources": sources, "outgoing": outgoing, "clients": clients, "counters": counters,
             "state": lock(&self.state).as_ref().map(|s| serde_json::json!({
                 "saved_s_ago": s.saved.map(|t| t.elapsed().as_secs_f64()), "failed": s.failed,
             })),

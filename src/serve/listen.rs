@@ -4,7 +4,7 @@
 
 mod duplex;
 mod stdin;
-mod tcp;
+pub(crate) mod tcp;
 mod udp;
 pub(crate) mod websocket;
 
@@ -207,7 +207,7 @@ fn too_many_clients(hub: &Hub) -> Bytes {
 }
 
 /// Now, as the log time of what was just received.
-fn now() -> Nanos {
+pub(super) fn now() -> Nanos {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     Nanos(since.map_or(0, |d| i64::try_from(d.as_nanos()).unwrap_or(i64::MAX)))
 }
@@ -228,6 +228,6 @@ thread_local! {
 }
 
 /// Works in this thread's room.
-fn in_room<T>(work: impl FnOnce(&mut [u8], &mut Scratch) -> T) -> T {
+pub(super) fn in_room<T>(work: impl FnOnce(&mut [u8], &mut Scratch) -> T) -> T {
     ROOM.with_borrow_mut(|room| work(&mut room.bytes, &mut room.scratch))
 }
