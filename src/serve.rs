@@ -18,6 +18,7 @@
 //! | [`limits`], [`admission`] | every bound; who may come in | pure |
 //! | [`listen`], `http` | sockets | I/O |
 //! | [`source`], [`connect`], [`upstream`] | sockets others listen on | I/O |
+//! | `page`, `top` | what a browser gets | pure |
 //! | [`shutdown`] | signals -> an orderly end | I/O |
 //!
 //! The wire is described in `docs/protocol.md`.
@@ -32,6 +33,7 @@ mod http;
 pub mod hub;
 pub mod limits;
 pub mod listen;
+mod page;
 pub mod playback;
 mod quiet;
 pub mod recorder;
@@ -41,6 +43,7 @@ pub mod source;
 pub mod state;
 pub mod stream;
 pub mod subscriber;
+mod top;
 pub mod upstream;
 pub mod wire;
 

@@ -40,6 +40,8 @@ pub struct SensorStream {
     /// Samples that by the sender's numbers did not come in their turn: never, or late.
     missing: u64,
     last: Option<AttitudeSample>,
+    /// Distance of a step from the ordinary one, s, smoothed over about 16 steps.
+    jitter_secs: f64,
     /// Verdicts that were said once, as bits.
     told: u32,
 }
@@ -117,6 +119,7 @@ impl SensorStream {
             expected: None,
             missing: 0,
             last: None,
+            jitter_secs: 0.0,
             told: 0,
         })
     }
@@ -177,7 +180,20 @@ impl SensorStream {
     /// The attitudes of what was taken, and the number of the first.
     pub(crate) fn attitudes(&mut self) -> (u64, &[AttitudeSample], &Arc<Channel>) {
         let first = self.next_seq;
+        let spacing = self.estimator.conditioning().spacing_nanos;
         let attitudes = self.estimator.attitudes(&Sequential);
+        let mut before = self.last.map(|l| l.stamp);
+        for attitude in attitudes {
+            let step = before.map(|b| attitude.stamp.since(b));
+            before = Some(attitude.stamp);
+            // A step over missing samples is a gap.
+            if let (Some(spacing), Some(step)) = (spacing, step)
+                && step < 2 * spacing
+            {
+                let off = (step - spacing).abs() as f64 * 1e-9;
+                self.jitter_secs += (off - self.jitter_secs) / 16.0;
+            }
+        }
         self.next_seq += attitudes.len() as u64;
         self.last = attitudes.last().copied().or(self.last);
         (first, attitudes, &self.channel)
@@ -234,6 +250,7 @@ impl SensorStream {
             "reset": self.last.map_or(0, |l| l.reset_count),
             "last_stamp": self.last.map(|l| stamp(l.stamp)),
             "rate_hz": report.spacing_nanos.filter(|n| *n > 0).map(|n| 1e9 / n as f64),
+            "jitter_s": self.jitter_secs,
             "sample_kind": self.kind.name(),
             "gyro_unit": self.unit.name(),
             "method": self.estimator.method().name(),
