@@ -15,7 +15,8 @@
 //! | [`subscriber`] | attitudes -> what one client gets, bounded | locks |
 //! | [`recorder`] | what goes through -> MCAP files that survive a crash | a queue; I/O on threads of its own |
 //! | [`limits`], [`admission`] | every bound; who may come in | pure |
-//! | [`listen`], `http` | sockets | I/O |
+//! | [`foxglove`], [`viewer`] | the same for Foxglove's viewers: messages in place of lines | pure; sans-I/O |
+//! | [`listen`], `http`, `outgoing` | sockets | I/O |
 //! | [`shutdown`] | signals -> an orderly end | I/O |
 //!
 //! The wire is described in `docs/protocol.md`.
@@ -24,11 +25,13 @@ pub mod address;
 pub mod admission;
 pub mod cast;
 pub mod channel;
+pub mod foxglove;
 pub mod framing;
 mod http;
 pub mod hub;
 pub mod limits;
 pub mod listen;
+mod outgoing;
 pub mod playback;
 mod quiet;
 pub mod recorder;
@@ -36,10 +39,12 @@ pub mod session;
 pub mod shutdown;
 pub mod stream;
 pub mod subscriber;
+pub mod viewer;
 pub mod wire;
 
 use crate::config::Plan;
 use crate::error::{Error, Result};
+use crate::sink::Target;
 use address::Listen;
 use admission::{Token, Web, is_loopback};
 use hub::Hub;
@@ -71,6 +76,8 @@ pub struct Settings {
     pub web: Web,
     /// Who records everything that goes through.
     pub recorder: Option<recorder::Handle>,
+    /// Whom to call and send every attitude to ([`Target::Tcp`], [`Target::Udp`]).
+    pub outputs: Vec<Target>,
     /// The replay that is served; no samples are taken then.
     pub playback: Option<Arc<playback::Playback>>,
 }
@@ -82,6 +89,7 @@ pub struct Server {
     web: Arc<Web>,
     listeners: Vec<Listener>,
     bound: Vec<Listen>,
+    outputs: Vec<Target>,
 }
 
 impl Settings {
@@ -110,6 +118,7 @@ impl Server {
         }
         let listen = std::mem::take(&mut settings.listen);
         let web = std::mem::take(&mut settings.web);
+        let outputs = std::mem::take(&mut settings.outputs);
         let hub = Hub::new(settings)?;
         let mut listeners = Vec::new();
         let mut bound = Vec::new();
@@ -123,6 +132,7 @@ impl Server {
             web: Arc::new(web),
             listeners,
             bound,
+            outputs,
         })
     }
 
@@ -143,14 +153,17 @@ impl Server {
     pub async fn run(self, stop: impl Future<Output = ()>) -> bool {
         let shutdown = Shutdown::default();
         let places = Arc::new(Semaphore::new(self.hub.limits().connections));
+        let context = || Context {
+            hub: self.hub.clone(),
+            web: self.web.clone(),
+            places: places.clone(),
+            running: shutdown.running(),
+        };
         for listener in self.listeners {
-            let context = Context {
-                hub: self.hub.clone(),
-                web: self.web.clone(),
-                places: places.clone(),
-                running: shutdown.running(),
-            };
-            tokio::spawn(listener.serve(context));
+            tokio::spawn(listener.serve(context()));
+        }
+        for target in self.outputs {
+            tokio::spawn(outgoing::send(target, context()));
         }
         stop.await;
         self.hub.stop();

@@ -7,9 +7,10 @@
 
 use super::Settings;
 use super::admission::Token;
-use super::channel::{Channel, Items};
+use super::channel::{Channel, Clock, Items};
+use super::foxglove;
 use super::limits::Limits;
-use super::playback::{Action, Playback};
+use super::playback::{Action, Place, Playback};
 use super::recorder::Handle;
 use super::stream::{SensorStream, live_plan};
 use super::subscriber::{Chunk, Class, Outbox};
@@ -18,7 +19,7 @@ use crate::config::Plan;
 use crate::decode::{Line, LineDecoder, printable};
 use crate::error::{Error, Result};
 use crate::record::{Nanos, RawSample};
-use crate::sink::Profile;
+use crate::sink::{Profile, Stream};
 use bytes::Bytes;
 use std::collections::BTreeMap;
 use std::hash::{BuildHasher, RandomState};
@@ -58,6 +59,18 @@ pub struct Sensor {
     owner: Option<u64>,
 }
 
+/// What a client is told, and how.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Shape {
+    /// Lines.
+    Lines(Profile),
+    /// Messages of the Foxglove protocol.
+    Foxglove {
+        /// Whether it can move a playback.
+        controls: bool,
+    },
+}
+
 /// One connection.
 #[derive(Debug)]
 pub struct Client {
@@ -67,8 +80,8 @@ pub struct Client {
     pub peer: String,
     /// What waits for it.
     pub outbox: Outbox,
-    /// What its objects look like.
-    profile: Profile,
+    /// What it is told, and how.
+    shape: Shape,
     since: Instant,
 }
 
@@ -225,16 +238,56 @@ impl Hub {
         classes
     }
 
-    /// A stream of a replay.
-    pub fn declare(&self, channel: &Arc<Channel>) {
-        write(&self.channels).push(channel.clone());
+    /// A further stream; viewers are told.
+    pub fn declare(&self, stream: &Stream) -> Arc<Channel> {
+        let mut channels = write(&self.channels);
+        let mut streams: Vec<Stream> = channels.iter().map(|c| c.stream().clone()).collect();
+        streams.push(stream.clone());
+        let channel = Arc::new(Channel::new(&streams));
+        channels.push(channel.clone());
+        // Under the lock: who joins meanwhile finds it in the list, and is not told twice.
+        let said = foxglove::channels(std::iter::once(&*channel), false);
+        for client in read(&self.clients).values() {
+            if matches!(client.shape, Shape::Foxglove { .. }) {
+                client.outbox.reply(said.clone());
+            }
+        }
+        channel
+    }
+
+    /// Whether a viewer can subscribe to it.
+    #[must_use]
+    pub fn has_channel(&self, number: u32) -> bool {
+        number == foxglove::TRANSFORMS
+            || read(&self.channels)
+                .iter()
+                .flat_map(|c| c.topics())
+                .any(|(known, _)| known == number)
     }
 
     /// Where the replay is; `None` where there is none to be controlled.
     #[must_use]
+    pub fn where_it_is(&self) -> Option<Place> {
+        self.playback.as_ref()?.place()
+    }
+
+    /// The same as a line.
+    #[must_use]
     pub fn place(&self) -> Option<Bytes> {
-        let place = self.playback.as_ref()?.place()?;
-        Some(wire::playback(&place, &self.session()))
+        Some(wire::playback(&self.where_it_is()?, &self.session()))
+    }
+
+    /// The replay has begun anew, as another session.
+    pub fn began_anew(&self) {
+        for client in read(&self.clients).values() {
+            if let Shape::Foxglove { controls } = client.shape {
+                client.outbox.reply(self.server_info(controls));
+            }
+        }
+    }
+
+    fn server_info(&self, controls: bool) -> Bytes {
+        foxglove::server_info(&self.session(), self.where_it_is().as_ref(), controls)
     }
 
     /// A client asks for something of the replay; all others that watch are told.
@@ -259,11 +312,21 @@ impl Hub {
 
     /// Tells whoever watches where the replay is. A `tick` is left out where one waits already.
     pub fn announce(&self, tick: bool, but: Option<u64>) {
-        let Some(line) = self.place() else { return };
-        let watchers = read(&self.watchers).clone();
-        for client in watchers.iter().filter(|c| Some(c.number) != but) {
-            if client.profile == Profile::Lines {
-                client.outbox.note(line.clone(), tick);
+        let Some(place) = self.where_it_is() else {
+            return;
+        };
+        let line = wire::playback(&place, &self.session());
+        let clients = read(&self.clients);
+        for client in clients.values().filter(|c| Some(c.number) != but) {
+            match client.shape {
+                Shape::Lines(Profile::Lines) if client.outbox.level().watching => {
+                    client.outbox.note(line.clone(), tick);
+                }
+                Shape::Foxglove { controls: true } => {
+                    let state = foxglove::playback_state(&place, false, "");
+                    client.outbox.note(state, tick);
+                }
+                _ => {}
             }
         }
     }
@@ -281,16 +344,30 @@ impl Hub {
 
     /// Somebody has connected.
     pub fn join(&self, peer: String) -> Arc<Client> {
-        self.join_as(peer, Profile::Lines)
+        self.join_as(peer, Shape::Lines(Profile::Lines))
     }
 
-    /// As [`Hub::join`], for somebody whose objects look like `profile`.
-    pub fn join_as(&self, peer: String, profile: Profile) -> Arc<Client> {
+    /// As [`Hub::join`], for somebody who is told things in another way. A viewer is told at once who
+    /// we are and what there is.
+    pub fn join_as(&self, peer: String, shape: Shape) -> Arc<Client> {
+        let outbox = match shape {
+            Shape::Lines(Profile::Lines) => Outbox::new(),
+            Shape::Lines(Profile::PlotJuggler) => Outbox::saying(|_, _| Bytes::new()),
+            Shape::Foxglove { .. } => Outbox::saying(foxglove::gap),
+        };
+        let channels = read(&self.channels);
+        if let Shape::Foxglove { controls } = shape {
+            outbox.reply(self.server_info(controls));
+            outbox.reply(foxglove::channels(channels.iter().map(|c| &**c), true));
+            if let Some(place) = self.where_it_is().filter(|_| controls) {
+                outbox.reply(foxglove::playback_state(&place, false, ""));
+            }
+        }
         let client = Arc::new(Client {
             number: self.next_client.fetch_add(1, Ordering::Relaxed),
             peer,
-            outbox: Outbox::new(),
-            profile,
+            outbox,
+            shape,
             since: Instant::now(),
         });
         write(&self.clients).insert(client.number, client.clone());
@@ -350,7 +427,10 @@ impl Hub {
         }
         let id: Arc<str> = id.into();
         let first = run.samples.first().copied().unwrap_or_default();
-        let stream = SensorStream::new(self.plan_of(&id), id.clone(), run.head, &first)?;
+        let stream =
+            SensorStream::new(self.plan_of(&id), id.clone(), run.head, &first, |labels| {
+                self.declare(labels)
+            })?;
         let sensor = Arc::new(Mutex::new(Sensor {
             stream,
             owner: None,
@@ -434,12 +514,25 @@ impl Hub {
         items: Items<'_>,
         text: &mut Vec<u8>,
     ) {
-        channel.count(items.len());
         // Encoded when the first asks, and shared by all.
         let mut encoded: [Option<Vec<Chunk>>; 2] = [None, None];
         let watchers = read(&self.watchers).clone();
         for client in &*watchers {
-            let profile = client.profile;
+            let profile = match client.shape {
+                Shape::Lines(profile) => profile,
+                Shape::Foxglove { .. } => {
+                    let clock = match &self.playback {
+                        None => Clock::Log,
+                        Some(_) => Clock::Stamp,
+                    };
+                    let now = self.where_it_is().and_then(|place| place.at);
+                    client.outbox.offer_frames(
+                        |wanted| channel.frames(wanted, first_seq, items, clock),
+                        now.map(|now| (now, foxglove::time as fn(Nanos) -> Bytes)),
+                    );
+                    continue;
+                }
+            };
             let [lines, plot] = &mut encoded;
             let kept = match profile {
                 Profile::Lines => lines,
@@ -460,6 +553,7 @@ impl Hub {
                 Items::Samples(_) => client.outbox.offer_samples(channel.id(), &mut shared),
             }
         }
+        channel.passed(items);
         if matches!(items, Items::Attitudes(_)) {
             count(&self.counters.attitudes, items.len());
         }
@@ -472,7 +566,7 @@ impl Hub {
         let sources: Vec<_> = sensors
             .iter()
             .map(|s| lock(s).stream.status())
-            .chain(read(&self.channels).iter().map(|c| c.status()))
+            .chain(self.own_streams())
             .collect();
         let clients: Vec<_> = read(&self.clients)
             .values()
@@ -502,6 +596,14 @@ impl Hub {
                 "bytes": r.bytes, "samples": r.samples, "attitudes": r.attitudes, "stopped": r.stopped,
             })),
         }))
+    }
+
+    /// The streams of a replay, for `STATUS`; those of sensors say more themselves.
+    fn own_streams(&self) -> Vec<serde_json::Value> {
+        match &self.playback {
+            None => Vec::new(),
+            Some(_) => read(&self.channels).iter().map(|c| c.status()).collect(),
+        }
     }
 
     /// Seconds since the start.

@@ -15,6 +15,7 @@ use crate::record::{AttitudeSample, Nanos, RawSample, SampleKind, Verdict};
 use crate::serve::channel::Channel;
 use crate::serve::recorder::stream_of;
 use crate::serve::wire::Fault;
+use crate::sink::Stream;
 use std::sync::Arc;
 
 /// The name of a sensor that gives none.
@@ -69,7 +70,7 @@ pub fn live_plan(plan: &Plan) -> Result<Plan, String> {
 
 impl SensorStream {
     /// For the sensor `id`, whose first line says `stated` and brings `first`. `plan` is a
-    /// [`live_plan`].
+    /// [`live_plan`]; `declare` makes its labels known to clients.
     ///
     /// # Errors
     /// The fault to answer with: the samples do not fit the plan.
@@ -78,6 +79,7 @@ impl SensorStream {
         id: Arc<str>,
         stated: &Line,
         first: &RawSample,
+        declare: impl FnOnce(&Stream) -> Arc<Channel>,
     ) -> Result<SensorStream, Fault> {
         let fault = |what: String| Fault {
             id: Some(id.to_string()),
@@ -93,7 +95,7 @@ impl SensorStream {
         let estimator = Estimator::live(plan, &resolved, &prepared).map_err(fault)?;
         let labels = labelled(stream_of(&id), plan, &resolved, &prepared);
         Ok(SensorStream {
-            channel: Arc::new(Channel::new(&labels)),
+            channel: declare(&labels),
             id,
             estimator,
             kind: resolved.kind,
