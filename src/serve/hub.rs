@@ -5,21 +5,23 @@
 //! the clients' outboxes. Sensors run side by side on as many cores as there are; within one the
 //! order is that of its lock.
 
+mod telling;
+
 use super::Settings;
 use super::admission::Token;
 use super::channel::{Channel, Clock, Items};
 use super::foxglove;
 use super::limits::Limits;
-use super::playback::{Action, Place, Playback};
+use super::playback::Playback;
 use super::recorder::Handle;
 use super::stream::{SensorStream, live_plan};
-use super::subscriber::{Chunk, Class, Outbox};
+use super::subscriber::{Chunk, Outbox};
 use super::wire::{self, Fault};
 use crate::config::Plan;
 use crate::decode::{Line, LineDecoder, printable};
 use crate::error::{Error, Result};
 use crate::record::{Nanos, RawSample};
-use crate::sink::{Profile, Stream};
+use crate::sink::Profile;
 use bytes::Bytes;
 use std::collections::BTreeMap;
 use std::hash::{BuildHasher, RandomState};
@@ -219,115 +221,6 @@ impl Hub {
         match self.playback.as_ref().map_or(0, |p| p.run()) {
             0 => self.session.clone(),
             run => format!("{}.{run}", self.session),
-        }
-    }
-
-    /// Whether clients may send samples: a replay has its own.
-    #[must_use]
-    pub fn takes_samples(&self) -> bool {
-        self.playback.is_none()
-    }
-
-    /// What can be watched.
-    #[must_use]
-    pub fn classes(&self) -> Vec<Class> {
-        let mut classes: Vec<Class> = read(&self.channels).iter().map(|c| c.class()).collect();
-        classes.push(Class::Att);
-        classes.sort_unstable();
-        classes.dedup();
-        classes
-    }
-
-    /// A further stream; viewers are told.
-    pub fn declare(&self, stream: &Stream) -> Arc<Channel> {
-        let mut channels = write(&self.channels);
-        let mut streams: Vec<Stream> = channels.iter().map(|c| c.stream().clone()).collect();
-        streams.push(stream.clone());
-        let channel = Arc::new(Channel::new(&streams));
-        channels.push(channel.clone());
-        // Under the lock: who joins meanwhile finds it in the list, and is not told twice.
-        let said = foxglove::channels(std::iter::once(&*channel), false);
-        for client in read(&self.clients).values() {
-            if matches!(client.shape, Shape::Foxglove { .. }) {
-                client.outbox.reply(said.clone());
-            }
-        }
-        channel
-    }
-
-    /// Whether a viewer can subscribe to it.
-    #[must_use]
-    pub fn has_channel(&self, number: u32) -> bool {
-        number == foxglove::TRANSFORMS
-            || read(&self.channels)
-                .iter()
-                .flat_map(|c| c.topics())
-                .any(|(known, _)| known == number)
-    }
-
-    /// Where the replay is; `None` where there is none to be controlled.
-    #[must_use]
-    pub fn where_it_is(&self) -> Option<Place> {
-        self.playback.as_ref()?.place()
-    }
-
-    /// The same as a line.
-    #[must_use]
-    pub fn place(&self) -> Option<Bytes> {
-        Some(wire::playback(&self.where_it_is()?, &self.session()))
-    }
-
-    /// The replay has begun anew, as another session.
-    pub fn began_anew(&self) {
-        for client in read(&self.clients).values() {
-            if let Shape::Foxglove { controls } = client.shape {
-                client.outbox.reply(self.server_info(controls));
-            }
-        }
-    }
-
-    fn server_info(&self, controls: bool) -> Bytes {
-        foxglove::server_info(&self.session(), self.where_it_is().as_ref(), controls)
-    }
-
-    /// A client asks for something of the replay; all others that watch are told.
-    ///
-    /// # Errors
-    /// The fault to answer with.
-    pub fn control(&self, client: u64, action: Action) -> std::result::Result<(), Fault> {
-        let playback = self.playback.as_ref().ok_or_else(|| {
-            Fault::new(
-                "nothing_to_play",
-                "samples come as they come here; strapd replay LOG -o ws-listen://... can be controlled",
-            )
-        })?;
-        if playback.ask(action)? {
-            for client in read(&self.clients).values() {
-                client.outbox.forget();
-            }
-        }
-        self.announce(false, Some(client));
-        Ok(())
-    }
-
-    /// Tells whoever watches where the replay is. A `tick` is left out where one waits already.
-    pub fn announce(&self, tick: bool, but: Option<u64>) {
-        let Some(place) = self.where_it_is() else {
-            return;
-        };
-        let line = wire::playback(&place, &self.session());
-        let clients = read(&self.clients);
-        for client in clients.values().filter(|c| Some(c.number) != but) {
-            match client.shape {
-                Shape::Lines(Profile::Lines) if client.outbox.level().watching => {
-                    client.outbox.note(line.clone(), tick);
-                }
-                Shape::Foxglove { controls: true } => {
-                    let state = foxglove::playback_state(&place, false, "");
-                    client.outbox.note(state, tick);
-                }
-                _ => {}
-            }
         }
     }
 
@@ -596,14 +489,6 @@ impl Hub {
                 "bytes": r.bytes, "samples": r.samples, "attitudes": r.attitudes, "stopped": r.stopped,
             })),
         }))
-    }
-
-    /// The streams of a replay, for `STATUS`; those of sensors say more themselves.
-    fn own_streams(&self) -> Vec<serde_json::Value> {
-        match &self.playback {
-            None => Vec::new(),
-            Some(_) => read(&self.channels).iter().map(|c| c.status()).collect(),
-        }
     }
 
     /// Seconds since the start.

@@ -504,6 +504,40 @@ mod tests {
     }
 
     #[test]
+    fn a_note_keeps_its_place_among_the_attitudes_and_the_last_one_is_never_dropped() {
+        let outbox = Outbox::new();
+        outbox.watch(Some(Filter::default()));
+        offer(&outbox, &chunk("a", 0, 4));
+        outbox.note(Bytes::from("one"), false);
+        offer(&outbox, &chunk("a", 10, 4));
+        outbox.note(Bytes::from("a tick too many"), true);
+        let mut out = VecDeque::new();
+        let taken = outbox.take(usize::MAX, &mut out);
+        assert_eq!(
+            (texts(&out), taken),
+            (["xxxx", "one", "xxxx"].map(str::to_owned).to_vec(), 11)
+        );
+        outbox.written(taken);
+        // Told again, once nothing of the kind waits.
+        outbox.note(Bytes::from("tick"), true);
+        outbox.note(Bytes::from("two"), false);
+        for n in 0..20 {
+            offer(&outbox, &chunk("a", n * 10, 32 << 10));
+        }
+        out.clear();
+        outbox.take(0, &mut out);
+        let said = texts(&out);
+        assert!(
+            said[0] == "two" && said[1].contains("GAP") && said.len() == 2,
+            "{said:?}"
+        );
+        outbox.note(Bytes::from("three"), false);
+        outbox.forget();
+        assert!(outbox.is_empty());
+        assert_eq!(outbox.level().queued, 0);
+    }
+
+    #[test]
     fn replies_are_never_dropped_and_one_too_many_closes() {
         let outbox = Outbox::new();
         outbox.watch(Some(Filter::default()));
