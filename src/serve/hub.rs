@@ -421,7 +421,7 @@ impl Hub {
                     let now = self.where_it_is().and_then(|place| place.at);
                     client.outbox.offer_frames(
                         |wanted| channel.frames(wanted, first_seq, items, clock),
-                        now.map(|now| (now, foxglove::time as fn(Nanos) -> Bytes)),
+                        now,
                     );
                     continue;
                 }

@@ -4,7 +4,7 @@
 //! queue has a cap, the oldest attitudes give way, what gave way is counted and said (`GAP`), and
 //! replies (`STATUS`, `ERROR`, ...) are never dropped: when too many wait, the client is closed.
 
-use super::wire;
+use super::{foxglove, wire};
 use crate::record::{AttitudeSample, Nanos};
 use crate::sink::Decimator;
 use bytes::Bytes;
@@ -319,20 +319,20 @@ impl Outbox {
     pub fn offer_frames(
         &self,
         make: impl FnOnce(&BTreeMap<u32, u32>) -> Vec<Chunk>,
-        now: Option<(Nanos, fn(Nanos) -> Bytes)>,
+        now: Option<Nanos>,
     ) {
         let mut state = self.state();
         let mut chunks = make(&state.subscriptions);
         let Some(last) = chunks.last_mut() else {
             return;
         };
-        if let Some((now, time)) = now
+        if let Some(now) = now
             && state
                 .told
                 .is_none_or(|told| now.since(told).abs() >= BETWEEN_TIMES)
         {
             state.told = Some(now);
-            last.bytes = [&last.bytes[..], &time(now)].concat().into();
+            last.bytes = [&last.bytes[..], &foxglove::time(now)].concat().into();
         }
         for chunk in chunks {
             state.push(chunk);
