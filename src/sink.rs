@@ -25,6 +25,7 @@ pub use copy::CopiedChannel;
 pub use decimate::Decimator;
 pub use mcap::chunk::Compression;
 pub use mcap::live::{LiveMcap, LiveStream};
+pub(crate) use mcap::payload;
 pub use mcap::{Attachment, Encoding, InputChannel, InputMessage};
 pub use output::Flow;
 pub(crate) use output::sync_directory;
