@@ -13,6 +13,7 @@ mod serve {
 
     mod admission;
     mod bad_lines;
+    mod cat;
     mod config;
     mod connecting;
     mod documentation;
@@ -22,4 +23,5 @@ mod serve {
     mod same_bytes;
     mod slow_readers;
     mod transports;
+    mod watch;
 }

@@ -37,6 +37,10 @@ pub struct SensorStream {
     /// Samples that by the sender's numbers were sent and never came.
     missing: u64,
     last: Option<AttitudeSample>,
+    /// Spacing of the last two attitudes, nanoseconds, while nothing was held between them.
+    spacing: Option<i64>,
+    /// How much one spacing differs from the next, nanoseconds, smoothed over 16 as RFC 3550 does.
+    jitter: f64,
     /// Verdicts that were said once, as bits.
     told: u32,
 }
@@ -105,6 +109,8 @@ impl SensorStream {
             expected: None,
             missing: 0,
             last: None,
+            spacing: None,
+            jitter: 0.0,
             told: 0,
         })
     }
@@ -149,7 +155,16 @@ impl SensorStream {
         let first = self.next_seq;
         let attitudes = self.estimator.attitudes(&Sequential);
         self.next_seq += attitudes.len() as u64;
-        self.last = attitudes.last().copied().or(self.last);
+        for attitude in attitudes {
+            let before = self.last.replace(*attitude);
+            let spacing = before
+                .filter(|b| b.reset_count == attitude.reset_count)
+                .map(|b| attitude.stamp.0.saturating_sub(b.stamp.0));
+            if let (Some(now), Some(then)) = (spacing, self.spacing) {
+                self.jitter += (now.saturating_sub(then).abs() as f64 - self.jitter) / 16.0;
+            }
+            self.spacing = spacing;
+        }
         (first, attitudes, &self.object)
     }
 
@@ -204,6 +219,7 @@ impl SensorStream {
             "reset": self.last.map_or(0, |l| l.reset_count),
             "last_stamp": self.last.map(|l| stamp(l.stamp)),
             "rate_hz": report.spacing_nanos.filter(|n| *n > 0).map(|n| 1e9 / n as f64),
+            "jitter_s": self.jitter * 1e-9,
             "sample_kind": self.kind.name(),
             "gyro_unit": self.unit.name(),
             "method": self.estimator.method().name(),
