@@ -1,11 +1,12 @@
 //! `strapd watch` in a terminal, as somebody would see it, and where there is none.
 
 use super::client::{Client, rate};
-use super::daemon::{Daemon, PATIENCE, TCP, eventually, listening, strapd};
+use super::daemon::{Daemon, PATIENCE, eventually, listening, strapd};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{LocalModes, Termios, Winsize, tcgetattr, tcsetwinsize};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};
+use std::num::NonZero;
 use std::process::{Child, Command, Stdio};
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
@@ -61,7 +62,10 @@ impl Terminal {
         let child = command.spawn().unwrap();
         let mut master = File::from(master);
         let keys = master.try_clone().unwrap();
-        let shown = Arc::new(Mutex::new((vt100::Parser::new(24, 100, 0), Vec::new())));
+        let shown = Arc::new(Mutex::new((
+            vt100::Parser::new(NonZero::new(24).unwrap(), NonZero::new(100).unwrap(), 0),
+            Vec::new(),
+        )));
         let screen = shown.clone();
         std::thread::spawn(move || {
             let mut buffer = [0; 4096];
@@ -145,7 +149,7 @@ fn a_sensor_is_seen_and_a_daemon_that_comes_back_too() {
     let address = daemon.address(0);
     let mut terminal = Terminal::watching(&format!("tcp://{address}"), true);
     terminal.until("nothing has come yet");
-    let _sender = turning(&daemon, "imu\u{1b}[31m0");
+    let _sender = turning(&daemon, "imu\\u001b[31m0");
     // Half a second at 90 degrees a second.
     let text = terminal.until("samples 501");
     let text = match text.contains("roll   +45.000") {
