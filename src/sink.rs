@@ -22,6 +22,7 @@ mod target;
 pub(crate) mod tests;
 
 pub use copy::CopiedChannel;
+pub(crate) use csv::roll_pitch_yaw;
 pub use decimate::Decimator;
 pub use mcap::chunk::Compression;
 pub use mcap::live::{LiveMcap, LiveStream};
