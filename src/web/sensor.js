@@ -15,6 +15,8 @@ const LOCUS = 10;
 const READABLE = 100;
 // Steps of stamps that jitter is judged by.
 const STEPS = 512;
+// Seconds from one attitude of a recording to the next that are a leap.
+const LEAP = 1;
 
 export class Sensor {
   // moved(): draw soon; resized(): draw at once, a canvas that changes its size is empty.
@@ -91,14 +93,17 @@ export class Sensor {
     if (!stamp || !q) return;
     this.first ??= stamp;
     // Differences before they become one float: nanoseconds survive.
-    let time = stamp.sec - this.first.sec + (stamp.nsec - this.first.nsec) * 1e-9;
-    const last = this.last;
-    if (last && time < this.history.newestTime) {
-      // A replay that began again.
+    const time = stamp.sec - this.first.sec + (stamp.nsec - this.first.nsec) * 1e-9;
+    if (this.last && time < this.history.newestTime) {
+      // A recording that was taken back: times go on from the same zero.
+      const first = this.first;
       this.clear();
-      this.first = stamp;
-      time = 0;
+      this.first = first;
+    } else if (this.isPlayed && time - this.history.newestTime > LEAP) {
+      // Or forward: what was passed over was not thinned.
+      this.interrupted = true;
     }
+    const last = this.last;
     const jumped = last && (att.reset !== last.reset || this.interrupted);
     if (last && att.seq > last.seq && !this.interrupted) {
       this.skipped += att.seq - last.seq - 1;
