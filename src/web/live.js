@@ -5,7 +5,7 @@ import { Link } from "./link.js";
 import { say, whole } from "./numbers.js";
 import { Playback } from "./playback.js";
 import { rollPitchYaw } from "./quaternion.js";
-import { Sensor } from "./sensor.js";
+import { Sensor, taken } from "./sensor.js";
 import { palette } from "./surface.js";
 
 // Attitudes a second asked for in all, shared among the sensors shown: every sample of one at
@@ -165,7 +165,8 @@ function told(now) {
   const elapsed = (at - statusAt) / 1000;
   const { sources = [], clients = [] } = now;
   const sum = (list, field) => list.reduce((total, each) => total + (each[field] ?? 0), 0);
-  const rate = before ? Math.max(0, sum(sources, "samples") - sum(before.sources ?? [], "samples")) / elapsed : NaN;
+  const count = (list) => list.reduce((total, source) => total + taken(source), 0);
+  const rate = before ? Math.max(0, count(sources) - count(before.sources ?? [])) / elapsed : NaN;
   say(parts.total, Number.isFinite(rate) ? `${whole(Math.round(rate))} Hz` : "–");
   say(parts.clients, whole(clients.length));
   const dropped = sum(clients, "dropped");

@@ -18,6 +18,9 @@ const STEPS = 512;
 // Seconds from one attitude of a recording to the next that are a leap.
 const LEAP = 1;
 
+// Samples so far, of a recording attitudes: STATUS knows one or the other.
+export const taken = (source) => source.samples ?? source.sent ?? 0;
+
 export class Sensor {
   // moved(): draw soon; resized(): draw at once, a canvas that changes its size is empty.
   constructor(id, template, moved, resized) {
@@ -289,7 +292,7 @@ export class Sensor {
   // The source as STATUS tells of it.
   tell(source, before, seconds) {
     const { parts } = this;
-    const rate = before && seconds > 0 ? (source.samples - before.samples) / seconds : NaN;
+    const rate = before && seconds > 0 ? (taken(source) - taken(before)) / seconds : NaN;
     const nominal = source.rate_hz ?? NaN;
     say(parts.rateNow, Number.isFinite(rate) ? `${whole(Math.round(rate))} Hz` : "–");
     say(parts.rateNominal, Number.isFinite(nominal) ? `of ${whole(Math.round(nominal * 10) / 10)}` : "");
