@@ -10,6 +10,7 @@ mod batch;
 mod copy;
 mod csv;
 mod decimate;
+mod document;
 pub(crate) mod json;
 mod mcap;
 mod output;
@@ -21,6 +22,7 @@ pub(crate) mod tests;
 
 pub use copy::CopiedChannel;
 pub use decimate::Decimator;
+pub use document::Document;
 pub use mcap::chunk::Compression;
 pub use mcap::live::{LiveMcap, LiveStream};
 pub use mcap::{Attachment, Encoding, InputChannel, InputMessage};
