@@ -21,6 +21,7 @@ use crate::report::summary::human_bytes;
 use markup::{Rows, escaped};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
+use std::path::Path;
 use verdict::Verdict;
 
 /// Largest page, bytes.
@@ -90,7 +91,7 @@ impl Page<'_> {
              <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; img-src data:\">\n\
              <meta name=\"color-scheme\" content=\"light dark\">\n<link rel=\"icon\" href=\"data:,\">\n\
              <title>{0} - strapd report</title>\n<style>\n{1}</style>\n</head>\n<body>\n<main>\n<h1>{0}</h1>\n",
-            escaped(&self.file),
+            escaped(self.name()),
             include_str!("page/page.css"),
         );
         let _ = writeln!(
@@ -152,12 +153,19 @@ impl Page<'_> {
             || self.checked.topics.iter().any(lossy)
     }
 
+    /// The file's name without its directory.
+    fn name(&self) -> &str {
+        let name = Path::new(&self.file).file_name();
+        name.and_then(|n| n.to_str()).unwrap_or(&self.file)
+    }
+
     fn verdict(&self) -> Verdict {
         Verdict::of(self.checked, &self.findings)
     }
 
     fn facts(&self, out: &mut String) {
         let mut rows = Rows::default();
+        rows.add("file", &self.file);
         if let Some(bytes) = self.checked.file_size {
             rows.add("size", &human_bytes(bytes));
         }

@@ -23,6 +23,8 @@ pub struct Chart {
     pub equal: bool,
     /// Width and height in pixels; `(0, 0)` = 860 by 520.
     pub size: (u32, u32),
+    /// Least width of the legend in pixels, for charts that are to be as wide as each other.
+    pub beside: u32,
 }
 
 /// One axis of a [`Chart`].
@@ -127,7 +129,7 @@ impl Chart {
         let mut text = String::new();
         {
             let whole = SVGBackend::with_string(&mut text, (width, height)).into_drawing_area();
-            let beside = self.legend_width().min(width / 2);
+            let beside = self.legend_width().max(self.beside).min(width / 2);
             let (area, legend) = whole.split_horizontally(width - beside);
             let drawn = whole
                 .fill(&WHITE)

@@ -25,6 +25,8 @@ fn drawn(figure: &str) -> Vec<[f64; 2]> {
             let (x, y) = pair.split_once(',').unwrap();
             [x.parse().unwrap(), y.parse().unwrap()]
         })
+        // To the right of the axes lies the legend.
+        .filter(|p: &[f64; 2]| p[0] <= 808.0)
         .collect()
 }
 

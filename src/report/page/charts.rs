@@ -7,10 +7,12 @@ use crate::report::trace::Traces;
 
 /// Size of a chart over time, pixels.
 const SIZE: (u32, u32) = (960, 300);
+/// Width of the legend: the same everywhere, so that the axes of time lie under each other.
+const BESIDE: u32 = 128;
 /// Up to this many points each is marked.
 const FEW: usize = 60;
 /// Errors this many times the smallest would flatten the others.
-const FLATTENING: f64 = 30.0;
+const FLATTENING: f64 = 6.0;
 
 /// The axis of time all charts of a topic share.
 #[derive(Clone, Copy, Debug)]
@@ -54,6 +56,7 @@ fn over_time(time: Time, title: &str, unit: &str, series: Vec<Series>) -> Result
         y: Axis::linear(unit),
         series,
         size: SIZE,
+        beside: BESIDE,
         ..Chart::default()
     }
     .svg()

@@ -1,6 +1,6 @@
 //! Findings -> their part of the page. Pure.
 
-use super::markup::escaped;
+use super::markup::{escaped, sentence};
 use crate::report::findings::{Finding, Severity};
 use serde_json::Value;
 use std::fmt::Write as _;
@@ -62,13 +62,17 @@ pub(super) fn section(told: &[Told], out: &mut String) {
         let _ = write!(
             out,
             "</p><p>{}.</p>",
-            escaped(finding.what.trim_end_matches('.'))
+            escaped(&sentence(finding.what.trim_end_matches('.')))
         );
         let advice = match (finding.advice.as_str(), finding.flags.as_str()) {
             ("", "") => String::new(),
-            (advice, "") => escaped(advice),
+            (advice, "") => escaped(&sentence(advice)),
             ("", flags) => format!("<code>{}</code>", escaped(flags)),
-            (advice, flags) => format!("{}: <code>{}</code>", escaped(advice), escaped(flags)),
+            (advice, flags) => format!(
+                "{}: <code>{}</code>",
+                escaped(&sentence(advice)),
+                escaped(flags)
+            ),
         };
         if let Some(flag) = one.answered {
             let _ = write!(

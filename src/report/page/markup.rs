@@ -1,15 +1,15 @@
 //! Text -> HTML that can not break the page. Pure.
 
-use crate::decode::printable;
 use std::fmt::Write as _;
 
 /// Longest text taken from a log that is shown whole, characters.
-const LONGEST: usize = 600;
+const LONGEST: usize = 2000;
 
-/// Fit for HTML text and attributes; control characters are shown, not obeyed, long text is cut.
+/// Fit for HTML text and attributes; what would steer a terminal or the direction of the text is shown,
+/// not obeyed; long text is cut.
 pub(super) fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
-    for (count, c) in printable(text).chars().enumerate() {
+    for (count, c) in text.chars().enumerate() {
         if count == LONGEST {
             out.push_str("...");
             break;
@@ -20,10 +20,22 @@ pub(super) fn escaped(text: &str) -> String {
             '>' => out.push_str("&gt;"),
             '"' => out.push_str("&quot;"),
             '\'' => out.push_str("&#39;"),
+            c if c.is_control()
+                || matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}') =>
+            {
+                out.extend(c.escape_unicode());
+            }
             c => out.push(c),
         }
     }
     out
+}
+
+/// The same with a capital first.
+pub(super) fn sentence(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().map(|c| c.to_uppercase().to_string());
+    first.unwrap_or_default() + letters.as_str()
 }
 
 /// A table of names and what they are.
@@ -93,6 +105,6 @@ mod tests {
             text.starts_with("&lt;/script&gt;&lt;b a=&#39;&quot;"),
             "{text}"
         );
-        assert!(escaped(&"x".repeat(10_000)).len() < 700);
+        assert!(escaped(&"x".repeat(10_000)).len() < 2100);
     }
 }

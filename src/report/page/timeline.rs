@@ -7,9 +7,9 @@ use crate::report::drawn::{Drawn, Mark};
 use crate::report::summary::significant;
 use std::fmt::Write as _;
 
-/// Pixels: left edge (as in the charts), width, height of a row.
-const LEFT: f64 = 120.0;
-const WIDTH: f64 = 816.0;
+/// Pixels: left edge and width, those of the charts above; height of a row.
+const LEFT: f64 = 72.0;
+const WIDTH: f64 = 736.0;
 const ROW: f64 = 24.0;
 /// Narrowest mark, pixels: one bad sample in ten million is seen.
 const NARROWEST: f64 = 2.0;
@@ -56,8 +56,8 @@ pub(super) fn strips(drawn: &Drawn, rests: &Rests, time: Time) -> Option<String>
         let y = ROW * index as f64 + 4.0;
         let _ = write!(
             svg,
-            "<text x=\"{:.0}\" y=\"{:.0}\" text-anchor=\"end\">{}</text><line class=\"row\" x1=\"{LEFT}\" x2=\"{:.0}\" y1=\"{4:.0}\" y2=\"{4:.0}\"/>",
-            LEFT - 8.0,
+            "<text x=\"{:.0}\" y=\"{:.0}\">{}</text><line class=\"row\" x1=\"{LEFT}\" x2=\"{:.0}\" y1=\"{4:.0}\" y2=\"{4:.0}\"/>",
+            LEFT + WIDTH + 24.0,
             y + 14.0,
             escaped(name),
             LEFT + WIDTH,

@@ -1,6 +1,7 @@
 //! Everything known -> one sentence. Pure.
 
 use super::findings::Told;
+use super::markup::sentence;
 use crate::pipeline::check::Checked;
 use crate::report::calendar::duration;
 use crate::report::findings::Severity;
@@ -65,14 +66,24 @@ impl Verdict {
             .iter()
             .find(|t| t.is_open(Severity::Error))
             .or_else(|| told.iter().find(|t| t.is_open(Severity::Warning)))
-            .map(|t| t.finding.what.as_str());
+            .map(|t| match t.finding.topic.as_str() {
+                topic if checked.topics.len() > 1 && !topic.is_empty() => {
+                    format!("{topic}: {}", t.finding.what)
+                }
+                _ => t.finding.what.clone(),
+            });
         let Some(best) = best else {
-            let why = worst.unwrap_or("the log holds no gyro sample that can be used");
+            let why =
+                worst.unwrap_or_else(|| "the log holds no gyro sample that can be used".to_owned());
             return Verdict {
                 level,
                 text: format!("No attitude could be had: {why}."),
             };
         };
+        // What does not follow the gyro says nothing about how well the gyro was followed.
+        let trusted = !told
+            .iter()
+            .any(|t| t.finding.topic == best.topic && t.finding.code.starts_with("orientation-"));
         let wrong = match (errors, warnings, worst) {
             (_, _, None) => "; nothing wrong was found.".to_owned(),
             (errors, warnings, Some(worst)) => {
@@ -91,12 +102,12 @@ impl Verdict {
         };
         Verdict {
             level,
-            text: good(best) + &wrong,
+            text: sentence(&good(best, trusted)) + &wrong,
         }
     }
 }
 
-fn good(s: &TopicSummary) -> String {
+fn good(s: &TopicSummary, trusted: bool) -> String {
     let (used, total) = (s.counts.used(), s.counts.total());
     let which = if used == total {
         format!("all {total}")
@@ -114,7 +125,7 @@ fn good(s: &TopicSummary) -> String {
     let follows = s
         .against
         .iter()
-        .find(|row| row.kind == s.kind.name())
+        .find(|row| trusted && row.kind == s.kind.name())
         .map_or_else(String::new, |row| {
             format!(
                 ", {} deg from the reference over 1 s (median)",
