@@ -2,6 +2,7 @@
 //!
 //! One file per command. Data goes to stdout, everything else to stderr.
 
+pub mod admission;
 pub mod allan;
 pub mod cat;
 pub mod check;
@@ -17,6 +18,7 @@ pub mod recover;
 pub mod replay;
 pub mod report;
 pub mod serve;
+pub mod serving;
 pub mod simulate;
 
 use crate::error::{Error, Result};

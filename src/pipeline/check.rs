@@ -155,6 +155,7 @@ fn integrate(
         copy_input: false,
         out_rate: None,
         speed: None,
+        cast: None,
         against: has_reference.then(|| asked.reference_topic.clone()),
         command: asked.command.clone(),
     };

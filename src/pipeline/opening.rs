@@ -60,6 +60,7 @@ pub(super) fn begin(
         &provenance,
         run.out_rate,
         run.speed,
+        run.cast.clone(),
     )?;
     Ok(Session::new(topics, outlet))
 }

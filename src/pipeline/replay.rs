@@ -170,6 +170,9 @@ fn file(
             .for_each(|topic| draw(topic, drawing));
     }
     let span = log.survey.times;
+    if let Some((first, last)) = span {
+        session.length(last.saturating_sub(first) as f64 * 1e-9);
+    }
     let total: u64 = log.survey.channels.iter().map(|c| c.messages).sum();
     let reader = again(&log, path)?;
     let mut failure = None;

@@ -7,25 +7,26 @@
 
 use super::Settings;
 use super::admission::Token;
+use super::channel::{Channel, Items};
+use super::connect::Outgoing;
 use super::limits::Limits;
+use super::playback::{Action, Playback};
 use super::recorder::Handle;
+use super::state::Sensors;
 use super::stream::{SensorStream, live_plan};
-use super::subscriber::{Chunk, Outbox};
+use super::subscriber::{Chunk, Class, Outbox};
 use super::wire::{self, Fault};
 use crate::config::Plan;
-use crate::decode::{Line, LineDecoder, printable};
+use crate::decode::{self, Line, LineDecoder, printable};
 use crate::error::{Error, Result};
 use crate::record::{Nanos, RawSample};
+use crate::sink::Profile;
 use bytes::Bytes;
 use std::collections::BTreeMap;
 use std::hash::{BuildHasher, RandomState};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::Instant;
-
-/// Bytes of one shared chunk of attitudes, about: small beside an outbox, so that little is dropped
-/// at once.
-const CHUNK_BYTES: usize = 16 << 10;
 
 /// The middle of the daemon.
 #[derive(Debug)]
@@ -37,12 +38,20 @@ pub struct Hub {
     limits: Limits,
     token: Option<Token>,
     recorder: Option<Handle>,
+    /// The replay it serves, which is then its only source.
+    playback: Option<Arc<Playback>>,
+    outgoing: Vec<Arc<Outgoing>>,
     session: String,
     started: Instant,
     stopping: AtomicBool,
     sensors: RwLock<BTreeMap<Arc<str>, Arc<Mutex<Sensor>>>>,
     clients: RwLock<BTreeMap<u64, Arc<Client>>>,
     watchers: RwLock<Arc<[Arc<Client>]>>,
+    /// Attitudes of before the start, of sensors that have not come back yet.
+    saved: Mutex<Sensors>,
+    /// How saving attitudes went the last time; `None` when they are not saved.
+    state: Mutex<Option<StateStatus>>,
+    channels: RwLock<Vec<Arc<Channel>>>,
     next_client: AtomicU64,
     /// What was counted.
     pub counters: Counters,
@@ -56,6 +65,13 @@ pub struct Sensor {
     owner: Option<u64>,
 }
 
+/// How the attitudes were saved last.
+#[derive(Debug)]
+struct StateStatus {
+    saved: Option<Instant>,
+    failed: Option<String>,
+}
+
 /// One connection.
 #[derive(Debug)]
 pub struct Client {
@@ -65,6 +81,8 @@ pub struct Client {
     pub peer: String,
     /// What waits for it.
     pub outbox: Outbox,
+    /// What its objects look like.
+    profile: Profile,
     since: Instant,
 }
 
@@ -161,12 +179,21 @@ impl Hub {
             limits: settings.limits,
             token: settings.token,
             recorder: settings.recorder,
+            playback: settings.playback,
+            outgoing: settings
+                .sources
+                .into_iter()
+                .map(|source| Arc::new(Outgoing::new(source)))
+                .collect(),
             session: format!("{session:08x}"),
             started: Instant::now(),
             stopping: AtomicBool::new(false),
             sensors: RwLock::default(),
             clients: RwLock::default(),
             watchers: RwLock::new(Arc::from([])),
+            saved: Mutex::new(settings.saved),
+            state: Mutex::default(),
+            channels: RwLock::default(),
             next_client: AtomicU64::new(1),
             counters: Counters::default(),
         })
@@ -194,10 +221,84 @@ impl Hub {
         &self.decoder
     }
 
-    /// Names this run of the daemon.
+    /// How lines are read.
     #[must_use]
-    pub fn session(&self) -> &str {
-        &self.session
+    pub fn decode_options(&self) -> &decode::Options {
+        &self.plan.decode
+    }
+
+    /// The sources it connects to.
+    #[must_use]
+    pub fn outgoing(&self) -> &[Arc<Outgoing>] {
+        &self.outgoing
+    }
+
+    /// Names this run of the daemon; a replay that begins anew gets another name.
+    #[must_use]
+    pub fn session(&self) -> String {
+        match self.playback.as_ref().map_or(0, |p| p.run()) {
+            0 => self.session.clone(),
+            run => format!("{}.{run}", self.session),
+        }
+    }
+
+    /// Whether clients may send samples: a replay has its own.
+    #[must_use]
+    pub fn takes_samples(&self) -> bool {
+        self.playback.is_none()
+    }
+
+    /// What can be watched.
+    #[must_use]
+    pub fn classes(&self) -> Vec<Class> {
+        let mut classes: Vec<Class> = read(&self.channels).iter().map(|c| c.class()).collect();
+        classes.push(Class::Att);
+        classes.sort_unstable();
+        classes.dedup();
+        classes
+    }
+
+    /// A stream of a replay.
+    pub fn declare(&self, channel: &Arc<Channel>) {
+        write(&self.channels).push(channel.clone());
+    }
+
+    /// Where the replay is; `None` where there is none to be controlled.
+    #[must_use]
+    pub fn place(&self) -> Option<Bytes> {
+        let place = self.playback.as_ref()?.place()?;
+        Some(wire::playback(&place, &self.session()))
+    }
+
+    /// A client asks for something of the replay; all others that watch are told.
+    ///
+    /// # Errors
+    /// The fault to answer with.
+    pub fn control(&self, client: u64, action: Action) -> std::result::Result<(), Fault> {
+        let playback = self.playback.as_ref().ok_or_else(|| {
+            Fault::new(
+                "nothing_to_play",
+                "samples come as they come here; strapd replay LOG -o ws-listen://... can be controlled",
+            )
+        })?;
+        if playback.ask(action)? {
+            for client in read(&self.clients).values() {
+                client.outbox.forget();
+            }
+        }
+        self.announce(false, Some(client));
+        Ok(())
+    }
+
+    /// Tells whoever watches where the replay is. A `tick` is left out where one waits already.
+    pub fn announce(&self, tick: bool, but: Option<u64>) {
+        let Some(line) = self.place() else { return };
+        let watchers = read(&self.watchers).clone();
+        for client in watchers.iter().filter(|c| Some(c.number) != but) {
+            if client.profile == Profile::Lines {
+                client.outbox.note(line.clone(), tick);
+            }
+        }
     }
 
     /// From now on it is shutting down.
@@ -213,10 +314,16 @@ impl Hub {
 
     /// Somebody has connected.
     pub fn join(&self, peer: String) -> Arc<Client> {
+        self.join_as(peer, Profile::Lines)
+    }
+
+    /// As [`Hub::join`], for somebody whose objects look like `profile`.
+    pub fn join_as(&self, peer: String, profile: Profile) -> Arc<Client> {
         let client = Arc::new(Client {
             number: self.next_client.fetch_add(1, Ordering::Relaxed),
             peer,
             outbox: Outbox::new(),
+            profile,
             since: Instant::now(),
         });
         write(&self.clients).insert(client.number, client.clone());
@@ -276,7 +383,14 @@ impl Hub {
         }
         let id: Arc<str> = id.into();
         let first = run.samples.first().copied().unwrap_or_default();
-        let stream = SensorStream::new(self.plan_of(&id), id.clone(), run.head, &first)?;
+        let mut saved = lock(&self.saved);
+        let last = saved.get(&*id);
+        let stream = SensorStream::new(self.plan_of(&id), id.clone(), run.head, &first, last)?;
+        saved.remove(&*id);
+        drop(saved);
+        if let Some(recorder) = &self.recorder {
+            recorder.declare(stream.recorded());
+        }
         let sensor = Arc::new(Mutex::new(Sensor {
             stream,
             owner: None,
@@ -342,43 +456,52 @@ impl Hub {
 
     /// Attitudes that are ready -> outboxes.
     fn deliver(&self, sensor: &mut Sensor, id: &Arc<str>, text: &mut Vec<u8>) {
-        let (first_seq, attitudes, object) = sensor.stream.attitudes();
+        let (first_seq, attitudes, channel) = sensor.stream.attitudes();
         if attitudes.is_empty() {
             return;
         }
-        count(&self.counters.attitudes, attitudes.len());
-        let encode = |out: &mut Vec<u8>, seq: u64, sample: &_| {
-            object.push(out, seq, sample);
-            out.push(b'\n');
-        };
-        let mut shared: Option<Vec<Chunk>> = None;
-        let mut encoded = || {
-            let chunks = shared.get_or_insert_with(|| {
-                let mut chunks = Vec::new();
-                let mut from = first_seq;
-                text.clear();
-                for (seq, sample) in (first_seq..).zip(attitudes) {
-                    encode(text, seq, sample);
-                    if text.len() >= CHUNK_BYTES {
-                        chunks.push(chunk(id, from, seq + 1, text));
-                        from = seq + 1;
-                    }
-                }
-                if !text.is_empty() {
-                    chunks.push(chunk(id, from, first_seq + attitudes.len() as u64, text));
-                }
-                chunks
-            });
-            chunks.clone()
-        };
-        let watchers = read(&self.watchers).clone();
-        for client in &*watchers {
-            client
-                .outbox
-                .offer(id, attitudes, &mut encoded, &encode, first_seq);
-        }
+        self.distribute(channel, first_seq, Items::Attitudes(attitudes), text);
         if let Some(recorder) = &self.recorder {
             recorder.attitude(id, first_seq, attitudes.to_vec());
+        }
+    }
+
+    /// Items of a channel, from number `first_seq` on -> outboxes; `text` is room for encoding.
+    pub fn distribute(
+        &self,
+        channel: &Channel,
+        first_seq: u64,
+        items: Items<'_>,
+        text: &mut Vec<u8>,
+    ) {
+        channel.count(items.len());
+        // Encoded when the first asks, and shared by all.
+        let mut encoded: [Option<Vec<Chunk>>; 2] = [None, None];
+        let watchers = read(&self.watchers).clone();
+        for client in &*watchers {
+            let profile = client.profile;
+            let [lines, plot] = &mut encoded;
+            let kept = match profile {
+                Profile::Lines => lines,
+                Profile::PlotJuggler => plot,
+            };
+            let mut shared = || {
+                kept.get_or_insert_with(|| channel.chunks(profile, first_seq, items, text))
+                    .clone()
+            };
+            match items {
+                Items::Attitudes(attitudes) => client.outbox.offer(
+                    channel.id(),
+                    attitudes,
+                    &mut shared,
+                    &|out, seq, sample| channel.line(out, profile, seq, sample),
+                    first_seq,
+                ),
+                Items::Samples(_) => client.outbox.offer_samples(channel.id(), &mut shared),
+            }
+        }
+        if matches!(items, Items::Attitudes(_)) {
+            count(&self.counters.attitudes, items.len());
         }
     }
 
@@ -386,7 +509,11 @@ impl Hub {
     #[must_use]
     pub fn status(&self) -> Bytes {
         let sensors: Vec<_> = read(&self.sensors).values().cloned().collect();
-        let sources: Vec<_> = sensors.iter().map(|s| lock(s).stream.status()).collect();
+        let sources: Vec<_> = sensors
+            .iter()
+            .map(|s| lock(s).stream.status())
+            .chain(read(&self.channels).iter().map(|c| c.status()))
+            .collect();
         let clients: Vec<_> = read(&self.clients)
             .values()
             .map(|client| {
@@ -399,6 +526,7 @@ impl Hub {
                 })
             })
             .collect();
+        let outgoing: Vec<_> = self.outgoing.iter().map(|o| o.status()).collect();
         let recording = self.recorder.as_ref().map(Handle::status);
         let counters: serde_json::Map<_, _> = self
             .counters
@@ -409,12 +537,58 @@ impl Hub {
             .collect();
         wire::status(serde_json::json!({
             "session": self.session, "uptime_s": self.uptime_secs(),
-            "sources": sources, "clients": clients, "counters": counters,
+            "sources": sources, "outgoing": outgoing, "clients": clients, "counters": counters,
+            "state": lock(&self.state).as_ref().map(|s| serde_json::json!({
+                "saved_s_ago": s.saved.map(|t| t.elapsed().as_secs_f64()), "failed": s.failed,
+            })),
             "recording": recording.map(|r| serde_json::json!({
                 "file": r.files.last().map(|f| f.display().to_string()), "files": r.files.len(),
                 "bytes": r.bytes, "samples": r.samples, "attitudes": r.attitudes, "stopped": r.stopped,
             })),
         }))
+    }
+
+    /// The last attitude of every sensor, also of those that have not come back since the start; no
+    /// more than there may be sensors.
+    #[must_use]
+    pub fn saved(&self) -> Sensors {
+        let sensors: Vec<_> = read(&self.sensors).values().cloned().collect();
+        let mut all: Sensors = sensors
+            .iter()
+            .filter_map(|sensor| {
+                let sensor = lock(sensor);
+                let last = sensor.stream.saved()?;
+                Some((sensor.stream.id().to_string(), last))
+            })
+            .collect();
+        let room = self.limits.sensors.saturating_sub(all.len());
+        let absent = lock(&self.saved);
+        all.extend(
+            absent
+                .iter()
+                .take(room)
+                .map(|(id, s)| (id.clone(), s.clone())),
+        );
+        all
+    }
+
+    /// The attitudes were saved, or why not.
+    pub(super) fn state_saved(&self, failed: Option<String>) {
+        let mut state = lock(&self.state);
+        let before = state.as_ref().and_then(|s| s.saved);
+        let saved = match failed {
+            None => Some(Instant::now()),
+            Some(_) => before,
+        };
+        *state = Some(StateStatus { saved, failed });
+    }
+
+    /// Ends the recording's file and goes on in a new one; `false` when there is no recording.
+    pub fn reopen_recording(&self) -> bool {
+        if let Some(recorder) = &self.recorder {
+            recorder.reopen();
+        }
+        self.recorder.is_some()
     }
 
     /// Seconds since the start.
@@ -436,18 +610,6 @@ impl Hub {
         for client in read(&self.clients).values() {
             tell(client);
         }
-    }
-}
-
-/// Empties `text` into a chunk of the attitudes `from..until`.
-fn chunk(id: &Arc<str>, from: u64, until: u64, text: &mut Vec<u8>) -> Chunk {
-    let bytes = Bytes::copy_from_slice(text);
-    text.clear();
-    Chunk {
-        id: id.clone(),
-        first_seq: from,
-        count: until - from,
-        bytes,
     }
 }
 

@@ -32,13 +32,51 @@ pub struct Chunk {
     pub bytes: Bytes,
 }
 
+/// The stream of notes, which are no attitudes.
+const NOTE: &str = "";
+
+impl Chunk {
+    fn is_note(&self) -> bool {
+        self.count == 0
+    }
+}
+
+/// What the objects of a stream are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Class {
+    /// Attitudes.
+    Att,
+    /// What a sensor put out.
+    Rate,
+}
+
+impl Class {
+    /// Its name on the wire.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Class::Att => "ATT",
+            Class::Rate => "RATE",
+        }
+    }
+}
+
 /// What a client asked for with `WATCH`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Filter {
+    /// Classes; `None` = all there are.
+    pub classes: Option<BTreeSet<Class>>,
     /// Sensors; `None` = all.
     pub ids: Option<BTreeSet<String>>,
     /// At most this many attitudes a second of each.
     pub rate_hz: Option<f64>,
+}
+
+impl Filter {
+    fn takes(&self, id: &str, class: Class) -> bool {
+        self.ids.as_ref().is_none_or(|ids| ids.contains(id))
+            && self.classes.as_ref().is_none_or(|c| c.contains(&class))
+    }
 }
 
 /// Attitudes that were dropped, to be said.
@@ -74,6 +112,10 @@ struct State {
     /// Bytes of `data` and of what was taken and is not yet written.
     queued: usize,
     gaps: BTreeMap<Arc<str>, Dropped>,
+    /// How many of `data` are notes.
+    notes: usize,
+    /// A note the data around which was dropped.
+    stray: Option<Bytes>,
     watch: Option<Filter>,
     decimators: HashMap<Arc<str>, Option<Decimator>>,
     full: Option<Full>,
@@ -128,6 +170,35 @@ impl Outbox {
         self.wake.notify_one();
     }
 
+    /// Queues a note (whole lines) behind the attitudes that wait, to be read at its place among
+    /// them. The last one is never dropped. A `tick` is left out while another waits.
+    pub fn note(&self, line: Bytes, tick: bool) {
+        let mut state = self.state();
+        if tick && (state.notes > 0 || state.stray.is_some()) {
+            return;
+        }
+        state.notes += 1;
+        state.push(Chunk {
+            id: NOTE.into(),
+            first_seq: 0,
+            count: 0,
+            bytes: line,
+        });
+        drop(state);
+        self.wake.notify_one();
+    }
+
+    /// Drops the attitudes that wait, unsaid: the client asked to be elsewhere.
+    pub fn forget(&self) {
+        let mut state = self.state();
+        let waiting: usize = state.data.iter().map(|c| c.bytes.len()).sum();
+        state.queued = state.queued.saturating_sub(waiting);
+        state.data.clear();
+        state.gaps.clear();
+        state.notes = 0;
+        state.stray = None;
+    }
+
     /// Offers attitudes of stream `id`, in order; `shared` gives them encoded, and is asked only when
     /// the client takes them all. `encode` encodes those a client takes of them.
     pub fn offer(
@@ -140,7 +211,7 @@ impl Outbox {
     ) {
         let mut state = self.state();
         let Some(filter) = &state.watch else { return };
-        if filter.ids.as_ref().is_some_and(|ids| !ids.contains(&**id)) {
+        if !filter.takes(id, Class::Att) {
             return;
         }
         match filter.rate_hz {
@@ -184,12 +255,30 @@ impl Outbox {
         self.wake.notify_one();
     }
 
+    /// Offers samples of stream `id`, in order and encoded; they are never thinned.
+    pub fn offer_samples(&self, id: &Arc<str>, shared: &mut dyn FnMut() -> Vec<Chunk>) {
+        let mut state = self.state();
+        if !state
+            .watch
+            .as_ref()
+            .is_some_and(|w| w.takes(id, Class::Rate))
+        {
+            return;
+        }
+        for chunk in shared() {
+            state.push(chunk);
+        }
+        drop(state);
+        self.wake.notify_one();
+    }
+
     /// Moves up to about `most` bytes out: replies first, then what was dropped, then attitudes.
     /// Returns how many bytes of attitudes are among them; give them back to [`Outbox::written`].
     pub fn take(&self, most: usize, out: &mut VecDeque<Bytes>) -> usize {
         let mut state = self.state();
         out.extend(state.control.drain(..));
         state.control_bytes = 0;
+        out.extend(state.stray.take());
         for (id, dropped) in std::mem::take(&mut state.gaps) {
             out.push_back(wire::gap(&id, &dropped));
         }
@@ -199,6 +288,7 @@ impl Outbox {
         {
             taken += chunk.bytes.len();
             state.sent += chunk.count;
+            state.notes -= usize::from(chunk.is_note());
             out.push_back(chunk.bytes);
         }
         taken
@@ -214,7 +304,10 @@ impl Outbox {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         let state = self.state();
-        state.control.is_empty() && state.data.is_empty() && state.gaps.is_empty()
+        state.control.is_empty()
+            && state.data.is_empty()
+            && state.gaps.is_empty()
+            && state.stray.is_none()
     }
 
     /// Why the client must be closed, if it must.
@@ -254,6 +347,11 @@ impl State {
             && let Some(oldest) = self.data.pop_front()
         {
             self.queued -= oldest.bytes.len();
+            if oldest.is_note() {
+                self.notes -= 1;
+                self.stray = Some(oldest.bytes);
+                continue;
+            }
             self.dropped += oldest.count;
             let last_seq = oldest.first_seq + oldest.count.saturating_sub(1);
             let dropped = self.gaps.entry(oldest.id).or_insert(Dropped {
@@ -366,6 +464,7 @@ mod tests {
         outbox.watch(Some(Filter {
             ids: Some(["a".to_owned()].into()),
             rate_hz: Some(10.0),
+            ..Filter::default()
         }));
         let samples: Vec<_> = (0..100).map(|k| sample(Nanos(k * 10_000_000))).collect();
         for id in ["a", "b"] {
