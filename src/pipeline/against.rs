@@ -19,9 +19,6 @@ use crate::report::trace::Traces;
 /// stays bounded on any log.
 const MOST: usize = 1 << 20;
 
-/// A meaning is not what was meant when it misses the orientation this many times as far as another.
-const PLAUSIBLE: f64 = 2.0;
-
 /// The meanings tried: name, words, kind, and the method where it is not the run's own.
 const MEANINGS: [(&str, &str, SampleKind, Option<Method>); 4] = [
     ("rate", "the rate at its stamp", SampleKind::Rate, None),
@@ -205,17 +202,14 @@ impl AgainstRecorded {
         if entries.is_empty() && self.unusable == 0 {
             return None;
         }
-        let fits: Vec<_> = self
-            .tracks
+        // The meaning that fits best says most about the axes; but rates taken for angles, or angles for
+        // rates, turn at random or hardly at all, and say nothing.
+        let is_angle = |kind: SampleKind| kind == SampleKind::DeltaAngle;
+        let best = MEANINGS
             .iter()
-            .filter_map(|track| fit_body_axes(&track.entries, entries))
-            .collect();
-        // The meaning that fits best says most about the axes, but none that can not be meant: taken as
-        // what they are not, rates or angles turn at random, and some other axes fit anything.
-        let least = fits.iter().map(|f| f.as_recorded).fold(f64::MAX, f64::min);
-        let best = fits
-            .into_iter()
-            .filter(|f| f.as_recorded <= PLAUSIBLE * least)
+            .zip(&self.tracks)
+            .filter(|((_, _, kind, _), _)| is_angle(*kind) == is_angle(self.resolved.kind))
+            .filter_map(|(_, track)| fit_body_axes(&track.entries, entries))
             .min_by(|a, b| a.turned.total_cmp(&b.turned));
         Some(Recorded {
             usable: entries.len(),

@@ -52,6 +52,20 @@ impl Mark {
         Mark::Moved,
     ];
 
+    /// For machines.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Mark::Bridged => "gap_bridged",
+            Mark::Held => "gap_held",
+            Mark::Reset => "reset",
+            Mark::NotFinite => "not_finite",
+            Mark::Lost => "lost",
+            Mark::Saturated => "too_fast",
+            Mark::Moved => "stamp_moved",
+        }
+    }
+
     /// In words.
     #[must_use]
     pub fn words(self) -> &'static str {

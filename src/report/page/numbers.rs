@@ -67,7 +67,7 @@ pub fn longest_rest(topic: &CheckedTopic) -> Option<(f64, f64)> {
 fn marks(drawn: &Drawn) -> Value {
     let counts = Mark::ALL.iter().zip(&drawn.marks);
     counts
-        .map(|(mark, found)| (mark.words().to_owned(), json!(found.samples)))
+        .map(|(mark, found)| (mark.name().to_owned(), json!(found.samples)))
         .collect::<serde_json::Map<_, _>>()
         .into()
 }

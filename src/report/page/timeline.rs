@@ -13,8 +13,8 @@ const WIDTH: f64 = 736.0;
 const ROW: f64 = 24.0;
 /// Narrowest mark, pixels: one bad sample in ten million is seen.
 const NARROWEST: f64 = 2.0;
-/// Labelled places of the axis.
-const TICKS: usize = 8;
+/// Labelled places of the axis, about.
+const TICKS: f64 = 8.0;
 
 /// The strips that have something in them; `None` when none has.
 pub(super) fn strips(drawn: &Drawn, rests: &Rests, time: Time) -> Option<String> {
@@ -85,14 +85,15 @@ pub(super) fn strips(drawn: &Drawn, rests: &Rests, time: Time) -> Option<String>
         LEFT + WIDTH,
         bottom
     );
-    for k in 0..=TICKS {
-        let part = k as f64 / TICKS as f64;
+    for place in ticks(time.end) {
         let _ = write!(
             svg,
-            "<text x=\"{:.0}\" y=\"{:.0}\" text-anchor=\"middle\">{}</text>",
-            LEFT + WIDTH * part,
+            "<text x=\"{:.1}\" y=\"{:.0}\" text-anchor=\"middle\">{}</text>",
+            LEFT + WIDTH * (place / time.end.max(f64::MIN_POSITIVE)).clamp(0.0, 1.0),
             bottom + 16.0,
-            significant(time.end * part, 3)
+            significant(place, 3)
+                .trim_end_matches(".00")
+                .trim_end_matches(".0")
         );
     }
     let _ = write!(
@@ -103,4 +104,20 @@ pub(super) fn strips(drawn: &Drawn, rests: &Rests, time: Time) -> Option<String>
         time.unit
     );
     Some(svg)
+}
+
+/// Round places from 0 to `end`.
+fn ticks(end: f64) -> Vec<f64> {
+    if !(end.is_finite() && end > 0.0) {
+        return vec![0.0];
+    }
+    let rough = end / TICKS;
+    let power = 10_f64.powf(rough.log10().floor());
+    let step = [1.0, 2.0, 5.0, 10.0]
+        .into_iter()
+        .map(|digit| digit * power)
+        .find(|step| *step >= rough)
+        .unwrap_or(rough);
+    let last = (end / step) as usize;
+    (0..=last.min(20)).map(|k| k as f64 * step).collect()
 }

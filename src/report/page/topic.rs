@@ -230,16 +230,15 @@ fn steps(topic: &CheckedTopic, out: &mut String) {
         out.push_str("<p>Fewer than two stamps advance, so there is no rate and no jitter.</p>\n");
         return;
     };
-    let ms = |secs: f64| significant(secs * 1e3, 4);
     let _ = writeln!(
         out,
-        "<p>The ordinary step is {} ms ({} Hz, {} clock). Steps deviate from it by {} ms (median), {} ms (99 %), {} ms at most; those with samples missing do not count.</p>",
-        ms(s.median_secs),
+        "<p>The ordinary step is {} ({} Hz, {} clock). Steps deviate from it by {} (median), {} (99 %), {} at most; those with samples missing do not count.</p>",
+        short(s.median_secs),
         significant(s.rate_hz, 5),
         topic.looked.clock.name(),
-        ms(s.jitter_p50_secs),
-        ms(s.jitter_p99_secs),
-        ms(s.jitter_max_secs)
+        short(s.jitter_p50_secs),
+        short(s.jitter_p99_secs),
+        short(s.jitter_max_secs)
     );
     let total: u64 = q.jitter.iter().map(|(.., n)| n).sum();
     let exact = q
@@ -264,6 +263,17 @@ fn steps(topic: &CheckedTopic, out: &mut String) {
             significant(offset.drift_ppm, 3)
         );
     }
+}
+
+/// A short time in the unit that suits it.
+fn short(secs: f64) -> String {
+    let (size, unit) = match secs.abs() {
+        size if size == 0.0 || size >= 1.0 => (1.0, "s"),
+        size if size >= 1e-3 => (1e3, "ms"),
+        size if size >= 1e-6 => (1e6, "us"),
+        _ => (1e9, "ns"),
+    };
+    format!("{} {unit}", significant(secs * size, 4))
 }
 
 fn rest(topic: &CheckedTopic, out: &mut String) {
