@@ -162,7 +162,9 @@ fn the_error_is_the_angle_from_the_truth() {
         .zip(&truth)
         .flat_map(|(a, b)| [&**a, &**b])
         .collect();
-    Client::tcp(daemon.address(0)).send(&mixed.join("\n"));
+    // Kept to the end: who closes before he has read takes back what he said.
+    let mut sender = Client::tcp(daemon.address(0));
+    sender.send(&mixed.join("\n"));
     let (a, b) = (wxyz(expected.last().unwrap()), wxyz(exact.last().unwrap()));
     let d = {
         let [w, x, y, z] = a;
