@@ -26,6 +26,8 @@
 
 #[cfg(feature = "service")]
 pub mod cli;
+#[cfg(feature = "service")]
+pub mod client;
 pub mod compare;
 pub mod condition;
 #[cfg(feature = "service")]

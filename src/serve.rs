@@ -14,9 +14,12 @@
 //! | [`hub`] | samples -> attitudes -> outboxes | locks |
 //! | [`subscriber`] | attitudes -> what one client gets, bounded | locks |
 //! | [`recorder`] | what goes through -> MCAP files that survive a crash | a queue; I/O on threads of its own |
+//! | [`state`] | attitudes <-> the file a restarted daemon goes on from | I/O |
 //! | [`limits`], [`admission`] | every bound; who may come in | pure |
 //! | [`foxglove`], [`viewer`] | the same for Foxglove's viewers: messages in place of lines | pure; sans-I/O |
-//! | [`listen`], `http`, `outgoing` | sockets | I/O |
+//! | [`listen`], `http`, `forward` | sockets | I/O |
+//! | [`source`], [`connect`], [`upstream`] | sockets others listen on | I/O |
+//! | `page`, `top` | what a browser gets | pure |
 //! | [`shutdown`] | signals -> an orderly end | I/O |
 //!
 //! The wire is described in `docs/protocol.md`.
@@ -25,20 +28,26 @@ pub mod address;
 pub mod admission;
 pub mod cast;
 pub mod channel;
+pub mod connect;
+mod forward;
 pub mod foxglove;
 pub mod framing;
 mod http;
 pub mod hub;
 pub mod limits;
 pub mod listen;
-mod outgoing;
+mod page;
 pub mod playback;
 mod quiet;
 pub mod recorder;
 pub mod session;
 pub mod shutdown;
+pub mod source;
+pub mod state;
 pub mod stream;
 pub mod subscriber;
+mod top;
+pub mod upstream;
 pub mod viewer;
 pub mod wire;
 
@@ -51,6 +60,7 @@ use hub::Hub;
 use limits::Limits;
 use listen::{Context, Listener};
 use shutdown::Shutdown;
+use source::Source;
 use std::collections::BTreeMap;
 use std::future::Future;
 use std::sync::Arc;
@@ -66,6 +76,8 @@ pub struct Settings {
     pub plans: BTreeMap<String, Plan>,
     /// Where to listen.
     pub listen: Vec<Listen>,
+    /// Where to connect for samples.
+    pub sources: Vec<Source>,
     /// The bounds.
     pub limits: Limits,
     /// What clients must show.
@@ -78,6 +90,11 @@ pub struct Settings {
     pub recorder: Option<recorder::Handle>,
     /// Whom to call and send every attitude to ([`Target::Tcp`], [`Target::Udp`]).
     pub outputs: Vec<Target>,
+    /// The attitudes sensors had before the daemon was restarted.
+    pub saved: state::Sensors,
+    /// Sockets a service manager has opened.
+    #[cfg(unix)]
+    pub passed: listen::Passed,
     /// The replay that is served; no samples are taken then.
     pub playback: Option<Arc<playback::Playback>>,
 }
@@ -100,7 +117,7 @@ impl Settings {
     /// token is asked for.
     pub fn check(self) -> Result<()> {
         for listen in &self.listen {
-            check_reach(listen, &self)?;
+            Reach::of(&self).check(listen)?;
         }
         Hub::new(self).map(|_| ())
     }
@@ -114,16 +131,26 @@ impl Server {
     /// no token is asked for; [`Error::Bind`].
     pub async fn bind(mut settings: Settings) -> Result<Server> {
         for listen in &settings.listen {
-            check_reach(listen, &settings)?;
+            Reach::of(&settings).check(listen)?;
         }
         let listen = std::mem::take(&mut settings.listen);
+        let reach = Reach::of(&settings);
+        #[cfg(unix)]
+        let mut passed = std::mem::take(&mut settings.passed);
         let web = std::mem::take(&mut settings.web);
         let outputs = std::mem::take(&mut settings.outputs);
         let hub = Hub::new(settings)?;
         let mut listeners = Vec::new();
         let mut bound = Vec::new();
         for listen in &listen {
-            let (listener, address) = Listener::bind(listen).await?;
+            let (listener, address) = Listener::bind(
+                listen,
+                #[cfg(unix)]
+                &mut passed,
+            )
+            .await?;
+            // Where a socket that was passed listens is known only now.
+            reach.check(&address)?;
             listeners.push(listener);
             bound.push(address);
         }
@@ -163,7 +190,11 @@ impl Server {
             tokio::spawn(listener.serve(context()));
         }
         for target in self.outputs {
-            tokio::spawn(outgoing::send(target, context()));
+            tokio::spawn(forward::send(target, context()));
+        }
+        for outgoing in self.hub.outgoing() {
+            let task = connect::keep(outgoing.clone(), self.hub.clone(), shutdown.running());
+            tokio::spawn(task);
         }
         stop.await;
         self.hub.stop();
@@ -173,20 +204,38 @@ impl Server {
     }
 }
 
-/// Refuses an address others can reach, unless clients must show a token.
-fn check_reach(listen: &Listen, settings: &Settings) -> Result<()> {
-    let is_open = listen.ip().is_some_and(|ip| !is_loopback(ip));
-    // A datagram shows no token that others on the way could not read and send again.
-    let is_guarded = settings.token.is_some() && !matches!(listen, Listen::Udp(_));
-    if is_open && !is_guarded && !settings.allow_insecure_remote {
-        let flag = if settings.playback.is_some() {
-            "-o"
-        } else {
-            "--listen"
-        };
-        return Err(Error::Usage(format!(
-            "{flag} {listen}: others can reach this address, and nothing keeps them out\n  help: --token-file FILE asks clients for a token (not over UDP); --allow-insecure-remote listens all the same; 127.0.0.1 is this machine alone"
-        )));
+/// Who may reach us.
+#[derive(Clone, Copy, Debug)]
+struct Reach {
+    has_token: bool,
+    allow_insecure_remote: bool,
+    /// How an address is given.
+    flag: &'static str,
+}
+
+impl Reach {
+    fn of(settings: &Settings) -> Reach {
+        Reach {
+            has_token: settings.token.is_some(),
+            allow_insecure_remote: settings.allow_insecure_remote,
+            flag: match settings.playback {
+                Some(_) => "-o",
+                None => "--listen",
+            },
+        }
     }
-    Ok(())
+
+    /// Refuses an address others can reach, unless clients must show a token.
+    fn check(self, listen: &Listen) -> Result<()> {
+        let is_open = listen.ip().is_some_and(|ip| !is_loopback(ip));
+        // A datagram shows no token that others on the way could not read and send again.
+        let is_guarded = self.has_token && !matches!(listen, Listen::Udp(_));
+        if is_open && !is_guarded && !self.allow_insecure_remote {
+            return Err(Error::Usage(format!(
+                "{} {listen}: others can reach this address, and nothing keeps them out\n  help: --token-file FILE asks clients for a token (not over UDP); --allow-insecure-remote listens all the same; 127.0.0.1 is this machine alone",
+                self.flag
+            )));
+        }
+        Ok(())
+    }
 }

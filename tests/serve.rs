@@ -14,11 +14,16 @@ mod serve {
     mod admission;
     mod bad_lines;
     mod config;
+    mod connecting;
     mod documentation;
+    mod faults;
+    mod frames;
     mod limits;
     mod operations;
+    mod packaging;
     mod recording;
     mod same_bytes;
     mod slow_readers;
+    mod state;
     mod transports;
 }

@@ -2,11 +2,13 @@
 //!
 //! The file's keys are the long flags, so there is one list of settings and one parser of their
 //! values. Flag before environment before file before default; `[sensor.ID]` holds the estimation
-//! flags of one sensor.
+//! flags of one sensor. Sources stand in `source = [...]`, or in `[source.ID]` with their `uri`; those on
+//! the command line replace them.
 
 use super::estimation::Estimation;
 use super::serve::Serve;
 use super::{Cli, Command, Outcome, print};
+use crate::client::remote;
 use crate::error::{Error, Result};
 use crate::serve::Settings;
 use clap::parser::ValueSource;
@@ -55,6 +57,7 @@ pub struct Layered {
     serve: Box<Serve>,
     matches: ArgMatches,
     from_file: Vec<String>,
+    sources_from_file: bool,
     sensors: Vec<(String, Estimation, Vec<OsString>)>,
 }
 
@@ -91,6 +94,7 @@ pub fn layered(file: &Path, argv: Vec<OsString>) -> Result<Layered> {
         Some(Value::Table(sensors)) => sensors,
         Some(_) => return Err(bad(file, "`sensor` is no table; expected [sensor.ID]")),
     };
+    let sources = sources(file, table.remove("source"))?;
     let command = Cli::command();
     let parse = |argv: &[OsString]| command.clone().try_get_matches_from(argv);
     let first = parse(&argv).map_err(|e| bad(file, &e.to_string()))?;
@@ -98,6 +102,11 @@ pub fn layered(file: &Path, argv: Vec<OsString>) -> Result<Layered> {
     let serve = Serve::augment_args(clap::Command::new("serve"));
     let mut whole = argv;
     let from_file = extend(&mut whole, file, "", &serve, &table, Some(&first))?;
+    let sources_from_file = !is_given(&first, "sources") && !sources.is_empty();
+    if sources_from_file {
+        whole.push("--".into());
+        whole.extend(sources.into_iter().map(OsString::from));
+    }
     let matches = parse(&whole).map_err(|e| bad(file, &e.to_string()))?;
     let Ok(Cli {
         command: Command::Serve(args),
@@ -135,6 +144,7 @@ pub fn layered(file: &Path, argv: Vec<OsString>) -> Result<Layered> {
         serve: args,
         matches,
         from_file,
+        sources_from_file,
         sensors,
     })
 }
@@ -169,6 +179,41 @@ fn is_given(matches: &ArgMatches, id: &str) -> bool {
         matches.value_source(id),
         Some(ValueSource::CommandLine | ValueSource::EnvVariable)
     )
+}
+
+/// The sources a file names: a list of addresses, or tables whose names name the sensors.
+fn sources(file: &Path, value: Option<Value>) -> Result<Vec<String>> {
+    const EXPECTED: &str =
+        "expected source = [\"tcp://HOST:PORT\", ...], or [source.ID] with uri = \"...\"";
+    let text = |value: Value| match value {
+        Value::String(text) => Ok(text),
+        _ => Err(bad(file, &format!("`source`: {EXPECTED}"))),
+    };
+    match value {
+        None => Ok(Vec::new()),
+        Some(Value::Array(all)) => all.into_iter().map(text).collect(),
+        Some(Value::Table(named)) => named
+            .into_iter()
+            .map(|(id, value)| {
+                let Value::Table(mut own) = value else {
+                    return Err(bad(file, &format!("[source.{id}]: {EXPECTED}")));
+                };
+                let uri = own
+                    .remove("uri")
+                    .ok_or_else(|| bad(file, &format!("[source.{id}]: uri is missing")))?;
+                if let Some(other) = own.keys().next() {
+                    return Err(bad(
+                        file,
+                        &format!("[source.{id}] unknown key `{other}`\n  help: there is uri"),
+                    ));
+                }
+                let uri = text(uri)?;
+                let joint = if uri.contains('?') { '&' } else { '?' };
+                Ok(format!("{uri}{joint}id={}", remote::encoded(&id, b"")))
+            })
+            .collect(),
+        Some(one) => text(one).map(|one| vec![one]),
+    }
 }
 
 /// Adds the keys of `table` to the arguments, but for those `given` already; returns those added.
@@ -275,6 +320,13 @@ impl Layered {
     /// The settings as TOML with their origins.
     fn show(&self) -> String {
         let mut out = String::new();
+        let origin = match (self.serve.sources.is_empty(), self.sources_from_file) {
+            (true, _) => "default",
+            (false, true) => "file",
+            (false, false) => "flag",
+        };
+        let sources = format!("source = {}", Value::from(self.serve.sources.clone()));
+        out.push_str(&format!("{sources:<48} # {origin}\n"));
         let known = Serve::augment_args(clap::Command::new("serve"));
         for arg in known.get_arguments() {
             let (Some(key), id) = (arg.get_long(), arg.get_id().as_str()) else {

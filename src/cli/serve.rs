@@ -4,15 +4,25 @@ use super::admission::Admission;
 use super::config::Layered;
 use super::estimation::Estimation;
 use super::{Global, Outcome};
+use crate::client::remote::Remote;
 use crate::error::{Error, Result};
 use crate::serve::address::{DEFAULTS, Listen};
+use crate::serve::hub::Hub;
 use crate::serve::recorder::{self, Recorder, Split};
 use crate::serve::shutdown::{self, Signals};
+use crate::serve::source::Source;
+use crate::serve::state::{self, StateFile};
 use crate::serve::{Server, Settings, listen};
 use crate::sink::{Format, Target};
 use clap::Args;
+use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+/// Most sources connected to.
+const MAX_SOURCES: usize = 64;
 
 /// Samples in over sockets, attitude out to whoever watches.
 #[derive(Args, Debug)]
@@ -22,13 +32,16 @@ use std::sync::atomic::Ordering;
   strapd cat flight.mcap | strapd serve -                lines on standard input, too
   strapd serve -o udp://127.0.0.1:9870?profile=plotjuggler
                                                          attitudes to PlotJuggler, as they come
+  strapd serve tcp://imu.local:7000?id=imu0              samples from somebody who listens, for as long as it takes
+  strapd serve 'ws://phone:8080/sensor/connect?type=android.sensor.gyroscope&id=phone'
 
 Talk to it:
   echo '{\"class\":\"RATE\",\"id\":\"imu0\",\"stamp\":{\"sec\":1,\"nsec\":0},\"gyro\":[0.1,0,0]}' | nc 127.0.0.1 4550
   echo '{\"class\":\"WATCH\"}' | nc 127.0.0.1 4550             attitudes as they come
   curl 127.0.0.1:8765/metrics")]
 pub struct Serve {
-    /// - reads samples from standard input as well
+    /// Where else samples come from: tcp://HOST:PORT, ws://HOST:PORT/PATH, unix:///PATH (connected to, and
+    /// again whenever lost; ?id=NAME names the sensor), or - for standard input
     #[arg(value_name = "SOURCE")]
     pub sources: Vec<String>,
     /// Where to listen: tcp-listen://HOST:PORT, udp-listen://HOST:PORT, ws-listen://HOST:PORT (with
@@ -68,6 +81,10 @@ pub struct Serve {
     /// Replace the recording if it exists
     #[arg(long, requires = "record", help_heading = "Recording")]
     pub force: bool,
+    /// Go on from the attitudes in this file, and keep it no more than a second behind: a restart
+    /// loses no heading
+    #[arg(long, value_name = "FILE")]
+    pub state: Option<PathBuf>,
     #[command(flatten)]
     #[allow(missing_docs)]
     pub admission: Admission,
@@ -88,11 +105,6 @@ fn sent_to(text: &str) -> Result<Target> {
 /// # Errors
 /// An address can not be listened on, or the arguments can not be.
 pub fn run(global: &Global, args: &Serve) -> Result<Outcome> {
-    if let Some(other) = args.sources.iter().find(|s| *s != "-") {
-        return Err(Error::Usage(format!(
-            "serve {other}: only - (standard input) is a source\n  help: --listen waits for senders; strapd replay reads a log"
-        )));
-    }
     let layered = match &args.config {
         Some(file) => Some(super::config::layered(file, std::env::args_os().collect())?),
         None => None,
@@ -104,6 +116,14 @@ pub fn run(global: &Global, args: &Serve) -> Result<Outcome> {
     let args = layered.as_ref().map_or(args, Layered::serve);
     let recorder = args.recording()?.map(Recorder::start).transpose()?;
     settings.recorder = recorder.as_ref().map(Recorder::handle);
+    let state = match &args.state {
+        Some(path) => {
+            let (file, saved) = StateFile::open(path)?;
+            settings.saved = saved;
+            Some(Arc::new(Mutex::new(file)))
+        }
+        None => None,
+    };
     let mut builder = tokio::runtime::Builder::new_multi_thread();
     if global.threads > 0 {
         builder.worker_threads(global.threads);
@@ -113,8 +133,8 @@ pub fn run(global: &Global, args: &Serve) -> Result<Outcome> {
         .enable_all()
         .build()
         .map_err(|e| Error::Usage(format!("--threads {}: {e}", global.threads)))?;
-    let has_stdin = !args.sources.is_empty();
-    let outcome = runtime.block_on(serve(settings, has_stdin));
+    let has_stdin = args.sources.iter().any(|s| s == "-");
+    let outcome = runtime.block_on(serve(settings, has_stdin, state));
     // A thread that waits for standard input would otherwise be waited for.
     runtime.shutdown_background();
     let Some(status) = recorder.map(Recorder::finish) else {
@@ -136,7 +156,11 @@ pub fn run(global: &Global, args: &Serve) -> Result<Outcome> {
     })
 }
 
-async fn serve(settings: Settings, has_stdin: bool) -> Result<Outcome> {
+async fn serve(
+    settings: Settings,
+    has_stdin: bool,
+    state: Option<Arc<Mutex<StateFile>>>,
+) -> Result<Outcome> {
     // Signals first: from the ready line on, one drains.
     let signals = Signals::new().map_err(|e| Error::Usage(format!("signals: {e}")))?;
     let server = Server::bind(settings).await?;
@@ -145,19 +169,32 @@ async fn serve(settings: Settings, has_stdin: bool) -> Result<Outcome> {
     tracing::info!(session = hub.session(), "ready {}", addresses.join(" "));
     // Nobody may have started us that wants to know.
     let _ = sd_notify::notify(&[sd_notify::NotifyState::Ready]);
+    tokio::spawn(pat_the_watchdog());
+    let keeping = state
+        .clone()
+        .map(|file| tokio::spawn(state::keep(file, hub.clone())));
     if has_stdin {
         let hub = hub.clone();
         std::thread::spawn(move || listen::read_stdin(&hub, std::io::stdin().lock()));
     }
     let drained = server
         .run(async {
-            let signal = shutdown::first(signals).await;
+            let reopened = hub.clone();
+            let signal = shutdown::first(signals, move || reopen(&reopened)).await;
             tracing::info!("{}: shutting down", signal.name());
             let _ = sd_notify::notify(&[sd_notify::NotifyState::Stopping]);
         })
         .await;
     if !drained {
         tracing::warn!("not everything could be sent in time");
+    }
+    if let Some(keeping) = keeping {
+        keeping.abort();
+    }
+    if let Some(file) = state {
+        let hub = hub.clone();
+        // Behind whatever save is still under way.
+        let _ = tokio::task::spawn_blocking(move || state::save(&file, &hub)).await;
     }
     let of = |n: &std::sync::atomic::AtomicU64| n.load(Ordering::Relaxed);
     tracing::info!(
@@ -168,6 +205,28 @@ async fn serve(settings: Settings, has_stdin: bool) -> Result<Outcome> {
         of(&hub.counters.faults)
     );
     Ok(Outcome::Done)
+}
+
+/// Tells a service manager that asks for it that the runtime still turns.
+async fn pat_the_watchdog() {
+    let Some(limit) = sd_notify::watchdog_enabled().filter(|limit| !limit.is_zero()) else {
+        return;
+    };
+    let mut tick = tokio::time::interval((limit / 2).max(Duration::from_millis(1)));
+    loop {
+        tick.tick().await;
+        let _ = sd_notify::notify(&[sd_notify::NotifyState::Watchdog]);
+    }
+}
+
+/// A hang-up: the wish to go on in a new file, as of a log rotation. In a terminal it means that the
+/// terminal has gone, and the daemon goes with it.
+fn reopen(hub: &Hub) -> bool {
+    let reopens = !std::io::stderr().is_terminal() && hub.reopen_recording();
+    if reopens {
+        tracing::info!("SIGHUP: the recording goes on in a new file");
+    }
+    reopens
 }
 
 impl Serve {
@@ -215,6 +274,33 @@ impl Serve {
         Ok(Some(settings))
     }
 
+    /// The sources to connect to.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] naming the source.
+    fn outgoing(&self) -> Result<Vec<Source>> {
+        let mut sources: Vec<Source> = Vec::new();
+        for text in self.sources.iter().filter(|s| *s != "-") {
+            if !Remote::is_meant(text) {
+                return Err(Error::Usage(format!(
+                    "serve {text}: is no source of a daemon; known: tcp://HOST:PORT, ws://HOST:PORT/PATH, unix:///PATH, -\n  help: --listen waits for senders; strapd replay reads a log"
+                )));
+            }
+            let source = Source::parse(text)?;
+            if sources.iter().any(|s| s.remote == source.remote) {
+                return Err(Error::Usage(format!("serve {text}: is given twice")));
+            }
+            sources.push(source);
+        }
+        if sources.len() > MAX_SOURCES {
+            return Err(Error::Usage(format!(
+                "serve: {} sources, at most {MAX_SOURCES} can be connected to",
+                sources.len()
+            )));
+        }
+        Ok(sources)
+    }
+
     /// The arguments, checked.
     ///
     /// # Errors
@@ -236,6 +322,9 @@ impl Serve {
                 .iter()
                 .map(|o| sent_to(o))
                 .collect::<Result<_>>()?,
+            sources: self.outgoing()?,
+            #[cfg(unix)]
+            passed: listen::Passed::from_env(),
             ..Settings::default()
         })
     }

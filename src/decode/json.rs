@@ -35,6 +35,8 @@ pub(crate) struct Plan {
     pub(crate) form: Form,
     /// Unit of stamps that do not state theirs.
     pub(crate) settled: Option<TimeUnit>,
+    /// The sensor of messages that name none.
+    pub(crate) sensor: Option<String>,
 }
 
 impl Plan {
@@ -49,6 +51,7 @@ impl Plan {
                 ..Form::default()
             },
             settled: None,
+            sensor: None,
         }
     }
 

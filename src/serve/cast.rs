@@ -264,7 +264,7 @@ async fn serve(
             };
             tokio::select! {
                 _ = &mut stopped => {}
-                signal = shutdown::first(signals) => {
+                signal = shutdown::first(signals, || false) => {
                     tracing::info!("{}: stopping", signal.name());
                     playback.stop();
                     // A run that waits for its input does not notice.

@@ -1,8 +1,8 @@
 //! Bytes as they come -> lines. Pure, sans-I/O.
 //!
 //! Apart from the sockets because every transport cuts its bytes elsewhere: a line may come in one
-//! piece, byte by byte, or with a thousand others. Holds at most one unfinished line of
-//! [`MAX_LINE`] bytes, whatever is sent.
+//! piece, byte by byte, or with a thousand others. Holds at most one unfinished line, of
+//! [`MAX_LINE`] bytes unless more is allowed, whatever is sent.
 
 use crate::decode::MAX_LINE;
 use memchr::memchr;
@@ -17,8 +17,10 @@ pub enum Framed<'a> {
 }
 
 /// Cuts a stream of bytes into lines.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Framer {
+    /// Longest line.
+    limit: usize,
     /// The beginning of a line whose end has not come.
     partial: Vec<u8>,
     /// Whether the rest of an over-long line is being skipped.
@@ -27,11 +29,28 @@ pub struct Framer {
     ended: u64,
 }
 
+impl Default for Framer {
+    fn default() -> Framer {
+        Framer::with_limit(MAX_LINE)
+    }
+}
+
 impl Framer {
     /// At the start of a stream.
     #[must_use]
     pub fn new() -> Framer {
         Framer::default()
+    }
+
+    /// At the start of a stream of lines of at most so many bytes, line end not counted.
+    #[must_use]
+    pub fn with_limit(limit: usize) -> Framer {
+        Framer {
+            limit,
+            partial: Vec::new(),
+            skipping: false,
+            ended: 0,
+        }
     }
 
     /// Lines ended so far, blank and over-long ones included.
@@ -82,10 +101,10 @@ impl Framer {
         if self.skipping {
             return true;
         }
-        let room = (MAX_LINE + 1).saturating_sub(self.partial.len());
+        let room = (self.limit + 1).saturating_sub(self.partial.len());
         self.partial
             .extend_from_slice(more.get(..room.min(more.len())).unwrap_or_default());
-        if self.partial.len() <= MAX_LINE {
+        if self.partial.len() <= self.limit {
             return true;
         }
         // One byte more may be the carriage return before the line feed.
@@ -103,7 +122,7 @@ impl Framer {
             return true;
         }
         let line = line.strip_suffix(b"\r").unwrap_or(line);
-        if line.len() > MAX_LINE {
+        if line.len() > self.limit {
             return take(Framed::TooLong(self.ended, line));
         }
         if line.iter().all(u8::is_ascii_whitespace) {

@@ -1,8 +1,9 @@
-//! HTTP requests -> state of the daemon, or a WebSocket. I/O.
+//! HTTP requests -> the pages, state of the daemon, or a WebSocket. I/O.
 
 use super::foxglove::SUBPROTOCOLS;
 use super::hub::Hub;
 use super::listen::{Connection, websocket};
+use super::{page, top};
 use crate::record::Verdict;
 use axum::Router;
 use axum::body::Body;
@@ -18,17 +19,32 @@ const OWN_SUBPROTOCOL: &str = "strapd.v1";
 /// Everything that is answered.
 pub(crate) fn router() -> Router {
     Router::new()
-        .route("/", get(upgrade))
+        .route("/", get(root))
         .route("/ws", get(upgrade))
         .route("/healthz", get(health))
         .route("/metrics", get(metrics))
+        .merge(page::router())
+        .route("/model/top", get(top::answer))
         .fallback(|| async {
             refusal(
                 StatusCode::NOT_FOUND,
                 "not_found",
-                "there are /ws, /healthz and /metrics",
+                "there are /, /top, /ws, /healthz and /metrics",
             )
         })
+}
+
+/// The live page, or a WebSocket for who asks for one.
+async fn root(
+    connection: Extension<Connection>,
+    headers: HeaderMap,
+    socket: Result<WebSocketUpgrade, axum::extract::ws::rejection::WebSocketUpgradeRejection>,
+) -> Response<Body> {
+    if headers.contains_key(header::UPGRADE) {
+        upgrade(connection, headers, socket).await
+    } else {
+        page::live()
+    }
 }
 
 async fn upgrade(
@@ -87,14 +103,10 @@ async fn health(Extension(connection): Extension<Connection>) -> Response<Body> 
         return response(
             StatusCode::SERVICE_UNAVAILABLE,
             "text/plain; charset=utf-8",
-            "stopping\n".to_owned(),
+            "stopping\n",
         );
     }
-    response(
-        StatusCode::OK,
-        "text/plain; charset=utf-8",
-        "ok\n".to_owned(),
-    )
+    response(StatusCode::OK, "text/plain; charset=utf-8", "ok\n")
 }
 
 async fn metrics(Extension(connection): Extension<Connection>) -> Response<Body> {
@@ -179,6 +191,7 @@ fn exposition(hub: &Hub) -> String {
             label(sensor.id())
         );
     });
+    super::connect::exposition(&mut out, hub);
     out
 }
 
@@ -195,14 +208,23 @@ pub(crate) fn refusal(status: StatusCode, code: &str, message: &str) -> Response
     response(status, "application/json", format!("{text}\n"))
 }
 
-fn response(status: StatusCode, kind: &'static str, text: String) -> Response<Body> {
-    let mut response = Response::new(Body::from(text));
+/// An answer with the headers all of them have.
+pub(super) fn response(
+    status: StatusCode,
+    kind: &'static str,
+    text: impl Into<Body>,
+) -> Response<Body> {
+    let mut response = Response::new(text.into());
     *response.status_mut() = status;
     for (name, value) in [
         (header::CONTENT_TYPE, kind),
         (header::CACHE_CONTROL, "no-store"),
         (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
-        (header::CONTENT_SECURITY_POLICY, "default-src 'self'"),
+        (
+            header::CONTENT_SECURITY_POLICY,
+            "default-src 'self'; base-uri 'none'; frame-ancestors 'none'",
+        ),
+        (header::REFERRER_POLICY, "no-referrer"),
     ] {
         response
             .headers_mut()

@@ -10,15 +10,17 @@ mod telling;
 use super::Settings;
 use super::admission::Token;
 use super::channel::{Channel, Clock, Items};
+use super::connect::Outgoing;
 use super::foxglove;
 use super::limits::Limits;
 use super::playback::Playback;
 use super::recorder::Handle;
+use super::state::Sensors;
 use super::stream::{SensorStream, live_plan};
 use super::subscriber::{Chunk, Outbox};
 use super::wire::{self, Fault};
 use crate::config::Plan;
-use crate::decode::{Line, LineDecoder, printable};
+use crate::decode::{self, Line, LineDecoder, printable};
 use crate::error::{Error, Result};
 use crate::record::{Nanos, RawSample};
 use crate::sink::Profile;
@@ -41,12 +43,17 @@ pub struct Hub {
     recorder: Option<Handle>,
     /// The replay it serves, which is then its only source.
     playback: Option<Arc<Playback>>,
+    outgoing: Vec<Arc<Outgoing>>,
     session: String,
     started: Instant,
     stopping: AtomicBool,
     sensors: RwLock<BTreeMap<Arc<str>, Arc<Mutex<Sensor>>>>,
     clients: RwLock<BTreeMap<u64, Arc<Client>>>,
     watchers: RwLock<Arc<[Arc<Client>]>>,
+    /// Attitudes of before the start, of sensors that have not come back yet.
+    saved: Mutex<Sensors>,
+    /// How saving attitudes went the last time; `None` when they are not saved.
+    state: Mutex<Option<StateStatus>>,
     channels: RwLock<Vec<Arc<Channel>>>,
     next_client: AtomicU64,
     /// What was counted.
@@ -71,6 +78,13 @@ pub enum Shape {
         /// Whether it can move a playback.
         controls: bool,
     },
+}
+
+/// How the attitudes were saved last.
+#[derive(Debug)]
+struct StateStatus {
+    saved: Option<Instant>,
+    failed: Option<String>,
 }
 
 /// One connection.
@@ -181,12 +195,19 @@ impl Hub {
             token: settings.token,
             recorder: settings.recorder,
             playback: settings.playback,
+            outgoing: settings
+                .sources
+                .into_iter()
+                .map(|source| Arc::new(Outgoing::new(source)))
+                .collect(),
             session: format!("{session:08x}"),
             started: Instant::now(),
             stopping: AtomicBool::new(false),
             sensors: RwLock::default(),
             clients: RwLock::default(),
             watchers: RwLock::new(Arc::from([])),
+            saved: Mutex::new(settings.saved),
+            state: Mutex::default(),
             channels: RwLock::default(),
             next_client: AtomicU64::new(1),
             counters: Counters::default(),
@@ -213,6 +234,18 @@ impl Hub {
     #[must_use]
     pub fn decoder(&self) -> &LineDecoder {
         &self.decoder
+    }
+
+    /// How lines are read.
+    #[must_use]
+    pub fn decode_options(&self) -> &decode::Options {
+        &self.plan.decode
+    }
+
+    /// The sources it connects to.
+    #[must_use]
+    pub fn outgoing(&self) -> &[Arc<Outgoing>] {
+        &self.outgoing
     }
 
     /// Names this run of the daemon; a replay that begins anew gets another name.
@@ -320,10 +353,20 @@ impl Hub {
         }
         let id: Arc<str> = id.into();
         let first = run.samples.first().copied().unwrap_or_default();
-        let stream =
-            SensorStream::new(self.plan_of(&id), id.clone(), run.head, &first, |labels| {
-                self.declare(labels)
-            })?;
+        let mut saved = lock(&self.saved);
+        let stream = SensorStream::new(
+            self.plan_of(&id),
+            id.clone(),
+            run.head,
+            &first,
+            saved.get(&*id),
+            |labels| self.declare(labels),
+        )?;
+        saved.remove(&*id);
+        drop(saved);
+        if let Some(recorder) = &self.recorder {
+            recorder.declare(stream.recorded());
+        }
         let sensor = Arc::new(Mutex::new(Sensor {
             stream,
             owner: None,
@@ -473,6 +516,7 @@ impl Hub {
                 })
             })
             .collect();
+        let outgoing: Vec<_> = self.outgoing.iter().map(|o| o.status()).collect();
         let recording = self.recorder.as_ref().map(Handle::status);
         let counters: serde_json::Map<_, _> = self
             .counters
@@ -483,12 +527,58 @@ impl Hub {
             .collect();
         wire::status(serde_json::json!({
             "session": self.session, "uptime_s": self.uptime_secs(),
-            "sources": sources, "clients": clients, "counters": counters,
+            "sources": sources, "outgoing": outgoing, "clients": clients, "counters": counters,
+            "state": lock(&self.state).as_ref().map(|s| serde_json::json!({
+                "saved_s_ago": s.saved.map(|t| t.elapsed().as_secs_f64()), "failed": s.failed,
+            })),
             "recording": recording.map(|r| serde_json::json!({
                 "file": r.files.last().map(|f| f.display().to_string()), "files": r.files.len(),
                 "bytes": r.bytes, "samples": r.samples, "attitudes": r.attitudes, "stopped": r.stopped,
             })),
         }))
+    }
+
+    /// The last attitude of every sensor, also of those that have not come back since the start; no
+    /// more than there may be sensors.
+    #[must_use]
+    pub fn saved(&self) -> Sensors {
+        let sensors: Vec<_> = read(&self.sensors).values().cloned().collect();
+        let mut all: Sensors = sensors
+            .iter()
+            .filter_map(|sensor| {
+                let sensor = lock(sensor);
+                let last = sensor.stream.saved()?;
+                Some((sensor.stream.id().to_string(), last))
+            })
+            .collect();
+        let room = self.limits.sensors.saturating_sub(all.len());
+        let absent = lock(&self.saved);
+        all.extend(
+            absent
+                .iter()
+                .take(room)
+                .map(|(id, s)| (id.clone(), s.clone())),
+        );
+        all
+    }
+
+    /// The attitudes were saved, or why not.
+    pub(super) fn state_saved(&self, failed: Option<String>) {
+        let mut state = lock(&self.state);
+        let before = state.as_ref().and_then(|s| s.saved);
+        let saved = match failed {
+            None => Some(Instant::now()),
+            Some(_) => before,
+        };
+        *state = Some(StateStatus { saved, failed });
+    }
+
+    /// Ends the recording's file and goes on in a new one; `false` when there is no recording.
+    pub fn reopen_recording(&self) -> bool {
+        if let Some(recorder) = &self.recorder {
+            recorder.reopen();
+        }
+        self.recorder.is_some()
     }
 
     /// Seconds since the start.

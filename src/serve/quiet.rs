@@ -7,11 +7,22 @@ use std::time::{Duration, Instant};
 /// Between two lines of one cause.
 const INTERVAL: Duration = Duration::from_secs(10);
 
-/// When each cause was said last, and how often it was not since.
-static SAID: LazyLock<Mutex<HashMap<&'static str, (Instant, u64)>>> = LazyLock::new(Mutex::default);
+/// When each cause was said last, and how often it was not since. There are as many as there are
+/// places that warn, and sources.
+static SAID: LazyLock<Mutex<HashMap<String, (Instant, u64)>>> = LazyLock::new(Mutex::default);
+
+/// Informs, unless the same cause was spoken of just now.
+pub(super) fn info(cause: &str, what: &str) {
+    if let Some(suppressed) = due(cause, Instant::now()) {
+        match suppressed {
+            0 => tracing::info!("{what}"),
+            n => tracing::info!("{what} (and {n} more like it since)"),
+        }
+    }
+}
 
 /// Warns, unless the same cause was warned of just now.
-pub(super) fn warn(cause: &'static str, what: &str) {
+pub(super) fn warn(cause: &str, what: &str) {
     if let Some(suppressed) = due(cause, Instant::now()) {
         match suppressed {
             0 => tracing::warn!("{what}"),
@@ -20,7 +31,7 @@ pub(super) fn warn(cause: &'static str, what: &str) {
     }
 }
 
-fn due(cause: &'static str, now: Instant) -> Option<u64> {
+fn due(cause: &str, now: Instant) -> Option<u64> {
     let mut said = SAID.lock().unwrap_or_else(PoisonError::into_inner);
     match said.get_mut(cause) {
         Some((last, suppressed)) if now.saturating_duration_since(*last) < INTERVAL => {
@@ -32,7 +43,7 @@ fn due(cause: &'static str, now: Instant) -> Option<u64> {
             Some(std::mem::take(suppressed))
         }
         None => {
-            said.insert(cause, (now, 0));
+            said.insert(cause.to_owned(), (now, 0));
             Some(0)
         }
     }

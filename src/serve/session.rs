@@ -8,8 +8,9 @@ use super::framing::{Framed, Framer};
 use super::hub::{Client, Hub, Run, Sensor, count};
 use super::limits::Allowance;
 use super::stream::NAMELESS;
+use super::upstream::{self, Event};
 use super::wire::{self, Fault, Message};
-use crate::decode::Line;
+use crate::decode::{Line, LineDecoder};
 use crate::record::{Nanos, RawSample};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
@@ -40,12 +41,82 @@ pub enum End {
     Unauthorised,
 }
 
+/// Which of the two has connected, and what follows from it.
+#[derive(Debug)]
+pub enum Side {
+    /// A client of ours, who need not show a token when trusted.
+    Client {
+        /// Whether it has shown the token, or need not.
+        trusted: bool,
+    },
+    /// A source we connected to: nobody who asks anything of us.
+    Source(Box<Naming>),
+}
+
+/// How the lines of a source are read and its sensor is called.
+#[derive(Debug)]
+pub struct Naming {
+    id: Option<String>,
+    decoder: Option<LineDecoder>,
+    /// What the lines call the sensor that is called `id` here, or that has no other name.
+    called: Option<Origin>,
+    events: Vec<Event>,
+}
+
+/// A sensor by what its lines say: `id`, and which of a device's sensors.
+type Origin = (Option<String>, Option<String>);
+
+impl Side {
+    /// A source whose sensor is called `id` whatever it calls itself, and whose lines `decoder` reads
+    /// where that is not the one of everybody.
+    #[must_use]
+    pub fn source(id: Option<String>, decoder: Option<LineDecoder>) -> Side {
+        Side::Source(Box::new(Naming {
+            id,
+            decoder,
+            called: None,
+            events: Vec::new(),
+        }))
+    }
+}
+
+impl Naming {
+    /// Gives a line's sensor its name here.
+    fn name(&mut self, head: &mut Line) -> Result<(), Fault> {
+        if self.id.is_none() && head.id.is_some() {
+            return Ok(());
+        }
+        let origin = (head.id.clone(), head.sensor.clone());
+        let called = self.called.get_or_insert_with(|| origin.clone());
+        if *called != origin {
+            let name = |(id, sensor): &Origin| {
+                id.clone()
+                    .or(sensor.clone())
+                    .unwrap_or_else(|| "one without a name".to_owned())
+            };
+            return Err(Fault::new(
+                "several_sensors",
+                format!(
+                    "the source sends several sensors ({} and {}), which must not be mixed; leave ?id= away where they have ids of their own, or ask for one of them",
+                    name(called),
+                    name(&origin)
+                ),
+            ));
+        }
+        if self.id.is_some() {
+            head.id.clone_from(&self.id);
+        }
+        Ok(())
+    }
+}
+
 /// One conversation.
 #[derive(Debug)]
 pub struct Session {
     hub: Arc<Hub>,
     client: Arc<Client>,
     framer: Framer,
+    side: Side,
     authorised: bool,
     errors_in_a_row: u32,
     errors: Allowance,
@@ -61,14 +132,24 @@ impl Session {
     /// Somebody has connected, who need not show a token when `trusted`. Greets.
     #[must_use]
     pub fn new(hub: &Arc<Hub>, peer: String, trusted: bool) -> Session {
+        Session::with(hub, peer, Side::Client { trusted })
+    }
+
+    /// With somebody who has connected, or to whom we have. Greets.
+    #[must_use]
+    pub fn with(hub: &Arc<Hub>, peer: String, side: Side) -> Session {
         let client = hub.join(peer);
         client.outbox.reply(wire::version(&hub.session()));
-        let authorised = trusted || hub.token().is_none();
+        let authorised = match side {
+            Side::Client { trusted } => trusted || hub.token().is_none(),
+            Side::Source(_) => true,
+        };
         if let Some(place) = hub.place().filter(|_| authorised) {
             client.outbox.reply(place);
         }
         Session {
             authorised,
+            side,
             hub: hub.clone(),
             client,
             framer: Framer::new(),
@@ -97,6 +178,14 @@ impl Session {
     #[must_use]
     pub fn has_spoken(&self) -> bool {
         self.framer.ended() > 0
+    }
+
+    /// What a source has said of itself since this was asked last.
+    pub fn events(&mut self) -> Vec<Event> {
+        match &mut self.side {
+            Side::Source(naming) => std::mem::take(&mut naming.events),
+            Side::Client { .. } => Vec::new(),
+        }
     }
 
     /// Why it is over, if it is. What waits in the outbox may still be sent.
@@ -144,7 +233,39 @@ impl Session {
 
     fn line(&mut self, number: u64, line: &[u8], received: Nanos, scratch: &mut Scratch) {
         let before = scratch.samples.len();
-        match wire::read(self.hub.decoder(), line, received, &mut scratch.samples) {
+        let (decoder, is_source) = match &self.side {
+            Side::Source(naming) => (naming.decoder.as_ref().unwrap_or(self.hub.decoder()), true),
+            Side::Client { .. } => (self.hub.decoder(), false),
+        };
+        let mut read = wire::read_from(decoder, line, received, is_source, &mut scratch.samples);
+        if let Side::Source(naming) = &mut self.side {
+            match &mut read {
+                Ok(Message::Samples(head)) => {
+                    if let Err(fault) = naming.name(head) {
+                        count(
+                            &self.hub.counters.refused_samples,
+                            scratch.samples.len() - before,
+                        );
+                        scratch.samples.truncate(before);
+                        self.say(&fault, number, line);
+                        return;
+                    }
+                }
+                // What a daemon says of itself; nobody there asks anything of us.
+                Ok(_)
+                | Err(Fault {
+                    code: "unknown_class",
+                    ..
+                }) => {
+                    if naming.events.len() < MAX_TOLD {
+                        naming.events.extend(upstream::read(line));
+                    }
+                    return;
+                }
+                Err(_) => {}
+            }
+        }
+        match read {
             Ok(Message::Auth(token)) => self.authorise(&token, number),
             Ok(_) | Err(_) if !self.authorised => {
                 scratch.samples.truncate(before);
@@ -214,8 +335,9 @@ impl Session {
                     Err(fault) => self.say(&fault, number, line),
                 }
             }
-            Err(fault) if fault.code == "unknown_class" => {
-                // Somebody newer than this daemon: said once, never held against it.
+            Err(fault) if matches!(fault.code, "unknown_class" | "other_sensor") => {
+                // Somebody newer than this daemon, or who has more than rates: said once, never held
+                // against it.
                 if self.told.len() < MAX_TOLD && self.told.insert(fault.message.clone()) {
                     self.say(&fault, number, line);
                 }

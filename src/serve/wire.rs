@@ -111,6 +111,21 @@ pub fn read(
     received: Nanos,
     samples: &mut Vec<RawSample>,
 ) -> Result<Message, Fault> {
+    read_from(decoder, line, received, false, samples)
+}
+
+/// The same of somebody we connected to: where that is a daemon, the rates of its attitudes are
+/// samples (`is_source`).
+///
+/// # Errors
+/// As [`read`].
+pub fn read_from(
+    decoder: &LineDecoder,
+    line: &[u8],
+    received: Nanos,
+    is_source: bool,
+    samples: &mut Vec<RawSample>,
+) -> Result<Message, Fault> {
     let before = samples.len();
     let head = decoder
         .decode(line, received, samples)
@@ -122,11 +137,21 @@ pub fn read(
         // A sample of our own whose rate is null was one with NaN: it is counted, not passed over.
         Class::Rate if samples.len() > before => return Ok(Message::Samples(head)),
         Class::None | Class::Imu if has_rate => return Ok(Message::Samples(head)),
+        Class::Att if is_source && has_rate => return Ok(Message::Samples(head)),
         Class::Other(class) => Some(class.clone()),
         Class::Att => Some("ATT".to_owned()),
         Class::None | Class::Imu | Class::Rate => None,
     };
     samples.truncate(before);
+    if let (None, Some(sensor)) = (&class, &head.sensor)
+        && sensor.starts_with("android.")
+        && !sensor.contains("gyro")
+    {
+        return Err(Fault::new(
+            "other_sensor",
+            format!("`{sensor}` brings no body rate; it is passed over"),
+        ));
+    }
     match class.as_deref() {
         Some("WATCH") => watch(line).map(Message::Watch),
         Some("POLL") => Ok(Message::Poll),

@@ -37,6 +37,9 @@ pub struct Line {
     pub class: Class,
     /// Which sensor, escaped for a terminal.
     pub id: Option<String>,
+    /// Which of several sensors of one device, where a line says so (`android.sensor.gyroscope`);
+    /// escaped for a terminal.
+    pub sensor: Option<String>,
     /// The sender's sequence number.
     pub seq: Option<u64>,
     /// What its samples mean in time, where it says so.
@@ -60,6 +63,15 @@ impl LineDecoder {
         LineDecoder {
             plan: Plan::compile("", options),
         }
+    }
+
+    /// The same for lines that do not say which sensor they are of: it is `sensor`, as Android names
+    /// it. One that does is believed.
+    #[must_use]
+    pub fn with_sensor(options: &Options, sensor: &str) -> Self {
+        let mut decoder = LineDecoder::new(options);
+        decoder.plan.sensor = Some(sensor.to_owned());
+        decoder
     }
 
     /// Reads one line, without or with its line end; `received` becomes the log and publish time.
@@ -101,6 +113,7 @@ impl LineDecoder {
         Ok(Line {
             class,
             id: seeker.id.as_deref().map(printable),
+            sensor: seeker.sensor.as_deref().map(printable),
             seq: seeker.seq,
             sample_kind: kind_named(seeker.kind.as_deref()).or(kind),
             gyro_unit: unit.or(stated),

@@ -32,6 +32,8 @@ pub(crate) struct Seeker<'a, 'p> {
     pub(crate) id: Option<Cow<'a, str>>,
     pub(crate) seq: Option<u64>,
     pub(crate) kind: Option<Cow<'a, str>>,
+    /// The sensor the outermost object is of, named there or assumed.
+    pub(crate) sensor: Option<Cow<'a, str>>,
 }
 
 impl<'a, 'p> Seeker<'a, 'p> {
@@ -49,6 +51,7 @@ impl<'a, 'p> Seeker<'a, 'p> {
             id: None,
             seq: None,
             kind: None,
+            sensor: None,
         }
     }
 
@@ -85,6 +88,12 @@ impl<'a, 'p> Seeker<'a, 'p> {
                 Some(node) => self.given(node, depth, &mut found)?,
                 None => self.named(&key, depth, twist, &mut found)?,
             }
+        }
+        if depth == 0 {
+            if found.sensor.is_none() {
+                found.sensor = self.plan.sensor.clone().map(Cow::Owned);
+            }
+            self.sensor = found.sensor.clone();
         }
         found.settle(!self.auto_stamp);
         Ok(found)
@@ -209,7 +218,10 @@ impl<'a, 'p> Seeker<'a, 'p> {
             ("linear_acceleration_covariance", Some(b'[')) => self.mark(Slot::ACCEL_MARK, found),
             ("orientation_covariance", Some(b'[')) => self.mark(Slot::ORIENTATION_MARK, found),
             ("values", Some(b'[' | b'{')) => {
-                let values = self.vector(0, found)?;
+                let values = match first {
+                    Some(b'[') => self.leading_triple()?,
+                    _ => self.vector(0, found)?,
+                };
                 found.values = values.or(found.values);
                 Ok(())
             }
@@ -367,6 +379,21 @@ impl<'a, 'p> Seeker<'a, 'p> {
     }
 
     fn triple(&mut self) -> Scan<Option<[f64; 3]>> {
+        Ok(self
+            .numbers()?
+            .and_then(|(v, count)| (count == 3).then_some(v)))
+    }
+
+    /// Three numbers, or six of which the last three say what is known of the first: the drift that
+    /// Android's uncalibrated gyro estimates and does not remove.
+    fn leading_triple(&mut self) -> Scan<Option<[f64; 3]>> {
+        Ok(self
+            .numbers()?
+            .and_then(|(v, count)| matches!(count, 3 | 6).then_some(v)))
+    }
+
+    /// The first three numbers of an array, and how many elements it has.
+    fn numbers(&mut self) -> Scan<Option<([f64; 3], usize)>> {
         let mut values = [None; 3];
         let mut count = 0_usize;
         self.scanner.enter();
@@ -378,8 +405,8 @@ impl<'a, 'p> Seeker<'a, 'p> {
             }
             count += 1;
         }
-        Ok(match (values, count) {
-            ([Some(x), Some(y), Some(z)], 3) => Some([x, y, z]),
+        Ok(match values {
+            [Some(x), Some(y), Some(z)] => Some(([x, y, z], count)),
             _ => None,
         })
     }

@@ -46,7 +46,7 @@ pub(super) async fn serve(listener: TcpListener, context: Context) {
 
 /// Small messages leave at once, and silence is probed. Neither can be refused with more than a
 /// loss of comfort.
-pub(super) fn prepare(stream: &TcpStream) {
+pub(crate) fn prepare(stream: &TcpStream) {
     let _ = stream.set_nodelay(true);
     let keepalive = socket2::TcpKeepalive::new().with_time(IDLE);
     #[cfg(unix)]

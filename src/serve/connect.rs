@@ -1,0 +1,334 @@
+//! Sources -> sessions: connects out, and again and again. I/O.
+//!
+//! One task per source. Whatever keeps it from its samples (an unknown name, a refused connection, a
+//! peer that goes) is a warning and another attempt, never the end: a sensor that is switched on
+//! after the daemon is the normal case. Its lines take the same way as those of a connection that
+//! was accepted.
+
+use super::hub::Hub;
+use super::listen::{in_room, now};
+use super::quiet;
+use super::session::{End, Session, Side};
+use super::shutdown::Running;
+use super::source::{Protocol, Source};
+use super::upstream::Event;
+use crate::client::link::{Heard, Link};
+use crate::client::remote::Remote;
+use futures_util::FutureExt;
+use std::collections::VecDeque;
+use std::fmt::Write;
+use std::hash::{BuildHasher, RandomState};
+use std::io;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Longest message of a WebSocket that is read.
+const MAX_MESSAGE: usize = 128 << 10;
+/// The first wait before another attempt.
+const FIRST_WAIT: Duration = Duration::from_millis(100);
+/// The longest.
+const LONGEST_WAIT: Duration = Duration::from_secs(5);
+/// A connection that stood so long was a good one: the waits begin anew.
+const STEADY: Duration = Duration::from_secs(1);
+/// Asks a daemon for everything it has.
+const WATCH: &str = r#"{"class":"WATCH"}"#;
+
+/// A source and how it stands.
+#[derive(Debug)]
+pub struct Outgoing {
+    source: Source,
+    state: Mutex<State>,
+}
+
+#[derive(Debug)]
+struct State {
+    /// Who answered, while connected.
+    peer: Option<String>,
+    /// When it was connected or lost.
+    since: Instant,
+    attempts: u64,
+    connections: u64,
+    last_error: Option<String>,
+}
+
+impl Outgoing {
+    /// Not yet connected.
+    #[must_use]
+    pub fn new(source: Source) -> Outgoing {
+        Outgoing {
+            source,
+            state: Mutex::new(State {
+                peer: None,
+                since: Instant::now(),
+                attempts: 0,
+                connections: 0,
+                last_error: None,
+            }),
+        }
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        // A State is whole after every statement.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// How it stands, for `STATUS`.
+    #[must_use]
+    pub fn status(&self) -> serde_json::Value {
+        let state = self.state();
+        serde_json::json!({
+            "uri": self.source.name, "id": self.source.id,
+            "connected": state.peer.is_some(), "peer": state.peer,
+            "since_s": state.since.elapsed().as_secs_f64(),
+            "attempts": state.attempts, "connections": state.connections,
+            "last_error": state.last_error,
+        })
+    }
+
+    fn connected(&self, peer: &str) {
+        let mut state = self.state();
+        state.peer = Some(peer.to_owned());
+        state.since = Instant::now();
+        state.connections += 1;
+    }
+
+    /// Not connected, for this reason.
+    fn lost(&self, why: &str) {
+        let mut state = self.state();
+        if state.peer.take().is_some() {
+            state.since = Instant::now();
+        }
+        state.last_error = Some(why.to_owned());
+    }
+
+    /// Something is wrong with what comes; the connection lives.
+    fn complain(&self, what: &str) {
+        self.state().last_error = Some(what.to_owned());
+        let name = &self.source.name;
+        quiet::warn(&format!("{name} says"), &format!("{name}: {what}"));
+    }
+}
+
+/// How long to wait before another attempt: ever longer, and never in step with others who lost the
+/// same peer at the same time.
+#[derive(Debug, Default)]
+struct Redial {
+    failures: u32,
+    chance: RandomState,
+}
+
+impl Redial {
+    fn failed(&mut self) -> Duration {
+        let whole = FIRST_WAIT * (1 << self.failures.min(6));
+        let part = self.chance.hash_one(self.failures) % 512;
+        self.failures = self.failures.saturating_add(1);
+        // Between three and five quarters.
+        let wait = whole.min(LONGEST_WAIT) * (768 + part as u32) / 1024;
+        wait.min(LONGEST_WAIT)
+    }
+}
+
+/// Stays connected until the daemon ends.
+pub(super) async fn keep(outgoing: Arc<Outgoing>, hub: Arc<Hub>, mut running: Running) {
+    let source = &outgoing.source;
+    let name = &source.name;
+    // The token of a stream goes in its first line instead.
+    let token = source.token.as_ref().map(|t| t.reveal());
+    let mut redial = Redial::default();
+    loop {
+        outgoing.state().attempts += 1;
+        let connecting = Link::connect(&source.remote, token, MAX_MESSAGE);
+        let connected = tokio::select! {
+            connected = connecting => connected,
+            () = running.asked() => return,
+        };
+        let why = match connected {
+            Ok(link) => {
+                let began = Instant::now();
+                outgoing.connected(link.peer());
+                quiet::info(&format!("{name} connected"), &format!("{name}: connected"));
+                let Some(why) = converse(link, &outgoing, &hub, &mut running).await else {
+                    return;
+                };
+                if began.elapsed() >= STEADY {
+                    redial.failures = 0;
+                }
+                why
+            }
+            Err(why) => why,
+        };
+        outgoing.lost(&why);
+        quiet::warn(
+            &format!("{name} lost"),
+            &format!("{name}: {why}; trying again until it is there"),
+        );
+        tokio::select! {
+            () = tokio::time::sleep(redial.failed()) => {}
+            () = running.asked() => return,
+        }
+    }
+}
+
+/// Listens to one connection. Returns why it ended, `None` when the daemon ends.
+async fn converse(
+    mut link: Link,
+    outgoing: &Outgoing,
+    hub: &Arc<Hub>,
+    running: &mut Running,
+) -> Option<String> {
+    let source = &outgoing.source;
+    let side = Side::source(source.id.clone(), source.decoder(hub.decode_options()));
+    let mut session = Session::with(hub, source.name.clone(), side);
+    let mut bytes = Vec::new();
+    let mut said = VecDeque::new();
+    let mut asked = source.protocol == Protocol::Strapd;
+    let is_web = matches!(source.remote, Remote::WebSocket { .. });
+    let mut first = Vec::new();
+    if let (Some(token), false) = (&source.token, is_web) {
+        first.push(serde_json::json!({"class": "AUTH", "token": token.reveal()}).to_string());
+    }
+    if asked {
+        first.push(WATCH.to_owned());
+    }
+    for line in first {
+        if let Err(why) = link.send(&line).await {
+            return Some(why.to_string());
+        }
+    }
+    loop {
+        let heard = tokio::select! {
+            heard = link.read(&mut bytes) => heard,
+            () = running.asked() => {
+                // What has arrived is still taken.
+                while let Some(Ok(heard @ (Heard::Bytes | Heard::Message))) =
+                    link.read(&mut bytes).now_or_never()
+                {
+                    take(&mut session, &heard, &bytes);
+                }
+                return None;
+            }
+        };
+        let ended = match heard {
+            Ok(heard) => {
+                take(&mut session, &heard, &bytes);
+                match heard {
+                    Heard::Bytes | Heard::Message => None,
+                    Heard::Closed(None) => Some("the peer has closed the connection".to_owned()),
+                    Heard::Closed(Some(words)) => Some(format!("the peer has closed: {words}")),
+                }
+            }
+            Err(why) if why.kind() == io::ErrorKind::Interrupted => None,
+            Err(why) => Some(why.to_string()),
+        };
+        // What a client would be told is for our own log.
+        let client = session.client();
+        client.outbox.take(usize::MAX, &mut said);
+        for line in said.drain(..) {
+            if let Some(Event::Complained(what)) = super::upstream::read(&line) {
+                outgoing.complain(&what);
+            }
+        }
+        for event in session.events() {
+            match event {
+                Event::Greeted(run) if run == hub.session() => {
+                    return Some("is this daemon itself".to_owned());
+                }
+                Event::Greeted(_) => {
+                    if source.protocol == Protocol::Auto && !std::mem::replace(&mut asked, true) {
+                        if let Err(why) = link.send(WATCH).await {
+                            return Some(why.to_string());
+                        }
+                    }
+                }
+                Event::Complained(what) => outgoing.complain(&what),
+                Event::Dropped(n) => {
+                    outgoing.complain(&format!("we were too slow for {n} of its attitudes"));
+                }
+            }
+        }
+        match session.end() {
+            Some(End::TooManyErrors) => return Some("too many bad lines in a row".to_owned()),
+            Some(End::Unauthorised) => return Some("unauthorised".to_owned()),
+            None => {}
+        }
+        if ended.is_some() {
+            return ended;
+        }
+    }
+}
+
+fn take(session: &mut Session, heard: &Heard, bytes: &[u8]) {
+    in_room(|_, scratch| match heard {
+        Heard::Bytes => session.bytes(bytes, now(), scratch),
+        Heard::Message => session.message(bytes, now(), scratch),
+        Heard::Closed(_) => session.finish(now(), scratch),
+    });
+}
+
+/// The metrics of the sources, as Prometheus text.
+pub(super) fn exposition(out: &mut String, hub: &Hub) {
+    let families: [(&str, &str, &str, fn(&State) -> u64); 3] = [
+        (
+            "outgoing_connected",
+            "gauge",
+            "Whether a source is connected.",
+            |s| u64::from(s.peer.is_some()),
+        ),
+        (
+            "outgoing_attempts_total",
+            "counter",
+            "Attempts to connect to a source.",
+            |s| s.attempts,
+        ),
+        (
+            "outgoing_connections_total",
+            "counter",
+            "Connections made to a source.",
+            |s| s.connections,
+        ),
+    ];
+    if hub.outgoing().is_empty() {
+        return;
+    }
+    for (name, kind, help, value) in families {
+        // A String takes every write.
+        let _ = write!(
+            out,
+            "# HELP strapd_{name} {help}\n# TYPE strapd_{name} {kind}\n"
+        );
+        for outgoing in hub.outgoing() {
+            let uri = outgoing
+                .source
+                .name
+                .replace('\\', "\\\\")
+                .replace('"', "\\\"");
+            let _ = writeln!(
+                out,
+                "strapd_{name}{{uri=\"{uri}\"}} {}",
+                value(&outgoing.state())
+            );
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn attempts_come_ever_later_and_at_least_every_five_seconds() {
+        let mut redial = Redial::default();
+        let waits: Vec<f64> = (0..100).map(|_| redial.failed().as_secs_f64()).collect();
+        for (n, wait) in waits.iter().enumerate() {
+            let whole = (0.1 * 2f64.powi(n.min(6) as i32)).min(5.0);
+            assert!((0.75 * whole..=1.25 * whole).contains(wait), "{n}: {wait}");
+            assert!(*wait <= 5.0);
+        }
+        assert!(waits.windows(2).skip(10).any(|w| w[0] != w[1]), "no jitter");
+        let mut other = Redial::default();
+        let others: Vec<f64> = (0..100).map(|_| other.failed().as_secs_f64()).collect();
+        assert_ne!(waits, others, "two of them in step");
+        redial.failures = 0;
+        assert!(redial.failed() < Duration::from_millis(130));
+    }
+}

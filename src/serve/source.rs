@@ -1,0 +1,181 @@
+//! A source on the command line -> where to connect and how to understand what comes. Pure but for
+//! reading a token file.
+//!
+//! A phone's SensorServer (Android) is a WebSocket server; each message is one event,
+//! `{"values":[x,y,z],"timestamp":ns,"accuracy":3}`, and where several sensors are asked for at once
+//! each names its own in `type`. The gyroscope's values are rad/s about the device's axes. The stamps
+//! are nanoseconds since the phone was started, a clock of their own that no restart of the app, but
+//! every restart of the phone, sets back.
+//!
+//! # Source
+//! SensorServer: its README and `SensorWebSocketServer.kt` (`/sensor/connect?type=T`,
+//! `/sensors/connect?types=["T","U"]`, close codes 4001-4009), github.com/umer0586/SensorServer.
+//! Stamps: Android's `SensorEvent.timestamp`, the time base of `SystemClock.elapsedRealtimeNanos()`.
+//! Units and the six values of the uncalibrated gyroscope: Android's `SensorEvent.values`.
+
+use super::admission::Secret;
+use crate::client::remote::Remote;
+use crate::decode::{LineDecoder, Options, printable};
+use crate::error::{Error, Result};
+use std::path::Path;
+
+/// Longest name of a sensor, in bytes.
+const MAX_ID: usize = super::wire::MAX_ID;
+/// The parameters that are ours.
+const OURS: [&str; 3] = ["id", "proto", "token-file"];
+
+/// Something to connect to for samples.
+#[derive(Clone, Debug)]
+pub struct Source {
+    /// Where.
+    pub remote: Remote,
+    /// What its sensor is called here, whatever it calls itself.
+    pub id: Option<String>,
+    /// How to speak with it.
+    pub protocol: Protocol,
+    /// What it wants to see first.
+    pub token: Option<Secret>,
+    /// What the user wrote, for people.
+    pub name: String,
+}
+
+/// How to speak with a source.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Protocol {
+    /// Nothing is said, unless it greets like a daemon: then it is asked to send what it has.
+    Auto,
+    /// Lines come by themselves.
+    Lines,
+    /// A daemon: it is asked at once.
+    Strapd,
+    /// A phone whose messages need not name this sensor.
+    SensorServer(String),
+}
+
+impl Source {
+    /// Reads what the user wrote: an address with `?id=NAME`, `?proto=auto|ndjson|strapd|sensorserver`
+    /// and `?token-file=FILE`.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with what is known; the token file can not be read.
+    pub fn parse(text: &str) -> Result<Source> {
+        let (remote, parameters) = Remote::with_parameters(text, |p| OURS.contains(&p))?;
+        let refuse = |what: String| {
+            Error::Usage(format!(
+                "serve {text}: {what}\n  help: ?id=NAME names the sensor; ?proto=auto|ndjson|strapd|sensorserver; ?token-file=FILE"
+            ))
+        };
+        if matches!(remote, Remote::UdpListen(_)) {
+            return Err(Error::Usage(format!(
+                "serve {text}: datagrams are listened for, not fetched\n  help: --listen {text}"
+            )));
+        }
+        let is_web = matches!(remote, Remote::WebSocket { .. });
+        let of = |name: &str| {
+            let mut values = parameters.iter().filter(|(n, _)| n == name);
+            match (values.next(), values.next()) {
+                (Some(_), Some(_)) => Err(refuse(format!("?{name}= is given twice"))),
+                (value, None) => Ok(value.map(|(_, v)| v.as_str())),
+                (None, Some(_)) => Ok(None),
+            }
+        };
+        if let Some((other, _)) = parameters
+            .iter()
+            .find(|(n, _)| !is_web && !OURS.contains(&n.as_str()))
+        {
+            return Err(refuse(format!("there is no ?{other}=")));
+        }
+        let id = match of("id")? {
+            None => None,
+            Some(id) if id.is_empty() || id.len() > MAX_ID => {
+                return Err(refuse(format!("?id= needs a name of 1 to {MAX_ID} bytes")));
+            }
+            Some(id) => Some(printable(id)),
+        };
+        let phone = match &remote {
+            Remote::WebSocket { path, .. } => {
+                path.starts_with("/sensor/connect") || path.starts_with("/sensors/connect")
+            }
+            _ => false,
+        };
+        let sensor = match if is_web { of("type")? } else { None } {
+            Some(sensor) if !sensor.to_ascii_lowercase().contains("gyro") && phone => {
+                return Err(refuse(format!(
+                    "`{sensor}` brings no body rate; take type=android.sensor.gyroscope, or gyroscope_uncalibrated whose bias nobody else removes"
+                )));
+            }
+            Some(sensor) => sensor.to_ascii_lowercase(),
+            None => "android.sensor.gyroscope".to_owned(),
+        };
+        let protocol = match of("proto")? {
+            Some("sensorserver") => Protocol::SensorServer(sensor),
+            None | Some("auto") if phone => Protocol::SensorServer(sensor),
+            None | Some("auto") => Protocol::Auto,
+            Some("ndjson") => Protocol::Lines,
+            Some("strapd") => Protocol::Strapd,
+            Some(other) => return Err(refuse(format!("there is no ?proto={other}"))),
+        };
+        let token = of("token-file")?
+            .map(|file| Secret::read("token-file", Path::new(file)))
+            .transpose()?;
+        Ok(Source {
+            remote,
+            id,
+            protocol,
+            token,
+            name: printable(text),
+        })
+    }
+
+    /// What reads its lines, where that is not what reads everybody's.
+    #[must_use]
+    pub fn decoder(&self, options: &Options) -> Option<LineDecoder> {
+        match &self.protocol {
+            Protocol::SensorServer(sensor) => Some(LineDecoder::with_sensor(options, sensor)),
+            Protocol::Auto | Protocol::Lines | Protocol::Strapd => None,
+        }
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_phone_is_known_by_its_path_and_anything_else_by_what_arrives() {
+        let of = |text: &str| Source::parse(text).unwrap();
+        let phone = of("ws://p:8080/sensor/connect?type=android.sensor.gyroscope&id=phone");
+        assert_eq!(
+            phone.protocol,
+            Protocol::SensorServer("android.sensor.gyroscope".to_owned())
+        );
+        assert_eq!(phone.id.as_deref(), Some("phone"));
+        assert_eq!(
+            phone.remote.to_string(),
+            "ws://p:8080/sensor/connect?type=android.sensor.gyroscope"
+        );
+        assert_eq!(of("ws://p:8765/ws").protocol, Protocol::Auto);
+        assert_eq!(of("tcp://p:1?proto=ndjson").protocol, Protocol::Lines);
+        assert_eq!(of("tcp://p:1?proto=strapd").protocol, Protocol::Strapd);
+    }
+
+    #[test]
+    fn what_can_bring_no_rate_is_refused_with_what_can() {
+        for (text, part) in [
+            (
+                "ws://p:1/sensor/connect?type=android.sensor.light",
+                "android.sensor.gyroscope",
+            ),
+            ("tcp://p:1?name=x", "no ?name="),
+            ("tcp://p:1?id=", "1 to 255 bytes"),
+            ("tcp://p:1?id=a&id=b", "twice"),
+            ("tcp://p:1?proto=mqtt", "no ?proto=mqtt"),
+            ("udp-listen://:1", "--listen udp-listen://:1"),
+            ("flight.mcap", "no scheme"),
+        ] {
+            let said = Source::parse(text).unwrap_err().to_string();
+            assert!(said.contains(part), "{text}: {said}");
+        }
+    }
+}
