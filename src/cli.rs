@@ -16,9 +16,11 @@ pub mod outputs;
 pub mod progress;
 pub mod recover;
 pub mod replay;
+pub mod report;
 pub mod serve;
 pub mod serving;
 pub mod simulate;
+pub mod watch;
 
 use crate::error::{Error, Result};
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -37,7 +39,10 @@ use std::process::ExitCode;
   strapd replay flight.mcap -o attitude.mcap   gyro samples to attitude
   strapd compare attitude.mcap flight.mcap     how far from a recorded orientation
   strapd simulate top -o top.mcap              a gyro whose truth is known, to try it all on
+  strapd report flight.mcap -o flight.html     all that can be said about it, on one page
   strapd cat flight.mcap --topic /imu | head   decoded samples as NDJSON
+  strapd serve                                 samples in over sockets, attitude out
+  strapd watch                                 what that daemon makes, live in the terminal
 
 Exit codes: 0 done; 1 failed; 2 bad arguments; 3 done, but samples were lost (check: something was found);
 4 compare: a limit was exceeded."
@@ -127,10 +132,14 @@ pub enum Command {
     Info(info::Info),
     /// Everything that may spoil the attitude from a log, with the flag that helps
     Check(check::Check),
+    /// One self-contained HTML page about a log: quality, attitude, errors, noise
+    Report(Box<report::Report>),
     /// Time-aligned angle error between two attitudes
     Compare(compare::Compare),
-    /// Decoded samples as NDJSON, CSV or a table
+    /// Decoded samples of a file, or attitudes of a daemon, as NDJSON, CSV or a table
     Cat(cat::Cat),
+    /// Every sensor of a daemon, live in the terminal
+    Watch(watch::Watch),
     /// Samples of a synthetic gyro whose true attitude is known exactly
     Simulate(Box<simulate::Simulate>),
     /// The model library: requests as NDJSON on stdin, answers on stdout
@@ -180,8 +189,10 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Config(command) => config::run(&command),
         Command::Info(command) => info::run(&cli.global, &command),
         Command::Check(command) => check::run(&cli.global, &command),
+        Command::Report(command) => report::run(&cli.global, &command),
         Command::Compare(command) => compare::run(&cli.global, &command),
         Command::Cat(command) => cat::run(&cli.global, &command),
+        Command::Watch(command) => watch::run(&cli.global, &command),
         Command::Simulate(command) => simulate::run(&cli.global, &command),
         Command::Model(command) => model::run(&cli.global, &command),
         Command::Allan(command) => allan::run(&cli.global, &command),

@@ -17,9 +17,9 @@
 //! | [`state`] | attitudes <-> the file a restarted daemon goes on from | I/O |
 //! | [`limits`], [`admission`] | every bound; who may come in | pure |
 //! | [`foxglove`], [`viewer`] | the same for Foxglove's viewers: messages in place of lines | pure; sans-I/O |
-//! | [`listen`], `http`, `forward` | sockets | I/O |
-//! | [`source`], [`connect`], [`upstream`] | sockets others listen on | I/O |
 //! | `page`, `top` | what a browser gets | pure |
+//! | [`listen`], `http` | sockets others come to | I/O |
+//! | [`source`], [`connect`], [`upstream`]; `outgoing` | sockets others listen on: samples from there; attitudes to there | I/O |
 //! | [`shutdown`] | signals -> an orderly end | I/O |
 //!
 //! The wire is described in `docs/protocol.md`.
@@ -29,13 +29,13 @@ pub mod admission;
 pub mod cast;
 pub mod channel;
 pub mod connect;
-mod forward;
 pub mod foxglove;
 pub mod framing;
 mod http;
 pub mod hub;
 pub mod limits;
 pub mod listen;
+mod outgoing;
 mod page;
 pub mod playback;
 mod quiet;
@@ -88,13 +88,13 @@ pub struct Settings {
     pub web: Web,
     /// Who records everything that goes through.
     pub recorder: Option<recorder::Handle>,
-    /// Whom to call and send every attitude to ([`Target::Tcp`], [`Target::Udp`]).
-    pub outputs: Vec<Target>,
     /// The attitudes sensors had before the daemon was restarted.
     pub saved: state::Sensors,
     /// Sockets a service manager has opened.
     #[cfg(unix)]
     pub passed: listen::Passed,
+    /// Whom to call and send every attitude to ([`Target::Tcp`], [`Target::Udp`]).
+    pub outputs: Vec<Target>,
     /// The replay that is served; no samples are taken then.
     pub playback: Option<Arc<playback::Playback>>,
 }
@@ -190,7 +190,7 @@ impl Server {
             tokio::spawn(listener.serve(context()));
         }
         for target in self.outputs {
-            tokio::spawn(forward::send(target, context()));
+            tokio::spawn(outgoing::send(target, context()));
         }
         for outgoing in self.hub.outgoing() {
             let task = connect::keep(outgoing.clone(), self.hub.clone(), shutdown.running());

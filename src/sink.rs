@@ -10,6 +10,7 @@ mod batch;
 mod copy;
 mod csv;
 mod decimate;
+mod document;
 pub(crate) mod json;
 mod mcap;
 mod output;
@@ -22,7 +23,9 @@ mod target;
 pub(crate) mod tests;
 
 pub use copy::CopiedChannel;
+pub(crate) use csv::roll_pitch_yaw;
 pub use decimate::Decimator;
+pub use document::Document;
 pub use mcap::chunk::Compression;
 pub use mcap::live::{LiveMcap, LiveStream};
 pub(crate) use mcap::payload;

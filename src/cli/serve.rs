@@ -30,14 +30,15 @@ const MAX_SOURCES: usize = 64;
   strapd serve                                           TCP on 127.0.0.1:4550, WebSocket and HTTP on 127.0.0.1:8765
   strapd serve --listen tcp-listen://127.0.0.1:0         a free port, named in the ready line
   strapd cat flight.mcap | strapd serve -                lines on standard input, too
-  strapd serve -o udp://127.0.0.1:9870?profile=plotjuggler
-                                                         attitudes to PlotJuggler, as they come
   strapd serve tcp://imu.local:7000?id=imu0              samples from somebody who listens, for as long as it takes
   strapd serve 'ws://phone:8080/sensor/connect?type=android.sensor.gyroscope&id=phone'
+  strapd serve -o udp://127.0.0.1:9870?profile=plotjuggler
+                                                         attitudes to PlotJuggler, as they come
 
 Talk to it:
   echo '{\"class\":\"RATE\",\"id\":\"imu0\",\"stamp\":{\"sec\":1,\"nsec\":0},\"gyro\":[0.1,0,0]}' | nc 127.0.0.1 4550
   echo '{\"class\":\"WATCH\"}' | nc 127.0.0.1 4550             attitudes as they come
+  http://127.0.0.1:8765/ in a browser                          the live page; /top: a top to spin
   curl 127.0.0.1:8765/metrics")]
 pub struct Serve {
     /// Where else samples come from: tcp://HOST:PORT, ws://HOST:PORT/PATH, unix:///PATH (connected to, and
@@ -317,14 +318,14 @@ impl Serve {
                 .into_iter()
                 .map(Listen::parse)
                 .collect::<Result<_>>()?,
+            sources: self.outgoing()?,
+            #[cfg(unix)]
+            passed: listen::Passed::from_env(),
             outputs: self
                 .output
                 .iter()
                 .map(|o| sent_to(o))
                 .collect::<Result<_>>()?,
-            sources: self.outgoing()?,
-            #[cfg(unix)]
-            passed: listen::Passed::from_env(),
             ..Settings::default()
         })
     }

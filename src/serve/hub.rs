@@ -68,6 +68,13 @@ pub struct Sensor {
     owner: Option<u64>,
 }
 
+/// How the attitudes were saved last.
+#[derive(Debug)]
+struct StateStatus {
+    saved: Option<Instant>,
+    failed: Option<String>,
+}
+
 /// What a client is told, and how.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Shape {
@@ -78,13 +85,6 @@ pub enum Shape {
         /// Whether it can move a playback.
         controls: bool,
     },
-}
-
-/// How the attitudes were saved last.
-#[derive(Debug)]
-struct StateStatus {
-    saved: Option<Instant>,
-    failed: Option<String>,
 }
 
 /// One connection.
@@ -353,17 +353,16 @@ impl Hub {
         }
         let id: Arc<str> = id.into();
         let first = run.samples.first().copied().unwrap_or_default();
-        let mut saved = lock(&self.saved);
+        let last = lock(&self.saved).get(&*id).cloned();
         let stream = SensorStream::new(
             self.plan_of(&id),
             id.clone(),
             run.head,
             &first,
-            saved.get(&*id),
+            last.as_ref(),
             |labels| self.declare(labels),
         )?;
-        saved.remove(&*id);
-        drop(saved);
+        lock(&self.saved).remove(&*id);
         if let Some(recorder) = &self.recorder {
             recorder.declare(stream.recorded());
         }

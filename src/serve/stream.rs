@@ -76,8 +76,8 @@ pub fn live_plan(plan: &Plan) -> Result<Plan, String> {
 
 impl SensorStream {
     /// For the sensor `id`, whose first line says `stated` and brings `first`. `plan` is a
-    /// [`live_plan`]. It goes on from `saved`, where there is such; `declare` makes its labels known
-    /// to clients.
+    /// [`live_plan`]. It goes on from `saved`, where there is such; `declare` makes its labels known to
+    /// clients.
     ///
     /// # Errors
     /// The fault to answer with: the samples do not fit the plan.

@@ -120,7 +120,7 @@ export class Scene {
   }
 
   // Points on the sphere, oldest first, fading with age; `front` says which half is drawn.
-  locus(points, colour, front, width = 1.75, dash = []) {
+  locus(points, colour, front, width = 1.75, dash = [], behind = 0.3) {
     const { context } = this;
     context.strokeStyle = colour;
     context.lineWidth = width;
@@ -128,7 +128,7 @@ export class Scene {
     const last = points.length - 1;
     for (let age = 0; age < AGES; age++) {
       const [from, to] = [Math.floor((age * last) / AGES), Math.floor(((age + 1) * last) / AGES)];
-      context.globalAlpha = (0.12 + (0.88 * (age + 1)) / AGES) * (front ? 1 : 0.3);
+      context.globalAlpha = (0.12 + (0.88 * (age + 1)) / AGES) * (front ? 1 : behind);
       context.beginPath();
       let drawing = false;
       for (let n = from; n <= to; n++) {

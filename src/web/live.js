@@ -200,6 +200,8 @@ function freeze() {
   parts.notice.hidden = true;
   link?.close();
   changed("frozen", "frozen");
+  // Scales remember what they have shown, and that depends on the moment.
+  for (const each of sensors.values()) for (const scale of Object.values(each.scales)) scale.reset();
   draw(Infinity);
 }
 
@@ -230,7 +232,7 @@ function tick(now) {
     draw(now);
     frames++;
   }
-  if (now - framesAt >= 1000 && !still) {
+  if (now - framesAt >= 1000 && !frozen) {
     fps = ((frames - (tick.before ?? 0)) * 1000) / (now - framesAt);
     [framesAt, tick.before] = [now, frames];
     say(parts.fps, fps.toFixed(0));
@@ -318,7 +320,6 @@ if (frozen && stopAt === null) {
   for (const att of demonstration(LAST)) heard(att);
   freeze();
 } else {
-  if (frozen) document.body.classList.add("still");
   link = new Link(heard, changed);
   if (!frozen) setInterval(() => link.send({ class: "POLL" }), 1000);
 }

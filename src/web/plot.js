@@ -51,13 +51,18 @@ export class Scale {
     this.high = NaN;
   }
 
-  follow(low, high) {
+  // An angle that goes around fills its circle at most.
+  follow(low, high, wraps) {
+    if (wraps && high - low > 150) {
+      [this.low, this.high] = [-180, 180];
+      return;
+    }
     if (!(high >= low)) [low, high] = [-this.least / 2, this.least / 2];
     const room = Math.max(this.least - (high - low), (high - low) * 0.12, 0) / 2;
     const { at, step } = ticks(low - room, high + room, 4);
     const [from, to] = [Math.min(low - room, at[0] ?? low), Math.max(high + room, at.at(-1) ?? high)];
     const fits = from >= this.low - step && to <= this.high + step && low >= this.low && high <= this.high;
-    const wasteful = this.high - this.low > 2.5 * (to - from);
+    const wasteful = this.high - this.low === 360 || this.high - this.low > 2.5 * (to - from);
     if (!fits || wasteful) [this.low, this.high] = [from, to];
   }
 }
@@ -71,7 +76,7 @@ export function drawPlot(surface, colours, history, plot) {
   const end = history.total ? history.newestTime : 0;
   const start = end - seconds;
   const from = history.firstFrom(start);
-  scale.follow(...range(history, series, from));
+  scale.follow(...range(history, series, from), wraps);
   const { low, high } = scale;
   const xOf = (time) => LEFT + ((time - start) / seconds) * width;
   const yOf = (value) => TOP + (1 - (value - low) / (high - low)) * height;
@@ -146,7 +151,10 @@ function frame(context, colours, { low, high, start, end, width, height, xOf, yO
   context.lineWidth = 1;
   context.textAlign = "right";
   context.textBaseline = "middle";
-  const across = ticks(low, high, Math.max(2, Math.min(5, height / 26)));
+  const across =
+    high - low === 360
+      ? { step: 90, at: [-180, -90, 0, 90, 180] }
+      : ticks(low, high, Math.max(2, Math.min(5, height / 26)));
   for (const value of across.at) {
     const y = Math.round(yOf(value)) + 0.5;
     context.beginPath();

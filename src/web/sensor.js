@@ -210,9 +210,9 @@ export class Sensor {
     scene.body((v) => up(rotate(seen, v)));
     scene.locus(other, colours.other, true, 1.5, [4, 4]);
     scene.locus(own, colours.z, true);
-    this.fastest = Math.max((this.fastest ?? 0) * 0.995, speed, 1e-3);
+    const fastest = Math.max(speed, history.fastest(LOCUS) / DEGREES);
     if (speed > 1e-4) {
-      const length = (0.85 * speed) / this.fastest / speed;
+      const length = 0.85 / fastest;
       scene.arrow(up(rotate(seen, rate.map((v) => v * length))), colours.rate);
     }
     scene.ends();
