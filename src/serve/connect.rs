@@ -234,10 +234,11 @@ async fn converse(
                     return Some("is this daemon itself".to_owned());
                 }
                 Event::Greeted(_) => {
-                    if source.protocol == Protocol::Auto && !std::mem::replace(&mut asked, true) {
-                        if let Err(why) = link.send(WATCH).await {
-                            return Some(why.to_string());
-                        }
+                    if source.protocol == Protocol::Auto
+                        && !std::mem::replace(&mut asked, true)
+                        && let Err(why) = link.send(WATCH).await
+                    {
+                        return Some(why.to_string());
                     }
                 }
                 Event::Complained(what) => outgoing.complain(&what),
@@ -267,7 +268,9 @@ fn take(session: &mut Session, heard: &Heard, bytes: &[u8]) {
 
 /// The metrics of the sources, as Prometheus text.
 pub(super) fn exposition(out: &mut String, hub: &Hub) {
-    let families: [(&str, &str, &str, fn(&State) -> u64); 3] = [
+    /// Name, kind, help, and the value of one source.
+    type Family = (&'static str, &'static str, &'static str, fn(&State) -> u64);
+    let families: [Family; 3] = [
         (
             "outgoing_connected",
             "gauge",

@@ -1,7 +1,7 @@
 //! JSON against texts made by hand.
 
 use super::{LOG, channel, decode, decode_one, options};
-use strapd::decode::{Class, Decoder, GyroUnit, MAX_LINE, Options, decode_line};
+use strapd::decode::{Class, Decoder, GyroUnit, LineDecoder, MAX_LINE, Options, decode_line};
 use strapd::record::{Nanos, SampleKind};
 
 const GYRO: [f64; 3] = [1.5, -2.5, 0.1];
