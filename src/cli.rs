@@ -2,6 +2,7 @@
 //!
 //! One file per command. Data goes to stdout, everything else to stderr.
 
+pub mod admission;
 pub mod allan;
 pub mod cat;
 pub mod check;
@@ -16,6 +17,7 @@ pub mod progress;
 pub mod recover;
 pub mod replay;
 pub mod serve;
+pub mod serving;
 pub mod simulate;
 pub mod watch;
 

@@ -16,6 +16,7 @@ mod body_axes;
 mod matching;
 mod relative;
 mod statistics;
+pub mod top;
 
 pub use align::{Align, ParseAlignError};
 pub use body_axes::{BodyAxesFit, fit_body_axes};

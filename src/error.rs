@@ -120,6 +120,16 @@ pub enum Error {
         /// Why.
         source: std::io::Error,
     },
+    /// Nobody takes what is sent there.
+    #[error(
+        "cannot connect to {address}: {source}\n  help: somebody has to listen there first: strapd serve, nc -l PORT, PlotJuggler's UDP server"
+    )]
+    Connect {
+        /// Where.
+        address: String,
+        /// Why.
+        source: std::io::Error,
+    },
     /// A daemon can not be reached, or has gone.
     #[error("{address}: {what}")]
     Remote {

@@ -166,6 +166,8 @@ impl Status {
 
     /// The sample shared its recorded stamp with another and was given one of its own.
     pub const RESTAMPED: Status = Status(1 << 8);
+    /// The first after a restart: the attitude is the one that was saved, held since.
+    pub const RESTARTED: Status = Status(1 << 9);
 
     /// Both sets of bits.
     #[must_use]
@@ -181,7 +183,7 @@ impl Status {
 
     /// The names of the bits that are set, in a fixed order; empty means `ok`.
     pub fn names(self) -> impl Iterator<Item = &'static str> {
-        const NAMES: [(Status, &str); 9] = [
+        const NAMES: [(Status, &str); 10] = [
             (Status::BRIDGED, "bridged"),
             (Status::HELD, "held"),
             (Status::RESET, "reset"),
@@ -191,6 +193,7 @@ impl Status {
             (Status::UNDERSAMPLED, "undersampled"),
             (Status::PROVISIONAL, "provisional"),
             (Status::RESTAMPED, "restamped"),
+            (Status::RESTARTED, "restarted"),
         ];
         NAMES
             .into_iter()

@@ -8,37 +8,52 @@
 //! |---|---|---|
 //! | [`framing`], [`wire`] | bytes -> lines -> requests; answers -> lines | pure |
 //! | [`stream`] | samples of one sensor -> attitudes | pure |
+//! | [`channel`] | a stream as clients know it | pure |
+//! | [`cast`], [`playback`] | a replay or simulation served in place of sensors, and who moves it | I/O; locks |
 //! | [`session`] | one client's lines -> hub, answers | sans-I/O |
 //! | [`hub`] | samples -> attitudes -> outboxes | locks |
 //! | [`subscriber`] | attitudes -> what one client gets, bounded | locks |
 //! | [`recorder`] | what goes through -> MCAP files that survive a crash | a queue; I/O on threads of its own |
+//! | [`state`] | attitudes <-> the file a restarted daemon goes on from | I/O |
 //! | [`limits`], [`admission`] | every bound; who may come in | pure |
-//! | [`listen`], `http` | sockets | I/O |
-//! | [`source`], [`connect`], [`upstream`] | sockets others listen on | I/O |
+//! | [`foxglove`], [`viewer`] | the same for Foxglove's viewers: messages in place of lines | pure; sans-I/O |
+//! | `page`, `top` | what a browser gets | pure |
+//! | [`listen`], `http` | sockets others come to | I/O |
+//! | [`source`], [`connect`], [`upstream`]; `outgoing` | sockets others listen on: samples from there; attitudes to there | I/O |
 //! | [`shutdown`] | signals -> an orderly end | I/O |
 //!
 //! The wire is described in `docs/protocol.md`.
 
 pub mod address;
 pub mod admission;
+pub mod cast;
+pub mod channel;
 pub mod connect;
+pub mod foxglove;
 pub mod framing;
 mod http;
 pub mod hub;
 pub mod limits;
 pub mod listen;
+mod outgoing;
+mod page;
+pub mod playback;
 mod quiet;
 pub mod recorder;
 pub mod session;
 pub mod shutdown;
 pub mod source;
+pub mod state;
 pub mod stream;
 pub mod subscriber;
+mod top;
 pub mod upstream;
+pub mod viewer;
 pub mod wire;
 
 use crate::config::Plan;
 use crate::error::{Error, Result};
+use crate::sink::Target;
 use address::Listen;
 use admission::{Token, Web, is_loopback};
 use hub::Hub;
@@ -73,6 +88,15 @@ pub struct Settings {
     pub web: Web,
     /// Who records everything that goes through.
     pub recorder: Option<recorder::Handle>,
+    /// The attitudes sensors had before the daemon was restarted.
+    pub saved: state::Sensors,
+    /// Sockets a service manager has opened.
+    #[cfg(unix)]
+    pub passed: listen::Passed,
+    /// Whom to call and send every attitude to ([`Target::Tcp`], [`Target::Udp`]).
+    pub outputs: Vec<Target>,
+    /// The replay that is served; no samples are taken then.
+    pub playback: Option<Arc<playback::Playback>>,
 }
 
 /// A daemon that listens, and serves when it is [run](Server::run).
@@ -82,6 +106,7 @@ pub struct Server {
     web: Arc<Web>,
     listeners: Vec<Listener>,
     bound: Vec<Listen>,
+    outputs: Vec<Target>,
 }
 
 impl Settings {
@@ -92,7 +117,7 @@ impl Settings {
     /// token is asked for.
     pub fn check(self) -> Result<()> {
         for listen in &self.listen {
-            check_reach(listen, &self)?;
+            Reach::of(&self).check(listen)?;
         }
         Hub::new(self).map(|_| ())
     }
@@ -106,15 +131,26 @@ impl Server {
     /// no token is asked for; [`Error::Bind`].
     pub async fn bind(mut settings: Settings) -> Result<Server> {
         for listen in &settings.listen {
-            check_reach(listen, &settings)?;
+            Reach::of(&settings).check(listen)?;
         }
         let listen = std::mem::take(&mut settings.listen);
+        let reach = Reach::of(&settings);
+        #[cfg(unix)]
+        let mut passed = std::mem::take(&mut settings.passed);
         let web = std::mem::take(&mut settings.web);
+        let outputs = std::mem::take(&mut settings.outputs);
         let hub = Hub::new(settings)?;
         let mut listeners = Vec::new();
         let mut bound = Vec::new();
         for listen in &listen {
-            let (listener, address) = Listener::bind(listen).await?;
+            let (listener, address) = Listener::bind(
+                listen,
+                #[cfg(unix)]
+                &mut passed,
+            )
+            .await?;
+            // Where a socket that was passed listens is known only now.
+            reach.check(&address)?;
             listeners.push(listener);
             bound.push(address);
         }
@@ -123,6 +159,7 @@ impl Server {
             web: Arc::new(web),
             listeners,
             bound,
+            outputs,
         })
     }
 
@@ -143,14 +180,17 @@ impl Server {
     pub async fn run(self, stop: impl Future<Output = ()>) -> bool {
         let shutdown = Shutdown::default();
         let places = Arc::new(Semaphore::new(self.hub.limits().connections));
+        let context = || Context {
+            hub: self.hub.clone(),
+            web: self.web.clone(),
+            places: places.clone(),
+            running: shutdown.running(),
+        };
         for listener in self.listeners {
-            let context = Context {
-                hub: self.hub.clone(),
-                web: self.web.clone(),
-                places: places.clone(),
-                running: shutdown.running(),
-            };
-            tokio::spawn(listener.serve(context));
+            tokio::spawn(listener.serve(context()));
+        }
+        for target in self.outputs {
+            tokio::spawn(outgoing::send(target, context()));
         }
         for outgoing in self.hub.outgoing() {
             let task = connect::keep(outgoing.clone(), self.hub.clone(), shutdown.running());
@@ -164,15 +204,38 @@ impl Server {
     }
 }
 
-/// Refuses an address others can reach, unless clients must show a token.
-fn check_reach(listen: &Listen, settings: &Settings) -> Result<()> {
-    let is_open = listen.ip().is_some_and(|ip| !is_loopback(ip));
-    // A datagram shows no token that others on the way could not read and send again.
-    let is_guarded = settings.token.is_some() && !matches!(listen, Listen::Udp(_));
-    if is_open && !is_guarded && !settings.allow_insecure_remote {
-        return Err(Error::Usage(format!(
-            "--listen {listen}: others can reach this address, and nothing keeps them out\n  help: --token-file FILE asks clients for a token (not over UDP); --allow-insecure-remote listens all the same; 127.0.0.1 is this machine alone"
-        )));
+/// Who may reach us.
+#[derive(Clone, Copy, Debug)]
+struct Reach {
+    has_token: bool,
+    allow_insecure_remote: bool,
+    /// How an address is given.
+    flag: &'static str,
+}
+
+impl Reach {
+    fn of(settings: &Settings) -> Reach {
+        Reach {
+            has_token: settings.token.is_some(),
+            allow_insecure_remote: settings.allow_insecure_remote,
+            flag: match settings.playback {
+                Some(_) => "-o",
+                None => "--listen",
+            },
+        }
     }
-    Ok(())
+
+    /// Refuses an address others can reach, unless clients must show a token.
+    fn check(self, listen: &Listen) -> Result<()> {
+        let is_open = listen.ip().is_some_and(|ip| !is_loopback(ip));
+        // A datagram shows no token that others on the way could not read and send again.
+        let is_guarded = self.has_token && !matches!(listen, Listen::Udp(_));
+        if is_open && !is_guarded && !self.allow_insecure_remote {
+            return Err(Error::Usage(format!(
+                "{} {listen}: others can reach this address, and nothing keeps them out\n  help: --token-file FILE asks clients for a token (not over UDP); --allow-insecure-remote listens all the same; 127.0.0.1 is this machine alone",
+                self.flag
+            )));
+        }
+        Ok(())
+    }
 }

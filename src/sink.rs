@@ -13,7 +13,9 @@ mod decimate;
 pub(crate) mod json;
 mod mcap;
 mod output;
+mod plot;
 mod size_limit;
+mod socket;
 mod stream;
 mod target;
 #[cfg(test)]
@@ -24,12 +26,14 @@ pub(crate) use csv::roll_pitch_yaw;
 pub use decimate::Decimator;
 pub use mcap::chunk::Compression;
 pub use mcap::live::{LiveMcap, LiveStream};
+pub(crate) use mcap::payload;
 pub use mcap::{Attachment, Encoding, InputChannel, InputMessage};
 pub use output::Flow;
 pub(crate) use output::sync_directory;
 pub use size_limit::make_size_limit_an_error;
 pub use stream::{Content, Provenance, Stream, output_topic};
-pub use target::{Format, Target};
+
+pub use target::{Format, Profile, Target};
 
 use crate::error::{Error, Result};
 use crate::record::{AttitudeSample, Nanos, RawSample};
@@ -75,6 +79,8 @@ pub struct Written {
     pub stamps_out_of_range: u64,
     /// Whether the reader hung up before the end.
     pub closed: bool,
+    /// It was a socket that broke before the end: what was said about it.
+    pub broken: bool,
 }
 
 /// An open output. Dropped without [`Sink::finish`], it leaves no file.
@@ -92,6 +98,7 @@ pub struct Sink {
     /// Uncompressed bytes of copied messages among them.
     queued_copies: usize,
     path: Option<PathBuf>,
+    is_socket: bool,
     samples: u64,
     messages: u64,
     bytes: u64,
@@ -143,7 +150,14 @@ impl Sink {
         let mut head = Vec::new();
         let form = match target.format() {
             None => Form::Null,
-            Some(Format::Ndjson) => Form::Ndjson(streams.iter().map(json::Objects::new).collect()),
+            Some(Format::Ndjson) => {
+                let profile = match target {
+                    Target::Udp { profile, .. } => *profile,
+                    _ => Profile::Lines,
+                };
+                let objects = streams.iter().map(|s| json::Objects::new(s, profile));
+                Form::Ndjson(objects.collect())
+            }
             Some(Format::Csv) => {
                 head.extend_from_slice(match table {
                     Some(Content::Samples(_)) => csv::RAW_HEADER,
@@ -193,6 +207,7 @@ impl Sink {
             .collect();
         let mut sink = Sink {
             path: output.path().map(PathBuf::from),
+            is_socket: output.is_socket(),
             state: State::Open(output),
             form,
             file,
@@ -325,6 +340,7 @@ impl Sink {
             },
             stamps_out_of_range: self.stamps_out_of_range,
             closed,
+            broken: closed && self.is_socket,
         }
     }
 

@@ -17,11 +17,15 @@ mod serve {
     mod config;
     mod connecting;
     mod documentation;
+    mod faults;
+    mod frames;
     mod limits;
     mod operations;
+    mod packaging;
     mod recording;
     mod same_bytes;
     mod slow_readers;
+    mod state;
     mod transports;
     mod watch;
 }

@@ -63,6 +63,9 @@ fn resolve_one(output: &str, log: &str, logs: usize) -> Result<String> {
     if output == "-" || output == "null:" {
         return Ok(output.to_owned());
     }
+    if output.contains("://") && logs == 1 {
+        return Ok(output.to_owned());
+    }
     if output.ends_with('/') || Path::new(output).is_dir() {
         let dir = output.trim_end_matches('/');
         return Ok(format!("{dir}/{}.attitude.mcap", stem(log)));

@@ -2,6 +2,7 @@
 
 use super::estimation::Estimation;
 use super::progress::Reporter;
+use super::serving::{Served, Serving};
 use super::{Global, Outcome, outputs, print};
 use crate::config::Plan;
 use crate::config::Shard;
@@ -21,13 +22,17 @@ use std::io::Write;
   strapd replay flight.mcap -o - | jq .q                    NDJSON on stdout
   strapd replay flight.mcap -o a.mcap --init gravity --bias auto --world enu
   strapd replay flight.mcap --against-recorded              which --sample-kind fits this log
-  strapd replay *.mcap -o out/{stem}.csv --shard 0/4        one share of many logs")]
+  strapd replay *.mcap -o out/{stem}.csv --shard 0/4        one share of many logs
+  strapd replay flight.mcap --page                          in a browser, with play, pause and seek
+  strapd replay flight.mcap --speed 1 -o udp://127.0.0.1:9870?profile=plotjuggler")]
 pub struct Replay {
     /// Logs: MCAP files, or - for a log on standard input (MCAP or NDJSON)
     #[arg(required = true, value_name = "SOURCE")]
     pub sources: Vec<String>,
-    /// Where the attitude goes: a .mcap, .ndjson or .csv file, a directory, - (NDJSON on stdout) or
-    /// null: (nowhere). {stem} stands for the log's name. May be given several times
+    /// Where the attitude goes: a .mcap, .ndjson or .csv file, a directory, - (NDJSON on stdout),
+    /// null: (nowhere); tcp-listen://HOST:PORT, unix-listen:///PATH, ws-listen://HOST:PORT (whoever
+    /// connects); tcp://HOST:PORT, udp://HOST:PORT[?profile=plotjuggler] (somebody who listens).
+    /// {stem} stands for the log's name. May be given several times
     #[arg(short, long = "output", value_name = "SINK")]
     pub outputs: Vec<String>,
     #[command(flatten)]
@@ -53,14 +58,12 @@ pub struct Replay {
         help_heading = "Output"
     )]
     pub out_rate: Option<f64>,
-    /// How fast: max, or a factor of data time such as 1 or 0.5
-    #[arg(
-        long,
-        value_name = "FACTOR",
-        default_value = "max",
-        help_heading = "Output"
-    )]
-    pub speed: String,
+    /// How fast: max, or a factor of data time such as 1 or 0.5 [default: max; with --page or --paused 1]
+    #[arg(long, value_name = "FACTOR", help_heading = "Output")]
+    pub speed: Option<String>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub serving: Serving,
     /// Print the error against the orientation recorded in the log (on TOPIC, or found) for each
     /// meaning a sample can have
     #[arg(long, value_name = "TOPIC", num_args = 0..=1, default_missing_value = "", require_equals = true)]
@@ -135,6 +138,11 @@ pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
                 .to_owned(),
         ));
     }
+    if args.sources.len() > 1 && args.serving.page.is_some() {
+        return Err(Error::Usage(
+            "--page: one log at a time\n  help: give one SOURCE".to_owned(),
+        ));
+    }
     outputs::check_distinct(&args.outputs, &args.sources)?;
     let plan = args.estimation.plan()?;
     let pool = Pool::new(global.threads)?;
@@ -143,16 +151,28 @@ pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
     for log in &logs {
         let result = outputs::resolve(&args.outputs, log, args.sources.len())
             .and_then(|names| args.run(log, &names, plan.clone()))
-            .and_then(|run| {
-                let mut reporter = Reporter::new(global, log);
-                let result = replay::run(&run, &pool, &mut |position| reporter.update(position));
-                reporter.finish();
-                result
+            .and_then(|(mut run, served)| {
+                served.run(|again| {
+                    if again {
+                        run.targets.retain(|target| target.listens().is_some());
+                    }
+                    let mut reporter = Reporter::new(global, log);
+                    let result =
+                        replay::run(&run, &pool, &mut |position| reporter.update(position));
+                    reporter.finish();
+                    result
+                })
             });
         match result {
+            Ok((summary, _)) if !summary.broken.is_empty() && summary.reader_gone => {
+                return Ok(Outcome::Lossy);
+            }
             // Whoever read the output has enough: nothing more to say or do.
-            Ok(summary) if summary.reader_gone => return Ok(outcome),
-            Ok(summary) => {
+            Ok((summary, _)) if summary.reader_gone => return Ok(outcome),
+            Ok((summary, ended)) => {
+                if ended == Outcome::Failed {
+                    outcome = ended;
+                }
                 if summary.is_lossy() && outcome == Outcome::Done {
                     outcome = Outcome::Lossy;
                 }
@@ -177,20 +197,26 @@ impl Replay {
     ///
     /// # Errors
     /// [`Error::Usage`] for a flag that can not be.
-    fn run(&self, log: &str, outputs: &[String], plan: Plan) -> Result<Run> {
-        let speed = speed(&self.speed)?;
+    fn run(&self, log: &str, outputs: &[String], plan: Plan) -> Result<(Run, Served)> {
         if self
             .out_rate
             .is_some_and(|hz| !(hz.is_finite() && hz > 0.0))
         {
             return Err(Error::Usage("--out-rate: a rate above 0 Hz".to_owned()));
         }
-        Ok(Run {
-            source: Source::parse(log),
-            targets: outputs
-                .iter()
-                .map(|o| Target::parse(o))
-                .collect::<Result<_>>()?,
+        let targets = outputs
+            .iter()
+            .map(|o| Target::parse(o))
+            .collect::<Result<_>>()?;
+        let source = Source::parse(log);
+        let can_rewind = matches!(&source, Source::File(path) if path.is_file());
+        let served = self
+            .serving
+            .start(targets, self.speed.as_deref(), (log, can_rewind))?;
+        let run = Run {
+            source,
+            targets: served.targets.clone(),
+            cast: served.cast.clone(),
             plan,
             options: Options {
                 force: self.force,
@@ -202,10 +228,11 @@ impl Replay {
             },
             copy_input: self.copy_input,
             out_rate: self.out_rate,
-            speed,
+            speed: served.speed,
             against: self.against_recorded.clone(),
             command: std::env::args().collect::<Vec<_>>().join(" "),
-        })
+        };
+        Ok((run, served))
     }
 }
 

@@ -1,22 +1,25 @@
 //! `strapd serve`: samples over sockets -> attitudes over sockets. I/O.
 
+use super::admission::Admission;
 use super::config::Layered;
 use super::estimation::Estimation;
 use super::{Global, Outcome};
 use crate::client::remote::Remote;
 use crate::error::{Error, Result};
 use crate::serve::address::{DEFAULTS, Listen};
-use crate::serve::admission::{Token, Web};
-use crate::serve::limits::Limits;
+use crate::serve::hub::Hub;
 use crate::serve::recorder::{self, Recorder, Split};
 use crate::serve::shutdown::{self, Signals};
 use crate::serve::source::Source;
+use crate::serve::state::{self, StateFile};
 use crate::serve::{Server, Settings, listen};
 use crate::sink::{Format, Target};
 use clap::Args;
-use std::collections::BTreeMap;
+use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
 /// Most sources connected to.
 const MAX_SOURCES: usize = 64;
@@ -29,10 +32,13 @@ const MAX_SOURCES: usize = 64;
   strapd cat flight.mcap | strapd serve -                lines on standard input, too
   strapd serve tcp://imu.local:7000?id=imu0              samples from somebody who listens, for as long as it takes
   strapd serve 'ws://phone:8080/sensor/connect?type=android.sensor.gyroscope&id=phone'
+  strapd serve -o udp://127.0.0.1:9870?profile=plotjuggler
+                                                         attitudes to PlotJuggler, as they come
 
 Talk to it:
   echo '{\"class\":\"RATE\",\"id\":\"imu0\",\"stamp\":{\"sec\":1,\"nsec\":0},\"gyro\":[0.1,0,0]}' | nc 127.0.0.1 4550
   echo '{\"class\":\"WATCH\"}' | nc 127.0.0.1 4550             attitudes as they come
+  http://127.0.0.1:8765/ in a browser                          the live page; /top: a top to spin
   curl 127.0.0.1:8765/metrics")]
 pub struct Serve {
     /// Where else samples come from: tcp://HOST:PORT, ws://HOST:PORT/PATH, unix:///PATH (connected to, and
@@ -44,6 +50,10 @@ pub struct Serve {
     /// [default: tcp-listen://127.0.0.1:4550 and ws-listen://127.0.0.1:8765]
     #[arg(long, value_name = "URI")]
     pub listen: Vec<String>,
+    /// Send every attitude there, too: tcp://HOST:PORT, udp://HOST:PORT[?profile=plotjuggler]. May be
+    /// given several times
+    #[arg(short, long = "output", value_name = "SINK")]
+    pub output: Vec<String>,
     /// Take what is not given as a flag or in the environment from this TOML file
     #[arg(long, value_name = "FILE", env = "STRAPD_CONFIG")]
     pub config: Option<PathBuf>,
@@ -72,23 +82,23 @@ pub struct Serve {
     /// Replace the recording if it exists
     #[arg(long, requires = "record", help_heading = "Recording")]
     pub force: bool,
-    /// Ask every client for the token in this file (first line, mode 0600)
-    #[arg(
-        long,
-        value_name = "FILE",
-        help_heading = "Admission",
-        env = "STRAPD_TOKEN_FILE"
-    )]
-    pub token_file: Option<PathBuf>,
-    /// Listen where others can reach it without asking for a token
-    #[arg(long, help_heading = "Admission")]
-    pub allow_insecure_remote: bool,
-    /// Let pages of this origin, such as `https://example.org`, connect. May be given several times
-    #[arg(long, value_name = "ORIGIN", help_heading = "Admission")]
-    pub allow_origin: Vec<String>,
-    /// A name this machine is called in HTTP requests. May be given several times
-    #[arg(long, value_name = "HOST", help_heading = "Admission")]
-    pub allow_host: Vec<String>,
+    /// Go on from the attitudes in this file, and keep it no more than a second behind: a restart
+    /// loses no heading
+    #[arg(long, value_name = "FILE")]
+    pub state: Option<PathBuf>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub admission: Admission,
+}
+
+/// A sink of the daemon.
+fn sent_to(text: &str) -> Result<Target> {
+    match Target::parse(text)? {
+        target @ (Target::Tcp(_) | Target::Udp { .. }) => Ok(target),
+        _ => Err(Error::Usage(format!(
+            "-o {text}: the daemon sends to tcp://HOST:PORT and udp://HOST:PORT[?profile=plotjuggler]\n  help: --listen waits for watchers, --record FILE.mcap writes a file"
+        ))),
+    }
 }
 
 /// Runs it until a signal.
@@ -107,6 +117,14 @@ pub fn run(global: &Global, args: &Serve) -> Result<Outcome> {
     let args = layered.as_ref().map_or(args, Layered::serve);
     let recorder = args.recording()?.map(Recorder::start).transpose()?;
     settings.recorder = recorder.as_ref().map(Recorder::handle);
+    let state = match &args.state {
+        Some(path) => {
+            let (file, saved) = StateFile::open(path)?;
+            settings.saved = saved;
+            Some(Arc::new(Mutex::new(file)))
+        }
+        None => None,
+    };
     let mut builder = tokio::runtime::Builder::new_multi_thread();
     if global.threads > 0 {
         builder.worker_threads(global.threads);
@@ -117,7 +135,7 @@ pub fn run(global: &Global, args: &Serve) -> Result<Outcome> {
         .build()
         .map_err(|e| Error::Usage(format!("--threads {}: {e}", global.threads)))?;
     let has_stdin = args.sources.iter().any(|s| s == "-");
-    let outcome = runtime.block_on(serve(settings, has_stdin));
+    let outcome = runtime.block_on(serve(settings, has_stdin, state));
     // A thread that waits for standard input would otherwise be waited for.
     runtime.shutdown_background();
     let Some(status) = recorder.map(Recorder::finish) else {
@@ -139,7 +157,11 @@ pub fn run(global: &Global, args: &Serve) -> Result<Outcome> {
     })
 }
 
-async fn serve(settings: Settings, has_stdin: bool) -> Result<Outcome> {
+async fn serve(
+    settings: Settings,
+    has_stdin: bool,
+    state: Option<Arc<Mutex<StateFile>>>,
+) -> Result<Outcome> {
     // Signals first: from the ready line on, one drains.
     let signals = Signals::new().map_err(|e| Error::Usage(format!("signals: {e}")))?;
     let server = Server::bind(settings).await?;
@@ -148,19 +170,32 @@ async fn serve(settings: Settings, has_stdin: bool) -> Result<Outcome> {
     tracing::info!(session = hub.session(), "ready {}", addresses.join(" "));
     // Nobody may have started us that wants to know.
     let _ = sd_notify::notify(&[sd_notify::NotifyState::Ready]);
+    tokio::spawn(pat_the_watchdog());
+    let keeping = state
+        .clone()
+        .map(|file| tokio::spawn(state::keep(file, hub.clone())));
     if has_stdin {
         let hub = hub.clone();
         std::thread::spawn(move || listen::read_stdin(&hub, std::io::stdin().lock()));
     }
     let drained = server
         .run(async {
-            let signal = shutdown::first(signals).await;
+            let reopened = hub.clone();
+            let signal = shutdown::first(signals, move || reopen(&reopened)).await;
             tracing::info!("{}: shutting down", signal.name());
             let _ = sd_notify::notify(&[sd_notify::NotifyState::Stopping]);
         })
         .await;
     if !drained {
         tracing::warn!("not everything could be sent in time");
+    }
+    if let Some(keeping) = keeping {
+        keeping.abort();
+    }
+    if let Some(file) = state {
+        let hub = hub.clone();
+        // Behind whatever save is still under way.
+        let _ = tokio::task::spawn_blocking(move || state::save(&file, &hub)).await;
     }
     let of = |n: &std::sync::atomic::AtomicU64| n.load(Ordering::Relaxed);
     tracing::info!(
@@ -171,6 +206,28 @@ async fn serve(settings: Settings, has_stdin: bool) -> Result<Outcome> {
         of(&hub.counters.faults)
     );
     Ok(Outcome::Done)
+}
+
+/// Tells a service manager that asks for it that the runtime still turns.
+async fn pat_the_watchdog() {
+    let Some(limit) = sd_notify::watchdog_enabled().filter(|limit| !limit.is_zero()) else {
+        return;
+    };
+    let mut tick = tokio::time::interval((limit / 2).max(Duration::from_millis(1)));
+    loop {
+        tick.tick().await;
+        let _ = sd_notify::notify(&[sd_notify::NotifyState::Watchdog]);
+    }
+}
+
+/// A hang-up: the wish to go on in a new file, as of a log rotation. In a terminal it means that the
+/// terminal has gone, and the daemon goes with it.
+fn reopen(hub: &Hub) -> bool {
+    let reopens = !std::io::stderr().is_terminal() && hub.reopen_recording();
+    if reopens {
+        tracing::info!("SIGHUP: the recording goes on in a new file");
+    }
+    reopens
 }
 
 impl Serve {
@@ -255,22 +312,21 @@ impl Serve {
         } else {
             self.listen.iter().map(String::as_str).collect()
         };
-        Ok(Settings {
+        self.admission.apply(Settings {
             plan: self.estimation.plan()?,
-            plans: BTreeMap::new(),
             listen: given
                 .into_iter()
                 .map(Listen::parse)
                 .collect::<Result<_>>()?,
             sources: self.outgoing()?,
-            limits: Limits::default(),
-            token: self.token_file.as_deref().map(Token::read).transpose()?,
-            allow_insecure_remote: self.allow_insecure_remote,
-            web: Web {
-                hosts: self.allow_host.clone(),
-                origins: self.allow_origin.clone(),
-            },
-            recorder: None,
+            #[cfg(unix)]
+            passed: listen::Passed::from_env(),
+            outputs: self
+                .output
+                .iter()
+                .map(|o| sent_to(o))
+                .collect::<Result<_>>()?,
+            ..Settings::default()
         })
     }
 }

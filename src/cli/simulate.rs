@@ -14,6 +14,7 @@ use super::{Global, Outcome, outputs, print};
 use crate::error::{Error, Result};
 use crate::model::motion::Motion;
 use crate::pipeline::pool::Pool;
+use crate::pipeline::position::Position;
 use crate::pipeline::simulate;
 use clap::{Args, Subcommand};
 use sampling::Common;
@@ -26,7 +27,9 @@ use std::io::Write;
   strapd simulate top --case looping --duration 60 -o top.ndjson
   strapd simulate coning --half-angle-deg 1 --frequency-hz 10 --rate-hz 400 -o coning.mcap
   strapd simulate top -o truth.mcap -o - | strapd replay - -o est.mcap \\
-    && strapd compare est.mcap truth.mcap                how good is the integration?")]
+    && strapd compare est.mcap truth.mcap                how good is the integration?
+  strapd simulate top --speed 1 -o tcp://127.0.0.1:4550  feeds a strapd serve
+  strapd simulate top --page                             in a browser, with play, pause and seek")]
 pub struct Simulate {
     /// Which motion
     #[command(subcommand)]
@@ -88,13 +91,24 @@ pub fn run(global: &Global, args: &Simulate) -> Result<Outcome> {
     }
     outputs::check_distinct(&common.outputs, &[name.to_owned()])?;
     let pool = Pool::new(global.threads)?;
-    let simulation = common.simulation(name, made)?;
-    let mut reporter = Reporter::new(global, name);
-    let result = simulate::run(simulation, &pool, &mut |position| reporter.update(position));
-    reporter.finish();
-    let summary = result?;
+    let (mut simulation, served) = common.simulation(name, made)?;
+    let (summary, mut outcome) = served.run(|again| {
+        if again {
+            simulation
+                .targets
+                .retain(|target| target.listens().is_some());
+        }
+        let mut reporter = Reporter::new(global, name);
+        let watch = &mut |position: &Position| reporter.update(position);
+        let result = simulate::run(simulation.clone(), &pool, watch);
+        reporter.finish();
+        result
+    })?;
+    if !summary.broken.is_empty() && outcome == Outcome::Done {
+        outcome = Outcome::Lossy;
+    }
     if summary.reader_gone {
-        return Ok(Outcome::Done);
+        return Ok(outcome);
     }
     if global.quiet {
         for warning in summary.warnings() {
@@ -109,7 +123,7 @@ pub fn run(global: &Global, args: &Simulate) -> Result<Outcome> {
     if global.json {
         print(&format!("{}\n", summary.json()))?;
     }
-    Ok(Outcome::Done)
+    Ok(outcome)
 }
 
 /// A flag's value as it stands in the metadata.

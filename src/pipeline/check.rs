@@ -107,6 +107,7 @@ fn integrate(
         copy_input: false,
         out_rate: None,
         speed: None,
+        cast: None,
         against: has_reference.then(String::new),
         command: "strapd check".to_owned(),
     };

@@ -76,6 +76,19 @@ impl Estimator {
         })
     }
 
+    /// Goes on from the last attitude of an estimator whose settings were the same, before the first
+    /// sample of this one: see [`Propagator::resume`].
+    ///
+    /// # Errors
+    /// In words: it is no rotation.
+    pub fn resume(&mut self, last: &AttitudeSample) -> Result<(), String> {
+        let mut last = *last;
+        if let Some(from) = self.world.convention() {
+            last = relabelled(&last, from, Convention::EnuFlu);
+        }
+        self.propagator.resume(&last).map_err(|e| e.to_string())
+    }
+
     /// Takes the next sample.
     #[inline]
     pub fn take(&mut self, raw: &RawSample) {
@@ -156,12 +169,18 @@ impl Estimator {
             Some(to) => to,
         };
         for sample in &mut self.out {
-            sample.q_nb = Convention::EnuFlu.convert(to, sample.q_nb);
-            sample.rate = Convention::EnuFlu.convert_body(to, sample.rate);
-            sample.covariance = sample
-                .covariance
-                .relabelled(|v| Convention::EnuFlu.convert_body(to, v));
-            sample.accel = sample.accel.map(|a| Convention::EnuFlu.convert_body(to, a));
+            *sample = relabelled(sample, Convention::EnuFlu, to);
         }
+    }
+}
+
+/// The same attitude between other axes: world and body change together.
+fn relabelled(sample: &AttitudeSample, from: Convention, to: Convention) -> AttitudeSample {
+    AttitudeSample {
+        q_nb: from.convert(to, sample.q_nb),
+        rate: from.convert_body(to, sample.rate),
+        covariance: sample.covariance.relabelled(|v| from.convert_body(to, v)),
+        accel: sample.accel.map(|a| from.convert_body(to, a)),
+        ..*sample
     }
 }

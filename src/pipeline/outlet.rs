@@ -5,6 +5,7 @@ use super::pool::Pool;
 use super::route::Copied;
 use crate::error::Result;
 use crate::record::{AttitudeSample, Nanos, RawSample};
+use crate::serve::cast::Cast;
 use crate::sink::{
     CopiedChannel, Decimator, Flow, InputChannel, InputMessage, Options, Provenance, Sink, Stream,
     Target, Written,
@@ -12,9 +13,29 @@ use crate::sink::{
 use rayon::ThreadPool;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// What standard output is called in the summary.
 const STDOUT: &str = "standard output";
+
+/// How items of a kind are handed over.
+struct Way<T> {
+    due: fn(&T) -> Nanos,
+    write: fn(&mut Sink, usize, &[T], &ThreadPool) -> Result<Flow>,
+    cast: fn(&Cast, usize, &[T], bool),
+}
+
+const ATTITUDES: Way<AttitudeSample> = Way {
+    due: |sample| sample.stamp,
+    write: Sink::write,
+    cast: Cast::attitudes,
+};
+
+const SAMPLES: Way<RawSample> = Way {
+    due: |sample| sample.log,
+    write: Sink::write_raw,
+    cast: Cast::samples,
+};
 
 /// What a target is called in the summary.
 fn name(target: &Target) -> String {
@@ -22,6 +43,9 @@ fn name(target: &Target) -> String {
         Target::File { path, .. } => path.display().to_string(),
         Target::Stdout => STDOUT.to_owned(),
         Target::Null => "null:".to_owned(),
+        Target::Listen(listen) => listen.to_string(),
+        Target::Tcp(address) => format!("tcp://{address}"),
+        Target::Udp { address, .. } => format!("udp://{address}"),
     }
 }
 
@@ -33,11 +57,32 @@ pub struct Outlet {
     decimators: Vec<Option<Decimator>>,
     kept: Vec<AttitudeSample>,
     pace: Option<Pace>,
+    cast: Option<Arc<Cast>>,
     closed: bool,
 }
 
+/// When items are handed over, and how many of them.
+#[derive(Clone, Debug, Default)]
+pub struct Delivery {
+    /// `--out-rate`, Hz.
+    pub out_rate: Option<f64>,
+    /// `--speed`; `None` = as fast as possible.
+    pub speed: Option<f64>,
+    /// Who serves targets that listen.
+    pub cast: Option<Arc<Cast>>,
+}
+
+/// The sockets that broke before the end.
+pub(super) fn broken(written: &[(String, Written)]) -> Vec<String> {
+    written
+        .iter()
+        .filter(|(_, w)| w.broken)
+        .map(|(name, _)| name.clone())
+        .collect()
+}
+
 impl Outlet {
-    /// Opens every target.
+    /// Opens every target; those that listen are served by `cast`, which then has the pace too.
     ///
     /// # Errors
     /// As [`Sink::create`]; nothing is left behind.
@@ -47,16 +92,24 @@ impl Outlet {
         options: Options,
         streams: &[Stream],
         provenance: &Provenance,
-        out_rate: Option<f64>,
-        speed: Option<f64>,
+        delivery: Delivery,
     ) -> Result<Outlet> {
+        let Delivery {
+            out_rate,
+            speed,
+            cast,
+        } = delivery;
         let sinks = targets
             .iter()
+            .filter(|target| target.listens().is_none())
             .map(|target| {
                 let sink = Sink::create(target, inputs, options, streams, provenance)?;
                 Ok((name(target), sink))
             })
             .collect::<Result<Vec<_>>>()?;
+        if let Some(cast) = &cast {
+            cast.begin(streams);
+        }
         Ok(Outlet {
             copied: sinks.iter().map(|_| BTreeMap::new()).collect(),
             sinks,
@@ -66,6 +119,7 @@ impl Outlet {
                 .collect(),
             kept: Vec::new(),
             pace: Pace::new(speed),
+            cast,
             closed: false,
         })
     }
@@ -81,12 +135,12 @@ impl Outlet {
         pool: &Pool,
     ) -> Result<Flow> {
         let Some(decimator) = self.decimators.get_mut(stream).and_then(Option::as_mut) else {
-            return self.hand_over(stream, samples, |s| s.stamp, Sink::write, pool);
+            return self.hand_over(stream, samples, ATTITUDES, pool);
         };
         let mut kept = std::mem::take(&mut self.kept);
         kept.clear();
         decimator.select(samples, &mut kept);
-        let flow = self.hand_over(stream, &kept, |s| s.stamp, Sink::write, pool);
+        let flow = self.hand_over(stream, &kept, ATTITUDES, pool);
         self.kept = kept;
         flow
     }
@@ -96,39 +150,51 @@ impl Outlet {
     /// # Errors
     /// As [`Sink::write_raw`].
     pub fn write_raw(&mut self, stream: usize, samples: &[RawSample], pool: &Pool) -> Result<Flow> {
-        self.hand_over(stream, samples, |s| s.log, Sink::write_raw, pool)
+        self.hand_over(stream, samples, SAMPLES, pool)
     }
 
     fn hand_over<T>(
         &mut self,
         stream: usize,
         samples: &[T],
-        due: fn(&T) -> Nanos,
-        write: fn(&mut Sink, usize, &[T], &ThreadPool) -> Result<Flow>,
+        way: Way<T>,
         pool: &Pool,
     ) -> Result<Flow> {
         let mut rest = samples;
         while let (false, Some(first)) = (self.closed, rest.first()) {
-            let n = match &mut self.pace {
-                None => rest.len(),
-                Some(pace) => {
-                    pace.wait(due(first));
-                    pace.take(rest.iter().map(due))
+            let stamps = rest.iter().map(way.due);
+            let (n, shown) = match (&self.cast, &mut self.pace) {
+                (Some(cast), _) => match cast.turn(stamps) {
+                    Some(turn) => turn,
+                    None => {
+                        self.closed = true;
+                        break;
+                    }
+                },
+                (None, Some(pace)) => {
+                    pace.wait((way.due)(first));
+                    (pace.take(stamps), true)
                 }
+                (None, None) => (rest.len(), true),
             };
-            let (now, later) = rest.split_at(n);
+            let (now, later) = rest.split_at(n.min(rest.len()));
             rest = later;
+            if let Some(cast) = &self.cast {
+                (way.cast)(cast, stream, now, shown);
+            }
             let mut flows = Vec::with_capacity(self.sinks.len());
             for (_, sink) in &mut self.sinks {
-                let mut flow = write(sink, stream, now, pool.rayon())?;
-                if self.pace.is_some() && flow == Flow::Continue {
+                let mut flow = (way.write)(sink, stream, now, pool.rayon())?;
+                if self.pace.is_some() && shown && flow == Flow::Continue {
                     flow = sink.flush(pool.rayon())?;
                 }
                 flows.push(flow);
             }
             // A reader that has gone ends the run only when nobody else is served: a file beside it
             // must still become whole.
-            self.closed = !flows.is_empty() && flows.iter().all(|flow| *flow == Flow::Closed);
+            self.closed = self.cast.is_none()
+                && !flows.is_empty()
+                && flows.iter().all(|flow| *flow == Flow::Closed);
         }
         Ok(if self.closed {
             Flow::Closed
@@ -137,14 +203,27 @@ impl Outlet {
         })
     }
 
-    /// Pushes what was handed over out to standard output, whose reader may wait for it. Files are
+    /// Whether what is handed over waits for its time.
+    #[must_use]
+    pub fn is_paced(&self) -> bool {
+        self.pace.is_some()
+    }
+
+    /// How long the input is, about, for whoever is shown where the run is.
+    pub fn length(&self, secs: f64) {
+        if let Some(cast) = &self.cast {
+            cast.playback().length(secs);
+        }
+    }
+
+    /// Pushes what was handed over out to standard output and sockets, whose readers may wait for it. Files are
     /// left to fill their batches: nobody reads them yet, and an MCAP's bytes would show it.
     ///
     /// # Errors
     /// As [`Sink::flush`].
     pub fn flush_to_readers(&mut self, pool: &Pool) -> Result<()> {
         for (name, sink) in &mut self.sinks {
-            if name == STDOUT {
+            if name == STDOUT || name.contains("://") {
                 // That it has hung up is noticed at the next write.
                 let _ = sink.flush(pool.rayon())?;
             }
@@ -187,11 +266,14 @@ impl Outlet {
         Ok(())
     }
 
-    /// Completes every output.
+    /// Completes every output; of a run that was told to end before its end, none.
     ///
     /// # Errors
     /// As [`Sink::finish`].
     pub fn finish(self) -> Result<Vec<(String, Written)>> {
+        if self.cast.as_ref().is_some_and(|c| c.playback().is_cut()) {
+            return Ok(Vec::new());
+        }
         self.sinks
             .into_iter()
             .map(|(name, sink)| Ok((name, sink.finish()?)))

@@ -6,8 +6,8 @@
 use crate::record::Nanos;
 use std::time::{Duration, Instant};
 
-/// Largest share of data handed on at once, s of data time at speed 1.
-const SLICE_NANOS: i64 = 5_000_000;
+/// Data handed on at once spans less than this, ns of data time at speed 1.
+const SLICE_NANOS: i64 = 1_000_000;
 
 /// A longer step of data time is not waited for.
 const JUMP_NANOS: i64 = 10_000_000_000;
@@ -36,7 +36,7 @@ impl Pace {
         let slice = self.slice_nanos();
         let mut first = None;
         stamps
-            .take_while(|stamp| stamp.since(*first.get_or_insert(*stamp)).abs() <= slice)
+            .take_while(|stamp| stamp.since(*first.get_or_insert(*stamp)).abs() < slice)
             .count()
             .max(1)
     }
@@ -50,8 +50,23 @@ impl Pace {
         }
     }
 
-    /// How long after `now` `stamp` is due.
-    fn until(&mut self, stamp: Nanos, now: Instant) -> Duration {
+    /// From the next sample on, as if it were the first.
+    pub fn restart(&mut self) {
+        self.origin = None;
+        self.last = None;
+    }
+
+    /// From `now` on so many times as fast as the data.
+    pub fn set_speed(&mut self, speed: f64, now: Instant) {
+        self.origin = self.origin.map(|(start, begun)| {
+            let elapsed = now.saturating_duration_since(begun).as_secs_f64() * self.speed * 1e9;
+            (Nanos(start.0.saturating_add(elapsed as i64)), now)
+        });
+        self.speed = speed;
+    }
+
+    /// How long after `now` `stamp` is due. It may be asked for the same stamp again.
+    pub fn until(&mut self, stamp: Nanos, now: Instant) -> Duration {
         // In data time: at a low speed an ordinary step is long on the wall.
         let longest = JUMP_NANOS.max(self.slice_nanos().saturating_mul(2));
         let jumped = self
@@ -83,7 +98,7 @@ mod tests {
         };
         let stamps = |n: i64, step: i64| (0..n).map(move |i| Nanos(i * step));
         assert_eq!(pace.take(stamps(10, 100_000_000)), 1);
-        assert_eq!(pace.take(stamps(100, 1_000_000)), 6);
+        assert_eq!(pace.take(stamps(100, 250_000)), 4);
     }
 
     #[test]

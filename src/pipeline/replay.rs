@@ -126,6 +126,9 @@ fn file(
         against.take_reference_from(&reference.resolved);
     }
     let span = log.survey.times;
+    if let Some((first, last)) = span {
+        session.length(last.saturating_sub(first) as f64 * 1e-9);
+    }
     let total: u64 = log.survey.channels.iter().map(|c| c.messages).sum();
     let reader = again(&log, path)?;
     let mut failure = None;

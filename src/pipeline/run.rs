@@ -2,8 +2,10 @@
 
 use crate::config::Plan;
 use crate::error::Error;
+use crate::serve::cast::Cast;
 use crate::sink::{self, Target};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// A replay to be done.
 #[derive(Clone, Debug)]
@@ -22,6 +24,8 @@ pub struct Replay {
     pub out_rate: Option<f64>,
     /// `--speed`; `None` = as fast as possible.
     pub speed: Option<f64>,
+    /// Who serves it to whoever connects, where a target listens.
+    pub cast: Option<Arc<Cast>>,
     /// `--against-recorded`: the reference's topic, empty = found.
     pub against: Option<String>,
     /// The command as typed, for the output's metadata.

@@ -156,35 +156,50 @@ impl Session {
     /// # Errors
     /// As [`Outlet::write`].
     pub fn consume(&mut self, items: impl Iterator<Item = Item>, pool: &Pool) -> Result<Flow> {
+        // Handed on in time topics must take turns: a batch of one would go by before the other's.
+        let take_turns = self.topics.len() > 1 && self.outlet.is_paced();
         for item in items {
-            match item {
-                Item::Sample(stream, raw) => {
-                    self.samples += 1;
-                    let Some(topic) = self.topics.get_mut(stream) else {
-                        continue;
-                    };
-                    topic.estimator.take(&raw);
-                    if let Some(against) = &mut topic.against {
-                        against.take(&raw);
-                    }
-                }
-                Item::Undecodable(stream, why) => {
-                    self.samples += 1;
-                    let Some(topic) = self.topics.get_mut(stream) else {
-                        continue;
-                    };
-                    topic.estimator.take_undecodable();
-                    topic.first_undecodable.get_or_insert(*why);
-                }
-                Item::Reference(raw) => {
-                    let topic = self.topics.get_mut(self.reference_for);
-                    if let Some(against) = topic.and_then(|t| t.against.as_mut()) {
-                        against.take_reference(&raw);
-                    }
-                }
-                Item::Copy(message) => self.outlet.copy(&message, pool)?,
+            self.take(item, pool)?;
+            if take_turns && self.advance(pool)? == Flow::Closed {
+                return Ok(Flow::Closed);
             }
         }
+        self.advance(pool)
+    }
+
+    fn take(&mut self, item: Item, pool: &Pool) -> Result<()> {
+        match item {
+            Item::Sample(stream, raw) => {
+                self.samples += 1;
+                let Some(topic) = self.topics.get_mut(stream) else {
+                    return Ok(());
+                };
+                topic.estimator.take(&raw);
+                if let Some(against) = &mut topic.against {
+                    against.take(&raw);
+                }
+            }
+            Item::Undecodable(stream, why) => {
+                self.samples += 1;
+                let Some(topic) = self.topics.get_mut(stream) else {
+                    return Ok(());
+                };
+                topic.estimator.take_undecodable();
+                topic.first_undecodable.get_or_insert(*why);
+            }
+            Item::Reference(raw) => {
+                let topic = self.topics.get_mut(self.reference_for);
+                if let Some(against) = topic.and_then(|t| t.against.as_mut()) {
+                    against.take_reference(&raw);
+                }
+            }
+            Item::Copy(message) => self.outlet.copy(&message, pool)?,
+        }
+        Ok(())
+    }
+
+    /// Writes what is known by now.
+    fn advance(&mut self, pool: &Pool) -> Result<Flow> {
         for (stream, topic) in self.topics.iter_mut().enumerate() {
             let attitudes = topic.estimator.attitudes(pool);
             topic.output.add(attitudes);
@@ -205,6 +220,11 @@ impl Session {
     /// As [`Outlet::write`].
     pub fn flush_to_readers(&mut self, pool: &Pool) -> Result<()> {
         self.outlet.flush_to_readers(pool)
+    }
+
+    /// How long the input is, about.
+    pub fn length(&self, secs: f64) {
+        self.outlet.length(secs);
     }
 
     /// Where the run is.

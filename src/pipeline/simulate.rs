@@ -1,13 +1,15 @@
 //! A synthetic gyro -> the sinks of a run. I/O, but for the samples themselves.
 
-use super::outlet::Outlet;
+use super::outlet::{Delivery, Outlet, broken};
 use super::pool::Pool;
 use super::position::Position;
 use crate::error::{Error, Result};
 use crate::record::{AttitudeCovariance, AttitudeSample, SampleKind, Status};
 use crate::report::simulation::SimulationSummary;
+use crate::serve::cast::Cast;
 use crate::sink::{Content, Flow, Options, Provenance, Stream, Target};
 use crate::source::synthetic::{Stretch, Synthetic, Truth};
+use std::sync::Arc;
 use std::time::Instant;
 
 /// The topic of the samples.
@@ -22,10 +24,10 @@ pub const TRUTH_ID: &str = "truth";
 /// Instants made and written together, when nobody waits for them.
 const BATCH: usize = 2048;
 /// Data time made together when paced, s.
-const PACED_SECS: f64 = 0.005;
+const PACED_SECS: f64 = 0.001;
 
 /// A simulation to be done.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Simulation {
     /// The name of the motion.
     pub name: String,
@@ -41,6 +43,8 @@ pub struct Simulation {
     pub targets: Vec<Target>,
     /// How outputs are made.
     pub options: Options,
+    /// Who serves it to whoever connects, where a target listens.
+    pub cast: Option<Arc<Cast>>,
     /// `--speed`; `None` = as fast as possible.
     pub speed: Option<f64>,
     /// Everything that decides the samples, for the outputs' metadata and the summary.
@@ -65,9 +69,16 @@ pub fn run(
         simulation.options,
         &streams(simulation.kind, &simulation.frame_id),
         &provenance(&simulation),
-        None,
-        simulation.speed,
+        Delivery {
+            out_rate: None,
+            speed: simulation.speed,
+            cast: simulation.cast.clone(),
+        },
     )?;
+    if let Some(cast) = &simulation.cast {
+        let steps = simulation.source.count().saturating_sub(1);
+        cast.playback().length(steps as f64 / simulation.rate_hz);
+    }
     let batch = match simulation.speed {
         None => BATCH,
         Some(speed) => ((simulation.rate_hz * speed * PACED_SECS) as usize).clamp(1, BATCH),
@@ -97,6 +108,7 @@ pub fn run(
         });
     }
     let written = outlet.finish()?;
+    let broken = broken(&written);
     let stamps_out_of_range = written.iter().map(|(_, w)| w.stamps_out_of_range).sum();
     Ok(SimulationSummary {
         name: simulation.name,
@@ -110,6 +122,7 @@ pub fn run(
             .into_iter()
             .map(|(name, w)| (name, w.bytes, w.messages))
             .collect(),
+        broken,
         reader_gone,
         elapsed_secs: begun.elapsed().as_secs_f64(),
     })

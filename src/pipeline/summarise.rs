@@ -1,6 +1,7 @@
 //! What the stages counted -> the summary of the run. Pure.
 
 use super::lines;
+use super::outlet::broken;
 use super::run::Replay;
 use super::session::{Ended, Topic};
 use crate::condition::regularise;
@@ -23,6 +24,7 @@ pub fn run(run: &Replay, ended: Ended, survey: &Survey) -> RunSummary {
     RunSummary {
         source: run.source.name().display().to_string(),
         topics: topics.iter().map(|topic| of_topic(run, topic)).collect(),
+        broken: broken(&outputs),
         reader_gone: !outputs.is_empty() && outputs.iter().all(|(_, written)| written.closed),
         outputs: outputs
             .into_iter()

@@ -212,6 +212,23 @@ impl Covariance {
         self.cross = ZERO;
     }
 
+    /// The attitude is one that was known so well when it was saved. How its error hangs together with
+    /// that of the bias was not saved, and is taken for nothing.
+    pub(crate) fn resume(&mut self, saved: AttitudeCovariance) {
+        let AttitudeCovariance {
+            xx,
+            xy,
+            xz,
+            yy,
+            yz,
+            zz,
+        } = saved;
+        self.restart();
+        self.kind = Kind::Wandering;
+        self.alike = 0.0;
+        self.attitude = [xx, xy, xz, yy, yz, zz];
+    }
+
     /// Adds what a bridged gap may hide: rad^2 about every axis, and seconds of white noise.
     pub(crate) fn bridge(&mut self, variance: f64, noise_secs: f64) {
         self.alike += variance + self.alike_arw * noise_secs;

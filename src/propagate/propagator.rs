@@ -70,6 +70,8 @@ pub struct Propagator {
     next: usize,
     state: State,
     started: bool,
+    /// The attitude is not that of this stream's beginning, but one that was saved.
+    resumed: bool,
     last_rate: [f64; 3],
     last_stamp: i64,
     /// Provisional steps, kept for its memory.
@@ -135,10 +137,33 @@ impl Propagator {
             next: 1,
             state: State::new(&settings, initial),
             started: false,
+            resumed: false,
             last_rate: [0.0; 3],
             last_stamp: 0,
             scratch: Vec::new(),
         })
+    }
+
+    /// Goes on from the last attitude of a stream that has ended, before this one's first sample: it is
+    /// held until then, and less is known of it the longer that was, as over any gap; the first output
+    /// says [`Status::RESTARTED`] and is one reset further. A later reset goes to the initial attitude of
+    /// the settings all the same.
+    ///
+    /// # Errors
+    /// [`SettingsError::Initial`] when it is no rotation.
+    pub fn resume(&mut self, last: &AttitudeSample) -> Result<(), SettingsError> {
+        let wxyz = last.q_nb.wxyz();
+        let norm = wxyz.iter().map(|c| c * c).sum::<f64>().sqrt();
+        if (norm - 1.0).abs() > 1e-6 || norm.is_nan() {
+            return Err(SettingsError::Initial { wxyz });
+        }
+        self.state.resume(last);
+        self.resumed = true;
+        self.last_stamp = last.stamp.0;
+        if last.rate.iter().all(|w| w.abs() <= FASTEST) {
+            self.last_rate = last.rate.into();
+        }
+        Ok(())
     }
 
     /// Takes samples in and appends the attitudes that are ready: all but the last few, which wait
@@ -210,7 +235,8 @@ impl Propagator {
         self.track.clear();
         self.next = 1;
         let sample = self.trusted(sample);
-        let first = self.state.report.samples == 0;
+        let resumed = std::mem::take(&mut self.resumed);
+        let first = self.state.report.samples == 0 && !resumed;
         self.state.begin(sample.stamp.0);
         if sample.join == Join::Reset {
             self.state.reset(self.initial);
@@ -231,6 +257,9 @@ impl Propagator {
                 Status::HELD
             };
             self.state.added = self.state.added.with(status);
+        }
+        if resumed {
+            self.state.added = self.state.added.with(Status::RESTARTED);
         }
         self.started = true;
         self.append(&sample);

@@ -25,6 +25,8 @@ pub struct SimulationSummary {
     pub stamps_out_of_range: u64,
     /// Outputs: name, bytes, messages.
     pub outputs: Vec<(String, u64, u64)>,
+    /// Sockets that broke before the end.
+    pub broken: Vec<String>,
     /// Whether the readers of every output hung up before the end.
     pub reader_gone: bool,
     /// Wall seconds.

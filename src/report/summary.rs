@@ -136,6 +136,8 @@ pub struct RunSummary {
     pub file_problems: Vec<String>,
     /// How many of them lost data.
     pub file_losses: u64,
+    /// Sockets that broke before the end.
+    pub broken: Vec<String>,
     /// Whether the readers of every output hung up before the end (`| head`): the run stopped there,
     /// on purpose.
     pub reader_gone: bool,
@@ -148,6 +150,7 @@ impl RunSummary {
     #[must_use]
     pub fn is_lossy(&self) -> bool {
         self.file_losses > 0
+            || !self.broken.is_empty()
             || self
                 .topics
                 .iter()

@@ -15,12 +15,48 @@ pub enum Listen {
     Unix(PathBuf),
     /// WebSocket, with `/healthz` and `/metrics` beside it.
     WebSocket(SocketAddr),
+    /// A socket the service manager has opened already, by its name or number, and what is spoken there.
+    Passed(Transport, String),
+}
+
+/// What is spoken on a socket.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Transport {
+    /// Lines over TCP.
+    Tcp,
+    /// Lines in datagrams.
+    Udp,
+    /// Lines over a Unix socket.
+    Unix,
+    /// WebSocket and HTTP.
+    WebSocket,
+}
+
+impl Transport {
+    fn scheme(self) -> &'static str {
+        match self {
+            Transport::Tcp => "tcp-listen",
+            Transport::Udp => "udp-listen",
+            Transport::Unix => "unix-listen",
+            Transport::WebSocket => "ws-listen",
+        }
+    }
+
+    fn named(scheme: &str) -> Option<Transport> {
+        Some(match scheme {
+            "tcp-listen" => Transport::Tcp,
+            "udp-listen" => Transport::Udp,
+            "unix-listen" => Transport::Unix,
+            "ws-listen" | "http-listen" => Transport::WebSocket,
+            _ => return None,
+        })
+    }
 }
 
 /// What `strapd serve` listens on when nothing is said.
 pub const DEFAULTS: [&str; 2] = ["tcp-listen://127.0.0.1:4550", "ws-listen://127.0.0.1:8765"];
 
-const KNOWN: &str = "known: tcp-listen://HOST:PORT, udp-listen://HOST:PORT, ws-listen://HOST:PORT (and HTTP), unix-listen:///PATH; port 0 takes a free one";
+const KNOWN: &str = "known: tcp-listen://HOST:PORT, udp-listen://HOST:PORT, ws-listen://HOST:PORT (and HTTP), unix-listen:///PATH; port 0 takes a free one; fd:NAME for HOST:PORT is a socket of that name (or number) from the service manager";
 
 impl Listen {
     /// Reads what the user wrote. A host left out is 127.0.0.1.
@@ -28,7 +64,15 @@ impl Listen {
     /// # Errors
     /// [`Error::Usage`] with what is known.
     pub fn parse(text: &str) -> Result<Listen> {
-        let refuse = |what: &str| Error::Usage(format!("--listen {text}: {what}\n  help: {KNOWN}"));
+        Listen::parse_from("--listen", text)
+    }
+
+    /// The same, written behind another flag.
+    ///
+    /// # Errors
+    /// As [`Listen::parse`].
+    pub fn parse_from(flag: &str, text: &str) -> Result<Listen> {
+        let refuse = |what: &str| Error::Usage(format!("{flag} {text}: {what}\n  help: {KNOWN}"));
         let (scheme, rest) = text.split_once("://").ok_or_else(|| refuse("no scheme"))?;
         let address = || -> Result<SocketAddr> {
             let rest = rest.strip_suffix('/').unwrap_or(rest);
@@ -44,13 +88,16 @@ impl Listen {
                 .next()
                 .ok_or_else(|| refuse("the host has no address"))
         };
-        match scheme {
-            "tcp-listen" => address().map(Listen::Tcp),
-            "udp-listen" => address().map(Listen::Udp),
-            "ws-listen" | "http-listen" => address().map(Listen::WebSocket),
-            "unix-listen" if rest.starts_with('/') => Ok(Listen::Unix(PathBuf::from(rest))),
-            "unix-listen" => Err(refuse("an absolute path is needed")),
-            _ => Err(refuse("unknown scheme")),
+        let transport = Transport::named(scheme).ok_or_else(|| refuse("unknown scheme"))?;
+        if let Some(name) = rest.strip_prefix("fd:") {
+            return Ok(Listen::Passed(transport, name.to_owned()));
+        }
+        match transport {
+            Transport::Tcp => address().map(Listen::Tcp),
+            Transport::Udp => address().map(Listen::Udp),
+            Transport::WebSocket => address().map(Listen::WebSocket),
+            Transport::Unix if rest.starts_with('/') => Ok(Listen::Unix(PathBuf::from(rest))),
+            Transport::Unix => Err(refuse("an absolute path is needed")),
         }
     }
 
@@ -59,7 +106,8 @@ impl Listen {
     pub fn ip(&self) -> Option<IpAddr> {
         match self {
             Listen::Tcp(a) | Listen::Udp(a) | Listen::WebSocket(a) => Some(a.ip()),
-            Listen::Unix(_) => None,
+            // Of a socket passed nothing is known before it is taken.
+            Listen::Unix(_) | Listen::Passed(..) => None,
         }
     }
 }
@@ -71,6 +119,7 @@ impl std::fmt::Display for Listen {
             Listen::Udp(a) => write!(f, "udp-listen://{a}"),
             Listen::WebSocket(a) => write!(f, "ws-listen://{a}"),
             Listen::Unix(path) => write!(f, "unix-listen://{}", path.display()),
+            Listen::Passed(transport, name) => write!(f, "{}://fd:{name}", transport.scheme()),
         }
     }
 }
@@ -87,6 +136,7 @@ mod tests {
             "udp-listen://[::1]:9",
             "ws-listen://0.0.0.0:8765",
             "unix-listen:///run/strapd.sock",
+            "ws-listen://fd:web",
         ] {
             assert_eq!(Listen::parse(text).unwrap().to_string(), text);
         }

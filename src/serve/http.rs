@@ -1,44 +1,73 @@
-//! HTTP requests -> state of the daemon, or a WebSocket. I/O.
+//! HTTP requests -> the pages, state of the daemon, or a WebSocket. I/O.
 
+use super::foxglove::SUBPROTOCOLS;
 use super::hub::Hub;
 use super::listen::{Connection, websocket};
+use super::{page, top};
 use crate::record::Verdict;
 use axum::Router;
 use axum::body::Body;
 use axum::extract::Extension;
 use axum::extract::ws::WebSocketUpgrade;
-use axum::http::{HeaderValue, Response, StatusCode, header};
+use axum::http::{HeaderMap, HeaderValue, Response, StatusCode, header};
 use axum::routing::get;
 use std::fmt::Write;
+
+/// Lines, where a client names what it speaks.
+const OWN_SUBPROTOCOL: &str = "strapd.v1";
 
 /// Everything that is answered.
 pub(crate) fn router() -> Router {
     Router::new()
-        .route("/", get(upgrade))
+        .route("/", get(root))
         .route("/ws", get(upgrade))
         .route("/healthz", get(health))
         .route("/metrics", get(metrics))
+        .merge(page::router())
+        .route("/model/top", get(top::answer))
         .fallback(|| async {
             refusal(
                 StatusCode::NOT_FOUND,
                 "not_found",
-                "there are /ws, /healthz and /metrics",
+                "there are /, /top, /ws, /healthz and /metrics",
             )
         })
 }
 
+/// The live page, or a WebSocket for who asks for one.
+async fn root(
+    connection: Extension<Connection>,
+    headers: HeaderMap,
+    socket: Result<WebSocketUpgrade, axum::extract::ws::rejection::WebSocketUpgradeRejection>,
+) -> Response<Body> {
+    if headers.contains_key(header::UPGRADE) {
+        upgrade(connection, headers, socket).await
+    } else {
+        page::live()
+    }
+}
+
 async fn upgrade(
     Extension(connection): Extension<Connection>,
+    headers: HeaderMap,
     upgrade: Result<WebSocketUpgrade, axum::extract::ws::rejection::WebSocketUpgradeRejection>,
 ) -> Response<Body> {
+    let spoken = subprotocol(&headers);
+    let foxglove = SUBPROTOCOLS.iter().position(|known| Some(*known) == spoken);
+    let foxglove = foxglove.map(|known| known == 0);
     match upgrade {
+        Ok(_) if foxglove.is_some() && connection.hub.token().is_some() && !connection.trusted => {
+            // Its first message can show no token.
+            unauthorised()
+        }
         Ok(upgrade) => upgrade
+            .protocols(spoken)
             .max_message_size(websocket::MAX_MESSAGE)
             .max_frame_size(websocket::MAX_MESSAGE)
             .read_buffer_size(websocket::READ_BUFFER)
             .write_buffer_size(websocket::WRITE_BUFFER)
             .max_write_buffer_size(websocket::MAX_WRITE_BUFFER)
-            .on_upgrade(move |socket| websocket::converse(socket, connection)),
+            .on_upgrade(move |socket| websocket::converse(socket, connection, foxglove)),
         Err(_) => refusal(
             StatusCode::UPGRADE_REQUIRED,
             "upgrade_required",
@@ -47,29 +76,42 @@ async fn upgrade(
     }
 }
 
+/// The first of the sub-protocols a client offers that we speak.
+fn subprotocol(headers: &HeaderMap) -> Option<&'static str> {
+    headers
+        .get_all(header::SEC_WEBSOCKET_PROTOCOL)
+        .iter()
+        .filter_map(|value| value.to_str().ok())
+        .flat_map(|value| value.split(','))
+        .find_map(|offered| {
+            let mut known = SUBPROTOCOLS.into_iter().chain([OWN_SUBPROTOCOL]);
+            known.find(|known| *known == offered.trim())
+        })
+}
+
+fn unauthorised() -> Response<Body> {
+    refusal(
+        StatusCode::UNAUTHORIZED,
+        "unauthorised",
+        "Authorization: Bearer TOKEN is needed",
+    )
+}
+
 /// Whether samples are taken: 200, or 503 while shutting down.
 async fn health(Extension(connection): Extension<Connection>) -> Response<Body> {
     if connection.hub.is_stopping() {
         return response(
             StatusCode::SERVICE_UNAVAILABLE,
             "text/plain; charset=utf-8",
-            "stopping\n".to_owned(),
+            "stopping\n",
         );
     }
-    response(
-        StatusCode::OK,
-        "text/plain; charset=utf-8",
-        "ok\n".to_owned(),
-    )
+    response(StatusCode::OK, "text/plain; charset=utf-8", "ok\n")
 }
 
 async fn metrics(Extension(connection): Extension<Connection>) -> Response<Body> {
     if connection.hub.token().is_some() && !connection.trusted {
-        return refusal(
-            StatusCode::UNAUTHORIZED,
-            "unauthorised",
-            "Authorization: Bearer TOKEN is needed",
-        );
+        return unauthorised();
     }
     response(
         StatusCode::OK,
@@ -166,14 +208,23 @@ pub(crate) fn refusal(status: StatusCode, code: &str, message: &str) -> Response
     response(status, "application/json", format!("{text}\n"))
 }
 
-fn response(status: StatusCode, kind: &'static str, text: String) -> Response<Body> {
-    let mut response = Response::new(Body::from(text));
+/// An answer with the headers all of them have.
+pub(super) fn response(
+    status: StatusCode,
+    kind: &'static str,
+    text: impl Into<Body>,
+) -> Response<Body> {
+    let mut response = Response::new(text.into());
     *response.status_mut() = status;
     for (name, value) in [
         (header::CONTENT_TYPE, kind),
         (header::CACHE_CONTROL, "no-store"),
         (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
-        (header::CONTENT_SECURITY_POLICY, "default-src 'self'"),
+        (
+            header::CONTENT_SECURITY_POLICY,
+            "default-src 'self'; base-uri 'none'; frame-ancestors 'none'",
+        ),
+        (header::REFERRER_POLICY, "no-referrer"),
     ] {
         response
             .headers_mut()

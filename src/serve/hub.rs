@@ -5,11 +5,17 @@
 //! the clients' outboxes. Sensors run side by side on as many cores as there are; within one the
 //! order is that of its lock.
 
+mod telling;
+
 use super::Settings;
 use super::admission::Token;
+use super::channel::{Channel, Clock, Items};
 use super::connect::Outgoing;
+use super::foxglove;
 use super::limits::Limits;
+use super::playback::Playback;
 use super::recorder::Handle;
+use super::state::Sensors;
 use super::stream::{SensorStream, live_plan};
 use super::subscriber::{Chunk, Outbox};
 use super::wire::{self, Fault};
@@ -17,16 +23,13 @@ use crate::config::Plan;
 use crate::decode::{self, Line, LineDecoder, printable};
 use crate::error::{Error, Result};
 use crate::record::{Nanos, RawSample};
+use crate::sink::Profile;
 use bytes::Bytes;
 use std::collections::BTreeMap;
 use std::hash::{BuildHasher, RandomState};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::Instant;
-
-/// Bytes of one shared chunk of attitudes, about: small beside an outbox, so that little is dropped
-/// at once.
-const CHUNK_BYTES: usize = 16 << 10;
 
 /// The middle of the daemon.
 #[derive(Debug)]
@@ -38,6 +41,8 @@ pub struct Hub {
     limits: Limits,
     token: Option<Token>,
     recorder: Option<Handle>,
+    /// The replay it serves, which is then its only source.
+    playback: Option<Arc<Playback>>,
     outgoing: Vec<Arc<Outgoing>>,
     session: String,
     started: Instant,
@@ -45,6 +50,11 @@ pub struct Hub {
     sensors: RwLock<BTreeMap<Arc<str>, Arc<Mutex<Sensor>>>>,
     clients: RwLock<BTreeMap<u64, Arc<Client>>>,
     watchers: RwLock<Arc<[Arc<Client>]>>,
+    /// Attitudes of before the start, of sensors that have not come back yet.
+    saved: Mutex<Sensors>,
+    /// How saving attitudes went the last time; `None` when they are not saved.
+    state: Mutex<Option<StateStatus>>,
+    channels: RwLock<Vec<Arc<Channel>>>,
     next_client: AtomicU64,
     /// What was counted.
     pub counters: Counters,
@@ -58,6 +68,25 @@ pub struct Sensor {
     owner: Option<u64>,
 }
 
+/// How the attitudes were saved last.
+#[derive(Debug)]
+struct StateStatus {
+    saved: Option<Instant>,
+    failed: Option<String>,
+}
+
+/// What a client is told, and how.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Shape {
+    /// Lines.
+    Lines(Profile),
+    /// Messages of the Foxglove protocol.
+    Foxglove {
+        /// Whether it can move a playback.
+        controls: bool,
+    },
+}
+
 /// One connection.
 #[derive(Debug)]
 pub struct Client {
@@ -67,6 +96,8 @@ pub struct Client {
     pub peer: String,
     /// What waits for it.
     pub outbox: Outbox,
+    /// What it is told, and how.
+    shape: Shape,
     since: Instant,
 }
 
@@ -163,6 +194,7 @@ impl Hub {
             limits: settings.limits,
             token: settings.token,
             recorder: settings.recorder,
+            playback: settings.playback,
             outgoing: settings
                 .sources
                 .into_iter()
@@ -174,6 +206,9 @@ impl Hub {
             sensors: RwLock::default(),
             clients: RwLock::default(),
             watchers: RwLock::new(Arc::from([])),
+            saved: Mutex::new(settings.saved),
+            state: Mutex::default(),
+            channels: RwLock::default(),
             next_client: AtomicU64::new(1),
             counters: Counters::default(),
         })
@@ -213,10 +248,13 @@ impl Hub {
         &self.outgoing
     }
 
-    /// Names this run of the daemon.
+    /// Names this run of the daemon; a replay that begins anew gets another name.
     #[must_use]
-    pub fn session(&self) -> &str {
-        &self.session
+    pub fn session(&self) -> String {
+        match self.playback.as_ref().map_or(0, |p| p.run()) {
+            0 => self.session.clone(),
+            run => format!("{}.{run}", self.session),
+        }
     }
 
     /// From now on it is shutting down.
@@ -232,10 +270,30 @@ impl Hub {
 
     /// Somebody has connected.
     pub fn join(&self, peer: String) -> Arc<Client> {
+        self.join_as(peer, Shape::Lines(Profile::Lines))
+    }
+
+    /// As [`Hub::join`], for somebody who is told things in another way. A viewer is told at once who
+    /// we are and what there is.
+    pub fn join_as(&self, peer: String, shape: Shape) -> Arc<Client> {
+        let outbox = match shape {
+            Shape::Lines(Profile::Lines) => Outbox::new(),
+            Shape::Lines(Profile::PlotJuggler) => Outbox::saying(|_, _| Bytes::new()),
+            Shape::Foxglove { .. } => Outbox::saying(foxglove::gap),
+        };
+        let channels = read(&self.channels);
+        if let Shape::Foxglove { controls } = shape {
+            outbox.reply(self.server_info(controls));
+            outbox.reply(foxglove::channels(channels.iter().map(|c| &**c), true));
+            if let Some(place) = self.where_it_is().filter(|_| controls) {
+                outbox.reply(foxglove::playback_state(&place, false, ""));
+            }
+        }
         let client = Arc::new(Client {
             number: self.next_client.fetch_add(1, Ordering::Relaxed),
             peer,
-            outbox: Outbox::new(),
+            outbox,
+            shape,
             since: Instant::now(),
         });
         write(&self.clients).insert(client.number, client.clone());
@@ -295,7 +353,19 @@ impl Hub {
         }
         let id: Arc<str> = id.into();
         let first = run.samples.first().copied().unwrap_or_default();
-        let stream = SensorStream::new(self.plan_of(&id), id.clone(), run.head, &first)?;
+        let last = lock(&self.saved).get(&*id).cloned();
+        let stream = SensorStream::new(
+            self.plan_of(&id),
+            id.clone(),
+            run.head,
+            &first,
+            last.as_ref(),
+            |labels| self.declare(labels),
+        )?;
+        lock(&self.saved).remove(&*id);
+        if let Some(recorder) = &self.recorder {
+            recorder.declare(stream.recorded());
+        }
         let sensor = Arc::new(Mutex::new(Sensor {
             stream,
             owner: None,
@@ -361,43 +431,66 @@ impl Hub {
 
     /// Attitudes that are ready -> outboxes.
     fn deliver(&self, sensor: &mut Sensor, id: &Arc<str>, text: &mut Vec<u8>) {
-        let (first_seq, attitudes, object) = sensor.stream.attitudes();
+        let (first_seq, attitudes, channel) = sensor.stream.attitudes();
         if attitudes.is_empty() {
             return;
         }
-        count(&self.counters.attitudes, attitudes.len());
-        let encode = |out: &mut Vec<u8>, seq: u64, sample: &_| {
-            object.push(out, seq, sample);
-            out.push(b'\n');
-        };
-        let mut shared: Option<Vec<Chunk>> = None;
-        let mut encoded = || {
-            let chunks = shared.get_or_insert_with(|| {
-                let mut chunks = Vec::new();
-                let mut from = first_seq;
-                text.clear();
-                for (seq, sample) in (first_seq..).zip(attitudes) {
-                    encode(text, seq, sample);
-                    if text.len() >= CHUNK_BYTES {
-                        chunks.push(chunk(id, from, seq + 1, text));
-                        from = seq + 1;
-                    }
-                }
-                if !text.is_empty() {
-                    chunks.push(chunk(id, from, first_seq + attitudes.len() as u64, text));
-                }
-                chunks
-            });
-            chunks.clone()
-        };
-        let watchers = read(&self.watchers).clone();
-        for client in &*watchers {
-            client
-                .outbox
-                .offer(id, attitudes, &mut encoded, &encode, first_seq);
-        }
+        self.distribute(channel, first_seq, Items::Attitudes(attitudes), text);
         if let Some(recorder) = &self.recorder {
             recorder.attitude(id, first_seq, attitudes.to_vec());
+        }
+    }
+
+    /// Items of a channel, from number `first_seq` on -> outboxes; `text` is room for encoding.
+    pub fn distribute(
+        &self,
+        channel: &Channel,
+        first_seq: u64,
+        items: Items<'_>,
+        text: &mut Vec<u8>,
+    ) {
+        // Encoded when the first asks, and shared by all.
+        let mut encoded: [Option<Vec<Chunk>>; 2] = [None, None];
+        let watchers = read(&self.watchers).clone();
+        for client in &*watchers {
+            let profile = match client.shape {
+                Shape::Lines(profile) => profile,
+                Shape::Foxglove { .. } => {
+                    let clock = match &self.playback {
+                        None => Clock::Log,
+                        Some(_) => Clock::Stamp,
+                    };
+                    let now = self.where_it_is().and_then(|place| place.at);
+                    client.outbox.offer_frames(
+                        |wanted| channel.frames(wanted, first_seq, items, clock),
+                        now,
+                    );
+                    continue;
+                }
+            };
+            let [lines, plot] = &mut encoded;
+            let kept = match profile {
+                Profile::Lines => lines,
+                Profile::PlotJuggler => plot,
+            };
+            let mut shared = || {
+                kept.get_or_insert_with(|| channel.chunks(profile, first_seq, items, text))
+                    .clone()
+            };
+            match items {
+                Items::Attitudes(attitudes) => client.outbox.offer(
+                    channel.id(),
+                    attitudes,
+                    &mut shared,
+                    &|out, seq, sample| channel.line(out, profile, seq, sample),
+                    first_seq,
+                ),
+                Items::Samples(_) => client.outbox.offer_samples(channel.id(), &mut shared),
+            }
+        }
+        channel.passed(items);
+        if matches!(items, Items::Attitudes(_)) {
+            count(&self.counters.attitudes, items.len());
         }
     }
 
@@ -405,7 +498,11 @@ impl Hub {
     #[must_use]
     pub fn status(&self) -> Bytes {
         let sensors: Vec<_> = read(&self.sensors).values().cloned().collect();
-        let sources: Vec<_> = sensors.iter().map(|s| lock(s).stream.status()).collect();
+        let sources: Vec<_> = sensors
+            .iter()
+            .map(|s| lock(s).stream.status())
+            .chain(self.own_streams())
+            .collect();
         let clients: Vec<_> = read(&self.clients)
             .values()
             .map(|client| {
@@ -430,11 +527,57 @@ impl Hub {
         wire::status(serde_json::json!({
             "session": self.session, "uptime_s": self.uptime_secs(),
             "sources": sources, "outgoing": outgoing, "clients": clients, "counters": counters,
+            "state": lock(&self.state).as_ref().map(|s| serde_json::json!({
+                "saved_s_ago": s.saved.map(|t| t.elapsed().as_secs_f64()), "failed": s.failed,
+            })),
             "recording": recording.map(|r| serde_json::json!({
                 "file": r.files.last().map(|f| f.display().to_string()), "files": r.files.len(),
                 "bytes": r.bytes, "samples": r.samples, "attitudes": r.attitudes, "stopped": r.stopped,
             })),
         }))
+    }
+
+    /// The last attitude of every sensor, also of those that have not come back since the start; no
+    /// more than there may be sensors.
+    #[must_use]
+    pub fn saved(&self) -> Sensors {
+        let sensors: Vec<_> = read(&self.sensors).values().cloned().collect();
+        let mut all: Sensors = sensors
+            .iter()
+            .filter_map(|sensor| {
+                let sensor = lock(sensor);
+                let last = sensor.stream.saved()?;
+                Some((sensor.stream.id().to_string(), last))
+            })
+            .collect();
+        let room = self.limits.sensors.saturating_sub(all.len());
+        let absent = lock(&self.saved);
+        all.extend(
+            absent
+                .iter()
+                .take(room)
+                .map(|(id, s)| (id.clone(), s.clone())),
+        );
+        all
+    }
+
+    /// The attitudes were saved, or why not.
+    pub(super) fn state_saved(&self, failed: Option<String>) {
+        let mut state = lock(&self.state);
+        let before = state.as_ref().and_then(|s| s.saved);
+        let saved = match failed {
+            None => Some(Instant::now()),
+            Some(_) => before,
+        };
+        *state = Some(StateStatus { saved, failed });
+    }
+
+    /// Ends the recording's file and goes on in a new one; `false` when there is no recording.
+    pub fn reopen_recording(&self) -> bool {
+        if let Some(recorder) = &self.recorder {
+            recorder.reopen();
+        }
+        self.recorder.is_some()
     }
 
     /// Seconds since the start.
@@ -456,18 +599,6 @@ impl Hub {
         for client in read(&self.clients).values() {
             tell(client);
         }
-    }
-}
-
-/// Empties `text` into a chunk of the attitudes `from..until`.
-fn chunk(id: &Arc<str>, from: u64, until: u64, text: &mut Vec<u8>) -> Chunk {
-    let bytes = Bytes::copy_from_slice(text);
-    text.clear();
-    Chunk {
-        id: id.clone(),
-        first_seq: from,
-        count: until - from,
-        bytes,
     }
 }
 

@@ -9,9 +9,11 @@ mod udp;
 pub(crate) mod websocket;
 
 #[cfg(unix)]
+mod passed;
+#[cfg(unix)]
 mod unix;
 
-use super::address::Listen;
+use super::address::{Listen, Transport};
 use super::admission::Web;
 use super::hub::{Hub, count};
 use super::limits::Backoff;
@@ -28,6 +30,8 @@ use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
+#[cfg(unix)]
+pub use passed::Passed;
 pub use stdin::read as read_stdin;
 pub(crate) use websocket::Connection;
 
@@ -66,7 +70,10 @@ impl Listener {
     ///
     /// # Errors
     /// [`Error::Bind`].
-    pub async fn bind(listen: &Listen) -> Result<(Listener, Listen)> {
+    pub async fn bind(
+        listen: &Listen,
+        #[cfg(unix)] passed: &mut Passed,
+    ) -> Result<(Listener, Listen)> {
         let fail = |source| Error::Bind {
             address: listen.to_string(),
             source,
@@ -92,9 +99,41 @@ impl Listener {
                 let bound = unix::Bound::new(path).map_err(fail)?;
                 Ok((Listener::Unix(bound), listen.clone()))
             }
+            #[cfg(unix)]
+            Listen::Passed(transport, name) => {
+                let socket = passed.take(*transport, name).map_err(fail)?;
+                Listener::of(*transport, socket).map_err(fail)
+            }
             #[cfg(not(unix))]
-            Listen::Unix(_) => Err(fail(io::ErrorKind::Unsupported.into())),
+            Listen::Unix(_) | Listen::Passed(..) => Err(fail(io::ErrorKind::Unsupported.into())),
         }
+    }
+
+    /// A socket that was opened for us, and where it listens.
+    #[cfg(unix)]
+    fn of(transport: Transport, socket: passed::Socket) -> io::Result<(Listener, Listen)> {
+        use passed::Socket;
+        Ok(match socket {
+            Socket::Tcp(socket) => {
+                let socket = tokio::net::TcpListener::from_std(socket)?;
+                let address = socket.local_addr()?;
+                match transport {
+                    Transport::WebSocket => {
+                        (Listener::WebSocket(socket), Listen::WebSocket(address))
+                    }
+                    _ => (Listener::Tcp(socket), Listen::Tcp(address)),
+                }
+            }
+            Socket::Udp(socket) => {
+                let socket = tokio::net::UdpSocket::from_std(socket)?;
+                let bound = Listen::Udp(socket.local_addr()?);
+                (Listener::Udp(socket), bound)
+            }
+            Socket::Unix(socket) => {
+                let (bound, path) = unix::Bound::passed(socket)?;
+                (Listener::Unix(bound), Listen::Unix(path))
+            }
+        })
     }
 
     /// Serves until the daemon ends. It counts as running until its address is free again: who waits

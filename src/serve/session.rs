@@ -139,12 +139,16 @@ impl Session {
     #[must_use]
     pub fn with(hub: &Arc<Hub>, peer: String, side: Side) -> Session {
         let client = hub.join(peer);
-        client.outbox.reply(wire::version(hub.session()));
+        client.outbox.reply(wire::version(&hub.session()));
+        let authorised = match side {
+            Side::Client { trusted } => trusted || hub.token().is_none(),
+            Side::Source(_) => true,
+        };
+        if let Some(place) = hub.place().filter(|_| authorised) {
+            client.outbox.reply(place);
+        }
         Session {
-            authorised: match side {
-                Side::Client { trusted } => trusted || hub.token().is_none(),
-                Side::Source(_) => true,
-            },
+            authorised,
             side,
             hub: hub.clone(),
             client,
@@ -271,6 +275,18 @@ impl Session {
                 );
                 self.refuse(&fault, number);
             }
+            Ok(Message::Samples(_)) if !self.hub.takes_samples() => {
+                count(
+                    &self.hub.counters.refused_samples,
+                    scratch.samples.len() - before,
+                );
+                scratch.samples.truncate(before);
+                let fault = Fault::new(
+                    "samples_not_taken",
+                    "this is a replay or a simulation: it has its own samples; strapd serve takes yours",
+                );
+                self.bad(&fault, number, line, received, scratch);
+            }
             Ok(Message::Samples(head)) => {
                 self.errors_in_a_row = 0;
                 let goes_on = scratch.head.as_ref().is_some_and(|run| {
@@ -286,8 +302,18 @@ impl Session {
             Ok(Message::Watch(filter)) => {
                 self.errors_in_a_row = 0;
                 self.flush(received, scratch, usize::MAX);
+                let offered = self.hub.classes();
+                let absent = filter.iter().flat_map(|f| &f.classes).flatten();
+                if let Some(class) = absent.copied().find(|c| !offered.contains(c)) {
+                    let fault = Fault::new(
+                        "bad_watch",
+                        format!("there is no stream `{}` here; there is: ATT", class.name()),
+                    );
+                    return self.bad(&fault, number, line, received, scratch);
+                }
                 // The answer comes before the first attitude.
-                self.client.outbox.reply(wire::watching(filter.as_ref()));
+                let answer = wire::watching(filter.as_ref(), &offered);
+                self.client.outbox.reply(answer);
                 self.client.outbox.watch(filter);
                 self.hub.watch_changed();
             }
@@ -295,6 +321,19 @@ impl Session {
                 self.errors_in_a_row = 0;
                 self.flush(received, scratch, usize::MAX);
                 self.client.outbox.reply(self.hub.status());
+            }
+            Ok(Message::Playback(action)) => {
+                self.errors_in_a_row = 0;
+                self.flush(received, scratch, usize::MAX);
+                match self.hub.control(self.client.number, action) {
+                    Ok(()) => {
+                        if let Some(place) = self.hub.place() {
+                            self.client.outbox.reply(place);
+                        }
+                    }
+                    // Well said, if in vain: not held against it.
+                    Err(fault) => self.say(&fault, number, line),
+                }
             }
             Err(fault) if matches!(fault.code, "unknown_class" | "other_sensor") => {
                 // Somebody newer than this daemon, or who has more than rates: said once, never held
@@ -350,7 +389,12 @@ impl Session {
         self.errors_in_a_row = 0;
         match self.hub.token() {
             Some(expected) if !self.authorised => match expected.judge(token, Instant::now()) {
-                Ok(()) => self.authorised = true,
+                Ok(()) => {
+                    self.authorised = true;
+                    if let Some(place) = self.hub.place() {
+                        self.client.outbox.reply(place);
+                    }
+                }
                 Err(fault) => self.refuse(&fault, number),
             },
             _ => {}

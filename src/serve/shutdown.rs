@@ -186,11 +186,23 @@ impl Signals {
     }
 }
 
-/// The first signal; from then on a second one ends the process.
-pub async fn first(mut signals: Signals) -> Signal {
-    let first = signals.next().await;
+/// The first signal that ends the daemon; from then on a second one ends the process. A hang-up ends
+/// nothing where `reopen` has taken it for the wish to go on in a new file.
+pub async fn first(
+    mut signals: Signals,
+    mut reopen: impl FnMut() -> bool + Send + 'static,
+) -> Signal {
+    let mut ending = async move || {
+        loop {
+            match signals.next().await {
+                Signal::HangUp if reopen() => {}
+                signal => return signal,
+            }
+        }
+    };
+    let first = ending().await;
     tokio::spawn(async move {
-        let second = signals.next().await;
+        let second = ending().await;
         std::process::exit(second.exit_code());
     });
     first

@@ -12,10 +12,15 @@ use crate::pipeline::opening::labelled;
 use crate::pipeline::preparation::{Prepared, Resolved, at_once};
 use crate::propagate::{Method, Sequential};
 use crate::record::{AttitudeSample, Nanos, RawSample, SampleKind, Verdict};
+use crate::serve::channel::Channel;
+use crate::serve::recorder::stream_of;
+use crate::serve::state::Saved;
 use crate::serve::wire::Fault;
-use crate::sink;
-use crate::sink::json::AttObject;
+use crate::sink::Stream;
 use std::sync::Arc;
+
+/// Numbers a sample may come behind its turn. Further back, the sender counts anew.
+const OVERTAKEN: u64 = 64;
 
 /// The name of a sensor that gives none.
 pub const NAMELESS: &str = "imu";
@@ -25,8 +30,7 @@ pub const NAMELESS: &str = "imu";
 pub struct SensorStream {
     id: Arc<str>,
     estimator: Estimator,
-    labels: sink::Stream,
-    object: AttObject,
+    channel: Arc<Channel>,
     kind: SampleKind,
     unit: GyroUnit,
     prepared: Prepared,
@@ -34,13 +38,11 @@ pub struct SensorStream {
     next_seq: u64,
     /// The sender's number expected next.
     expected: Option<u64>,
-    /// Samples that by the sender's numbers were sent and never came.
+    /// Samples that by the sender's numbers did not come in their turn: never, or late.
     missing: u64,
     last: Option<AttitudeSample>,
-    /// Spacing of the last two attitudes, nanoseconds, while nothing was held between them.
-    spacing: Option<i64>,
-    /// How much one spacing differs from the next, nanoseconds, smoothed over 16 as RFC 3550 does.
-    jitter: f64,
+    /// Distance of a step from the ordinary one, s, smoothed over about 16 steps.
+    jitter_secs: f64,
     /// Verdicts that were said once, as bits.
     told: u32,
 }
@@ -74,7 +76,8 @@ pub fn live_plan(plan: &Plan) -> Result<Plan, String> {
 
 impl SensorStream {
     /// For the sensor `id`, whose first line says `stated` and brings `first`. `plan` is a
-    /// [`live_plan`].
+    /// [`live_plan`]. It goes on from `saved`, where there is such; `declare` makes its labels known to
+    /// clients.
     ///
     /// # Errors
     /// The fault to answer with: the samples do not fit the plan.
@@ -83,6 +86,8 @@ impl SensorStream {
         id: Arc<str>,
         stated: &Line,
         first: &RawSample,
+        saved: Option<&Saved>,
+        declare: impl FnOnce(&Stream) -> Arc<Channel>,
     ) -> Result<SensorStream, Fault> {
         let fault = |what: String| Fault {
             id: Some(id.to_string()),
@@ -94,14 +99,22 @@ impl SensorStream {
             ..Stated::default()
         };
         let resolved = Resolved::new(plan, &stated);
-        let prepared = at_once(plan, &resolved, first).map_err(fault)?;
-        let estimator = Estimator::live(plan, &resolved, &prepared).map_err(fault)?;
-        let labels = labelled(sink::Stream::new(&id, ""), plan, &resolved, &prepared);
+        let mut prepared = at_once(plan, &resolved, first).map_err(fault)?;
+        let mut estimator = Estimator::live(plan, &resolved, &prepared).map_err(fault)?;
+        let labels = labelled(stream_of(&id), plan, &resolved, &prepared);
+        if let Some(saved) = saved {
+            let resumed = saved
+                .attitude(&labels)
+                .and_then(|last| estimator.resume(&last));
+            match resumed {
+                Ok(()) => "as saved before the restart".clone_into(&mut prepared.initial_origin),
+                Err(why) => prepared.warnings.push(why),
+            }
+        }
         Ok(SensorStream {
-            object: AttObject::new(&labels),
+            channel: declare(&labels),
             id,
             estimator,
-            labels,
             kind: resolved.kind,
             unit: resolved.unit,
             prepared,
@@ -109,10 +122,15 @@ impl SensorStream {
             expected: None,
             missing: 0,
             last: None,
-            spacing: None,
-            jitter: 0.0,
+            jitter_secs: 0.0,
             told: 0,
         })
+    }
+
+    /// As clients know it.
+    #[must_use]
+    pub fn channel(&self) -> &Arc<Channel> {
+        &self.channel
     }
 
     /// Its name.
@@ -129,16 +147,28 @@ impl SensorStream {
         (kind, unit) == (self.kind, self.unit)
     }
 
+    /// What a recording calls it.
+    #[must_use]
+    pub fn recorded(&self) -> crate::sink::Stream {
+        self.channel.stream().clone()
+    }
+
+    /// What a daemon after this one needs to go on; `None` before the first attitude.
+    #[must_use]
+    pub fn saved(&self) -> Option<Saved> {
+        Some(Saved::new(self.last.as_ref()?, self.channel.stream()))
+    }
+
     /// Takes samples in the order they came. The attitudes they give come from
     /// `attitudes`.
     pub fn take(&mut self, seq: Option<u64>, samples: &[RawSample]) {
         if let Some(seq) = seq {
-            if let Some(expected) = self.expected
-                && seq > expected
-            {
-                self.missing = self.missing.saturating_add(seq - expected);
+            let expected = self.expected.unwrap_or(seq);
+            self.missing = self.missing.saturating_add(seq.saturating_sub(expected));
+            // One that was overtaken, or came twice, is no new beginning.
+            if seq >= expected || expected - seq > OVERTAKEN {
+                self.expected = Some(seq.saturating_add(1));
             }
-            self.expected = Some(seq.saturating_add(1));
         }
         for raw in samples {
             self.estimator.take(raw);
@@ -151,21 +181,25 @@ impl SensorStream {
     }
 
     /// The attitudes of what was taken, and the number of the first.
-    pub(crate) fn attitudes(&mut self) -> (u64, &[AttitudeSample], &AttObject) {
+    pub(crate) fn attitudes(&mut self) -> (u64, &[AttitudeSample], &Arc<Channel>) {
         let first = self.next_seq;
+        let spacing = self.estimator.conditioning().spacing_nanos;
         let attitudes = self.estimator.attitudes(&Sequential);
-        self.next_seq += attitudes.len() as u64;
+        let mut before = self.last.map(|l| l.stamp);
         for attitude in attitudes {
-            let before = self.last.replace(*attitude);
-            let spacing = before
-                .filter(|b| b.reset_count == attitude.reset_count)
-                .map(|b| attitude.stamp.0.saturating_sub(b.stamp.0));
-            if let (Some(now), Some(then)) = (spacing, self.spacing) {
-                self.jitter += (now.saturating_sub(then).abs() as f64 - self.jitter) / 16.0;
+            let step = before.map(|b| attitude.stamp.since(b));
+            before = Some(attitude.stamp);
+            // A step over missing samples is a gap.
+            if let (Some(spacing), Some(step)) = (spacing, step)
+                && step < 2 * spacing
+            {
+                let off = (step - spacing).abs() as f64 * 1e-9;
+                self.jitter_secs += (off - self.jitter_secs) / 16.0;
             }
-            self.spacing = spacing;
         }
-        (first, attitudes, &self.object)
+        self.next_seq += attitudes.len() as u64;
+        self.last = attitudes.last().copied().or(self.last);
+        (first, attitudes, &self.channel)
     }
 
     /// The kinds of loss that have happened for the first time since this was asked last.
@@ -219,12 +253,12 @@ impl SensorStream {
             "reset": self.last.map_or(0, |l| l.reset_count),
             "last_stamp": self.last.map(|l| stamp(l.stamp)),
             "rate_hz": report.spacing_nanos.filter(|n| *n > 0).map(|n| 1e9 / n as f64),
-            "jitter_s": self.jitter * 1e-9,
+            "jitter_s": self.jitter_secs,
             "sample_kind": self.kind.name(),
             "gyro_unit": self.unit.name(),
             "method": self.estimator.method().name(),
-            "world": self.labels.world_axes,
-            "body": self.labels.body_axes,
+            "world": self.channel.stream().world_axes,
+            "body": self.channel.stream().body_axes,
             "initial": self.prepared.initial_origin,
             "bias": self.prepared.bias_origin,
             "warnings": self.prepared.warnings,

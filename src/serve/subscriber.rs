@@ -4,8 +4,8 @@
 //! queue has a cap, the oldest attitudes give way, what gave way is counted and said (`GAP`), and
 //! replies (`STATUS`, `ERROR`, ...) are never dropped: when too many wait, the client is closed.
 
-use super::wire;
-use crate::record::AttitudeSample;
+use super::{foxglove, wire};
+use crate::record::{AttitudeSample, Nanos};
 use crate::sink::Decimator;
 use bytes::Bytes;
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
@@ -32,13 +32,54 @@ pub struct Chunk {
     pub bytes: Bytes,
 }
 
+/// Between two notices of the time in the data, ns of it.
+const BETWEEN_TIMES: i64 = 20_000_000;
+
+/// The stream of notes, which are no attitudes.
+const NOTE: &str = "";
+
+impl Chunk {
+    fn is_note(&self) -> bool {
+        self.count == 0
+    }
+}
+
+/// What the objects of a stream are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Class {
+    /// Attitudes.
+    Att,
+    /// What a sensor put out.
+    Rate,
+}
+
+impl Class {
+    /// Its name on the wire.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Class::Att => "ATT",
+            Class::Rate => "RATE",
+        }
+    }
+}
+
 /// What a client asked for with `WATCH`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Filter {
+    /// Classes; `None` = all there are.
+    pub classes: Option<BTreeSet<Class>>,
     /// Sensors; `None` = all.
     pub ids: Option<BTreeSet<String>>,
     /// At most this many attitudes a second of each.
     pub rate_hz: Option<f64>,
+}
+
+impl Filter {
+    fn takes(&self, id: &str, class: Class) -> bool {
+        self.ids.as_ref().is_none_or(|ids| ids.contains(id))
+            && self.classes.as_ref().is_none_or(|c| c.contains(&class))
+    }
 }
 
 /// Attitudes that were dropped, to be said.
@@ -59,11 +100,19 @@ pub enum Full {
     Control,
 }
 
+impl Default for Outbox {
+    fn default() -> Outbox {
+        Outbox::new()
+    }
+}
+
 /// Everything that waits for one client.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Outbox {
     state: Mutex<State>,
     wake: Notify,
+    /// How it is said that attitudes were dropped; empty: not at all.
+    gap: fn(&str, &Dropped) -> Bytes,
 }
 
 #[derive(Debug, Default)]
@@ -74,7 +123,15 @@ struct State {
     /// Bytes of `data` and of what was taken and is not yet written.
     queued: usize,
     gaps: BTreeMap<Arc<str>, Dropped>,
+    /// How many of `data` are notes.
+    notes: usize,
+    /// A note the data around which was dropped.
+    stray: Option<Bytes>,
     watch: Option<Filter>,
+    /// Of a viewer: subscription by channel.
+    subscriptions: BTreeMap<u32, u32>,
+    /// What time it was told last.
+    told: Option<Nanos>,
     decimators: HashMap<Arc<str>, Option<Decimator>>,
     full: Option<Full>,
     dropped: u64,
@@ -98,7 +155,17 @@ impl Outbox {
     /// Empty, watching nothing.
     #[must_use]
     pub fn new() -> Outbox {
-        Outbox::default()
+        Outbox::saying(wire::gap)
+    }
+
+    /// The same, for somebody to whom `gap` says what was dropped; empty: nothing is said.
+    #[must_use]
+    pub fn saying(gap: fn(&str, &Dropped) -> Bytes) -> Outbox {
+        Outbox {
+            state: Mutex::default(),
+            wake: Notify::new(),
+            gap,
+        }
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
@@ -128,6 +195,35 @@ impl Outbox {
         self.wake.notify_one();
     }
 
+    /// Queues a note (whole lines) behind the attitudes that wait, to be read at its place among
+    /// them. The last one is never dropped. A `tick` is left out while another waits.
+    pub fn note(&self, line: Bytes, tick: bool) {
+        let mut state = self.state();
+        if tick && (state.notes > 0 || state.stray.is_some()) {
+            return;
+        }
+        state.notes += 1;
+        state.push(Chunk {
+            id: NOTE.into(),
+            first_seq: 0,
+            count: 0,
+            bytes: line,
+        });
+        drop(state);
+        self.wake.notify_one();
+    }
+
+    /// Drops the attitudes that wait, unsaid: the client asked to be elsewhere.
+    pub fn forget(&self) {
+        let mut state = self.state();
+        let waiting: usize = state.data.iter().map(|c| c.bytes.len()).sum();
+        state.queued = state.queued.saturating_sub(waiting);
+        state.data.clear();
+        state.gaps.clear();
+        state.notes = 0;
+        state.stray = None;
+    }
+
     /// Offers attitudes of stream `id`, in order; `shared` gives them encoded, and is asked only when
     /// the client takes them all. `encode` encodes those a client takes of them.
     pub fn offer(
@@ -140,7 +236,7 @@ impl Outbox {
     ) {
         let mut state = self.state();
         let Some(filter) = &state.watch else { return };
-        if filter.ids.as_ref().is_some_and(|ids| !ids.contains(&**id)) {
+        if !filter.takes(id, Class::Att) {
             return;
         }
         match filter.rate_hz {
@@ -184,14 +280,76 @@ impl Outbox {
         self.wake.notify_one();
     }
 
+    /// Offers samples of stream `id`, in order and encoded; they are never thinned.
+    pub fn offer_samples(&self, id: &Arc<str>, shared: &mut dyn FnMut() -> Vec<Chunk>) {
+        let mut state = self.state();
+        if !state
+            .watch
+            .as_ref()
+            .is_some_and(|w| w.takes(id, Class::Rate))
+        {
+            return;
+        }
+        for chunk in shared() {
+            state.push(chunk);
+        }
+        drop(state);
+        self.wake.notify_one();
+    }
+
+    /// A viewer subscribes to a channel. `false`: it has already, or has `most` subscriptions.
+    pub fn subscribe(&self, channel: u32, subscription: u32, most: usize) -> bool {
+        let subscriptions = &mut self.state().subscriptions;
+        let is_new = subscriptions.len() < most
+            && !subscriptions.contains_key(&channel)
+            && !subscriptions.values().any(|s| *s == subscription);
+        if is_new {
+            subscriptions.insert(channel, subscription);
+        }
+        is_new
+    }
+
+    /// A viewer ends a subscription.
+    pub fn unsubscribe(&self, subscription: u32) {
+        self.state().subscriptions.retain(|_, s| *s != subscription);
+    }
+
+    /// Offers messages to a viewer, made for its subscriptions. `now`: what time it is in the data,
+    /// where it wants to know.
+    pub fn offer_frames(
+        &self,
+        make: impl FnOnce(&BTreeMap<u32, u32>) -> Vec<Chunk>,
+        now: Option<Nanos>,
+    ) {
+        let mut state = self.state();
+        let mut chunks = make(&state.subscriptions);
+        let Some(last) = chunks.last_mut() else {
+            return;
+        };
+        if let Some(now) = now
+            && state
+                .told
+                .is_none_or(|told| now.since(told).abs() >= BETWEEN_TIMES)
+        {
+            state.told = Some(now);
+            last.bytes = [&last.bytes[..], &foxglove::time(now)].concat().into();
+        }
+        for chunk in chunks {
+            state.push(chunk);
+        }
+        drop(state);
+        self.wake.notify_one();
+    }
+
     /// Moves up to about `most` bytes out: replies first, then what was dropped, then attitudes.
     /// Returns how many bytes of attitudes are among them; give them back to [`Outbox::written`].
     pub fn take(&self, most: usize, out: &mut VecDeque<Bytes>) -> usize {
         let mut state = self.state();
         out.extend(state.control.drain(..));
         state.control_bytes = 0;
+        out.extend(state.stray.take());
         for (id, dropped) in std::mem::take(&mut state.gaps) {
-            out.push_back(wire::gap(&id, &dropped));
+            out.push_back((self.gap)(&id, &dropped));
         }
         let mut taken = 0;
         while taken < most
@@ -199,6 +357,7 @@ impl Outbox {
         {
             taken += chunk.bytes.len();
             state.sent += chunk.count;
+            state.notes -= usize::from(chunk.is_note());
             out.push_back(chunk.bytes);
         }
         taken
@@ -214,7 +373,10 @@ impl Outbox {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         let state = self.state();
-        state.control.is_empty() && state.data.is_empty() && state.gaps.is_empty()
+        state.control.is_empty()
+            && state.data.is_empty()
+            && state.gaps.is_empty()
+            && state.stray.is_none()
     }
 
     /// Why the client must be closed, if it must.
@@ -228,7 +390,7 @@ impl Outbox {
     pub fn level(&self) -> Level {
         let state = self.state();
         Level {
-            watching: state.watch.is_some(),
+            watching: state.watch.is_some() || !state.subscriptions.is_empty(),
             queued: state.queued,
             sent: state.sent,
             dropped: state.dropped,
@@ -254,6 +416,11 @@ impl State {
             && let Some(oldest) = self.data.pop_front()
         {
             self.queued -= oldest.bytes.len();
+            if oldest.is_note() {
+                self.notes -= 1;
+                self.stray = Some(oldest.bytes);
+                continue;
+            }
             self.dropped += oldest.count;
             let last_seq = oldest.first_seq + oldest.count.saturating_sub(1);
             let dropped = self.gaps.entry(oldest.id).or_insert(Dropped {
@@ -271,7 +438,6 @@ impl State {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use crate::record::Nanos;
     use crate::sink::tests::sample;
 
     fn chunk(id: &str, first_seq: u64, size: usize) -> Chunk {
@@ -338,6 +504,40 @@ mod tests {
     }
 
     #[test]
+    fn a_note_keeps_its_place_among_the_attitudes_and_the_last_one_is_never_dropped() {
+        let outbox = Outbox::new();
+        outbox.watch(Some(Filter::default()));
+        offer(&outbox, &chunk("a", 0, 4));
+        outbox.note(Bytes::from("one"), false);
+        offer(&outbox, &chunk("a", 10, 4));
+        outbox.note(Bytes::from("a tick too many"), true);
+        let mut out = VecDeque::new();
+        let taken = outbox.take(usize::MAX, &mut out);
+        assert_eq!(
+            (texts(&out), taken),
+            (["xxxx", "one", "xxxx"].map(str::to_owned).to_vec(), 11)
+        );
+        outbox.written(taken);
+        // Told again, once nothing of the kind waits.
+        outbox.note(Bytes::from("tick"), true);
+        outbox.note(Bytes::from("two"), false);
+        for n in 0..20 {
+            offer(&outbox, &chunk("a", n * 10, 32 << 10));
+        }
+        out.clear();
+        outbox.take(0, &mut out);
+        let said = texts(&out);
+        assert!(
+            said[0] == "two" && said[1].contains("GAP") && said.len() == 2,
+            "{said:?}"
+        );
+        outbox.note(Bytes::from("three"), false);
+        outbox.forget();
+        assert!(outbox.is_empty());
+        assert_eq!(outbox.level().queued, 0);
+    }
+
+    #[test]
     fn replies_are_never_dropped_and_one_too_many_closes() {
         let outbox = Outbox::new();
         outbox.watch(Some(Filter::default()));
@@ -366,6 +566,7 @@ mod tests {
         outbox.watch(Some(Filter {
             ids: Some(["a".to_owned()].into()),
             rate_hz: Some(10.0),
+            ..Filter::default()
         }));
         let samples: Vec<_> = (0..100).map(|k| sample(Nanos(k * 10_000_000))).collect();
         for id in ["a", "b"] {

@@ -4,7 +4,8 @@
 //! encoder as its output: here are only the objects of the conversation around them
 //! (`docs/protocol.md`).
 
-use super::subscriber::{Dropped, Filter, MAX_QUEUED};
+use super::playback::{Action, Place};
+use super::subscriber::{Class as Stream, Dropped, Filter, MAX_QUEUED};
 use crate::decode::{Class, Line, LineDecoder, MAX_LINE, Undecodable, printable};
 use crate::record::{Nanos, RawSample};
 use bytes::Bytes;
@@ -27,6 +28,8 @@ pub enum Message {
     Watch(Option<Filter>),
     /// Tell the state.
     Poll,
+    /// Be elsewhere in a replay.
+    Playback(Action),
     /// Here is the token.
     Auth(String),
 }
@@ -64,6 +67,20 @@ struct WatchObject {
     id: Option<Ids>,
     ids: Option<Ids>,
     rate_hz: Option<f64>,
+}
+
+#[derive(Deserialize)]
+struct PlaybackObject {
+    action: String,
+    at: Option<StampObject>,
+    speed: Option<f64>,
+}
+
+#[derive(Deserialize)]
+struct StampObject {
+    sec: i64,
+    #[serde(default)]
+    nsec: u32,
 }
 
 #[derive(Deserialize)]
@@ -138,13 +155,16 @@ pub fn read_from(
     match class.as_deref() {
         Some("WATCH") => watch(line).map(Message::Watch),
         Some("POLL") => Ok(Message::Poll),
+        Some("PLAYBACK") => playback_action(line).map(Message::Playback),
         Some("AUTH") => {
             object::<AuthObject>(line, "bad_auth", "{\"class\":\"AUTH\",\"token\":\"...\"}")
                 .map(|auth| Message::Auth(auth.token))
         }
         Some(other) => Err(Fault::new(
             "unknown_class",
-            format!("class `{other}` is none a client sends; known: RATE, WATCH, POLL, AUTH"),
+            format!(
+                "class `{other}` is none a client sends; known: RATE, WATCH, POLL, PLAYBACK, AUTH"
+            ),
         )),
         None => Err(Fault::new(
             "no_rate",
@@ -169,6 +189,27 @@ fn object<'a, T: Deserialize<'a>>(
     })
 }
 
+fn playback_action(line: &[u8]) -> Result<Action, Fault> {
+    let bad = |message: String| Fault::new("bad_playback", message);
+    let asked: PlaybackObject = object(
+        line,
+        "bad_playback",
+        "like {\"class\":\"PLAYBACK\",\"action\":\"seek\",\"at\":{\"sec\":1,\"nsec\":0}}",
+    )?;
+    match (asked.action.as_str(), asked.at, asked.speed) {
+        ("play", ..) => Ok(Action::Play),
+        ("pause", ..) => Ok(Action::Pause),
+        ("seek", Some(at), _) => Ok(Action::Seek(Nanos::from_sec_nanosec(at.sec, at.nsec))),
+        ("speed", _, Some(speed)) => Ok(Action::Speed(speed)),
+        ("seek", None, _) => Err(bad("seek needs `at`: {\"sec\":1,\"nsec\":0}".to_owned())),
+        ("speed", _, None) => Err(bad("`speed` is missing: a factor such as 2.0".to_owned())),
+        (other, ..) => Err(bad(format!(
+            "there is no action `{}`; there are: play, pause, seek, speed",
+            printable(other)
+        ))),
+    }
+}
+
 fn watch(line: &[u8]) -> Result<Option<Filter>, Fault> {
     let bad = |message: String| Fault::new("bad_watch", message);
     let asked: WatchObject = object(
@@ -176,12 +217,23 @@ fn watch(line: &[u8]) -> Result<Option<Filter>, Fault> {
         "bad_watch",
         "like {\"class\":\"WATCH\",\"enable\":true,\"streams\":[\"ATT\"],\"ids\":[\"imu0\"],\"rate_hz\":50}",
     )?;
-    if let Some(other) = asked.streams.iter().flatten().find(|s| *s != "ATT") {
-        return Err(bad(format!(
-            "there is no stream `{}`; there is: ATT",
-            printable(other)
-        )));
-    }
+    let classes = asked.streams.as_ref().map(|names| {
+        names
+            .iter()
+            .map(|name| {
+                [Stream::Att, Stream::Rate]
+                    .into_iter()
+                    .find(|class| class.name() == name)
+                    .ok_or_else(|| {
+                        bad(format!(
+                            "there is no stream `{}`; there is: ATT, and RATE where a simulation is served",
+                            printable(name)
+                        ))
+                    })
+            })
+            .collect::<Result<_, _>>()
+    });
+    let classes = classes.transpose()?;
     if let Some(rate_hz) = asked.rate_hz
         && crate::sink::Decimator::new(rate_hz).is_none()
     {
@@ -189,6 +241,7 @@ fn watch(line: &[u8]) -> Result<Option<Filter>, Fault> {
     }
     let nothing = asked.streams.as_ref().is_some_and(Vec::is_empty);
     Ok((asked.enable && !nothing).then(|| Filter {
+        classes,
         ids: asked.ids.or(asked.id).map(|ids| match ids {
             Ids::One(id) => [printable(&id)].into(),
             Ids::Several(ids) => ids.iter().map(|id| printable(id)).collect(),
@@ -236,10 +289,12 @@ pub fn version(session: &str) -> Bytes {
 
 /// The answer to `WATCH`.
 #[must_use]
-pub fn watching(filter: Option<&Filter>) -> Bytes {
+pub fn watching(filter: Option<&Filter>, offered: &[Stream]) -> Bytes {
     let mut answer = json!({"class": "WATCH", "enable": filter.is_some()});
     if let (Some(filter), Some(fields)) = (filter, answer.as_object_mut()) {
-        fields.insert("streams".into(), json!(["ATT"]));
+        let wanted = |class: &&Stream| filter.classes.as_ref().is_none_or(|c| c.contains(*class));
+        let names: Vec<_> = offered.iter().filter(wanted).map(|c| c.name()).collect();
+        fields.insert("streams".into(), json!(names));
         fields.insert("queue_bytes".into(), json!(MAX_QUEUED));
         fields.insert("policy".into(), json!("drop_oldest"));
         if let Some(ids) = &filter.ids {
@@ -258,6 +313,22 @@ pub fn gap(id: &str, dropped: &Dropped) -> Bytes {
     line(&json!({
         "class": "GAP", "id": id, "dropped": dropped.count,
         "first_seq": dropped.first_seq, "last_seq": dropped.last_seq,
+    }))
+}
+
+/// Where a replay is.
+#[must_use]
+pub fn playback(place: &Place, session: &str) -> Bytes {
+    let stamp = |at: Option<Nanos>| {
+        at.map(|at| {
+            let (sec, nsec) = at.to_sec_nanosec();
+            json!({"sec": sec, "nsec": nsec})
+        })
+    };
+    line(&json!({
+        "class": "PLAYBACK", "state": place.mode.name(), "at": stamp(place.at),
+        "start": stamp(place.start), "end": stamp(place.end), "speed": place.speed,
+        "file": place.file, "session": session,
     }))
 }
 
@@ -352,12 +423,39 @@ mod tests {
             (r#"{"class":"EXEC"}"#, "unknown_class"),
             (r#"{"a":1}"#, "no_rate"),
             (r#"{"class":"AUTH"}"#, "bad_auth"),
+            (r#"{"class":"PLAYBACK"}"#, "bad_playback"),
+            (r#"{"class":"PLAYBACK","action":"stop"}"#, "bad_playback"),
+            (r#"{"class":"PLAYBACK","action":"seek"}"#, "bad_playback"),
+            (
+                r#"{"class":"PLAYBACK","action":"seek","at":1}"#,
+                "bad_playback",
+            ),
+            (
+                r#"{"class":"PLAYBACK","action":"speed","speed":"2"}"#,
+                "bad_playback",
+            ),
             (r#"{"class":"WATCH","streams":["POSE"]}"#, "bad_watch"),
             (r#"{"class":"WATCH","rate_hz":0}"#, "bad_watch"),
             (r#"{"class":"WATCH","rate_hz":"fast"}"#, "bad_watch"),
             ("nonsense", "bad_json"),
         ] {
             assert_eq!(ask(text).unwrap_err().code, code, "{text}");
+        }
+    }
+
+    #[test]
+    fn playback_is_asked_for_by_name() {
+        for (text, action) in [
+            (r#""action":"play""#, Action::Play),
+            (r#""action":"pause","x":1"#, Action::Pause),
+            (
+                r#""action":"seek","at":{"sec":-1,"nsec":999999999}"#,
+                Action::Seek(Nanos(-1)),
+            ),
+            (r#""action":"speed","speed":2"#, Action::Speed(2.0)),
+        ] {
+            let text = format!("{{\"class\":\"PLAYBACK\",{text}}}");
+            assert_eq!(ask(&text), Ok(Message::Playback(action)), "{text}");
         }
     }
 
@@ -374,7 +472,8 @@ mod tests {
             filter(r#"{"class":"WATCH","id":"a","rate_hz":50,"from":"now","x":[]}"#),
             Some(Filter {
                 ids: Some(["a".to_owned()].into()),
-                rate_hz: Some(50.0)
+                rate_hz: Some(50.0),
+                ..Filter::default()
             })
         );
     }

@@ -5,7 +5,9 @@
 //! JSON has no NaN: what is not finite is `null`.
 
 use super::batch::Batch;
+use super::plot::PlotObject;
 use super::stream::{Content, Stream};
+use super::target::Profile;
 use crate::record::{AttitudeSample, Nanos, RawSample, SampleKind};
 use serde_json::ser::{CompactFormatter, Formatter};
 
@@ -29,7 +31,7 @@ fn push_u64(out: &mut Vec<u8>, value: u64) {
 }
 
 /// Appends `"text"` with what needs escaping escaped.
-fn push_string(out: &mut Vec<u8>, text: &str) {
+pub(super) fn push_string(out: &mut Vec<u8>, text: &str) {
     // Serialising a str into a Vec has no way to fail.
     let _ = serde_json::to_writer(out, text);
 }
@@ -56,34 +58,52 @@ fn push_stamp(out: &mut Vec<u8>, stamp: Nanos) {
 
 /// The lines of one stream.
 #[derive(Debug)]
-pub(super) enum Objects {
+pub(crate) enum Objects {
     Att(AttObject),
     Rate(RateObject),
+    Plot(PlotObject),
 }
 
 impl Objects {
-    pub(super) fn new(stream: &Stream) -> Objects {
-        match stream.content {
-            Content::Attitude | Content::Truth => Objects::Att(AttObject::new(stream)),
-            Content::Samples(kind) => Objects::Rate(RateObject::new(stream, kind)),
+    pub(crate) fn new(stream: &Stream, profile: Profile) -> Objects {
+        match (profile, stream.content) {
+            (Profile::PlotJuggler, _) => Objects::Plot(PlotObject::new(stream)),
+            (Profile::Lines, Content::Attitude | Content::Truth) => {
+                Objects::Att(AttObject::new(stream))
+            }
+            (Profile::Lines, Content::Samples(kind)) => {
+                Objects::Rate(RateObject::new(stream, kind))
+            }
         }
+    }
+
+    /// Appends the line of an attitude, number `seq` of its stream.
+    pub(crate) fn push_attitude(&self, out: &mut Vec<u8>, seq: u64, sample: &AttitudeSample) {
+        match self {
+            Objects::Att(object) => object.push(out, seq, sample),
+            Objects::Plot(object) => object.push(out, sample),
+            Objects::Rate(_) => return,
+        }
+        out.push(b'\n');
+    }
+
+    /// Appends the line of a sample, number `seq` of its stream.
+    pub(crate) fn push_raw(&self, out: &mut Vec<u8>, seq: u64, sample: &RawSample) {
+        match self {
+            Objects::Rate(object) => object.push(out, seq, sample),
+            Objects::Plot(object) => object.push_raw(out, sample),
+            Objects::Att(_) => return,
+        }
+        out.push(b'\n');
     }
 
     /// Appends a line a sample.
     pub(super) fn push(&self, out: &mut Vec<u8>, batch: &Batch) {
-        match self {
-            Objects::Att(object) => {
-                for (seq, sample) in (batch.first..).zip(&batch.samples) {
-                    object.push(out, seq, sample);
-                    out.push(b'\n');
-                }
-            }
-            Objects::Rate(object) => {
-                for (seq, sample) in (batch.first..).zip(&batch.raw) {
-                    object.push(out, seq, sample);
-                    out.push(b'\n');
-                }
-            }
+        for (seq, sample) in (batch.first..).zip(&batch.samples) {
+            self.push_attitude(out, seq, sample);
+        }
+        for (seq, sample) in (batch.first..).zip(&batch.raw) {
+            self.push_raw(out, seq, sample);
         }
     }
 }
@@ -91,7 +111,7 @@ impl Objects {
 /// The `RATE` object of one stream: what is absent is left out. Rate in rad/s (a delta angle in
 /// rad), specific force in m/s^2.
 #[derive(Debug)]
-pub(super) struct RateObject {
+pub(crate) struct RateObject {
     head: Vec<u8>,
     kind: Vec<u8>,
 }

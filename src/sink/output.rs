@@ -4,6 +4,7 @@
 //! formats is. A regular file is written under a temporary name in the same directory, synced, and
 //! given its name only when complete: a run that dies leaves no finished-looking file.
 
+use super::socket::{Tcp, Udp};
 use super::target::Target;
 use crate::error::{Error, Result};
 use std::fs::{self, File, Metadata, OpenOptions};
@@ -37,6 +38,10 @@ pub(super) enum Output {
     },
     /// Standard output.
     Stdout(io::Stdout),
+    /// Somebody who listens.
+    Tcp(Tcp),
+    /// Somebody who may listen.
+    Udp(Udp),
     /// Nowhere.
     Null,
 }
@@ -48,7 +53,10 @@ impl Output {
     /// [`Error::OutputExists`], [`Error::OutputIsInput`], [`Error::Write`].
     pub(super) fn open(target: &Target, inputs: &[PathBuf], force: bool) -> Result<Output> {
         let path = match target {
-            Target::Null => return Ok(Output::Null),
+            // Who listens is served, not written to.
+            Target::Null | Target::Listen(_) => return Ok(Output::Null),
+            Target::Tcp(address) => return Tcp::connect(address).map(Output::Tcp),
+            Target::Udp { address, .. } => return Udp::to(address).map(Output::Udp),
             Target::Stdout => return Ok(Output::Stdout(io::stdout())),
             Target::File { path, .. } => path,
         };
@@ -97,8 +105,13 @@ impl Output {
         match self {
             Output::Part(part) => Some(&part.shown),
             Output::Direct { path, .. } => Some(path),
-            Output::Stdout(_) | Output::Null => None,
+            Output::Stdout(_) | Output::Tcp(_) | Output::Udp(_) | Output::Null => None,
         }
+    }
+
+    /// Whether it is a connection to somebody.
+    pub(super) fn is_socket(&self) -> bool {
+        matches!(self, Output::Tcp(_) | Output::Udp(_))
     }
 
     /// Hands all of `bytes` over.
@@ -110,6 +123,8 @@ impl Output {
             Output::Part(part) => part.file.write_all(bytes),
             Output::Direct { file, .. } => file.write_all(bytes),
             Output::Stdout(stdout) => stdout.write_all(bytes),
+            Output::Tcp(tcp) => tcp.write(bytes),
+            Output::Udp(udp) => udp.write(bytes),
             Output::Null => Ok(()),
         };
         self.judge(result)
@@ -122,8 +137,8 @@ impl Output {
     pub(super) fn flush(&mut self) -> Result<Flow> {
         let result = match self {
             Output::Stdout(stdout) => stdout.flush(),
-            // Files are unbuffered.
-            Output::Part(_) | Output::Direct { .. } | Output::Null => Ok(()),
+            // The others are unbuffered.
+            _ => Ok(()),
         };
         self.judge(result)
     }
@@ -134,13 +149,26 @@ impl Output {
     /// [`Error::Write`]; [`Error::OutputExists`] when somebody else created the file meanwhile.
     pub(super) fn finish(mut self) -> Result<Flow> {
         let flow = self.flush()?;
-        if let Output::Part(part) = self {
-            part.publish()?;
+        match self {
+            Output::Part(part) => part.publish()?,
+            Output::Tcp(tcp) => tcp.finish(),
+            Output::Udp(udp) => udp.finish(),
+            Output::Direct { .. } | Output::Stdout(_) | Output::Null => {}
         }
         Ok(flow)
     }
 
     fn judge(&self, result: io::Result<()>) -> Result<Flow> {
+        let socket = match self {
+            Output::Tcp(tcp) => Some(tcp.name()),
+            Output::Udp(udp) => Some(udp.name()),
+            _ => None,
+        };
+        if let (Some(name), Err(why)) = (socket, &result) {
+            // Whoever else is written to is not to suffer for it.
+            tracing::error!("{name}: {why}; nothing more is sent there");
+            return Ok(Flow::Closed);
+        }
         match result {
             Ok(()) => Ok(Flow::Continue),
             Err(e) if e.kind() == ErrorKind::BrokenPipe => Ok(Flow::Closed),

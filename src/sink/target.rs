@@ -1,6 +1,7 @@
 //! The word after `-o` -> where the attitude goes, in which format. Pure.
 
 use crate::error::{Error, Result};
+use crate::serve::address::Listen;
 use std::path::{Path, PathBuf};
 
 /// What a file or pipe is filled with.
@@ -28,25 +29,31 @@ pub enum Target {
     Stdout,
     /// Counted and discarded.
     Null,
+    /// Whoever connects.
+    Listen(Listen),
+    /// NDJSON to somebody who listens at `HOST:PORT`. One who reads slowly slows the run down.
+    Tcp(String),
+    /// One object a datagram to `HOST:PORT`, whether or not somebody listens.
+    Udp {
+        /// To where.
+        address: String,
+        /// What the objects look like.
+        profile: Profile,
+    },
 }
 
 /// The list every message about an unknown sink ends with.
-const KNOWN: &str = "known sinks: FILE.mcap, FILE.ndjson (or .jsonl), FILE.csv, - (NDJSON on standard output), null: (discard)";
+const KNOWN: &str = "known sinks: FILE.mcap, FILE.ndjson (or .jsonl), FILE.csv, - (NDJSON on standard output), null: (discard), tcp-listen://HOST:PORT, unix-listen:///PATH, ws-listen://HOST:PORT (whoever connects), tcp://HOST:PORT, udp://HOST:PORT[?profile=plotjuggler] (somebody who listens)";
 
-/// Schemes that are sinks of the daemon, not of a finished replay.
-const SOCKET_SCHEMES: [&str; 11] = [
-    "tcp",
-    "tcp-listen",
-    "udp",
-    "udp-listen",
-    "unix",
-    "unix-listen",
-    "ws",
-    "wss",
-    "ws-listen",
-    "http",
-    "https",
-];
+/// What the objects sent to somebody look like.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Profile {
+    /// The lines of NDJSON.
+    #[default]
+    Lines,
+    /// What PlotJuggler's UDP server reads with its JSON protocol.
+    PlotJuggler,
+}
 
 impl Target {
     /// Reads what the user wrote after `-o`.
@@ -64,18 +71,54 @@ impl Target {
             }
             _ => {}
         }
-        if let Some((scheme, _)) = text.split_once("://") {
-            return Err(Error::Usage(
-                if SOCKET_SCHEMES.contains(&scheme.to_ascii_lowercase().as_str()) {
-                    format!(
-                        "-o {text}: this command does not write to sockets yet\n  help: write NDJSON to standard output with `-o -` and pipe it; {KNOWN}"
-                    )
-                } else {
-                    format!("-o {text}: unknown scheme `{scheme}`\n  help: {KNOWN}")
-                },
-            ));
+        match text.split_once("://") {
+            Some((scheme, rest)) => Target::socket(text, &scheme.to_ascii_lowercase(), rest),
+            None => Target::from_path(Path::new(text)),
         }
-        Target::from_path(Path::new(text))
+    }
+
+    fn socket(text: &str, scheme: &str, rest: &str) -> Result<Target> {
+        let refuse = |what: &str| Err(Error::Usage(format!("-o {text}: {what}\n  help: {KNOWN}")));
+        let (address, query) = match rest.split_once('?') {
+            Some((address, query)) => (address, Some(query)),
+            None => (rest, None),
+        };
+        let address = address.strip_suffix('/').unwrap_or(address);
+        let is_complete = address.rsplit_once(':').is_some_and(|(host, port)| {
+            !host.is_empty() && port.parse::<u16>().is_ok_and(|p| p > 0)
+        });
+        match (scheme, query) {
+            ("tcp-listen" | "unix-listen" | "ws-listen", None) => {
+                Listen::parse_from("-o", text).map(Target::Listen)
+            }
+            ("tcp-listen" | "unix-listen" | "ws-listen" | "tcp", Some(_)) => {
+                refuse("nothing follows the address; a profile is for udp://")
+            }
+            ("udp-listen", _) => {
+                refuse("takes samples in (strapd serve --listen); udp://HOST:PORT sends")
+            }
+            ("tcp" | "udp", _) if !is_complete => refuse("HOST:PORT is needed"),
+            ("tcp", None) => Ok(Target::Tcp(address.to_owned())),
+            ("udp", query) => {
+                let profile = match query {
+                    None => Profile::Lines,
+                    Some("profile=plotjuggler") => Profile::PlotJuggler,
+                    Some(_) => return refuse("the only thing after ? is profile=plotjuggler"),
+                };
+                let address = address.to_owned();
+                Ok(Target::Udp { address, profile })
+            }
+            _ => refuse(&format!("unknown scheme `{scheme}`")),
+        }
+    }
+
+    /// Where it listens, if it does.
+    #[must_use]
+    pub fn listens(&self) -> Option<&Listen> {
+        match self {
+            Target::Listen(listen) => Some(listen),
+            _ => None,
+        }
     }
 
     /// A file whose extension, in any case, names the format.
@@ -109,13 +152,14 @@ impl Target {
         })
     }
 
-    /// What it is filled with; `None` for [`Target::Null`].
+    /// What it is filled with; `None` for [`Target::Null`] and for what listens: that is not a
+    /// [`Sink`](super::Sink).
     #[must_use]
     pub fn format(&self) -> Option<Format> {
         match self {
             Target::File { format, .. } => Some(*format),
-            Target::Stdout => Some(Format::Ndjson),
-            Target::Null => None,
+            Target::Stdout | Target::Tcp(_) | Target::Udp { .. } => Some(Format::Ndjson),
+            Target::Null | Target::Listen(_) => None,
         }
     }
 }
@@ -153,12 +197,48 @@ mod tests {
                 other => assert_eq!(text, "x.mcap/", "{other:?}"),
             }
         }
-        let Err(Error::Usage(message)) = Target::parse("tcp://host:1") else {
-            unreachable!("a socket is not a sink of replay")
-        };
-        assert!(
-            message.contains("does not write to sockets yet"),
-            "{message}"
+    }
+
+    #[test]
+    fn a_socket_is_listened_on_or_written_to() {
+        for text in [
+            "tcp-listen://127.0.0.1:0",
+            "ws-listen://[::1]:9",
+            "unix-listen:///x",
+        ] {
+            let target = Target::parse(text).unwrap();
+            assert_eq!(target.listens().unwrap().to_string(), text);
+        }
+        assert_eq!(
+            Target::parse("tcp://host:1").unwrap(),
+            Target::Tcp("host:1".to_owned())
         );
+        for (text, profile) in [
+            ("udp://host:1", Profile::Lines),
+            ("udp://host:1?profile=plotjuggler", Profile::PlotJuggler),
+        ] {
+            let address = "host:1".to_owned();
+            assert_eq!(
+                Target::parse(text).unwrap(),
+                Target::Udp { address, profile }
+            );
+        }
+        for text in [
+            "tcp://host",
+            "tcp://:1",
+            "udp://host:0",
+            "udp://host:1?profile=rerun",
+            "tcp://host:1?profile=plotjuggler",
+            "udp-listen://127.0.0.1:1",
+            "ws://host:1",
+            "unix-listen://relative",
+            "s3://b/x.mcap",
+        ] {
+            let said = Target::parse(text).unwrap_err().to_string();
+            assert!(
+                said.contains(text) && said.contains("help: known"),
+                "{said}"
+            );
+        }
     }
 }

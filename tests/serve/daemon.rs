@@ -75,7 +75,7 @@ impl Daemon {
     pub(crate) fn address(&self, n: usize) -> SocketAddr {
         match &self.addresses[n] {
             Listen::Tcp(a) | Listen::Udp(a) | Listen::WebSocket(a) => *a,
-            Listen::Unix(_) => unreachable!("a path"),
+            Listen::Unix(_) | Listen::Passed(..) => unreachable!("a path"),
         }
     }
 
@@ -128,6 +128,12 @@ impl Process {
         Process::spawn(command, args)
     }
 
+    /// `strapd COMMAND ARGS`, another command that listens.
+    #[allow(dead_code)]
+    pub(crate) fn of(args: &[&str]) -> Process {
+        Process::spawn(Command::new(strapd()), args)
+    }
+
     /// The same after a command of the shell, such as a limit.
     pub(crate) fn start_limited(limit: &str, args: &[&str]) -> Process {
         let mut command = Command::new("sh");
@@ -137,13 +143,25 @@ impl Process {
         Process::spawn(command, args)
     }
 
-    fn spawn(mut command: Command, args: &[&str]) -> Process {
+    /// The same by a command of the shell that ends in `exec "$0" serve "$@"`, with something as its
+    /// standard input.
+    pub(crate) fn start_by(script: &str, stdin: Stdio, args: &[&str]) -> Process {
+        let mut command = Command::new("sh");
+        command.args(["-c", script]).arg(strapd());
+        Process::spawn_with(command, stdin, args)
+    }
+
+    fn spawn(command: Command, args: &[&str]) -> Process {
+        Process::spawn_with(command, Stdio::piped(), args)
+    }
+
+    fn spawn_with(mut command: Command, stdin: Stdio, args: &[&str]) -> Process {
         let mut child = command
             .args(args)
             .args(["--log-format", "json"])
             .env_remove("STRAPD_LOG")
             .env_remove("STRAPD_LOG_FORMAT")
-            .stdin(Stdio::piped())
+            .stdin(stdin)
             .stdout(Stdio::null())
             .stderr(Stdio::piped())
             .spawn()

@@ -1,7 +1,7 @@
 //! `--record`: what came in is in the file, and replays to what went out.
 
 use super::client::{Client, rate};
-use super::daemon::{Process, TCP};
+use super::daemon::{Process, TCP, eventually};
 
 #[test]
 fn everything_sent_before_sigterm_is_in_the_recording_with_its_attitudes() {
@@ -14,6 +14,10 @@ fn everything_sent_before_sigterm_is_in_the_recording_with_its_attitudes() {
         "0",
         "--record",
         path.to_str().unwrap(),
+        "--world",
+        "ned",
+        "--body",
+        "frd",
     ];
     let mut process = Process::start(&record);
     let mut sender = Client::tcp(process.address(0));
@@ -33,6 +37,19 @@ fn everything_sent_before_sigterm_is_in_the_recording_with_its_attitudes() {
         .stats
         .unwrap();
     assert_eq!(stats.message_count, 1500, "sample, attitude, transform");
+    let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+    let of = |topic: &str, key: &str| {
+        let channel = summary.channels.values().find(|c| c.topic == topic);
+        channel.unwrap().metadata.get(key).cloned()
+    };
+    for (key, value) in [
+        ("world", "ned"),
+        ("body", "frd"),
+        ("rotates", "sensor_to_world"),
+    ] {
+        assert_eq!(of("imu0/data", key).as_deref(), Some(value));
+        assert_eq!(of("imu0/data_raw", key), None);
+    }
     let (mut samples, mut attitudes) = (0, Vec::new());
     for message in mcap::MessageStream::new(&bytes).unwrap() {
         let message = message.unwrap();
@@ -57,6 +74,52 @@ fn everything_sent_before_sigterm_is_in_the_recording_with_its_attitudes() {
         }
     }
     assert_eq!(attitudes.len(), sent.len());
+}
+
+#[test]
+fn a_hang_up_ends_the_file_and_goes_on_in_a_new_one() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("a.mcap");
+    let record = [
+        "--listen",
+        TCP,
+        "--min-free",
+        "0",
+        "--record",
+        path.to_str().unwrap(),
+    ];
+    let mut process = Process::start(&record);
+    let mut sender = Client::tcp(process.address(0));
+    let mut watcher = Client::tcp(process.address(0)).watching("{\"class\":\"WATCH\"}");
+    let moved = dir.path().join("moved.mcap");
+    for round in 0..3 {
+        for n in 0..100 {
+            sender.send(&rate("imu0", 100 * round + n, 1.0));
+            watcher.object("ATT");
+        }
+        match round {
+            // As a log rotation does it.
+            0 => {
+                std::fs::rename(&path, &moved).unwrap();
+                process.signal("HUP");
+                eventually("a new file of the same name", || path.exists());
+            }
+            // The name is taken: the next one is numbered.
+            1 => {
+                process.signal("HUP");
+                let next = dir.path().join("a_0001.mcap");
+                eventually("a numbered file", || next.exists());
+            }
+            _ => {}
+        }
+    }
+    process.signal("TERM");
+    assert_eq!(process.exit(), Some(0));
+    for file in ["moved.mcap", "a.mcap", "a_0001.mcap"] {
+        let bytes = std::fs::read(dir.path().join(file)).unwrap();
+        let stats = mcap::Summary::read(&bytes).unwrap().unwrap().stats.unwrap();
+        assert_eq!(stats.message_count, 300, "{file}");
+    }
 }
 
 #[test]

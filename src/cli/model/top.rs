@@ -2,17 +2,16 @@
 //!
 //! With flags for people, without any as a filter.
 
-mod errors;
 mod tables;
 
 use super::filter::{self, Refusal};
-use super::top_flags::{self, TopFlags};
+use super::top_flags::TopFlags;
 use crate::cli::{Global, Outcome, print};
+use crate::compare::top::{self as compare, Course, How, MethodErrors};
 use crate::error::{Error, Result};
 use crate::model::top::{Case, EulerState, SymmetricTop};
 use crate::report::summary::significant;
 use clap::Args;
-use errors::{Course, How, MethodErrors};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 use std::fmt::Write as _;
@@ -118,9 +117,9 @@ impl Top {
 }
 
 fn answer(request: &Request) -> std::result::Result<Value, Refusal> {
-    let case = top_flags::case(&request.case)?;
+    let case = compare::case(&request.case)?;
     let seed = SymmetricTop::seed();
-    let top = top_flags::top(
+    let top = compare::body(
         request.mass.unwrap_or(seed.mass()),
         request.arm.unwrap_or(seed.arm()),
         request.inertia.unwrap_or([seed.transverse(), seed.axial()]),

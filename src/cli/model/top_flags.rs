@@ -1,5 +1,6 @@
 //! The flags that say which top, and how it starts: shared by `simulate top` and `model top`. Pure.
 
+use crate::compare::top::{body, case};
 use crate::config::numbers;
 use crate::error::{Error, Result};
 use crate::model::top::{Case, EulerAngles, EulerState, SymmetricTop};
@@ -50,40 +51,6 @@ pub struct TopFlags {
     pub gravity: Option<f64>,
 }
 
-/// A case by its name.
-///
-/// # Errors
-/// An unknown one; says which there are.
-pub(crate) fn case(name: &str) -> std::result::Result<Case, String> {
-    Case::from_name(name).ok_or_else(|| {
-        let names: Vec<&str> = Case::ALL.iter().map(|c| c.name()).collect();
-        format!(
-            "unknown case `{}`: one of {}",
-            name.escape_debug(),
-            names.join(", ")
-        )
-    })
-}
-
-/// A top some arrangement of matter can be.
-///
-/// # Errors
-/// What can not be, with its numbers.
-pub(crate) fn top(
-    mass: f64,
-    arm: f64,
-    [across, along]: [f64; 2],
-    gravity: f64,
-) -> std::result::Result<SymmetricTop, String> {
-    if along > 2.0 * across {
-        return Err(format!(
-            "inertia {across} across, {along} along the axis: the latter exceeds the sum of the two across it ({}), which no matter can",
-            2.0 * across
-        ));
-    }
-    SymmetricTop::new(mass, arm, across, along, gravity).map_err(|e| e.to_string())
-}
-
 impl TopFlags {
     /// The top.
     ///
@@ -95,7 +62,7 @@ impl TopFlags {
             Some(list) => numbers("--inertia", list)?,
             None => [seed.transverse(), seed.axial()],
         };
-        top(
+        body(
             self.mass.unwrap_or(seed.mass()),
             self.arm.unwrap_or(seed.arm()),
             [across, along],

@@ -3,6 +3,7 @@
 use super::{Made, parameter};
 use crate::cli::estimation::KindArg;
 use crate::cli::replay::CompressionArg;
+use crate::cli::serving::{Served, Serving};
 use crate::error::{Error, Result};
 use crate::model::imu_error::{ImuError, StampError};
 use crate::pipeline::simulate::Simulation;
@@ -18,13 +19,15 @@ const GRAVITY: f64 = 9.80665;
 #[derive(Args, Debug, Clone)]
 #[command(next_help_heading = "Sampling")]
 pub struct Common {
-    /// Where the samples go: .mcap, .ndjson or .csv, - (NDJSON on stdout), null: (nowhere). May be
-    /// given several times
+    /// Where the samples go: .mcap, .ndjson or .csv, - (NDJSON on stdout), null: (nowhere);
+    /// tcp-listen://HOST:PORT, unix-listen:///PATH, ws-listen://HOST:PORT (whoever connects);
+    /// tcp://HOST:PORT, udp://HOST:PORT[?profile=plotjuggler] (somebody who listens). May be given
+    /// several times
     #[arg(
         short,
         long = "output",
         value_name = "SINK",
-        required = true,
+        required_unless_present = "page",
         help_heading = "Output"
     )]
     pub outputs: Vec<String>,
@@ -34,14 +37,12 @@ pub struct Common {
     /// Compression of MCAP outputs
     #[arg(long, value_enum, default_value = "zstd", help_heading = "Output")]
     pub compression: CompressionArg,
-    /// How fast: max, or a factor of data time such as 1 or 0.5
-    #[arg(
-        long,
-        value_name = "FACTOR",
-        default_value = "max",
-        help_heading = "Output"
-    )]
-    pub speed: String,
+    /// How fast: max, or a factor of data time such as 1 or 0.5 [default: max; with --page or --paused 1]
+    #[arg(long, value_name = "FACTOR", help_heading = "Output")]
+    pub speed: Option<String>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub serving: Serving,
     /// Samples a second
     #[arg(
         long,
@@ -146,7 +147,7 @@ impl Common {
     ///
     /// # Errors
     /// [`Error::Usage`] naming the flag.
-    pub(super) fn simulation(&self, name: &str, made: Made) -> Result<Simulation> {
+    pub(super) fn simulation(&self, name: &str, made: Made) -> Result<(Simulation, Served)> {
         let kind = SampleKind::from(self.sample_kind);
         let start = stamp("--start-stamp", &self.start_stamp)?;
         let error = ImuError::parse(&self.noise)
@@ -193,26 +194,33 @@ impl Common {
                 parameters.push(parameter("unit_bias_rad_s", text));
             }
         }
-        Ok(Simulation {
+        let targets = self
+            .outputs
+            .iter()
+            .map(|o| Target::parse(o))
+            .collect::<Result<_>>()?;
+        let played = format!("simulate {name}");
+        let served = self
+            .serving
+            .start(targets, self.speed.as_deref(), (&played, true))?;
+        let simulation = Simulation {
             name: name.to_owned(),
             source,
             kind,
             rate_hz: self.rate_hz,
             frame_id: self.frame_id.clone(),
-            targets: self
-                .outputs
-                .iter()
-                .map(|o| Target::parse(o))
-                .collect::<Result<_>>()?,
+            targets: served.targets.clone(),
+            cast: served.cast.clone(),
             options: Options {
                 force: self.force,
                 compression: self.compression.into(),
                 ..Options::default()
             },
-            speed: crate::cli::replay::speed(&self.speed)?,
+            speed: served.speed,
             parameters,
             notes: made.notes,
-        })
+        };
+        Ok((simulation, served))
     }
 }
 

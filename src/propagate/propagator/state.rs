@@ -93,6 +93,14 @@ impl State {
         }
     }
 
+    /// Goes on from an attitude that was saved, at its instant.
+    pub(super) fn resume(&mut self, last: &AttitudeSample) {
+        self.reset(last.q_nb.wxyz());
+        self.covariance.resume(last.covariance);
+        self.now = last.stamp.0;
+        self.reset_count = last.reset_count;
+    }
+
     pub(super) fn reset(&mut self, initial: [f64; 4]) {
         self.attitude.restart(initial);
         self.covariance.restart();

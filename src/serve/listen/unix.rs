@@ -13,9 +13,24 @@ use tokio::net::{UnixListener, UnixStream};
 pub struct Bound {
     listener: UnixListener,
     path: PathBuf,
+    /// The name is ours to take away.
+    owned: bool,
 }
 
 impl Bound {
+    /// One that was opened for us: its name stays when we go.
+    pub(super) fn passed(socket: std::os::unix::net::UnixListener) -> io::Result<(Bound, PathBuf)> {
+        let listener = UnixListener::from_std(socket)?;
+        let address = listener.local_addr()?;
+        let path = address.as_pathname().unwrap_or(Path::new("/")).to_owned();
+        let bound = Bound {
+            listener,
+            path: path.clone(),
+            owned: false,
+        };
+        Ok((bound, path))
+    }
+
     /// Listens at `path`, for the user who runs the daemon alone. The name left behind by a daemon
     /// that was killed is taken over; one that answers is not.
     pub(super) fn new(path: &Path) -> io::Result<Bound> {
@@ -31,14 +46,17 @@ impl Bound {
         Ok(Bound {
             listener,
             path: path.to_owned(),
+            owned: true,
         })
     }
 }
 
 impl Drop for Bound {
     fn drop(&mut self) {
-        // Somebody may have tidied up already.
-        let _ = std::fs::remove_file(&self.path);
+        if self.owned {
+            // Somebody may have tidied up already.
+            let _ = std::fs::remove_file(&self.path);
+        }
     }
 }
 

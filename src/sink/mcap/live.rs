@@ -68,17 +68,19 @@ impl LiveMcap {
             sealed: Vec::new(),
             has_chunk: false,
         };
-        live.transform = live.declare(TF_TOPIC, TF_SCHEMA)?;
+        live.transform = live.declare(TF_TOPIC, TF_SCHEMA, &[])?;
         Ok(live)
     }
 
-    fn declare(&mut self, topic: &str, schema: [&str; 3]) -> Result<u16> {
+    /// A channel, whose metadata says `more`.
+    fn declare(&mut self, topic: &str, schema: [&str; 3], more: &[(&str, &str)]) -> Result<u16> {
         let [name, form, text] = schema;
         let out = &mut self.declared;
         self.file
             .schema(out, name, form, text.as_bytes())
             .and_then(|id| {
-                let metadata = self.metadata.clone();
+                let mut metadata = self.metadata.clone();
+                metadata.extend(more.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())));
                 self.file
                     .channel(out, id, topic, Encoding::Cdr.name(), metadata)
             })
@@ -91,8 +93,13 @@ impl LiveMcap {
     /// [`Error::Usage`] when there are more than MCAP can number.
     pub fn stream(&mut self, stream: &Stream) -> Result<LiveStream> {
         let stream = stream.bounded();
-        let input = self.declare(&stream.input_topic, IMU_SCHEMA)?;
-        let attitude = self.declare(&stream.output_topic, IMU_SCHEMA)?;
+        let input = self.declare(&stream.input_topic, IMU_SCHEMA, &[])?;
+        let axes = [
+            ("rotates", stream.rotates.as_str()),
+            ("world", &stream.world_axes),
+            ("body", &stream.body_axes),
+        ];
+        let attitude = self.declare(&stream.output_topic, IMU_SCHEMA, &axes)?;
         let parent = parent_frame(&stream);
         let frame_id = stream.frame_id.clone();
         self.streams.push(stream);

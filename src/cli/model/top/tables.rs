@@ -1,8 +1,8 @@
 //! The tables of `docs/top.md`, from live runs. Pure.
 
-use super::errors::{Course, HELD, How, propagated};
+use crate::compare::top::{Course, How, propagated};
 use crate::model::rigid_body::HeldRate;
-use crate::model::top::{Case, SymmetricTop};
+use crate::model::top::{Case, SymmetricTop, TopMethod};
 use crate::propagate::{Method, Order, Placement};
 use crate::report::summary::significant;
 use std::fmt::Write as _;
@@ -19,6 +19,12 @@ const FITS: [(&str, usize, Placement); 6] = [
     ("quintic, centred (6)", 6, Placement::Centred),
     ("7th degree, centred (8)", 8, Placement::Centred),
 ];
+
+/// A method for each rate that can be held.
+type OfHeld = fn(HeldRate) -> TopMethod;
+
+/// The columns of the table of methods, in its order.
+const HELD: [(&str, OfHeld); 2] = [("live", TopMethod::Live), ("gyro", TopMethod::Gyro)];
 
 /// Both tables as text.
 pub(super) fn text() -> Result<String, String> {

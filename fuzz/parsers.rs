@@ -1,0 +1,264 @@
+//! Everything that reads bytes from outside, each as a function of bytes alone: what the fuzzers of this folder and
+//! the mutation test (`tests/mutations.rs`) run. What must hold is asserted; a panic is a finding.
+#![allow(dead_code)]
+
+use std::cell::RefCell;
+use std::ops::ControlFlow;
+use std::sync::{Arc, LazyLock};
+use strapd::decode::{Channel, Decoder, Options, decode_line, role};
+use strapd::record::{Nanos, RawSample};
+use strapd::serve::framing::{Framed, Framer};
+use strapd::serve::hub::Hub;
+use strapd::serve::session::{Scratch, Session};
+use strapd::source::mcap::{Reader, WalkOptions, walk};
+
+const NOW: Nanos = Nanos(1_700_000_000_000_000_000);
+
+/// A message with what decoders find hardest: sequences of messages, strings, arrays, alignment.
+pub const RIG: &str = "string[] words\nsensor_msgs/Imu[] imus\nfloat32[<=4] data\nuint8 x\nfloat64[3] gyro\nduration d\n\
+================================================================================\nMSG: sensor_msgs/Imu\n\
+std_msgs/Header header\ngeometry_msgs/Vector3 angular_velocity\n\
+================================================================================\nMSG: std_msgs/Header\n\
+builtin_interfaces/Time stamp\nstring frame_id\n\
+================================================================================\nMSG: builtin_interfaces/Time\n\
+int32 sec\nuint32 nanosec\n\
+================================================================================\nMSG: geometry_msgs/Vector3\n\
+float64 x\nfloat64 y\nfloat64 z\n";
+
+/// `FileDescriptorSet` of `message S { repeated float gyro = 1; int64 t = 2; }` and
+/// `message B { repeated S samples = 4; }` in package `p`.
+pub const DESCRIPTORS: &[u8] = b"\x0a\x40\x0a\x01\x70\x12\x01\x70\x22\x1c\x0a\x01\x53\x12\x0c\x0a\x04\x67\x79\x72\x6f\x18\x01\x20\x03\x28\x02\x12\x09\x0a\x01\x74\x18\x02\x20\x01\x28\x03\x22\x1a\x0a\x01\x42\x12\x15\x0a\x07\x73\x61\x6d\x70\x6c\x65\x73\x18\x04\x20\x03\x28\x0b\x32\x04\x2e\x70\x2e\x53";
+
+/// The first byte chooses the decoder, the rest is the payload.
+fn payload(decoders: &[Decoder], data: &[u8]) {
+    let Some((which, payload)) = data.split_first() else {
+        return;
+    };
+    let Some(decoder) = decoders.get(*which as usize % decoders.len().max(1)) else {
+        return;
+    };
+    let mut out = Vec::new();
+    match decoder.decode(payload, NOW, NOW, &mut out) {
+        Ok(decoded) => assert_eq!(decoded.samples, out.len()),
+        Err(why) => assert!(out.is_empty() && !why.to_string().is_empty()),
+    }
+    let _ = decoder.frame_id(payload);
+}
+
+fn compiled(channels: &[(&str, &str, &str, &[u8])]) -> Vec<Decoder> {
+    channels
+        .iter()
+        .map(|(encoding, name, schema_encoding, schema_data)| {
+            let channel = Channel {
+                topic: "/t",
+                message_encoding: encoding,
+                schema_name: name,
+                schema_encoding,
+                schema_data,
+            };
+            match Decoder::compile(&channel, &Options::default()) {
+                Ok(decoder) => decoder,
+                Err(why) => panic!("{encoding} {name}: {why}"),
+            }
+        })
+        .collect()
+}
+
+/// CDR, little and big endian by its own head: well-known and custom types.
+pub fn cdr(data: &[u8]) {
+    static DECODERS: LazyLock<Vec<Decoder>> = LazyLock::new(|| {
+        compiled(&[
+            ("cdr", "sensor_msgs/msg/Imu", "", b""),
+            ("cdr", "tf2_msgs/msg/TFMessage", "", b""),
+            ("cdr", "a/msg/Rig", "ros2msg", RIG.as_bytes()),
+        ])
+    });
+    payload(&DECODERS, data);
+}
+
+/// ROS 1 serialisation.
+pub fn ros1(data: &[u8]) {
+    static DECODERS: LazyLock<Vec<Decoder>> = LazyLock::new(|| {
+        let rig = RIG.replace("builtin_interfaces/Time stamp", "uint32 seq\ntime stamp");
+        let rig = rig
+            .replace("float32[<=4]", "float32[]")
+            .replace("duration d", "uint8 y");
+        compiled(&[
+            ("ros1", "sensor_msgs/Imu", "", b""),
+            ("ros1", "a/Rig", "ros1msg", rig.as_bytes()),
+        ])
+    });
+    payload(&DECODERS, data);
+}
+
+/// JSON messages of a log.
+pub fn json(data: &[u8]) {
+    static DECODERS: LazyLock<Vec<Decoder>> =
+        LazyLock::new(|| compiled(&[("json", "", "", b""), ("json", "a", "jsonschema", b"{}")]));
+    payload(&DECODERS, data);
+}
+
+/// Protobuf.
+pub fn protobuf(data: &[u8]) {
+    static DECODERS: LazyLock<Vec<Decoder>> =
+        LazyLock::new(|| compiled(&[("protobuf", "p.B", "protobuf", DESCRIPTORS)]));
+    payload(&DECODERS, data);
+}
+
+/// Schema text or descriptors up to the first 0xff, then a payload; in every language.
+pub fn schema(data: &[u8]) {
+    let (text, payload) = match data.iter().position(|b| *b == 0xff) {
+        Some(at) => (&data[..at], &data[at + 1..]),
+        None => (data, &[][..]),
+    };
+    for (message_encoding, schema_encoding, schema_name) in [
+        ("cdr", "ros2msg", "a/msg/A"),
+        ("cdr", "ros2idl", "a/msg/A"),
+        ("ros1", "ros1msg", "a/A"),
+        ("protobuf", "protobuf", "p.B"),
+    ] {
+        let channel = Channel {
+            topic: "/t",
+            message_encoding,
+            schema_name,
+            schema_encoding,
+            schema_data: text,
+        };
+        let _ = role(&channel, Some((payload, NOW)));
+        if let Ok(decoder) = Decoder::compile(&channel, &Options::default()) {
+            let mut out = Vec::new();
+            match decoder.decode(payload, NOW, NOW, &mut out) {
+                Ok(decoded) => assert_eq!(decoded.samples, out.len()),
+                Err(_) => assert!(out.is_empty()),
+            }
+        }
+    }
+}
+
+/// NDJSON: however the bytes are cut, the lines are the same, and each is a sample or an error.
+pub fn lines(data: &[u8]) {
+    let cut = |size: usize| {
+        let mut framer = Framer::new();
+        let mut lines: Vec<(u64, Option<Vec<u8>>)> = Vec::new();
+        let mut take = |framed: Framed<'_>| {
+            lines.push(match framed {
+                Framed::Line(n, line) => (n, Some(line.to_vec())),
+                Framed::TooLong(n, _) => (n, None),
+            });
+            true
+        };
+        for piece in data.chunks(size) {
+            framer.feed(piece, &mut take);
+        }
+        framer.finish(&mut take);
+        lines
+    };
+    let whole = cut(usize::MAX);
+    assert_eq!(whole, cut(1 + data.len() % 7));
+    let mut out: Vec<RawSample> = Vec::new();
+    for line in whole.iter().filter_map(|(_, line)| line.as_deref()) {
+        out.clear();
+        if decode_line(line, NOW, &mut out).is_err() {
+            assert!(out.is_empty());
+        }
+    }
+}
+
+/// A whole conversation with the daemon: what it answers is JSON, a line each, and every attitude is finite.
+pub fn session(data: &[u8]) {
+    let settings = strapd::serve::Settings::default();
+    let Ok(hub) = Hub::new(settings) else {
+        panic!("the default settings are in order");
+    };
+    let hub = Arc::new(hub);
+    let mut session = Session::new(&hub, "fuzz".to_owned(), false);
+    let mut scratch = Scratch::default();
+    session.bytes(b"{\"class\":\"WATCH\"}\n", NOW, &mut scratch);
+    let (size, data) = data
+        .split_first()
+        .map_or((1, data), |(n, rest)| (1 + *n as usize, rest));
+    for (n, piece) in data.chunks(size).enumerate() {
+        let received = Nanos(NOW.0 + n as i64 * 1_000_000);
+        match n % 5 {
+            4 => session.message(piece, received, &mut scratch),
+            _ => session.bytes(piece, received, &mut scratch),
+        }
+        answered(&session);
+        if session.end().is_some() {
+            return;
+        }
+    }
+    session.finish(NOW, &mut scratch);
+    answered(&session);
+}
+
+fn answered(session: &Session) {
+    let outbox = &session.client().outbox;
+    let mut taken = std::collections::VecDeque::new();
+    let bytes = outbox.take(usize::MAX, &mut taken);
+    outbox.written(bytes);
+    for line in taken.iter().flat_map(|bytes| bytes.split(|b| *b == b'\n')) {
+        if line.is_empty() {
+            continue;
+        }
+        let Ok(text) = std::str::from_utf8(line) else {
+            panic!("an answer that is no text");
+        };
+        assert!(
+            text.starts_with("{\"class\":\"") && text.ends_with('}'),
+            "{text}"
+        );
+        if text.starts_with("{\"class\":\"ATT\"") {
+            let q = text
+                .split("\"q\":")
+                .nth(1)
+                .and_then(|rest| rest.split('}').next());
+            assert!(q.is_some_and(|q| !q.contains("null")), "{text}");
+        }
+    }
+}
+
+/// A log, as a stream and as a file: the walk ends, and both find the same where nothing is damaged.
+pub fn mcap(data: &[u8]) {
+    fn read(reader: Reader) -> (u64, bool) {
+        let mut items = 0;
+        let report = walk(
+            reader,
+            &WalkOptions::default(),
+            |_| Some(()),
+            |(), message, out: &mut Vec<u64>| out.push(message.log_time),
+            |times| {
+                items += times.len() as u64;
+                ControlFlow::Continue(())
+            },
+        );
+        match report {
+            Ok(report) => {
+                assert_eq!(report.items, items);
+                (items, report.survey.problems.is_empty())
+            }
+            Err(why) => {
+                assert!(!why.to_string().is_empty());
+                (0, false)
+            }
+        }
+    }
+    thread_local! {
+        static FILE: RefCell<Option<tempfile::NamedTempFile>> = RefCell::new(tempfile::NamedTempFile::new().ok());
+    }
+    let streamed =
+        Reader::from_stream("m", Box::new(std::io::Cursor::new(data.to_vec()))).map(read);
+    FILE.with_borrow(|file| {
+        let Some(path) = file.as_ref().map(|f| f.path()) else {
+            panic!("no room for a temporary file");
+        };
+        let Ok(()) = std::fs::write(path, data) else {
+            panic!("no room for a temporary file");
+        };
+        match (Reader::open(path).map(read), streamed) {
+            (Ok((from_file, true)), Ok((from_stream, true))) => assert_eq!(from_file, from_stream),
+            (Ok(_), Ok(_)) | (Err(_), Err(_)) => {}
+            (file, stream) => panic!("{file:?} from a file, {stream:?} from a stream"),
+        }
+    });
+}

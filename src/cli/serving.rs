@@ -1,0 +1,167 @@
+//! A replay or a simulation that is served: its flags, and its server. I/O.
+
+use super::admission::Admission;
+use super::{Outcome, replay};
+use crate::error::{Error, Result};
+use crate::serve::Settings;
+use crate::serve::address::Listen;
+use crate::serve::cast::{Cast, Next};
+use crate::serve::playback::Playback;
+use crate::sink::Target;
+use clap::Args;
+use std::sync::Arc;
+
+/// Where the page is when nothing else is said: beside the daemon's.
+const PAGE: &str = "127.0.0.1:8766";
+
+/// How a run is served to whoever connects.
+#[derive(Args, Debug, Clone)]
+#[command(next_help_heading = "Serving (-o tcp-listen://, unix-listen://, ws-listen://)")]
+pub struct Serving {
+    /// Serve at this address as -o ws-listen:// does, at --speed 1 unless said otherwise, and stay
+    /// after the end until Ctrl-C. Without --page a run ends at its end
+    #[arg(long, value_name = "ADDR", num_args = 0..=1, default_missing_value = PAGE, require_equals = true)]
+    pub page: Option<String>,
+    /// Wait at the start until a client asks to play; at --speed 1 unless said otherwise
+    #[arg(long)]
+    pub paused: bool,
+    /// Begin again at the end, until Ctrl-C
+    #[arg(long = "loop")]
+    pub looping: bool,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub admission: Admission,
+}
+
+/// A run to be served, and how.
+#[derive(Debug)]
+pub(super) struct Served {
+    /// To where.
+    pub(super) targets: Vec<Target>,
+    /// How fast.
+    pub(super) speed: Option<f64>,
+    /// Its server, where there is somebody to serve.
+    pub(super) cast: Option<Arc<Cast>>,
+    looping: bool,
+    can_rewind: bool,
+}
+
+impl Serving {
+    /// Starts the server, if a target listens. `speed` is what was given; `source` what is played, and
+    /// whether it can be played again.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] naming the flag; [`Error::Bind`].
+    pub(super) fn start(
+        &self,
+        mut targets: Vec<Target>,
+        speed: Option<&str>,
+        (source, can_rewind): (&str, bool),
+    ) -> Result<Served> {
+        if let Some(page) = &self.page {
+            targets.push(Target::Listen(Listen::parse_from(
+                "--page",
+                &format!("ws-listen://{page}"),
+            )?));
+        }
+        let speed = match speed {
+            Some(text) => replay::speed(text)?,
+            None if self.page.is_some() || self.paused => Some(1.0),
+            None => None,
+        };
+        let listen: Vec<Listen> = targets
+            .iter()
+            .filter_map(Target::listens)
+            .cloned()
+            .collect();
+        for (given, flag) in [(self.paused, "--paused"), (self.looping, "--loop")] {
+            if given && listen.is_empty() {
+                return Err(Error::Usage(format!(
+                    "{flag}: nobody is served\n  help: --page, or -o ws-listen://127.0.0.1:8766"
+                )));
+            }
+        }
+        if self.paused && speed.is_none() {
+            return Err(Error::Usage(
+                "--paused: a run at --speed max is not controlled\n  help: --speed 1".to_owned(),
+            ));
+        }
+        if self.looping && !can_rewind {
+            return Err(Error::Usage(format!(
+                "--loop: {source} can be read only once\n  help: give it as a file"
+            )));
+        }
+        let cast = if listen.is_empty() {
+            None
+        } else {
+            let others = targets.len() - listen.len();
+            let playback = Playback::new(source, speed, self.paused);
+            playback.forward_only(if !can_rewind {
+                Some("the input can be read only once, so there is no way back")
+            } else if others > 0 {
+                Some("the run also writes outputs that are not complete yet; there is a way back after the end")
+            } else {
+                None
+            });
+            let settings = self.admission.apply(Settings {
+                listen,
+                ..Settings::default()
+            })?;
+            let cast = Cast::start(settings, playback, self.page.is_some(), true)?;
+            let addresses: Vec<String> = cast.addresses().iter().map(ToString::to_string).collect();
+            tracing::info!(
+                session = cast.hub().session(),
+                "ready {}",
+                addresses.join(" ")
+            );
+            if self.page.is_some()
+                && let Some(Listen::WebSocket(page)) = cast.addresses().last()
+            {
+                tracing::info!("page http://{page}/");
+            }
+            Some(Arc::new(cast))
+        };
+        Ok(Served {
+            targets,
+            speed,
+            cast,
+            looping: self.looping,
+            can_rewind,
+        })
+    }
+}
+
+impl Served {
+    /// Runs once, and again as often as a client or `--loop` asks for it: then with `true`, to those
+    /// who are connected alone. The result is that of the first run.
+    ///
+    /// # Errors
+    /// Those of a run.
+    pub(super) fn run<T>(&self, mut once: impl FnMut(bool) -> Result<T>) -> Result<(T, Outcome)> {
+        let first = once(false)?;
+        let Some(cast) = &self.cast else {
+            return Ok((first, Outcome::Done));
+        };
+        let mut outcome = Outcome::Done;
+        let others: Vec<&Target> = self
+            .targets
+            .iter()
+            .filter(|t| t.listens().is_none())
+            .collect();
+        if cast.playback().is_stopped() && others.iter().any(|t| matches!(t, Target::File { .. })) {
+            tracing::warn!("stopped before the end: the files were not written");
+            outcome = Outcome::Failed;
+        }
+        // Whatever else was written is complete now.
+        if !others.is_empty() && self.can_rewind {
+            cast.playback().forward_only(None);
+        }
+        while cast.next(self.looping) == Next::Again {
+            once(true)?;
+        }
+        if !cast.finish() {
+            tracing::warn!("not everything could be sent in time");
+        }
+        Ok((first, outcome))
+    }
+}

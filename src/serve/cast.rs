@@ -1,0 +1,286 @@
+//! A replay or a simulation -> whoever connects: its server, on a thread of its own. I/O.
+//!
+//! The same listeners, sessions, outboxes and limits as the daemon's; what differs is that the samples
+//! are the run's own, and that the run can be stopped, moved and begun anew ([`super::playback`]).
+
+use super::address::Listen;
+use super::channel::{Channel, Items};
+use super::hub::Hub;
+use super::playback::{News, Playback, Turn};
+use super::shutdown::{self, Signals};
+use super::{Server, Settings};
+use crate::error::{Error, Result};
+use crate::record::{AttitudeSample, Nanos, RawSample};
+use crate::sink::Stream;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use tokio::sync::oneshot;
+
+/// A run that is served.
+#[derive(Debug)]
+pub struct Cast {
+    hub: Arc<Hub>,
+    playback: Arc<Playback>,
+    addresses: Vec<Listen>,
+    streams: Mutex<Vec<Lane>>,
+    text: Mutex<Vec<u8>>,
+    server: Mutex<Option<Serving>>,
+    forever: bool,
+}
+
+#[derive(Debug)]
+struct Serving {
+    stop: oneshot::Sender<()>,
+    thread: JoinHandle<bool>,
+}
+
+/// A stream of the run.
+#[derive(Debug)]
+struct Lane {
+    channel: Arc<Channel>,
+    /// Number of the next item.
+    next: u64,
+    /// Added to the reset counts: those of the runs before this one.
+    resets: u32,
+    /// The last reset count, as it was sent.
+    last_reset: u32,
+}
+
+/// What becomes of a run that has ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Next {
+    /// It begins anew.
+    Again,
+    /// That was it.
+    Done,
+}
+
+impl Cast {
+    /// Listens, on everything or on nothing. `forever`: after the end it stays, for who may want to go
+    /// back, until a signal. `signals`: the first one ends the run in order, the second one at once.
+    ///
+    /// # Errors
+    /// As [`Server::bind`].
+    pub fn start(
+        mut settings: Settings,
+        playback: Playback,
+        forever: bool,
+        signals: bool,
+    ) -> Result<Cast> {
+        let playback = Arc::new(playback);
+        settings.playback = Some(playback.clone());
+        let failed = |e: std::io::Error| Error::Usage(format!("cannot serve: {e}"));
+        let runtime = tokio::runtime::Builder::new_multi_thread()
+            .worker_threads(1)
+            .thread_name("strapd-cast")
+            .enable_all()
+            .build()
+            .map_err(failed)?;
+        let (server, signals) = runtime.block_on(async {
+            let signals = signals.then(Signals::new).transpose().map_err(failed)?;
+            Ok::<_, Error>((Server::bind(settings).await?, signals))
+        })?;
+        let (hub, addresses) = (server.hub().clone(), server.addresses().to_vec());
+        let (stop, stopped) = oneshot::channel();
+        let asked = playback.clone();
+        let thread = std::thread::Builder::new()
+            .name("strapd-cast".to_owned())
+            .spawn(move || {
+                let drained = runtime.block_on(serve(server, asked, stopped, signals));
+                runtime.shutdown_background();
+                drained
+            })
+            .map_err(failed)?;
+        Ok(Cast {
+            hub,
+            playback,
+            addresses,
+            streams: Mutex::default(),
+            text: Mutex::default(),
+            server: Mutex::new(Some(Serving { stop, thread })),
+            forever,
+        })
+    }
+
+    /// Where it listens, with real ports.
+    #[must_use]
+    pub fn addresses(&self) -> &[Listen] {
+        &self.addresses
+    }
+
+    /// Its middle.
+    #[must_use]
+    pub fn hub(&self) -> &Arc<Hub> {
+        &self.hub
+    }
+
+    /// Where the run is.
+    #[must_use]
+    pub fn playback(&self) -> &Arc<Playback> {
+        &self.playback
+    }
+
+    /// Whether the run goes at a pace.
+    #[must_use]
+    pub fn is_paced(&self) -> bool {
+        self.playback.is_controlled()
+    }
+
+    /// A run with these streams begins; they are those of the run before, if there was one.
+    pub fn begin(&self, streams: &[Stream]) {
+        let mut lanes = lock(&self.streams);
+        if lanes.len() == streams.len() {
+            for lane in &mut *lanes {
+                lane.next = 0;
+            }
+            return;
+        }
+        for stream in streams.iter().skip(lanes.len()) {
+            lanes.push(Lane {
+                channel: self.hub.declare(stream),
+                next: 0,
+                resets: 0,
+                last_reset: 0,
+            });
+        }
+    }
+
+    /// Waits until items with these stamps are due: how many of them, and whether they are shown.
+    /// `None`: the run is to end.
+    pub fn turn(&self, stamps: impl Iterator<Item = Nanos> + Clone) -> Option<(usize, bool)> {
+        loop {
+            let (turn, news) = self.playback.turn(stamps.clone());
+            if news != News::Nothing {
+                self.hub.announce(news == News::Tick, None);
+            }
+            match turn {
+                Turn::Show(0) if stamps.clone().next().is_some() => {}
+                Turn::Show(n) => return Some((n, true)),
+                Turn::Mute(n) => return Some((n, false)),
+                Turn::End => return None,
+            }
+        }
+    }
+
+    /// Attitudes of a stream, to everybody unless muted.
+    pub fn attitudes(&self, stream: usize, samples: &[AttitudeSample], shown: bool) {
+        let mut lanes = lock(&self.streams);
+        let Some(lane) = lanes.get_mut(stream) else {
+            return;
+        };
+        if let Some(last) = samples.last() {
+            lane.last_reset = last.reset_count.saturating_add(lane.resets);
+            if !shown {
+                self.playback.passed(last.stamp);
+            }
+        }
+        if lane.resets == 0 {
+            return self.hand(lane, Items::Attitudes(samples), shown);
+        }
+        let counted: Vec<AttitudeSample> = samples
+            .iter()
+            .map(|sample| AttitudeSample {
+                reset_count: sample.reset_count.saturating_add(lane.resets),
+                ..*sample
+            })
+            .collect();
+        self.hand(lane, Items::Attitudes(&counted), shown);
+    }
+
+    /// Samples of a stream, to everybody unless muted.
+    pub fn samples(&self, stream: usize, samples: &[RawSample], shown: bool) {
+        if let Some(lane) = lock(&self.streams).get_mut(stream) {
+            self.hand(lane, Items::Samples(samples), shown);
+        }
+    }
+
+    fn hand(&self, lane: &mut Lane, items: Items<'_>, shown: bool) {
+        let first = lane.next;
+        lane.next += items.len() as u64;
+        if shown {
+            let mut text = lock(&self.text);
+            self.hub.distribute(&lane.channel, first, items, &mut text);
+        }
+    }
+
+    /// The run has ended, of itself or because it was told to. Waits where there is to be waited for
+    /// somebody who wants to go back.
+    #[must_use]
+    pub fn next(&self, looping: bool) -> Next {
+        if self.playback.ended() {
+            if looping {
+                for lane in &mut *lock(&self.streams) {
+                    lane.resets = lane.last_reset.saturating_add(1);
+                }
+                self.playback.again();
+            } else {
+                self.hub.announce(false, None);
+                if !self.forever || !self.playback.wait_for_restart() {
+                    return Next::Done;
+                }
+            }
+        }
+        if self.playback.begin_anew() {
+            self.hub.began_anew();
+            self.hub.announce(false, None);
+            Next::Again
+        } else {
+            Next::Done
+        }
+    }
+
+    /// Sends what waits, for no longer than the limit, and closes. Says whether all was sent.
+    pub fn finish(&self) -> bool {
+        self.playback.stop();
+        let Some(Serving { stop, thread }) = lock(&self.server).take() else {
+            return true;
+        };
+        // It has stopped already, after a signal.
+        let _ = stop.send(());
+        thread.join().unwrap_or(false)
+    }
+}
+
+impl Drop for Cast {
+    fn drop(&mut self) {
+        self.finish();
+    }
+}
+
+/// Serves until the run has ended, or a signal has ended it.
+async fn serve(
+    server: Server,
+    playback: Arc<Playback>,
+    mut stopped: oneshot::Receiver<()>,
+    signals: Option<Signals>,
+) -> bool {
+    let limit = server.hub().limits().drain;
+    let mut at_once = None;
+    let drained = server
+        .run(async {
+            let Some(signals) = signals else {
+                let _ = stopped.await;
+                return;
+            };
+            tokio::select! {
+                _ = &mut stopped => {}
+                signal = shutdown::first(signals, || false) => {
+                    tracing::info!("{}: stopping", signal.name());
+                    playback.stop();
+                    // A run that waits for its input does not notice.
+                    if tokio::time::timeout(limit, &mut stopped).await.is_err() {
+                        at_once = Some(signal);
+                    }
+                }
+            }
+        })
+        .await;
+    if let Some(signal) = at_once {
+        std::process::exit(signal.exit_code());
+    }
+    drained
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

@@ -1,0 +1,281 @@
+//! Attitudes <-> the file a restarted daemon goes on from (`--state`). Pure, but for [`StateFile`].
+//!
+//! One JSON object, written under another name, synced and renamed: whatever happens, there is a whole
+//! one, at most a second old.
+
+use super::hub::Hub;
+use super::quiet;
+use crate::error::{Error, Result};
+use crate::model::attitude::Quaternion;
+use crate::record::{AttitudeCovariance, AttitudeSample, Nanos, Status};
+use crate::sink::{self, sync_directory};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fs::{File, OpenOptions};
+use std::io::{self, Read, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// What this release writes.
+const FORMAT: u32 = 1;
+/// A larger file is none of ours: a sensor takes half a kilobyte.
+const MAX_BYTES: u64 = 16 << 20;
+/// How often it is written.
+const EVERY: Duration = Duration::from_millis(500);
+
+/// The last attitude of a sensor, and between which axes it is.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct Saved {
+    /// Nanoseconds since the epoch of the sensor's clock.
+    stamp_ns: i64,
+    /// Sensor to world, w, x, y, z.
+    q: [f64; 4],
+    /// rad/s.
+    rate: [f64; 3],
+    /// rad^2: xx, xy, xz, yy, yz, zz.
+    covariance: [f64; 6],
+    reset: u32,
+    world: String,
+    body: String,
+}
+
+/// The last attitudes of all sensors, by `id`.
+pub type Sensors = BTreeMap<String, Saved>;
+
+#[derive(Serialize, Deserialize)]
+struct Document {
+    strapd_state: u32,
+    sensors: Sensors,
+}
+
+impl Saved {
+    /// Of a stream with these labels.
+    #[must_use]
+    pub fn new(last: &AttitudeSample, labels: &sink::Stream) -> Saved {
+        let p = last.covariance;
+        Saved {
+            stamp_ns: last.stamp.0,
+            q: last.q_nb.wxyz(),
+            rate: last.rate.into(),
+            covariance: [p.xx, p.xy, p.xz, p.yy, p.yz, p.zz],
+            reset: last.reset_count,
+            world: labels.world_axes.clone(),
+            body: labels.body_axes.clone(),
+        }
+    }
+
+    /// As it was.
+    ///
+    /// # Errors
+    /// In words: it is between other axes than those of the stream that is to go on from it.
+    pub fn attitude(&self, labels: &sink::Stream) -> std::result::Result<AttitudeSample, String> {
+        let saved = (&self.world, &self.body);
+        let wanted = (&labels.world_axes, &labels.body_axes);
+        if saved != wanted {
+            return Err(format!(
+                "the attitude saved is of body {} in world {}, and now body {} in world {} is asked for: begun anew",
+                self.body, self.world, labels.body_axes, labels.world_axes
+            ));
+        }
+        let [xx, xy, xz, yy, yz, zz] = self.covariance;
+        Ok(AttitudeSample {
+            stamp: Nanos(self.stamp_ns),
+            q_nb: Quaternion::assume_unit(self.q),
+            rate: self.rate.into(),
+            accel: None,
+            covariance: AttitudeCovariance {
+                xx,
+                xy,
+                xz,
+                yy,
+                yz,
+                zz,
+            },
+            status: Status::OK,
+            reset_count: self.reset,
+            log: Nanos(self.stamp_ns),
+        })
+    }
+}
+
+/// The file.
+#[derive(Debug)]
+pub struct StateFile {
+    path: PathBuf,
+    temporary: PathBuf,
+    written: Vec<u8>,
+}
+
+impl StateFile {
+    /// Reads what a daemon before this one has left, if there was one, and shows that the file can be
+    /// written.
+    ///
+    /// # Errors
+    /// [`Error::Open`], [`Error::Write`]; [`Error::Usage`] when it is no state file: to begin anew in
+    /// silence would be to give an attitude nobody expects.
+    pub fn open(path: &Path) -> Result<(StateFile, Sensors)> {
+        let sensors = match File::open(path) {
+            Err(e) if e.kind() == io::ErrorKind::NotFound => Sensors::new(),
+            Err(source) => {
+                return Err(Error::Open {
+                    path: path.to_owned(),
+                    source,
+                });
+            }
+            Ok(file) => read(path, file)?,
+        };
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let mut file = StateFile {
+            temporary: path.with_file_name(format!(".{name}.part")),
+            path: path.to_owned(),
+            written: Vec::new(),
+        };
+        file.write(&sensors)?;
+        Ok((file, sensors))
+    }
+
+    /// Replaces its content, unless that is the same.
+    ///
+    /// # Errors
+    /// [`Error::Write`]; what was there before is there still.
+    pub fn write(&mut self, sensors: &Sensors) -> Result<()> {
+        let document = Document {
+            strapd_state: FORMAT,
+            sensors: sensors.clone(),
+        };
+        let failed = |source| Error::Write {
+            path: self.path.clone(),
+            source,
+        };
+        let mut text = serde_json::to_vec(&document).map_err(|e| failed(e.into()))?;
+        text.push(b'\n');
+        if text == self.written {
+            return Ok(());
+        }
+        let mut options = OpenOptions::new();
+        options.write(true).create(true).truncate(true);
+        #[cfg(unix)]
+        std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+        let replaced = options.open(&self.temporary).and_then(|mut file| {
+            file.write_all(&text)?;
+            file.sync_all()?;
+            std::fs::rename(&self.temporary, &self.path)?;
+            sync_directory(&self.path)
+        });
+        replaced.map_err(failed)?;
+        self.written = text;
+        Ok(())
+    }
+}
+
+fn read(path: &Path, file: File) -> Result<Sensors> {
+    let mut text = Vec::new();
+    let read = file.take(MAX_BYTES).read_to_end(&mut text);
+    read.map_err(|source| Error::Open {
+        path: path.to_owned(),
+        source,
+    })?;
+    let foreign = |why: String| {
+        Error::Usage(format!(
+            "--state {}: {why}\n  help: move it away to begin anew",
+            path.display()
+        ))
+    };
+    let document: Document = serde_json::from_slice(&text)
+        .map_err(|e| foreign(format!("is no state that strapd has saved: {e}")))?;
+    if document.strapd_state != FORMAT {
+        return Err(foreign(format!(
+            "is of format {}, and this release reads {FORMAT}",
+            document.strapd_state
+        )));
+    }
+    Ok(document.sensors)
+}
+
+/// Saves the hub's attitudes again and again, until it is dropped.
+pub async fn keep(file: Arc<std::sync::Mutex<StateFile>>, hub: Arc<Hub>) {
+    let mut tick = tokio::time::interval(EVERY);
+    tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+    loop {
+        tick.tick().await;
+        let (file, hub) = (file.clone(), hub.clone());
+        // A thread of its own for each: the disk may be slow. It can only panic on a bug, which
+        // would be printed; the next one tries again.
+        let _ = tokio::task::spawn_blocking(move || save(&file, &hub)).await;
+    }
+}
+
+/// Saves them once; a failure is said, and is no reason to stop.
+pub fn save(file: &std::sync::Mutex<StateFile>, hub: &Hub) {
+    let sensors = hub.saved();
+    let mut file = file
+        .lock()
+        .unwrap_or_else(std::sync::PoisonError::into_inner);
+    let outcome = file.write(&sensors);
+    drop(file);
+    if let Err(e) = &outcome {
+        quiet::warn(
+            "state",
+            &format!("{e}; a restart would go on from an older attitude"),
+        );
+    }
+    hub.state_saved(outcome.err().map(|e| e.to_string()));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+
+    fn sample() -> AttitudeSample {
+        AttitudeSample {
+            stamp: Nanos(1_700_000_000_123_456_789),
+            q_nb: Quaternion::assume_unit([0.6, 0.0, 0.8, 0.0]),
+            rate: Vector3::new(0.1, 0.2, 1.0 / 3.0),
+            accel: None,
+            covariance: AttitudeCovariance::from_sigma(Vector3::new(0.1, 0.2, 0.3)),
+            status: Status::OK,
+            reset_count: 3,
+            log: Nanos(1_700_000_000_123_456_789),
+        }
+    }
+
+    #[test]
+    fn what_was_saved_comes_back_to_the_bit_and_only_between_the_same_axes() -> Result<()> {
+        let dir = std::env::temp_dir().join(format!("strapd-state-{}", std::process::id()));
+        std::fs::create_dir_all(&dir).map_err(|e| Error::Usage(e.to_string()))?;
+        let path = dir.join("s.json");
+        let labels = sink::Stream::new("imu", "");
+        let (mut file, found) = StateFile::open(&path)?;
+        assert!(found.is_empty());
+        let sensors = Sensors::from([("imu".to_owned(), Saved::new(&sample(), &labels))]);
+        file.write(&sensors)?;
+        let (_, found) = StateFile::open(&path)?;
+        assert_eq!(found, sensors);
+        assert_eq!(
+            found.get("imu").map(|s| s.attitude(&labels)),
+            Some(Ok(sample()))
+        );
+        let other = sink::Stream {
+            world_axes: "ned".to_owned(),
+            ..labels
+        };
+        assert!(found.values().all(|s| s.attitude(&other).is_err()));
+
+        for damaged in [
+            "",
+            "{}",
+            "{\"strapd_state\":2,\"sensors\":{}}",
+            "\u{0}\u{0}",
+        ] {
+            std::fs::write(&path, damaged).map_err(|e| Error::Usage(e.to_string()))?;
+            let said = StateFile::open(&path).err().map(|e| e.to_string());
+            assert!(
+                said.is_some_and(|s| s.contains("move it away")),
+                "{damaged}"
+            );
+        }
+        std::fs::remove_dir_all(&dir).map_err(|e| Error::Usage(e.to_string()))
+    }
+}

@@ -1,0 +1,200 @@
+//! Lines -> somebody who listens on a socket. I/O.
+//!
+//! Over TCP a slow reader slows the run down, as a pipe does; over UDP nobody is waited for. Either is
+//! a sink of its own: when it fails it is said and that sink ends, the others go on.
+
+use crate::error::{Error, Result};
+use std::io::{self, BufRead, BufReader, ErrorKind, Read, Write};
+use std::net::{Shutdown, SocketAddr, TcpStream, ToSocketAddrs, UdpSocket};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::Duration;
+
+/// How long a connection may take to come about.
+const CONNECT: Duration = Duration::from_secs(10);
+/// A reader that takes nothing for so long will never take anything.
+const STALLED: Duration = Duration::from_secs(30);
+/// How long the other side may take to read the rest and close.
+const CLOSE: Duration = Duration::from_secs(2);
+/// Longest answer that is looked at.
+const MAX_ANSWER: u64 = 64 << 10;
+
+/// Every address a `HOST:PORT` has.
+pub(crate) fn resolve(name: &str, address: &str) -> Result<Vec<SocketAddr>> {
+    let found = address.to_socket_addrs().map(Iterator::collect::<Vec<_>>);
+    match found {
+        Ok(found) if !found.is_empty() => Ok(found),
+        Ok(_) => Err(connecting(
+            name,
+            io::Error::new(ErrorKind::NotFound, "the host has no address"),
+        )),
+        Err(source) => Err(connecting(name, source)),
+    }
+}
+
+fn connecting(name: &str, source: io::Error) -> Error {
+    Error::Connect {
+        address: name.to_owned(),
+        source,
+    }
+}
+
+/// A TCP connection that is written to.
+#[derive(Debug)]
+pub(super) struct Tcp {
+    name: String,
+    stream: TcpStream,
+    /// Hangs up when the other side has closed.
+    closed: Receiver<()>,
+}
+
+impl Tcp {
+    /// Connects to `HOST:PORT`.
+    ///
+    /// # Errors
+    /// [`Error::Connect`].
+    pub(super) fn connect(address: &str) -> Result<Tcp> {
+        let name = format!("tcp://{address}");
+        let mut last = None;
+        for place in resolve(&name, address)? {
+            match TcpStream::connect_timeout(&place, CONNECT) {
+                Ok(stream) => {
+                    return Tcp::over(name.clone(), stream).map_err(|e| connecting(&name, e));
+                }
+                Err(why) => last = Some(why),
+            }
+        }
+        Err(connecting(
+            &name,
+            last.unwrap_or_else(|| ErrorKind::NotFound.into()),
+        ))
+    }
+
+    fn over(name: String, stream: TcpStream) -> io::Result<Tcp> {
+        // A loss of comfort at most.
+        let _ = stream.set_nodelay(true);
+        stream.set_write_timeout(Some(STALLED))?;
+        // What is answered must be read: unread bytes turn our close into a reset, which loses what
+        // was sent last. And a daemon's ERROR is worth knowing.
+        let answers = stream.try_clone()?;
+        let (open, closed) = channel();
+        let peer = name.clone();
+        std::thread::Builder::new()
+            .name("strapd-answers".to_owned())
+            .spawn(move || {
+                hear(&peer, answers);
+                drop(open);
+            })?;
+        Ok(Tcp {
+            name,
+            stream,
+            closed,
+        })
+    }
+
+    pub(super) fn name(&self) -> &str {
+        &self.name
+    }
+
+    pub(super) fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.stream
+            .write_all(bytes)
+            .map_err(|why| match why.kind() {
+                ErrorKind::WouldBlock | ErrorKind::TimedOut => io::Error::new(
+                    ErrorKind::TimedOut,
+                    format!("it has taken nothing for {} s", STALLED.as_secs()),
+                ),
+                _ => why,
+            })
+    }
+
+    /// Everything was written: waits for a moment until the other side has read it.
+    pub(super) fn finish(self) {
+        // It may have gone already.
+        let _ = self.stream.shutdown(Shutdown::Write);
+        let _ = self.closed.recv_timeout(CLOSE);
+        let _ = self.stream.shutdown(Shutdown::Both);
+    }
+}
+
+/// Reads what comes back to its end and says what is an error.
+fn hear(name: &str, stream: TcpStream) {
+    let mut lines = BufReader::with_capacity(4 << 10, stream);
+    let mut line = Vec::new();
+    let mut said = 0;
+    loop {
+        line.clear();
+        match Read::take(&mut lines, MAX_ANSWER).read_until(b'\n', &mut line) {
+            Ok(0) | Err(_) => return,
+            Ok(_) => {}
+        }
+        let text = String::from_utf8_lossy(&line);
+        if said < 10 && text.contains("\"class\":\"ERROR\"") {
+            said += 1;
+            tracing::warn!(
+                "{name}: answers {}",
+                crate::decode::printable(text.trim_end())
+            );
+        }
+    }
+}
+
+/// Datagrams to one place.
+#[derive(Debug)]
+pub(super) struct Udp {
+    name: String,
+    socket: UdpSocket,
+    /// Datagrams nobody took, as far as that is told.
+    refused: u64,
+}
+
+impl Udp {
+    /// Sends to `HOST:PORT`.
+    ///
+    /// # Errors
+    /// [`Error::Connect`]: there is no such place.
+    pub(super) fn to(address: &str) -> Result<Udp> {
+        let name = format!("udp://{address}");
+        let place = resolve(&name, address)?.into_iter().next();
+        let place = place.ok_or_else(|| connecting(&name, ErrorKind::NotFound.into()))?;
+        let own: SocketAddr = match place {
+            SocketAddr::V4(_) => ([0, 0, 0, 0], 0).into(),
+            SocketAddr::V6(_) => ([0; 16], 0).into(),
+        };
+        let socket = UdpSocket::bind(own)
+            .and_then(|socket| socket.connect(place).map(|()| socket))
+            .map_err(|e| connecting(&name, e))?;
+        Ok(Udp {
+            name,
+            socket,
+            refused: 0,
+        })
+    }
+
+    pub(super) fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// One datagram for each line.
+    pub(super) fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
+        for line in bytes.split_inclusive(|b| *b == b'\n') {
+            match self.socket.send(line) {
+                Ok(_) => {}
+                // The answer to an earlier one: nobody listens, yet.
+                Err(why) if why.kind() == ErrorKind::ConnectionRefused => self.refused += 1,
+                Err(why) => return Err(why),
+            }
+        }
+        Ok(())
+    }
+
+    /// Everything was written.
+    pub(super) fn finish(self) {
+        if self.refused > 0 {
+            tracing::warn!(
+                "{}: at least {} datagrams found nobody listening",
+                self.name,
+                self.refused
+            );
+        }
+    }
+}

@@ -1,0 +1,34 @@
+// Numbers as people read them: fixed width, a true minus, the whole value for programs.
+
+export function fixed(value, digits) {
+  if (!Number.isFinite(value)) return "–";
+  const text = value.toFixed(digits);
+  return Number(text) === 0 ? text.replace("-", "") : text.replace("-", "−");
+}
+
+// Into a <data> element: what is read, and all of its digits.
+export function show(element, value, digits) {
+  const text = fixed(value, digits);
+  if (element.textContent !== text) element.textContent = text;
+  const whole = Number.isFinite(value) ? String(value) : "";
+  if (element.value !== whole) element.value = whole;
+}
+
+export function say(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}
+
+// Three or four digits of a quantity that is not negative, with its unit.
+export function measure(value, units) {
+  if (!Number.isFinite(value)) return "–";
+  if (value < 1e-9) return `0 ${units[0][1]}`;
+  const [factor, unit] = units.find(([f]) => value >= f) ?? units.at(-1);
+  const scaled = value / factor;
+  return `${scaled >= 100 ? scaled.toFixed(0) : scaled >= 10 ? scaled.toFixed(1) : scaled.toFixed(2)} ${unit}`;
+}
+
+export const SECONDS = [[1, "s"], [1e-3, "ms"], [1e-6, "µs"], [1e-9, "ns"]];
+
+export function whole(value) {
+  return Number.isFinite(value) ? value.toLocaleString("en").replaceAll(",", "\u2009") : "–";
+}

@@ -1,0 +1,103 @@
+// Pause, seek and speed of a recording the daemon plays; not there until the daemon speaks of one.
+
+import { fixed, say } from "./numbers.js";
+
+const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10, 100];
+// Milliseconds between two seeks while the slider is dragged.
+const SPACING = 100;
+
+const seconds = (from, to) => to.sec - from.sec + (to.nsec - from.nsec) * 1e-9;
+
+function later(stamp, by) {
+  const whole = Math.floor(by);
+  const nsec = stamp.nsec + Math.round((by - whole) * 1e9);
+  return { sec: stamp.sec + whole + Math.floor(nsec / 1e9), nsec: nsec % 1e9 };
+}
+
+function clock(value) {
+  const minutes = Math.floor(value / 60);
+  const rest = (value - 60 * minutes).toFixed(1).padStart(4, "0");
+  return `${minutes}:${rest}`;
+}
+
+export class Playback {
+  constructor(element, send) {
+    this.element = element;
+    this.send = (fields) => send({ class: "PLAYBACK", ...fields });
+    this.parts = {};
+    for (const part of element.querySelectorAll("[data-part]")) this.parts[part.dataset.part] = part;
+    const { toggle, slider, speed } = this.parts;
+    toggle.addEventListener("click", () => this.toggle());
+    slider.addEventListener("input", () => this.drag(false));
+    slider.addEventListener("change", () => this.drag(true));
+    speed.replaceChildren(...SPEEDS.map((value) => this.option(value)));
+    speed.addEventListener("change", () => this.send({ action: "speed", speed: Number(speed.value) }));
+  }
+
+  option(value) {
+    const option = document.createElement("option");
+    option.value = String(value);
+    option.textContent = `${value}×`;
+    return option;
+  }
+
+  get isThere() {
+    return this.state !== undefined;
+  }
+
+  gone() {
+    this.state = undefined;
+    this.element.hidden = true;
+  }
+
+  heard(state) {
+    if (!state.start || !state.end || !state.at) return;
+    this.state = state;
+    this.element.hidden = false;
+    const { toggle, slider, speed, name, place } = this.parts;
+    const length = Math.max(0, seconds(state.start, state.end));
+    const at = Math.max(0, seconds(state.start, state.at));
+    const playing = state.state === "playing";
+    say(toggle, playing ? "Pause" : state.state === "ended" ? "Again" : "Play");
+    toggle.setAttribute("aria-pressed", String(playing));
+    slider.max = String(length);
+    if (!this.dragging) slider.value = String(at);
+    slider.setAttribute("aria-valuetext", `${fixed(at, 1)} of ${fixed(length, 1)} seconds`);
+    say(place, `${clock(at)} / ${clock(length)}`);
+    say(name, state.file ?? "");
+    const chosen = String(state.speed);
+    if (![...speed.options].some((o) => o.value === chosen)) speed.append(this.option(state.speed));
+    speed.value = chosen;
+  }
+
+  toggle() {
+    if (!this.isThere) return;
+    if (this.state.state === "playing") return this.send({ action: "pause" });
+    if (this.state.state === "ended") this.send({ action: "seek", at: this.state.start });
+    this.send({ action: "play" });
+  }
+
+  // By so many seconds.
+  step(by) {
+    if (!this.isThere) return;
+    const { start, end, at } = this.state;
+    const to = Math.max(0, Math.min(seconds(start, end), seconds(start, at) + by));
+    this.send({ action: "seek", at: later(start, to) });
+  }
+
+  faster(by) {
+    if (!this.isThere) return;
+    const at = SPEEDS.findIndex((speed) => speed >= this.state.speed);
+    const speed = SPEEDS[Math.max(0, Math.min(SPEEDS.length - 1, (at < 0 ? SPEEDS.length : at) + by))];
+    this.send({ action: "speed", speed });
+  }
+
+  // While it is dragged a seek now and then, and one where it is let go.
+  drag(done) {
+    this.dragging = !done;
+    const now = performance.now();
+    if (!done && now - (this.soughtAt ?? -Infinity) < SPACING) return;
+    this.soughtAt = now;
+    this.send({ action: "seek", at: later(this.state.start, Number(this.parts.slider.value)) });
+  }
+}

@@ -1,0 +1,148 @@
+//! `--state`: a restart loses no attitude (service.md 6.4 D6).
+
+use super::client::{Client, rate};
+use super::daemon::{Process, TCP, eventually};
+use serde_json::Value;
+use std::path::Path;
+
+fn started(state: &Path, more: &[&str]) -> (Process, Client, Client) {
+    let args = [&["--listen", TCP, "--state", state.to_str().unwrap()], more].concat();
+    let process = Process::start(&args);
+    let sender = Client::tcp(process.address(0));
+    let watcher = Client::tcp(process.address(0)).watching("{\"class\":\"WATCH\"}");
+    (process, sender, watcher)
+}
+
+fn through(sender: &mut Client, watcher: &mut Client, numbers: std::ops::Range<u64>) -> Value {
+    let mut last = Value::Null;
+    for n in numbers {
+        sender.send(&rate("imu0", n, 1.0));
+        last = watcher.object("ATT");
+    }
+    last
+}
+
+fn sigma(att: &Value) -> f64 {
+    att["sigma_deg"][0].as_f64().unwrap()
+}
+
+#[test]
+fn killed_and_started_again_it_goes_on_where_it_was_and_says_so() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("state.json");
+    let (mut process, mut sender, mut watcher) = started(&path, &[]);
+    let last = through(&mut sender, &mut watcher, 0..500);
+    let stamp = "1700000000499000000";
+    eventually("the last attitude in the file", || {
+        std::fs::read_to_string(&path).is_ok_and(|text| text.contains(stamp))
+    });
+    process.child.kill().unwrap();
+    process.child.wait().unwrap();
+
+    // Two seconds later by the sensor's clock.
+    let (mut process, mut sender, mut watcher) = started(&path, &[]);
+    let first = through(&mut sender, &mut watcher, 2500..2501);
+    assert_eq!(first["q"], last["q"], "to the bit");
+    let status: Vec<_> = first["status"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|s| s.as_str().unwrap())
+        .collect();
+    assert!(
+        status.contains(&"restarted") && status.contains(&"held"),
+        "{status:?}"
+    );
+    assert_eq!((&last["reset"], &first["reset"]), (&0.into(), &1.into()));
+    // At 1 rad/s two seconds may hide two rad.
+    assert!(
+        sigma(&last) < 1.0 && (sigma(&first) - 2f64.to_degrees()).abs() < 1.0,
+        "{first}"
+    );
+    let second = through(&mut sender, &mut watcher, 2501..2502);
+    assert!(
+        !second["status"].to_string().contains("restarted"),
+        "{second}"
+    );
+    assert_eq!(second["reset"], 1);
+
+    // Ended in order, the very last one is there, at once.
+    let last = through(&mut sender, &mut watcher, 2502..2600);
+    process.signal("TERM");
+    assert_eq!(process.exit(), Some(0));
+    let (mut process, mut sender, mut watcher) = started(&path, &["--on-gap", "reset"]);
+    // A sensor that has not come back keeps its attitude in the file.
+    sender.send(&rate("other", 2600, 1.0));
+    watcher.object("ATT");
+    process.signal("TERM");
+    assert_eq!(process.exit(), Some(0));
+    let (process, mut sender, mut watcher) = started(&path, &["--on-gap", "reset"]);
+    let first = through(&mut sender, &mut watcher, 2600..2601);
+    assert_eq!(first["q"], last["q"]);
+    assert_eq!(first["reset"], 2);
+    // A reset later goes to where the flags say, not to what was saved.
+    let after = through(&mut sender, &mut watcher, 9600..9601);
+    assert_eq!(after["q"]["w"], 1.0, "{after}");
+
+    sender.send("{\"class\":\"POLL\"}");
+    let said = sender.next_of("STATUS");
+    assert_eq!(said["sources"][0]["initial"], "as saved before the restart");
+    drop(process);
+}
+
+#[test]
+fn between_other_axes_it_begins_anew_and_says_so() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("state.json");
+    let (mut process, mut sender, mut watcher) =
+        started(&path, &["--world", "ned", "--body", "frd"]);
+    let ned = through(&mut sender, &mut watcher, 0..100);
+    process.signal("TERM");
+    assert_eq!(process.exit(), Some(0));
+    let (mut process, mut sender, mut watcher) =
+        started(&path, &["--world", "ned", "--body", "frd"]);
+    let same = through(&mut sender, &mut watcher, 100..101);
+    for c in ["w", "x", "y", "z"] {
+        let difference = same["q"][c].as_f64().unwrap() - ned["q"][c].as_f64().unwrap();
+        assert!(difference.abs() < 1e-15, "{ned} {same}");
+    }
+    process.signal("TERM");
+    assert_eq!(process.exit(), Some(0));
+
+    let (_process, mut sender, mut watcher) = started(&path, &[]);
+    let anew = through(&mut sender, &mut watcher, 101..102);
+    assert_eq!(
+        (&anew["q"]["w"], &anew["reset"]),
+        (&1.0.into(), &0.into()),
+        "{anew}"
+    );
+    sender.send("{\"class\":\"POLL\"}");
+    let said = sender.next_of("STATUS");
+    let warnings = said["sources"][0]["warnings"].to_string();
+    assert!(
+        warnings.contains("ned") && warnings.contains("begun anew"),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_file_that_is_none_of_ours_or_can_not_be_written_is_said_before_anything_listens() {
+    let dir = tempfile::tempdir().unwrap();
+    let foreign = dir.path().join("foreign");
+    std::fs::write(&foreign, b"precious").unwrap();
+    let nowhere = dir.path().join("no/such/folder");
+    for (path, code, words) in [
+        (&foreign, 2, "move it away"),
+        (&nowhere, 1, "no/such/folder"),
+    ] {
+        let output = std::process::Command::new(super::daemon::strapd())
+            .args(["serve", "--listen", TCP, "--state"])
+            .arg(path)
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(code), "{said}");
+        assert!(said.contains(words), "{said}");
+    }
+    assert_eq!(std::fs::read(&foreign).unwrap(), b"precious");
+}
