@@ -57,7 +57,7 @@ async fn print(args: &Cat, remote: &Remote, token: Option<&Secret>) -> Result<Ou
     };
     let signals = Signals::new().map_err(|e| Error::Usage(format!("signals: {e}")))?;
     // On a thread of its own: a second signal ends the process even when nobody reads our output.
-    let mut stop = tokio::spawn(shutdown::first(signals));
+    let mut stop = tokio::spawn(shutdown::first(signals, || false));
     let until = tokio::time::sleep(args.seconds.map_or(Duration::MAX, Duration::from_secs_f64));
     tokio::pin!(until);
     let mut printer = Printer::new(args)?;
