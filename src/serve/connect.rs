@@ -30,8 +30,10 @@ const FIRST_WAIT: Duration = Duration::from_millis(100);
 const LONGEST_WAIT: Duration = Duration::from_secs(5);
 /// A connection that stood so long was a good one: the waits begin anew.
 const STEADY: Duration = Duration::from_secs(1);
-/// Asks a daemon for everything it has.
-const WATCH: &str = r#"{"class":"WATCH"}"#;
+/// Asks a daemon for its samples: a simulation has some.
+const RATES: &str = r#"{"class":"WATCH","streams":["RATE"]}"#;
+/// Asks a daemon that has none for its attitudes.
+const ATTITUDES: &str = r#"{"class":"WATCH","streams":["ATT"]}"#;
 
 /// A source and how it stands.
 #[derive(Debug)]
@@ -182,13 +184,14 @@ async fn converse(
     let mut bytes = Vec::new();
     let mut said = VecDeque::new();
     let mut asked = source.protocol == Protocol::Strapd;
+    let mut asked_again = false;
     let is_web = matches!(source.remote, Remote::WebSocket { .. });
     let mut first = Vec::new();
     if let (Some(token), false) = (&source.token, is_web) {
         first.push(serde_json::json!({"class": "AUTH", "token": token.reveal()}).to_string());
     }
     if asked {
-        first.push(WATCH.to_owned());
+        first.push(RATES.to_owned());
     }
     for line in first {
         if let Err(why) = link.send(&line).await {
@@ -236,8 +239,16 @@ async fn converse(
                 Event::Greeted(_) => {
                     if source.protocol == Protocol::Auto
                         && !std::mem::replace(&mut asked, true)
-                        && let Err(why) = link.send(WATCH).await
+                        && let Err(why) = link.send(RATES).await
                     {
+                        return Some(why.to_string());
+                    }
+                }
+                Event::Complained(what)
+                    if asked && !asked_again && what.starts_with("bad_watch") =>
+                {
+                    asked_again = true;
+                    if let Err(why) = link.send(ATTITUDES).await {
                         return Some(why.to_string());
                     }
                 }
