@@ -16,6 +16,7 @@ pub mod outputs;
 pub mod progress;
 pub mod recover;
 pub mod replay;
+pub mod report;
 pub mod serve;
 pub mod serving;
 pub mod simulate;
@@ -38,6 +39,7 @@ use std::process::ExitCode;
   strapd replay flight.mcap -o attitude.mcap   gyro samples to attitude
   strapd compare attitude.mcap flight.mcap     how far from a recorded orientation
   strapd simulate top -o top.mcap              a gyro whose truth is known, to try it all on
+  strapd report flight.mcap -o flight.html     all that can be said about it, on one page
   strapd cat flight.mcap --topic /imu | head   decoded samples as NDJSON
   strapd serve                                 samples in over sockets, attitude out
   strapd watch                                 what that daemon makes, live in the terminal
@@ -130,6 +132,8 @@ pub enum Command {
     Info(info::Info),
     /// Everything that may spoil the attitude from a log, with the flag that helps
     Check(check::Check),
+    /// One self-contained HTML page about a log: quality, attitude, errors, noise
+    Report(Box<report::Report>),
     /// Time-aligned angle error between two attitudes
     Compare(compare::Compare),
     /// Decoded samples of a file, or attitudes of a daemon, as NDJSON, CSV or a table
@@ -185,6 +189,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Config(command) => config::run(&command),
         Command::Info(command) => info::run(&cli.global, &command),
         Command::Check(command) => check::run(&cli.global, &command),
+        Command::Report(command) => report::run(&cli.global, &command),
         Command::Compare(command) => compare::run(&cli.global, &command),
         Command::Cat(command) => cat::run(&cli.global, &command),
         Command::Watch(command) => watch::run(&cli.global, &command),

@@ -136,13 +136,23 @@ pub fn compare(estimate: &[Stamped], reference: &[Stamped], align: Align) -> Com
 #[must_use]
 pub fn error_series(estimate: &[Stamped], reference: &[Stamped], align: Align) -> Vec<ErrorAt> {
     let mut series = Vec::new();
+    for_each_error(estimate, reference, align, |at| series.push(*at));
+    series
+}
+
+/// The same without keeping them.
+pub fn for_each_error(
+    estimate: &[Stamped],
+    reference: &[Stamped],
+    align: Align,
+    mut visit: impl FnMut(&ErrorAt),
+) {
     each_error(
         &Track::new(estimate),
         &Track::new(reference),
         align,
-        |at, _| series.push(at),
+        |at, _| visit(&at),
     );
-    series
 }
 
 fn each_error(

@@ -4,6 +4,7 @@ pub mod against;
 pub mod check;
 mod chosen;
 pub mod estimator;
+pub mod history;
 pub mod lines;
 pub mod log;
 pub mod look;

@@ -1,7 +1,11 @@
 //! What a run says about itself, for people and for machines. Pure.
 
+pub mod calendar;
+pub mod drawn;
 pub mod findings;
+pub mod page;
 pub mod plot;
 pub mod simulation;
 pub mod stamps;
 pub mod summary;
+pub mod trace;

@@ -13,9 +13,11 @@ use crate::error::{Error, Result};
 use crate::model::allan::{AllanFit, Point, cluster_sizes, deviation, fit};
 use crate::pipeline::pool::Pool;
 use crate::record::SampleKind;
+use crate::report::page::Noise;
+use crate::sink::Document;
 use clap::Args;
 use gather::Gathered;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Allan deviation of a recording at rest: angle random walk, bias instability, rate random walk,
 /// quantisation, ramp
@@ -95,11 +97,17 @@ struct Axis {
 /// The log can not be read, holds no rate, or too few samples; an output exists.
 pub fn run(global: &Global, args: &Allan) -> Result<Outcome> {
     let plan = args.plan()?;
-    for path in [&args.plot, &args.csv].into_iter().flatten() {
-        outputs::check(path, &args.file, args.force)?;
-    }
+    args.plot
+        .iter()
+        .try_for_each(|p| super::outputs::check_chart(p))?;
+    let open = |path: &Option<PathBuf>| {
+        path.as_deref()
+            .map(|p| Document::create(p, std::slice::from_ref(&args.file), args.force))
+            .transpose()
+    };
+    let (plot, csv) = (open(&args.plot)?, open(&args.csv)?);
     let pool = Pool::new(global.threads)?;
-    let gathered = gather::gather(&args.file, &plan, &pool)?;
+    let gathered = gather::gather(&args.file, &plan, gather::CAPACITY, &pool)?;
     let axes = analyse(&gathered).map_err(|what| Error::Topic {
         path: args.file.clone(),
         topic: gathered.topic.clone(),
@@ -108,17 +116,17 @@ pub fn run(global: &Global, args: &Allan) -> Result<Outcome> {
     for warning in gathered.warnings().iter().chain(&words::doubts(&axes)) {
         tracing::warn!("{warning}");
     }
-    if let Some(path) = &args.plot {
+    if let Some(document) = plot {
         let chart = outputs::chart(&gathered.topic, &axes);
         let svg = chart.svg().map_err(|e| Error::Topic {
             path: args.file.clone(),
             topic: gathered.topic.clone(),
             what: e.to_string(),
         })?;
-        outputs::write(path, &svg)?;
+        document.write(&svg)?;
     }
-    if let Some(path) = &args.csv {
-        outputs::write(path, &outputs::table(&axes))?;
+    if let Some(document) = csv {
+        document.write(&outputs::table(&axes))?;
     }
     if global.json {
         print(&format!("{}\n", words::json(&gathered, &axes)))?;
@@ -129,6 +137,35 @@ pub fn run(global: &Global, args: &Allan) -> Result<Outcome> {
         Outcome::Lossy
     } else {
         Outcome::Done
+    })
+}
+
+/// Angles held for a report: 25 MB.
+const FOR_REPORT: usize = 1 << 20;
+
+/// The same for a report.
+///
+/// # Errors
+/// As [`run`], but for outputs.
+pub(super) fn examined(path: &Path, plan: &Plan, pool: &Pool) -> Result<Noise> {
+    let gathered = gather::gather(path, plan, FOR_REPORT, pool)?;
+    let fails = |what| Error::Topic {
+        path: path.to_owned(),
+        topic: gathered.topic.clone(),
+        what,
+    };
+    let axes = analyse(&gathered).map_err(fails)?;
+    let svg = outputs::chart(&gathered.topic, &axes)
+        .svg()
+        .map_err(|e| fails(e.to_string()))?;
+    let mut text = words::text(path, &gathered, &axes);
+    for warning in gathered.warnings().iter().chain(&words::doubts(&axes)) {
+        text.push_str(&format!("  warning  {warning}\n"));
+    }
+    Ok(Noise::Measured {
+        svg,
+        text,
+        json: words::json(&gathered, &axes),
     })
 }
 

@@ -1,13 +1,17 @@
 //! `strapd compare EST REF`: time-aligned angle error between two attitudes. I/O.
 
 use super::{Global, Outcome, print};
-use crate::compare::{Align, Comparison, ErrorStats, Stamped, compare};
+use crate::compare::{Align, Comparison, ErrorStats, Errors, Stamped, compare, for_each_error};
 use crate::error::{Error, Result};
 use crate::pipeline::pool::Pool;
 use crate::pipeline::track::{self, Side};
+use crate::report::page::{STRETCHES, comparison_json};
+use crate::report::plot::{Axis, Chart, Look, Series};
 use crate::report::summary::significant;
+use crate::report::trace::Traces;
+use crate::sink::Document;
 use clap::Args;
-use serde_json::{Value, json};
+use serde_json::Value;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -18,6 +22,7 @@ use std::path::PathBuf;
   strapd compare a.csv truth.ndjson --align none --max-angle 0.5 && echo good
   strapd compare est.mcap top.mcap                              against /truth, of strapd simulate
   strapd compare out.mcap out.mcap --ref-topic /truth           two topics of one file
+  strapd compare att.mcap flight.mcap --plot error.svg          the errors over time
 
 Exit code 4 when --max-angle is exceeded.")]
 pub struct Compare {
@@ -40,6 +45,12 @@ pub struct Compare {
     /// Fail (exit 4) when the largest total error exceeds this, in degrees
     #[arg(long, value_name = "DEG")]
     pub max_angle: Option<f64>,
+    /// Write the errors over time as a chart
+    #[arg(long, value_name = "FILE.svg")]
+    pub plot: Option<PathBuf>,
+    /// Replace a chart that exists
+    #[arg(long)]
+    pub force: bool,
 }
 
 /// Runs it.
@@ -59,6 +70,15 @@ pub fn run(global: &Global, args: &Compare) -> Result<Outcome> {
             "--max-angle: an angle of 0 degrees or more".to_owned(),
         ));
     }
+    args.plot
+        .iter()
+        .try_for_each(|p| super::outputs::check_chart(p))?;
+    let inputs = [args.estimate.clone(), args.reference.clone()];
+    let plot = args
+        .plot
+        .as_deref()
+        .map(|p| Document::create(p, &inputs, args.force))
+        .transpose()?;
     let pool = Pool::new(global.threads)?;
     let estimate = track::read(&args.estimate, Side::Estimate, args.topic.as_deref(), &pool)?;
     let reference = track::read(
@@ -70,10 +90,18 @@ pub fn run(global: &Global, args: &Compare) -> Result<Outcome> {
     for problem in estimate.problems.iter().chain(&reference.problems) {
         tracing::warn!("{problem}");
     }
-    let result = compare(&attitudes(&estimate), &attitudes(&reference), align);
+    let (estimated, referred) = (attitudes(&estimate), attitudes(&reference));
+    let result = compare(&estimated, &referred, align);
     let Some(errors) = &result.errors else {
         return Err(no_match(args, &estimate, &reference));
     };
+    if let Some(document) = plot {
+        let chart = chart(&estimated, &referred, align, errors);
+        document.write(&chart.svg().map_err(|e| Error::Unsupported {
+            path: args.estimate.clone(),
+            what: e.to_string(),
+        })?)?;
+    }
     let exceeded = args
         .max_angle
         .is_some_and(|limit| errors.total.max.to_degrees() > limit);
@@ -94,6 +122,40 @@ pub fn run(global: &Global, args: &Compare) -> Result<Outcome> {
         return Ok(Outcome::LimitExceeded);
     }
     Ok(Outcome::Done)
+}
+
+/// The errors over time, with their statistics in the legend.
+fn chart(estimate: &[Stamped], reference: &[Stamped], align: Align, errors: &Errors) -> Chart {
+    let mut traces = Traces::<3>::new(STRETCHES);
+    let mut first = None;
+    for_each_error(estimate, reference, align, |at| {
+        let first = *first.get_or_insert(at.stamp);
+        let degrees = [at.total, at.heading, at.inclination].map(f64::to_degrees);
+        traces.push(at.stamp.since(first), degrees);
+    });
+    let named = [
+        ("total", &errors.total),
+        ("heading", &errors.heading),
+        ("inclination", &errors.inclination),
+    ];
+    let [rms, p95, max] = degrees(&errors.total);
+    Chart {
+        title: format!("Error, world aligned: {align}; total rms {rms}, 95 % {p95}, max {max} deg"),
+        x: Axis::linear("time since the first common instant, s"),
+        y: Axis::linear("deg"),
+        series: named
+            .iter()
+            .enumerate()
+            .map(|(index, (name, stats))| Series {
+                name: format!("{name}, rms {}", significant(stats.rms.to_degrees(), 3)),
+                points: traces.points(index, 1e9),
+                look: Look::Thin,
+                color: Some(index + 1),
+            })
+            .collect(),
+        size: (1040, 420),
+        ..Chart::default()
+    }
 }
 
 /// What is no rotation becomes one with NaN, so that the comparison counts it.
@@ -191,28 +253,11 @@ fn degrees(stats: &ErrorStats) -> [String; 3] {
 }
 
 fn as_json(result: &Comparison, align: Align, limit: Option<f64>, exceeded: bool) -> Value {
-    let stats = |s: &ErrorStats| {
-        json!({ "rms_deg": s.rms.to_degrees(), "p95_deg": s.p95.to_degrees(),
-                "max_deg": s.max.to_degrees(), "mean_deg": s.mean.to_degrees() })
-    };
-    json!({
-        "align": align.name(),
-        "samples": result.samples,
-        "span_s": result.span.map(|(a, b)| b.secs_since(a)),
-        "left_out": {
-            "bad_estimates": result.left_out.bad_estimates,
-            "bad_references": result.left_out.bad_references,
-            "outside": result.left_out.outside,
-            "in_gap": result.left_out.in_gap,
-        },
-        "total": result.errors.as_ref().map(|e| stats(&e.total)),
-        "heading": result.errors.as_ref().map(|e| stats(&e.heading)),
-        "inclination": result.errors.as_ref().map(|e| stats(&e.inclination)),
-        "drift_deg_per_h": result.drift.as_ref().map(|d| json!({
-            "total": d.total_deg_per_hour(), "heading": d.heading_deg_per_hour() })),
-        "relative_1s": result.relative_1s.as_ref().map(|r| json!({
-            "median_deg": r.median.to_degrees(), "p95_deg": r.p95.to_degrees(), "pairs": r.count })),
-        "max_angle_deg": limit,
-        "exceeded": exceeded,
-    })
+    let mut value = comparison_json(result);
+    if let Some(object) = value.as_object_mut() {
+        object.insert("align".to_owned(), align.name().into());
+        object.insert("max_angle_deg".to_owned(), limit.into());
+        object.insert("exceeded".to_owned(), exceeded.into());
+    }
+    value
 }

@@ -51,6 +51,24 @@ pub fn check_distinct(outputs: &[String], logs: &[String]) -> Result<()> {
     Ok(())
 }
 
+/// Checks that a chart's name ends in `.svg`.
+///
+/// # Errors
+/// [`Error::Usage`] with the way to another format.
+pub fn check_chart(path: &Path) -> Result<()> {
+    let is_svg = path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("svg"));
+    if is_svg || path == Path::new("-") {
+        return Ok(());
+    }
+    Err(Error::Usage(format!(
+        "--plot {}: charts are written as SVG alone\n  help: --plot {}; a browser, Inkscape or rsvg-convert makes a PNG of it",
+        path.display(),
+        path.with_extension("svg").display()
+    )))
+}
+
 /// The path without `.` and double slashes, as far as that can be told without asking the disk.
 fn plain(name: &str) -> PathBuf {
     Path::new(name)

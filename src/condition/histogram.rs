@@ -44,6 +44,23 @@ impl Histogram {
         self.max
     }
 
+    /// How many values lie in `from..to` nanoseconds, octave by octave, from the first that holds one
+    /// to the last. The first octave is 0 alone, the second 1 alone.
+    pub(super) fn octaves(&self) -> Vec<(f64, f64, u64)> {
+        let mut counts = [0_u64; 70];
+        for (index, (count, _)) in self.bins.iter().enumerate() {
+            counts[octave(index)] += count;
+        }
+        let first = counts.iter().position(|n| *n > 0).unwrap_or(0);
+        let last = counts.iter().rposition(|n| *n > 0).map_or(0, |k| k + 1);
+        (first..last)
+            .map(|k| match k {
+                0 => (0.0, 1.0, counts[0]),
+                _ => (2_f64.powi(k as i32 - 1), 2_f64.powi(k as i32), counts[k]),
+            })
+            .collect()
+    }
+
     /// The value below or at which the share `q` of all values lies, nanoseconds; 0 of nothing.
     pub(super) fn quantile(&self, q: f64) -> f64 {
         let rank = (q * self.count as f64).ceil().max(1.0);
@@ -67,6 +84,14 @@ fn bin(nanos: i64) -> usize {
     }
     let within = (n >> (octave - PER_OCTAVE_BITS)) as usize & (PER_OCTAVE - 1);
     (octave - PER_OCTAVE_BITS + 1) as usize * PER_OCTAVE + within
+}
+
+/// Which octave a bin belongs to: 0 = the value 0, k = `2^(k-1)..2^k`.
+fn octave(bin: usize) -> usize {
+    if bin < 2 * PER_OCTAVE {
+        return (usize::BITS - bin.leading_zeros()) as usize;
+    }
+    bin / PER_OCTAVE + PER_OCTAVE_BITS as usize
 }
 
 #[cfg(test)]
@@ -99,6 +124,23 @@ mod tests {
             let got = histogram.quantile(q);
             // Half a bin either way and the mean within it: 1/32.
             assert!((got / exact - 1.0).abs() < 1.0 / 32.0, "{q}: {got} {exact}");
+        }
+    }
+
+    #[test]
+    fn octaves_hold_every_value_once() {
+        let mut histogram = Histogram::new();
+        let values = [0, 0, 1, 2, 3, 31, 32, 63, 64, 65, 1000, 1 << 40, i64::MAX];
+        values.iter().for_each(|v| histogram.add(*v));
+        let octaves = histogram.octaves();
+        for (from, to, count) in octaves {
+            let inside =
+                |v: &&i64| (from..to).contains(&(**v as f64)) || (**v == i64::MAX && from > 4e18);
+            assert_eq!(
+                count,
+                values.iter().filter(inside).count() as u64,
+                "{from}..{to}"
+            );
         }
     }
 }

@@ -5,19 +5,22 @@
 
 use super::estimator::Estimator;
 use super::preparation::{Prepared, Resolved};
-use crate::compare::{Align, Stamped, compare, fit_body_axes};
+use crate::compare::{Align, Stamped, compare, fit_body_axes, for_each_error};
 use crate::config::Plan;
+use crate::model::attitude::Quaternion;
 use crate::model::frames::World;
 use crate::propagate::{Executor, Method};
-use crate::record::{RawSample, SampleKind};
+use crate::record::{Nanos, RawSample, SampleKind};
+use crate::report::drawn::{ErrorTrace, Errors};
 use crate::report::summary::{Against, Recorded};
+use crate::report::trace::Traces;
 
 /// Most attitudes kept per track; beyond, every second one goes, again and again, so that memory
 /// stays bounded on any log.
 const MOST: usize = 1 << 20;
 
 /// The meanings tried: name, words, kind, and the method where it is not the run's own.
-const MEANINGS: [(&str, &str, SampleKind, Option<Method>); 3] = [
+const MEANINGS: [(&str, &str, SampleKind, Option<Method>); 4] = [
     ("rate", "the rate at its stamp", SampleKind::Rate, None),
     (
         "average",
@@ -30,6 +33,12 @@ const MEANINGS: [(&str, &str, SampleKind, Option<Method>); 3] = [
         "held over the interval after its stamp (--method dcm-left)",
         SampleKind::Rate,
         Some(Method::DcmLeft),
+    ),
+    (
+        "delta-angle",
+        "the angle turned over the interval ending at its stamp",
+        SampleKind::DeltaAngle,
+        None,
     ),
 ];
 
@@ -123,6 +132,17 @@ impl AgainstRecorded {
         self.resolved.recorded = recorded.recorded;
     }
 
+    /// The reference is this track, of the body whose attitude is estimated, and not in the log.
+    pub fn take_reference_track(&mut self, entries: &[(Nanos, [f64; 4])]) {
+        self.own_reference = false;
+        for (stamp, wxyz) in entries {
+            match Quaternion::try_from_wxyz(*wxyz) {
+                Ok(attitude) => self.reference.push((*stamp, attitude)),
+                Err(_) => self.unusable += 1,
+            }
+        }
+    }
+
     /// Takes a sample, and the orientation in it unless the reference has a topic of its own.
     pub fn take(&mut self, raw: &RawSample) {
         for estimator in &mut self.estimators {
@@ -182,11 +202,14 @@ impl AgainstRecorded {
         if entries.is_empty() && self.unusable == 0 {
             return None;
         }
-        // The meaning that fits best says most about the axes.
-        let best = self
-            .tracks
+        // The meaning that fits best says most about the axes; but rates taken for angles, or angles for
+        // rates, turn at random or hardly at all, and say nothing.
+        let is_angle = |kind: SampleKind| kind == SampleKind::DeltaAngle;
+        let best = MEANINGS
             .iter()
-            .filter_map(|track| fit_body_axes(&track.entries, entries))
+            .zip(&self.tracks)
+            .filter(|((_, _, kind, _), _)| is_angle(*kind) == is_angle(self.resolved.kind))
+            .filter_map(|(_, track)| fit_body_axes(&track.entries, entries))
             .min_by(|a, b| a.turned.total_cmp(&b.turned));
         Some(Recorded {
             usable: entries.len(),
@@ -195,6 +218,42 @@ impl AgainstRecorded {
                 && first.is_some_and(|first| entries.iter().all(|(_, q)| *q == first)),
             axes: best,
         })
+    }
+
+    /// The errors over time after [`Align::First`], for each meaning that finds a reference: `x` places
+    /// a stamp on the axis, `used` is the meaning the run took.
+    #[must_use]
+    pub fn errors(&self, stretches: usize, used: SampleKind, x: impl Fn(Nanos) -> i64) -> Errors {
+        let of = |((kind, meaning, sample_kind, method), track): (
+            &(&'static str, &'static str, SampleKind, Option<Method>),
+            &Thinned,
+        )| {
+            let reference = &self.reference.entries;
+            let comparison = compare(&track.entries, reference, Align::First);
+            comparison.errors?;
+            let mut trace = Traces::new(stretches);
+            let mut last = i64::MIN;
+            for_each_error(&track.entries, reference, Align::First, |at| {
+                last = last.max(x(at.stamp));
+                trace.push(
+                    last,
+                    [at.total, at.heading, at.inclination].map(f64::to_degrees),
+                );
+            });
+            Some(ErrorTrace {
+                kind,
+                meaning,
+                is_used: method.is_none() && *sample_kind == used,
+                comparison,
+                trace,
+            })
+        };
+        Errors {
+            stride: self.tracks.iter().map(|t| t.stride).max().unwrap_or(1),
+            usable: self.references(),
+            unusable: self.unusable,
+            traces: MEANINGS.iter().zip(&self.tracks).filter_map(of).collect(),
+        }
     }
 
     /// The errors; empty when no two recorded orientations are 1 s apart.

@@ -4,9 +4,10 @@
 //! gaps and turns per step is what a replay would do, and not another program's opinion.
 
 use super::log::{Log, problems};
-use super::look::{Looked, look};
+use super::look::{Looked, look_as};
 use super::pool::Pool;
-use super::replay;
+use super::position::Position;
+use super::replay::{self, Drawing};
 use super::run::{Replay, Source};
 use crate::config::Plan;
 use crate::decode;
@@ -22,6 +23,10 @@ pub struct Checked {
     pub problems: Vec<String>,
     /// How many of those lost data.
     pub file_losses: u64,
+    /// Its size in bytes, where that can be known.
+    pub file_size: Option<u64>,
+    /// The profile it names.
+    pub profile: String,
     /// Topics that sound like an IMU's and can not be decoded: why.
     pub refused: Vec<String>,
     /// Its topics of samples.
@@ -37,7 +42,20 @@ pub struct CheckedTopic {
     pub replayed: std::result::Result<Box<TopicSummary>, String>,
 }
 
-/// Examines a log, or one topic of it.
+/// How a log is examined.
+#[derive(Clone, Debug)]
+pub struct Examination<'a> {
+    /// How its samples are understood and integrated; [`Plan::topic`] names the only topic looked at.
+    pub plan: Plan,
+    /// The topic of the reference in the log, empty = found.
+    pub reference_topic: String,
+    /// What is drawn of the replays.
+    pub drawing: Option<Drawing<'a>>,
+    /// The command as typed.
+    pub command: String,
+}
+
+/// Examines a log, or one topic of it, with default flags.
 ///
 /// # Errors
 /// It can not be read, or holds no such topic.
@@ -47,21 +65,49 @@ pub fn check(
     options: &decode::Options,
     pool: &Pool,
 ) -> Result<Checked> {
+    let examination = Examination {
+        plan: Plan {
+            topic: named.map(str::to_owned),
+            decode: options.clone(),
+            ..Plan::default()
+        },
+        reference_topic: String::new(),
+        drawing: None,
+        command: "strapd check".to_owned(),
+    };
+    examine(path, &examination, pool, &mut |_| {})
+}
+
+/// Examines a log, or one topic of it.
+///
+/// # Errors
+/// It can not be read, or holds no such topic.
+pub fn examine(
+    path: &Path,
+    asked: &Examination<'_>,
+    pool: &Pool,
+    watch: &mut dyn FnMut(&Position),
+) -> Result<Checked> {
     let log = Log::open(path, pool)?;
-    if let Some(topic) = named
-        && !log.channels.iter().any(|k| k.channel.topic == topic)
+    let named = asked.plan.topic.as_deref().filter(|name| *name != "all");
+    for topic in named
+        .into_iter()
+        .chain(Some(asked.reference_topic.as_str()).filter(|name| !name.is_empty()))
     {
-        return Err(Error::NoSuchTopic {
-            path: path.to_owned(),
-            topic: topic.to_owned(),
-            topics: super::topics::listing(&log.candidates()),
-        });
+        if !log.channels.iter().any(|k| k.channel.topic == topic) {
+            return Err(Error::NoSuchTopic {
+                path: path.to_owned(),
+                topic: topic.to_owned(),
+                topics: super::topics::listing(&log.candidates()),
+            });
+        }
     }
-    let (looked, survey) = look(path, &log, named, options, pool)?;
-    let has_reference = log
-        .channels
-        .iter()
-        .any(|k| k.role.has_orientation && k.messages > 0);
+    let (looked, survey) = look_as(path, &log, named, &asked.plan, pool)?;
+    let has_reference = asked.drawing.is_some_and(|d| d.reference.is_some())
+        || log
+            .channels
+            .iter()
+            .any(|k| k.role.has_orientation && k.messages > 0);
     let refused = if looked.is_empty() {
         // With what it says about channels that only sound like one.
         log.choose(path, None)
@@ -76,13 +122,15 @@ pub fn check(
         .into_iter()
         .filter(|l| named.is_none_or(|name| l.topic == name))
         .map(|looked| CheckedTopic {
-            replayed: integrate(path, &looked.topic, options, has_reference, pool),
+            replayed: integrate(path, &looked.topic, asked, has_reference, pool, watch),
             looked,
         })
         .collect();
     Ok(Checked {
         problems: problems(&survey),
         file_losses: survey.problems.losses(),
+        file_size: survey.file_size,
+        profile: survey.facts.profile.clone(),
         refused,
         topics,
     })
@@ -91,28 +139,35 @@ pub fn check(
 fn integrate(
     path: &Path,
     topic: &str,
-    options: &decode::Options,
+    asked: &Examination<'_>,
     has_reference: bool,
     pool: &Pool,
+    watch: &mut dyn FnMut(&Position),
 ) -> std::result::Result<Box<TopicSummary>, String> {
     let run = Replay {
         source: Source::File(path.to_owned()),
         targets: Vec::new(),
         plan: Plan {
             topic: Some(topic.to_owned()),
-            decode: options.clone(),
-            ..Plan::default()
+            ..asked.plan.clone()
         },
         options: sink::Options::default(),
         copy_input: false,
         out_rate: None,
         speed: None,
         cast: None,
-        against: has_reference.then(String::new),
-        command: "strapd check".to_owned(),
+        against: has_reference.then(|| asked.reference_topic.clone()),
+        command: asked.command.clone(),
     };
-    let summary = replay::run(&run, pool, &mut |_| {}).map_err(|e| e.to_string())?;
-    let found = summary.topics.into_iter().next();
+    let summary = match &asked.drawing {
+        None => replay::run(&run, pool, watch),
+        Some(drawing) => replay::drawn(&run, drawing, pool, watch),
+    };
+    let found = summary
+        .map_err(|e| e.to_string())?
+        .topics
+        .into_iter()
+        .next();
     found
         .map(Box::new)
         .ok_or_else(|| "the replay gave nothing".to_owned())

@@ -4,7 +4,7 @@
 //! channels, which of them carry a rate or an orientation, and a decoder that has seen a message.
 
 use super::pool::Pool;
-use super::topics::{self, Candidate, Choice};
+use super::topics::{self, Candidate, Choice, PICKED_UNNAMED};
 use crate::decode::{self, Decoder, Rank, Role, Unsupported, role};
 use crate::error::{Error, Result};
 use crate::record::Nanos;
@@ -103,7 +103,31 @@ impl Log {
     /// For the choice of topics.
     #[must_use]
     pub fn candidates(&self) -> Vec<Candidate> {
-        self.channels.iter().map(Known::candidate).collect()
+        let candidate = |known: &Known| {
+            let mut candidate = known.candidate();
+            if self.is_our_attitude(known) {
+                candidate.rank = candidate.rank.min(PICKED_UNNAMED);
+            }
+            candidate
+        };
+        self.channels.iter().map(candidate).collect()
+    }
+
+    /// Whether a channel holds what a run put out, by its metadata or by its name beside the input's:
+    /// its rates are another channel's, less the bias.
+    fn is_our_attitude(&self, known: &Known) -> bool {
+        let topic = known.channel.topic.as_str();
+        let is_output = |(key, value): (&String, &String)| {
+            value == topic && (key == "output_topic" || key.ends_with(" output_topic"))
+        };
+        let has_input = |name: &str| {
+            let input = format!("{name}/data_raw");
+            let mut channels = self.channels.iter();
+            channels.any(|k| k.role.has_rate && k.channel.topic == input)
+        };
+        known.channel.metadata.contains_key("rotates")
+            || self.survey.facts.provenance.iter().any(is_output)
+            || topic.strip_suffix("/data").is_some_and(has_input)
     }
 }
 

@@ -57,6 +57,7 @@ struct Look {
     resolved: Resolved,
     first: Vec<RawSample>,
     clock: Option<(Clock, Option<String>)>,
+    asked: Clock,
     quality: Quality,
     conditioned: Conditioned,
     stillness: Stillness,
@@ -82,7 +83,7 @@ impl Look {
     }
 
     fn settle(&mut self) {
-        let (clock, warning) = choose_clock(&self.first, Clock::Header);
+        let (clock, warning) = choose_clock(&self.first, self.asked);
         self.quality = Quality::new(clock);
         self.first.drain(..).for_each(|raw| self.quality.push(&raw));
         self.clock = Some((clock, warning.map(|w| w.to_string())));
@@ -92,7 +93,7 @@ impl Look {
         if self.clock.is_none() {
             self.settle();
         }
-        let (clock, clock_warning) = self.clock.unwrap_or((Clock::Header, None));
+        let (clock, clock_warning) = self.clock.unwrap_or((self.asked, None));
         self.conditioned.finish(|sample| {
             self.stillness.push(sample);
             self.stamps.push(sample);
@@ -128,12 +129,30 @@ pub fn look(
     options: &Options,
     pool: &Pool,
 ) -> Result<(Vec<Looked>, Survey)> {
+    let plan = Plan {
+        decode: options.clone(),
+        ..Plan::default()
+    };
+    look_as(path, log, named, &plan, pool)
+}
+
+/// The same with the samples understood as a run of `plan` understands them.
+///
+/// # Errors
+/// As [`look`].
+pub fn look_as(
+    path: &Path,
+    log: &Log,
+    named: Option<&str>,
+    plan: &Plan,
+    pool: &Pool,
+) -> Result<(Vec<Looked>, Survey)> {
     let wanted =
         |k: &&Known| rank(&k.role) >= PICKED_UNNAMED || named == Some(k.channel.topic.as_str());
     let mut looks: Vec<Look> = Vec::new();
     let mut decoders = Vec::new();
     for known in log.channels.iter().filter(wanted) {
-        let decoder = match known.decoder(options) {
+        let decoder = match known.decoder(&plan.decode) {
             Ok(decoder) => decoder,
             Err(why) if named.is_some() => {
                 return Err(Error::Unsupported {
@@ -149,7 +168,7 @@ pub fn look(
         let stream = match looks.iter().position(|l| l.topic == known.channel.topic) {
             Some(stream) => stream,
             None => {
-                looks.push(begin(known, &decoder));
+                looks.push(begin(known, &decoder, plan));
                 looks.len() - 1
             }
         };
@@ -206,9 +225,8 @@ pub fn look(
     Ok((looked, report.survey))
 }
 
-fn begin(known: &Known, decoder: &decode::Decoder) -> Look {
-    let plan = Plan::default();
-    let resolved = Resolved::new(&plan, decoder.stated());
+fn begin(known: &Known, decoder: &decode::Decoder, plan: &Plan) -> Look {
+    let resolved = Resolved::new(plan, decoder.stated());
     Look {
         topic: known.channel.topic.clone(),
         described: described(&known.channel),
@@ -220,8 +238,9 @@ fn begin(known: &Known, decoder: &decode::Decoder) -> Look {
         kind_stated: decoder.stated().sample_kind.is_some(),
         first: Vec::new(),
         clock: None,
-        quality: Quality::new(Clock::Header),
-        conditioned: Conditioned::new(&plan, &resolved),
+        quality: Quality::new(plan.clock),
+        conditioned: Conditioned::new(plan, &resolved),
+        asked: plan.clock,
         stillness: Stillness::new(resolved.kind, Limits::default()),
         stamps: regularise::Survey::new(),
         resolved,

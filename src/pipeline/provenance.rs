@@ -82,6 +82,37 @@ pub fn of(
     Ok(provenance)
 }
 
+/// SHA-256 of all of a file, hexadecimal.
+///
+/// # Errors
+/// It can not be read.
+pub fn sha256(path: &Path) -> Result<String> {
+    let mut offset = 0;
+    let fail = |offset, source| Error::Read {
+        path: path.to_owned(),
+        offset,
+        source,
+    };
+    let mut file = File::open(path).map_err(|e| fail(0, e))?;
+    let mut hash = Sha256::new();
+    let mut block = vec![0; 1 << 20];
+    loop {
+        match file.read(&mut block) {
+            Ok(0) => return Ok(hexadecimal(&hash.finalize())),
+            Ok(n) => {
+                offset += n as u64;
+                hash.update(block.get(..n).unwrap_or_default());
+            }
+            Err(e) if e.kind() == std::io::ErrorKind::Interrupted => {}
+            Err(e) => return Err(fail(offset, e)),
+        }
+    }
+}
+
+fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
+}
+
 /// `sha256-ends:HEX`: SHA-256 over the length (8 bytes, little endian), the first and the last MiB.
 /// It names a log as surely as a hash of all of it would, without reading 10 GB for it.
 fn fingerprint(path: &Path) -> Result<String> {
@@ -103,6 +134,5 @@ fn fingerprint(path: &Path) -> Result<String> {
             .map_err(fail)?;
         hash.update(&end);
     }
-    let hex: String = hash.finalize().iter().map(|b| format!("{b:02x}")).collect();
-    Ok(format!("sha256-ends:{hex}"))
+    Ok(format!("sha256-ends:{}", hexadecimal(&hash.finalize())))
 }

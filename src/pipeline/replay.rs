@@ -4,6 +4,7 @@
 //! through stamps, then to integrate. A stream is read once; its first samples wait until these are known.
 
 use super::chosen::{Chosen, choose, find, reference, route};
+use super::history::History;
 use super::log::Log;
 use super::opening::{begin, labelled};
 use super::pool::Pool;
@@ -11,9 +12,10 @@ use super::position::Position;
 use super::preparation::{Patience, Preparation, Prepared};
 use super::route::{Item, Route};
 use super::run::{Replay, Source, refused};
-use super::session::Found;
+use super::session::{Found, Topic};
 use super::stamps::StampPass;
 use super::summarise;
+use super::track::Track;
 use super::{lines, streamed};
 use crate::error::{Error, Result};
 use crate::report::summary::RunSummary;
@@ -30,6 +32,37 @@ use std::time::Instant;
 /// Whatever kept it from being carried out. Bad samples and damaged files are no error: they are
 /// counted in the summary.
 pub fn run(run: &Replay, pool: &Pool, watch: &mut dyn FnMut(&Position)) -> Result<RunSummary> {
+    whole(run, None, pool, watch)
+}
+
+/// What a report wants of a replay beside its summary.
+#[derive(Clone, Copy, Debug)]
+pub struct Drawing<'a> {
+    /// Stretches of time each series is drawn in.
+    pub stretches: usize,
+    /// A reference from another file; `None` = as the run says.
+    pub reference: Option<&'a Track>,
+}
+
+/// The same for an MCAP file, with what is to be drawn in each topic's summary.
+///
+/// # Errors
+/// As [`run`].
+pub fn drawn(
+    run: &Replay,
+    drawing: &Drawing<'_>,
+    pool: &Pool,
+    watch: &mut dyn FnMut(&Position),
+) -> Result<RunSummary> {
+    whole(run, Some(drawing), pool, watch)
+}
+
+fn whole(
+    run: &Replay,
+    drawing: Option<&Drawing<'_>>,
+    pool: &Pool,
+    watch: &mut dyn FnMut(&Position),
+) -> Result<RunSummary> {
     let begun = Instant::now();
     let mut summary = match &run.source {
         Source::File(path) if is_lines(path) => {
@@ -45,7 +78,7 @@ pub fn run(run: &Replay, pool: &Pool, watch: &mut dyn FnMut(&Position)) -> Resul
             let pipe = lines::open(path)?;
             piped(run, pipe, pool, watch)?
         }
-        Source::File(path) => file(run, path, pool, watch)?,
+        Source::File(path) => file(run, path, drawing, pool, watch)?,
         Source::Stdin => piped(run, std::io::stdin(), pool, watch)?,
     };
     summary.elapsed_secs = begun.elapsed().as_secs_f64();
@@ -101,6 +134,7 @@ fn piped(
 fn file(
     run: &Replay,
     path: &Path,
+    drawing: Option<&Drawing<'_>>,
     pool: &Pool,
     watch: &mut dyn FnMut(&Position),
 ) -> Result<RunSummary> {
@@ -110,7 +144,11 @@ fn file(
     if let (Some(note), Some(first)) = (choice.note, chosen.first_mut()) {
         first.found.warnings.push(note);
     }
-    let reference = reference(run, path, &log, &chosen)?;
+    let elsewhere = drawing.and_then(|d| d.reference);
+    let reference = match elsewhere {
+        Some(_) => None,
+        None => reference(run, path, &log, &chosen)?,
+    };
     let prepared = prepare(run, path, &log, &chosen, pool)?;
 
     let streams: Vec<Stream> = chosen
@@ -124,6 +162,12 @@ fn file(
         && let Some(against) = &mut topic.against
     {
         against.take_reference_from(&reference.resolved);
+    }
+    if let Some(drawing) = drawing {
+        session
+            .topics
+            .iter_mut()
+            .for_each(|topic| draw(topic, drawing));
     }
     let span = log.survey.times;
     if let Some((first, last)) = span {
@@ -165,6 +209,13 @@ fn file(
         return Err(e);
     }
     Ok(summarise::run(run, session.finish(pool)?, &report.survey))
+}
+
+fn draw(topic: &mut Topic, drawing: &Drawing<'_>) {
+    topic.history = Some(History::new(topic.prepared.clock, drawing.stretches));
+    if let (Some(against), Some(track)) = (&mut topic.against, drawing.reference) {
+        against.take_reference_track(&track.entries);
+    }
 }
 
 /// Reads as far as needed to know clock, bias and initial attitude of every topic.

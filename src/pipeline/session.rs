@@ -3,6 +3,7 @@
 
 use super::against::AgainstRecorded;
 use super::estimator::Estimator;
+use super::history::History;
 use super::outlet::Outlet;
 use super::pool::Pool;
 use super::position::Position;
@@ -41,6 +42,8 @@ pub struct Topic {
     pub first_undecodable: Option<(Nanos, Undecodable)>,
     /// Its comparison with the recorded orientation.
     pub against: Option<AgainstRecorded>,
+    /// What is kept to be drawn, for a report.
+    pub history: Option<History>,
 }
 
 /// What came out of an estimator.
@@ -104,6 +107,7 @@ impl Topic {
             output: Output::default(),
             first_undecodable: None,
             against,
+            history: None,
         })
     }
 }
@@ -175,6 +179,9 @@ impl Session {
                     return Ok(());
                 };
                 topic.estimator.take(&raw);
+                if let Some(history) = &mut topic.history {
+                    history.took(Some(&raw), &topic.estimator.conditioning().counts);
+                }
                 if let Some(against) = &mut topic.against {
                     against.take(&raw);
                 }
@@ -185,6 +192,9 @@ impl Session {
                     return Ok(());
                 };
                 topic.estimator.take_undecodable();
+                if let Some(history) = &mut topic.history {
+                    history.took(None, &topic.estimator.conditioning().counts);
+                }
                 topic.first_undecodable.get_or_insert(*why);
             }
             Item::Reference(raw) => {
@@ -203,6 +213,9 @@ impl Session {
         for (stream, topic) in self.topics.iter_mut().enumerate() {
             let attitudes = topic.estimator.attitudes(pool);
             topic.output.add(attitudes);
+            if let Some(history) = &mut topic.history {
+                history.add(attitudes);
+            }
             if self.outlet.write(stream, attitudes, pool)? == Flow::Closed {
                 self.closed = true;
                 return Ok(Flow::Closed);
@@ -255,6 +268,9 @@ impl Session {
         for (stream, topic) in self.topics.iter_mut().enumerate() {
             let attitudes = topic.estimator.finish(pool);
             topic.output.add(attitudes);
+            if let Some(history) = &mut topic.history {
+                history.add(attitudes);
+            }
             let _ = self.outlet.write(stream, attitudes, pool)?;
             if let Some(against) = &mut topic.against {
                 against.finish(pool);

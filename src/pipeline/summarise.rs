@@ -8,6 +8,7 @@ use crate::condition::regularise;
 use crate::model::attitude::Quaternion;
 use crate::propagate::Method;
 use crate::record::{Nanos, SampleKind, Verdict};
+use crate::report::drawn::Drawn;
 use crate::report::stamps::{Regularised, Segment};
 use crate::report::summary::{Gaps, RunSummary, TopicSummary, significant};
 use crate::source::mcap::Survey;
@@ -20,10 +21,16 @@ const UNLIKELY_RATE: f64 = 200.0;
 /// The summary of a run.
 #[must_use]
 pub fn run(run: &Replay, ended: Ended, survey: &Survey) -> RunSummary {
-    let Ended { topics, outputs } = ended;
+    let Ended {
+        mut topics,
+        outputs,
+    } = ended;
     RunSummary {
         source: run.source.name().display().to_string(),
-        topics: topics.iter().map(|topic| of_topic(run, topic)).collect(),
+        topics: topics
+            .iter_mut()
+            .map(|topic| of_topic(run, topic))
+            .collect(),
         broken: broken(&outputs),
         reader_gone: !outputs.is_empty() && outputs.iter().all(|(_, written)| written.closed),
         outputs: outputs
@@ -36,7 +43,8 @@ pub fn run(run: &Replay, ended: Ended, survey: &Survey) -> RunSummary {
     }
 }
 
-fn of_topic(run: &Replay, topic: &Topic) -> TopicSummary {
+fn of_topic(run: &Replay, topic: &mut Topic) -> TopicSummary {
+    let drawn = drawn(topic);
     let conditioning = topic.estimator.conditioning();
     let propagation = topic.estimator.propagation();
     let (world, body) = topic.resolved.labels(topic.prepared.world);
@@ -102,10 +110,24 @@ fn of_topic(run: &Replay, topic: &Topic) -> TopicSummary {
             .as_ref()
             .and_then(super::against::AgainstRecorded::recorded),
         warnings: topic.prepared.warnings.clone(),
+        drawn,
     };
     summary.warnings.extend(topic.warnings.iter().cloned());
     summary.warnings.extend(warnings(topic, &summary));
     summary
+}
+
+/// What was kept to be drawn, with the errors against the reference.
+fn drawn(topic: &mut Topic) -> Option<Box<Drawn>> {
+    let mut drawn = topic.history.take()?.finish();
+    if let Some(against) = &topic.against {
+        let elapsed = &drawn.elapsed;
+        let errors = against.errors(drawn.stretches, topic.resolved.kind, |stamp| {
+            elapsed.at(stamp)
+        });
+        drawn.errors = Some(errors);
+    }
+    Some(Box::new(drawn))
 }
 
 /// What is not known of the bias at the end, about the worst axis, rad/s: what was not known at the start,

@@ -23,6 +23,8 @@ pub struct Chart {
     pub equal: bool,
     /// Width and height in pixels; `(0, 0)` = 860 by 520.
     pub size: (u32, u32),
+    /// Least width of the legend in pixels, for charts that are to be as wide as each other.
+    pub beside: u32,
 }
 
 /// One axis of a [`Chart`].
@@ -75,6 +77,8 @@ pub enum Look {
     /// A line through the points.
     #[default]
     Line,
+    /// A thin line: many points, many lines.
+    Thin,
     /// A broken line: references, theory.
     Dashed,
     /// A line with its points marked: few, measured.
@@ -125,7 +129,7 @@ impl Chart {
         let mut text = String::new();
         {
             let whole = SVGBackend::with_string(&mut text, (width, height)).into_drawing_area();
-            let beside = self.legend_width().min(width / 2);
+            let beside = self.legend_width().max(self.beside).min(width / 2);
             let (area, legend) = whole.split_horizontally(width - beside);
             let drawn = whole
                 .fill(&WHITE)
@@ -229,7 +233,7 @@ impl Chart {
             let y = 52 + ROW * row as i32;
             let color = PALETTE[series.color.unwrap_or(i) % PALETTE.len()];
             let pieces: &[(i32, i32)] = match series.look {
-                Look::Line | Look::Marked => &[(0, 24)],
+                Look::Line | Look::Thin | Look::Marked => &[(0, 24)],
                 Look::Dashed => &[(0, 6), (9, 15), (18, 24)],
                 Look::Dots => &[],
             };
@@ -291,11 +295,11 @@ impl Chart {
             .map_err(say)?;
         for (i, series) in self.series.iter().enumerate() {
             let color = PALETTE[series.color.unwrap_or(i) % PALETTE.len()];
-            let style = color.stroke_width(2);
+            let style = color.stroke_width(if series.look == Look::Thin { 1 } else { 2 });
             for run in series.points.split(|p| !self.drawable(p)) {
                 let points = || run.iter().map(|[x, y]| (*x, *y));
                 match series.look {
-                    Look::Line | Look::Marked => {
+                    Look::Line | Look::Thin | Look::Marked => {
                         chart
                             .draw_series(LineSeries::new(points(), style))
                             .map_err(say)?;

@@ -2,6 +2,7 @@
 //!
 //! Built by the pipeline, which knows the numbers; the words are here, in one place.
 
+use super::drawn::Drawn;
 use super::stamps::Regularised;
 use crate::compare::BodyAxesFit;
 use crate::model::frames::EARTH_RATE;
@@ -76,6 +77,8 @@ pub struct TopicSummary {
     pub recorded: Option<Recorded>,
     /// Things to know, each with the flag that helps.
     pub warnings: Vec<String>,
+    /// What is drawn of it, where a report asked for that.
+    pub drawn: Option<Box<Drawn>>,
 }
 
 /// Gaps and jumps.
@@ -151,10 +154,7 @@ impl RunSummary {
     pub fn is_lossy(&self) -> bool {
         self.file_losses > 0
             || !self.broken.is_empty()
-            || self
-                .topics
-                .iter()
-                .any(|t| t.counts.lost() > 0 || t.gaps.held + t.gaps.resets > 0)
+            || self.topics.iter().any(TopicSummary::is_lossy)
     }
 
     /// Samples seen on all topics.
@@ -220,6 +220,12 @@ impl RunSummary {
 }
 
 impl TopicSummary {
+    /// Whether samples were lost, or time in which nothing is known.
+    #[must_use]
+    pub fn is_lossy(&self) -> bool {
+        self.counts.lost() > 0 || self.gaps.held + self.gaps.resets > 0
+    }
+
     fn write_text(&self, source: &str, damaged: bool, out: &mut String) {
         let _ = writeln!(out, "{source}  {}  {}", self.topic, self.decoded_as);
         let rate = self
@@ -382,7 +388,9 @@ impl TopicSummary {
         )
     }
 
-    fn json(&self) -> Value {
+    /// For machines.
+    #[must_use]
+    pub fn json(&self) -> Value {
         let [w, x, y, z] = self.final_wxyz;
         let [yaw, pitch, roll] = self.final_ypr.map(f64::to_degrees);
         json!({

@@ -52,16 +52,23 @@ impl Output {
     /// # Errors
     /// [`Error::OutputExists`], [`Error::OutputIsInput`], [`Error::Write`].
     pub(super) fn open(target: &Target, inputs: &[PathBuf], force: bool) -> Result<Output> {
-        let path = match target {
+        match target {
             // Who listens is served, not written to.
-            Target::Null | Target::Listen(_) => return Ok(Output::Null),
-            Target::Tcp(address) => return Tcp::connect(address).map(Output::Tcp),
-            Target::Udp { address, .. } => return Udp::to(address).map(Output::Udp),
-            Target::Stdout => return Ok(Output::Stdout(io::stdout())),
-            Target::File { path, .. } => path,
-        };
+            Target::Null | Target::Listen(_) => Ok(Output::Null),
+            Target::Tcp(address) => Tcp::connect(address).map(Output::Tcp),
+            Target::Udp { address, .. } => Udp::to(address).map(Output::Udp),
+            Target::Stdout => Ok(Output::Stdout(io::stdout())),
+            Target::File { path, .. } => Output::file(path, inputs, force),
+        }
+    }
+
+    /// Opens the file `path`, whatever it is filled with.
+    ///
+    /// # Errors
+    /// As [`Output::open`].
+    pub(super) fn file(path: &Path, inputs: &[PathBuf], force: bool) -> Result<Output> {
         let write_error = |source| Error::Write {
-            path: path.clone(),
+            path: path.to_path_buf(),
             source,
         };
         match fs::metadata(path) {
@@ -73,7 +80,9 @@ impl Output {
             }
             Ok(found) => {
                 if is_one_of(path, &found, inputs) {
-                    return Err(Error::OutputIsInput { path: path.clone() });
+                    return Err(Error::OutputIsInput {
+                        path: path.to_path_buf(),
+                    });
                 }
                 if !found.is_file() {
                     let file = OpenOptions::new()
@@ -81,22 +90,26 @@ impl Output {
                         .open(path)
                         .map_err(write_error)?;
                     return Ok(Output::Direct {
-                        path: path.clone(),
+                        path: path.to_path_buf(),
                         file,
                     });
                 }
                 if !force {
-                    return Err(Error::OutputExists { path: path.clone() });
+                    return Err(Error::OutputExists {
+                        path: path.to_path_buf(),
+                    });
                 }
             }
             // A dangling link is somebody's name too.
             Err(_) if fs::symlink_metadata(path).is_ok() && !force => {
-                return Err(Error::OutputExists { path: path.clone() });
+                return Err(Error::OutputExists {
+                    path: path.to_path_buf(),
+                });
             }
             Err(_) => {}
         }
         // Through a link the file it points to is replaced, not the link.
-        let place = fs::canonicalize(path).unwrap_or_else(|_| path.clone());
+        let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
         PartFile::create(path, &place, inputs, force).map(Output::Part)
     }
 

@@ -216,3 +216,29 @@ fn shards_take_every_log_once() {
     assert_eq!(taken, logs);
     assert_eq!(crate::names(&at.join("out")).len(), 5);
 }
+
+#[test]
+fn of_samples_and_the_attitude_made_of_them_the_samples_are_taken() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let made = strapd(dir, "simulate top --duration 2 -q -o top.mcap");
+    assert_eq!(made.code, Some(0), "{made:?}");
+    // The input beside the output, as in a recording of the daemon.
+    let ran = strapd(dir, "replay top.mcap -q -o both.mcap --copy-input");
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    let again = strapd(dir, "replay both.mcap -o again.csv");
+    assert_eq!(again.code, Some(0), "{again:?}");
+    assert!(
+        again
+            .out
+            .contains("took /imu/data_raw; /imu/data could be taken too"),
+        "{again:?}"
+    );
+    strapd(dir, "replay top.mcap -q -o first.csv");
+    let read = |name: &str| std::fs::read_to_string(dir.join(name)).unwrap();
+    assert_eq!(read("first.csv"), read("again.csv"));
+    // Without the input it is the output that is taken.
+    strapd(dir, "replay top.mcap -q -o alone.mcap");
+    let alone = strapd(dir, "replay alone.mcap -o alone.csv");
+    assert_eq!(alone.code, Some(0), "{alone:?}");
+}

@@ -17,7 +17,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 /// Angles held at most: 24 bytes each, 200 MB.
-const CAPACITY: usize = 1 << 23;
+pub(super) const CAPACITY: usize = 1 << 23;
 /// Samples that tell which clock moves.
 const FEW: usize = 512;
 /// A record at rest for less than this part of its length is said to move.
@@ -36,6 +36,8 @@ pub(super) struct Gathered {
     pub(super) resolved: Resolved,
     /// Angles; of rates in units of `interval`.
     pub(super) record: AngleRecord,
+    /// How many it holds at most.
+    capacity: usize,
     /// Mean sampling interval where samples follow each other, s.
     pub(super) interval: f64,
     /// Root mean square of its variation, s.
@@ -56,11 +58,11 @@ pub(super) struct Gathered {
     lost_in_file: bool,
 }
 
-/// Decodes, conditions and gathers the topic chosen.
+/// Decodes, conditions and gathers the topic chosen; at most `capacity` angles are held.
 ///
 /// # Errors
 /// The log can not be read, no topic or several, or a topic without a rate.
-pub(super) fn gather(path: &Path, plan: &Plan, pool: &Pool) -> Result<Gathered> {
+pub(super) fn gather(path: &Path, plan: &Plan, capacity: usize, pool: &Pool) -> Result<Gathered> {
     let log = Log::open(path, pool)?;
     if plan.topic.as_deref() == Some("all") {
         return Err(Error::Usage(
@@ -89,7 +91,7 @@ pub(super) fn gather(path: &Path, plan: &Plan, pool: &Pool) -> Result<Gathered> 
             described(channel)
         )));
     }
-    let mut gathering = Gathering::new(plan, Resolved::new(plan, decoder.stated()));
+    let mut gathering = Gathering::new(plan, Resolved::new(plan, decoder.stated()), capacity);
     let described = described(channel);
     let mut failure = None;
     let reader = log.reader().map_or_else(|| mcap::Reader::open(path), Ok)?;
@@ -153,6 +155,7 @@ struct Gathering {
     conditioned: Vec<RateSample>,
     notes: Vec<String>,
     record: AngleRecord,
+    capacity: usize,
     detector: Stillness,
     last: Option<(Nanos, Vector3<f64>)>,
     begin: Option<Nanos>,
@@ -169,7 +172,7 @@ struct Gathering {
 }
 
 impl Gathering {
-    fn new(plan: &Plan, resolved: Resolved) -> Gathering {
+    fn new(plan: &Plan, resolved: Resolved, capacity: usize) -> Gathering {
         Gathering {
             plan: plan.clone(),
             detector: Stillness::new(resolved.kind, Limits::default()),
@@ -178,7 +181,8 @@ impl Gathering {
             running: None,
             conditioned: Vec::new(),
             notes: Vec::new(),
-            record: AngleRecord::new(CAPACITY),
+            record: AngleRecord::new(capacity),
+            capacity,
             last: None,
             begin: None,
             steps: 0,
@@ -325,6 +329,7 @@ impl Gathering {
             described,
             resolved: self.resolved,
             record: self.record,
+            capacity: self.capacity,
             interval: mean * 1e-9,
             unevenness: (self.step_squares / steps - off * off).max(0.0).sqrt() * 1e-9,
             secs: self
@@ -384,8 +389,9 @@ impl Gathered {
         }
         if self.record.stride() > 1 {
             all.push(format!(
-                "{} samples are more than the {CAPACITY} angles held: every {}th was kept, and the curve begins at {} s",
+                "{} samples are more than the {} angles held: every {}th was kept, and the curve begins at {} s",
                 self.record.count(),
+                self.capacity,
                 self.record.stride(),
                 significant(self.record.stride() as f64 * self.interval, 3)
             ));

@@ -1,35 +1,10 @@
-//! Curves and fits -> a chart, a table, files. I/O.
+//! Curves and fits -> a chart, a table. Pure.
 
 use super::Axis;
-use crate::error::{Error, Result};
 use crate::report::plot::{self, Chart, Look, Series};
 use std::fmt::Write as _;
-use std::path::Path;
 
 const DEG_PER_H: f64 = std::f64::consts::PI / 180.0 / 3600.0;
-
-/// Refuses to replace what should stay.
-pub(super) fn check(path: &Path, input: &Path, force: bool) -> Result<()> {
-    if path == input || std::fs::canonicalize(path).ok() == std::fs::canonicalize(input).ok() {
-        return Err(Error::OutputIsInput {
-            path: path.to_owned(),
-        });
-    }
-    if !force && std::fs::symlink_metadata(path).is_ok() {
-        return Err(Error::OutputExists {
-            path: path.to_owned(),
-        });
-    }
-    Ok(())
-}
-
-/// Writes all of `text`.
-pub(super) fn write(path: &Path, text: &str) -> Result<()> {
-    std::fs::write(path, text).map_err(|source| Error::Write {
-        path: path.to_owned(),
-        source,
-    })
-}
 
 /// Measured points and fitted curves of the three axes, deg/h over s.
 pub(super) fn chart(topic: &str, axes: &[Axis]) -> Chart {

@@ -90,6 +90,8 @@ pub struct QualitySummary {
     pub duration_secs: f64,
     /// Steps and jitter; `None` below two stamps that advance.
     pub spacing: Option<SpacingStats>,
+    /// Deviations from the ordinary step: `from..to` in ns, by octave, and how many.
+    pub jitter: Vec<(f64, f64, u64)>,
     /// Steps with samples missing.
     pub gaps: u64,
     /// Samples missing in them, by the ordinary step.
@@ -155,6 +157,7 @@ pub(super) fn summarise(quality: &Quality) -> QualitySummary {
         newest,
         duration_secs,
         spacing: quality.nominal.map(|_| spacing(quality)),
+        jitter: quality.jitter.octaves(),
         gaps: quality.gaps,
         missing: quality.missing,
         longest_gap_secs: secs(quality.longest_gap),

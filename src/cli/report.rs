@@ -1,0 +1,192 @@
+//! `strapd report FILE -o r.html`: one self-contained page about a log. I/O.
+
+use super::estimation::Estimation;
+use super::progress::Reporter;
+use super::{Global, Outcome, allan, print};
+use crate::config::{Bias, Plan};
+use crate::error::{Error, Result};
+use crate::pipeline::check::{CheckedTopic, Examination, examine};
+use crate::pipeline::pool::Pool;
+use crate::pipeline::provenance::sha256;
+use crate::pipeline::replay::Drawing;
+use crate::pipeline::track::{self, Side, Track};
+use crate::report::findings::findings;
+use crate::report::page::{Noise, Page, STRETCHES, Told, longest_rest};
+use crate::report::summary::significant;
+use crate::sink::Document;
+use clap::Args;
+use std::path::PathBuf;
+
+/// Rest from which an Allan deviation is worth having, s.
+const ENOUGH: f64 = 600.0;
+
+/// One self-contained HTML page about a log: what is good and what is wrong, rates and attitude,
+/// gaps, jitter, rest and bias, noise, error against a reference.
+#[derive(Args, Debug)]
+#[command(after_help = "Examples:
+  strapd report flight.mcap -o flight.html
+  strapd report flight.mcap -o r.html --bias auto --init gravity     every flag of replay's estimation
+  strapd report flight.mcap -o r.html --reference truth.csv          the error against another file
+  strapd report flight.mcap --json | jq .verdict                     the same numbers, no page
+
+The page needs no network and no script; it opens from a file, prints, and is at most 2 MB for any log.
+Exit codes: 0 done; 3 done, but samples were lost or could not be read.")]
+pub struct Report {
+    /// An MCAP file
+    #[arg(value_name = "FILE")]
+    pub file: PathBuf,
+    /// The page; - is standard output
+    #[arg(short, long, value_name = "FILE.html")]
+    pub output: Option<PathBuf>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub estimation: Estimation,
+    /// Hold the attitude against the one in this file (.mcap, .ndjson, .csv), not the one in the log
+    #[arg(long, value_name = "FILE")]
+    pub reference: Option<PathBuf>,
+    /// Topic or id of the reference, in --reference or in the log itself
+    #[arg(long, value_name = "NAME")]
+    pub ref_topic: Option<String>,
+    /// Replace a page that exists
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// Runs it.
+///
+/// # Errors
+/// A file can not be read, the page exists, or the topic named is not in the log. What is wrong with
+/// the samples is no error: the page says it.
+pub fn run(global: &Global, args: &Report) -> Result<Outcome> {
+    let output = args.output.as_deref();
+    match output {
+        None if !global.json => {
+            return Err(Error::Usage(
+                "report: where to?\n  help: -o report.html writes the page, --json prints the numbers alone".to_owned(),
+            ));
+        }
+        Some(path) if global.json && path.as_os_str() == "-" => {
+            return Err(Error::Usage(
+                "--json and -o - would both write to stdout\n  help: give the page a file name"
+                    .to_owned(),
+            ));
+        }
+        _ => {}
+    }
+    let plan = args.estimation.plan()?;
+    let inputs: Vec<PathBuf> = Some(&args.file)
+        .into_iter()
+        .chain(&args.reference)
+        .cloned()
+        .collect();
+    let document = output
+        .map(|path| Document::create(path, &inputs, args.force))
+        .transpose()?;
+    let pool = Pool::new(global.threads)?;
+    let reference = args.read_reference(&pool)?;
+    let asked = Examination {
+        plan,
+        reference_topic: match &reference {
+            Some(_) => String::new(),
+            None => args.ref_topic.clone().unwrap_or_default(),
+        },
+        drawing: Some(Drawing {
+            stretches: STRETCHES,
+            reference: reference.as_ref(),
+        }),
+        command: std::env::args().collect::<Vec<_>>().join(" "),
+    };
+    let mut reporter = Reporter::new(global, &args.file.display().to_string());
+    let checked = examine(&args.file, &asked, &pool, &mut |position| {
+        reporter.update(position);
+    });
+    reporter.finish();
+    let checked = checked?;
+    let told = findings(&checked).into_iter().map(|finding| Told {
+        answered: answered(finding.code, &asked.plan),
+        finding,
+    });
+    let page = Page {
+        file: args.file.display().to_string(),
+        sha256: sha256(&args.file)?,
+        command: asked.command.clone(),
+        reference: match (&reference, asked.reference_topic.as_str()) {
+            (Some(track), _) => track.name.clone(),
+            (None, "") => String::new(),
+            (None, topic) => format!("the orientation on {topic}"),
+        },
+        findings: told.collect(),
+        noise: checked
+            .topics
+            .iter()
+            .map(|topic| args.noise(&asked.plan, topic, &pool))
+            .collect(),
+        checked: &checked,
+    };
+    if let Some(document) = document {
+        document.write(&page.html())?;
+    }
+    if global.json {
+        print(&format!("{}\n", page.json()))?;
+    }
+    Ok(if page.is_lossy() {
+        Outcome::Lossy
+    } else {
+        Outcome::Done
+    })
+}
+
+impl Report {
+    fn read_reference(&self, pool: &Pool) -> Result<Option<Track>> {
+        let Some(path) = &self.reference else {
+            return Ok(None);
+        };
+        let track = track::read(path, Side::Reference, self.ref_topic.as_deref(), pool)?;
+        for problem in &track.problems {
+            tracing::warn!("{problem}");
+        }
+        Ok(Some(track))
+    }
+
+    /// The Allan deviation of a topic's longest rest, or what is missing.
+    fn noise(&self, plan: &Plan, topic: &CheckedTopic, pool: &Pool) -> Noise {
+        let Some((begins, secs)) = longest_rest(topic) else {
+            return Noise::Missing(format!(
+                "Needs {ENOUGH:.0} s of rest, and there is none in this log."
+            ));
+        };
+        if secs < ENOUGH {
+            return Noise::Missing(format!(
+                "Needs {ENOUGH:.0} s of rest; the longest in this log lasts {} s, so {} s are missing.",
+                significant(secs, 3),
+                significant(ENOUGH - secs, 3)
+            ));
+        }
+        let begins = plan.start.unwrap_or(0.0) + begins;
+        let plan = Plan {
+            topic: Some(topic.looked.topic.clone()),
+            start: Some(begins),
+            until: Some(begins + secs),
+            ..plan.clone()
+        };
+        allan::examined(&self.file, &plan, pool).unwrap_or_else(|why| {
+            let why = why.to_string().replace('\n', " ");
+            Noise::Missing(format!("It could not be had: {why}"))
+        })
+    }
+}
+
+/// The flag of this run that deals with a finding about the samples as recorded.
+fn answered(code: &str, plan: &Plan) -> Option<&'static str> {
+    let (is_given, flag) = match code {
+        "unit-degrees" => (plan.unit.is_some(), "--gyro-unit"),
+        "unit-against-gravity" if plan.unit.is_some() => (true, "--gyro-unit"),
+        "unit-against-gravity" | "looks-frd" => (plan.body.is_some(), "--body"),
+        "mounted-on-side" => (plan.mount.is_some(), "--mount"),
+        "bias" => (plan.bias != Bias::None, "--bias"),
+        "jitter" => (plan.regularise_stamps, "--regularise-stamps"),
+        "sample-kind-unknown" => (plan.kind.is_some(), "--sample-kind"),
+        _ => (false, ""),
+    };
+    is_given.then_some(flag)
+}

@@ -1,0 +1,228 @@
+//! A log, examined -> one self-contained HTML page, and the same as JSON. Pure.
+//!
+//! No script, no font, no picture from anywhere else: the page is to be mailed, printed and opened
+//! ten years on. What can not be said is said to be so, with the reason.
+
+mod charts;
+mod findings;
+mod markup;
+mod numbers;
+mod reference;
+mod timeline;
+mod topic;
+mod verdict;
+
+pub use findings::Told;
+pub use numbers::{comparison_json, longest_rest};
+
+use crate::pipeline::check::{Checked, CheckedTopic};
+use crate::report::calendar::date;
+use crate::report::summary::human_bytes;
+use markup::{Rows, escaped};
+use serde_json::{Value, json};
+use std::fmt::Write as _;
+use std::path::Path;
+use verdict::Verdict;
+
+/// Largest page, bytes.
+pub const LARGEST: usize = 2_000_000;
+/// Stretches of time a series is drawn in: about two to a pixel.
+pub const STRETCHES: usize = 1400;
+/// Topics that are drawn; of the others the numbers are told.
+const DRAWN: usize = 6;
+/// Fewest stretches, when all must fit.
+const FEWEST: usize = 64;
+
+/// Allan deviation of a topic, or why there is none.
+#[derive(Clone, Debug)]
+pub enum Noise {
+    /// Measured at rest.
+    Measured {
+        /// The curves, as SVG.
+        svg: String,
+        /// The fitted terms, as text for people.
+        text: String,
+        /// The same for machines.
+        json: Value,
+    },
+    /// What is missing.
+    Missing(String),
+}
+
+/// Everything a report is made of.
+#[derive(Debug)]
+pub struct Page<'a> {
+    /// The file's name.
+    pub file: String,
+    /// SHA-256 of all of it, hexadecimal.
+    pub sha256: String,
+    /// The command as typed.
+    pub command: String,
+    /// What is held against, in words; empty = what the log holds.
+    pub reference: String,
+    /// What was found out.
+    pub checked: &'a Checked,
+    /// What `check` says about it.
+    pub findings: Vec<Told>,
+    /// By topic.
+    pub noise: Vec<Noise>,
+}
+
+impl Page<'_> {
+    /// The page, at most [`LARGEST`] bytes: drawn more coarsely where it would be larger.
+    #[must_use]
+    pub fn html(&self) -> String {
+        let topics = self.checked.topics.len().clamp(1, DRAWN);
+        let mut stretches = STRETCHES / topics;
+        loop {
+            let html = self.html_in(stretches);
+            if html.len() <= LARGEST || stretches <= FEWEST {
+                return html;
+            }
+            stretches /= 2;
+        }
+    }
+
+    fn html_in(&self, stretches: usize) -> String {
+        let verdict = self.verdict();
+        let mut out = format!(
+            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+             <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; img-src data:\">\n\
+             <meta name=\"color-scheme\" content=\"light dark\">\n<link rel=\"icon\" href=\"data:,\">\n\
+             <title>{0} - strapd report</title>\n<style>\n{1}</style>\n</head>\n<body>\n<main>\n<h1>{0}</h1>\n",
+            escaped(self.name()),
+            include_str!("page/page.css"),
+        );
+        let _ = writeln!(
+            out,
+            "<p id=\"verdict\" class=\"{}\"><strong>{}</strong> {}</p>",
+            verdict.level.name(),
+            verdict.level.word(),
+            escaped(&verdict.text)
+        );
+        self.facts(&mut out);
+        findings::section(&self.findings, &mut out);
+        for (index, topic) in self.checked.topics.iter().enumerate() {
+            let drawn = (index < DRAWN).then_some(stretches);
+            topic::section(self, topic, self.noise.get(index), drawn, &mut out);
+        }
+        if self.checked.topics.is_empty() {
+            out.push_str("<section><h2>Attitude</h2>\n<p>There is no topic of gyro samples, so there is nothing to draw.</p></section>\n");
+        }
+        self.made(&mut out);
+        // The only character that could end the block is written as an escape of JSON.
+        let data = self.json().to_string().replace('<', "\\u003c");
+        let _ = write!(
+            out,
+            "</main>\n<script type=\"application/json\" id=\"report\">{data}</script>\n</body>\n</html>\n"
+        );
+        out
+    }
+
+    /// For machines: one object, the one in the page.
+    #[must_use]
+    pub fn json(&self) -> Value {
+        let verdict = self.verdict();
+        let topics = self.checked.topics.iter().enumerate();
+        json!({
+            "strapd": env!("CARGO_PKG_VERSION"),
+            "command": self.command,
+            "file": self.file,
+            "bytes": self.checked.file_size,
+            "sha256": self.sha256,
+            "verdict": { "level": verdict.level.name(), "text": verdict.text },
+            "file_problems": self.checked.problems,
+            "file_losses": self.checked.file_losses,
+            "findings": self.findings.iter().map(Told::json).collect::<Vec<_>>(),
+            "reference": self.reference,
+            "topics": topics.map(|(i, t)| numbers::topic(t, self.noise.get(i))).collect::<Vec<_>>(),
+            "lossy": self.is_lossy(),
+        })
+    }
+
+    /// Whether anything was lost or could not be done: exit code 3.
+    #[must_use]
+    pub fn is_lossy(&self) -> bool {
+        let lossy = |t: &CheckedTopic| match &t.replayed {
+            Ok(s) => s.is_lossy() || t.looked.undecodable > 0,
+            Err(_) => true,
+        };
+        self.checked.file_losses > 0
+            || self.checked.topics.is_empty()
+            || self.checked.topics.iter().any(lossy)
+    }
+
+    /// The file's name without its directory.
+    fn name(&self) -> &str {
+        let name = Path::new(&self.file).file_name();
+        name.and_then(|n| n.to_str()).unwrap_or(&self.file)
+    }
+
+    fn verdict(&self) -> Verdict {
+        Verdict::of(self.checked, &self.findings)
+    }
+
+    fn facts(&self, out: &mut String) {
+        let mut rows = Rows::default();
+        rows.add("file", &self.file);
+        if let Some(bytes) = self.checked.file_size {
+            rows.add("size", &human_bytes(bytes));
+        }
+        if !self.checked.profile.is_empty() {
+            rows.add("profile", &self.checked.profile);
+        }
+        let spans = self.checked.topics.iter().filter_map(|t| {
+            let quality = &t.looked.quality;
+            quality.first.zip(quality.newest)
+        });
+        let first = spans.clone().map(|(first, _)| first).min();
+        let last = spans.map(|(_, last)| last).max();
+        if let (Some(first), Some(last)) = (first, last) {
+            let dated = |stamp: crate::record::Nanos| date(u64::try_from(stamp.0).unwrap_or(0));
+            match (dated(first), dated(last)) {
+                (Some(first), Some(last)) => {
+                    rows.add("time span, UTC", &format!("{first} to {last}"))
+                }
+                _ => rows.add(
+                    "time span",
+                    &format!(
+                        "{:.3} s to {:.3} s on the log's own clock, which is not UTC",
+                        first.0 as f64 * 1e-9,
+                        last.0 as f64 * 1e-9
+                    ),
+                ),
+            }
+        }
+        for topic in &self.checked.topics {
+            let looked = &topic.looked;
+            let frame = match looked.frame.as_str() {
+                "" => String::new(),
+                frame => format!(", frame {frame}"),
+            };
+            rows.add(
+                &format!("sensor {}", looked.topic),
+                &format!(
+                    "{}{frame}, {} samples",
+                    looked.described, looked.quality.count
+                ),
+            );
+        }
+        for problem in &self.checked.problems {
+            rows.add("damage", problem);
+        }
+        let _ = writeln!(out, "<section><h2>The log</h2>\n{}</section>", rows.html());
+    }
+
+    fn made(&self, out: &mut String) {
+        let mut rows = Rows::default();
+        rows.add_code("command", &self.command);
+        rows.add("strapd", env!("CARGO_PKG_VERSION"));
+        rows.add_code("SHA-256 of the log", &self.sha256);
+        let _ = writeln!(
+            out,
+            "<section><h2>How this was made</h2>\n{}<p class=\"small\">The same numbers for machines are in this page as JSON (<code>script#report</code>), and from <code>strapd report --json</code>.</p></section>",
+            rows.html()
+        );
+    }
+}

@@ -1,0 +1,178 @@
+//! What was kept of a run -> charts over time. Pure.
+
+use crate::condition::quality::QualitySummary;
+use crate::report::drawn::{Drawn, ErrorTrace};
+use crate::report::plot::{Axis, Chart, Look, Series};
+use crate::report::trace::Traces;
+
+/// Size of a chart over time, pixels.
+const SIZE: (u32, u32) = (960, 300);
+/// Width of the legend: the same everywhere, so that the axes of time lie under each other.
+const BESIDE: u32 = 128;
+/// Up to this many points each is marked.
+const FEW: usize = 60;
+/// Errors this many times the smallest would flatten the others.
+const FLATTENING: f64 = 6.0;
+
+/// The axis of time all charts of a topic share.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Time {
+    /// ns of the unit.
+    pub(super) nanos: f64,
+    pub(super) unit: &'static str,
+    /// Where it ends, in the unit.
+    pub(super) end: f64,
+}
+
+impl Time {
+    pub(super) fn of(drawn: &Drawn) -> Time {
+        let nanos = drawn.elapsed.x() as f64;
+        let (unit, length) = match nanos * 1e-9 {
+            secs if secs < 600.0 => ("s", 1e9),
+            secs if secs < 3.0 * 3600.0 => ("min", 60e9),
+            _ => ("h", 3600e9),
+        };
+        Time {
+            nanos: length,
+            unit,
+            end: nanos / length,
+        }
+    }
+
+    fn axis(self) -> Axis {
+        Axis {
+            label: format!("time since the first sample, {}", self.unit),
+            // A given range is taken as it is; one sample has none.
+            range: (self.end > 0.0).then_some((0.0, self.end)),
+            ..Axis::default()
+        }
+    }
+}
+
+fn over_time(time: Time, title: &str, unit: &str, series: Vec<Series>) -> Result<String, String> {
+    Chart {
+        title: format!("{title}, {unit}"),
+        x: time.axis(),
+        y: Axis::linear(unit),
+        series,
+        size: SIZE,
+        beside: BESIDE,
+        ..Chart::default()
+    }
+    .svg()
+    .map_err(|e| e.to_string())
+}
+
+fn line(name: &str, color: usize, points: Vec<[f64; 2]>) -> Series {
+    Series {
+        name: name.to_owned(),
+        look: match points.len() {
+            0..=FEW => Look::Marked,
+            _ => Look::Thin,
+        },
+        points,
+        color: Some(color),
+    }
+}
+
+/// Some of a run's series in one chart.
+pub(super) fn series(
+    traces: &Traces<7>,
+    time: Time,
+    title: &str,
+    unit: &str,
+    named: &[(usize, &str)],
+) -> Result<String, String> {
+    let wraps = unit == "deg" && named.len() == 3;
+    let lines = named.iter().enumerate().map(|(color, (index, name))| {
+        let mut points = traces.points(*index, time.nanos);
+        if wraps {
+            interrupt_turns(&mut points, traces.samples);
+        }
+        line(name, color + 1, points)
+    });
+    over_time(time, title, unit, lines.collect())
+}
+
+/// Breaks a line of angles where it passes from 180 to -180 deg: the stroke across the chart is no
+/// motion. Not where a stretch holds many samples: there it is the band the angle sweeps.
+fn interrupt_turns(points: &mut Vec<[f64; 2]>, samples: u64) {
+    if samples > 3 * points.len() as u64 {
+        return;
+    }
+    let whole = std::mem::take(points);
+    for point in whole {
+        if points
+            .last()
+            .is_some_and(|last: &[f64; 2]| (last[1] - point[1]).abs() > 180.0)
+        {
+            points.push([f64::NAN; 2]);
+        }
+        points.push(point);
+    }
+}
+
+/// Total errors of every meaning worth drawing, and the names of the others.
+pub(super) fn totals(
+    traces: &[(&ErrorTrace, Traces<3>)],
+    time: Time,
+) -> (Result<String, String>, Vec<&'static str>) {
+    let rms = |t: &ErrorTrace| t.comparison.errors.map_or(f64::INFINITY, |e| e.total.rms);
+    let least = traces
+        .iter()
+        .map(|(t, _)| rms(t))
+        .fold(f64::INFINITY, f64::min);
+    let flattens = |t: &ErrorTrace| rms(t) > FLATTENING * least && !t.is_used && rms(t) > 0.02;
+    let lines = traces
+        .iter()
+        .enumerate()
+        .filter(|(_, (t, _))| !flattens(t))
+        .map(|(color, (t, trace))| line(t.kind, color + 1, trace.points(0, time.nanos)))
+        .collect();
+    let left_out = traces
+        .iter()
+        .filter(|(t, _)| flattens(t))
+        .map(|(t, _)| t.kind);
+    (
+        over_time(time, "Error by meaning of a sample", "deg", lines),
+        left_out.collect(),
+    )
+}
+
+/// Heading and inclination of one meaning.
+pub(super) fn parts(trace: &Traces<3>, time: Time) -> Result<String, String> {
+    let lines = [(1, "heading"), (2, "inclination")]
+        .map(|(index, name)| line(name, index, trace.points(index, time.nanos)));
+    over_time(time, "Error as taken here, in parts", "deg", lines.into())
+}
+
+/// Deviations of the step from the ordinary one: how many, by octave.
+pub(super) fn jitter(quality: &QualitySummary) -> Result<String, String> {
+    let mut stairs = Vec::new();
+    for (from, to, count) in quality.jitter.iter().filter(|(from, ..)| *from > 0.0) {
+        let height = (*count as f64).max(0.5);
+        stairs.push([from * 1e-3, height]);
+        stairs.push([to * 1e-3, height]);
+    }
+    if stairs.is_empty() {
+        return Err("Every step is the ordinary one: there is no jitter to draw.".to_owned());
+    }
+    let highest = stairs.iter().map(|p| p[1]).fold(1.0, f64::max);
+    Chart {
+        title: "How far steps are from the ordinary one".to_owned(),
+        x: Axis::log("deviation, us"),
+        y: Axis {
+            range: Some((0.5, 2.0 * highest)),
+            ..Axis::log("steps")
+        },
+        series: vec![Series {
+            points: stairs,
+            color: Some(1),
+            ..Series::default()
+        }],
+        size: SIZE,
+        ..Chart::default()
+    }
+    .svg()
+    .map_err(|e| e.to_string())
+}

@@ -1,0 +1,127 @@
+//! Findings -> their part of the page. Pure.
+
+use super::markup::{escaped, sentence};
+use crate::report::findings::{Finding, Severity};
+use serde_json::Value;
+use std::fmt::Write as _;
+
+/// Most findings written out; the worst come first.
+const SHOWN: usize = 200;
+
+/// A finding, and the flag of this run that deals with it already.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Told {
+    /// What was found.
+    pub finding: Finding,
+    /// The flag; `None` = nothing was done about it.
+    pub answered: Option<&'static str>,
+}
+
+impl Told {
+    /// Whether it is as bad as `severity`, and nothing was done about it.
+    pub(super) fn is_open(&self, severity: Severity) -> bool {
+        self.answered.is_none() && self.finding.severity == severity
+    }
+
+    /// For machines.
+    #[must_use]
+    pub fn json(&self) -> Value {
+        let mut value = self.finding.json();
+        if let Some(object) = value.as_object_mut() {
+            object.insert("answered_by".to_owned(), self.answered.into());
+        }
+        value
+    }
+}
+
+pub(super) fn section(told: &[Told], out: &mut String) {
+    out.push_str("<section id=\"findings\"><h2>Quality of the input</h2>\n");
+    if told.is_empty() {
+        out.push_str("<p>Nothing was found.</p>\n");
+    }
+    let topics = |told: &[Told]| {
+        let mut names: Vec<&str> = told.iter().map(|t| t.finding.topic.as_str()).collect();
+        names.retain(|name| !name.is_empty());
+        names.sort_unstable();
+        names.dedup();
+        names.len()
+    };
+    let several = topics(told) > 1;
+    for one in told.iter().take(SHOWN) {
+        let finding = &one.finding;
+        let answered = one.answered.map_or("", |_| " answered");
+        let _ = write!(
+            out,
+            "<div class=\"finding {0}{answered}\"><p><b>{0}</b> <code>{1}</code>",
+            finding.severity.name(),
+            finding.code
+        );
+        if several && !finding.topic.is_empty() {
+            let _ = write!(out, " {}", escaped(&finding.topic));
+        }
+        let _ = write!(
+            out,
+            "</p><p>{}.</p>",
+            escaped(&sentence(finding.what.trim_end_matches('.')))
+        );
+        let advice = match (finding.advice.as_str(), finding.flags.as_str()) {
+            ("", "") => String::new(),
+            (advice, "") => escaped(&sentence(advice)),
+            ("", flags) => format!("<code>{}</code>", escaped(flags)),
+            (advice, flags) => format!(
+                "{}: <code>{}</code>",
+                escaped(&sentence(advice)),
+                escaped(flags)
+            ),
+        };
+        if let Some(flag) = one.answered {
+            let _ = write!(
+                out,
+                "<p class=\"small\">Of the samples as recorded; dealt with by <code>{flag}</code> here.</p>"
+            );
+        } else if !advice.is_empty() {
+            let _ = write!(out, "<p>&rarr; {advice}</p>");
+        }
+        let evidence = evidence(finding);
+        if !evidence.is_empty() {
+            let _ = write!(out, "<p class=\"small\">{}</p>", escaped(&evidence));
+        }
+        out.push_str("</div>\n");
+    }
+    if told.len() > SHOWN {
+        let _ = writeln!(
+            out,
+            "<p>And {} more; all are in the JSON block.</p>",
+            told.len() - SHOWN
+        );
+    }
+    out.push_str("</section>\n");
+}
+
+/// The numbers behind it, in one line.
+fn evidence(finding: &Finding) -> String {
+    let parts: Vec<String> = finding
+        .evidence
+        .iter()
+        .map(|(name, value)| format!("{}: {}", name.replace('_', " "), short(value)))
+        .collect();
+    parts.join("; ")
+}
+
+fn short(value: &Value) -> String {
+    match value {
+        Value::Number(n) if n.is_f64() => n
+            .as_f64()
+            .map_or_else(String::new, |v| crate::report::summary::significant(v, 4)),
+        Value::String(text) => text.clone(),
+        Value::Array(all) => all.iter().map(short).collect::<Vec<_>>().join(", "),
+        Value::Object(all) => {
+            let parts: Vec<String> = all
+                .iter()
+                .map(|(k, v)| format!("{k} {}", short(v)))
+                .collect();
+            parts.join(", ")
+        }
+        other => other.to_string(),
+    }
+}

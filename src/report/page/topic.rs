@@ -1,0 +1,350 @@
+//! One topic -> its part of the page. Pure.
+
+use super::charts::{self, Time};
+use super::markup::{Rows, escaped, figure, table};
+use super::{Noise, Page, numbers, reference, timeline};
+use crate::pipeline::check::CheckedTopic;
+use crate::record::Verdict;
+use crate::report::drawn::Drawn;
+use crate::report::summary::{TopicSummary, meaning, significant};
+use std::fmt::Write as _;
+
+/// Rests and cuts told one by one.
+const TOLD: usize = 12;
+
+pub(super) fn section(
+    page: &Page<'_>,
+    topic: &CheckedTopic,
+    noise: Option<&Noise>,
+    stretches: Option<usize>,
+    out: &mut String,
+) {
+    let _ = writeln!(
+        out,
+        "<section class=\"topic\"><h2>{}</h2>",
+        escaped(&topic.looked.topic)
+    );
+    match &topic.replayed {
+        Err(why) => {
+            let why = why.replace("\n  help: ", "; ").replace('\n', " ");
+            let _ = writeln!(out, "<p>No attitude could be had: {}.</p>", escaped(&why));
+        }
+        Ok(summary) => integrated(summary, stretches, out),
+    }
+    let drawn = topic
+        .replayed
+        .as_ref()
+        .ok()
+        .and_then(|s| s.drawn.as_deref())
+        .filter(|d| d.series.samples > 0);
+    out.push_str("<h3>Gaps, bad samples and resets</h3>\n");
+    match drawn {
+        Some(drawn) => lost(topic, drawn, stretches, out),
+        None => {
+            out.push_str("<p>Without an attitude there is no axis of time to draw them on.</p>\n")
+        }
+    }
+    steps(topic, out);
+    rest(topic, out);
+    out.push_str("<h3>Allan deviation</h3>\n");
+    match noise {
+        Some(Noise::Measured { svg, text, .. }) => {
+            out.push_str(&figure("allan", Ok(svg.clone())));
+            let _ = writeln!(out, "<pre>{}</pre>", lines(text));
+        }
+        Some(Noise::Missing(why)) => {
+            let _ = writeln!(out, "<p>{}</p>", escaped(why));
+        }
+        None => {}
+    }
+    if let Ok(summary) = &topic.replayed {
+        let errors = summary.drawn.as_deref().and_then(|d| d.errors.as_ref());
+        let drawn = drawn.zip(stretches).map(|(d, n)| (Time::of(d), n));
+        reference::section(summary, &page.reference, errors, drawn, out);
+    }
+    out.push_str("</section>\n");
+}
+
+/// Text of several lines, each fit for HTML.
+fn lines(text: &str) -> String {
+    text.lines().map(escaped).collect::<Vec<_>>().join("\n")
+}
+
+fn integrated(s: &TopicSummary, stretches: Option<usize>, out: &mut String) {
+    let mut rows = Rows::default();
+    let rate = s
+        .rate_hz
+        .map_or_else(String::new, |hz| format!(" at {} Hz", significant(hz, 5)));
+    rows.add(
+        "samples",
+        &format!(
+            "{} in, {} used; {:.3} s{rate}, {} clock",
+            s.counts.total(),
+            s.counts.used(),
+            s.duration_secs,
+            s.clock
+        ),
+    );
+    let lost: Vec<String> = Verdict::ALL
+        .iter()
+        .filter(|v| **v != Verdict::Accepted && s.counts.get(**v) > 0)
+        .map(|v| format!("{} {}", s.counts.get(*v), v.name().replace('_', " ")))
+        .chain(s.first_losses.iter().cloned())
+        .collect();
+    if !lost.is_empty() {
+        rows.add("not plainly used", &lost.join("; "));
+    }
+    rows.add("method", &format!("{}; {}", s.method, meaning(s.kind)));
+    rows.add(
+        "frames",
+        &format!(
+            "input {} to body {} to world {}; initial attitude: {}",
+            s.input_axes, s.body, s.world, s.initial
+        ),
+    );
+    let [x, y, z] = s.bias;
+    rows.add(
+        "bias removed",
+        &if s.bias == [0.0; 3] {
+            s.bias_origin.clone()
+        } else {
+            format!("({x:.6}, {y:.6}, {z:.6}) rad/s, {}", s.bias_origin)
+        },
+    );
+    rows.add(
+        "turned",
+        &format!(
+            "{:.1} deg in all, at most {:.3} deg in one step",
+            s.turned.to_degrees(),
+            s.largest_step.to_degrees()
+        ),
+    );
+    let [yaw, pitch, roll] = s.final_ypr.map(f64::to_degrees);
+    let sigma = s.final_sigma.into_iter().fold(0.0, f64::max).to_degrees();
+    rows.add(
+        "at the end",
+        &format!(
+            "roll {roll:.3}, pitch {pitch:.3}, yaw {yaw:.3} deg, one sigma of {} deg at most; about {} deg/h of drift to be expected ({} noise)",
+            significant(sigma, 2),
+            significant(s.drift.to_degrees() * 3600.0, 2),
+            s.noise
+        ),
+    );
+    for warning in &s.warnings {
+        rows.add("warning", &warning.replace("\n  help: ", "; "));
+    }
+    out.push_str(&rows.html());
+    let drawn = s.drawn.as_deref().filter(|d| d.series.samples > 0);
+    match (drawn, stretches) {
+        (Some(drawn), Some(stretches)) => plots(s, drawn, stretches, out),
+        (Some(_), None) => out.push_str("<p>Not drawn, to keep this page small: <code>strapd report --topic NAME</code> draws it.</p>\n"),
+        (None, _) => out.push_str("<p>No sample was used, so there is nothing to draw.</p>\n"),
+    }
+}
+
+fn plots(s: &TopicSummary, drawn: &Drawn, stretches: usize, out: &mut String) {
+    let time = Time::of(drawn);
+    let traces = drawn.series.reduced(stretches);
+    if drawn.series.samples == 1 {
+        out.push_str(
+            "<p>One sample is an instant: nothing turns, and the charts hold one point.</p>\n",
+        );
+    }
+    let rate = charts::series(
+        &traces,
+        time,
+        "Body rate",
+        "deg/s",
+        &[(0, "x"), (1, "y"), (2, "z")],
+    );
+    out.push_str(&figure("rate", rate));
+    let title = format!("Attitude, {} to {}", s.body, s.world);
+    let named = [(3, "roll"), (4, "pitch"), (5, "yaw")];
+    out.push_str(&figure(
+        "attitude",
+        charts::series(&traces, time, &title, "deg", &named),
+    ));
+    let sigma = charts::series(
+        &traces,
+        time,
+        "One sigma of the attitude, worst axis",
+        "deg",
+        &[(6, "")],
+    );
+    out.push_str(&figure("sigma", sigma));
+    if drawn.series.samples > stretches as u64 * 4 {
+        let _ = writeln!(
+            out,
+            "<p class=\"small\">{} samples; of each stretch of time the first, smallest, largest and last are drawn, so no spike is hidden.</p>",
+            drawn.series.samples
+        );
+    }
+    for (at, nanos) in drawn.elapsed.kept.iter().take(TOLD) {
+        let _ = writeln!(
+            out,
+            "<p class=\"small\">The clock jumps by {} s at {} {}; the axis of time is cut there.</p>",
+            significant(*nanos as f64 * 1e-9, 6),
+            significant(*at as f64 / time.nanos, 5),
+            time.unit
+        );
+    }
+    let more = drawn.elapsed.cuts.saturating_sub(TOLD as u64);
+    if more > 0 {
+        let _ = writeln!(out, "<p class=\"small\">And {more} more such jumps.</p>");
+    }
+}
+
+fn lost(topic: &CheckedTopic, drawn: &Drawn, stretches: Option<usize>, out: &mut String) {
+    let Ok(s) = &topic.replayed else { return };
+    let gaps = s.gaps;
+    let count = gaps.bridged + gaps.held + gaps.resets;
+    let said = if count == 0 {
+        "No gap.".to_owned()
+    } else {
+        format!(
+            "{count} gaps: {} bridged, {} held, {} reset; {:.3} s in all, the longest {:.3} s at {:.3} s.",
+            gaps.bridged,
+            gaps.held,
+            gaps.resets,
+            gaps.total_secs,
+            gaps.longest_secs,
+            gaps.longest_at_secs
+        )
+    };
+    let bad = match s.counts.lost() {
+        0 => " No sample was lost.".to_owned(),
+        n => format!(" {n} of {} samples were lost.", s.counts.total()),
+    };
+    let _ = writeln!(out, "<p>{said}{bad}</p>");
+    if stretches.is_some()
+        && let Some(svg) = timeline::strips(drawn, &topic.looked.rests, Time::of(drawn))
+    {
+        out.push_str(&figure("timeline", Ok(svg)));
+    }
+}
+
+fn steps(topic: &CheckedTopic, out: &mut String) {
+    out.push_str("<h3>Stamps</h3>\n");
+    let q = &topic.looked.quality;
+    let Some(s) = q.spacing else {
+        out.push_str("<p>Fewer than two stamps advance, so there is no rate and no jitter.</p>\n");
+        return;
+    };
+    let _ = writeln!(
+        out,
+        "<p>The ordinary step is {} ({} Hz, {} clock). Steps deviate from it by {} (median), {} (99 %), {} at most; those with samples missing do not count.</p>",
+        short(s.median_secs),
+        significant(s.rate_hz, 5),
+        topic.looked.clock.name(),
+        short(s.jitter_p50_secs),
+        short(s.jitter_p99_secs),
+        short(s.jitter_max_secs)
+    );
+    let total: u64 = q.jitter.iter().map(|(.., n)| n).sum();
+    let exact = q
+        .jitter
+        .iter()
+        .find(|(from, ..)| *from == 0.0)
+        .map_or(0, |(.., n)| *n);
+    if exact > 0 && exact < total {
+        let _ = writeln!(
+            out,
+            "<p>{exact} of {total} steps are the ordinary one to the nanosecond.</p>"
+        );
+    }
+    out.push_str(&figure("jitter", charts::jitter(q)));
+    if let Some(offset) = q.offset {
+        let _ = writeln!(
+            out,
+            "<p>Header stamp less log time: mean {} s, from {} to {} s, drifting by {} ppm.</p>",
+            significant(offset.mean_secs, 4),
+            significant(offset.min_secs, 4),
+            significant(offset.max_secs, 4),
+            significant(offset.drift_ppm, 3)
+        );
+    }
+}
+
+/// A short time in the unit that suits it.
+fn short(secs: f64) -> String {
+    let (size, unit) = match secs.abs() {
+        size if size == 0.0 || size >= 1.0 => (1.0, "s"),
+        size if size >= 1e-3 => (1e3, "ms"),
+        size if size >= 1e-6 => (1e6, "us"),
+        _ => (1e9, "ns"),
+    };
+    format!("{} {unit}", significant(secs * size, 4))
+}
+
+fn rest(topic: &CheckedTopic, out: &mut String) {
+    out.push_str("<h3>Rest and bias</h3>\n");
+    let rests = &topic.looked.rests;
+    let Some((_, longest)) = numbers::longest_rest(topic) else {
+        let still = rests.stillest.map_or_else(String::new, |rate| {
+            format!(
+                ": in its stillest half second the gyro varies by {} deg/s",
+                significant(rate.to_degrees(), 3)
+            )
+        });
+        let _ = writeln!(
+            out,
+            "<p>The sensor was never at rest{still}, so no bias can be had from this log.</p>"
+        );
+        return;
+    };
+    let _ = writeln!(
+        out,
+        "<p>At rest for {} s in {} stretches, the longest {} s.</p>",
+        significant(rests.secs, 4),
+        rests.count,
+        significant(longest, 4)
+    );
+    match &topic.looked.bias {
+        None => {
+            out.push_str("<p>The rests do not agree on a bias, or are too short for one.</p>\n")
+        }
+        Some(b) => {
+            let per_hour = |v: f64| significant(v.to_degrees() * 3600.0, 3);
+            let _ = writeln!(
+                out,
+                "<p>Bias at rest ({:.6}, {:.6}, {:.6}) rad/s, that is ({}, {}, {}) deg/h, &plusmn; {} deg/h, from {} s.</p>",
+                b.bias.x,
+                b.bias.y,
+                b.bias.z,
+                per_hour(b.bias.x),
+                per_hour(b.bias.y),
+                per_hour(b.bias.z),
+                per_hour(b.sigma.max()),
+                significant(b.secs, 3)
+            );
+        }
+    }
+    let first = rests.first.unwrap_or_default();
+    let dps = |v: f64| significant(v.to_degrees(), 3);
+    let rows: Vec<Vec<String>> = rests
+        .kept
+        .iter()
+        .take(TOLD)
+        .map(|r| {
+            vec![
+                format!("{:.3}", r.start.secs_since(first)),
+                format!("{:.3}", r.secs()),
+                format!(
+                    "{}, {}, {}",
+                    dps(r.mean_rate.x),
+                    dps(r.mean_rate.y),
+                    dps(r.mean_rate.z)
+                ),
+            ]
+        })
+        .collect();
+    let head = ["begins, s", "lasts, s", "reads about x, y, z, deg/s"];
+    out.push_str(&table("numbers", &head, &rows));
+    if rests.count > TOLD as u64 {
+        let _ = writeln!(
+            out,
+            "<p class=\"small\">And {} more.</p>",
+            rests.count - TOLD as u64
+        );
+    }
+}

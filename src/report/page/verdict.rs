@@ -1,0 +1,139 @@
+//! Everything known -> one sentence. Pure.
+
+use super::findings::Told;
+use super::markup::sentence;
+use crate::pipeline::check::Checked;
+use crate::report::calendar::duration;
+use crate::report::findings::Severity;
+use crate::report::summary::{TopicSummary, significant};
+
+/// How good it is.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Level {
+    Good,
+    Warning,
+    Bad,
+}
+
+impl Level {
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Level::Good => "good",
+            Level::Warning => "warning",
+            Level::Bad => "bad",
+        }
+    }
+
+    /// Read aloud before the sentence, so that no colour is needed.
+    pub(super) fn word(self) -> &'static str {
+        match self {
+            Level::Good => "Good.",
+            Level::Warning => "Usable, with care.",
+            Level::Bad => "Something is wrong.",
+        }
+    }
+}
+
+#[derive(Clone, Debug)]
+pub(super) struct Verdict {
+    pub(super) level: Level,
+    pub(super) text: String,
+}
+
+impl Verdict {
+    pub(super) fn of(checked: &Checked, told: &[Told]) -> Verdict {
+        let count = |severity| told.iter().filter(|t| t.is_open(severity)).count();
+        let (errors, warnings) = (count(Severity::Error), count(Severity::Warning));
+        let runs = || {
+            checked
+                .topics
+                .iter()
+                .filter_map(|t| t.replayed.as_ref().ok())
+        };
+        let used = |s: &&TopicSummary| s.counts.used();
+        let best = runs()
+            .map(|s| &**s)
+            .max_by_key(used)
+            .filter(|s| s.counts.used() > 0);
+        let lossy = runs().any(|s| s.is_lossy());
+        let level = match (best, errors, warnings) {
+            (None, ..) => Level::Bad,
+            _ if errors > 0 || lossy => Level::Bad,
+            (_, _, 1..) => Level::Warning,
+            _ => Level::Good,
+        };
+        let worst = told
+            .iter()
+            .find(|t| t.is_open(Severity::Error))
+            .or_else(|| told.iter().find(|t| t.is_open(Severity::Warning)))
+            .map(|t| match t.finding.topic.as_str() {
+                topic if checked.topics.len() > 1 && !topic.is_empty() => {
+                    format!("{topic}: {}", t.finding.what)
+                }
+                _ => t.finding.what.clone(),
+            });
+        let Some(best) = best else {
+            let why =
+                worst.unwrap_or_else(|| "the log holds no gyro sample that can be used".to_owned());
+            return Verdict {
+                level,
+                text: format!("No attitude could be had: {why}."),
+            };
+        };
+        // What does not follow the gyro says nothing about how well the gyro was followed.
+        let trusted = !told
+            .iter()
+            .any(|t| t.finding.topic == best.topic && t.finding.code.starts_with("orientation-"));
+        let wrong = match (errors, warnings, worst) {
+            (_, _, None) => "; nothing wrong was found.".to_owned(),
+            (errors, warnings, Some(worst)) => {
+                let counts: Vec<String> = [(errors, "error"), (warnings, "warning")]
+                    .into_iter()
+                    .filter(|(n, _)| *n > 0)
+                    .map(|(n, what)| format!("{n} {what}{}", if n == 1 { "" } else { "s" }))
+                    .collect();
+                let first = if errors + warnings == 1 {
+                    ""
+                } else {
+                    "first of all, "
+                };
+                format!("; but {}: {first}{worst}.", counts.join(" and "))
+            }
+        };
+        Verdict {
+            level,
+            text: sentence(&good(best, trusted)) + &wrong,
+        }
+    }
+}
+
+fn good(s: &TopicSummary, trusted: bool) -> String {
+    let (used, total) = (s.counts.used(), s.counts.total());
+    let which = if used == total {
+        format!("all {total}")
+    } else {
+        format!("{used} of {total}")
+    };
+    let rate = s
+        .rate_hz
+        .map_or_else(String::new, |hz| format!(" at {} Hz", significant(hz, 4)));
+    let gaps = match s.gaps.bridged + s.gaps.held + s.gaps.resets {
+        0 => " without a gap".to_owned(),
+        1 => " with one gap".to_owned(),
+        n => format!(" with {n} gaps"),
+    };
+    let follows = s
+        .against
+        .iter()
+        .find(|row| trusted && row.kind == s.kind.name())
+        .map_or_else(String::new, |row| {
+            format!(
+                ", {} deg from the reference over 1 s (median)",
+                significant(row.median_deg, 3)
+            )
+        });
+    format!(
+        "{which} samples{rate} were integrated over {}{gaps}{follows}",
+        duration(s.duration_secs)
+    )
+}
