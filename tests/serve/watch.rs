@@ -162,7 +162,7 @@ fn a_sensor_is_seen_and_a_daemon_that_comes_back_too() {
         "imu\\u{1b}[31m0  flu in start  provisional",
         "rate x  +90.000",
         "gaps 0",
-        "|:",
+        "///:::|  roll",
     ] {
         assert!(text.contains(part), "no `{part}` in\n{text}");
     }
