@@ -16,6 +16,7 @@ mod page {
     pub(crate) mod browser;
 
     mod admission;
+    mod controls;
     mod drawing;
     mod live_numbers;
     mod model_top;

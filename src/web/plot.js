@@ -78,10 +78,11 @@ export function drawPlot(surface, colours, history, plot) {
   const from = history.firstFrom(start);
   scale.follow(...range(history, series, from), wraps);
   const { low, high } = scale;
+  const first = history.total ? history.timeOf(history.oldest) - 1e-9 : NaN;
   const xOf = (time) => LEFT + ((time - start) / seconds) * width;
   const yOf = (value) => TOP + (1 - (value - low) / (high - low)) * height;
 
-  frame(context, colours, { low, high, start, end, width, height, xOf, yOf });
+  frame(context, colours, { low, high, start, end, first, width, height, xOf, yOf });
   context.save();
   context.beginPath();
   context.rect(LEFT, 0, width + RIGHT, surface.height);
@@ -144,7 +145,7 @@ function trace(context, history, values, { from, xOf, yOf, wraps, hole }) {
   return points;
 }
 
-function frame(context, colours, { low, high, start, end, width, height, xOf, yOf }) {
+function frame(context, colours, { low, high, start, end, first, width, height, xOf, yOf }) {
   context.font = `11px ${FONT}`;
   context.fillStyle = colours.muted;
   context.strokeStyle = colours.grid;
@@ -166,7 +167,7 @@ function frame(context, colours, { low, high, start, end, width, height, xOf, yO
   context.textBaseline = "alphabetic";
   const along = ticks(start, end, Math.max(2, Math.min(6, width / 70)));
   for (const time of along.at) {
-    if (time < -1e-9) continue;
+    if (!(time >= first)) continue;
     const x = Math.round(xOf(time)) + 0.5;
     context.beginPath();
     context.moveTo(x, TOP);

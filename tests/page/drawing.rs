@@ -181,3 +181,44 @@ fn a_frozen_picture_is_the_same_to_the_byte() {
         "the picture of another attitude is the same"
     );
 }
+
+#[test]
+fn a_spike_of_one_sample_is_drawn() {
+    let Some(mut browser) = Browser::start() else {
+        return;
+    };
+    let daemon = Daemon::start(listening(&[TCP, WS]));
+    browser.go(daemon.address(1), "/");
+    browser.until_open();
+    let mut sender = Client::tcp(daemon.address(0));
+    // Eight seconds at 1 kHz: about twenty samples a column.
+    let lines: Vec<String> = (0..8000_u32)
+        .map(|n| {
+            let x = if n == 4321 { 8.0 } else { 0.2 * f64::from(n % 2) };
+            format!(
+                "{{\"class\":\"RATE\",\"id\":\"imu0\",\"stamp\":{{\"sec\":{},\"nsec\":{}}},\"gyro\":[{x},0,0]}}",
+                1_700_000_000 + n / 1000,
+                n % 1000 * 1_000_000
+            )
+        })
+        .collect();
+    for part in lines.chunks(500) {
+        sender.send(&part.join("\n"));
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    browser.until("all of it", "__strapd.seq === 7999");
+    assert_eq!(browser.eval("__strapd.sensors.imu0.points"), 8000);
+    // Rows of the plot, from the top, in which the colour of x is found.
+    let highest = browser.number(
+        r"(() => {
+        const canvas = document.querySelector('[data-testid=plot-rate]');
+        const { width, height } = canvas;
+        const { data } = canvas.getContext('2d').getImageData(60, 0, width - 80, height);
+        for (let at = 0; at < data.length; at += 4) {
+          if (data[at + 3] > 60 && data[at] > 150 && data[at + 1] < 120 && data[at + 2] < 120) return Math.floor(at / 4 / (width - 80)) / height;
+        }
+        return 1;
+      })()",
+    );
+    assert!(highest < 0.3, "the highest of x is {highest} down");
+}

@@ -65,7 +65,7 @@ fn a_case_and_a_method_are_chosen_and_the_error_is_that_of_the_command() {
         "the reason",
         "/no steady precession/.test(document.querySelector('[data-testid=problem]').textContent)",
     );
-    browser.eval("(() => { const form = document.querySelector('[data-testid=form]'); form.elements.case.value = 'sleeping'; form.elements.spin_hz.value = '20'; form.dispatchEvent(new Event('input', { bubbles: true })); })()");
+    browser.eval("(() => { const form = document.querySelector('[data-testid=form]'); form.elements.case.value = 'sleeping'; form.elements.method.value = 'live-right'; form.elements.spin_hz.value = '20'; form.dispatchEvent(new Event('input', { bubbles: true })); })()");
     browser.until(
         "the next",
         "__strapd.state === 'open' && __strapd.run.case === 'sleeping'",

@@ -1,7 +1,7 @@
 //! Playback controls, against a daemon that is made up: it speaks of a recording and notes what it is told.
 
 use super::browser::Browser;
-use crate::daemon::{Daemon, PATIENCE, WS, listening};
+use crate::daemon::{Daemon, PATIENCE, Process, WS, listening, strapd};
 use serde_json::{Value, json};
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -161,7 +161,51 @@ fn a_recording_is_paused_sought_and_sped_up() {
         "document.querySelector('[data-testid=play]').textContent === 'Again'",
     );
     browser.eval(&key("p"));
-    assert_eq!(next()["action"], "seek");
-    assert_eq!(next()["action"], "play");
+    assert_eq!(next(), json!({"class": "PLAYBACK", "action": "play"}));
+    // A stream has no end to slide to.
+    let mut endless = playing("playing", 3.0, 1.0);
+    endless["end"] = Value::Null;
+    say.send(endless).unwrap();
+    browser.until(
+        "no slider",
+        "document.querySelector('[data-testid=seek]').hidden && document.querySelector('[data-testid=place]').textContent === '0:03.0'",
+    );
+    browser.is_unharmed();
+}
+
+const LOG: &str = "fixtures/xsens_mti.mcap";
+
+#[test]
+fn a_replay_is_moved_from_the_page_and_ends_where_a_file_ends() {
+    let Some(mut browser) = Browser::start() else {
+        return;
+    };
+    let output = std::process::Command::new(strapd())
+        .args(["replay", LOG, "-o", "-", "--quiet"])
+        .output()
+        .unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    let last: Value = serde_json::from_str(text.lines().last().unwrap()).unwrap();
+    let process = Process::of(&[
+        "replay",
+        LOG,
+        "--page=127.0.0.1:0",
+        "--paused",
+        "--speed",
+        "10",
+    ]);
+    browser.go(process.address(0), "/");
+    browser.until_open();
+    browser.until("it waits", "document.querySelector('[data-testid=play]').textContent === 'Play' && !document.querySelector('[data-testid=playback]').hidden");
+    browser.eval("document.querySelector('[data-testid=play]').click()");
+    browser.until("its end", &format!("document.querySelector('[data-testid=play]').textContent === 'Again' && __strapd.seq === {}", last["seq"]));
+    for name in ["w", "x", "y", "z"] {
+        let shown = browser.eval(&format!("__strapd.q.{name}"));
+        assert_eq!(shown, last["q"][name], "q.{name}");
+    }
+    // Back to 12 s: the attitude there, and nothing after it.
+    browser.eval("(() => { const slider = document.querySelector('[data-testid=seek]'); slider.value = '12'; slider.dispatchEvent(new Event('change')); })()");
+    browser.until("it is there", "document.querySelector('[data-testid=place]').textContent.startsWith('0:12.0') && __strapd.seq === 600");
+    assert_eq!(browser.text("thinning"), "every sample");
     browser.is_unharmed();
 }
