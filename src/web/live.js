@@ -1,12 +1,13 @@
 // The live page: messages -> sensors -> at most 30 pictures a second.
 
+import { Camera, Scene } from "./body3d.js";
 import { demonstration, LAST } from "./demonstration.js";
 import { Link } from "./link.js";
 import { say, whole } from "./numbers.js";
 import { Playback } from "./playback.js";
 import { rollPitchYaw } from "./quaternion.js";
 import { Sensor, taken } from "./sensor.js";
-import { palette } from "./surface.js";
+import { palette, Surface } from "./surface.js";
 
 // Attitudes a second asked for in all, shared among the sensors shown: every sample of one at
 // 1 kHz, and of an 8 kHz one every eighth.
@@ -233,6 +234,15 @@ function draw(now) {
   }
 }
 
+// The pose of a body nobody has heard of.
+const neutral = new Surface(parts.neutral, rest);
+function rest() {
+  const scene = new Scene(neutral, new Camera(), colours);
+  scene.world([]);
+  scene.body((v) => v);
+  scene.ends();
+}
+
 let drawnAt = -Infinity;
 function tick(now) {
   requestAnimationFrame(tick);
@@ -322,12 +332,14 @@ parts.token.addEventListener("submit", (event) => {
 });
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
   colours = palette();
+  rest();
   for (const each of sensors.values()) each.dirty = true;
   touch();
 });
 document.addEventListener("visibilitychange", watch);
 parts.window.value = String(seconds);
 
+rest();
 let link = null;
 if (frozen && stopAt === null) {
   for (const att of demonstration(LAST)) heard(att);

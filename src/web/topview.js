@@ -93,6 +93,7 @@ export function drawTop(surface, camera, colours, run, at, { small = false } = {
     scene.arrow(run.truth.momentum[at], colours.y, 2.5);
     scene.arrow(run.truth.rate[at], colours.rate, 2.5);
   }
+  scene.label([]);
   const dot = (v, colour, radius) => {
     const [cx, cy] = scene.project(v);
     scene.context.fillStyle = colour;

@@ -202,11 +202,11 @@ fn a_spike_of_one_sample_is_drawn() {
             )
         })
         .collect();
-    for part in lines.chunks(500) {
+    for (n, part) in (1..).zip(lines.chunks(400)) {
         sender.send(&part.join("\n"));
-        std::thread::sleep(std::time::Duration::from_millis(20));
+        // No faster than it is drawn: nothing is to be dropped.
+        browser.until("all so far", &format!("__strapd.seq === {}", n * 400 - 1));
     }
-    browser.until("all of it", "__strapd.seq === 7999");
     assert_eq!(browser.eval("__strapd.sensors.imu0.points"), 8000);
     // Rows of the plot, from the top, in which the colour of x is found.
     let highest = browser.number(

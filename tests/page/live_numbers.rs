@@ -4,7 +4,6 @@ use super::browser::Browser;
 use crate::client::Client;
 use crate::daemon::{Daemon, TCP, WS, listening, strapd};
 use serde_json::{Value, json};
-use std::fmt::Write as _;
 use std::io::Write as _;
 use std::process::{Command, Stdio};
 
@@ -90,7 +89,6 @@ fn the_page_shows_what_the_command_line_says() {
         ),
     );
     let q = wxyz(last);
-    let mut names = String::new();
     for (name, expected) in ["q-w", "q-x", "q-y", "q-z"].into_iter().zip(q) {
         let shown = browser.shown(name);
         assert!(
@@ -99,7 +97,6 @@ fn the_page_shows_what_the_command_line_says() {
         );
         let text = browser.text(name).replace('−', "-");
         assert_eq!(text, format!("{expected:.9}"), "{name} as people read it");
-        let _ = write!(names, "{name} ");
     }
     for (name, expected) in ["roll", "pitch", "yaw"].into_iter().zip(roll_pitch_yaw(q)) {
         let shown = browser.shown(name);
@@ -165,7 +162,9 @@ fn the_error_is_the_angle_from_the_truth() {
         .zip(&truth)
         .flat_map(|(a, b)| [&**a, &**b])
         .collect();
-    Client::tcp(daemon.address(0)).send(&mixed.join("\n"));
+    // Kept to the end: who closes before he has read takes back what he said.
+    let mut sender = Client::tcp(daemon.address(0));
+    sender.send(&mixed.join("\n"));
     let (a, b) = (wxyz(expected.last().unwrap()), wxyz(exact.last().unwrap()));
     let d = {
         let [w, x, y, z] = a;
