@@ -92,6 +92,7 @@ fn workspace() -> Chart {
         ],
         equal: true,
         size: (860, 760),
+        ..Chart::default()
     }
 }
 

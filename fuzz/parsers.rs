@@ -1,6 +1,6 @@
 //! Everything that reads bytes from outside, each as a function of bytes alone: what the fuzzers of this folder and
 //! the mutation test (`tests/mutations.rs`) run. What must hold is asserted; a panic is a finding.
-#![allow(dead_code)]
+#![allow(dead_code, unreachable_pub)]
 
 use std::cell::RefCell;
 use std::ops::ControlFlow;

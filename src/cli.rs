@@ -20,6 +20,7 @@ pub mod report;
 pub mod serve;
 pub mod serving;
 pub mod simulate;
+pub mod watch;
 
 use crate::error::{Error, Result};
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -40,6 +41,8 @@ use std::process::ExitCode;
   strapd simulate top -o top.mcap              a gyro whose truth is known, to try it all on
   strapd report flight.mcap -o flight.html     all that can be said about it, on one page
   strapd cat flight.mcap --topic /imu | head   decoded samples as NDJSON
+  strapd serve                                 samples in over sockets, attitude out
+  strapd watch                                 what that daemon makes, live in the terminal
 
 Exit codes: 0 done; 1 failed; 2 bad arguments; 3 done, but samples were lost (check: something was found);
 4 compare: a limit was exceeded."
@@ -133,8 +136,10 @@ pub enum Command {
     Report(Box<report::Report>),
     /// Time-aligned angle error between two attitudes
     Compare(compare::Compare),
-    /// Decoded samples as NDJSON, CSV or a table
+    /// Decoded samples of a file, or attitudes of a daemon, as NDJSON, CSV or a table
     Cat(cat::Cat),
+    /// Every sensor of a daemon, live in the terminal
+    Watch(watch::Watch),
     /// Samples of a synthetic gyro whose true attitude is known exactly
     Simulate(Box<simulate::Simulate>),
     /// The model library: requests as NDJSON on stdin, answers on stdout
@@ -187,6 +192,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Report(command) => report::run(&cli.global, &command),
         Command::Compare(command) => compare::run(&cli.global, &command),
         Command::Cat(command) => cat::run(&cli.global, &command),
+        Command::Watch(command) => watch::run(&cli.global, &command),
         Command::Simulate(command) => simulate::run(&cli.global, &command),
         Command::Model(command) => model::run(&cli.global, &command),
         Command::Allan(command) => allan::run(&cli.global, &command),

@@ -130,6 +130,14 @@ pub enum Error {
         /// Why.
         source: std::io::Error,
     },
+    /// A daemon can not be reached, or has gone.
+    #[error("{address}: {what}")]
+    Remote {
+        /// Where.
+        address: String,
+        /// What, and what it said before.
+        what: String,
+    },
     /// A combination of arguments that can not be.
     #[error("{0}")]
     Usage(String),

@@ -16,9 +16,10 @@
 //! | [`recorder`] | what goes through -> MCAP files that survive a crash | a queue; I/O on threads of its own |
 //! | [`state`] | attitudes <-> the file a restarted daemon goes on from | I/O |
 //! | [`limits`], [`admission`] | every bound; who may come in | pure |
-//! | [`listen`], `http` | sockets | I/O |
-//! | [`source`], [`connect`], [`upstream`] | sockets others listen on | I/O |
+//! | [`foxglove`], [`viewer`] | the same for Foxglove's viewers: messages in place of lines | pure; sans-I/O |
 //! | `page`, `top` | what a browser gets | pure |
+//! | [`listen`], `http` | sockets others come to | I/O |
+//! | [`source`], [`connect`], [`upstream`]; `outgoing` | sockets others listen on: samples from there; attitudes to there | I/O |
 //! | [`shutdown`] | signals -> an orderly end | I/O |
 //!
 //! The wire is described in `docs/protocol.md`.
@@ -28,11 +29,13 @@ pub mod admission;
 pub mod cast;
 pub mod channel;
 pub mod connect;
+pub mod foxglove;
 pub mod framing;
 mod http;
 pub mod hub;
 pub mod limits;
 pub mod listen;
+mod outgoing;
 mod page;
 pub mod playback;
 mod quiet;
@@ -45,10 +48,12 @@ pub mod stream;
 pub mod subscriber;
 mod top;
 pub mod upstream;
+pub mod viewer;
 pub mod wire;
 
 use crate::config::Plan;
 use crate::error::{Error, Result};
+use crate::sink::Target;
 use address::Listen;
 use admission::{Token, Web, is_loopback};
 use hub::Hub;
@@ -88,6 +93,8 @@ pub struct Settings {
     /// Sockets a service manager has opened.
     #[cfg(unix)]
     pub passed: listen::Passed,
+    /// Whom to call and send every attitude to ([`Target::Tcp`], [`Target::Udp`]).
+    pub outputs: Vec<Target>,
     /// The replay that is served; no samples are taken then.
     pub playback: Option<Arc<playback::Playback>>,
 }
@@ -99,6 +106,7 @@ pub struct Server {
     web: Arc<Web>,
     listeners: Vec<Listener>,
     bound: Vec<Listen>,
+    outputs: Vec<Target>,
 }
 
 impl Settings {
@@ -130,6 +138,7 @@ impl Server {
         #[cfg(unix)]
         let mut passed = std::mem::take(&mut settings.passed);
         let web = std::mem::take(&mut settings.web);
+        let outputs = std::mem::take(&mut settings.outputs);
         let hub = Hub::new(settings)?;
         let mut listeners = Vec::new();
         let mut bound = Vec::new();
@@ -150,6 +159,7 @@ impl Server {
             web: Arc::new(web),
             listeners,
             bound,
+            outputs,
         })
     }
 
@@ -170,14 +180,17 @@ impl Server {
     pub async fn run(self, stop: impl Future<Output = ()>) -> bool {
         let shutdown = Shutdown::default();
         let places = Arc::new(Semaphore::new(self.hub.limits().connections));
+        let context = || Context {
+            hub: self.hub.clone(),
+            web: self.web.clone(),
+            places: places.clone(),
+            running: shutdown.running(),
+        };
         for listener in self.listeners {
-            let context = Context {
-                hub: self.hub.clone(),
-                web: self.web.clone(),
-                places: places.clone(),
-                running: shutdown.running(),
-            };
-            tokio::spawn(listener.serve(context));
+            tokio::spawn(listener.serve(context()));
+        }
+        for target in self.outputs {
+            tokio::spawn(outgoing::send(target, context()));
         }
         for outgoing in self.hub.outgoing() {
             let task = connect::keep(outgoing.clone(), self.hub.clone(), shutdown.running());

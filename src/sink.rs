@@ -23,10 +23,12 @@ mod target;
 pub(crate) mod tests;
 
 pub use copy::CopiedChannel;
+pub(crate) use csv::roll_pitch_yaw;
 pub use decimate::Decimator;
 pub use document::Document;
 pub use mcap::chunk::Compression;
 pub use mcap::live::{LiveMcap, LiveStream};
+pub(crate) use mcap::payload;
 pub use mcap::{Attachment, Encoding, InputChannel, InputMessage};
 pub use output::Flow;
 pub(crate) use output::sync_directory;

@@ -21,5 +21,7 @@ mod control;
 mod lines;
 #[path = "cast/sent.rs"]
 mod sent;
+#[path = "cast/viewers.rs"]
+mod viewers;
 #[path = "cast/watched.rs"]
 mod watched;

@@ -13,6 +13,7 @@ mod serve {
 
     mod admission;
     mod bad_lines;
+    mod cat;
     mod config;
     mod connecting;
     mod documentation;
@@ -26,4 +27,5 @@ mod serve {
     mod slow_readers;
     mod state;
     mod transports;
+    mod watch;
 }

@@ -1,6 +1,9 @@
-//! `strapd cat SOURCE`: decoded samples as NDJSON, CSV or a table. I/O.
+//! `strapd cat SOURCE`: decoded samples of a file, or attitudes of a daemon, as NDJSON, CSV or a table. I/O.
+
+mod url;
 
 use super::{Global, Outcome};
+use crate::client::remote::Remote;
 use crate::config::Plan;
 use crate::decode::{FieldPath, Options};
 use crate::error::{Error, Result};
@@ -17,14 +20,17 @@ use std::io::{BufWriter, Write};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
-/// Decoded samples as NDJSON, CSV or a table: rad/s, m/s^2, axes FLU.
+/// Decoded samples of a file, or attitudes of a daemon, as NDJSON, CSV or a table: rad/s, m/s^2, axes FLU.
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:
   strapd cat flight.mcap -n 5 --format table
   strapd cat flight.mcap --topic /imu > samples.ndjson     (strapd replay samples.ndjson reads it)
-  strapd cat flight.mcap --topic /odom --format csv")]
+  strapd cat flight.mcap --topic /odom --format csv
+  strapd cat tcp://127.0.0.1:4550 -n 100                   attitudes of a daemon as they come
+  strapd cat ws://127.0.0.1:8765 --id imu0 --rate-hz 10 -x 60 --format csv
+  strapd cat udp-listen://127.0.0.1:9870                   attitudes that somebody sends here")]
 pub struct Cat {
-    /// An MCAP file
+    /// An MCAP file; or a daemon: tcp://HOST:PORT, ws://HOST:PORT, unix:///PATH, udp-listen://HOST:PORT
     #[arg(value_name = "SOURCE")]
     pub source: PathBuf,
     /// Topic; the IMU topic by default
@@ -36,9 +42,26 @@ pub struct Cat {
     /// Form of the output
     #[arg(long, value_enum, default_value = "ndjson")]
     pub format: Format,
-    /// Stop after so many samples
+    /// Stop after so many samples (of a daemon: attitudes)
     #[arg(short = 'n', long, value_name = "N")]
     pub count: Option<u64>,
+    /// Stop after so many seconds
+    #[arg(short = 'x', long, value_name = "SECS", value_parser = seconds, help_heading = "Daemon")]
+    pub seconds: Option<f64>,
+    /// Only this sensor. May be given several times
+    #[arg(long = "id", value_name = "NAME", help_heading = "Daemon")]
+    pub ids: Vec<String>,
+    /// At most so many attitudes a second of each sensor
+    #[arg(long, value_name = "HZ", value_parser = seconds, help_heading = "Daemon")]
+    pub rate_hz: Option<f64>,
+    /// The token the daemon asks for is in this file (first line, mode 0600)
+    #[arg(
+        long,
+        value_name = "FILE",
+        env = "STRAPD_TOKEN_FILE",
+        help_heading = "Daemon"
+    )]
+    pub token_file: Option<PathBuf>,
 }
 
 /// `--format`.
@@ -60,6 +83,22 @@ const CSV_HEADER: &str =
 /// # Errors
 /// The log can not be read or decoded; stdout can not be written.
 pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
+    match args.source.to_str() {
+        Some(text) if Remote::is_meant(text) => return url::run(args, text),
+        _ => {}
+    }
+    for (given, flag) in [
+        (args.seconds.is_some(), "-x"),
+        (!args.ids.is_empty(), "--id"),
+        (args.rate_hz.is_some(), "--rate-hz"),
+    ] {
+        if given {
+            return Err(Error::Usage(format!(
+                "cat {}: {flag} is for daemons\n  help: -n N stops after N samples, --topic NAME takes one topic",
+                args.source.display()
+            )));
+        }
+    }
     let options = Options {
         fields: args
             .fields
@@ -163,6 +202,16 @@ pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
         return Ok(Outcome::Lossy);
     }
     Ok(Outcome::Done)
+}
+
+/// A number of seconds (or times a second) above 0, and not above a century.
+fn seconds(text: &str) -> std::result::Result<f64, String> {
+    text.strip_suffix('s')
+        .unwrap_or(text)
+        .parse()
+        .ok()
+        .filter(|v| *v > 0.0 && *v < 3.2e9)
+        .ok_or_else(|| "expected a number above 0".to_owned())
 }
 
 struct Printer {

@@ -138,6 +138,11 @@ pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
                 .to_owned(),
         ));
     }
+    if args.sources.len() > 1 && args.serving.page.is_some() {
+        return Err(Error::Usage(
+            "--page: one log at a time\n  help: give one SOURCE".to_owned(),
+        ));
+    }
     outputs::check_distinct(&args.outputs, &args.sources)?;
     let plan = args.estimation.plan()?;
     let pool = Pool::new(global.threads)?;

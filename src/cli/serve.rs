@@ -32,10 +32,13 @@ const MAX_SOURCES: usize = 64;
   strapd cat flight.mcap | strapd serve -                lines on standard input, too
   strapd serve tcp://imu.local:7000?id=imu0              samples from somebody who listens, for as long as it takes
   strapd serve 'ws://phone:8080/sensor/connect?type=android.sensor.gyroscope&id=phone'
+  strapd serve -o udp://127.0.0.1:9870?profile=plotjuggler
+                                                         attitudes to PlotJuggler, as they come
 
 Talk to it:
   echo '{\"class\":\"RATE\",\"id\":\"imu0\",\"stamp\":{\"sec\":1,\"nsec\":0},\"gyro\":[0.1,0,0]}' | nc 127.0.0.1 4550
   echo '{\"class\":\"WATCH\"}' | nc 127.0.0.1 4550             attitudes as they come
+  http://127.0.0.1:8765/ in a browser                          the live page; /top: a top to spin
   curl 127.0.0.1:8765/metrics")]
 pub struct Serve {
     /// Where else samples come from: tcp://HOST:PORT, ws://HOST:PORT/PATH, unix:///PATH (connected to, and
@@ -47,6 +50,10 @@ pub struct Serve {
     /// [default: tcp-listen://127.0.0.1:4550 and ws-listen://127.0.0.1:8765]
     #[arg(long, value_name = "URI")]
     pub listen: Vec<String>,
+    /// Send every attitude there, too: tcp://HOST:PORT, udp://HOST:PORT[?profile=plotjuggler]. May be
+    /// given several times
+    #[arg(short, long = "output", value_name = "SINK")]
+    pub output: Vec<String>,
     /// Take what is not given as a flag or in the environment from this TOML file
     #[arg(long, value_name = "FILE", env = "STRAPD_CONFIG")]
     pub config: Option<PathBuf>,
@@ -82,6 +89,16 @@ pub struct Serve {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub admission: Admission,
+}
+
+/// A sink of the daemon.
+fn sent_to(text: &str) -> Result<Target> {
+    match Target::parse(text)? {
+        target @ (Target::Tcp(_) | Target::Udp { .. }) => Ok(target),
+        _ => Err(Error::Usage(format!(
+            "-o {text}: the daemon sends to tcp://HOST:PORT and udp://HOST:PORT[?profile=plotjuggler]\n  help: --listen waits for watchers, --record FILE.mcap writes a file"
+        ))),
+    }
 }
 
 /// Runs it until a signal.
@@ -304,6 +321,11 @@ impl Serve {
             sources: self.outgoing()?,
             #[cfg(unix)]
             passed: listen::Passed::from_env(),
+            outputs: self
+                .output
+                .iter()
+                .map(|o| sent_to(o))
+                .collect::<Result<_>>()?,
             ..Settings::default()
         })
     }

@@ -2,7 +2,7 @@
 //!
 //! Apart from the sources because a file, a stream and lines all begin the same way.
 
-use super::outlet::Outlet;
+use super::outlet::{Delivery, Outlet};
 use super::preparation::{Prepared, Resolved};
 use super::provenance;
 use super::run::{Replay, Source};
@@ -58,9 +58,11 @@ pub(super) fn begin(
         run.options,
         streams,
         &provenance,
-        run.out_rate,
-        run.speed,
-        run.cast.clone(),
+        Delivery {
+            out_rate: run.out_rate,
+            speed: run.speed,
+            cast: run.cast.clone(),
+        },
     )?;
     Ok(Session::new(topics, outlet))
 }

@@ -61,6 +61,17 @@ pub struct Outlet {
     closed: bool,
 }
 
+/// When items are handed over, and how many of them.
+#[derive(Clone, Debug, Default)]
+pub struct Delivery {
+    /// `--out-rate`, Hz.
+    pub out_rate: Option<f64>,
+    /// `--speed`; `None` = as fast as possible.
+    pub speed: Option<f64>,
+    /// Who serves targets that listen.
+    pub cast: Option<Arc<Cast>>,
+}
+
 /// The sockets that broke before the end.
 pub(super) fn broken(written: &[(String, Written)]) -> Vec<String> {
     written
@@ -81,10 +92,13 @@ impl Outlet {
         options: Options,
         streams: &[Stream],
         provenance: &Provenance,
-        out_rate: Option<f64>,
-        speed: Option<f64>,
-        cast: Option<Arc<Cast>>,
+        delivery: Delivery,
     ) -> Result<Outlet> {
+        let Delivery {
+            out_rate,
+            speed,
+            cast,
+        } = delivery;
         let sinks = targets
             .iter()
             .filter(|target| target.listens().is_none())

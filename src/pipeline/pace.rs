@@ -6,7 +6,7 @@
 use crate::record::Nanos;
 use std::time::{Duration, Instant};
 
-/// Largest share of data handed on at once, s of data time at speed 1.
+/// Data handed on at once spans less than this, ns of data time at speed 1.
 const SLICE_NANOS: i64 = 1_000_000;
 
 /// A longer step of data time is not waited for.
@@ -36,7 +36,7 @@ impl Pace {
         let slice = self.slice_nanos();
         let mut first = None;
         stamps
-            .take_while(|stamp| stamp.since(*first.get_or_insert(*stamp)).abs() <= slice)
+            .take_while(|stamp| stamp.since(*first.get_or_insert(*stamp)).abs() < slice)
             .count()
             .max(1)
     }
@@ -98,7 +98,7 @@ mod tests {
         };
         let stamps = |n: i64, step: i64| (0..n).map(move |i| Nanos(i * step));
         assert_eq!(pace.take(stamps(10, 100_000_000)), 1);
-        assert_eq!(pace.take(stamps(100, 250_000)), 5);
+        assert_eq!(pace.take(stamps(100, 250_000)), 4);
     }
 
     #[test]

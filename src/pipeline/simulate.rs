@@ -1,6 +1,6 @@
 //! A synthetic gyro -> the sinks of a run. I/O, but for the samples themselves.
 
-use super::outlet::{Outlet, broken};
+use super::outlet::{Delivery, Outlet, broken};
 use super::pool::Pool;
 use super::position::Position;
 use crate::error::{Error, Result};
@@ -69,9 +69,11 @@ pub fn run(
         simulation.options,
         &streams(simulation.kind, &simulation.frame_id),
         &provenance(&simulation),
-        None,
-        simulation.speed,
-        simulation.cast.clone(),
+        Delivery {
+            out_rate: None,
+            speed: simulation.speed,
+            cast: simulation.cast.clone(),
+        },
     )?;
     if let Some(cast) = &simulation.cast {
         let steps = simulation.source.count().saturating_sub(1);

@@ -136,10 +136,8 @@ impl Cast {
             return;
         }
         for stream in streams.iter().skip(lanes.len()) {
-            let channel = Arc::new(Channel::new(stream));
-            self.hub.declare(&channel);
             lanes.push(Lane {
-                channel,
+                channel: self.hub.declare(stream),
                 next: 0,
                 resets: 0,
                 last_reset: 0,
@@ -223,6 +221,7 @@ impl Cast {
             }
         }
         if self.playback.begin_anew() {
+            self.hub.began_anew();
             self.hub.announce(false, None);
             Next::Again
         } else {

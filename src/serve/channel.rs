@@ -3,12 +3,17 @@
 //! Apart from where its samples come from: a sensor of the daemon and a stream of a replay reach
 //! whoever watches in the same way.
 
+use super::foxglove;
 use super::subscriber::{Chunk, Class};
-use crate::record::{AttitudeSample, RawSample};
+use crate::record::{AttitudeSample, Nanos, RawSample};
 use crate::sink::json::Objects;
+use crate::sink::payload::{Payloads, Topic};
 use crate::sink::{Content, Profile, Stream};
 use bytes::Bytes;
+use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::sync::Mutex;
+use std::sync::PoisonError;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Bytes of one shared chunk of lines, about: small beside an outbox, so that little is dropped at once.
@@ -21,7 +26,21 @@ pub struct Channel {
     stream: Stream,
     lines: Objects,
     plot: Objects,
+    /// Number of its first channel for viewers.
+    number: u32,
+    payloads: Payloads,
+    /// Stamp of the attitude sent last: a transform with the same is not sent again.
+    last: Mutex<Option<Nanos>>,
     sent: AtomicU64,
+}
+
+/// Which of an item's times a message is given.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Clock {
+    /// When it was logged or received.
+    Log,
+    /// Its stamp: what a playback shows and is moved by.
+    Stamp,
 }
 
 /// Consecutive items of a stream, oldest first.
@@ -51,14 +70,19 @@ impl Items<'_> {
 }
 
 impl Channel {
-    /// Named and labelled as `stream` says.
+    /// Named and labelled as the last of `streams` says, which is all there are.
     #[must_use]
-    pub fn new(stream: &Stream) -> Channel {
+    pub fn new(streams: &[Stream]) -> Channel {
+        let nameless = Stream::default();
+        let stream = streams.last().unwrap_or(&nameless);
         Channel {
             id: stream.id.as_str().into(),
             stream: stream.clone(),
             lines: Objects::new(stream, Profile::Lines),
             plot: Objects::new(stream, Profile::PlotJuggler),
+            number: foxglove::channel_of(streams.len().saturating_sub(1)),
+            payloads: Payloads::new(stream, streams),
+            last: Mutex::new(None),
             sent: AtomicU64::new(0),
         }
     }
@@ -84,9 +108,90 @@ impl Channel {
         }
     }
 
-    /// This many items more were offered to clients.
-    pub(super) fn count(&self, items: usize) {
-        self.sent.fetch_add(items as u64, Ordering::Relaxed);
+    /// These items were offered to clients.
+    pub(super) fn passed(&self, items: Items<'_>) {
+        self.sent.fetch_add(items.len() as u64, Ordering::Relaxed);
+        if let Items::Attitudes([.., last]) = items {
+            *self.last() = Some(last.stamp);
+        }
+    }
+
+    fn last(&self) -> std::sync::MutexGuard<'_, Option<Nanos>> {
+        self.last.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Number and topic of each of its channels for viewers.
+    pub(crate) fn topics(&self) -> impl Iterator<Item = (u32, Topic)> + use<> {
+        (self.number..).zip(Payloads::topics(&self.stream))
+    }
+
+    /// The messages of items from number `first_seq` on for a viewer with these subscriptions.
+    pub(super) fn frames(
+        &self,
+        subscriptions: &BTreeMap<u32, u32>,
+        first_seq: u64,
+        items: Items<'_>,
+        clock: Clock,
+    ) -> Vec<Chunk> {
+        let of = |channel: u32| subscriptions.get(&channel).copied();
+        let own = of(self.number);
+        let (beside, is_transform) = match self.payloads {
+            Payloads::Attitude { .. } => (of(foxglove::TRANSFORMS), true),
+            Payloads::Truth { .. } => (of(self.number + 1), false),
+            Payloads::Samples { .. } => (None, false),
+        };
+        if own.is_none() && beside.is_none() {
+            return Vec::new();
+        }
+        let mut previous = *self.last();
+        let mut out = Vec::new();
+        let push = |out: &mut Vec<u8>, subscription, time, payload: &dyn Fn(&mut Vec<u8>)| {
+            if let Some(subscription) = subscription {
+                let from = foxglove::open(out, subscription, time);
+                payload(out);
+                foxglove::close(out, from);
+            }
+        };
+        let mut chunks = Vec::new();
+        let mut from = first_seq;
+        let end = first_seq + items.len() as u64;
+        for (n, seq) in (first_seq..end).enumerate() {
+            match items {
+                Items::Attitudes(items) => {
+                    let item = &items[n];
+                    let time = match clock {
+                        Clock::Log => item.log,
+                        Clock::Stamp => item.stamp,
+                    };
+                    push(&mut out, own, time, &|out| {
+                        self.payloads.attitude(out, item)
+                    });
+                    let repeats = previous.replace(item.stamp) == Some(item.stamp);
+                    // A repeat of a stamp is what tf2 warns about.
+                    if !(is_transform && repeats) {
+                        push(&mut out, beside, time, &|out| {
+                            self.payloads.beside(out, item)
+                        });
+                    }
+                }
+                Items::Samples(items) => {
+                    let item = &items[n];
+                    push(&mut out, own, item.log, &|out| {
+                        self.payloads.sample(out, item)
+                    });
+                }
+            }
+            if out.len() >= CHUNK_BYTES || (seq + 1 == end && !out.is_empty()) {
+                chunks.push(Chunk {
+                    id: self.id.clone(),
+                    first_seq: from,
+                    count: seq + 1 - from,
+                    bytes: std::mem::take(&mut out).into(),
+                });
+                from = seq + 1;
+            }
+        }
+        chunks
     }
 
     /// Its line in `STATUS`.

@@ -1,5 +1,6 @@
 //! HTTP requests -> the pages, state of the daemon, or a WebSocket. I/O.
 
+use super::foxglove::SUBPROTOCOLS;
 use super::hub::Hub;
 use super::listen::{Connection, websocket};
 use super::{page, top};
@@ -11,6 +12,9 @@ use axum::extract::ws::WebSocketUpgrade;
 use axum::http::{HeaderMap, HeaderValue, Response, StatusCode, header};
 use axum::routing::get;
 use std::fmt::Write;
+
+/// Lines, where a client names what it speaks.
+const OWN_SUBPROTOCOL: &str = "strapd.v1";
 
 /// Everything that is answered.
 pub(crate) fn router() -> Router {
@@ -37,7 +41,7 @@ async fn root(
     socket: Result<WebSocketUpgrade, axum::extract::ws::rejection::WebSocketUpgradeRejection>,
 ) -> Response<Body> {
     if headers.contains_key(header::UPGRADE) {
-        upgrade(connection, socket).await
+        upgrade(connection, headers, socket).await
     } else {
         page::live()
     }
@@ -45,22 +49,52 @@ async fn root(
 
 async fn upgrade(
     Extension(connection): Extension<Connection>,
+    headers: HeaderMap,
     upgrade: Result<WebSocketUpgrade, axum::extract::ws::rejection::WebSocketUpgradeRejection>,
 ) -> Response<Body> {
+    let spoken = subprotocol(&headers);
+    let foxglove = SUBPROTOCOLS.iter().position(|known| Some(*known) == spoken);
+    let foxglove = foxglove.map(|known| known == 0);
     match upgrade {
+        Ok(_) if foxglove.is_some() && connection.hub.token().is_some() && !connection.trusted => {
+            // Its first message can show no token.
+            unauthorised()
+        }
         Ok(upgrade) => upgrade
+            .protocols(spoken)
             .max_message_size(websocket::MAX_MESSAGE)
             .max_frame_size(websocket::MAX_MESSAGE)
             .read_buffer_size(websocket::READ_BUFFER)
             .write_buffer_size(websocket::WRITE_BUFFER)
             .max_write_buffer_size(websocket::MAX_WRITE_BUFFER)
-            .on_upgrade(move |socket| websocket::converse(socket, connection)),
+            .on_upgrade(move |socket| websocket::converse(socket, connection, foxglove)),
         Err(_) => refusal(
             StatusCode::UPGRADE_REQUIRED,
             "upgrade_required",
             "this is a WebSocket; docs/protocol.md says how to talk to it",
         ),
     }
+}
+
+/// The first of the sub-protocols a client offers that we speak.
+fn subprotocol(headers: &HeaderMap) -> Option<&'static str> {
+    headers
+        .get_all(header::SEC_WEBSOCKET_PROTOCOL)
+        .iter()
+        .filter_map(|value| value.to_str().ok())
+        .flat_map(|value| value.split(','))
+        .find_map(|offered| {
+            let mut known = SUBPROTOCOLS.into_iter().chain([OWN_SUBPROTOCOL]);
+            known.find(|known| *known == offered.trim())
+        })
+}
+
+fn unauthorised() -> Response<Body> {
+    refusal(
+        StatusCode::UNAUTHORIZED,
+        "unauthorised",
+        "Authorization: Bearer TOKEN is needed",
+    )
 }
 
 /// Whether samples are taken: 200, or 503 while shutting down.
@@ -77,11 +111,7 @@ async fn health(Extension(connection): Extension<Connection>) -> Response<Body> 
 
 async fn metrics(Extension(connection): Extension<Connection>) -> Response<Body> {
     if connection.hub.token().is_some() && !connection.trusted {
-        return refusal(
-            StatusCode::UNAUTHORIZED,
-            "unauthorised",
-            "Authorization: Bearer TOKEN is needed",
-        );
+        return unauthorised();
     }
     response(
         StatusCode::OK,

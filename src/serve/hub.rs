@@ -5,16 +5,19 @@
 //! the clients' outboxes. Sensors run side by side on as many cores as there are; within one the
 //! order is that of its lock.
 
+mod telling;
+
 use super::Settings;
 use super::admission::Token;
-use super::channel::{Channel, Items};
+use super::channel::{Channel, Clock, Items};
 use super::connect::Outgoing;
+use super::foxglove;
 use super::limits::Limits;
-use super::playback::{Action, Playback};
+use super::playback::Playback;
 use super::recorder::Handle;
 use super::state::Sensors;
 use super::stream::{SensorStream, live_plan};
-use super::subscriber::{Chunk, Class, Outbox};
+use super::subscriber::{Chunk, Outbox};
 use super::wire::{self, Fault};
 use crate::config::Plan;
 use crate::decode::{self, Line, LineDecoder, printable};
@@ -72,6 +75,18 @@ struct StateStatus {
     failed: Option<String>,
 }
 
+/// What a client is told, and how.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Shape {
+    /// Lines.
+    Lines(Profile),
+    /// Messages of the Foxglove protocol.
+    Foxglove {
+        /// Whether it can move a playback.
+        controls: bool,
+    },
+}
+
 /// One connection.
 #[derive(Debug)]
 pub struct Client {
@@ -81,8 +96,8 @@ pub struct Client {
     pub peer: String,
     /// What waits for it.
     pub outbox: Outbox,
-    /// What its objects look like.
-    profile: Profile,
+    /// What it is told, and how.
+    shape: Shape,
     since: Instant,
 }
 
@@ -242,65 +257,6 @@ impl Hub {
         }
     }
 
-    /// Whether clients may send samples: a replay has its own.
-    #[must_use]
-    pub fn takes_samples(&self) -> bool {
-        self.playback.is_none()
-    }
-
-    /// What can be watched.
-    #[must_use]
-    pub fn classes(&self) -> Vec<Class> {
-        let mut classes: Vec<Class> = read(&self.channels).iter().map(|c| c.class()).collect();
-        classes.push(Class::Att);
-        classes.sort_unstable();
-        classes.dedup();
-        classes
-    }
-
-    /// A stream of a replay.
-    pub fn declare(&self, channel: &Arc<Channel>) {
-        write(&self.channels).push(channel.clone());
-    }
-
-    /// Where the replay is; `None` where there is none to be controlled.
-    #[must_use]
-    pub fn place(&self) -> Option<Bytes> {
-        let place = self.playback.as_ref()?.place()?;
-        Some(wire::playback(&place, &self.session()))
-    }
-
-    /// A client asks for something of the replay; all others that watch are told.
-    ///
-    /// # Errors
-    /// The fault to answer with.
-    pub fn control(&self, client: u64, action: Action) -> std::result::Result<(), Fault> {
-        let playback = self.playback.as_ref().ok_or_else(|| {
-            Fault::new(
-                "nothing_to_play",
-                "samples come as they come here; strapd replay LOG -o ws-listen://... can be controlled",
-            )
-        })?;
-        if playback.ask(action)? {
-            for client in read(&self.clients).values() {
-                client.outbox.forget();
-            }
-        }
-        self.announce(false, Some(client));
-        Ok(())
-    }
-
-    /// Tells whoever watches where the replay is. A `tick` is left out where one waits already.
-    pub fn announce(&self, tick: bool, but: Option<u64>) {
-        let Some(line) = self.place() else { return };
-        let watchers = read(&self.watchers).clone();
-        for client in watchers.iter().filter(|c| Some(c.number) != but) {
-            if client.profile == Profile::Lines {
-                client.outbox.note(line.clone(), tick);
-            }
-        }
-    }
-
     /// From now on it is shutting down.
     pub fn stop(&self) {
         self.stopping.store(true, Ordering::Relaxed);
@@ -314,16 +270,30 @@ impl Hub {
 
     /// Somebody has connected.
     pub fn join(&self, peer: String) -> Arc<Client> {
-        self.join_as(peer, Profile::Lines)
+        self.join_as(peer, Shape::Lines(Profile::Lines))
     }
 
-    /// As [`Hub::join`], for somebody whose objects look like `profile`.
-    pub fn join_as(&self, peer: String, profile: Profile) -> Arc<Client> {
+    /// As [`Hub::join`], for somebody who is told things in another way. A viewer is told at once who
+    /// we are and what there is.
+    pub fn join_as(&self, peer: String, shape: Shape) -> Arc<Client> {
+        let outbox = match shape {
+            Shape::Lines(Profile::Lines) => Outbox::new(),
+            Shape::Lines(Profile::PlotJuggler) => Outbox::saying(|_, _| Bytes::new()),
+            Shape::Foxglove { .. } => Outbox::saying(foxglove::gap),
+        };
+        let channels = read(&self.channels);
+        if let Shape::Foxglove { controls } = shape {
+            outbox.reply(self.server_info(controls));
+            outbox.reply(foxglove::channels(channels.iter().map(|c| &**c), true));
+            if let Some(place) = self.where_it_is().filter(|_| controls) {
+                outbox.reply(foxglove::playback_state(&place, false, ""));
+            }
+        }
         let client = Arc::new(Client {
             number: self.next_client.fetch_add(1, Ordering::Relaxed),
             peer,
-            outbox: Outbox::new(),
-            profile,
+            outbox,
+            shape,
             since: Instant::now(),
         });
         write(&self.clients).insert(client.number, client.clone());
@@ -383,11 +353,16 @@ impl Hub {
         }
         let id: Arc<str> = id.into();
         let first = run.samples.first().copied().unwrap_or_default();
-        let mut saved = lock(&self.saved);
-        let last = saved.get(&*id);
-        let stream = SensorStream::new(self.plan_of(&id), id.clone(), run.head, &first, last)?;
-        saved.remove(&*id);
-        drop(saved);
+        let last = lock(&self.saved).get(&*id).cloned();
+        let stream = SensorStream::new(
+            self.plan_of(&id),
+            id.clone(),
+            run.head,
+            &first,
+            last.as_ref(),
+            |labels| self.declare(labels),
+        )?;
+        lock(&self.saved).remove(&*id);
         if let Some(recorder) = &self.recorder {
             recorder.declare(stream.recorded());
         }
@@ -474,12 +449,25 @@ impl Hub {
         items: Items<'_>,
         text: &mut Vec<u8>,
     ) {
-        channel.count(items.len());
         // Encoded when the first asks, and shared by all.
         let mut encoded: [Option<Vec<Chunk>>; 2] = [None, None];
         let watchers = read(&self.watchers).clone();
         for client in &*watchers {
-            let profile = client.profile;
+            let profile = match client.shape {
+                Shape::Lines(profile) => profile,
+                Shape::Foxglove { .. } => {
+                    let clock = match &self.playback {
+                        None => Clock::Log,
+                        Some(_) => Clock::Stamp,
+                    };
+                    let now = self.where_it_is().and_then(|place| place.at);
+                    client.outbox.offer_frames(
+                        |wanted| channel.frames(wanted, first_seq, items, clock),
+                        now,
+                    );
+                    continue;
+                }
+            };
             let [lines, plot] = &mut encoded;
             let kept = match profile {
                 Profile::Lines => lines,
@@ -500,6 +488,7 @@ impl Hub {
                 Items::Samples(_) => client.outbox.offer_samples(channel.id(), &mut shared),
             }
         }
+        channel.passed(items);
         if matches!(items, Items::Attitudes(_)) {
             count(&self.counters.attitudes, items.len());
         }
@@ -512,7 +501,7 @@ impl Hub {
         let sources: Vec<_> = sensors
             .iter()
             .map(|s| lock(s).stream.status())
-            .chain(read(&self.channels).iter().map(|c| c.status()))
+            .chain(self.own_streams())
             .collect();
         let clients: Vec<_> = read(&self.clients)
             .values()

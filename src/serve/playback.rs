@@ -360,10 +360,7 @@ impl Playback {
         if state.stopped || state.restart {
             return false;
         }
-        if state.at.is_none() || state.until.is_some() {
-            // A seek beyond the end.
-            state.at = state.at.max(state.end);
-        }
+        // A seek may have led beyond the end.
         state.until = None;
         state.mode = Mode::Ended;
         if let Some(at) = state.at {

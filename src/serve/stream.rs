@@ -16,6 +16,7 @@ use crate::serve::channel::Channel;
 use crate::serve::recorder::stream_of;
 use crate::serve::state::Saved;
 use crate::serve::wire::Fault;
+use crate::sink::Stream;
 use std::sync::Arc;
 
 /// Numbers a sample may come behind its turn. Further back, the sender counts anew.
@@ -75,7 +76,8 @@ pub fn live_plan(plan: &Plan) -> Result<Plan, String> {
 
 impl SensorStream {
     /// For the sensor `id`, whose first line says `stated` and brings `first`. `plan` is a
-    /// [`live_plan`]. It goes on from `saved`, where there is such.
+    /// [`live_plan`]. It goes on from `saved`, where there is such; `declare` makes its labels known to
+    /// clients.
     ///
     /// # Errors
     /// The fault to answer with: the samples do not fit the plan.
@@ -85,6 +87,7 @@ impl SensorStream {
         stated: &Line,
         first: &RawSample,
         saved: Option<&Saved>,
+        declare: impl FnOnce(&Stream) -> Arc<Channel>,
     ) -> Result<SensorStream, Fault> {
         let fault = |what: String| Fault {
             id: Some(id.to_string()),
@@ -109,7 +112,7 @@ impl SensorStream {
             }
         }
         Ok(SensorStream {
-            channel: Arc::new(Channel::new(&labels)),
+            channel: declare(&labels),
             id,
             estimator,
             kind: resolved.kind,

@@ -4,8 +4,8 @@
 //! queue has a cap, the oldest attitudes give way, what gave way is counted and said (`GAP`), and
 //! replies (`STATUS`, `ERROR`, ...) are never dropped: when too many wait, the client is closed.
 
-use super::wire;
-use crate::record::AttitudeSample;
+use super::{foxglove, wire};
+use crate::record::{AttitudeSample, Nanos};
 use crate::sink::Decimator;
 use bytes::Bytes;
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
@@ -31,6 +31,9 @@ pub struct Chunk {
     /// Whole lines.
     pub bytes: Bytes,
 }
+
+/// Between two notices of the time in the data, ns of it.
+const BETWEEN_TIMES: i64 = 20_000_000;
 
 /// The stream of notes, which are no attitudes.
 const NOTE: &str = "";
@@ -97,11 +100,19 @@ pub enum Full {
     Control,
 }
 
+impl Default for Outbox {
+    fn default() -> Outbox {
+        Outbox::new()
+    }
+}
+
 /// Everything that waits for one client.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Outbox {
     state: Mutex<State>,
     wake: Notify,
+    /// How it is said that attitudes were dropped; empty: not at all.
+    gap: fn(&str, &Dropped) -> Bytes,
 }
 
 #[derive(Debug, Default)]
@@ -117,6 +128,10 @@ struct State {
     /// A note the data around which was dropped.
     stray: Option<Bytes>,
     watch: Option<Filter>,
+    /// Of a viewer: subscription by channel.
+    subscriptions: BTreeMap<u32, u32>,
+    /// What time it was told last.
+    told: Option<Nanos>,
     decimators: HashMap<Arc<str>, Option<Decimator>>,
     full: Option<Full>,
     dropped: u64,
@@ -140,7 +155,17 @@ impl Outbox {
     /// Empty, watching nothing.
     #[must_use]
     pub fn new() -> Outbox {
-        Outbox::default()
+        Outbox::saying(wire::gap)
+    }
+
+    /// The same, for somebody to whom `gap` says what was dropped; empty: nothing is said.
+    #[must_use]
+    pub fn saying(gap: fn(&str, &Dropped) -> Bytes) -> Outbox {
+        Outbox {
+            state: Mutex::default(),
+            wake: Notify::new(),
+            gap,
+        }
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
@@ -272,6 +297,50 @@ impl Outbox {
         self.wake.notify_one();
     }
 
+    /// A viewer subscribes to a channel. `false`: it has already, or has `most` subscriptions.
+    pub fn subscribe(&self, channel: u32, subscription: u32, most: usize) -> bool {
+        let subscriptions = &mut self.state().subscriptions;
+        let is_new = subscriptions.len() < most
+            && !subscriptions.contains_key(&channel)
+            && !subscriptions.values().any(|s| *s == subscription);
+        if is_new {
+            subscriptions.insert(channel, subscription);
+        }
+        is_new
+    }
+
+    /// A viewer ends a subscription.
+    pub fn unsubscribe(&self, subscription: u32) {
+        self.state().subscriptions.retain(|_, s| *s != subscription);
+    }
+
+    /// Offers messages to a viewer, made for its subscriptions. `now`: what time it is in the data,
+    /// where it wants to know.
+    pub fn offer_frames(
+        &self,
+        make: impl FnOnce(&BTreeMap<u32, u32>) -> Vec<Chunk>,
+        now: Option<Nanos>,
+    ) {
+        let mut state = self.state();
+        let mut chunks = make(&state.subscriptions);
+        let Some(last) = chunks.last_mut() else {
+            return;
+        };
+        if let Some(now) = now
+            && state
+                .told
+                .is_none_or(|told| now.since(told).abs() >= BETWEEN_TIMES)
+        {
+            state.told = Some(now);
+            last.bytes = [&last.bytes[..], &foxglove::time(now)].concat().into();
+        }
+        for chunk in chunks {
+            state.push(chunk);
+        }
+        drop(state);
+        self.wake.notify_one();
+    }
+
     /// Moves up to about `most` bytes out: replies first, then what was dropped, then attitudes.
     /// Returns how many bytes of attitudes are among them; give them back to [`Outbox::written`].
     pub fn take(&self, most: usize, out: &mut VecDeque<Bytes>) -> usize {
@@ -280,7 +349,7 @@ impl Outbox {
         state.control_bytes = 0;
         out.extend(state.stray.take());
         for (id, dropped) in std::mem::take(&mut state.gaps) {
-            out.push_back(wire::gap(&id, &dropped));
+            out.push_back((self.gap)(&id, &dropped));
         }
         let mut taken = 0;
         while taken < most
@@ -321,7 +390,7 @@ impl Outbox {
     pub fn level(&self) -> Level {
         let state = self.state();
         Level {
-            watching: state.watch.is_some(),
+            watching: state.watch.is_some() || !state.subscriptions.is_empty(),
             queued: state.queued,
             sent: state.sent,
             dropped: state.dropped,
@@ -369,7 +438,6 @@ impl State {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use crate::record::Nanos;
     use crate::sink::tests::sample;
 
     fn chunk(id: &str, first_seq: u64, size: usize) -> Chunk {
@@ -432,6 +500,40 @@ mod tests {
         offer(&outbox, &chunk("a", 100, 1));
         assert_eq!(outbox.level().dropped, 130);
         outbox.written(taken);
+        assert_eq!(outbox.level().queued, 0);
+    }
+
+    #[test]
+    fn a_note_keeps_its_place_among_the_attitudes_and_the_last_one_is_never_dropped() {
+        let outbox = Outbox::new();
+        outbox.watch(Some(Filter::default()));
+        offer(&outbox, &chunk("a", 0, 4));
+        outbox.note(Bytes::from("one"), false);
+        offer(&outbox, &chunk("a", 10, 4));
+        outbox.note(Bytes::from("a tick too many"), true);
+        let mut out = VecDeque::new();
+        let taken = outbox.take(usize::MAX, &mut out);
+        assert_eq!(
+            (texts(&out), taken),
+            (["xxxx", "one", "xxxx"].map(str::to_owned).to_vec(), 11)
+        );
+        outbox.written(taken);
+        // Told again, once nothing of the kind waits.
+        outbox.note(Bytes::from("tick"), true);
+        outbox.note(Bytes::from("two"), false);
+        for n in 0..20 {
+            offer(&outbox, &chunk("a", n * 10, 32 << 10));
+        }
+        out.clear();
+        outbox.take(0, &mut out);
+        let said = texts(&out);
+        assert!(
+            said[0] == "two" && said[1].contains("GAP") && said.len() == 2,
+            "{said:?}"
+        );
+        outbox.note(Bytes::from("three"), false);
+        outbox.forget();
+        assert!(outbox.is_empty());
         assert_eq!(outbox.level().queued, 0);
     }
 

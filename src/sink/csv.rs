@@ -73,7 +73,7 @@ fn push_number(out: &mut Vec<u8>, value: f64) {
 /// # Source
 /// Bernardes and Viollet, PLoS ONE 17 (2022), the half-angle form, derived here for ZYX: with half
 /// angles, `w - y = (cos - sin)(pitch/2) cos((yaw + roll)/2)` and so on for `x + z`, `w + y`, `z - x`.
-fn roll_pitch_yaw([w, x, y, z]: [f64; 4]) -> [f64; 3] {
+pub(crate) fn roll_pitch_yaw([w, x, y, z]: [f64; 4]) -> [f64; 3] {
     let half_sum = (x + z).atan2(w - y);
     let half_difference = (z - x).atan2(w + y);
     let pitch =

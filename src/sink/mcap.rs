@@ -8,6 +8,7 @@ pub(super) mod cdr;
 pub(super) mod chunk;
 pub(super) mod file;
 pub(super) mod live;
+pub(crate) mod payload;
 pub(super) mod record;
 mod schemas;
 

@@ -28,7 +28,7 @@ pub enum Content {
 }
 
 /// One estimated topic and what its output is called.
-#[derive(Clone, PartialEq, Eq, Debug)]
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Stream {
     /// What its samples are.
     pub content: Content,

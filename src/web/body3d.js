@@ -108,19 +108,27 @@ export class Scene {
     context.stroke();
     this.path([this.project([0, -1, 0]), this.project([0, 1, 0])]);
     context.stroke();
-    context.font = `11px ${FONT}`;
-    context.textAlign = "center";
-    context.textBaseline = "middle";
-    names.forEach((name, axis) => {
+    this.labels = names.map((name, axis) => {
       const v = [0, 0, 0];
       v[axis] = 1.18;
-      const [x, y] = this.project(v);
-      context.fillText(name, x, y);
+      return [name, ...this.project(v)];
     });
   }
 
+  // The names of the world's axes, but where something else is written.
+  label(taken) {
+    const { context, colours } = this;
+    context.font = `11px ${FONT}`;
+    context.textAlign = "center";
+    context.textBaseline = "middle";
+    context.fillStyle = colours.muted;
+    for (const [name, x, y] of this.labels) {
+      if (taken.every((t) => Math.hypot(t[0] - x, t[1] - y) > 20)) context.fillText(name, x, y);
+    }
+  }
+
   // Points on the sphere, oldest first, fading with age; `front` says which half is drawn.
-  locus(points, colour, front, width = 1.75, dash = []) {
+  locus(points, colour, front, width = 1.75, dash = [], behind = 0.3) {
     const { context } = this;
     context.strokeStyle = colour;
     context.lineWidth = width;
@@ -128,7 +136,7 @@ export class Scene {
     const last = points.length - 1;
     for (let age = 0; age < AGES; age++) {
       const [from, to] = [Math.floor((age * last) / AGES), Math.floor(((age + 1) * last) / AGES)];
-      context.globalAlpha = (0.12 + (0.88 * (age + 1)) / AGES) * (front ? 1 : 0.3);
+      context.globalAlpha = (0.12 + (0.88 * (age + 1)) / AGES) * (front ? 1 : behind);
       context.beginPath();
       let drawing = false;
       for (let n = from; n <= to; n++) {
@@ -213,16 +221,17 @@ export class Scene {
   // The ends of the axes, over everything: each disc is centred on the projected point.
   ends() {
     const { context, colours } = this;
-    context.font = `600 12px ${FONT}`;
-    context.textAlign = "center";
-    context.textBaseline = "middle";
-    this.tips.forEach(([x, y], n) => {
-      const colour = [colours.x, colours.y, colours.z][n];
+    const letters = this.tips.map(([x, y]) => {
       const [dx, dy] = [x - this.centre[0], y - this.centre[1]];
       const length = Math.hypot(dx, dy);
       const [ux, uy] = length > 1 ? [dx / length, dy / length] : [0.7, -0.7];
-      context.fillStyle = colour;
-      context.fillText("xyz"[n], x + ux * 14, y + uy * 14);
+      return [x + ux * 14, y + uy * 14];
+    });
+    this.label(letters);
+    context.font = `600 12px ${FONT}`;
+    letters.forEach(([x, y], n) => {
+      context.fillStyle = [colours.x, colours.y, colours.z][n];
+      context.fillText("xyz"[n], x, y);
     });
     this.tips.forEach(([x, y], n) => {
       context.fillStyle = [colours.x, colours.y, colours.z][n];

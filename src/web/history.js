@@ -71,6 +71,19 @@ export class History {
     return low;
   }
 
+  // Greatest rate of the last `seconds`, looked at here and there: for the length of an arrow.
+  fastest(seconds) {
+    const from = this.firstFrom(this.newestTime - seconds);
+    const step = Math.ceil((this.total - from) / 200) || 1;
+    let most = 0;
+    for (let n = Math.ceil(from / step) * step; n < this.total; n += step) {
+      const slot = this.slot(n);
+      const speed = Math.hypot(this.rate[0][slot], this.rate[1][slot], this.rate[2][slot]);
+      if (speed > most) most = speed;
+    }
+    return most;
+  }
+
   // Attitude at `time`, between its neighbours; null outside, and across a hole.
   attitudeAt(time) {
     const after = this.firstFrom(time);

@@ -1,12 +1,13 @@
 // The live page: messages -> sensors -> at most 30 pictures a second.
 
+import { Camera, Scene } from "./body3d.js";
 import { demonstration, LAST } from "./demonstration.js";
 import { Link } from "./link.js";
 import { say, whole } from "./numbers.js";
 import { Playback } from "./playback.js";
 import { rollPitchYaw } from "./quaternion.js";
-import { Sensor } from "./sensor.js";
-import { palette } from "./surface.js";
+import { Sensor, taken } from "./sensor.js";
+import { palette, Surface } from "./surface.js";
 
 // Attitudes a second asked for in all, shared among the sensors shown: every sample of one at
 // 1 kHz, and of an 8 kHz one every eighth.
@@ -33,7 +34,7 @@ let seconds = WINDOWS.includes(Number(parameters.get("window"))) ? Number(parame
 let colours = palette();
 let watched = "";
 let [status, statusAt] = [null, 0];
-let [session, missed] = [null, 0];
+let [session, run, missed] = [null, null, 0];
 let [frames, fps, framesAt, dirty] = [0, 0, 0, true];
 
 const touch = () => (dirty = true);
@@ -73,6 +74,7 @@ function sensor(id) {
     return null;
   }
   const made = new Sensor(id, parts.template, touch, () => draw(performance.now()));
+  made.isPlayed = playback.isThere;
   sensors.set(id, made);
   // By name, but truth last: it is what the others are held against.
   const order = [...sensors.values()].sort(
@@ -124,13 +126,21 @@ function heard(message) {
       told(message);
       break;
     case "PLAYBACK":
-      playback.heard(message);
+      played(message);
       break;
     case "ERROR":
       // The daemon that plays nothing does not know the word, and says so once.
       if (message.code !== "unknown_class") notice(`${message.code}: ${message.message}`);
       break;
   }
+}
+
+function played(message) {
+  // A run that began anew: what was received before does not go with what comes.
+  if (run !== null && message.session !== run) for (const each of sensors.values()) each.clear();
+  run = message.session;
+  playback.heard(message);
+  for (const each of sensors.values()) each.isPlayed = true;
 }
 
 function greeted(version) {
@@ -144,6 +154,7 @@ function greeted(version) {
   watched = "";
   status = null;
   left.clear();
+  run = null;
   playback.gone();
   watch();
   if (!frozen) link.send({ class: "POLL" });
@@ -153,21 +164,23 @@ function told(now) {
   const at = performance.now();
   const before = status;
   const elapsed = (at - statusAt) / 1000;
+  const { sources = [], clients = [] } = now;
   const sum = (list, field) => list.reduce((total, each) => total + (each[field] ?? 0), 0);
-  const rate = before ? Math.max(0, sum(now.sources, "samples") - sum(before.sources, "samples")) / elapsed : NaN;
+  const count = (list) => list.reduce((total, source) => total + taken(source), 0);
+  const rate = before ? Math.max(0, count(sources) - count(before.sources ?? [])) / elapsed : NaN;
   say(parts.total, Number.isFinite(rate) ? `${whole(Math.round(rate))} Hz` : "–");
-  say(parts.clients, whole(now.clients.length));
-  const dropped = sum(now.clients, "dropped");
+  say(parts.clients, whole(clients.length));
+  const dropped = sum(clients, "dropped");
   say(parts.dropped, whole(dropped));
   parts.dropped.closest("div").classList.toggle("bad", dropped > 0);
-  const queued = sum(now.clients, "queued_bytes") / 1024;
+  const queued = sum(clients, "queued_bytes") / 1024;
   say(parts.queued, `${queued < 10 ? queued.toFixed(1) : queued.toFixed(0)} KiB`);
   say(parts.uptime, now.uptime_s < 120 ? `${now.uptime_s.toFixed(0)} s` : `${whole(Math.floor(now.uptime_s / 60))} min`);
   const gone = now.recording?.stopped ? "recording stopped" : now.recording ? "recording" : "";
   say(parts.recording, gone);
-  for (const source of now.sources) {
+  for (const source of sources) {
     const of = sensor(source.id);
-    of?.tell(source, before?.sources.find((s) => s.id === source.id), elapsed);
+    of?.tell(source, before?.sources?.find((s) => s.id === source.id), elapsed);
   }
   const others = [...left].sort();
   parts.others.hidden = others.length === 0;
@@ -200,6 +213,8 @@ function freeze() {
   parts.notice.hidden = true;
   link?.close();
   changed("frozen", "frozen");
+  // Scales remember what they have shown, and that depends on the moment.
+  for (const each of sensors.values()) for (const scale of Object.values(each.scales)) scale.reset();
   draw(Infinity);
 }
 
@@ -214,8 +229,18 @@ function draw(now) {
       q: each.last.q, rpy: rollPitchYaw(each.last.q), seq: each.last.seq, stamp: each.last.stamp,
       error: each.error, worst: each.worst, tips: each.tips, centre: each.centre, scale: each.scale,
       camera: { ...each.view.camera }, points: each.history.total, dropped: each.dropped,
+      plotted: each.plotted,
     };
   }
+}
+
+// The pose of a body nobody has heard of.
+const neutral = new Surface(parts.neutral, rest);
+function rest() {
+  const scene = new Scene(neutral, new Camera(), colours);
+  scene.world([]);
+  scene.body((v) => v);
+  scene.ends();
 }
 
 let drawnAt = -Infinity;
@@ -230,7 +255,7 @@ function tick(now) {
     draw(now);
     frames++;
   }
-  if (now - framesAt >= 1000 && !still) {
+  if (now - framesAt >= 1000 && !frozen) {
     fps = ((frames - (tick.before ?? 0)) * 1000) / (now - framesAt);
     [framesAt, tick.before] = [now, frames];
     say(parts.fps, fps.toFixed(0));
@@ -307,18 +332,19 @@ parts.token.addEventListener("submit", (event) => {
 });
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
   colours = palette();
+  rest();
   for (const each of sensors.values()) each.dirty = true;
   touch();
 });
 document.addEventListener("visibilitychange", watch);
 parts.window.value = String(seconds);
 
+rest();
 let link = null;
 if (frozen && stopAt === null) {
   for (const att of demonstration(LAST)) heard(att);
   freeze();
 } else {
-  if (frozen) document.body.classList.add("still");
   link = new Link(heard, changed);
   if (!frozen) setInterval(() => link.send({ class: "POLL" }), 1000);
 }

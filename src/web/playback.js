@@ -41,6 +41,17 @@ export class Playback {
     return option;
   }
 
+  // Seconds, NaN where there is no end.
+  get length() {
+    const { start, end } = this.state;
+    return start && end ? Math.max(0, seconds(start, end)) : NaN;
+  }
+
+  get place() {
+    const { start, at } = this.state;
+    return start ? Math.max(0, seconds(start, at)) : 0;
+  }
+
   get isThere() {
     return this.state !== undefined;
   }
@@ -51,19 +62,21 @@ export class Playback {
   }
 
   heard(state) {
-    if (!state.start || !state.end || !state.at) return;
+    if (!state.at) return;
     this.state = state;
     this.element.hidden = false;
     const { toggle, slider, speed, name, place } = this.parts;
-    const length = Math.max(0, seconds(state.start, state.end));
-    const at = Math.max(0, seconds(state.start, state.at));
+    // Of a stream nobody knows the end, or the start.
+    const length = this.length;
+    const at = this.place;
     const playing = state.state === "playing";
     say(toggle, playing ? "Pause" : state.state === "ended" ? "Again" : "Play");
+    slider.hidden = Number.isNaN(length);
     toggle.setAttribute("aria-pressed", String(playing));
-    slider.max = String(length);
+    slider.max = String(length || 0);
     if (!this.dragging) slider.value = String(at);
     slider.setAttribute("aria-valuetext", `${fixed(at, 1)} of ${fixed(length, 1)} seconds`);
-    say(place, `${clock(at)} / ${clock(length)}`);
+    say(place, Number.isNaN(length) ? clock(at) : `${clock(at)} / ${clock(length)}`);
     say(name, state.file ?? "");
     const chosen = String(state.speed);
     if (![...speed.options].some((o) => o.value === chosen)) speed.append(this.option(state.speed));
@@ -72,17 +85,16 @@ export class Playback {
 
   toggle() {
     if (!this.isThere) return;
-    if (this.state.state === "playing") return this.send({ action: "pause" });
-    if (this.state.state === "ended") this.send({ action: "seek", at: this.state.start });
-    this.send({ action: "play" });
+    // After the end `play` begins again.
+    this.send({ action: this.state.state === "playing" ? "pause" : "play" });
   }
 
   // By so many seconds.
   step(by) {
-    if (!this.isThere) return;
-    const { start, end, at } = this.state;
-    const to = Math.max(0, Math.min(seconds(start, end), seconds(start, at) + by));
-    this.send({ action: "seek", at: later(start, to) });
+    if (!this.isThere || !this.state.start) return;
+    const end = Number.isNaN(this.length) ? Infinity : this.length;
+    const to = Math.max(0, Math.min(end, this.place + by));
+    this.send({ action: "seek", at: later(this.state.start, to) });
   }
 
   faster(by) {

@@ -51,13 +51,18 @@ export class Scale {
     this.high = NaN;
   }
 
-  follow(low, high) {
+  // An angle that goes around fills its circle at most.
+  follow(low, high, wraps) {
+    if (wraps && high - low > 150) {
+      [this.low, this.high] = [-180, 180];
+      return;
+    }
     if (!(high >= low)) [low, high] = [-this.least / 2, this.least / 2];
     const room = Math.max(this.least - (high - low), (high - low) * 0.12, 0) / 2;
     const { at, step } = ticks(low - room, high + room, 4);
     const [from, to] = [Math.min(low - room, at[0] ?? low), Math.max(high + room, at.at(-1) ?? high)];
     const fits = from >= this.low - step && to <= this.high + step && low >= this.low && high <= this.high;
-    const wasteful = this.high - this.low > 2.5 * (to - from);
+    const wasteful = this.high - this.low === 360 || this.high - this.low > 2.5 * (to - from);
     if (!fits || wasteful) [this.low, this.high] = [from, to];
   }
 }
@@ -71,12 +76,13 @@ export function drawPlot(surface, colours, history, plot) {
   const end = history.total ? history.newestTime : 0;
   const start = end - seconds;
   const from = history.firstFrom(start);
-  scale.follow(...range(history, series, from));
+  scale.follow(...range(history, series, from), wraps);
   const { low, high } = scale;
+  const first = history.total ? history.timeOf(history.oldest) - 1e-9 : NaN;
   const xOf = (time) => LEFT + ((time - start) / seconds) * width;
   const yOf = (value) => TOP + (1 - (value - low) / (high - low)) * height;
 
-  frame(context, colours, { low, high, start, end, width, height, xOf, yOf });
+  frame(context, colours, { low, high, start, end, first, width, height, xOf, yOf });
   context.save();
   context.beginPath();
   context.rect(LEFT, 0, width + RIGHT, surface.height);
@@ -139,14 +145,17 @@ function trace(context, history, values, { from, xOf, yOf, wraps, hole }) {
   return points;
 }
 
-function frame(context, colours, { low, high, start, end, width, height, xOf, yOf }) {
+function frame(context, colours, { low, high, start, end, first, width, height, xOf, yOf }) {
   context.font = `11px ${FONT}`;
   context.fillStyle = colours.muted;
   context.strokeStyle = colours.grid;
   context.lineWidth = 1;
   context.textAlign = "right";
   context.textBaseline = "middle";
-  const across = ticks(low, high, Math.max(2, Math.min(5, height / 26)));
+  const across =
+    high - low === 360
+      ? { step: 90, at: [-180, -90, 0, 90, 180] }
+      : ticks(low, high, Math.max(2, Math.min(5, height / 26)));
   for (const value of across.at) {
     const y = Math.round(yOf(value)) + 0.5;
     context.beginPath();
@@ -158,7 +167,7 @@ function frame(context, colours, { low, high, start, end, width, height, xOf, yO
   context.textBaseline = "alphabetic";
   const along = ticks(start, end, Math.max(2, Math.min(6, width / 70)));
   for (const time of along.at) {
-    if (time < -1e-9) continue;
+    if (!(time >= first)) continue;
     const x = Math.round(xOf(time)) + 0.5;
     context.beginPath();
     context.moveTo(x, TOP);

@@ -15,6 +15,11 @@ const LOCUS = 10;
 const READABLE = 100;
 // Steps of stamps that jitter is judged by.
 const STEPS = 512;
+// Seconds from one attitude of a recording to the next that are a leap.
+const LEAP = 1;
+
+// Samples so far, of a recording attitudes: STATUS knows one or the other.
+export const taken = (source) => source.samples ?? source.sent ?? 0;
 
 export class Sensor {
   // moved(): draw soon; resized(): draw at once, a canvas that changes its size is empty.
@@ -91,14 +96,17 @@ export class Sensor {
     if (!stamp || !q) return;
     this.first ??= stamp;
     // Differences before they become one float: nanoseconds survive.
-    let time = stamp.sec - this.first.sec + (stamp.nsec - this.first.nsec) * 1e-9;
-    const last = this.last;
-    if (last && time < this.history.newestTime) {
-      // A replay that began again.
+    const time = stamp.sec - this.first.sec + (stamp.nsec - this.first.nsec) * 1e-9;
+    if (this.last && time < this.history.newestTime) {
+      // A recording that was taken back: times go on from the same zero.
+      const first = this.first;
       this.clear();
-      this.first = stamp;
-      time = 0;
+      this.first = first;
+    } else if (this.isPlayed && time - this.history.newestTime > LEAP) {
+      // Or forward: what was passed over was not thinned.
+      this.interrupted = true;
     }
+    const last = this.last;
     const jumped = last && (att.reset !== last.reset || this.interrupted);
     if (last && att.seq > last.seq && !this.interrupted) {
       this.skipped += att.seq - last.seq - 1;
@@ -210,9 +218,9 @@ export class Sensor {
     scene.body((v) => up(rotate(seen, v)));
     scene.locus(other, colours.other, true, 1.5, [4, 4]);
     scene.locus(own, colours.z, true);
-    this.fastest = Math.max((this.fastest ?? 0) * 0.995, speed, 1e-3);
+    const fastest = Math.max(speed, history.fastest(LOCUS) / DEGREES);
     if (speed > 1e-4) {
-      const length = (0.85 * speed) / this.fastest / speed;
+      const length = 0.85 / fastest;
       scene.arrow(up(rotate(seen, rate.map((v) => v * length))), colours.rate);
     }
     scene.ends();
@@ -225,8 +233,9 @@ export class Sensor {
     drawHorizon(surfaces.horizon, colours, seen, world, heading);
     const axes = [colours.x, colours.y, colours.z];
     const common = { seconds, strokes: axes };
-    drawPlot(surfaces.rates, colours, history, { ...common, series: history.rate, scale: this.scales.rate });
+    const points = drawPlot(surfaces.rates, colours, history, { ...common, series: history.rate, scale: this.scales.rate });
     drawPlot(surfaces.angles, colours, history, { ...common, series: history.angle, scale: this.scales.angle, wraps: true });
+    this.plotted = { points, width: surfaces.rates.width };
     if (this.against) {
       drawPlot(surfaces.errors, colours, history, {
         seconds, strokes: [colours.error], series: [history.error], scale: this.scales.error,
@@ -283,7 +292,7 @@ export class Sensor {
   // The source as STATUS tells of it.
   tell(source, before, seconds) {
     const { parts } = this;
-    const rate = before && seconds > 0 ? (source.samples - before.samples) / seconds : NaN;
+    const rate = before && seconds > 0 ? (taken(source) - taken(before)) / seconds : NaN;
     const nominal = source.rate_hz ?? NaN;
     say(parts.rateNow, Number.isFinite(rate) ? `${whole(Math.round(rate))} Hz` : "–");
     say(parts.rateNominal, Number.isFinite(nominal) ? `of ${whole(Math.round(nominal * 10) / 10)}` : "");

@@ -13,6 +13,10 @@ const WORDS = {
   "steady-slow": "pushed with the slow precession",
 };
 const HINTS = {
+  cusped: "Let go at rest but for its spin: the axis falls and rises, its path has cusps.",
+  wavy: "Pushed with half the slow precession: its path waves and never turns back.",
+  looping: "Pushed backwards with the slow precession: its path makes loops.",
+  "steady-slow": "Pushed with the slow precession: no nutation.",
   "steady-fast": "The fast precession: nearly a free top.",
   sleeping: "Upright: it stays so above a certain spin.",
   falling: "Too little spin: it tips over.",

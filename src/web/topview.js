@@ -39,21 +39,27 @@ function drawBody(scene, q, colours) {
     faces.push({ points, depth, light, isMarked });
   }
   faces.sort((a, b) => a.depth - b.depth);
+  context.lineWidth = 0.8;
+  const [box, disc, surface] = [colours.box, colours.method, colours.surface].map(parts);
+  const pale = mixed(disc, surface, 0.35);
   for (const { points, light, isMarked } of faces) {
+    const lit = mixed(isMarked ? box : pale, surface, 0.4 - 0.4 * Math.max(0, light));
+    const colour = `rgb(${lit.map(Math.round).join(" ")})`;
     scene.path(points);
     context.closePath();
-    context.fillStyle = colours.surface;
+    context.fillStyle = colour;
     context.fill();
-    context.globalAlpha = 0.5 + 0.5 * Math.max(0, light);
-    context.fillStyle = isMarked ? colours.box : colours.method;
-    context.fill();
-    if (isMarked) continue;
-    context.globalAlpha = 0.45;
-    context.fillStyle = colours.surface;
-    context.fill();
+    // Over the seam to the neighbour.
+    context.strokeStyle = colour;
+    context.stroke();
   }
-  context.globalAlpha = 1;
 }
+
+// Red, green, blue of #rrggbb.
+const parts = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16));
+
+// A colour `part` of the way to another.
+const mixed = (from, to, part) => from.map((v, n) => v + (to[n] - v) * part);
 
 const axisOf = (q) => rotate({ w: q[0], x: q[1], y: q[2], z: q[3] }, [0, 0, 1]);
 
@@ -74,9 +80,10 @@ export function drawTop(surface, camera, colours, run, at, { small = false } = {
   const found = chosen ? pathTo(chosen.q, at) : [];
   const angles = euler && euler !== chosen ? pathTo(euler.q, at) : [];
   const loci = (front) => {
-    scene.locus(exact, colours.other, front, small ? 1.25 : 1.75);
-    scene.locus(found, colours.method, front, small ? 1.25 : 2);
-    scene.locus(angles, colours.error, front, 1.25, [5, 5]);
+    const line = (points, colour, width, dash) => scene.locus(points, colour, front, width, dash, 0.6);
+    line(exact, colours.other, small ? 1.25 : 1.75);
+    line(found, colours.method, small ? 1.25 : 2);
+    line(angles, colours.error, 1.25, [5, 5]);
   };
   loci(false);
   const [w, x, y, z] = run.truth.q[at];
@@ -86,6 +93,7 @@ export function drawTop(surface, camera, colours, run, at, { small = false } = {
     scene.arrow(run.truth.momentum[at], colours.y, 2.5);
     scene.arrow(run.truth.rate[at], colours.rate, 2.5);
   }
+  scene.label([]);
   const dot = (v, colour, radius) => {
     const [cx, cy] = scene.project(v);
     scene.context.fillStyle = colour;

@@ -118,13 +118,13 @@ fn a_pause_stops_it_and_play_goes_on_where_it_was() {
     let mut client = Client::tcp(process.address(0)).watching(r#"{"class":"WATCH"}"#);
     let mut other = Client::tcp(process.address(0)).watching(r#"{"class":"WATCH","ids":[]}"#);
     client.play("\"play\"");
-    let mut lines = vec![client.next_of("ATT").to_string()];
+    client.next_of("ATT");
     let paused = client.play("\"pause\"");
     assert_eq!(paused["state"], "paused");
     // The others are told.
     while other.next_of("PLAYBACK")["state"] != "paused" {}
     client.play("\"play\"");
-    lines = to_the_end(&mut client);
+    let lines = to_the_end(&mut client);
     let seqs = seqs(&lines);
     assert!(
         seqs.windows(2).all(|pair| pair[1] == pair[0] + 1),
@@ -168,8 +168,8 @@ fn what_can_not_be_done_is_answered_with_an_error() {
 
     let process = paused(&format!("replay {LOG}"), &[WS, "null:"]);
     let mut client = Client::web(process.address(0)).watching(r#"{"class":"WATCH"}"#);
-    let first = client.play("\"play\"");
-    client.next_of("ATT");
+    client.play("\"play\"");
+    let first = client.next_of("ATT");
     for (action, expected) in [
         ("\"speed\",\"speed\":0", "bad_playback"),
         ("\"speed\",\"speed\":1e300", "bad_playback"),
@@ -178,6 +178,6 @@ fn what_can_not_be_done_is_answered_with_an_error() {
     ] {
         assert_eq!(code(&mut client, action), expected, "{action}");
     }
-    let back = format!("\"seek\",\"at\":{}", first["start"]);
+    let back = format!("\"seek\",\"at\":{}", first["stamp"]);
     assert_eq!(code(&mut client, &back), "forward_only");
 }

@@ -129,6 +129,7 @@ impl Process {
     }
 
     /// `strapd COMMAND ARGS`, another command that listens.
+    #[allow(dead_code)]
     pub(crate) fn of(args: &[&str]) -> Process {
         Process::spawn(Command::new(strapd()), args)
     }

@@ -1,8 +1,12 @@
 //! The examples of `docs/protocol.md` do what they say.
 
-use super::client::Client;
-use super::daemon::{Daemon, TCP, WS, listening};
-use std::process::Command;
+use super::client::{Client, rate};
+use super::daemon::{Daemon, PATIENCE, TCP, WS, eventually, listening};
+use std::io::{BufRead, BufReader, Write};
+use std::net::TcpListener;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::sync::mpsc::channel;
 
 const PAGE: &str = include_str!("../../docs/protocol.md");
 
@@ -20,6 +24,7 @@ fn the_python_example_turns_by_ninety_degrees() {
     let daemon = Daemon::tcp();
     let script = blocks("python");
     assert_eq!(script.len(), 1);
+    assert!(script[0].lines().count() <= 20);
     let port = daemon.address(0).port().to_string();
     let output = Command::new("python3")
         .args(["-c", &script[0].replace("4550", &port)])
@@ -30,6 +35,154 @@ fn the_python_example_turns_by_ninety_degrees() {
         String::from_utf8(output.stdout).unwrap(),
         "yaw 90.000000 deg\n"
     );
+}
+
+/// Says that a test has proved nothing; not in CI.
+fn skip(what: &str) {
+    assert!(
+        std::env::var_os("CI").is_none(),
+        "{what}, and this is CI: the test must run"
+    );
+    eprintln!("SKIPPED LOUDLY: {what}; this test proved nothing");
+}
+
+/// `nc` is played by this test: what would be sent to it is caught and sent over a socket.
+#[test]
+fn every_line_for_nc_is_answered_as_is_said_behind_it() {
+    let daemon = Daemon::tcp();
+    let lines: Vec<&str> = blocks("sh")
+        .into_iter()
+        .flat_map(str::lines)
+        .filter(|l| l.contains("| nc "))
+        .collect();
+    assert!(lines.len() >= 6);
+    for line in lines {
+        let (command, expected) = line.split_once("  # ").unwrap_or_else(|| {
+            unreachable!("nothing is said of {line}");
+        });
+        let caught = Command::new("sh")
+            .args(["-c", &format!("nc() {{ cat; }}\n{command}")])
+            .stdin(Stdio::null())
+            .output()
+            .unwrap();
+        assert!(
+            caught.status.success() && caught.stderr.is_empty(),
+            "{caught:?}"
+        );
+        assert!(!caught.stdout.is_empty());
+        let mut client = Client::tcp(daemon.address(0));
+        client.send_bytes(&caught.stdout);
+        client.shut();
+        let watches = expected.contains("WATCH");
+        for class in expected.split_whitespace() {
+            client.object(class);
+        }
+        if !watches {
+            assert_eq!(client.rest(), Vec::<serde_json::Value>::new(), "{line}");
+        }
+    }
+}
+
+/// `STRAPD_ORACLES_PYTHON` names a Python with the packages of `benches/peers/requirements.txt`.
+#[test]
+fn python_websockets_speaks_with_the_daemon() {
+    let Some(python) = std::env::var_os("STRAPD_ORACLES_PYTHON") else {
+        return skip("STRAPD_ORACLES_PYTHON is not set");
+    };
+    let daemon = Daemon::start(listening(&[WS]));
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/oracles/websockets_client.py");
+    let output = Command::new(&python)
+        .args(["-c", "import websockets"])
+        .output()
+        .unwrap();
+    if !output.status.success() {
+        return skip("the package websockets is absent");
+    }
+    let output = Command::new(python)
+        .arg(script)
+        .arg(format!("ws://{}/ws", daemon.address(0)))
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{output:?}");
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(said, "yaw 90.000000 deg after 1001 attitudes\n");
+}
+
+#[test]
+fn the_browser_example_shows_the_attitude() {
+    if Command::new("chromium").arg("--version").output().is_err() {
+        return skip("chromium is absent");
+    }
+    let page = blocks("html");
+    assert_eq!(page.len(), 1);
+    assert!(page[0].lines().count() <= 20);
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let origin = format!("http://{}", listener.local_addr().unwrap());
+    let mut settings = listening(&[TCP, WS]);
+    settings.web.origins = vec![origin.clone()];
+    let daemon = Daemon::start(settings);
+    // The page as it stands, and after it somebody who tells what it shows.
+    let page = page[0].replace("127.0.0.1:8765", &daemon.address(1).to_string())
+        + "<script>new MutationObserver(() => fetch('/shown?' + encodeURIComponent(shown.textContent))).observe(shown, { childList: true });</script>";
+    let (tell, told) = channel();
+    std::thread::spawn(move || {
+        for stream in listener.incoming() {
+            let mut stream = BufReader::new(stream.unwrap());
+            let mut request = String::new();
+            let mut line = String::new();
+            while stream.read_line(&mut line).is_ok_and(|n| n > 2) {
+                request.push_str(&std::mem::take(&mut line));
+            }
+            let path = request.split(' ').nth(1).unwrap_or("/");
+            if let Some(shown) = path.strip_prefix("/shown?")
+                && tell
+                    .send(shown.replace("%20", " ").replace("%2C", ","))
+                    .is_err()
+            {
+                return;
+            }
+            let _ = write!(
+                stream.get_mut(),
+                "HTTP/1.1 200 OK\r\nContent-Type: text/html\r\nContent-Length: {}\r\nConnection: close\r\n\r\n{page}",
+                page.len()
+            );
+        }
+    });
+    let profile = tempfile::tempdir().unwrap();
+    let mut chromium = Command::new("chromium")
+        .args([
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--remote-debugging-port=0",
+        ])
+        .arg(format!("--user-data-dir={}", profile.path().display()))
+        .arg(&origin)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    eventually("the page watches", || {
+        let status = daemon.status();
+        let clients = status["clients"].as_array().unwrap();
+        clients.iter().any(|c| c["watching"] == true)
+    });
+    let mut sender = Client::tcp(daemon.address(0));
+    for n in 0..=500 {
+        sender.send(&rate("imu0", n, std::f64::consts::FRAC_PI_2));
+    }
+    // Later than a thirtieth of a second: it is not thinned out.
+    sender.send(&rate("imu0", 540, std::f64::consts::FRAC_PI_2));
+    let shown = std::iter::from_fn(|| told.recv_timeout(PATIENCE).ok())
+        .find(|shown| shown.starts_with("imu0  48.60,"));
+    chromium.kill().unwrap();
+    chromium.wait().unwrap();
+    let shown = shown.unwrap();
+    let angles: Vec<f64> = shown["imu0  ".len()..]
+        .split(',')
+        .map(|a| a.parse().unwrap())
+        .collect();
+    assert_eq!(angles, [48.6, 0.0, 0.0]);
 }
 
 #[test]

@@ -39,6 +39,8 @@ const PARTS: usize = 64;
 /// What is still read of a client that is being closed, so that our last words are not lost with a
 /// reset.
 const LINGER: Duration = Duration::from_millis(250);
+/// What arrived before the end shows by then.
+const SETTLE: Duration = Duration::from_millis(20);
 /// Bytes read from a client at the end of the daemon: more than a socket's buffer holds.
 const LAST_READ: usize = 16 << 20;
 
@@ -209,7 +211,9 @@ async fn talk(
                     closing = Some(None);
                     continue;
                 }
-                // What has arrived is still taken.
+                // What has arrived is still taken, also what the kernel has and the reactor has not yet
+                // told of.
+                let _ = timeout(SETTLE, io.readable()).await;
                 let mut left = LAST_READ;
                 while reading && left > 0 {
                     let read = in_room(|buffer, scratch| {

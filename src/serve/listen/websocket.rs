@@ -5,10 +5,12 @@
 
 use super::{Context, accept, in_room, now, tcp, too_many_clients};
 use crate::serve::admission::Web;
+use crate::serve::foxglove::{self, Framed};
 use crate::serve::http;
-use crate::serve::hub::{Hub, count};
+use crate::serve::hub::{Client, Hub, count};
 use crate::serve::session::Session;
 use crate::serve::shutdown::Running;
+use crate::serve::viewer::Viewer;
 use axum::body::Body;
 use axum::extract::ws::{Message, Utf8Bytes, WebSocket};
 use axum::http::{Request, Response, StatusCode, header};
@@ -156,7 +158,9 @@ async fn answer(
 }
 
 /// Serves one WebSocket to the end of its conversation.
-pub(crate) async fn converse(socket: WebSocket, connection: Connection) {
+///
+/// `foxglove`: it speaks Foxglove's protocol, and whether that which knows playback.
+pub(crate) async fn converse(socket: WebSocket, connection: Connection, foxglove: Option<bool>) {
     let Connection {
         hub,
         peer,
@@ -165,7 +169,10 @@ pub(crate) async fn converse(socket: WebSocket, connection: Connection) {
         _place,
     } = connection;
     let limits = *hub.limits();
-    let mut session = Session::new(&hub, peer, trusted);
+    let mut session = match foxglove {
+        None => Talk::Lines(Box::new(Session::new(&hub, peer, trusted))),
+        Some(controls) => Talk::Foxglove(Viewer::new(&hub, peer, controls)),
+    };
     let client = session.client().clone();
     let (mut sink, mut stream) = socket.split();
     let closing = AtomicBool::new(false);
@@ -183,7 +190,7 @@ pub(crate) async fn converse(socket: WebSocket, connection: Connection) {
                 () = running.asked() => {
                     // What has arrived is still taken.
                     while let Some(Ok(message)) = ready(&mut stream).await {
-                        take(&mut session, &message);
+                        session.take(&message);
                     }
                     running.has_read();
                     running.asked_to_send().await;
@@ -194,9 +201,9 @@ pub(crate) async fn converse(socket: WebSocket, connection: Connection) {
                 Err(_) => return Some("nothing was heard from it for too long"),
                 Ok(None | Some(Err(_))) => return None,
                 Ok(Some(Ok(Message::Close(_)))) => return None,
-                Ok(Some(Ok(message))) => take(&mut session, &message),
+                Ok(Some(Ok(message))) => session.take(&message),
             }
-            if session.end().is_some() {
+            if session.is_over() {
                 return Some("bad lines or no token");
             }
         }
@@ -229,10 +236,21 @@ pub(crate) async fn converse(socket: WebSocket, connection: Connection) {
             let bytes: usize = parts.iter().map(Bytes::len).sum();
             let sending = async {
                 for part in parts.drain(..) {
-                    for line in lines(&part) {
-                        // Everything we say is JSON, and so UTF-8.
-                        let text = Utf8Bytes::try_from(line).unwrap_or_default();
-                        sink.feed(Message::Text(text)).await?;
+                    match foxglove {
+                        None => {
+                            for line in lines(&part) {
+                                sink.feed(text(line)).await?;
+                            }
+                        }
+                        Some(_) => {
+                            for message in foxglove::messages(&part) {
+                                sink.feed(match message {
+                                    Framed::Text(line) => text(line),
+                                    Framed::Binary(bytes) => Message::Binary(bytes),
+                                })
+                                .await?;
+                            }
+                        }
                     }
                 }
                 sink.flush().await
@@ -266,13 +284,54 @@ pub(crate) async fn converse(socket: WebSocket, connection: Connection) {
     }
 }
 
-fn take(session: &mut Session, message: &Message) {
-    let bytes: &[u8] = match message {
-        Message::Text(text) => text.as_bytes(),
-        Message::Binary(bytes) => bytes,
-        Message::Ping(_) | Message::Pong(_) | Message::Close(_) => return,
-    };
-    in_room(|_, scratch| session.message(bytes, now(), scratch));
+/// Who is talked to.
+enum Talk {
+    Lines(Box<Session>),
+    Foxglove(Viewer),
+}
+
+impl Talk {
+    fn client(&self) -> &Arc<Client> {
+        match self {
+            Talk::Lines(session) => session.client(),
+            Talk::Foxglove(viewer) => viewer.client(),
+        }
+    }
+
+    /// Whether it need not be waited for to say something first.
+    fn has_spoken(&self) -> bool {
+        match self {
+            Talk::Lines(session) => session.has_spoken(),
+            // Its handshake has said what it is.
+            Talk::Foxglove(_) => true,
+        }
+    }
+
+    fn is_over(&self) -> bool {
+        match self {
+            Talk::Lines(session) => session.end().is_some(),
+            Talk::Foxglove(viewer) => viewer.is_over(),
+        }
+    }
+
+    fn take(&mut self, message: &Message) {
+        let (bytes, is_text): (&[u8], bool) = match message {
+            Message::Text(text) => (text.as_bytes(), true),
+            Message::Binary(bytes) => (bytes, false),
+            Message::Ping(_) | Message::Pong(_) | Message::Close(_) => return,
+        };
+        match self {
+            Talk::Lines(session) => {
+                in_room(|_, scratch| session.message(bytes, now(), scratch));
+            }
+            Talk::Foxglove(viewer) => viewer.message(bytes, is_text),
+        }
+    }
+}
+
+/// Everything we say in text is JSON, and so UTF-8.
+fn text(line: Bytes) -> Message {
+    Message::Text(Utf8Bytes::try_from(line).unwrap_or_default())
 }
 
 /// The next item if it is there already.

@@ -113,7 +113,7 @@ pub(super) fn ros_time(stamp: Nanos) -> ([u8; 8], bool) {
 
 /// `sensor_msgs/msg/Imu` of one stream.
 #[derive(Debug)]
-pub(super) struct Imu(Template);
+pub(crate) struct Imu(Template);
 
 impl Imu {
     pub(super) fn new(channel: u16, frame_id: &str) -> Imu {
@@ -180,7 +180,7 @@ impl Imu {
 /// A header and `N` numbers: `geometry_msgs/msg/QuaternionStamped` (x, y, z, w) and
 /// `geometry_msgs/msg/Vector3Stamped` of one stream.
 #[derive(Debug)]
-pub(super) struct Stamped<const N: usize>(Template);
+pub(crate) struct Stamped<const N: usize>(Template);
 
 impl<const N: usize> Stamped<N> {
     pub(super) fn new(channel: u16, frame_id: &str) -> Self {
@@ -241,7 +241,7 @@ impl Imu {
 
 /// `tf2_msgs/msg/TFMessage` of one stream: one transform, no translation.
 #[derive(Debug)]
-pub(super) struct Tf(Template);
+pub(crate) struct Tf(Template);
 
 impl Tf {
     pub(super) fn new(channel: u16, parent: &str, child: &str) -> Tf {

@@ -1,0 +1,227 @@
+//! `strapd cat URL`: attitudes of a daemon as NDJSON, CSV or a table. I/O.
+
+use super::{Cat, Format};
+use crate::cli::Outcome;
+use crate::client::attitude::Attitude;
+use crate::client::remote::Remote;
+use crate::client::watcher::{Said, Watcher, request};
+use crate::error::{Error, Result};
+use crate::serve::admission::Secret;
+use crate::serve::shutdown::{self, Signals};
+use std::io::{BufWriter, Stdout, Write};
+use std::time::Duration;
+
+const CSV_HEADER: &str = "id,stamp_ns,w,x,y,z,roll_deg,pitch_deg,yaw_deg,wx,wy,wz,sigma_x_deg,sigma_y_deg,sigma_z_deg,status\n";
+const TABLE_HEADER: &str = "               stamp s        qw        qx        qy        qz    roll deg   pitch deg     yaw deg     rate x        y        z  status, id\n";
+
+/// Runs it.
+///
+/// # Errors
+/// Nobody answers, or whoever answered has gone; stdout can not be written.
+pub(super) fn run(args: &Cat, url: &str) -> Result<Outcome> {
+    let file_flags = [
+        (args.topic.is_some(), "--topic", "--id NAME names a sensor"),
+        (
+            !args.fields.is_empty(),
+            "--field",
+            "a daemon has read the fields already",
+        ),
+    ];
+    for (given, flag, help) in file_flags {
+        if given {
+            return Err(Error::Usage(format!(
+                "cat {url}: {flag} is for files\n  help: {help}"
+            )));
+        }
+    }
+    let remote = Remote::parse(url)?;
+    let token = args
+        .token_file
+        .as_deref()
+        .map(|file| Secret::read("--token-file", file))
+        .transpose()?;
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(1)
+        .enable_all()
+        .build()
+        .map_err(|e| Error::Usage(format!("cat {url}: {e}")))?;
+    let outcome = runtime.block_on(print(args, &remote, token.as_ref()));
+    runtime.shutdown_background();
+    outcome
+}
+
+async fn print(args: &Cat, remote: &Remote, token: Option<&Secret>) -> Result<Outcome> {
+    let failed = |what: String| Error::Remote {
+        address: remote.to_string(),
+        what,
+    };
+    let signals = Signals::new().map_err(|e| Error::Usage(format!("signals: {e}")))?;
+    // On a thread of its own: a second signal ends the process even when nobody reads our output.
+    let mut stop = tokio::spawn(shutdown::first(signals, || false));
+    let until = tokio::time::sleep(args.seconds.map_or(Duration::MAX, Duration::from_secs_f64));
+    tokio::pin!(until);
+    let mut printer = Printer::new(args)?;
+    let request = request(&args.ids, args.rate_hz);
+    let mut watcher = tokio::select! {
+        connected = Watcher::connect(remote, token, &request) => connected.map_err(failed)?,
+        () = &mut until => return Ok(Outcome::Done),
+        _ = &mut stop => return Ok(Outcome::Done),
+    };
+    if matches!(remote, Remote::UdpListen(_)) {
+        tracing::info!("listening on {}", watcher.peer());
+    }
+    let ended = loop {
+        let mut take = |said: Said<'_>| printer.take(said);
+        let next = tokio::select! {
+            next = watcher.next(&mut take) => next,
+            () = &mut until => break Ok(()),
+            _ = &mut stop => break Ok(()),
+        };
+        printer.flush()?;
+        match next {
+            Ok(true) => {}
+            Ok(false) => break Ok(()),
+            Err(why) => break Err(failed(why)),
+        }
+    };
+    printer.flush()?;
+    ended.map(|()| match printer.dropped {
+        0 => Outcome::Done,
+        _ => Outcome::Lossy,
+    })
+}
+
+struct Printer {
+    out: BufWriter<Stdout>,
+    format: Format,
+    left: u64,
+    dropped: u64,
+    failure: Option<std::io::Error>,
+}
+
+impl Printer {
+    fn new(args: &Cat) -> Result<Printer> {
+        let mut out = BufWriter::with_capacity(1 << 16, std::io::stdout());
+        let head = match args.format {
+            Format::Ndjson => "",
+            Format::Csv => CSV_HEADER,
+            Format::Table => TABLE_HEADER,
+        };
+        out.write_all(head.as_bytes())
+            .and_then(|()| out.flush())
+            .map_err(|e| Error::writing("stdout", e))?;
+        Ok(Printer {
+            out,
+            format: args.format,
+            left: args.count.unwrap_or(u64::MAX),
+            dropped: 0,
+            failure: None,
+        })
+    }
+
+    /// Prints what was said; says whether more is wanted.
+    fn take(&mut self, said: Said<'_>) -> bool {
+        if self.left == 0 || self.failure.is_some() {
+            return false;
+        }
+        match said {
+            Said::Attitude(line) => match self.attitude(line) {
+                Ok(()) => self.left -= 1,
+                Err(why) => self.failure = Some(why),
+            },
+            Said::Gap { id, dropped } => {
+                self.dropped += dropped;
+                tracing::warn!(
+                    "{id}: {dropped} attitudes came faster than they were taken here, and were dropped"
+                );
+            }
+            Said::Complaint(what) => tracing::error!("the daemon says {what}"),
+            Said::Status(_) => {}
+        }
+        self.left > 0 && self.failure.is_none()
+    }
+
+    fn attitude(&mut self, line: &[u8]) -> std::io::Result<()> {
+        if self.format == Format::Ndjson {
+            self.out.write_all(&harmless(line))?;
+            return self.out.write_all(b"\n");
+        }
+        let a = match Attitude::read(line) {
+            Ok(attitude) => attitude,
+            Err(why) => {
+                tracing::error!("an attitude that is none: {why}");
+                self.dropped += 1;
+                return Ok(());
+            }
+        };
+        match self.format {
+            Format::Csv => self.csv(&a),
+            _ => self.table(&a),
+        }
+    }
+
+    fn csv(&mut self, a: &Attitude) -> std::io::Result<()> {
+        let quoted = a.id.contains([',', '"']);
+        match quoted {
+            true => write!(self.out, "\"{}\"", a.id.replace('"', "\"\""))?,
+            false => write!(self.out, "{}", a.id)?,
+        }
+        write!(self.out, ",{}", a.stamp.0)?;
+        let numbers = a.q.into_iter().chain(a.roll_pitch_yaw_deg()).chain(a.rate);
+        for value in numbers.chain(a.sigma_deg) {
+            match value.is_finite() {
+                true => write!(self.out, ",{value:?}")?,
+                false => write!(self.out, ",nan")?,
+            }
+        }
+        writeln!(self.out, ",{}", a.status.join("|").replace([',', '"'], "_"))
+    }
+
+    fn table(&mut self, a: &Attitude) -> std::io::Result<()> {
+        let (sec, nsec) = a.stamp.to_sec_nanosec();
+        write!(self.out, "{sec:>12}.{nsec:09}")?;
+        a.q.iter().try_for_each(|c| write!(self.out, " {c:>9.6}"))?;
+        a.roll_pitch_yaw_deg()
+            .iter()
+            .try_for_each(|c| write!(self.out, " {c:>11.5}"))?;
+        write!(self.out, "  ")?;
+        a.rate
+            .iter()
+            .try_for_each(|c| write!(self.out, " {c:>8.4}"))?;
+        writeln!(self.out, "  {} {}", a.status.join(","), a.id)
+    }
+
+    fn flush(&mut self) -> Result<()> {
+        match self.failure.take() {
+            Some(why) => Err(why),
+            None => self.out.flush(),
+        }
+        .map_err(|e| Error::writing("stdout", e))
+    }
+}
+
+/// The same JSON, with every character that a terminal might obey, or that hides others, escaped. What
+/// our own daemon sends has none.
+fn harmless(line: &[u8]) -> std::borrow::Cow<'_, [u8]> {
+    if line.iter().all(|b| (0x20..0x7f).contains(b)) {
+        return line.into();
+    }
+    let mut out = String::with_capacity(line.len());
+    for c in String::from_utf8_lossy(line).chars() {
+        if matches!(c, '\r' | '\t') {
+            // White space between the parts of an object: inside of a string JSON forbids it.
+            out.push(' ');
+            continue;
+        }
+        let one = crate::decode::printable(c.encode_utf8(&mut [0; 4]));
+        match one.starts_with("\\u{") {
+            // JSON's own escape, inside of a string: nowhere else can such a character stand.
+            true => c
+                .encode_utf16(&mut [0; 2])
+                .iter()
+                .for_each(|unit| out.push_str(&format!("\\u{unit:04x}"))),
+            false => out.push_str(&one),
+        }
+    }
+    out.into_bytes().into()
+}

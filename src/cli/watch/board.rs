@@ -1,0 +1,126 @@
+//! What a daemon says -> what is known of every sensor. Pure: time is given.
+
+use crate::client::attitude::Attitude;
+use crate::client::watcher::Said;
+use crate::decode::printable;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+/// Most sensors that are shown; a daemon has no more.
+const MAX_SENSORS: usize = 1024;
+
+/// Everything that is known.
+#[derive(Debug)]
+pub(super) struct Board {
+    /// What the user asked for.
+    pub(super) name: String,
+    pub(super) link: LinkState,
+    pub(super) sensors: BTreeMap<String, Sensor>,
+    /// What the daemon complained of last.
+    pub(super) complaint: Option<String>,
+}
+
+/// How the connection stands.
+#[derive(Debug)]
+pub(super) enum LinkState {
+    Connecting,
+    Connected(Instant),
+    /// Since when, and why.
+    Lost(Instant, String),
+}
+
+/// What is known of one sensor.
+#[derive(Debug, Default)]
+pub(super) struct Sensor {
+    pub(super) attitude: Option<Attitude>,
+    /// When the last attitude came.
+    pub(super) heard: Option<Instant>,
+    /// Attitudes we were too slow for.
+    pub(super) dropped: u64,
+    pub(super) health: Health,
+}
+
+/// What the daemon says of a sensor's samples.
+#[derive(Clone, Debug, Default, Deserialize)]
+pub(super) struct Health {
+    #[serde(default)]
+    id: String,
+    #[serde(default)]
+    pub(super) samples: u64,
+    #[serde(default)]
+    pub(super) lost: u64,
+    #[serde(default)]
+    pub(super) missing: u64,
+    #[serde(default)]
+    pub(super) gaps: u64,
+    pub(super) rate_hz: Option<f64>,
+    pub(super) jitter_s: Option<f64>,
+}
+
+#[derive(Deserialize)]
+struct Status {
+    #[serde(default)]
+    sources: Vec<Health>,
+}
+
+impl Board {
+    pub(super) fn new(name: String) -> Board {
+        Board {
+            name,
+            link: LinkState::Connecting,
+            sensors: BTreeMap::new(),
+            complaint: None,
+        }
+    }
+
+    pub(super) fn connected(&mut self, now: Instant) {
+        self.link = LinkState::Connected(now);
+        self.complaint = None;
+    }
+
+    pub(super) fn lost(&mut self, why: String, now: Instant) {
+        let since = match self.link {
+            LinkState::Lost(since, _) => since,
+            _ => now,
+        };
+        self.link = LinkState::Lost(since, why);
+    }
+
+    fn sensor(&mut self, id: &str) -> Option<&mut Sensor> {
+        if !self.sensors.contains_key(id) && self.sensors.len() >= MAX_SENSORS {
+            return None;
+        }
+        Some(self.sensors.entry(id.to_owned()).or_default())
+    }
+
+    pub(super) fn take(&mut self, said: Said<'_>, now: Instant) {
+        match said {
+            Said::Attitude(line) => match Attitude::read(line) {
+                Ok(attitude) => {
+                    if let Some(sensor) = self.sensor(&attitude.id) {
+                        sensor.attitude = Some(attitude);
+                        sensor.heard = Some(now);
+                    }
+                }
+                Err(why) => self.complaint = Some(format!("an attitude that is none: {why}")),
+            },
+            Said::Gap { id, dropped } => {
+                if let Some(sensor) = self.sensor(&id) {
+                    sensor.dropped = sensor.dropped.saturating_add(dropped);
+                }
+            }
+            Said::Status(line) => {
+                if let Ok(status) = serde_json::from_slice::<Status>(line) {
+                    for health in status.sources {
+                        // Those that are not watched are not shown.
+                        if let Some(sensor) = self.sensors.get_mut(&printable(&health.id)) {
+                            sensor.health = health;
+                        }
+                    }
+                }
+            }
+            Said::Complaint(what) => self.complaint = Some(what),
+        }
+    }
+}

@@ -1,0 +1,271 @@
+//! What is known -> lines of text. Pure: time is given. Everything that came from a daemon was made
+//! fit for a terminal when it was read.
+
+use super::board::{Board, LinkState, Sensor};
+use super::horizon::horizon;
+use std::time::{Duration, Instant};
+
+/// The horizon's size in characters.
+const PICTURE: (usize, usize) = (21, 7);
+/// Below this width there is no room for a picture.
+const WIDE: usize = 84;
+/// After this silence a sensor is marked.
+const SILENT: Duration = Duration::from_secs(2);
+/// Longest name that is shown whole.
+const MAX_NAME: usize = 48;
+
+/// How a line is shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Tone {
+    Plain,
+    Heading,
+    Alarm,
+}
+
+/// A line of text.
+pub(super) type Line = (Tone, String);
+
+/// The first line: where, and how the connection stands.
+pub(super) fn heading(board: &Board, now: Instant) -> Line {
+    let sensors = board.sensors.len();
+    let (tone, state) = match &board.link {
+        LinkState::Connecting => (Tone::Heading, "connecting".to_owned()),
+        LinkState::Connected(since) => (
+            Tone::Heading,
+            format!(
+                "connected {}",
+                lasting(now.saturating_duration_since(*since))
+            ),
+        ),
+        LinkState::Lost(since, why) => (
+            Tone::Alarm,
+            format!(
+                "NOT CONNECTED for {}, trying again: {why}",
+                lasting(now.saturating_duration_since(*since))
+            ),
+        ),
+    };
+    let plural = if sensors == 1 { "" } else { "s" };
+    (
+        tone,
+        format!(
+            "strapd watch {}  {sensors} sensor{plural}  {state}",
+            board.name
+        ),
+    )
+}
+
+/// The last line.
+pub(super) fn footing(board: &Board) -> Line {
+    match &board.complaint {
+        Some(what) => (Tone::Alarm, format!("q quits; the daemon says {what}")),
+        None => (Tone::Plain, "q quits; up and down scroll".to_owned()),
+    }
+}
+
+/// Everything between them, for a terminal so many characters wide.
+pub(super) fn body(board: &Board, now: Instant, width: usize) -> Vec<Line> {
+    if board.sensors.is_empty() {
+        return vec![(Tone::Plain, "nothing has come yet".to_owned())];
+    }
+    let mut lines = Vec::new();
+    for (id, sensor) in &board.sensors {
+        let alarm = alarm(sensor, now);
+        let tone = if alarm { Tone::Alarm } else { Tone::Heading };
+        lines.push((tone, title(id, sensor)));
+        let figures = figures(sensor, now);
+        if width < WIDE {
+            lines.extend(
+                figures
+                    .into_iter()
+                    .map(|text| (Tone::Plain, format!("  {text}"))),
+            );
+        } else {
+            let (columns, rows) = PICTURE;
+            let picture = match &sensor.attitude {
+                Some(a) => horizon(a.q, &a.world, &a.body, columns, rows),
+                None => vec![" ".repeat(columns); rows],
+            };
+            for (n, row) in picture.iter().enumerate() {
+                let text = figures.get(n).map_or("", String::as_str);
+                lines.push((Tone::Plain, format!("  |{row}|  {text}")));
+            }
+        }
+        lines.push((Tone::Plain, String::new()));
+    }
+    lines
+}
+
+/// Whether something is wrong with a sensor now.
+fn alarm(sensor: &Sensor, now: Instant) -> bool {
+    let silent = sensor
+        .heard
+        .is_none_or(|heard| now.saturating_duration_since(heard) > SILENT);
+    let usual = |s: &String| matches!(s.as_str(), "ok" | "provisional");
+    silent
+        || sensor
+            .attitude
+            .as_ref()
+            .is_some_and(|a| !a.status.iter().all(usual))
+}
+
+fn title(id: &str, sensor: &Sensor) -> String {
+    let name = shortened(id);
+    match &sensor.attitude {
+        Some(a) => format!("{name}  {} in {}  {}", a.body, a.world, a.status.join(" ")),
+        None => name,
+    }
+}
+
+fn shortened(id: &str) -> String {
+    match id.char_indices().nth(MAX_NAME) {
+        Some((at, _)) => format!("{}~", id.get(..at).unwrap_or_default()),
+        None => id.to_owned(),
+    }
+}
+
+/// The figures of one sensor, a line each.
+fn figures(sensor: &Sensor, now: Instant) -> Vec<String> {
+    let mut lines = Vec::new();
+    if let Some(a) = &sensor.attitude {
+        let [roll, pitch, yaw] = a.roll_pitch_yaw_deg().map(|v| figure(v, 9, 3));
+        let [w, x, y, z] = a.q.map(|v| figure(v, 10, 6));
+        let [p, q, r] = a.rate.map(|v| figure(v.to_degrees(), 9, 3));
+        let [sx, sy, sz] = a.sigma_deg.map(|v| figure(v, 9, 3).replace('+', " "));
+        let (sec, nsec) = a.stamp.to_sec_nanosec();
+        lines.push(format!("roll {roll}  pitch {pitch}  yaw {yaw}  deg"));
+        lines.push(format!("q  w{w}  x{x}  y{y}  z{z}"));
+        lines.push(format!("rate x{p}  y{q}  z{r}  deg/s"));
+        lines.push(format!("sigma {sx}   {sy}   {sz}  deg (1 sigma, x y z)"));
+        lines.push(format!(
+            "stamp {sec}.{nsec:09}  seq {}  resets {}",
+            a.seq, a.reset
+        ));
+    }
+    let h = &sensor.health;
+    let rate = h.rate_hz.map_or("?".to_owned(), |v| format!("{v:.1}"));
+    let jitter = h
+        .jitter_s
+        .map_or("?".to_owned(), |v| format!("{:.3}", v * 1e3));
+    lines.push(format!(
+        "{rate} Hz  jitter {jitter} ms  samples {}  gaps {}",
+        h.samples, h.gaps
+    ));
+    let age = sensor.heard.map_or("?".to_owned(), |heard| {
+        lasting(now.saturating_duration_since(heard))
+    });
+    lines.push(format!(
+        "lost {}  missing {}  dropped {}  last {age} ago",
+        h.lost, h.missing, sensor.dropped
+    ));
+    lines
+}
+
+/// Where there is no terminal: a line for each sensor, and one when the daemon is not there.
+pub(super) fn plain(board: &Board, now: Instant) -> String {
+    let mut out = String::new();
+    if let LinkState::Lost(..) | LinkState::Connecting = board.link {
+        out.push_str(&heading(board, now).1);
+        out.push('\n');
+        return out;
+    }
+    if let Some(what) = &board.complaint {
+        out.push_str(&format!("the daemon says {what}\n"));
+    }
+    for (id, sensor) in &board.sensors {
+        let Some(a) = &sensor.attitude else { continue };
+        let [roll, pitch, yaw] = a.roll_pitch_yaw_deg().map(|v| figure(v, 9, 3));
+        let h = &sensor.health;
+        let rate = h.rate_hz.map_or("?".to_owned(), |v| format!("{v:.1}"));
+        let age = sensor.heard.map_or("?".to_owned(), |heard| {
+            lasting(now.saturating_duration_since(heard))
+        });
+        out.push_str(&format!(
+            "{}  seq {}  roll {roll}  pitch {pitch}  yaw {yaw} deg  {rate} Hz  gaps {}  lost {}  dropped {}  last {age} ago  {}\n",
+            shortened(id), a.seq, h.gaps, h.lost, sensor.dropped, a.status.join(",")
+        ));
+    }
+    out
+}
+
+/// A number in so many characters, with its sign; one that does not fit says how large it is.
+fn figure(value: f64, width: usize, digits: usize) -> String {
+    let text = format!("{value:+width$.digits$}");
+    match text.len() > width {
+        true => format!("{value:+width$.1e}"),
+        false => text,
+    }
+}
+
+/// A time for people.
+fn lasting(time: Duration) -> String {
+    match time.as_secs() {
+        0..10 => format!("{:.1} s", time.as_secs_f64()),
+        s @ 10..120 => format!("{s} s"),
+        s @ 120..7200 => format!("{} min", s / 60),
+        s => format!("{} h", s / 3600),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::client::watcher::Said;
+
+    const ATT: &str = r#"{"class":"ATT","id":"imu\u001b[31m0","seq":17,"stamp":{"sec":1700000000,"nsec":5000000},"q":{"w":0.7071067811865476,"x":0.7071067811865476,"y":0.0,"z":0.0},"rotates":"sensor_to_world","world":"start","body":"flu","rate":[0.017453292519943295,0.0,-1e300],"sigma_deg":[0.01,0.01,null],"status":["provisional"],"reset":0}"#;
+    const STATUS: &str = r#"{"class":"STATUS","sources":[{"id":"imu\u001b[31m0","samples":18,"lost":1,"missing":2,"gaps":3,"rate_hz":1000.0,"jitter_s":0.00025},{"id":"other","rate_hz":null}]}"#;
+
+    fn board() -> (Board, Instant) {
+        let now = Instant::now();
+        let mut board = Board::new("tcp://127.0.0.1:4550".to_owned());
+        board.connected(now);
+        board.take(Said::Attitude(ATT.as_bytes()), now);
+        board.take(Said::Status(STATUS.as_bytes()), now);
+        board.take(
+            Said::Gap {
+                id: "imu\\u{1b}[31m0".to_owned(),
+                dropped: 4,
+            },
+            now,
+        );
+        (board, now)
+    }
+
+    #[test]
+    fn every_figure_of_a_sensor_is_shown_and_no_name_commands_the_terminal() {
+        let (board, now) = board();
+        assert_eq!(board.sensors.len(), 1, "only what is watched");
+        for width in [60, 100] {
+            let lines = body(&board, now + Duration::from_millis(300), width);
+            let text: String = lines.iter().map(|(_, l)| format!("{l}\n")).collect();
+            for part in [
+                "imu\\u{1b}[31m0  flu in start  provisional",
+                "roll   +90.000  pitch    +0.000  yaw    +0.000  deg",
+                "w +0.707107  x +0.707107  y +0.000000  z +0.000000",
+                "rate x   +1.000  y   +0.000  z",
+                "1000.0 Hz  jitter 0.250 ms  samples 18  gaps 3",
+                "lost 1  missing 2  dropped 4  last 0.3 s ago",
+            ] {
+                assert!(text.contains(part), "no `{part}` in\n{text}");
+            }
+            assert!(!text.contains('\u{1b}'));
+            assert_eq!(text.contains("|::"), width == 100, "{text}");
+        }
+    }
+
+    #[test]
+    fn silence_and_loss_are_alarms() {
+        let (mut board, now) = board();
+        assert_eq!(body(&board, now, 100)[0].0, Tone::Heading);
+        assert_eq!(body(&board, now + SILENT * 2, 100)[0].0, Tone::Alarm);
+        assert_eq!(heading(&board, now).0, Tone::Heading);
+        board.lost("refused".to_owned(), now);
+        board.lost("refused again".to_owned(), now + Duration::from_secs(3));
+        let (tone, text) = heading(&board, now + Duration::from_secs(4));
+        assert_eq!(tone, Tone::Alarm);
+        assert!(
+            text.contains("NOT CONNECTED for 4.0 s, trying again: refused again"),
+            "{text}"
+        );
+    }
+}

@@ -1,0 +1,130 @@
+//! What clients are told beside attitudes: which streams there are, and where a replay is. Pure but for locks.
+
+use super::{Hub, Shape, read, write};
+use crate::serve::channel::Channel;
+use crate::serve::foxglove;
+use crate::serve::playback::{Action, Place};
+use crate::serve::subscriber::Class;
+use crate::serve::wire::{self, Fault};
+use crate::sink::{Profile, Stream};
+use bytes::Bytes;
+use std::sync::Arc;
+
+impl Hub {
+    /// Whether clients may send samples: a replay has its own.
+    #[must_use]
+    pub fn takes_samples(&self) -> bool {
+        self.playback.is_none()
+    }
+
+    /// What can be watched.
+    #[must_use]
+    pub fn classes(&self) -> Vec<Class> {
+        let mut classes: Vec<Class> = read(&self.channels).iter().map(|c| c.class()).collect();
+        classes.push(Class::Att);
+        classes.sort_unstable();
+        classes.dedup();
+        classes
+    }
+
+    /// A further stream; viewers are told.
+    pub fn declare(&self, stream: &Stream) -> Arc<Channel> {
+        let mut channels = write(&self.channels);
+        let mut streams: Vec<Stream> = channels.iter().map(|c| c.stream().clone()).collect();
+        streams.push(stream.clone());
+        let channel = Arc::new(Channel::new(&streams));
+        channels.push(channel.clone());
+        // Under the lock: who joins meanwhile finds it in the list, and is not told twice.
+        let said = foxglove::channels(std::iter::once(&*channel), false);
+        for client in read(&self.clients).values() {
+            if matches!(client.shape, Shape::Foxglove { .. }) {
+                client.outbox.reply(said.clone());
+            }
+        }
+        channel
+    }
+
+    /// Whether a viewer can subscribe to it.
+    #[must_use]
+    pub fn has_channel(&self, number: u32) -> bool {
+        number == foxglove::TRANSFORMS
+            || read(&self.channels)
+                .iter()
+                .flat_map(|c| c.topics())
+                .any(|(known, _)| known == number)
+    }
+
+    /// Where the replay is; `None` where there is none to be controlled.
+    #[must_use]
+    pub fn where_it_is(&self) -> Option<Place> {
+        self.playback.as_ref()?.place()
+    }
+
+    /// The same as a line.
+    #[must_use]
+    pub fn place(&self) -> Option<Bytes> {
+        Some(wire::playback(&self.where_it_is()?, &self.session()))
+    }
+
+    /// The replay has begun anew, as another session.
+    pub fn began_anew(&self) {
+        for client in read(&self.clients).values() {
+            if let Shape::Foxglove { controls } = client.shape {
+                client.outbox.reply(self.server_info(controls));
+            }
+        }
+    }
+
+    pub(super) fn server_info(&self, controls: bool) -> Bytes {
+        foxglove::server_info(&self.session(), self.where_it_is().as_ref(), controls)
+    }
+
+    /// A client asks for something of the replay; all others that watch are told.
+    ///
+    /// # Errors
+    /// The fault to answer with.
+    pub fn control(&self, client: u64, action: Action) -> std::result::Result<(), Fault> {
+        let playback = self.playback.as_ref().ok_or_else(|| {
+            Fault::new(
+                "nothing_to_play",
+                "samples come as they come here; strapd replay LOG -o ws-listen://... can be controlled",
+            )
+        })?;
+        if playback.ask(action)? {
+            for client in read(&self.clients).values() {
+                client.outbox.forget();
+            }
+        }
+        self.announce(false, Some(client));
+        Ok(())
+    }
+
+    /// Tells whoever watches where the replay is. A `tick` is left out where one waits already.
+    pub fn announce(&self, tick: bool, but: Option<u64>) {
+        let Some(place) = self.where_it_is() else {
+            return;
+        };
+        let line = wire::playback(&place, &self.session());
+        let clients = read(&self.clients);
+        for client in clients.values().filter(|c| Some(c.number) != but) {
+            match client.shape {
+                Shape::Lines(Profile::Lines) if client.outbox.level().watching => {
+                    client.outbox.note(line.clone(), tick);
+                }
+                Shape::Foxglove { controls: true } => {
+                    let state = foxglove::playback_state(&place, false, "");
+                    client.outbox.note(state, tick);
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// The streams of a replay, for `STATUS`; those of sensors say more themselves.
+    pub(super) fn own_streams(&self) -> Vec<serde_json::Value> {
+        match &self.playback {
+            None => Vec::new(),
+            Some(_) => read(&self.channels).iter().map(|c| c.status()).collect(),
+        }
+    }
+}

@@ -1,0 +1,25 @@
+//! Promise: what a browser shows is what the daemon said (service.md 9).
+//!
+//! A headless Chromium on real pages of a real daemon, everything on loopback. Where there is no
+//! Chromium these tests skip loudly; in CI they must run.
+
+#![cfg(all(feature = "service", unix))]
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
+#[allow(dead_code)]
+#[path = "serve/client.rs"]
+mod client;
+#[allow(dead_code)]
+#[path = "serve/daemon.rs"]
+mod daemon;
+mod page {
+    pub(crate) mod browser;
+
+    mod admission;
+    mod controls;
+    mod drawing;
+    mod live_numbers;
+    mod model_top;
+    mod playback;
+    mod staying_up;
+}
