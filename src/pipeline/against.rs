@@ -17,7 +17,7 @@ use crate::report::trace::Traces;
 
 /// Most attitudes kept per track; beyond, every second one goes, again and again, so that memory
 /// stays bounded on any log.
-const MOST: usize = 1 << 20;
+const MOST: usize = 1 << 17;
 
 /// Attitudes kept while the samples have brought no orientation yet.
 const BEFORE: usize = 1024;
