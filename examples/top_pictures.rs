@@ -183,6 +183,7 @@ fn path_of_the_axis(case: Case) -> Result<Chart, Failure> {
         ],
         equal: true,
         size: (860, 640),
+        ..Chart::default()
     })
 }
 

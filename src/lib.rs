@@ -17,6 +17,7 @@
 //! | `sink` | attitude -> MCAP, NDJSON, CSV | I/O |
 //! | `pipeline` | the stages wired: replay, tracks, what a log holds | I/O |
 //! | `serve` | the daemon: samples in over sockets, attitude out | I/O |
+//! | `client` | the other end: a daemon, or whatever sends samples -> lines | I/O |
 //! | [`compare`] | two attitudes -> how far apart | pure |
 //! | `config`, `report`, `cli` | arguments -> a run -> its summary | |
 //! | [`model`] | frames, attitude, rigid body, top, inertia, the youBot's arm, motions with exact truth | pure |

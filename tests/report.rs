@@ -6,7 +6,6 @@
 
 #[path = "report/browser.rs"]
 mod browser;
-#[allow(unreachable_pub)]
 mod commands;
 mod made_logs;
 #[path = "report/pages.rs"]

@@ -87,7 +87,7 @@ impl Remote {
         let place = |authority: &str| Place::parse(authority).map_err(|what| refuse(&what));
         let bare = rest.strip_suffix('/').unwrap_or(rest);
         let remote = match scheme {
-            "tcp" => Remote::Tcp(place(bare)?.to_connect().map_err(refuse)?),
+            "tcp" => Remote::Tcp(place(bare)?.connectable().map_err(refuse)?),
             "udp-listen" => Remote::UdpListen(place(bare)?),
             "unix" if rest.starts_with('/') => Remote::Unix(PathBuf::from(rest)),
             "unix" => return Err(refuse("an absolute path is needed")),
@@ -107,7 +107,7 @@ impl Remote {
                     path.push('=');
                     path.push_str(&encoded(value, b""));
                 }
-                let place = place(authority)?.to_connect().map_err(refuse)?;
+                let place = place(authority)?.connectable().map_err(refuse)?;
                 Remote::WebSocket { place, path }
             }
             "wss" | "https" => {
@@ -150,7 +150,7 @@ impl Place {
         })
     }
 
-    fn to_connect(self) -> std::result::Result<Place, &'static str> {
+    fn connectable(self) -> std::result::Result<Place, &'static str> {
         if self.port == 0 {
             return Err("nobody listens on port 0");
         }

@@ -17,7 +17,10 @@ use crate::report::trace::Traces;
 
 /// Most attitudes kept per track; beyond, every second one goes, again and again, so that memory
 /// stays bounded on any log.
-const MOST: usize = 1 << 20;
+const MOST: usize = 1 << 17;
+
+/// Attitudes kept while the samples have brought no orientation yet.
+const BEFORE: usize = 1024;
 
 /// The meanings tried: name, words, kind, and the method where it is not the run's own.
 const MEANINGS: [(&str, &str, SampleKind, Option<Method>); 4] = [
@@ -175,6 +178,12 @@ impl AgainstRecorded {
         for (estimator, track) in self.estimators.iter_mut().zip(&mut self.tracks) {
             for sample in estimator.attitudes(exec) {
                 track.push((sample.stamp, sample.q_nb));
+            }
+            // Estimates long before the first reference are compared with nothing, and the samples
+            // may carry none at all.
+            if self.own_reference && self.reference.entries.is_empty() {
+                let useless = track.entries.len().saturating_sub(BEFORE);
+                track.entries.drain(..useless);
             }
         }
     }

@@ -30,8 +30,10 @@ const FIRST_WAIT: Duration = Duration::from_millis(100);
 const LONGEST_WAIT: Duration = Duration::from_secs(5);
 /// A connection that stood so long was a good one: the waits begin anew.
 const STEADY: Duration = Duration::from_secs(1);
-/// Asks a daemon for everything it has.
-const WATCH: &str = r#"{"class":"WATCH"}"#;
+/// Asks a daemon for its samples: a simulation has some.
+const RATES: &str = r#"{"class":"WATCH","streams":["RATE"]}"#;
+/// Asks a daemon that has none for its attitudes.
+const ATTITUDES: &str = r#"{"class":"WATCH","streams":["ATT"]}"#;
 
 /// A source and how it stands.
 #[derive(Debug)]
@@ -182,13 +184,14 @@ async fn converse(
     let mut bytes = Vec::new();
     let mut said = VecDeque::new();
     let mut asked = source.protocol == Protocol::Strapd;
+    let mut asked_again = false;
     let is_web = matches!(source.remote, Remote::WebSocket { .. });
     let mut first = Vec::new();
     if let (Some(token), false) = (&source.token, is_web) {
         first.push(serde_json::json!({"class": "AUTH", "token": token.reveal()}).to_string());
     }
     if asked {
-        first.push(WATCH.to_owned());
+        first.push(RATES.to_owned());
     }
     for line in first {
         if let Err(why) = link.send(&line).await {
@@ -234,10 +237,19 @@ async fn converse(
                     return Some("is this daemon itself".to_owned());
                 }
                 Event::Greeted(_) => {
-                    if source.protocol == Protocol::Auto && !std::mem::replace(&mut asked, true) {
-                        if let Err(why) = link.send(WATCH).await {
-                            return Some(why.to_string());
-                        }
+                    if source.protocol == Protocol::Auto
+                        && !std::mem::replace(&mut asked, true)
+                        && let Err(why) = link.send(RATES).await
+                    {
+                        return Some(why.to_string());
+                    }
+                }
+                Event::Complained(what)
+                    if asked && !asked_again && what.starts_with("bad_watch") =>
+                {
+                    asked_again = true;
+                    if let Err(why) = link.send(ATTITUDES).await {
+                        return Some(why.to_string());
                     }
                 }
                 Event::Complained(what) => outgoing.complain(&what),
@@ -267,7 +279,9 @@ fn take(session: &mut Session, heard: &Heard, bytes: &[u8]) {
 
 /// The metrics of the sources, as Prometheus text.
 pub(super) fn exposition(out: &mut String, hub: &Hub) {
-    let families: [(&str, &str, &str, fn(&State) -> u64); 3] = [
+    /// Name, kind, help, and the value of one source.
+    type Family = (&'static str, &'static str, &'static str, fn(&State) -> u64);
+    let families: [Family; 3] = [
         (
             "outgoing_connected",
             "gauge",

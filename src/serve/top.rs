@@ -287,10 +287,15 @@ mod tests {
                 ..Request::default()
             };
             let found = request.answer().unwrap();
-            assert_eq!(found["t"].as_array().unwrap().len(), 100);
+            // At most: every so-manieth sample, and the last.
+            let points = found["t"].as_array().unwrap().len();
+            assert!((90..=100).contains(&points), "{points}");
             for method in found["methods"].as_array().unwrap() {
                 let of = |list: &Value| list.as_array().unwrap().len();
-                assert_eq!((of(&method["q"]), of(&method["error_deg"])), (100, 100));
+                assert_eq!(
+                    (of(&method["q"]), of(&method["error_deg"])),
+                    (points, points)
+                );
                 let errors = method["error_deg"].as_array().unwrap().iter();
                 let most = errors.map(|e| e.as_f64().unwrap()).fold(0.0, f64::max);
                 let name = method["name"].as_str().unwrap();

@@ -153,6 +153,8 @@ pub fn read_from(
         ));
     }
     match class.as_deref() {
+        // What a source says of itself is no request.
+        Some(other) if is_source => Err(Fault::new("unknown_class", other.to_owned())),
         Some("WATCH") => watch(line).map(Message::Watch),
         Some("POLL") => Ok(Message::Poll),
         Some("PLAYBACK") => playback_action(line).map(Message::Playback),

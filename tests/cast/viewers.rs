@@ -5,13 +5,18 @@ use super::daemon::{Daemon, PATIENCE, TCP, WS, listening};
 use super::lines::{LOG, lines_of};
 use super::watched::paused;
 use serde_json::{Value, json};
+use std::collections::VecDeque;
 use std::net::{SocketAddr, TcpStream};
 use std::process::{Command, Stdio};
 use tungstenite::client::IntoClientRequest;
 use tungstenite::{Message, WebSocket};
 
 /// A viewer that speaks one of the sub-protocols.
-struct Viewer(WebSocket<TcpStream>);
+struct Viewer {
+    socket: WebSocket<TcpStream>,
+    /// What came while something else was waited for: an answer overtakes data, or not.
+    passed_over: VecDeque<Message>,
+}
 
 impl Viewer {
     fn connect(address: SocketAddr, protocols: &str) -> (Viewer, Option<String>) {
@@ -25,43 +30,57 @@ impl Viewer {
         let (socket, response) = tungstenite::client(request, stream).unwrap();
         let spoken = response.headers().get(name);
         let spoken = spoken.map(|s| s.to_str().unwrap().to_owned());
-        (Viewer(socket), spoken)
+        let viewer = Viewer {
+            socket,
+            passed_over: VecDeque::new(),
+        };
+        (viewer, spoken)
     }
 
     fn send(&mut self, value: &Value) {
-        self.0.send(Message::text(value.to_string())).unwrap();
+        self.socket.send(Message::text(value.to_string())).unwrap();
     }
 
     fn next(&mut self) -> Message {
         loop {
-            match self.0.read().unwrap() {
+            match self.socket.read().unwrap() {
                 Message::Ping(_) | Message::Pong(_) => {}
                 message => return message,
             }
         }
     }
 
+    /// The first message not yet found of which `find` makes something.
+    fn first<T>(&mut self, find: impl Fn(&Message) -> Option<T>) -> T {
+        let known = self.passed_over.iter().enumerate();
+        if let Some((n, found)) = known.filter_map(|(n, m)| Some((n, find(m)?))).next() {
+            self.passed_over.remove(n);
+            return found;
+        }
+        loop {
+            let message = self.next();
+            if let Some(found) = find(&message) {
+                return found;
+            }
+            self.passed_over.push_back(message);
+            assert!(self.passed_over.len() < 50_000, "it does not come");
+        }
+    }
+
     /// The next text message with this `op`.
     fn text(&mut self, op: &str) -> Value {
-        loop {
-            if let Message::Text(text) = self.next() {
-                let value: Value = serde_json::from_str(&text).unwrap();
-                if value["op"] == op {
-                    return value;
-                }
-            }
-        }
+        self.first(|message| {
+            let value: Value = serde_json::from_str(message.to_text().ok()?).ok()?;
+            (value["op"] == op).then_some(value)
+        })
     }
 
     /// The next binary message that begins with this byte.
     fn binary(&mut self, op: u8) -> Vec<u8> {
-        loop {
-            if let Message::Binary(bytes) = self.next()
-                && bytes[0] == op
-            {
-                return bytes.to_vec();
-            }
-        }
+        self.first(|message| match message {
+            Message::Binary(bytes) if bytes[0] == op => Some(bytes.to_vec()),
+            _ => None,
+        })
     }
 
     /// Asks for playback; the state that answers.
@@ -72,13 +91,13 @@ impl Viewer {
         message.extend(seek.unwrap_or_default().to_le_bytes());
         message.extend(3u32.to_le_bytes());
         message.extend(b"now");
-        self.0.send(Message::binary(message)).unwrap();
-        loop {
-            let state = self.binary(5);
-            if state.ends_with(b"now") {
-                return state;
+        self.socket.send(Message::binary(message)).unwrap();
+        self.first(|message| match message {
+            Message::Binary(bytes) if bytes[0] == 5 && bytes.ends_with(b"now") => {
+                Some(bytes.to_vec())
             }
-        }
+            _ => None,
+        })
     }
 }
 
@@ -143,7 +162,7 @@ fn the_sensors_of_a_daemon_are_channels_as_they_come_and_what_is_not_offered_is_
     viewer.text("status");
     // Nothing that can be done here moves it.
     viewer
-        .0
+        .socket
         .send(Message::binary([&[3u8, 0][..], &[0; 17]].concat()))
         .unwrap();
     assert!(
@@ -153,9 +172,9 @@ fn the_sensors_of_a_daemon_are_channels_as_they_come_and_what_is_not_offered_is_
             .contains("replay")
     );
     for _ in 0..30 {
-        let _ = viewer.0.send(Message::text("nonsense"));
+        let _ = viewer.socket.send(Message::text("nonsense"));
     }
-    let closed = std::iter::from_fn(|| viewer.0.read().ok())
+    let closed = std::iter::from_fn(|| viewer.socket.read().ok())
         .take(1000)
         .count();
     assert!(closed < 1000, "it is closed after too much nonsense");

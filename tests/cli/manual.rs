@@ -3,11 +3,13 @@
 use crate::{names, strapd};
 use std::process::Command;
 
-const COMMANDS: [&str; 7] = [
+const COMMANDS: [&str; 9] = [
     "replay",
     "info",
     "compare",
     "cat",
+    "serve",
+    "watch",
     "model",
     "completions",
     "man",

@@ -1,7 +1,7 @@
 //! JSON against texts made by hand.
 
 use super::{LOG, channel, decode, decode_one, options};
-use strapd::decode::{Class, Decoder, GyroUnit, MAX_LINE, Options, decode_line};
+use strapd::decode::{Class, Decoder, GyroUnit, LineDecoder, MAX_LINE, Options, decode_line};
 use strapd::record::{Nanos, SampleKind};
 
 const GYRO: [f64; 3] = [1.5, -2.5, 0.1];
@@ -391,6 +391,25 @@ fn lines_of_our_own_wire_and_of_gpsd_and_sensorserver_are_read() {
             Some(Nanos(12_345_678_901_234)),
             Some(GyroUnit::Rad)
         )
+    );
+
+    // The uncalibrated one says what it thinks of its drift as well, and does not remove it.
+    out.clear();
+    let uncalibrated = br#"{"type":"android.sensor.gyroscope_uncalibrated","timestamp":12345678901234,"values":[1,2,3,0.1,0.2,0.3]}"#;
+    decode_line(uncalibrated, LOG, &mut out).unwrap();
+    assert_eq!(out[0].gyro, Some([1.0, 2.0, 3.0]));
+    // Asked for alone, no event says what it is of: then it is what was asked for.
+    out.clear();
+    let nameless = br#"{"values":[1,2,3],"timestamp":12345678901234,"accuracy":3}"#;
+    decode_line(nameless, LOG, &mut out).unwrap();
+    assert_eq!(out[0].gyro, None);
+    out.clear();
+    let phone = LineDecoder::with_sensor(&Options::default(), "android.sensor.gyroscope");
+    let line = phone.decode(nameless, LOG, &mut out).unwrap();
+    assert_eq!(line.sensor.as_deref(), Some("android.sensor.gyroscope"));
+    assert_eq!(
+        (out[0].gyro, out[0].header),
+        (Some([1.0, 2.0, 3.0]), Some(Nanos(12_345_678_901_234)))
     );
 
     out.clear();

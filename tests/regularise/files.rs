@@ -212,7 +212,7 @@ fn every_meaning_is_compared_on_its_own_lines() {
     let summary = done(&replay).unwrap();
     assert_eq!(
         only(&summary).against.len(),
-        3,
+        4,
         "{:?}",
         only(&summary).warnings
     );

@@ -162,7 +162,7 @@ fn a_recorded_orientation_on_a_topic_of_its_own_can_be_named() {
     let named = done(&replay).unwrap();
     let medians = |summary| only(summary).against.iter().map(|r| r.median_deg).collect();
     let found: Vec<f64> = medians(&found);
-    assert_eq!(found.len(), 3);
+    assert_eq!(found.len(), 4);
     assert_eq!(found, medians(&named));
     replay.against = Some("/nowhere".to_owned());
     let error = done(&replay).unwrap_err().to_string();

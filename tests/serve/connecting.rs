@@ -223,6 +223,49 @@ fn a_daemon_behind_a_daemon_integrates_the_same_rates_to_the_same_attitude() {
     }
 }
 
+/// A simulation hands out its samples; what it says besides is neither a sample nor a bad line.
+#[test]
+fn of_a_simulation_the_samples_are_taken_and_not_its_truth() {
+    let (listener, address) = listen();
+    drop(listener);
+    let mut simulation = Command::new(strapd())
+        .args([
+            "-q",
+            "simulate",
+            "top",
+            "--rate-hz",
+            "200",
+            "--duration",
+            "600",
+            "--speed",
+            "1",
+        ])
+        .args(["-o", &format!("tcp-listen://{address}")])
+        .spawn()
+        .unwrap();
+    let daemon = fed_by(&[format!("tcp://{address}?id=top")]);
+    eventually("two seconds of it", || {
+        daemon.status()["sources"][0]["samples"].as_u64() >= Some(400)
+    });
+    let status = daemon.status();
+    simulation.kill().unwrap();
+    simulation.wait().unwrap();
+    assert_eq!(status["sources"].as_array().unwrap().len(), 1, "{status}");
+    let sensor = &status["sources"][0];
+    assert_eq!(
+        (&sensor["id"], &sensor["lost"]),
+        (&json!("top"), &json!(0)),
+        "{sensor}"
+    );
+    assert_eq!(sensor["rate_hz"], 200.0);
+    assert_eq!(sensor["missing"], 0);
+    assert_eq!(status["counters"]["faults"], 0);
+    eventually("its end is told", || {
+        let state = outgoing(&daemon, 0);
+        state["connected"] == false && state["last_error"].is_string()
+    });
+}
+
 #[test]
 fn a_daemon_never_listens_to_itself() {
     let (listener, address) = listen();

@@ -156,13 +156,12 @@ fn a_sensor_is_seen_and_a_daemon_that_comes_back_too() {
         true => text,
         false => terminal.until("roll   +4"),
     };
-    println!("{text}");
     for part in [
         "1 sensor  connected",
         "imu\\u{1b}[31m0  flu in start  provisional",
         "rate x  +90.000",
         "gaps 0",
-        "|:",
+        "///:::|  roll",
     ] {
         assert!(text.contains(part), "no `{part}` in\n{text}");
     }

@@ -70,7 +70,7 @@ fn what_can_not_be_is_refused_with_its_numbers_and_leaves_nothing() {
         strapd(at, &format!("simulate {flags} -o a.mcap")).refused(2, words);
     }
     strapd(at, "simulate top").refused(2, &["--output"]);
-    strapd(at, "simulate top -o tcp://localhost:1").refused(2, &["sockets", "FILE.mcap"]);
+    strapd(at, "simulate top -o tcp://localhost").refused(2, &["HOST:PORT", "FILE.mcap"]);
     strapd(at, "simulate top -o a.mcap -o a.mcap").refused(2, &["given twice"]);
     strapd(at, "simulate top -o - --json").refused(2, &["--json"]);
     assert_eq!(std::fs::read_dir(at).unwrap().count(), 0);

@@ -16,10 +16,13 @@ const NARROWEST: f64 = 2.0;
 /// Labelled places of the axis, about.
 const TICKS: f64 = 8.0;
 
+/// Name, class, and from where to where, ns.
+type Row = (&'static str, &'static str, Vec<(f64, f64)>);
+
 /// The strips that have something in them; `None` when none has.
 pub(super) fn strips(drawn: &Drawn, rests: &Rests, time: Time) -> Option<String> {
     let end = drawn.elapsed.x().max(1) as f64;
-    let mut rows: Vec<(&str, &str, Vec<(f64, f64)>)> = Vec::new();
+    let mut rows: Vec<Row> = Vec::new();
     for (mark, marks) in Mark::ALL.iter().zip(&drawn.marks) {
         if marks.samples == 0 {
             continue;
