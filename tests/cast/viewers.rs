@@ -162,7 +162,7 @@ fn the_sensors_of_a_daemon_are_channels_as_they_come_and_what_is_not_offered_is_
     viewer.text("status");
     // Nothing that can be done here moves it.
     viewer
-        .0
+        .socket
         .send(Message::binary([&[3u8, 0][..], &[0; 17]].concat()))
         .unwrap();
     assert!(
