@@ -1,7 +1,8 @@
 //! How fast and how evenly `strapd serve` answers: a bounded load on a daemon of its own, over TCP on
 //! loopback. The figures stand in `docs/performance.md`, "Serving".
 //!
-//! `cargo bench --bench serve_load -- [SECONDS] [CASE]...`; cases by name, default all. Latency is from
+//! `cargo bench --bench serve_load -- [SECONDS] [CASE]...`; cases by name, default all. From a minute on the
+//! paced cases also tell whether memory and open files grow: `-- 600 P1` is the soak. Latency is from
 //! just before a line is written to just after its attitude was read, on the same machine, whose
 //! cores the generator shares with the daemon.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout)]
@@ -21,6 +22,9 @@ const PACED: [(&str, usize, u64, usize, usize); 5] = [
     ("M3", 8, 1000, 1, 1),
     ("M4", 8, 1000, 8, 50),
 ];
+
+/// Seconds from which on a paced case is a soak.
+const SOAK: u64 = 60;
 
 struct Daemon {
     child: Child,
@@ -60,6 +64,13 @@ impl Daemon {
         let status = std::fs::read_to_string(path).unwrap();
         let line = status.lines().find(|l| l.starts_with("VmRSS")).unwrap();
         line.split_whitespace().nth(1).unwrap().parse().unwrap()
+    }
+
+    /// Open files.
+    fn files(&self) -> usize {
+        std::fs::read_dir(format!("/proc/{}/fd", self.child.id()))
+            .unwrap()
+            .count()
     }
 
     /// Seconds of both cores so far.
@@ -198,10 +209,19 @@ fn paced(name: &str, publishers: usize, hz: u64, subscribers: usize, stalled: us
             })
         })
         .collect();
+    // Memory and files every second, the first fifth left out: buffers are made there.
+    let mut levels = Vec::new();
+    while writers.iter().any(|w| !w.is_finished()) {
+        std::thread::sleep(Duration::from_secs(1));
+        if secs >= SOAK && begin.elapsed().as_secs() >= secs / 5 {
+            let now = begin.elapsed().as_secs_f64();
+            levels.push((now, daemon.rss() as f64, daemon.files()));
+        }
+    }
+    let took = begin.elapsed().as_secs_f64();
     for writer in writers {
         writer.join().unwrap();
     }
-    let took = begin.elapsed().as_secs_f64();
     done.store(true, Ordering::Relaxed);
     let seen: Vec<Seen> = readers.into_iter().map(|r| r.join().unwrap()).collect();
     let cpu = daemon.cpu_secs() - before;
@@ -228,6 +248,30 @@ fn paced(name: &str, publishers: usize, hz: u64, subscribers: usize, stalled: us
         at(1.0),
         cpu / took * 100.0,
         daemon.rss(),
+    );
+    soaked(&levels);
+}
+
+/// How memory and open files went: the slope of a straight line through all.
+fn soaked(levels: &[(f64, f64, usize)]) {
+    let (Some(first), Some(last)) = (levels.first(), levels.last()) else {
+        return;
+    };
+    let n = levels.len() as f64;
+    let mean = |f: fn(&(f64, f64, usize)) -> f64| levels.iter().map(f).sum::<f64>() / n;
+    let (t, rss) = (mean(|l| l.0), mean(|l| l.1));
+    let above: f64 = levels.iter().map(|l| (l.0 - t) * (l.1 - rss)).sum();
+    let below: f64 = levels.iter().map(|l| (l.0 - t) * (l.0 - t)).sum();
+    let most = levels.iter().map(|l| l.1).fold(0.0, f64::max);
+    println!(
+        "  from {:.0} s to {:.0} s: {:.0} to {:.0} KiB resident, at most {most:.0}, {:+.2} KiB a minute; {} to {} files open",
+        first.0,
+        last.0,
+        first.1,
+        last.1,
+        above / below * 60.0,
+        first.2,
+        last.2
     );
 }
 
