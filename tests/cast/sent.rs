@@ -25,6 +25,7 @@ fn whoever_listens_on_tcp_gets_the_bytes_of_standard_output_and_an_end() {
     strapd(root(), &format!("replay {LOG} -o tcp://{address}")).done();
     let text = reader.join().unwrap();
     assert!(text.lines().eq(lines_of(&format!("replay {LOG}"))));
+    assert!(text.ends_with('\n'), "the last line is cut");
 }
 
 #[test]
