@@ -128,6 +128,11 @@ motion = [
 ]
 seed("session", "motion", b"\xff" + "\n".join(motion + [""]).encode())
 
+seed("foxglove", "subscribe", b'{"op":"subscribe","subscriptions":[{"id":7,"channelId":1},{"id":8,"channelId":2}]}')
+seed("foxglove", "unsubscribe", b'{"op":"unsubscribe","subscriptionIds":[7,8]}')
+seek = struct.pack("<BBfBQI", 3, 0, 2.0, 1, 1_700_000_000_000_000_000, 4) + b"r-17"
+seed("foxglove", "playback", seek)
+
 for name, options in {
     "none": dict(compression=CompressionType.NONE),
     "lz4": dict(compression=CompressionType.LZ4),

@@ -218,6 +218,18 @@ fn answered(session: &Session) {
     }
 }
 
+/// What a viewer sends: text and binary messages of Foxglove's protocol.
+pub fn foxglove(data: &[u8]) {
+    for asked in [
+        strapd::serve::foxglove::read_text(data),
+        strapd::serve::foxglove::read_binary(data),
+    ] {
+        if let Err(why) = asked {
+            assert!(!why.is_empty());
+        }
+    }
+}
+
 /// A log, as a stream and as a file: the walk ends, and both find the same where nothing is damaged.
 pub fn mcap(data: &[u8]) {
     fn read(reader: Reader) -> (u64, bool) {

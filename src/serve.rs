@@ -19,7 +19,7 @@
 //! | [`foxglove`], [`viewer`] | the same for Foxglove's viewers: messages in place of lines | pure; sans-I/O |
 //! | `page`, `top` | what a browser gets | pure |
 //! | [`listen`], `http` | sockets others come to | I/O |
-//! | [`source`], [`connect`], [`upstream`]; `outgoing` | sockets others listen on: samples from there; attitudes to there | I/O |
+//! | [`source`], [`connect`], [`upstream`]; `forward` | sockets others listen on: samples from there; attitudes to there | I/O |
 //! | [`shutdown`] | signals -> an orderly end | I/O |
 //!
 //! The wire is described in `docs/protocol.md`.
@@ -29,13 +29,13 @@ pub mod admission;
 pub mod cast;
 pub mod channel;
 pub mod connect;
+mod forward;
 pub mod foxglove;
 pub mod framing;
 mod http;
 pub mod hub;
 pub mod limits;
 pub mod listen;
-mod outgoing;
 mod page;
 pub mod playback;
 mod quiet;
@@ -190,7 +190,7 @@ impl Server {
             tokio::spawn(listener.serve(context()));
         }
         for target in self.outputs {
-            tokio::spawn(outgoing::send(target, context()));
+            tokio::spawn(forward::send(target, context()));
         }
         for outgoing in self.hub.outgoing() {
             let task = connect::keep(outgoing.clone(), self.hub.clone(), shutdown.running());

@@ -153,6 +153,11 @@ fn conversations() {
 }
 
 #[test]
+fn viewers() {
+    survives("foxglove", CASES, parsers::foxglove);
+}
+
+#[test]
 fn logs() {
     survives("mcap", CASES, parsers::mcap);
 }
