@@ -194,7 +194,7 @@ fn chart_and_table_are_written_once() {
         allan(dir.path(), "rest.mcap --csv a.csv --force").2,
         Some(0)
     );
-    let (_, err, _) = allan(dir.path(), "rest.mcap --plot rest.mcap --force");
+    let (_, err, _) = allan(dir.path(), "rest.mcap --csv rest.mcap --force");
     assert!(err.contains("is the input"), "{err}");
 }
 
