@@ -12,6 +12,8 @@ const CLEARLY: f64 = 0.95;
 const EXPLAINED: f64 = 0.4;
 /// Errors over 1 s below this need no explanation, rad (2 degrees).
 const SMALL: f64 = 0.035;
+/// Where gaps take more than this share of the time, what was turned is not known.
+const MOSTLY_THERE: f64 = 0.1;
 /// An orientation that misses the motion by this share of it does not follow the gyro.
 const ANOTHER_MOTION: f64 = 0.5;
 
@@ -25,7 +27,8 @@ pub(super) fn find(topic: &CheckedTopic, out: &mut Vec<Finding>) {
         }
         return;
     };
-    let trusted = is_truth(recorded, out);
+    let is_seen = summary.gaps.total_secs <= MOSTLY_THERE * summary.duration_secs;
+    let trusted = is_truth(recorded, is_seen, out);
     let used = summary.kind.name();
     match best_meaning(&summary.against) {
         Some(best) if trusted => meaning(&summary.against, best, used, out),
@@ -86,8 +89,9 @@ fn meaning(rows: &[Against], best: &Against, used: &str, out: &mut Vec<Finding>)
     );
 }
 
-/// Whether the recorded orientation can be a reference; what is wrong with it is said.
-fn is_truth(recorded: &Recorded, out: &mut Vec<Finding>) -> bool {
+/// Whether the recorded orientation can be a reference; what is wrong with it is said. Of its axes nothing can be
+/// where the motion was not seen.
+fn is_truth(recorded: &Recorded, is_seen: bool, out: &mut Vec<Finding>) -> bool {
     if recorded.unusable > 0 {
         out.push(
             Finding::new(
@@ -118,7 +122,7 @@ fn is_truth(recorded: &Recorded, out: &mut Vec<Finding>) -> bool {
         );
         return false;
     }
-    recorded.axes.is_none_or(|fit| axes_agree(&fit, out))
+    is_seen && recorded.axes.is_none_or(|fit| axes_agree(&fit, out))
 }
 
 fn axes_agree(fit: &BodyAxesFit, out: &mut Vec<Finding>) -> bool {
