@@ -136,6 +136,12 @@ impl Drop for Terminal {
 
 /// A sensor turning about x, level at its first sample.
 fn turning(daemon: &Daemon, id: &str) -> Client {
+    // Connected is not yet watching.
+    eventually("somebody to watch", || {
+        let status = daemon.status();
+        let mut clients = status["clients"].as_array().unwrap().iter();
+        clients.any(|client| client["watching"] == true)
+    });
     let mut sender = Client::tcp(daemon.address(0));
     for n in 0..=500 {
         sender.send(&rate(id, n, std::f64::consts::FRAC_PI_2));
