@@ -13,7 +13,7 @@ const EXPLAINED: f64 = 0.4;
 /// Errors over 1 s below this need no explanation, rad (2 degrees).
 const SMALL: f64 = 0.035;
 /// Where gaps take more than this share of the time, what was turned is not known.
-const MOSTLY_THERE: f64 = 0.1;
+const MOSTLY_THERE: f64 = 0.5;
 /// An orientation that misses the motion by this share of it does not follow the gyro.
 const ANOTHER_MOTION: f64 = 0.5;
 
