@@ -271,11 +271,12 @@ impl Playback {
         }
     }
 
-    /// A client asks for something. Whether what waits for the watchers is out of date.
+    /// A client asks for something. `stale` is called where what waits for the watchers is out of date by that,
+    /// before the run goes on: what it shows next is not.
     ///
     /// # Errors
     /// The fault to answer with.
-    pub fn ask(&self, action: Action) -> Result<bool, Fault> {
+    pub fn ask(&self, action: Action, stale: impl FnOnce()) -> Result<(), Fault> {
         let refuse = |what: &str| Err(Fault::new("bad_playback", what.to_owned()));
         let mut state = self.state();
         if state.pace.is_none() {
@@ -284,13 +285,13 @@ impl Playback {
                 "this run goes as fast as it can; --speed 1 makes it one that can be controlled",
             ));
         }
-        let mut stale = false;
+        let mut leaps = false;
         match action {
             Action::Pause if state.mode == Mode::Playing => state.mode = Mode::Paused,
             Action::Pause => {}
             Action::Play if state.mode == Mode::Ended => {
                 state.rewind(None)?;
-                stale = true;
+                leaps = true;
                 state.mode = Mode::Playing;
             }
             Action::Play => {
@@ -326,12 +327,15 @@ impl Playback {
                 if state.mode == Mode::Ended {
                     state.mode = Mode::Paused;
                 }
-                stale = true;
+                leaps = true;
             }
+        }
+        if leaps {
+            stale();
         }
         drop(state);
         self.changed.notify_all();
-        Ok(stale)
+        Ok(())
     }
 
     /// From now on nothing is handed on.
@@ -440,7 +444,11 @@ mod tests {
     fn a_seek_forward_is_mute_up_to_its_stamp_and_then_shows() {
         let playback = Playback::new("f", Some(1000.0), false);
         assert!(matches!(playback.turn(stamps(0, 1)), (Turn::Show(1), _)));
-        assert_eq!(playback.ask(Action::Seek(Nanos(50_000_000))), Ok(true));
+        let mut stale = false;
+        playback
+            .ask(Action::Seek(Nanos(50_000_000)), || stale = true)
+            .unwrap();
+        assert!(stale);
         assert_eq!(playback.turn(stamps(1, 100)).0, Turn::Mute(49));
         let (turn, news) = playback.turn(stamps(50, 1));
         assert_eq!((turn, news), (Turn::Show(1), News::Changed));
@@ -450,7 +458,11 @@ mod tests {
     fn a_seek_backward_ends_the_run_and_the_next_one_is_mute_up_to_its_stamp() {
         let playback = Playback::new("f", Some(1000.0), false);
         assert!(matches!(playback.turn(stamps(5, 5)), (Turn::Show(5), _)));
-        assert_eq!(playback.ask(Action::Seek(Nanos(7_000_000))), Ok(true));
+        let mut stale = false;
+        playback
+            .ask(Action::Seek(Nanos(7_000_000)), || stale = true)
+            .unwrap();
+        assert!(stale);
         assert_eq!(playback.turn(stamps(10, 5)).0, Turn::End);
         assert!(!playback.ended(), "it is not the end");
         assert!(playback.wait_for_restart() && playback.begin_anew());
@@ -458,7 +470,7 @@ mod tests {
         assert!(matches!(playback.turn(stamps(7, 1)), (Turn::Show(1), _)));
         assert_eq!(playback.run(), 1);
         playback.forward_only(Some("because"));
-        let refused = playback.ask(Action::Seek(Nanos(0))).unwrap_err();
+        let refused = playback.ask(Action::Seek(Nanos(0)), || {}).unwrap_err();
         assert_eq!(refused.code, "forward_only");
     }
 
@@ -468,29 +480,56 @@ mod tests {
         // That it waits, and where, is said first.
         assert_eq!(playback.turn(stamps(0, 9)), (Turn::Show(0), News::Changed));
         assert_eq!(playback.place().unwrap().at, Some(Nanos(0)));
-        playback.ask(Action::Seek(Nanos(3_000_000))).unwrap();
+        playback.ask(Action::Seek(Nanos(3_000_000)), || {}).unwrap();
         assert_eq!(playback.turn(stamps(0, 9)).0, Turn::Mute(3));
         assert_eq!(playback.turn(stamps(3, 6)), (Turn::Show(1), News::Changed));
-        playback.ask(Action::Play).unwrap();
+        playback.ask(Action::Play, || {}).unwrap();
         assert!(matches!(playback.turn(stamps(4, 5)), (Turn::Show(5), _)));
     }
 
     #[test]
     fn what_can_not_be_is_refused() {
         let unpaced = Playback::new("f", None, true);
-        assert_eq!(unpaced.ask(Action::Pause).unwrap_err().code, "not_paced");
+        assert_eq!(
+            unpaced.ask(Action::Pause, || {}).unwrap_err().code,
+            "not_paced"
+        );
         assert_eq!(unpaced.place(), None);
         assert_eq!(unpaced.turn(stamps(0, 9)).0, Turn::Show(9));
         let playback = Playback::new("f", Some(1.0), false);
         for speed in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-            assert!(playback.ask(Action::Speed(speed)).is_err(), "{speed}");
+            assert!(
+                playback.ask(Action::Speed(speed), || {}).is_err(),
+                "{speed}"
+            );
         }
         assert!(
-            playback.ask(Action::Seek(Nanos(0))).is_err(),
+            playback.ask(Action::Seek(Nanos(0)), || {}).is_err(),
             "no start yet"
         );
         playback.stop();
         assert_eq!(playback.turn(stamps(0, 9)).0, Turn::End);
         assert!(!playback.wait_for_restart());
+    }
+
+    #[test]
+    fn what_is_shown_after_a_seek_is_not_forgotten_with_what_came_before() {
+        let playback = std::sync::Arc::new(Playback::new("f", Some(1.0), true));
+        let (turn, _) = playback.turn(stamps(0, 10));
+        assert_eq!(turn, Turn::Show(0));
+        let run = playback.clone();
+        let forgotten = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(false));
+        let seen = forgotten.clone();
+        let shown = std::thread::spawn(move || {
+            while run.turn(stamps(0, 10)).0 != Turn::Show(1) {}
+            seen.load(std::sync::atomic::Ordering::SeqCst)
+        });
+        std::thread::sleep(Duration::from_millis(20));
+        let forget = || {
+            std::thread::sleep(Duration::from_millis(50));
+            forgotten.store(true, std::sync::atomic::Ordering::SeqCst);
+        };
+        playback.ask(Action::Seek(Nanos(0)), forget).unwrap();
+        assert!(shown.join().unwrap());
     }
 }

@@ -90,11 +90,11 @@ impl Hub {
                 "samples come as they come here; strapd replay LOG -o ws-listen://... can be controlled",
             )
         })?;
-        if playback.ask(action)? {
+        playback.ask(action, || {
             for client in read(&self.clients).values() {
                 client.outbox.forget();
             }
-        }
+        })?;
         self.announce(false, Some(client));
         Ok(())
     }
