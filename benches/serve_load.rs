@@ -210,11 +210,12 @@ fn paced(name: &str, publishers: usize, hz: u64, subscribers: usize, stalled: us
         })
         .collect();
     // Memory and files every second, the first fifth left out: buffers are made there.
-    let mut levels = Vec::new();
+    let mut levels: Vec<(f64, f64, usize)> = Vec::new();
     while writers.iter().any(|w| !w.is_finished()) {
-        std::thread::sleep(Duration::from_secs(1));
-        if secs >= SOAK && begin.elapsed().as_secs() >= secs / 5 {
-            let now = begin.elapsed().as_secs_f64();
+        std::thread::sleep(Duration::from_millis(10));
+        let now = begin.elapsed().as_secs_f64();
+        let last = levels.last().map_or(secs as f64 / 5.0, |(t, ..)| t + 1.0);
+        if secs >= SOAK && now >= last {
             levels.push((now, daemon.rss() as f64, daemon.files()));
         }
     }

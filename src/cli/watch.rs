@@ -2,9 +2,9 @@
 //!
 //! | file | arrow | |
 //! |---|---|---|
-//! | [`board`] | what a daemon says -> what is known of every sensor | pure |
-//! | [`view`], [`horizon`] | what is known -> lines of text | pure |
-//! | [`screen`] | lines -> the terminal, and its restoration | I/O |
+//! | `board` | what a daemon says -> what is known of every sensor | pure |
+//! | `view`, `horizon` | what is known -> lines of text | pure |
+//! | `screen` | lines -> the terminal, and its restoration | I/O |
 
 mod board;
 mod horizon;
