@@ -68,9 +68,12 @@ impl Hub {
 
     /// The replay has begun anew, as another session.
     pub fn began_anew(&self) {
+        // Before the clients are locked: `control` locks the playback first, then them.
+        let (plain, controlling) = (self.server_info(false), self.server_info(true));
         for client in read(&self.clients).values() {
             if let Shape::Foxglove { controls } = client.shape {
-                client.outbox.reply(self.server_info(controls));
+                let info = if controls { &controlling } else { &plain };
+                client.outbox.reply(info.clone());
             }
         }
     }
