@@ -8,12 +8,13 @@
 #![allow(clippy::print_stdout)]
 
 use std::path::Path;
+use strapd::compare;
 use strapd::model::attitude::Quaternion;
 use strapd::model::frames::{Body, In, Nav};
 use strapd::model::rigid_body::{HeldRate, Spin};
 use strapd::model::top::{Case, EulerState, SymmetricTop, TopMethod, TopRun};
-use strapd::propagate::{Method, Noise, Order, Placement, Propagator, Sequential, Settings};
-use strapd::record::{Join, Nanos, RateSample, SampleKind, Status};
+use strapd::propagate::{Method, Order, Placement};
+use strapd::record::Nanos;
 use strapd::report::plot::{Axis, Chart, Look, Series};
 
 type Failure = Box<dyn std::error::Error>;
@@ -58,37 +59,12 @@ fn nanos(k: u64, rate_hz: f64) -> u64 {
 
 /// The propagator on exact samples.
 fn propagated(method: Method, truth: &[Spin], rate_hz: f64) -> Result<Vec<Attitude>, Failure> {
-    let mut propagator = Propagator::new(Settings {
-        method,
-        kind: SampleKind::Rate,
-        initial: truth.first().ok_or("no samples")?.q_nb,
-        noise: Noise::default(),
-        ..Settings::default()
-    })?;
-    let samples: Vec<RateSample> = truth
+    let stamped: Vec<_> = truth
         .iter()
         .zip(0..)
-        .map(|(spin, k)| {
-            let stamp = Nanos(nanos(k, rate_hz) as i64);
-            RateSample {
-                stamp,
-                start: stamp,
-                value: spin.w_nb_b,
-                accel: None,
-                join: if k == 0 {
-                    Join::Start
-                } else {
-                    Join::Continuous
-                },
-                status: Status::OK,
-                log: stamp,
-            }
-        })
+        .map(|(spin, k)| (Nanos(nanos(k, rate_hz) as i64), *spin))
         .collect();
-    let mut out = Vec::new();
-    propagator.push(&samples, &Sequential, &mut out);
-    propagator.finish(&Sequential, &mut out);
-    Ok(out.iter().map(|a| a.q_nb).collect())
+    Ok(compare::top::attitudes(method, &stamped)?)
 }
 
 /// One of the model's own methods.

@@ -13,3 +13,21 @@ pub mod attitude;
 pub mod link;
 pub mod remote;
 pub mod watcher;
+
+use crate::error::{Error, Result};
+
+/// Runs the work of a command that talks to a daemon, `name` in what is said when it can not even begin.
+/// What it leaves behind is not waited for.
+///
+/// # Errors
+/// Those of `work`; [`Error::Usage`] when the system gives no thread.
+pub fn run<T>(name: &str, work: impl Future<Output = Result<T>>) -> Result<T> {
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(1)
+        .enable_all()
+        .build()
+        .map_err(|e| Error::Usage(format!("{name}: {e}")))?;
+    let outcome = runtime.block_on(work);
+    runtime.shutdown_background();
+    outcome
+}

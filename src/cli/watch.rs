@@ -12,6 +12,7 @@ mod screen;
 mod view;
 
 use super::{Global, Outcome, When, print};
+use crate::client;
 use crate::client::remote::Remote;
 use crate::client::watcher::{Said, Watcher, request};
 use crate::error::{Error, Result};
@@ -71,11 +72,6 @@ pub fn run(global: &Global, args: &Watch) -> Result<Outcome> {
         .as_deref()
         .map(|file| Secret::read("--token-file", file))
         .transpose()?;
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(1)
-        .enable_all()
-        .build()
-        .map_err(|e| Error::Usage(format!("watch {}: {e}", args.url)))?;
     let watching = async {
         let mut signals = Signals::new().map_err(|e| Error::Usage(format!("signals: {e}")))?;
         // Made inside, so that it is restored before anything is said.
@@ -96,9 +92,7 @@ pub fn run(global: &Global, args: &Watch) -> Result<Outcome> {
             _ = signals.next() => Ok(()),
         }
     };
-    let ended = runtime.block_on(watching);
-    runtime.shutdown_background();
-    ended.map(|()| Outcome::Done)
+    client::run(&format!("watch {}", args.url), watching).map(|()| Outcome::Done)
 }
 
 fn use_colour(when: When) -> bool {

@@ -299,7 +299,10 @@ pub fn propagated(method: Method, truth: &[(Nanos, Spin)], margin: usize) -> Res
 }
 
 /// The propagator's attitudes from exact samples of the rate, started at the truth.
-fn attitudes(
+///
+/// # Errors
+/// In words: a method that is none for rates.
+pub fn attitudes(
     method: Method,
     truth: &[(Nanos, Spin)],
 ) -> Result<Vec<Quaternion<Nav, Body>>, String> {

@@ -215,18 +215,10 @@ impl Covariance {
     /// The attitude is one that was known so well when it was saved. How its error hangs together with
     /// that of the bias was not saved, and is taken for nothing.
     pub(crate) fn resume(&mut self, saved: AttitudeCovariance) {
-        let AttitudeCovariance {
-            xx,
-            xy,
-            xz,
-            yy,
-            yz,
-            zz,
-        } = saved;
         self.restart();
         self.kind = Kind::Wandering;
         self.alike = 0.0;
-        self.attitude = [xx, xy, xz, yy, yz, zz];
+        self.attitude = saved.upper();
     }
 
     /// Adds what a bridged gap may hide: rad^2 about every axis, and seconds of white noise.
@@ -276,15 +268,7 @@ impl Covariance {
         if p[0].max(p[3]).max(p[5]) >= LOST * LOST {
             capped(&mut p);
         }
-        let [xx, xy, xz, yy, yz, zz] = p;
-        AttitudeCovariance {
-            xx,
-            xy,
-            xz,
-            yy,
-            yz,
-            zz,
-        }
+        AttitudeCovariance::from_upper(p)
     }
 
     /// Of attitude error (rad, body axes) and bias (rad/s), in this order; not capped.

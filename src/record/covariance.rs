@@ -38,6 +38,26 @@ impl AttitudeCovariance {
         }
     }
 
+    /// From the upper triangle, row by row: xx, xy, xz, yy, yz, zz.
+    #[must_use]
+    #[inline(always)]
+    pub fn from_upper([xx, xy, xz, yy, yz, zz]: [f64; 6]) -> AttitudeCovariance {
+        AttitudeCovariance {
+            xx,
+            xy,
+            xz,
+            yy,
+            yz,
+            zz,
+        }
+    }
+
+    /// The upper triangle, row by row.
+    #[must_use]
+    pub fn upper(&self) -> [f64; 6] {
+        [self.xx, self.xy, self.xz, self.yy, self.yz, self.zz]
+    }
+
     /// One standard deviation about each body axis, rad.
     #[must_use]
     pub fn sigma(&self) -> Vector3<f64> {
@@ -47,14 +67,7 @@ impl AttitudeCovariance {
     /// The whole matrix.
     #[must_use]
     pub fn matrix(&self) -> Matrix3<f64> {
-        let AttitudeCovariance {
-            xx,
-            xy,
-            xz,
-            yy,
-            yz,
-            zz,
-        } = *self;
+        let [xx, xy, xz, yy, yz, zz] = self.upper();
         Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
     }
 

@@ -44,21 +44,20 @@ pub struct Saved {
 pub type Sensors = BTreeMap<String, Saved>;
 
 #[derive(Serialize, Deserialize)]
-struct Document {
+struct Document<S> {
     strapd_state: u32,
-    sensors: Sensors,
+    sensors: S,
 }
 
 impl Saved {
     /// Of a stream with these labels.
     #[must_use]
     pub fn new(last: &AttitudeSample, labels: &sink::Stream) -> Saved {
-        let p = last.covariance;
         Saved {
             stamp_ns: last.stamp.0,
             q: last.q_nb.wxyz(),
             rate: last.rate.into(),
-            covariance: [p.xx, p.xy, p.xz, p.yy, p.yz, p.zz],
+            covariance: last.covariance.upper(),
             reset: last.reset_count,
             world: labels.world_axes.clone(),
             body: labels.body_axes.clone(),
@@ -78,20 +77,12 @@ impl Saved {
                 self.body, self.world, labels.body_axes, labels.world_axes
             ));
         }
-        let [xx, xy, xz, yy, yz, zz] = self.covariance;
         Ok(AttitudeSample {
             stamp: Nanos(self.stamp_ns),
             q_nb: Quaternion::assume_unit(self.q),
             rate: self.rate.into(),
             accel: None,
-            covariance: AttitudeCovariance {
-                xx,
-                xy,
-                xz,
-                yy,
-                yz,
-                zz,
-            },
+            covariance: AttitudeCovariance::from_upper(self.covariance),
             status: Status::OK,
             reset_count: self.reset,
             log: Nanos(self.stamp_ns),
@@ -142,7 +133,7 @@ impl StateFile {
     pub fn write(&mut self, sensors: &Sensors) -> Result<()> {
         let document = Document {
             strapd_state: FORMAT,
-            sensors: sensors.clone(),
+            sensors,
         };
         let failed = |source| Error::Write {
             path: self.path.clone(),
@@ -182,7 +173,7 @@ fn read(path: &Path, file: File) -> Result<Sensors> {
             path.display()
         ))
     };
-    let document: Document = serde_json::from_slice(&text)
+    let document: Document<Sensors> = serde_json::from_slice(&text)
         .map_err(|e| foreign(format!("is no state that strapd has saved: {e}")))?;
     if document.strapd_state != FORMAT {
         return Err(foreign(format!(

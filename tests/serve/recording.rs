@@ -2,26 +2,24 @@
 
 use super::client::{Client, rate};
 use super::daemon::{Process, TCP, eventually};
+use std::path::Path;
+
+/// A daemon that records there, one who sends and one who watches.
+fn recording(path: &Path, more: &[&str]) -> (Process, Client, Client) {
+    let path = path.to_str().unwrap();
+    let args = ["--listen", TCP, "--min-free", "0", "--record", path];
+    let process = Process::start(&[&args, more].concat());
+    let sender = Client::tcp(process.address(0));
+    let watcher = Client::tcp(process.address(0)).watching("{\"class\":\"WATCH\"}");
+    (process, sender, watcher)
+}
 
 #[test]
 fn everything_sent_before_sigterm_is_in_the_recording_with_its_attitudes() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("a.mcap");
-    let record = [
-        "--listen",
-        TCP,
-        "--min-free",
-        "0",
-        "--record",
-        path.to_str().unwrap(),
-        "--world",
-        "ned",
-        "--body",
-        "frd",
-    ];
-    let mut process = Process::start(&record);
-    let mut sender = Client::tcp(process.address(0));
-    let mut watcher = Client::tcp(process.address(0)).watching("{\"class\":\"WATCH\"}");
+    let (mut process, mut sender, mut watcher) =
+        recording(&path, &["--world", "ned", "--body", "frd"]);
     let lines: Vec<String> = (0..500).map(|n| rate("imu0", n, 1.0)).collect();
     sender.send(&lines.join("\n"));
     let mut sent = Vec::new();
@@ -80,17 +78,7 @@ fn everything_sent_before_sigterm_is_in_the_recording_with_its_attitudes() {
 fn a_hang_up_ends_the_file_and_goes_on_in_a_new_one() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("a.mcap");
-    let record = [
-        "--listen",
-        TCP,
-        "--min-free",
-        "0",
-        "--record",
-        path.to_str().unwrap(),
-    ];
-    let mut process = Process::start(&record);
-    let mut sender = Client::tcp(process.address(0));
-    let mut watcher = Client::tcp(process.address(0)).watching("{\"class\":\"WATCH\"}");
+    let (mut process, mut sender, mut watcher) = recording(&path, &[]);
     let moved = dir.path().join("moved.mcap");
     for round in 0..3 {
         for n in 0..100 {

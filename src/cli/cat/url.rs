@@ -2,6 +2,7 @@
 
 use super::{Cat, Format};
 use crate::cli::Outcome;
+use crate::client;
 use crate::client::attitude::Attitude;
 use crate::client::remote::Remote;
 use crate::client::watcher::{Said, Watcher, request};
@@ -40,14 +41,7 @@ pub(super) fn run(args: &Cat, url: &str) -> Result<Outcome> {
         .as_deref()
         .map(|file| Secret::read("--token-file", file))
         .transpose()?;
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(1)
-        .enable_all()
-        .build()
-        .map_err(|e| Error::Usage(format!("cat {url}: {e}")))?;
-    let outcome = runtime.block_on(print(args, &remote, token.as_ref()));
-    runtime.shutdown_background();
-    outcome
+    client::run(&format!("cat {url}"), print(args, &remote, token.as_ref()))
 }
 
 async fn print(args: &Cat, remote: &Remote, token: Option<&Secret>) -> Result<Outcome> {
