@@ -16,6 +16,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use tokio::sync::oneshot;
 
+/// Items handed out at once: well below what may wait for a client.
+const AT_ONCE: usize = 256;
+
 /// A run that is served.
 #[derive(Debug)]
 pub struct Cast {
@@ -197,9 +200,17 @@ impl Cast {
     fn hand(&self, lane: &mut Lane, items: Items<'_>, shown: bool) {
         let first = lane.next;
         lane.next += items.len() as u64;
-        if shown {
-            let mut text = lock(&self.text);
-            self.hub.distribute(&lane.channel, first, items, &mut text);
+        if !shown {
+            return;
+        }
+        let mut text = lock(&self.text);
+        let mut seq = first;
+        for some in items.chunks(AT_ONCE) {
+            if !self.is_paced() {
+                self.hub.wait_for_room();
+            }
+            self.hub.distribute(&lane.channel, seq, some, &mut text);
+            seq += some.len() as u64;
         }
     }
 

@@ -62,6 +62,18 @@ impl Items<'_> {
         }
     }
 
+    /// The same in pieces of at most `most`.
+    pub fn chunks(&self, most: usize) -> impl Iterator<Item = Items<'_>> + use<'_> {
+        let pieces = |n: usize| (0..n).step_by(most.max(1));
+        pieces(self.len()).map(move |from| {
+            let until = (from + most.max(1)).min(self.len());
+            match self {
+                Items::Attitudes(items) => Items::Attitudes(&items[from..until]),
+                Items::Samples(items) => Items::Samples(&items[from..until]),
+            }
+        })
+    }
+
     /// Whether there are none.
     #[must_use]
     pub fn is_empty(&self) -> bool {

@@ -5,14 +5,14 @@
 //! after the daemon is the normal case. Its lines take the same way as those of a connection that
 //! was accepted.
 
-use super::hub::Hub;
+use super::hub::{Flood, Hub};
 use super::listen::{in_room, now};
 use super::quiet;
 use super::session::{End, Session, Side};
 use super::shutdown::Running;
 use super::source::{Protocol, Source};
 use super::upstream::Event;
-use crate::client::link::{Heard, Link};
+use crate::client::link::{self, Heard, Link};
 use crate::client::remote::Remote;
 use futures_util::FutureExt;
 use std::collections::VecDeque;
@@ -186,6 +186,7 @@ async fn converse(
     let mut asked = source.protocol == Protocol::Strapd;
     let mut asked_again = false;
     let is_web = matches!(source.remote, Remote::WebSocket { .. });
+    let mut flood = Flood::default();
     let mut first = Vec::new();
     if let (Some(token), false) = (&source.token, is_web) {
         first.push(serde_json::json!({"class": "AUTH", "token": token.reveal()}).to_string());
@@ -199,8 +200,16 @@ async fn converse(
         }
     }
     loop {
+        let next = async {
+            let there = link.read(&mut bytes).now_or_never();
+            flood.message(there.is_some());
+            match there {
+                Some(heard) => heard,
+                None => link.read(&mut bytes).await,
+            }
+        };
         let heard = tokio::select! {
-            heard = link.read(&mut bytes) => heard,
+            heard = next => heard,
             () = running.asked() => {
                 // What has arrived is still taken.
                 while let Some(Ok(heard @ (Heard::Bytes | Heard::Message))) =
@@ -215,7 +224,11 @@ async fn converse(
             Ok(heard) => {
                 take(&mut session, &heard, &bytes);
                 match heard {
-                    Heard::Bytes | Heard::Message => None,
+                    Heard::Bytes => {
+                        flood.read(bytes.len(), link::READ);
+                        None
+                    }
+                    Heard::Message => None,
                     Heard::Closed(None) => Some("the peer has closed the connection".to_owned()),
                     Heard::Closed(Some(words)) => Some(format!("the peer has closed: {words}")),
                 }
@@ -266,6 +279,7 @@ async fn converse(
         if ended.is_some() {
             return ended;
         }
+        flood.wait(hub).await;
     }
 }
 

@@ -6,9 +6,11 @@
 //! order is that of its lock.
 
 mod counters;
+mod room;
 mod telling;
 
 pub use counters::{Counters, count};
+pub use room::Flood;
 
 use super::Settings;
 use super::admission::Token;
@@ -33,6 +35,7 @@ use std::hash::{BuildHasher, RandomState};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::Instant;
+use tokio::sync::Notify;
 
 /// The middle of the daemon.
 #[derive(Debug)]
@@ -53,6 +56,8 @@ pub struct Hub {
     sensors: RwLock<BTreeMap<Arc<str>, Arc<Mutex<Sensor>>>>,
     clients: RwLock<BTreeMap<u64, Arc<Client>>>,
     watchers: RwLock<Arc<[Arc<Client>]>>,
+    /// A watcher has room again.
+    room_made: Arc<Notify>,
     /// Attitudes of before the start, of sensors that have not come back yet.
     saved: Mutex<Sensors>,
     /// How saving attitudes went the last time; `None` when they are not saved.
@@ -156,6 +161,7 @@ impl Hub {
             sensors: RwLock::default(),
             clients: RwLock::default(),
             watchers: RwLock::new(Arc::from([])),
+            room_made: Arc::default(),
             saved: Mutex::new(settings.saved),
             state: Mutex::default(),
             channels: RwLock::default(),
@@ -230,7 +236,8 @@ impl Hub {
             Shape::Lines(Profile::Lines) => Outbox::new(),
             Shape::Lines(Profile::PlotJuggler) => Outbox::saying(|_, _| Bytes::new()),
             Shape::Foxglove { .. } => Outbox::saying(foxglove::gap),
-        };
+        }
+        .telling(self.room_made.clone());
         let channels = read(&self.channels);
         if let Shape::Foxglove { controls } = shape {
             outbox.reply(self.server_info(controls));
@@ -401,7 +408,7 @@ impl Hub {
     ) {
         // Encoded when the first asks, and shared by all.
         let mut encoded: [Option<Vec<Chunk>>; 2] = [None, None];
-        let watchers = read(&self.watchers).clone();
+        let watchers = self.watchers();
         for client in &*watchers {
             let profile = match client.shape {
                 Shape::Lines(profile) => profile,

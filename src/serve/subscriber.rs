@@ -14,6 +14,8 @@ use tokio::sync::Notify;
 
 /// Most bytes of attitudes waiting for one client, what is being written included.
 pub const MAX_QUEUED: usize = 256 << 10;
+/// With more than this waiting, senders that can wait do.
+const CROWDED: usize = MAX_QUEUED / 2;
 /// Most replies waiting for one client.
 pub const MAX_CONTROL: usize = 64;
 /// Most bytes of replies waiting for one client, once there is more than one.
@@ -111,6 +113,8 @@ impl Default for Outbox {
 pub struct Outbox {
     state: Mutex<State>,
     wake: Notify,
+    /// Told when there is room again.
+    room: Arc<Notify>,
     /// How it is said that attitudes were dropped; empty: not at all.
     gap: fn(&str, &Dropped) -> Bytes,
 }
@@ -134,6 +138,8 @@ struct State {
     told: Option<Nanos>,
     decimators: HashMap<Arc<str>, Option<Decimator>>,
     full: Option<Full>,
+    /// It took nothing while it was waited for.
+    is_stalled: bool,
     dropped: u64,
     sent: u64,
 }
@@ -164,8 +170,16 @@ impl Outbox {
         Outbox {
             state: Mutex::default(),
             wake: Notify::new(),
+            room: Arc::default(),
             gap,
         }
+    }
+
+    /// The same, telling `room` whenever there is room again.
+    #[must_use]
+    pub fn telling(mut self, room: Arc<Notify>) -> Outbox {
+        self.room = room;
+        self
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
@@ -365,8 +379,27 @@ impl Outbox {
 
     /// This many bytes of attitudes have left.
     pub fn written(&self, bytes: usize) {
+        if bytes == 0 {
+            return;
+        }
         let mut state = self.state();
         state.queued = state.queued.saturating_sub(bytes);
+        state.is_stalled = false;
+        drop(state);
+        self.room.notify_waiters();
+    }
+
+    /// Whether more would soon be too much for it, and it may be waited for.
+    #[must_use]
+    pub fn is_crowded(&self) -> bool {
+        let state = self.state();
+        state.queued > CROWDED && !state.is_stalled
+    }
+
+    /// It was waited for in vain: not again until it takes something.
+    pub fn lose_patience(&self) {
+        let mut state = self.state();
+        state.is_stalled = state.queued > CROWDED;
     }
 
     /// Whether anything waits.

@@ -1,7 +1,7 @@
 //! A reader that does not read is nobody else's matter (service.md 6.2 M3, M5).
 
 use super::client::{Client, rate};
-use super::daemon::{Daemon, PATIENCE, TCP, eventually, listening};
+use super::daemon::{Daemon, PATIENCE, TCP, WS, eventually, listening};
 use std::time::Duration;
 use strapd::serve::limits::Limits;
 
@@ -136,4 +136,42 @@ fn a_watcher_gets_the_sensors_and_the_rate_it_asked_for() {
     all.object("ATT");
     some.send("{\"class\":\"POLL\"}");
     some.object("STATUS");
+}
+
+/// Sends as fast as the transport takes it, to one that reads as fast as it can.
+fn flood(daemon: &Daemon, id: &'static str, mut sender: Client) {
+    let mut watcher = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");
+    let samples = 100_000;
+    let sending = std::thread::spawn(move || {
+        for from in (0..samples).step_by(100) {
+            let lines: Vec<String> = (from..from + 100).map(|n| rate(id, n, 0.5)).collect();
+            sender.send(&lines.join("\n"));
+        }
+        sender
+    });
+    let (mut next, mut got) = (0, 0);
+    while next < samples {
+        let value: serde_json::Value = serde_json::from_str(&watcher.line().unwrap()).unwrap();
+        if value["class"] == "GAP" {
+            next = value["last_seq"].as_u64().unwrap() + 1;
+        } else {
+            assert_eq!(value["seq"], next);
+            next += 1;
+            got += 1;
+        }
+    }
+    drop(sending.join().unwrap());
+    // All, where the watcher has its share of the machine; next to none before senders waited.
+    assert!(got > samples / 4, "{got} of {samples}");
+}
+
+#[test]
+fn a_flood_waits_for_whoever_reads_it() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("s");
+    let unix = format!("unix-listen://{}", path.display());
+    let daemon = Daemon::start(listening(&[TCP, WS, &unix]));
+    flood(&daemon, "tcp", Client::tcp(daemon.address(0)));
+    flood(&daemon, "web", Client::web(daemon.address(1)));
+    flood(&daemon, "unix", Client::unix(&path));
 }

@@ -4,7 +4,7 @@
 //! a client that is worked for is not read from, which is how TCP slows a sender down.
 
 use super::{Context, in_room, now};
-use crate::serve::hub::count;
+use crate::serve::hub::{Flood, count};
 use crate::serve::session::Session;
 use crate::serve::shutdown::Running;
 use crate::serve::subscriber::Outbox;
@@ -119,6 +119,7 @@ async fn talk(
     let mut progress = opened;
     let mut pending = Pending::default();
     let mut reading = true;
+    let mut flood = Flood::default();
     let mut closing = None;
     let mut stopping = false;
     let mut tick = interval(limits.tick());
@@ -164,9 +165,11 @@ async fn talk(
             progress = Instant::now();
         }
         tokio::select! {
-            ready = io.readable(), if reading => {
+            () = flood.wait(&hub), if flood.must_wait() => {}
+            ready = io.readable(), if reading && !flood.must_wait() => {
                 let read = ready.and_then(|()| in_room(|buffer, scratch| {
                     let n = io.try_read(buffer)?;
+                    flood.read(n, buffer.len());
                     session.bytes(buffer.get(..n).unwrap_or_default(), now(), scratch);
                     Ok(n)
                 }));

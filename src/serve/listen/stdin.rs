@@ -1,7 +1,7 @@
 //! Standard input -> a session. I/O.
 
 use super::{in_room, now};
-use crate::serve::hub::Hub;
+use crate::serve::hub::{Flood, Hub};
 use crate::serve::session::Session;
 use std::collections::VecDeque;
 use std::io::Read;
@@ -12,9 +12,12 @@ use std::sync::Arc;
 pub fn read(hub: &Arc<Hub>, mut input: impl Read) {
     let mut session = Session::new(hub, "standard input".to_owned(), true);
     let mut said = VecDeque::new();
+    let mut flood = Flood::default();
     loop {
+        flood.wait_in_thread(hub);
         let read = in_room(|buffer, scratch| {
             let n = input.read(buffer)?;
+            flood.read(n, buffer.len());
             match buffer.get(..n).unwrap_or_default() {
                 [] => session.finish(now(), scratch),
                 bytes => session.bytes(bytes, now(), scratch),

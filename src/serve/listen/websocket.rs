@@ -7,7 +7,7 @@ use super::{Context, accept, in_room, now, tcp, too_many_clients};
 use crate::serve::admission::Web;
 use crate::serve::foxglove::{self, Framed};
 use crate::serve::http;
-use crate::serve::hub::{Client, Hub, count};
+use crate::serve::hub::{Client, Flood, Hub, count};
 use crate::serve::session::Session;
 use crate::serve::shutdown::Running;
 use crate::serve::viewer::Viewer;
@@ -179,14 +179,23 @@ pub(crate) async fn converse(socket: WebSocket, connection: Connection, foxglove
 
     let reader = async {
         let opened = Instant::now();
+        let mut flood = Flood::default();
         loop {
             let patience = if session.has_spoken() {
                 limits.ping * 2 + limits.ping / 3
             } else {
                 limits.first_line.saturating_sub(opened.elapsed())
             };
+            let next = async {
+                let there = ready(&mut stream).await;
+                flood.message(there.is_some());
+                match there {
+                    Some(message) => Ok(Some(message)),
+                    None => timeout(patience, stream.next()).await,
+                }
+            };
             let message = tokio::select! {
-                message = timeout(patience, stream.next()) => message,
+                message = next => message,
                 () = running.asked() => {
                     // What has arrived is still taken.
                     while let Some(Ok(message)) = ready(&mut stream).await {
@@ -203,6 +212,7 @@ pub(crate) async fn converse(socket: WebSocket, connection: Connection, foxglove
                 Ok(Some(Ok(Message::Close(_)))) => return None,
                 Ok(Some(Ok(message))) => session.take(&message),
             }
+            flood.wait(&hub).await;
             if session.is_over() {
                 return Some("bad lines or no token");
             }

@@ -1,0 +1,237 @@
+//! Back-pressure: who sends as fast as it can waits a moment for who watches.
+//!
+//! A sensor sends at its own pace and waits for nobody. A log that is pushed in as fast as the
+//! socket takes it would otherwise be read before the watchers on the same cores have had their
+//! turn, and all but the last of it would be dropped for each. Bounded twice: a wait is at most
+//! [`PATIENCE`] long, and a watcher that took nothing during one is not waited for again until it
+//! takes something. So a stalled watcher costs a sender one wait.
+
+use super::{Client, Hub, read};
+use std::sync::Arc;
+use std::time::Duration;
+use tokio::time::{Instant, timeout_at};
+
+/// Longest wait for room, before one read.
+const PATIENCE: Duration = Duration::from_millis(5);
+/// How often a thread looks.
+const LOOK: Duration = Duration::from_micros(200);
+/// A sender of messages floods when so many have come that none was waited for.
+const MESSAGES: u32 = 32;
+
+/// Notices that a sender floods: it has sent more than was read, time after time.
+#[derive(Debug, Default)]
+pub struct Flood {
+    messages: u32,
+    until: Option<Instant>,
+}
+
+impl Flood {
+    /// `n` bytes were read of a stream into room for `most`.
+    pub fn read(&mut self, n: usize, most: usize) {
+        if n >= most {
+            self.until = Some(Instant::now() + PATIENCE);
+        }
+    }
+
+    /// A message has come; `at_once`: it was there already.
+    pub fn message(&mut self, at_once: bool) {
+        self.messages = if at_once { self.messages + 1 } else { 0 };
+        if self.messages >= MESSAGES {
+            self.messages = 0;
+            self.until = Some(Instant::now() + PATIENCE);
+        }
+    }
+
+    /// Whether it is to wait before the next read.
+    #[must_use]
+    pub fn must_wait(&self) -> bool {
+        self.until.is_some()
+    }
+
+    /// Waits, if it must. May be dropped and called again: the end of the wait stands.
+    pub async fn wait(&mut self, hub: &Hub) {
+        if let Some(until) = self.until {
+            hub.room(until).await;
+            self.until = None;
+        }
+    }
+
+    /// The same for a thread of its own.
+    pub fn wait_in_thread(&mut self, hub: &Hub) {
+        if let Some(until) = self.until.take() {
+            hub.room_in_thread(until);
+        }
+    }
+}
+
+fn is_crowded(watchers: &[Arc<Client>]) -> bool {
+    watchers.iter().any(|c| c.outbox.is_crowded())
+}
+
+fn lose_patience(watchers: &[Arc<Client>]) {
+    for client in watchers {
+        client.outbox.lose_patience();
+    }
+}
+
+impl Hub {
+    pub(super) fn watchers(&self) -> Arc<[Arc<Client>]> {
+        read(&self.watchers).clone()
+    }
+
+    /// For a thread that makes as many attitudes as it can: until every watcher that takes anything has
+    /// room for more, or a moment has passed.
+    pub fn wait_for_room(&self) {
+        self.room_in_thread(Instant::now() + PATIENCE);
+    }
+
+    fn room_in_thread(&self, until: Instant) {
+        let watchers = self.watchers();
+        while is_crowded(&watchers) {
+            if Instant::now() >= until {
+                return lose_patience(&watchers);
+            }
+            std::thread::sleep(LOOK);
+        }
+    }
+
+    /// Until every watcher that takes anything has room for more, or `until`.
+    async fn room(&self, until: Instant) {
+        let watchers = self.watchers();
+        if watchers.is_empty() {
+            return;
+        }
+        // Others on this thread have their turn, the watchers above all.
+        tokio::task::yield_now().await;
+        loop {
+            // Made before it is looked: no room made meanwhile goes unnoticed.
+            let made = self.room_made.notified();
+            if !is_crowded(&watchers) {
+                return;
+            }
+            if timeout_at(until, made).await.is_err() {
+                return lose_patience(&watchers);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::super::super::Settings;
+    use super::super::super::subscriber::{Chunk, Filter, MAX_QUEUED};
+    use super::*;
+    use std::collections::VecDeque;
+
+    fn watched() -> (Arc<Hub>, Arc<Client>) {
+        let hub = Arc::new(Hub::new(Settings::default()).unwrap());
+        let client = hub.join("somebody".to_owned());
+        client.outbox.watch(Some(Filter::default()));
+        hub.watch_changed();
+        (hub, client)
+    }
+
+    fn fill(client: &Client, bytes: usize) {
+        let chunk = Chunk {
+            id: "a".into(),
+            first_seq: 0,
+            count: 1,
+            bytes: vec![b'x'; bytes].into(),
+        };
+        client
+            .outbox
+            .offer_samples(&chunk.id, &mut || vec![chunk.clone()]);
+    }
+
+    fn flooding() -> Flood {
+        let mut flood = Flood::default();
+        flood.read(10, 10);
+        flood
+    }
+
+    /// How long the wait takes.
+    async fn wait(hub: &Hub) -> Duration {
+        let begin = Instant::now();
+        let mut flood = flooding();
+        flood.wait(hub).await;
+        assert!(!flood.must_wait());
+        begin.elapsed()
+    }
+
+    #[test]
+    fn only_who_sends_more_than_is_read_floods() {
+        let mut flood = Flood::default();
+        flood.read(9, 10);
+        assert!(!flood.must_wait());
+        flood.read(10, 10);
+        assert!(flood.must_wait());
+        let mut flood = Flood::default();
+        for n in 0..10 * MESSAGES {
+            // A sensor's messages come one by one, now and then a few together.
+            flood.message(n % MESSAGES != 0);
+            assert!(!flood.must_wait());
+        }
+        for _ in 0..MESSAGES {
+            flood.message(true);
+        }
+        assert!(flood.must_wait());
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn nobody_waits_for_a_watcher_with_room() {
+        let (hub, client) = watched();
+        assert_eq!(wait(&hub).await, Duration::ZERO);
+        fill(&client, MAX_QUEUED / 2);
+        assert_eq!(wait(&hub).await, Duration::ZERO);
+        client.outbox.watch(None);
+        hub.watch_changed();
+        fill(&client, MAX_QUEUED);
+        assert_eq!(wait(&hub).await, Duration::ZERO);
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_flood_waits_until_the_watcher_has_taken_some() {
+        let (hub, client) = watched();
+        fill(&client, MAX_QUEUED / 2 + 1);
+        let taker = {
+            let client = client.clone();
+            tokio::spawn(async move {
+                tokio::time::sleep(Duration::from_millis(2)).await;
+                let taken = client.outbox.take(1, &mut VecDeque::new());
+                client.outbox.written(taken);
+            })
+        };
+        assert_eq!(wait(&hub).await, Duration::from_millis(2));
+        taker.await.unwrap();
+        assert_eq!(client.outbox.level().dropped, 0);
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_watcher_that_takes_nothing_costs_one_wait() {
+        let (hub, client) = watched();
+        fill(&client, MAX_QUEUED * 2 / 3);
+        assert_eq!(wait(&hub).await, PATIENCE);
+        for _ in 0..10 {
+            assert_eq!(wait(&hub).await, Duration::ZERO);
+            fill(&client, MAX_QUEUED * 2 / 3);
+        }
+        // It takes something, and is waited for again.
+        let taken = client.outbox.take(1, &mut VecDeque::new());
+        client.outbox.written(taken);
+        fill(&client, MAX_QUEUED * 2 / 3);
+        assert_eq!(wait(&hub).await, PATIENCE);
+        assert_eq!(wait(&hub).await, Duration::ZERO);
+    }
+
+    #[test]
+    fn a_thread_waits_in_the_same_way() {
+        let (hub, client) = watched();
+        fill(&client, MAX_QUEUED * 2 / 3);
+        let begin = Instant::now();
+        flooding().wait_in_thread(&hub);
+        assert!(begin.elapsed() >= PATIENCE - Duration::from_millis(1));
+        assert!(!client.outbox.is_crowded(), "it is not waited for again");
+        flooding().wait_in_thread(&hub);
+    }
+}
