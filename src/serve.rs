@@ -24,7 +24,6 @@
 //!
 //! The wire is described in `docs/protocol.md`.
 
-pub mod address;
 pub mod admission;
 pub mod cast;
 pub mod channel;
@@ -54,7 +53,7 @@ pub mod wire;
 use crate::config::Plan;
 use crate::error::{Error, Result};
 use crate::sink::Target;
-use address::Listen;
+use crate::sink::address::Listen;
 use admission::{Token, Web, is_loopback};
 use hub::Hub;
 use limits::Limits;

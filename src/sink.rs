@@ -6,6 +6,7 @@
 //! filled. The bytes depend on the samples and the order of the calls alone: not on the number of
 //! threads and not (within a stream) on how the samples were cut into calls.
 
+pub mod address;
 mod batch;
 mod copy;
 mod csv;

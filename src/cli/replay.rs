@@ -216,7 +216,7 @@ impl Replay {
         let run = Run {
             source,
             targets: served.targets.clone(),
-            cast: served.cast.clone(),
+            audience: served.audience(),
             plan,
             options: Options {
                 force: self.force,

@@ -3,11 +3,12 @@
 use super::admission::Admission;
 use super::{Outcome, replay};
 use crate::error::{Error, Result};
+use crate::pipeline::audience::Audience;
 use crate::serve::Settings;
-use crate::serve::address::Listen;
 use crate::serve::cast::{Cast, Next};
 use crate::serve::playback::Playback;
 use crate::sink::Target;
+use crate::sink::address::Listen;
 use clap::Args;
 use std::sync::Arc;
 
@@ -41,7 +42,7 @@ pub(super) struct Served {
     /// How fast.
     pub(super) speed: Option<f64>,
     /// Its server, where there is somebody to serve.
-    pub(super) cast: Option<Arc<Cast>>,
+    cast: Option<Arc<Cast>>,
     looping: bool,
     can_rewind: bool,
 }
@@ -132,6 +133,12 @@ impl Serving {
 }
 
 impl Served {
+    /// Who is shown the run.
+    pub(super) fn audience(&self) -> Option<Arc<dyn Audience>> {
+        let cast = self.cast.clone()?;
+        Some(cast)
+    }
+
     /// Runs once, and again as often as a client or `--loop` asks for it: then with `true`, to those
     /// who are connected alone. The result is that of the first run.
     ///

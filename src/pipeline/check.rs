@@ -155,7 +155,7 @@ fn integrate(
         copy_input: false,
         out_rate: None,
         speed: None,
-        cast: None,
+        audience: None,
         against: has_reference.then(|| asked.reference_topic.clone()),
         command: asked.command.clone(),
     };

@@ -61,7 +61,7 @@ pub(super) fn begin(
         Delivery {
             out_rate: run.out_rate,
             speed: run.speed,
-            cast: run.cast.clone(),
+            audience: run.audience.clone(),
         },
     )?;
     Ok(Session::new(topics, outlet))

@@ -1,11 +1,11 @@
 //! Attitudes of every stream -> every sink of the run. I/O.
 
+use super::audience::{Audience, Turn};
 use super::pace::Pace;
 use super::pool::Pool;
 use super::route::Copied;
 use crate::error::Result;
 use crate::record::{AttitudeSample, Nanos, RawSample};
-use crate::serve::cast::Cast;
 use crate::sink::{
     CopiedChannel, Decimator, Flow, InputChannel, InputMessage, Options, Provenance, Sink, Stream,
     Target, Written,
@@ -22,19 +22,19 @@ const STDOUT: &str = "standard output";
 struct Way<T> {
     due: fn(&T) -> Nanos,
     write: fn(&mut Sink, usize, &[T], &ThreadPool) -> Result<Flow>,
-    cast: fn(&Cast, usize, &[T], bool),
+    show: fn(&dyn Audience, usize, &[T], bool),
 }
 
 const ATTITUDES: Way<AttitudeSample> = Way {
     due: |sample| sample.stamp,
     write: Sink::write,
-    cast: Cast::attitudes,
+    show: |audience, stream, samples, shown| audience.attitudes(stream, samples, shown),
 };
 
 const SAMPLES: Way<RawSample> = Way {
     due: |sample| sample.log,
     write: Sink::write_raw,
-    cast: Cast::samples,
+    show: |audience, stream, samples, shown| audience.samples(stream, samples, shown),
 };
 
 /// What a target is called in the summary.
@@ -57,7 +57,7 @@ pub struct Outlet {
     decimators: Vec<Option<Decimator>>,
     kept: Vec<AttitudeSample>,
     pace: Option<Pace>,
-    cast: Option<Arc<Cast>>,
+    audience: Option<Arc<dyn Audience>>,
     closed: bool,
 }
 
@@ -68,8 +68,8 @@ pub struct Delivery {
     pub out_rate: Option<f64>,
     /// `--speed`; `None` = as fast as possible.
     pub speed: Option<f64>,
-    /// Who serves targets that listen.
-    pub cast: Option<Arc<Cast>>,
+    /// Who is served where targets listen.
+    pub audience: Option<Arc<dyn Audience>>,
 }
 
 /// The sockets that broke before the end.
@@ -82,7 +82,7 @@ pub(super) fn broken(written: &[(String, Written)]) -> Vec<String> {
 }
 
 impl Outlet {
-    /// Opens every target; those that listen are served by `cast`, which then has the pace too.
+    /// Opens every target; those that listen are the `audience`'s, which then has the pace too.
     ///
     /// # Errors
     /// As [`Sink::create`]; nothing is left behind.
@@ -97,7 +97,7 @@ impl Outlet {
         let Delivery {
             out_rate,
             speed,
-            cast,
+            audience,
         } = delivery;
         let sinks = targets
             .iter()
@@ -107,8 +107,8 @@ impl Outlet {
                 Ok((name(target), sink))
             })
             .collect::<Result<Vec<_>>>()?;
-        if let Some(cast) = &cast {
-            cast.begin(streams);
+        if let Some(audience) = &audience {
+            audience.begin(streams);
         }
         Ok(Outlet {
             copied: sinks.iter().map(|_| BTreeMap::new()).collect(),
@@ -119,7 +119,7 @@ impl Outlet {
                 .collect(),
             kept: Vec::new(),
             pace: Pace::new(speed),
-            cast,
+            audience,
             closed: false,
         })
     }
@@ -162,37 +162,44 @@ impl Outlet {
     ) -> Result<Flow> {
         let mut rest = samples;
         while let (false, Some(first)) = (self.closed, rest.first()) {
-            let stamps = rest.iter().map(way.due);
-            let (n, shown) = match (&self.cast, &mut self.pace) {
-                (Some(cast), _) => match cast.turn(stamps) {
-                    Some(turn) => turn,
-                    None => {
-                        self.closed = true;
-                        break;
+            let turn = match (&self.audience, &mut self.pace) {
+                (Some(audience), _) => {
+                    let due = |n: usize| (way.due)(rest.get(n).unwrap_or(first));
+                    match audience.turn(rest.len(), &due) {
+                        Some(turn) => turn,
+                        None => {
+                            self.closed = true;
+                            break;
+                        }
                     }
-                },
-                (None, Some(pace)) => {
-                    pace.wait((way.due)(first));
-                    (pace.take(stamps), true)
                 }
-                (None, None) => (rest.len(), true),
+                (None, pace) => {
+                    let count = pace.as_mut().map_or(rest.len(), |pace| {
+                        pace.wait((way.due)(first));
+                        pace.take(rest.iter().map(way.due))
+                    });
+                    Turn {
+                        count,
+                        is_shown: true,
+                    }
+                }
             };
-            let (now, later) = rest.split_at(n.min(rest.len()));
+            let (now, later) = rest.split_at(turn.count.min(rest.len()));
             rest = later;
-            if let Some(cast) = &self.cast {
-                (way.cast)(cast, stream, now, shown);
+            if let Some(audience) = &self.audience {
+                (way.show)(&**audience, stream, now, turn.is_shown);
             }
             let mut flows = Vec::with_capacity(self.sinks.len());
             for (_, sink) in &mut self.sinks {
                 let mut flow = (way.write)(sink, stream, now, pool.rayon())?;
-                if self.pace.is_some() && shown && flow == Flow::Continue {
+                if self.pace.is_some() && turn.is_shown && flow == Flow::Continue {
                     flow = sink.flush(pool.rayon())?;
                 }
                 flows.push(flow);
             }
             // A reader that has gone ends the run only when nobody else is served: a file beside it
             // must still become whole.
-            self.closed = self.cast.is_none()
+            self.closed = self.audience.is_none()
                 && !flows.is_empty()
                 && flows.iter().all(|flow| *flow == Flow::Closed);
         }
@@ -211,8 +218,8 @@ impl Outlet {
 
     /// How long the input is, about, for whoever is shown where the run is.
     pub fn length(&self, secs: f64) {
-        if let Some(cast) = &self.cast {
-            cast.playback().length(secs);
+        if let Some(audience) = &self.audience {
+            audience.length(secs);
         }
     }
 
@@ -271,7 +278,7 @@ impl Outlet {
     /// # Errors
     /// As [`Sink::finish`].
     pub fn finish(self) -> Result<Vec<(String, Written)>> {
-        if self.cast.as_ref().is_some_and(|c| c.playback().is_cut()) {
+        if self.audience.as_ref().is_some_and(|a| a.is_cut()) {
             return Ok(Vec::new());
         }
         self.sinks

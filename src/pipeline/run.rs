@@ -1,8 +1,8 @@
 //! What a replay is: from where, to where, how. Pure.
 
+use super::audience::Audience;
 use crate::config::Plan;
 use crate::error::Error;
-use crate::serve::cast::Cast;
 use crate::sink::{self, Target};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -25,7 +25,7 @@ pub struct Replay {
     /// `--speed`; `None` = as fast as possible.
     pub speed: Option<f64>,
     /// Who serves it to whoever connects, where a target listens.
-    pub cast: Option<Arc<Cast>>,
+    pub audience: Option<Arc<dyn Audience>>,
     /// `--against-recorded`: the reference's topic, empty = found.
     pub against: Option<String>,
     /// The command as typed, for the output's metadata.

@@ -1,12 +1,12 @@
 //! A synthetic gyro -> the sinks of a run. I/O, but for the samples themselves.
 
+use super::audience::Audience;
 use super::outlet::{Delivery, Outlet, broken};
 use super::pool::Pool;
 use super::position::Position;
 use crate::error::{Error, Result};
 use crate::record::{AttitudeCovariance, AttitudeSample, SampleKind, Status};
 use crate::report::simulation::SimulationSummary;
-use crate::serve::cast::Cast;
 use crate::sink::{Content, Flow, Options, Provenance, Stream, Target};
 use crate::source::synthetic::{Stretch, Synthetic, Truth};
 use std::sync::Arc;
@@ -44,7 +44,7 @@ pub struct Simulation {
     /// How outputs are made.
     pub options: Options,
     /// Who serves it to whoever connects, where a target listens.
-    pub cast: Option<Arc<Cast>>,
+    pub audience: Option<Arc<dyn Audience>>,
     /// `--speed`; `None` = as fast as possible.
     pub speed: Option<f64>,
     /// Everything that decides the samples, for the outputs' metadata and the summary.
@@ -72,13 +72,11 @@ pub fn run(
         Delivery {
             out_rate: None,
             speed: simulation.speed,
-            cast: simulation.cast.clone(),
+            audience: simulation.audience.clone(),
         },
     )?;
-    if let Some(cast) = &simulation.cast {
-        let steps = simulation.source.count().saturating_sub(1);
-        cast.playback().length(steps as f64 / simulation.rate_hz);
-    }
+    let steps = simulation.source.count().saturating_sub(1);
+    outlet.length(steps as f64 / simulation.rate_hz);
     let batch = match simulation.speed {
         None => BATCH,
         Some(speed) => ((simulation.rate_hz * speed * PACED_SECS) as usize).clamp(1, BATCH),

@@ -2,16 +2,18 @@
 //!
 //! The same listeners, sessions, outboxes and limits as the daemon's; what differs is that the samples
 //! are the run's own, and that the run can be stopped, moved and begun anew ([`super::playback`]).
+//! To the run it is an [`Audience`].
 
-use super::address::Listen;
 use super::channel::{Channel, Items};
 use super::hub::Hub;
 use super::playback::{News, Playback, Turn};
 use super::shutdown::{self, Signals};
 use super::{Server, Settings};
 use crate::error::{Error, Result};
+use crate::pipeline::audience::{self, Audience};
 use crate::record::{AttitudeSample, Nanos, RawSample};
 use crate::sink::Stream;
+use crate::sink::address::Listen;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use tokio::sync::oneshot;
@@ -129,74 +131,6 @@ impl Cast {
         self.playback.is_controlled()
     }
 
-    /// A run with these streams begins; they are those of the run before, if there was one.
-    pub fn begin(&self, streams: &[Stream]) {
-        let mut lanes = lock(&self.streams);
-        if lanes.len() == streams.len() {
-            for lane in &mut *lanes {
-                lane.next = 0;
-            }
-            return;
-        }
-        for stream in streams.iter().skip(lanes.len()) {
-            lanes.push(Lane {
-                channel: self.hub.declare(stream),
-                next: 0,
-                resets: 0,
-                last_reset: 0,
-            });
-        }
-    }
-
-    /// Waits until items with these stamps are due: how many of them, and whether they are shown.
-    /// `None`: the run is to end.
-    pub fn turn(&self, stamps: impl Iterator<Item = Nanos> + Clone) -> Option<(usize, bool)> {
-        loop {
-            let (turn, news) = self.playback.turn(stamps.clone());
-            if news != News::Nothing {
-                self.hub.announce(news == News::Tick, None);
-            }
-            match turn {
-                Turn::Show(0) if stamps.clone().next().is_some() => {}
-                Turn::Show(n) => return Some((n, true)),
-                Turn::Mute(n) => return Some((n, false)),
-                Turn::End => return None,
-            }
-        }
-    }
-
-    /// Attitudes of a stream, to everybody unless muted.
-    pub fn attitudes(&self, stream: usize, samples: &[AttitudeSample], shown: bool) {
-        let mut lanes = lock(&self.streams);
-        let Some(lane) = lanes.get_mut(stream) else {
-            return;
-        };
-        if let Some(last) = samples.last() {
-            lane.last_reset = last.reset_count.saturating_add(lane.resets);
-            if !shown {
-                self.playback.passed(last.stamp);
-            }
-        }
-        if lane.resets == 0 {
-            return self.hand(lane, Items::Attitudes(samples), shown);
-        }
-        let counted: Vec<AttitudeSample> = samples
-            .iter()
-            .map(|sample| AttitudeSample {
-                reset_count: sample.reset_count.saturating_add(lane.resets),
-                ..*sample
-            })
-            .collect();
-        self.hand(lane, Items::Attitudes(&counted), shown);
-    }
-
-    /// Samples of a stream, to everybody unless muted.
-    pub fn samples(&self, stream: usize, samples: &[RawSample], shown: bool) {
-        if let Some(lane) = lock(&self.streams).get_mut(stream) {
-            self.hand(lane, Items::Samples(samples), shown);
-        }
-    }
-
     fn hand(&self, lane: &mut Lane, items: Items<'_>, shown: bool) {
         let first = lane.next;
         lane.next += items.len() as u64;
@@ -249,6 +183,81 @@ impl Cast {
         // It has stopped already, after a signal.
         let _ = stop.send(());
         thread.join().unwrap_or(false)
+    }
+}
+
+impl Audience for Cast {
+    // The streams are those of the run before, if there was one.
+    fn begin(&self, streams: &[Stream]) {
+        let mut lanes = lock(&self.streams);
+        if lanes.len() == streams.len() {
+            for lane in &mut *lanes {
+                lane.next = 0;
+            }
+            return;
+        }
+        for stream in streams.iter().skip(lanes.len()) {
+            lanes.push(Lane {
+                channel: self.hub.declare(stream),
+                next: 0,
+                resets: 0,
+                last_reset: 0,
+            });
+        }
+    }
+
+    fn length(&self, secs: f64) {
+        self.playback.length(secs);
+    }
+
+    fn turn(&self, count: usize, due: &dyn Fn(usize) -> Nanos) -> Option<audience::Turn> {
+        let of = |count, is_shown| Some(audience::Turn { count, is_shown });
+        loop {
+            let (turn, news) = self.playback.turn((0..count).map(due));
+            if news != News::Nothing {
+                self.hub.announce(news == News::Tick, None);
+            }
+            match turn {
+                Turn::Show(0) if count > 0 => {}
+                Turn::Show(n) => return of(n, true),
+                Turn::Mute(n) => return of(n, false),
+                Turn::End => return None,
+            }
+        }
+    }
+
+    fn attitudes(&self, stream: usize, samples: &[AttitudeSample], shown: bool) {
+        let mut lanes = lock(&self.streams);
+        let Some(lane) = lanes.get_mut(stream) else {
+            return;
+        };
+        if let Some(last) = samples.last() {
+            lane.last_reset = last.reset_count.saturating_add(lane.resets);
+            if !shown {
+                self.playback.passed(last.stamp);
+            }
+        }
+        if lane.resets == 0 {
+            return self.hand(lane, Items::Attitudes(samples), shown);
+        }
+        let counted: Vec<AttitudeSample> = samples
+            .iter()
+            .map(|sample| AttitudeSample {
+                reset_count: sample.reset_count.saturating_add(lane.resets),
+                ..*sample
+            })
+            .collect();
+        self.hand(lane, Items::Attitudes(&counted), shown);
+    }
+
+    fn samples(&self, stream: usize, samples: &[RawSample], shown: bool) {
+        if let Some(lane) = lock(&self.streams).get_mut(stream) {
+            self.hand(lane, Items::Samples(samples), shown);
+        }
+    }
+
+    fn is_cut(&self) -> bool {
+        self.playback.is_cut()
     }
 }
 

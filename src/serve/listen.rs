@@ -13,7 +13,6 @@ mod passed;
 #[cfg(unix)]
 mod unix;
 
-use super::address::{Listen, Transport};
 use super::admission::Web;
 use super::hub::{Hub, count};
 use super::limits::Backoff;
@@ -22,6 +21,7 @@ use super::shutdown::Running;
 use super::wire::{self, Fault};
 use crate::error::{Error, Result};
 use crate::record::Nanos;
+use crate::sink::address::{Listen, Transport};
 use bytes::Bytes;
 use std::cell::RefCell;
 use std::future::Future;

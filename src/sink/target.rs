@@ -1,7 +1,7 @@
 //! The word after `-o` -> where the attitude goes, in which format. Pure.
 
 use crate::error::{Error, Result};
-use crate::serve::address::Listen;
+use crate::sink::address::Listen;
 use std::path::{Path, PathBuf};
 
 /// What a file or pipe is filled with.

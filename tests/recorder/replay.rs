@@ -61,7 +61,7 @@ fn attitudes(path: &Path, topic: Option<&str>, out: &Path) -> Vec<serde_json::Va
         copy_input: false,
         out_rate: None,
         speed: None,
-        cast: None,
+        audience: None,
         against: None,
         command: "test".to_owned(),
     };

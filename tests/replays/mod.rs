@@ -20,7 +20,7 @@ pub fn replay_of(path: &Path) -> Replay {
         copy_input: false,
         out_rate: None,
         speed: None,
-        cast: None,
+        audience: None,
         against: None,
         command: "test".to_owned(),
     }

@@ -7,9 +7,9 @@ use std::process::{Child, ChildStderr, Command, Stdio};
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
-use strapd::serve::address::Listen;
 use strapd::serve::hub::Hub;
 use strapd::serve::{Server, Settings};
+use strapd::sink::address::Listen;
 
 /// Longer than anything here takes on a busy machine.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(60);

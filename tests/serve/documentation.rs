@@ -219,8 +219,8 @@ fn every_object_shown_is_one_the_daemon_sends_or_takes() {
 
 #[test]
 fn the_page_names_the_addresses_it_listens_on_by_default() {
-    for uri in strapd::serve::address::DEFAULTS {
-        let listen = strapd::serve::address::Listen::parse(uri).unwrap();
+    for uri in strapd::sink::address::DEFAULTS {
+        let listen = strapd::sink::address::Listen::parse(uri).unwrap();
         assert!(listen.ip().unwrap().is_loopback());
         assert!(PAGE.contains(uri.split_once("://").unwrap().1), "{uri}");
     }

@@ -10,7 +10,7 @@ use std::num::NonZero;
 use std::process::{Child, Command, Stdio};
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
-use strapd::serve::address::Listen;
+use strapd::sink::address::Listen;
 
 /// A terminal with `strapd watch` in it.
 struct Terminal {

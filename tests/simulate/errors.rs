@@ -45,7 +45,7 @@ fn simulated(noise: &str, seed: u64, path: &Path) {
             ..Options::default()
         },
         speed: None,
-        cast: None,
+        audience: None,
         parameters: Vec::new(),
         notes: Vec::new(),
     };

@@ -210,7 +210,7 @@ impl Common {
             rate_hz: self.rate_hz,
             frame_id: self.frame_id.clone(),
             targets: served.targets.clone(),
-            cast: served.cast.clone(),
+            audience: served.audience(),
             options: Options {
                 force: self.force,
                 compression: self.compression.into(),

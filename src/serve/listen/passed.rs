@@ -3,7 +3,7 @@
 //! Socket activation (`sd_listen_fds(3)`): the manager listens from boot on and hands its sockets over, so
 //! that no client is turned away while the daemon starts, and the daemon needs no right to bind.
 
-use crate::serve::address::Transport;
+use crate::sink::address::Transport;
 use listenfd::ListenFd;
 use std::io;
 use std::net::{TcpListener, UdpSocket};

@@ -1,0 +1,39 @@
+//! Who is shown a run while it goes, and may stop and move it.
+//!
+//! The run knows them only by what they are shown and when: who they are, and over what, is the
+//! matter of `serve`, which is built on this and not below it.
+
+use crate::record::{AttitudeSample, Nanos, RawSample};
+use crate::sink::Stream;
+use std::fmt::Debug;
+
+/// What to do with the next items of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Turn {
+    /// How many of them are due.
+    pub count: usize,
+    /// Whether they are shown; those before a place that was sought are not.
+    pub is_shown: bool,
+}
+
+/// Who is shown a run. Has its pace, where there is one.
+pub trait Audience: Debug + Send + Sync {
+    /// A run with these streams begins.
+    fn begin(&self, streams: &[Stream]);
+
+    /// The input is so many seconds long, about.
+    fn length(&self, secs: f64);
+
+    /// Waits until the first of `count` items, which are due at `due` of their number, is due. `None`: the
+    /// run is to end.
+    fn turn(&self, count: usize, due: &dyn Fn(usize) -> Nanos) -> Option<Turn>;
+
+    /// Attitudes of a stream.
+    fn attitudes(&self, stream: usize, samples: &[AttitudeSample], is_shown: bool);
+
+    /// Samples of a stream.
+    fn samples(&self, stream: usize, samples: &[RawSample], is_shown: bool);
+
+    /// Whether the run was told to end before its end.
+    fn is_cut(&self) -> bool;
+}
