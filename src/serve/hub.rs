@@ -6,10 +6,12 @@
 //! order is that of its lock.
 
 mod counters;
+mod report;
 mod room;
 mod telling;
 
 pub use counters::{Counters, count};
+use report::StateStatus;
 pub use room::Flood;
 
 use super::Settings;
@@ -23,7 +25,7 @@ use super::recorder::Handle;
 use super::state::Sensors;
 use super::stream::{SensorStream, live_plan};
 use super::subscriber::{Chunk, Outbox};
-use super::wire::{self, Fault};
+use super::wire::Fault;
 use crate::config::Plan;
 use crate::decode::{self, Line, LineDecoder, printable};
 use crate::error::{Error, Result};
@@ -74,13 +76,6 @@ pub struct Sensor {
     stream: SensorStream,
     /// Only one may send a sensor's samples at a time: two gyros in one attitude are no attitude.
     owner: Option<u64>,
-}
-
-/// How the attitudes were saved last.
-#[derive(Debug)]
-struct StateStatus {
-    saved: Option<Instant>,
-    failed: Option<String>,
 }
 
 /// What a client is told, and how.
@@ -451,111 +446,12 @@ impl Hub {
         }
     }
 
-    /// The state of everything, for `STATUS`.
-    #[must_use]
-    pub fn status(&self) -> Bytes {
-        let sensors: Vec<_> = read(&self.sensors).values().cloned().collect();
-        let sources: Vec<_> = sensors
-            .iter()
-            .map(|s| lock(s).stream.status())
-            .chain(self.own_streams())
-            .collect();
-        let clients: Vec<_> = read(&self.clients)
-            .values()
-            .map(|client| {
-                let level = client.outbox.level();
-                serde_json::json!({
-                    "client": client.number, "peer": client.peer,
-                    "since_s": client.since.elapsed().as_secs_f64(),
-                    "watching": level.watching, "queued_bytes": level.queued,
-                    "sent": level.sent, "dropped": level.dropped,
-                })
-            })
-            .collect();
-        let outgoing: Vec<_> = self.outgoing.iter().map(|o| o.status()).collect();
-        let recording = self.recorder.as_ref().map(Handle::status);
-        let counters: serde_json::Map<_, _> = self
-            .counters
-            .named()
-            .into_iter()
-            .chain([("unrecorded", recording.as_ref().map_or(0, |r| r.unrecorded))])
-            .map(|(name, value)| (name.to_owned(), value.into()))
-            .collect();
-        wire::status(serde_json::json!({
-            "session": self.session, "uptime_s": self.uptime_secs(),
-            "sources": sources, "outgoing": outgoing, "clients": clients, "counters": counters,
-            "state": lock(&self.state).as_ref().map(|s| serde_json::json!({
-                "saved_s_ago": s.saved.map(|t| t.elapsed().as_secs_f64()), "failed": s.failed,
-            })),
-            "recording": recording.map(|r| serde_json::json!({
-                "file": r.files.last().map(|f| f.display().to_string()), "files": r.files.len(),
-                "bytes": r.bytes, "samples": r.samples, "attitudes": r.attitudes, "stopped": r.stopped,
-            })),
-        }))
-    }
-
-    /// The last attitude of every sensor, also of those that have not come back since the start; no
-    /// more than there may be sensors.
-    #[must_use]
-    pub fn saved(&self) -> Sensors {
-        let sensors: Vec<_> = read(&self.sensors).values().cloned().collect();
-        let mut all: Sensors = sensors
-            .iter()
-            .filter_map(|sensor| {
-                let sensor = lock(sensor);
-                let last = sensor.stream.saved()?;
-                Some((sensor.stream.id().to_string(), last))
-            })
-            .collect();
-        let room = self.limits.sensors.saturating_sub(all.len());
-        let absent = lock(&self.saved);
-        all.extend(
-            absent
-                .iter()
-                .take(room)
-                .map(|(id, s)| (id.clone(), s.clone())),
-        );
-        all
-    }
-
-    /// The attitudes were saved, or why not.
-    pub(super) fn state_saved(&self, failed: Option<String>) {
-        let mut state = lock(&self.state);
-        let before = state.as_ref().and_then(|s| s.saved);
-        let saved = match failed {
-            None => Some(Instant::now()),
-            Some(_) => before,
-        };
-        *state = Some(StateStatus { saved, failed });
-    }
-
     /// Ends the recording's file and goes on in a new one; `false` when there is no recording.
     pub fn reopen_recording(&self) -> bool {
         if let Some(recorder) = &self.recorder {
             recorder.reopen();
         }
         self.recorder.is_some()
-    }
-
-    /// Seconds since the start.
-    #[must_use]
-    pub fn uptime_secs(&self) -> f64 {
-        self.started.elapsed().as_secs_f64()
-    }
-
-    /// Every sensor's report, by name, for the metrics.
-    pub fn each_sensor(&self, mut tell: impl FnMut(&SensorStream)) {
-        let sensors: Vec<_> = read(&self.sensors).values().cloned().collect();
-        for sensor in sensors {
-            tell(&lock(&sensor).stream);
-        }
-    }
-
-    /// Every client's outbox, for the metrics.
-    pub fn each_client(&self, mut tell: impl FnMut(&Client)) {
-        for client in read(&self.clients).values() {
-            tell(client);
-        }
     }
 }
 

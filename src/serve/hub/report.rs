@@ -1,0 +1,116 @@
+//! The state of everything -> `STATUS`, metrics, the file of the last attitudes.
+
+use super::{Client, Hub, SensorStream, lock, read};
+use crate::serve::recorder::Handle;
+use crate::serve::state::Sensors;
+use crate::serve::wire;
+use bytes::Bytes;
+use std::time::Instant;
+
+/// How the attitudes were saved last.
+#[derive(Debug)]
+pub(super) struct StateStatus {
+    saved: Option<Instant>,
+    failed: Option<String>,
+}
+
+impl Hub {
+    /// The state of everything, for `STATUS`.
+    #[must_use]
+    pub fn status(&self) -> Bytes {
+        let sensors: Vec<_> = read(&self.sensors).values().cloned().collect();
+        let sources: Vec<_> = sensors
+            .iter()
+            .map(|s| lock(s).stream.status())
+            .chain(self.own_streams())
+            .collect();
+        let clients: Vec<_> = read(&self.clients)
+            .values()
+            .map(|client| {
+                let level = client.outbox.level();
+                serde_json::json!({
+                    "client": client.number, "peer": client.peer,
+                    "since_s": client.since.elapsed().as_secs_f64(),
+                    "watching": level.watching, "queued_bytes": level.queued,
+                    "sent": level.sent, "dropped": level.dropped,
+                })
+            })
+            .collect();
+        let outgoing: Vec<_> = self.outgoing.iter().map(|o| o.status()).collect();
+        let recording = self.recorder.as_ref().map(Handle::status);
+        let counters: serde_json::Map<_, _> = self
+            .counters
+            .named()
+            .into_iter()
+            .chain([("unrecorded", recording.as_ref().map_or(0, |r| r.unrecorded))])
+            .map(|(name, value)| (name.to_owned(), value.into()))
+            .collect();
+        wire::status(serde_json::json!({
+            "session": self.session, "uptime_s": self.uptime_secs(),
+            "sources": sources, "outgoing": outgoing, "clients": clients, "counters": counters,
+            "state": lock(&self.state).as_ref().map(|s| serde_json::json!({
+                "saved_s_ago": s.saved.map(|t| t.elapsed().as_secs_f64()), "failed": s.failed,
+            })),
+            "recording": recording.map(|r| serde_json::json!({
+                "file": r.files.last().map(|f| f.display().to_string()), "files": r.files.len(),
+                "bytes": r.bytes, "samples": r.samples, "attitudes": r.attitudes, "stopped": r.stopped,
+            })),
+        }))
+    }
+
+    /// The last attitude of every sensor, also of those that have not come back since the start; no
+    /// more than there may be sensors.
+    #[must_use]
+    pub fn saved(&self) -> Sensors {
+        let sensors: Vec<_> = read(&self.sensors).values().cloned().collect();
+        let mut all: Sensors = sensors
+            .iter()
+            .filter_map(|sensor| {
+                let sensor = lock(sensor);
+                let last = sensor.stream.saved()?;
+                Some((sensor.stream.id().to_string(), last))
+            })
+            .collect();
+        let room = self.limits.sensors.saturating_sub(all.len());
+        let absent = lock(&self.saved);
+        all.extend(
+            absent
+                .iter()
+                .take(room)
+                .map(|(id, s)| (id.clone(), s.clone())),
+        );
+        all
+    }
+
+    /// The attitudes were saved, or why not.
+    pub(in crate::serve) fn state_saved(&self, failed: Option<String>) {
+        let mut state = lock(&self.state);
+        let before = state.as_ref().and_then(|s| s.saved);
+        let saved = match failed {
+            None => Some(Instant::now()),
+            Some(_) => before,
+        };
+        *state = Some(StateStatus { saved, failed });
+    }
+
+    /// Seconds since the start.
+    #[must_use]
+    pub fn uptime_secs(&self) -> f64 {
+        self.started.elapsed().as_secs_f64()
+    }
+
+    /// Every sensor's report, by name, for the metrics.
+    pub fn each_sensor(&self, mut tell: impl FnMut(&SensorStream)) {
+        let sensors: Vec<_> = read(&self.sensors).values().cloned().collect();
+        for sensor in sensors {
+            tell(&lock(&sensor).stream);
+        }
+    }
+
+    /// Every client's outbox, for the metrics.
+    pub fn each_client(&self, mut tell: impl FnMut(&Client)) {
+        for client in read(&self.clients).values() {
+            tell(client);
+        }
+    }
+}
