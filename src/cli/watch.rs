@@ -82,7 +82,7 @@ pub fn run(global: &Global, args: &Watch) -> Result<Outcome> {
             Out::Lines(Instant::now())
         };
         let mut watching = Watching {
-            board: Board::new(remote.to_string()),
+            board: Board::new(remote.to_string(), &args.ids),
             remote: &remote,
             token: token.as_ref(),
             request: request(&args.ids, Some(RATE_HZ)),

@@ -15,6 +15,8 @@ const MAX_SENSORS: usize = 1024;
 pub(super) struct Board {
     /// What the user asked for.
     pub(super) name: String,
+    /// The sensors the user asked for; none: all.
+    ids: Vec<String>,
     pub(super) link: LinkState,
     pub(super) sensors: BTreeMap<String, Sensor>,
     /// What the daemon complained of last.
@@ -46,6 +48,8 @@ pub(super) struct Sensor {
 pub(super) struct Health {
     #[serde(default)]
     id: String,
+    /// Of a stream that is no sensor's: what it is made of.
+    class: Option<String>,
     #[serde(default)]
     pub(super) samples: u64,
     #[serde(default)]
@@ -65,9 +69,10 @@ struct Status {
 }
 
 impl Board {
-    pub(super) fn new(name: String) -> Board {
+    pub(super) fn new(name: String, ids: &[String]) -> Board {
         Board {
             name,
+            ids: ids.iter().map(|id| printable(id)).collect(),
             link: LinkState::Connecting,
             sensors: BTreeMap::new(),
             complaint: None,
@@ -113,8 +118,14 @@ impl Board {
             Said::Status(line) => {
                 if let Ok(status) = serde_json::from_slice::<Status>(line) {
                     for health in status.sources {
-                        // Those that are not watched are not shown.
-                        if let Some(sensor) = self.sensors.get_mut(&printable(&health.id)) {
+                        // Also those that have been silent since we came; not those nobody asked for.
+                        let id = printable(&health.id);
+                        let is_shown = self.ids.is_empty() || self.ids.contains(&id);
+                        let is_rate = health.class.as_deref() == Some("RATE");
+                        if is_shown
+                            && !is_rate
+                            && let Some(sensor) = self.sensor(&id)
+                        {
                             sensor.health = health;
                         }
                     }

@@ -113,7 +113,7 @@ fn title(id: &str, sensor: &Sensor) -> String {
     let name = shortened(id);
     match &sensor.attitude {
         Some(a) => format!("{name}  {} in {}  {}", a.body, a.world, a.status.join(" ")),
-        None => name,
+        None => format!("{name}  silent since this watch began"),
     }
 }
 
@@ -173,7 +173,14 @@ pub(super) fn plain(board: &Board, now: Instant) -> String {
         out.push_str(&format!("the daemon says {what}\n"));
     }
     for (id, sensor) in &board.sensors {
-        let Some(a) = &sensor.attitude else { continue };
+        let Some(a) = &sensor.attitude else {
+            out.push_str(&format!(
+                "{}  silent since this watch began  samples {}\n",
+                shortened(id),
+                sensor.health.samples
+            ));
+            continue;
+        };
         let [roll, pitch, yaw] = a.roll_pitch_yaw_deg().map(|v| figure(v, 9, 3));
         let h = &sensor.health;
         let rate = h.rate_hz.map_or("?".to_owned(), |v| format!("{v:.1}"));
@@ -216,8 +223,12 @@ mod tests {
     const STATUS: &str = r#"{"class":"STATUS","sources":[{"id":"imu\u001b[31m0","samples":18,"lost":1,"missing":2,"gaps":3,"rate_hz":1000.0,"jitter_s":0.00025},{"id":"other","rate_hz":null}]}"#;
 
     fn board() -> (Board, Instant) {
+        board_of(&["imu\u{1b}[31m0".to_owned()])
+    }
+
+    fn board_of(ids: &[String]) -> (Board, Instant) {
         let now = Instant::now();
-        let mut board = Board::new("tcp://127.0.0.1:4550".to_owned());
+        let mut board = Board::new("tcp://127.0.0.1:4550".to_owned(), ids);
         board.connected(now);
         board.take(Said::Attitude(ATT.as_bytes()), now);
         board.take(Said::Status(STATUS.as_bytes()), now);
@@ -251,6 +262,23 @@ mod tests {
             assert!(!text.contains('\u{1b}'));
             assert_eq!(text.contains("|::"), width == 100, "{text}");
         }
+    }
+
+    #[test]
+    fn a_sensor_that_has_been_silent_since_the_start_is_shown_all_the_same() {
+        let (board, now) = board_of(&[]);
+        let lines = body(&board, now, 100);
+        let silent = (
+            Tone::Alarm,
+            "other  silent since this watch began".to_owned(),
+        );
+        assert!(lines.contains(&silent), "{lines:?}");
+        assert!(plain(&board, now).contains("\nother  silent since this watch began  samples 0\n"));
+        // Samples of a simulation are no sensor's.
+        let (mut board, now) = board_of(&[]);
+        let status = r#"{"class":"STATUS","sources":[{"id":"rates","class":"RATE"},{"id":"truth","class":"ATT"}]}"#;
+        board.take(Said::Status(status.as_bytes()), now);
+        assert!(board.sensors.contains_key("truth") && !board.sensors.contains_key("rates"));
     }
 
     #[test]
