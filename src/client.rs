@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | [`remote`] | the word on the command line -> where to connect | pure |
 //! | [`link`] | bytes and messages both ways, over any transport | I/O |
+//! | [`secret`] | a file -> the token in it | reads it |
 //! | [`watcher`] | what a daemon says -> attitudes, state, complaints | I/O |
 //! | [`attitude`] | an `ATT` object -> numbers; nothing in it is trusted | pure |
 //!
@@ -12,6 +13,7 @@
 pub mod attitude;
 pub mod link;
 pub mod remote;
+pub mod secret;
 pub mod watcher;
 
 use crate::error::{Error, Result};

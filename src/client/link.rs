@@ -2,7 +2,6 @@
 
 use super::remote::{Place, Remote};
 use crate::decode::printable;
-use crate::serve::listen::tcp;
 use futures_util::{SinkExt, StreamExt};
 use std::io;
 use std::time::Duration;
@@ -27,6 +26,11 @@ const SILENCE: Duration = Duration::from_secs(35);
 pub const READ: usize = 16 << 10;
 /// Longest datagram there is.
 const MAX_DATAGRAM: usize = 65_536;
+
+/// A peer that has vanished is noticed after 15 + 3 * 5 s.
+const IDLE: Duration = Duration::from_secs(15);
+const PROBE: Duration = Duration::from_secs(5);
+const PROBES: u32 = 3;
 
 /// A connection.
 #[derive(Debug)]
@@ -169,8 +173,18 @@ async fn dial(place: &Place) -> Result<TcpStream, String> {
     let stream = TcpStream::connect((place.host.as_str(), place.port))
         .await
         .map_err(|e| e.to_string())?;
-    tcp::prepare(&stream);
+    prepare(&stream);
     Ok(stream)
+}
+
+/// Small messages leave at once, and silence is probed. Neither can be refused with more than a
+/// loss of comfort.
+pub(crate) fn prepare(stream: &TcpStream) {
+    let _ = stream.set_nodelay(true);
+    let keepalive = socket2::TcpKeepalive::new().with_time(IDLE);
+    #[cfg(unix)]
+    let keepalive = keepalive.with_interval(PROBE).with_retries(PROBES);
+    let _ = socket2::SockRef::from(stream).set_tcp_keepalive(&keepalive);
 }
 
 fn address(stream: &TcpStream) -> String {

@@ -2,8 +2,8 @@
 
 use super::link::{Heard, Link};
 use super::remote::Remote;
+use crate::client::secret::Secret;
 use crate::decode::printable;
-use crate::serve::admission::Secret;
 use crate::serve::framing::{Framed, Framer};
 use serde::Deserialize;
 use std::borrow::Cow;

@@ -5,7 +5,8 @@
 
 use super::limits::Allowance;
 use super::wire::Fault;
-use crate::error::{Error, Result};
+use crate::client::secret::Secret;
+use crate::error::Result;
 use sha2::{Digest, Sha256};
 use std::net::IpAddr;
 use std::path::Path;
@@ -15,10 +16,6 @@ use subtle::ConstantTimeEq;
 
 /// Wrong tokens a second, over all clients.
 const FAILURES_PER_SECOND: u32 = 5;
-/// A token shorter than this can be guessed.
-const MIN_TOKEN: usize = 16;
-/// A file longer than this is no token.
-const MAX_TOKEN: u64 = 4096;
 
 /// The token clients must show. Only its hash is kept.
 pub struct Token {
@@ -29,33 +26,6 @@ pub struct Token {
 impl std::fmt::Debug for Token {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str("Token(..)")
-    }
-}
-
-/// A token that we show to others.
-#[derive(Clone)]
-pub struct Secret(String);
-
-impl std::fmt::Debug for Secret {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("Secret(..)")
-    }
-}
-
-impl Secret {
-    /// The first line of a file that nobody but its owner can read; `flag` names the file in what is
-    /// said of it.
-    ///
-    /// # Errors
-    /// It can not be read, others can read it, or it holds no token of 16 bytes.
-    pub fn read(flag: &str, path: &Path) -> Result<Secret> {
-        read_token(flag, path).map(Secret)
-    }
-
-    /// What only its receiver may see.
-    #[must_use]
-    pub fn reveal(&self) -> &str {
-        &self.0
     }
 }
 
@@ -74,7 +44,7 @@ impl Token {
     /// # Errors
     /// It can not be read, others can read it, or it holds no token of 16 bytes.
     pub fn read(path: &Path) -> Result<Token> {
-        read_token("--token-file", path).map(|token| Token::new(&token))
+        Secret::read("--token-file", path).map(|secret| Token::new(secret.reveal()))
     }
 
     /// Whether this is it. The time taken does not depend on what is right of it, and only so many
@@ -101,38 +71,6 @@ impl Token {
         *failures = after;
         Err(Fault::new("unauthorised", "the token is wrong"))
     }
-}
-
-fn read_token(flag: &str, path: &Path) -> Result<String> {
-    let open = |source| Error::Open {
-        path: path.to_owned(),
-        source,
-    };
-    let refuse = |what: String| Error::Usage(format!("{flag} {}: {what}", path.display()));
-    let metadata = std::fs::metadata(path).map_err(open)?;
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        let mode = metadata.permissions().mode() & 0o777;
-        if mode & 0o077 != 0 {
-            return Err(refuse(format!(
-                "others can read it (mode {mode:o})\n  help: chmod 600 {}",
-                path.display()
-            )));
-        }
-    }
-    if !metadata.is_file() || metadata.len() > MAX_TOKEN {
-        return Err(refuse("is no file of one short line".to_owned()));
-    }
-    let text = std::fs::read_to_string(path).map_err(open)?;
-    let token = text.lines().next().unwrap_or_default().trim();
-    if token.len() < MIN_TOKEN {
-        return Err(refuse(format!(
-            "holds {} bytes, a token has at least {MIN_TOKEN}\n  help: head -c 32 /dev/urandom | base64 > FILE",
-            token.len()
-        )));
-    }
-    Ok(token.to_owned())
 }
 
 /// Whether an address is reached from this machine alone.

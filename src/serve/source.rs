@@ -13,8 +13,8 @@
 //! Stamps: Android's `SensorEvent.timestamp`, the time base of `SystemClock.elapsedRealtimeNanos()`.
 //! Units and the six values of the uncalibrated gyroscope: Android's `SensorEvent.values`.
 
-use super::admission::Secret;
 use crate::client::remote::Remote;
+use crate::client::secret::Secret;
 use crate::decode::{LineDecoder, Options, printable};
 use crate::error::{Error, Result};
 use std::path::Path;

@@ -3,7 +3,8 @@
 //! One message is one line or several; every answer and attitude is a message of its own, so that a
 //! page can hand it to `JSON.parse` as it is.
 
-use super::{Context, accept, in_room, now, tcp, too_many_clients};
+use super::{Context, accept, in_room, now, too_many_clients};
+use crate::client::link;
 use crate::serve::admission::Web;
 use crate::serve::foxglove::{self, Framed};
 use crate::serve::http;
@@ -62,7 +63,7 @@ pub(super) async fn serve(listener: TcpListener, context: Context) {
         context,
         || listener.accept(),
         |(stream, peer), context, place| {
-            tcp::prepare(&stream);
+            link::prepare(&stream);
             let connection = Connection {
                 hub: context.hub.clone(),
                 peer: format!("ws://{peer}"),

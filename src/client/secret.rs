@@ -1,0 +1,64 @@
+//! A file -> the token in it. Reads the file.
+
+use crate::error::{Error, Result};
+use std::path::Path;
+
+/// A token shorter than this can be guessed.
+const MIN_TOKEN: usize = 16;
+/// A file longer than this is no token.
+const MAX_TOKEN: u64 = 4096;
+
+/// A token that is shown to others, or that others must show.
+#[derive(Clone)]
+pub struct Secret(String);
+
+impl std::fmt::Debug for Secret {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Secret(..)")
+    }
+}
+
+impl Secret {
+    /// The first line of a file that nobody but its owner can read; `flag` names the file in what is
+    /// said of it.
+    ///
+    /// # Errors
+    /// It can not be read, others can read it, or it holds no token of 16 bytes.
+    pub fn read(flag: &str, path: &Path) -> Result<Secret> {
+        let open = |source| Error::Open {
+            path: path.to_owned(),
+            source,
+        };
+        let refuse = |what: String| Error::Usage(format!("{flag} {}: {what}", path.display()));
+        let metadata = std::fs::metadata(path).map_err(open)?;
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            let mode = metadata.permissions().mode() & 0o777;
+            if mode & 0o077 != 0 {
+                return Err(refuse(format!(
+                    "others can read it (mode {mode:o})\n  help: chmod 600 {}",
+                    path.display()
+                )));
+            }
+        }
+        if !metadata.is_file() || metadata.len() > MAX_TOKEN {
+            return Err(refuse("is no file of one short line".to_owned()));
+        }
+        let text = std::fs::read_to_string(path).map_err(open)?;
+        let token = text.lines().next().unwrap_or_default().trim();
+        if token.len() < MIN_TOKEN {
+            return Err(refuse(format!(
+                "holds {} bytes, a token has at least {MIN_TOKEN}\n  help: head -c 32 /dev/urandom | base64 > FILE",
+                token.len()
+            )));
+        }
+        Ok(Secret(token.to_owned()))
+    }
+
+    /// What only its receiver may see.
+    #[must_use]
+    pub fn reveal(&self) -> &str {
+        &self.0
+    }
+}
