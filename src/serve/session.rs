@@ -7,6 +7,7 @@
 use super::framing::{Framed, Framer};
 use super::hub::{Client, Hub, Run, Sensor, count};
 use super::limits::Allowance;
+use super::packed::{self, Object};
 use super::stream::NAMELESS;
 use super::upstream::{self, Event};
 use super::wire::{self, Fault, Message};
@@ -22,6 +23,8 @@ const BURST: u32 = 64;
 const MAX_TOLD: usize = 32;
 /// Sensors one client may send.
 const MAX_OWNED: usize = 256;
+/// Numbers of packed streams one client may bind.
+const MAX_BOUND: usize = 256;
 
 /// Room for the work on one chunk of bytes; one per thread, so that an idle client holds none.
 #[derive(Debug, Default)]
@@ -123,6 +126,8 @@ pub struct Session {
     told: BTreeSet<String>,
     /// The sensors it sends.
     owned: BTreeMap<String, Arc<Mutex<Sensor>>>,
+    /// What packed samples with a number say, as lines would.
+    bound: BTreeMap<u32, Line>,
     /// The one it sent last.
     last: Option<Arc<Mutex<Sensor>>>,
     end: Option<End>,
@@ -157,6 +162,7 @@ impl Session {
             errors: Allowance::new(BURST),
             told: BTreeSet::new(),
             owned: BTreeMap::new(),
+            bound: BTreeMap::new(),
             last: None,
             end: None,
         }
@@ -219,6 +225,10 @@ impl Session {
                 Framed::TooLong(number, head) => {
                     self.bad(&wire::too_long(), number, head, received, scratch);
                 }
+                Framed::Packed(number, object) => self.packed(number, object, received, scratch),
+                Framed::Broken(number) => {
+                    self.bad(&wire::broken_packed(), number, &[], received, scratch);
+                }
             }
             self.end.is_none()
         };
@@ -269,35 +279,30 @@ impl Session {
             Ok(Message::Auth(token)) => self.authorise(&token, number),
             Ok(_) | Err(_) if !self.authorised => {
                 scratch.samples.truncate(before);
-                let fault = Fault::new(
-                    "unauthorised",
-                    "the first line must be {\"class\":\"AUTH\",\"token\":\"...\"}",
-                );
-                self.refuse(&fault, number);
+                self.refuse(&first_line_must_be_auth(), number);
             }
             Ok(Message::Samples(_)) if !self.hub.takes_samples() => {
-                count(
-                    &self.hub.counters.refused_samples,
-                    scratch.samples.len() - before,
-                );
-                scratch.samples.truncate(before);
-                let fault = Fault::new(
-                    "samples_not_taken",
-                    "this is a replay or a simulation: it has its own samples; strapd serve takes yours",
-                );
-                self.bad(&fault, number, line, received, scratch);
+                self.not_taken(number, line, before, received, scratch);
             }
             Ok(Message::Samples(head)) => {
                 self.errors_in_a_row = 0;
-                let goes_on = scratch.head.as_ref().is_some_and(|run| {
-                    run.id == head.id
-                        && (run.sample_kind, run.gyro_unit) == (head.sample_kind, head.gyro_unit)
-                });
-                if !goes_on {
+                let seq = head.seq;
+                if !goes_on(scratch, &head) {
                     self.flush(received, scratch, before);
+                    scratch.head = Some(head);
                 }
-                scratch.lines.push((head.seq, scratch.samples.len()));
-                scratch.head.get_or_insert(head);
+                scratch.lines.push((seq, scratch.samples.len()));
+            }
+            Ok(Message::Packed(stream, head)) => {
+                self.errors_in_a_row = 0;
+                if self.bound.len() >= MAX_BOUND && !self.bound.contains_key(&stream) {
+                    let fault = Fault::new(
+                        "bad_packed",
+                        format!("one connection binds at most {MAX_BOUND} numbers"),
+                    );
+                    return self.bad(&fault, number, line, received, scratch);
+                }
+                self.bound.insert(stream, head);
             }
             Ok(Message::Watch(filter)) => {
                 self.errors_in_a_row = 0;
@@ -344,6 +349,68 @@ impl Session {
             }
             Err(fault) => self.bad(&fault, number, line, received, scratch),
         }
+    }
+
+    /// A packed object: a sample as the line would be that says what its number was bound to.
+    fn packed(&mut self, number: u64, object: &[u8], received: Nanos, scratch: &mut Scratch) {
+        if !self.authorised {
+            return self.refuse(&first_line_must_be_auth(), number);
+        }
+        let fault = match packed::read(object, received) {
+            Ok(Object::Rate {
+                stream,
+                seq,
+                sample,
+            }) => match self.bound.get(&stream) {
+                Some(head) => {
+                    let before = scratch.samples.len();
+                    // Most are of the run before them: nothing is cloned for those.
+                    let begins = (!goes_on(scratch, head)).then(|| head.clone());
+                    scratch.samples.push(sample);
+                    if !self.hub.takes_samples() {
+                        return self.not_taken(number, &[], before, received, scratch);
+                    }
+                    self.errors_in_a_row = 0;
+                    if let Some(head) = begins {
+                        self.flush(received, scratch, before);
+                        scratch.head = Some(head);
+                    }
+                    return scratch.lines.push((seq, scratch.samples.len()));
+                }
+                None => Fault::new(
+                    "unknown_stream",
+                    format!(
+                        "number {stream} is bound to no sensor; say {{\"class\":\"PACKED\",\"stream\":{stream},\"id\":\"imu0\"}} first"
+                    ),
+                ),
+            },
+            Ok(Object::Att { .. }) => {
+                Fault::new("bad_packed", "packed kind 2 (ATT) is none a client sends")
+            }
+            Err(why) => wire::unreadable(&why),
+        };
+        self.bad(&fault, number, &[], received, scratch);
+    }
+
+    /// Samples came, from `before` on, where none are taken.
+    fn not_taken(
+        &mut self,
+        number: u64,
+        line: &[u8],
+        before: usize,
+        received: Nanos,
+        scratch: &mut Scratch,
+    ) {
+        count(
+            &self.hub.counters.refused_samples,
+            scratch.samples.len() - before,
+        );
+        scratch.samples.truncate(before);
+        let fault = Fault::new(
+            "samples_not_taken",
+            "this is a replay or a simulation: it has its own samples; strapd serve takes yours",
+        );
+        self.bad(&fault, number, line, received, scratch);
     }
 
     /// A line that is no good: said, counted, and after too many in a row the end.
@@ -460,6 +527,20 @@ impl Session {
         self.owned.insert(id.to_owned(), sensor.clone());
         Ok(sensor)
     }
+}
+
+/// Whether a sample with this head belongs to the run that is gathered.
+fn goes_on(scratch: &Scratch, head: &Line) -> bool {
+    scratch.head.as_ref().is_some_and(|run| {
+        run.id == head.id && (run.sample_kind, run.gyro_unit) == (head.sample_kind, head.gyro_unit)
+    })
+}
+
+fn first_line_must_be_auth() -> Fault {
+    Fault::new(
+        "unauthorised",
+        "the first line must be {\"class\":\"AUTH\",\"token\":\"...\"}",
+    )
 }
 
 impl Drop for Session {

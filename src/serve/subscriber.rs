@@ -4,6 +4,7 @@
 //! queue has a cap, the oldest attitudes give way, what gave way is counted and said (`GAP`), and
 //! replies (`STATUS`, `ERROR`, ...) are never dropped: when too many wait, the client is closed.
 
+use super::packed::Form;
 use super::{foxglove, wire};
 use crate::record::{AttitudeSample, Nanos};
 use crate::sink::Decimator;
@@ -28,8 +29,10 @@ pub struct Chunk {
     pub first_seq: u64,
     /// How many.
     pub count: u64,
-    /// Whole lines.
+    /// Whole lines, or whole packed objects.
     pub bytes: Bytes,
+    /// Number of the stream and the line that says what it is, where it is packed.
+    pub label: Option<(u32, Bytes)>,
 }
 
 /// Between two notices of the time in the data, ns of it.
@@ -73,6 +76,8 @@ pub struct Filter {
     pub ids: Option<BTreeSet<String>>,
     /// At most this many attitudes a second of each.
     pub rate_hz: Option<f64>,
+    /// How they are written.
+    pub form: Form,
 }
 
 impl Filter {
@@ -134,6 +139,11 @@ struct State {
     told: Option<Nanos>,
     decimators: HashMap<Arc<str>, Option<Decimator>>,
     full: Option<Full>,
+    /// Labels of packed streams that wait; apart from the replies, which may be too many. There are no
+    /// more than streams, as each is said once.
+    labels: Vec<Bytes>,
+    /// Streams whose label was said.
+    labelled: BTreeSet<u32>,
     dropped: u64,
     sent: u64,
 }
@@ -208,6 +218,7 @@ impl Outbox {
             first_seq: 0,
             count: 0,
             bytes: line,
+            label: None,
         });
         drop(state);
         self.wake.notify_one();
@@ -225,13 +236,13 @@ impl Outbox {
     }
 
     /// Offers attitudes of stream `id`, in order; `shared` gives them encoded, and is asked only when
-    /// the client takes them all. `encode` encodes those a client takes of them.
+    /// the client takes them all. `encode` encodes those a client takes of them, with their numbers.
     pub fn offer(
         &self,
         id: &Arc<str>,
         samples: &[AttitudeSample],
-        shared: &mut dyn FnMut() -> Vec<Chunk>,
-        encode: &dyn Fn(&mut Vec<u8>, u64, &AttitudeSample),
+        shared: &mut dyn FnMut(Form) -> Vec<Chunk>,
+        encode: &dyn Fn(Form, &[(u64, AttitudeSample)]) -> Chunk,
         first_seq: u64,
     ) {
         let mut state = self.state();
@@ -239,9 +250,10 @@ impl Outbox {
         if !filter.takes(id, Class::Att) {
             return;
         }
+        let form = filter.form;
         match filter.rate_hz {
             None => {
-                for chunk in shared() {
+                for chunk in shared(form) {
                     state.push(chunk);
                 }
             }
@@ -250,30 +262,17 @@ impl Outbox {
                     .decimators
                     .entry(id.clone())
                     .or_insert_with(|| Decimator::new(rate_hz));
-                let mut bytes = Vec::new();
-                let (mut first, mut count) = (0, 0);
-                for (seq, sample) in (first_seq..).zip(samples) {
-                    let kept = match decimator {
-                        Some(decimator) => decimator.keep(sample),
-                        None => Some(*sample),
-                    };
-                    if let Some(kept) = kept {
-                        if count == 0 {
-                            first = seq;
-                        }
-                        count += 1;
-                        encode(&mut bytes, seq, &kept);
-                    }
-                }
-                if count == 0 {
+                let kept: Vec<_> = (first_seq..)
+                    .zip(samples)
+                    .filter_map(|(seq, sample)| match decimator {
+                        Some(decimator) => decimator.keep(sample).map(|kept| (seq, kept)),
+                        None => Some((seq, *sample)),
+                    })
+                    .collect();
+                if kept.is_empty() {
                     return;
                 }
-                state.push(Chunk {
-                    id: id.clone(),
-                    first_seq: first,
-                    count,
-                    bytes: bytes.into(),
-                });
+                state.push(encode(form, &kept));
             }
         }
         drop(state);
@@ -281,16 +280,12 @@ impl Outbox {
     }
 
     /// Offers samples of stream `id`, in order and encoded; they are never thinned.
-    pub fn offer_samples(&self, id: &Arc<str>, shared: &mut dyn FnMut() -> Vec<Chunk>) {
+    pub fn offer_samples(&self, id: &Arc<str>, shared: &mut dyn FnMut(Form) -> Vec<Chunk>) {
         let mut state = self.state();
-        if !state
-            .watch
-            .as_ref()
-            .is_some_and(|w| w.takes(id, Class::Rate))
-        {
+        let Some(filter) = state.watch.as_ref().filter(|w| w.takes(id, Class::Rate)) else {
             return;
-        }
-        for chunk in shared() {
+        };
+        for chunk in shared(filter.form) {
             state.push(chunk);
         }
         drop(state);
@@ -351,6 +346,7 @@ impl Outbox {
         for (id, dropped) in std::mem::take(&mut state.gaps) {
             out.push_back((self.gap)(&id, &dropped));
         }
+        out.extend(state.labels.drain(..));
         let mut taken = 0;
         while taken < most
             && let Some(chunk) = state.data.pop_front()
@@ -377,6 +373,7 @@ impl Outbox {
             && state.data.is_empty()
             && state.gaps.is_empty()
             && state.stray.is_none()
+            && state.labels.is_empty()
     }
 
     /// Why the client must be closed, if it must.
@@ -410,6 +407,11 @@ impl Outbox {
 
 impl State {
     fn push(&mut self, chunk: Chunk) {
+        if let Some((number, label)) = &chunk.label
+            && self.labelled.insert(*number)
+        {
+            self.labels.push(label.clone());
+        }
         self.queued += chunk.bytes.len();
         self.data.push_back(chunk);
         while self.queued > MAX_QUEUED
@@ -446,6 +448,7 @@ mod tests {
             first_seq,
             count: 10,
             bytes: vec![b'x'; size].into(),
+            label: None,
         }
     }
 
@@ -453,8 +456,8 @@ mod tests {
         outbox.offer(
             &chunk.id,
             &[],
-            &mut || vec![chunk.clone()],
-            &|_, _, _| {},
+            &mut |_| vec![chunk.clone()],
+            &|_, _| chunk.clone(),
             chunk.first_seq,
         );
     }
@@ -573,8 +576,15 @@ mod tests {
             outbox.offer(
                 &id.into(),
                 &samples,
-                &mut || unreachable!("not all are taken"),
-                &|out, seq, _| out.extend_from_slice(format!("{id}{seq}\n").as_bytes()),
+                &mut |_| unreachable!("not all are taken"),
+                &|_, kept| {
+                    let lines: String =
+                        kept.iter().map(|(seq, _)| format!("{id}{seq}\n")).collect();
+                    Chunk {
+                        bytes: lines.into(),
+                        ..chunk(id, 0, 0)
+                    }
+                },
                 0,
             );
         }

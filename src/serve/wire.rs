@@ -4,10 +4,12 @@
 //! encoder as its output: here are only the objects of the conversation around them
 //! (`docs/protocol.md`).
 
+use super::packed::{Form, Unreadable};
 use super::playback::{Action, Place};
 use super::subscriber::{Class as Stream, Dropped, Filter, MAX_QUEUED};
-use crate::decode::{Class, Line, LineDecoder, MAX_LINE, Undecodable, printable};
-use crate::record::{Nanos, RawSample};
+use crate::decode::{Class, GyroUnit, Line, LineDecoder, MAX_LINE, Undecodable, printable};
+use crate::record::{Nanos, RawSample, SampleKind};
+use crate::sink::{self, Content};
 use bytes::Bytes;
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -24,6 +26,8 @@ pub const MAX_ID: usize = 255;
 pub enum Message {
     /// Samples of one sensor: they are in the buffer given.
     Samples(Line),
+    /// Packed samples of this number are of this sensor from now on, and mean this.
+    Packed(u32, Line),
     /// Start (or with `None` stop) the attitudes.
     Watch(Option<Filter>),
     /// Tell the state.
@@ -67,6 +71,16 @@ struct WatchObject {
     id: Option<Ids>,
     ids: Option<Ids>,
     rate_hz: Option<f64>,
+    #[serde(default)]
+    packed: bool,
+}
+
+#[derive(Deserialize)]
+struct PackedObject {
+    stream: u32,
+    id: Option<String>,
+    sample_kind: Option<String>,
+    gyro_unit: Option<String>,
 }
 
 #[derive(Deserialize)]
@@ -156,6 +170,7 @@ pub fn read_from(
         // What a source says of itself is no request.
         Some(other) if is_source => Err(Fault::new("unknown_class", other.to_owned())),
         Some("WATCH") => watch(line).map(Message::Watch),
+        Some("PACKED") => packed(line).map(|(stream, head)| Message::Packed(stream, head)),
         Some("POLL") => Ok(Message::Poll),
         Some("PLAYBACK") => playback_action(line).map(Message::Playback),
         Some("AUTH") => {
@@ -165,7 +180,7 @@ pub fn read_from(
         Some(other) => Err(Fault::new(
             "unknown_class",
             format!(
-                "class `{other}` is none a client sends; known: RATE, WATCH, POLL, PLAYBACK, AUTH"
+                "class `{other}` is none a client sends; known: RATE, PACKED, WATCH, POLL, PLAYBACK, AUTH"
             ),
         )),
         None => Err(Fault::new(
@@ -188,6 +203,58 @@ fn object<'a, T: Deserialize<'a>>(
             column: Some(why.column() as u64),
             ..Fault::new(code, format!("{}; expected {expected}", printable(what)))
         }
+    })
+}
+
+/// The number of a stream of packed samples, and what each of them says as a line would.
+fn packed(line: &[u8]) -> Result<(u32, Line), Fault> {
+    let asked: PackedObject = object(
+        line,
+        "bad_packed",
+        "like {\"class\":\"PACKED\",\"stream\":1,\"id\":\"imu0\",\"sample_kind\":\"rate\"}",
+    )?;
+    let head = Line {
+        class: Class::Rate,
+        id: asked.id.as_deref().map(printable),
+        sample_kind: named(
+            "sample_kind",
+            asked.sample_kind.as_deref(),
+            [
+                SampleKind::Rate,
+                SampleKind::Average,
+                SampleKind::DeltaAngle,
+            ]
+            .map(|k| (k.name(), k)),
+        )?,
+        // That of a RATE line that does not say.
+        gyro_unit: named(
+            "gyro_unit",
+            asked.gyro_unit.as_deref(),
+            [GyroUnit::Rad, GyroUnit::Deg, GyroUnit::Mrad].map(|u| (u.name(), u)),
+        )?
+        .or(Some(GyroUnit::Rad)),
+        ..Line::default()
+    };
+    Ok((asked.stream, head))
+}
+
+/// The one of `all` that is called `name`.
+fn named<T: Copy>(
+    field: &str,
+    name: Option<&str>,
+    all: [(&'static str, T); 3],
+) -> Result<Option<T>, Fault> {
+    let Some(name) = name else { return Ok(None) };
+    let found = all.iter().find(|(known, _)| *known == name);
+    found.map(|(_, value)| Some(*value)).ok_or_else(|| {
+        let known = all.map(|(known, _)| known).join(", ");
+        Fault::new(
+            "bad_packed",
+            format!(
+                "there is no {field} `{}`; there are: {known}",
+                printable(name)
+            ),
+        )
     })
 }
 
@@ -249,6 +316,11 @@ fn watch(line: &[u8]) -> Result<Option<Filter>, Fault> {
             Ids::Several(ids) => ids.iter().map(|id| printable(id)).collect(),
         }),
         rate_hz: asked.rate_hz,
+        form: if asked.packed {
+            Form::Packed
+        } else {
+            Form::Lines
+        },
     }))
 }
 
@@ -271,6 +343,21 @@ pub fn too_long() -> Fault {
     Fault::new(
         "line_too_long",
         format!("a line of more than {MAX_LINE} bytes; it is skipped up to its end"),
+    )
+}
+
+/// The fault of a packed object that says nothing.
+#[must_use]
+pub fn unreadable(why: &Unreadable) -> Fault {
+    Fault::new("bad_packed", why.to_string())
+}
+
+/// The fault of a packed object whose end can not be found.
+#[must_use]
+pub fn broken_packed() -> Fault {
+    Fault::new(
+        "bad_packed",
+        "a packed object whose length is less than 8, or that was cut short; what follows is skipped up to the next line end",
     )
 }
 
@@ -305,8 +392,33 @@ pub fn watching(filter: Option<&Filter>, offered: &[Stream]) -> Bytes {
         if let Some(rate_hz) = filter.rate_hz {
             fields.insert("rate_hz".into(), json!(rate_hz));
         }
+        if filter.form == Form::Packed {
+            fields.insert("packed".into(), json!(true));
+        }
     }
     line(&answer)
+}
+
+/// What packed objects with the number `number` are: the labels of the stream.
+#[must_use]
+pub fn packed_stream(number: u32, stream: &sink::Stream) -> Bytes {
+    let mut said = json!({"class": "PACKED", "stream": number, "id": stream.id});
+    if let Some(fields) = said.as_object_mut() {
+        let labels = match stream.content {
+            Content::Samples(kind) => vec![("sample_kind", kind.name())],
+            Content::Attitude | Content::Truth => vec![
+                ("rotates", &*stream.rotates),
+                ("world", &stream.world_axes),
+                ("body", &stream.body_axes),
+            ],
+        };
+        fields.extend(
+            labels
+                .into_iter()
+                .map(|(name, value)| (name.to_owned(), value.into())),
+        );
+    }
+    line(&said)
 }
 
 /// The notice that attitudes of `id` were dropped.
