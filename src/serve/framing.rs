@@ -286,8 +286,7 @@ mod tests {
         bytes.extend_from_slice(b"one\n  \xf8 in a line\n");
         bytes.extend(object(u16::MAX));
         bytes.extend_from_slice(b"\n");
-        bytes.extend(object(7));
-        bytes.extend_from_slice(b"skipped \xf8\x01\x08\0\ntwo\n");
+        bytes.extend_from_slice(b"\xf8\x01\x07\0skipped \xf8\x01\x08\0\ntwo\n");
         // A length that holds a line end, and is none.
         bytes.extend_from_slice(b"\xf8\n\0\0\xf8\x01\x08\0....\n");
         bytes.extend(object(72));
@@ -330,7 +329,9 @@ mod tests {
         framer.feed(&[0], &mut |_| true);
         assert_eq!((framer.partial.capacity(), framer.ended()), (0, 20));
         // One that can not be is given up without waiting for anything.
-        framer.feed(&object(7), &mut |framed| framed == Framed::Broken(21));
+        framer.feed(b"\xf8\x01\x07\0", &mut |framed| {
+            framed == Framed::Broken(21)
+        });
         framer.feed(&[b'x'; 1000], &mut |_| unreachable!("skipped"));
         assert_eq!(framer.partial.capacity(), 0);
     }

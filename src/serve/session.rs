@@ -4,10 +4,11 @@
 //! the hub because it remembers what only matters to one client: which sensor it sent last, how
 //! many lines in a row were bad, whether it has shown the token.
 
+mod unpacking;
+
 use super::framing::{Framed, Framer};
 use super::hub::{Client, Hub, Run, Sensor, count};
 use super::limits::Allowance;
-use super::packed::{self, Object};
 use super::stream::NAMELESS;
 use super::upstream::{self, Event};
 use super::wire::{self, Fault, Message};
@@ -23,8 +24,6 @@ const BURST: u32 = 64;
 const MAX_TOLD: usize = 32;
 /// Sensors one client may send.
 const MAX_OWNED: usize = 256;
-/// Numbers of packed streams one client may bind.
-const MAX_BOUND: usize = 256;
 
 /// Room for the work on one chunk of bytes; one per thread, so that an idle client holds none.
 #[derive(Debug, Default)]
@@ -293,17 +292,10 @@ impl Session {
                 }
                 scratch.lines.push((seq, scratch.samples.len()));
             }
-            Ok(Message::Packed(stream, head)) => {
-                self.errors_in_a_row = 0;
-                if self.bound.len() >= MAX_BOUND && !self.bound.contains_key(&stream) {
-                    let fault = Fault::new(
-                        "bad_packed",
-                        format!("one connection binds at most {MAX_BOUND} numbers"),
-                    );
-                    return self.bad(&fault, number, line, received, scratch);
-                }
-                self.bound.insert(stream, head);
-            }
+            Ok(Message::Packed(stream, head)) => match self.bind(stream, head) {
+                Ok(()) => self.errors_in_a_row = 0,
+                Err(fault) => self.bad(&fault, number, line, received, scratch),
+            },
             Ok(Message::Watch(filter)) => {
                 self.errors_in_a_row = 0;
                 self.flush(received, scratch, usize::MAX);
@@ -349,47 +341,6 @@ impl Session {
             }
             Err(fault) => self.bad(&fault, number, line, received, scratch),
         }
-    }
-
-    /// A packed object: a sample as the line would be that says what its number was bound to.
-    fn packed(&mut self, number: u64, object: &[u8], received: Nanos, scratch: &mut Scratch) {
-        if !self.authorised {
-            return self.refuse(&first_line_must_be_auth(), number);
-        }
-        let fault = match packed::read(object, received) {
-            Ok(Object::Rate {
-                stream,
-                seq,
-                sample,
-            }) => match self.bound.get(&stream) {
-                Some(head) => {
-                    let before = scratch.samples.len();
-                    // Most are of the run before them: nothing is cloned for those.
-                    let begins = (!goes_on(scratch, head)).then(|| head.clone());
-                    scratch.samples.push(sample);
-                    if !self.hub.takes_samples() {
-                        return self.not_taken(number, &[], before, received, scratch);
-                    }
-                    self.errors_in_a_row = 0;
-                    if let Some(head) = begins {
-                        self.flush(received, scratch, before);
-                        scratch.head = Some(head);
-                    }
-                    return scratch.lines.push((seq, scratch.samples.len()));
-                }
-                None => Fault::new(
-                    "unknown_stream",
-                    format!(
-                        "number {stream} is bound to no sensor; say {{\"class\":\"PACKED\",\"stream\":{stream},\"id\":\"imu0\"}} first"
-                    ),
-                ),
-            },
-            Ok(Object::Att { .. }) => {
-                Fault::new("bad_packed", "packed kind 2 (ATT) is none a client sends")
-            }
-            Err(why) => wire::unreadable(&why),
-        };
-        self.bad(&fault, number, &[], received, scratch);
     }
 
     /// Samples came, from `before` on, where none are taken.

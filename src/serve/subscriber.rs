@@ -564,6 +564,39 @@ mod tests {
     }
 
     #[test]
+    fn a_packed_stream_is_named_once_before_it_however_many_there_are_and_whatever_is_dropped() {
+        let outbox = Outbox::new();
+        outbox.watch(Some(Filter::default()));
+        let packed = |n: u32, size: usize| Chunk {
+            label: Some((n, format!("label {n}").into())),
+            ..chunk(&n.to_string(), 0, size)
+        };
+        // More than replies may wait, and more bytes than attitudes may.
+        for n in 0..200 {
+            offer(&outbox, &packed(n, 10 << 10));
+        }
+        assert_eq!(outbox.full(), None);
+        outbox.reply(Bytes::from("a reply"));
+        outbox.forget();
+        assert!(!outbox.is_empty());
+        offer(&outbox, &packed(199, 4));
+        let mut out = VecDeque::new();
+        outbox.take(usize::MAX, &mut out);
+        let labels = (0..200).map(|n| format!("label {n}"));
+        let expected = ["a reply".to_owned()]
+            .into_iter()
+            .chain(labels)
+            .chain(["xxxx".to_owned()]);
+        assert!(texts(&out).into_iter().eq(expected), "{:?}", texts(&out));
+        assert!(outbox.is_empty());
+        out.clear();
+        outbox.watch(Some(Filter::default()));
+        offer(&outbox, &packed(7, 4));
+        outbox.take(usize::MAX, &mut out);
+        assert_eq!(texts(&out), ["xxxx"]);
+    }
+
+    #[test]
     fn a_client_gets_the_sensors_and_the_rate_it_asked_for() {
         let outbox = Outbox::new();
         outbox.watch(Some(Filter {

@@ -4,12 +4,15 @@
 //! encoder as its output: here are only the objects of the conversation around them
 //! (`docs/protocol.md`).
 
-use super::packed::{Form, Unreadable};
+mod packing;
+
+pub use packing::{broken_packed, packed_stream, unreadable};
+
+use super::packed::Form;
 use super::playback::{Action, Place};
 use super::subscriber::{Class as Stream, Dropped, Filter, MAX_QUEUED};
-use crate::decode::{Class, GyroUnit, Line, LineDecoder, MAX_LINE, Undecodable, printable};
-use crate::record::{Nanos, RawSample, SampleKind};
-use crate::sink::{self, Content};
+use crate::decode::{Class, Line, LineDecoder, MAX_LINE, Undecodable, printable};
+use crate::record::{Nanos, RawSample};
 use bytes::Bytes;
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -73,14 +76,6 @@ struct WatchObject {
     rate_hz: Option<f64>,
     #[serde(default)]
     packed: bool,
-}
-
-#[derive(Deserialize)]
-struct PackedObject {
-    stream: u32,
-    id: Option<String>,
-    sample_kind: Option<String>,
-    gyro_unit: Option<String>,
 }
 
 #[derive(Deserialize)]
@@ -170,7 +165,7 @@ pub fn read_from(
         // What a source says of itself is no request.
         Some(other) if is_source => Err(Fault::new("unknown_class", other.to_owned())),
         Some("WATCH") => watch(line).map(Message::Watch),
-        Some("PACKED") => packed(line).map(|(stream, head)| Message::Packed(stream, head)),
+        Some("PACKED") => packing::read(line).map(|(stream, head)| Message::Packed(stream, head)),
         Some("POLL") => Ok(Message::Poll),
         Some("PLAYBACK") => playback_action(line).map(Message::Playback),
         Some("AUTH") => {
@@ -203,58 +198,6 @@ fn object<'a, T: Deserialize<'a>>(
             column: Some(why.column() as u64),
             ..Fault::new(code, format!("{}; expected {expected}", printable(what)))
         }
-    })
-}
-
-/// The number of a stream of packed samples, and what each of them says as a line would.
-fn packed(line: &[u8]) -> Result<(u32, Line), Fault> {
-    let asked: PackedObject = object(
-        line,
-        "bad_packed",
-        "like {\"class\":\"PACKED\",\"stream\":1,\"id\":\"imu0\",\"sample_kind\":\"rate\"}",
-    )?;
-    let head = Line {
-        class: Class::Rate,
-        id: asked.id.as_deref().map(printable),
-        sample_kind: named(
-            "sample_kind",
-            asked.sample_kind.as_deref(),
-            [
-                SampleKind::Rate,
-                SampleKind::Average,
-                SampleKind::DeltaAngle,
-            ]
-            .map(|k| (k.name(), k)),
-        )?,
-        // That of a RATE line that does not say.
-        gyro_unit: named(
-            "gyro_unit",
-            asked.gyro_unit.as_deref(),
-            [GyroUnit::Rad, GyroUnit::Deg, GyroUnit::Mrad].map(|u| (u.name(), u)),
-        )?
-        .or(Some(GyroUnit::Rad)),
-        ..Line::default()
-    };
-    Ok((asked.stream, head))
-}
-
-/// The one of `all` that is called `name`.
-fn named<T: Copy>(
-    field: &str,
-    name: Option<&str>,
-    all: [(&'static str, T); 3],
-) -> Result<Option<T>, Fault> {
-    let Some(name) = name else { return Ok(None) };
-    let found = all.iter().find(|(known, _)| *known == name);
-    found.map(|(_, value)| Some(*value)).ok_or_else(|| {
-        let known = all.map(|(known, _)| known).join(", ");
-        Fault::new(
-            "bad_packed",
-            format!(
-                "there is no {field} `{}`; there are: {known}",
-                printable(name)
-            ),
-        )
     })
 }
 
@@ -346,21 +289,6 @@ pub fn too_long() -> Fault {
     )
 }
 
-/// The fault of a packed object that says nothing.
-#[must_use]
-pub fn unreadable(why: &Unreadable) -> Fault {
-    Fault::new("bad_packed", why.to_string())
-}
-
-/// The fault of a packed object whose end can not be found.
-#[must_use]
-pub fn broken_packed() -> Fault {
-    Fault::new(
-        "bad_packed",
-        "a packed object whose length is less than 8, or that was cut short; what follows is skipped up to the next line end",
-    )
-}
-
 fn line(value: &Value) -> Bytes {
     let mut text = value.to_string();
     text.push('\n');
@@ -397,28 +325,6 @@ pub fn watching(filter: Option<&Filter>, offered: &[Stream]) -> Bytes {
         }
     }
     line(&answer)
-}
-
-/// What packed objects with the number `number` are: the labels of the stream.
-#[must_use]
-pub fn packed_stream(number: u32, stream: &sink::Stream) -> Bytes {
-    let mut said = json!({"class": "PACKED", "stream": number, "id": stream.id});
-    if let Some(fields) = said.as_object_mut() {
-        let labels = match stream.content {
-            Content::Samples(kind) => vec![("sample_kind", kind.name())],
-            Content::Attitude | Content::Truth => vec![
-                ("rotates", &*stream.rotates),
-                ("world", &stream.world_axes),
-                ("body", &stream.body_axes),
-            ],
-        };
-        fields.extend(
-            labels
-                .into_iter()
-                .map(|(name, value)| (name.to_owned(), value.into())),
-        );
-    }
-    line(&said)
 }
 
 /// The notice that attitudes of `id` were dropped.
@@ -589,6 +495,28 @@ mod tests {
                 rate_hz: Some(50.0),
                 ..Filter::default()
             })
+        );
+    }
+
+    #[test]
+    fn packed_is_asked_for_and_the_answer_repeats_it_and_only_then() {
+        for (asked, form) in [("true", Form::Packed), ("false", Form::Lines)] {
+            let text = format!("{{\"class\":\"WATCH\",\"packed\":{asked}}}");
+            let Ok(Message::Watch(Some(filter))) = ask(&text) else {
+                unreachable!("{text}");
+            };
+            assert_eq!(filter.form, form);
+            let answer: Value =
+                serde_json::from_slice(&watching(Some(&filter), &[Stream::Att])).unwrap();
+            let is_packed = form == Form::Packed;
+            assert_eq!(
+                answer.get("packed"),
+                is_packed.then_some(&Value::Bool(true))
+            );
+        }
+        assert_eq!(
+            ask(r#"{"class":"WATCH","packed":1}"#).unwrap_err().code,
+            "bad_watch"
         );
     }
 

@@ -4,9 +4,19 @@
 //! The objects sent are laid out here from the table of `docs/protocol.md`, not by the daemon's encoder.
 
 use super::client::{Client, Item, rate};
-use super::daemon::{Daemon, TCP, UDP, WS, eventually, listening};
+use super::daemon::{Daemon, Process, TCP, UDP, WS, eventually, listening, strapd};
 use serde_json::{Value, json};
-use strapd::record::Status;
+use std::collections::VecDeque;
+use std::io::Write;
+use std::net::TcpListener;
+use std::process::Command;
+use std::sync::Arc;
+use strapd::record::{Nanos, Status};
+use strapd::serve::Settings;
+use strapd::serve::admission::Token;
+use strapd::serve::hub::Hub;
+use strapd::serve::session::{Scratch, Session};
+use strapd::serve::source::Source;
 
 const WATCH: &str = r#"{"class":"WATCH"}"#;
 const WATCH_PACKED: &str = r#"{"class":"WATCH","packed":true}"#;
@@ -342,4 +352,321 @@ fn a_packed_watch_is_answered_with_its_form_and_each_stream_is_named_once_before
     said(&mut client, "WATCH");
     client.send(&rate("a", 5, 1.0));
     assert_eq!(u64_at(&client.packed(), 8), 5);
+}
+
+#[test]
+fn thinned_packed_attitudes_are_the_thinned_lines() {
+    let daemon = Daemon::start(listening(&[TCP, WS]));
+    let thin = r#"{"class":"WATCH","rate_hz":30,"id":"a""#;
+    let mut lines = Client::tcp(daemon.address(0)).watching(&format!("{thin}}}"));
+    let mut packed = Client::web(daemon.address(1)).watching(&format!("{thin},\"packed\":true}}"));
+    let mut sender = Client::tcp(daemon.address(0));
+    for n in 0..1000 {
+        sender.send(&rate("a", n, 2.0));
+        sender.send(&rate("b", n, 2.0));
+    }
+    let labels = said(&mut packed, "PACKED");
+    for _ in 0..30 {
+        assert_eq!(unpacked(&packed.packed(), &labels), said(&mut lines, "ATT"));
+    }
+}
+
+#[test]
+fn what_is_wrong_with_an_object_is_answered_with_its_place_and_the_next_one_counts() {
+    let daemon = Daemon::tcp();
+    let mut client = Client::tcp(daemon.address(0)).watching(WATCH);
+    // WATCH was the first; the objects count with the lines.
+    client.send_bytes(&[bind(1, "a").into_bytes(), Sample::lively(0).packed(1)].concat());
+    client.object("ATT");
+    let good = Sample::lively(1).packed(1);
+    let attitude = object(2, 1, &[0; 104]);
+    let whole = |bytes: &[u8]| bytes.to_vec();
+    for (number, (bytes, code, words)) in (4..).zip([
+        (Sample::lively(1).packed(2), "unknown_stream", "number 2 is"),
+        (object(9, 1, &[b'\n'; 40]), "bad_packed", "kind 9"),
+        (attitude, "bad_packed", "kind 2 (ATT)"),
+        (object(1, 1, &[0; 39]), "bad_packed", "47 bytes, need 48"),
+        (
+            whole(b"\xf8\x01\x07\0 all of it \xf8 up to here\n"),
+            "bad_packed",
+            "less than 8",
+        ),
+        (
+            whole(b"{\"class\":\"PACKED\"}\n"),
+            "bad_packed",
+            "missing field",
+        ),
+        (whole(b"x\xf8\n"), "bad_json", "column 2"),
+    ]) {
+        client.send_bytes(&bytes);
+        let error = client.object("ERROR");
+        assert_eq!(
+            (&error["code"], &error["line"]),
+            (&json!(code), &json!(number)),
+            "{error}"
+        );
+        assert!(
+            error["message"].as_str().unwrap().contains(words),
+            "{error}"
+        );
+    }
+    client.send_bytes(&good);
+    let att = client.object("ATT");
+    assert_eq!(att["seq"], 1);
+    assert_eq!(att["status"], json!(["rejected-before", "provisional"]));
+    let status = daemon.status();
+    assert_eq!(status["sources"][0]["counts"]["undecodable"], 7);
+    assert_eq!(status["counters"]["lines"], 11);
+    // A client that ends within an object has sent a bad one.
+    client.send_bytes(&good[..20]);
+    client.shut();
+    assert_eq!(client.object("ERROR")["line"], 12);
+}
+
+#[test]
+fn twenty_one_bad_objects_in_a_row_close_the_connection_and_good_ones_make_up_for_bad_ones() {
+    let daemon = Daemon::start(listening(&[TCP, WS]));
+    let mut patient = Client::web(daemon.address(1));
+    patient.object("VERSION");
+    patient.send(bind(1, "a").trim_end());
+    for n in 0..3 {
+        let bad = object(9, 1, &[]).repeat(20);
+        patient.send_packed(&[bad, Sample::lively(n).packed(1)].concat());
+        for _ in 0..20 {
+            assert_eq!(patient.object("ERROR")["code"], "bad_packed");
+        }
+    }
+    // The end of a message is the end of what is skipped, and of what is cut short.
+    patient.send_packed(b"\xf8\x01\0\0 \xf8 ");
+    patient.send_packed(&Sample::lively(3).packed(1)[..47]);
+    patient.send_packed(&Sample::lively(3).packed(1));
+    assert_eq!(patient.object("ERROR")["code"], "bad_packed");
+    assert_eq!(patient.object("ERROR")["code"], "bad_packed");
+    // Before the first sample nobody knew whose the bad ones were.
+    eventually("four samples", || {
+        daemon.status()["sources"][0]["samples"] == 4 + 42
+    });
+    let mut other = Client::tcp(daemon.address(0));
+    other.send_bytes(&Sample::lively(0).packed(1).repeat(500));
+    let said = other.rest();
+    assert_eq!(said.len(), 1 + 21 + 1, "greeting, errors, reason");
+    assert_eq!(said.last().unwrap()["code"], "too_many_errors");
+}
+
+#[test]
+fn numbers_are_of_one_connection_may_be_bound_anew_and_are_at_most_256() {
+    let daemon = Daemon::tcp();
+    let mut watcher = Client::tcp(daemon.address(0)).watching(WATCH);
+    let mut client = Client::tcp(daemon.address(0));
+    client.object("VERSION");
+    for (id, n) in [("a", 0), ("b", 0), ("a", 1)] {
+        client.send_bytes(&[bind(5, id).into_bytes(), Sample::lively(n).packed(5)].concat());
+        let att = watcher.object("ATT");
+        assert_eq!((&att["id"], &att["seq"]), (&json!(id), &json!(n)));
+    }
+    let mut other = Client::tcp(daemon.address(0));
+    other.object("VERSION");
+    other.send_bytes(&Sample::lively(2).packed(5));
+    assert_eq!(other.object("ERROR")["code"], "unknown_stream");
+    // The rules of lines: a sensor has one sender, and one meaning.
+    other.send_bytes(&[bind(5, "a").into_bytes(), Sample::lively(2).packed(5)].concat());
+    assert_eq!(other.object("ERROR")["code"], "id_in_use");
+    client.send(r#"{"class":"PACKED","stream":6,"id":"a","sample_kind":"average"}"#);
+    client.send_bytes(&Sample::lively(2).packed(6));
+    assert_eq!(client.object("ERROR")["code"], "meaning_changed");
+    for stream in 7..261 {
+        client.send(bind(stream, "c").trim_end());
+    }
+    client.send(bind(261, "c").trim_end());
+    let error = client.object("ERROR");
+    assert_eq!(error["code"], "bad_packed");
+    assert!(error["message"].to_string().contains("256"), "{error}");
+    client.send(bind(260, "c").trim_end());
+    client.send_bytes(&Sample::lively(0).packed(260));
+    assert_eq!(watcher.object("ATT")["id"], "c");
+}
+
+#[test]
+fn more_packed_streams_at_once_than_replies_may_wait_are_all_named() {
+    let daemon = Daemon::tcp();
+    let mut watcher = Client::tcp(daemon.address(0)).watching(WATCH_PACKED);
+    let mut sender = Client::tcp(daemon.address(0));
+    let mut bytes = Vec::new();
+    for stream in 0..200 {
+        bytes.extend(bind(stream, &format!("s{stream}")).into_bytes());
+        bytes.extend(Sample::lively(0).packed(stream));
+    }
+    sender.send_bytes(&bytes);
+    let mut named = std::collections::BTreeSet::new();
+    let mut seen = 0;
+    while seen < 200 {
+        match watcher.item().unwrap() {
+            Item::Line(line) => assert!(named.insert(read(&line)["stream"].as_u64().unwrap())),
+            Item::Packed(object) => {
+                assert!(
+                    named.contains(&u64::from(u32_at(&object, 4))),
+                    "not named before"
+                );
+                seen += 1;
+            }
+        }
+    }
+    assert_eq!(named.len(), 200);
+}
+
+#[test]
+fn where_a_token_is_asked_for_a_packed_object_is_no_way_in() {
+    let mut settings = listening(&[TCP]);
+    settings.token = Some(Token::new("0123456789abcdef"));
+    let daemon = Daemon::start(settings);
+    for first in [Sample::lively(0).packed(1), bind(1, "a").into_bytes()] {
+        let mut client = Client::tcp(daemon.address(0));
+        client.object("VERSION");
+        client.send_bytes(&first);
+        assert_eq!(client.object("ERROR")["code"], "unauthorised");
+        assert_eq!(client.rest(), [Value::Null; 0]);
+    }
+    assert_eq!(daemon.status()["sources"], json!([]));
+}
+
+#[test]
+fn a_source_that_sends_packed_unasked_is_complained_of_and_left() {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let mut settings = listening(&[TCP]);
+    let uri = format!("tcp://{}", listener.local_addr().unwrap());
+    settings.sources = vec![Source::parse(&uri).unwrap()];
+    let daemon = Daemon::start(settings);
+    let (mut stream, _) = listener.accept().unwrap();
+    // A daemon's label binds nothing here.
+    let label = br#"{"class":"PACKED","stream":1,"id":"a","world":"start"}"#;
+    let bytes = [&label[..], b"\n", &Sample::lively(0).packed(1).repeat(30)].concat();
+    stream.write_all(&bytes).unwrap();
+    eventually("the complaint", || {
+        let said = daemon.status()["outgoing"][0]["last_error"].to_string();
+        said.contains("too many bad lines") || said.contains("unknown_stream")
+    });
+    let (mut again, _) = listener.accept().unwrap();
+    again.write_all(rate("a", 0, 1.0).as_bytes()).unwrap();
+    again.write_all(b"\n").unwrap();
+    eventually("the sample of the next", || {
+        daemon.status()["sources"][0]["samples"] == 1
+    });
+}
+
+/// `strapd ARGS` in one go: what it writes.
+fn output(args: &[&str]) -> String {
+    let output = Command::new(strapd()).args(args).output().unwrap();
+    assert!(output.status.success(), "{args:?}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// The `RATE` line that says what a packed sample says.
+fn unpacked_sample(object: &[u8], label: &Value) -> Value {
+    assert_eq!(
+        (object[1], label["stream"].as_u64()),
+        (1, Some(u32_at(object, 4).into()))
+    );
+    let mut line = json!({
+        "class": "RATE", "id": label["id"], "seq": u64_at(object, 8), "stamp": stamp_at(object, 16),
+        "gyro": floats_at(object, 24),
+    });
+    if object.len() > 48 && !floats_at(object, 48)[0].is_null() {
+        line["accel"] = floats_at(object, 48);
+    }
+    if object.len() > 72 {
+        line["dt_ns"] = u64_at(object, 72).cast_signed().into();
+    }
+    if label["sample_kind"] != "rate" {
+        line["sample_kind"] = label["sample_kind"].clone();
+    }
+    line
+}
+
+#[test]
+fn a_simulation_packs_its_samples_and_its_truth_and_takes_no_samples() {
+    for kind in ["rate", "delta-angle"] {
+        let run = [
+            "simulate",
+            "coning",
+            "--rate-hz",
+            "200",
+            "--duration",
+            "2",
+            "--sample-kind",
+            kind,
+        ];
+        let expected = output(&[&run[..], &["-o", "-"]].concat());
+        let expected: Vec<Value> = expected.lines().map(read).collect();
+        let serving = ["-o", TCP, "-o", WS, "--speed", "10", "--paused"];
+        let mut process = Process::of(&[&run[..], &serving].concat());
+        let mut client = Client::web(process.address(1)).watching(WATCH_PACKED);
+        client.send(bind(1, "a").trim_end());
+        client.send_packed(&Sample::lively(0).packed(1));
+        assert_eq!(client.next_of("ERROR")["code"], "samples_not_taken");
+        client.send(r#"{"class":"PLAYBACK","action":"play"}"#);
+        let mut labels = std::collections::BTreeMap::new();
+        let mut got = Vec::new();
+        while let Some(item) = client.item() {
+            match item {
+                Item::Line(line) => {
+                    let said = read(&line);
+                    match said["class"].as_str().unwrap() {
+                        "PACKED" => drop(labels.insert(said["stream"].as_u64().unwrap(), said)),
+                        class => assert_eq!(class, "PLAYBACK"),
+                    }
+                }
+                Item::Packed(object) => {
+                    let label = &labels[&u64::from(u32_at(&object, 4))];
+                    got.push(match object[1] {
+                        1 => unpacked_sample(&object, label),
+                        _ => unpacked(&object, label),
+                    });
+                }
+            }
+        }
+        for class in ["RATE", "ATT"] {
+            let of = |all: &[Value]| -> Vec<Value> {
+                all.iter()
+                    .filter(|v| v["class"] == class)
+                    .cloned()
+                    .collect()
+            };
+            assert!(of(&expected).len() > 300, "{class} {}", expected.len());
+            assert_eq!(of(&got), of(&expected), "{kind}");
+        }
+        assert_eq!(process.exit(), Some(0));
+    }
+}
+
+#[test]
+fn a_packed_watcher_that_stalls_is_told_what_it_lost_and_every_other_object_is_whole() {
+    let hub = Arc::new(Hub::new(Settings::default()).unwrap());
+    let mut scratch = Scratch::default();
+    let mut sender = Session::new(&hub, "sender".to_owned(), true);
+    let mut watcher = Session::new(&hub, "watcher".to_owned(), true);
+    watcher.bytes(
+        format!("{WATCH_PACKED}\n").as_bytes(),
+        Nanos(0),
+        &mut scratch,
+    );
+    sender.bytes(bind(1, "a").as_bytes(), Nanos(0), &mut scratch);
+    let count = 10_000;
+    for n in 0..count {
+        sender.bytes(&Sample::lively(n).packed(1), Nanos(0), &mut scratch);
+    }
+    let mut parts = VecDeque::new();
+    watcher.client().outbox.take(usize::MAX, &mut parts);
+    let (packed, lines): (Vec<_>, Vec<_>) = parts.into_iter().partition(|part| part[0] == 0xf8);
+    let lines: Vec<Value> = lines
+        .iter()
+        .map(|l| serde_json::from_slice(l).unwrap())
+        .collect();
+    let classes: Vec<_> = lines.iter().filter_map(|v| v["class"].as_str()).collect();
+    assert_eq!(classes, ["VERSION", "WATCH", "GAP", "PACKED"]);
+    let dropped = lines[2]["dropped"].as_u64().unwrap();
+    assert_eq!(lines[2]["last_seq"], dropped - 1);
+    let packed = packed.concat();
+    let seqs: Vec<u64> = packed.chunks(112).map(|object| u64_at(object, 8)).collect();
+    assert!(seqs.into_iter().eq(dropped..count));
+    assert!(packed.len() <= 256 << 10 && packed.len() > 255 << 10);
 }
