@@ -1,13 +1,13 @@
 //! Lines that say what packed objects are, and what is wrong with them. Pure.
 
-use super::{Fault, line, object};
+use super::{Fault, object};
 use crate::decode::{Class, GyroUnit, Line, printable};
 use crate::record::SampleKind;
 use crate::serve::packed::Unreadable;
 use crate::sink::{Content, Stream};
 use bytes::Bytes;
 use serde::Deserialize;
-use serde_json::json;
+use serde_json::Value;
 
 #[derive(Deserialize)]
 struct PackedObject {
@@ -87,23 +87,21 @@ pub fn broken_packed() -> Fault {
 /// What packed objects with the number `number` are: the labels of the stream.
 #[must_use]
 pub fn packed_stream(number: u32, stream: &Stream) -> Bytes {
-    let mut said = json!({"class": "PACKED", "stream": number, "id": stream.id});
-    if let Some(fields) = said.as_object_mut() {
-        let labels = match stream.content {
-            Content::Samples(kind) => vec![("sample_kind", kind.name())],
-            Content::Attitude | Content::Truth => vec![
-                ("rotates", &*stream.rotates),
-                ("world", &stream.world_axes),
-                ("body", &stream.body_axes),
-            ],
-        };
-        fields.extend(
-            labels
-                .into_iter()
-                .map(|(name, value)| (name.to_owned(), value.into())),
-        );
+    let labels = match stream.content {
+        Content::Samples(kind) => vec![("sample_kind", kind.name())],
+        Content::Attitude | Content::Truth => vec![
+            ("rotates", &*stream.rotates),
+            ("world", &stream.world_axes),
+            ("body", &stream.body_axes),
+        ],
+    };
+    // By hand: the class comes first.
+    let mut said = format!("{{\"class\":\"PACKED\",\"stream\":{number}");
+    for (name, value) in [("id", &*stream.id)].into_iter().chain(labels) {
+        said += &format!(",\"{name}\":{}", Value::from(value));
     }
-    line(&said)
+    said += "}\n";
+    said.into()
 }
 
 #[cfg(test)]
