@@ -356,10 +356,12 @@ fn saturated(name: &str, form: Form, publishers: usize, subscribers: usize, secs
             std::thread::spawn(move || {
                 let mut block = Vec::new();
                 let mut n = 0;
-                let binding = format!(
-                    "{{\"class\":\"PACKED\",\"stream\":{publisher},\"id\":\"p{publisher}\"}}\n"
-                );
-                (&stream).write_all(binding.as_bytes()).unwrap();
+                if form == Form::Packed {
+                    let binding = format!(
+                        "{{\"class\":\"PACKED\",\"stream\":{publisher},\"id\":\"p{publisher}\"}}\n"
+                    );
+                    (&stream).write_all(binding.as_bytes()).unwrap();
+                }
                 let mut busy = Duration::ZERO;
                 while busy.as_secs() < secs {
                     block.clear();

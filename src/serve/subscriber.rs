@@ -35,6 +35,9 @@ pub struct Chunk {
     pub label: Option<(u32, Bytes)>,
 }
 
+/// Encodes some attitudes of a stream, at least one, with their numbers.
+pub type Encode<'a> = dyn Fn(Form, &[(u64, AttitudeSample)]) -> Chunk + 'a;
+
 /// Between two notices of the time in the data, ns of it.
 const BETWEEN_TIMES: i64 = 20_000_000;
 
@@ -242,7 +245,7 @@ impl Outbox {
         id: &Arc<str>,
         samples: &[AttitudeSample],
         shared: &mut dyn FnMut(Form) -> Vec<Chunk>,
-        encode: &dyn Fn(Form, &[(u64, AttitudeSample)]) -> Chunk,
+        encode: &Encode<'_>,
         first_seq: u64,
     ) {
         let mut state = self.state();
