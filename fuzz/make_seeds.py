@@ -135,6 +135,7 @@ objects = [
     packed(2, 0, 1e-3, 0, math.nan, *[math.nan] * 3, 500000, form="6dq"),
     packed(1, 2, 1, 0, 0, 0, 0.1, 0.2, 0.3, 0, 0, 0, 0x80, 3, kind=2, form="10d2I"),
     b"\xf8\x01\x07\0 hopeless\n",
+    b"\xf8\x01\0\0\n",
 ]
 seed("lines", "packed", bound.encode() + b"".join(objects) + "\n".join(lines).encode() + objects[1][:50])
 talk = ['{"class":"POLL"}', '{"class":"WATCH","id":"imu0","rate_hz":50}', '{"class":"AUTH","token":"x"}', '{"class":"WATCH","enable":false}']

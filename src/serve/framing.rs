@@ -289,6 +289,8 @@ mod tests {
         bytes.extend_from_slice(b"\xf8\x01\x07\0skipped \xf8\x01\x08\0\ntwo\n");
         // A length that holds a line end, and is none.
         bytes.extend_from_slice(b"\xf8\n\0\0\xf8\x01\x08\0....\n");
+        // The line end at once, and the object after it is whole.
+        bytes.extend_from_slice(b"\xf8\x01\0\0\n");
         bytes.extend(object(72));
         bytes.extend_from_slice(b"\xf8\x01\x48");
         let whole = in_pieces(&bytes, bytes.len());
@@ -303,8 +305,9 @@ mod tests {
                 Seen::Broken(7),
                 Seen::Line(8, b"two".to_vec()),
                 Seen::Broken(9),
-                Seen::Packed(10, object(72)),
-                Seen::Broken(11),
+                Seen::Broken(10),
+                Seen::Packed(11, object(72)),
+                Seen::Broken(12),
             ]
         );
         for size in [1, 2, 3, 4, 5, 7, 47, 48, 49, 4096, 65_534, 65_535, 65_536] {
