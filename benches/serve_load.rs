@@ -13,6 +13,8 @@ use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
+use strapd::record::{Nanos, RawSample};
+use strapd::serve::packed::{self, Form};
 
 /// Name, publishers, samples a second of each, subscribers, subscribers that never read.
 const PACED: [(&str, usize, u64, usize, usize); 5] = [
@@ -101,6 +103,16 @@ fn push_line(out: &mut Vec<u8>, publisher: usize, n: u64, step: u64) {
     .unwrap();
 }
 
+/// The sample of [`push_line`], packed.
+fn push_packed(out: &mut Vec<u8>, publisher: usize, n: u64, step: u64) {
+    let sample = RawSample {
+        header: Some(Nanos((1_700_000_000_000_000_000 + n * step) as i64)),
+        gyro: Some([(n as f64 * 1e-3).sin(), 0.1, -0.2]),
+        ..RawSample::default()
+    };
+    packed::push_sample(out, publisher as u32, n, &sample);
+}
+
 /// What a subscriber has seen.
 #[derive(Default)]
 struct Seen {
@@ -156,9 +168,55 @@ fn subscribe(
     }
 }
 
+/// The same of packed attitudes, of which only the heads are looked at.
+fn subscribe_packed(mut stream: TcpStream, done: &AtomicBool) -> Seen {
+    stream
+        .set_read_timeout(Some(Duration::from_millis(500)))
+        .unwrap();
+    let mut seen = Seen::default();
+    let mut buffer = vec![0; 256 << 10];
+    let mut have = 0;
+    loop {
+        match stream.read(&mut buffer[have..]) {
+            Ok(0) => return seen,
+            Ok(n) => have += n,
+            Err(_) if done.load(Ordering::Relaxed) => return seen,
+            Err(_) => continue,
+        }
+        let mut rest = &buffer[..have];
+        while !rest.is_empty() {
+            let end = if packed::is_packed(rest) {
+                packed::length(rest)
+            } else {
+                rest.iter().position(|b| *b == b'\n').map(|n| n + 1)
+            };
+            let Some((item, after)) = end.and_then(|n| rest.split_at_checked(n)) else {
+                break;
+            };
+            if packed::is_packed(item) {
+                seen.attitudes += 1;
+            } else if item.windows(5).any(|w| w == b"\"GAP\"") {
+                seen.dropped += number(item, b"\"dropped\":").unwrap();
+            }
+            rest = after;
+        }
+        let left = rest.len();
+        buffer.copy_within(have - left..have, 0);
+        have = left;
+    }
+}
+
 fn watch(daemon: &Daemon) -> TcpStream {
+    watch_as(daemon, Form::Lines)
+}
+
+fn watch_as(daemon: &Daemon, form: Form) -> TcpStream {
     let stream = daemon.connect();
-    (&stream).write_all(b"{\"class\":\"WATCH\"}\n").unwrap();
+    let request: &[u8] = match form {
+        Form::Lines => b"{\"class\":\"WATCH\"}\n",
+        Form::Packed => b"{\"class\":\"WATCH\",\"packed\":true}\n",
+    };
+    (&stream).write_all(request).unwrap();
     // One byte of the greeting: the daemon is there.
     let mut byte = [0];
     (&stream).read_exact(&mut byte).unwrap();
@@ -276,17 +334,20 @@ fn soaked(levels: &[(f64, f64, usize)]) {
     );
 }
 
-fn saturated(publishers: usize, subscribers: usize, secs: u64) {
+fn saturated(name: &str, form: Form, publishers: usize, subscribers: usize, secs: u64) {
     let daemon = Daemon::start();
     let start = Instant::now();
     let done = Arc::new(AtomicBool::new(false));
     let readers: Vec<_> = (0..subscribers)
         .map(|_| {
-            let (stream, done) = (watch(&daemon), done.clone());
-            std::thread::spawn(move || subscribe(stream, start, &[], &done))
+            let (stream, done) = (watch_as(&daemon, form), done.clone());
+            std::thread::spawn(move || match form {
+                Form::Lines => subscribe(stream, start, &[], &done),
+                Form::Packed => subscribe_packed(stream, &done),
+            })
         })
         .collect();
-    // Lines made beforehand: the generator must not be what is measured.
+    // Samples made beforehand: the generator must not be what is measured.
     let per_block = 50_000;
     let begin = Instant::now();
     let writers: Vec<_> = (0..publishers)
@@ -295,11 +356,20 @@ fn saturated(publishers: usize, subscribers: usize, secs: u64) {
             std::thread::spawn(move || {
                 let mut block = Vec::new();
                 let mut n = 0;
+                if form == Form::Packed {
+                    let binding = format!(
+                        "{{\"class\":\"PACKED\",\"stream\":{publisher},\"id\":\"p{publisher}\"}}\n"
+                    );
+                    (&stream).write_all(binding.as_bytes()).unwrap();
+                }
                 let mut busy = Duration::ZERO;
                 while busy.as_secs() < secs {
                     block.clear();
                     for k in n..n + per_block {
-                        push_line(&mut block, publisher, k, 1_000_000);
+                        match form {
+                            Form::Lines => push_line(&mut block, publisher, k, 1_000_000),
+                            Form::Packed => push_packed(&mut block, publisher, k, 1_000_000),
+                        }
                     }
                     n += per_block;
                     let from = Instant::now();
@@ -327,7 +397,7 @@ fn saturated(publishers: usize, subscribers: usize, secs: u64) {
     let got: u64 = seen.iter().map(|s| s.attitudes).sum();
     let dropped: u64 = seen.iter().map(|s| s.dropped).sum();
     println!(
-        "| P4: {publishers} as fast as they can -> {subscribers} | {:.0} | {while_writing:.0} | {:.0} | {dropped} | {} | {:.2} | {} |",
+        "| {name}: {publishers} as fast as they can -> {subscribers} | {:.0} | {while_writing:.0} | {:.0} | {dropped} | {} | {:.2} | {} |",
         samples as f64 / took,
         got as f64 / took,
         samples * subscribers as u64 - got - dropped,
@@ -375,7 +445,12 @@ fn main() {
     println!("|---|---|---|---|---|---|---|---|");
     for (publishers, subscribers) in [(4, 0), (4, 1), (1, 1)] {
         if wanted("P4") {
-            saturated(publishers, subscribers, secs);
+            saturated("P4", Form::Lines, publishers, subscribers, secs);
+        }
+    }
+    for (publishers, subscribers) in [(4, 0), (4, 1)] {
+        if wanted("P4P") {
+            saturated("P4P", Form::Packed, publishers, subscribers, secs);
         }
     }
 }

@@ -4,6 +4,7 @@
 """
 
 import io
+import math
 import pathlib
 import struct
 
@@ -120,12 +121,33 @@ lines = [
     "",
 ]
 seed("lines", "samples", "\n".join(lines).encode())
+
+
+def packed(stream, seq, *more, kind=1, form="3d"):
+    body = struct.pack("<Qq" + form, seq, 1700000000000000000 + seq * 500000, *more)
+    return struct.pack("<BBHI", 0xF8, kind, 8 + len(body), stream) + body
+
+
+bound = '{"class":"PACKED","stream":1,"id":"imu0"}\n{"class":"PACKED","stream":2,"id":"d","sample_kind":"delta-angle","gyro_unit":"deg"}\n'
+objects = [
+    packed(1, 0, 0.1, -0.2, 3),
+    packed(1, 1, 0.1, -0.2, 3, 0, 0, 9.81, form="6d"),
+    packed(2, 0, 1e-3, 0, math.nan, *[math.nan] * 3, 500000, form="6dq"),
+    packed(1, 2, 1, 0, 0, 0, 0.1, 0.2, 0.3, 0, 0, 0, 0x80, 3, kind=2, form="10d2I"),
+    b"\xf8\x01\x07\0 hopeless\n",
+    b"\xf8\x01\0\0\n",
+]
+seed("lines", "packed", bound.encode() + b"".join(objects) + "\n".join(lines).encode() + objects[1][:50])
 talk = ['{"class":"POLL"}', '{"class":"WATCH","id":"imu0","rate_hz":50}', '{"class":"AUTH","token":"x"}', '{"class":"WATCH","enable":false}']
 seed("session", "talk", b"\x40" + "\n".join(talk + lines).encode())
 motion = [
     '{"class":"RATE","id":"%s","seq":%d,"stamp":{"sec":1700000000,"nsec":%d},"gyro":[0.1,%g,3]}' % ("ab"[k % 2], k // 2, k * 500000, 0.1 * k)
     for k in range(24)
 ]
+turn = [packed(1 + k % 2, k // 2, 0.1, 0.1 * k, 3) for k in range(24)]
+watch = b'{"class":"WATCH","packed":true,"rate_hz":500}\n'
+for name, size in [("packed_as_lines", b"\x40"), ("packed", b"\xff")]:
+    seed("session", name, size + bound.encode() + b"".join(turn[:12]) + watch + b"".join(objects) + b"".join(turn[12:]))
 seed("session", "motion", b"\xff" + "\n".join(motion + [""]).encode())
 
 seed("foxglove", "subscribe", b'{"op":"subscribe","subscriptions":[{"id":7,"channelId":1},{"id":8,"channelId":2}]}')

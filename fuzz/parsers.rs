@@ -3,12 +3,14 @@
 #![allow(dead_code, unreachable_pub)]
 
 use std::cell::RefCell;
+use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::sync::{Arc, LazyLock};
 use strapd::decode::{Channel, Decoder, Options, decode_line, role};
 use strapd::record::{Nanos, RawSample};
 use strapd::serve::framing::{Framed, Framer};
 use strapd::serve::hub::Hub;
+use strapd::serve::packed::{self, Object};
 use strapd::serve::session::{Scratch, Session};
 use strapd::source::mcap::{Reader, WalkOptions, walk};
 
@@ -135,15 +137,18 @@ pub fn schema(data: &[u8]) {
     }
 }
 
-/// NDJSON: however the bytes are cut, the lines are the same, and each is a sample or an error.
+/// NDJSON with packed objects: however the bytes are cut, the lines and objects are the same, and each is a sample or an
+/// error.
 pub fn lines(data: &[u8]) {
     let cut = |size: usize| {
         let mut framer = Framer::new();
-        let mut lines: Vec<(u64, Option<Vec<u8>>)> = Vec::new();
+        let mut items: Vec<(u64, Item)> = Vec::new();
         let mut take = |framed: Framed<'_>| {
-            lines.push(match framed {
-                Framed::Line(n, line) => (n, Some(line.to_vec())),
-                Framed::TooLong(n, _) => (n, None),
+            items.push(match framed {
+                Framed::Line(n, line) => (n, Item::Line(line.to_vec())),
+                Framed::TooLong(n, _) => (n, Item::TooLong),
+                Framed::Packed(n, object) => (n, Item::Packed(object.to_vec())),
+                Framed::Broken(n) => (n, Item::Broken),
             });
             true
         };
@@ -151,20 +156,62 @@ pub fn lines(data: &[u8]) {
             framer.feed(piece, &mut take);
         }
         framer.finish(&mut take);
-        lines
+        items
     };
     let whole = cut(usize::MAX);
     assert_eq!(whole, cut(1 + data.len() % 7));
+    assert!(whole.windows(2).all(|pair| pair[0].0 < pair[1].0));
     let mut out: Vec<RawSample> = Vec::new();
-    for line in whole.iter().filter_map(|(_, line)| line.as_deref()) {
+    for (_, item) in &whole {
         out.clear();
-        if decode_line(line, NOW, &mut out).is_err() {
-            assert!(out.is_empty());
+        match item {
+            Item::Line(line) => {
+                if decode_line(line, NOW, &mut out).is_err() {
+                    assert!(out.is_empty());
+                }
+            }
+            Item::Packed(object) => packed_object(object),
+            Item::TooLong | Item::Broken => {}
         }
     }
 }
 
-/// A whole conversation with the daemon: what it answers is JSON, a line each, and every attitude is finite.
+#[derive(Debug, PartialEq, Eq)]
+enum Item {
+    Line(Vec<u8>),
+    Packed(Vec<u8>),
+    TooLong,
+    Broken,
+}
+
+/// As long as it says; what it says is written again as the same sample.
+fn packed_object(object: &[u8]) {
+    assert_eq!(packed::length(object), Some(object.len()));
+    match packed::read(object, NOW) {
+        Ok(Object::Rate {
+            stream,
+            seq,
+            sample,
+        }) => {
+            let mut again = Vec::new();
+            packed::push_sample(&mut again, stream, seq.unwrap_or(packed::NO_SEQ), &sample);
+            let Ok(Object::Rate { sample: other, .. }) = packed::read(&again, NOW) else {
+                panic!("what was written can not be read");
+            };
+            // A line has neither: what is infinite is no data there, and no stamp is when it was logged.
+            let finite = |v: &[f64; 3]| v.iter().all(|c| c.is_finite());
+            assert_eq!(other.gyro, sample.gyro.filter(finite));
+            assert_eq!(other.accel, sample.accel.filter(finite));
+            assert_eq!(other.header, sample.header.or(Some(NOW)));
+            assert_eq!(other.interval_nanos, sample.interval_nanos);
+        }
+        Ok(Object::Att { .. }) => assert!(object.len() >= packed::ATT),
+        Err(why) => assert!(!why.to_string().is_empty()),
+    }
+}
+
+/// A whole conversation with the daemon, watched as lines or (by the first byte) packed: what it answers is JSON, a line
+/// each, or whole packed attitudes that were named before, and every attitude is finite.
 pub fn session(data: &[u8]) {
     let settings = strapd::serve::Settings::default();
     let Ok(hub) = Hub::new(settings) else {
@@ -173,7 +220,12 @@ pub fn session(data: &[u8]) {
     let hub = Arc::new(hub);
     let mut session = Session::new(&hub, "fuzz".to_owned(), false);
     let mut scratch = Scratch::default();
-    session.bytes(b"{\"class\":\"WATCH\"}\n", NOW, &mut scratch);
+    let watch: &[u8] = match data.first().is_some_and(|n| n % 2 == 0) {
+        true => b"{\"class\":\"WATCH\"}\n",
+        false => b"{\"class\":\"WATCH\",\"packed\":true}\n",
+    };
+    session.bytes(watch, NOW, &mut scratch);
+    let mut named = BTreeSet::new();
     let (size, data) = data
         .split_first()
         .map_or((1, data), |(n, rest)| (1 + *n as usize, rest));
@@ -183,38 +235,67 @@ pub fn session(data: &[u8]) {
             4 => session.message(piece, received, &mut scratch),
             _ => session.bytes(piece, received, &mut scratch),
         }
-        answered(&session);
+        answered(&session, &mut named);
         if session.end().is_some() {
             return;
         }
     }
     session.finish(NOW, &mut scratch);
-    answered(&session);
+    answered(&session, &mut named);
 }
 
-fn answered(session: &Session) {
+fn answered(session: &Session, named: &mut BTreeSet<u64>) {
     let outbox = &session.client().outbox;
     let mut taken = std::collections::VecDeque::new();
     let bytes = outbox.take(usize::MAX, &mut taken);
     outbox.written(bytes);
-    for line in taken.iter().flat_map(|bytes| bytes.split(|b| *b == b'\n')) {
-        if line.is_empty() {
-            continue;
+    for part in &taken {
+        if packed::is_packed(part) {
+            packed_attitudes(part, named);
+        } else {
+            for line in part.split(|b| *b == b'\n').filter(|l| !l.is_empty()) {
+                answer(line, named);
+            }
         }
-        let Ok(text) = std::str::from_utf8(line) else {
-            panic!("an answer that is no text");
+    }
+}
+
+fn packed_attitudes(part: &[u8], named: &BTreeSet<u64>) {
+    let whole: usize = packed::objects(part).map(<[u8]>::len).sum();
+    assert_eq!(whole, part.len());
+    for object in packed::objects(part) {
+        let Ok(Object::Att { stream, attitude }) = packed::read(object, NOW) else {
+            panic!("no attitude");
         };
+        assert!(named.contains(&u64::from(stream)), "{stream} was not named");
+        assert!(attitude.q.iter().all(|c| c.is_finite()), "{attitude:?}");
+    }
+}
+
+fn answer(line: &[u8], named: &mut BTreeSet<u64>) {
+    let Ok(text) = std::str::from_utf8(line) else {
+        panic!("an answer that is no text");
+    };
+    assert!(
+        text.starts_with("{\"class\":\"") && text.ends_with('}'),
+        "{text}"
+    );
+    if text.starts_with("{\"class\":\"ATT\"") {
+        let q = text
+            .split("\"q\":")
+            .nth(1)
+            .and_then(|rest| rest.split('}').next());
+        assert!(q.is_some_and(|q| !q.contains("null")), "{text}");
+    }
+    if text.starts_with("{\"class\":\"PACKED\"") {
+        let number = text.rsplit("\"stream\":").next().map(|rest| {
+            let digits = rest.bytes().take_while(u8::is_ascii_digit);
+            digits.fold(0, |n, b| n * 10 + u64::from(b - b'0'))
+        });
         assert!(
-            text.starts_with("{\"class\":\"") && text.ends_with('}'),
-            "{text}"
+            named.insert(number.unwrap_or_default()),
+            "named twice: {text}"
         );
-        if text.starts_with("{\"class\":\"ATT\"") {
-            let q = text
-                .split("\"q\":")
-                .nth(1)
-                .and_then(|rest| rest.split('}').next());
-            assert!(q.is_some_and(|q| !q.contains("null")), "{text}");
-        }
     }
 }
 

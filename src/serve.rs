@@ -7,6 +7,7 @@
 //! | file | arrow | |
 //! |---|---|---|
 //! | [`framing`], [`wire`] | bytes -> lines -> requests; answers -> lines | pure |
+//! | [`packed`] | samples and attitudes <-> packed objects | pure |
 //! | [`stream`] | samples of one sensor -> attitudes | pure |
 //! | [`channel`] | a stream as clients know it | pure |
 //! | [`cast`], [`playback`] | a replay or simulation served in place of sensors, and who moves it | I/O; locks |
@@ -35,6 +36,7 @@ mod http;
 pub mod hub;
 pub mod limits;
 pub mod listen;
+pub mod packed;
 mod page;
 pub mod playback;
 mod quiet;

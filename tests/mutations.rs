@@ -35,7 +35,7 @@ fn seeds(target: &str) -> Vec<Vec<u8>> {
 /// Up to seven changes of the kinds that hurt: bits, cuts, counts that promise the world, words of the format in
 /// the wrong place, pieces of another input.
 fn mutate(bytes: &mut Vec<u8>, other: &[u8], rng: &mut ChaCha8Rng) {
-    const WORDS: [&[u8]; 12] = [
+    const WORDS: [&[u8]; 13] = [
         b"\n",
         b"{",
         b"}",
@@ -48,6 +48,7 @@ fn mutate(bytes: &mut Vec<u8>, other: &[u8], rng: &mut ChaCha8Rng) {
         b"\xff",
         b"\0\0\0\0",
         b"\xff\xff\xff\x7f",
+        b"\xf8\x01\x30\0",
     ];
     for _ in 0..rng.random_range(1..8) {
         let at = rng.random_range(0..bytes.len() + 1);

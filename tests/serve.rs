@@ -22,6 +22,7 @@ mod serve {
     mod limits;
     mod operations;
     mod packaging;
+    mod packed;
     mod recording;
     mod same_bytes;
     mod slow_readers;

@@ -139,6 +139,9 @@ impl Watcher {
                 Framed::TooLong(..) => Some(Said::Complaint(format!(
                     "it says a line of more than {MAX_LINE} bytes; skipped"
                 ))),
+                Framed::Packed(..) | Framed::Broken(_) => Some(Said::Complaint(
+                    "it says packed objects, which nobody asked for; skipped".to_owned(),
+                )),
             };
             if let Some(said) = said {
                 if let Said::Complaint(what) = &said {

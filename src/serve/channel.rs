@@ -3,8 +3,9 @@
 //! Apart from where its samples come from: a sensor of the daemon and a stream of a replay reach
 //! whoever watches in the same way.
 
-use super::foxglove;
+use super::packed::{self, Form};
 use super::subscriber::{Chunk, Class};
+use super::{foxglove, wire};
 use crate::record::{AttitudeSample, Nanos, RawSample};
 use crate::sink::json::Objects;
 use crate::sink::payload::{Payloads, Topic};
@@ -26,6 +27,8 @@ pub struct Channel {
     stream: Stream,
     lines: Objects,
     plot: Objects,
+    /// Its number in packed objects, and the line that says so.
+    label: (u32, Bytes),
     /// Number of its first channel for viewers.
     number: u32,
     payloads: Payloads,
@@ -87,11 +90,13 @@ impl Channel {
     pub fn new(streams: &[Stream]) -> Channel {
         let nameless = Stream::default();
         let stream = streams.last().unwrap_or(&nameless);
+        let number = u32::try_from(streams.len()).unwrap_or(u32::MAX);
         Channel {
             id: stream.id.as_str().into(),
             stream: stream.clone(),
             lines: Objects::new(stream, Profile::Lines),
             plot: Objects::new(stream, Profile::PlotJuggler),
+            label: (number, wire::packed_stream(number, stream)),
             number: foxglove::channel_of(streams.len().saturating_sub(1)),
             payloads: Payloads::new(stream, streams),
             last: Mutex::new(None),
@@ -199,6 +204,7 @@ impl Channel {
                     first_seq: from,
                     count: seq + 1 - from,
                     bytes: std::mem::take(&mut out).into(),
+                    label: None,
                 });
                 from = seq + 1;
             }
@@ -221,20 +227,40 @@ impl Channel {
         }
     }
 
-    /// Appends the line of one attitude.
-    pub(super) fn line(
-        &self,
-        out: &mut Vec<u8>,
-        profile: Profile,
-        seq: u64,
-        sample: &AttitudeSample,
-    ) {
-        self.objects(profile).push_attitude(out, seq, sample);
+    fn chunk(&self, form: Form, first_seq: u64, count: u64, bytes: Bytes) -> Chunk {
+        Chunk {
+            id: self.id.clone(),
+            first_seq,
+            count,
+            bytes,
+            label: (form == Form::Packed).then(|| self.label.clone()),
+        }
     }
 
-    /// The lines of items from number `first_seq` on; `text` is room for encoding.
+    /// The objects of those attitudes a client takes, at least one, with their numbers.
+    pub(super) fn thinned(
+        &self,
+        form: Form,
+        profile: Profile,
+        attitudes: &[(u64, AttitudeSample)],
+    ) -> Chunk {
+        let mut bytes = Vec::new();
+        for (seq, sample) in attitudes {
+            match form {
+                Form::Lines => self
+                    .objects(profile)
+                    .push_attitude(&mut bytes, *seq, sample),
+                Form::Packed => packed::push_attitude(&mut bytes, self.label.0, *seq, sample),
+            }
+        }
+        let first_seq = attitudes.first().map_or(0, |(seq, _)| *seq);
+        self.chunk(form, first_seq, attitudes.len() as u64, bytes.into())
+    }
+
+    /// The objects of items from number `first_seq` on; `text` is room for encoding.
     pub(super) fn chunks(
         &self,
+        form: Form,
         profile: Profile,
         first_seq: u64,
         items: Items<'_>,
@@ -245,20 +271,24 @@ impl Channel {
         let mut from = first_seq;
         text.clear();
         let mut cut = |text: &mut Vec<u8>, until: u64| {
-            chunks.push(Chunk {
-                id: self.id.clone(),
-                first_seq: from,
-                count: until - from,
-                bytes: Bytes::copy_from_slice(text),
-            });
+            let bytes = Bytes::copy_from_slice(text);
+            chunks.push(self.chunk(form, from, until - from, bytes));
             text.clear();
             from = until;
         };
         let end = first_seq + items.len() as u64;
         for (n, seq) in (first_seq..end).enumerate() {
-            match items {
-                Items::Attitudes(items) => objects.push_attitude(text, seq, &items[n]),
-                Items::Samples(items) => objects.push_raw(text, seq, &items[n]),
+            match (form, items) {
+                (Form::Lines, Items::Attitudes(items)) => {
+                    objects.push_attitude(text, seq, &items[n]);
+                }
+                (Form::Lines, Items::Samples(items)) => objects.push_raw(text, seq, &items[n]),
+                (Form::Packed, Items::Attitudes(items)) => {
+                    packed::push_attitude(text, self.label.0, seq, &items[n]);
+                }
+                (Form::Packed, Items::Samples(items)) => {
+                    packed::push_sample(text, self.label.0, seq, &items[n]);
+                }
             }
             if text.len() >= CHUNK_BYTES {
                 cut(text, seq + 1);

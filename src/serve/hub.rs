@@ -20,6 +20,7 @@ use super::channel::{Channel, Clock, Items};
 use super::connect::Outgoing;
 use super::foxglove;
 use super::limits::Limits;
+use super::packed::Form;
 use super::playback::Playback;
 use super::recorder::Handle;
 use super::state::Sensors;
@@ -402,7 +403,7 @@ impl Hub {
         text: &mut Vec<u8>,
     ) {
         // Encoded when the first asks, and shared by all.
-        let mut encoded: [Option<Vec<Chunk>>; 2] = [None, None];
+        let mut encoded: [Option<Vec<Chunk>>; 3] = [None, None, None];
         let watchers = self.watchers();
         for client in &*watchers {
             let profile = match client.shape {
@@ -420,13 +421,14 @@ impl Hub {
                     continue;
                 }
             };
-            let [lines, plot] = &mut encoded;
-            let kept = match profile {
-                Profile::Lines => lines,
-                Profile::PlotJuggler => plot,
-            };
-            let mut shared = || {
-                kept.get_or_insert_with(|| channel.chunks(profile, first_seq, items, text))
+            let [lines, plot, packed] = &mut encoded;
+            let mut shared = |form| {
+                let kept = match (form, profile) {
+                    (Form::Packed, _) => &mut *packed,
+                    (Form::Lines, Profile::Lines) => &mut *lines,
+                    (Form::Lines, Profile::PlotJuggler) => &mut *plot,
+                };
+                kept.get_or_insert_with(|| channel.chunks(form, profile, first_seq, items, text))
                     .clone()
             };
             match items {
@@ -434,7 +436,7 @@ impl Hub {
                     channel.id(),
                     attitudes,
                     &mut shared,
-                    &|out, seq, sample| channel.line(out, profile, seq, sample),
+                    &|form, kept| channel.thinned(form, profile, kept),
                     first_seq,
                 ),
                 Items::Samples(_) => client.outbox.offer_samples(channel.id(), &mut shared),

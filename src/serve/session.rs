@@ -4,6 +4,8 @@
 //! the hub because it remembers what only matters to one client: which sensor it sent last, how
 //! many lines in a row were bad, whether it has shown the token.
 
+mod unpacking;
+
 use super::framing::{Framed, Framer};
 use super::hub::{Client, Hub, Run, Sensor, count};
 use super::limits::Allowance;
@@ -123,6 +125,8 @@ pub struct Session {
     told: BTreeSet<String>,
     /// The sensors it sends.
     owned: BTreeMap<String, Arc<Mutex<Sensor>>>,
+    /// What packed samples with a number say, as lines would.
+    bound: BTreeMap<u32, Line>,
     /// The one it sent last.
     last: Option<Arc<Mutex<Sensor>>>,
     end: Option<End>,
@@ -157,6 +161,7 @@ impl Session {
             errors: Allowance::new(BURST),
             told: BTreeSet::new(),
             owned: BTreeMap::new(),
+            bound: BTreeMap::new(),
             last: None,
             end: None,
         }
@@ -219,6 +224,10 @@ impl Session {
                 Framed::TooLong(number, head) => {
                     self.bad(&wire::too_long(), number, head, received, scratch);
                 }
+                Framed::Packed(number, object) => self.packed(number, object, received, scratch),
+                Framed::Broken(number) => {
+                    self.bad(&wire::broken_packed(), number, &[], received, scratch);
+                }
             }
             self.end.is_none()
         };
@@ -269,36 +278,24 @@ impl Session {
             Ok(Message::Auth(token)) => self.authorise(&token, number),
             Ok(_) | Err(_) if !self.authorised => {
                 scratch.samples.truncate(before);
-                let fault = Fault::new(
-                    "unauthorised",
-                    "the first line must be {\"class\":\"AUTH\",\"token\":\"...\"}",
-                );
-                self.refuse(&fault, number);
+                self.refuse(&first_line_must_be_auth(), number);
             }
             Ok(Message::Samples(_)) if !self.hub.takes_samples() => {
-                count(
-                    &self.hub.counters.refused_samples,
-                    scratch.samples.len() - before,
-                );
-                scratch.samples.truncate(before);
-                let fault = Fault::new(
-                    "samples_not_taken",
-                    "this is a replay or a simulation: it has its own samples; strapd serve takes yours",
-                );
-                self.bad(&fault, number, line, received, scratch);
+                self.not_taken(number, line, before, received, scratch);
             }
             Ok(Message::Samples(head)) => {
                 self.errors_in_a_row = 0;
-                let goes_on = scratch.head.as_ref().is_some_and(|run| {
-                    run.id == head.id
-                        && (run.sample_kind, run.gyro_unit) == (head.sample_kind, head.gyro_unit)
-                });
-                if !goes_on {
+                let seq = head.seq;
+                if !goes_on(scratch, &head) {
                     self.flush(received, scratch, before);
+                    scratch.head = Some(head);
                 }
-                scratch.lines.push((head.seq, scratch.samples.len()));
-                scratch.head.get_or_insert(head);
+                scratch.lines.push((seq, scratch.samples.len()));
             }
+            Ok(Message::Packed(stream, head)) => match self.bind(stream, head) {
+                Ok(()) => self.errors_in_a_row = 0,
+                Err(fault) => self.bad(&fault, number, line, received, scratch),
+            },
             Ok(Message::Watch(filter)) => {
                 self.errors_in_a_row = 0;
                 self.flush(received, scratch, usize::MAX);
@@ -344,6 +341,27 @@ impl Session {
             }
             Err(fault) => self.bad(&fault, number, line, received, scratch),
         }
+    }
+
+    /// Samples came, from `before` on, where none are taken.
+    fn not_taken(
+        &mut self,
+        number: u64,
+        line: &[u8],
+        before: usize,
+        received: Nanos,
+        scratch: &mut Scratch,
+    ) {
+        count(
+            &self.hub.counters.refused_samples,
+            scratch.samples.len() - before,
+        );
+        scratch.samples.truncate(before);
+        let fault = Fault::new(
+            "samples_not_taken",
+            "this is a replay or a simulation: it has its own samples; strapd serve takes yours",
+        );
+        self.bad(&fault, number, line, received, scratch);
     }
 
     /// A line that is no good: said, counted, and after too many in a row the end.
@@ -460,6 +478,20 @@ impl Session {
         self.owned.insert(id.to_owned(), sensor.clone());
         Ok(sensor)
     }
+}
+
+/// Whether a sample with this head belongs to the run that is gathered.
+fn goes_on(scratch: &Scratch, head: &Line) -> bool {
+    scratch.head.as_ref().is_some_and(|run| {
+        run.id == head.id && (run.sample_kind, run.gyro_unit) == (head.sample_kind, head.gyro_unit)
+    })
+}
+
+fn first_line_must_be_auth() -> Fault {
+    Fault::new(
+        "unauthorised",
+        "the first line must be {\"class\":\"AUTH\",\"token\":\"...\"}",
+    )
 }
 
 impl Drop for Session {

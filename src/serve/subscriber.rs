@@ -4,6 +4,7 @@
 //! queue has a cap, the oldest attitudes give way, what gave way is counted and said (`GAP`), and
 //! replies (`STATUS`, `ERROR`, ...) are never dropped: when too many wait, the client is closed.
 
+use super::packed::Form;
 use super::{foxglove, wire};
 use crate::record::{AttitudeSample, Nanos};
 use crate::sink::Decimator;
@@ -30,9 +31,14 @@ pub struct Chunk {
     pub first_seq: u64,
     /// How many.
     pub count: u64,
-    /// Whole lines.
+    /// Whole lines, or whole packed objects.
     pub bytes: Bytes,
+    /// Number of the stream and the line that says what it is, where it is packed.
+    pub label: Option<(u32, Bytes)>,
 }
+
+/// Encodes some attitudes of a stream, at least one, with their numbers.
+pub type Encode<'a> = dyn Fn(Form, &[(u64, AttitudeSample)]) -> Chunk + 'a;
 
 /// Between two notices of the time in the data, ns of it.
 const BETWEEN_TIMES: i64 = 20_000_000;
@@ -75,6 +81,8 @@ pub struct Filter {
     pub ids: Option<BTreeSet<String>>,
     /// At most this many attitudes a second of each.
     pub rate_hz: Option<f64>,
+    /// How they are written.
+    pub form: Form,
 }
 
 impl Filter {
@@ -140,6 +148,11 @@ struct State {
     full: Option<Full>,
     /// It took nothing while it was waited for.
     is_stalled: bool,
+    /// Labels of packed streams that wait; apart from the replies, which may be too many. There are no
+    /// more than streams, as each is said once.
+    labels: Vec<Bytes>,
+    /// Streams whose label was said.
+    labelled: BTreeSet<u32>,
     dropped: u64,
     sent: u64,
 }
@@ -222,6 +235,7 @@ impl Outbox {
             first_seq: 0,
             count: 0,
             bytes: line,
+            label: None,
         });
         drop(state);
         self.wake.notify_one();
@@ -239,13 +253,13 @@ impl Outbox {
     }
 
     /// Offers attitudes of stream `id`, in order; `shared` gives them encoded, and is asked only when
-    /// the client takes them all. `encode` encodes those a client takes of them.
+    /// the client takes them all. `encode` encodes those a client takes of them, with their numbers.
     pub fn offer(
         &self,
         id: &Arc<str>,
         samples: &[AttitudeSample],
-        shared: &mut dyn FnMut() -> Vec<Chunk>,
-        encode: &dyn Fn(&mut Vec<u8>, u64, &AttitudeSample),
+        shared: &mut dyn FnMut(Form) -> Vec<Chunk>,
+        encode: &Encode<'_>,
         first_seq: u64,
     ) {
         let mut state = self.state();
@@ -253,9 +267,10 @@ impl Outbox {
         if !filter.takes(id, Class::Att) {
             return;
         }
+        let form = filter.form;
         match filter.rate_hz {
             None => {
-                for chunk in shared() {
+                for chunk in shared(form) {
                     state.push(chunk);
                 }
             }
@@ -264,30 +279,17 @@ impl Outbox {
                     .decimators
                     .entry(id.clone())
                     .or_insert_with(|| Decimator::new(rate_hz));
-                let mut bytes = Vec::new();
-                let (mut first, mut count) = (0, 0);
-                for (seq, sample) in (first_seq..).zip(samples) {
-                    let kept = match decimator {
-                        Some(decimator) => decimator.keep(sample),
-                        None => Some(*sample),
-                    };
-                    if let Some(kept) = kept {
-                        if count == 0 {
-                            first = seq;
-                        }
-                        count += 1;
-                        encode(&mut bytes, seq, &kept);
-                    }
-                }
-                if count == 0 {
+                let kept: Vec<_> = (first_seq..)
+                    .zip(samples)
+                    .filter_map(|(seq, sample)| match decimator {
+                        Some(decimator) => decimator.keep(sample).map(|kept| (seq, kept)),
+                        None => Some((seq, *sample)),
+                    })
+                    .collect();
+                if kept.is_empty() {
                     return;
                 }
-                state.push(Chunk {
-                    id: id.clone(),
-                    first_seq: first,
-                    count,
-                    bytes: bytes.into(),
-                });
+                state.push(encode(form, &kept));
             }
         }
         drop(state);
@@ -295,16 +297,12 @@ impl Outbox {
     }
 
     /// Offers samples of stream `id`, in order and encoded; they are never thinned.
-    pub fn offer_samples(&self, id: &Arc<str>, shared: &mut dyn FnMut() -> Vec<Chunk>) {
+    pub fn offer_samples(&self, id: &Arc<str>, shared: &mut dyn FnMut(Form) -> Vec<Chunk>) {
         let mut state = self.state();
-        if !state
-            .watch
-            .as_ref()
-            .is_some_and(|w| w.takes(id, Class::Rate))
-        {
+        let Some(filter) = state.watch.as_ref().filter(|w| w.takes(id, Class::Rate)) else {
             return;
-        }
-        for chunk in shared() {
+        };
+        for chunk in shared(filter.form) {
             state.push(chunk);
         }
         drop(state);
@@ -365,6 +363,7 @@ impl Outbox {
         for (id, dropped) in std::mem::take(&mut state.gaps) {
             out.push_back((self.gap)(&id, &dropped));
         }
+        out.extend(state.labels.drain(..));
         let mut taken = 0;
         while taken < most
             && let Some(chunk) = state.data.pop_front()
@@ -410,6 +409,7 @@ impl Outbox {
             && state.data.is_empty()
             && state.gaps.is_empty()
             && state.stray.is_none()
+            && state.labels.is_empty()
     }
 
     /// Why the client must be closed, if it must.
@@ -443,6 +443,11 @@ impl Outbox {
 
 impl State {
     fn push(&mut self, chunk: Chunk) {
+        if let Some((number, label)) = &chunk.label
+            && self.labelled.insert(*number)
+        {
+            self.labels.push(label.clone());
+        }
         self.queued += chunk.bytes.len();
         self.data.push_back(chunk);
         while self.queued > MAX_QUEUED
@@ -479,6 +484,7 @@ mod tests {
             first_seq,
             count: 10,
             bytes: vec![b'x'; size].into(),
+            label: None,
         }
     }
 
@@ -486,8 +492,8 @@ mod tests {
         outbox.offer(
             &chunk.id,
             &[],
-            &mut || vec![chunk.clone()],
-            &|_, _, _| {},
+            &mut |_| vec![chunk.clone()],
+            &|_, _| chunk.clone(),
             chunk.first_seq,
         );
     }
@@ -594,6 +600,39 @@ mod tests {
     }
 
     #[test]
+    fn a_packed_stream_is_named_once_before_it_however_many_there_are_and_whatever_is_dropped() {
+        let outbox = Outbox::new();
+        outbox.watch(Some(Filter::default()));
+        let packed = |n: u32, size: usize| Chunk {
+            label: Some((n, format!("label {n}").into())),
+            ..chunk(&n.to_string(), 0, size)
+        };
+        // More than replies may wait, and more bytes than attitudes may.
+        for n in 0..200 {
+            offer(&outbox, &packed(n, 10 << 10));
+        }
+        assert_eq!(outbox.full(), None);
+        outbox.reply(Bytes::from("a reply"));
+        outbox.forget();
+        assert!(!outbox.is_empty());
+        offer(&outbox, &packed(199, 4));
+        let mut out = VecDeque::new();
+        outbox.take(usize::MAX, &mut out);
+        let labels = (0..200).map(|n| format!("label {n}"));
+        let expected = ["a reply".to_owned()]
+            .into_iter()
+            .chain(labels)
+            .chain(["xxxx".to_owned()]);
+        assert!(texts(&out).into_iter().eq(expected), "{:?}", texts(&out));
+        assert!(outbox.is_empty());
+        out.clear();
+        outbox.watch(Some(Filter::default()));
+        offer(&outbox, &packed(7, 4));
+        outbox.take(usize::MAX, &mut out);
+        assert_eq!(texts(&out), ["xxxx"]);
+    }
+
+    #[test]
     fn a_client_gets_the_sensors_and_the_rate_it_asked_for() {
         let outbox = Outbox::new();
         outbox.watch(Some(Filter {
@@ -606,8 +645,15 @@ mod tests {
             outbox.offer(
                 &id.into(),
                 &samples,
-                &mut || unreachable!("not all are taken"),
-                &|out, seq, _| out.extend_from_slice(format!("{id}{seq}\n").as_bytes()),
+                &mut |_| unreachable!("not all are taken"),
+                &|_, kept| {
+                    let lines: String =
+                        kept.iter().map(|(seq, _)| format!("{id}{seq}\n")).collect();
+                    Chunk {
+                        bytes: lines.into(),
+                        ..chunk(id, 0, 0)
+                    }
+                },
                 0,
             );
         }

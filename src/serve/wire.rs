@@ -4,6 +4,11 @@
 //! encoder as its output: here are only the objects of the conversation around them
 //! (`docs/protocol.md`).
 
+mod packing;
+
+pub use packing::{broken_packed, packed_stream, unreadable};
+
+use super::packed::Form;
 use super::playback::{Action, Place};
 use super::subscriber::{Class as Stream, Dropped, Filter, MAX_QUEUED};
 use crate::decode::{Class, Line, LineDecoder, MAX_LINE, Undecodable, printable};
@@ -24,6 +29,8 @@ pub const MAX_ID: usize = 255;
 pub enum Message {
     /// Samples of one sensor: they are in the buffer given.
     Samples(Line),
+    /// Packed samples of this number are of this sensor from now on, and mean this.
+    Packed(u32, Line),
     /// Start (or with `None` stop) the attitudes.
     Watch(Option<Filter>),
     /// Tell the state.
@@ -67,6 +74,8 @@ struct WatchObject {
     id: Option<Ids>,
     ids: Option<Ids>,
     rate_hz: Option<f64>,
+    #[serde(default)]
+    packed: bool,
 }
 
 #[derive(Deserialize)]
@@ -156,6 +165,7 @@ pub fn read_from(
         // What a source says of itself is no request.
         Some(other) if is_source => Err(Fault::new("unknown_class", other.to_owned())),
         Some("WATCH") => watch(line).map(Message::Watch),
+        Some("PACKED") => packing::read(line).map(|(stream, head)| Message::Packed(stream, head)),
         Some("POLL") => Ok(Message::Poll),
         Some("PLAYBACK") => playback_action(line).map(Message::Playback),
         Some("AUTH") => {
@@ -165,7 +175,7 @@ pub fn read_from(
         Some(other) => Err(Fault::new(
             "unknown_class",
             format!(
-                "class `{other}` is none a client sends; known: RATE, WATCH, POLL, PLAYBACK, AUTH"
+                "class `{other}` is none a client sends; known: RATE, PACKED, WATCH, POLL, PLAYBACK, AUTH"
             ),
         )),
         None => Err(Fault::new(
@@ -249,6 +259,11 @@ fn watch(line: &[u8]) -> Result<Option<Filter>, Fault> {
             Ids::Several(ids) => ids.iter().map(|id| printable(id)).collect(),
         }),
         rate_hz: asked.rate_hz,
+        form: if asked.packed {
+            Form::Packed
+        } else {
+            Form::Lines
+        },
     }))
 }
 
@@ -304,6 +319,9 @@ pub fn watching(filter: Option<&Filter>, offered: &[Stream]) -> Bytes {
         }
         if let Some(rate_hz) = filter.rate_hz {
             fields.insert("rate_hz".into(), json!(rate_hz));
+        }
+        if filter.form == Form::Packed {
+            fields.insert("packed".into(), json!(true));
         }
     }
     line(&answer)
@@ -477,6 +495,28 @@ mod tests {
                 rate_hz: Some(50.0),
                 ..Filter::default()
             })
+        );
+    }
+
+    #[test]
+    fn packed_is_asked_for_and_the_answer_repeats_it_and_only_then() {
+        for (asked, form) in [("true", Form::Packed), ("false", Form::Lines)] {
+            let text = format!("{{\"class\":\"WATCH\",\"packed\":{asked}}}");
+            let Ok(Message::Watch(Some(filter))) = ask(&text) else {
+                unreachable!("{text}");
+            };
+            assert_eq!(filter.form, form);
+            let answer: Value =
+                serde_json::from_slice(&watching(Some(&filter), &[Stream::Att])).unwrap();
+            let is_packed = form == Form::Packed;
+            assert_eq!(
+                answer.get("packed"),
+                is_packed.then_some(&Value::Bool(true))
+            );
+        }
+        assert_eq!(
+            ask(r#"{"class":"WATCH","packed":1}"#).unwrap_err().code,
+            "bad_watch"
         );
     }
 

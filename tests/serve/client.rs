@@ -2,6 +2,7 @@
 
 use super::daemon::PATIENCE;
 use serde_json::Value;
+use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{SocketAddr, TcpStream, UdpSocket};
 use std::os::unix::net::UnixStream;
@@ -12,6 +13,15 @@ use tungstenite::{Message, WebSocket};
 /// Somebody at the other end of a socket.
 pub(crate) struct Client {
     link: Link,
+    /// Packed objects of a message of which the first was handed over.
+    objects: VecDeque<Vec<u8>>,
+}
+
+/// What a client is told.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) enum Item {
+    Line(String),
+    Packed(Vec<u8>),
 }
 
 enum Link {
@@ -28,6 +38,7 @@ impl Client {
         stream.set_nodelay(true).unwrap();
         Client {
             link: Link::Tcp(BufReader::new(stream)),
+            objects: VecDeque::new(),
         }
     }
 
@@ -36,6 +47,7 @@ impl Client {
         stream.set_read_timeout(Some(PATIENCE)).unwrap();
         Client {
             link: Link::Unix(BufReader::new(stream)),
+            objects: VecDeque::new(),
         }
     }
 
@@ -47,6 +59,7 @@ impl Client {
                 .unwrap();
         Client {
             link: Link::Web(Box::new(socket)),
+            objects: VecDeque::new(),
         }
     }
 
@@ -56,6 +69,7 @@ impl Client {
         socket.connect(address).unwrap();
         Client {
             link: Link::Udp(socket),
+            objects: VecDeque::new(),
         }
     }
 
@@ -79,6 +93,55 @@ impl Client {
                 .send(Message::text(String::from_utf8_lossy(bytes).into_owned()))
                 .unwrap(),
             Link::Udp(s) => assert_eq!(s.send(bytes).unwrap(), bytes.len()),
+        }
+    }
+
+    /// Sends packed objects, and lines if need be: where there are messages, as a binary one.
+    pub(crate) fn send_packed(&mut self, bytes: &[u8]) {
+        match &mut self.link {
+            Link::Web(s) => s.send(Message::binary(bytes.to_vec())).unwrap(),
+            _ => self.send_bytes(bytes),
+        }
+    }
+
+    /// The next line or packed object; `None` when the daemon has closed.
+    pub(crate) fn item(&mut self) -> Option<Item> {
+        match &mut self.link {
+            Link::Tcp(s) => item(s),
+            Link::Unix(s) => item(s),
+            Link::Web(s) => loop {
+                if let Some(object) = self.objects.pop_front() {
+                    return Some(Item::Packed(object));
+                }
+                match s.read() {
+                    Ok(Message::Text(text)) => return Some(Item::Line(text.as_str().to_owned())),
+                    Ok(Message::Binary(bytes)) => {
+                        let mut bytes = &bytes[..];
+                        while let Some(Item::Packed(object)) = item(&mut bytes) {
+                            self.objects.push_back(object);
+                        }
+                        assert!(
+                            bytes.is_empty(),
+                            "a message of packed objects holds nothing else"
+                        );
+                    }
+                    Ok(Message::Close(_)) => return None,
+                    Ok(_) => {}
+                    Err(e) => {
+                        assert!(!is_late(&e), "nothing came");
+                        return None;
+                    }
+                }
+            },
+            Link::Udp(_) => unreachable!("nobody answers datagrams"),
+        }
+    }
+
+    /// The next packed object; there must be no line before it.
+    pub(crate) fn packed(&mut self) -> Vec<u8> {
+        match self.item() {
+            Some(Item::Packed(object)) => object,
+            other => unreachable!("{other:?}"),
         }
     }
 
@@ -156,6 +219,21 @@ impl Client {
             Link::Udp(_) => {}
         }
     }
+}
+
+/// A line, or what begins with the mark and is as long as it says.
+fn item(from: &mut impl BufRead) -> Option<Item> {
+    let first = *from.fill_buf().unwrap().first()?;
+    if first == 0xf8 {
+        let mut object = vec![0; 4];
+        from.read_exact(&mut object).unwrap();
+        object.resize(usize::from(u16::from_le_bytes([object[2], object[3]])), 0);
+        from.read_exact(&mut object[4..]).unwrap();
+        return Some(Item::Packed(object));
+    }
+    let mut line = String::new();
+    from.read_line(&mut line).unwrap();
+    Some(Item::Line(line.trim_end_matches('\n').to_owned()))
 }
 
 fn is_late(error: &tungstenite::Error) -> bool {

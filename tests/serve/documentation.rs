@@ -20,21 +20,23 @@ fn blocks(language: &str) -> Vec<&'static str> {
 }
 
 #[test]
-fn the_python_example_turns_by_ninety_degrees() {
+fn the_python_examples_as_lines_and_packed_turn_by_ninety_degrees() {
     let daemon = Daemon::tcp();
-    let script = blocks("python");
-    assert_eq!(script.len(), 1);
-    assert!(script[0].lines().count() <= 20);
+    let scripts = blocks("python");
+    assert_eq!(scripts.len(), 2);
     let port = daemon.address(0).port().to_string();
-    let output = Command::new("python3")
-        .args(["-c", &script[0].replace("4550", &port)])
-        .output()
-        .unwrap();
-    assert!(output.status.success(), "{output:?}");
-    assert_eq!(
-        String::from_utf8(output.stdout).unwrap(),
-        "yaw 90.000000 deg\n"
-    );
+    for script in scripts {
+        assert!(script.lines().count() <= 20);
+        let output = Command::new("python3")
+            .args(["-c", &script.replace("4550", &port)])
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{output:?}");
+        assert_eq!(
+            String::from_utf8(output.stdout).unwrap(),
+            "yaw 90.000000 deg\n"
+        );
+    }
 }
 
 /// Says that a test has proved nothing; not in CI.
@@ -201,8 +203,13 @@ fn every_object_shown_is_one_the_daemon_sends_or_takes() {
     seen.push(client.object("ATT"));
     client.send("{\"class\":\"RATE\" \"gyro\":1}");
     seen.push(client.object("ERROR"));
+    let mut packed = Client::web(daemon.address(1)).watching(r#"{"class":"WATCH","packed":true}"#);
+    client.send(&of("PACKED").to_string());
+    client.send(&rate("imu0", 100, 0.0));
+    seen.push(packed.object("PACKED"));
+    let error = seen[3].clone();
     for object in &seen {
-        // The answer to WATCH is the second of its class.
+        // The answer to WATCH, and what the daemon says of a number, are the second of their classes.
         let class = &object["class"];
         let example = shown.iter().rfind(|v| v["class"] == *class).unwrap();
         let keys = |v: &serde_json::Value| {
@@ -212,7 +219,6 @@ fn every_object_shown_is_one_the_daemon_sends_or_takes() {
         };
         assert_eq!(keys(object), keys(example), "{class}");
     }
-    let error = seen.last().unwrap();
     assert_eq!(error["message"], of("ERROR")["message"]);
     assert_eq!(error["near"], of("ERROR")["near"]);
 }

@@ -13,13 +13,13 @@ pub struct Counters {
     pub accept_failures: AtomicU64,
     /// Connections closed by us for what they did or did not do.
     pub closed: AtomicU64,
-    /// Lines received.
+    /// Lines and packed objects received.
     pub lines: AtomicU64,
     /// Bytes received.
     pub bytes_in: AtomicU64,
     /// Bytes sent.
     pub bytes_out: AtomicU64,
-    /// Lines answered with an error, said or suppressed.
+    /// Lines and packed objects answered with an error, said or suppressed.
     pub faults: AtomicU64,
     /// Samples received.
     pub samples: AtomicU64,

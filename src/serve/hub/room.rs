@@ -138,10 +138,11 @@ mod tests {
             first_seq: 0,
             count: 1,
             bytes: vec![b'x'; bytes].into(),
+            label: None,
         };
         client
             .outbox
-            .offer_samples(&chunk.id, &mut || vec![chunk.clone()]);
+            .offer_samples(&chunk.id, &mut |_| vec![chunk.clone()]);
     }
 
     fn flooding() -> Flood {

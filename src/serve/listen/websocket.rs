@@ -1,7 +1,7 @@
 //! WebSocket -> sessions, HTTP -> `/healthz`, `/metrics`. I/O.
 //!
 //! One message is one line or several; every answer and attitude is a message of its own, so that a
-//! page can hand it to `JSON.parse` as it is.
+//! page can hand it to `JSON.parse` as it is. Packed objects go in binary messages, one or more in each.
 
 use super::{Context, accept, in_room, now, too_many_clients};
 use crate::client::link;
@@ -9,6 +9,7 @@ use crate::serve::admission::Web;
 use crate::serve::foxglove::{self, Framed};
 use crate::serve::http;
 use crate::serve::hub::{Client, Flood, Hub, count};
+use crate::serve::packed;
 use crate::serve::session::Session;
 use crate::serve::shutdown::Running;
 use crate::serve::viewer::Viewer;
@@ -248,6 +249,9 @@ pub(crate) async fn converse(socket: WebSocket, connection: Connection, foxglove
             let sending = async {
                 for part in parts.drain(..) {
                     match foxglove {
+                        None if packed::is_packed(&part) => {
+                            sink.feed(Message::Binary(part)).await?;
+                        }
                         None => {
                             for line in lines(&part) {
                                 sink.feed(text(line)).await?;

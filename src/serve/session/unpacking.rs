@@ -1,0 +1,71 @@
+//! Packed objects of a client -> samples, as its lines. Pure.
+
+use super::{Scratch, Session, first_line_must_be_auth, goes_on};
+use crate::decode::Line;
+use crate::record::Nanos;
+use crate::serve::packed::{self, Object};
+use crate::serve::wire::{self, Fault};
+
+/// Numbers of packed streams one client may bind.
+const MAX_BOUND: usize = 256;
+
+impl Session {
+    /// From now on packed samples with this number say what a line with this head would.
+    pub(super) fn bind(&mut self, stream: u32, head: Line) -> Result<(), Fault> {
+        if self.bound.len() >= MAX_BOUND && !self.bound.contains_key(&stream) {
+            return Err(Fault::new(
+                "bad_packed",
+                format!("one connection binds at most {MAX_BOUND} numbers"),
+            ));
+        }
+        self.bound.insert(stream, head);
+        Ok(())
+    }
+
+    /// A packed object: a sample as the line would be that says what its number was bound to.
+    pub(super) fn packed(
+        &mut self,
+        number: u64,
+        object: &[u8],
+        received: Nanos,
+        scratch: &mut Scratch,
+    ) {
+        if !self.authorised {
+            return self.refuse(&first_line_must_be_auth(), number);
+        }
+        let fault = match packed::read(object, received) {
+            Ok(Object::Rate {
+                stream,
+                seq,
+                sample,
+            }) => match self.bound.get(&stream) {
+                Some(head) => {
+                    let before = scratch.samples.len();
+                    // Most are of the run before them: nothing is cloned for those.
+                    let begins = (!goes_on(scratch, head)).then(|| head.clone());
+                    scratch.samples.push(sample);
+                    if !self.hub.takes_samples() {
+                        return self.not_taken(number, &[], before, received, scratch);
+                    }
+                    self.errors_in_a_row = 0;
+                    if let Some(head) = begins {
+                        self.flush(received, scratch, before);
+                        scratch.head = Some(head);
+                    }
+                    return scratch.lines.push((seq, scratch.samples.len()));
+                }
+                None => Fault::new(
+                    "unknown_stream",
+                    format!(
+                        "number {stream} is bound to no sensor; say {{\"class\":\"PACKED\",\"stream\":{stream},\"id\":\"imu0\"}} first"
+                    ),
+                ),
+            },
+            Ok(Object::Att { .. }) => {
+                Fault::new("bad_packed", "packed kind 2 (ATT) is none a client sends")
+            }
+            Err(why) => wire::unreadable(&why),
+        };
+        self.bad(&fault, number, &[], received, scratch);
+    }
+}

@@ -1,0 +1,156 @@
+//! Lines that say what packed objects are, and what is wrong with them. Pure.
+
+use super::{Fault, object};
+use crate::decode::{Class, GyroUnit, Line, printable};
+use crate::record::SampleKind;
+use crate::serve::packed::Unreadable;
+use crate::sink::{Content, Stream};
+use bytes::Bytes;
+use serde::Deserialize;
+use serde_json::Value;
+
+#[derive(Deserialize)]
+struct PackedObject {
+    stream: u32,
+    id: Option<String>,
+    sample_kind: Option<String>,
+    gyro_unit: Option<String>,
+}
+
+/// The number of a stream of packed samples, and what each of them says as a line would.
+pub(super) fn read(line: &[u8]) -> Result<(u32, Line), Fault> {
+    let asked: PackedObject = object(
+        line,
+        "bad_packed",
+        "like {\"class\":\"PACKED\",\"stream\":1,\"id\":\"imu0\",\"sample_kind\":\"rate\"}",
+    )?;
+    let head = Line {
+        class: Class::Rate,
+        id: asked.id.as_deref().map(printable),
+        sample_kind: named(
+            "sample_kind",
+            asked.sample_kind.as_deref(),
+            [
+                SampleKind::Rate,
+                SampleKind::Average,
+                SampleKind::DeltaAngle,
+            ]
+            .map(|k| (k.name(), k)),
+        )?,
+        // That of a RATE line that does not say.
+        gyro_unit: named(
+            "gyro_unit",
+            asked.gyro_unit.as_deref(),
+            [GyroUnit::Rad, GyroUnit::Deg, GyroUnit::Mrad].map(|u| (u.name(), u)),
+        )?
+        .or(Some(GyroUnit::Rad)),
+        ..Line::default()
+    };
+    Ok((asked.stream, head))
+}
+
+/// The one of `all` that is called `name`.
+fn named<T: Copy>(
+    field: &str,
+    name: Option<&str>,
+    all: [(&'static str, T); 3],
+) -> Result<Option<T>, Fault> {
+    let Some(name) = name else { return Ok(None) };
+    let found = all.iter().find(|(known, _)| *known == name);
+    found.map(|(_, value)| Some(*value)).ok_or_else(|| {
+        let known = all.map(|(known, _)| known).join(", ");
+        Fault::new(
+            "bad_packed",
+            format!(
+                "there is no {field} `{}`; there are: {known}",
+                printable(name)
+            ),
+        )
+    })
+}
+
+/// The fault of a packed object that says nothing.
+#[must_use]
+pub fn unreadable(why: &Unreadable) -> Fault {
+    Fault::new("bad_packed", why.to_string())
+}
+
+/// The fault of a packed object whose end can not be found.
+#[must_use]
+pub fn broken_packed() -> Fault {
+    Fault::new(
+        "bad_packed",
+        "a packed object whose length is less than 8, or that was cut short; what follows is skipped up to the next line end",
+    )
+}
+
+/// What packed objects with the number `number` are: the labels of the stream.
+#[must_use]
+pub fn packed_stream(number: u32, stream: &Stream) -> Bytes {
+    let labels = match stream.content {
+        Content::Samples(kind) => vec![("sample_kind", kind.name())],
+        Content::Attitude | Content::Truth => vec![
+            ("rotates", &*stream.rotates),
+            ("world", &stream.world_axes),
+            ("body", &stream.body_axes),
+        ],
+    };
+    // By hand: the class comes first.
+    let mut said = format!("{{\"class\":\"PACKED\",\"stream\":{number}");
+    for (name, value) in [("id", &*stream.id)].into_iter().chain(labels) {
+        said += &format!(",\"{name}\":{}", Value::from(value));
+    }
+    said += "}\n";
+    said.into()
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_number_is_bound_to_what_a_line_would_say() {
+        let bound = |rest: &str| read(format!("{{\"class\":\"PACKED\",{rest}}}").as_bytes());
+        let line = Line {
+            class: Class::Rate,
+            gyro_unit: Some(GyroUnit::Rad),
+            ..Line::default()
+        };
+        assert_eq!(bound(r#""stream":0"#), Ok((0, line.clone())));
+        let named = Line {
+            id: Some("a\\u{1b}".to_owned()),
+            sample_kind: Some(SampleKind::DeltaAngle),
+            gyro_unit: Some(GyroUnit::Mrad),
+            ..line
+        };
+        assert_eq!(
+            bound(
+                r#""stream":4294967295,"id":"a\u001b","sample_kind":"delta-angle","gyro_unit":"mrad","x":[]"#
+            ),
+            Ok((u32::MAX, named))
+        );
+        for rest in [
+            r#""id":"a""#,
+            r#""stream":-1"#,
+            r#""stream":4294967296"#,
+            r#""stream":"1""#,
+            r#""stream":1,"id":7"#,
+            r#""stream":1,"sample_kind":"rates""#,
+            r#""stream":1,"gyro_unit":"rpm""#,
+        ] {
+            assert_eq!(bound(rest).unwrap_err().code, "bad_packed", "{rest}");
+        }
+    }
+
+    #[test]
+    fn a_stream_of_samples_is_announced_as_a_sender_would_bind_it() {
+        let mut stream = Stream::new("/imu", "imu");
+        stream.id = "a\"é".to_owned();
+        stream.content = Content::Samples(SampleKind::Average);
+        let said = packed_stream(7, &stream);
+        let (number, head) = read(&said).unwrap();
+        assert_eq!((number, head.id.as_deref()), (7, Some("a\"é")));
+        assert_eq!(head.sample_kind, Some(SampleKind::Average));
+    }
+}
