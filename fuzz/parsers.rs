@@ -6,11 +6,11 @@ use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::sync::{Arc, LazyLock};
+use strapd::decode::framing::{Framed, Framer};
+use strapd::decode::packed::{self, Object};
 use strapd::decode::{Channel, Decoder, Options, decode_line, role};
 use strapd::record::{Nanos, RawSample};
-use strapd::serve::framing::{Framed, Framer};
 use strapd::serve::hub::Hub;
-use strapd::serve::packed::{self, Object};
 use strapd::serve::session::{Scratch, Session};
 use strapd::source::mcap::{Reader, WalkOptions, walk};
 

@@ -16,9 +16,12 @@
 //! | `ros1` | `ros1msg`, or none for well-known types | `decode::ros` |
 //! | `json` | any or none | `decode::json` |
 //! | `protobuf` | `protobuf` (file descriptor set) | `decode::protobuf` |
+//! | lines, packed objects | cut from a stream by [`framing`] | [`LineDecoder`], [`packed`] |
 
 mod fields;
+pub mod framing;
 mod json;
+pub mod packed;
 mod protobuf;
 mod refusal;
 mod registers;
@@ -32,7 +35,7 @@ mod stated;
 pub use crate::condition::GyroUnit;
 pub use fields::{BadFieldPath, FieldPath, FieldRole};
 pub use json::line::{Class, Line, LineDecoder, MAX_LINE, decode_line};
-pub use refusal::{Undecodable, Unsupported, printable};
+pub use refusal::{MAX_NEAR, Undecodable, Unsupported, printable, snippet};
 pub use role::{Rank, Role, role};
 pub use stamp::TimeUnit;
 pub use stated::{AccelUnit, BodyAxes, Stated, WorldAxes};

@@ -6,8 +6,7 @@
 //!
 //! | file | arrow | |
 //! |---|---|---|
-//! | [`framing`], [`wire`] | bytes -> lines -> requests; answers -> lines | pure |
-//! | [`packed`] | samples and attitudes <-> packed objects | pure |
+//! | [`wire`] | lines and packed objects (cut by [`crate::decode::framing`]) -> requests; answers -> lines | pure |
 //! | [`stream`] | samples of one sensor -> attitudes | pure |
 //! | [`channel`] | a stream as clients know it | pure |
 //! | [`cast`], [`playback`] | a replay or simulation served in place of sensors, and who moves it | I/O; locks |
@@ -31,12 +30,10 @@ pub mod channel;
 pub mod connect;
 mod forward;
 pub mod foxglove;
-pub mod framing;
 mod http;
 pub mod hub;
 pub mod limits;
 pub mod listen;
-pub mod packed;
 mod page;
 pub mod playback;
 mod quiet;

@@ -3,8 +3,8 @@
 use super::link::{Heard, Link};
 use super::remote::Remote;
 use crate::client::secret::Secret;
+use crate::decode::framing::{Framed, Framer};
 use crate::decode::printable;
-use crate::serve::framing::{Framed, Framer};
 use serde::Deserialize;
 use std::borrow::Cow;
 
@@ -183,7 +183,7 @@ fn understood(line: &[u8]) -> Option<Said<'_>> {
         Err(_) => {
             return Some(Said::Complaint(format!(
                 "a line that is no JSON object: {}",
-                crate::serve::wire::snippet(line)
+                crate::decode::snippet(line)
             )));
         }
     };

@@ -107,6 +107,9 @@ pub enum Undecodable {
     },
 }
 
+/// Most bytes of what is bad that are repeated in what is said of it.
+pub const MAX_NEAR: usize = 64;
+
 /// `text` fit for a terminal: at most 255 bytes, control and other invisible characters escaped.
 #[must_use]
 pub fn printable(text: &str) -> String {
@@ -129,4 +132,18 @@ pub fn printable(text: &str) -> String {
 /// Characters that reorder or hide the text around them.
 fn is_invisible(c: char) -> bool {
     matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}')
+}
+/// The beginning of a hostile line, fit for a terminal: at most 64 bytes.
+#[must_use]
+pub fn snippet(bytes: &[u8]) -> String {
+    let head = bytes.get(..bytes.len().min(MAX_NEAR)).unwrap_or_default();
+    let mut out = String::new();
+    for c in String::from_utf8_lossy(head).chars() {
+        let escaped = printable(c.encode_utf8(&mut [0; 4]));
+        if out.len() + escaped.len() > MAX_NEAR {
+            break;
+        }
+        out.push_str(&escaped);
+    }
+    out
 }

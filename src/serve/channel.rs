@@ -3,9 +3,9 @@
 //! Apart from where its samples come from: a sensor of the daemon and a stream of a replay reach
 //! whoever watches in the same way.
 
-use super::packed::{self, Form};
 use super::subscriber::{Chunk, Class};
 use super::{foxglove, wire};
+use crate::decode::packed::{self, Form};
 use crate::record::{AttitudeSample, Nanos, RawSample};
 use crate::sink::json::Objects;
 use crate::sink::payload::{Payloads, Topic};

@@ -84,7 +84,7 @@ pub fn read_text(text: &[u8]) -> Result<Request, String> {
         ("unsubscribe", _, None) => Err("unsubscribe: `subscriptionIds` is missing".to_owned()),
         (other, ..) => Err(format!(
             "`{}` is not offered here: messages can be subscribed to, nothing else",
-            super::wire::snippet(other.as_bytes())
+            crate::decode::snippet(other.as_bytes())
         )),
     }
 }

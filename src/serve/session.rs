@@ -6,12 +6,12 @@
 
 mod unpacking;
 
-use super::framing::{Framed, Framer};
 use super::hub::{Client, Hub, Run, Sensor, count};
 use super::limits::Allowance;
 use super::stream::NAMELESS;
 use super::upstream::{self, Event};
 use super::wire::{self, Fault, Message};
+use crate::decode::framing::{Framed, Framer};
 use crate::decode::{Line, LineDecoder};
 use crate::record::{Nanos, RawSample};
 use std::collections::{BTreeMap, BTreeSet};

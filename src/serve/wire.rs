@@ -8,10 +8,10 @@ mod packing;
 
 pub use packing::{broken_packed, packed_stream, unreadable};
 
-use super::packed::Form;
 use super::playback::{Action, Place};
 use super::subscriber::{Class as Stream, Dropped, Filter, MAX_QUEUED};
-use crate::decode::{Class, Line, LineDecoder, MAX_LINE, Undecodable, printable};
+use crate::decode::packed::Form;
+use crate::decode::{Class, Line, LineDecoder, MAX_LINE, Undecodable, printable, snippet};
 use crate::record::{Nanos, RawSample};
 use bytes::Bytes;
 use serde::Deserialize;
@@ -19,8 +19,6 @@ use serde_json::{Value, json};
 
 /// Version of the protocol.
 pub const PROTO: u32 = 1;
-/// Most bytes of a bad line that are repeated in the answer.
-const MAX_NEAR: usize = 64;
 /// Longest name of a sensor, in bytes.
 pub const MAX_ID: usize = 255;
 
@@ -387,21 +385,6 @@ pub fn error(fault: &Fault, number: u64, near: &[u8], suppressed: u64) -> Bytes 
     line(&answer)
 }
 
-/// The beginning of a hostile line, fit for a terminal: at most 64 bytes.
-#[must_use]
-pub fn snippet(bytes: &[u8]) -> String {
-    let head = bytes.get(..bytes.len().min(MAX_NEAR)).unwrap_or_default();
-    let mut out = String::new();
-    for c in String::from_utf8_lossy(head).chars() {
-        let escaped = printable(c.encode_utf8(&mut [0; 4]));
-        if out.len() + escaped.len() > MAX_NEAR {
-            break;
-        }
-        out.push_str(&escaped);
-    }
-    out
-}
-
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
@@ -537,7 +520,7 @@ mod tests {
             vec![0xff; 100],
             "é\u{202e}".repeat(99).into_bytes(),
         ] {
-            assert!(snippet(&hostile).len() <= MAX_NEAR);
+            assert!(snippet(&hostile).len() <= crate::decode::MAX_NEAR);
         }
     }
 }

@@ -5,11 +5,11 @@
 
 use super::{Context, accept, in_room, now, too_many_clients};
 use crate::client::link;
+use crate::decode::packed;
 use crate::serve::admission::Web;
 use crate::serve::foxglove::{self, Framed};
 use crate::serve::http;
 use crate::serve::hub::{Client, Flood, Hub, count};
-use crate::serve::packed;
 use crate::serve::session::Session;
 use crate::serve::shutdown::Running;
 use crate::serve::viewer::Viewer;

@@ -2,8 +2,8 @@
 
 use super::{Scratch, Session, first_line_must_be_auth, goes_on};
 use crate::decode::Line;
+use crate::decode::packed::{self, Object};
 use crate::record::Nanos;
-use crate::serve::packed::{self, Object};
 use crate::serve::wire::{self, Fault};
 
 /// Numbers of packed streams one client may bind.

@@ -1,9 +1,9 @@
 //! Lines that say what packed objects are, and what is wrong with them. Pure.
 
 use super::{Fault, object};
+use crate::decode::packed::Unreadable;
 use crate::decode::{Class, GyroUnit, Line, printable};
 use crate::record::SampleKind;
-use crate::serve::packed::Unreadable;
 use crate::sink::{Content, Stream};
 use bytes::Bytes;
 use serde::Deserialize;

@@ -4,8 +4,8 @@
 //! piece, byte by byte, or with a thousand others. Holds at most one unfinished line, of
 //! [`MAX_LINE`] bytes unless more is allowed, or one unfinished packed object, whatever is sent.
 
+use super::MAX_LINE;
 use super::packed::{self, HEAD, MARK};
-use crate::decode::MAX_LINE;
 use memchr::memchr;
 
 /// Bytes of an object that show its length.

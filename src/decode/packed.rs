@@ -1,6 +1,6 @@
 //! Samples and attitudes <-> packed objects: the compact form beside the lines. Pure.
 //!
-//! Apart from [`super::wire`] because there is nothing to parse: fixed places, little endian, naturally
+//! Apart from the lines because there is nothing to parse: fixed places, little endian, naturally
 //! aligned. The mark begins no line and occurs in no UTF-8, so both forms go through one stream. Which
 //! stream a number means is said by lines (`PACKED`).
 //!

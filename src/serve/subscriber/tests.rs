@@ -1,0 +1,191 @@
+//! What a client gets, what gives way, and what it is told of that.
+
+use super::*;
+use crate::sink::tests::sample;
+
+fn chunk(id: &str, first_seq: u64, size: usize) -> Chunk {
+    Chunk {
+        id: id.into(),
+        first_seq,
+        count: 10,
+        bytes: vec![b'x'; size].into(),
+        label: None,
+    }
+}
+
+fn offer(outbox: &Outbox, chunk: &Chunk) {
+    outbox.offer(
+        &chunk.id,
+        &[],
+        &mut |_| vec![chunk.clone()],
+        &|_, _| chunk.clone(),
+        chunk.first_seq,
+    );
+}
+
+fn texts(taken: &VecDeque<Bytes>) -> Vec<String> {
+    taken
+        .iter()
+        .map(|b| String::from_utf8_lossy(b).into_owned())
+        .collect()
+}
+
+#[test]
+fn the_oldest_give_way_and_are_counted_by_sensor_before_the_next_data() {
+    let outbox = Outbox::new();
+    outbox.watch(Some(Filter::default()));
+    for n in 0..20 {
+        offer(
+            &outbox,
+            &chunk(if n % 2 == 0 { "a" } else { "b" }, n / 2 * 10, 32 << 10),
+        );
+    }
+    // 8 of 32 KiB fit.
+    let level = outbox.level();
+    assert_eq!((level.queued, level.dropped), (256 << 10, 120));
+    let mut out = VecDeque::new();
+    let taken = outbox.take(usize::MAX, &mut out);
+    assert_eq!(taken, 256 << 10);
+    let said: Vec<serde_json::Value> = texts(&out)
+        .iter()
+        .filter_map(|t| serde_json::from_str(t).ok())
+        .collect();
+    assert_eq!(said.len(), 2);
+    for (gap, id) in said.iter().zip(["a", "b"]) {
+        assert_eq!(gap["class"], "GAP");
+        assert_eq!(gap["id"], id);
+        assert_eq!(gap["dropped"], 60);
+        assert_eq!(
+            (&gap["first_seq"], &gap["last_seq"]),
+            (&0.into(), &59.into())
+        );
+    }
+    // What is being written still counts.
+    offer(&outbox, &chunk("a", 100, 1));
+    assert_eq!(outbox.level().dropped, 130);
+    outbox.written(taken);
+    assert_eq!(outbox.level().queued, 0);
+}
+
+#[test]
+fn a_note_keeps_its_place_among_the_attitudes_and_the_last_one_is_never_dropped() {
+    let outbox = Outbox::new();
+    outbox.watch(Some(Filter::default()));
+    offer(&outbox, &chunk("a", 0, 4));
+    outbox.note(Bytes::from("one"), false);
+    offer(&outbox, &chunk("a", 10, 4));
+    outbox.note(Bytes::from("a tick too many"), true);
+    let mut out = VecDeque::new();
+    let taken = outbox.take(usize::MAX, &mut out);
+    assert_eq!(
+        (texts(&out), taken),
+        (["xxxx", "one", "xxxx"].map(str::to_owned).to_vec(), 11)
+    );
+    outbox.written(taken);
+    // Told again, once nothing of the kind waits.
+    outbox.note(Bytes::from("tick"), true);
+    outbox.note(Bytes::from("two"), false);
+    for n in 0..20 {
+        offer(&outbox, &chunk("a", n * 10, 32 << 10));
+    }
+    out.clear();
+    outbox.take(0, &mut out);
+    let said = texts(&out);
+    assert!(
+        said[0] == "two" && said[1].contains("GAP") && said.len() == 2,
+        "{said:?}"
+    );
+    outbox.note(Bytes::from("three"), false);
+    outbox.forget();
+    assert!(outbox.is_empty());
+    assert_eq!(outbox.level().queued, 0);
+}
+
+#[test]
+fn replies_are_never_dropped_and_one_too_many_closes() {
+    let outbox = Outbox::new();
+    outbox.watch(Some(Filter::default()));
+    for _ in 0..100 {
+        offer(&outbox, &chunk("a", 0, 32 << 10));
+    }
+    for n in 0..MAX_CONTROL {
+        outbox.reply(Bytes::from(n.to_string()));
+        assert_eq!(outbox.full(), None, "{n}");
+    }
+    let mut out = VecDeque::new();
+    outbox.take(0, &mut out);
+    assert_eq!(
+        texts(&out)[..MAX_CONTROL],
+        (0..MAX_CONTROL).map(|n| n.to_string()).collect::<Vec<_>>()[..]
+    );
+    for _ in 0..=MAX_CONTROL {
+        outbox.reply(Bytes::new());
+    }
+    assert_eq!(outbox.full(), Some(Full::Control));
+}
+
+#[test]
+fn a_packed_stream_is_named_once_before_it_however_many_there_are_and_whatever_is_dropped() {
+    let outbox = Outbox::new();
+    outbox.watch(Some(Filter::default()));
+    let packed = |n: u32, size: usize| Chunk {
+        label: Some((n, format!("label {n}").into())),
+        ..chunk(&n.to_string(), 0, size)
+    };
+    // More than replies may wait, and more bytes than attitudes may.
+    for n in 0..200 {
+        offer(&outbox, &packed(n, 10 << 10));
+    }
+    assert_eq!(outbox.full(), None);
+    outbox.reply(Bytes::from("a reply"));
+    outbox.forget();
+    assert!(!outbox.is_empty());
+    offer(&outbox, &packed(199, 4));
+    let mut out = VecDeque::new();
+    outbox.take(usize::MAX, &mut out);
+    let labels = (0..200).map(|n| format!("label {n}"));
+    let expected = ["a reply".to_owned()]
+        .into_iter()
+        .chain(labels)
+        .chain(["xxxx".to_owned()]);
+    assert!(texts(&out).into_iter().eq(expected), "{:?}", texts(&out));
+    assert!(outbox.is_empty());
+    out.clear();
+    outbox.watch(Some(Filter::default()));
+    offer(&outbox, &packed(7, 4));
+    outbox.take(usize::MAX, &mut out);
+    assert_eq!(texts(&out), ["xxxx"]);
+}
+
+#[test]
+fn a_client_gets_the_sensors_and_the_rate_it_asked_for() {
+    let outbox = Outbox::new();
+    outbox.watch(Some(Filter {
+        ids: Some(["a".to_owned()].into()),
+        rate_hz: Some(10.0),
+        ..Filter::default()
+    }));
+    let samples: Vec<_> = (0..100).map(|k| sample(Nanos(k * 10_000_000))).collect();
+    for id in ["a", "b"] {
+        outbox.offer(
+            &id.into(),
+            &samples,
+            &mut |_| unreachable!("not all are taken"),
+            &|_, kept| {
+                let lines: String = kept.iter().map(|(seq, _)| format!("{id}{seq}\n")).collect();
+                Chunk {
+                    bytes: lines.into(),
+                    ..chunk(id, 0, 0)
+                }
+            },
+            0,
+        );
+    }
+    let mut out = VecDeque::new();
+    outbox.take(usize::MAX, &mut out);
+    let expected: String = (0..10).map(|k| format!("a{}\n", k * 10)).collect();
+    assert_eq!(texts(&out), [expected]);
+    outbox.watch(None);
+    offer(&outbox, &chunk("a", 0, 10));
+    assert!(outbox.is_empty());
+}
