@@ -23,13 +23,23 @@ const MESSAGES: u32 = 32;
 pub struct Flood {
     messages: u32,
     until: Option<Instant>,
+    /// Somebody watches it: less is read at once, so that what is made of it finds room.
+    is_watched: bool,
 }
 
 impl Flood {
-    /// `n` bytes were read of a stream into room for `most`.
+    /// How many bytes to read at once, where there is room for `room`.
+    #[must_use]
+    pub fn most(&self, room: usize) -> usize {
+        if self.is_watched { room / 4 } else { room }
+    }
+
+    /// `n` bytes were read of a stream, of at most `most`.
     pub fn read(&mut self, n: usize, most: usize) {
         if n >= most {
             self.until = Some(Instant::now() + PATIENCE);
+        } else {
+            self.is_watched = false;
         }
     }
 
@@ -51,7 +61,7 @@ impl Flood {
     /// Waits, if it must. May be dropped and called again: the end of the wait stands.
     pub async fn wait(&mut self, hub: &Hub) {
         if let Some(until) = self.until {
-            hub.room(until).await;
+            self.is_watched = hub.room(until).await;
             self.until = None;
         }
     }
@@ -95,11 +105,11 @@ impl Hub {
         }
     }
 
-    /// Until every watcher that takes anything has room for more, or `until`.
-    async fn room(&self, until: Instant) {
+    /// Until every watcher that takes anything has room for more, or `until`. Whether there are watchers.
+    async fn room(&self, until: Instant) -> bool {
         let watchers = self.watchers();
         if watchers.is_empty() {
-            return;
+            return false;
         }
         // Others on this thread have their turn, the watchers above all.
         tokio::task::yield_now().await;
@@ -107,10 +117,11 @@ impl Hub {
             // Made before it is looked: no room made meanwhile goes unnoticed.
             let made = self.room_made.notified();
             if !is_crowded(&watchers) {
-                return;
+                return true;
             }
             if timeout_at(until, made).await.is_err() {
-                return lose_patience(&watchers);
+                lose_patience(&watchers);
+                return true;
             }
         }
     }
@@ -157,6 +168,10 @@ mod tests {
         let mut flood = flooding();
         flood.wait(hub).await;
         assert!(!flood.must_wait());
+        let is_watched = !hub.watchers().is_empty();
+        assert_eq!(flood.most(1000), if is_watched { 250 } else { 1000 });
+        flood.read(9, 10);
+        assert_eq!(flood.most(1000), 1000, "the flood is over");
         begin.elapsed()
     }
 
@@ -167,6 +182,7 @@ mod tests {
         assert!(!flood.must_wait());
         flood.read(10, 10);
         assert!(flood.must_wait());
+        assert_eq!(flood.most(1000), 1000, "nobody is known to watch");
         let mut flood = Flood::default();
         for n in 0..10 * MESSAGES {
             // A sensor's messages come one by one, now and then a few together.

@@ -168,8 +168,9 @@ async fn talk(
             () = flood.wait(&hub), if flood.must_wait() => {}
             ready = io.readable(), if reading && !flood.must_wait() => {
                 let read = ready.and_then(|()| in_room(|buffer, scratch| {
-                    let n = io.try_read(buffer)?;
-                    flood.read(n, buffer.len());
+                    let most = flood.most(buffer.len());
+                    let n = io.try_read(buffer.get_mut(..most).unwrap_or_default())?;
+                    flood.read(n, most);
                     session.bytes(buffer.get(..n).unwrap_or_default(), now(), scratch);
                     Ok(n)
                 }));
