@@ -405,6 +405,7 @@ impl Hub {
         // Encoded when the first asks, and shared by all.
         let mut encoded: [Option<Vec<Chunk>>; 3] = [None, None, None];
         let watchers = self.watchers();
+        let now = std::cell::LazyCell::new(|| self.where_it_is().and_then(|place| place.at));
         for client in &*watchers {
             let profile = match client.shape {
                 Shape::Lines(profile) => profile,
@@ -413,10 +414,9 @@ impl Hub {
                         None => Clock::Log,
                         Some(_) => Clock::Stamp,
                     };
-                    let now = self.where_it_is().and_then(|place| place.at);
                     client.outbox.offer_frames(
                         |wanted| channel.frames(wanted, first_seq, items, clock),
-                        now,
+                        *now,
                     );
                     continue;
                 }

@@ -104,7 +104,10 @@ impl LineDecoder {
             Some(first) if !found.has_gyro() => of_rates(first),
             _ => of_rates(&found),
         };
+        // Where there is no rate, its unit is not said either.
+        let has_rate = found.has_gyro() || found.batch.iter().any(|f| f.has_gyro());
         let stated = match class {
+            _ if !has_rate => None,
             Class::Imu => Some(GyroUnit::Deg),
             Class::Rate | Class::Att => Some(GyroUnit::Rad),
             Class::None | Class::Other(_) => None,
