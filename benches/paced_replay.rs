@@ -39,6 +39,7 @@ fn lateness(log: &Path, hz: u64) -> Vec<(f64, f64)> {
             "json",
         ])
         .args(["-o", "tcp-listen://127.0.0.1:0"])
+        .stdout(Stdio::null())
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
@@ -92,7 +93,7 @@ fn main() {
         .unwrap_or(60);
     let dir = tempfile::tempdir().unwrap();
     println!(
-        "| Hz | attitudes | p50 of |late - median| ms | p99 | p99.9 | max | drift ms over {secs} s |"
+        "| Hz | attitudes | p50 of abs(late - median) ms | p99 | p99.9 | max | drift ms over {secs} s |"
     );
     println!("|---|---|---|---|---|---|---|");
     for hz in RATES_HZ {

@@ -37,6 +37,11 @@ pub fn run(run: &Replay, ended: Ended, survey: &Survey) -> RunSummary {
             .into_iter()
             .map(|(name, written)| (name, written.bytes, written.messages))
             .collect(),
+        served: run
+            .targets
+            .iter()
+            .filter_map(|target| Some(target.listens()?.to_string()))
+            .collect(),
         file_problems: super::log::problems(survey),
         file_losses: survey.problems.losses(),
         elapsed_secs: 0.0,

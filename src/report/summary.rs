@@ -135,6 +135,8 @@ pub struct RunSummary {
     pub topics: Vec<TopicSummary>,
     /// Outputs: name, bytes, messages.
     pub outputs: Vec<(String, u64, u64)>,
+    /// Where it was served to whoever connected.
+    pub served: Vec<String>,
     /// What was wrong with the file itself.
     pub file_problems: Vec<String>,
     /// How many of them lost data.
@@ -181,7 +183,10 @@ impl RunSummary {
             };
             line(&mut out, "wrote", &what);
         }
-        if self.outputs.is_empty() {
+        for name in &self.served {
+            line(&mut out, "served", name);
+        }
+        if self.outputs.is_empty() && self.served.is_empty() {
             line(
                 &mut out,
                 "wrote",
@@ -212,6 +217,7 @@ impl RunSummary {
             "outputs": self.outputs.iter().map(|(name, bytes, messages)| json!({
                 "name": name, "bytes": bytes, "messages": messages,
             })).collect::<Vec<_>>(),
+            "served": self.served,
             "elapsed_s": self.elapsed_secs,
             "samples_per_s": self.samples() as f64 / self.elapsed_secs.max(1e-9),
             "lossy": self.is_lossy(),

@@ -33,6 +33,24 @@ fn the_summary_in_words_has_every_line_a_user_looks_for() {
 }
 
 #[test]
+fn a_run_that_was_served_says_where_and_one_that_was_kept_nowhere_says_how() {
+    let dir = bench();
+    let served = strapd(dir.path(), "replay log.mcap -o tcp-listen://127.0.0.1:0");
+    assert_eq!(served.code, Some(0), "{}", served.err);
+    assert!(
+        served.out.contains("  served   tcp-listen://127.0.0.1:0"),
+        "{}",
+        served.out
+    );
+    assert!(!served.out.contains("wrote"), "{}", served.out);
+    let kept_nowhere = strapd(dir.path(), "replay log.mcap").done().out.clone();
+    assert!(
+        kept_nowhere.contains("  wrote    nothing: add -o "),
+        "{kept_nowhere}"
+    );
+}
+
+#[test]
 fn the_summary_as_json_is_one_object_with_the_same_numbers() {
     let dir = bench();
     let ran = strapd(dir.path(), "replay log.mcap -o a.mcap -o a.ndjson --json");
