@@ -5,7 +5,7 @@
 //! To the run it is an [`Audience`].
 
 use super::channel::{Channel, Items};
-use super::hub::Hub;
+use super::hub::{Flood, Hub};
 use super::playback::{News, Playback, Turn};
 use super::shutdown::{self, Signals};
 use super::{Server, Settings};
@@ -45,6 +45,8 @@ struct Lane {
     channel: Arc<Channel>,
     /// Number of the next item.
     next: u64,
+    /// Of a run without a pace.
+    flood: Flood,
     /// Added to the reset counts: those of the runs before this one.
     resets: u32,
     /// The last reset count, as it was sent.
@@ -140,10 +142,11 @@ impl Cast {
         let mut text = lock(&self.text);
         let mut seq = first;
         for some in items.chunks(AT_ONCE) {
-            if !self.is_paced() {
-                self.hub.wait_for_room();
-            }
             self.hub.distribute(&lane.channel, seq, some, &mut text);
+            if !self.is_paced() {
+                lane.flood.read(1, 1);
+                lane.flood.wait_in_thread(&self.hub);
+            }
             seq += some.len() as u64;
         }
     }
@@ -200,6 +203,7 @@ impl Audience for Cast {
             lanes.push(Lane {
                 channel: self.hub.declare(stream),
                 next: 0,
+                flood: Flood::default(),
                 resets: 0,
                 last_reset: 0,
             });

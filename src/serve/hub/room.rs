@@ -2,9 +2,11 @@
 //!
 //! A sensor sends at its own pace and waits for nobody. A log that is pushed in as fast as the
 //! socket takes it would otherwise be read before the watchers on the same cores have had their
-//! turn, and all but the last of it would be dropped for each. Bounded twice: a wait is at most
-//! [`PATIENCE`] long, and a watcher that took nothing during one is not waited for again until it
-//! takes something. So a stalled watcher costs a sender one wait.
+//! turn, and all but the last of it would be dropped for each. Bounded three times: a wait is at most
+//! [`PATIENCE`] long; a watcher that took nothing during one is not waited for again until it takes
+//! something; and after a wait in vain the sender goes on without another for as long again, after
+//! several in a row for [`FREE`]. So a moment's absence costs a watcher a moment, a stalled watcher costs
+//! a sender one wait, and any number of slow ones a twentieth of its time.
 
 use super::{Client, Hub, read};
 use std::sync::Arc;
@@ -13,6 +15,8 @@ use tokio::time::{Instant, timeout_at};
 
 /// Longest wait for room, before one read.
 const PATIENCE: Duration = Duration::from_millis(5);
+/// After several waits in vain, none for so long.
+const FREE: Duration = PATIENCE.saturating_mul(20);
 /// How often a thread looks.
 const LOOK: Duration = Duration::from_micros(200);
 /// A sender of messages floods when so many have come that none was waited for.
@@ -23,6 +27,10 @@ const MESSAGES: u32 = 32;
 pub struct Flood {
     messages: u32,
     until: Option<Instant>,
+    /// It waited in vain, and does not wait before this.
+    free: Option<Instant>,
+    /// Waits in vain since the last that was not.
+    failures: u32,
     /// Somebody watches it: less is read at once, so that what is made of it finds room.
     is_watched: bool,
 }
@@ -37,7 +45,7 @@ impl Flood {
     /// `n` bytes were read of a stream, of at most `most`.
     pub fn read(&mut self, n: usize, most: usize) {
         if n >= most {
-            self.until = Some(Instant::now() + PATIENCE);
+            self.hold();
         } else {
             self.is_watched = false;
         }
@@ -48,8 +56,32 @@ impl Flood {
         self.messages = if at_once { self.messages + 1 } else { 0 };
         if self.messages >= MESSAGES {
             self.messages = 0;
-            self.until = Some(Instant::now() + PATIENCE);
+            self.hold();
         }
+    }
+
+    /// To wait before the next read; while it is free, only until others have had their turn.
+    fn hold(&mut self) {
+        let now = Instant::now();
+        self.free = self.free.filter(|free| now < *free);
+        self.until = Some(match self.free {
+            Some(_) => now,
+            None => now + PATIENCE,
+        });
+    }
+
+    fn waited(&mut self, outcome: Waited) {
+        self.is_watched = outcome != Waited::Nobody;
+        match outcome {
+            Waited::InVain if self.free.is_none() => {
+                let free = PATIENCE * (1 << self.failures.min(5));
+                self.free = Some(Instant::now() + free.min(FREE));
+                self.failures += 1;
+            }
+            Waited::Room => self.failures = 0,
+            _ => {}
+        }
+        self.until = None;
     }
 
     /// Whether it is to wait before the next read.
@@ -61,17 +93,31 @@ impl Flood {
     /// Waits, if it must. May be dropped and called again: the end of the wait stands.
     pub async fn wait(&mut self, hub: &Hub) {
         if let Some(until) = self.until {
-            self.is_watched = hub.room(until).await;
-            self.until = None;
+            let outcome = hub.room(until).await;
+            self.waited(outcome);
         }
     }
 
     /// The same for a thread of its own.
     pub fn wait_in_thread(&mut self, hub: &Hub) {
-        if let Some(until) = self.until.take() {
-            hub.room_in_thread(until);
+        if let Some(until) = self.until {
+            let outcome = hub.room_in_thread(until);
+            self.waited(outcome);
         }
     }
+}
+
+/// What came of a wait.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Waited {
+    /// Nobody watches.
+    Nobody,
+    /// There was room from the first.
+    Nothing,
+    /// There is room now.
+    Room,
+    /// There is none yet.
+    InVain,
 }
 
 fn is_crowded(watchers: &[Arc<Client>]) -> bool {
@@ -89,40 +135,43 @@ impl Hub {
         read(&self.watchers).clone()
     }
 
-    /// For a thread that makes as many attitudes as it can: until every watcher that takes anything has
-    /// room for more, or a moment has passed.
-    pub fn wait_for_room(&self) {
-        self.room_in_thread(Instant::now() + PATIENCE);
-    }
-
-    fn room_in_thread(&self, until: Instant) {
-        let watchers = self.watchers();
-        while is_crowded(&watchers) {
-            if Instant::now() >= until {
-                return lose_patience(&watchers);
-            }
-            std::thread::sleep(LOOK);
-        }
-    }
-
-    /// Until every watcher that takes anything has room for more, or `until`. Whether there are watchers.
-    async fn room(&self, until: Instant) -> bool {
+    fn room_in_thread(&self, until: Instant) -> Waited {
         let watchers = self.watchers();
         if watchers.is_empty() {
-            return false;
+            return Waited::Nobody;
+        }
+        let mut waited = Waited::Nothing;
+        while is_crowded(&watchers) {
+            if Instant::now() >= until {
+                lose_patience(&watchers);
+                return Waited::InVain;
+            }
+            std::thread::sleep(LOOK);
+            waited = Waited::Room;
+        }
+        waited
+    }
+
+    /// Until every watcher that takes anything has room for more, or `until`.
+    async fn room(&self, until: Instant) -> Waited {
+        let watchers = self.watchers();
+        if watchers.is_empty() {
+            return Waited::Nobody;
         }
         // Others on this thread have their turn, the watchers above all.
         tokio::task::yield_now().await;
+        let mut waited = Waited::Nothing;
         loop {
             // Made before it is looked: no room made meanwhile goes unnoticed.
             let made = self.room_made.notified();
             if !is_crowded(&watchers) {
-                return true;
+                return waited;
             }
             if timeout_at(until, made).await.is_err() {
                 lose_patience(&watchers);
-                return true;
+                return Waited::InVain;
             }
+            waited = Waited::Room;
         }
     }
 }
@@ -239,6 +288,37 @@ mod tests {
         fill(&client, MAX_QUEUED * 2 / 3);
         assert_eq!(wait(&hub).await, PATIENCE);
         assert_eq!(wait(&hub).await, Duration::ZERO);
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn any_number_of_slow_watchers_costs_a_sender_a_twentieth_of_its_time() {
+        let hub = Arc::new(Hub::new(Settings::default()).unwrap());
+        let clients: Vec<_> = (0..20).map(|n| hub.join(n.to_string())).collect();
+        for client in &clients {
+            client.outbox.watch(Some(Filter::default()));
+            fill(client, MAX_QUEUED * 2 / 3);
+        }
+        hub.watch_changed();
+        // Each takes something all the time, and none enough.
+        let takers = tokio::spawn(async move {
+            loop {
+                for client in &clients {
+                    tokio::time::sleep(Duration::from_millis(1)).await;
+                    client.outbox.written(1);
+                }
+            }
+        });
+        let (begin, mut waited, mut flood) = (Instant::now(), Duration::ZERO, Flood::default());
+        while begin.elapsed() < Duration::from_secs(10) {
+            flood.read(10, 10);
+            let before = Instant::now();
+            flood.wait(&hub).await;
+            waited += before.elapsed();
+            tokio::time::sleep(Duration::from_millis(1)).await;
+        }
+        takers.abort();
+        let share = waited.as_secs_f64() / begin.elapsed().as_secs_f64();
+        assert!((0.03..0.06).contains(&share), "{share}");
     }
 
     #[test]
