@@ -161,8 +161,9 @@ fn flood(daemon: &Daemon, id: &'static str, mut sender: Client) {
         }
     }
     drop(sending.join().unwrap());
-    // All, where the watcher has its share of the machine; next to none before senders waited.
-    assert!(got > samples / 4, "{got} of {samples}");
+    // All, where the watcher has its share of the machine, which it need not have here; before senders
+    // waited, one in a thousand.
+    assert!(got > samples / 10, "{got} of {samples}");
 }
 
 #[test]
