@@ -202,7 +202,7 @@ async fn converse(
     loop {
         let next = async {
             let there = link.read(&mut bytes).now_or_never();
-            flood.message(there.is_some());
+            flood.message(there.is_some(), bytes.len());
             match there {
                 Some(heard) => heard,
                 None => link.read(&mut bytes).await,

@@ -163,7 +163,8 @@ fn flood(daemon: &Daemon, id: &'static str, mut sender: Client) {
     drop(sending.join().unwrap());
     // All, where the watcher has its share of the machine, which it need not have here; before senders
     // waited, one in a thousand.
-    assert!(got > samples / 10, "{got} of {samples}");
+    assert!(got > samples / 4, "{id}: {got} of {samples}");
+    eprintln!("{id}: {got} of {samples}");
 }
 
 #[test]

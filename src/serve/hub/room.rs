@@ -17,13 +17,16 @@ use tokio::time::{Instant, timeout_at};
 const PATIENCE: Duration = Duration::from_millis(5);
 /// How often a thread looks.
 const LOOK: Duration = Duration::from_micros(200);
-/// A sender of messages floods when so many have come that none was waited for.
+/// A sender of messages floods when so many have come that none was waited for, or so many bytes.
 const MESSAGES: u32 = 32;
+const MESSAGE_BYTES: usize = 4 << 10;
 
 /// Notices that a sender floods: it has sent more than was read, time after time.
 #[derive(Debug, Default)]
 pub struct Flood {
     messages: u32,
+    /// Of those messages.
+    bytes: usize,
     until: Option<Instant>,
     /// It waited in vain, and does not wait before this.
     free: Option<Instant>,
@@ -47,11 +50,16 @@ impl Flood {
         }
     }
 
-    /// A message has come; `at_once`: it was there already.
-    pub fn message(&mut self, at_once: bool) {
-        self.messages = if at_once { self.messages + 1 } else { 0 };
-        if self.messages >= MESSAGES {
-            self.messages = 0;
+    /// A message of so many bytes has come; `at_once`: it was there already.
+    pub fn message(&mut self, at_once: bool, bytes: usize) {
+        if !at_once {
+            (self.messages, self.bytes) = (0, 0);
+            return;
+        }
+        self.messages += 1;
+        self.bytes += bytes;
+        if self.messages >= MESSAGES || self.bytes >= MESSAGE_BYTES {
+            (self.messages, self.bytes) = (0, 0);
             self.hold();
         }
     }
@@ -219,12 +227,18 @@ mod tests {
         let mut flood = Flood::default();
         for n in 0..10 * MESSAGES {
             // A sensor's messages come one by one, now and then a few together.
-            flood.message(n % MESSAGES != 0);
+            flood.message(n % MESSAGES != 0, 100);
             assert!(!flood.must_wait());
         }
         for _ in 0..MESSAGES {
-            flood.message(true);
+            flood.message(true, 100);
         }
+        assert!(flood.must_wait());
+        // Many lines in each.
+        let mut flood = Flood::default();
+        flood.message(false, MESSAGE_BYTES);
+        assert!(!flood.must_wait());
+        flood.message(true, MESSAGE_BYTES);
         assert!(flood.must_wait());
     }
 

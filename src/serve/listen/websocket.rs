@@ -190,7 +190,12 @@ pub(crate) async fn converse(socket: WebSocket, connection: Connection, foxglove
             };
             let next = async {
                 let there = ready(&mut stream).await;
-                flood.message(there.is_some());
+                let bytes = match &there {
+                    Some(Ok(Message::Text(text))) => text.len(),
+                    Some(Ok(Message::Binary(bytes))) => bytes.len(),
+                    _ => 0,
+                };
+                flood.message(there.is_some(), bytes);
                 match there {
                     Some(message) => Ok(Some(message)),
                     None => timeout(patience, stream.next()).await,
