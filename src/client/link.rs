@@ -23,7 +23,7 @@ const PING: Duration = Duration::from_secs(15);
 /// A WebSocket that says nothing for so long, not even in answer to two pings, has gone.
 const SILENCE: Duration = Duration::from_secs(35);
 /// Bytes read at once.
-pub const READ: usize = 16 << 10;
+const READ: usize = 16 << 10;
 /// Longest datagram there is.
 const MAX_DATAGRAM: usize = 65_536;
 

@@ -134,17 +134,16 @@ impl Cast {
     }
 
     fn hand(&self, lane: &mut Lane, items: Items<'_>, shown: bool) {
-        let first = lane.next;
+        let mut seq = lane.next;
         lane.next += items.len() as u64;
         if !shown {
             return;
         }
         let mut text = lock(&self.text);
-        let mut seq = first;
         for some in items.chunks(AT_ONCE) {
             self.hub.distribute(&lane.channel, seq, some, &mut text);
             if !self.is_paced() {
-                lane.flood.read(1, 1);
+                lane.flood.hold();
                 lane.flood.wait_in_thread(&self.hub);
             }
             seq += some.len() as u64;

@@ -237,6 +237,20 @@ impl Channel {
         }
     }
 
+    fn push_attitude(
+        &self,
+        out: &mut Vec<u8>,
+        form: Form,
+        profile: Profile,
+        seq: u64,
+        sample: &AttitudeSample,
+    ) {
+        match form {
+            Form::Lines => self.objects(profile).push_attitude(out, seq, sample),
+            Form::Packed => packed::push_attitude(out, self.label.0, seq, sample),
+        }
+    }
+
     /// The objects of those attitudes a client takes, at least one, with their numbers.
     pub(super) fn thinned(
         &self,
@@ -246,12 +260,7 @@ impl Channel {
     ) -> Chunk {
         let mut bytes = Vec::new();
         for (seq, sample) in attitudes {
-            match form {
-                Form::Lines => self
-                    .objects(profile)
-                    .push_attitude(&mut bytes, *seq, sample),
-                Form::Packed => packed::push_attitude(&mut bytes, self.label.0, *seq, sample),
-            }
+            self.push_attitude(&mut bytes, form, profile, *seq, sample);
         }
         let first_seq = attitudes.first().map_or(0, |(seq, _)| *seq);
         self.chunk(form, first_seq, attitudes.len() as u64, bytes.into())
@@ -266,7 +275,6 @@ impl Channel {
         items: Items<'_>,
         text: &mut Vec<u8>,
     ) -> Vec<Chunk> {
-        let objects = self.objects(profile);
         let mut chunks = Vec::new();
         let mut from = first_seq;
         text.clear();
@@ -278,15 +286,14 @@ impl Channel {
         };
         let end = first_seq + items.len() as u64;
         for (n, seq) in (first_seq..end).enumerate() {
-            match (form, items) {
-                (Form::Lines, Items::Attitudes(items)) => {
-                    objects.push_attitude(text, seq, &items[n]);
+            match (items, form) {
+                (Items::Attitudes(items), _) => {
+                    self.push_attitude(text, form, profile, seq, &items[n]);
                 }
-                (Form::Lines, Items::Samples(items)) => objects.push_raw(text, seq, &items[n]),
-                (Form::Packed, Items::Attitudes(items)) => {
-                    packed::push_attitude(text, self.label.0, seq, &items[n]);
+                (Items::Samples(items), Form::Lines) => {
+                    self.objects(profile).push_raw(text, seq, &items[n]);
                 }
-                (Form::Packed, Items::Samples(items)) => {
+                (Items::Samples(items), Form::Packed) => {
                     packed::push_sample(text, self.label.0, seq, &items[n]);
                 }
             }

@@ -12,7 +12,7 @@ use super::session::{End, Session, Side};
 use super::shutdown::Running;
 use super::source::{Protocol, Source};
 use super::upstream::Event;
-use crate::client::link::{self, Heard, Link};
+use crate::client::link::{Heard, Link};
 use crate::client::remote::Remote;
 use futures_util::FutureExt;
 use std::collections::VecDeque;
@@ -224,11 +224,7 @@ async fn converse(
             Ok(heard) => {
                 take(&mut session, &heard, &bytes);
                 match heard {
-                    Heard::Bytes => {
-                        flood.read(bytes.len(), link::READ);
-                        None
-                    }
-                    Heard::Message => None,
+                    Heard::Bytes | Heard::Message => None,
                     Heard::Closed(None) => Some("the peer has closed the connection".to_owned()),
                     Heard::Closed(Some(words)) => Some(format!("the peer has closed: {words}")),
                 }

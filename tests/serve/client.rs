@@ -155,28 +155,9 @@ impl Client {
 
     /// The next line, without its end; `None` when the daemon has closed.
     pub(crate) fn line(&mut self) -> Option<String> {
-        let mut line = String::new();
-        let read = match &mut self.link {
-            Link::Tcp(s) => s.read_line(&mut line),
-            Link::Unix(s) => s.read_line(&mut line),
-            Link::Web(s) => loop {
-                match s.read() {
-                    Ok(Message::Text(text)) => return Some(text.as_str().to_owned()),
-                    Ok(Message::Close(_)) => return None,
-                    Ok(_) => {}
-                    Err(e) => {
-                        assert!(!is_late(&e), "nothing came");
-                        return None;
-                    }
-                }
-            },
-            Link::Udp(_) => unreachable!("nobody answers datagrams"),
-        };
-        match read {
-            Ok(0) => None,
-            Ok(_) => Some(line.trim_end_matches('\n').to_owned()),
-            Err(e) if e.kind() == std::io::ErrorKind::ConnectionReset => None,
-            Err(e) => unreachable!("nothing came: {e}"),
+        match self.item()? {
+            Item::Line(line) => Some(line),
+            Item::Packed(object) => unreachable!("no line: {object:?}"),
         }
     }
 
@@ -223,17 +204,26 @@ impl Client {
 
 /// A line, or what begins with the mark and is as long as it says.
 fn item(from: &mut impl BufRead) -> Option<Item> {
-    let first = *from.fill_buf().unwrap().first()?;
+    let first = *there(from.fill_buf())?.first()?;
     if first == 0xf8 {
         let mut object = vec![0; 4];
-        from.read_exact(&mut object).unwrap();
+        there(from.read_exact(&mut object))?;
         object.resize(usize::from(u16::from_le_bytes([object[2], object[3]])), 0);
-        from.read_exact(&mut object[4..]).unwrap();
+        there(from.read_exact(&mut object[4..]))?;
         return Some(Item::Packed(object));
     }
     let mut line = String::new();
-    from.read_line(&mut line).unwrap();
+    there(from.read_line(&mut line))?;
     Some(Item::Line(line.trim_end_matches('\n').to_owned()))
+}
+
+/// What was read; `None` when the daemon has closed without a word.
+fn there<T>(read: std::io::Result<T>) -> Option<T> {
+    match read {
+        Ok(read) => Some(read),
+        Err(e) if e.kind() == std::io::ErrorKind::ConnectionReset => None,
+        Err(e) => unreachable!("nothing came: {e}"),
+    }
 }
 
 fn is_late(error: &tungstenite::Error) -> bool {

@@ -11,6 +11,8 @@ const PICTURE: (usize, usize) = (21, 7);
 const WIDE: usize = 84;
 /// After this silence a sensor is marked.
 const SILENT: Duration = Duration::from_secs(2);
+/// What is said of a sensor that the daemon knows and that has said nothing to us.
+const NEVER_HEARD: &str = "silent since this watch began";
 /// Longest name that is shown whole.
 const MAX_NAME: usize = 48;
 
@@ -113,7 +115,7 @@ fn title(id: &str, sensor: &Sensor) -> String {
     let name = shortened(id);
     match &sensor.attitude {
         Some(a) => format!("{name}  {} in {}  {}", a.body, a.world, a.status.join(" ")),
-        None => format!("{name}  silent since this watch began"),
+        None => format!("{name}  {NEVER_HEARD}"),
     }
 }
 
@@ -175,7 +177,7 @@ pub(super) fn plain(board: &Board, now: Instant) -> String {
     for (id, sensor) in &board.sensors {
         let Some(a) = &sensor.attitude else {
             out.push_str(&format!(
-                "{}  silent since this watch began  samples {}\n",
+                "{}  {NEVER_HEARD}  samples {}\n",
                 shortened(id),
                 sensor.health.samples
             ));

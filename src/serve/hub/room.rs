@@ -17,7 +17,8 @@ use tokio::time::{Instant, timeout_at};
 const PATIENCE: Duration = Duration::from_millis(5);
 /// How often a thread looks.
 const LOOK: Duration = Duration::from_micros(200);
-/// A sender of messages floods when so many have come that none was waited for, or so many bytes.
+/// Who is not asked how much there is to read floods when so many messages have come that none was
+/// waited for, or so many bytes.
 const MESSAGES: u32 = 32;
 const MESSAGE_BYTES: usize = 4 << 10;
 
@@ -50,7 +51,7 @@ impl Flood {
         }
     }
 
-    /// A message of so many bytes has come; `at_once`: it was there already.
+    /// A message, or stretch of a stream, of so many bytes has come; `at_once`: it was there already.
     pub fn message(&mut self, at_once: bool, bytes: usize) {
         if !at_once {
             (self.messages, self.bytes) = (0, 0);
@@ -64,8 +65,8 @@ impl Flood {
         }
     }
 
-    /// To wait before the next read; while it is free, only until others have had their turn.
-    fn hold(&mut self) {
+    /// It is to wait before it goes on; while it is free, only until others have had their turn.
+    pub fn hold(&mut self) {
         let now = Instant::now();
         self.free = self.free.filter(|free| now < *free);
         self.until = Some(match self.free {

@@ -190,12 +190,8 @@ pub(crate) async fn converse(socket: WebSocket, connection: Connection, foxglove
             };
             let next = async {
                 let there = ready(&mut stream).await;
-                let bytes = match &there {
-                    Some(Ok(Message::Text(text))) => text.len(),
-                    Some(Ok(Message::Binary(bytes))) => bytes.len(),
-                    _ => 0,
-                };
-                flood.message(there.is_some(), bytes);
+                let said = there.as_ref().and_then(|m| payload(m.as_ref().ok()?));
+                flood.message(there.is_some(), said.map_or(0, |(bytes, _)| bytes.len()));
                 match there {
                     Some(message) => Ok(Some(message)),
                     None => timeout(patience, stream.next()).await,
@@ -335,10 +331,8 @@ impl Talk {
     }
 
     fn take(&mut self, message: &Message) {
-        let (bytes, is_text): (&[u8], bool) = match message {
-            Message::Text(text) => (text.as_bytes(), true),
-            Message::Binary(bytes) => (bytes, false),
-            Message::Ping(_) | Message::Pong(_) | Message::Close(_) => return,
+        let Some((bytes, is_text)) = payload(message) else {
+            return;
         };
         match self {
             Talk::Lines(session) => {
@@ -346,6 +340,15 @@ impl Talk {
             }
             Talk::Foxglove(viewer) => viewer.message(bytes, is_text),
         }
+    }
+}
+
+/// What a message says, and whether as text.
+fn payload(message: &Message) -> Option<(&[u8], bool)> {
+    match message {
+        Message::Text(text) => Some((text.as_bytes(), true)),
+        Message::Binary(bytes) => Some((bytes, false)),
+        Message::Ping(_) | Message::Pong(_) | Message::Close(_) => None,
     }
 }
 
