@@ -420,7 +420,7 @@ fn every_fault_of_a_chunk_is_named() {
     let chunk = |head: Vec<u8>, packed: &[u8]| record(op::CHUNK, &[head, packed.to_vec()].concat());
     let over = 65 << 20;
     type Case = (Vec<u8>, fn(&ProblemKind) -> bool);
-    let cases: [Case; 8] = [
+    let cases: [Case; 9] = [
         (chunk(chunk_head(1000, 1, "zstd", n), &packed), |k| {
             matches!(k, ProblemKind::ChunkCrc { stored: 1, .. })
         }),
@@ -455,6 +455,10 @@ fn every_fault_of_a_chunk_is_named() {
             chunk(chunk_head(12, 0, "", 12), &record(op::MESSAGE, &[0; 3])),
             |k| *k == ProblemKind::ShortMessages,
         ),
+        // Nine zeros would be a record of nothing, and a megabyte of them a hundred thousand.
+        (chunk(chunk_head(900, 0, "", 900), &[0; 900]), |k| {
+            *k == ProblemKind::NoInnerRecord { at: 0 }
+        }),
     ];
     for (i, (chunk, expected)) in cases.into_iter().enumerate() {
         let broken = [data, &chunk, rest].concat();

@@ -7,7 +7,11 @@
 use std::io::{BufWriter, Write};
 use std::ops::ControlFlow;
 use std::path::Path;
+use strapd::pipeline::pool::Pool;
+use strapd::pipeline::recover::{Recover, run};
+use strapd::pipeline::run::Source;
 use strapd::record::RawSample;
+use strapd::sink::{Options, Target};
 use strapd::source::mcap::{MAGIC, Message, ProblemKind, Reader, WalkOptions, op, walk};
 
 /// Peak resident memory of this process so far, MiB.
@@ -150,5 +154,71 @@ fn memory_is_bounded_by_what_is_in_flight_whatever_the_file() {
         assert!(refused, "{declared}: {problem:?}");
         assert!(grown <= 66, "{declared}: {grown} MiB");
         eprintln!("bomb declaring {declared}: peak grew by {grown} MiB");
+    }
+    recovering_holds_little_of_a_long_record(dir.path());
+}
+
+/// Peak resident memory that `work` adds to what is there now, MiB.
+fn added(work: impl FnOnce()) -> u64 {
+    // Forgets the peak of what came before.
+    std::fs::write("/proc/self/clear_refs", "5").unwrap();
+    let before = peak();
+    work();
+    peak() - before
+}
+
+fn recovering_holds_little_of_a_long_record(dir: &Path) {
+    let sized = |bytes: &[u8]| [&(bytes.len() as u32).to_le_bytes(), bytes].concat();
+    let metadata = |pairs: Vec<u8>| [sized(b"m"), sized(&pairs)].concat();
+    let pair = |key: &[u8], value: &[u8]| [sized(key), sized(value)].concat();
+    let long = vec![b'v'; 60 << 20];
+    let small = (0u32..3_000_000).flat_map(|n| pair(&n.to_le_bytes().map(|b| b & 0x7F), b""));
+    let attachment = [
+        &[0; 16],
+        &sized(b"a")[..],
+        &sized(b""),
+        &(long.len() as u64).to_le_bytes(),
+        &long,
+        &[0; 4],
+    ];
+    // An attachment is read once and written once; a metadata record of this size is nobody's.
+    for (name, opcode, body, copied, most) in [
+        ("pairs", op::METADATA, metadata(small.collect()), 0, 90),
+        ("value", op::METADATA, metadata(pair(b"k", &long)), 0, 90),
+        ("attachment", op::ATTACHMENT, attachment.concat(), 1, 200),
+    ] {
+        let input = dir.join(format!("{name}.mcap"));
+        let mut file = std::fs::File::create(&input).unwrap();
+        let header = [sized(b""), sized(b"")].concat();
+        for bytes in [
+            &MAGIC[..],
+            &[op::HEADER],
+            &(header.len() as u64).to_le_bytes(),
+            &header,
+            &[opcode],
+            &(body.len() as u64).to_le_bytes(),
+            &body,
+        ] {
+            file.write_all(bytes).unwrap();
+        }
+        drop(body);
+        let wanted = Recover {
+            source: Source::File(input),
+            target: Target::parse(dir.join("out.mcap").to_str().unwrap()).unwrap(),
+            options: Options {
+                force: true,
+                ..Options::default()
+            },
+        };
+        let mut recovered = None;
+        let grown = added(|| {
+            let pool = Pool::new(2).unwrap();
+            recovered = Some(run(&wanted, &pool, &mut |_| {}).unwrap());
+        });
+        let recovered = recovered.unwrap();
+        eprintln!("recover, one long record, {name}: {grown} MiB");
+        assert_eq!(recovered.attachments + recovered.metadata, copied, "{name}");
+        assert!(recovered.was_damaged(), "{name}");
+        assert!(grown <= most, "{name}: {grown} MiB");
     }
 }

@@ -8,6 +8,10 @@ pub(crate) mod descriptor;
 pub(crate) mod idl;
 pub(crate) mod rosmsg;
 
+/// Longest name of a type, with its package and modules: it is kept once for each type and joined to
+/// others, so that a longer one would make the work grow faster than the schema.
+pub(crate) const MAX_NAME: usize = 1024;
+
 /// Structs by index; they may refer to each other in circles (a hostile schema does), so whoever
 /// walks the graph bounds the depth.
 #[derive(Debug, Default, Clone)]

@@ -247,6 +247,58 @@ fn schemas_that_grow_without_end_are_refused_quickly() {
     );
 }
 
+/// A megabyte each that costs minutes where work grows as the square of the length: the same tokens as in any
+/// schema, but on one line, under one long name, or of one name again and again. `growth.rs` counts instructions;
+/// this has room for a slow machine.
+#[test]
+fn long_schemas_are_read_in_time_that_grows_as_they_do() {
+    const LENGTH: usize = 1_000_000;
+    let fill = |head: &str, piece: &str, tail: &str| {
+        let times = (LENGTH - head.len() - tail.len()) / piece.len();
+        format!("{head}{}{tail}", piece.repeat(times))
+    };
+    let long = "n".repeat(250);
+    let modules: String = (0..30).map(|_| format!("module {long} {{ ")).collect();
+    let path = format!("{long}::").repeat(LENGTH / 2 / 252);
+    let typedefs: String = (0..19_000)
+        .map(|n| format!("typedef T{n} T{}; ", n + 1))
+        .collect();
+    let idl = [
+        fill("struct A { double x; }; ", "; ", ""),
+        fill("struct A { double x; }; ", "const long a = 1; ", ""),
+        fill(&modules, "struct A { B b; }; ", ""),
+        fill(&format!("struct A {{ {path}B "), "a,", "b; };"),
+        format!("{typedefs} struct A {{ {} }};", "T19000 a; ".repeat(900)),
+        fill("struct A { T9 x; }; ", "module a{};", ""),
+    ];
+    let package = "p".repeat(LENGTH / 2);
+    let rosmsg = format!(
+        "float64 x\n=====\nMSG: {package}/A\n{}",
+        "B b\n".repeat(19_000)
+    );
+    let keys = |n| format!("\"{}\":", "k".repeat(n));
+    let json = format!("{{{}", keys(250)).repeat(5)
+        + "{"
+        + &format!("{}{{}},", keys(0)).repeat(LENGTH / 6);
+    let channels = idl
+        .iter()
+        .map(|text| Channel {
+            schema_encoding: "ros2idl",
+            ..channel("cdr", "a/msg/A", text)
+        })
+        .chain([
+            channel("cdr", "a/msg/A", &rosmsg),
+            channel("json", "A", &json),
+        ]);
+    for (n, channel) in channels.enumerate() {
+        let start = Instant::now();
+        let _ = role(&channel, None);
+        let secs = start.elapsed();
+        eprintln!("{n}: {} bytes in {secs:?}", channel.schema_data.len());
+        assert!(secs < Duration::from_secs(5), "{n}: {secs:?}");
+    }
+}
+
 #[test]
 fn a_batch_has_a_limit_and_beyond_it_nothing_is_pushed() {
     let text = format!("a/S[] samples{}", section("a/S", "uint8[3] gyro"));

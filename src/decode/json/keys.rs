@@ -30,58 +30,69 @@ pub(crate) fn schema_keys(schema: &[u8]) -> (bool, bool) {
 pub(crate) fn keys(payload: &[u8]) -> Vec<String> {
     let mut list = Vec::new();
     if let Ok(mut scanner) = Scanner::new(payload) {
-        // What is broken ends the list early, no more.
-        let _ = collect_keys(&mut scanner, "", 0, &mut list);
+        // What is broken ends the list early, and so does a full one; no more.
+        let _ = collect_keys(&mut scanner, &mut String::new(), 0, &mut list);
     }
     list
 }
 
+/// Why a list of keys ends.
+struct Ended;
+
+impl From<Undecodable> for Ended {
+    fn from(_: Undecodable) -> Ended {
+        Ended
+    }
+}
+
 fn collect_keys(
     scanner: &mut Scanner<'_>,
-    path: &str,
+    path: &mut String,
     depth: u32,
     list: &mut Vec<String>,
-) -> Result<(), Undecodable> {
+) -> Result<(), Ended> {
+    if list.len() >= MAX_KEYS {
+        return Err(Ended);
+    }
     let first = &mut true;
+    let length = path.len();
     match scanner.peek() {
-        Some(b'{') if depth < MAX_SEARCH && list.len() < MAX_KEYS => {
+        Some(b'{') if depth < MAX_SEARCH => {
             scanner.enter();
             while let Some(key) = scanner.key(first)? {
-                let key = crate::decode::printable(&key);
-                let path = if path.is_empty() {
-                    key
-                } else {
-                    format!("{path}.{key}")
-                };
-                collect_keys(scanner, &path, depth + 1, list)?;
+                if length > 0 {
+                    path.push('.');
+                }
+                path.push_str(&crate::decode::printable(&key));
+                collect_keys(scanner, path, depth + 1, list)?;
+                path.truncate(length);
             }
             Ok(())
         }
-        Some(b'[') if depth < MAX_SEARCH && list.len() < MAX_KEYS => {
+        Some(b'[') if depth < MAX_SEARCH => {
             scanner.enter();
             let mut index = 0;
             while scanner.element(first)? {
                 match (index, scanner.peek()) {
                     (0, Some(b'{')) => {
-                        collect_keys(scanner, &format!("{path}[]"), depth + 1, list)?
+                        path.push_str("[]");
+                        collect_keys(scanner, path, depth + 1, list)?;
+                        path.truncate(length);
                     }
                     _ => scanner.skip(depth)?,
                 }
                 index += 1;
             }
-            if !path.is_empty()
-                && !list.iter().any(|known| known.starts_with(path))
-                && list.len() < MAX_KEYS
-            {
-                list.push(path.to_owned());
+            if !path.is_empty() && !list.iter().any(|known| known.starts_with(path.as_str())) {
+                list.push(path.clone());
             }
             Ok(())
         }
         _ => {
-            if !path.is_empty() && list.len() < MAX_KEYS {
-                list.push(path.to_owned());
+            if !path.is_empty() {
+                list.push(path.clone());
             }
-            scanner.skip(depth)
+            Ok(scanner.skip(depth)?)
         }
     }
 }

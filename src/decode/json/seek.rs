@@ -27,6 +27,8 @@ pub(crate) struct Seeker<'a, 'p> {
     auto_orientation: bool,
     auto_stamp: bool,
     auto_interval: bool,
+    /// Samples in arrays so far, wherever in the message.
+    batched: usize,
     /// The strings and numbers of the outermost object that a line protocol needs.
     pub(crate) class: Option<Cow<'a, str>>,
     pub(crate) id: Option<Cow<'a, str>>,
@@ -47,6 +49,7 @@ impl<'a, 'p> Seeker<'a, 'p> {
             auto_orientation: auto(FieldRole::Orientation),
             auto_stamp: auto(FieldRole::Stamp),
             auto_interval: auto(FieldRole::Interval),
+            batched: 0,
             class: None,
             id: None,
             seq: None,
@@ -294,12 +297,13 @@ impl<'a, 'p> Seeker<'a, 'p> {
     /// One object of an array: a sample of a batch, or one transform among others.
     fn element(&mut self, element: Found<'a>, found: &mut Found<'a>) -> Scan<()> {
         if element.has_gyro() {
-            if found.batch.len() >= MAX_BATCH {
+            if self.batched >= MAX_BATCH {
                 return Err(Undecodable::TooMany {
                     limit: MAX_BATCH as u64,
                     field: "an array of samples".to_owned(),
                 });
             }
+            self.batched += 1;
             found.batch.push(element);
         } else if element.has_orientation() && !found.has_orientation() {
             let wanted = match &self.plan.child {

@@ -7,13 +7,14 @@
 //! # Source
 //! google/protobuf/descriptor.proto: the field numbers.
 
-use super::{Field, Kind, Many, Number, Schema, Struct};
+use super::{Field, Kind, MAX_NAME, Many, Number, Schema, Struct};
 use crate::decode::protobuf::wire::{Broken, Reader, Value};
 use std::collections::BTreeMap;
 
-/// Longest descriptor set that is read, and most messages in it.
+/// Longest descriptor set that is read, and most messages and fields in it.
 const MAX_BYTES: usize = 4 << 20;
 const MAX_MESSAGES: usize = 20_000;
+const MAX_FIELDS: usize = 100_000;
 
 /// Deepest nesting of message declarations.
 const MAX_DEPTH: usize = 32;
@@ -50,6 +51,7 @@ pub(crate) fn parse(bytes: &[u8], type_name: &str) -> Result<Schema, String> {
 struct Messages {
     names: Vec<String>,
     fields: Vec<Vec<Declared>>,
+    declared: usize,
 }
 
 #[derive(Default)]
@@ -99,11 +101,9 @@ impl Messages {
         outer: &str,
         depth: usize,
     ) -> Result<(), Broken> {
+        let broken = |offset, what| Err(Broken { offset, what });
         if depth > MAX_DEPTH || self.names.len() > MAX_MESSAGES {
-            return Err(Broken {
-                offset: base,
-                what: "too many messages",
-            });
+            return broken(base, "too many messages");
         }
         let mut name = String::new();
         let mut fields = Vec::new();
@@ -114,7 +114,13 @@ impl Messages {
             let at = message.offset() - inner.len();
             match number {
                 1 => name = text(inner),
-                2 => fields.push(declared(inner, at)?),
+                2 => {
+                    self.declared += 1;
+                    if self.declared > MAX_FIELDS {
+                        return broken(at, "too many fields");
+                    }
+                    fields.push(declared(inner, at)?);
+                }
                 3 => nested.push((inner, at)),
                 _ => {}
             }
@@ -124,6 +130,9 @@ impl Messages {
         } else {
             format!("{outer}.{name}")
         };
+        if full.len() > MAX_NAME {
+            return broken(base, "a message's name is too long");
+        }
         for (inner, at) in nested {
             self.message(inner, at, &full, depth + 1)?;
         }

@@ -10,12 +10,15 @@
 
 mod tokens;
 
-use super::{Field, Kind, Many, Number, Schema, Struct, ros_name};
+use super::{Field, Kind, MAX_NAME, Many, Number, Schema, Struct, ros_name};
 use std::collections::BTreeMap;
+use std::rc::Rc;
 use tokens::tokens;
 
 const MAX_TEXT: usize = 1 << 20;
 const MAX_DEPTH: usize = 32;
+/// Most structs, members, typedefs and enums.
+const MAX_DEFINITIONS: usize = 20_000;
 
 /// Reads `text` and makes `type_name` the root.
 ///
@@ -31,9 +34,11 @@ pub(crate) fn parse(text: &str, type_name: &str) -> Result<Schema, String> {
     let mut parser = Parser {
         tokens: tokens(text),
         at: 0,
-        scope: Vec::new(),
+        scope: Rc::from(""),
         names: BTreeMap::new(),
+        uses: Vec::new(),
         structs: Vec::new(),
+        definitions: 0,
     };
     parser.items(0)?;
     let wanted = ros_name(type_name);
@@ -49,21 +54,21 @@ pub(crate) fn parse(text: &str, type_name: &str) -> Result<Schema, String> {
 }
 
 /// A type before names are resolved.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy)]
 enum Written {
     Known(Kind),
-    /// The name, and the module it was used in.
-    Named(String, String),
+    /// A name, by its place in [`Parser::uses`].
+    Named(usize),
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy)]
 struct Typed {
     written: Written,
     many: Many,
 }
 
 /// What a scoped name stands for.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy)]
 enum Meaning {
     Struct(usize),
     Typedef(Typed),
@@ -75,9 +80,13 @@ type Members = Vec<(String, Typed)>;
 struct Parser<'a> {
     tokens: Vec<&'a str>,
     at: usize,
-    scope: Vec<&'a str>,
+    /// The modules around, joined by `::`.
+    scope: Rc<str>,
     names: BTreeMap<String, Meaning>,
+    /// Names that are used as types, each with the modules it was used in.
+    uses: Vec<(String, Rc<str>)>,
     structs: Vec<(String, Members)>,
+    definitions: usize,
 }
 
 impl<'a> Parser<'a> {
@@ -121,13 +130,15 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// `name` as seen from outside the modules it stands in.
-    fn full(&self, name: &str) -> String {
-        let mut full = self.scope.join("::");
-        if !full.is_empty() {
-            full.push_str("::");
+    /// `name`, which is defined here, as seen from outside the modules it stands in.
+    fn full(&mut self, name: &str) -> Result<String, String> {
+        self.definitions += 1;
+        if self.definitions > MAX_DEFINITIONS {
+            return Err(format!(
+                "the schema defines more than {MAX_DEFINITIONS} types and members"
+            ));
         }
-        full + name
+        joined(&self.scope, name)
     }
 
     fn items(&mut self, depth: usize) -> Result<(), String> {
@@ -146,24 +157,25 @@ impl<'a> Parser<'a> {
                     self.at += 1;
                     let name = self.name()?;
                     self.expect("{")?;
-                    self.scope.push(name);
+                    let inner = joined(&self.scope, name)?;
+                    let outer = std::mem::replace(&mut self.scope, inner.into());
                     self.items(depth + 1)?;
-                    self.scope.pop();
+                    self.scope = outer;
                     self.expect("}")?;
                 }
                 "struct" => self.structure()?,
                 "typedef" => {
                     self.at += 1;
                     let typed = self.typed(0)?;
-                    for (name, typed) in self.declarators(&typed)? {
-                        let full = self.full(&name);
+                    for (name, typed) in self.declarators(typed)? {
+                        let full = joined(&self.scope, &name)?;
                         self.names.insert(full, Meaning::Typedef(typed));
                     }
                 }
                 "enum" => {
                     self.at += 1;
                     let name = self.name()?;
-                    let full = self.full(name);
+                    let full = self.full(name)?;
                     self.names.insert(full, Meaning::Enum);
                     self.skip();
                 }
@@ -215,7 +227,7 @@ impl<'a> Parser<'a> {
     fn structure(&mut self) -> Result<(), String> {
         self.at += 1;
         let name = self.name()?;
-        let full = self.full(name);
+        let full = self.full(name)?;
         if self.take(";") {
             return Ok(());
         }
@@ -235,7 +247,7 @@ impl<'a> Parser<'a> {
             if optional {
                 typed.written = Written::Known(Kind::Undefined);
             }
-            members.extend(self.declarators(&typed)?);
+            members.extend(self.declarators(typed)?);
         }
         let index = self.structs.len();
         self.names.insert(full.clone(), Meaning::Struct(index));
@@ -244,10 +256,11 @@ impl<'a> Parser<'a> {
     }
 
     /// `a, b[3], c[2][2];`
-    fn declarators(&mut self, typed: &Typed) -> Result<Members, String> {
+    fn declarators(&mut self, typed: Typed) -> Result<Members, String> {
         let mut list = Vec::new();
         loop {
             let name = self.name()?;
+            self.full(name)?;
             let mut many = Many::One;
             while self.take("[") {
                 let size = self.next();
@@ -326,7 +339,7 @@ impl<'a> Parser<'a> {
                     self.at += 1;
                 }
                 self.expect(">")?;
-                return Ok(nested(&element, Many::Sequence));
+                return Ok(nested(element, Many::Sequence));
             }
             "map" | "any" | "fixed" => {
                 self.at += 1;
@@ -365,22 +378,23 @@ impl<'a> Parser<'a> {
         self.take("::");
         let mut name = self.name()?.to_owned();
         while self.take("::") {
-            name.push_str("::");
-            name.push_str(self.name()?);
+            name = joined(&name, self.name()?)?;
         }
+        self.uses.push((name, Rc::clone(&self.scope)));
         Ok(Typed {
-            written: Written::Named(name, self.scope.join("::")),
+            written: Written::Named(self.uses.len() - 1),
             many: Many::One,
         })
     }
 
     fn link(&self) -> Schema {
+        let mut known = vec![None; self.uses.len()];
         let structs = self.structs.iter().map(|(name, members)| Struct {
             name: name.clone(),
             fields: members
                 .iter()
                 .map(|(name, typed)| {
-                    let (kind, many) = self.resolve(typed, 0);
+                    let (kind, many) = self.resolve(*typed, &mut known, 0);
                     Field {
                         name: name.clone(),
                         kind,
@@ -404,46 +418,96 @@ impl<'a> Parser<'a> {
         Schema { structs, root: 0 }
     }
 
-    fn resolve(&self, typed: &Typed, depth: usize) -> (Kind, Many) {
-        let (name, scope) = match &typed.written {
-            Written::Known(kind) => return (*kind, typed.many),
-            Written::Named(name, scope) => (name, scope),
+    /// What a type is; `known` has what each use of a name was found to stand for.
+    fn resolve(
+        &self,
+        typed: Typed,
+        known: &mut [Option<(Kind, Many)>],
+        depth: usize,
+    ) -> (Kind, Many) {
+        let of_name = match typed.written {
+            Written::Known(kind) => return (kind, typed.many),
+            Written::Named(at) => match known.get(at) {
+                Some(Some(found)) => *found,
+                _ => self.resolve_name(at, known, depth),
+            },
         };
-        // From the innermost module outwards.
-        let mut scope = scope.as_str();
-        let meaning = loop {
-            let full = if scope.is_empty() {
-                name.clone()
-            } else {
-                format!("{scope}::{name}")
+        let (kind, many) = of_name;
+        let written = Written::Known(kind);
+        match nested(Typed { written, many }, typed.many) {
+            Typed {
+                written: Written::Known(kind),
+                many,
+            } => (kind, many),
+            other => (Kind::Undefined, other.many),
+        }
+    }
+
+    fn resolve_name(
+        &self,
+        at: usize,
+        known: &mut [Option<(Kind, Many)>],
+        depth: usize,
+    ) -> (Kind, Many) {
+        let undefined = (Kind::Undefined, Many::One);
+        let (Some(slot), Some((name, scope))) = (known.get_mut(at), self.uses.get(at)) else {
+            return undefined;
+        };
+        // A typedef that comes back to itself finds this.
+        *slot = Some(undefined);
+        let found = match self.meaning(name, scope) {
+            Some(Meaning::Struct(index)) => (Kind::Struct(index), Many::One),
+            Some(Meaning::Enum) => (Kind::Number(Number::U32), Many::One),
+            Some(Meaning::Typedef(inner)) if depth < MAX_DEPTH => {
+                self.resolve(inner, known, depth + 1)
+            }
+            _ => undefined,
+        };
+        if let Some(slot) = known.get_mut(at) {
+            *slot = Some(found);
+        }
+        found
+    }
+
+    /// What `name` stands for in `scope`: from the innermost module outwards.
+    fn meaning(&self, name: &str, mut scope: &str) -> Option<Meaning> {
+        loop {
+            let full = match scope {
+                "" => name.to_owned(),
+                _ => format!("{scope}::{name}"),
             };
             if let Some(meaning) = self.names.get(&full) {
-                break Some(meaning);
+                return Some(*meaning);
             }
             if scope.is_empty() {
-                break None;
+                return None;
             }
             scope = scope.rsplit_once("::").map_or("", |(outer, _)| outer);
-        };
-        match meaning {
-            Some(Meaning::Struct(index)) => (Kind::Struct(*index), typed.many),
-            Some(Meaning::Enum) => (Kind::Number(Number::U32), typed.many),
-            Some(Meaning::Typedef(inner)) if depth < MAX_DEPTH => {
-                let inner = nested(inner, typed.many);
-                self.resolve(&inner, depth + 1)
-            }
-            _ => (Kind::Undefined, typed.many),
         }
+    }
+}
+
+/// `outer::name`, of bounded length: it is kept for everything that is defined or used there.
+fn joined(outer: &str, name: &str) -> Result<String, String> {
+    let full = match outer {
+        "" => name.to_owned(),
+        _ => format!("{outer}::{name}"),
+    };
+    match full.len() {
+        0..=MAX_NAME => Ok(full),
+        n => Err(format!(
+            "the schema has a name of {n} bytes, over the limit of {MAX_NAME}"
+        )),
     }
 }
 
 /// `many` of what `inner` already is: arrays of arrays lie flat, anything else has no place in a
 /// [`Field`] and becomes undefined.
-fn nested(inner: &Typed, many: Many) -> Typed {
+fn nested(inner: Typed, many: Many) -> Typed {
     let (written, many) = match (inner.many, many) {
-        (one, Many::One) => (inner.written.clone(), one),
-        (Many::One, many) => (inner.written.clone(), many),
-        (Many::Array(n), many @ Many::Array(_)) => (inner.written.clone(), product(many, n)),
+        (one, Many::One) => (inner.written, one),
+        (Many::One, many) => (inner.written, many),
+        (Many::Array(n), many @ Many::Array(_)) => (inner.written, product(many, n)),
         _ => (Written::Known(Kind::Undefined), Many::One),
     };
     Typed { written, many }

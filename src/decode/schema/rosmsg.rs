@@ -3,7 +3,7 @@
 //! The text is what MCAP and the ROS 1 bag store: the message's own definition, then one section for
 //! each type it needs, behind a line of `=` and a line `MSG: pkg/Type`.
 
-use super::{Field, Kind, Many, Number, Schema, Struct, ros_name};
+use super::{Field, Kind, MAX_NAME, Many, Number, Schema, Struct, ros_name};
 use std::collections::BTreeMap;
 
 /// Longest schema text that is read, and most fields it may define. The largest in use (vision,
@@ -31,19 +31,19 @@ pub(crate) fn parse(text: &str, type_name: &str, dialect: Dialect) -> Result<Sch
             text.len()
         ));
     }
-    let mut sections = vec![Section::new(ros_name(type_name))];
+    let mut sections = vec![Section::new(type_name)?];
     let mut fields = 0;
     for (number, line) in text.lines().enumerate() {
+        let at_line = |why: String| format!("schema line {}: {why}", number + 1);
         let line = line.trim();
         if line.len() >= 5 && line.bytes().all(|b| b == b'=') {
             continue;
         }
         if let Some(name) = line.strip_prefix("MSG:") {
-            sections.push(Section::new(ros_name(name.trim())));
+            sections.push(Section::new(name.trim()).map_err(at_line)?);
             continue;
         }
-        let declaration =
-            declaration(line).map_err(|why| format!("schema line {}: {why}", number + 1))?;
+        let declaration = declaration(line).map_err(at_line)?;
         if let (Some(d), Some(section)) = (declaration, sections.last_mut()) {
             fields += 1;
             if fields > MAX_FIELDS {
@@ -62,10 +62,16 @@ struct Section<'a> {
 }
 
 impl Section<'_> {
-    fn new(name: String) -> Self {
-        Section {
-            name,
-            declarations: Vec::new(),
+    fn new(type_name: &str) -> Result<Self, String> {
+        let name = ros_name(type_name);
+        match name.len() {
+            0..=MAX_NAME => Ok(Section {
+                name,
+                declarations: Vec::new(),
+            }),
+            n => Err(format!(
+                "a type's name of {n} bytes, over the limit of {MAX_NAME}"
+            )),
         }
     }
 }

@@ -18,6 +18,8 @@ pub(in crate::sink) struct McapFile {
     offset: u64,
     crc: crc32fast::Hasher,
     schemas: Vec<Schema>,
+    /// Places in `schemas` by CRC-32 and length of the text: a log may have thousands, and each is asked for.
+    schemas_by_text: BTreeMap<(u32, usize), Vec<usize>>,
     channels: Vec<Channel>,
     messages: BTreeMap<u16, u64>,
     times: Option<(u64, u64)>,
@@ -75,6 +77,8 @@ impl McapFile {
         attachment: &Attachment<'_>,
     ) {
         let at = out.len();
+        // At once: growing would hold it twice.
+        out.reserve(attachment.data.len() + 1024);
         Body::begin(out, ATTACHMENT)
             .u64(attachment.log_time)
             .u64(attachment.create_time)
@@ -108,9 +112,11 @@ impl McapFile {
         encoding: &str,
         text: &[u8],
     ) -> Option<u16> {
-        if let Some(known) = self
-            .schemas
+        let key = (crc32fast::hash(text), text.len());
+        let alike = self.schemas_by_text.entry(key).or_default();
+        if let Some(known) = alike
             .iter()
+            .filter_map(|at| self.schemas.get(*at))
             .find(|s| s.name == name && s.encoding == encoding && s.text == text)
         {
             return Some(known.id);
@@ -124,6 +130,7 @@ impl McapFile {
             text: text.to_vec(),
         };
         schema.push(out);
+        alike.push(self.schemas.len());
         self.schemas.push(schema);
         Some(id)
     }

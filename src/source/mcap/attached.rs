@@ -18,7 +18,7 @@ pub(super) fn intact(opcode: u8, body: &[u8]) -> Result<Record<'_>, ProblemKind>
         _ => "header",
     };
     let Some(record) = Record::parse(opcode, body) else {
-        let why = "its lengths do not add up";
+        let why = "its lengths do not add up, or it has more than 65536 entries";
         return Err(ProblemKind::Attached { what, why });
     };
     if let Record::Attachment(attachment) = &record

@@ -83,9 +83,11 @@ pub fn list(
                                 body,
                             }),
                             None => {
-                                let kind = ProblemKind::InnerRecord {
-                                    at: at as u64,
-                                    length: body.map_or(0, |b| b.len() as u64),
+                                let at = at as u64;
+                                let length = body.map_or(0, |b| b.len() as u64);
+                                let kind = match opcode {
+                                    0 => ProblemKind::NoInnerRecord { at },
+                                    _ => ProblemKind::InnerRecord { at, length },
                                 };
                                 problems.add(place.offset, kind, None);
                                 ControlFlow::Continue(())
@@ -109,7 +111,8 @@ pub fn list(
     Ok((scanner.facts, problems))
 }
 
-/// Calls `see` with offset, opcode and body of each record; a body of `None` runs over the end.
+/// Calls `see` with offset, opcode and body of each record; one that runs over the end, or has the
+/// opcode 0 that no record has, has no body and is the last.
 fn each(
     records: &[u8],
     mut see: impl FnMut(usize, u8, Option<&[u8]>) -> ControlFlow<()>,
@@ -123,6 +126,7 @@ fn each(
             .ok()
             .and_then(|n| (at + HEAD).checked_add(n));
         let body = end.and_then(|end| records.get(at + HEAD..end));
+        let body = body.filter(|_| opcode != 0);
         see(at, opcode, body)?;
         let Some(body) = body else { break };
         at += HEAD + body.len();

@@ -6,6 +6,7 @@
 use super::bytes::{HEAD, head_at};
 use super::channels::{Channel, NONE, Table};
 use super::order::Batch;
+use super::problem::ProblemKind;
 use super::record::{MessageRecord, op};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -124,6 +125,27 @@ pub(super) enum Stop {
         at: usize,
         length: u64,
     },
+    /// Opcode 0, which no record has: what is here was never written as one.
+    NoRecord {
+        at: usize,
+    },
+}
+
+impl Stop {
+    /// What ended a pass before the end of its records, and where.
+    pub(super) fn fault(self) -> Option<(ProblemKind, usize)> {
+        match self {
+            Stop::Broken { at, length } => {
+                let kind = ProblemKind::InnerRecord {
+                    at: at as u64,
+                    length,
+                };
+                Some((kind, at))
+            }
+            Stop::NoRecord { at } => Some((ProblemKind::NoInnerRecord { at: at as u64 }, at)),
+            Stop::End | Stop::Definition { .. } | Stop::Adopt { .. } => None,
+        }
+    }
 }
 
 /// Where a block lies: what its messages report as their place.
@@ -163,6 +185,7 @@ pub(super) fn pass<T, D>(
             return Stop::Broken { at, length };
         };
         match opcode {
+            0 => return Stop::NoRecord { at },
             op::MESSAGE => match MessageRecord::parse(body) {
                 Some(m) => {
                     let index = table.lookup(m.channel_id);

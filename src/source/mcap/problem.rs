@@ -97,6 +97,11 @@ pub enum ProblemKind {
         /// Length of the record's body.
         length: u64,
     },
+    /// Bytes inside a chunk that begin with opcode 0 and so are no record; records before them were used.
+    NoInnerRecord {
+        /// Where in the unpacked chunk.
+        at: u64,
+    },
     /// Messages too short to hold a message header.
     ShortMessages,
     /// Messages on a channel that was never defined.
@@ -235,6 +240,10 @@ impl fmt::Display for ProblemKind {
             ProblemKind::InnerRecord { at, length } => write!(
                 f,
                 "record of {length} bytes at {at} runs over the end of its chunk; the rest skipped"
+            ),
+            ProblemKind::NoInnerRecord { at } => write!(
+                f,
+                "no record at {at} in its chunk (opcode 0); the rest skipped"
             ),
             ProblemKind::ShortMessages => write!(f, "messages shorter than a message header"),
             ProblemKind::UnknownChannel { id } => {

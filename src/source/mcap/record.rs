@@ -184,7 +184,8 @@ pub struct Statistics {
 }
 
 impl<'a> Record<'a> {
-    /// The fields of a record, or `None` where the body is too short or its lengths do not add up.
+    /// The fields of a record, or `None` where the body is too short, its lengths do not add up, or it has
+    /// more than 65,536 pairs of text.
     #[must_use]
     pub fn parse(opcode: u8, body: &'a [u8]) -> Option<Record<'a>> {
         let mut b = Bytes::new(body);
@@ -263,8 +264,16 @@ impl<'a> Record<'a> {
     }
 }
 
+/// Most pairs of text a record may have: each takes several times the memory of its bytes, and what is in
+/// use has a few dozen.
+const MAX_PAIRS: usize = 1 << 16;
+
 fn pairs<'a>(b: &mut Bytes<'a>) -> Option<Vec<(&'a str, &'a str)>> {
-    b.entries(|e| Some((e.text()?, e.text()?)))
+    let mut left = MAX_PAIRS;
+    b.entries(|e| {
+        left = left.checked_sub(1)?;
+        Some((e.text()?, e.text()?))
+    })
 }
 
 impl Footer {

@@ -26,6 +26,10 @@ const SLACK: u64 = 1 << 10;
 /// Metadata records up to this long are looked into; ours takes about 1 kB.
 const METADATA_READ: u64 = 64 << 10;
 
+/// Longest metadata record that is copied, unless the limit of all records is lower: it is held several
+/// times over on its way into the copy, and those in use are a thousand times shorter.
+const METADATA_COPIED: u64 = 8 << 20;
+
 /// What a log says about itself outside its messages.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Facts {
@@ -305,7 +309,10 @@ impl Scanner {
             || attached
             || self.besides == Besides::Everything
             || matches!(opcode, op::HEADER | op::DATA_END | op::STATISTICS);
-        let limit = self.limits.record;
+        let limit = match opcode {
+            op::METADATA if attached => self.limits.record.min(METADATA_COPIED),
+            _ => self.limits.record,
+        };
         if !wanted || length > limit {
             if attached {
                 let kind = ProblemKind::RecordTooLong {

@@ -175,16 +175,11 @@ where
                         &mut batch,
                     )
                 });
-                let fault = match stop {
-                    Stop::Broken { at, length } => {
-                        let unread = records.len().saturating_sub(at) as u64;
-                        let at = at as u64;
-                        Some((ProblemKind::InnerRecord { at, length }, unread))
-                    }
-                    _ => None,
-                };
+                let fault = stop
+                    .fault()
+                    .map(|(kind, at)| (kind, records.len().saturating_sub(at) as u64));
                 match stop {
-                    Stop::End | Stop::Broken { .. } => {
+                    Stop::End | Stop::Broken { .. } | Stop::NoRecord { .. } => {
                         self.arrange(&mut batch);
                         Done::Walked {
                             batch,

@@ -1,13 +1,12 @@
 //! IDL text -> tokens. Pure.
 
 /// Words, numbers, punctuation; comments, preprocessor lines, section marks and the contents of
-/// strings are left out.
+/// strings are left out. What is searched for is gone over, so that the work grows as the text does.
 pub(super) fn tokens(text: &str) -> Vec<&str> {
     let mut tokens = Vec::new();
     let mut rest = text;
     let mut line_start = true;
     while let Some(c) = rest.chars().next() {
-        let line = rest.find('\n').unwrap_or(rest.len());
         let skip = if c == '\n' {
             line_start = true;
             1
@@ -16,7 +15,7 @@ pub(super) fn tokens(text: &str) -> Vec<&str> {
         } else if line_start && (c == '#' || c == '=' || rest.starts_with("IDL:"))
             || rest.starts_with("//")
         {
-            line
+            rest.find('\n').unwrap_or(rest.len())
         } else if rest.starts_with("/*") {
             rest.find("*/").map_or(rest.len(), |end| end + 2)
         } else if c == '"' || c == '\'' {

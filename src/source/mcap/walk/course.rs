@@ -213,13 +213,11 @@ where
                     let (select, problems) = (&mut *self.select, &mut self.problems);
                     match stop {
                         Stop::End => break,
-                        Stop::Broken { at, length } => {
-                            let kind = ProblemKind::InnerRecord {
-                                at: at as u64,
-                                length,
-                            };
-                            problems.add(offset, kind, None);
-                            problems.skip((records.len() - at) as u64);
+                        Stop::Broken { .. } | Stop::NoRecord { .. } => {
+                            if let Some((kind, at)) = stop.fault() {
+                                problems.add(offset, kind, None);
+                                problems.skip((records.len() - at) as u64);
+                            }
                             break;
                         }
                         Stop::Definition { at } => {
