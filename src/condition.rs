@@ -33,6 +33,7 @@
 mod clock;
 mod gate;
 mod histogram;
+mod memory;
 mod order;
 mod report;
 mod settings;
@@ -44,6 +45,7 @@ pub mod regularise;
 pub mod stillness;
 
 pub use clock::{Clock, ClockWarning, choose_clock};
+pub use memory::Memory;
 pub use report::{FirstBad, GAPS_KEPT, Gap, Gaps, Report};
 pub use settings::{GyroUnit, OnGap, Settings, SettingsError};
 

@@ -82,6 +82,12 @@ impl Default for Plan {
 }
 
 impl Plan {
+    /// Whether a step of so many nanoseconds is integrated across.
+    #[must_use]
+    pub fn bridges(&self, nanos: i64) -> bool {
+        self.on_gap == OnGap::Bridge || nanos as f64 <= self.max_gap_secs * 1e9
+    }
+
     /// Checks what can be judged without the data.
     ///
     /// # Errors

@@ -48,6 +48,6 @@ mod window;
 pub use covariance::Noise;
 pub use executor::{Executor, Sequential};
 pub use method::{LARGEST_WINDOW, Method, Order, Placement, UnknownName};
-pub use propagator::Propagator;
+pub use propagator::{Memory, Propagator};
 pub use report::Report;
 pub use settings::{Settings, SettingsError};

@@ -24,6 +24,7 @@ mod serve {
     mod packaging;
     mod packed;
     mod recording;
+    mod runs;
     mod same_bytes;
     mod slow_readers;
     mod state;

@@ -7,6 +7,7 @@ use super::{Global, Outcome};
 use crate::client::remote::Remote;
 use crate::error::{Error, Result};
 use crate::serve::hub::Hub;
+use crate::serve::limits::Limits;
 use crate::serve::recorder::{self, Recorder, Split};
 use crate::serve::shutdown::{self, Signals};
 use crate::serve::source::Source;
@@ -86,9 +87,21 @@ pub struct Serve {
     /// loses no heading
     #[arg(long, value_name = "FILE")]
     pub state: Option<PathBuf>,
+    /// A sensor that connects again and sends again what it has sent may begin so many seconds back:
+    /// those samples count as late. One that begins further back begins a new run
+    #[arg(long, value_name = "SECS", value_parser = window, default_value = "60")]
+    pub state_window: Duration,
     #[command(flatten)]
     #[allow(missing_docs)]
     pub admission: Admission,
+}
+
+/// `--state-window`.
+fn window(text: &str) -> std::result::Result<Duration, String> {
+    let secs: Option<f64> = text.strip_suffix('s').unwrap_or(text).parse().ok();
+    secs.filter(|secs| (0.0..=86_400.0).contains(secs))
+        .map(Duration::from_secs_f64)
+        .ok_or_else(|| "expected seconds, 0 to 86400".to_owned())
 }
 
 /// A sink of the daemon.
@@ -326,6 +339,10 @@ impl Serve {
                 .iter()
                 .map(|o| sent_to(o))
                 .collect::<Result<_>>()?,
+            limits: Limits {
+                state_window: self.state_window,
+                ..Limits::default()
+            },
             ..Settings::default()
         })
     }

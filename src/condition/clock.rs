@@ -171,6 +171,16 @@ impl IndexClock {
         }
     }
 
+    /// When the first sample was received.
+    pub(super) fn base(&self) -> Option<Nanos> {
+        self.base
+    }
+
+    /// The first sample was received at `base`.
+    pub(super) fn count_from(&mut self, base: Nanos) {
+        self.base = Some(base);
+    }
+
     pub(super) fn stamp(&mut self, index: u64, log: Nanos) -> Nanos {
         let n = i64::try_from(index).unwrap_or(i64::MAX);
         let base = *self.base.get_or_insert(log);

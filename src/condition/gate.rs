@@ -144,7 +144,7 @@ impl Gate {
     }
 }
 
-const NO_ACCEL: Vector3<f64> = Vector3::new(f64::NAN, f64::NAN, f64::NAN);
+pub(super) const NO_ACCEL: Vector3<f64> = Vector3::new(f64::NAN, f64::NAN, f64::NAN);
 
 /// The acceleration, unless a component is not finite.
 #[inline]

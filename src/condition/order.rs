@@ -62,6 +62,40 @@ impl Order {
         self.high
     }
 
+    pub(super) fn epoch(&self) -> u32 {
+        self.epoch
+    }
+
+    pub(super) fn floor(&self) -> Option<Nanos> {
+        self.floor
+    }
+
+    pub(super) fn suspects(&self) -> &[Entry] {
+        &self.suspects
+    }
+
+    /// Entries in the line that were not timed yet.
+    pub(super) fn untimed(&self) -> &[Entry] {
+        self.line.get(self.cursor..).unwrap_or_default()
+    }
+
+    /// Goes on with these in place of what there was.
+    pub(super) fn recall(
+        &mut self,
+        untimed: Vec<Entry>,
+        suspects: Vec<Entry>,
+        epoch: u32,
+        high: Option<Nanos>,
+        floor: Option<Nanos>,
+    ) {
+        let current = untimed.iter().position(|e| e.epoch == epoch);
+        self.epoch_from = current.unwrap_or(untimed.len());
+        self.cursor = 0;
+        self.line = untimed;
+        (self.suspects, self.epoch) = (suspects, epoch);
+        (self.high, self.floor) = (high, floor);
+    }
+
     /// The sample of `epoch` that was timed last got this stamp: nothing can be put in before it.
     #[inline]
     pub(super) fn timed(&mut self, stamp: Nanos, epoch: u32) {

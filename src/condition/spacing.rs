@@ -26,7 +26,58 @@ pub(super) struct Spacing {
     limit: i64,
 }
 
+/// All that a [`Spacing`] knows.
+#[derive(Clone, PartialEq, Debug)]
+#[cfg_attr(
+    feature = "service",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(deny_unknown_fields)
+)]
+pub(super) struct Steps {
+    steps: Vec<i64>,
+    agreeing: u32,
+    excess: i64,
+    early: bool,
+    nominal: Option<i64>,
+}
+
 impl Spacing {
+    pub(super) fn steps(&self) -> Steps {
+        Steps {
+            steps: self.steps.get(..self.len).unwrap_or_default().to_vec(),
+            agreeing: self.agreeing,
+            excess: self.excess,
+            early: self.early,
+            nominal: self.nominal,
+        }
+    }
+
+    /// Knows this from now on; `false`, and nothing has changed, when none can know it.
+    pub(super) fn set_steps(&mut self, known: &Steps) -> bool {
+        let len = known.steps.len();
+        let agreeing = usize::try_from(known.agreeing).unwrap_or(usize::MAX);
+        // A judgement divides by those that agree.
+        if len >= BLOCK || agreeing > len || known.nominal.is_some_and(|n| n < 1) {
+            return false;
+        }
+        if let Some(nominal) = known.nominal {
+            self.set(nominal);
+        }
+        for (slot, step) in self.steps.iter_mut().zip(&known.steps) {
+            *slot = *step;
+        }
+        self.len = len;
+        self.agreeing = known.agreeing;
+        self.excess = known.excess.clamp(-self.most_excess(), self.most_excess());
+        self.early = known.early;
+        true
+    }
+
+    /// No sum of excesses is larger.
+    fn most_excess(&self) -> i64 {
+        self.tolerance.saturating_mul(BLOCK as i64)
+    }
+
     /// Until the ordinary step is known, `limit` nanoseconds count as ordinary.
     pub(super) fn new(limit: i64) -> Self {
         Spacing {

@@ -6,7 +6,7 @@
 use super::gate::{Entry, finite_accel};
 use super::report::{Gap, Report};
 use super::settings::{OnGap, Settings};
-use super::spacing::Spacing;
+use super::spacing::{Spacing, Steps};
 use crate::record::{Join, Nanos, RateSample, SampleKind, Status, Verdict};
 use nalgebra::Vector3;
 
@@ -18,11 +18,11 @@ const MAX_LOOK: usize = 12;
 
 /// The sample before.
 #[derive(Clone, Copy, Debug)]
-struct Previous {
-    stamp: Nanos,
-    start: Nanos,
-    value: Vector3<f64>,
-    epoch: u32,
+pub(super) struct Previous {
+    pub(super) stamp: Nanos,
+    pub(super) start: Nanos,
+    pub(super) value: Vector3<f64>,
+    pub(super) epoch: u32,
 }
 
 /// Gives every entry its interval and its join.
@@ -51,6 +51,24 @@ impl Timing {
     #[inline]
     pub(super) fn spacing(&self) -> Option<i64> {
         self.spacing.nominal()
+    }
+
+    pub(super) fn previous(&self) -> Option<Previous> {
+        self.previous
+    }
+
+    pub(super) fn set_previous(&mut self, previous: Option<Previous>) {
+        self.previous = previous;
+    }
+
+    /// What is known of the ordinary step.
+    pub(super) fn steps(&self) -> Steps {
+        self.spacing.steps()
+    }
+
+    /// Whether that can be known; it is from now on.
+    pub(super) fn set_steps(&mut self, steps: &Steps) -> bool {
+        self.spacing.set_steps(steps)
     }
 
     /// Learns the ordinary step from the first entries, before any of them is timed.

@@ -9,7 +9,8 @@ use crate::condition::{self, Conditioner};
 use crate::config::Plan;
 use crate::model::frames::{Convention, World};
 use crate::propagate::{self, Executor, Method, Propagator};
-use crate::record::{AttitudeSample, RateSample, RawSample};
+use crate::record::{AttitudeSample, Nanos, RateSample, RawSample};
+use serde::{Deserialize, Serialize};
 
 /// An estimator of one stream.
 #[derive(Debug)]
@@ -18,10 +19,28 @@ pub struct Estimator {
     regulariser: Option<Regulariser>,
     propagator: Propagator,
     world: World,
+    /// Tells settings apart under which a [`Memory`] means something else.
+    settings: u64,
     rates: Vec<RateSample>,
     /// The same with their new stamps.
     even: Vec<RateSample>,
     out: Vec<AttitudeSample>,
+}
+
+/// What an estimator knows at one moment: a few kilobytes of text.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+pub struct Memory {
+    settings: u64,
+    conditioning: condition::Memory,
+    propagation: propagate::Memory,
+}
+
+impl Memory {
+    /// The last stamp that was used.
+    #[must_use]
+    pub fn last(&self) -> Option<Nanos> {
+        self.conditioning.last()
+    }
 }
 
 impl Estimator {
@@ -57,15 +76,20 @@ impl Estimator {
         prepared: &Prepared,
         settings: &condition::Settings,
     ) -> Result<Estimator, String> {
-        let propagator = Propagator::new(propagate::Settings {
+        let propagation = propagate::Settings {
             method: plan.method,
             kind: resolved.kind,
             initial: prepared.initial,
             world_rate: prepared.world_rate,
             noise: plan.noise.with_bias(prepared.bias_sigma.into()),
-        })
-        .map_err(|e| e.to_string())?;
+        };
+        let propagator = Propagator::new(propagation).map_err(|e| e.to_string())?;
+        let noise = propagation.noise;
         Ok(Estimator {
+            settings: told_apart(&format!(
+                "{settings:?} {:?} {:?} {noise:?}",
+                plan.method, prepared.world_rate
+            )),
             conditioner: Conditioner::new(settings).map_err(|e| e.to_string())?,
             regulariser: prepared.stamps.regulariser(resolved.kind)?,
             propagator,
@@ -87,6 +111,54 @@ impl Estimator {
             last = relabelled(&last, from, Convention::EnuFlu);
         }
         self.propagator.resume(&last).map_err(|e| e.to_string())
+    }
+
+    /// What it knows, for another estimator to go on exactly; `None` where there is nothing yet, and
+    /// where stamps are regularised, which is not kept.
+    #[must_use]
+    pub fn memory(&self) -> Option<Memory> {
+        if self.regulariser.is_some() {
+            return None;
+        }
+        Some(Memory {
+            settings: self.settings,
+            conditioning: self.conditioner.memory()?,
+            propagation: self.propagator.memory()?,
+        })
+    }
+
+    /// Goes on as the estimator would have that knew this; what was counted here stays. `false`, and it
+    /// is as before, when that had other settings or no estimator can have known it.
+    #[must_use]
+    pub fn recall(&mut self, memory: &Memory) -> bool {
+        if self.regulariser.is_some() || self.settings != memory.settings {
+            return false;
+        }
+        let mut conditioner = self.conditioner.clone();
+        let fits =
+            conditioner.recall(&memory.conditioning) && self.propagator.recall(&memory.propagation);
+        if fits {
+            self.conditioner = conditioner;
+        }
+        fits
+    }
+
+    /// Begins as the run after that of `before`, whose samples stay counted: the first attitude says
+    /// that it was reset.
+    pub fn succeed(&mut self, before: &condition::Report, resets: u32) {
+        self.conditioner.succeed(before);
+        self.propagator.succeed(resets);
+    }
+
+    /// See [`Conditioner::stamp_of`].
+    #[must_use]
+    pub fn stamp_of(&self, raw: &RawSample, near: Nanos) -> Option<Nanos> {
+        self.conditioner.stamp_of(raw, near)
+    }
+
+    /// See [`Conditioner::push_late`].
+    pub fn take_late(&mut self, stamp: Nanos) {
+        self.conditioner.push_late(stamp);
     }
 
     /// Takes the next sample.
@@ -172,6 +244,13 @@ impl Estimator {
             *sample = relabelled(sample, Convention::EnuFlu, to);
         }
     }
+}
+
+/// A number for a text, the same in every release (FNV-1a).
+fn told_apart(text: &str) -> u64 {
+    text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+    })
 }
 
 /// The same attitude between other axes: world and body change together.

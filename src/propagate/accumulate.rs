@@ -22,6 +22,16 @@ impl Accumulator {
         }
     }
 
+    /// The quaternion before it is normalised, and what is in it too much.
+    pub(crate) fn parts(&self) -> ([f64; 4], [f64; 4]) {
+        (self.q, self.excess)
+    }
+
+    /// What [`parts`](Self::parts) said.
+    pub(crate) fn from_parts(q: [f64; 4], excess: [f64; 4]) -> Self {
+        Accumulator { q, excess }
+    }
+
     /// Turns on by `[cos(a/2) - 1, x, y, z]`, about body axes: the increment multiplies on the right.
     #[inline(always)]
     pub(crate) fn turn(&mut self, [c, x, y, z]: [f64; 4]) {

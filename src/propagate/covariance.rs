@@ -297,6 +297,56 @@ impl Covariance {
     }
 }
 
+/// What moves of a [`Covariance`], to go on from exactly.
+#[derive(Clone, PartialEq, Debug)]
+#[cfg_attr(
+    feature = "service",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(deny_unknown_fields)
+)]
+pub struct Carried {
+    /// Whether it was begun from a saved attitude: then all pieces move.
+    resumed: bool,
+    alike: f64,
+    turned: Rows,
+    attitude: Triangle,
+    cross: Rows,
+    bias: [f64; 3],
+}
+
+impl Covariance {
+    /// What [`carry`](Self::carry) needs.
+    pub(crate) fn carried(&self) -> Carried {
+        Carried {
+            resumed: self.kind != Covariance::new(self.noise).kind,
+            alike: self.alike,
+            turned: self.turned,
+            attitude: self.attitude,
+            cross: self.cross,
+            bias: self.bias,
+        }
+    }
+
+    /// Goes on from what another of the same noise has carried; `false` when that can not be.
+    pub(crate) fn carry(&mut self, carried: &Carried) -> bool {
+        let rows = carried.turned.iter().chain(&carried.cross).flatten();
+        let mut numbers = rows.chain(&carried.attitude).chain(&carried.bias);
+        let is_sound = numbers.all(|v| v.is_finite()) && (0.0..f64::MAX).contains(&carried.alike);
+        if !is_sound {
+            return false;
+        }
+        if carried.resumed {
+            self.kind = Kind::Wandering;
+        }
+        self.alike = carried.alike;
+        self.turned = carried.turned;
+        self.attitude = carried.attitude;
+        self.cross = carried.cross;
+        self.bias = carried.bias;
+        true
+    }
+}
+
 /// Brings variances beyond pi^2 back to it and keeps the correlations.
 #[cold]
 fn capped(p: &mut Triangle) {

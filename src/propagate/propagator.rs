@@ -1,7 +1,10 @@
 //! The stream: runs, breaks, outputs in order. Pure.
 
+mod memory;
 mod state;
 mod world;
+
+pub use memory::Memory;
 
 use super::classical;
 use super::executor::Executor;
@@ -19,6 +22,8 @@ use std::collections::VecDeque;
 const SEGMENT: usize = 1024;
 /// Samples taken in before outputs are made: bounds memory, whatever is pushed at once.
 const BLOCK: usize = 32 * SEGMENT;
+/// Elements before the interval integrated next that a window may still hold.
+const LOOKED_BACK: usize = LARGEST_WINDOW + classical::LOOK_BACK + 8;
 /// Fastest rate, and largest increment, that is believed: those of [`crate::record::Verdict::Huge`].
 const FASTEST: f64 = 1e4;
 const LARGEST: f64 = 1e3;
@@ -166,6 +171,12 @@ impl Propagator {
         Ok(())
     }
 
+    /// Begins as the run after one that was reset so often: the first output says [`Status::RESET`].
+    pub fn succeed(&mut self, resets: u32) {
+        self.state.reset_count = resets.saturating_add(1);
+        self.state.added = self.state.added.with(Status::RESET);
+    }
+
     /// Takes samples in and appends the attitudes that are ready: all but the last few, which wait
     /// for the method's look-ahead.
     pub fn push(
@@ -269,7 +280,11 @@ impl Propagator {
 
     /// Any later sample of a run.
     fn admit(&mut self, sample: &RateSample) {
-        let sample = self.trusted(sample);
+        let mut sample = self.trusted(sample);
+        // Nothing is missing, or it was held: `begin` says so itself.
+        if std::mem::take(&mut self.resumed) && sample.join == Join::Bridge {
+            sample.status = sample.status.with(Status::RESTARTED);
+        }
         let turns = sample.stamp.0 > self.last_stamp;
         if turns {
             self.append(&sample);
@@ -372,9 +387,7 @@ impl Propagator {
 
     /// Drops elements no window needs any more, now and then.
     fn forget(&mut self) {
-        let needed = self
-            .next
-            .saturating_sub(LARGEST_WINDOW + classical::LOOK_BACK + 8);
+        let needed = self.next.saturating_sub(LOOKED_BACK);
         if needed >= 2 * SEGMENT {
             self.track.drop_front(needed);
             self.next -= needed;

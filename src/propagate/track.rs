@@ -85,6 +85,11 @@ impl Track {
         self.bridged.push(bridged);
     }
 
+    /// Elements dropped from the front so far, were these all that is left of a longer run.
+    pub(crate) fn count_from(&mut self, base: usize) {
+        self.base = base;
+    }
+
     /// Forgets the first `count` elements.
     pub(crate) fn drop_front(&mut self, count: usize) {
         let count = count.min(self.len());

@@ -23,6 +23,7 @@ use super::limits::Limits;
 use super::playback::Playback;
 use super::recorder::Handle;
 use super::state::Sensors;
+use super::stream::run::Placed;
 use super::stream::{SensorStream, live_plan};
 use super::subscriber::{Chunk, Outbox};
 use super::wire::Fault;
@@ -114,10 +115,21 @@ pub struct Run<'a> {
     pub head: &'a Line,
     /// When they were received.
     pub received: Nanos,
+    /// What tells where they stand in their stream.
+    pub placed: Placed,
     /// The sender's number of each line, and where its samples end.
     pub lines: &'a [(Option<u64>, usize)],
     /// The samples.
     pub samples: &'a [RawSample],
+}
+
+/// What a sender should hear of its samples.
+#[derive(Clone, Debug, Default)]
+pub struct News {
+    /// No fault: a new run has begun.
+    pub note: Option<Fault>,
+    /// What was not used, the first time.
+    pub faults: Vec<Fault>,
 }
 
 impl Hub {
@@ -312,7 +324,7 @@ impl Hub {
             id.clone(),
             run.head,
             &first,
-            last.as_ref(),
+            last,
             |labels| self.declare(labels),
         )?;
         lock(&self.saved).remove(&*id);
@@ -337,7 +349,7 @@ impl Hub {
         sensor: &Mutex<Sensor>,
         run: &Run<'_>,
         text: &mut Vec<u8>,
-    ) -> std::result::Result<Vec<Fault>, Fault> {
+    ) -> std::result::Result<News, Fault> {
         let mut sensor = lock(sensor);
         let id = sensor.stream.id().clone();
         let refuse = |code, what: String| Fault {
@@ -351,7 +363,11 @@ impl Hub {
                     "another connection sends the samples of this sensor; give this one an `id` of its own".to_owned(),
                 ));
             }
-            _ => sensor.owner = Some(run.client),
+            Some(_) => {}
+            None => {
+                sensor.owner = Some(run.client);
+                sensor.stream.meet();
+            }
         }
         if !sensor.stream.agrees(self.plan_of(&id), run.head) {
             return Err(refuse(
@@ -359,11 +375,15 @@ impl Hub {
                 "`sample_kind` or unit is another than in this sensor's first sample; give it another `id`".to_owned(),
             ));
         }
+        let plan = self.plan_of(&id);
+        let note = sensor
+            .stream
+            .join(plan, run.samples, self.limits.state_window, run.placed)?;
         let mut rest = run.samples;
         let mut from = 0;
         for (seq, end) in run.lines {
             let (now, later) = rest.split_at(end.saturating_sub(from).min(rest.len()));
-            sensor.stream.take(*seq, now);
+            sensor.stream.take(plan, *seq, now);
             (rest, from) = (later, *end);
         }
         if let Some(recorder) = &self.recorder {
@@ -371,7 +391,8 @@ impl Hub {
         }
         count(&self.counters.samples, run.samples.len());
         self.deliver(&mut sensor, &id, text);
-        Ok(sensor.stream.news())
+        let faults = sensor.stream.news();
+        Ok(News { note, faults })
     }
 
     /// A line that could not be read stood among the samples of this sensor.

@@ -21,6 +21,8 @@ pub struct Limits {
     pub sender_silence: Duration,
     /// By when a shutdown has drained.
     pub drain: Duration,
+    /// How far back a new connection may send again what a sensor has sent before.
+    pub state_window: Duration,
 }
 
 impl Default for Limits {
@@ -34,6 +36,7 @@ impl Default for Limits {
             ping: Duration::from_secs(15),
             sender_silence: Duration::from_secs(5),
             drain: Duration::from_secs(2),
+            state_window: Duration::from_secs(60),
         }
     }
 }

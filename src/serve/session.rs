@@ -6,9 +6,11 @@
 
 mod unpacking;
 
-use super::hub::{Client, Hub, Run, Sensor, count};
+use super::hub::{Client, Hub, News, Run, Sensor, count};
 use super::limits::Allowance;
+use super::quiet;
 use super::stream::NAMELESS;
+use super::stream::run::Placed;
 use super::upstream::{self, Event};
 use super::wire::{self, Fault, Message};
 use crate::decode::framing::{Framed, Framer};
@@ -436,6 +438,7 @@ impl Session {
             client: self.client.number,
             head: &head,
             received,
+            placed: Placed::ByStamp,
             lines: &scratch.lines,
             samples: scratch.samples.get(..until).unwrap_or_default(),
         };
@@ -450,8 +453,12 @@ impl Session {
             news
         });
         match news {
-            Ok(news) => {
-                for fault in news {
+            Ok(News { note, faults }) => {
+                if let Some(note) = note {
+                    quiet::info(&format!("run {id}"), &format!("{id}: {}", note.message));
+                    self.client.outbox.reply(wire::note(&note));
+                }
+                for fault in faults {
                     self.say(&fault, 0, &[]);
                 }
             }

@@ -5,8 +5,10 @@
 
 use super::hub::Hub;
 use super::quiet;
+use super::stream::run::Span;
 use crate::error::{Error, Result};
 use crate::model::attitude::Quaternion;
+use crate::pipeline::estimator::Memory;
 use crate::record::{AttitudeCovariance, AttitudeSample, Nanos, Status};
 use crate::sink::{self, sync_directory};
 use serde::{Deserialize, Serialize};
@@ -17,10 +19,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// What this release writes.
-const FORMAT: u32 = 1;
-/// A larger file is none of ours: a sensor takes half a kilobyte.
-const MAX_BYTES: u64 = 16 << 20;
+/// What this release writes. 1 had neither the run nor the memory.
+const FORMAT: u32 = 2;
+/// A larger file is none of ours: a sensor takes no more than 8 KiB.
+const MAX_BYTES: u64 = 64 << 20;
 /// How often it is written.
 const EVERY: Duration = Duration::from_millis(500);
 
@@ -38,6 +40,18 @@ pub struct Saved {
     reset: u32,
     world: String,
     body: String,
+    /// First stamp of the run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    first_ns: Option<i64>,
+    /// Last stamp that was taken, where the last attitude is an older one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    last_ns: Option<i64>,
+    /// Number of the next attitude.
+    #[serde(default)]
+    seq: u64,
+    /// What the estimator needs to go on exactly.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    memory: Option<Box<Memory>>,
 }
 
 /// The last attitudes of all sensors, by `id`.
@@ -61,7 +75,50 @@ impl Saved {
             reset: last.reset_count,
             world: labels.world_axes.clone(),
             body: labels.body_axes.clone(),
+            first_ns: None,
+            last_ns: None,
+            seq: 0,
+            memory: None,
         }
+    }
+
+    /// In a run that began with this stamp, before the attitude with number `seq`.
+    #[must_use]
+    pub fn in_run(self, first: Option<Nanos>, seq: u64, memory: Option<Memory>) -> Saved {
+        let last = memory.as_ref().and_then(Memory::last);
+        Saved {
+            first_ns: first.map(|f| f.0),
+            last_ns: last.map(|l| l.0).filter(|l| *l != self.stamp_ns),
+            seq,
+            memory: memory.map(Box::new),
+            ..self
+        }
+    }
+
+    /// From where to where the run went.
+    pub(super) fn span(&self) -> Span {
+        Span {
+            first: self.first_ns.map(Nanos),
+            last: Nanos(self.last_ns.unwrap_or(self.stamp_ns)),
+        }
+    }
+
+    /// Number of the next attitude.
+    #[must_use]
+    pub fn next_seq(&self) -> u64 {
+        self.seq
+    }
+
+    /// How often it has been reset.
+    #[must_use]
+    pub fn resets(&self) -> u32 {
+        self.reset
+    }
+
+    /// What the estimator knew.
+    #[must_use]
+    pub fn memory(&self) -> Option<&Memory> {
+        self.memory.as_deref()
     }
 
     /// As it was.
@@ -106,15 +163,21 @@ impl StateFile {
     /// [`Error::Open`], [`Error::Write`]; [`Error::Usage`] when it is no state file: to begin anew in
     /// silence would be to give an attitude nobody expects.
     pub fn open(path: &Path) -> Result<(StateFile, Sensors)> {
-        let sensors = match File::open(path) {
+        let failed = |source| Error::Open {
+            path: path.to_owned(),
+            source,
+        };
+        let sensors = match std::fs::metadata(path) {
             Err(e) if e.kind() == io::ErrorKind::NotFound => Sensors::new(),
-            Err(source) => {
-                return Err(Error::Open {
-                    path: path.to_owned(),
-                    source,
-                });
+            Err(source) => return Err(failed(source)),
+            // To open a FIFO is to wait for its other end, and what is replaced must be a file.
+            Ok(found) if !found.is_file() => {
+                return Err(Error::Usage(format!(
+                    "--state {}: is no regular file\n  help: name a file in a folder that the daemon may write to; it is made if it is not there",
+                    path.display()
+                )));
             }
-            Ok(file) => read(path, file)?,
+            Ok(_) => read(path, File::open(path).map_err(failed)?)?,
         };
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let mut file = StateFile {
@@ -144,8 +207,13 @@ impl StateFile {
         if text == self.written {
             return Ok(());
         }
+        // What a crash has left, or somebody has put there.
+        match std::fs::remove_file(&self.temporary) {
+            Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(failed(e)),
+            _ => {}
+        }
         let mut options = OpenOptions::new();
-        options.write(true).create(true).truncate(true);
+        options.write(true).create_new(true);
         #[cfg(unix)]
         std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
         let replaced = options.open(&self.temporary).and_then(|mut file| {
@@ -175,9 +243,9 @@ fn read(path: &Path, file: File) -> Result<Sensors> {
     };
     let document: Document<Sensors> = serde_json::from_slice(&text)
         .map_err(|e| foreign(format!("is no state that strapd has saved: {e}")))?;
-    if document.strapd_state != FORMAT {
+    if !(1..=FORMAT).contains(&document.strapd_state) {
         return Err(foreign(format!(
-            "is of format {}, and this release reads {FORMAT}",
+            "is of format {}, and this release reads 1 to {FORMAT}",
             document.strapd_state
         )));
     }
@@ -257,7 +325,7 @@ mod tests {
         for damaged in [
             "",
             "{}",
-            "{\"strapd_state\":2,\"sensors\":{}}",
+            "{\"strapd_state\":3,\"sensors\":{}}",
             "\u{0}\u{0}",
         ] {
             std::fs::write(&path, damaged).map_err(|e| Error::Usage(e.to_string()))?;

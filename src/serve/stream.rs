@@ -1,9 +1,12 @@
 //! Raw samples of one sensor -> attitudes, live. Pure.
 //!
 //! The estimator is the one of a replay; what differs is decided here: the method needs no later
-//! sample, no sample is held back, and nothing is looked at before the first attitude leaves.
+//! sample, no sample is held back, nothing is looked at before the first attitude leaves, and senders
+//! come and go ([`run`]).
 
-use crate::condition::{GyroUnit, Report};
+pub mod run;
+
+use crate::condition::{Clock, Report};
 use crate::config::Plan;
 use crate::decode::{Line, Stated};
 use crate::model::attitude::Quaternion;
@@ -11,13 +14,15 @@ use crate::pipeline::estimator::Estimator;
 use crate::pipeline::opening::labelled;
 use crate::pipeline::preparation::{Prepared, Resolved, at_once};
 use crate::propagate::{Method, Sequential};
-use crate::record::{AttitudeSample, Nanos, RawSample, SampleKind, Verdict};
+use crate::record::{AttitudeSample, Counts, Nanos, RawSample, Verdict};
 use crate::serve::channel::Channel;
 use crate::serve::recorder::stream_of;
 use crate::serve::state::Saved;
 use crate::serve::wire::Fault;
 use crate::sink::Stream;
+use run::{Placed, Span, Standing};
 use std::sync::Arc;
+use std::time::Duration;
 
 /// Numbers a sample may come behind its turn. Further back, the sender counts anew.
 const OVERTAKEN: u64 = 64;
@@ -31,11 +36,19 @@ pub struct SensorStream {
     id: Arc<str>,
     estimator: Estimator,
     channel: Arc<Channel>,
-    kind: SampleKind,
-    unit: GyroUnit,
+    resolved: Resolved,
     prepared: Prepared,
-    /// Attitudes so far: the number of the next.
+    /// Who sends it has just come, and its first stamp is still to decide where it stands.
+    joining: Joining,
+    /// What to go on from, until a stamp has decided that.
+    saved: Option<Saved>,
+    /// First stamp of the run.
+    first: Option<Nanos>,
+    /// Runs begun by a connection since the start.
+    runs: u64,
+    /// Number of the next attitude, and of the first since the start.
     next_seq: u64,
+    first_seq: u64,
     /// The sender's number expected next.
     expected: Option<u64>,
     /// Samples that by the sender's numbers did not come in their turn: never, or late.
@@ -43,8 +56,20 @@ pub struct SensorStream {
     last: Option<AttitudeSample>,
     /// Distance of a step from the ordinary one, s, smoothed over about 16 steps.
     jitter_secs: f64,
-    /// Verdicts that were said once, as bits.
+    /// Verdicts that were said to who sends it, as bits, and what was counted when it came.
     told: u32,
+    counted: Counts,
+}
+
+/// How far it is known where a sender stands.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Joining {
+    /// No stamp of it has come yet.
+    Undecided,
+    /// It sends again what was taken, up to this.
+    Again(Nanos),
+    /// It is where the run is.
+    Joined,
 }
 
 /// The plan as it is for live streams: `auto` is the method without latency.
@@ -76,8 +101,8 @@ pub fn live_plan(plan: &Plan) -> Result<Plan, String> {
 
 impl SensorStream {
     /// For the sensor `id`, whose first line says `stated` and brings `first`. `plan` is a
-    /// [`live_plan`]. It goes on from `saved`, where there is such; `declare` makes its labels known to
-    /// clients.
+    /// [`live_plan`]. It goes on from `saved`, where there is such and the stamps do; `declare` makes its
+    /// labels known to clients.
     ///
     /// # Errors
     /// The fault to answer with: the samples do not fit the plan.
@@ -86,7 +111,7 @@ impl SensorStream {
         id: Arc<str>,
         stated: &Line,
         first: &RawSample,
-        saved: Option<&Saved>,
+        saved: Option<Saved>,
         declare: impl FnOnce(&Stream) -> Arc<Channel>,
     ) -> Result<SensorStream, Fault> {
         let fault = |what: String| Fault {
@@ -100,30 +125,34 @@ impl SensorStream {
         };
         let resolved = Resolved::new(plan, &stated);
         let mut prepared = at_once(plan, &resolved, first).map_err(fault)?;
-        let mut estimator = Estimator::live(plan, &resolved, &prepared).map_err(fault)?;
+        let estimator = Estimator::live(plan, &resolved, &prepared).map_err(fault)?;
         let labels = labelled(stream_of(&id), plan, &resolved, &prepared);
-        if let Some(saved) = saved {
-            let resumed = saved
-                .attitude(&labels)
-                .and_then(|last| estimator.resume(&last));
-            match resumed {
-                Ok(()) => "as saved before the restart".clone_into(&mut prepared.initial_origin),
-                Err(why) => prepared.warnings.push(why),
+        let saved = saved.filter(|saved| match saved.attitude(&labels) {
+            Ok(_) => true,
+            Err(why) => {
+                prepared.warnings.push(why);
+                false
             }
-        }
+        });
+        let first_seq = saved.as_ref().map_or(0, Saved::next_seq);
         Ok(SensorStream {
             channel: declare(&labels),
             id,
             estimator,
-            kind: resolved.kind,
-            unit: resolved.unit,
+            resolved,
             prepared,
-            next_seq: 0,
+            joining: Joining::Undecided,
+            saved,
+            first: None,
+            runs: 0,
+            next_seq: first_seq,
+            first_seq,
             expected: None,
             missing: 0,
             last: None,
             jitter_secs: 0.0,
             told: 0,
+            counted: Counts::default(),
         })
     }
 
@@ -142,9 +171,9 @@ impl SensorStream {
     /// Whether a later line means the same by its numbers as the first. `plan` wins over both.
     #[must_use]
     pub fn agrees(&self, plan: &Plan, line: &Line) -> bool {
-        let kind = plan.kind.or(line.sample_kind).unwrap_or(self.kind);
-        let unit = plan.unit.or(line.gyro_unit).unwrap_or(self.unit);
-        (kind, unit) == (self.kind, self.unit)
+        let (kind, unit) = (self.resolved.kind, self.resolved.unit);
+        plan.kind.or(line.sample_kind).unwrap_or(kind) == kind
+            && plan.unit.or(line.gyro_unit).unwrap_or(unit) == unit
     }
 
     /// What a recording calls it.
@@ -156,12 +185,162 @@ impl SensorStream {
     /// What a daemon after this one needs to go on; `None` before the first attitude.
     #[must_use]
     pub fn saved(&self) -> Option<Saved> {
-        Some(Saved::new(self.last.as_ref()?, self.channel.stream()))
+        if let Some(saved) = &self.saved {
+            return Some(saved.clone());
+        }
+        let saved = Saved::new(self.last.as_ref()?, self.channel.stream());
+        Some(saved.in_run(self.first, self.next_seq, self.estimator.memory()))
     }
 
-    /// Takes samples in the order they came. The attitudes they give come from
-    /// `attitudes`.
-    pub fn take(&mut self, seq: Option<u64>, samples: &[RawSample]) {
+    /// Somebody else sends it from now on, and hears again what is wrong with its samples.
+    pub fn meet(&mut self) {
+        self.joining = Joining::Undecided;
+        self.told = 0;
+        self.counted = self.conditioning().counts;
+    }
+
+    /// Before samples are taken: decides by the first stamp of who sends it whether the run goes on.
+    /// `plan` is that of [`SensorStream::new`]. What is to be known of a run that has begun comes back.
+    ///
+    /// # Errors
+    /// The fault to answer with: a run can not begin with these samples.
+    pub fn join(
+        &mut self,
+        plan: &Plan,
+        samples: &[RawSample],
+        window: Duration,
+        placed: Placed,
+    ) -> Result<Option<Fault>, Fault> {
+        if self.joining != Joining::Undecided {
+            return Ok(None);
+        }
+        let span = match &self.saved {
+            Some(saved) => Some(saved.span()),
+            None => self.conditioning().last.map(|last| Span {
+                first: self.first,
+                last,
+            }),
+        };
+        let near = span.map_or(Nanos(0), |span| span.last);
+        let first = samples
+            .iter()
+            .find_map(|raw| Some((raw, self.estimator.stamp_of(raw, near)?)));
+        let (span, raw, stamp) = match (span, first) {
+            (Some(span), Some((raw, stamp))) => (span, raw, stamp),
+            // Nothing to stand in yet, or nothing that tells where.
+            (None, Some(_)) => {
+                self.joining = Joining::Joined;
+                return Ok(None);
+            }
+            (_, None) if matches!(plan.clock, Clock::Index { .. }) => {
+                self.go_on(plan, None);
+                return Ok(None);
+            }
+            (_, None) => return Ok(None),
+        };
+        match span.standing(stamp, window, placed) {
+            Standing::GoesOn => {
+                self.go_on(plan, Some(stamp));
+                Ok(None)
+            }
+            Standing::Again => {
+                self.joining = Joining::Again(span.last);
+                Ok(None)
+            }
+            Standing::Anew => self.begin_anew(plan, raw, stamp, span).map(Some),
+        }
+    }
+
+    /// The run goes on with a sample stamped so.
+    fn go_on(&mut self, plan: &Plan, stamp: Option<Nanos>) {
+        self.joining = Joining::Joined;
+        let Some(saved) = self.saved.take() else {
+            return;
+        };
+        self.first = saved.span().first;
+        let step = stamp.map(|stamp| stamp.since(saved.span().last));
+        let is_near = step.is_some_and(|step| plan.bridges(step));
+        let resumed = match saved.memory().filter(|_| is_near) {
+            Some(memory) if self.estimator.recall(memory) => Ok(()),
+            _ => saved
+                .attitude(self.channel.stream())
+                .and_then(|last| self.estimator.resume(&last)),
+        };
+        match resumed {
+            Ok(()) => "as saved before the restart".clone_into(&mut self.prepared.initial_origin),
+            Err(why) => self.prepared.warnings.push(why),
+        }
+        self.last = saved.attitude(self.channel.stream()).ok();
+    }
+
+    /// A run begins with `raw`: the world is there anew, and only what was counted goes on.
+    fn begin_anew(
+        &mut self,
+        plan: &Plan,
+        raw: &RawSample,
+        stamp: Nanos,
+        before: Span,
+    ) -> Result<Fault, Fault> {
+        let fault = |what: String| Fault {
+            id: Some(self.id.to_string()),
+            ..Fault::new("not_ready", what)
+        };
+        let prepared = at_once(plan, &self.resolved, raw).map_err(fault)?;
+        let mut estimator = Estimator::live(plan, &self.resolved, &prepared).map_err(fault)?;
+        let labels = labelled(stream_of(&self.id), plan, &self.resolved, &prepared);
+        if labels.world_axes != self.channel.stream().world_axes {
+            return Err(fault(format!(
+                "a run that begins between other axes ({}) than those announced ({}); give it another `id`",
+                labels.world_axes,
+                self.channel.stream().world_axes
+            )));
+        }
+        let saved = self.saved.take().map(|saved| saved.resets());
+        let resets = saved.or(self.last.map(|l| l.reset_count)).unwrap_or(0);
+        estimator.succeed(self.conditioning(), resets);
+        (self.estimator, self.prepared) = (estimator, prepared);
+        (self.first, self.last) = (None, None);
+        self.joining = Joining::Joined;
+        self.runs += 1;
+        let secs = |nanos: Nanos| nanos.0 as f64 * 1e-9;
+        let seen = match before.first {
+            Some(first) => format!("{:.6} s to {:.6} s", secs(first), secs(before.last)),
+            None => format!("until {:.6} s", secs(before.last)),
+        };
+        Ok(Fault {
+            id: Some(self.id.to_string()),
+            ..Fault::new(
+                "new_run",
+                format!(
+                    "the first stamp of this connection, {:.6} s, was passed already ({seen}): a new run begins, reset {}",
+                    secs(stamp),
+                    resets.saturating_add(1)
+                ),
+            )
+        })
+    }
+
+    /// Whether a sample is one that was taken before, and now is only counted.
+    fn is_again(&mut self, plan: &Plan, raw: &RawSample) -> bool {
+        let Joining::Again(last) = self.joining else {
+            return false;
+        };
+        match self.estimator.stamp_of(raw, last) {
+            Some(stamp) if stamp > last => {
+                self.go_on(plan, Some(stamp));
+                false
+            }
+            Some(stamp) => {
+                self.estimator.take_late(stamp);
+                true
+            }
+            None => false,
+        }
+    }
+
+    /// Takes samples in the order they came, by the `plan` of [`SensorStream::new`]. The attitudes they
+    /// give come from `attitudes`.
+    pub fn take(&mut self, plan: &Plan, seq: Option<u64>, samples: &[RawSample]) {
         if let Some(seq) = seq {
             let expected = self.expected.unwrap_or(seq);
             self.missing = self.missing.saturating_add(seq.saturating_sub(expected));
@@ -171,8 +350,11 @@ impl SensorStream {
             }
         }
         for raw in samples {
-            self.estimator.take(raw);
+            if self.joining == Joining::Joined || !self.is_again(plan, raw) {
+                self.estimator.take(raw);
+            }
         }
+        self.first = self.first.or(self.conditioning().first);
     }
 
     /// A line that could not be decoded stood here.
@@ -202,13 +384,14 @@ impl SensorStream {
         (first, attitudes, &self.channel)
     }
 
-    /// The kinds of loss that have happened for the first time since this was asked last.
+    /// The kinds of loss that have happened for the first time to who sends it, since this was asked last.
     pub fn news(&mut self) -> Vec<Fault> {
         let counts = self.estimator.conditioning().counts;
         let mut news = Vec::new();
         for verdict in Verdict::ALL {
             let bit = 1 << verdict as u32;
-            if self.told & bit == 0 && verdict.is_loss() && counts.get(verdict) > 0 {
+            let is_new = counts.get(verdict) > self.counted.get(verdict);
+            if self.told & bit == 0 && verdict.is_loss() && is_new {
                 self.told |= bit;
                 // An undecodable line was answered itself.
                 if verdict != Verdict::Undecodable {
@@ -249,13 +432,14 @@ impl SensorStream {
             "counts": counts,
             "gaps": report.gaps.count,
             "not_bridged": report.gaps.not_bridged,
-            "attitudes": self.next_seq,
+            "attitudes": self.next_seq - self.first_seq,
+            "new_runs": self.runs,
             "reset": self.last.map_or(0, |l| l.reset_count),
             "last_stamp": self.last.map(|l| stamp(l.stamp)),
             "rate_hz": report.spacing_nanos.filter(|n| *n > 0).map(|n| 1e9 / n as f64),
             "jitter_s": self.jitter_secs,
-            "sample_kind": self.kind.name(),
-            "gyro_unit": self.unit.name(),
+            "sample_kind": self.resolved.kind.name(),
+            "gyro_unit": self.resolved.unit.name(),
             "method": self.estimator.method().name(),
             "world": self.channel.stream().world_axes,
             "body": self.channel.stream().body_axes,
@@ -275,7 +459,9 @@ fn explained(verdict: Verdict) -> String {
             "a body rate no gyro can have; if it is in degrees, start the daemon with --gyro-unit deg"
         }
         Verdict::DuplicateStamp => "two samples with one stamp and other data",
-        Verdict::Late => "a sample older than what was already integrated; send in order",
+        Verdict::Late => {
+            "a sample older than what was already integrated; send in order, and after a connection was lost from the first sample on (a new run) or from the last one taken"
+        }
         Verdict::NoStamp => {
             "a sample without a usable stamp (absent, or 0); send `stamp`, or start the daemon with --time log to use the time of arrival"
         }

@@ -325,6 +325,12 @@ pub fn watching(filter: Option<&Filter>, offered: &[Stream]) -> Bytes {
     line(&answer)
 }
 
+/// What a sender is to know, and is no fault.
+#[must_use]
+pub fn note(what: &Fault) -> Bytes {
+    line(&json!({"class": "NOTE", "code": what.code, "id": what.id, "message": what.message}))
+}
+
 /// The notice that attitudes of `id` were dropped.
 #[must_use]
 pub fn gap(id: &str, dropped: &Dropped) -> Bytes {

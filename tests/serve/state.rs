@@ -1,7 +1,7 @@
 //! `--state`: a restart loses no attitude (service.md 6.4 D6).
 
 use super::client::{Client, rate};
-use super::daemon::{Process, TCP, eventually};
+use super::daemon::{Daemon, Process, TCP, eventually};
 use serde_json::Value;
 use std::path::Path;
 
@@ -77,6 +77,7 @@ fn killed_and_started_again_it_goes_on_where_it_was_and_says_so() {
     process.signal("TERM");
     assert_eq!(process.exit(), Some(0));
     let (process, mut sender, mut watcher) = started(&path, &["--on-gap", "reset"]);
+    // Other settings than when it was saved: it can not go on exactly.
     let first = through(&mut sender, &mut watcher, 2600..2601);
     assert_eq!(first["q"], last["q"]);
     assert_eq!(first["reset"], 2);
@@ -91,6 +92,52 @@ fn killed_and_started_again_it_goes_on_where_it_was_and_says_so() {
 }
 
 #[test]
+fn ended_and_started_again_a_stream_goes_on_to_the_byte() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("state.json");
+    let mut lines = Vec::new();
+    for (from, to) in [(0, 300), (300, 301), (301, 700)] {
+        let (mut process, mut sender, mut watcher) = started(&path, &[]);
+        for n in from..to {
+            sender.send(&rate("imu0", n, (n as f64 * 0.1).sin()));
+            lines.push(watcher.line().unwrap());
+        }
+        process.signal("TERM");
+        assert_eq!(process.exit(), Some(0));
+    }
+    let daemon = Daemon::tcp();
+    let mut unbroken = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");
+    for (n, line) in lines.iter().enumerate() {
+        unbroken.send(&rate("imu0", n as u64, (n as f64 * 0.1).sin()));
+        assert_eq!(unbroken.line().as_ref(), Some(line), "{n}");
+    }
+}
+
+#[test]
+fn what_is_no_regular_file_is_refused_at_once() {
+    let dir = tempfile::tempdir().unwrap();
+    let fifo = dir.path().join("fifo");
+    let made = std::process::Command::new("mkfifo")
+        .arg(&fifo)
+        .status()
+        .unwrap();
+    assert!(made.success());
+    for path in [fifo.as_path(), dir.path(), Path::new("/dev/null")] {
+        let mut child = std::process::Command::new(super::daemon::strapd())
+            .args(["serve", "--listen", TCP, "--state"])
+            .arg(path)
+            .stderr(std::process::Stdio::piped())
+            .spawn()
+            .unwrap();
+        eventually("it has refused", || child.try_wait().unwrap().is_some());
+        let output = child.wait_with_output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(said.contains("no regular file"), "{said}");
+    }
+}
+
+#[test]
 fn between_other_axes_it_begins_anew_and_says_so() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("state.json");
@@ -101,7 +148,8 @@ fn between_other_axes_it_begins_anew_and_says_so() {
     assert_eq!(process.exit(), Some(0));
     let (mut process, mut sender, mut watcher) =
         started(&path, &["--world", "ned", "--body", "frd"]);
-    let same = through(&mut sender, &mut watcher, 100..101);
+    // After a gap too long to be bridged, so that it is held.
+    let same = through(&mut sender, &mut watcher, 1100..1101);
     for c in ["w", "x", "y", "z"] {
         let difference = same["q"][c].as_f64().unwrap() - ned["q"][c].as_f64().unwrap();
         assert!(difference.abs() < 1e-15, "{ned} {same}");
@@ -110,7 +158,7 @@ fn between_other_axes_it_begins_anew_and_says_so() {
     assert_eq!(process.exit(), Some(0));
 
     let (_process, mut sender, mut watcher) = started(&path, &[]);
-    let anew = through(&mut sender, &mut watcher, 101..102);
+    let anew = through(&mut sender, &mut watcher, 1101..1102);
     assert_eq!(
         (&anew["q"]["w"], &anew["reset"]),
         (&1.0.into(), &0.into()),

@@ -29,9 +29,9 @@ pub(super) struct Waiting {
 pub(super) struct State {
     pub(super) attitude: Accumulator,
     /// Sum of rotation vectors, for the method that wants it.
-    sum: Option<Triple<1>>,
+    pub(super) sum: Option<Triple<1>>,
     /// What the attitude accumulated is relative to, where the world turns: then it is q_ib.
-    world: Option<TurningWorld>,
+    pub(super) world: Option<TurningWorld>,
     /// Instant of the attitude accumulated, ns.
     pub(super) now: i64,
     pub(super) covariance: Covariance,
@@ -40,7 +40,7 @@ pub(super) struct State {
     pub(super) added: Status,
     pub(super) report: Report,
     pub(super) reset_count: u32,
-    rate: Vector3<f64>,
+    pub(super) rate: Vector3<f64>,
     pub(super) integrated_nanos: i64,
 }
 

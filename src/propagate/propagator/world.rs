@@ -48,6 +48,11 @@ impl TurningWorld {
         quat::normalised(&quat::product(&turned, q_ib))
     }
 
+    /// The instant [`count_from`](Self::count_from) was told last.
+    pub(super) fn since(&self) -> i64 {
+        self.since
+    }
+
     /// From now on the accumulated attitude is counted from `stamp`, where it is q_nb itself.
     pub(super) fn count_from(&mut self, stamp: i64) {
         self.since = stamp;
