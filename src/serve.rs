@@ -184,6 +184,7 @@ impl Server {
             places: places.clone(),
             running: shutdown.running(),
         };
+        let answering = tokio::spawn(self.hub.clone().keep_answering());
         for listener in self.listeners {
             tokio::spawn(listener.serve(context()));
         }
@@ -198,6 +199,7 @@ impl Server {
         self.hub.stop();
         let limit = self.hub.limits().drain;
         let drained = tokio::time::timeout(limit, shutdown.drain(limit / 2)).await;
+        answering.abort();
         drained.is_ok()
     }
 }

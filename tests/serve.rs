@@ -28,6 +28,7 @@ mod serve {
     mod same_bytes;
     mod slow_readers;
     mod state;
+    mod storms;
     mod transports;
     mod watch;
 }

@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::serve::hub::Hub;
 use crate::serve::limits::Limits;
 use crate::serve::recorder::{self, Recorder, Split};
-use crate::serve::shutdown::{self, Signals};
+use crate::serve::shutdown::Signals;
 use crate::serve::source::Source;
 use crate::serve::state::{self, StateFile};
 use crate::serve::{Server, Settings, listen};
@@ -176,7 +176,7 @@ async fn serve(
     state: Option<Arc<Mutex<StateFile>>>,
 ) -> Result<Outcome> {
     // Signals first: from the ready line on, one drains.
-    let signals = Signals::new().map_err(|e| Error::Usage(format!("signals: {e}")))?;
+    let mut signals = Signals::new().map_err(|e| Error::Usage(format!("signals: {e}")))?;
     let server = Server::bind(settings).await?;
     let addresses: Vec<String> = server.addresses().iter().map(ToString::to_string).collect();
     let hub = server.hub().clone();
@@ -193,8 +193,7 @@ async fn serve(
     }
     let drained = server
         .run(async {
-            let reopened = hub.clone();
-            let signal = shutdown::first(signals, move || reopen(&reopened)).await;
+            let signal = signals.first(|| reopen(&hub)).await;
             tracing::info!("{}: shutting down", signal.name());
             let _ = sd_notify::notify(&[sd_notify::NotifyState::Stopping]);
         })

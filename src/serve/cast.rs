@@ -7,7 +7,7 @@
 use super::channel::{Channel, Items};
 use super::hub::{Flood, Hub};
 use super::playback::{News, Playback, Turn};
-use super::shutdown::{self, Signals};
+use super::shutdown::Signals;
 use super::{Server, Settings};
 use crate::error::{Error, Result};
 use crate::pipeline::audience::{self, Audience};
@@ -281,13 +281,13 @@ async fn serve(
     let mut at_once = None;
     let drained = server
         .run(async {
-            let Some(signals) = signals else {
+            let Some(mut signals) = signals else {
                 let _ = stopped.await;
                 return;
             };
             tokio::select! {
                 _ = &mut stopped => {}
-                signal = shutdown::first(signals, || false) => {
+                signal = signals.first(|| false) => {
                     tracing::info!("{}: stopping", signal.name());
                     playback.stop();
                     // A run that waits for its input does not notice.

@@ -85,19 +85,18 @@ impl Items<'_> {
 }
 
 impl Channel {
-    /// Named and labelled as the last of `streams` says, which is all there are.
+    /// Number `number`, named and labelled as the last of `streams` says, which is all there are.
     #[must_use]
-    pub fn new(streams: &[Stream]) -> Channel {
+    pub fn new(number: u32, streams: &[Stream]) -> Channel {
         let nameless = Stream::default();
         let stream = streams.last().unwrap_or(&nameless);
-        let number = u32::try_from(streams.len()).unwrap_or(u32::MAX);
         Channel {
             id: stream.id.as_str().into(),
             stream: stream.clone(),
             lines: Objects::new(stream, Profile::Lines),
             plot: Objects::new(stream, Profile::PlotJuggler),
             label: (number, wire::packed_stream(number, stream)),
-            number: foxglove::channel_of(streams.len().saturating_sub(1)),
+            number: foxglove::channel_of(number),
             payloads: Payloads::new(stream, streams),
             last: Mutex::new(None),
             sent: AtomicU64::new(0),
@@ -140,6 +139,12 @@ impl Channel {
     /// Number and topic of each of its channels for viewers.
     pub(crate) fn topics(&self) -> impl Iterator<Item = (u32, Topic)> + use<> {
         (self.number..).zip(Payloads::topics(&self.stream))
+    }
+
+    /// Whether one of its channels for viewers has this number.
+    pub(super) fn has(&self, channel: u32) -> bool {
+        let second = matches!(self.payloads, Payloads::Truth { .. });
+        channel == self.number || (second && channel == self.number + 1)
     }
 
     /// The messages of items from number `first_seq` on for a viewer with these subscriptions.

@@ -14,6 +14,7 @@ use super::source::{Protocol, Source};
 use super::upstream::Event;
 use crate::client::link::{Heard, Link};
 use crate::client::remote::Remote;
+use bytes::Bytes;
 use futures_util::FutureExt;
 use std::collections::VecDeque;
 use std::fmt::Write;
@@ -21,6 +22,8 @@ use std::hash::{BuildHasher, RandomState};
 use std::io;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
+use tokio::task::yield_now;
+use tokio::time::timeout;
 
 /// Longest message of a WebSocket that is read.
 const MAX_MESSAGE: usize = 128 << 10;
@@ -212,17 +215,20 @@ async fn converse(
             heard = next => heard,
             () = running.asked() => {
                 // What has arrived is still taken.
-                while let Some(Ok(heard @ (Heard::Bytes | Heard::Message))) =
-                    link.read(&mut bytes).now_or_never()
-                {
-                    take(&mut session, &heard, &bytes);
-                }
+                let rest = async {
+                    while let Some(Ok(heard @ (Heard::Bytes | Heard::Message))) =
+                        link.read(&mut bytes).now_or_never()
+                    {
+                        take(&mut session, &heard, &bytes, &mut said).await;
+                    }
+                };
+                let _ = timeout(hub.limits().drain / 2, rest).await;
                 return None;
             }
         };
         let ended = match heard {
             Ok(heard) => {
-                take(&mut session, &heard, &bytes);
+                take(&mut session, &heard, &bytes, &mut said).await;
                 match heard {
                     Heard::Bytes | Heard::Message => None,
                     Heard::Closed(None) => Some("the peer has closed the connection".to_owned()),
@@ -233,8 +239,6 @@ async fn converse(
             Err(why) => Some(why.to_string()),
         };
         // What a client would be told is for our own log.
-        let client = session.client();
-        client.outbox.take(usize::MAX, &mut said);
         for line in said.drain(..) {
             if let Some(Event::Complained(what)) = super::upstream::read(&line) {
                 outgoing.complain(&what);
@@ -279,12 +283,21 @@ async fn converse(
     }
 }
 
-fn take(session: &mut Session, heard: &Heard, bytes: &[u8]) {
+/// Takes what was heard, step by step; `said`: what a client would be told of it.
+async fn take(session: &mut Session, heard: &Heard, bytes: &[u8], said: &mut VecDeque<Bytes>) {
     in_room(|_, scratch| match heard {
         Heard::Bytes => session.bytes(bytes, now(), scratch),
         Heard::Message => session.message(bytes, now(), scratch),
         Heard::Closed(_) => session.finish(now(), scratch),
     });
+    loop {
+        session.client().outbox.discard(said);
+        if !session.is_held() {
+            return;
+        }
+        yield_now().await;
+        in_room(|_, scratch| session.go_on(scratch));
+    }
 }
 
 /// The metrics of the sources, as Prometheus text.

@@ -29,10 +29,16 @@ pub const TRANSFORMS: u32 = 1;
 const TEXT: u8 = 1;
 const BINARY: u8 = 2;
 
-/// Number of a stream's first channel; the second has the next one.
+/// Number of the first channel of stream `number`, from 1; the second has the next one.
 #[must_use]
-pub fn channel_of(stream: usize) -> u32 {
-    u32::try_from(stream).map_or(u32::MAX - 1, |n| n.saturating_mul(2).saturating_add(2))
+pub fn channel_of(number: u32) -> u32 {
+    number.saturating_mul(2)
+}
+
+/// The stream a channel is of.
+#[must_use]
+pub fn stream_of(channel: u32) -> u32 {
+    channel / 2
 }
 
 /// What a viewer asks for.

@@ -6,11 +6,13 @@
 //! order is that of its lock.
 
 mod counters;
+mod polling;
 mod report;
 mod room;
 mod telling;
 
 pub use counters::{Counters, count};
+use polling::Polling;
 use report::StateStatus;
 pub use room::Flood;
 
@@ -36,7 +38,7 @@ use crate::sink::Profile;
 use bytes::Bytes;
 use std::collections::BTreeMap;
 use std::hash::{BuildHasher, RandomState};
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::Instant;
 use tokio::sync::Notify;
@@ -66,7 +68,10 @@ pub struct Hub {
     saved: Mutex<Sensors>,
     /// How saving attitudes went the last time; `None` when they are not saved.
     state: Mutex<Option<StateStatus>>,
-    channels: RwLock<Vec<Arc<Channel>>>,
+    /// By number.
+    channels: RwLock<BTreeMap<u32, Arc<Channel>>>,
+    next_channel: AtomicU32,
+    polling: Polling,
     next_client: AtomicU64,
     /// What was counted.
     pub counters: Counters,
@@ -173,6 +178,8 @@ impl Hub {
             saved: Mutex::new(settings.saved),
             state: Mutex::default(),
             channels: RwLock::default(),
+            next_channel: AtomicU32::new(1),
+            polling: Polling::default(),
             next_client: AtomicU64::new(1),
             counters: Counters::default(),
         })
@@ -249,7 +256,7 @@ impl Hub {
         let channels = read(&self.channels);
         if let Shape::Foxglove { controls } = shape {
             outbox.reply(self.server_info(controls));
-            outbox.reply(foxglove::channels(channels.iter().map(|c| &**c), true));
+            outbox.reply(foxglove::channels(channels.values().map(|c| &**c), true));
             if let Some(place) = self.where_it_is().filter(|_| controls) {
                 outbox.reply(foxglove::playback_state(&place, false, ""));
             }
@@ -268,7 +275,9 @@ impl Hub {
     /// It has gone; its sensors may be sent by others.
     pub fn leave(&self, client: &Client, owned: &[Arc<Mutex<Sensor>>]) {
         write(&self.clients).remove(&client.number);
-        self.watch_changed();
+        if client.outbox.level().watching {
+            self.watch_changed();
+        }
         for sensor in owned {
             let mut sensor = lock(sensor);
             if sensor.owner == Some(client.number) {

@@ -4,6 +4,7 @@
 //! the hub because it remembers what only matters to one client: which sensor it sent last, how
 //! many lines in a row were bad, whether it has shown the token.
 
+mod turn;
 mod unpacking;
 
 use super::hub::{Client, Hub, News, Run, Sensor, count};
@@ -13,12 +14,13 @@ use super::stream::NAMELESS;
 use super::stream::run::Placed;
 use super::upstream::{self, Event};
 use super::wire::{self, Fault, Message};
-use crate::decode::framing::{Framed, Framer};
+use crate::decode::framing::Framer;
 use crate::decode::{Line, LineDecoder};
 use crate::record::{Nanos, RawSample};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
+use turn::{Held, Step};
 
 /// Errors said at once before they are thinned.
 const BURST: u32 = 64;
@@ -51,6 +53,11 @@ pub enum Side {
     /// A client of ours, who need not show a token when trusted.
     Client {
         /// Whether it has shown the token, or need not.
+        trusted: bool,
+    },
+    /// Who sends and is told nothing: what it asks for is passed over.
+    Deaf {
+        /// As above.
         trusted: bool,
     },
     /// A source we connected to: nobody who asks anything of us.
@@ -131,6 +138,9 @@ pub struct Session {
     bound: BTreeMap<u32, Line>,
     /// The one it sent last.
     last: Option<Arc<Mutex<Sensor>>>,
+    step: Step,
+    /// What waits for the next step.
+    held: Option<Held>,
     end: Option<End>,
 }
 
@@ -147,7 +157,7 @@ impl Session {
         let client = hub.join(peer);
         client.outbox.reply(wire::version(&hub.session()));
         let authorised = match side {
-            Side::Client { trusted } => trusted || hub.token().is_none(),
+            Side::Client { trusted } | Side::Deaf { trusted } => trusted || hub.token().is_none(),
             Side::Source(_) => true,
         };
         if let Some(place) = hub.place().filter(|_| authorised) {
@@ -165,6 +175,8 @@ impl Session {
             owned: BTreeMap::new(),
             bound: BTreeMap::new(),
             last: None,
+            step: Step::default(),
+            held: None,
             end: None,
         }
     }
@@ -191,7 +203,7 @@ impl Session {
     pub fn events(&mut self) -> Vec<Event> {
         match &mut self.side {
             Side::Source(naming) => std::mem::take(&mut naming.events),
-            Side::Client { .. } => Vec::new(),
+            Side::Client { .. } | Side::Deaf { .. } => Vec::new(),
         }
     }
 
@@ -201,52 +213,11 @@ impl Session {
         self.end
     }
 
-    /// The next bytes of the stream, received at `received`.
-    pub fn bytes(&mut self, bytes: &[u8], received: Nanos, scratch: &mut Scratch) {
-        self.feed(bytes, false, received, scratch);
-    }
-
-    /// A datagram or message: its end ends its last line.
-    pub fn message(&mut self, bytes: &[u8], received: Nanos, scratch: &mut Scratch) {
-        self.feed(bytes, true, received, scratch);
-    }
-
-    /// The stream has ended: what is unfinished is a line.
-    pub fn finish(&mut self, received: Nanos, scratch: &mut Scratch) {
-        self.feed(&[], true, received, scratch);
-    }
-
-    fn feed(&mut self, bytes: &[u8], whole: bool, received: Nanos, scratch: &mut Scratch) {
-        count(&self.hub.counters.bytes_in, bytes.len());
-        let mut framer = std::mem::take(&mut self.framer);
-        let before = framer.ended();
-        let mut take = |framed: Framed<'_>| {
-            match framed {
-                Framed::Line(number, line) => self.line(number, line, received, scratch),
-                Framed::TooLong(number, head) => {
-                    self.bad(&wire::too_long(), number, head, received, scratch);
-                }
-                Framed::Packed(number, object) => self.packed(number, object, received, scratch),
-                Framed::Broken(number) => {
-                    self.bad(&wire::broken_packed(), number, &[], received, scratch);
-                }
-            }
-            self.end.is_none()
-        };
-        framer.feed(bytes, &mut take);
-        if whole {
-            framer.finish(&mut take);
-        }
-        count(&self.hub.counters.lines, (framer.ended() - before) as usize);
-        self.framer = framer;
-        self.flush(received, scratch, usize::MAX);
-    }
-
     fn line(&mut self, number: u64, line: &[u8], received: Nanos, scratch: &mut Scratch) {
         let before = scratch.samples.len();
         let (decoder, is_source) = match &self.side {
             Side::Source(naming) => (naming.decoder.as_ref().unwrap_or(self.hub.decoder()), true),
-            Side::Client { .. } => (self.hub.decoder(), false),
+            Side::Client { .. } | Side::Deaf { .. } => (self.hub.decoder(), false),
         };
         let mut read = wire::read_from(decoder, line, received, is_source, &mut scratch.samples);
         if let Side::Source(naming) = &mut self.side {
@@ -276,6 +247,10 @@ impl Session {
                 Err(_) => {}
             }
         }
+        self.step.asked |= matches!(
+            read,
+            Ok(Message::Watch(_) | Message::Poll | Message::Playback(_) | Message::Auth(_))
+        );
         match read {
             Ok(Message::Auth(token)) => self.authorise(&token, number),
             Ok(_) | Err(_) if !self.authorised => {
@@ -298,6 +273,9 @@ impl Session {
                 Ok(()) => self.errors_in_a_row = 0,
                 Err(fault) => self.bad(&fault, number, line, received, scratch),
             },
+            Ok(Message::Watch(_) | Message::Poll) if matches!(self.side, Side::Deaf { .. }) => {
+                self.errors_in_a_row = 0;
+            }
             Ok(Message::Watch(filter)) => {
                 self.errors_in_a_row = 0;
                 self.flush(received, scratch, usize::MAX);
@@ -319,7 +297,7 @@ impl Session {
             Ok(Message::Poll) => {
                 self.errors_in_a_row = 0;
                 self.flush(received, scratch, usize::MAX);
-                self.client.outbox.reply(self.hub.status());
+                self.poll();
             }
             Ok(Message::Playback(action)) => {
                 self.errors_in_a_row = 0;
@@ -398,7 +376,9 @@ impl Session {
 
     fn say(&mut self, fault: &Fault, number: u64, near: &[u8]) {
         count(&self.hub.counters.faults, 1);
+        self.step.worked = true;
         if let Some(suppressed) = self.errors.take(Instant::now()) {
+            self.step.answered = true;
             self.client
                 .outbox
                 .reply(wire::error(fault, number, near, suppressed));
@@ -433,6 +413,7 @@ impl Session {
         let Some(head) = scratch.head.take() else {
             return;
         };
+        self.step.worked = true;
         let until = until.min(scratch.samples.len());
         let run = Run {
             client: self.client.number,

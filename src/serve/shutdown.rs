@@ -1,5 +1,7 @@
 //! Signals -> an orderly end. I/O.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use tokio::sync::{mpsc, watch};
 use tokio::time::timeout;
@@ -129,32 +131,97 @@ impl Signal {
     }
 }
 
-/// The signals as they come.
-#[cfg(unix)]
+/// The signals as they come, heard on a thread of their own: whatever the others are busy with, the
+/// second that means the end ends the process at once.
 #[derive(Debug)]
 pub struct Signals {
-    interrupt: tokio::signal::unix::Signal,
-    terminate: tokio::signal::unix::Signal,
-    hang_up: tokio::signal::unix::Signal,
+    came: mpsc::UnboundedReceiver<Signal>,
+    /// Whether one that means the end has come.
+    is_ending: Arc<AtomicBool>,
 }
 
-#[cfg(unix)]
 impl Signals {
     /// Starts to listen to them.
     ///
     /// # Errors
     /// The operating system refuses.
     pub fn new() -> std::io::Result<Signals> {
+        let (tell, came) = mpsc::unbounded_channel();
+        let (ready, is_ready) = std::sync::mpsc::channel();
+        let is_ending = Arc::new(AtomicBool::new(false));
+        let ending = is_ending.clone();
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .enable_io()
+            .build()?;
+        std::thread::Builder::new()
+            .name("strapd-signals".to_owned())
+            .spawn(move || {
+                runtime.block_on(async {
+                    let mut heard = match Heard::new() {
+                        Ok(heard) => heard,
+                        Err(why) => return drop(ready.send(Err(why))),
+                    };
+                    // Who asked for it has gone, or it is heard from now on.
+                    let _ = ready.send(Ok(()));
+                    loop {
+                        let signal = heard.next().await;
+                        if ending.load(Ordering::SeqCst) && signal != Signal::HangUp {
+                            std::process::exit(signal.exit_code());
+                        }
+                        if signal != Signal::HangUp {
+                            ending.store(true, Ordering::SeqCst);
+                        }
+                        // Nobody waits for it any more: the next one ends the process.
+                        let _ = tell.send(signal);
+                    }
+                });
+            })?;
+        is_ready
+            .recv()
+            .map_err(|_| std::io::Error::other("the thread for signals has gone"))??;
+        Ok(Signals { came, is_ending })
+    }
+
+    /// The next one.
+    pub async fn next(&mut self) -> Signal {
+        // The thread ends with the process.
+        self.came.recv().await.unwrap_or(Signal::Terminate)
+    }
+
+    /// The first that ends the daemon; from then on a second one ends the process. A hang-up ends
+    /// nothing where `reopen` has taken it for the wish to go on in a new file.
+    pub async fn first(&mut self, mut reopen: impl FnMut() -> bool) -> Signal {
+        loop {
+            match self.next().await {
+                Signal::HangUp if reopen() => {}
+                signal => {
+                    self.is_ending.store(true, Ordering::SeqCst);
+                    return signal;
+                }
+            }
+        }
+    }
+}
+
+#[cfg(unix)]
+struct Heard {
+    interrupt: tokio::signal::unix::Signal,
+    terminate: tokio::signal::unix::Signal,
+    hang_up: tokio::signal::unix::Signal,
+}
+
+#[cfg(unix)]
+impl Heard {
+    fn new() -> std::io::Result<Heard> {
         use tokio::signal::unix::{SignalKind, signal};
-        Ok(Signals {
+        Ok(Heard {
             interrupt: signal(SignalKind::interrupt())?,
             terminate: signal(SignalKind::terminate())?,
             hang_up: signal(SignalKind::hangup())?,
         })
     }
 
-    /// The next one.
-    pub async fn next(&mut self) -> Signal {
+    async fn next(&mut self) -> Signal {
         tokio::select! {
             _ = self.interrupt.recv() => Signal::Interrupt,
             _ = self.terminate.recv() => Signal::Terminate,
@@ -165,45 +232,17 @@ impl Signals {
 
 /// Where there is only Ctrl-C.
 #[cfg(not(unix))]
-#[derive(Debug)]
-pub struct Signals;
+struct Heard;
 
 #[cfg(not(unix))]
-impl Signals {
-    /// Starts to listen to them.
-    ///
-    /// # Errors
-    /// Never.
-    pub fn new() -> std::io::Result<Signals> {
-        Ok(Signals)
+impl Heard {
+    fn new() -> std::io::Result<Heard> {
+        Ok(Heard)
     }
 
-    /// The next one.
-    pub async fn next(&mut self) -> Signal {
+    async fn next(&mut self) -> Signal {
         // An error leaves nothing to wait for.
         let _ = tokio::signal::ctrl_c().await;
         Signal::Interrupt
     }
-}
-
-/// The first signal that ends the daemon; from then on a second one ends the process. A hang-up ends
-/// nothing where `reopen` has taken it for the wish to go on in a new file.
-pub async fn first(
-    mut signals: Signals,
-    mut reopen: impl FnMut() -> bool + Send + 'static,
-) -> Signal {
-    let mut ending = async move || {
-        loop {
-            match signals.next().await {
-                Signal::HangUp if reopen() => {}
-                signal => return signal,
-            }
-        }
-    };
-    let first = ending().await;
-    tokio::spawn(async move {
-        let second = ending().await;
-        std::process::exit(second.exit_code());
-    });
-    first
 }

@@ -21,6 +21,12 @@ const CROWDED: usize = MAX_QUEUED / 2;
 pub const MAX_CONTROL: usize = 64;
 /// Most bytes of replies waiting for one client, once there is more than one.
 const MAX_CONTROL_BYTES: usize = 1 << 20;
+/// Most bytes of announcements waiting for one client.
+const MAX_ANNOUNCED: usize = 8 << 20;
+/// With so many replies that have not left, or so many bytes of them waiting, no more is taken from a
+/// client.
+const CROWDED_REPLIES: usize = MAX_CONTROL / 4;
+const CROWDED_BYTES: usize = MAX_CONTROL_BYTES / 4;
 
 /// Attitudes of one stream, encoded once and shared by every client that takes them all.
 #[derive(Clone, Debug)]
@@ -121,6 +127,8 @@ impl Default for Outbox {
 pub struct Outbox {
     state: Mutex<State>,
     wake: Notify,
+    /// Told when replies have left.
+    answered: Notify,
     /// Told when there is room again.
     room: Arc<Notify>,
     /// How it is said that attitudes were dropped; empty: not at all.
@@ -131,6 +139,10 @@ pub struct Outbox {
 struct State {
     control: VecDeque<Bytes>,
     control_bytes: usize,
+    /// Replies that were taken and have not left.
+    leaving: usize,
+    /// The answer to `POLL`: one at most, which may be larger than all others and is shared by all.
+    status: Asked,
     data: VecDeque<Chunk>,
     /// Bytes of `data` and of what was taken and is not yet written.
     queued: usize,
@@ -140,21 +152,37 @@ struct State {
     /// A note the data around which was dropped.
     stray: Option<Bytes>,
     watch: Option<Filter>,
-    /// Of a viewer: subscription by channel.
+    /// Of a viewer: subscription by channel, and the other way.
     subscriptions: BTreeMap<u32, u32>,
+    channels: BTreeMap<u32, u32>,
     /// What time it was told last.
     told: Option<Nanos>,
     decimators: HashMap<Arc<str>, Option<Decimator>>,
     full: Option<Full>,
     /// It took nothing while it was waited for.
     is_stalled: bool,
-    /// Labels of packed streams that wait; apart from the replies, which may be too many. There are no
-    /// more than streams, as each is said once.
+    /// Labels of packed streams that wait, and announcements; apart from the replies, which may be too
+    /// many.
     labels: Vec<Bytes>,
+    label_bytes: usize,
     /// Streams whose label was said.
     labelled: BTreeSet<u32>,
     dropped: u64,
     sent: u64,
+}
+
+/// How an answer that is made for all who ask stands.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+enum Asked {
+    /// Nobody has asked.
+    #[default]
+    Not,
+    /// It is to come.
+    For,
+    /// It waits.
+    Made(Bytes),
+    /// It was taken and has not left.
+    Taken,
 }
 
 /// What a client's outbox holds, for `STATUS`.
@@ -183,6 +211,7 @@ impl Outbox {
         Outbox {
             state: Mutex::default(),
             wake: Notify::new(),
+            answered: Notify::new(),
             room: Arc::default(),
             gap,
         }
@@ -220,6 +249,48 @@ impl Outbox {
         }
         drop(state);
         self.wake.notify_one();
+    }
+
+    /// Queues what everybody is told of the streams there are. It may come a thousand times at once, which
+    /// is no fault of the client's.
+    pub fn announce(&self, line: Bytes) {
+        self.state().label(line);
+        self.wake.notify_one();
+    }
+
+    /// The state is asked for, and its answer is to come. `false`: it was before, and has not left.
+    pub fn ask(&self) -> bool {
+        let status = &mut self.state().status;
+        let is_first = *status == Asked::Not;
+        if is_first {
+            *status = Asked::For;
+        }
+        is_first
+    }
+
+    /// Queues the answer to who has [asked](Outbox::ask).
+    pub fn answer(&self, line: Bytes) {
+        self.state().status = Asked::Made(line);
+        self.wake.notify_one();
+    }
+
+    /// Whether an answer is to come, or has not left.
+    #[must_use]
+    pub fn owes_answer(&self) -> bool {
+        self.state().status != Asked::Not
+    }
+
+    /// Whether so many replies wait that no more may be asked for.
+    #[must_use]
+    pub fn is_full(&self) -> bool {
+        let state = self.state();
+        state.control.len() + state.leaving >= CROWDED_REPLIES
+            || state.control_bytes >= CROWDED_BYTES
+    }
+
+    /// Until replies have left, since this was called last.
+    pub async fn answered(&self) {
+        self.answered.notified().await;
     }
 
     /// Queues a note (whole lines) behind the attitudes that wait, to be read at its place among
@@ -311,19 +382,23 @@ impl Outbox {
 
     /// A viewer subscribes to a channel. `false`: it has already, or has `most` subscriptions.
     pub fn subscribe(&self, channel: u32, subscription: u32, most: usize) -> bool {
-        let subscriptions = &mut self.state().subscriptions;
-        let is_new = subscriptions.len() < most
-            && !subscriptions.contains_key(&channel)
-            && !subscriptions.values().any(|s| *s == subscription);
+        let state = &mut *self.state();
+        let is_new = state.subscriptions.len() < most
+            && !state.subscriptions.contains_key(&channel)
+            && !state.channels.contains_key(&subscription);
         if is_new {
-            subscriptions.insert(channel, subscription);
+            state.subscriptions.insert(channel, subscription);
+            state.channels.insert(subscription, channel);
         }
         is_new
     }
 
     /// A viewer ends a subscription.
     pub fn unsubscribe(&self, subscription: u32) {
-        self.state().subscriptions.retain(|_, s| *s != subscription);
+        let state = &mut *self.state();
+        if let Some(channel) = state.channels.remove(&subscription) {
+            state.subscriptions.remove(&channel);
+        }
     }
 
     /// Offers messages to a viewer, made for its subscriptions. `now`: what time it is in the data,
@@ -357,13 +432,20 @@ impl Outbox {
     /// Returns how many bytes of attitudes are among them; give them back to [`Outbox::written`].
     pub fn take(&self, most: usize, out: &mut VecDeque<Bytes>) -> usize {
         let mut state = self.state();
+        state.leaving += state.control.len();
         out.extend(state.control.drain(..));
         state.control_bytes = 0;
+        if matches!(state.status, Asked::Made(_))
+            && let Asked::Made(line) = std::mem::replace(&mut state.status, Asked::Taken)
+        {
+            out.push_back(line);
+        }
         out.extend(state.stray.take());
         for (id, dropped) in std::mem::take(&mut state.gaps) {
             out.push_back((self.gap)(&id, &dropped));
         }
         out.extend(state.labels.drain(..));
+        state.label_bytes = 0;
         let mut taken = 0;
         while taken < most
             && let Some(chunk) = state.data.pop_front()
@@ -376,16 +458,31 @@ impl Outbox {
         taken
     }
 
-    /// This many bytes of attitudes have left.
+    /// Moves everything out: what is told to nobody, or read here.
+    pub fn discard(&self, out: &mut VecDeque<Bytes>) {
+        let attitudes = self.take(usize::MAX, out);
+        self.written(attitudes);
+    }
+
+    /// All that was taken has left, this many bytes of attitudes among it.
     pub fn written(&self, bytes: usize) {
-        if bytes == 0 {
-            return;
-        }
         let mut state = self.state();
-        state.queued = state.queued.saturating_sub(bytes);
-        state.is_stalled = false;
+        let had_replies = state.leaving > 0 || state.status == Asked::Taken;
+        state.leaving = 0;
+        if state.status == Asked::Taken {
+            state.status = Asked::Not;
+        }
+        if bytes > 0 {
+            state.queued = state.queued.saturating_sub(bytes);
+            state.is_stalled = false;
+        }
         drop(state);
-        self.room.notify_waiters();
+        if had_replies {
+            self.answered.notify_one();
+        }
+        if bytes > 0 {
+            self.room.notify_waiters();
+        }
     }
 
     /// Whether more would soon be too much for it, and it may be waited for.
@@ -406,6 +503,7 @@ impl Outbox {
     pub fn is_empty(&self) -> bool {
         let state = self.state();
         state.control.is_empty()
+            && !matches!(state.status, Asked::Made(_))
             && state.data.is_empty()
             && state.gaps.is_empty()
             && state.stray.is_none()
@@ -442,11 +540,20 @@ impl Outbox {
 }
 
 impl State {
+    fn label(&mut self, line: Bytes) {
+        self.label_bytes += line.len();
+        if self.label_bytes > MAX_ANNOUNCED {
+            self.full = Some(Full::Control);
+        } else {
+            self.labels.push(line);
+        }
+    }
+
     fn push(&mut self, chunk: Chunk) {
         if let Some((number, label)) = &chunk.label
             && self.labelled.insert(*number)
         {
-            self.labels.push(label.clone());
+            self.label(label.clone());
         }
         self.queued += chunk.bytes.len();
         self.data.push_back(chunk);

@@ -68,6 +68,7 @@ impl Viewer {
 
     fn take(&mut self, request: Request) -> Result<(), String> {
         let outbox = &self.client.outbox;
+        let watched = outbox.level().watching;
         match request {
             Request::Subscribe(list) => {
                 let mut refused = Vec::new();
@@ -78,7 +79,9 @@ impl Viewer {
                         refused.push(channel);
                     }
                 }
-                self.hub.watch_changed();
+                if !watched {
+                    self.hub.watch_changed();
+                }
                 match refused.first() {
                     None => Ok(()),
                     Some(first) => Err(format!(
@@ -91,7 +94,9 @@ impl Viewer {
                 for subscription in list {
                     outbox.unsubscribe(subscription);
                 }
-                self.hub.watch_changed();
+                if watched && !outbox.level().watching {
+                    self.hub.watch_changed();
+                }
                 Ok(())
             }
             Request::Playback(actions, name) => {

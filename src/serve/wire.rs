@@ -22,6 +22,9 @@ pub const PROTO: u32 = 1;
 /// Longest name of a sensor, in bytes.
 pub const MAX_ID: usize = 255;
 
+/// Most sensors one `WATCH` can name: as many as there are, unless more are allowed.
+pub const MAX_WATCHED: usize = 1024;
+
 /// What a line asks for.
 #[derive(Debug, PartialEq)]
 pub enum Message {
@@ -249,10 +252,19 @@ fn watch(line: &[u8]) -> Result<Option<Filter>, Fault> {
     {
         return Err(bad(format!("rate_hz {rate_hz} is not a rate above 0")));
     }
+    let ids = asked.ids.or(asked.id);
+    if let Some(Ids::Several(ids)) = &ids
+        && ids.len() > MAX_WATCHED
+    {
+        return Err(bad(format!(
+            "{} ids; at most {MAX_WATCHED} can be named, and a WATCH without `ids` is for all sensors",
+            ids.len()
+        )));
+    }
     let nothing = asked.streams.as_ref().is_some_and(Vec::is_empty);
     Ok((asked.enable && !nothing).then(|| Filter {
         classes,
-        ids: asked.ids.or(asked.id).map(|ids| match ids {
+        ids: ids.map(|ids| match ids {
             Ids::One(id) => [printable(&id)].into(),
             Ids::Several(ids) => ids.iter().map(|id| printable(id)).collect(),
         }),
@@ -446,10 +458,17 @@ mod tests {
             (r#"{"class":"WATCH","streams":["POSE"]}"#, "bad_watch"),
             (r#"{"class":"WATCH","rate_hz":0}"#, "bad_watch"),
             (r#"{"class":"WATCH","rate_hz":"fast"}"#, "bad_watch"),
+            (&watching_ids(5000), "bad_watch"),
+            (&watching_ids(MAX_WATCHED + 1), "bad_watch"),
             ("nonsense", "bad_json"),
         ] {
             assert_eq!(ask(text).unwrap_err().code, code, "{text}");
         }
+    }
+
+    fn watching_ids(n: usize) -> String {
+        let ids: Vec<String> = (0..n).map(|n| format!("\"{n}\"")).collect();
+        format!(r#"{{"class":"WATCH","ids":[{}]}}"#, ids.join(","))
     }
 
     #[test]
@@ -477,6 +496,8 @@ mod tests {
         assert_eq!(filter(r#"{"class":"WATCH"}"#), Some(Filter::default()));
         assert_eq!(filter(r#"{"class":"WATCH","enable":false}"#), None);
         assert_eq!(filter(r#"{"class":"WATCH","streams":[]}"#), None);
+        let most = filter(&watching_ids(MAX_WATCHED)).and_then(|f| f.ids);
+        assert_eq!(most.map(|ids| ids.len()), Some(MAX_WATCHED));
         assert_eq!(
             filter(r#"{"class":"WATCH","id":"a","rate_hz":50,"from":"now","x":[]}"#),
             Some(Filter {

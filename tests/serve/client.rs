@@ -145,14 +145,6 @@ impl Client {
         }
     }
 
-    /// Sends unless the daemon has closed.
-    pub(crate) fn try_send(&mut self, bytes: &[u8]) -> bool {
-        match &mut self.link {
-            Link::Tcp(s) => s.get_mut().write_all(bytes).is_ok(),
-            _ => unreachable!("asked of TCP only"),
-        }
-    }
-
     /// The next line, without its end; `None` when the daemon has closed.
     pub(crate) fn line(&mut self) -> Option<String> {
         match self.item()? {

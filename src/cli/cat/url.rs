@@ -8,7 +8,7 @@ use crate::client::remote::Remote;
 use crate::client::secret::Secret;
 use crate::client::watcher::{Said, Watcher, request};
 use crate::error::{Error, Result};
-use crate::serve::shutdown::{self, Signals};
+use crate::serve::shutdown::Signals;
 use std::io::{BufWriter, Stdout, Write};
 use std::time::Duration;
 
@@ -49,9 +49,10 @@ async fn print(args: &Cat, remote: &Remote, token: Option<&Secret>) -> Result<Ou
         address: remote.to_string(),
         what,
     };
-    let signals = Signals::new().map_err(|e| Error::Usage(format!("signals: {e}")))?;
-    // On a thread of its own: a second signal ends the process even when nobody reads our output.
-    let mut stop = tokio::spawn(shutdown::first(signals, || false));
+    // A second one ends the process even when nobody reads our output.
+    let mut signals = Signals::new().map_err(|e| Error::Usage(format!("signals: {e}")))?;
+    let stop = signals.first(|| false);
+    tokio::pin!(stop);
     let until = tokio::time::sleep(args.seconds.map_or(Duration::MAX, Duration::from_secs_f64));
     tokio::pin!(until);
     let mut printer = Printer::new(args)?;

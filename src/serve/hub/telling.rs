@@ -9,6 +9,7 @@ use crate::serve::wire::{self, Fault};
 use crate::sink::{Profile, Stream};
 use bytes::Bytes;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 impl Hub {
     /// Whether clients may send samples: a replay has its own.
@@ -20,7 +21,7 @@ impl Hub {
     /// What can be watched.
     #[must_use]
     pub fn classes(&self) -> Vec<Class> {
-        let mut classes: Vec<Class> = read(&self.channels).iter().map(|c| c.class()).collect();
+        let mut classes: Vec<Class> = read(&self.channels).values().map(|c| c.class()).collect();
         classes.push(Class::Att);
         classes.sort_unstable();
         classes.dedup();
@@ -30,15 +31,16 @@ impl Hub {
     /// A further stream; viewers are told.
     pub fn declare(&self, stream: &Stream) -> Arc<Channel> {
         let mut channels = write(&self.channels);
-        let mut streams: Vec<Stream> = channels.iter().map(|c| c.stream().clone()).collect();
+        let mut streams: Vec<Stream> = channels.values().map(|c| c.stream().clone()).collect();
         streams.push(stream.clone());
-        let channel = Arc::new(Channel::new(&streams));
-        channels.push(channel.clone());
+        let number = self.next_channel.fetch_add(1, Ordering::Relaxed);
+        let channel = Arc::new(Channel::new(number, &streams));
+        channels.insert(number, channel.clone());
         // Under the lock: who joins meanwhile finds it in the list, and is not told twice.
         let said = foxglove::channels(std::iter::once(&*channel), false);
         for client in read(&self.clients).values() {
             if matches!(client.shape, Shape::Foxglove { .. }) {
-                client.outbox.reply(said.clone());
+                client.outbox.announce(said.clone());
             }
         }
         channel
@@ -49,9 +51,8 @@ impl Hub {
     pub fn has_channel(&self, number: u32) -> bool {
         number == foxglove::TRANSFORMS
             || read(&self.channels)
-                .iter()
-                .flat_map(|c| c.topics())
-                .any(|(known, _)| known == number)
+                .get(&foxglove::stream_of(number))
+                .is_some_and(|c| c.has(number))
     }
 
     /// Where the replay is; `None` where there is none to be controlled.
@@ -127,7 +128,7 @@ impl Hub {
     pub(super) fn own_streams(&self) -> Vec<serde_json::Value> {
         match &self.playback {
             None => Vec::new(),
-            Some(_) => read(&self.channels).iter().map(|c| c.status()).collect(),
+            Some(_) => read(&self.channels).values().map(|c| c.status()).collect(),
         }
     }
 }

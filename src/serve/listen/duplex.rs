@@ -11,9 +11,10 @@ use crate::serve::subscriber::Outbox;
 use crate::serve::wire::{self, Fault};
 use bytes::{Buf, Bytes};
 use std::collections::VecDeque;
-use std::future::Future;
+use std::future::{Future, ready};
 use std::io::{self, IoSlice};
 use std::time::Duration;
+use tokio::task::yield_now;
 use tokio::time::{Instant, MissedTickBehavior, interval, timeout};
 
 /// A stream socket of tokio.
@@ -48,16 +49,19 @@ const LAST_READ: usize = 16 << 20;
 #[derive(Debug, Default)]
 struct Pending {
     parts: VecDeque<Bytes>,
-    /// Bytes of attitudes among them.
-    attitudes: usize,
+    /// Bytes of attitudes among them; `None`: nothing was taken.
+    attitudes: Option<usize>,
 }
 
 impl Pending {
     /// Takes more when all has left; says whether there is anything.
     fn fill(&mut self, outbox: &Outbox) -> bool {
         if self.parts.is_empty() {
-            outbox.written(std::mem::take(&mut self.attitudes));
-            self.attitudes = outbox.take(TAKE, &mut self.parts);
+            if let Some(attitudes) = self.attitudes.take() {
+                outbox.written(attitudes);
+            }
+            let attitudes = outbox.take(TAKE, &mut self.parts);
+            self.attitudes = (!self.parts.is_empty()).then_some(attitudes);
         }
         !self.parts.is_empty()
     }
@@ -119,12 +123,24 @@ async fn talk(
     let mut progress = opened;
     let mut pending = Pending::default();
     let mut reading = true;
+    // It has said that it sends nothing more.
+    let mut has_ended = false;
     let mut flood = Flood::default();
     let mut closing = None;
-    let mut stopping = false;
+    // What is still read of it at the end of the daemon.
+    let mut last_read: Option<usize> = None;
     let mut tick = interval(limits.tick());
     tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
+        if session.end().is_some() && closing.is_none() {
+            reading = false;
+            closing = Some(Some("bad lines or no token"));
+        }
+        let held = session.is_held();
+        // Whoever sent a request and nothing more still wants the answers.
+        if has_ended && !held && closing.is_none() && !outbox.level().watching {
+            closing = Some(None);
+        }
         // Write what there is without asking: there nearly always is room.
         let mut blocked = false;
         let mut turns = 0;
@@ -146,7 +162,7 @@ async fn talk(
                 Err(_) => return closing.flatten(),
             }
         }
-        if closing.is_some() {
+        if closing.is_some() || (last_read.is_some() && !reading && !held) {
             running.has_read();
         }
         if outbox.full().is_some() && closing.is_none() {
@@ -156,6 +172,7 @@ async fn talk(
         if !blocked
             && !hurry
             && let Some(reason) = closing
+            && !outbox.owes_answer()
         {
             linger(io).await;
             return reason;
@@ -164,10 +181,17 @@ async fn talk(
             // Nothing waits: the clock of progress stands still.
             progress = Instant::now();
         }
+        let reads = reading && !held && !flood.must_wait();
         tokio::select! {
-            () = flood.wait(&hub), if flood.must_wait() => {}
-            ready = io.readable(), if reading && !flood.must_wait() => {
-                let read = ready.and_then(|()| in_room(|buffer, scratch| {
+            () = flood.wait(&hub), if flood.must_wait() && !held => {}
+            () = ready(()), if held && closing.is_none() && session.may_go_on() => {
+                yield_now().await;
+                let _turn = hub.turn(session.is_asking()).await;
+                in_room(|_, scratch| session.go_on(scratch));
+            }
+            readable = io.readable(), if reads && last_read.is_none() => {
+                let _turn = hub.turn(session.is_asking()).await;
+                let read = readable.and_then(|()| in_room(|buffer, scratch| {
                     let most = flood.most(buffer.len());
                     let n = io.try_read(buffer.get_mut(..most).unwrap_or_default())?;
                     flood.read(n, most);
@@ -177,19 +201,32 @@ async fn talk(
                 match read {
                     Ok(0) => {
                         reading = false;
+                        has_ended = true;
                         in_room(|_, scratch| session.finish(now(), scratch));
-                        // Whoever sent a request and nothing more still wants the answers.
-                        if !outbox.level().watching {
-                            closing = Some(None);
-                        }
                     }
                     Ok(_) => {}
                     Err(e) if e.kind() == io::ErrorKind::WouldBlock => {}
                     Err(_) => return None,
                 }
-                if session.end().is_some() {
-                    reading = false;
-                    closing = Some(Some("bad lines or no token"));
+            }
+            // What has arrived is still taken, also what the kernel has and the reactor has not yet told
+            // of.
+            () = ready(()), if reading && !held && last_read.is_some() => {
+                yield_now().await;
+                let _turn = hub.turn(session.is_asking()).await;
+                let read = in_room(|buffer, scratch| {
+                    let n = io.try_read(buffer)?;
+                    session.bytes(buffer.get(..n).unwrap_or_default(), now(), scratch);
+                    io::Result::Ok(n)
+                });
+                let left = last_read.unwrap_or(0);
+                match read {
+                    Ok(n) if n > 0 && n < left => last_read = Some(left - n),
+                    Ok(0) => {
+                        reading = false;
+                        in_room(|_, scratch| session.finish(now(), scratch));
+                    }
+                    _ => reading = false,
                 }
             }
             ready = io.writable(), if blocked => {
@@ -198,7 +235,7 @@ async fn talk(
                 }
             }
             () = outbox.filled(), if !blocked && !hurry => {}
-            () = tokio::task::yield_now(), if hurry => {}
+            () = yield_now(), if hurry => {}
             _ = tick.tick() => {
                 if blocked && progress.elapsed() >= limits.no_progress {
                     return Some("it took nothing for too long");
@@ -210,29 +247,13 @@ async fn talk(
                     closing = Some(Some("no first line"));
                 }
             }
-            () = running.asked_further(stopping), if closing.is_none() => {
-                if stopping {
+            () = running.asked_further(last_read.is_some()), if closing.is_none() => {
+                if last_read.is_some() {
                     closing = Some(None);
-                    continue;
+                } else {
+                    let _ = timeout(SETTLE, io.readable()).await;
+                    last_read = Some(LAST_READ);
                 }
-                // What has arrived is still taken, also what the kernel has and the reactor has not yet
-                // told of.
-                let _ = timeout(SETTLE, io.readable()).await;
-                let mut left = LAST_READ;
-                while reading && left > 0 {
-                    let read = in_room(|buffer, scratch| {
-                        let n = io.try_read(buffer)?;
-                        session.bytes(buffer.get(..n).unwrap_or_default(), now(), scratch);
-                        io::Result::Ok(n)
-                    });
-                    match read {
-                        Ok(n) if n > 0 && session.end().is_none() => left = left.saturating_sub(n),
-                        _ => break,
-                    }
-                }
-                reading = false;
-                stopping = true;
-                running.has_read();
             }
         }
     }

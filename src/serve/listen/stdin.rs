@@ -2,7 +2,7 @@
 
 use super::{in_room, now};
 use crate::serve::hub::{Flood, Hub};
-use crate::serve::session::Session;
+use crate::serve::session::{Session, Side};
 use std::collections::VecDeque;
 use std::io::Read;
 use std::sync::Arc;
@@ -10,7 +10,8 @@ use std::sync::Arc;
 /// Reads lines to the end of `input` on this thread; whoever started the daemon is trusted, and
 /// what is wrong with the lines is said in the log.
 pub fn read(hub: &Arc<Hub>, mut input: impl Read) {
-    let mut session = Session::new(hub, "standard input".to_owned(), true);
+    let side = Side::Deaf { trusted: true };
+    let mut session = Session::with(hub, "standard input".to_owned(), side);
     let mut said = VecDeque::new();
     let mut flood = Flood::default();
     loop {
@@ -24,14 +25,19 @@ pub fn read(hub: &Arc<Hub>, mut input: impl Read) {
             }
             std::io::Result::Ok(n)
         });
-        let client = session.client();
-        client.outbox.watch(None);
-        client.outbox.take(usize::MAX, &mut said);
-        for line in said.drain(..) {
-            let line = String::from_utf8_lossy(&line);
-            if line.contains("\"class\":\"ERROR\"") {
-                super::super::quiet::warn("stdin", &format!("standard input: {}", line.trim_end()));
+        loop {
+            session.client().outbox.discard(&mut said);
+            for line in said.drain(..) {
+                let line = String::from_utf8_lossy(&line);
+                if line.contains("\"class\":\"ERROR\"") {
+                    let what = format!("standard input: {}", line.trim_end());
+                    super::super::quiet::warn("stdin", &what);
+                }
             }
+            if !session.is_held() {
+                break;
+            }
+            in_room(|_, scratch| session.go_on(scratch));
         }
         match read {
             Ok(0) => {

@@ -4,12 +4,13 @@
 //! is counted and shows in `STATUS`.
 
 use super::{Context, in_room, now};
-use crate::serve::session::Session;
-use std::collections::HashMap;
-use std::collections::VecDeque;
+use crate::serve::session::{Session, Side};
+use bytes::Bytes;
+use std::collections::{HashMap, VecDeque};
 use std::net::SocketAddr;
 use tokio::net::UdpSocket;
-use tokio::time::{Instant, MissedTickBehavior, interval};
+use tokio::task::yield_now;
+use tokio::time::{Instant, MissedTickBehavior, interval, timeout};
 
 /// Senders remembered at once.
 const MAX_SENDERS: usize = 256;
@@ -44,30 +45,47 @@ pub(super) async fn serve(socket: UdpSocket, context: Context) {
                     continue;
                 }
                 let sender = senders.entry(peer).or_insert_with(|| Sender {
-                    session: Session::new(&hub, format!("udp://{peer}"), false),
+                    session: Session::with(
+                        &hub,
+                        format!("udp://{peer}"),
+                        Side::Deaf { trusted: false },
+                    ),
                     heard: Instant::now(),
                 });
                 sender.heard = Instant::now();
                 let datagram = buffer.get(..n).unwrap_or_default();
-                in_room(|_, scratch| sender.session.message(datagram, now(), scratch));
-                let client = sender.session.client();
-                client.outbox.watch(None);
-                client.outbox.take(usize::MAX, &mut unheard);
-                unheard.clear();
+                take(&mut sender.session, datagram, &mut unheard).await;
                 if sender.session.end().is_some() {
                     senders.remove(&peer);
                 }
             }
             _ = tick.tick() => senders.retain(|_, s| s.heard.elapsed() < silence),
             () = running.asked() => {
-                while let Ok((n, peer)) = socket.try_recv_from(&mut buffer) {
-                    if let Some(sender) = senders.get_mut(&peer) {
-                        let datagram = buffer.get(..n).unwrap_or_default();
-                        in_room(|_, scratch| sender.session.message(datagram, now(), scratch));
+                let rest = async {
+                    while let Ok((n, peer)) = socket.try_recv_from(&mut buffer) {
+                        if let Some(sender) = senders.get_mut(&peer) {
+                            let datagram = buffer.get(..n).unwrap_or_default();
+                            take(&mut sender.session, datagram, &mut unheard).await;
+                        }
                     }
-                }
+                };
+                let _ = timeout(hub.limits().drain / 2, rest).await;
                 return;
             }
         }
+    }
+}
+
+/// Takes a datagram, step by step. What would be answered goes nowhere.
+async fn take(session: &mut Session, datagram: &[u8], unheard: &mut VecDeque<Bytes>) {
+    in_room(|_, scratch| session.message(datagram, now(), scratch));
+    loop {
+        session.client().outbox.discard(unheard);
+        unheard.clear();
+        if !session.is_held() {
+            return;
+        }
+        yield_now().await;
+        in_room(|_, scratch| session.go_on(scratch));
     }
 }

@@ -30,6 +30,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::task::Poll;
 use tokio::net::TcpListener;
 use tokio::sync::OwnedSemaphorePermit;
+use tokio::task::yield_now;
 use tokio::time::{Instant, MissedTickBehavior, interval_at, timeout};
 
 /// Longest message that is read: a line that is too long is still answered, up to here.
@@ -201,9 +202,12 @@ pub(crate) async fn converse(socket: WebSocket, connection: Connection, foxglove
                 message = next => message,
                 () = running.asked() => {
                     // What has arrived is still taken.
-                    while let Some(Ok(message)) = ready(&mut stream).await {
-                        session.take(&message);
-                    }
+                    let rest = async {
+                        while let Some(Ok(message)) = ready(&mut stream).await {
+                            session.take_all(&message, &hub).await;
+                        }
+                    };
+                    let _ = timeout(limits.drain / 2, rest).await;
                     running.has_read();
                     running.asked_to_send().await;
                     return None;
@@ -213,7 +217,7 @@ pub(crate) async fn converse(socket: WebSocket, connection: Connection, foxglove
                 Err(_) => return Some("nothing was heard from it for too long"),
                 Ok(None | Some(Err(_))) => return None,
                 Ok(Some(Ok(Message::Close(_)))) => return None,
-                Ok(Some(Ok(message))) => session.take(&message),
+                Ok(Some(Ok(message))) => session.take_all(&message, &hub).await,
             }
             flood.wait(&hub).await;
             if session.is_over() {
@@ -229,7 +233,7 @@ pub(crate) async fn converse(socket: WebSocket, connection: Connection, foxglove
         loop {
             let attitudes = client.outbox.take(TAKE, &mut parts);
             if parts.is_empty() {
-                if closing.load(Ordering::Acquire) {
+                if closing.load(Ordering::Acquire) && !client.outbox.owes_answer() {
                     return None;
                 }
                 tokio::select! {
@@ -330,15 +334,37 @@ impl Talk {
         }
     }
 
-    fn take(&mut self, message: &Message) {
+    /// Takes a message, step by step, as fast as the client reads the answers.
+    async fn take_all(&mut self, message: &Message, hub: &Hub) {
         let Some((bytes, is_text)) = payload(message) else {
             return;
         };
+        let client = self.client().clone();
         match self {
             Talk::Lines(session) => {
+                let turn = hub.turn(session.is_asking()).await;
                 in_room(|_, scratch| session.message(bytes, now(), scratch));
+                drop(turn);
+                while session.is_held() {
+                    if !session.may_go_on() {
+                        client.outbox.answered().await;
+                        continue;
+                    }
+                    yield_now().await;
+                    let _turn = hub.turn(session.is_asking()).await;
+                    in_room(|_, scratch| session.go_on(scratch));
+                }
             }
-            Talk::Foxglove(viewer) => viewer.message(bytes, is_text),
+            Talk::Foxglove(viewer) => {
+                // All it can say are requests.
+                yield_now().await;
+                let turn = hub.turn(true).await;
+                viewer.message(bytes, is_text);
+                drop(turn);
+                while client.outbox.is_full() {
+                    client.outbox.answered().await;
+                }
+            }
         }
     }
 }

@@ -189,3 +189,53 @@ fn a_client_gets_the_sensors_and_the_rate_it_asked_for() {
     offer(&outbox, &chunk("a", 0, 10));
     assert!(outbox.is_empty());
 }
+
+#[test]
+fn a_client_that_leaves_its_answers_unread_is_full_long_before_one_is_too_many() {
+    let outbox = Outbox::new();
+    let mut out = VecDeque::new();
+    for _ in 0..MAX_CONTROL / 4 {
+        assert!(!outbox.is_full());
+        outbox.reply(Bytes::from("x"));
+        // Taken is not read.
+        outbox.take(0, &mut out);
+    }
+    assert!(outbox.is_full());
+    outbox.written(0);
+    assert!(!outbox.is_full());
+    outbox.reply(vec![b'x'; 512 << 10].into());
+    assert!(outbox.is_full());
+}
+
+#[test]
+fn the_state_is_owed_once_from_the_question_until_the_answer_has_left() {
+    let outbox = Outbox::new();
+    let mut out = VecDeque::new();
+    assert!(!outbox.owes_answer());
+    assert!(outbox.ask() && !outbox.ask());
+    // Larger than all replies together may be, and no reason to close.
+    outbox.reply(Bytes::from("a reply"));
+    outbox.answer(vec![b'x'; 4 << 20].into());
+    assert!(!outbox.is_empty() && !outbox.ask());
+    outbox.take(0, &mut out);
+    assert_eq!((out.len(), outbox.full()), (2, None));
+    assert!(outbox.is_empty() && outbox.owes_answer() && !outbox.ask());
+    outbox.written(0);
+    assert!(!outbox.owes_answer() && outbox.ask());
+}
+
+#[test]
+fn a_thousand_new_streams_at_once_are_no_fault_of_who_is_told() {
+    let outbox = Outbox::new();
+    for _ in 0..1000 {
+        outbox.announce(vec![b'x'; 3000].into());
+    }
+    assert_eq!((outbox.full(), outbox.is_full()), (None, false));
+    let mut out = VecDeque::new();
+    outbox.take(0, &mut out);
+    assert_eq!(out.len(), 1000);
+    for _ in 0..3000 {
+        outbox.announce(vec![b'x'; 3000].into());
+    }
+    assert_eq!(outbox.full(), Some(Full::Control), "memory is bounded");
+}
