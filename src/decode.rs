@@ -191,6 +191,30 @@ impl Decoder {
         }
     }
 
+    /// The same for a message that names this frame, or none; nothing of one that names another.
+    ///
+    /// # Errors
+    /// As [`Decoder::decode`].
+    pub fn decode_of(
+        &self,
+        frame: &str,
+        payload: &[u8],
+        log: Nanos,
+        publish: Nanos,
+        out: &mut Vec<RawSample>,
+    ) -> Result<Option<Decoded>, Undecodable> {
+        if let Plan::Json(plan) = &self.plan {
+            return plan.decode_of(frame, payload, log, publish, out);
+        }
+        let names_another = |named: &[u8]| {
+            named != frame.as_bytes() && printable(&String::from_utf8_lossy(named)) != frame
+        };
+        if self.frame_bytes(payload).is_some_and(names_another) {
+            return Ok(None);
+        }
+        self.decode(payload, log, publish, out).map(Some)
+    }
+
     /// Learns from one message (the first of the topic) what no schema says: the unit of a stamp
     /// that is a bare number, by the recorder's clock and else by its magnitude, and for JSON what
     /// the messages hold. Without this call such stamps are read by magnitude, one by one.
@@ -312,15 +336,25 @@ impl Decoder {
     /// The frame a message names: at most 255 bytes, control characters escaped.
     #[must_use]
     pub fn frame_id(&self, payload: &[u8]) -> Option<String> {
-        let bytes = match (&self.frame, &self.plan) {
-            (Some(Plan::Ros(plan)), _) => plan.text(payload)?,
-            (Some(Plan::Protobuf(plan)), _) => plan.text(payload)?,
-            (_, Plan::Json(plan)) => {
-                return plan.find(payload).ok()?.frame.as_deref().map(printable);
-            }
-            _ => return None,
-        };
+        if let Plan::Json(plan) = &self.plan {
+            return plan.find(payload).ok()?.frame.as_deref().map(printable);
+        }
+        let bytes = self.frame_bytes(payload)?;
         Some(printable(&String::from_utf8_lossy(bytes)))
+    }
+
+    /// Whether messages may name a frame.
+    #[must_use]
+    pub fn names_frames(&self) -> bool {
+        self.frame.is_some() || matches!(self.plan, Plan::Json(_))
+    }
+
+    fn frame_bytes<'a>(&'a self, payload: &'a [u8]) -> Option<&'a [u8]> {
+        match self.frame.as_ref()? {
+            Plan::Ros(plan) => plan.text(payload),
+            Plan::Protobuf(plan) => plan.text(payload),
+            Plan::Json(_) => None,
+        }
     }
 
     fn found(&self) -> Found {

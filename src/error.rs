@@ -76,8 +76,8 @@ pub enum Error {
         /// What is there, one indented line each.
         topics: String,
     },
-    /// The log holds several IMU topics and none was named.
-    #[error("{}: several IMU topics, and they must not be mixed:{topics}\n  help: --topic NAME takes one of them, --topic all each of them", path.display())]
+    /// The log holds several IMU topics, or several publishers on one, and none was named.
+    #[error("{}: several IMU topics or publishers, and they must not be mixed:{topics}\n  help: --topic NAME takes one of them, --topic all each of them", path.display())]
     SeveralImuTopics {
         /// Which file.
         path: PathBuf,

@@ -23,6 +23,7 @@ pub mod route;
 pub mod run;
 pub mod session;
 pub mod simulate;
+pub mod sources;
 pub mod stamps;
 mod streamed;
 pub mod summarise;

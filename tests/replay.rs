@@ -17,6 +17,8 @@ mod hostile;
 mod made_logs;
 #[path = "replay/outputs.rs"]
 mod outputs;
+#[path = "replay/publishers.rs"]
+mod publishers;
 #[path = "replay/recordings.rs"]
 mod recordings;
 mod replays;

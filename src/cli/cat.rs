@@ -10,7 +10,8 @@ use crate::error::{Error, Result};
 use crate::pipeline::log::{Log, problems};
 use crate::pipeline::pool::Pool;
 use crate::pipeline::preparation::Resolved;
-use crate::pipeline::route::{Item, Route};
+use crate::pipeline::route::{Item, Noticed, Route, Taker};
+use crate::pipeline::sources::is_same;
 use crate::pipeline::topics;
 use crate::record::{RawSample, SampleKind};
 use crate::source::mcap::{self, WalkOptions};
@@ -19,6 +20,7 @@ use serde_json::json;
 use std::io::{BufWriter, Write};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// Decoded samples of a file, or attitudes of a daemon, as NDJSON, CSV or a table: rad/s, m/s^2, axes FLU.
 #[derive(Args, Debug)]
@@ -112,31 +114,28 @@ pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
         ..Options::default()
     };
     let pool = Pool::new(global.threads)?;
-    let log = Log::open(&args.source, &pool)?;
-    let topic = match &args.topic {
-        Some(topic) => topic.clone(),
-        None => {
-            let choice = log.choose(&args.source, None)?;
-            choice.topics.into_iter().next().unwrap_or_default()
-        }
-    };
+    let log = Log::told_apart(&args.source, args.topic.as_deref(), &options, &pool)?;
+    let choice = log.choose(&args.source, args.topic.as_deref())?;
+    let topic = choice.topics.into_iter().next().unwrap_or_default();
+    let source = log.source(&topic);
     let mut decoders = Vec::new();
     let mut meanings = Vec::new();
-    for known in log.channels.iter().filter(|k| k.channel.topic == topic) {
+    for known in source.iter().flat_map(|s| log.channels_of(s)) {
         let decoder = known.decoder(&options).map_err(|why| Error::Unsupported {
             path: args.source.clone(),
             what: why.to_string(),
         })?;
         meanings.push(Resolved::new(&Plan::default(), decoder.stated()));
-        decoders.push((known.channel.id, decoder));
+        decoders.push((known.channel.clone(), decoder));
     }
-    if decoders.is_empty() {
+    let (Some(source), false) = (source, decoders.is_empty()) else {
         return Err(Error::NoSuchTopic {
             path: args.source.clone(),
             topic,
             topics: topics::listing(&log.candidates()),
         });
-    }
+    };
+    let noticed = Arc::new(Noticed::of(&source));
     let mut printer = Printer::new(args.format, &topic, args.count)?;
     let mut failure = None;
     let mut undecodable = 0u64;
@@ -153,8 +152,9 @@ pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
             let (stream, (_, decoder)) = decoders
                 .iter()
                 .enumerate()
-                .find(|(_, (id, _))| *id == channel.id && channel.topic == topic)?;
-            Some(Route::samples(decoder.clone(), stream))
+                .find(|(_, (known, _))| is_same(known, channel))?;
+            let noticed = noticed.clone();
+            Some(Route::to(decoder.clone(), vec![Taker { stream, noticed }]))
         },
         Route::map,
         |items| {

@@ -12,7 +12,8 @@ use clap::{Args, ValueEnum};
 #[derive(Args, Debug, Clone)]
 #[command(next_help_heading = "Estimation")]
 pub struct Estimation {
-    /// IMU topic; needed only when a log has several. `all` = each of them
+    /// IMU topic, or TOPIC@FRAME of one with several publishers; needed only when a log has several.
+    /// `all` = each of them
     #[arg(long, value_name = "NAME")]
     pub topic: Option<String>,
     /// Which clock the samples are placed on; `index` needs --rate-hz

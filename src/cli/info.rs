@@ -35,7 +35,6 @@ pub struct Info {
 /// The log can not be read, or the topic named is not in it.
 pub fn run(global: &Global, args: &Info) -> Result<Outcome> {
     let pool = Pool::new(global.threads)?;
-    let log = Log::open(&args.file, &pool)?;
     let options = Options {
         fields: args
             .fields
@@ -44,8 +43,9 @@ pub fn run(global: &Global, args: &Info) -> Result<Outcome> {
             .collect::<Result<_>>()?,
         ..Options::default()
     };
+    let log = Log::told_apart(&args.file, args.topic.as_deref(), &options, &pool)?;
     if let Some(topic) = &args.topic
-        && !log.channels.iter().any(|k| k.channel.topic == *topic)
+        && !log.has(topic)
     {
         return Err(Error::NoSuchTopic {
             path: args.file.clone(),

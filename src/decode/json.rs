@@ -12,6 +12,7 @@ pub(crate) mod scan;
 pub(crate) mod seek;
 pub(crate) mod trie;
 
+use super::refusal::printable;
 use super::registers::Form;
 use super::schema::{last_name, ros_name};
 use super::select::names::{Px4, px4};
@@ -66,6 +67,24 @@ impl Plan {
         let mut seeker = Seeker::new(self, Scanner::new(payload)?);
         let found = seeker.message()?;
         Ok(self.push(&found, log, publish, out))
+    }
+
+    /// The same for a message that names this frame, or none; nothing of one that names another.
+    pub(crate) fn decode_of(
+        &self,
+        frame: &str,
+        payload: &[u8],
+        log: Nanos,
+        publish: Nanos,
+        out: &mut Vec<RawSample>,
+    ) -> Result<Option<Decoded>, Undecodable> {
+        let mut seeker = Seeker::new(self, Scanner::new(payload)?);
+        let found = seeker.message()?;
+        let names_another = |named: &str| named != frame && printable(named) != frame;
+        if found.frame.as_deref().is_some_and(names_another) {
+            return Ok(None);
+        }
+        Ok(Some(self.push(&found, log, publish, out)))
     }
 
     /// Everything one payload holds.

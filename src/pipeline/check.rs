@@ -88,13 +88,13 @@ pub fn examine(
     pool: &Pool,
     watch: &mut dyn FnMut(&Position),
 ) -> Result<Checked> {
-    let log = Log::open(path, pool)?;
     let named = asked.plan.topic.as_deref().filter(|name| *name != "all");
+    let log = Log::told_apart(path, named, &asked.plan.decode, pool)?;
     for topic in named
         .into_iter()
         .chain(Some(asked.reference_topic.as_str()).filter(|name| !name.is_empty()))
     {
-        if !log.channels.iter().any(|k| k.channel.topic == topic) {
+        if !log.has(topic) {
             return Err(Error::NoSuchTopic {
                 path: path.to_owned(),
                 topic: topic.to_owned(),
@@ -120,7 +120,7 @@ pub fn examine(
     };
     let topics = looked
         .into_iter()
-        .filter(|l| named.is_none_or(|name| l.topic == name))
+        .filter(|l| named.is_none_or(|name| l.topic == name || l.of == name))
         .map(|looked| CheckedTopic {
             replayed: integrate(path, &looked.topic, asked, has_reference, pool, watch),
             looked,

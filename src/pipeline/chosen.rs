@@ -5,9 +5,10 @@
 
 use super::log::{Known, Log, described, rank};
 use super::preparation::Resolved;
-use super::route::Route;
+use super::route::{Noticed, Route, Taker};
 use super::run::Replay;
 use super::session::Found;
+use super::sources::{Source, is_same};
 use super::topics;
 use crate::decode::Decoder;
 use crate::error::{Error, Result};
@@ -21,6 +22,7 @@ use std::sync::Arc;
 pub(super) struct Chosen {
     pub(super) found: Found,
     pub(super) stream: Stream,
+    source: Source,
     channels: Vec<(Arc<Channel>, Decoder)>,
 }
 
@@ -53,7 +55,14 @@ fn choose_one(
 ) -> Result<Chosen> {
     let mut channels = Vec::new();
     let mut refusals = Vec::new();
-    for known in log.channels.iter().filter(|c| c.channel.topic == name) {
+    let Some(source) = log.source(name) else {
+        return Err(Error::NoSuchTopic {
+            path: path.to_owned(),
+            topic: name.to_owned(),
+            topics: topics::listing(&log.candidates()),
+        });
+    };
+    for known in log.channels_of(&source) {
         match known.decoder(&run.plan.decode) {
             Ok(decoder) => channels.push((known, decoder)),
             Err(why) => refusals.push(why.to_string()),
@@ -75,12 +84,12 @@ fn choose_one(
             ),
         });
     }
-    let frame = first
-        .first
-        .as_ref()
-        .and_then(|(_, payload)| decoder.frame_id(payload))
-        .unwrap_or_default();
-    let topic = output_topic(name, taken);
+    let frame = source.frame.clone().or_else(|| {
+        let (_, payload) = first.first.as_ref()?;
+        decoder.frame_id(payload)
+    });
+    let frame = frame.unwrap_or_default();
+    let topic = output_topic(&plain_name(&source), taken);
     let mut stream = Stream::new(name, &frame);
     stream.output_topic = topic.clone();
     let found = Found {
@@ -88,7 +97,7 @@ fn choose_one(
         output_topic: topic,
         described: described(&first.channel),
         resolved: Resolved::new(&run.plan, decoder.stated()),
-        noticed: Arc::default(),
+        noticed: Arc::new(Noticed::of(&source)),
         warnings: refusals,
     };
     let channels = channels
@@ -98,8 +107,19 @@ fn choose_one(
     Ok(Chosen {
         found,
         stream,
+        source,
         channels,
     })
+}
+
+/// A source's name fit for a topic: letters, digits and underscores in place of the label.
+fn plain_name(source: &Source) -> String {
+    if source.label.is_empty() {
+        return source.topic.clone();
+    }
+    let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
+    let label: String = source.label.chars().map(plain).collect();
+    format!("{}_{label}", source.topic.trim_end_matches('/'))
 }
 
 /// A channel of recorded orientations the estimate is held against.
@@ -120,7 +140,7 @@ pub(super) fn reference(
     let Some(asked) = &run.against else {
         return Ok(None);
     };
-    let taken = |k: &&Known| chosen.iter().any(|c| c.found.name == k.channel.topic);
+    let taken = |k: &&Known| chosen.iter().any(|c| c.source.topic == k.channel.topic);
     let found = if asked.is_empty() {
         let mut others = log.channels.iter().filter(|k| {
             !taken(k) && k.role.has_orientation && rank(&k.role) <= 1 && k.messages > 0
@@ -156,38 +176,51 @@ pub(super) fn reference(
     }))
 }
 
-pub(super) fn find<'c>(chosen: &'c [Chosen], channel: &Channel) -> Option<(usize, &'c Decoder)> {
-    chosen.iter().enumerate().find_map(|(stream, c)| {
-        c.channels
-            .iter()
-            .find(|(known, _)| is_same(known, channel))
-            .map(|(_, decoder)| (stream, decoder))
-    })
+/// The decoder of a channel's messages and the streams they may belong to: of several, the one of the
+/// frame that a message names.
+fn find<'c>(chosen: &'c [Chosen], channel: &Channel) -> Option<(&'c Decoder, Vec<usize>)> {
+    let mut decoder = None;
+    let mut streams = Vec::new();
+    for (stream, c) in chosen.iter().enumerate() {
+        if let Some((_, own)) = c.channels.iter().find(|(known, _)| is_same(known, channel)) {
+            decoder.get_or_insert(own);
+            streams.push(stream);
+        }
+    }
+    Some((decoder?, streams))
 }
 
-/// Whether a channel met in a walk is the one the survey knows: the index may differ, since the
-/// summary lists them in another order.
-fn is_same(known: &Channel, met: &Channel) -> bool {
-    known.id == met.id && known.topic == met.topic && known.schema_id == met.schema_id
+/// The way of a channel's messages to the streams, with what is noticed put aside.
+pub(super) fn looked_at(chosen: &[Chosen], channel: &Channel) -> Option<Route> {
+    let (decoder, streams) = find(chosen, channel)?;
+    let taker = |stream: usize| {
+        let noticed = chosen.get(stream).map(|c| Noticed::of(&c.source));
+        Taker {
+            stream,
+            noticed: Arc::new(noticed.unwrap_or_default()),
+        }
+    };
+    let takers = streams.into_iter().map(taker).collect();
+    Some(Route::to(decoder.clone(), takers))
 }
 
 pub(super) fn route(
-    chosen: &mut [Chosen],
+    chosen: &[Chosen],
     reference: Option<&Reference>,
     copy_input: bool,
     channel: &Arc<Channel>,
 ) -> Option<Route> {
     let copied = copy_input.then(|| channel.clone());
-    if let Some((stream, decoder)) = find(chosen, channel) {
-        let noticed = chosen
-            .get(stream)
-            .map(|c| c.found.noticed.clone())
-            .unwrap_or_default();
-        return Some(
-            Route::samples(decoder.clone(), stream)
-                .noticing(&noticed)
-                .copying(copied),
-        );
+    if let Some((decoder, streams)) = find(chosen, channel) {
+        let taker = |stream: usize| {
+            let noticed = chosen.get(stream).map(|c| c.found.noticed.clone());
+            Taker {
+                stream,
+                noticed: noticed.unwrap_or_default(),
+            }
+        };
+        let takers = streams.into_iter().map(taker).collect();
+        return Some(Route::to(decoder.clone(), takers).copying(copied));
     }
     match reference.filter(|r| is_same(&r.channel, channel)) {
         Some(r) => Some(Route::reference(r.decoder.clone()).copying(copied)),

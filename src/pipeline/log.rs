@@ -4,6 +4,7 @@
 //! channels, which of them carry a rate or an orientation, and a decoder that has seen a message.
 
 use super::pool::Pool;
+use super::sources::{self, Source};
 use super::topics::{self, Candidate, Choice, PICKED_UNNAMED};
 use crate::decode::{self, Decoder, Rank, Role, Unsupported, role};
 use crate::error::{Error, Result};
@@ -22,6 +23,8 @@ pub struct Log {
     pub survey: Survey,
     /// Its channels, with what they can serve as.
     pub channels: Vec<Known>,
+    /// Who speaks on its topics: one for each until [`Log::tell_apart`] has looked.
+    pub sources: Vec<Source>,
     /// What was wrong with it as far as it was read: all of it when it has no summary, otherwise up
     /// to the first message of the last channel.
     pub problems: Vec<String>,
@@ -62,7 +65,7 @@ impl Log {
             Some(again) => first_messages(again, &survey)?,
             None => (Vec::new(), Vec::new()),
         };
-        let channels = survey
+        let channels: Vec<Known> = survey
             .channels
             .iter()
             .map(|found| {
@@ -80,8 +83,62 @@ impl Log {
             },
             reader,
             survey,
+            sources: sources::by_topic(&channels),
             channels,
         })
+    }
+
+    /// Opens and surveys a file, and looks at who speaks on its topics: whatever integrates samples must
+    /// know. `named` is `--topic`.
+    ///
+    /// # Errors
+    /// As [`Log::open`].
+    pub fn told_apart(
+        path: &Path,
+        named: Option<&str>,
+        options: &decode::Options,
+        pool: &Pool,
+    ) -> Result<Log> {
+        let mut log = Log::open(path, pool)?;
+        if let Some(again) = log.reader.again() {
+            log.sources = sources::tell_apart(again, &log.channels, named, options, pool)?;
+        }
+        Ok(log)
+    }
+
+    /// The source of this name. `TOPIC@FRAME` is one even if nobody named that frame so far.
+    #[must_use]
+    pub fn source(&self, name: &str) -> Option<Source> {
+        if let Some(known) = self.sources.iter().find(|s| s.name == name) {
+            return Some(known.clone());
+        }
+        let (whole, frame) = sources::by_topic(&self.channels)
+            .into_iter()
+            .find_map(|s| Some((s.clone(), name.strip_prefix(&s.topic)?.strip_prefix('@')?)))?;
+        Some(Source {
+            name: name.to_owned(),
+            frame: Some(frame.to_owned()),
+            label: frame.to_owned(),
+            others: self
+                .sources
+                .iter()
+                .filter(|s| s.topic == whole.topic)
+                .filter_map(|s| s.frame.clone())
+                .collect(),
+            ..whole
+        })
+    }
+
+    /// Whether `--topic` of this name can be meant: a topic, or one of several sources on it.
+    #[must_use]
+    pub fn has(&self, name: &str) -> bool {
+        self.channels.iter().any(|k| k.channel.topic == name) || self.source(name).is_some()
+    }
+
+    /// The channels of a source.
+    pub fn channels_of<'l>(&'l self, source: &Source) -> impl Iterator<Item = &'l Known> {
+        let indices = source.channels.clone();
+        indices.into_iter().filter_map(|n| self.channels.get(n))
     }
 
     /// The topics to estimate from ([`topics::choose`]). Where there are none, the error also says
@@ -90,6 +147,22 @@ impl Log {
     /// # Errors
     /// As [`topics::choose`].
     pub fn choose(&self, path: &Path, named: Option<&str>) -> Result<Choice> {
+        if let Some(name) = named.filter(|name| *name != "all") {
+            let mut rivals = self.candidates();
+            rivals.retain(|c| c.topic != name && c.of == name);
+            if !rivals.is_empty() {
+                return Err(Error::SeveralImuTopics {
+                    path: path.to_owned(),
+                    topics: topics::listing(&rivals),
+                });
+            }
+            if self.source(name).is_some() {
+                return Ok(Choice {
+                    topics: vec![name.to_owned()],
+                    note: None,
+                });
+            }
+        }
         topics::choose(path, &self.candidates(), named)
             .map_err(|error| explained(error, &self.channels, &self.problems))
     }
@@ -100,17 +173,42 @@ impl Log {
         self.reader.again()
     }
 
-    /// For the choice of topics.
+    /// For the choice of topics: one for each source.
     #[must_use]
     pub fn candidates(&self) -> Vec<Candidate> {
-        let candidate = |known: &Known| {
-            let mut candidate = known.candidate();
-            if self.is_our_attitude(known) {
-                candidate.rank = candidate.rank.min(PICKED_UNNAMED);
-            }
-            candidate
+        self.sources.iter().map(|s| self.candidate(s)).collect()
+    }
+
+    fn candidate(&self, source: &Source) -> Candidate {
+        let rank_of = |known: &Known| match rank(&known.role) {
+            best if self.is_our_attitude(known) => best.min(PICKED_UNNAMED),
+            best => best,
         };
-        self.channels.iter().map(candidate).collect()
+        let first = self.channels_of(source).next();
+        let mut said = first.map_or_else(String::new, |k| described(&k.channel));
+        if !source.label.is_empty() {
+            let publishers = first.map_or_else(String::new, |k| sources::publisher(&k.channel));
+            for (what, name) in [
+                ("frame", source.frame.as_deref().unwrap_or_default()),
+                ("publisher", publishers.as_str()),
+            ] {
+                if !name.is_empty() {
+                    said.push_str(&format!("  {what} {name}"));
+                }
+            }
+        }
+        let shared = self
+            .sources
+            .iter()
+            .any(|s| s != source && s.channels.iter().any(|c| source.channels.contains(c)));
+        Candidate {
+            topic: source.name.clone(),
+            of: source.topic.clone(),
+            described: said,
+            // How many of a channel's messages are whose is known at the end.
+            messages: (!shared).then(|| self.channels_of(source).map(|k| k.messages).sum()),
+            rank: self.channels_of(source).map(rank_of).max().unwrap_or(0),
+        }
     }
 
     /// Whether a channel holds what a run put out, by its metadata or by its name beside the input's:
@@ -137,6 +235,7 @@ impl Known {
     pub fn candidate(&self) -> Candidate {
         Candidate {
             topic: self.channel.topic.clone(),
+            of: self.channel.topic.clone(),
             described: described(&self.channel),
             messages: Some(self.messages),
             rank: rank(&self.role),

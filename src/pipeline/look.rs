@@ -7,7 +7,8 @@ use super::log::{Known, Log, described, rank};
 use super::passes::{Conditioned, FEW};
 use super::pool::Pool;
 use super::preparation::Resolved;
-use super::route::{Item, Route};
+use super::route::{Item, Noticed, Route, Taker};
+use super::sources::{Source, is_same};
 use super::topics::PICKED_UNNAMED;
 use crate::condition::quality::{Quality, QualitySummary};
 use crate::condition::regularise;
@@ -20,12 +21,15 @@ use crate::record::RawSample;
 use crate::source::mcap::{self, Survey, WalkOptions};
 use std::ops::ControlFlow;
 use std::path::Path;
+use std::sync::Arc;
 
 /// One topic of samples, looked at.
 #[derive(Debug)]
 pub struct Looked {
-    /// Its name.
+    /// Its name: the topic, or one of several sources on it.
     pub topic: String,
+    /// The topic.
+    pub of: String,
     /// Type and encoding.
     pub described: String,
     /// The frame its first message names.
@@ -51,6 +55,7 @@ pub struct Looked {
 /// A topic being looked at.
 struct Look {
     topic: String,
+    of: String,
     described: String,
     frame: String,
     kind_stated: bool,
@@ -103,6 +108,7 @@ impl Look {
         quality.judge_lines(&self.stamps.finish());
         Ok(Looked {
             topic: self.topic,
+            of: self.of,
             described: self.described,
             frame: self.frame,
             resolved: self.resolved,
@@ -147,32 +153,42 @@ pub fn look_as(
     plan: &Plan,
     pool: &Pool,
 ) -> Result<(Vec<Looked>, Survey)> {
-    let wanted =
-        |k: &&Known| rank(&k.role) >= PICKED_UNNAMED || named == Some(k.channel.topic.as_str());
     let mut looks: Vec<Look> = Vec::new();
-    let mut decoders = Vec::new();
-    for known in log.channels.iter().filter(wanted) {
-        let decoder = match known.decoder(&plan.decode) {
-            Ok(decoder) => decoder,
-            Err(why) if named.is_some() => {
-                return Err(Error::Unsupported {
-                    path: path.to_owned(),
-                    what: why.to_string(),
-                });
-            }
-            Err(why) => {
-                tracing::warn!("{why}");
+    let mut decoders: Vec<(Arc<mcap::Channel>, decode::Decoder, Vec<Taker>)> = Vec::new();
+    for source in &log.sources {
+        let is_named = named.is_some_and(|name| name == source.name || name == source.topic);
+        let noticed = Arc::new(Noticed::of(source));
+        let mut begun = None;
+        for known in log.channels_of(source) {
+            if rank(&known.role) < PICKED_UNNAMED && !is_named {
                 continue;
             }
-        };
-        let stream = match looks.iter().position(|l| l.topic == known.channel.topic) {
-            Some(stream) => stream,
-            None => {
-                looks.push(begin(known, &decoder, plan));
+            let decoder = match known.decoder(&plan.decode) {
+                Ok(decoder) => decoder,
+                Err(why) if named.is_some() => {
+                    return Err(Error::Unsupported {
+                        path: path.to_owned(),
+                        what: why.to_string(),
+                    });
+                }
+                Err(why) => {
+                    tracing::warn!("{why}");
+                    continue;
+                }
+            };
+            let stream = *begun.get_or_insert_with(|| {
+                looks.push(begin(source, known, &decoder, plan));
                 looks.len() - 1
+            });
+            let taker = Taker {
+                stream,
+                noticed: noticed.clone(),
+            };
+            match decoders.iter_mut().find(|d| is_same(&d.0, &known.channel)) {
+                Some((_, _, takers)) => takers.push(taker),
+                None => decoders.push((known.channel.clone(), decoder, vec![taker])),
             }
-        };
-        decoders.push((known.channel.clone(), stream, decoder));
+        }
     }
     let mut failure = None;
     let reader = log.reader().map_or_else(|| mcap::Reader::open(path), Ok)?;
@@ -183,10 +199,8 @@ pub fn look_as(
             ..WalkOptions::default()
         },
         |channel| {
-            let (_, stream, decoder) = decoders
-                .iter()
-                .find(|(known, ..)| known.id == channel.id && known.topic == channel.topic)?;
-            Some(Route::samples(decoder.clone(), *stream))
+            let (_, decoder, takers) = decoders.iter().find(|d| is_same(&d.0, channel))?;
+            Some(Route::to(decoder.clone(), takers.clone()))
         },
         Route::map,
         |items| {
@@ -225,15 +239,20 @@ pub fn look_as(
     Ok((looked, report.survey))
 }
 
-fn begin(known: &Known, decoder: &decode::Decoder, plan: &Plan) -> Look {
+fn begin(source: &Source, known: &Known, decoder: &decode::Decoder, plan: &Plan) -> Look {
     let resolved = Resolved::new(plan, decoder.stated());
+    let first_frame = || {
+        let (_, payload) = known.first.as_ref()?;
+        decoder.frame_id(payload)
+    };
     Look {
-        topic: known.channel.topic.clone(),
+        topic: source.name.clone(),
+        of: source.topic.clone(),
         described: described(&known.channel),
-        frame: known
-            .first
-            .as_ref()
-            .and_then(|(_, payload)| decoder.frame_id(payload))
+        frame: source
+            .frame
+            .clone()
+            .or_else(first_frame)
             .unwrap_or_default(),
         kind_stated: decoder.stated().sample_kind.is_some(),
         first: Vec::new(),

@@ -3,7 +3,7 @@
 //! A file is read twice: once as far as is needed to know clock, bias, initial attitude and lines
 //! through stamps, then to integrate. A stream is read once; its first samples wait until these are known.
 
-use super::chosen::{Chosen, choose, find, reference, route};
+use super::chosen::{Chosen, choose, looked_at, reference, route};
 use super::history::History;
 use super::log::Log;
 use super::opening::{begin, labelled};
@@ -138,7 +138,7 @@ fn file(
     pool: &Pool,
     watch: &mut dyn FnMut(&Position),
 ) -> Result<RunSummary> {
-    let log = Log::open(path, pool)?;
+    let log = Log::told_apart(path, run.plan.topic.as_deref(), &run.plan.decode, pool)?;
     let choice = log.choose(path, run.plan.topic.as_deref())?;
     let mut chosen = choose(run, path, &log, &choice.topics)?;
     if let (Some(note), Some(first)) = (choice.note, chosen.first_mut()) {
@@ -182,7 +182,7 @@ fn file(
             pool: Some(pool.rayon()),
             ..WalkOptions::default()
         },
-        |channel| route(&mut chosen, reference.as_ref(), run.copy_input, channel),
+        |channel| route(&chosen, reference.as_ref(), run.copy_input, channel),
         Route::map,
         |items| {
             let done = items
@@ -242,10 +242,7 @@ fn prepare(
             in_flight: 4 << 20,
             ..WalkOptions::default()
         },
-        |channel| {
-            let (stream, decoder) = find(chosen, channel)?;
-            Some(Route::samples(decoder.clone(), stream))
-        },
+        |channel| looked_at(chosen, channel),
         Route::map,
         |items| {
             for item in items.drain(..) {

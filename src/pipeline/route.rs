@@ -1,24 +1,35 @@
 //! What becomes of the messages of one channel, on the workers. Pure.
 
 use super::log::nanos;
+use super::sources::{Source, Turns, digest};
 use crate::decode::{Decoder, Undecodable};
 use crate::record::{Nanos, RawSample};
 use crate::source::mcap::{Channel, Message};
 use std::cell::RefCell;
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// What a channel's messages are used for.
 #[derive(Debug)]
 pub struct Route {
     /// Reads them; `None` when they are only copied.
     pub decoder: Option<Decoder>,
-    /// Which of the run's streams they belong to.
-    pub stream: usize,
+    /// Which of the run's streams they belong to; of several, the one of the frame that a message names.
+    takers: Vec<Taker>,
+    /// The channel's number, where it is not known beforehand whether channels take turns.
+    turn: Option<usize>,
     /// Whether they are a recorded orientation to compare with, not samples.
     pub is_reference: bool,
     /// The channel, when its messages are copied to the output.
     pub copied: Option<Arc<Channel>>,
+}
+
+/// A stream, and what is noticed on its way there.
+#[derive(Clone, Debug)]
+pub struct Taker {
+    /// Which of the run's streams.
+    pub stream: usize,
     /// Notes for the summary.
     pub noticed: Arc<Noticed>,
 }
@@ -30,9 +41,62 @@ pub struct Noticed {
     pub gyro_marked_absent: AtomicU64,
     /// Stamps with a second or more of nanoseconds.
     pub stamps_carried: AtomicU64,
-    /// The frame the first message names; empty when it names none. Which message was first is
-    /// certain only where one thread reads.
+    /// The frame of the stream: given, or what the first message names; empty when it names none. Which
+    /// message was first is certain only where one thread reads.
     pub frame_id: OnceLock<String>,
+    /// Messages of any frame are taken.
+    pub any_frame: bool,
+    /// Frames of other streams: theirs are not missed here.
+    pub others: Vec<String>,
+    /// Messages left out because they name another frame, by its name; of many, the first few.
+    left_out: Mutex<BTreeMap<String, u64>>,
+    /// How the channels of a stream followed each other, where that shows only in the run.
+    turns: Mutex<Turns>,
+}
+
+/// Foreign frames that are told apart.
+const FOREIGN: usize = 16;
+
+impl Noticed {
+    /// For the samples of a source.
+    #[must_use]
+    pub fn of(source: &Source) -> Noticed {
+        Noticed {
+            frame_id: source
+                .frame
+                .clone()
+                .map_or_else(OnceLock::new, OnceLock::from),
+            any_frame: source.frame.is_none(),
+            others: source.others.clone(),
+            ..Noticed::default()
+        }
+    }
+
+    /// Messages that name a frame of no stream that is known, by its name.
+    #[must_use]
+    pub fn left_out(&self) -> Vec<(String, u64)> {
+        let left_out = self.left_out.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut found: Vec<(String, u64)> = left_out.clone().into_iter().collect();
+        found.retain(|(frame, _)| !self.others.contains(frame));
+        found
+    }
+
+    /// Whether two publishers' channels take turns on the topic.
+    #[must_use]
+    pub fn are_several(&self) -> bool {
+        let turns = self.turns.lock().unwrap_or_else(PoisonError::into_inner);
+        turns.are_several()
+    }
+
+    #[cold]
+    fn leave_out(&self, frame: String) {
+        let mut left_out = self.left_out.lock().unwrap_or_else(PoisonError::into_inner);
+        if left_out.len() < FOREIGN || left_out.contains_key(&frame) {
+            *left_out.entry(frame).or_default() += 1;
+        } else if let Some((_, n)) = left_out.iter_mut().next_back() {
+            *n += 1;
+        }
+    }
 }
 
 /// What a message became.
@@ -69,15 +133,31 @@ thread_local! {
 }
 
 impl Route {
-    /// Messages that are samples of a stream.
+    /// Messages that are samples of a stream, whatever frame they name.
     #[must_use]
     pub fn samples(decoder: Decoder, stream: usize) -> Route {
+        let noticed = Noticed {
+            any_frame: true,
+            ..Noticed::default()
+        };
+        Route::to(
+            decoder,
+            vec![Taker {
+                stream,
+                noticed: Arc::new(noticed),
+            }],
+        )
+    }
+
+    /// Messages that are samples of the stream whose frame they name, of these.
+    #[must_use]
+    pub fn to(decoder: Decoder, takers: Vec<Taker>) -> Route {
         Route {
             decoder: Some(decoder),
-            stream,
+            takers,
+            turn: None,
             is_reference: false,
             copied: None,
-            noticed: Arc::default(),
         }
     }
 
@@ -95,10 +175,10 @@ impl Route {
     pub fn only_copied(channel: Arc<Channel>) -> Route {
         Route {
             decoder: None,
-            stream: 0,
+            takers: Vec::new(),
+            turn: None,
             is_reference: false,
             copied: Some(channel),
-            noticed: Arc::default(),
         }
     }
 
@@ -111,11 +191,11 @@ impl Route {
         }
     }
 
-    /// The same, what is noticed going to `noticed`.
+    /// The same, watching whether the stream's channels take turns; `number` is this one's.
     #[must_use]
-    pub fn noticing(self, noticed: &Arc<Noticed>) -> Route {
+    pub fn taking_turns(self, number: usize) -> Route {
         Route {
-            noticed: noticed.clone(),
+            turn: Some(number),
             ..self
         }
     }
@@ -138,31 +218,59 @@ impl Route {
 
     fn decode(&self, decoder: &Decoder, message: &Message<'_>, out: &mut Vec<Item>) {
         let log = nanos(message.log_time);
-        self.noticed
-            .frame_id
-            .get_or_init(|| decoder.frame_id(message.data).unwrap_or_default());
+        let publish = nanos(message.publish_time);
         SCRATCH.with_borrow_mut(|samples| {
             samples.clear();
-            match decoder.decode(message.data, log, nanos(message.publish_time), samples) {
-                Ok(_) if self.is_reference => {
+            if self.is_reference {
+                // A reference that can not be read is one row less to compare with.
+                if decoder.decode(message.data, log, publish, samples).is_ok() {
                     out.extend(samples.drain(..).map(Item::Reference));
                 }
-                Ok(decoded) => {
+                return;
+            }
+            let Some(Taker { stream, noticed }) = self.taker(decoder, message.data) else {
+                return;
+            };
+            if let Some(number) = self.turn {
+                let mut turns = noticed.turns.lock().unwrap_or_else(PoisonError::into_inner);
+                turns.take(number, digest(message.data));
+            }
+            let frame = noticed
+                .frame_id
+                .get_or_init(|| decoder.frame_id(message.data).unwrap_or_default());
+            let decoded = if noticed.any_frame {
+                decoder
+                    .decode(message.data, log, publish, samples)
+                    .map(Some)
+            } else {
+                decoder.decode_of(frame, message.data, log, publish, samples)
+            };
+            match decoded {
+                Ok(Some(decoded)) => {
                     let add = |counter: &AtomicU64, n: usize| {
                         if n > 0 {
                             counter.fetch_add(n as u64, Ordering::Relaxed);
                         }
                     };
-                    add(&self.noticed.gyro_marked_absent, decoded.gyro_marked_absent);
-                    add(&self.noticed.stamps_carried, decoded.stamps_carried);
-                    out.extend(samples.drain(..).map(|raw| Item::Sample(self.stream, raw)));
+                    add(&noticed.gyro_marked_absent, decoded.gyro_marked_absent);
+                    add(&noticed.stamps_carried, decoded.stamps_carried);
+                    out.extend(samples.drain(..).map(|raw| Item::Sample(*stream, raw)));
                 }
-                // A reference that can not be read is one row less to compare with.
-                Err(_) if self.is_reference => {}
-                Err(why) => {
-                    out.push(Item::Undecodable(self.stream, Box::new((log, why))));
+                Ok(None) => {
+                    noticed.leave_out(decoder.frame_id(message.data).unwrap_or_default());
                 }
+                Err(why) => out.push(Item::Undecodable(*stream, Box::new((log, why)))),
             }
         });
+    }
+
+    fn taker(&self, decoder: &Decoder, payload: &[u8]) -> Option<&Taker> {
+        let first = self.takers.first();
+        if self.takers.len() < 2 {
+            return first;
+        }
+        let frame = decoder.frame_id(payload).unwrap_or_default();
+        let of = |taker: &&Taker| taker.noticed.frame_id.get() == Some(&frame);
+        self.takers.iter().find(of).or(first)
     }
 }

@@ -7,9 +7,10 @@ use super::log::{Known, described, explained, known, plain, problems, rank};
 use super::pool::Pool;
 use super::position::Position;
 use super::preparation::Resolved;
-use super::route::{Noticed, Route};
+use super::route::{Noticed, Route, Taker};
 use super::run::Replay;
 use super::session::Found;
+use super::sources::publisher;
 use super::summarise;
 use super::topics::{self, PICKED_UNNAMED};
 use super::waiting::Waiting;
@@ -45,8 +46,9 @@ pub(super) fn replay(
         |channel| picked.borrow_mut().route(run, channel),
         Route::map,
         |items| {
-            let step = waiting
-                .meet(&mut picked.borrow_mut().found)
+            let met = waiting.meet(&mut picked.borrow_mut().found);
+            let step = met
+                .and_then(|()| picked.borrow().is_one_body(&path))
                 .and_then(|()| waiting.consume(items.drain(..), pool));
             match step {
                 Ok(Flow::Continue) => {
@@ -80,6 +82,10 @@ pub(super) fn replay(
 #[derive(Default)]
 struct Picked {
     topic: Option<String>,
+    publisher: String,
+    noticed: Arc<Noticed>,
+    /// Channels of the topic so far.
+    channels: usize,
     found: Option<(Found, Stream)>,
     others: BTreeSet<String>,
     refusals: Vec<String>,
@@ -91,7 +97,15 @@ impl Picked {
         let found = known(channel, 0, None);
         let named = run.plan.topic.as_deref().filter(|t| *t != "all");
         let wanted = match (&self.topic, named) {
-            (Some(topic), _) => *topic == channel.topic,
+            (Some(topic), _) => {
+                let is_same = *topic == channel.topic;
+                if is_same && publisher(channel) != self.publisher {
+                    let other = format!("{topic} published by `{}`", publisher(channel));
+                    self.others.insert(other);
+                    return copied.map(Route::only_copied);
+                }
+                is_same
+            }
             (None, Some(name)) => name == channel.topic,
             // A twist that may be a body rate is taken only when nothing better is there, and what
             // is still to come nobody knows.
@@ -105,9 +119,9 @@ impl Picked {
         }
         match Decoder::compile(&plain(channel), &run.plan.decode) {
             Ok(decoder) => {
-                let noticed = Arc::<Noticed>::default();
                 if self.topic.is_none() {
                     self.topic = Some(channel.topic.clone());
+                    self.publisher = publisher(channel);
                     let resolved = Resolved::new(&run.plan, decoder.stated());
                     self.found = Some((
                         Found {
@@ -115,15 +129,20 @@ impl Picked {
                             output_topic: output_topic(&channel.topic, &BTreeSet::new()),
                             described: described(channel),
                             resolved,
-                            noticed: noticed.clone(),
+                            noticed: self.noticed.clone(),
                             warnings: Vec::new(),
                         },
                         Stream::new(&channel.topic, ""),
                     ));
                 }
+                let taker = Taker {
+                    stream: 0,
+                    noticed: self.noticed.clone(),
+                };
+                self.channels += 1;
                 Some(
-                    Route::samples(decoder, 0)
-                        .noticing(&noticed)
+                    Route::to(decoder, vec![taker])
+                        .taking_turns(self.channels)
                         .copying(copied),
                 )
             }
@@ -132,6 +151,22 @@ impl Picked {
                 copied.map(Route::only_copied)
             }
         }
+    }
+
+    /// Whether the topic's channels so far are one publisher's.
+    fn is_one_body(&self, path: &Path) -> Result<()> {
+        if self.channels > 1 && self.noticed.are_several() {
+            return Err(Error::Topic {
+                path: path.to_owned(),
+                topic: self.topic.clone().unwrap_or_default(),
+                what: format!(
+                    "{} channels of this topic take turns: two publishers, and they must not be mixed
+  help: save it to a file, where --topic tells them apart",
+                    self.channels
+                ),
+            });
+        }
+        Ok(())
     }
 
     /// Why nothing was picked.

@@ -67,6 +67,7 @@ fn of_topic(run: &Replay, topic: &mut Topic) -> TopicSummary {
         output_topic: topic.output_topic.clone(),
         decoded_as: topic.described.clone(),
         counts: conditioning.counts,
+        left_out: topic.noticed.left_out().iter().map(|(_, n)| n).sum(),
         first_losses: first_losses(topic, first),
         written: topic.output.count,
         duration_secs: conditioning.last.map_or(0.0, |last| last.secs_since(first)),
@@ -234,6 +235,12 @@ fn warnings(topic: &Topic, summary: &TopicSummary) -> Vec<String> {
     if carried > 0 {
         said.push(format!(
             "{carried} stamps had a second or more of nanoseconds, carried over"
+        ));
+    }
+    for (frame, n) in topic.noticed.left_out() {
+        let (name, _) = topic.name.split_once('@').unwrap_or((&topic.name, ""));
+        said.push(format!(
+            "{n} messages name the frame `{frame}`, another body's, and were left out: --topic {name}@{frame} takes them"
         ));
     }
     let restamped = summary.counts.get(Verdict::Restamped);

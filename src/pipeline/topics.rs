@@ -9,8 +9,10 @@ use std::path::Path;
 /// What the choice needs to know of one channel.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Candidate {
-    /// Topic.
+    /// What `--topic` takes: the topic, or one of its sources.
     pub topic: String,
+    /// The topic.
+    pub of: String,
     /// Type and encoding, for the listing.
     pub described: String,
     /// Messages, where known.
@@ -128,6 +130,7 @@ mod tests {
     fn candidate(topic: &str, rank: u8) -> Candidate {
         Candidate {
             topic: topic.into(),
+            of: topic.into(),
             described: "t [e]".into(),
             messages: Some(3),
             rank,

@@ -21,6 +21,8 @@ pub struct TopicSummary {
     pub decoded_as: String,
     /// What became of every sample.
     pub counts: Counts,
+    /// Messages of another body, by the frame they name, that nobody asked to leave out.
+    pub left_out: u64,
     /// The first sample of each verdict that is a loss, explained.
     pub first_losses: Vec<String>,
     /// Attitudes written.
@@ -229,7 +231,7 @@ impl TopicSummary {
     /// Whether samples were lost, or time in which nothing is known.
     #[must_use]
     pub fn is_lossy(&self) -> bool {
-        self.counts.lost() > 0 || self.gaps.held + self.gaps.resets > 0
+        self.counts.lost() + self.left_out > 0 || self.gaps.held + self.gaps.resets > 0
     }
 
     fn write_text(&self, source: &str, damaged: bool, out: &mut String) {
@@ -411,6 +413,7 @@ impl TopicSummary {
                     .map(|v| (v.name().to_owned(), json!(self.counts.get(*v))))
                     .collect::<serde_json::Map<_, _>>(),
             },
+            "left_out": self.left_out,
             "first_losses": self.first_losses,
             "written": self.written,
             "duration_s": self.duration_secs,

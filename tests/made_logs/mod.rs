@@ -7,7 +7,8 @@
 #[path = "../../examples/make_fixtures/imu_cdr.rs"]
 mod imu_cdr;
 
-pub(crate) use imu_cdr::ImuSample;
+#[allow(unused_imports)]
+pub(crate) use imu_cdr::{ImuSample, imu_definition, imu_message};
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 

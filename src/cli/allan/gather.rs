@@ -8,13 +8,15 @@ use crate::model::allan::AngleRecord;
 use crate::pipeline::log::{Log, described, problems};
 use crate::pipeline::pool::Pool;
 use crate::pipeline::preparation::Resolved;
-use crate::pipeline::route::{Item, Route};
+use crate::pipeline::route::{Item, Noticed, Route, Taker};
+use crate::pipeline::sources::is_same;
 use crate::record::{Join, Nanos, RateSample, RawSample, SampleKind};
 use crate::report::summary::significant;
 use crate::source::mcap::{self, WalkOptions};
 use nalgebra::Vector3;
 use std::ops::ControlFlow;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Angles held at most: 24 bytes each, 200 MB.
 pub(super) const CAPACITY: usize = 1 << 23;
@@ -63,12 +65,12 @@ pub(super) struct Gathered {
 /// # Errors
 /// The log can not be read, no topic or several, or a topic without a rate.
 pub(super) fn gather(path: &Path, plan: &Plan, capacity: usize, pool: &Pool) -> Result<Gathered> {
-    let log = Log::open(path, pool)?;
     if plan.topic.as_deref() == Some("all") {
         return Err(Error::Usage(
             "--topic all: one topic at a time\n  help: --topic NAME".to_owned(),
         ));
     }
+    let log = Log::told_apart(path, plan.topic.as_deref(), &plan.decode, pool)?;
     let choice = log.choose(path, plan.topic.as_deref())?;
     let topic = choice.topics.into_iter().next().unwrap_or_default();
     let unsupported = |what: String| Error::Unsupported {
@@ -76,7 +78,8 @@ pub(super) fn gather(path: &Path, plan: &Plan, capacity: usize, pool: &Pool) -> 
         what,
     };
     let mut decoders = Vec::new();
-    for known in log.channels.iter().filter(|k| k.channel.topic == topic) {
+    let source = log.source(&topic);
+    for known in source.iter().flat_map(|s| log.channels_of(s)) {
         let decoder = known
             .decoder(&plan.decode)
             .map_err(|why| unsupported(why.to_string()))?;
@@ -91,6 +94,7 @@ pub(super) fn gather(path: &Path, plan: &Plan, capacity: usize, pool: &Pool) -> 
             described(channel)
         )));
     }
+    let noticed = Arc::new(source.as_ref().map(Noticed::of).unwrap_or_default());
     let mut gathering = Gathering::new(plan, Resolved::new(plan, decoder.stated()), capacity);
     let described = described(channel);
     let mut failure = None;
@@ -104,8 +108,11 @@ pub(super) fn gather(path: &Path, plan: &Plan, capacity: usize, pool: &Pool) -> 
         |met| {
             decoders
                 .iter()
-                .find(|(known, _)| known.id == met.id && known.topic == met.topic)
-                .map(|(_, decoder)| Route::samples(decoder.clone(), 0))
+                .find(|(known, _)| is_same(known, met))
+                .map(|(_, decoder)| {
+                    let noticed = noticed.clone();
+                    Route::to(decoder.clone(), vec![Taker { stream: 0, noticed }])
+                })
         },
         Route::map,
         |items| {

@@ -92,7 +92,7 @@ impl Report<'_> {
         let others: Vec<&Known> = self
             .channels
             .iter()
-            .filter(|k| !self.looked.iter().any(|l| l.topic == k.channel.topic))
+            .filter(|k| !self.looked.iter().any(|l| l.of == k.channel.topic))
             .collect();
         for known in others.iter().take(OTHERS) {
             let what = match (rank(&known.role), known.role.has_orientation) {
@@ -127,7 +127,7 @@ impl Report<'_> {
                 let of = |l: &Looked| {
                     self.channels
                         .iter()
-                        .find(|k| k.channel.topic == l.topic)
+                        .find(|k| k.channel.topic == l.of)
                         .map_or(0, |k| rank(&k.role))
                 };
                 let best = several.iter().map(of).max().unwrap_or(0);

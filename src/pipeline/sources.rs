@@ -1,0 +1,402 @@
+//! Channels of a log, and their messages -> who speaks on each topic. I/O.
+//!
+//! Apart from the choice of topics because it looks at messages: two drivers may publish on one topic,
+//! and two bodies must never be integrated as one. A topic recorded in several channels one after the
+//! other is one source. Channels that take turns, or name another publisher, and messages that name
+//! another frame, are several, and each gets a name: `TOPIC@FRAME`, `TOPIC@PUBLISHER`.
+
+use super::log::Known;
+use super::pool::Pool;
+use super::topics::PICKED_UNNAMED;
+use crate::decode::{Decoder, Options, printable};
+use crate::error::Result;
+use crate::source::mcap::{self, Channel, Reader, WalkOptions};
+use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::ops::ControlFlow;
+
+/// One publisher's samples on a topic.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Source {
+    /// What `--topic` takes: the topic, unless it has several sources.
+    pub name: String,
+    /// The topic.
+    pub topic: String,
+    /// Its channels, by their place in [`super::log::Log::channels`].
+    pub channels: Vec<usize>,
+    /// The frame its messages name; `None` = any: they name none, or what they name is no frame.
+    pub frame: Option<String>,
+    /// The frames that the topic's other sources name.
+    pub others: Vec<String>,
+    /// What tells it from the others of its topic; empty where there is none.
+    pub label: String,
+}
+
+impl Source {
+    /// All channels of a topic, whatever they say.
+    fn whole(topic: &str, channels: Vec<usize>) -> Source {
+        Source {
+            name: topic.to_owned(),
+            topic: topic.to_owned(),
+            channels,
+            frame: None,
+            others: Vec::new(),
+            label: String::new(),
+        }
+    }
+}
+
+/// One source for each topic, in order of appearance.
+pub(super) fn by_topic(channels: &[Known]) -> Vec<Source> {
+    let mut at: HashMap<&str, usize> = HashMap::new();
+    let mut sources: Vec<Source> = Vec::new();
+    for (index, known) in channels.iter().enumerate() {
+        let topic = known.channel.topic.as_str();
+        let place = *at.entry(topic).or_insert(sources.len());
+        match sources.get_mut(place) {
+            Some(source) => source.channels.push(index),
+            None => sources.push(Source::whole(topic, vec![index])),
+        }
+    }
+    sources
+}
+
+/// Messages of a channel after which its frames are known. A second publisher a hundred times slower
+/// has sent a handful by then; one that comes later is met in the run, and left out.
+const FIRST: u64 = 512;
+/// Messages of all channels together after which those that are slow are not waited for.
+const ENOUGH: u64 = 16_384;
+/// Channels whose messages are looked at.
+const MOST_CHANNELS: usize = 256;
+/// More names than this on one topic are no frames.
+const MOST_FRAMES: usize = 8;
+/// Messages that make a frame: a damaged one, or one all of zeros, is no second body.
+const FEW: u64 = 3;
+
+/// Who speaks on each topic, from the messages; `named` is looked at though it may carry no rate that is
+/// found without [`Options`].
+///
+/// # Errors
+/// The log can not be read.
+pub(super) fn tell_apart(
+    reader: Reader,
+    channels: &[Known],
+    named: Option<&str>,
+    options: &Options,
+    pool: &Pool,
+) -> Result<Vec<Source>> {
+    let sources = by_topic(channels);
+    let mut looked: Vec<(usize, Decoder)> = Vec::new();
+    let mut speakers: BTreeMap<usize, Speakers> = BTreeMap::new();
+    let mut missing = 0;
+    for (place, source) in sources.iter().enumerate() {
+        let is_named = named
+            .and_then(|name| name.strip_prefix(source.topic.as_str()))
+            .is_some_and(|rest| rest.is_empty() || rest.starts_with('@'));
+        let speaking: Vec<(usize, &Known)> = source
+            .channels
+            .iter()
+            .filter_map(|index| Some((*index, channels.get(*index)?)))
+            .filter(|(_, k)| k.messages > 0)
+            .filter(|(_, k)| super::log::rank(&k.role) >= PICKED_UNNAMED || is_named)
+            .collect();
+        let several = speaking.len() > 1;
+        for (index, known) in speaking {
+            let Ok(decoder) = known.decoder(options) else {
+                continue;
+            };
+            if looked.len() < MOST_CHANNELS && (several || decoder.names_frames()) {
+                missing += known.messages.min(FIRST);
+                speakers
+                    .entry(place)
+                    .or_insert_with(|| Speakers::new(several))
+                    .add(index, &known.channel);
+                looked.push((index, decoder));
+            }
+        }
+    }
+    if looked.is_empty() {
+        return Ok(sources);
+    }
+    let place_of: HashMap<usize, usize> = sources
+        .iter()
+        .enumerate()
+        .flat_map(|(place, s)| s.channels.iter().map(move |index| (*index, place)))
+        .collect();
+    let to_the_end = speakers.values().any(|s| s.several);
+    let (mut counts, mut total) = (HashMap::<usize, u64>::new(), 0);
+    mcap::walk(
+        reader,
+        // This usually ends soon.
+        &WalkOptions {
+            pool: Some(pool.rayon()),
+            in_flight: 4 << 20,
+            ..WalkOptions::default()
+        },
+        |met| {
+            looked.iter().find(|(index, _)| {
+                channels
+                    .get(*index)
+                    .is_some_and(|known| is_same(&known.channel, met))
+            })
+        },
+        |(index, decoder), message, out: &mut Vec<Met>| {
+            out.push(Met {
+                channel: *index,
+                frame: decoder.frame_id(message.data),
+                digest: digest(message.data),
+            });
+        },
+        |items| {
+            for met in items.drain(..) {
+                let count = counts.entry(met.channel).or_default();
+                *count += 1;
+                total += 1;
+                missing = missing.saturating_sub(u64::from(*count <= FIRST));
+                if let Some(place) = place_of.get(&met.channel)
+                    && let Some(speakers) = speakers.get_mut(place)
+                {
+                    speakers.take(met);
+                }
+            }
+            if !to_the_end && (missing == 0 || total >= ENOUGH) {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        },
+    )?;
+    let mut told = Vec::new();
+    for (place, source) in sources.into_iter().enumerate() {
+        match speakers.remove(&place) {
+            Some(speakers) => told.append(&mut speakers.sources(&source)),
+            None => told.push(source),
+        }
+    }
+    Ok(told)
+}
+
+/// Whether a channel met in a walk is the one the survey knows: the index may differ, since the
+/// summary lists them in another order.
+pub(crate) fn is_same(known: &Channel, met: &Channel) -> bool {
+    known.id == met.id && known.topic == met.topic && known.schema_id == met.schema_id
+}
+
+/// What a channel says of its publisher: the keys that recorders and converters write.
+pub(super) fn publisher(channel: &Channel) -> String {
+    const KEYS: [&str; 10] = [
+        "callerid",
+        "publisher",
+        "publisher_gid",
+        "gid",
+        "node",
+        "node_name",
+        "device",
+        "device_id",
+        "serial",
+        "serial_number",
+    ];
+    let said: Vec<&str> = channel
+        .metadata
+        .iter()
+        .filter(|(key, _)| KEYS.contains(&key.to_ascii_lowercase().as_str()))
+        .map(|(_, value)| value.as_str())
+        .collect();
+    printable(&said.join(" "))
+}
+
+/// One message.
+struct Met {
+    channel: usize,
+    frame: Option<String>,
+    digest: u64,
+}
+
+/// A payload in a number: the same payload in two channels was recorded twice.
+pub(super) fn digest(payload: &[u8]) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    payload.hash(&mut hasher);
+    hasher.finish()
+}
+
+/// What is learnt about a topic.
+struct Speakers {
+    /// Whether it has several channels.
+    several: bool,
+    publishers: BTreeMap<usize, (String, u16)>,
+    frames: BTreeMap<Option<String>, u64>,
+    groups: BTreeMap<(String, Option<String>), Group>,
+    /// The frames are too many to be frames.
+    nameless: bool,
+}
+
+/// Messages of one publisher in one frame.
+#[derive(Default)]
+struct Group {
+    channels: BTreeSet<usize>,
+    turns: Turns,
+}
+
+impl Speakers {
+    fn new(several: bool) -> Speakers {
+        Speakers {
+            several,
+            publishers: BTreeMap::new(),
+            frames: BTreeMap::new(),
+            groups: BTreeMap::new(),
+            nameless: false,
+        }
+    }
+
+    fn add(&mut self, index: usize, channel: &Channel) {
+        self.publishers
+            .insert(index, (publisher(channel), channel.id));
+    }
+
+    fn take(&mut self, met: Met) {
+        if self.nameless {
+            return;
+        }
+        let publisher = self
+            .publishers
+            .get(&met.channel)
+            .map_or_else(String::new, |(name, _)| name.clone());
+        *self.frames.entry(met.frame.clone()).or_default() += 1;
+        self.nameless = self.frames.len() > MOST_FRAMES;
+        let group = self.groups.entry((publisher, met.frame)).or_default();
+        group.channels.insert(met.channel);
+        if self.several {
+            group.turns.take(met.channel, met.digest);
+        }
+    }
+
+    /// Publisher, frame and channels of each source.
+    fn apart(&self) -> Vec<(String, Option<String>, Vec<usize>)> {
+        let named = self.frames.iter().filter(|(frame, _)| frame.is_some());
+        let most = named.map(|(_, n)| *n).max().unwrap_or(0);
+        let is_named = self.frames.keys().any(Option::is_some);
+        // A payload that can not be read names none.
+        let is_frame = |frame: &Option<String>| {
+            frame.is_some() == is_named
+                && self.frames.get(frame).is_some_and(|n| *n >= FEW.min(most))
+        };
+        let mut apart = Vec::new();
+        for ((publisher, frame), group) in &self.groups {
+            if !is_frame(frame) {
+                continue;
+            }
+            if group.turns.are_several() {
+                for channel in &group.channels {
+                    apart.push((publisher.clone(), frame.clone(), vec![*channel]));
+                }
+            } else {
+                let channels = group.channels.iter().copied().collect();
+                apart.push((publisher.clone(), frame.clone(), channels));
+            }
+        }
+        apart.sort_by(|a, b| a.2.cmp(&b.2));
+        apart
+    }
+
+    fn sources(&self, whole: &Source) -> Vec<Source> {
+        let apart = self.apart();
+        if self.nameless || apart.is_empty() {
+            return vec![whole.clone()];
+        }
+        if let [(_, frame, _)] = apart.as_slice() {
+            return vec![Source {
+                frame: frame.clone(),
+                ..whole.clone()
+            }];
+        }
+        let frames: Vec<String> = apart.iter().filter_map(|(_, f, _)| f.clone()).collect();
+        labels(&apart, &self.publishers)
+            .into_iter()
+            .zip(&apart)
+            .map(|(label, (_, frame, channels))| Source {
+                name: format!("{}@{label}", whole.topic),
+                topic: whole.topic.clone(),
+                channels: channels.clone(),
+                frame: frame.clone(),
+                others: frames
+                    .iter()
+                    .filter(|f| Some(*f) != frame.as_ref())
+                    .cloned()
+                    .collect(),
+                label,
+            })
+            .collect()
+    }
+}
+
+/// The first of frame, publisher and channel id that differs for all.
+fn labels(
+    apart: &[(String, Option<String>, Vec<usize>)],
+    publishers: &BTreeMap<usize, (String, u16)>,
+) -> Vec<String> {
+    let id = |channels: &Vec<usize>| {
+        let index = channels.first().copied().unwrap_or_default();
+        let id = publishers.get(&index).map_or(0, |(_, id)| *id);
+        format!("channel-{id}")
+    };
+    let kinds: [Vec<String>; 4] = [
+        apart
+            .iter()
+            .map(|a| a.1.clone().unwrap_or_default())
+            .collect(),
+        apart.iter().map(|a| a.0.clone()).collect(),
+        apart.iter().map(|a| id(&a.2)).collect(),
+        // Ids are reused in the wild.
+        (1..=apart.len()).map(|n| format!("source-{n}")).collect(),
+    ];
+    let differ =
+        |labels: &Vec<String>| labels.iter().collect::<BTreeSet<_>>().len() == labels.len();
+    kinds.into_iter().find(differ).unwrap_or_default()
+}
+
+/// Recent payloads that are remembered.
+const RECENT: usize = 512;
+/// Returns to a channel that was left which are no second publisher's: messages that overtook each other
+/// where one channel ends and the next begins.
+const MOST_RETURNS: u64 = 2;
+
+/// Whether channels of one topic follow each other, as when a recorder was started again, or take turns.
+#[derive(Debug, Default)]
+pub struct Turns {
+    current: Option<usize>,
+    left: BTreeSet<usize>,
+    returns: u64,
+    echoes: u64,
+    recent: HashMap<u64, usize>,
+    order: VecDeque<u64>,
+}
+
+impl Turns {
+    /// The next message came on `channel`.
+    pub fn take(&mut self, channel: usize, digest: u64) {
+        if self.recent.get(&digest).is_some_and(|of| *of != channel) {
+            // Two recorders wrote what one publisher sent.
+            self.echoes += 1;
+        }
+        if self.recent.insert(digest, channel).is_none() {
+            self.order.push_back(digest);
+        }
+        if self.order.len() > RECENT
+            && let Some(oldest) = self.order.pop_front()
+        {
+            self.recent.remove(&oldest);
+        }
+        if let Some(current) = self.current.filter(|current| *current != channel) {
+            self.left.insert(current);
+            self.returns += u64::from(self.left.contains(&channel));
+        }
+        self.current = Some(channel);
+    }
+
+    /// Whether they are several publishers' channels.
+    #[must_use]
+    pub fn are_several(&self) -> bool {
+        // Each message that is there twice may bring two returns.
+        self.returns > MOST_RETURNS + 2 * self.echoes
+    }
+}
