@@ -15,7 +15,7 @@
 //! | [`subscriber`] | attitudes -> what one client gets, bounded | locks |
 //! | [`recorder`] | what goes through -> MCAP files that survive a crash | a queue; I/O on threads of its own |
 //! | [`state`] | attitudes <-> the file a restarted daemon goes on from | I/O |
-//! | [`limits`], [`admission`] | every bound; who may come in | pure |
+//! | [`limits`], [`admission`], [`peer`] | every bound; who may come in, and from where | pure |
 //! | [`foxglove`], [`viewer`] | the same for Foxglove's viewers: messages in place of lines | pure; sans-I/O |
 //! | `page`, `top` | what a browser gets | pure |
 //! | [`listen`], `http` | sockets others come to | I/O |
@@ -35,6 +35,7 @@ pub mod hub;
 pub mod limits;
 pub mod listen;
 mod page;
+pub mod peer;
 pub mod playback;
 mod quiet;
 pub mod recorder;
@@ -198,7 +199,8 @@ impl Server {
         stop.await;
         self.hub.stop();
         let limit = self.hub.limits().drain;
-        let drained = tokio::time::timeout(limit, shutdown.drain(limit / 2)).await;
+        // What is left of the limit is for who saves and goes.
+        let drained = tokio::time::timeout(limit * 9 / 10, shutdown.drain(limit / 2)).await;
         answering.abort();
         drained.is_ok()
     }

@@ -23,6 +23,7 @@ mod serve {
     mod operations;
     mod packaging;
     mod packed;
+    mod places;
     mod recording;
     mod runs;
     mod same_bytes;

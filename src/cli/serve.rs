@@ -24,6 +24,8 @@ use std::time::Duration;
 
 /// Most sources connected to.
 const MAX_SOURCES: usize = 64;
+/// Most sensors that can be asked for.
+const MAX_SENSORS: u64 = 4096;
 
 /// Samples in over sockets, attitude out to whoever watches.
 #[derive(Args, Debug)]
@@ -91,6 +93,10 @@ pub struct Serve {
     /// those samples count as late. One that begins further back begins a new run
     #[arg(long, value_name = "SECS", value_parser = window, default_value = "60")]
     pub state_window: Duration,
+    /// Most sensors at once. One more takes the place of the sensor that nobody sends and that has been
+    /// silent longest; one connection sends at most 256, one peer half of all
+    #[arg(long, value_name = "N", default_value_t = 1024, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=MAX_SENSORS))]
+    pub max_sensors: usize,
     #[command(flatten)]
     #[allow(missing_docs)]
     pub admission: Admission,
@@ -206,8 +212,12 @@ async fn serve(
     }
     if let Some(file) = state {
         let hub = hub.clone();
-        // Behind whatever save is still under way.
-        let _ = tokio::task::spawn_blocking(move || state::save(&file, &hub)).await;
+        let limit = hub.limits().drain;
+        // Behind whatever save is still under way; a disk that hangs is not waited for.
+        let saving = tokio::task::spawn_blocking(move || state::save(&file, &hub));
+        if tokio::time::timeout(limit, saving).await.is_err() {
+            tracing::warn!("the attitudes could not be saved in time");
+        }
     }
     let of = |n: &std::sync::atomic::AtomicU64| n.load(Ordering::Relaxed);
     tracing::info!(
@@ -340,6 +350,7 @@ impl Serve {
                 .collect::<Result<_>>()?,
             limits: Limits {
                 state_window: self.state_window,
+                sensors: self.max_sensors,
                 ..Limits::default()
             },
             ..Settings::default()

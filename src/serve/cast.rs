@@ -291,7 +291,7 @@ async fn serve(
                     tracing::info!("{}: stopping", signal.name());
                     playback.stop();
                     // A run that waits for its input does not notice.
-                    if tokio::time::timeout(limit, &mut stopped).await.is_err() {
+                    if tokio::time::timeout(limit / 2, &mut stopped).await.is_err() {
                         at_once = Some(signal);
                     }
                 }

@@ -103,6 +103,12 @@ impl Channel {
         }
     }
 
+    /// Its number.
+    #[must_use]
+    pub fn number(&self) -> u32 {
+        self.label.0
+    }
+
     /// Its name.
     #[must_use]
     pub fn id(&self) -> &Arc<str> {

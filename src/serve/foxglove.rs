@@ -200,6 +200,12 @@ pub(crate) fn channels<'a>(
     advertise(first.into_iter().chain(streams.flat_map(Channel::topics)))
 }
 
+/// These channels are no more.
+#[must_use]
+pub fn withdrawn(channels: &[u32]) -> Bytes {
+    text(&json!({"op": "unadvertise", "channelIds": channels}))
+}
+
 /// How bad it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Level {

@@ -113,6 +113,8 @@ async fn metrics(Extension(connection): Extension<Connection>) -> Response<Body>
     if connection.hub.token().is_some() && !connection.trusted {
         return unauthorised();
     }
+    // One after another, with all who ask for much.
+    let _turn = connection.hub.turn(true).await;
     response(
         StatusCode::OK,
         "text/plain; version=0.0.4; charset=utf-8",

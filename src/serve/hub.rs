@@ -6,12 +6,14 @@
 //! order is that of its lock.
 
 mod counters;
+mod places;
 mod polling;
 mod report;
 mod room;
 mod telling;
 
 pub use counters::{Counters, count};
+use places::Absent;
 use polling::Polling;
 use report::StateStatus;
 pub use room::Flood;
@@ -22,9 +24,9 @@ use super::channel::{Channel, Clock, Items};
 use super::connect::Outgoing;
 use super::foxglove;
 use super::limits::Limits;
+use super::peer::Peer;
 use super::playback::Playback;
 use super::recorder::Handle;
-use super::state::Sensors;
 use super::stream::run::Placed;
 use super::stream::{SensorStream, live_plan};
 use super::subscriber::{Chunk, Outbox};
@@ -36,12 +38,15 @@ use crate::error::{Error, Result};
 use crate::record::{Nanos, RawSample};
 use crate::sink::Profile;
 use bytes::Bytes;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::hash::{BuildHasher, RandomState};
-use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::Instant;
 use tokio::sync::Notify;
+
+/// The fault of samples that came when their sensor had just given way.
+pub const GAVE_WAY: &str = "gave_way";
 
 /// The middle of the daemon.
 #[derive(Debug)]
@@ -64,8 +69,12 @@ pub struct Hub {
     watchers: RwLock<Arc<[Arc<Client>]>>,
     /// A watcher has room again.
     room_made: Arc<Notify>,
-    /// Attitudes of before the start, of sensors that have not come back yet.
-    saved: Mutex<Sensors>,
+    /// Attitudes of sensors that are not there.
+    saved: Mutex<Absent>,
+    /// Sensors that gave way last.
+    gave_way: Mutex<VecDeque<Arc<str>>>,
+    /// Counts what is heard of sensors.
+    heard: AtomicU64,
     /// How saving attitudes went the last time; `None` when they are not saved.
     state: Mutex<Option<StateStatus>>,
     /// By number.
@@ -83,6 +92,10 @@ pub struct Sensor {
     stream: SensorStream,
     /// Only one may send a sensor's samples at a time: two gyros in one attitude are no attitude.
     owner: Option<u64>,
+    /// Which number of all that was heard of sensors its last was.
+    heard: u64,
+    /// Another one has its place.
+    gave_way: bool,
 }
 
 /// What a client is told, and how.
@@ -102,13 +115,15 @@ pub enum Shape {
 pub struct Client {
     /// Its number.
     pub number: u64,
-    /// Who it is, for people.
-    pub peer: String,
+    /// Who it is.
+    pub peer: Peer,
     /// What waits for it.
     pub outbox: Outbox,
     /// What it is told, and how.
     shape: Shape,
     since: Instant,
+    /// How many sensors it sends.
+    sensors: AtomicUsize,
 }
 
 /// Samples of one sensor from one client that came together.
@@ -135,6 +150,18 @@ pub struct News {
     pub note: Option<Fault>,
     /// What was not used, the first time.
     pub faults: Vec<Fault>,
+}
+
+impl Client {
+    /// Whether it is told things as Foxglove's viewers are.
+    fn is_viewer(&self) -> bool {
+        matches!(self.shape, Shape::Foxglove { .. })
+    }
+
+    /// It sends a sensor less.
+    pub fn let_go(&self) {
+        self.sensors.fetch_sub(1, Ordering::Relaxed);
+    }
 }
 
 impl Hub {
@@ -175,7 +202,9 @@ impl Hub {
             clients: RwLock::default(),
             watchers: RwLock::new(Arc::from([])),
             room_made: Arc::default(),
-            saved: Mutex::new(settings.saved),
+            saved: Mutex::new(Absent::new(settings.saved)),
+            gave_way: Mutex::default(),
+            heard: AtomicU64::new(0),
             state: Mutex::default(),
             channels: RwLock::default(),
             next_channel: AtomicU32::new(1),
@@ -240,13 +269,13 @@ impl Hub {
     }
 
     /// Somebody has connected.
-    pub fn join(&self, peer: String) -> Arc<Client> {
+    pub fn join(&self, peer: impl Into<Peer>) -> Arc<Client> {
         self.join_as(peer, Shape::Lines(Profile::Lines))
     }
 
     /// As [`Hub::join`], for somebody who is told things in another way. A viewer is told at once who
     /// we are and what there is.
-    pub fn join_as(&self, peer: String, shape: Shape) -> Arc<Client> {
+    pub fn join_as(&self, peer: impl Into<Peer>, shape: Shape) -> Arc<Client> {
         let outbox = match shape {
             Shape::Lines(Profile::Lines) => Outbox::new(),
             Shape::Lines(Profile::PlotJuggler) => Outbox::saying(|_, _| Bytes::new()),
@@ -263,10 +292,11 @@ impl Hub {
         }
         let client = Arc::new(Client {
             number: self.next_client.fetch_add(1, Ordering::Relaxed),
-            peer,
+            peer: peer.into(),
             outbox,
             shape,
             since: Instant::now(),
+            sensors: AtomicUsize::new(0),
         });
         write(&self.clients).insert(client.number, client.clone());
         client
@@ -303,51 +333,6 @@ impl Hub {
         read(&self.clients).len()
     }
 
-    /// The sensor a run is of; begun by its first sample.
-    ///
-    /// # Errors
-    /// The fault to answer with.
-    pub fn sensor(
-        &self,
-        id: &str,
-        run: &Run<'_>,
-    ) -> std::result::Result<Arc<Mutex<Sensor>>, Fault> {
-        if let Some(sensor) = read(&self.sensors).get(id) {
-            return Ok(sensor.clone());
-        }
-        let mut sensors = write(&self.sensors);
-        if let Some(sensor) = sensors.get(id) {
-            return Ok(sensor.clone());
-        }
-        if sensors.len() >= self.limits.sensors {
-            return Err(Fault::new(
-                "too_many_sensors",
-                format!("there are {} sensors already", sensors.len()),
-            ));
-        }
-        let id: Arc<str> = id.into();
-        let first = run.samples.first().copied().unwrap_or_default();
-        let last = lock(&self.saved).get(&*id).cloned();
-        let stream = SensorStream::new(
-            self.plan_of(&id),
-            id.clone(),
-            run.head,
-            &first,
-            last,
-            |labels| self.declare(labels),
-        )?;
-        lock(&self.saved).remove(&*id);
-        if let Some(recorder) = &self.recorder {
-            recorder.declare(stream.recorded());
-        }
-        let sensor = Arc::new(Mutex::new(Sensor {
-            stream,
-            owner: None,
-        }));
-        sensors.insert(id, sensor.clone());
-        Ok(sensor)
-    }
-
     /// Takes samples of a sensor and gives its attitudes to whoever watches. What the sender should
     /// hear of them comes back; `text` is room for encoding.
     ///
@@ -365,6 +350,13 @@ impl Hub {
             id: Some(id.to_string()),
             ..Fault::new(code, what)
         };
+        if sensor.gave_way {
+            return Err(refuse(
+                GAVE_WAY,
+                "its place has just gone to another sensor; its next sample asks for one"
+                    .to_owned(),
+            ));
+        }
         match sensor.owner {
             Some(owner) if owner != run.client => {
                 return Err(refuse(
@@ -378,6 +370,7 @@ impl Hub {
                 sensor.stream.meet();
             }
         }
+        sensor.heard = self.heard.fetch_add(1, Ordering::Relaxed);
         if !sensor.stream.agrees(self.plan_of(&id), run.head) {
             return Err(refuse(
                 "meaning_changed",

@@ -7,8 +7,10 @@ use std::time::{Duration, Instant};
 pub struct Limits {
     /// Most connections at once, over all listeners.
     pub connections: usize,
-    /// Most sensors.
+    /// Most sensors (`--max-sensors`).
     pub sensors: usize,
+    /// Most sensors of one connection.
+    pub sensors_of_client: usize,
     /// Consecutive bad lines after which a connection is closed.
     pub errors_in_a_row: u32,
     /// By when the first line (or the head of the first HTTP request) must have come.
@@ -30,6 +32,7 @@ impl Default for Limits {
         Limits {
             connections: 256,
             sensors: 1024,
+            sensors_of_client: 256,
             errors_in_a_row: 20,
             first_line: Duration::from_secs(10),
             no_progress: Duration::from_secs(10),
@@ -42,6 +45,13 @@ impl Default for Limits {
 }
 
 impl Limits {
+    /// Most sensors of one peer, over all its connections: half of all, so that nobody takes them from
+    /// everybody else, but no fewer than one connection may send.
+    #[must_use]
+    pub fn sensors_of_peer(&self) -> usize {
+        (self.sensors / 2).max(self.sensors_of_client)
+    }
+
     /// How often a connection looks at its clocks.
     #[must_use]
     pub fn tick(&self) -> Duration {

@@ -19,6 +19,7 @@ use super::limits::Backoff;
 use super::session::Scratch;
 use super::shutdown::Running;
 use super::wire::{self, Fault};
+use crate::client::link;
 use crate::error::{Error, Result};
 use crate::record::Nanos;
 use crate::sink::address::{Listen, Transport};
@@ -37,6 +38,11 @@ pub(crate) use websocket::Connection;
 
 /// Most bytes taken from a socket at once.
 const READ: usize = 16 << 10;
+
+/// Bytes the kernel keeps for a client that does not read. By itself it would keep megabytes, which with
+/// hundreds of such clients is more than it has for all connections together: then packets of those
+/// who do read are dropped, and sent again only after a while.
+const SEND_BUFFER: usize = 128 << 10;
 
 /// Something that is listened on.
 #[derive(Debug)]
@@ -192,6 +198,13 @@ async fn accept<S, A: Future<Output = io::Result<S>>>(
             }
         }
     }
+}
+
+/// A connection as it was accepted is made ready.
+fn prepare(stream: &tokio::net::TcpStream) {
+    link::prepare(stream);
+    // Refused, it is as large as ever.
+    let _ = socket2::SockRef::from(stream).set_send_buffer_size(SEND_BUFFER);
 }
 
 /// What a client without a place is told.

@@ -7,8 +7,9 @@
 mod turn;
 mod unpacking;
 
-use super::hub::{Client, Hub, News, Run, Sensor, count};
+use super::hub::{Client, GAVE_WAY, Hub, News, Run, Sensor, count};
 use super::limits::Allowance;
+use super::peer::Peer;
 use super::quiet;
 use super::stream::NAMELESS;
 use super::stream::run::Placed;
@@ -26,8 +27,6 @@ use turn::{Held, Step};
 const BURST: u32 = 64;
 /// Unknown classes remembered, so that each is said once.
 const MAX_TOLD: usize = 32;
-/// Sensors one client may send.
-const MAX_OWNED: usize = 256;
 
 /// Room for the work on one chunk of bytes; one per thread, so that an idle client holds none.
 #[derive(Debug, Default)]
@@ -147,13 +146,13 @@ pub struct Session {
 impl Session {
     /// Somebody has connected, who need not show a token when `trusted`. Greets.
     #[must_use]
-    pub fn new(hub: &Arc<Hub>, peer: String, trusted: bool) -> Session {
+    pub fn new(hub: &Arc<Hub>, peer: impl Into<Peer>, trusted: bool) -> Session {
         Session::with(hub, peer, Side::Client { trusted })
     }
 
     /// With somebody who has connected, or to whom we have. Greets.
     #[must_use]
-    pub fn with(hub: &Arc<Hub>, peer: String, side: Side) -> Session {
+    pub fn with(hub: &Arc<Hub>, peer: impl Into<Peer>, side: Side) -> Session {
         let client = hub.join(peer);
         client.outbox.reply(wire::version(&hub.session()));
         let authorised = match side {
@@ -445,6 +444,9 @@ impl Session {
             }
             Err(fault) => {
                 count(&self.hub.counters.refused_samples, run.samples.len());
+                if fault.code == GAVE_WAY && self.owned.remove(id).is_some() {
+                    self.client.let_go();
+                }
                 self.say(&fault, 0, &[]);
             }
         }
@@ -456,13 +458,7 @@ impl Session {
         if let Some(sensor) = self.owned.get(id) {
             return Ok(sensor.clone());
         }
-        if self.owned.len() >= MAX_OWNED {
-            return Err(Fault::new(
-                "too_many_sensors",
-                format!("one connection sends at most {MAX_OWNED} sensors"),
-            ));
-        }
-        let sensor = self.hub.sensor(id, run)?;
+        let sensor = self.hub.sensor(id, &self.client, run)?;
         self.owned.insert(id.to_owned(), sensor.clone());
         Ok(sensor)
     }

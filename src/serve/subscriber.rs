@@ -401,6 +401,18 @@ impl Outbox {
         }
     }
 
+    /// A stream is no more: what is remembered of it goes.
+    pub fn forget_stream(&self, id: &str, number: u32, channels: &[u32]) {
+        let state = &mut *self.state();
+        state.decimators.remove(id);
+        state.labelled.remove(&number);
+        for channel in channels {
+            if let Some(subscription) = state.subscriptions.remove(channel) {
+                state.channels.remove(&subscription);
+            }
+        }
+    }
+
     /// Offers messages to a viewer, made for its subscriptions. `now`: what time it is in the data,
     /// where it wants to know.
     pub fn offer_frames(

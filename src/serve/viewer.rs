@@ -5,6 +5,7 @@
 use super::foxglove::{self, Level, MAX_SUBSCRIPTIONS, Request};
 use super::hub::{Client, Hub, Shape, count};
 use super::limits::Allowance;
+use super::peer::Peer;
 use super::playback::Action;
 use std::sync::Arc;
 use std::time::Instant;
@@ -25,7 +26,7 @@ impl Viewer {
     /// Somebody has connected; `controls`: its sub-protocol knows playback. Says who we are and what
     /// there is.
     #[must_use]
-    pub fn new(hub: &Arc<Hub>, peer: String, controls: bool) -> Viewer {
+    pub fn new(hub: &Arc<Hub>, peer: impl Into<Peer>, controls: bool) -> Viewer {
         let client = hub.join_as(peer, Shape::Foxglove { controls });
         Viewer {
             hub: hub.clone(),

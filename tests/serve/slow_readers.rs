@@ -72,6 +72,33 @@ fn a_stalled_reader_is_told_what_it_lost_while_others_lose_nothing() {
 }
 
 #[test]
+#[cfg(target_os = "linux")]
+fn of_what_a_reader_leaves_the_kernel_keeps_little() {
+    let daemon = with_patience(PATIENCE);
+    let mut stalled = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");
+    let mut healthy = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");
+    let mut sender = Client::tcp(daemon.address(0));
+    let stalls = || {
+        let status = daemon.status();
+        let clients = status["clients"].as_array().unwrap();
+        let one = clients.iter().find(|c| c["dropped"].as_u64() > Some(0));
+        one.map(|c| c["sent"].as_u64().unwrap())
+    };
+    let mut n = 0;
+    let sent = loop {
+        assert!(n < ENOUGH, "it holds more than it should");
+        let until = n + 500;
+        send(&mut sender, &mut healthy, &mut n, until);
+        if let Some(sent) = stalls() {
+            break sent;
+        }
+    };
+    let line = stalled.line().unwrap().len() as u64;
+    // Both ends together, where one alone had up to 4 MiB; an eighth is what the other end takes unread.
+    assert!(sent * line < 1 << 20, "{sent} attitudes of {line} bytes");
+}
+
+#[test]
 fn a_reader_that_takes_nothing_is_closed_and_others_never_notice() {
     // Long enough that a healthy reader on a busy machine is not taken for one that stalls.
     let daemon = with_patience(Duration::from_secs(3));

@@ -25,6 +25,8 @@ pub struct Counters {
     pub samples: AtomicU64,
     /// Samples refused before any estimator saw them.
     pub refused_samples: AtomicU64,
+    /// Sensors whose place went to another.
+    pub gave_way: AtomicU64,
     /// Attitudes made.
     pub attitudes: AtomicU64,
 }
@@ -32,7 +34,7 @@ pub struct Counters {
 impl Counters {
     /// Name and value of each, in a fixed order.
     #[must_use]
-    pub fn named(&self) -> [(&'static str, u64); 11] {
+    pub fn named(&self) -> [(&'static str, u64); 12] {
         let of = |n: &AtomicU64| n.load(Ordering::Relaxed);
         [
             ("connections_accepted", of(&self.accepted)),
@@ -45,6 +47,7 @@ impl Counters {
             ("faults", of(&self.faults)),
             ("samples", of(&self.samples)),
             ("samples_refused", of(&self.refused_samples)),
+            ("sensors_gave_way", of(&self.gave_way)),
             ("attitudes", of(&self.attitudes)),
         ]
     }

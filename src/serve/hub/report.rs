@@ -29,7 +29,7 @@ impl Hub {
             .map(|client| {
                 let level = client.outbox.level();
                 serde_json::json!({
-                    "client": client.number, "peer": client.peer,
+                    "client": client.number, "peer": client.peer.name,
                     "since_s": client.since.elapsed().as_secs_f64(),
                     "watching": level.watching, "queued_bytes": level.queued,
                     "sent": level.sent, "dropped": level.dropped,
@@ -47,7 +47,7 @@ impl Hub {
             .collect();
         wire::status(serde_json::json!({
             "session": self.session, "uptime_s": self.uptime_secs(),
-            "sources": sources, "outgoing": outgoing, "clients": clients, "counters": counters,
+            "sources": sources, "places": self.places(), "outgoing": outgoing, "clients": clients, "counters": counters,
             "state": lock(&self.state).as_ref().map(|s| serde_json::json!({
                 "saved_s_ago": s.saved.map(|t| t.elapsed().as_secs_f64()), "failed": s.failed,
             })),
@@ -58,8 +58,8 @@ impl Hub {
         }))
     }
 
-    /// The last attitude of every sensor, also of those that have not come back since the start; no
-    /// more than there may be sensors.
+    /// The last attitude of every sensor, also of those that are not there; of these no more than there
+    /// may be sensors.
     #[must_use]
     pub fn saved(&self) -> Sensors {
         let sensors: Vec<_> = read(&self.sensors).values().cloned().collect();
@@ -71,14 +71,10 @@ impl Hub {
                 Some((sensor.stream.id().to_string(), last))
             })
             .collect();
-        let room = self.limits.sensors.saturating_sub(all.len());
-        let absent = lock(&self.saved);
-        all.extend(
-            absent
-                .iter()
-                .take(room)
-                .map(|(id, s)| (id.clone(), s.clone())),
-        );
+        // One that has come back meanwhile is in both, and the newer counts.
+        for (id, saved) in lock(&self.saved).iter() {
+            all.entry(id.clone()).or_insert_with(|| saved.clone());
+        }
         all
     }
 

@@ -39,7 +39,7 @@ impl Hub {
         // Under the lock: who joins meanwhile finds it in the list, and is not told twice.
         let said = foxglove::channels(std::iter::once(&*channel), false);
         for client in read(&self.clients).values() {
-            if matches!(client.shape, Shape::Foxglove { .. }) {
+            if client.is_viewer() {
                 client.outbox.announce(said.clone());
             }
         }

@@ -5,6 +5,7 @@
 
 use super::{Context, in_room, now};
 use crate::serve::hub::{Flood, count};
+use crate::serve::peer::Peer;
 use crate::serve::session::Session;
 use crate::serve::shutdown::Running;
 use crate::serve::subscriber::Outbox;
@@ -94,7 +95,7 @@ impl Pending {
 }
 
 /// Serves one client to the end of its conversation.
-pub(super) async fn converse(io: impl Duplex, peer: String, context: Context) {
+pub(super) async fn converse(io: impl Duplex, peer: Peer, context: Context) {
     let Context {
         hub, mut running, ..
     } = context;
@@ -287,7 +288,7 @@ async fn linger(io: &impl Duplex) {
 /// A client of an accepted stream, as a task.
 pub(super) fn spawn<D: Duplex>(
     io: D,
-    peer: String,
+    peer: Peer,
     context: Context,
     place: tokio::sync::OwnedSemaphorePermit,
 ) {

@@ -1,11 +1,10 @@
 //! TCP -> sessions. I/O.
 
 use super::duplex::{self, Duplex};
-use super::{Context, accept};
-use crate::client::link;
+use super::{Context, accept, prepare};
+use crate::serve::peer::Peer;
 use std::future::Future;
 use std::io::{self, IoSlice};
-use std::net::SocketAddr;
 use tokio::net::{TcpListener, TcpStream};
 
 impl Duplex for TcpStream {
@@ -31,14 +30,10 @@ pub(super) async fn serve(listener: TcpListener, context: Context) {
         context,
         || listener.accept(),
         |(stream, peer), context, place| {
-            link::prepare(&stream);
-            duplex::spawn(stream, name(peer), context, place);
+            prepare(&stream);
+            duplex::spawn(stream, Peer::at("tcp", peer), context, place);
         },
         |(stream, _), context| duplex::spawn_dismissal(stream, &context),
     )
     .await;
-}
-
-fn name(peer: SocketAddr) -> String {
-    format!("tcp://{peer}")
 }

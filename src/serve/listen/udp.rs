@@ -4,6 +4,7 @@
 //! is counted and shows in `STATUS`.
 
 use super::{Context, in_room, now};
+use crate::serve::peer::Peer;
 use crate::serve::session::{Session, Side};
 use bytes::Bytes;
 use std::collections::{HashMap, VecDeque};
@@ -47,7 +48,7 @@ pub(super) async fn serve(socket: UdpSocket, context: Context) {
                 let sender = senders.entry(peer).or_insert_with(|| Sender {
                     session: Session::with(
                         &hub,
-                        format!("udp://{peer}"),
+                        Peer::at("udp", peer),
                         Side::Deaf { trusted: false },
                     ),
                     heard: Instant::now(),

@@ -2,6 +2,7 @@
 
 use super::duplex::{self, Duplex};
 use super::{Context, accept};
+use crate::serve::peer::Peer;
 use std::future::Future;
 use std::io::{self, IoSlice};
 use std::os::unix::fs::{FileTypeExt, PermissionsExt};
@@ -79,11 +80,15 @@ impl Duplex for UnixStream {
 }
 
 pub(super) async fn serve(bound: Bound, context: Context) {
-    let peer = format!("unix://{}", bound.path.display());
+    let name = format!("unix://{}", bound.path.display());
     accept(
         context,
         || bound.listener.accept(),
-        |(stream, _), context, place| duplex::spawn(stream, peer.clone(), context, place),
+        |(stream, _), context, place| {
+            // One whose user can not be told shares with all such.
+            let user = stream.peer_cred().map_or(u32::MAX, |who| who.uid());
+            duplex::spawn(stream, Peer::user(name.clone(), user), context, place);
+        },
         |(stream, _), context| duplex::spawn_dismissal(stream, &context),
     )
     .await;

@@ -3,13 +3,13 @@
 //! One message is one line or several; every answer and attitude is a message of its own, so that a
 //! page can hand it to `JSON.parse` as it is. Packed objects go in binary messages, one or more in each.
 
-use super::{Context, accept, in_room, now, too_many_clients};
-use crate::client::link;
+use super::{Context, accept, in_room, now, prepare, too_many_clients};
 use crate::decode::packed;
 use crate::serve::admission::Web;
 use crate::serve::foxglove::{self, Framed};
 use crate::serve::http;
 use crate::serve::hub::{Client, Flood, Hub, count};
+use crate::serve::peer::Peer;
 use crate::serve::session::Session;
 use crate::serve::shutdown::Running;
 use crate::serve::viewer::Viewer;
@@ -48,7 +48,7 @@ const TAKE: usize = 64 << 10;
 #[derive(Clone, Debug)]
 pub(crate) struct Connection {
     pub(crate) hub: Arc<Hub>,
-    pub(crate) peer: String,
+    pub(crate) peer: Peer,
     /// The client has shown the token with the request.
     pub(crate) trusted: bool,
     pub(crate) running: Running,
@@ -65,10 +65,10 @@ pub(super) async fn serve(listener: TcpListener, context: Context) {
         context,
         || listener.accept(),
         |(stream, peer), context, place| {
-            link::prepare(&stream);
+            prepare(&stream);
             let connection = Connection {
                 hub: context.hub.clone(),
-                peer: format!("ws://{peer}"),
+                peer: Peer::at("ws", peer),
                 trusted: false,
                 running: context.running.clone(),
                 _place: Arc::new(place),

@@ -1,0 +1,285 @@
+//! Places for sensors: who takes one, and who gives way. Pure but for locks.
+
+use super::{Client, Hub, Run, Sensor, count, lock, read, write};
+use crate::serve::channel::Channel;
+use crate::serve::foxglove;
+use crate::serve::peer::Origin;
+use crate::serve::state::{Saved, Sensors};
+use crate::serve::stream::SensorStream;
+use crate::serve::wire::Fault;
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex, TryLockError};
+
+/// Sensors that gave way last, in `STATUS`.
+const TOLD: usize = 16;
+
+/// Attitudes of sensors that are not there: not since the start, or no more. As many as there may be
+/// sensors; the one that has been in it longest gives way.
+#[derive(Debug, Default)]
+pub(super) struct Absent {
+    sensors: Sensors,
+    /// Oldest first.
+    order: VecDeque<String>,
+}
+
+impl Absent {
+    /// Those of before the start.
+    pub(super) fn new(sensors: Sensors) -> Absent {
+        Absent {
+            order: sensors.keys().cloned().collect(),
+            sensors,
+        }
+    }
+
+    pub(super) fn get(&self, id: &str) -> Option<&Saved> {
+        self.sensors.get(id)
+    }
+
+    /// It is there again.
+    pub(super) fn remove(&mut self, id: &str) {
+        if self.sensors.remove(id).is_some() {
+            self.order.retain(|known| known != id);
+        }
+    }
+
+    fn insert(&mut self, id: &str, saved: Saved, most: usize) {
+        self.remove(id);
+        while self.sensors.len() >= most
+            && let Some(oldest) = self.order.pop_front()
+        {
+            self.sensors.remove(&oldest);
+        }
+        self.sensors.insert(id.to_owned(), saved);
+        self.order.push_back(id.to_owned());
+    }
+
+    pub(super) fn iter(&self) -> impl Iterator<Item = (&String, &Saved)> {
+        self.sensors.iter()
+    }
+}
+
+impl Hub {
+    /// The sensor a run of `client` is of; begun by its first sample. Where all places are taken, the
+    /// sensor that nobody sends and that has been silent longest gives way.
+    ///
+    /// # Errors
+    /// The fault to answer with.
+    pub fn sensor(
+        &self,
+        id: &str,
+        client: &Client,
+        run: &Run<'_>,
+    ) -> Result<Arc<Mutex<Sensor>>, Fault> {
+        self.check_share(client)?;
+        if let Some(sensor) = read(&self.sensors).get(id) {
+            client.sensors.fetch_add(1, Ordering::Relaxed);
+            return Ok(sensor.clone());
+        }
+        let mut sensors = write(&self.sensors);
+        if let Some(sensor) = sensors.get(id) {
+            client.sensors.fetch_add(1, Ordering::Relaxed);
+            return Ok(sensor.clone());
+        }
+        if sensors.len() >= self.limits.sensors {
+            self.make_room(&mut sensors)?;
+        }
+        let id: Arc<str> = id.into();
+        let first = run.samples.first().copied().unwrap_or_default();
+        let last = lock(&self.saved).get(&id).cloned();
+        let stream = SensorStream::new(
+            self.plan_of(&id),
+            id.clone(),
+            run.head,
+            &first,
+            last,
+            |labels| self.declare(labels),
+        )?;
+        lock(&self.saved).remove(&id);
+        if let Some(recorder) = &self.recorder {
+            recorder.declare(stream.recorded());
+        }
+        let sensor = Arc::new(Mutex::new(Sensor {
+            stream,
+            owner: None,
+            heard: self.heard.fetch_add(1, Ordering::Relaxed),
+            gave_way: false,
+        }));
+        sensors.insert(id, sensor.clone());
+        client.sensors.fetch_add(1, Ordering::Relaxed);
+        Ok(sensor)
+    }
+
+    /// Whether a client may send one sensor more.
+    fn check_share(&self, client: &Client) -> Result<(), Fault> {
+        let refuse = |what: String| Err(Fault::new("too_many_sensors", what));
+        let most = self.limits.sensors_of_client;
+        if client.sensors.load(Ordering::Relaxed) >= most {
+            return refuse(format!("one connection sends at most {most} sensors"));
+        }
+        let Some(who) = client.peer.origin.named() else {
+            return Ok(());
+        };
+        let all: usize = read(&self.clients)
+            .values()
+            .filter(|c| c.peer.origin == client.peer.origin)
+            .map(|c| c.sensors.load(Ordering::Relaxed))
+            .sum();
+        let most = self.limits.sensors_of_peer();
+        if all >= most {
+            return refuse(format!(
+                "{who} sends {all} sensors already, and may send {most}; --max-sensors allows more"
+            ));
+        }
+        Ok(())
+    }
+
+    fn make_room(&self, sensors: &mut BTreeMap<Arc<str>, Arc<Mutex<Sensor>>>) -> Result<(), Fault> {
+        let silent = sensors
+            .iter()
+            .filter_map(|(id, sensor)| {
+                // One that is locked is at work.
+                let sensor = match sensor.try_lock() {
+                    Ok(sensor) => sensor,
+                    Err(TryLockError::Poisoned(sensor)) => sensor.into_inner(),
+                    Err(TryLockError::WouldBlock) => return None,
+                };
+                sensor.owner.is_none().then(|| (sensor.heard, id.clone()))
+            })
+            .min();
+        let Some((_, id)) = silent else {
+            return Err(Fault::new(
+                "too_many_sensors",
+                format!(
+                    "there are {} sensors already, and all of them are being sent; --max-sensors allows more",
+                    sensors.len()
+                ),
+            ));
+        };
+        if let Some(sensor) = sensors.remove(&id) {
+            let mut sensor = lock(&sensor);
+            // Somebody may be about to send it.
+            sensor.gave_way = true;
+            if let Some(saved) = sensor.stream.saved() {
+                lock(&self.saved).insert(&id, saved, self.limits.sensors);
+            }
+            self.withdraw(sensor.stream.channel());
+        }
+        count(&self.counters.gave_way, 1);
+        let mut told = lock(&self.gave_way);
+        told.retain(|known| *known != id);
+        if told.len() == TOLD {
+            told.pop_front();
+        }
+        told.push_back(id);
+        Ok(())
+    }
+
+    /// A stream is no more; viewers are told.
+    fn withdraw(&self, channel: &Channel) {
+        let mut channels = write(&self.channels);
+        channels.remove(&channel.number());
+        let numbers: Vec<u32> = channel.topics().map(|(number, _)| number).collect();
+        let said = foxglove::withdrawn(&numbers);
+        for client in read(&self.clients).values() {
+            client
+                .outbox
+                .forget_stream(channel.id(), channel.number(), &numbers);
+            if client.is_viewer() {
+                client.outbox.announce(said.clone());
+            }
+        }
+    }
+
+    /// How the places for sensors are taken, for `STATUS`.
+    pub(super) fn places(&self) -> serde_json::Value {
+        serde_json::json!({
+            "sensors": self.limits.sensors,
+            "taken": read(&self.sensors).len(),
+            "saved": lock(&self.saved).iter().count(),
+            "gave_way": self.counters.gave_way.load(Ordering::Relaxed),
+            "gave_way_last": lock(&self.gave_way).iter().map(|id| &**id).collect::<Vec<_>>(),
+        })
+    }
+}
+
+impl Origin {
+    /// In words; `None`: somebody we chose ourselves.
+    fn named(self) -> Option<String> {
+        match self {
+            Origin::Own => None,
+            Origin::Address(ip) => Some(ip.to_string()),
+            Origin::User(id) => Some(format!("user {id}")),
+        }
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::super::super::Settings;
+    use super::super::super::limits::Limits;
+    use super::super::super::session::{Scratch, Session};
+    use super::super::{Hub, Shape};
+    use super::*;
+    use crate::record::Nanos;
+
+    fn line(id: &str, n: u64) -> String {
+        format!("{{\"id\":\"{id}\",\"stamp\":{{\"sec\":{n},\"nsec\":0}},\"gyro\":[0.1,0,0]}}\n")
+    }
+
+    #[test]
+    fn who_comes_with_ever_new_names_makes_nothing_grow() {
+        let places = 8;
+        let hub = Arc::new(
+            Hub::new(Settings {
+                limits: Limits {
+                    sensors: places,
+                    ..Limits::default()
+                },
+                ..Settings::default()
+            })
+            .unwrap(),
+        );
+        let viewer = hub.join_as("viewer".to_owned(), Shape::Foxglove { controls: false });
+        let watcher = hub.join("watcher".to_owned());
+        watcher.outbox.watch(Some(Default::default()));
+        hub.watch_changed();
+        let mut scratch = Scratch::default();
+        let mut said = VecDeque::new();
+        for n in 0..20 * places as u64 {
+            let mut session = Session::new(&hub, "sender".to_owned(), true);
+            session.bytes(
+                line(&format!("s{n}"), n + 1).as_bytes(),
+                Nanos(0),
+                &mut scratch,
+            );
+            assert_eq!(session.end(), None);
+            drop(session);
+            viewer
+                .outbox
+                .subscribe(foxglove::channel_of(n as u32 + 1), n as u32, 4096);
+            viewer.outbox.discard(&mut said);
+        }
+        assert_eq!(read(&hub.sensors).len(), places);
+        assert_eq!(read(&hub.channels).len(), places);
+        assert_eq!(lock(&hub.saved).order.len(), places);
+        assert_eq!(lock(&hub.saved).sensors.len(), places);
+        // The newest are there, those before them are saved, and the viewer was told of each.
+        assert!(
+            read(&hub.sensors).contains_key("s159") && !read(&hub.sensors).contains_key("s151")
+        );
+        assert!(lock(&hub.saved).get("s151").is_some() && lock(&hub.saved).get("s143").is_none());
+        let count = |what: &[u8]| {
+            let has = |line: &&bytes::Bytes| line.windows(what.len()).any(|w| w == what);
+            said.iter().filter(has).count()
+        };
+        assert_eq!(count(b"\"unadvertise\""), 19 * places);
+        let told = hub.places();
+        assert_eq!(
+            (&told["gave_way"], &told["taken"]),
+            (&152.into(), &8.into())
+        );
+        assert_eq!(told["gave_way_last"].as_array().map(Vec::len), Some(TOLD));
+    }
+}

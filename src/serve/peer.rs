@@ -1,0 +1,60 @@
+//! Who is at the other end. Pure.
+
+use std::fmt;
+use std::net::{IpAddr, SocketAddr};
+
+/// Who is at the other end of a connection.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Peer {
+    /// For people.
+    pub name: String,
+    /// Whose connections count together.
+    pub origin: Origin,
+}
+
+/// Where somebody comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Origin {
+    /// An address.
+    Address(IpAddr),
+    /// A user of this machine, by id: over a Unix socket.
+    User(u32),
+    /// Whoever started the daemon chose it: a source, standard input.
+    Own,
+}
+
+impl Peer {
+    /// Somebody at an address.
+    #[must_use]
+    pub fn at(transport: &str, address: SocketAddr) -> Peer {
+        Peer {
+            name: format!("{transport}://{address}"),
+            origin: Origin::Address(address.ip().to_canonical()),
+        }
+    }
+
+    /// A user of this machine.
+    #[must_use]
+    pub fn user(name: String, id: u32) -> Peer {
+        Peer {
+            name,
+            origin: Origin::User(id),
+        }
+    }
+}
+
+impl From<String> for Peer {
+    /// Chosen by ourselves.
+    fn from(name: String) -> Peer {
+        Peer {
+            name,
+            origin: Origin::Own,
+        }
+    }
+}
+
+impl fmt::Display for Peer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.name)
+    }
+}

@@ -1,0 +1,131 @@
+//! Places for sensors are given back: to whom, and what becomes of who had them.
+
+use super::client::{Client, rate};
+use super::daemon::{Daemon, Process, TCP, eventually, listening};
+use serde_json::Value;
+use strapd::serve::limits::Limits;
+
+fn with_places(sensors: usize) -> Daemon {
+    let mut settings = listening(&[TCP]);
+    settings.limits = Limits {
+        sensors,
+        ..Limits::default()
+    };
+    Daemon::start(settings)
+}
+
+fn ids(status: &Value) -> Vec<&str> {
+    let sources = status["sources"].as_array().unwrap();
+    sources.iter().map(|s| s["id"].as_str().unwrap()).collect()
+}
+
+#[test]
+fn the_sensor_nobody_sends_that_is_silent_longest_gives_way_and_goes_on_where_it_was() {
+    let daemon = with_places(3);
+    let mut watcher = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");
+    let mut kept = Client::tcp(daemon.address(0));
+    let mut gone = Client::tcp(daemon.address(0));
+    let mut turned = Value::Null;
+    for n in 0..100 {
+        // `oldest` is named last and sent first; `kept` is silent still longer, but its sender is there.
+        if n == 0 {
+            kept.send(&rate("kept", 0, 1.0));
+            watcher.object("ATT");
+        }
+        for id in ["oldest", "a newer one"] {
+            gone.send(&rate(id, n, 2.0));
+            let att = watcher.object("ATT");
+            if id == "oldest" {
+                turned = att;
+            }
+        }
+    }
+    drop(gone);
+    let mut new = Client::tcp(daemon.address(0));
+    let mut n = 0;
+    // Until the daemon has noticed that the sender has gone, there is no place.
+    eventually("a place", || {
+        new.send(&rate("new", n, 1.0));
+        n += 1;
+        daemon.status()["places"]["gave_way"] == 1
+    });
+    let status = daemon.status();
+    assert_eq!(ids(&status), ["a newer one", "kept", "new"]);
+    let places = &status["places"];
+    assert_eq!(places["gave_way_last"], serde_json::json!(["oldest"]));
+    assert_eq!(
+        (&places["sensors"], &places["taken"], &places["saved"]),
+        (&3.into(), &3.into(), &1.into())
+    );
+    assert_eq!(status["counters"]["sensors_gave_way"], 1);
+    // It comes back, after a gap too long to be bridged, where it was.
+    let mut again = Client::tcp(daemon.address(0));
+    again.send(&rate("oldest", 9000, 2.0));
+    let back = loop {
+        let att = watcher.object("ATT");
+        if att["id"] == "oldest" {
+            break att;
+        }
+    };
+    assert_eq!(back["q"], turned["q"], "{back}");
+    assert!(back["q"]["w"].as_f64() < Some(0.999), "it had turned");
+    assert!(back["status"].to_string().contains("held"), "{back}");
+    assert_eq!(ids(&daemon.status()), ["kept", "new", "oldest"]);
+}
+
+#[test]
+fn where_all_are_sent_one_more_is_refused_with_the_flag_that_helps() {
+    let mut process = Process::start(&["--listen", TCP, "--max-sensors", "2"]);
+    let mut sender = Client::tcp(process.address(0));
+    for id in ["a", "b", "c"] {
+        sender.send(&rate(id, 0, 1.0));
+    }
+    let said = sender.next_of("ERROR");
+    assert_eq!(said["code"], "too_many_sensors");
+    assert!(said.to_string().contains("--max-sensors"), "{said}");
+    sender.send("{\"class\":\"POLL\"}");
+    let status = sender.next_of("STATUS");
+    assert_eq!(ids(&status), ["a", "b"]);
+    assert_eq!(status["counters"]["samples_refused"], 1);
+    process.signal("TERM");
+    assert_eq!(process.exit(), Some(0));
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn one_connection_sends_256_sensors_and_one_peer_512_and_others_have_the_rest() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("s");
+    let daemon = Daemon::start(listening(&[
+        TCP,
+        &format!("unix-listen://{}", path.display()),
+    ]));
+    let count = || ids(&daemon.status()).len();
+    // Sent, each with 300 names, and what there is after that.
+    let mut senders = Vec::new();
+    let mut fill = |mut sender: Client, part: usize, expected: usize| {
+        let lines: Vec<String> = (0..300)
+            .map(|n| rate(&format!("{part}-{n}"), 0, 0.1))
+            .collect();
+        sender.send(&lines.join("\n"));
+        assert_eq!(sender.next_of("ERROR")["code"], "too_many_sensors");
+        eventually("the sensors", || count() == expected);
+        senders.push(sender);
+    };
+    fill(Client::tcp(daemon.address(0)), 0, 256);
+    fill(Client::tcp(daemon.address(0)), 1, 512);
+    fill(Client::tcp(daemon.address(0)), 2, 512);
+    fill(Client::from_another(daemon.address(0)), 3, 768);
+    // A user is a peer, whatever its addresses.
+    fill(Client::unix(&path), 4, 1024);
+    // All are being sent: nobody gives way.
+    fill(Client::unix(&path), 5, 1024);
+    // Who goes makes room.
+    drop(senders.remove(0));
+    let mut late = Client::unix(&path);
+    eventually("a place", || {
+        late.send(&rate("late", 0, 1.0));
+        ids(&daemon.status()).contains(&"late")
+    });
+    assert_eq!(count(), 1024);
+}
