@@ -35,9 +35,9 @@ mod stated;
 pub use crate::condition::GyroUnit;
 pub use fields::{BadFieldPath, FieldPath, FieldRole};
 pub use json::line::{Class, Line, LineDecoder, MAX_LINE, decode_line};
-pub use refusal::{MAX_NEAR, Undecodable, Unsupported, printable, snippet};
+pub use refusal::{MAX_NEAR, Undecodable, Unsupported, exact_name, printable, snippet};
 pub use role::{Rank, Role, role};
-pub use stamp::TimeUnit;
+pub use stamp::{Ambiguous, Bare, MOST_WAITING, TimeUnit, unit_of};
 pub use stated::{AccelUnit, BodyAxes, Stated, WorldAxes};
 
 use crate::record::{Nanos, RawSample};
@@ -247,7 +247,7 @@ impl Decoder {
         };
         *form = given;
         if let Some(Nanos(count)) = count.filter(|n| n.0 != 0) {
-            let unit = settled_unit(count as f64, log);
+            let unit = settled_unit(Bare::whole(count), log);
             form.stamp = match given.stamp {
                 StampForm::Count(_) => StampForm::Count(unit),
                 _ => StampForm::Float(unit),
@@ -277,7 +277,7 @@ impl Decoder {
             _ => &learnt,
         };
         let stamped = if one.stamp.is_some() { one } else { &learnt };
-        let unit = stamped.unlabelled().map(|count| settled_unit(count, log));
+        let unit = stamped.unlabelled().map(|bare| settled_unit(bare, log));
         let missing = self.options.fields.iter().find(|field| match field.role {
             FieldRole::Gyro => !one.has_gyro(),
             FieldRole::Accel => !one.registers.has(Slot::ACCEL, 3),
@@ -362,13 +362,9 @@ impl Decoder {
     }
 }
 
-fn settled_unit(count: f64, log: Nanos) -> TimeUnit {
-    TimeUnit::nearest(count, log).unwrap_or_else(|| match TimeUnit::ByMagnitude.nanos(count) {
-        1 => TimeUnit::Nano,
-        1_000 => TimeUnit::Micro,
-        1_000_000 => TimeUnit::Milli,
-        _ => TimeUnit::Second,
-    })
+fn settled_unit(bare: Bare, log: Nanos) -> TimeUnit {
+    let count = bare.count();
+    TimeUnit::nearest(count, log).unwrap_or_else(|| TimeUnit::of_magnitude(count))
 }
 
 fn label(channel: &Channel<'_>) -> [String; 3] {

@@ -63,6 +63,7 @@ use source::Source;
 use std::collections::BTreeMap;
 use std::future::Future;
 use std::sync::Arc;
+use std::time::Duration;
 use tokio::sync::Semaphore;
 
 /// What a daemon is to do.
@@ -196,13 +197,24 @@ impl Server {
             let task = connect::keep(outgoing.clone(), self.hub.clone(), shutdown.running());
             tokio::spawn(task);
         }
+        let waits = tokio::spawn(end_waits(self.hub.clone()));
         stop.await;
+        waits.abort();
         self.hub.stop();
         let limit = self.hub.limits().drain;
         // What is left of the limit is for who saves and goes.
         let drained = tokio::time::timeout(limit * 9 / 10, shutdown.drain(limit / 2)).await;
         answering.abort();
         drained.is_ok()
+    }
+}
+
+/// Sees to it that samples do not wait for ever for the unit of their stamps.
+async fn end_waits(hub: Arc<Hub>) {
+    let mut tick = tokio::time::interval(Duration::from_millis(250));
+    loop {
+        tick.tick().await;
+        hub.end_waits(listen::now());
     }
 }
 

@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
+#[path = "decode/bare_stamps.rs"]
+mod bare_stamps;
 #[path = "decode/hostile.rs"]
 mod hostile;
 #[path = "decode/json.rs"]

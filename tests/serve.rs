@@ -13,6 +13,7 @@ mod serve {
 
     mod admission;
     mod bad_lines;
+    mod bare_stamps;
     mod cat;
     mod config;
     mod connecting;

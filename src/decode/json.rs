@@ -16,10 +16,10 @@ use super::refusal::printable;
 use super::registers::Form;
 use super::schema::{last_name, ros_name};
 use super::select::names::{Px4, px4};
-use super::stamp::TimeUnit;
+use super::stamp::{Bare, TimeUnit};
 use super::{Decoded, MAX_BATCH, Options, Undecodable};
 use crate::record::{Nanos, RawSample};
-use found::Found;
+use found::{Found, Instant};
 use scan::Scanner;
 use seek::Seeker;
 use trie::Trie;
@@ -66,7 +66,13 @@ impl Plan {
     ) -> Result<Decoded, Undecodable> {
         let mut seeker = Seeker::new(self, Scanner::new(payload)?);
         let found = seeker.message()?;
-        Ok(self.push(&found, log, publish, out))
+        let before = out.len();
+        let mut bare = Vec::new();
+        let decoded = self.push(&found, log, publish, out, &mut bare);
+        for (sample, bare) in out.iter_mut().skip(before).zip(bare) {
+            sample.header = bare.map(Bare::by_magnitude).or(sample.header);
+        }
+        Ok(decoded)
     }
 
     /// The same for a message that names this frame, or none; nothing of one that names another.
@@ -92,17 +98,30 @@ impl Plan {
         Seeker::new(self, Scanner::new(payload)?).message()
     }
 
+    /// Pushes the samples of what was found; those whose stamp is a bare number have none yet, and the
+    /// number stands at their place in `bare`.
     pub(crate) fn push(
         &self,
         found: &Found<'_>,
         log: Nanos,
         publish: Nanos,
         out: &mut Vec<RawSample>,
+        bare: &mut Vec<Option<Bare>>,
     ) -> Decoded {
         let mut outcome = Decoded::default();
         let header = found.instant(self.settled, &mut outcome);
         let form = &self.form;
+        let mut stamped = |n: usize, instant: Option<Instant>| match instant {
+            None => None,
+            Some(Instant::At(stamp)) => Some(stamp),
+            Some(Instant::Bare(number)) => {
+                bare.resize(n, None);
+                bare.push(Some(number));
+                None
+            }
+        };
         if found.has_gyro() || found.batch.is_empty() {
+            let header = stamped(0, header);
             out.push(found.sample(form, header, log, publish, &mut outcome));
             outcome.samples = 1;
             return outcome;
@@ -110,6 +129,7 @@ impl Plan {
         for element in found.batch.iter().take(MAX_BATCH) {
             let own = element.instant(self.settled, &mut outcome);
             let stamp = if element.stamp.is_some() { own } else { header };
+            let stamp = stamped(outcome.samples, stamp);
             out.push(element.sample(form, stamp, log, publish, &mut outcome));
             outcome.samples += 1;
         }

@@ -89,6 +89,14 @@ pub enum Undecodable {
         /// The repeated field.
         field: String,
     },
+    /// A sensor's name that, made fit for a terminal, would be another's.
+    #[error(
+        "`id` {near}: a sensor's name has at most 255 bytes, and no control or invisible characters"
+    )]
+    Name {
+        /// How it begins, fit for a terminal.
+        near: String,
+    },
     /// Not JSON.
     #[error("JSON, byte {offset}: {what}")]
     Json {
@@ -127,6 +135,21 @@ pub fn printable(text: &str) -> String {
         }
     }
     out
+}
+
+/// A sensor's name as it is given: what would have to be cut or escaped for a terminal could be taken
+/// for another's.
+///
+/// # Errors
+/// [`Undecodable::Name`].
+pub fn exact_name(text: &str) -> Result<String, Undecodable> {
+    let shown = printable(text);
+    if shown != text {
+        return Err(Undecodable::Name {
+            near: snippet(text.as_bytes()),
+        });
+    }
+    Ok(shown)
 }
 
 /// Characters that reorder or hide the text around them.

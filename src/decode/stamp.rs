@@ -4,6 +4,10 @@
 //! nanoseconds, one integer of some unit, decimal seconds, RFC 3339. Decimal text is never turned
 //! into an `f64` on the way: at today's epoch one step of it is 2.4e-7 s.
 
+mod unit;
+
+pub use unit::{Ambiguous, Bare, MOST_WAITING, unit_of};
+
 use crate::record::Nanos;
 
 /// Unit of a stamp or of an interval held in one number.
@@ -32,12 +36,30 @@ impl TimeUnit {
             TimeUnit::Micro => 1_000,
             TimeUnit::Milli => 1_000_000,
             TimeUnit::Second => 1_000_000_000,
-            TimeUnit::ByMagnitude => match magnitude.abs() {
-                m if m >= 1e17 => 1,
-                m if m >= 1e14 => 1_000,
-                m if m >= 1e11 => 1_000_000,
-                _ => 1_000_000_000,
-            },
+            TimeUnit::ByMagnitude => TimeUnit::of_magnitude(magnitude).nanos(magnitude),
+        }
+    }
+
+    /// The unit of an instant since 1970 of which nothing is known but its magnitude.
+    #[must_use]
+    pub fn of_magnitude(magnitude: f64) -> TimeUnit {
+        match magnitude.abs() {
+            m if m >= 1e17 => TimeUnit::Nano,
+            m if m >= 1e14 => TimeUnit::Micro,
+            m if m >= 1e11 => TimeUnit::Milli,
+            _ => TimeUnit::Second,
+        }
+    }
+
+    /// Its name, as [`TimeUnit::named`] takes it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            TimeUnit::Nano => "ns",
+            TimeUnit::Micro => "us",
+            TimeUnit::Milli => "ms",
+            TimeUnit::Second => "s",
+            TimeUnit::ByMagnitude => "",
         }
     }
 
@@ -97,6 +119,18 @@ pub(crate) fn from_float(count: f64, unit: TimeUnit) -> Option<Nanos> {
 /// Decimal text (`1700000000.123456789`, `-3`, `1.7e9`), exact to the nanosecond and rounded half
 /// away from zero below it. `None` when it is not a number.
 pub(crate) fn from_decimal(text: &str, unit: TimeUnit) -> Option<Nanos> {
+    let nanos = scaled(text, |magnitude| unit.nanos(magnitude))?;
+    let beyond = if nanos < 0 { -i64::MAX } else { i64::MAX };
+    Some(Nanos(i64::try_from(nanos).unwrap_or(beyond)))
+}
+
+/// Decimal text whose unit nobody says. `None` when it is not a number.
+pub(crate) fn bare(text: &str) -> Option<Bare> {
+    scaled(text, |_| 1_000_000_000).map(Bare)
+}
+
+/// Decimal text times `scale` of its magnitude, to the nearest whole number; saturating.
+fn scaled(text: &str, scale: impl Fn(f64) -> i64) -> Option<i128> {
     let (negative, digits) = match text.as_bytes() {
         [b'-', rest @ ..] => (true, rest),
         [b'+', rest @ ..] => (false, rest),
@@ -112,8 +146,9 @@ pub(crate) fn from_decimal(text: &str, unit: TimeUnit) -> Option<Nanos> {
         match byte {
             b'0'..=b'9' => {
                 any = true;
-                // 30 digits are beyond any stamp; further ones move only the exponent.
-                if mantissa < 10_i128.pow(29) {
+                // 28 digits are beyond any stamp, and times a billion still a number; further ones move
+                // only the exponent.
+                if mantissa < 10_i128.pow(27) {
                     mantissa = mantissa * 10 + i128::from(byte - b'0');
                     exponent -= i64::from(fraction);
                 } else {
@@ -133,7 +168,7 @@ pub(crate) fn from_decimal(text: &str, unit: TimeUnit) -> Option<Nanos> {
         return None;
     }
     let power = |n: i64| 10_f64.powi(i32::try_from(n).unwrap_or(i32::MAX));
-    let scale = unit.nanos(mantissa as f64 * power(exponent.clamp(-400, 400)));
+    let scale = scale(mantissa as f64 * power(exponent.clamp(-400, 400)));
     let mut nanos = mantissa.saturating_mul(i128::from(scale));
     match exponent {
         0 => {}
@@ -145,8 +180,7 @@ pub(crate) fn from_decimal(text: &str, unit: TimeUnit) -> Option<Nanos> {
         n if n < 0 || mantissa == 0 => nanos = 0,
         _ => nanos = i128::MAX,
     }
-    let nanos = i64::try_from(nanos).unwrap_or(i64::MAX);
-    Some(Nanos(if negative { -nanos } else { nanos }))
+    Some(if negative { -nanos } else { nanos })
 }
 
 /// RFC 3339 (`2023-11-14T22:13:20.5Z`, `2023-11-14 22:13:20+01:00`); a missing offset is read as
@@ -234,6 +268,7 @@ mod tests {
         assert_eq!(ns("1e-400"), Some(0));
         assert_eq!(ns("0e400"), Some(0));
         assert_eq!(ns(&format!("1.{}", "3".repeat(1000))), Some(1_333_333_333));
+        assert_eq!(ns(&format!("9.{}", "3".repeat(1000))), Some(9_333_333_333));
         assert_eq!(ns(&"9".repeat(1000)), Some(i64::MAX));
         for bad in [
             "",

@@ -10,7 +10,9 @@ use super::simulate::TRUTH_ID;
 use super::stamps::{StampPass, Stamps};
 use super::summarise;
 use super::waiting::Waiting;
-use crate::decode::{Class, LineDecoder, MAX_LINE, Stated};
+use crate::decode::{
+    Ambiguous, Bare, Class, LineDecoder, MAX_LINE, MOST_WAITING, Stated, TimeUnit, unit_of,
+};
 use crate::error::{Error, Result};
 use crate::record::{Nanos, RawSample};
 use crate::report::summary::RunSummary;
@@ -174,6 +176,7 @@ fn read(
         line: Vec::new(),
     };
     let mut sensor: Option<String> = None;
+    let mut bare = BareStamps::default();
     let mut has_rates = false;
     let mut samples = Vec::new();
     let mut items = Vec::with_capacity(BATCH);
@@ -251,17 +254,9 @@ fn read(
                     }
                     Some(_) => {}
                 }
-                items.extend(samples.drain(..).map(|raw| {
-                    let stamp = raw.header.unwrap_or(received);
-                    Item::Sample(
-                        0,
-                        RawSample {
-                            log: stamp,
-                            publish: stamp,
-                            ..raw
-                        },
-                    )
-                }));
+                let numbers = line.bare.into_iter().chain(std::iter::repeat(None));
+                let known = bare.take(samples.drain(..).zip(numbers));
+                items.extend(known.map_err(|what| unclear(path, &what))?);
             }
         }
         // With nothing left in the buffer the next line may be long in coming: what is known goes
@@ -277,8 +272,66 @@ fn read(
     if sensor.is_none() {
         return Err(nothing(path));
     }
+    items.extend(bare.settle().map_err(|what| unclear(path, &what))?);
     let _ = taker.take(&mut items)?;
     Ok(())
+}
+
+/// Stamps that are bare numbers: their samples wait until the unit of all is known.
+#[derive(Default)]
+struct BareStamps {
+    unit: Option<TimeUnit>,
+    waiting: Vec<(RawSample, Option<Bare>)>,
+}
+
+impl BareStamps {
+    /// The samples whose stamps are known by now.
+    fn take(
+        &mut self,
+        samples: impl Iterator<Item = (RawSample, Option<Bare>)>,
+    ) -> std::result::Result<Vec<Item>, Ambiguous> {
+        self.waiting.extend(samples);
+        let mut numbers = self.waiting.iter().filter_map(|(_, bare)| *bare);
+        let (first, ninth) = (numbers.next(), numbers.nth(MOST_WAITING - 1));
+        self.unit = self.unit.or(first.and_then(Bare::certain_unit));
+        match (self.unit, first, ninth) {
+            (None, Some(_), None) => Ok(Vec::new()),
+            _ => self.settle(),
+        }
+    }
+
+    /// The unit is that of those there are.
+    fn settle(&mut self) -> std::result::Result<Vec<Item>, Ambiguous> {
+        let mut numbers = self.waiting.iter().filter_map(|(_, bare)| *bare);
+        if self.unit.is_none() && numbers.clone().next().is_some() {
+            self.unit = Some(unit_of(numbers.by_ref().take(MOST_WAITING + 1))?);
+        }
+        let unit = self.unit.unwrap_or_default();
+        let item = |(raw, bare): (RawSample, Option<Bare>)| {
+            let header = raw.header.or(bare.map(|bare| bare.in_unit(unit)));
+            // A line has no time but the one in it.
+            let stamp = header.unwrap_or(Nanos(0));
+            Item::Sample(
+                0,
+                RawSample {
+                    header,
+                    log: stamp,
+                    publish: stamp,
+                    ..raw
+                },
+            )
+        };
+        Ok(self.waiting.drain(..).map(item).collect())
+    }
+}
+
+fn unclear(path: &Path, what: &Ambiguous) -> Error {
+    Error::Unsupported {
+        path: path.to_owned(),
+        what: format!(
+            "{what}\n  help: --field stamp=NAME:ns (or us, ms, s) says it for a name as it is"
+        ),
+    }
 }
 
 fn nothing(path: &Path) -> Error {

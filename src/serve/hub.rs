@@ -26,14 +26,16 @@ use super::foxglove;
 use super::limits::Limits;
 use super::peer::Peer;
 use super::playback::Playback;
+use super::quiet;
 use super::recorder::Handle;
 use super::stream::run::Placed;
+use super::stream::stamps::Taken;
 use super::stream::{SensorStream, live_plan};
 use super::subscriber::{Chunk, Outbox};
-use super::wire::Fault;
+use super::wire::{self, Fault};
 use crate::config::Plan;
 use crate::decode::packed::Form;
-use crate::decode::{self, Line, LineDecoder, printable};
+use crate::decode::{self, Bare, Line, LineDecoder, exact_name, printable};
 use crate::error::{Error, Result};
 use crate::record::{Nanos, RawSample};
 use crate::sink::Profile;
@@ -82,6 +84,8 @@ pub struct Hub {
     next_channel: AtomicU32,
     polling: Polling,
     next_client: AtomicU64,
+    /// Some sensor's samples wait for the unit of their stamps.
+    stamps_wait: AtomicBool,
     /// What was counted.
     pub counters: Counters,
 }
@@ -141,6 +145,8 @@ pub struct Run<'a> {
     pub lines: &'a [(Option<u64>, usize)],
     /// The samples.
     pub samples: &'a [RawSample],
+    /// Their stamps that are numbers without a unit, at their places; shorter where no more follow.
+    pub bare: &'a [Option<Bare>],
 }
 
 /// What a sender should hear of its samples.
@@ -177,7 +183,9 @@ impl Hub {
             .map(|(id, plan)| {
                 let live = live_plan(plan)
                     .map_err(|what| Error::Usage(format!("sensor {}: {what}", printable(id))))?;
-                Ok((printable(id), live))
+                let name =
+                    exact_name(id).map_err(|why| Error::Usage(format!("[sensor.ID]: {why}")))?;
+                Ok((name, live))
             })
             .collect::<Result<_>>()?;
         // No secret: it only tells a reader that the daemon was restarted.
@@ -210,6 +218,7 @@ impl Hub {
             next_channel: AtomicU32::new(1),
             polling: Polling::default(),
             next_client: AtomicU64::new(1),
+            stamps_wait: AtomicBool::new(false),
             counters: Counters::default(),
         })
     }
@@ -311,6 +320,8 @@ impl Hub {
         for sensor in owned {
             let mut sensor = lock(sensor);
             if sensor.owner == Some(client.number) {
+                // Nothing follows that would tell more.
+                self.take_overdue(&mut sensor);
                 sensor.owner = None;
             }
         }
@@ -377,24 +388,91 @@ impl Hub {
                 "`sample_kind` or unit is another than in this sensor's first sample; give it another `id`".to_owned(),
             ));
         }
-        let plan = self.plan_of(&id);
-        let note = sensor
-            .stream
-            .join(plan, run.samples, self.limits.state_window, run.placed)?;
-        let mut rest = run.samples;
+        count(&self.counters.samples, run.samples.len());
+        let taken = sensor.stream.stamped(run);
+        let (lines, samples) = match &taken {
+            None => (run.lines, run.samples),
+            Some(taken) => (&*taken.lines, &*taken.samples),
+        };
+        if sensor.stream.is_waiting() {
+            self.stamps_wait.store(true, Ordering::Relaxed);
+        }
+        self.integrate(&mut sensor, &id, lines, samples, run.placed, text)
+    }
+
+    /// Samples whose stamps are known -> attitudes.
+    fn integrate(
+        &self,
+        sensor: &mut Sensor,
+        id: &Arc<str>,
+        lines: &[(Option<u64>, usize)],
+        samples: &[RawSample],
+        placed: Placed,
+        text: &mut Vec<u8>,
+    ) -> std::result::Result<News, Fault> {
+        let plan = self.plan_of(id);
+        let window = self.limits.state_window;
+        let note = sensor.stream.join(plan, samples, window, placed)?;
+        let mut rest = samples;
         let mut from = 0;
-        for (seq, end) in run.lines {
+        for (seq, end) in lines {
             let (now, later) = rest.split_at(end.saturating_sub(from).min(rest.len()));
             sensor.stream.take(plan, *seq, now);
             (rest, from) = (later, *end);
         }
-        if let Some(recorder) = &self.recorder {
-            recorder.input(&id, run.samples.to_vec());
+        if let Some(recorder) = &self.recorder
+            && !samples.is_empty()
+        {
+            recorder.input(id, samples.to_vec());
         }
-        count(&self.counters.samples, run.samples.len());
-        self.deliver(&mut sensor, &id, text);
+        self.deliver(sensor, id, text);
         let faults = sensor.stream.news();
         Ok(News { note, faults })
+    }
+
+    /// Samples that wait for the unit of their stamps are taken by what is known.
+    fn take_overdue(&self, sensor: &mut Sensor) {
+        if !sensor.stream.is_waiting() {
+            return;
+        }
+        let id = sensor.stream.id().clone();
+        let Taken { lines, samples } = sensor.stream.overdue();
+        let placed = Placed::ByStamp;
+        let news = self.integrate(sensor, &id, &lines, &samples, placed, &mut Vec::new());
+        let (note, faults) = match news {
+            Ok(news) => (news.note, news.faults),
+            Err(fault) => (None, vec![fault]),
+        };
+        let clients = read(&self.clients);
+        let owner = sensor.owner.and_then(|owner| clients.get(&owner));
+        for fault in note.iter().chain(&faults) {
+            quiet::info(&format!("run {id}"), &format!("{id}: {}", fault.message));
+        }
+        let Some(owner) = owner else { return };
+        for said in note.iter().map(wire::note) {
+            owner.outbox.reply(said);
+        }
+        for fault in &faults {
+            owner.outbox.reply(wire::error(fault, 0, &[], 0));
+        }
+    }
+
+    /// To be called again and again: nobody waits for long for the unit of a stamp
+    /// ([`stream::stamps::LONGEST_WAIT`](super::stream::stamps::LONGEST_WAIT)).
+    pub fn end_waits(&self, now: Nanos) {
+        if !self.stamps_wait.swap(false, Ordering::Relaxed) {
+            return;
+        }
+        let sensors: Vec<_> = read(&self.sensors).values().cloned().collect();
+        for sensor in sensors {
+            let mut sensor = lock(&sensor);
+            if sensor.stream.is_overdue(now) {
+                self.take_overdue(&mut sensor);
+            }
+            if sensor.stream.is_waiting() {
+                self.stamps_wait.store(true, Ordering::Relaxed);
+            }
+        }
     }
 
     /// A line that could not be read stood among the samples of this sensor.

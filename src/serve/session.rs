@@ -16,7 +16,7 @@ use super::stream::run::Placed;
 use super::upstream::{self, Event};
 use super::wire::{self, Fault, Message};
 use crate::decode::framing::Framer;
-use crate::decode::{Line, LineDecoder};
+use crate::decode::{Bare, Line, LineDecoder};
 use crate::record::{Nanos, RawSample};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
@@ -32,6 +32,8 @@ const MAX_TOLD: usize = 32;
 #[derive(Debug, Default)]
 pub struct Scratch {
     samples: Vec<RawSample>,
+    /// Their stamps that are bare numbers, at their places.
+    bare: Vec<Option<Bare>>,
     lines: Vec<(Option<u64>, usize)>,
     head: Option<Line>,
     text: Vec<u8>,
@@ -259,12 +261,18 @@ impl Session {
             Ok(Message::Samples(_)) if !self.hub.takes_samples() => {
                 self.not_taken(number, line, before, received, scratch);
             }
-            Ok(Message::Samples(head)) => {
+            Ok(Message::Samples(mut head)) => {
                 self.errors_in_a_row = 0;
                 let seq = head.seq;
+                let bare = std::mem::take(&mut head.bare);
                 if !goes_on(scratch, &head) {
                     self.flush(received, scratch, before);
                     scratch.head = Some(head);
+                }
+                if !bare.is_empty() {
+                    let first = scratch.lines.last().map_or(0, |(_, end)| *end);
+                    scratch.bare.resize(first, None);
+                    scratch.bare.extend(bare);
                 }
                 scratch.lines.push((seq, scratch.samples.len()));
             }
@@ -421,6 +429,7 @@ impl Session {
             placed: Placed::ByStamp,
             lines: &scratch.lines,
             samples: scratch.samples.get(..until).unwrap_or_default(),
+            bare: &scratch.bare,
         };
         let id = head
             .id
@@ -451,6 +460,8 @@ impl Session {
             }
         }
         scratch.samples.drain(..until);
+        // Those of a line that is still to come are not there yet.
+        scratch.bare.clear();
         scratch.lines.clear();
     }
 

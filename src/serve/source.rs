@@ -15,7 +15,7 @@
 
 use crate::client::remote::Remote;
 use crate::client::secret::Secret;
-use crate::decode::{LineDecoder, Options, printable};
+use crate::decode::{LineDecoder, Options, exact_name, printable};
 use crate::error::{Error, Result};
 use std::path::Path;
 
@@ -90,7 +90,7 @@ impl Source {
             Some(id) if id.is_empty() || id.len() > MAX_ID => {
                 return Err(refuse(format!("?id= needs a name of 1 to {MAX_ID} bytes")));
             }
-            Some(id) => Some(printable(id)),
+            Some(id) => Some(exact_name(id).map_err(|why| refuse(format!("?id=: {why}")))?),
         };
         let phone = match &remote {
             Remote::WebSocket { path, .. } => {

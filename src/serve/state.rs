@@ -6,6 +6,7 @@
 use super::hub::Hub;
 use super::quiet;
 use super::stream::run::Span;
+use crate::decode::TimeUnit;
 use crate::error::{Error, Result};
 use crate::model::attitude::Quaternion;
 use crate::pipeline::estimator::Memory;
@@ -46,6 +47,9 @@ pub struct Saved {
     /// Last stamp that was taken, where the last attitude is an older one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     last_ns: Option<i64>,
+    /// Unit of stamps that do not say theirs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    unit: Option<String>,
     /// Number of the next attitude.
     #[serde(default)]
     seq: u64,
@@ -77,6 +81,7 @@ impl Saved {
             body: labels.body_axes.clone(),
             first_ns: None,
             last_ns: None,
+            unit: None,
             seq: 0,
             memory: None,
         }
@@ -84,12 +89,19 @@ impl Saved {
 
     /// In a run that began with this stamp, before the attitude with number `seq`.
     #[must_use]
-    pub fn in_run(self, first: Option<Nanos>, seq: u64, memory: Option<Memory>) -> Saved {
+    pub fn in_run(
+        self,
+        first: Option<Nanos>,
+        seq: u64,
+        unit: Option<TimeUnit>,
+        memory: Option<Memory>,
+    ) -> Saved {
         let last = memory.as_ref().and_then(Memory::last);
         Saved {
             first_ns: first.map(|f| f.0),
             last_ns: last.map(|l| l.0).filter(|l| *l != self.stamp_ns),
             seq,
+            unit: unit.map(|unit| unit.name().to_owned()),
             memory: memory.map(Box::new),
             ..self
         }
@@ -106,7 +118,14 @@ impl Saved {
     /// Number of the next attitude.
     #[must_use]
     pub fn next_seq(&self) -> u64 {
-        self.seq
+        // Who has written another number there must not make the count overflow.
+        self.seq.min(u64::MAX / 4)
+    }
+
+    /// The unit of stamps that do not say theirs.
+    #[must_use]
+    pub fn unit(&self) -> Option<TimeUnit> {
+        TimeUnit::named(self.unit.as_deref()?)
     }
 
     /// How often it has been reset.

@@ -5,10 +5,11 @@
 //! come and go ([`run`]).
 
 pub mod run;
+pub mod stamps;
 
 use crate::condition::{Clock, Report};
 use crate::config::Plan;
-use crate::decode::{Line, Stated};
+use crate::decode::{Ambiguous, Bare, Line, Stated, TimeUnit};
 use crate::model::attitude::Quaternion;
 use crate::pipeline::estimator::Estimator;
 use crate::pipeline::opening::labelled;
@@ -16,16 +17,21 @@ use crate::pipeline::preparation::{Prepared, Resolved, at_once};
 use crate::propagate::{Method, Sequential};
 use crate::record::{AttitudeSample, Counts, Nanos, RawSample, Verdict};
 use crate::serve::channel::Channel;
+use crate::serve::hub::Run;
 use crate::serve::recorder::stream_of;
 use crate::serve::state::Saved;
 use crate::serve::wire::Fault;
 use crate::sink::Stream;
 use run::{Placed, Span, Standing};
+use stamps::{Stamps, Taken};
 use std::sync::Arc;
 use std::time::Duration;
 
 /// Numbers a sample may come behind its turn. Further back, the sender counts anew.
 const OVERTAKEN: u64 = 64;
+
+/// Nobody who goes on in the same unit begins later than so long after the last stamp.
+const NEAR_NANOS: i64 = 3_600_000_000_000;
 
 /// The name of a sensor that gives none.
 pub const NAMELESS: &str = "imu";
@@ -42,6 +48,10 @@ pub struct SensorStream {
     joining: Joining,
     /// What to go on from, until a stamp has decided that.
     saved: Option<Saved>,
+    /// The unit of stamps that do not say theirs.
+    stamps: Stamps,
+    /// What is to be said of them.
+    ambiguous: Option<Fault>,
     /// First stamp of the run.
     first: Option<Nanos>,
     /// Runs begun by a connection since the start.
@@ -142,6 +152,8 @@ impl SensorStream {
             resolved,
             prepared,
             joining: Joining::Undecided,
+            stamps: Stamps::new(saved.as_ref().and_then(Saved::unit)),
+            ambiguous: None,
             saved,
             first: None,
             runs: 0,
@@ -189,7 +201,12 @@ impl SensorStream {
             return Some(saved.clone());
         }
         let saved = Saved::new(self.last.as_ref()?, self.channel.stream());
-        Some(saved.in_run(self.first, self.next_seq, self.estimator.memory()))
+        Some(saved.in_run(
+            self.first,
+            self.next_seq,
+            self.stamps.unit(),
+            self.estimator.memory(),
+        ))
     }
 
     /// Somebody else sends it from now on, and hears again what is wrong with its samples.
@@ -197,6 +214,72 @@ impl SensorStream {
         self.joining = Joining::Undecided;
         self.told = 0;
         self.counted = self.conditioning().counts;
+    }
+
+    /// The samples of a run whose stamps are known by now: `None` where these are all that came, as they
+    /// are. Those whose stamps are bare numbers wait for the unit of all.
+    pub fn stamped(&mut self, run: &Run<'_>) -> Option<Taken> {
+        let bare = run.bare.iter().flatten().next();
+        if self.joining == Joining::Undecided
+            && let Some(bare) = bare
+            && !self.continues(*bare)
+        {
+            self.stamps.reopen();
+        }
+        let (taken, why) = self
+            .stamps
+            .take(run.lines, run.samples, run.bare, run.received);
+        self.doubt(why);
+        taken
+    }
+
+    /// Whether samples wait for the unit of their stamps.
+    #[must_use]
+    pub fn is_waiting(&self) -> bool {
+        self.stamps.is_waiting()
+    }
+
+    /// Whether some have waited for the unit of their stamps for long enough.
+    #[must_use]
+    pub fn is_overdue(&self, now: Nanos) -> bool {
+        self.stamps.is_overdue(now)
+    }
+
+    /// Those that wait for the unit of their stamps, when nobody is to wait any longer.
+    pub fn overdue(&mut self) -> Taken {
+        let (taken, why) = self.stamps.release(true);
+        self.doubt(why);
+        taken
+    }
+
+    fn doubt(&mut self, why: Option<Ambiguous>) {
+        let Some(why) = why else { return };
+        // Not said of each of them once more.
+        self.told |= 1 << Verdict::NoStamp as u32;
+        self.ambiguous = Some(Fault {
+            id: Some(self.id.to_string()),
+            ..Fault::new("ambiguous_stamp", why.to_string())
+        });
+    }
+
+    /// Whether a new connection's first number goes on in the unit settled for the run; where it does
+    /// not, that may be another run, or somebody who counts in another unit.
+    fn continues(&self, bare: Bare) -> bool {
+        let (Some(span), Some(unit)) = (self.span(), self.stamps.unit()) else {
+            return false;
+        };
+        let stamp = bare.in_unit(unit);
+        span.first.is_some_and(|first| stamp > first) && stamp.since(span.last) < NEAR_NANOS
+    }
+
+    fn span(&self) -> Option<Span> {
+        match &self.saved {
+            Some(saved) => Some(saved.span()),
+            None => self.conditioning().last.map(|last| Span {
+                first: self.first,
+                last,
+            }),
+        }
     }
 
     /// Before samples are taken: decides by the first stamp of who sends it whether the run goes on.
@@ -214,13 +297,7 @@ impl SensorStream {
         if self.joining != Joining::Undecided {
             return Ok(None);
         }
-        let span = match &self.saved {
-            Some(saved) => Some(saved.span()),
-            None => self.conditioning().last.map(|last| Span {
-                first: self.first,
-                last,
-            }),
-        };
+        let span = self.span();
         let near = span.map_or(Nanos(0), |span| span.last);
         let first = samples
             .iter()
@@ -387,7 +464,7 @@ impl SensorStream {
     /// The kinds of loss that have happened for the first time to who sends it, since this was asked last.
     pub fn news(&mut self) -> Vec<Fault> {
         let counts = self.estimator.conditioning().counts;
-        let mut news = Vec::new();
+        let mut news = Vec::from_iter(self.ambiguous.take());
         for verdict in Verdict::ALL {
             let bit = 1 << verdict as u32;
             let is_new = counts.get(verdict) > self.counted.get(verdict);
@@ -438,6 +515,7 @@ impl SensorStream {
             "last_stamp": self.last.map(|l| stamp(l.stamp)),
             "rate_hz": report.spacing_nanos.filter(|n| *n > 0).map(|n| 1e9 / n as f64),
             "jitter_s": self.jitter_secs,
+            "stamp_unit": self.stamps.unit().map(TimeUnit::name),
             "sample_kind": self.resolved.kind.name(),
             "gyro_unit": self.resolved.unit.name(),
             "method": self.estimator.method().name(),
@@ -463,7 +541,7 @@ fn explained(verdict: Verdict) -> String {
             "a sample older than what was already integrated; send in order, and after a connection was lost from the first sample on (a new run) or from the last one taken"
         }
         Verdict::NoStamp => {
-            "a sample without a usable stamp (absent, or 0); send `stamp`, or start the daemon with --time log to use the time of arrival"
+            "a sample without a usable stamp (absent, 0, or a bare number of no unit); send `stamp`, or start the daemon with --time log to use the time of arrival"
         }
         Verdict::StrayStamp => "a stamp far ahead of its neighbours",
         other => other.name(),

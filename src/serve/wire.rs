@@ -11,7 +11,9 @@ pub use packing::{broken_packed, packed_stream, unreadable};
 use super::playback::{Action, Place};
 use super::subscriber::{Class as Stream, Dropped, Filter, MAX_QUEUED};
 use crate::decode::packed::Form;
-use crate::decode::{Class, Line, LineDecoder, MAX_LINE, Undecodable, printable, snippet};
+use crate::decode::{
+    Class, Line, LineDecoder, MAX_LINE, Undecodable, exact_name, printable, snippet,
+};
 use crate::record::{Nanos, RawSample};
 use bytes::Bytes;
 use serde::Deserialize;
@@ -262,12 +264,14 @@ fn watch(line: &[u8]) -> Result<Option<Filter>, Fault> {
         )));
     }
     let nothing = asked.streams.as_ref().is_some_and(Vec::is_empty);
-    Ok((asked.enable && !nothing).then(|| Filter {
+    let ids = match ids {
+        None => None,
+        Some(Ids::One(id)) => Some([name(&id)?].into()),
+        Some(Ids::Several(ids)) => Some(ids.iter().map(|id| name(id)).collect::<Result<_, _>>()?),
+    };
+    Ok((asked.enable && !nothing).then_some(Filter {
         classes,
-        ids: ids.map(|ids| match ids {
-            Ids::One(id) => [printable(&id)].into(),
-            Ids::Several(ids) => ids.iter().map(|id| printable(id)).collect(),
-        }),
+        ids,
         rate_hz: asked.rate_hz,
         form: if asked.packed {
             Form::Packed
@@ -275,6 +279,11 @@ fn watch(line: &[u8]) -> Result<Option<Filter>, Fault> {
             Form::Lines
         },
     }))
+}
+
+/// A sensor's name, as a line gives it.
+fn name(text: &str) -> Result<String, Fault> {
+    exact_name(text).map_err(|why| undecodable(&why))
 }
 
 /// The fault of a line that can not be decoded.
@@ -286,6 +295,7 @@ pub fn undecodable(why: &Undecodable) -> Fault {
             ..Fault::new("bad_json", format!("{what}, at column {}", offset + 1))
         },
         Undecodable::LongLine { .. } => too_long(),
+        Undecodable::Name { .. } => Fault::new("bad_id", why.to_string()),
         other => Fault::new("undecodable", other.to_string()),
     }
 }

@@ -54,6 +54,40 @@ fn a_bad_line_is_answered_with_its_place_and_the_next_one_counts() {
 }
 
 #[test]
+fn names_alike_at_their_beginning_or_when_escaped_are_refused_and_not_mixed() {
+    let daemon = Daemon::tcp();
+    let mut client = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");
+    let longest = "n".repeat(255);
+    client.send(&rate(&longest, 0, 1.0));
+    assert_eq!(client.object("ATT")["id"], longest);
+    client.send(&rate("a\\\\u{1b}", 0, 1.0));
+    assert_eq!(client.object("ATT")["id"], "a\\u{1b}");
+    for evil in [
+        longest.clone() + "1",
+        longest.clone() + "2",
+        "a\\u001b".to_owned(),
+        "a\u{200b}".to_owned(),
+    ] {
+        for line in [
+            rate(&evil, 1, 1.0),
+            format!("{{\"class\":\"PACKED\",\"stream\":1,\"id\":\"{evil}\"}}"),
+            format!("{{\"class\":\"WATCH\",\"id\":\"{evil}\"}}"),
+        ] {
+            client.send(&line);
+            let error = client.next_of("ERROR");
+            assert_eq!(error["code"], "bad_id", "{error}");
+            assert!(
+                error["message"].as_str().unwrap().contains("255 bytes"),
+                "{error}"
+            );
+            client.send(&rate(&longest, 2, 1.0));
+        }
+    }
+    let status = daemon.status();
+    assert_eq!(status["sources"].as_array().unwrap().len(), 2, "{status}");
+}
+
+#[test]
 fn a_line_that_is_too_long_is_answered_once_and_skipped_to_its_end() {
     let daemon = Daemon::tcp();
     let mut client = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");

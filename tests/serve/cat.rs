@@ -236,6 +236,22 @@ fn nothing_a_daemon_says_commands_the_terminal() {
     }
 }
 
+/// Lines without end that are no attitudes: of no strapd, and of one that does nothing but complain.
+#[test]
+fn whoever_says_nothing_but_nonsense_is_left_with_few_words() {
+    let nonsense: String = (0..200_000).map(|n| format!("nonsense {n}\n")).collect();
+    let complaints = "{\"class\":\"ERROR\",\"code\":\"x\",\"message\":\"y\"}\n".repeat(200_000);
+    for (bytes, said_once) in [(nonsense, "nonsense 7"), (complaints, "says x: y")] {
+        let output = ended(cat(&[&impostor(bytes.into_bytes())]));
+        let said = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{said}");
+        assert!(said.len() < 4096, "{} bytes", said.len());
+        assert!(said.contains(said_once), "{said}");
+        assert!(said.contains("is this the port of a strapd?"), "{said}");
+        assert!(said.contains("more lines were wrong"), "{said}");
+    }
+}
+
 #[test]
 fn flags_of_files_and_of_daemons_are_told_apart() {
     for (args, part) in [

@@ -164,11 +164,13 @@ fn a_hostile_name_reaches_no_terminal() {
     client.send("{\"class\":\"RATE\",\"id\":\"\\u001b]0;owned\\u0007\\u202e\",\"stamp\":{\"sec\":1},\"gyro\":[1,0,0]}");
     client.send("\x1b[31m");
     client.send("{\"class\":\"POLL\"}");
+    let mut was_refused = false;
     loop {
         let line = client.line().unwrap();
         assert!(is_harmless(&serde_json::from_str(&line).unwrap()), "{line}");
+        was_refused |= line.contains("bad_id") && line.contains("owned");
         if line.contains("\"STATUS\"") {
-            assert!(line.contains("owned"), "{line}");
+            assert!(was_refused && !line.contains("owned"), "{line}");
             break;
         }
     }

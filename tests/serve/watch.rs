@@ -155,7 +155,7 @@ fn a_sensor_is_seen_and_a_daemon_that_comes_back_too() {
     let address = daemon.address(0);
     let mut terminal = Terminal::watching(&format!("tcp://{address}"), true);
     terminal.until("nothing has come yet");
-    let _sender = turning(&daemon, "imu\\u001b[31m0");
+    let _sender = turning(&daemon, "imu\\\\u{1b}[31m0");
     // Half a second at 90 degrees a second.
     let text = terminal.until("samples 501");
     let text = match text.contains("roll   +45.000") {

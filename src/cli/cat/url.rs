@@ -8,9 +8,11 @@ use crate::client::remote::Remote;
 use crate::client::secret::Secret;
 use crate::client::watcher::{Said, Watcher, request};
 use crate::error::{Error, Result};
+use crate::serve::limits::Allowance;
 use crate::serve::shutdown::Signals;
+use std::collections::BTreeSet;
 use std::io::{BufWriter, Stdout, Write};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 const CSV_HEADER: &str = "id,stamp_ns,w,x,y,z,roll_deg,pitch_deg,yaw_deg,wx,wy,wz,sigma_x_deg,sigma_y_deg,sigma_z_deg,status\n";
 const TABLE_HEADER: &str = "               stamp s        qw        qx        qy        qz    roll deg   pitch deg     yaw deg     rate x        y        z  status, id\n";
@@ -55,7 +57,7 @@ async fn print(args: &Cat, remote: &Remote, token: Option<&Secret>) -> Result<Ou
     tokio::pin!(stop);
     let until = tokio::time::sleep(args.seconds.map_or(Duration::MAX, Duration::from_secs_f64));
     tokio::pin!(until);
-    let mut printer = Printer::new(args)?;
+    let mut printer = Printer::new(args, remote)?;
     let request = request(&args.ids, args.rate_hz);
     let mut watcher = tokio::select! {
         connected = Watcher::connect(remote, token, &request) => connected.map_err(failed)?,
@@ -72,7 +74,10 @@ async fn print(args: &Cat, remote: &Remote, token: Option<&Secret>) -> Result<Ou
             () = &mut until => break Ok(()),
             _ = &mut stop => break Ok(()),
         };
-        printer.flush()?;
+        if let Err(why) = printer.flush() {
+            printer.sum_up();
+            return Err(why);
+        }
         match next {
             Ok(true) => {}
             Ok(false) => break Ok(()),
@@ -80,6 +85,7 @@ async fn print(args: &Cat, remote: &Remote, token: Option<&Secret>) -> Result<Ou
         }
     };
     printer.flush()?;
+    printer.sum_up();
     ended.map(|()| match printer.dropped {
         0 => Outcome::Done,
         _ => Outcome::Lossy,
@@ -89,13 +95,54 @@ async fn print(args: &Cat, remote: &Remote, token: Option<&Secret>) -> Result<Ou
 struct Printer {
     out: BufWriter<Stdout>,
     format: Format,
+    /// Who is listened to.
+    address: String,
     left: u64,
     dropped: u64,
-    failure: Option<std::io::Error>,
+    gap_told: bool,
+    complaints: Complaints,
+    failure: Option<Error>,
+}
+
+/// Lines in a row that say nothing after which nobody listens any longer.
+const MOST_IN_A_ROW: u32 = 100;
+/// Complaints said at once, before they are thinned to one a second.
+const BURST: u32 = 8;
+/// Complaints remembered, so that each is said once.
+const MOST_TOLD: usize = 64;
+
+/// What is wrong with what comes: each once, not many at a time, and an end where there is nothing else.
+struct Complaints {
+    allowance: Allowance,
+    told: BTreeSet<String>,
+    in_a_row: u32,
+    unsaid: u64,
+}
+
+impl Complaints {
+    fn new() -> Complaints {
+        Complaints {
+            allowance: Allowance::new(BURST),
+            told: BTreeSet::new(),
+            in_a_row: 0,
+            unsaid: 0,
+        }
+    }
+
+    /// Whether this one is to be said.
+    fn is_due(&mut self, what: &str, now: Instant) -> bool {
+        self.in_a_row += 1;
+        let is_new = !self.told.contains(what) && self.allowance.take(now).is_some();
+        if is_new && self.told.len() < MOST_TOLD {
+            self.told.insert(what.to_owned());
+        }
+        self.unsaid += u64::from(!is_new);
+        is_new
+    }
 }
 
 impl Printer {
-    fn new(args: &Cat) -> Result<Printer> {
+    fn new(args: &Cat, remote: &Remote) -> Result<Printer> {
         let mut out = BufWriter::with_capacity(1 << 16, std::io::stdout());
         let head = match args.format {
             Format::Ndjson => "",
@@ -108,8 +155,11 @@ impl Printer {
         Ok(Printer {
             out,
             format: args.format,
+            address: remote.to_string(),
             left: args.count.unwrap_or(u64::MAX),
             dropped: 0,
+            gap_told: false,
+            complaints: Complaints::new(),
             failure: None,
         })
     }
@@ -121,38 +171,72 @@ impl Printer {
         }
         match said {
             Said::Attitude(line) => match self.attitude(line) {
-                Ok(()) => self.left -= 1,
-                Err(why) => self.failure = Some(why),
+                Ok(is_one) => self.left -= u64::from(is_one),
+                Err(why) => self.failure = Some(Error::writing("stdout", why)),
             },
             Said::Gap { id, dropped } => {
+                self.complaints.in_a_row = 0;
+                if !std::mem::replace(&mut self.gap_told, true) {
+                    tracing::warn!(
+                        "{id}: {dropped} attitudes came faster than they were taken here, and were dropped; the sum is said at the end"
+                    );
+                }
                 self.dropped += dropped;
-                tracing::warn!(
-                    "{id}: {dropped} attitudes came faster than they were taken here, and were dropped"
-                );
             }
-            Said::Complaint(what) => tracing::error!("the daemon says {what}"),
-            Said::Status(_) => {}
+            Said::Complaint(what) => self.complain(&format!("the daemon says {what}")),
+            Said::Status(_) => self.complaints.in_a_row = 0,
         }
         self.left > 0 && self.failure.is_none()
     }
 
-    fn attitude(&mut self, line: &[u8]) -> std::io::Result<()> {
+    /// Says what is wrong, unless that was said; after too much of it there is an end.
+    fn complain(&mut self, what: &str) {
+        if self.complaints.is_due(what, Instant::now()) {
+            tracing::error!("{what}");
+        }
+        if self.complaints.in_a_row >= MOST_IN_A_ROW {
+            self.failure = Some(Error::Remote {
+                address: self.address.clone(),
+                what: format!(
+                    "{MOST_IN_A_ROW} lines in a row that are no attitudes, last: {what}\n  help: is this the port of a strapd?"
+                ),
+            });
+        }
+    }
+
+    /// What was counted in place of being said.
+    fn sum_up(&self) {
+        match self.complaints.unsaid {
+            0 => {}
+            n => tracing::error!("{n} more lines were wrong in the same or other ways"),
+        }
+        match self.dropped {
+            0 => {}
+            n => tracing::warn!("{n} attitudes were lost in all"),
+        }
+    }
+
+    /// Prints one; says whether it was one.
+    fn attitude(&mut self, line: &[u8]) -> std::io::Result<bool> {
         if self.format == Format::Ndjson {
+            self.complaints.in_a_row = 0;
             self.out.write_all(&harmless(line))?;
-            return self.out.write_all(b"\n");
+            return self.out.write_all(b"\n").map(|()| true);
         }
         let a = match Attitude::read(line) {
             Ok(attitude) => attitude,
             Err(why) => {
-                tracing::error!("an attitude that is none: {why}");
+                self.complain(&format!("an attitude that is none: {why}"));
                 self.dropped += 1;
-                return Ok(());
+                return Ok(false);
             }
         };
+        self.complaints.in_a_row = 0;
         match self.format {
-            Format::Csv => self.csv(&a),
-            _ => self.table(&a),
+            Format::Csv => self.csv(&a)?,
+            _ => self.table(&a)?,
         }
+        Ok(true)
     }
 
     fn csv(&mut self, a: &Attitude) -> std::io::Result<()> {
@@ -187,11 +271,11 @@ impl Printer {
     }
 
     fn flush(&mut self) -> Result<()> {
+        let flushed = self.out.flush();
         match self.failure.take() {
             Some(why) => Err(why),
-            None => self.out.flush(),
+            None => flushed.map_err(|e| Error::writing("stdout", e)),
         }
-        .map_err(|e| Error::writing("stdout", e))
     }
 }
 

@@ -1,7 +1,7 @@
 //! What one JSON object held, and how the finds of nested objects join. Pure.
 
 use super::super::registers::{Form, Registers, Slot};
-use super::super::stamp::{TimeUnit, from_decimal, from_rfc3339};
+use super::super::stamp::{self, Bare, TimeUnit, from_decimal, from_rfc3339};
 use super::super::{Decoded, GyroUnit};
 use crate::record::{Nanos, RawSample, SampleKind};
 use std::borrow::Cow;
@@ -15,6 +15,15 @@ pub(crate) enum Written<'a> {
     Text(Cow<'a, str>, TimeUnit),
     /// Seconds and nanoseconds.
     Pair(&'a str, &'a str),
+}
+
+/// When a sample was taken, as far as one message tells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Instant {
+    /// Then.
+    At(Nanos),
+    /// A number whose unit only its stream tells.
+    Bare(Bare),
 }
 
 /// What one object held.
@@ -174,31 +183,34 @@ impl<'a> Found<'a> {
         &self,
         settled: Option<TimeUnit>,
         outcome: &mut Decoded,
-    ) -> Option<Nanos> {
-        let unit = |named: TimeUnit| match (named, settled) {
-            (TimeUnit::ByMagnitude, _) if self.px4 => TimeUnit::Micro,
-            (TimeUnit::ByMagnitude, Some(settled)) => settled,
-            (named, _) => named,
+    ) -> Option<Instant> {
+        let number = |text: &str, named: TimeUnit| {
+            let unit = match (named, settled) {
+                (TimeUnit::ByMagnitude, _) if self.px4 => TimeUnit::Micro,
+                (TimeUnit::ByMagnitude, Some(settled)) => settled,
+                (TimeUnit::ByMagnitude, None) => return stamp::bare(text).map(Instant::Bare),
+                (named, _) => named,
+            };
+            from_decimal(text, unit).map(Instant::At)
         };
         match &self.stamp.as_ref()?.1 {
-            Written::Number(text, named) => from_decimal(text, unit(*named)),
-            Written::Text(text, named) => {
-                from_rfc3339(text).or_else(|| from_decimal(text, unit(*named)))
-            }
+            Written::Number(text, named) => number(text, *named),
+            Written::Text(text, named) => from_rfc3339(text)
+                .map(Instant::At)
+                .or_else(|| number(text, *named)),
             Written::Pair(sec, nanos) => {
                 let sec = from_decimal(sec, TimeUnit::Second)?;
                 let nanos = from_decimal(nanos, TimeUnit::Nano)?;
                 outcome.stamps_carried += usize::from(!(0..1_000_000_000).contains(&nanos.0));
-                Some(Nanos(sec.0.saturating_add(nanos.0)))
+                Some(Instant::At(Nanos(sec.0.saturating_add(nanos.0))))
             }
         }
     }
 
-    /// The number behind an unlabelled stamp, for [`TimeUnit::nearest`].
-    pub(crate) fn unlabelled(&self) -> Option<f64> {
-        match &self.stamp.as_ref()?.1 {
-            Written::Number(text, TimeUnit::ByMagnitude) if !self.px4 => text.parse().ok(),
-            Written::Text(text, TimeUnit::ByMagnitude) if !self.px4 => text.parse().ok(),
+    /// The number behind an unlabelled stamp.
+    pub(crate) fn unlabelled(&self) -> Option<Bare> {
+        match self.instant(None, &mut Decoded::default()) {
+            Some(Instant::Bare(bare)) => Some(bare),
             _ => None,
         }
     }

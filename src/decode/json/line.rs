@@ -7,8 +7,8 @@
 use super::Plan;
 use super::scan::Scanner;
 use super::seek::Seeker;
-use crate::decode::refusal::printable;
-use crate::decode::{Decoded, GyroUnit, Options, Undecodable};
+use crate::decode::refusal::{exact_name, printable};
+use crate::decode::{Bare, Decoded, GyroUnit, Options, Undecodable};
 use crate::record::{Nanos, RawSample, SampleKind};
 
 /// Longest line that is read.
@@ -35,7 +35,7 @@ pub enum Class {
 pub struct Line {
     /// Its class.
     pub class: Class,
-    /// Which sensor, escaped for a terminal.
+    /// Which sensor, as it is: nothing in it needs to be escaped.
     pub id: Option<String>,
     /// Which of several sensors of one device, where a line says so (`android.sensor.gyroscope`);
     /// escaped for a terminal.
@@ -48,6 +48,9 @@ pub struct Line {
     pub gyro_unit: Option<GyroUnit>,
     /// How many samples, and what was noticed.
     pub decoded: Decoded,
+    /// Stamps that are numbers without a unit, at the places of their samples, which have none until
+    /// [`unit_of`](crate::decode::unit_of) some of them is known; shorter where no more follow.
+    pub bare: Vec<Option<Bare>>,
 }
 
 /// Reads lines; holds the paths of `--field`.
@@ -77,7 +80,8 @@ impl LineDecoder {
     /// Reads one line, without or with its line end; `received` becomes the log and publish time.
     ///
     /// # Errors
-    /// Not a JSON object (or array of them), or longer than [`MAX_LINE`].
+    /// Not a JSON object (or array of them), or longer than [`MAX_LINE`]; an `id` that could be taken for
+    /// another's.
     pub fn decode(
         &self,
         line: &[u8],
@@ -112,15 +116,18 @@ impl LineDecoder {
             Class::Rate | Class::Att => Some(GyroUnit::Rad),
             Class::None | Class::Other(_) => None,
         };
-        let decoded = self.plan.push(&found, received, received, out);
+        let id = seeker.id.as_deref().map(exact_name).transpose()?;
+        let mut bare = Vec::new();
+        let decoded = self.plan.push(&found, received, received, out, &mut bare);
         Ok(Line {
             class,
-            id: seeker.id.as_deref().map(printable),
+            id,
             sensor: seeker.sensor.as_deref().map(printable),
             seq: seeker.seq,
             sample_kind: kind_named(seeker.kind.as_deref()).or(kind),
             gyro_unit: unit.or(stated),
             decoded,
+            bare,
         })
     }
 }

@@ -15,7 +15,9 @@ impl Session {
         if self.bound.len() >= MAX_BOUND && !self.bound.contains_key(&stream) {
             return Err(Fault::new(
                 "bad_packed",
-                format!("one connection binds at most {MAX_BOUND} numbers"),
+                format!(
+                    "one connection binds at most {MAX_BOUND} numbers; give one of them another meaning, or open another connection"
+                ),
             ));
         }
         self.bound.insert(stream, head);

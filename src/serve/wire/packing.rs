@@ -26,7 +26,7 @@ pub(super) fn read(line: &[u8]) -> Result<(u32, Line), Fault> {
     )?;
     let head = Line {
         class: Class::Rate,
-        id: asked.id.as_deref().map(printable),
+        id: asked.id.as_deref().map(super::name).transpose()?,
         sample_kind: named(
             "sample_kind",
             asked.sample_kind.as_deref(),
@@ -119,16 +119,20 @@ mod tests {
         };
         assert_eq!(bound(r#""stream":0"#), Ok((0, line.clone())));
         let named = Line {
-            id: Some("a\\u{1b}".to_owned()),
+            id: Some("a\"é".to_owned()),
             sample_kind: Some(SampleKind::DeltaAngle),
             gyro_unit: Some(GyroUnit::Mrad),
             ..line
         };
         assert_eq!(
             bound(
-                r#""stream":4294967295,"id":"a\u001b","sample_kind":"delta-angle","gyro_unit":"mrad","x":[]"#
+                r#""stream":4294967295,"id":"a\"é","sample_kind":"delta-angle","gyro_unit":"mrad","x":[]"#
             ),
             Ok((u32::MAX, named))
+        );
+        assert_eq!(
+            bound(r#""stream":1,"id":"a\u001b""#).unwrap_err().code,
+            "bad_id"
         );
         for rest in [
             r#""id":"a""#,
