@@ -1,0 +1,164 @@
+//! `cargo metadata` -> the licences of everything in the binary, as one text. I/O.
+//!
+//! ```sh
+//! cargo run --example third_party_notices > THIRD-PARTY-NOTICES.txt
+//! ```
+//!
+//! Permissive licences ask for one thing: that their text goes with the binary. So the text is taken
+//! from the very sources the binary is built from, and a crate that has none fails the run unless it at
+//! least names its licence. Texts that are alike stand once. `packaging/release` ships the result.
+
+use serde_json::Value;
+use std::collections::{BTreeMap, BTreeSet};
+use std::error::Error;
+use std::path::Path;
+use std::process::Command;
+
+type Outcome<T> = Result<T, Box<dyn Error>>;
+
+/// What a licence file is called, in any case and with any ending. `COPYING` stands beside one and names
+/// what else could be chosen (zstd: the GPL).
+const NAMES: [&str; 4] = ["LICENSE", "LICENCE", "NOTICE", "UNLICENSE"];
+
+/// A crate of the binary: its name, version, what it says of its licence and authors, and the texts.
+struct Notice {
+    name: String,
+    licence: String,
+    authors: String,
+    texts: Vec<String>,
+}
+
+fn main() -> Outcome<()> {
+    let notices = linked(&metadata()?)?
+        .iter()
+        .map(|package| notice(package))
+        .collect::<Outcome<Vec<_>>>()?;
+    write(&notices, &mut std::io::stdout().lock())
+}
+
+fn metadata() -> Outcome<Value> {
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let version = Command::new(&cargo).args(["-vV"]).output()?;
+    let host = String::from_utf8(version.stdout)?
+        .lines()
+        .find_map(|line| line.strip_prefix("host: ").map(str::to_owned))
+        .ok_or("`cargo -vV` names no host")?;
+    let out = Command::new(&cargo)
+        .args(["metadata", "--locked", "--format-version", "1"])
+        .args(["--filter-platform", &host])
+        .output()?;
+    if !out.status.success() {
+        return Err(String::from_utf8_lossy(&out.stderr).into());
+    }
+    Ok(serde_json::from_slice(&out.stdout)?)
+}
+
+fn list<'a>(value: &'a Value, key: &str) -> impl Iterator<Item = &'a Value> {
+    value[key].as_array().into_iter().flatten()
+}
+
+fn text<'a>(value: &'a Value, key: &str) -> &'a str {
+    value[key].as_str().unwrap_or_default()
+}
+
+/// Every package the binary is linked from, but for our own: normal dependencies, all the way down.
+fn linked(metadata: &Value) -> Outcome<Vec<&Value>> {
+    let resolve = &metadata["resolve"];
+    let nodes: BTreeMap<&str, &Value> =
+        list(resolve, "nodes").map(|n| (text(n, "id"), n)).collect();
+    let root = resolve["root"].as_str().ok_or("there is no root package")?;
+    let mut seen = BTreeSet::new();
+    let mut next = vec![root];
+    while let Some(id) = next.pop() {
+        if seen.insert(id) {
+            let node = nodes.get(id).ok_or("a package without a node")?;
+            next.extend(
+                list(node, "deps")
+                    .filter(|dep| list(dep, "dep_kinds").any(|kind| kind["kind"].is_null()))
+                    .map(|dep| text(dep, "pkg")),
+            );
+        }
+    }
+    seen.remove(root);
+    let linked: Vec<_> = list(metadata, "packages")
+        .filter(|package| seen.contains(text(package, "id")))
+        .collect();
+    if linked.len() < seen.len() {
+        return Err("a dependency is not among the packages".into());
+    }
+    Ok(linked)
+}
+
+fn notice(package: &Value) -> Outcome<Notice> {
+    let name = format!("{} {}", text(package, "name"), text(package, "version"));
+    let licence = text(package, "license").to_owned();
+    let folder = Path::new(text(package, "manifest_path"))
+        .parent()
+        .ok_or("a manifest without a folder")?;
+    // Bundled C has its licence a folder deeper.
+    let mut files = Vec::new();
+    for inside in std::fs::read_dir(folder)? {
+        let inside = inside?.path();
+        if inside.is_dir() {
+            for deeper in std::fs::read_dir(&inside)? {
+                files.push(deeper?.path());
+            }
+        } else {
+            files.push(inside);
+        }
+    }
+    files.retain(|path| {
+        let file = path.file_name().unwrap_or_default().to_string_lossy();
+        let file = file.to_uppercase();
+        NAMES.iter().any(|name| file.starts_with(name)) && path.is_file()
+    });
+    files.sort();
+    let texts = files
+        .iter()
+        .map(|path| {
+            Ok(std::fs::read_to_string(path)?
+                .replace("\r\n", "\n")
+                .trim_end()
+                .to_owned())
+        })
+        .collect::<Outcome<Vec<_>>>()?;
+    if licence.is_empty() && texts.is_empty() {
+        return Err(format!("{name} neither names a licence nor holds one").into());
+    }
+    let authors = list(package, "authors").filter_map(Value::as_str);
+    Ok(Notice {
+        name,
+        licence,
+        authors: authors.collect::<Vec<_>>().join(", "),
+        texts,
+    })
+}
+
+fn write(notices: &[Notice], out: &mut impl std::io::Write) -> Outcome<()> {
+    writeln!(
+        out,
+        "strapd is made with the {} crates below, each under its own licence.\n",
+        notices.len()
+    )?;
+    let mut texts: BTreeMap<&str, usize> = BTreeMap::new();
+    for notice in notices {
+        write!(out, "{}: {}", notice.name, notice.licence)?;
+        for text in &notice.texts {
+            let number = texts.len() + 1;
+            write!(out, " [{}]", texts.entry(text).or_insert(number))?;
+        }
+        if notice.texts.is_empty() {
+            write!(out, " (ships no text; by {})", notice.authors)?;
+        }
+        writeln!(out)?;
+    }
+    let mut numbered: Vec<_> = texts
+        .into_iter()
+        .map(|(text, number)| (number, text))
+        .collect();
+    numbered.sort_unstable();
+    for (number, text) in numbered {
+        write!(out, "\n{:=<100}\n[{number}]\n\n{text}\n", "")?;
+    }
+    Ok(())
+}
