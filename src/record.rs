@@ -168,6 +168,8 @@ impl Status {
     pub const RESTAMPED: Status = Status(1 << 8);
     /// The first after a restart: the attitude is the one that was saved, held since.
     pub const RESTARTED: Status = Status(1 << 9);
+    /// Sent to a watcher that came after it: no news, but the last there was.
+    pub const LAST: Status = Status(1 << 10);
 
     /// Both sets of bits.
     #[must_use]
@@ -183,7 +185,7 @@ impl Status {
 
     /// The names of the bits that are set, in a fixed order; empty means `ok`.
     pub fn names(self) -> impl Iterator<Item = &'static str> {
-        const NAMES: [(Status, &str); 10] = [
+        const NAMES: [(Status, &str); 11] = [
             (Status::BRIDGED, "bridged"),
             (Status::HELD, "held"),
             (Status::RESET, "reset"),
@@ -194,6 +196,7 @@ impl Status {
             (Status::PROVISIONAL, "provisional"),
             (Status::RESTAMPED, "restamped"),
             (Status::RESTARTED, "restarted"),
+            (Status::LAST, "last"),
         ];
         NAMES
             .into_iter()

@@ -8,7 +8,7 @@
 //! |---|---|---|
 //! | [`wire`] | lines and packed objects (cut by [`crate::decode::framing`]) -> requests; answers -> lines | pure |
 //! | [`stream`] | samples of one sensor -> attitudes | pure |
-//! | [`channel`] | a stream as clients know it | pure |
+//! | [`channel`], [`last`] | a stream as clients know it; its last attitude, for who comes late | pure |
 //! | [`cast`], [`playback`] | a replay or simulation served in place of sensors, and who moves it | I/O; locks |
 //! | [`session`] | one client's lines -> hub, answers | sans-I/O |
 //! | [`hub`] | samples -> attitudes -> outboxes | locks |
@@ -32,6 +32,7 @@ mod forward;
 pub mod foxglove;
 mod http;
 pub mod hub;
+pub mod last;
 pub mod limits;
 pub mod listen;
 mod page;

@@ -18,6 +18,7 @@ mod page {
     mod admission;
     mod controls;
     mod drawing;
+    mod late;
     mod live_numbers;
     mod model_top;
     mod playback;

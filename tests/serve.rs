@@ -20,6 +20,7 @@ mod serve {
     mod documentation;
     mod faults;
     mod frames;
+    mod late;
     mod limits;
     mod operations;
     mod packaging;

@@ -101,6 +101,12 @@ impl Attitude {
         })
     }
 
+    /// Whether it is no news, but the last there was before we came.
+    #[must_use]
+    pub fn is_last(&self) -> bool {
+        self.status.iter().any(|s| s == "last")
+    }
+
     /// Roll, pitch and yaw in degrees, turned about z, then y, then x.
     #[must_use]
     pub fn roll_pitch_yaw_deg(&self) -> [f64; 3] {

@@ -195,6 +195,7 @@ impl Audience for Cast {
         if lanes.len() == streams.len() {
             for lane in &mut *lanes {
                 lane.next = 0;
+                lane.channel.begin_anew();
             }
             return;
         }

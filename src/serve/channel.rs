@@ -11,11 +11,9 @@ use crate::sink::json::Objects;
 use crate::sink::payload::{Payloads, Topic};
 use crate::sink::{Content, Profile, Stream};
 use bytes::Bytes;
-use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::sync::Mutex;
-use std::sync::PoisonError;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Bytes of one shared chunk of lines, about: small beside an outbox, so that little is dropped at once.
 const CHUNK_BYTES: usize = 16 << 10;
@@ -32,8 +30,8 @@ pub struct Channel {
     /// Number of its first channel for viewers.
     number: u32,
     payloads: Payloads,
-    /// Stamp of the attitude sent last: a transform with the same is not sent again.
-    last: Mutex<Option<Nanos>>,
+    /// Number of the attitude handed out last, and itself.
+    last: Mutex<Option<(u64, AttitudeSample)>>,
     sent: AtomicU64,
 }
 
@@ -130,16 +128,28 @@ impl Channel {
         }
     }
 
-    /// These items were offered to clients.
-    pub(super) fn passed(&self, items: Items<'_>) {
+    /// Number of the attitude handed out last, and itself. Locked while items are handed out: who sees
+    /// it sees all of them passed, or none.
+    pub(super) fn last(&self) -> MutexGuard<'_, Option<(u64, AttitudeSample)>> {
+        self.last.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Items from number `first_seq` on were offered to clients; `last` is that of this channel.
+    pub(super) fn passed(
+        &self,
+        last: &mut Option<(u64, AttitudeSample)>,
+        first_seq: u64,
+        items: Items<'_>,
+    ) {
         self.sent.fetch_add(items.len() as u64, Ordering::Relaxed);
-        if let Items::Attitudes([.., last]) = items {
-            *self.last() = Some(last.stamp);
+        if let Items::Attitudes([before @ .., newest]) = items {
+            *last = Some((first_seq + before.len() as u64, *newest));
         }
     }
 
-    fn last(&self) -> std::sync::MutexGuard<'_, Option<Nanos>> {
-        self.last.lock().unwrap_or_else(PoisonError::into_inner)
+    /// Another run begins: what was last in the one before is none of its.
+    pub(super) fn begin_anew(&self) {
+        *self.last() = None;
     }
 
     /// Number and topic of each of its channels for viewers.
@@ -153,15 +163,16 @@ impl Channel {
         channel == self.number || (second && channel == self.number + 1)
     }
 
-    /// The messages of items from number `first_seq` on for a viewer with these subscriptions.
+    /// The messages of items from number `first_seq` on for a viewer with these subscriptions, by channel.
+    /// `previous`: stamp of the attitude before them; a transform with the same is not sent again.
     pub(super) fn frames(
         &self,
-        subscriptions: &BTreeMap<u32, u32>,
+        of: impl Fn(u32) -> Option<u32>,
         first_seq: u64,
         items: Items<'_>,
         clock: Clock,
+        mut previous: Option<Nanos>,
     ) -> Vec<Chunk> {
-        let of = |channel: u32| subscriptions.get(&channel).copied();
         let own = of(self.number);
         let (beside, is_transform) = match self.payloads {
             Payloads::Attitude { .. } => (of(foxglove::TRANSFORMS), true),
@@ -171,7 +182,6 @@ impl Channel {
         if own.is_none() && beside.is_none() {
             return Vec::new();
         }
-        let mut previous = *self.last();
         let mut out = Vec::new();
         let push = |out: &mut Vec<u8>, subscription, time, payload: &dyn Fn(&mut Vec<u8>)| {
             if let Some(subscription) = subscription {

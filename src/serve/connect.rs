@@ -36,7 +36,8 @@ const STEADY: Duration = Duration::from_secs(1);
 /// Asks a daemon for its samples: a simulation has some.
 const RATES: &str = r#"{"class":"WATCH","streams":["RATE"]}"#;
 /// Asks a daemon that has none for its attitudes.
-const ATTITUDES: &str = r#"{"class":"WATCH","streams":["ATT"]}"#;
+/// The last one of each is no sample.
+const ATTITUDES: &str = r#"{"class":"WATCH","streams":["ATT"],"last":false}"#;
 
 /// A source and how it stands.
 #[derive(Debug)]

@@ -43,9 +43,8 @@ pub(super) async fn send(target: Target, context: Context) {
             Target::Udp { address, .. } => udp(address, &hub, &client, &mut running).await,
             _ => return,
         };
-        client.outbox.watch(None);
+        hub.watch(&client, None);
         client.outbox.forget();
-        hub.watch_changed();
         let Err(why) = ended else { break };
         quiet::warn(
             "outgoing",
@@ -60,8 +59,11 @@ pub(super) async fn send(target: Target, context: Context) {
 }
 
 fn begin(hub: &Hub, client: &Client) {
-    client.outbox.watch(Some(Filter::default()));
-    hub.watch_changed();
+    let filter = Filter {
+        last: true,
+        ..Filter::default()
+    };
+    hub.watch(client, Some(filter));
 }
 
 /// What there is to send next; `None`: the daemon ends and all was sent.

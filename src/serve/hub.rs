@@ -6,6 +6,7 @@
 //! order is that of its lock.
 
 mod counters;
+mod latecomers;
 mod places;
 mod polling;
 mod report;
@@ -20,7 +21,7 @@ pub use room::Flood;
 
 use super::Settings;
 use super::admission::Token;
-use super::channel::{Channel, Clock, Items};
+use super::channel::{Channel, Items};
 use super::connect::Outgoing;
 use super::foxglove;
 use super::limits::Limits;
@@ -505,18 +506,20 @@ impl Hub {
     ) {
         // Encoded when the first asks, and shared by all.
         let mut encoded: [Option<Vec<Chunk>>; 3] = [None, None, None];
+        // Locked to the end: who comes late finds all of these in it, or is among the watchers.
+        let mut last = channel.last();
+        let before = last.map(|(_, sample)| sample.stamp);
         let watchers = self.watchers();
         let now = std::cell::LazyCell::new(|| self.where_it_is().and_then(|place| place.at));
         for client in &*watchers {
             let profile = match client.shape {
                 Shape::Lines(profile) => profile,
                 Shape::Foxglove { .. } => {
-                    let clock = match &self.playback {
-                        None => Clock::Log,
-                        Some(_) => Clock::Stamp,
-                    };
                     client.outbox.offer_frames(
-                        |wanted| channel.frames(wanted, first_seq, items, clock),
+                        |wanted| {
+                            let of = |channel| wanted.get(&channel).copied();
+                            channel.frames(of, first_seq, items, self.clock(), before)
+                        },
                         *now,
                     );
                     continue;
@@ -543,7 +546,7 @@ impl Hub {
                 Items::Samples(_) => client.outbox.offer_samples(channel.id(), &mut shared),
             }
         }
-        channel.passed(items);
+        channel.passed(&mut last, first_seq, items);
         if matches!(items, Items::Attitudes(_)) {
             count(&self.counters.attitudes, items.len());
         }

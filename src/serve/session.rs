@@ -298,8 +298,7 @@ impl Session {
                 // The answer comes before the first attitude.
                 let answer = wire::watching(filter.as_ref(), &offered);
                 self.client.outbox.reply(answer);
-                self.client.outbox.watch(filter);
-                self.hub.watch_changed();
+                self.hub.watch(&self.client, filter);
             }
             Ok(Message::Poll) => {
                 self.errors_in_a_row = 0;

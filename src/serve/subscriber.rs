@@ -4,6 +4,7 @@
 //! queue has a cap, the oldest attitudes give way, what gave way is counted and said (`GAP`), and
 //! replies (`STATUS`, `ERROR`, ...) are never dropped: when too many wait, the client is closed.
 
+use super::last::Last;
 use super::{foxglove, wire};
 use crate::decode::packed::Form;
 use crate::record::{AttitudeSample, Nanos};
@@ -89,10 +90,14 @@ pub struct Filter {
     pub rate_hz: Option<f64>,
     /// How they are written.
     pub form: Form,
+    /// Whether the last attitude of each stream that was not watched before is wanted first.
+    pub last: bool,
 }
 
 impl Filter {
-    fn takes(&self, id: &str, class: Class) -> bool {
+    /// Whether it wants objects of this class of stream `id`.
+    #[must_use]
+    pub fn takes(&self, id: &str, class: Class) -> bool {
         self.ids.as_ref().is_none_or(|ids| ids.contains(id))
             && self.classes.as_ref().is_none_or(|c| c.contains(&class))
     }
@@ -144,8 +149,13 @@ struct State {
     /// The answer to `POLL`: one at most, which may be larger than all others and is shared by all.
     status: Asked,
     data: VecDeque<Chunk>,
+    /// How many have ever left `data`.
+    left: u64,
     /// Bytes of `data` and of what was taken and is not yet written.
     queued: usize,
+    /// Last attitudes of streams that were not watched before, each behind the chunk with this number:
+    /// apart from `data`, as there may be more of them than may wait there. No more than streams.
+    lasts: VecDeque<(u64, Last)>,
     gaps: BTreeMap<Arc<str>, Dropped>,
     /// How many of `data` are notes.
     notes: usize,
@@ -229,11 +239,33 @@ impl Outbox {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Starts or stops the attitudes.
-    pub fn watch(&self, filter: Option<Filter>) {
+    /// Starts or stops the attitudes. Returns what was watched before.
+    pub fn watch(&self, filter: Option<Filter>) -> Option<Filter> {
         let mut state = self.state();
         state.decimators.clear();
-        state.watch = filter;
+        let takes = |id: &str| filter.as_ref().is_some_and(|f| f.takes(id, Class::Att));
+        state.lasts.retain(|(_, last)| takes(last.id()));
+        std::mem::replace(&mut state.watch, filter)
+    }
+
+    /// How many chunks of attitudes were ever queued.
+    #[must_use]
+    pub fn queued_so_far(&self) -> u64 {
+        self.state().queued_so_far()
+    }
+
+    /// Queues the last attitude of a stream behind the attitudes that wait; not where some of it were
+    /// queued behind the first `since` chunks. It is never dropped.
+    pub fn offer_last(&self, last: Last, since: u64) {
+        let mut state = self.state();
+        let known = since.saturating_sub(state.left) as usize;
+        if state.data.iter().skip(known).any(|c| c.id == *last.id()) {
+            return;
+        }
+        let behind = state.queued_so_far();
+        state.lasts.push_back((behind, last));
+        drop(state);
+        self.wake.notify_one();
     }
 
     /// Queues a reply (whole lines). A client with too many of them waiting is closed instead.
@@ -317,7 +349,9 @@ impl Outbox {
         let mut state = self.state();
         let waiting: usize = state.data.iter().map(|c| c.bytes.len()).sum();
         state.queued = state.queued.saturating_sub(waiting);
+        state.left = state.queued_so_far();
         state.data.clear();
+        state.lasts.clear();
         state.gaps.clear();
         state.notes = 0;
         state.stray = None;
@@ -398,6 +432,7 @@ impl Outbox {
         let state = &mut *self.state();
         if let Some(channel) = state.channels.remove(&subscription) {
             state.subscriptions.remove(&channel);
+            state.lasts.retain(|(_, last)| !last.is_for(channel));
         }
     }
 
@@ -440,7 +475,8 @@ impl Outbox {
         self.wake.notify_one();
     }
 
-    /// Moves up to about `most` bytes out: replies first, then what was dropped, then attitudes.
+    /// Moves up to about `most` bytes out: replies first, then what was dropped, then attitudes. The last
+    /// one of a stream comes before what was dropped of it.
     /// Returns how many bytes of attitudes are among them; give them back to [`Outbox::written`].
     pub fn take(&self, most: usize, out: &mut VecDeque<Bytes>) -> usize {
         let mut state = self.state();
@@ -453,21 +489,35 @@ impl Outbox {
             out.push_back(line);
         }
         out.extend(state.stray.take());
-        for (id, dropped) in std::mem::take(&mut state.gaps) {
-            out.push_back((self.gap)(&id, &dropped));
-        }
         out.extend(state.labels.drain(..));
         state.label_bytes = 0;
         let mut taken = 0;
-        while taken < most
-            && let Some(chunk) = state.data.pop_front()
-        {
+        loop {
+            let is_last = state.is_turn_of_last();
+            if !is_last {
+                for (id, dropped) in std::mem::take(&mut state.gaps) {
+                    out.push_back((self.gap)(&id, &dropped));
+                }
+            }
+            if taken >= most {
+                return taken;
+            }
+            let chunk = match is_last {
+                true => state.pop_last(out),
+                false => state.pop(),
+            };
+            let Some(chunk) = chunk else {
+                // There is none for that channel.
+                if is_last {
+                    continue;
+                }
+                return taken;
+            };
             taken += chunk.bytes.len();
             state.sent += chunk.count;
             state.notes -= usize::from(chunk.is_note());
             out.push_back(chunk.bytes);
         }
-        taken
     }
 
     /// Moves everything out: what is told to nobody, or read here.
@@ -517,6 +567,7 @@ impl Outbox {
         state.control.is_empty()
             && !matches!(state.status, Asked::Made(_))
             && state.data.is_empty()
+            && state.lasts.is_empty()
             && state.gaps.is_empty()
             && state.stray.is_none()
             && state.labels.is_empty()
@@ -561,6 +612,40 @@ impl State {
         }
     }
 
+    fn queued_so_far(&self) -> u64 {
+        self.left + self.data.len() as u64
+    }
+
+    fn pop(&mut self) -> Option<Chunk> {
+        let chunk = self.data.pop_front()?;
+        self.left += 1;
+        Some(chunk)
+    }
+
+    /// Whether everything before the next last attitude has left.
+    fn is_turn_of_last(&self) -> bool {
+        let next = self.lasts.front();
+        next.is_some_and(|(behind, _)| *behind <= self.left)
+    }
+
+    /// The next last attitude, behind the label of its stream.
+    fn pop_last(&mut self, out: &mut VecDeque<Bytes>) -> Option<Chunk> {
+        while self.is_turn_of_last() {
+            let (_, last) = self.lasts.pop_front()?;
+            let Some(chunk) = last.chunk() else {
+                continue;
+            };
+            if let Some((number, label)) = &chunk.label
+                && self.labelled.insert(*number)
+            {
+                out.push_back(label.clone());
+            }
+            self.queued += chunk.bytes.len();
+            return Some(chunk);
+        }
+        None
+    }
+
     fn push(&mut self, chunk: Chunk) {
         if let Some((number, label)) = &chunk.label
             && self.labelled.insert(*number)
@@ -570,7 +655,7 @@ impl State {
         self.queued += chunk.bytes.len();
         self.data.push_back(chunk);
         while self.queued > MAX_QUEUED
-            && let Some(oldest) = self.data.pop_front()
+            && let Some(oldest) = self.pop()
         {
             self.queued -= oldest.bytes.len();
             if oldest.is_note() {

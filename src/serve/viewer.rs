@@ -7,6 +7,7 @@ use super::hub::{Client, Hub, Shape, count};
 use super::limits::Allowance;
 use super::peer::Peer;
 use super::playback::Action;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -72,17 +73,21 @@ impl Viewer {
         let watched = outbox.level().watching;
         match request {
             Request::Subscribe(list) => {
-                let mut refused = Vec::new();
+                let since = outbox.queued_so_far();
+                let (mut made, mut refused) = (BTreeMap::new(), Vec::new());
                 for (subscription, channel) in list {
-                    if !self.hub.has_channel(channel)
-                        || !outbox.subscribe(channel, subscription, MAX_SUBSCRIPTIONS)
+                    if self.hub.has_channel(channel)
+                        && outbox.subscribe(channel, subscription, MAX_SUBSCRIPTIONS)
                     {
+                        made.insert(channel, subscription);
+                    } else {
                         refused.push(channel);
                     }
                 }
                 if !watched {
                     self.hub.watch_changed();
                 }
+                self.hub.subscribed(&self.client, made, since);
                 match refused.first() {
                     None => Ok(()),
                     Some(first) => Err(format!(

@@ -79,6 +79,8 @@ struct WatchObject {
     rate_hz: Option<f64>,
     #[serde(default)]
     packed: bool,
+    #[serde(default = "yes")]
+    last: bool,
 }
 
 #[derive(Deserialize)]
@@ -278,6 +280,7 @@ fn watch(line: &[u8]) -> Result<Option<Filter>, Fault> {
         } else {
             Form::Lines
         },
+        last: asked.last,
     }))
 }
 
@@ -342,6 +345,9 @@ pub fn watching(filter: Option<&Filter>, offered: &[Stream]) -> Bytes {
         }
         if filter.form == Form::Packed {
             fields.insert("packed".into(), json!(true));
+        }
+        if !filter.last {
+            fields.insert("last".into(), json!(false));
         }
     }
     line(&answer)
@@ -503,7 +509,15 @@ mod tests {
             Ok(Message::Watch(filter)) => filter,
             other => unreachable!("{other:?}"),
         };
-        assert_eq!(filter(r#"{"class":"WATCH"}"#), Some(Filter::default()));
+        let all = Filter {
+            last: true,
+            ..Filter::default()
+        };
+        assert_eq!(filter(r#"{"class":"WATCH"}"#), Some(all.clone()));
+        assert_eq!(
+            filter(r#"{"class":"WATCH","last":false}"#),
+            Some(Filter::default())
+        );
         assert_eq!(filter(r#"{"class":"WATCH","enable":false}"#), None);
         assert_eq!(filter(r#"{"class":"WATCH","streams":[]}"#), None);
         let most = filter(&watching_ids(MAX_WATCHED)).and_then(|f| f.ids);
@@ -513,7 +527,7 @@ mod tests {
             Some(Filter {
                 ids: Some(["a".to_owned()].into()),
                 rate_hz: Some(50.0),
-                ..Filter::default()
+                ..all
             })
         );
     }

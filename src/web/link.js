@@ -35,10 +35,9 @@ export class Link {
       } catch {
         return;
       }
-      if (message.class === "VERSION") {
-        this.failures = 0;
-        this.changed("open", "connected");
-      }
+      if (message.class === "VERSION") this.failures = 0;
+      // Greeted is not yet watching: from here on nothing is lost.
+      if (message.class === "WATCH" && message.enable) this.changed("open", "connected");
       if (message.class === "ERROR" && /^(unauthorised|too_many_attempts|bad_auth)$/.test(message.code)) {
         this.refused = true;
         this.changed("token", message.message);

@@ -224,7 +224,10 @@ function draw(now) {
     if (!each.surfaces || (!each.dirty && !(each.stale && now - each.shownAt > 100))) continue;
     each.dirty = false;
     each.draw(colours, seconds, now);
-    if (!each.last) continue;
+    if (!each.last) {
+      delete window.__strapd.sensors[each.id];
+      continue;
+    }
     window.__strapd.sensors[each.id] = {
       q: each.last.q, rpy: rollPitchYaw(each.last.q), seq: each.last.seq, stamp: each.last.stamp,
       error: each.error, worst: each.worst, tips: each.tips, centre: each.centre, scale: each.scale,

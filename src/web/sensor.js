@@ -8,7 +8,6 @@ import { drawPlot, Scale } from "./plot.js";
 import { aboutZ, angleBetween, DEGREES, product, rollPitchYaw, rotate } from "./quaternion.js";
 import { Surface } from "./surface.js";
 
-const NEUTRAL = { w: 1, x: 0, y: 0, z: 0 };
 // Seconds of the path of the z axis.
 const LOCUS = 10;
 // Milliseconds between two changes of the numbers: faster nobody reads.
@@ -94,6 +93,13 @@ export class Sensor {
   take(att) {
     const { stamp, q, rate } = att;
     if (!stamp || !q) return;
+    if (att.status?.includes("last")) {
+      const { last } = this;
+      // After a lost connection: the one that is shown.
+      if (last?.seq === att.seq && last.stamp.sec === stamp.sec && last.stamp.nsec === stamp.nsec) return;
+      // What came before it was not seen, which is another matter than thinned.
+      this.interrupted = true;
+    }
     this.first ??= stamp;
     // Differences before they become one float: nanoseconds survive.
     const time = stamp.sec - this.first.sec + (stamp.nsec - this.first.nsec) * 1e-9;
@@ -200,8 +206,13 @@ export class Sensor {
 
   draw(colours, seconds, now) {
     const { history, surfaces, view, parts } = this;
-    const q = this.last?.q ?? NEUTRAL;
-    const world = this.last?.world ?? "start";
+    parts.empty.hidden = this.last !== null;
+    if (!this.last) {
+      this.drawNothing(colours);
+      return;
+    }
+    const { q } = this.last;
+    const world = this.last.world ?? "start";
     const zeroed = aboutZ(-view.yaw / DEGREES);
     const up = upright(world);
     const toView = (v) => up(rotate(zeroed, v));
@@ -211,7 +222,7 @@ export class Sensor {
     scene.world(worldNames(world));
     const own = zLocus(history, LOCUS, toView);
     const other = this.against ? zLocus(this.against.history, LOCUS, toView) : [];
-    const rate = this.last?.rate;
+    const { rate } = this.last;
     const speed = rate ? Math.hypot(...rate) : 0;
     scene.locus(other, colours.other, false, 1.5, [4, 4]);
     scene.locus(own, colours.z, false);
@@ -248,7 +259,20 @@ export class Sensor {
     } else {
       this.stale = true;
     }
-    parts.empty.hidden = this.last !== null;
+  }
+
+  // The body in a neutral pose, and no number: nothing is known.
+  drawNothing(colours) {
+    const { surfaces, parts } = this;
+    for (const name of ["horizon", "rates", "angles", "errors"]) surfaces[name].begin();
+    const scene = new Scene(surfaces.body, this.view.camera, colours);
+    scene.world([]);
+    scene.body((v) => v);
+    scene.ends();
+    for (const number of this.element.querySelectorAll("data")) show(number, NaN, 0);
+    for (const name of ["stamp", "flags", "frame", "thinning", "dropped"]) say(parts[name], "");
+    for (const name of ["body", "horizon"]) parts[name].setAttribute("aria-label", `${this.id}: no data yet`);
+    this.stale = false;
   }
 
   write(q, angles, heading, speed) {
@@ -260,16 +284,17 @@ export class Sensor {
     say(parts.yawName, view.yaw ? "yaw, zeroed" : "yaw");
     this.element.classList.toggle("zeroed", view.yaw !== 0);
     for (const [n, name] of ["x", "y", "z"].entries()) {
-      show(parts[`rate${name}`], (last?.rate?.[n] ?? NaN) * DEGREES, 3);
-      show(parts[`sigma${name}`], last?.sigma_deg?.[n] ?? NaN, 3);
+      show(parts[`rate${name}`], (last.rate?.[n] ?? NaN) * DEGREES, 3);
+      show(parts[`sigma${name}`], last.sigma_deg?.[n] ?? NaN, 3);
     }
     show(parts.speed, speed * DEGREES, 3);
-    say(parts.seq, last ? whole(last.seq) : "–");
-    parts.seq.value = last ? String(last.seq) : "";
-    say(parts.stamp, last ? `${fixed(this.history.newestTime, 3)} s` : "–");
-    const flags = (last?.status ?? []).filter((flag) => flag !== "ok" && flag !== "provisional");
+    say(parts.seq, whole(last.seq));
+    parts.seq.value = String(last.seq);
+    say(parts.stamp, `${fixed(this.history.newestTime, 3)} s`);
+    const flags = (last.status ?? []).filter((flag) => flag !== "ok" && flag !== "provisional");
     say(parts.flags, flags.join(" "));
-    say(parts.frame, last ? `${last.body} → ${last.world}` : "");
+    parts.flags.title = flags.includes("last") ? "The last there was when this page came; none since." : "";
+    say(parts.frame, `${last.body} → ${last.world}`);
     if (this.against) {
       show(parts.error, this.error, 6);
       show(parts.worst, this.worst, 6);
@@ -277,7 +302,7 @@ export class Sensor {
     const part = this.thinning;
     say(
       parts.thinning,
-      !last ? "" : part < 1.0005 ? "every sample" : `1 of ${Number(part.toFixed(part < 10 ? 1 : 0))} samples`,
+      part < 1.0005 ? "every sample" : `1 of ${Number(part.toFixed(part < 10 ? 1 : 0))} samples`,
     );
     parts.thinning.title =
       part < 1.0005

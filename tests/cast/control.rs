@@ -154,6 +154,44 @@ fn a_loop_begins_again_as_another_session_with_another_reset_count() {
 }
 
 #[test]
+fn who_comes_after_the_end_or_while_it_waits_sees_what_was_shown_last() {
+    let all = lines_of(&format!("replay {LOG}"));
+    let process = Process::of(&[
+        "replay",
+        LOG,
+        "--page=127.0.0.1:0",
+        "--paused",
+        "--speed",
+        "100",
+    ]);
+    let watch = r#"{"class":"WATCH"}"#;
+    let last_of_another = |expected: &str| {
+        let mut late = Client::web(process.address(0)).watching(watch);
+        let mut att = late.next_of("ATT");
+        let status = att["status"].as_array_mut().unwrap();
+        let at = status.iter().position(|s| s == "last").expect("not marked");
+        status.remove(at);
+        if status.is_empty() {
+            status.push(json!("ok"));
+        }
+        assert_eq!(att, serde_json::from_str::<Value>(expected).unwrap());
+        // And nothing else: the next it is told is an answer.
+        late.send(r#"{"class":"POLL"}"#);
+        let next = late.line().unwrap();
+        assert!(next.contains("\"class\":\"STATUS\""), "{next}");
+    };
+    let mut client = Client::web(process.address(0)).watching(watch);
+    client.play("\"play\"");
+    to_the_end(&mut client);
+    last_of_another(&all[952]);
+    let first: Value = serde_json::from_str(&all[0]).unwrap();
+    let at = later(&first["stamp"], 5);
+    client.play(&format!("\"seek\",\"at\":{at}"));
+    assert_eq!(client.next_of("ATT")["stamp"], at);
+    last_of_another(&all[250]);
+}
+
+#[test]
 fn what_can_not_be_done_is_answered_with_an_error() {
     let code = |client: &mut Client, action: &str| {
         client.send(&format!("{{\"class\":\"PLAYBACK\",\"action\":{action}}}"));

@@ -153,10 +153,12 @@ fn the_sensors_of_a_daemon_are_channels_as_they_come_and_what_is_not_offered_is_
     // Subscribed, once the next answer comes.
     viewer.send(&json!({"op": "x"}));
     viewer.text("status");
+    viewer.binary(1);
     sender.send(&rate("imu0", 1, 0.5));
     let frame = viewer.binary(1);
     assert_eq!(frame[1..5], 7u32.to_le_bytes());
     assert_eq!(&frame[13..17], &[0, 1, 0, 0], "CDR, little endian");
+    assert_eq!(frame[21..25], 1_000_000_u32.to_le_bytes());
     viewer.send(&json!({"op": "unsubscribe", "subscriptionIds": [7]}));
     viewer.send(&json!({"op": "x"}));
     viewer.text("status");
@@ -178,6 +180,48 @@ fn the_sensors_of_a_daemon_are_channels_as_they_come_and_what_is_not_offered_is_
         .take(1000)
         .count();
     assert!(closed < 1000, "it is closed after too much nonsense");
+}
+
+#[test]
+fn a_new_subscription_gets_the_last_message_of_its_channel_at_once() {
+    let daemon = Daemon::start(listening(&[TCP, WS]));
+    let mut sender = Client::tcp(daemon.address(0)).watching(r#"{"class":"WATCH"}"#);
+    for (id, until) in [("ended", 4), ("imu0", 7)] {
+        for n in 0..until {
+            sender.send(&rate(id, n, 0.5));
+            sender.next_of("ATT");
+        }
+    }
+    let (mut viewer, _) = Viewer::connect(daemon.address(1), "foxglove.sdk.v1");
+    let channels = viewer.text("advertise")["channels"].clone();
+    let of = |topic: &str| {
+        let known = channels.as_array().unwrap().iter();
+        let found = known.clone().find(|c| c["topic"] == topic);
+        found.expect("no such topic")["id"].clone()
+    };
+    // The stamp in the header is the first of an Imu, behind the encapsulation.
+    let second = |frame: &[u8]| i32::from_le_bytes(frame[17..21].try_into().unwrap());
+    let nanos = |frame: &[u8]| u32::from_le_bytes(frame[21..25].try_into().unwrap());
+    let subscribe = |viewer: &mut Viewer, id: u32, channel: &Value| {
+        viewer
+            .send(&json!({"op": "subscribe", "subscriptions": [{"id": id, "channelId": channel}]}));
+    };
+    subscribe(&mut viewer, 7, &of("ended/data"));
+    let frame = viewer.binary(1);
+    assert_eq!(frame[1..5], 7u32.to_le_bytes());
+    assert_eq!((second(&frame), nanos(&frame)), (1_700_000_000, 3_000_000));
+    // Of the transforms one of each sensor, and of what was subscribed to before nothing again.
+    subscribe(&mut viewer, 8, &of("/tf"));
+    for _ in 0..2 {
+        assert_eq!(viewer.binary(1)[1..5], 8u32.to_le_bytes());
+    }
+    subscribe(&mut viewer, 9, &of("imu0/data"));
+    let frame = viewer.binary(1);
+    assert_eq!((frame[1], nanos(&frame)), (9, 6_000_000));
+    sender.send(&rate("imu0", 7, 0.5));
+    let frame = viewer.binary(1);
+    assert_eq!((frame[1], nanos(&frame)), (9, 7_000_000));
+    assert_eq!(viewer.binary(1)[1..5], 8u32.to_le_bytes());
 }
 
 #[test]

@@ -658,9 +658,9 @@ fn a_packed_watcher_that_stalls_is_told_what_it_lost_and_every_other_object_is_w
         .map(|l| serde_json::from_slice(l).unwrap())
         .collect();
     let classes: Vec<_> = lines.iter().filter_map(|v| v["class"].as_str()).collect();
-    assert_eq!(classes, ["VERSION", "WATCH", "GAP", "PACKED"]);
-    let dropped = lines[2]["dropped"].as_u64().unwrap();
-    assert_eq!(lines[2]["last_seq"], dropped - 1);
+    assert_eq!(classes, ["VERSION", "WATCH", "PACKED", "GAP"]);
+    let dropped = lines[3]["dropped"].as_u64().unwrap();
+    assert_eq!(lines[3]["last_seq"], dropped - 1);
     let packed = packed.concat();
     let seqs: Vec<u64> = packed.chunks(112).map(|object| u64_at(object, 8)).collect();
     assert!(seqs.into_iter().eq(dropped..count));

@@ -190,7 +190,8 @@ fn a_watcher_gets_the_sensors_and_the_rate_it_asked_for() {
 
 /// Sends as fast as the transport takes it, to one that reads as fast as it can.
 fn flood(daemon: &Daemon, id: &'static str, mut sender: Client) {
-    let mut watcher = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");
+    let request = format!("{{\"class\":\"WATCH\",\"id\":\"{id}\"}}");
+    let mut watcher = Client::tcp(daemon.address(0)).watching(&request);
     let samples = 100_000;
     let sending = std::thread::spawn(move || {
         for from in (0..samples).step_by(100) {

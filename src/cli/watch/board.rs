@@ -104,8 +104,11 @@ impl Board {
             Said::Attitude(line) => match Attitude::read(line) {
                 Ok(attitude) => {
                     if let Some(sensor) = self.sensor(&attitude.id) {
+                        // One of before we came: when it was made, nobody says.
+                        if !attitude.is_last() {
+                            sensor.heard = Some(now);
+                        }
                         sensor.attitude = Some(attitude);
-                        sensor.heard = Some(now);
                     }
                 }
                 Err(why) => self.complaint = Some(format!("an attitude that is none: {why}")),

@@ -11,7 +11,7 @@ const PICTURE: (usize, usize) = (21, 7);
 const WIDE: usize = 84;
 /// After this silence a sensor is marked.
 const SILENT: Duration = Duration::from_secs(2);
-/// What is said of a sensor that the daemon knows and that has said nothing to us.
+/// What is said of a sensor that has said nothing to us, but what was last before we came.
 const NEVER_HEARD: &str = "silent since this watch began";
 /// Longest name that is shown whole.
 const MAX_NAME: usize = 48;
@@ -114,7 +114,14 @@ fn alarm(sensor: &Sensor, now: Instant) -> bool {
 fn title(id: &str, sensor: &Sensor) -> String {
     let name = shortened(id);
     match &sensor.attitude {
-        Some(a) => format!("{name}  {} in {}  {}", a.body, a.world, a.status.join(" ")),
+        Some(a) => {
+            let silent = match sensor.heard {
+                Some(_) => String::new(),
+                None => format!("  {NEVER_HEARD}"),
+            };
+            let status = a.status.join(" ");
+            format!("{name}  {} in {}  {status}{silent}", a.body, a.world)
+        }
         None => format!("{name}  {NEVER_HEARD}"),
     }
 }
@@ -281,6 +288,32 @@ mod tests {
         let status = r#"{"class":"STATUS","sources":[{"id":"rates","class":"RATE"},{"id":"truth","class":"ATT"}]}"#;
         board.take(Said::Status(status.as_bytes()), now);
         assert!(board.sensors.contains_key("truth") && !board.sensors.contains_key("rates"));
+    }
+
+    #[test]
+    fn the_last_attitude_of_before_is_shown_as_such_until_another_comes() {
+        let now = Instant::now();
+        let mut board = Board::new("tcp://127.0.0.1:4550".to_owned(), &[]);
+        let last = ATT.replace("\"provisional\"", "\"provisional\",\"last\"");
+        board.take(Said::Attitude(last.as_bytes()), now);
+        let (tone, text) = body(&board, now, 100)[0].clone();
+        assert_eq!(tone, Tone::Alarm);
+        assert!(
+            text.ends_with("flu in start  provisional last  silent since this watch began"),
+            "{text}"
+        );
+        board.connected(now);
+        let text = plain(&board, now);
+        assert!(
+            text.contains("roll   +90.000") && text.ends_with("last ? ago  provisional,last\n"),
+            "{text}"
+        );
+        board.take(Said::Attitude(ATT.as_bytes()), now);
+        let (tone, text) = body(&board, now, 100)[0].clone();
+        assert!(
+            tone == Tone::Heading && text.ends_with("  provisional"),
+            "{text}"
+        );
     }
 
     #[test]

@@ -5,6 +5,7 @@ use crate::serve::recorder::Handle;
 use crate::serve::state::Sensors;
 use crate::serve::wire;
 use bytes::Bytes;
+use std::collections::BTreeSet;
 use std::time::Instant;
 
 /// How the attitudes were saved last.
@@ -24,6 +25,8 @@ impl Hub {
             .map(|s| lock(s).stream.status())
             .chain(self.own_streams())
             .collect();
+        // Who is handed attitudes, not who is about to be.
+        let watchers: BTreeSet<u64> = self.watchers().iter().map(|c| c.number).collect();
         let clients: Vec<_> = read(&self.clients)
             .values()
             .map(|client| {
@@ -31,7 +34,7 @@ impl Hub {
                 serde_json::json!({
                     "client": client.number, "peer": client.peer.name,
                     "since_s": client.since.elapsed().as_secs_f64(),
-                    "watching": level.watching, "queued_bytes": level.queued,
+                    "watching": watchers.contains(&client.number), "queued_bytes": level.queued,
                     "sent": level.sent, "dropped": level.dropped,
                 })
             })

@@ -1,6 +1,9 @@
 //! What a client gets, what gives way, and what it is told of that.
 
 use super::*;
+use crate::serve::channel::Channel;
+use crate::serve::last::Wanted;
+use crate::sink::Stream;
 use crate::sink::tests::sample;
 
 fn chunk(id: &str, first_seq: u64, size: usize) -> Chunk {
@@ -238,4 +241,106 @@ fn a_thousand_new_streams_at_once_are_no_fault_of_who_is_told() {
         outbox.announce(vec![b'x'; 3000].into());
     }
     assert_eq!(outbox.full(), Some(Full::Control), "memory is bounded");
+}
+
+/// Last attitudes of streams `0..count`, number 7 of each.
+fn lasts(count: usize, form: Form) -> Vec<Last> {
+    let mut streams = Vec::new();
+    (0..count)
+        .map(|n| {
+            let mut stream = Stream::new("imu", "imu");
+            stream.id = n.to_string();
+            streams.push(stream);
+            let channel = Arc::new(Channel::new(n as u32 + 1, &streams));
+            Last::new(channel, 7, sample(Nanos(1)), Wanted::Object(form))
+        })
+        .collect()
+}
+
+/// Everything, taken in pieces as a socket takes it.
+fn drained(outbox: &Outbox) -> Vec<String> {
+    let mut out = VecDeque::new();
+    while !outbox.is_empty() {
+        let taken = outbox.take(1000, &mut out);
+        outbox.written(taken);
+    }
+    texts(&out)
+}
+
+#[test]
+fn a_last_attitude_comes_before_newer_ones_of_its_stream_and_takes_no_room_from_any() {
+    let outbox = Outbox::new();
+    outbox.watch(Some(Filter::default()));
+    // Asked for before: it stays where it is.
+    offer(&outbox, &chunk("before", 0, 4));
+    let since = outbox.queued_so_far();
+    for last in lasts(300, Form::Lines) {
+        outbox.offer_last(last, since);
+    }
+    let level = outbox.level();
+    assert_eq!((level.queued, level.dropped), (4, 0));
+    // Newer ones of two streams: of one all that came since gives way, of the other nothing.
+    for n in 0..9 {
+        offer(&outbox, &chunk("5", 8 + n * 10, 32 << 10));
+    }
+    offer(&outbox, &chunk("299", 8, 1));
+    assert_eq!(
+        outbox.level().dropped,
+        30,
+        "the one before, and of stream 5"
+    );
+    let said = drained(&outbox);
+    for (n, line) in said[..300].iter().enumerate() {
+        let att: serde_json::Value = serde_json::from_str(line).unwrap();
+        assert_eq!(
+            (&att["id"], &att["seq"]),
+            (&n.to_string().into(), &7.into())
+        );
+        assert_eq!(att["status"], serde_json::json!(["last"]));
+    }
+    let gaps: Vec<serde_json::Value> = said[300..302]
+        .iter()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    assert_eq!(
+        (&gaps[0]["id"], &gaps[0]["first_seq"]),
+        (&"5".into(), &8.into())
+    );
+    assert_eq!(
+        (&gaps[1]["id"], &gaps[1]["dropped"]),
+        (&"before".into(), &10.into())
+    );
+    assert_eq!(said.len(), 300 + 2 + 7 + 1);
+    assert_eq!(outbox.level().queued, 0);
+}
+
+#[test]
+fn a_last_attitude_waits_its_turn_and_is_left_out_where_its_stream_came_meanwhile() {
+    let outbox = Outbox::new();
+    outbox.watch(Some(Filter::default()));
+    offer(&outbox, &chunk("0", 0, 4));
+    let since = outbox.queued_so_far();
+    offer(&outbox, &chunk("1", 7, 4));
+    for last in lasts(3, Form::Packed) {
+        outbox.offer_last(last, since);
+    }
+    // Nobody watches stream 2 any more.
+    outbox.watch(Some(Filter {
+        ids: Some(["0".to_owned(), "1".to_owned()].into()),
+        ..Filter::default()
+    }));
+    let mut out = VecDeque::new();
+    let taken = outbox.take(usize::MAX, &mut out);
+    assert_eq!(taken, 4 + 4 + crate::decode::packed::ATT);
+    let [before, meanwhile, label, last] = out.make_contiguous() else {
+        unreachable!("{out:?}")
+    };
+    assert_eq!((&before[..], &meanwhile[..]), (&b"xxxx"[..], &b"xxxx"[..]));
+    assert!(label.starts_with(b"{\"class\":\"PACKED\",\"stream\":1,"));
+    assert!(crate::decode::packed::is_packed(last));
+    for last in lasts(3, Form::Lines) {
+        outbox.offer_last(last, 0);
+    }
+    outbox.forget();
+    assert!(outbox.is_empty());
 }
