@@ -35,6 +35,7 @@ mod stated;
 pub use crate::condition::GyroUnit;
 pub use fields::{BadFieldPath, FieldPath, FieldRole};
 pub use json::line::{Class, Line, LineDecoder, MAX_LINE, decode_line};
+pub use json::objects::{Object, Objects};
 pub use refusal::{MAX_NEAR, Undecodable, Unsupported, exact_name, printable, snippet};
 pub use role::{Rank, Role, role};
 pub use stamp::{Ambiguous, Bare, MOST_WAITING, TimeUnit, unit_of};

@@ -18,7 +18,7 @@
 //! | [`limits`], [`admission`], [`peer`] | every bound; who may come in, and from where | pure |
 //! | [`foxglove`], [`viewer`] | the same for Foxglove's viewers: messages in place of lines | pure; sans-I/O |
 //! | `page`, `top` | what a browser gets | pure |
-//! | [`listen`], `http` | sockets others come to | I/O |
+//! | [`listen`], `http`, `samples` | sockets others come to; samples by `POST` | I/O |
 //! | [`source`], [`connect`], [`upstream`]; `forward` | sockets others listen on: samples from there; attitudes to there | I/O |
 //! | [`shutdown`] | signals -> an orderly end | I/O |
 //!
@@ -40,6 +40,7 @@ pub mod peer;
 pub mod playback;
 mod quiet;
 pub mod recorder;
+mod samples;
 pub mod session;
 pub mod shutdown;
 pub mod source;

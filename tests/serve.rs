@@ -22,10 +22,12 @@ mod serve {
     mod frames;
     mod late;
     mod limits;
+    mod opening;
     mod operations;
     mod packaging;
     mod packed;
     mod places;
+    mod posting;
     mod recording;
     mod runs;
     mod same_bytes;

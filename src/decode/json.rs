@@ -8,6 +8,7 @@
 pub(crate) mod found;
 pub(crate) mod keys;
 pub(crate) mod line;
+pub(crate) mod objects;
 pub(crate) mod scan;
 pub(crate) mod seek;
 pub(crate) mod trie;

@@ -84,6 +84,31 @@ pub fn is_loopback(ip: IpAddr) -> bool {
     }
 }
 
+/// Why a request is not answered.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Foreign {
+    /// It does not say whom it is for.
+    NoHost,
+    /// It is for a name that is none of ours: another's name may have been made to lead here.
+    Host,
+    /// It comes from a page of somebody else.
+    Origin,
+}
+
+impl Foreign {
+    /// In words, with the flag that helps.
+    #[must_use]
+    pub fn reason(self) -> &'static str {
+        match self {
+            Foreign::NoHost => "the request names no Host",
+            Foreign::Host => "this Host is not one of ours; --allow-host NAME allows it",
+            Foreign::Origin => {
+                "pages of this Origin may not connect; --allow-origin ORIGIN allows them"
+            }
+        }
+    }
+}
+
 /// The names a browser may use for us, and the pages that may talk to us.
 #[derive(Clone, Debug, Default)]
 pub struct Web {
@@ -98,16 +123,14 @@ impl Web {
     /// it came in at.
     ///
     /// # Errors
-    /// What is not allowed, in words.
+    /// What is not allowed.
     pub fn admit(
         &self,
         bound: IpAddr,
         host: Option<&str>,
         origin: Option<&str>,
-    ) -> std::result::Result<(), String> {
-        let Some(host) = host else {
-            return Err("the request names no Host".to_owned());
-        };
+    ) -> std::result::Result<(), Foreign> {
+        let host = host.ok_or(Foreign::NoHost)?;
         let name = host_name(host).unwrap_or_default();
         let is_bound = name
             .parse::<IpAddr>()
@@ -122,7 +145,7 @@ impl Web {
                 .iter()
                 .any(|a| a.eq_ignore_ascii_case(host) || a.eq_ignore_ascii_case(name));
         if !known {
-            return Err("this Host is not one of ours; --allow-host NAME allows it".to_owned());
+            return Err(Foreign::Host);
         }
         match origin {
             None => Ok(()),
@@ -135,10 +158,7 @@ impl Web {
                 if authority.is_some_and(|a| a.eq_ignore_ascii_case(host)) {
                     Ok(())
                 } else {
-                    Err(
-                        "pages of this Origin may not connect; --allow-origin ORIGIN allows them"
-                            .to_owned(),
-                    )
+                    Err(Foreign::Origin)
                 }
             }
         }

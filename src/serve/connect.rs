@@ -275,6 +275,7 @@ async fn converse(
         match session.end() {
             Some(End::TooManyErrors) => return Some("too many bad lines in a row".to_owned()),
             Some(End::Unauthorised) => return Some("unauthorised".to_owned()),
+            Some(End::NoObject) => return Some("it speaks something else".to_owned()),
             None => {}
         }
         if ended.is_some() {

@@ -1,16 +1,18 @@
 //! HTTP requests -> the pages, state of the daemon, or a WebSocket. I/O.
 
+use super::admission::Foreign;
 use super::foxglove::SUBPROTOCOLS;
 use super::hub::Hub;
 use super::listen::{Connection, websocket};
-use super::{page, top};
+use super::{page, quiet, samples, top};
+use crate::decode::printable;
 use crate::record::Verdict;
 use axum::Router;
 use axum::body::Body;
 use axum::extract::Extension;
 use axum::extract::ws::WebSocketUpgrade;
 use axum::http::{HeaderMap, HeaderValue, Response, StatusCode, header};
-use axum::routing::get;
+use axum::routing::{get, post};
 use std::fmt::Write;
 
 /// Lines, where a client names what it speaks.
@@ -23,13 +25,17 @@ pub(crate) fn router() -> Router {
         .route("/ws", get(upgrade))
         .route("/healthz", get(health))
         .route("/metrics", get(metrics))
+        .route(
+            "/samples",
+            post(samples::post).fallback(samples::not_posted),
+        )
         .merge(page::router())
         .route("/model/top", get(top::answer))
         .fallback(|| async {
             refusal(
                 StatusCode::NOT_FOUND,
                 "not_found",
-                "there are /, /top, /ws, /healthz and /metrics",
+                "there are /, /top, /ws, /samples, /healthz and /metrics",
             )
         })
 }
@@ -89,7 +95,34 @@ fn subprotocol(headers: &HeaderMap) -> Option<&'static str> {
         })
 }
 
-fn unauthorised() -> Response<Body> {
+/// Says in the log that a request was refused, for whoever wonders why a page shows nothing: no browser
+/// shows the answer.
+pub(crate) fn warn_of(why: Foreign, host: Option<&str>, origin: Option<&str>) {
+    let named = |name: Option<&str>| printable(name.unwrap_or_default());
+    match why {
+        Foreign::NoHost => {}
+        Foreign::Host => quiet::warn(
+            "foreign host",
+            &format!(
+                "a request for the host {} was refused; --allow-host allows it",
+                named(host)
+            ),
+        ),
+        Foreign::Origin if origin == Some("null") => quiet::warn(
+            "foreign origin",
+            "a page from a file (origin null) was refused; serve it over HTTP, and --allow-origin with that address allows it",
+        ),
+        Foreign::Origin => quiet::warn(
+            "foreign origin",
+            &format!(
+                "pages of {origin} were refused; --allow-origin {origin} allows them",
+                origin = named(origin)
+            ),
+        ),
+    }
+}
+
+pub(super) fn unauthorised() -> Response<Body> {
     refusal(
         StatusCode::UNAUTHORIZED,
         "unauthorised",

@@ -17,6 +17,8 @@ pub struct Limits {
     pub first_line: Duration,
     /// How long a client may take nothing while something waits for it.
     pub no_progress: Duration,
+    /// How long who sends and watches nothing keeps its place when places are short.
+    pub idle: Duration,
     /// Between WebSocket pings; a client that answers none of two is closed.
     pub ping: Duration,
     /// How long a sensor sent by datagrams stays its sender's after the last.
@@ -36,6 +38,7 @@ impl Default for Limits {
             errors_in_a_row: 20,
             first_line: Duration::from_secs(10),
             no_progress: Duration::from_secs(10),
+            idle: Duration::from_secs(60),
             ping: Duration::from_secs(15),
             sender_silence: Duration::from_secs(5),
             drain: Duration::from_secs(2),

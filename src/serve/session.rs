@@ -4,6 +4,7 @@
 //! the hub because it remembers what only matters to one client: which sensor it sent last, how
 //! many lines in a row were bad, whether it has shown the token.
 
+mod opening;
 mod turn;
 mod unpacking;
 
@@ -18,6 +19,7 @@ use super::wire::{self, Fault, Message};
 use crate::decode::framing::Framer;
 use crate::decode::{Bare, Line, LineDecoder};
 use crate::record::{Nanos, RawSample};
+use opening::Opening;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
@@ -46,6 +48,32 @@ pub enum End {
     TooManyErrors,
     /// No token, or a wrong one.
     Unauthorised,
+    /// It did not begin with an object: somebody who speaks something else.
+    NoObject,
+}
+
+impl End {
+    /// In words, for the log.
+    #[must_use]
+    pub fn reason(self) -> &'static str {
+        match self {
+            End::TooManyErrors => "too many bad lines in a row",
+            End::Unauthorised => "it has not shown the token",
+            End::NoObject => "it did not begin with an object",
+        }
+    }
+
+    /// Says in the log that somebody speaks something else, for whoever wonders where its samples are.
+    pub(super) fn warn_of(self, peer: &str) {
+        if self == End::NoObject {
+            quiet::warn(
+                "no object",
+                &format!(
+                    "{peer} did not begin with a JSON object and was closed; samples by HTTP go to POST /samples at a ws-listen:// address"
+                ),
+            );
+        }
+    }
 }
 
 /// Which of the two has connected, and what follows from it.
@@ -130,6 +158,7 @@ pub struct Session {
     framer: Framer,
     side: Side,
     authorised: bool,
+    opening: Opening,
     errors_in_a_row: u32,
     errors: Allowance,
     told: BTreeSet<String>,
@@ -157,15 +186,18 @@ impl Session {
     pub fn with(hub: &Arc<Hub>, peer: impl Into<Peer>, side: Side) -> Session {
         let client = hub.join(peer);
         client.outbox.reply(wire::version(&hub.session()));
-        let authorised = match side {
-            Side::Client { trusted } | Side::Deaf { trusted } => trusted || hub.token().is_none(),
-            Side::Source(_) => true,
+        let (authorised, opening) = match side {
+            Side::Client { trusted } => (trusted || hub.token().is_none(), Opening::Blank),
+            // A datagram stands alone, and whom to listen to otherwise was chosen here.
+            Side::Deaf { trusted } => (trusted || hub.token().is_none(), Opening::Over),
+            Side::Source(_) => (true, Opening::Over),
         };
         if let Some(place) = hub.place().filter(|_| authorised) {
             client.outbox.reply(place);
         }
         Session {
             authorised,
+            opening,
             side,
             hub: hub.clone(),
             client,
@@ -197,7 +229,7 @@ impl Session {
     /// Whether a first line has come.
     #[must_use]
     pub fn has_spoken(&self) -> bool {
-        self.framer.ended() > 0
+        self.opening == Opening::Over
     }
 
     /// What a source has said of itself since this was asked last.
@@ -252,6 +284,12 @@ impl Session {
             read,
             Ok(Message::Watch(_) | Message::Poll | Message::Playback(_) | Message::Auth(_))
         );
+        if !self.has_spoken() {
+            if matches!(&read, Err(fault) if fault.code == "bad_json") {
+                return self.refuse_opening(number, line);
+            }
+            self.opening = Opening::Over;
+        }
         match read {
             Ok(Message::Auth(token)) => self.authorise(&token, number),
             Ok(_) | Err(_) if !self.authorised => {
@@ -343,11 +381,7 @@ impl Session {
             scratch.samples.len() - before,
         );
         scratch.samples.truncate(before);
-        let fault = Fault::new(
-            "samples_not_taken",
-            "this is a replay or a simulation: it has its own samples; strapd serve takes yours",
-        );
-        self.bad(&fault, number, line, received, scratch);
+        self.bad(&wire::samples_not_taken(), number, line, received, scratch);
     }
 
     /// A line that is no good: said, counted, and after too many in a row the end.
@@ -476,9 +510,8 @@ impl Session {
 
 /// Whether a sample with this head belongs to the run that is gathered.
 fn goes_on(scratch: &Scratch, head: &Line) -> bool {
-    scratch.head.as_ref().is_some_and(|run| {
-        run.id == head.id && (run.sample_kind, run.gyro_unit) == (head.sample_kind, head.gyro_unit)
-    })
+    let run = scratch.head.as_ref();
+    run.is_some_and(|run| run.goes_on_in(head))
 }
 
 fn first_line_must_be_auth() -> Fault {

@@ -141,8 +141,9 @@ pub fn read_from(
     samples: &mut Vec<RawSample>,
 ) -> Result<Message, Fault> {
     let before = samples.len();
+    // Who cuts the lines keeps them short; the object of a body may be longer.
     let head = decoder
-        .decode(line, received, samples)
+        .decode_object(line, received, samples)
         .map_err(|why| undecodable(&why))?;
     let has_rate = samples
         .get(before..)
@@ -312,6 +313,42 @@ pub fn too_long() -> Fault {
     )
 }
 
+/// The fault of samples where none are taken.
+#[must_use]
+pub fn samples_not_taken() -> Fault {
+    Fault::new(
+        "samples_not_taken",
+        "this is a replay or a simulation: it has its own samples; strapd serve takes yours",
+    )
+}
+
+/// The fault of a conversation that does not begin with an object, but like `beginning`.
+#[must_use]
+pub fn no_object(beginning: &[u8], takes_samples: bool) -> Fault {
+    let what = match beginning {
+        _ if is_http(beginning) => "this is HTTP",
+        [0x16, 0x03, ..] => "this is TLS, which is not spoken here",
+        [b'[', ..] => "the first line is an array, which only later ones may be",
+        _ => "the first line is no JSON object",
+    };
+    let where_to = if takes_samples {
+        "samples by HTTP go to POST /samples at a ws-listen:// address (http://127.0.0.1:8765/samples unless --listen says otherwise)"
+    } else {
+        "HTTP is answered at a ws-listen:// address"
+    };
+    Fault::new(
+        "not_an_object",
+        format!("{what}; a connection begins with one JSON object on a line; {where_to}"),
+    )
+}
+
+/// Whether a request of HTTP begins so: a method, and where to.
+fn is_http(beginning: &[u8]) -> bool {
+    let method = beginning.iter().take_while(|b| b.is_ascii_uppercase());
+    let letters = method.count();
+    letters > 0 && beginning.get(letters) == Some(&b' ')
+}
+
 fn line(value: &Value) -> Bytes {
     let mut text = value.to_string();
     text.push('\n');
@@ -398,6 +435,11 @@ pub fn status(fields: Value) -> Bytes {
 /// not said since the last.
 #[must_use]
 pub fn error(fault: &Fault, number: u64, near: &[u8], suppressed: u64) -> Bytes {
+    line(&error_object(fault, number, near, suppressed))
+}
+
+/// The same as an object.
+pub(super) fn error_object(fault: &Fault, number: u64, near: &[u8], suppressed: u64) -> Value {
     let mut answer = json!({"class": "ERROR", "code": fault.code, "message": fault.message});
     if let Some(fields) = answer.as_object_mut() {
         if let Some(id) = &fault.id {
@@ -416,7 +458,7 @@ pub fn error(fault: &Fault, number: u64, near: &[u8], suppressed: u64) -> Bytes 
             fields.insert("suppressed".into(), json!(suppressed));
         }
     }
-    line(&answer)
+    answer
 }
 
 #[cfg(test)]
@@ -485,6 +527,25 @@ mod tests {
     fn watching_ids(n: usize) -> String {
         let ids: Vec<String> = (0..n).map(|n| format!("\"{n}\"")).collect();
         format!(r#"{{"class":"WATCH","ids":[{}]}}"#, ids.join(","))
+    }
+
+    #[test]
+    fn who_begins_with_no_object_hears_what_it_speaks_and_where_samples_go_by_http() {
+        for (begins, what) in [
+            ("POST / HTTP/1.1\r\n", "this is HTTP"),
+            ("OPTIONS * HTTP/1.1", "this is HTTP"),
+            ("\x16\x03\x01\x02", "this is TLS"),
+            ("[{\"gyro\":[1,2,3]}]", "an array"),
+            ("GET", "no JSON object"),
+            (" ", "no JSON object"),
+            ("", "no JSON object"),
+        ] {
+            let fault = no_object(begins.as_bytes(), true);
+            assert!(fault.message.contains(what), "{begins}: {fault:?}");
+            assert!(fault.message.contains("POST /samples"), "{fault:?}");
+            let of_replay = no_object(begins.as_bytes(), false);
+            assert!(!of_replay.message.contains("samples"), "{of_replay:?}");
+        }
     }
 
     #[test]

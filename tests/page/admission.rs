@@ -2,7 +2,7 @@
 
 use super::browser::Browser;
 use crate::client::get;
-use crate::daemon::{Daemon, WS, listening};
+use crate::daemon::{Daemon, TCP, WS, listening};
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener};
 use strapd::serve::admission::Token;
@@ -58,6 +58,62 @@ fn a_page_of_another_origin_gets_no_socket() {
     browser.page();
     browser.go(address, "/top");
     assert_eq!(browser.eval(&opened), "open");
+}
+
+#[test]
+fn a_page_of_another_origin_writes_no_sample() {
+    let Some(mut browser) = Browser::start() else {
+        return;
+    };
+    let daemon = Daemon::start(listening(&[TCP, WS]));
+    let (lines, web) = (daemon.address(0), daemon.address(1));
+    browser.go(elsewhere(), "/");
+    // Whatever a page may send without having asked: by fetch, by beacon and by a form, of each type.
+    let tried = browser.eval(&format!(
+        "(async () => {{
+            const samples = Array.from({{ length: 40 }}, (_, n) => JSON.stringify({{ class: 'RATE', id: 'evil', stamp_ns: 1e18 + n * 1e7, gyro: [1, 0, 0] }})).join('\\n') + '\\n';
+            let tried = 0;
+            for (const url of ['http://{lines}/', 'http://{web}/samples', 'http://{web}/']) {{
+                for (const type of ['text/plain', 'application/x-www-form-urlencoded', 'application/json', 'application/x-ndjson']) {{
+                    for (const mode of ['no-cors', 'cors']) {{
+                        const headers = {{ 'Content-Type': type }};
+                        await fetch(url, {{ method: 'POST', mode, headers, body: samples }}).then((a) => a.text(), () => '');
+                        tried += 1;
+                    }}
+                    navigator.sendBeacon(url, new Blob([samples], {{ type }}));
+                }}
+                const frame = document.body.appendChild(document.createElement('iframe'));
+                frame.name = 'frame' + tried;
+                const form = document.body.appendChild(document.createElement('form'));
+                Object.assign(form, {{ method: 'POST', action: url, enctype: 'text/plain', target: frame.name }});
+                const area = form.appendChild(document.createElement('textarea'));
+                area.name = '\\n' + samples + '#';
+                const loaded = new Promise((done) => {{ frame.onload = done; setTimeout(done, 3000); }});
+                form.submit();
+                await loaded;
+            }}
+            return tried;
+        }})()"
+    ));
+    assert_eq!(tried, 24);
+    // It has reached us, or this proves nothing.
+    let status = daemon.status();
+    assert!(
+        status["counters"]["connections_closed"].as_u64().unwrap() >= 3,
+        "{status}"
+    );
+    assert!(
+        status["counters"]["connections_refused"].as_u64().unwrap() >= 3,
+        "{status}"
+    );
+    assert_eq!(status["sources"], serde_json::json!([]), "{status}");
+    // Nor does our own page post: it has a WebSocket.
+    browser.go(web, "/top");
+    let posted = browser.eval(
+        "fetch('/samples', { method: 'POST', headers: { 'Content-Type': 'application/json' }, body: '{\"gyro\":[1,0,0],\"stamp_ns\":7}' }).then((a) => a.status)",
+    );
+    assert_eq!(posted, 403);
+    assert_eq!(daemon.status()["sources"], serde_json::json!([]));
 }
 
 #[test]

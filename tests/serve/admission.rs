@@ -128,6 +128,24 @@ fn a_page_from_elsewhere_gets_neither_numbers_nor_a_web_socket() {
     assert_eq!(status, 426);
     let (status, _) = get(address, "/../etc/passwd", &[("Host", &host)]);
     assert_eq!(status, 404);
+    // A target that names whom it is for is believed no more than Host is.
+    for foreign in [
+        "http://evil.example/metrics",
+        "http://evil.example:80/samples",
+        "http://localhost@evil.example/metrics",
+        "http://evil@localhost/metrics",
+        "//evil.example/metrics",
+    ] {
+        let (status, body) = get(address, foreign, &[("Host", &host)]);
+        assert!(matches!(status, 403 | 404), "{foreign}: {status} {body}");
+        assert!(!body.contains("strapd_"), "{foreign}: {body}");
+        if foreign.starts_with("http:") {
+            assert_eq!(status, 403, "{foreign}: {body}");
+        }
+    }
+    let ours = format!("http://{host}/healthz");
+    assert_eq!(get(address, &ours, &[("Host", &host)]).0, 200);
+    assert_eq!(get(address, &ours, &[("Host", "evil.example")]).0, 403);
     // A page served from here would have this origin.
     let origin = format!("http://{host}");
     let (status, _) = get(address, "/metrics", &[("Host", &host), ("Origin", &origin)]);

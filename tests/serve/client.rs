@@ -159,6 +159,14 @@ impl Client {
         }
     }
 
+    /// Sends unless the daemon has closed.
+    pub(crate) fn try_send(&mut self, bytes: &[u8]) -> bool {
+        match &mut self.link {
+            Link::Tcp(s) => s.get_mut().write_all(bytes).is_ok(),
+            _ => unreachable!("asked of TCP only"),
+        }
+    }
+
     /// The next line, without its end; `None` when the daemon has closed.
     pub(crate) fn line(&mut self) -> Option<String> {
         match self.item()? {
@@ -247,16 +255,32 @@ pub(crate) fn rate(id: &str, n: u64, rate: f64) -> String {
 
 /// An HTTP answer: its status and its body.
 pub(crate) fn get(address: SocketAddr, path: &str, headers: &[(&str, &str)]) -> (u16, String) {
+    ask(address, &format!("GET {path}"), headers, b"")
+}
+
+/// As [`get`] for any request: method and target, headers, body.
+pub(crate) fn ask(
+    address: SocketAddr,
+    what: &str,
+    headers: &[(&str, &str)],
+    body: &[u8],
+) -> (u16, String) {
     let mut stream = TcpStream::connect(address).unwrap();
     stream.set_read_timeout(Some(PATIENCE)).unwrap();
-    let mut request = format!("GET {path} HTTP/1.1\r\nConnection: close\r\n");
+    let mut request = format!("{what} HTTP/1.1\r\nConnection: close\r\n");
     for (name, value) in headers {
         request.push_str(&format!("{name}: {value}\r\n"));
     }
+    if !body.is_empty() {
+        request.push_str(&format!("Content-Length: {}\r\n", body.len()));
+    }
     request.push_str("\r\n");
     stream.write_all(request.as_bytes()).unwrap();
-    let mut answer = String::new();
-    stream.read_to_string(&mut answer).unwrap();
+    // Who is refused by its head need not have been read to the end.
+    let _ = stream.write_all(body);
+    let mut answer = Vec::new();
+    let _ = stream.read_to_end(&mut answer);
+    let answer = String::from_utf8(answer).unwrap();
     let status = answer.split(' ').nth(1).unwrap().parse().unwrap();
     let body = answer.split_once("\r\n\r\n").map_or("", |(_, body)| body);
     (status, body.to_owned())

@@ -53,6 +53,15 @@ pub struct Line {
     pub bare: Vec<Option<Bare>>,
 }
 
+impl Line {
+    /// Whether samples of a line like `next` are of the same run: of one sensor, and alike in meaning.
+    #[must_use]
+    pub fn goes_on_in(&self, next: &Line) -> bool {
+        self.id == next.id
+            && (self.sample_kind, self.gyro_unit) == (next.sample_kind, next.gyro_unit)
+    }
+}
+
 /// Reads lines; holds the paths of `--field`.
 #[derive(Debug, Clone, Default)]
 pub struct LineDecoder {
@@ -94,6 +103,19 @@ impl LineDecoder {
                 limit: MAX_LINE as u64,
             });
         }
+        self.decode_object(line, received, out)
+    }
+
+    /// The same for an object whose length the caller bounds, and which may go over several lines.
+    ///
+    /// # Errors
+    /// Not a JSON object (or array of them).
+    pub fn decode_object(
+        &self,
+        line: &[u8],
+        received: Nanos,
+        out: &mut Vec<RawSample>,
+    ) -> Result<Line, Undecodable> {
         let mut seeker = Seeker::new(&self.plan, Scanner::new(line)?);
         let found = seeker.message()?;
         let class = match seeker.class.as_deref() {

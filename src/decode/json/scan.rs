@@ -32,6 +32,17 @@ impl<'a> Scanner<'a> {
         }
     }
 
+    /// The byte it is at.
+    pub(crate) fn position(&self) -> usize {
+        self.pos
+    }
+
+    /// What was gone over since `start`.
+    pub(crate) fn since(&self, start: usize) -> &'a [u8] {
+        let bytes = self.text.as_bytes();
+        bytes.get(start..self.pos).unwrap_or_default()
+    }
+
     #[cold]
     fn broken<T>(&self, what: &'static str) -> Scan<T> {
         Err(Undecodable::Json {

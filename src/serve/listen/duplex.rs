@@ -133,9 +133,12 @@ async fn talk(
     let mut tick = interval(limits.tick());
     tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
-        if session.end().is_some() && closing.is_none() {
+        if let Some(end) = session.end()
+            && closing.is_none()
+        {
             reading = false;
-            closing = Some(Some("bad lines or no token"));
+            closing = Some(Some(end.reason()));
+            end.warn_of(&client.peer.name);
         }
         let held = session.is_held();
         // Whoever sent a request and nothing more still wants the answers.

@@ -10,6 +10,7 @@ use crate::serve::foxglove::{self, Framed};
 use crate::serve::http;
 use crate::serve::hub::{Client, Flood, Hub, count};
 use crate::serve::peer::Peer;
+use crate::serve::samples::Posters;
 use crate::serve::session::Session;
 use crate::serve::shutdown::Running;
 use crate::serve::viewer::Viewer;
@@ -49,6 +50,9 @@ const TAKE: usize = 64 << 10;
 pub(crate) struct Connection {
     pub(crate) hub: Arc<Hub>,
     pub(crate) peer: Peer,
+    /// Its address, without the port.
+    pub(crate) from: IpAddr,
+    pub(crate) posters: Arc<Posters>,
     /// The client has shown the token with the request.
     pub(crate) trusted: bool,
     pub(crate) running: Running,
@@ -58,6 +62,7 @@ pub(crate) struct Connection {
 
 pub(super) async fn serve(listener: TcpListener, context: Context) {
     let router = http::router();
+    let posters = Arc::new(Posters::default());
     let bound = listener
         .local_addr()
         .map_or(IpAddr::from([127, 0, 0, 1]), |a| a.ip());
@@ -69,6 +74,8 @@ pub(super) async fn serve(listener: TcpListener, context: Context) {
             let connection = Connection {
                 hub: context.hub.clone(),
                 peer: Peer::at("ws", peer),
+                from: peer.ip().to_canonical(),
+                posters: posters.clone(),
                 trusted: false,
                 running: context.running.clone(),
                 _place: Arc::new(place),
@@ -133,13 +140,20 @@ async fn answer(
             _ => Some("?".to_owned()),
         }
     };
-    if let Err(why) = web.admit(
-        bound,
-        text(header::HOST).as_deref(),
-        text(header::ORIGIN).as_deref(),
-    ) {
+    let (host, origin) = (text(header::HOST), text(header::ORIGIN));
+    // A target may name whom it is for by itself, and that then counts as Host does.
+    let target = request.uri().authority().map(|name| name.as_str());
+    let admitted = target
+        .map_or(Ok(()), |name| web.admit(bound, Some(name), None))
+        .and_then(|()| web.admit(bound, host.as_deref(), origin.as_deref()));
+    if let Err(why) = admitted {
         count(&connection.hub.counters.refused, 1);
-        return Ok(http::refusal(StatusCode::FORBIDDEN, "forbidden", &why));
+        http::warn_of(why, target.or(host.as_deref()), origin.as_deref());
+        return Ok(http::refusal(
+            StatusCode::FORBIDDEN,
+            "forbidden",
+            why.reason(),
+        ));
     }
     if let (Some(token), Some(shown)) = (connection.hub.token(), text(header::AUTHORIZATION)) {
         let shown = shown.strip_prefix("Bearer ").unwrap_or_default();
@@ -170,6 +184,7 @@ pub(crate) async fn converse(socket: WebSocket, connection: Connection, foxglove
         trusted,
         mut running,
         _place,
+        ..
     } = connection;
     let limits = *hub.limits();
     let mut session = match foxglove {

@@ -4,6 +4,7 @@
 //! of twenty can ask for more than a thousand samples do. What is behind is held until the next, and
 //! nothing more is read of the client meanwhile.
 
+use super::opening::Opening;
 use super::{Scratch, Session};
 use crate::decode::framing::Framed;
 use crate::record::Nanos;
@@ -122,19 +123,27 @@ impl Session {
     /// Works on bytes for no longer than a step. Says how many of them are left.
     fn step(&mut self, bytes: &[u8], whole: bool, received: Nanos, scratch: &mut Scratch) -> usize {
         self.step = Step::default();
+        if !self.begins(bytes) {
+            return 0;
+        }
         let began = Instant::now();
         let mut framer = std::mem::take(&mut self.framer);
         let before = framer.ended();
         let mut take = |framed: Framed<'_>| {
             match framed {
                 Framed::Line(number, line) => self.line(number, line, received, scratch),
-                Framed::TooLong(number, head) => {
+                Framed::Packed(number, object) => {
+                    self.opening = Opening::Over;
+                    self.packed(number, object, received, scratch);
+                }
+                Framed::TooLong(number, head) if self.has_spoken() => {
                     self.bad(&wire::too_long(), number, head, received, scratch);
                 }
-                Framed::Packed(number, object) => self.packed(number, object, received, scratch),
-                Framed::Broken(number) => {
+                Framed::Broken(number) if self.has_spoken() => {
                     self.bad(&wire::broken_packed(), number, &[], received, scratch);
                 }
+                Framed::TooLong(number, head) => self.refuse_opening(number, head),
+                Framed::Broken(number) => self.refuse_opening(number, &[]),
             }
             if scratch.lines.len() >= LONGEST_RUN {
                 self.flush(received, scratch, usize::MAX);
