@@ -235,13 +235,25 @@ pub fn session(data: &[u8]) {
             4 => session.message(piece, received, &mut scratch),
             _ => session.bytes(piece, received, &mut scratch),
         }
-        answered(&session, &mut named);
+        worked(&mut session, &mut named, &mut scratch);
         if session.end().is_some() {
             return;
         }
     }
     session.finish(NOW, &mut scratch);
-    answered(&session, &mut named);
+    worked(&mut session, &mut named, &mut scratch);
+}
+
+/// Takes what is answered, and every further step, until nothing of what was sent is left.
+fn worked(session: &mut Session, named: &mut BTreeSet<u64>, scratch: &mut Scratch) {
+    session.hub().answer_polls();
+    answered(session, named);
+    while session.is_held() {
+        assert!(session.may_go_on(), "everything was read");
+        session.go_on(scratch);
+        session.hub().answer_polls();
+        answered(session, named);
+    }
 }
 
 fn answered(session: &Session, named: &mut BTreeSet<u64>) {
