@@ -17,7 +17,8 @@
 //! | NaN in the acceleration | the acceleration alone is dropped | `Accepted` |
 //! | same stamp, same data (also when sent again later) | dropped, nothing is lost | `Repeated` |
 //! | same stamp, other data | given a stamp inside the longer step after it, or else before it | `Restamped` |
-//! | ... and no longer step beside it | rates: dropped; increments: spread all the same | `DuplicateStamp`, `Restamped` |
+//! | ... and no longer step beside it | dropped | `DuplicateStamp` |
+//! | three and more on every stamp: a coarse clock | spread over its step, the first ones at the end of theirs | `Restamped` |
 //! | overtaken on its way, by no more than the window | put back | `Reordered` |
 //! | ... by more | dropped | `Late` |
 //! | clock set back, and it stays so | held (or reset), integration goes on behind it | `Accepted` |
@@ -57,6 +58,8 @@ use timing::Timing;
 
 /// Entries from which the ordinary step is learnt before the first sample leaves (recordings).
 const PRIMING: usize = 32;
+/// Entries held at most until the ordinary step of a coarse clock is learnt.
+const COARSE_PRIMING: usize = 1 << 15;
 /// A stamp of zero is taken for a stamp only where the clock is within this of zero.
 const ZERO_IS_CLOSE_NANOS: i64 = 10_000_000_000;
 
@@ -133,6 +136,7 @@ impl Conditioner {
             self.take(sample, out);
         }
         self.report.spacing_nanos = self.timing.spacing();
+        self.report.coarse_nanos = self.timing.coarse();
     }
 
     /// `n` payloads that could not be decoded stood here in the stream.
@@ -158,6 +162,7 @@ impl Conditioner {
         self.drain(out);
         self.finishing = false;
         self.report.spacing_nanos = self.timing.spacing();
+        self.report.coarse_nanos = self.timing.coarse();
     }
 
     /// What became of the samples so far; those held back have no verdict yet.
@@ -263,6 +268,12 @@ impl Conditioner {
                 return;
             }
             if !self.primed {
+                let may_wait = self.window > 0 && !self.finishing && self.order.epoch_from == 0;
+                if may_wait && line.len() < COARSE_PRIMING && Timing::needs_more(line) {
+                    // Twice as many: looking again and again costs no more than looking once.
+                    self.hold = line.len().saturating_mul(2);
+                    return;
+                }
                 self.primed = true;
                 self.hold = self.window;
                 if self.window > 0 || line.len() > 1 {
@@ -278,7 +289,9 @@ impl Conditioner {
                 // The end, or live: nothing to wait for.
                 None => true,
             };
-            if !is_alone || self.timing.has_passed(entry) {
+            // The first of a coarse clock's may be the only one of its step that was recorded.
+            let is_first = self.timing.coarse().is_some() && self.timing.is_first(entry);
+            if !is_alone || is_first || self.timing.has_passed(entry) {
                 if self.drain_shared(out) {
                     continue;
                 }
@@ -303,6 +316,14 @@ impl Conditioner {
         let Some(first) = line.get(self.order.cursor).copied() else {
             return false;
         };
+        // Sorted by stamp: nothing follows them yet.
+        if !self.finishing
+            && line
+                .last()
+                .is_some_and(|last| last.stamp == first.stamp && last.epoch == first.epoch)
+        {
+            return false;
+        }
         let rest = line.get(self.order.cursor..).unwrap_or_default();
         let n = rest
             .iter()

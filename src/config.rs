@@ -1,7 +1,7 @@
 //! What a run is: arguments as text -> values, parsed once and validated once. Pure.
 
 use crate::condition::{self, Clock, GyroUnit, OnGap};
-use crate::decode;
+use crate::decode::{self, FieldRole};
 use crate::error::{Error, Result};
 use crate::model::attitude::{Quaternion, YawPitchRoll};
 use crate::model::frames::{Body, BodyAxes, Nav, World};
@@ -86,6 +86,13 @@ impl Plan {
     #[must_use]
     pub fn bridges(&self, nanos: i64) -> bool {
         self.on_gap == OnGap::Bridge || nanos as f64 <= self.max_gap_secs * 1e9
+    }
+
+    /// Whether the user says where the samples' own interval lies, and in which unit.
+    #[must_use]
+    pub fn states_interval_unit(&self) -> bool {
+        let mut fields = self.decode.fields.iter();
+        fields.any(|f| f.role == FieldRole::Interval && f.unit.is_some())
     }
 
     /// Checks what can be judged without the data.

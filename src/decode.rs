@@ -75,6 +75,9 @@ pub struct Options {
     pub ignore_covariance_flag: bool,
     /// Of several transforms in a message, take the one to this child frame; else the first.
     pub child_frame: Option<String>,
+    /// Of several stamps in a message, which to read: 0 is the message's own, then those of nested
+    /// messages from the outside in ([`Decoder::stamps`]).
+    pub nth_stamp: usize,
 }
 
 /// What became of one payload.
@@ -97,6 +100,8 @@ pub struct Decoder {
     frame: Option<Plan>,
     stated: Stated,
     found: Found,
+    /// Where stamps lie; the one that is read is [`Options::nth_stamp`].
+    stamps: Vec<String>,
     options: Options,
     /// For the messages about it: topic, type, encoding.
     label: [String; 3],
@@ -145,6 +150,7 @@ impl Decoder {
             frame,
             stated: state(channel.schema_name, &selection),
             found: selection.found,
+            stamps: selection.stamps.iter().map(|s| printable(s)).collect(),
             options: options.clone(),
             label,
         })
@@ -169,6 +175,7 @@ impl Decoder {
             frame: None,
             stated,
             found,
+            stamps: Vec::new(),
             options: options.clone(),
             label,
         }
@@ -304,6 +311,10 @@ impl Decoder {
         stated.has_orientation = one.has_orientation();
         stated.has_stamp = stamped.stamp.is_some();
         stated.has_interval = one.registers.has(Slot::INTERVAL, 1);
+        stated.interval = one
+            .registers
+            .has(Slot::INTERVAL, 1)
+            .then(|| ("PATH".to_owned(), one.interval));
         stated.batched = !learnt.has_gyro() && !learnt.batch.is_empty();
         stated.gyro_unit = one.unit.or(stated.gyro_unit);
         stated.sample_kind = one.kind.or(stated.sample_kind);
@@ -313,7 +324,13 @@ impl Decoder {
             Some(5) if plan.px4.is_none() => Found::Twist,
             Some(_) => Found::Named,
         };
+        let rivals = learnt.has_rival_stamps;
         drop(learnt);
+        if rivals && !plan.trie.gives(FieldRole::Stamp) {
+            self.stamps = ["the outer stamp", "the nested stamp"]
+                .map(str::to_owned)
+                .into();
+        }
         plan.settled = unit.or(plan.settled);
         match complaint {
             None => Ok(()),
@@ -332,6 +349,41 @@ impl Decoder {
     #[must_use]
     pub fn stated(&self) -> &Stated {
         &self.stated
+    }
+
+    /// Where messages carry stamps, the message's own at first, then those of messages nested in it; one
+    /// of them is read ([`Options::nth_stamp`]). Empty where `--field` names it.
+    #[must_use]
+    pub fn stamps(&self) -> &[String] {
+        &self.stamps
+    }
+
+    /// Which of [`Decoder::stamps`] is read.
+    #[must_use]
+    pub fn nth_stamp(&self) -> usize {
+        self.options
+            .nth_stamp
+            .min(self.stamps.len().saturating_sub(1))
+    }
+
+    /// Whether the stamp that is read is one: not zero, not shared by many samples, not in whole seconds
+    /// throughout. `first` are the first messages of the channel, with their log times.
+    #[must_use]
+    pub fn has_good_stamps(&self, first: &[(Nanos, Vec<u8>)]) -> bool {
+        let mut samples = Vec::new();
+        for (log, payload) in first {
+            // What can not be decoded says nothing about stamps.
+            let _ = self.decode(payload, *log, *log, &mut samples);
+        }
+        let mut stamps: Vec<i64> = samples.iter().filter_map(|s| Some(s.header?.0)).collect();
+        let n = stamps.len();
+        stamps.retain(|stamp| *stamp != 0);
+        let nonzero = stamps.len();
+        let whole = stamps.iter().filter(|s| *s % 1_000_000_000 == 0).count();
+        stamps.sort_unstable();
+        stamps.dedup();
+        // A few that collide are jitter; one that stands at a whole second is chance.
+        2 * nonzero > n && 10 * stamps.len() >= 9 * nonzero && (whole < 2 || whole < nonzero)
     }
 
     /// The frame a message names: at most 255 bytes, control characters escaped.
@@ -491,6 +543,9 @@ fn state(type_name: &str, selection: &Selection) -> Stated {
     stated.has_orientation = selection.has(Slot::ORIENTATION, 4);
     stated.has_stamp = selection.form.stamp != StampForm::None;
     stated.has_interval = selection.has(Slot::INTERVAL, 1);
+    stated.interval = stated
+        .has_interval
+        .then(|| (printable(&selection.interval), selection.form.interval));
     stated.batched = selection
         .batch
         .as_ref()

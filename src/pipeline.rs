@@ -6,6 +6,7 @@ pub mod check;
 mod chosen;
 pub mod estimator;
 pub mod history;
+mod intervals;
 pub mod lines;
 pub mod log;
 pub mod look;

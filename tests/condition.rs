@@ -2,6 +2,8 @@
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 #[cfg(feature = "service")]
+#[path = "condition/coarse.rs"]
+mod coarse;
 #[path = "condition/recordings.rs"]
 mod recordings;
 #[path = "condition/rest.rs"]

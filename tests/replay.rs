@@ -24,3 +24,5 @@ mod recordings;
 mod replays;
 #[allow(unreachable_pub)]
 mod shared_data;
+#[path = "replay/stated_times.rs"]
+mod stated_times;

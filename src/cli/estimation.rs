@@ -222,7 +222,7 @@ impl Estimation {
                     .map(|f| f.parse().map_err(|e| usage("--field", &e)))
                     .collect::<Result<_>>()?,
                 ignore_covariance_flag: self.ignore_covariance_flag,
-                child_frame: None,
+                ..crate::decode::Options::default()
             },
             method: self.method()?,
             kind: self.sample_kind.map(SampleKind::from),

@@ -264,7 +264,7 @@ fn say_warnings(summary: &RunSummary) {
             tracing::warn!(
                 "{source}: {}: {breaks} gaps were not integrated over, {:.3} s in all",
                 topic.topic,
-                topic.gaps.total_secs
+                topic.gaps.held_secs
             );
         }
         for warning in &topic.warnings {

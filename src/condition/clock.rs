@@ -35,7 +35,7 @@ impl Clock {
     }
 
     /// This clock's stamp, or `None` where the message has none. [`Clock::Index`] reads no stamp.
-    pub(super) fn read(self, raw: &RawSample) -> Option<Nanos> {
+    pub(crate) fn read(self, raw: &RawSample) -> Option<Nanos> {
         match self {
             Clock::Header => raw.header,
             Clock::Log => Some(raw.log),

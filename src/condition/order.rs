@@ -14,8 +14,14 @@ use crate::record::{Nanos, Status, Verdict};
 const HISTORY: usize = 64;
 /// Released entries after which the line is shortened.
 const COMPACT_AT: usize = 1024;
-/// Samples with one and the same stamp that are told apart; a stuck clock makes no more.
-const MAX_COLLISION: usize = 64;
+/// Samples with one and the same stamp that are told apart: a second of the fastest gyros, on a clock
+/// that counts whole seconds. A stuck clock makes no more.
+const MAX_COLLISION: usize = 8192;
+/// Samples with one stamp that data sent a second time is looked for among.
+const LOOKED_THROUGH: usize = 64;
+/// Different measurements on one stamp after which equal ones are no repeats: the clock is too coarse to
+/// tell.
+const TOO_COARSE: usize = 3;
 /// Fewest suspects that can prove a clock set back. Two samples mistaken for overtaken ones
 /// cost two intervals; a set-back clock mistaken from two jittery stamps would cost an attitude reset.
 const MIN_RUN: usize = 3;
@@ -180,22 +186,27 @@ impl Order {
 
     /// Whether the current epoch holds this very measurement at this very stamp.
     fn is_repeat(&self, entry: &Entry) -> bool {
-        let line = self.current();
-        let from = line.partition_point(|e| e.stamp < entry.stamp);
-        line.iter()
-            .skip(from)
-            .take_while(|e| e.stamp == entry.stamp)
+        let sharing = self.sharing(entry.stamp);
+        if sharing.len() >= TOO_COARSE {
+            return false;
+        }
+        sharing
+            .iter()
             .chain(self.suspects.iter().filter(|e| e.stamp == entry.stamp))
+            .take(LOOKED_THROUGH)
             .any(|e| e.same_data(entry))
     }
 
-    fn collisions_at(&self, stamp: Nanos) -> usize {
+    /// The entries of the current epoch that have this stamp.
+    fn sharing(&self, stamp: Nanos) -> &[Entry] {
         let line = self.current();
         let from = line.partition_point(|e| e.stamp < stamp);
-        line.iter()
-            .skip(from)
-            .take_while(|e| e.stamp == stamp)
-            .count()
+        let to = line.partition_point(|e| e.stamp <= stamp);
+        line.get(from..to).unwrap_or_default()
+    }
+
+    fn collisions_at(&self, stamp: Nanos) -> usize {
+        self.sharing(stamp).len()
     }
 
     /// Suspects that no hole in the line was waiting for.

@@ -40,6 +40,8 @@ pub struct Gaps {
     pub total_nanos: i64,
     /// The longest, nanoseconds.
     pub longest_nanos: i64,
+    /// Nanoseconds in those that were not bridged, together and in the longest.
+    pub not_bridged_nanos: (i64, i64),
     /// Sum of the rotation bounds, rad.
     pub rotation_bound: f64,
     /// The first [`GAPS_KEPT`].
@@ -54,6 +56,11 @@ impl Gaps {
         self.missing = self.missing.saturating_add(gap.missing);
         self.total_nanos = self.total_nanos.saturating_add(gap.length_nanos.max(0));
         self.longest_nanos = self.longest_nanos.max(gap.length_nanos);
+        if gap.join != Join::Bridge {
+            let (total, longest) = &mut self.not_bridged_nanos;
+            *total = total.saturating_add(gap.length_nanos.max(0));
+            *longest = (*longest).max(gap.length_nanos);
+        }
         self.rotation_bound += gap.rotation_bound;
         if self.kept.len() < GAPS_KEPT {
             self.kept.push(gap);
@@ -83,6 +90,9 @@ pub struct Report {
     pub accel_dropped: u64,
     /// The ordinary spacing, nanoseconds; `None` until two samples were used.
     pub spacing_nanos: Option<i64>,
+    /// The step of the clock, nanoseconds, where it is coarser than the sensor's: its samples were spread
+    /// over it.
+    pub coarse_nanos: Option<i64>,
     /// Stamp of the first sample used.
     pub first: Option<Nanos>,
     /// Stamp of the last sample used so far.

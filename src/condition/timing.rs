@@ -16,6 +16,13 @@ const LONE_INTERVAL_NANOS: i64 = 10_000_000;
 /// Beyond a dozen steps a few percent of error in the ordinary step look like a sample.
 const MAX_LOOK: usize = 12;
 
+/// Samples on one stamp, on average, from which the clock is coarse: it counts in steps longer than the
+/// sensor's, and a stamp says only in which of them a sample was taken. Pairs are collisions.
+const COARSE: usize = 3;
+/// Stamps that must have been seen of a coarse clock: between the first and the last of them lie two
+/// steps that are surely full.
+const COARSE_STAMPS: usize = 4;
+
 /// The sample before.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Previous {
@@ -34,6 +41,8 @@ pub(super) struct Timing {
     on_gap: OnGap,
     spacing: Spacing,
     previous: Option<Previous>,
+    /// The step of a coarse clock, nanoseconds.
+    coarse: Option<i64>,
 }
 
 impl Timing {
@@ -45,6 +54,7 @@ impl Timing {
             on_gap: settings.on_gap,
             spacing: Spacing::new(max_gap_nanos),
             previous: None,
+            coarse: None,
         }
     }
 
@@ -71,23 +81,45 @@ impl Timing {
         self.spacing.set_steps(steps)
     }
 
+    /// Whether more entries must be seen before the ordinary step can be learnt: of a coarse clock, so
+    /// many that some of its steps are whole.
+    pub(super) fn needs_more(line: &[Entry]) -> bool {
+        let groups = groups_of(line);
+        is_coarse(line.len(), groups.len()) && groups.len() < COARSE_STAMPS
+    }
+
+    /// The step of a coarse clock, nanoseconds; `None` where stamps are as fine as samples.
+    pub(super) fn coarse(&self) -> Option<i64> {
+        self.coarse
+    }
+
     /// Learns the ordinary step from the first entries, before any of them is timed.
     pub(super) fn prime(&mut self, line: &[Entry]) {
-        let mut steps = Vec::with_capacity(line.len());
-        let mut sharing = 1;
-        for pair in line.windows(2) {
-            let [a, b] = pair else { continue };
-            let step = b.stamp.since(a.stamp);
-            if a.epoch != b.epoch {
-                sharing = 1;
-            } else if step == 0 {
-                sharing += 1;
-            } else {
-                // n samples on one stamp and then a step are n samples in that step.
-                steps.extend(std::iter::repeat_n(step / sharing, sharing as usize));
-                sharing = 1;
+        let groups = groups_of(line);
+        let mut known: Vec<(i64, i64)> = groups
+            .iter()
+            .filter_map(|g| g.step.zip(Some(g.n)))
+            .collect();
+        if is_coarse(line.len(), groups.len()) && !known.is_empty() {
+            if known.len() > 1 {
+                // The first began anywhere in its step; the last has no end yet, and is not known.
+                known.remove(0);
+            } else if let (Some(first), Some(last)) = (known.first_mut(), groups.last()) {
+                // Neither is whole: the fuller one is nearer to it.
+                first.1 = first.1.max(last.n);
             }
+            let mut steps: Vec<i64> = known.iter().map(|(step, _)| *step).collect();
+            let middle = (steps.len() - 1) / 2;
+            let quantum = *steps.select_nth_unstable(middle).1;
+            // Not where a clock stood still for a while and then went on in the sensor's steps.
+            let shares = known.iter().filter(|(_, n)| *n > 1).count();
+            self.coarse = (2 * shares > known.len()).then_some(quantum);
         }
+        // n samples on one stamp and then a step are n samples in that step.
+        let mut steps: Vec<i64> = known
+            .into_iter()
+            .flat_map(|(step, n)| std::iter::repeat_n(step / n, usize::try_from(n).unwrap_or(0)))
+            .collect();
         self.spacing.prime(&mut steps);
     }
 
@@ -96,6 +128,11 @@ impl Timing {
     pub(super) fn has_passed(&self, entry: &Entry) -> bool {
         self.previous
             .is_some_and(|p| p.epoch == entry.epoch && p.stamp >= entry.stamp)
+    }
+
+    /// Whether nothing has left before it in its epoch.
+    pub(super) fn is_first(&self, entry: &Entry) -> bool {
+        self.previous.is_none_or(|p| p.epoch != entry.epoch)
     }
 
     /// Times one entry at `stamp`; `ahead` are the entries after it, as far as they are known.
@@ -306,9 +343,11 @@ impl Timing {
     ///
     /// Two real samples that collided on one stamp leave a longer step beside them: the later ones
     /// go into the step after, evenly, or else the earlier ones into the step before. Where
-    /// there is no room, a rate too many is dropped (the instant is known already; a rate at
-    /// half the spacing tells nothing more); an increment is never dropped, its rotation was turned: the
-    /// wider side is shared evenly, so that time is conserved.
+    /// there is no room, what is too many is dropped: the instant is known already. What a sample means
+    /// plays no part in it.
+    ///
+    /// A coarse clock's samples lie in the step that begins with their stamp: the first ones of a stream
+    /// at its end, for a recording begins anywhere in it, and the last ones no further than it reaches.
     pub(super) fn place(&self, sharing: &[Entry], next: Option<Nanos>) -> Placement {
         let Some(first) = sharing.first() else {
             return Placement::alone(Nanos::default());
@@ -320,30 +359,46 @@ impl Timing {
         let before = same_epoch.filter(|_| left == 0).map(|p| p.stamp);
         let n = sharing.len() as i64 + left;
 
-        let room_after = next.map_or(i64::MAX, |next| next.since(at));
         let room_before = before.map_or(0, |before| at.since(before));
-        let nominal = self.spacing.nominal().unwrap_or(match next {
-            Some(_) => (room_after / n).max(1),
+        let room_after = next.map(|next| next.since(at)).or(self.coarse);
+        let nominal = self.spacing.nominal().unwrap_or(match room_after {
+            Some(room) => (room / n).max(1),
             None => LONE_INTERVAL_NANOS,
         });
+        // Nothing lies further behind the end of a stream than one more step.
+        let room_after = room_after.unwrap_or(nominal.saturating_mul(2));
+        if let Some(quantum) = self.coarse
+            && left == 0
+            && next.is_some()
+            && (before.is_none() || room_before > quantum.saturating_add(quantum / 2))
+        {
+            let room = room_after.min(quantum);
+            let step = nominal.min(room / n).max(1);
+            return Placement {
+                from: Nanos(at.0.saturating_add((room - step.saturating_mul(n)).max(0))),
+                step,
+                keep: sharing.len(),
+                original: at,
+            };
+        }
         let least = (nominal - nominal / 4).max(1);
         let most = nominal.saturating_add(nominal / 4);
         let spread = |room: i64, n: i64| match room / n {
-            // More than enough: samples are missing as well; keep to the ordinary step.
-            step if step > most => nominal,
+            // More than enough: samples are missing as well, or the recording ends within the step; keep to
+            // the ordinary one.
+            step if step > most || (next.is_none() && step > nominal) => nominal,
             step => step,
         };
         let (keep, step, backwards) = if room_after / n >= least {
             (n, spread(room_after, n), false)
         } else if room_before / n >= least {
             (n, spread(room_before, n), true)
-        } else if self.kind == SampleKind::Rate {
-            let keep = (room_after / least).clamp(1, n);
-            (keep, spread(room_after, keep), false)
-        } else if room_after >= room_before {
+        } else if self.coarse.is_some() {
+            // A rate that has risen: no clock but this one says how many there are.
             (n, room_after / n, false)
         } else {
-            (n, room_before / n, true)
+            let keep = (room_after / least).clamp(1, n);
+            (keep, spread(room_after, keep), false)
         };
         // Below one nanosecond apart there are no two instants.
         let keep = if step > 0 { keep } else { 1 };
@@ -359,6 +414,38 @@ impl Timing {
             original: at,
         }
     }
+}
+
+/// Entries in a row that share one stamp.
+struct Group {
+    n: i64,
+    /// To the next stamp, where one follows in the same epoch.
+    step: Option<i64>,
+}
+
+fn groups_of(line: &[Entry]) -> Vec<Group> {
+    let mut groups: Vec<Group> = Vec::new();
+    let mut before: Option<&Entry> = None;
+    for entry in line {
+        match (before, groups.last_mut()) {
+            (Some(b), Some(group)) if b.epoch == entry.epoch && b.stamp == entry.stamp => {
+                group.n += 1;
+            }
+            (Some(b), Some(group)) => {
+                group.step = (b.epoch == entry.epoch).then(|| entry.stamp.since(b.stamp));
+                groups.push(Group { n: 1, step: None });
+            }
+            _ => groups.push(Group { n: 1, step: None }),
+        }
+        before = Some(entry);
+    }
+    groups
+}
+
+/// Whether so many entries on so many stamps are a coarse clock's. The first and the last stamp may have
+/// any number of them.
+fn is_coarse(entries: usize, stamps: usize) -> bool {
+    entries > COARSE * stamps.saturating_sub(1).max(1)
 }
 
 /// Where samples that shared a stamp go: `from`, `from + step`, ...; the first `keep` of them.

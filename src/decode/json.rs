@@ -13,6 +13,7 @@ pub(crate) mod scan;
 pub(crate) mod seek;
 pub(crate) mod trie;
 
+use super::fields::FieldRole;
 use super::refusal::printable;
 use super::registers::Form;
 use super::schema::{last_name, ros_name};
@@ -20,7 +21,7 @@ use super::select::names::{Px4, px4};
 use super::stamp::{Bare, TimeUnit};
 use super::{Decoded, MAX_BATCH, Options, Undecodable};
 use crate::record::{Nanos, RawSample};
-use found::{Found, Instant};
+use found::{Found, Instant, StampRule};
 use scan::Scanner;
 use seek::Seeker;
 use trie::Trie;
@@ -39,6 +40,8 @@ pub(crate) struct Plan {
     pub(crate) settled: Option<TimeUnit>,
     /// The sensor of messages that name none.
     pub(crate) sensor: Option<String>,
+    /// Of a message's stamp and a nested one, the nested is read.
+    pub(crate) nested_stamp: bool,
 }
 
 impl Plan {
@@ -54,6 +57,16 @@ impl Plan {
             },
             settled: None,
             sensor: None,
+            nested_stamp: options.nth_stamp > 0,
+        }
+    }
+
+    /// Which stamp holds where a message and one nested in it both have one.
+    pub(crate) fn stamp_rule(&self) -> StampRule {
+        match (self.trie.gives(FieldRole::Stamp), self.nested_stamp) {
+            (true, _) => StampRule::Given,
+            (false, true) => StampRule::Nested,
+            (false, false) => StampRule::Outer,
         }
     }
 
@@ -67,13 +80,24 @@ impl Plan {
     ) -> Result<Decoded, Undecodable> {
         let mut seeker = Seeker::new(self, Scanner::new(payload)?);
         let found = seeker.message()?;
+        Ok(self.push_by_magnitude(&found, log, publish, out))
+    }
+
+    /// Pushes the samples of what was found, bare stamps by their magnitude.
+    fn push_by_magnitude(
+        &self,
+        found: &Found<'_>,
+        log: Nanos,
+        publish: Nanos,
+        out: &mut Vec<RawSample>,
+    ) -> Decoded {
         let before = out.len();
         let mut bare = Vec::new();
-        let decoded = self.push(&found, log, publish, out, &mut bare);
+        let decoded = self.push(found, log, publish, out, &mut bare);
         for (sample, bare) in out.iter_mut().skip(before).zip(bare) {
             sample.header = bare.map(Bare::by_magnitude).or(sample.header);
         }
-        Ok(decoded)
+        decoded
     }
 
     /// The same for a message that names this frame, or none; nothing of one that names another.
@@ -91,7 +115,7 @@ impl Plan {
         if found.frame.as_deref().is_some_and(names_another) {
             return Ok(None);
         }
-        Ok(Some(self.push(&found, log, publish, out)))
+        Ok(Some(self.push_by_magnitude(&found, log, publish, out)))
     }
 
     /// Everything one payload holds.

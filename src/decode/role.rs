@@ -83,7 +83,10 @@ fn rank(channel: &Channel<'_>, found: Found, stated: &Stated) -> Rank {
         Found::Nothing => Rank::ByNameOnly,
         Found::Given => Rank::Imu,
         Found::Named => match name.as_str() {
+            _ if topic.contains("groundtruth") => Rank::ByNameOnly,
             "vehicleimu" | "vehicleangularvelocity" | "vehicleodometry" => Rank::Processed,
+            // Older ones carry the filter's rates beside its attitude.
+            "vehicleattitude" => Rank::Weak,
             _ => Rank::Imu,
         },
         // Several twists in a message are several bodies.

@@ -51,6 +51,10 @@ pub(crate) struct Selection {
     pub(crate) holder: String,
     /// How the body rate was found; higher is weaker.
     pub(crate) found: Found,
+    /// Where the interval lies.
+    pub(crate) interval: String,
+    /// Where stamps lie, the one to be taken first at first.
+    pub(crate) stamps: Vec<String>,
     /// In words, for the user.
     pub(crate) description: Vec<String>,
 }
@@ -119,12 +123,7 @@ pub(crate) fn select(
         take_given(schema, field, &mut selection)?;
     }
     selection.given = selection.picks.len();
-    search::complete(
-        schema,
-        type_name,
-        options.child_frame.is_some(),
-        &mut selection,
-    );
+    search::complete(schema, type_name, options, &mut selection);
     selection.form.ignore_covariance_flag = options.ignore_covariance_flag;
     search::check(schema, &mut selection)?;
     Ok(selection)
@@ -174,6 +173,7 @@ fn take_given(schema: &Schema, field: &FieldPath, selection: &mut Selection) -> 
     }
     if field.role == FieldRole::Interval {
         selection.form.interval = field.unit.unwrap_or_default();
+        selection.interval = path_text(schema, &first.0);
     }
     selection.describe(field.role, schema, &first.0);
     Ok(())

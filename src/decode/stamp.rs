@@ -63,6 +63,14 @@ impl TimeUnit {
         }
     }
 
+    /// Every unit that has a name.
+    pub const NAMED: [(&str, TimeUnit); 4] = [
+        ("ns", TimeUnit::Nano),
+        ("us", TimeUnit::Micro),
+        ("ms", TimeUnit::Milli),
+        ("s", TimeUnit::Second),
+    ];
+
     /// The unit that a name like `ns`, `us`, `ms`, `s` states.
     #[must_use]
     pub fn named(name: &str) -> Option<TimeUnit> {

@@ -3,6 +3,7 @@
 //! Apart from the samples because it is decided once per channel, and because the user may know
 //! better: a flag given by hand wins over anything stated here.
 
+use super::stamp::TimeUnit;
 use crate::condition::GyroUnit;
 use crate::record::SampleKind;
 
@@ -56,6 +57,8 @@ pub struct Stated {
     pub has_stamp: bool,
     /// Whether they carry their own integration interval.
     pub has_interval: bool,
+    /// Where that interval lies, and its unit; a path only where a schema says so.
+    pub interval: Option<(String, TimeUnit)>,
     /// Whether one message may hold several samples.
     pub batched: bool,
     /// Which fields were chosen, in words: `gyro angular_velocity, stamp header.stamp`.

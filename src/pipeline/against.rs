@@ -10,10 +10,11 @@ use crate::config::Plan;
 use crate::model::attitude::Quaternion;
 use crate::model::frames::World;
 use crate::propagate::{Executor, Method};
-use crate::record::{Nanos, RawSample, SampleKind};
+use crate::record::{Nanos, RawSample, SampleKind, Status};
 use crate::report::drawn::{ErrorTrace, Errors};
 use crate::report::summary::{Against, Recorded};
 use crate::report::trace::Traces;
+use std::collections::HashMap;
 
 /// Most attitudes kept per track; beyond, every second one goes, again and again, so that memory
 /// stays bounded on any log.
@@ -54,6 +55,10 @@ pub struct AgainstRecorded {
     estimators: Vec<Estimator>,
     tracks: Vec<Thinned>,
     reference: Thinned,
+    /// When the sample of each recorded orientation was received, as they lie in `reference`; and where
+    /// samples that were given another stamp went.
+    received: Vec<Nanos>,
+    moved: HashMap<Nanos, Nanos>,
     unusable: u64,
 }
 
@@ -125,6 +130,8 @@ impl AgainstRecorded {
             tracks: estimators.iter().map(|_| Thinned::new()).collect(),
             estimators,
             reference: Thinned::new(),
+            received: Vec::new(),
+            moved: HashMap::new(),
             unusable: 0,
         })
     }
@@ -168,9 +175,28 @@ impl AgainstRecorded {
             return;
         };
         match (stamp, self.resolved.recorded_attitude(recorded)) {
+            (Some(stamp), Some(attitude)) if self.own_reference && self.received.len() < MOST => {
+                self.reference.push((stamp, attitude));
+                self.received.push(raw.log);
+            }
+            // So many that they are thinned out: stamps as they were recorded.
             (Some(stamp), Some(attitude)) => self.reference.push((stamp, attitude)),
             _ => self.unusable += 1,
         }
+    }
+
+    /// An orientation in a sample that was given another stamp belongs there, too.
+    fn move_references(&mut self) {
+        if self.moved.is_empty() || self.reference.stride > 1 {
+            return;
+        }
+        for (entry, received) in self.reference.entries.iter_mut().zip(&self.received) {
+            if let Some(stamp) = self.moved.get(received) {
+                entry.0 = *stamp;
+            }
+        }
+        self.reference.entries.sort_by_key(|(stamp, _)| *stamp);
+        self.moved.clear();
     }
 
     /// Propagates what was taken.
@@ -178,6 +204,12 @@ impl AgainstRecorded {
         for (estimator, track) in self.estimators.iter_mut().zip(&mut self.tracks) {
             for sample in estimator.attitudes(exec) {
                 track.push((sample.stamp, sample.q_nb));
+                if self.own_reference
+                    && sample.status.has(Status::RESTAMPED)
+                    && self.moved.len() < MOST
+                {
+                    self.moved.insert(sample.log, sample.stamp);
+                }
             }
             // Estimates long before the first reference are compared with nothing, and the samples
             // may carry none at all.
@@ -193,8 +225,12 @@ impl AgainstRecorded {
         for (estimator, track) in self.estimators.iter_mut().zip(&mut self.tracks) {
             for sample in estimator.finish(exec) {
                 track.push((sample.stamp, sample.q_nb));
+                if self.own_reference && sample.status.has(Status::RESTAMPED) {
+                    self.moved.insert(sample.log, sample.stamp);
+                }
             }
         }
+        self.move_references();
     }
 
     /// Recorded orientations that could be used.

@@ -98,7 +98,7 @@ fn choose_one(
         described: described(&first.channel),
         resolved: Resolved::new(&run.plan, decoder.stated()),
         noticed: Arc::new(Noticed::of(&source)),
-        warnings: refusals,
+        warnings: refusals.into_iter().chain(which_stamp(decoder)).collect(),
     };
     let channels = channels
         .into_iter()
@@ -109,6 +109,23 @@ fn choose_one(
         stream,
         source,
         channels,
+    })
+}
+
+/// Which of several stamps is read, in words.
+pub(super) fn which_stamp(decoder: &Decoder) -> Option<String> {
+    let stamps = decoder.stamps();
+    let read = stamps.get(decoder.nth_stamp())?;
+    let others: Vec<&str> = stamps
+        .iter()
+        .filter(|s| *s != read)
+        .map(String::as_str)
+        .collect();
+    (!others.is_empty()).then(|| {
+        format!(
+            "messages carry several stamps: {read} was taken, not {}; --field stamp=PATH takes another",
+            others.join(", ")
+        )
     })
 }
 

@@ -39,6 +39,8 @@ pub struct Known {
     pub messages: u64,
     /// Log time and payload of its first message, where there is one.
     pub first: Option<(Nanos, Vec<u8>)>,
+    /// Log times and payloads of its first messages, where one does not tell enough.
+    pub openings: Vec<(Nanos, Vec<u8>)>,
     /// What it can serve as.
     pub role: Role,
 }
@@ -101,7 +103,7 @@ impl Log {
     ) -> Result<Log> {
         let mut log = Log::open(path, pool)?;
         if let Some(again) = log.reader.again() {
-            log.sources = sources::tell_apart(again, &log.channels, named, options, pool)?;
+            log.sources = sources::tell_apart(again, &mut log.channels, named, options, pool)?;
         }
         Ok(log)
     }
@@ -247,6 +249,22 @@ impl Known {
     /// # Errors
     /// The channel can not be decoded: which, why, and the flag that helps.
     pub fn decoder(&self, options: &decode::Options) -> std::result::Result<Decoder, Unsupported> {
+        let own = self.decoder_of(options)?;
+        // The message's own stamp, unless it is none and a nested one is.
+        for nth_stamp in 0..own.stamps().len() {
+            let options = decode::Options {
+                nth_stamp,
+                ..options.clone()
+            };
+            let decoder = self.decoder_of(&options)?;
+            if !self.openings.is_empty() && decoder.has_good_stamps(&self.openings) {
+                return Ok(decoder);
+            }
+        }
+        Ok(own)
+    }
+
+    fn decoder_of(&self, options: &decode::Options) -> std::result::Result<Decoder, Unsupported> {
         let mut decoder = Decoder::compile(&plain(&self.channel), options)?;
         if let Some((log, payload)) = &self.first {
             decoder.settle(payload, *log)?;
@@ -330,6 +348,7 @@ pub fn known(channel: &Arc<Channel>, messages: u64, first: Option<(Nanos, Vec<u8
         channel: channel.clone(),
         messages,
         first,
+        openings: Vec::new(),
         role,
     }
 }

@@ -3,12 +3,13 @@
 //! Apart from the estimator because it is all about what is not known yet: when enough has been
 //! seen, and what to say when it can not be known.
 
+use super::intervals::Mismatch;
 use super::passes::{FEW, RestPass};
 use super::stamps::{StampPass, Stamps};
 use crate::condition::stillness::{self, Limits, NoRest, Rests};
 use crate::condition::{Clock, ClockWarning, GyroUnit, Settings, choose_clock};
 use crate::config::{Bias, Initial, Plan};
-use crate::decode::{self, Stated};
+use crate::decode::{self, Stated, TimeUnit};
 use crate::model::attitude::{Quaternion, YawPitchRoll};
 use crate::model::frames::{Body, BodyAxes, Convention, EARTH_RATE, In, Nav, Sensor, World};
 use crate::record::{Nanos, RawSample, SampleKind};
@@ -33,6 +34,8 @@ pub struct Resolved {
     pub accel_scale: f64,
     /// The convention of recorded orientations.
     pub recorded: Convention,
+    /// Where the samples' own interval lies, and its unit.
+    pub interval: Option<(String, TimeUnit)>,
     axes: Matrix3<f64>,
     mount: Matrix3<f64>,
 }
@@ -57,6 +60,7 @@ impl Resolved {
                 Some(decode::AccelUnit::MetresPerSecondSquared) | None => 1.0,
             },
             recorded: orientation_convention(stated),
+            interval: stated.interval.clone(),
             axes: body
                 .c_bs()
                 .map_or_else(Matrix3::identity, |c| *c.as_matrix()),
@@ -291,6 +295,12 @@ impl Preparation {
             return Err(fatal.to_string());
         }
         let mut warnings: Vec<String> = warning.iter().map(ToString::to_string).collect();
+        if let Some(mismatch) = Mismatch::between(&first, clock, resolved.kind) {
+            if !plan.states_interval_unit() {
+                return Err(mismatch.refusal(resolved.interval.as_ref()));
+            }
+            warnings.push(format!("{mismatch}: what lies between is bridged"));
+        }
         let rests = rest.map_or_else(|| Ok(Rests::default()), RestPass::finish)?;
         let (initial, initial_origin, world) =
             decide_initial(&plan, &resolved, &first, &rests, &mut warnings)?;

@@ -5,15 +5,17 @@
 //! other is one source. Channels that take turns, or name another publisher, and messages that name
 //! another frame, are several, and each gets a name: `TOPIC@FRAME`, `TOPIC@PUBLISHER`.
 
-use super::log::Known;
+use super::log::{Known, nanos};
 use super::pool::Pool;
 use super::topics::PICKED_UNNAMED;
 use crate::decode::{Decoder, Options, printable};
 use crate::error::Result;
+use crate::record::Nanos;
 use crate::source::mcap::{self, Channel, Reader, WalkOptions};
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 /// One publisher's samples on a topic.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -66,6 +68,9 @@ pub(super) fn by_topic(channels: &[Known]) -> Vec<Source> {
 const FIRST: u64 = 512;
 /// Messages of all channels together after which those that are slow are not waited for.
 const ENOUGH: u64 = 16_384;
+/// First messages that are kept of a channel whose stamps are to be chosen, and the largest of them.
+const OPENINGS: usize = 64;
+const OPENING_LIMIT: usize = 1 << 14;
 /// Channels whose messages are looked at.
 const MOST_CHANNELS: usize = 256;
 /// More names than this on one topic are no frames.
@@ -80,13 +85,13 @@ const FEW: u64 = 3;
 /// The log can not be read.
 pub(super) fn tell_apart(
     reader: Reader,
-    channels: &[Known],
+    channels: &mut [Known],
     named: Option<&str>,
     options: &Options,
     pool: &Pool,
 ) -> Result<Vec<Source>> {
     let sources = by_topic(channels);
-    let mut looked: Vec<(usize, Decoder)> = Vec::new();
+    let mut looked: Vec<(Arc<Channel>, usize, Decoder)> = Vec::new();
     let mut speakers: BTreeMap<usize, Speakers> = BTreeMap::new();
     let mut missing = 0;
     for (place, source) in sources.iter().enumerate() {
@@ -105,13 +110,14 @@ pub(super) fn tell_apart(
             let Ok(decoder) = known.decoder(options) else {
                 continue;
             };
-            if looked.len() < MOST_CHANNELS && (several || decoder.names_frames()) {
+            let is_worth_it = several || decoder.names_frames() || decoder.stamps().len() > 1;
+            if looked.len() < MOST_CHANNELS && is_worth_it {
                 missing += known.messages.min(FIRST);
                 speakers
                     .entry(place)
                     .or_insert_with(|| Speakers::new(several))
                     .add(index, &known.channel);
-                looked.push((index, decoder));
+                looked.push((known.channel.clone(), index, decoder));
             }
         }
     }
@@ -133,22 +139,24 @@ pub(super) fn tell_apart(
             in_flight: 4 << 20,
             ..WalkOptions::default()
         },
-        |met| {
-            looked.iter().find(|(index, _)| {
-                channels
-                    .get(*index)
-                    .is_some_and(|known| is_same(&known.channel, met))
-            })
-        },
-        |(index, decoder), message, out: &mut Vec<Met>| {
+        |met| looked.iter().find(|(known, ..)| is_same(known, met)),
+        |(_, index, decoder), message, out: &mut Vec<Met>| {
+            let may_be_kept = decoder.stamps().len() > 1 && message.data.len() < OPENING_LIMIT;
             out.push(Met {
                 channel: *index,
                 frame: decoder.frame_id(message.data),
                 digest: digest(message.data),
+                opening: may_be_kept.then(|| (nanos(message.log_time), message.data.to_vec())),
             });
         },
         |items| {
-            for met in items.drain(..) {
+            for mut met in items.drain(..) {
+                if let Some(opening) = met.opening.take()
+                    && let Some(known) = channels.get_mut(met.channel)
+                    && known.openings.len() < OPENINGS
+                {
+                    known.openings.push(opening);
+                }
                 let count = counts.entry(met.channel).or_default();
                 *count += 1;
                 total += 1;
@@ -210,6 +218,8 @@ struct Met {
     channel: usize,
     frame: Option<String>,
     digest: u64,
+    /// Log time and payload, where first messages are kept.
+    opening: Option<(Nanos, Vec<u8>)>,
 }
 
 /// A payload in a number: the same payload in two channels was recorded twice.

@@ -3,6 +3,7 @@
 //! Nothing is known before it comes: the first IMU topic is taken, and its first samples wait until
 //! clock, bias and initial attitude are known.
 
+use super::chosen::which_stamp;
 use super::log::{Known, described, explained, known, plain, problems, rank};
 use super::pool::Pool;
 use super::position::Position;
@@ -130,7 +131,7 @@ impl Picked {
                             described: described(channel),
                             resolved,
                             noticed: self.noticed.clone(),
-                            warnings: Vec::new(),
+                            warnings: which_stamp(&decoder).into_iter().collect(),
                         },
                         Stream::new(&channel.topic, ""),
                     ));

@@ -97,6 +97,8 @@ fn of_topic(run: &Replay, topic: &mut Topic) -> TopicSummary {
             held: propagation.holds,
             resets: propagation.resets,
             total_secs: gaps.total_nanos as f64 * 1e-9,
+            held_secs: gaps.not_bridged_nanos.0 as f64 * 1e-9,
+            longest_held_secs: gaps.not_bridged_nanos.1 as f64 * 1e-9,
             longest_secs: gaps.longest_nanos as f64 * 1e-9,
             longest_at_secs: longest.map_or(0.0, |g| g.start.secs_since(first)),
         },
@@ -244,7 +246,15 @@ fn warnings(topic: &Topic, summary: &TopicSummary) -> Vec<String> {
         ));
     }
     let restamped = summary.counts.get(Verdict::Restamped);
-    if restamped > 0 {
+    if let Some(step) = topic.estimator.conditioning().coarse_nanos {
+        let clock = &summary.clock;
+        let other = if clock == "log" { "header" } else { "log" };
+        said.push(format!(
+            "the {clock} stamps count in steps of {} s, {:.1} samples in each: these were spread over it evenly ({restamped} of them), so a stamp is good to a part of that step; --time {other} may be finer",
+            significant(step as f64 * 1e-9, 3),
+            summary.rate_hz.unwrap_or(0.0) * step as f64 * 1e-9
+        ));
+    } else if restamped > 0 {
         said.push(format!(
             "{restamped} samples shared their stamp with another and were given one of their own between their neighbours"
         ));

@@ -160,6 +160,9 @@ pub fn findings(checked: &Checked) -> Vec<Finding> {
 /// Largest turn per step that integrates well whatever the motion: beyond, aliasing is near.
 const LARGE_STEP_DEG: f64 = 30.0;
 
+/// Longest gap that anybody would bridge.
+const LONGEST_BRIDGE_SECS: f64 = 3600.0;
+
 /// What only integrating shows.
 fn replayed(topic: &CheckedTopic, out: &mut Vec<Finding>) {
     let summary = match &topic.replayed {
@@ -173,25 +176,30 @@ fn replayed(topic: &CheckedTopic, out: &mut Vec<Finding>) {
     };
     let breaks = summary.gaps.held + summary.gaps.resets;
     if breaks > 0 {
-        out.push(
-            Finding::new(
-                Severity::Error,
-                "gap-held",
-                format!(
-                    "{breaks} gaps or clock jumps are too long to integrate over, the longest {:.3} s, {:.1} s after the start",
-                    summary.gaps.longest_secs, summary.gaps.longest_at_secs
-                ),
-            )
-            .with("count", breaks)
-            .with("longest_s", summary.gaps.longest_secs)
-            .with("longest_at_s", summary.gaps.longest_at_secs)
-            .with("total_s", summary.gaps.total_secs)
-            .advise("the attitude is held there; bridge them where the motion was slow")
-            .flags(format!(
-                "--on-gap bridge --max-gap {:.1}",
-                (summary.gaps.longest_secs * 10.0).ceil() / 10.0
-            )),
-        );
+        let longest = summary.gaps.longest_held_secs;
+        let held = Finding::new(
+            Severity::Error,
+            "gap-held",
+            format!(
+                "{breaks} gaps or clock jumps are too long to integrate over, the longest {longest:.3} s, {:.1} s after the start",
+                summary.gaps.longest_at_secs
+            ),
+        )
+        .with("count", breaks)
+        .with("longest_s", longest)
+        .with("longest_at_s", summary.gaps.longest_at_secs)
+        .with("total_s", summary.gaps.held_secs);
+        // Nobody bridges an hour, or a clock that was set back: such a stamp is wrong, or another clock's.
+        out.push(if (f64::MIN_POSITIVE..=LONGEST_BRIDGE_SECS).contains(&longest) {
+            held.advise("the attitude is held there; bridge them where the motion was slow")
+                .flags(format!(
+                    "--on-gap bridge --max-gap {:.1}",
+                    (longest * 10.0).ceil() / 10.0
+                ))
+        } else {
+            held.advise("the attitude is held there; a clock was set, or is not always the same one: another may be steadier")
+                .flags("--time log, or --time header")
+        });
     }
     let step_deg = summary.largest_step.to_degrees();
     if summary.undersampled > 0 {

@@ -94,6 +94,10 @@ pub struct Gaps {
     pub resets: u64,
     /// Seconds missing in all.
     pub total_secs: f64,
+    /// Seconds missing where nothing was integrated: held over, or reset at.
+    pub held_secs: f64,
+    /// The longest of those, s; 0 where only clocks jumped back.
+    pub longest_held_secs: f64,
     /// The longest, s.
     pub longest_secs: f64,
     /// Where the longest begins, seconds after the first sample.
@@ -316,8 +320,9 @@ impl TopicSummary {
                 || "integration error not estimated for this method".to_owned(),
                 |error| {
                     format!(
-                        "integration error at most about {} deg, by a window of four samples less",
-                        significant(error.to_degrees(), 2)
+                        "integration error at most about {} deg, by a window of four samples less{}",
+                        significant(error.to_degrees(), 2),
+                        self.gaps.not_in_the_error()
                     )
                 },
             ),
@@ -439,6 +444,7 @@ impl TopicSummary {
                 "held": self.gaps.held,
                 "resets": self.gaps.resets,
                 "total_s": self.gaps.total_secs,
+                "not_integrated_s": self.gaps.held_secs,
                 "longest_s": self.gaps.longest_secs,
                 "longest_at_s": self.gaps.longest_at_secs,
             },
@@ -459,6 +465,27 @@ impl TopicSummary {
 }
 
 impl Gaps {
+    /// What an integration error says nothing of.
+    fn not_in_the_error(&self) -> String {
+        let parts: Vec<String> = [
+            (self.bridged, self.total_secs - self.held_secs, "bridged"),
+            (self.held + self.resets, self.held_secs, "held or reset"),
+        ]
+        .into_iter()
+        .filter(|(count, ..)| *count > 0)
+        .map(|(count, secs, what)| {
+            format!("{count} gaps of {:.3} s that were {what}", secs.max(0.0))
+        })
+        .collect();
+        if parts.is_empty() {
+            return String::new();
+        }
+        format!(
+            "; not in it: {}, where nothing was measured",
+            parts.join(", ")
+        )
+    }
+
     fn text(&self) -> String {
         let count = self.bridged + self.held + self.resets;
         if count == 0 {

@@ -14,7 +14,7 @@ mod schemas;
 
 use super::batch::Batch;
 use super::json::{AttObject, FrameTransform};
-use super::stream::{Content, Provenance, Stream, child_frames, parent_frame};
+use super::stream::{Content, Provenance, Stream, child_frames, named_frame, parent_frame};
 use crate::error::{Error, Result};
 use crate::record::Nanos;
 use chunk::Chunk;
@@ -223,7 +223,7 @@ impl Layout {
                 match encoding {
                     Encoding::Cdr => Messages::Cdr {
                         attitude,
-                        imu: cdr::Imu::new(attitude, &stream.frame_id),
+                        imu: cdr::Imu::new(attitude, named_frame(stream, child)),
                         transform,
                         tf: cdr::Tf::new(transform, &parent, child),
                     },

@@ -131,6 +131,14 @@ pub(super) fn child_frames(streams: &[Stream]) -> Vec<String> {
         .collect()
 }
 
+/// The frame an attitude message names: the stream's own, or where it has none the child of its transform.
+pub(super) fn named_frame<'s>(stream: &'s Stream, child: &'s str) -> &'s str {
+    match stream.frame_id.as_str() {
+        "" => child,
+        own => own,
+    }
+}
+
 /// The parent frame of a stream's transform.
 pub(super) fn parent_frame(stream: &Stream) -> String {
     match stream.world_frame.trim_start_matches('/') {

@@ -11,7 +11,7 @@ fn stream(n: i64) -> Vec<RawSample> {
     (0..n).map(sample).collect()
 }
 
-fn kind(kind: SampleKind) -> Settings {
+pub(super) fn kind(kind: SampleKind) -> Settings {
     Settings {
         kind,
         ..Settings::default()
@@ -23,10 +23,6 @@ fn steps(out: &[RateSample]) -> Vec<f64> {
     out.windows(2)
         .map(|w| w[1].stamp.since(w[0].stamp) as f64 / STEP as f64)
         .collect()
-}
-
-fn angle(out: &[RateSample]) -> Vector3<f64> {
-    out.iter().skip(1).map(|s| s.value).sum()
 }
 
 #[test]
@@ -53,26 +49,22 @@ fn colliding_stamps_move_into_the_longer_step_before_them_when_none_is_after() {
     assert_eq!(report.gaps.count, 0);
 }
 
+pub(super) const KINDS: [SampleKind; 3] = [
+    SampleKind::Rate,
+    SampleKind::Average,
+    SampleKind::DeltaAngle,
+];
+
 #[test]
-fn a_rate_too_many_is_dropped_and_an_increment_too_many_is_not() {
+fn a_sample_too_many_is_dropped_and_said_whatever_it_means() {
     let mut raw = stream(100);
     raw.insert(50, at(T0 + 49 * STEP, 1000));
-    let (out, report) = run(&Settings::default(), &raw);
-    assert_eq!(report.counts.get(Verdict::DuplicateStamp), 1);
-    assert_eq!(report.counts.lost(), 1);
-    assert_eq!(steps(&out), vec![1.0; 99]);
-
-    let (out, report) = run(&kind(SampleKind::DeltaAngle), &raw);
-    assert_eq!(report.counts.get(Verdict::Restamped), 1);
-    assert_eq!(report.counts.lost(), 0);
-    let recorded: f64 = raw.iter().skip(1).map(|r| r.gyro.unwrap()[0]).sum();
-    // Sums of a hundred numbers below 1 in another order.
-    assert!((angle(&out).x - recorded).abs() < 1e-12);
-
-    // A mean rate is shared out over the time there is: no time counts twice.
-    let (out, _) = run(&kind(SampleKind::Average), &raw);
-    let turned = angle(&out).y;
-    assert!((turned - 0.5 * 99.0 * 0.005).abs() < 1e-12, "{turned}");
+    for k in KINDS {
+        let (out, report) = run(&kind(k), &raw);
+        assert_eq!(report.counts.get(Verdict::DuplicateStamp), 1, "{k:?}");
+        assert_eq!(report.counts.lost(), 1, "{k:?}");
+        assert_eq!(steps(&out), vec![1.0; 99], "{k:?}");
+    }
 }
 
 #[test]
@@ -672,7 +664,8 @@ fn lists_and_buffers_stay_bounded_whatever_comes() {
     let mut conditioner = Conditioner::new(&kind(SampleKind::DeltaAngle)).unwrap();
     let mut out = Vec::new();
     conditioner.push(&stuck, &mut out);
-    assert!(conditioner.report().counts.get(Verdict::DuplicateStamp) > 49_900);
+    // A second of an 8 kHz gyro is kept, the rest is turned away.
+    assert!(conditioner.report().counts.get(Verdict::DuplicateStamp) > 41_000);
     let backwards: Vec<RawSample> = (0..50_000).rev().map(sample).collect();
     conditioner.push(&backwards, &mut out);
     let gappy: Vec<RawSample> = (0..9000)

@@ -35,7 +35,7 @@ fn a_body_rate_is_found_under_every_name_and_shape() {
 }
 
 #[test]
-fn the_stamp_nearest_to_the_body_rate_is_its_own() {
+fn the_messages_own_stamp_comes_before_a_nested_one() {
     let decoder = decoder("");
     let header = |sec| format!(r#""header":{{"stamp":{{"sec":{sec},"nsec":0}}}}"#);
     for (text, sec) in [
@@ -45,7 +45,7 @@ fn the_stamp_nearest_to_the_body_rate_is_its_own() {
                 header(1),
                 header(2)
             ),
-            2,
+            1,
         ),
         (
             format!(
@@ -53,7 +53,7 @@ fn the_stamp_nearest_to_the_body_rate_is_its_own() {
                 header(2),
                 header(1)
             ),
-            2,
+            1,
         ),
         (
             format!(

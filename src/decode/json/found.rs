@@ -26,6 +26,17 @@ pub(crate) enum Instant {
     Bare(Bare),
 }
 
+/// Which stamp holds where an object and one inside it both have one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum StampRule {
+    /// The one that `--field` names, wherever it lies.
+    Given,
+    /// The outermost.
+    Outer,
+    /// The one nearest to the sample.
+    Nested,
+}
+
 /// What one object held.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Found<'a> {
@@ -46,6 +57,8 @@ pub(crate) struct Found<'a> {
     pub(crate) delta_velocity: bool,
     /// A PX4 message: an unlabelled integer stamp is in microseconds.
     pub(crate) px4: bool,
+    /// An object and one inside it both have a stamp.
+    pub(crate) has_rival_stamps: bool,
     /// What objects inside this one held; joined last, so that the order of keys does not matter.
     pub(crate) nested: Option<Box<Found<'a>>>,
     /// Samples of an array inside.
@@ -103,16 +116,16 @@ impl<'a> Found<'a> {
     }
 
     /// Keeps what an object inside this one held, until all keys have been seen.
-    pub(crate) fn nest(&mut self, inner: Found<'a>, given_stamp: bool) {
+    pub(crate) fn nest(&mut self, inner: Found<'a>, rule: StampRule) {
         if inner.registers.seen == 0 && inner.batch.is_empty() && inner.stamp.is_none() {
             return;
         }
         match &mut self.nested {
-            Some(nested) => nested.join(inner, given_stamp),
+            Some(nested) => nested.join(inner, rule),
             // An empty one joins first, as any other: a stamp alone must not come in by itself.
             None => {
                 let mut nested = Found::default();
-                nested.join(inner, given_stamp);
+                nested.join(inner, rule);
                 self.nested = Some(Box::new(nested));
             }
         }
@@ -120,7 +133,7 @@ impl<'a> Found<'a> {
 
     /// All keys have been seen: joins what lay inside, and reads `values` as a body rate when the
     /// sensor's name says so.
-    pub(crate) fn settle(&mut self, given_stamp: bool) {
+    pub(crate) fn settle(&mut self, rule: StampRule) {
         if self.delta_velocity && !self.registers.has(Slot::ACCEL_INTERVAL, 1) {
             self.registers.seen &= !Slot::ACCEL.bits(3);
         }
@@ -138,16 +151,18 @@ impl<'a> Found<'a> {
             }
         }
         if let Some(nested) = self.nested.take() {
-            self.join(*nested, given_stamp);
+            self.join(*nested, rule);
         }
     }
 
     /// Takes in what an object inside this one held.
-    fn join(&mut self, mut inner: Found<'a>, given_stamp: bool) {
+    fn join(&mut self, mut inner: Found<'a>, rule: StampRule) {
         let nearer = inner.has_gyro() || (inner.has_orientation() && !self.has_gyro());
         let wanted = (inner.has_gyro() && !self.has_gyro())
             || (inner.has_orientation() && !self.has_orientation());
-        if given_stamp && let Some((rank, stamp)) = inner.stamp.clone() {
+        if rule == StampRule::Given
+            && let Some((rank, stamp)) = inner.stamp.clone()
+        {
             self.stamp(rank, stamp);
         }
         if self.batch.is_empty() {
@@ -158,8 +173,14 @@ impl<'a> Found<'a> {
             return;
         }
         if nearer && wanted {
-            // Its own stamp is nearer to the sample than any out here.
-            if !given_stamp && inner.stamp.is_some() {
+            self.has_rival_stamps |=
+                inner.has_rival_stamps || (self.stamp.is_some() && inner.stamp.is_some());
+            let wins = match rule {
+                StampRule::Given => false,
+                StampRule::Outer => self.stamp.is_none(),
+                StampRule::Nested => true,
+            };
+            if wins && inner.stamp.is_some() {
                 self.stamp = inner.stamp.take();
             }
             self.frame = inner.frame.take().or(self.frame.take());

@@ -64,7 +64,7 @@ impl<'a, 'p> Seeker<'a, 'p> {
             Some(b'[') => {
                 let mut found = Found::default();
                 self.array(Some(0), 0, &mut found)?;
-                found.settle(!self.auto_stamp);
+                found.settle(self.plan.stamp_rule());
                 found
             }
             Some(b'{') => self.object(Some(0), 0, false)?,
@@ -98,7 +98,7 @@ impl<'a, 'p> Seeker<'a, 'p> {
             }
             self.sensor = found.sensor.clone();
         }
-        found.settle(!self.auto_stamp);
+        found.settle(self.plan.stamp_rule());
         Ok(found)
     }
 
@@ -179,7 +179,7 @@ impl<'a, 'p> Seeker<'a, 'p> {
                     found.stamp(rank, stamp);
                 }
                 found.frame = header.frame.clone().or(found.frame.take());
-                found.nest(header, !self.auto_stamp);
+                found.nest(header, self.plan.stamp_rule());
             }
             Some(Meaning::GyroInterval(unit)) if self.auto_interval => {
                 found.px4 = true;
@@ -263,7 +263,7 @@ impl<'a, 'p> Seeker<'a, 'p> {
         match self.scanner.peek() {
             Some(b'{') if depth < limit => {
                 let inner = self.object(at, depth + 1, twist)?;
-                found.nest(inner, !self.auto_stamp);
+                found.nest(inner, self.plan.stamp_rule());
                 Ok(())
             }
             Some(b'[') if depth < limit => self.array(at, depth, found),
@@ -311,7 +311,7 @@ impl<'a, 'p> Seeker<'a, 'p> {
                 None => true,
             };
             if wanted {
-                found.nest(element, !self.auto_stamp);
+                found.nest(element, self.plan.stamp_rule());
             }
         }
         Ok(())

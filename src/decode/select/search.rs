@@ -7,6 +7,7 @@ use super::names::{self, Meaning, Px4};
 use super::shapes::{end_of, quaternion, stamp_at, stamp_in, structs_on, text_near, vector, with};
 use super::{End, Found, Pick, Selection, StampFields, Step, batch_of, path_text, px4_stamp};
 use crate::condition::GyroUnit;
+use crate::decode::Options;
 use crate::decode::fields::FieldRole;
 use crate::decode::registers::{Slot, StampForm};
 use crate::decode::schema::{Field, Kind, Many, Schema, Struct, last_name};
@@ -31,9 +32,10 @@ struct Site {
 pub(super) fn complete(
     schema: &Schema,
     type_name: &str,
-    by_child: bool,
+    options: &Options,
     selection: &mut Selection,
 ) {
+    let by_child = options.child_frame.is_some();
     let sites = sites(schema);
     let px4 = names::px4(type_name);
     let given = selection.found == Found::Given;
@@ -54,11 +56,20 @@ pub(super) fn complete(
     });
     let chain = around.map_or_else(|| vec![Vec::new()], |path| structs_on(schema, &path));
     if selection.form.stamp == StampForm::None {
-        let found = chain.iter().find_map(|path| {
-            let structure = end_of(schema, path)?.structure(schema)?;
-            stamp_in(schema, path, structure, 2).map(|(_, stamp)| stamp)
-        });
-        if let Some(mut stamp) = found {
+        let mut found: Vec<StampFields> = chain
+            .iter()
+            .filter_map(|path| {
+                let structure = end_of(schema, path)?.structure(schema)?;
+                stamp_in(schema, path, structure, 2).map(|(_, stamp)| stamp)
+            })
+            .collect();
+        // The message's own first; but of a batch every sample has its own.
+        if selection.batch.is_none() {
+            found.reverse();
+        }
+        selection.stamps = found.iter().filter_map(|s| stamp_text(schema, s)).collect();
+        let wanted = options.nth_stamp.min(found.len().saturating_sub(1));
+        if let Some(mut stamp) = found.into_iter().nth(wanted) {
             if px4.is_some() || selection.kind.is_some() {
                 stamp.form = px4_stamp(stamp.form);
             }
@@ -78,6 +89,13 @@ pub(super) fn complete(
         element.push(Step::Each);
         selection.child = text_near(schema, &element, "child_frame_id");
     }
+}
+
+/// Of `stamp.sec` only `stamp` is worth saying.
+fn stamp_text(schema: &Schema, stamp: &StampFields) -> Option<String> {
+    let (path, _) = stamp.paths.first()?;
+    let whole = path.len() - usize::from(stamp.paths.len() > 1);
+    Some(path_text(schema, path.get(..whole).unwrap_or(path)))
 }
 
 /// What a walk can not do is refused here, before any payload.
@@ -322,6 +340,7 @@ fn beside_gyro(schema: &Schema, gyro: &[Step], given: bool, selection: &mut Sele
             }
             Some(Meaning::GyroInterval(unit)) if number && !given => {
                 if !selection.has(Slot::INTERVAL, 1) {
+                    selection.interval = path_text(schema, &path);
                     selection.take(vec![path], Slot::INTERVAL);
                     selection.form.interval = unit;
                 }
@@ -332,6 +351,7 @@ fn beside_gyro(schema: &Schema, gyro: &[Step], given: bool, selection: &mut Sele
                     && selection.kind == Some(SampleKind::DeltaAngle)
                     && !selection.has(Slot::INTERVAL, 1) =>
             {
+                selection.interval = path_text(schema, &path);
                 selection.take(vec![path], Slot::INTERVAL);
                 selection.form.interval = unit;
             }

@@ -12,7 +12,7 @@ use super::{Encoding, IMU_SCHEMA, Provenance, Stream, TF_SCHEMA, TF_TOPIC, push_
 use super::{log_time, too_many_channels};
 use crate::error::{Error, Result};
 use crate::record::{AttitudeSample, Nanos, RawSample};
-use crate::sink::stream::{child_frames, parent_frame};
+use crate::sink::stream::{child_frames, named_frame, parent_frame};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -102,13 +102,13 @@ impl LiveMcap {
         let attitude = self.declare(&stream.output_topic, IMU_SCHEMA, &axes)?;
         let parent = parent_frame(&stream);
         let frame_id = stream.frame_id.clone();
-        self.streams.push(stream);
+        self.streams.push(stream.clone());
         let child = child_frames(&self.streams).pop().unwrap_or_default();
         self.layouts.push(Layout {
             input,
             input_imu: cdr::Imu::new(input, &frame_id),
             attitude,
-            imu: cdr::Imu::new(attitude, &frame_id),
+            imu: cdr::Imu::new(attitude, named_frame(&stream, &child)),
             tf: cdr::Tf::new(self.transform, &parent, &child),
             last: None,
         });

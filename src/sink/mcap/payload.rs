@@ -6,7 +6,7 @@ use super::cdr::{self, ros_time};
 use super::record::MESSAGE_HEAD;
 use super::{IMU_SCHEMA, TF_SCHEMA, TF_TOPIC, schemas};
 use crate::record::{AttitudeSample, RawSample};
-use crate::sink::stream::{Content, Stream, child_frames, parent_frame};
+use crate::sink::stream::{Content, Stream, child_frames, named_frame, parent_frame};
 
 /// A topic and the type of its messages, all `cdr` described as `ros2msg`.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -54,10 +54,13 @@ impl Payloads {
         let stream = stream.bounded();
         let parent = parent_frame(&stream);
         match stream.content {
-            Content::Attitude => Payloads::Attitude {
-                imu: cdr::Imu::new(0, &stream.frame_id),
-                tf: cdr::Tf::new(0, &parent, &child_frames(streams).pop().unwrap_or_default()),
-            },
+            Content::Attitude => {
+                let child = child_frames(streams).pop().unwrap_or_default();
+                Payloads::Attitude {
+                    imu: cdr::Imu::new(0, named_frame(&stream, &child)),
+                    tf: cdr::Tf::new(0, &parent, &child),
+                }
+            }
             Content::Samples(_) => Payloads::Samples {
                 imu: cdr::Imu::new(0, &stream.frame_id),
             },
