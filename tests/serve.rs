@@ -7,6 +7,8 @@
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 mod made_logs;
+#[allow(dead_code)]
+mod shared_data;
 mod serve {
     pub(crate) mod client;
     pub(crate) mod daemon;

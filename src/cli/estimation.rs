@@ -25,7 +25,8 @@ pub struct Estimation {
     /// Where a value lies in the message: ROLE=PATH, ROLE one of gyro, accel, orientation, stamp, dt
     #[arg(long = "field", value_name = "ROLE=PATH")]
     pub fields: Vec<String>,
-    /// auto, magnus, causal, commit, dcm-left, dcm-right, dcm-mean, rotvec-sum
+    /// auto, magnus, causal, commit, dcm-left, dcm-right, dcm-mean, rotvec-sum. `commit` is that of
+    /// `serve`: it waits for no later sample, nor for one that was overtaken
     #[arg(long, default_value = "auto", env = "STRAPD_METHOD")]
     pub method: String,
     /// Samples in the window of --method magnus|causal|commit (2 to 24; commit: 6 rates or 5 increments)

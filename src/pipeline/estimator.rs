@@ -46,9 +46,18 @@ impl Memory {
 impl Estimator {
     /// For samples understood as `resolved`, from what `prepared` says.
     ///
+    /// The method without latency takes them as [`Estimator::live`] does, in a replay, too: what it gives
+    /// is what a daemon would have said.
+    ///
     /// # Errors
     /// In words, with the flag that helps: settings that can not be.
     pub fn new(plan: &Plan, resolved: &Resolved, prepared: &Prepared) -> Result<Estimator, String> {
+        if matches!(
+            plan.method,
+            Method::Live { .. } | Method::CommitProvisional { .. }
+        ) {
+            return Estimator::live(plan, resolved, prepared);
+        }
         let settings = resolved.conditioning(plan, prepared.clock, prepared.bias);
         Estimator::with(plan, resolved, prepared, &settings)
     }

@@ -3,9 +3,11 @@
 use super::client::Client;
 use super::daemon::{Daemon, Process, TCP, UDP, WS, listening, strapd};
 use crate::made_logs::{motion, written};
+use crate::shared_data;
 use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Stdio};
+use strapd::record::SampleKind;
 
 /// `strapd ARGS` with this on standard input.
 fn output(args: &[&str], input: &[u8]) -> Vec<u8> {
@@ -104,6 +106,122 @@ fn check(log: &Path) {
     assert!(got == expected, "{name} on standard input");
     process.signal("TERM");
     assert_eq!(process.exit(), Some(0));
+}
+
+/// Samples of most recordings that are sent: past the first seconds, where steps are learnt, and past gaps.
+const MANY: usize = 4000;
+
+/// What `strapd ARGS` prints, whether or not samples were lost on the way; `None` where it can not begin.
+fn printed(args: &[&str], input: &[u8]) -> Option<Vec<u8>> {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("input");
+    std::fs::write(&path, input).unwrap();
+    let output = Command::new(strapd())
+        .args(args)
+        .stdin(std::fs::File::open(path).unwrap())
+        .output()
+        .unwrap();
+    matches!(output.status.code(), Some(0 | 3)).then_some(output.stdout)
+}
+
+/// The attitudes a daemon that takes samples for this kind makes of these lines.
+fn served(kind: SampleKind, lines: &[&[u8]]) -> Vec<u8> {
+    let mut settings = listening(&[TCP]);
+    settings.plan.kind = Some(kind);
+    let daemon = Daemon::start(settings);
+    let mut watcher = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");
+    let mut sender = Client::tcp(daemon.address(0));
+    let mut out = Vec::new();
+    // Another sensor says when a round has been answered: attitudes come in the order of their samples.
+    let mut marks = 0;
+    let mut mark = |sender: &mut Client| {
+        marks += 1;
+        let line = format!(
+            "{{\"class\":\"RATE\",\"id\":\"mark\",\"stamp\":{{\"sec\":1700000000,\"nsec\":{}}},\"gyro\":[0,0,0]}}\n",
+            marks * 1_000_000
+        );
+        sender.send_bytes(line.as_bytes());
+    };
+    // The first mean waits for the second.
+    mark(&mut sender);
+    mark(&mut sender);
+    let mut expected = 2;
+    for round in lines.chunks(ROUND) {
+        sender.send_bytes(&round.concat());
+        mark(&mut sender);
+        expected += 1;
+        let last = format!("\"id\":\"mark\",\"seq\":{},", expected - 1);
+        loop {
+            let line = watcher.line().unwrap();
+            if line.contains(&last) {
+                break;
+            }
+            if !line.contains("\"id\":\"mark\"") {
+                out.extend_from_slice(line.as_bytes());
+                out.push(b'\n');
+            }
+        }
+    }
+    out
+}
+
+#[test]
+fn every_recording_gives_the_bytes_of_a_replay_whatever_its_stamps_and_samples_are_like() {
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures");
+    let folders = [Some(fixtures), shared_data::shared("logs/real")];
+    let logs = folders.iter().flatten().flat_map(|folder| {
+        let entries = std::fs::read_dir(folder).unwrap();
+        entries.map(|entry| entry.unwrap().path())
+    });
+    let mut compared = 0;
+    for log in logs.filter(|path| path.extension().is_some_and(|e| e == "mcap")) {
+        let Some(samples) = printed(&["cat", log.to_str().unwrap()], b"") else {
+            // Several topics, or none.
+            continue;
+        };
+        let lines: Vec<&[u8]> = samples
+            .split_inclusive(|b| *b == b'\n')
+            .take(MANY)
+            .collect();
+        let sent = lines.concat();
+        for kind in [SampleKind::Rate, SampleKind::Average] {
+            let args = [
+                "replay",
+                "-",
+                "--method",
+                "commit",
+                "--sample-kind",
+                kind.name(),
+            ];
+            let Some(expected) = printed(&[&args[..], &["-o", "-"]].concat(), &sent) else {
+                continue;
+            };
+            let got = served(kind, &lines);
+            // What shares the last stamp of all waits for a later one, which a replay knows not to come.
+            let rest = expected.strip_prefix(&got[..]).unwrap_or_else(|| {
+                let at = got
+                    .iter()
+                    .zip(&expected)
+                    .take_while(|(a, b)| a == b)
+                    .count();
+                let line = got[..at].iter().filter(|b| **b == b'\n').count();
+                panic!(
+                    "{} as {}: differs at attitude {line}",
+                    log.display(),
+                    kind.name()
+                )
+            });
+            let rest = rest.iter().filter(|b| **b == b'\n').count();
+            assert!(
+                rest < 20,
+                "{} as {}: {rest} short",
+                log.display(),
+                kind.name()
+            );
+            compared += 1;
+        }
+    }
+    assert!(compared >= 16, "{compared} compared");
 }
 
 #[test]
