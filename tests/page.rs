@@ -1,7 +1,6 @@
 //! Promise: what a browser shows is what the daemon said (service.md 9).
 //!
-//! A headless Chromium on real pages of a real daemon, everything on loopback. Where there is no
-//! Chromium these tests skip loudly; in CI they must run.
+//! A headless Chromium on real pages of a real daemon, everything on loopback.
 
 #![cfg(all(feature = "service", unix))]
 #![allow(clippy::unwrap_used, clippy::expect_used)]

@@ -550,9 +550,9 @@ fn flush_brings_the_pending_samples_out() {
     .unwrap();
     assert_eq!(sink.write(0, &samples(1), &pool).unwrap(), Flow::Continue);
     assert_eq!(sink.flush(&pool).unwrap(), Flow::Continue);
-    // The line comes although the sink is still open. Ten seconds: for a machine that is busy.
+    // The line comes although the sink is still open. A minute: for a machine that is busy.
     let line = received
-        .recv_timeout(std::time::Duration::from_secs(10))
+        .recv_timeout(std::time::Duration::from_secs(60))
         .unwrap();
     assert!(line.starts_with("{\"class\":\"ATT\""));
     reader.join().unwrap();
@@ -660,11 +660,12 @@ proptest! {
 
 /// `STRAPD_ORACLES_PYTHON` names a Python with the packages that `read_output.py` lists.
 #[test]
+#[cfg_attr(
+    not(has_oracles),
+    ignore = "needs STRAPD_ORACLES_PYTHON=PYTHON with the packages of benches/peers/requirements.txt"
+)]
 fn mcap_ros2_support_and_rosbags_read_what_the_ndjson_says() {
-    let Some(python) = std::env::var_os("STRAPD_ORACLES_PYTHON") else {
-        eprintln!("SKIPPED LOUDLY: STRAPD_ORACLES_PYTHON is not set; this test proved nothing");
-        return;
-    };
+    let python = std::env::var_os("STRAPD_ORACLES_PYTHON").expect("it is not set");
     let dir = tempfile::tempdir().unwrap();
     let samples = samples(5000);
     let ndjson = dir.path().join("a.ndjson");

@@ -7,7 +7,7 @@ use super::watched::paused;
 use serde_json::{Value, json};
 use std::collections::VecDeque;
 use std::net::{SocketAddr, TcpStream};
-use std::process::{Command, Stdio};
+use std::process::Command;
 use tungstenite::client::IntoClientRequest;
 use tungstenite::{Message, WebSocket};
 
@@ -274,55 +274,14 @@ fn number(value: &Value) -> u64 {
     (value.as_f64().unwrap() + 0.0).to_bits()
 }
 
-/// The client Foxglove publishes, from npm, below `target/`. `None`, said loudly, without node or npm;
-/// never in CI.
-fn foxglove_modules() -> Option<std::path::PathBuf> {
-    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
-    let place = root.join("target/foxglove");
-    let installed = || {
-        std::fs::create_dir_all(&place).ok()?;
-        let client = place.join("node_modules/@foxglove/ws-protocol/package.json");
-        if !client.exists() {
-            std::fs::write(place.join("package.json"), "{\"private\":true}\n").ok()?;
-            let done = Command::new("npm")
-                .args([
-                    "install",
-                    "--silent",
-                    "--no-audit",
-                    "--no-fund",
-                    "--ignore-scripts",
-                ])
-                .args([
-                    "@foxglove/ws-protocol@0.8.0",
-                    "@foxglove/rosmsg2-serialization@3.1.0",
-                ])
-                .args(["@foxglove/rosmsg@5.0.5", "ws@8.23.0"])
-                .current_dir(&place)
-                .stdout(Stdio::null())
-                .status();
-            if !done.is_ok_and(|status| status.success()) {
-                return None;
-            }
-        }
-        let node = Command::new("node").arg("--version").output().ok()?;
-        (node.status.success() && client.exists()).then(|| place.join("node_modules"))
-    };
-    let found = installed();
-    if found.is_none() {
-        assert!(
-            std::env::var_os("CI").is_none(),
-            "node or npm is absent or could not install, and this is CI: the test must run"
-        );
-        eprintln!("SKIPPED LOUDLY: no node with @foxglove/ws-protocol; this test proved nothing");
-    }
-    found
-}
-
 #[test]
+#[cfg_attr(
+    not(has_foxglove),
+    ignore = "needs node, and what .ci/run installs in target/foxglove"
+)]
 fn foxgloves_own_client_reads_every_attitude_as_it_stands_in_the_lines() {
-    let Some(modules) = foxglove_modules() else {
-        return;
-    };
+    // The client Foxglove publishes, from npm.
+    let modules = concat!(env!("CARGO_MANIFEST_DIR"), "/target/foxglove/node_modules");
     let expected = lines_of(&format!("replay {LOG}"));
     let process = paused(&format!("replay {LOG}"), &[WS]);
     let output = Command::new("node")

@@ -32,6 +32,7 @@ fn elsewhere() -> SocketAddr {
 }
 
 #[test]
+#[cfg_attr(not(has_chromium), ignore = "needs chromium")]
 fn a_page_of_another_origin_gets_no_socket() {
     let Some(mut browser) = Browser::start() else {
         return;
@@ -61,6 +62,7 @@ fn a_page_of_another_origin_gets_no_socket() {
 }
 
 #[test]
+#[cfg_attr(not(has_chromium), ignore = "needs chromium")]
 fn a_page_of_another_origin_writes_no_sample() {
     let Some(mut browser) = Browser::start() else {
         return;
@@ -117,6 +119,7 @@ fn a_page_of_another_origin_writes_no_sample() {
 }
 
 #[test]
+#[cfg_attr(not(has_chromium), ignore = "needs chromium")]
 fn the_page_asks_for_the_token_and_goes_on_with_it() {
     let Some(mut browser) = Browser::start() else {
         return;

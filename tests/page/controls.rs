@@ -19,6 +19,7 @@ fn turn(sender: &mut Client, from: u64, until: u64) {
 }
 
 #[test]
+#[cfg_attr(not(has_chromium), ignore = "needs chromium")]
 fn keys_change_the_view_and_nothing_else() {
     let Some(mut browser) = Browser::start() else {
         return;
@@ -94,6 +95,7 @@ fn keys_change_the_view_and_nothing_else() {
 }
 
 #[test]
+#[cfg_attr(not(has_chromium), ignore = "needs chromium")]
 fn pages_fit_a_phone_and_name_their_parts() {
     let Some(mut browser) = Browser::start() else {
         return;

@@ -87,6 +87,7 @@ fn quarter_turns() -> Vec<[f64; 3]> {
 }
 
 #[test]
+#[cfg_attr(not(has_chromium), ignore = "needs chromium")]
 fn the_ends_of_the_axes_are_drawn_where_the_attitude_says() {
     let Some(mut browser) = Browser::start() else {
         return;
@@ -151,6 +152,7 @@ fn wavering(n: u32) -> String {
 }
 
 #[test]
+#[cfg_attr(not(has_chromium), ignore = "needs chromium")]
 fn a_frozen_picture_is_the_same_to_the_byte() {
     let Some(mut browser) = Browser::start() else {
         return;
@@ -183,6 +185,7 @@ fn a_frozen_picture_is_the_same_to_the_byte() {
 }
 
 #[test]
+#[cfg_attr(not(has_chromium), ignore = "needs chromium")]
 fn a_spike_of_one_sample_is_drawn() {
     let Some(mut browser) = Browser::start() else {
         return;

@@ -6,6 +6,7 @@ use crate::daemon::{Daemon, TCP, WS, listening};
 use serde_json::json;
 
 #[test]
+#[cfg_attr(not(has_chromium), ignore = "needs chromium")]
 fn a_sensor_that_has_ended_is_shown_as_it_was_last_and_one_without_an_attitude_without_a_number() {
     let Some(mut browser) = Browser::start() else {
         return;

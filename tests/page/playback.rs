@@ -86,6 +86,7 @@ fn playing(state: &str, at: f64, speed: f64) -> Value {
 }
 
 #[test]
+#[cfg_attr(not(has_chromium), ignore = "needs chromium")]
 fn a_recording_is_paused_sought_and_sped_up() {
     let Some(mut browser) = Browser::start() else {
         return;
@@ -182,6 +183,7 @@ fn a_recording_is_paused_sought_and_sped_up() {
 const LOG: &str = "fixtures/xsens_mti.mcap";
 
 #[test]
+#[cfg_attr(not(has_chromium), ignore = "needs chromium")]
 fn a_replay_is_moved_from_the_page_and_ends_where_a_file_ends() {
     let Some(mut browser) = Browser::start() else {
         return;

@@ -53,6 +53,7 @@ fn reported(dir: &Path, log: &Path) -> Option<(String, i32)> {
 }
 
 #[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
 fn real_recordings_are_drawn_whole() {
     let dir = tempfile::tempdir().unwrap();
     for log in logs("real") {
@@ -72,6 +73,7 @@ fn real_recordings_are_drawn_whole() {
 }
 
 #[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
 fn native_and_hostile_files_end_in_a_page_or_a_clear_error() {
     let dir = tempfile::tempdir().unwrap();
     for log in logs("native").into_iter().chain(logs("hostile")) {
@@ -112,6 +114,7 @@ fn native_and_hostile_files_end_in_a_page_or_a_clear_error() {
 }
 
 #[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
 fn the_page_says_what_check_and_compare_say() {
     let Some(log) = shared("logs/real/broad07_60s_ros2_zstd.mcap") else {
         return;

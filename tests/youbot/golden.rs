@@ -137,6 +137,7 @@ fn check_pose(arm: &Arm, case: &Value, what: &str) {
 }
 
 #[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
 fn every_pose_jacobian_and_solution_of_the_seed_preset() {
     let Some(g) = file() else { return };
     for (i, case) in list(&g["fk_ik"]).iter().enumerate() {
@@ -146,6 +147,7 @@ fn every_pose_jacobian_and_solution_of_the_seed_preset() {
 }
 
 #[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
 fn every_pose_jacobian_and_solution_of_the_urdf_preset() {
     let Some(g) = file() else { return };
     for (i, case) in list(&g["fk_ik_urdf_preset"]).iter().enumerate() {
@@ -155,6 +157,7 @@ fn every_pose_jacobian_and_solution_of_the_urdf_preset() {
 }
 
 #[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
 fn every_special_pose() {
     let Some(g) = file() else { return };
     let special = g["special"].as_object().unwrap();
@@ -165,6 +168,7 @@ fn every_special_pose() {
 }
 
 #[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
 fn the_presets_hold_the_files_numbers() {
     let Some(g) = file() else { return };
     let meta = &g["meta"];
@@ -195,6 +199,7 @@ fn the_presets_hold_the_files_numbers() {
 }
 
 #[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
 fn unreachable_targets_under_the_four_policies() {
     let Some(g) = file() else { return };
     let arm = Arm::seed();
@@ -256,6 +261,7 @@ fn unreachable_targets_under_the_four_policies() {
 }
 
 #[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
 fn velocities_accelerations_torques_and_energies() {
     let Some(g) = file() else { return };
     let cases = list(&g["dynamics"]);
@@ -313,6 +319,7 @@ fn velocities_accelerations_torques_and_energies() {
 }
 
 #[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
 fn an_imu_on_the_joint_trajectory() {
     let Some(g) = file() else { return };
     let golden = &g["gyro_joint_trajectory"];
@@ -373,6 +380,7 @@ pub(crate) fn cartesian_path() -> ToolPath {
 }
 
 #[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
 fn the_gripper_along_the_cartesian_trajectory() {
     let Some(g) = file() else { return };
     let arm = Arm::seed();
