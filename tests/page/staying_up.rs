@@ -2,7 +2,7 @@
 
 use super::browser::Browser;
 use crate::client::{Client, rate};
-use crate::daemon::{Daemon, TCP, WS, listening};
+use crate::daemon::{Daemon, TCP, WS, eventually, listening};
 use serde_json::json;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -69,6 +69,7 @@ const COUNT: &str = r"new Promise((done) => {
 })";
 
 #[test]
+#[cfg_attr(not(has_chromium), ignore = "needs chromium")]
 fn a_sensor_at_8_khz_is_drawn_smoothly_in_bounded_memory() {
     let Some(mut browser) = Browser::start() else {
         return;
@@ -143,6 +144,7 @@ fn a_sensor_at_8_khz_is_drawn_smoothly_in_bounded_memory() {
 }
 
 #[test]
+#[cfg_attr(not(has_chromium), ignore = "needs chromium")]
 fn it_connects_again_soon_after_the_daemon_is_back() {
     let Some(mut browser) = Browser::start() else {
         return;
@@ -155,7 +157,9 @@ fn it_connects_again_soon_after_the_daemon_is_back() {
     let mut took = Vec::new();
     // A machine that is busy for a moment is no reason: one of three must be in time.
     for gone in [1500, 700, 100] {
-        Client::tcp(tcp).send(&rate("imu0", 0, 0.1));
+        // Kept: who closes before he has read takes back what he said.
+        let mut sender = Client::tcp(tcp);
+        sender.send(&rate("imu0", 0, 0.1));
         browser.until("an attitude", "__strapd.seq === 0");
         assert!(daemon.stop());
         browser.until("it says so", "__strapd.state !== 'open' && document.querySelector('[data-testid=connection]').textContent.includes('connection lost')");
@@ -180,7 +184,8 @@ fn it_connects_again_soon_after_the_daemon_is_back() {
         browser.number("document.querySelectorAll('[data-testid=sensor]').length"),
         1.0
     );
-    Client::tcp(tcp).send(&rate("imu0", 5, 0.1));
+    let mut sender = Client::tcp(tcp);
+    sender.send(&rate("imu0", 5, 0.1));
     browser.until(
         "the new one's attitudes",
         "__strapd.seq === 0 && __strapd.sensors.imu0.points === 1",
@@ -188,6 +193,7 @@ fn it_connects_again_soon_after_the_daemon_is_back() {
 }
 
 #[test]
+#[cfg_attr(not(has_chromium), ignore = "needs chromium")]
 fn what_the_page_was_too_slow_for_is_said() {
     let Some(mut browser) = Browser::start() else {
         return;
@@ -195,19 +201,26 @@ fn what_the_page_was_too_slow_for_is_said() {
     let daemon = Daemon::start(listening(&[TCP, WS]));
     browser.go(daemon.address(1), "/?rate_hz=100000");
     browser.until_open();
-    // Nobody reads while this runs.
-    browser.eval(
-        "setTimeout(() => { const until = Date.now() + 4000; while (Date.now() < until); }, 50)",
-    );
-    std::thread::sleep(Duration::from_millis(200));
+    let is_too_slow = || {
+        let status = daemon.status();
+        let mut clients = status["clients"].as_array().unwrap().iter();
+        clients.any(|client| client["dropped"].as_u64() > Some(0))
+    };
     let mut sender = Client::tcp(daemon.address(0));
     let mut n = 0;
-    let since = Instant::now();
-    while since.elapsed() < Duration::from_secs(3) {
-        let lines: Vec<String> = (n..n + 2000).map(|n| rate("imu0", n, 0.1)).collect();
-        sender.send(&lines.join("\n"));
-        n += 2000;
-    }
+    eventually("the page to be too slow", || {
+        // Nobody reads while this runs.
+        browser.eval(
+            "setTimeout(() => { const until = Date.now() + 4000; while (Date.now() < until); }, 0)",
+        );
+        let since = Instant::now();
+        while !is_too_slow() && since.elapsed() < Duration::from_secs(4) {
+            let lines: Vec<String> = (n..n + 2000).map(|n| rate("imu0", n, 0.1)).collect();
+            sender.send(&lines.join("\n"));
+            n += 2000;
+        }
+        is_too_slow()
+    });
     browser.until("it is said", "__strapd.dropped > 0 && /dropped/.test(document.querySelector('[data-testid=notice]').textContent)");
     browser.is_unharmed();
 }

@@ -232,6 +232,7 @@ fn packed_or_as_lines_in_or_out_the_attitudes_are_the_same_to_the_bit_over_every
                 "udp" => Client::udp(daemon.address(1)),
                 _ => client(),
             };
+            // Over UDP no answer tells when a datagram was taken: all of them fit a socket's buffer.
             for some in samples.chunks(piece) {
                 if packs {
                     // Bound anew with every piece: a datagram before it may be lost.
@@ -242,10 +243,6 @@ fn packed_or_as_lines_in_or_out_the_attitudes_are_the_same_to_the_bit_over_every
                 } else {
                     let text: String = some.iter().map(|s| s.line(head, gyro)).collect();
                     sender.send_bytes(text.as_bytes());
-                }
-                if way == "udp" {
-                    // No answer tells when one was taken.
-                    std::thread::sleep(std::time::Duration::from_millis(2));
                 }
             }
             eventually(
