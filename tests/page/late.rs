@@ -43,10 +43,7 @@ fn a_sensor_that_has_ended_is_shown_as_it_was_last_and_one_without_an_attitude_w
     );
     assert_eq!(browser.eval("__strapd.sensors.ended.points"), 1);
 
-    browser.until(
-        "STATUS tells of the other",
-        &format!("{}", of("mute", "seq")),
-    );
+    browser.until("STATUS tells of the other", &of("mute", "seq").to_string());
     browser.until(
         "nothing is known of it",
         "!document.querySelector('[data-id=mute] [data-part=empty]').hidden",

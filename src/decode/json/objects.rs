@@ -146,7 +146,9 @@ fn within(why: Undecodable, start: usize) -> Undecodable {
 mod tests {
     use super::*;
 
-    fn of(objects: Objects<'_>) -> Vec<Result<(u64, &str), (u64, Undecodable)>> {
+    type Numbered<'a> = Result<(u64, &'a str), (u64, Undecodable)>;
+
+    fn of(objects: Objects<'_>) -> Vec<Numbered<'_>> {
         objects
             .map(|item| {
                 item.map(|object| {
