@@ -142,10 +142,14 @@ fn only_of_sensors_that_are_watched_and_were_not_before_and_not_where_it_is_not_
 fn a_thousand_last_attitudes_are_more_than_may_wait_and_all_come() {
     let daemon = Daemon::tcp();
     let sensors = 1000;
-    let mut senders: Vec<Client> = (0..5)
+    // Two peers: one may send half of them.
+    let mut senders: Vec<Client> = (0..4)
         .map(|part| {
-            let mut sender = Client::tcp(daemon.address(0));
-            let lines: Vec<String> = (0..sensors / 5)
+            let mut sender = match part % 2 {
+                0 => Client::tcp(daemon.address(0)),
+                _ => Client::from_another(daemon.address(0)),
+            };
+            let lines: Vec<String> = (0..sensors / 4)
                 .map(|n| rate(&format!("gyro{part}-{n}"), 0, 0.5))
                 .collect();
             sender.send(&lines.join("\n"));
@@ -158,7 +162,7 @@ fn a_thousand_last_attitudes_are_more_than_may_wait_and_all_come() {
     let mut late = Client::tcp(daemon.address(0)).watching(WATCH);
     // Newer ones of each, all at once, before this client has read anything.
     for (part, sender) in senders.iter_mut().enumerate() {
-        let lines: Vec<String> = (0..sensors / 5)
+        let lines: Vec<String> = (0..sensors / 4)
             .map(|n| rate(&format!("gyro{part}-{n}"), 1, 0.5))
             .collect();
         sender.send(&lines.join("\n"));
