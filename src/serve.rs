@@ -15,7 +15,8 @@
 //! | [`subscriber`] | attitudes -> what one client gets, bounded | locks |
 //! | [`recorder`] | what goes through -> MCAP files that survive a crash | a queue; I/O on threads of its own |
 //! | [`state`] | attitudes <-> the file a restarted daemon goes on from | I/O |
-//! | [`limits`], [`admission`], [`peer`] | every bound; who may come in, and from where | pure |
+//! | [`limits`], [`admission`], [`peer`], `strangers` | every bound; who may come in, and from where; who shows wrong tokens | pure |
+//! | [`places`] | which connection has a place, and who gives it up | locks |
 //! | [`foxglove`], [`viewer`] | the same for Foxglove's viewers: messages in place of lines | pure; sans-I/O |
 //! | `page`, `top` | what a browser gets | pure |
 //! | [`listen`], `http`, `samples` | sockets others come to; samples by `POST` | I/O |
@@ -37,6 +38,7 @@ pub mod limits;
 pub mod listen;
 mod page;
 pub mod peer;
+pub mod places;
 pub mod playback;
 mod quiet;
 pub mod recorder;
@@ -45,6 +47,7 @@ pub mod session;
 pub mod shutdown;
 pub mod source;
 pub mod state;
+mod strangers;
 pub mod stream;
 pub mod subscriber;
 mod top;
@@ -60,13 +63,13 @@ use admission::{Token, Web, is_loopback};
 use hub::Hub;
 use limits::Limits;
 use listen::{Context, Listener};
+use places::Places;
 use shutdown::Shutdown;
 use source::Source;
 use std::collections::BTreeMap;
 use std::future::Future;
 use std::sync::Arc;
 use std::time::Duration;
-use tokio::sync::Semaphore;
 
 /// What a daemon is to do.
 #[derive(Debug, Default)]
@@ -181,7 +184,7 @@ impl Server {
     /// no longer than [`Limits::drain`]. Says whether everything ended in that time.
     pub async fn run(self, stop: impl Future<Output = ()>) -> bool {
         let shutdown = Shutdown::default();
-        let places = Arc::new(Semaphore::new(self.hub.limits().connections));
+        let places = Arc::new(Places::new(*self.hub.limits()));
         let context = || Context {
             hub: self.hub.clone(),
             web: self.web.clone(),

@@ -36,6 +36,7 @@ mod serve {
     mod slow_readers;
     mod state;
     mod storms;
+    mod strangers;
     mod transports;
     mod watch;
 }

@@ -3,7 +3,7 @@
 //! A gyro stream looks harmless, but a page in any browser can reach loopback: so names and
 //! origins are checked, and beyond loopback a token is needed.
 
-use super::limits::Allowance;
+use super::strangers::Strangers;
 use super::wire::Fault;
 use crate::client::secret::Secret;
 use crate::error::Result;
@@ -11,16 +11,13 @@ use sha2::{Digest, Sha256};
 use std::net::IpAddr;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 use subtle::ConstantTimeEq;
-
-/// Wrong tokens a second, over all clients.
-const FAILURES_PER_SECOND: u32 = 5;
 
 /// The token clients must show. Only its hash is kept.
 pub struct Token {
     hash: [u8; 32],
-    failures: Mutex<Allowance>,
+    strangers: Mutex<Strangers>,
 }
 
 impl std::fmt::Debug for Token {
@@ -35,7 +32,7 @@ impl Token {
     pub fn new(token: &str) -> Token {
         Token {
             hash: Sha256::digest(token.as_bytes()).into(),
-            failures: Mutex::new(Allowance::new(FAILURES_PER_SECOND)),
+            strangers: Mutex::default(),
         }
     }
 
@@ -47,30 +44,39 @@ impl Token {
         Secret::read("--token-file", path).map(|secret| Token::new(secret.reveal()))
     }
 
-    /// Whether this is it. The time taken does not depend on what is right of it, and only so many
-    /// wrong ones are judged a second.
+    /// Whether this is it, shown by somebody at `from`. The time taken does not depend on what is right of
+    /// it.
     ///
     /// # Errors
-    /// The fault to answer with.
-    pub fn judge(&self, shown: &str, now: Instant) -> std::result::Result<(), Fault> {
+    /// What to answer with, and how long to wait before.
+    pub fn judge(
+        &self,
+        shown: &str,
+        from: IpAddr,
+        now: Instant,
+    ) -> std::result::Result<(), Denied> {
         let hash: [u8; 32] = Sha256::digest(shown.as_bytes()).into();
-        let right = bool::from(hash.ct_eq(&self.hash));
-        // A right one among many wrong ones must wait, too: else the answer would tell.
-        let mut failures = self.failures.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut after = *failures;
-        if after.take(now).is_none() {
-            *failures = after;
-            return Err(Fault::new(
-                "too_many_attempts",
-                "too many wrong tokens in the last second; try again",
-            ));
-        }
-        if right {
+        if bool::from(hash.ct_eq(&self.hash)) {
             return Ok(());
         }
-        *failures = after;
-        Err(Fault::new("unauthorised", "the token is wrong"))
+        let mut strangers = self
+            .strangers
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        Err(Denied {
+            fault: Fault::new("unauthorised", "the token is wrong"),
+            delay: strangers.failed(from, now),
+        })
     }
+}
+
+/// The answer to a wrong token.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Denied {
+    /// What is said.
+    pub fault: Fault,
+    /// How long it is held back, so that nobody tries fast.
+    pub delay: Duration,
 }
 
 /// Whether an address is reached from this machine alone.

@@ -2,8 +2,9 @@
 
 use super::admission::Foreign;
 use super::foxglove::SUBPROTOCOLS;
-use super::hub::Hub;
+use super::hub::{Hub, count};
 use super::listen::{Connection, websocket};
+use super::places::Kind;
 use super::{page, quiet, samples, top};
 use crate::decode::printable;
 use crate::record::Verdict;
@@ -66,14 +67,27 @@ async fn upgrade(
             // Its first message can show no token.
             unauthorised()
         }
-        Ok(upgrade) => upgrade
-            .protocols(spoken)
-            .max_message_size(websocket::MAX_MESSAGE)
-            .max_frame_size(websocket::MAX_MESSAGE)
-            .read_buffer_size(websocket::READ_BUFFER)
-            .write_buffer_size(websocket::WRITE_BUFFER)
-            .max_write_buffer_size(websocket::MAX_WRITE_BUFFER)
-            .on_upgrade(move |socket| websocket::converse(socket, connection, foxglove)),
+        Ok(upgrade) => {
+            // From now on it converses, and needs another place.
+            let is_known = connection.trusted || connection.hub.token().is_none();
+            let kind = if is_known {
+                Kind::Served
+            } else {
+                Kind::Unproven
+            };
+            if let Err(fault) = connection.place.become_of(kind, connection.trusted) {
+                count(&connection.hub.counters.refused, 1);
+                return refusal(StatusCode::SERVICE_UNAVAILABLE, fault.code, &fault.message);
+            }
+            upgrade
+                .protocols(spoken)
+                .max_message_size(websocket::MAX_MESSAGE)
+                .max_frame_size(websocket::MAX_MESSAGE)
+                .read_buffer_size(websocket::READ_BUFFER)
+                .write_buffer_size(websocket::WRITE_BUFFER)
+                .max_write_buffer_size(websocket::MAX_WRITE_BUFFER)
+                .on_upgrade(move |socket| websocket::converse(socket, connection, foxglove))
+        }
         Err(_) => refusal(
             StatusCode::UPGRADE_REQUIRED,
             "upgrade_required",
@@ -165,18 +179,24 @@ fn exposition(hub: &Hub) -> String {
             "# HELP strapd_{name} {help}\n# TYPE strapd_{name} {kind}\n"
         );
     };
-    family(&mut out, "uptime_seconds", "gauge", "Since the start.");
+    family(
+        &mut out,
+        "uptime_seconds",
+        "gauge",
+        "Seconds since the start.",
+    );
     let _ = writeln!(out, "strapd_uptime_seconds {}", hub.uptime_secs());
-    family(&mut out, "connections", "gauge", "Clients connected.");
+    family(
+        &mut out,
+        "connections",
+        "gauge",
+        "Who converses now: connections but those of plain HTTP, senders of datagrams, addresses that post, and whom the daemon connects to.",
+    );
     let _ = writeln!(out, "strapd_connections {}", hub.connected());
-    for (name, value) in hub.counters.named() {
-        family(
-            &mut out,
-            &format!("{name}_total"),
-            "counter",
-            "Since the start.",
-        );
-        let _ = writeln!(out, "strapd_{name}_total {value}");
+    for counter in hub.counters.named() {
+        let name = format!("{}_total", counter.name);
+        family(&mut out, &name, "counter", counter.counts);
+        let _ = writeln!(out, "strapd_{name} {}", counter.value);
     }
     let (mut queued, mut dropped) = (0, 0);
     hub.each_client(|client| {
@@ -188,21 +208,21 @@ fn exposition(hub: &Hub) -> String {
         &mut out,
         "queued_bytes",
         "gauge",
-        "Attitudes waiting for clients.",
+        "Bytes of attitudes and samples waiting for those connected now, or being written to them.",
     );
     let _ = writeln!(out, "strapd_queued_bytes {queued}");
     family(
         &mut out,
         "dropped_attitudes",
         "gauge",
-        "Attitudes the clients now connected were too slow for.",
+        "Attitudes that those connected now were too slow for; less again when one of them goes.",
     );
     let _ = writeln!(out, "strapd_dropped_attitudes {dropped}");
     family(
         &mut out,
         "sensor_samples_total",
         "counter",
-        "Samples by sensor and verdict.",
+        "Samples by sensor and verdict; a line that could not be read counts for the sensor sent before it.",
     );
     hub.each_sensor(|sensor| {
         let id = label(sensor.id());
@@ -217,7 +237,12 @@ fn exposition(hub: &Hub) -> String {
             }
         }
     });
-    family(&mut out, "sensor_gaps_total", "counter", "Gaps by sensor.");
+    family(
+        &mut out,
+        "sensor_gaps_total",
+        "counter",
+        "Gaps by sensor, bridged ones and jumps of the clock among them.",
+    );
     hub.each_sensor(|sensor| {
         let n = sensor.conditioning().gaps.count;
         let _ = writeln!(

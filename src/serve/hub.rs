@@ -13,7 +13,7 @@ mod report;
 mod room;
 mod telling;
 
-pub use counters::{Counters, count};
+pub use counters::{Counter, Counters, count};
 use places::Absent;
 use polling::Polling;
 use report::StateStatus;

@@ -5,8 +5,12 @@ use std::time::{Duration, Instant};
 /// The bounds. The defaults are those of the documentation; tests shorten the times.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
-    /// Most connections at once, over all listeners.
+    /// Most connections at once, over all listeners, of those who converse.
     pub connections: usize,
+    /// Most connections of plain HTTP beside them.
+    pub http: usize,
+    /// Most connections that have not shown the token that is asked for, beside them.
+    pub unproven: usize,
     /// Most sensors (`--max-sensors`).
     pub sensors: usize,
     /// Most sensors of one connection.
@@ -33,6 +37,8 @@ impl Default for Limits {
     fn default() -> Limits {
         Limits {
             connections: 256,
+            http: 64,
+            unproven: 256,
             sensors: 1024,
             sensors_of_client: 256,
             errors_in_a_row: 20,

@@ -3,6 +3,7 @@
 //! One file per transport; the conversation is the same over all ([`super::session`]).
 
 mod duplex;
+mod stalling;
 mod stdin;
 pub(crate) mod tcp;
 mod udp;
@@ -16,9 +17,10 @@ mod unix;
 use super::admission::Web;
 use super::hub::{Hub, count};
 use super::limits::Backoff;
+use super::places::{Kind, Place, Places};
 use super::session::Scratch;
 use super::shutdown::Running;
-use super::wire::{self, Fault};
+use super::wire;
 use crate::client::link;
 use crate::error::{Error, Result};
 use crate::record::Nanos;
@@ -29,7 +31,6 @@ use std::future::Future;
 use std::io;
 use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 #[cfg(unix)]
 pub use passed::Passed;
@@ -65,8 +66,8 @@ pub struct Context {
     pub hub: Arc<Hub>,
     /// Who may connect over HTTP.
     pub web: Arc<Web>,
-    /// A permit for each connection.
-    pub places: Arc<Semaphore>,
+    /// A place for each connection.
+    pub places: Arc<Places>,
     /// Lives as long as the task.
     pub running: Running,
 }
@@ -158,13 +159,15 @@ impl Listener {
     }
 }
 
-/// Accepts until the daemon ends. A connection that finds no place is handed to `refuse`. An accept
-/// that fails (too many open files, mostly) is tried again, ever more slowly.
+/// Accepts until the daemon ends; who comes is of this kind at first. A connection that finds no place is
+/// handed to `refuse`, with what to say. An accept that fails (too many open files, mostly) is tried again,
+/// ever more slowly.
 async fn accept<S, A: Future<Output = io::Result<S>>>(
     context: Context,
+    kind: Kind,
     mut next: impl FnMut() -> A,
-    mut serve: impl FnMut(S, Context, OwnedSemaphorePermit),
-    mut refuse: impl FnMut(S, Context),
+    mut serve: impl FnMut(S, Context, Place),
+    mut refuse: impl FnMut(S, Context, Bytes),
 ) {
     let mut backoff = Backoff::default();
     let mut running = context.running.clone();
@@ -176,12 +179,13 @@ async fn accept<S, A: Future<Output = io::Result<S>>>(
         match accepted {
             Ok(stream) => {
                 backoff.worked();
-                if let Ok(place) = context.places.clone().try_acquire_owned() {
+                if let Some(place) = context.places.take(kind) {
                     count(&context.hub.counters.accepted, 1);
                     serve(stream, context.clone(), place);
                 } else {
                     count(&context.hub.counters.refused, 1);
-                    refuse(stream, context.clone());
+                    let words = wire::error(&context.places.refusal(kind), 0, &[], 0);
+                    refuse(stream, context.clone(), words);
                 }
             }
             Err(why) => {
@@ -207,16 +211,12 @@ fn prepare(stream: &tokio::net::TcpStream) {
     let _ = socket2::SockRef::from(stream).set_send_buffer_size(SEND_BUFFER);
 }
 
-/// What a client without a place is told.
-fn too_many_clients(hub: &Hub) -> Bytes {
-    let fault = Fault::new(
-        "too_many_clients",
-        format!(
-            "{} connections are served already",
-            hub.limits().connections
-        ),
-    );
-    wire::error(&fault, 0, &[], 0)
+/// Of what kind a connection of lines is before it has said anything.
+fn unheard(hub: &Hub) -> Kind {
+    match hub.token() {
+        None => Kind::Served,
+        Some(_) => Kind::Unproven,
+    }
 }
 
 /// Now, as the log time of what was just received.

@@ -1,7 +1,7 @@
 //! Who is at the other end. Pure.
 
 use std::fmt;
-use std::net::{IpAddr, SocketAddr};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 
 /// Who is at the other end of a connection.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -30,6 +30,15 @@ impl Peer {
         Peer {
             name: format!("{transport}://{address}"),
             origin: Origin::Address(address.ip().to_canonical()),
+        }
+    }
+
+    /// Its address; of those on this machine without one, the unspecified one.
+    #[must_use]
+    pub fn address(&self) -> IpAddr {
+        match self.origin {
+            Origin::Address(ip) => ip,
+            Origin::User(_) | Origin::Own => Ipv4Addr::UNSPECIFIED.into(),
         }
     }
 

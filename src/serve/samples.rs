@@ -115,7 +115,6 @@ pub(super) async fn post(
         );
     }
     if hub.token().is_some() && !connection.trusted {
-        count(&hub.counters.refused, 1);
         return unauthorised();
     }
     let name = match asked {

@@ -19,10 +19,11 @@ use super::wire::{self, Fault, Message};
 use crate::decode::framing::Framer;
 use crate::decode::{Bare, Line, LineDecoder};
 use crate::record::{Nanos, RawSample};
+use bytes::Bytes;
 use opening::Opening;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 use turn::{Held, Step};
 
 /// Errors said at once before they are thinned.
@@ -171,6 +172,8 @@ pub struct Session {
     step: Step,
     /// What waits for the next step.
     held: Option<Held>,
+    /// What it is told at the end, after a while.
+    last_words: Option<(Duration, Bytes)>,
     end: Option<End>,
 }
 
@@ -210,6 +213,7 @@ impl Session {
             last: None,
             step: Step::default(),
             held: None,
+            last_words: None,
             end: None,
         }
     }
@@ -224,6 +228,17 @@ impl Session {
     #[must_use]
     pub fn hub(&self) -> &Arc<Hub> {
         &self.hub
+    }
+
+    /// Whether it has shown the token, or need not.
+    #[must_use]
+    pub fn is_authorised(&self) -> bool {
+        self.authorised
+    }
+
+    /// What is still to be said to it, and how long to wait before.
+    pub fn last_words(&mut self) -> Option<(Duration, Bytes)> {
+        self.last_words.take()
     }
 
     /// Whether a first line has come.
@@ -428,15 +443,22 @@ impl Session {
     fn authorise(&mut self, token: &str, number: u64) {
         self.errors_in_a_row = 0;
         match self.hub.token() {
-            Some(expected) if !self.authorised => match expected.judge(token, Instant::now()) {
-                Ok(()) => {
-                    self.authorised = true;
-                    if let Some(place) = self.hub.place() {
-                        self.client.outbox.reply(place);
+            Some(expected) if !self.authorised => {
+                match expected.judge(token, self.client.peer.address(), Instant::now()) {
+                    Ok(()) => {
+                        self.authorised = true;
+                        if let Some(place) = self.hub.place() {
+                            self.client.outbox.reply(place);
+                        }
+                    }
+                    Err(denied) => {
+                        count(&self.hub.counters.faults, 1);
+                        let words = wire::error(&denied.fault, number, &[], 0);
+                        self.last_words = Some((denied.delay, words));
+                        self.end = Some(End::Unauthorised);
                     }
                 }
-                Err(fault) => self.refuse(&fault, number),
-            },
+            }
             _ => {}
         }
     }

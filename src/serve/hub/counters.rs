@@ -32,25 +32,88 @@ pub struct Counters {
 }
 
 impl Counters {
-    /// Name and value of each, in a fixed order.
+    /// Each, in a fixed order.
     #[must_use]
-    pub fn named(&self) -> [(&'static str, u64); 12] {
-        let of = |n: &AtomicU64| n.load(Ordering::Relaxed);
+    pub fn named(&self) -> [Counter; 12] {
+        let counter = |name, counts, n: &AtomicU64| Counter {
+            name,
+            counts,
+            value: n.load(Ordering::Relaxed),
+        };
         [
-            ("connections_accepted", of(&self.accepted)),
-            ("connections_refused", of(&self.refused)),
-            ("accept_failures", of(&self.accept_failures)),
-            ("connections_closed", of(&self.closed)),
-            ("lines", of(&self.lines)),
-            ("bytes_in", of(&self.bytes_in)),
-            ("bytes_out", of(&self.bytes_out)),
-            ("faults", of(&self.faults)),
-            ("samples", of(&self.samples)),
-            ("samples_refused", of(&self.refused_samples)),
-            ("sensors_gave_way", of(&self.gave_way)),
-            ("attitudes", of(&self.attitudes)),
+            counter(
+                "connections_accepted",
+                "Connections that got a place, those of plain HTTP among them.",
+                &self.accepted,
+            ),
+            counter(
+                "connections_refused",
+                "Connections and requests turned away: no place, a foreign Host or Origin, a post from a page, a wrong token; and datagrams of more senders than may be.",
+                &self.refused,
+            ),
+            counter(
+                "accept_failures",
+                "Attempts to accept a connection that failed, mostly for want of open files.",
+                &self.accept_failures,
+            ),
+            counter(
+                "connections_closed",
+                "Connections, but none of plain HTTP, that the daemon closed for what they did or did not do.",
+                &self.closed,
+            ),
+            counter(
+                "lines",
+                "Lines, packed objects, posted objects and viewers' messages received, blank and bad ones among them.",
+                &self.lines,
+            ),
+            counter(
+                "bytes_in",
+                "Bytes of lines, datagrams, messages and posted objects received.",
+                &self.bytes_in,
+            ),
+            counter(
+                "bytes_out",
+                "Bytes of lines, datagrams and messages sent; no answers to plain HTTP.",
+                &self.bytes_out,
+            ),
+            counter(
+                "faults",
+                "Errors, said or thinned out: of lines and objects, of what was asked for, and the first of each kind of every sensor's samples.",
+                &self.faults,
+            ),
+            counter(
+                "samples",
+                "Samples given to the estimators, which may have rejected some: see sensor_samples_total.",
+                &self.samples,
+            ),
+            counter(
+                "samples_refused",
+                "Samples no estimator was given: of another's sensor, of one too many, with another meaning than before, or where none are taken.",
+                &self.refused_samples,
+            ),
+            counter(
+                "sensors_gave_way",
+                "Sensors that nobody sent and whose place another took; they go on from there when they come back.",
+                &self.gave_way,
+            ),
+            counter(
+                "attitudes",
+                "Attitudes made, watched or not.",
+                &self.attitudes,
+            ),
         ]
     }
+}
+
+/// A total as it is told.
+#[derive(Clone, Copy, Debug)]
+pub struct Counter {
+    /// Its name.
+    pub name: &'static str,
+    /// What is counted, in a sentence.
+    pub counts: &'static str,
+    /// How many.
+    pub value: u64,
 }
 
 /// Adds to a counter.

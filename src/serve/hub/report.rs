@@ -44,6 +44,7 @@ impl Hub {
         let counters: serde_json::Map<_, _> = self
             .counters
             .named()
+            .map(|counter| (counter.name, counter.value))
             .into_iter()
             .chain([("unrecorded", recording.as_ref().map_or(0, |r| r.unrecorded))])
             .map(|(name, value)| (name.to_owned(), value.into()))

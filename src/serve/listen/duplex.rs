@@ -6,6 +6,7 @@
 use super::{Context, in_room, now};
 use crate::serve::hub::{Flood, count};
 use crate::serve::peer::Peer;
+use crate::serve::places::{Kind, Place};
 use crate::serve::session::Session;
 use crate::serve::shutdown::Running;
 use crate::serve::subscriber::Outbox;
@@ -16,7 +17,7 @@ use std::future::{Future, ready};
 use std::io::{self, IoSlice};
 use std::time::Duration;
 use tokio::task::yield_now;
-use tokio::time::{Instant, MissedTickBehavior, interval, timeout};
+use tokio::time::{Instant, MissedTickBehavior, interval, sleep, timeout};
 
 /// A stream socket of tokio.
 pub(super) trait Duplex: Send + Sync + 'static {
@@ -45,6 +46,9 @@ const LINGER: Duration = Duration::from_millis(250);
 const SETTLE: Duration = Duration::from_millis(20);
 /// Bytes read from a client at the end of the daemon: more than a socket's buffer holds.
 const LAST_READ: usize = 16 << 20;
+
+/// Why one was ended whose place another needed.
+const MADE_ROOM: &str = "others needed its place";
 
 /// What is on its way to one client.
 #[derive(Debug, Default)]
@@ -95,13 +99,14 @@ impl Pending {
 }
 
 /// Serves one client to the end of its conversation.
-pub(super) async fn converse(io: impl Duplex, peer: Peer, context: Context) {
+pub(super) async fn converse(io: impl Duplex, peer: Peer, context: Context, place: Place) {
     let Context {
         hub, mut running, ..
     } = context;
     let mut session = Session::new(&hub, peer, false);
     let client = session.client().clone();
-    let reason = talk(&io, &mut session, &mut running).await;
+    place.serves(&client);
+    let reason = talk(&io, &mut session, &mut running, &place).await;
     // What it sent is no longer its own; only its last words are still to be said.
     drop(session);
     if let Some(reason) = reason {
@@ -115,6 +120,7 @@ async fn talk(
     io: &impl Duplex,
     session: &mut Session,
     running: &mut Running,
+    place: &Place,
 ) -> Option<&'static str> {
     let client = session.client().clone();
     let hub = session.hub().clone();
@@ -128,6 +134,7 @@ async fn talk(
     let mut has_ended = false;
     let mut flood = Flood::default();
     let mut closing = None;
+    let mut has_place = session.is_authorised();
     // What is still read of it at the end of the daemon.
     let mut last_read: Option<usize> = None;
     let mut tick = interval(limits.tick());
@@ -139,6 +146,22 @@ async fn talk(
             reading = false;
             closing = Some(Some(end.reason()));
             end.warn_of(&client.peer.name);
+            if let Some((delay, words)) = session.last_words() {
+                tokio::select! {
+                    () = sleep(delay) => {}
+                    () = place.lost() => return Some(MADE_ROOM),
+                    () = running.asked() => {}
+                }
+                outbox.reply(words);
+            }
+        }
+        if session.is_authorised() && !has_place && closing.is_none() {
+            has_place = true;
+            if let Err(fault) = place.become_of(Kind::Served, true) {
+                outbox.reply(wire::error(&fault, 0, &[], 0));
+                reading = false;
+                closing = Some(Some("there is no place for it"));
+            }
         }
         let held = session.is_held();
         // Whoever sent a request and nothing more still wants the answers.
@@ -208,7 +231,7 @@ async fn talk(
                         has_ended = true;
                         in_room(|_, scratch| session.finish(now(), scratch));
                     }
-                    Ok(_) => {}
+                    Ok(_) => place.heard(),
                     Err(e) if e.kind() == io::ErrorKind::WouldBlock => {}
                     Err(_) => return None,
                 }
@@ -240,6 +263,14 @@ async fn talk(
             }
             () = outbox.filled(), if !blocked && !hurry => {}
             () = yield_now(), if hurry => {}
+            () = place.lost() => {
+                outbox.reply(wire::error(&place.made_room(), 0, &[], 0));
+                if pending.fill(outbox) {
+                    // What has no room now comes too late.
+                    let _ = pending.write(io);
+                }
+                return Some(MADE_ROOM);
+            }
             _ = tick.tick() => {
                 if blocked && progress.elapsed() >= limits.no_progress {
                     return Some("it took nothing for too long");
@@ -289,21 +320,12 @@ async fn linger(io: &impl Duplex) {
 }
 
 /// A client of an accepted stream, as a task.
-pub(super) fn spawn<D: Duplex>(
-    io: D,
-    peer: Peer,
-    context: Context,
-    place: tokio::sync::OwnedSemaphorePermit,
-) {
-    tokio::spawn(async move {
-        converse(io, peer, context).await;
-        drop(place);
-    });
+pub(super) fn spawn<D: Duplex>(io: D, peer: Peer, context: Context, place: Place) {
+    tokio::spawn(converse(io, peer, context, place));
 }
 
 /// As [`spawn`] for one without a place.
-pub(super) fn spawn_dismissal<D: Duplex>(io: D, context: &Context) {
-    let words = super::too_many_clients(&context.hub);
+pub(super) fn spawn_dismissal<D: Duplex>(io: D, context: &Context, words: Bytes) {
     let running = context.running.clone();
     tokio::spawn(async move {
         dismiss(io, words).await;

@@ -1,7 +1,7 @@
 //! TCP -> sessions. I/O.
 
 use super::duplex::{self, Duplex};
-use super::{Context, accept, prepare};
+use super::{Context, accept, prepare, unheard};
 use crate::serve::peer::Peer;
 use std::future::Future;
 use std::io::{self, IoSlice};
@@ -26,14 +26,16 @@ impl Duplex for TcpStream {
 }
 
 pub(super) async fn serve(listener: TcpListener, context: Context) {
+    let kind = unheard(&context.hub);
     accept(
         context,
+        kind,
         || listener.accept(),
         |(stream, peer), context, place| {
             prepare(&stream);
             duplex::spawn(stream, Peer::at("tcp", peer), context, place);
         },
-        |(stream, _), context| duplex::spawn_dismissal(stream, &context),
+        |(stream, _), context, words| duplex::spawn_dismissal(stream, &context, words),
     )
     .await;
 }

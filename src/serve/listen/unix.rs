@@ -1,7 +1,7 @@
 //! Unix socket -> sessions. I/O.
 
 use super::duplex::{self, Duplex};
-use super::{Context, accept};
+use super::{Context, accept, unheard};
 use crate::serve::peer::Peer;
 use std::future::Future;
 use std::io::{self, IoSlice};
@@ -81,15 +81,17 @@ impl Duplex for UnixStream {
 
 pub(super) async fn serve(bound: Bound, context: Context) {
     let name = format!("unix://{}", bound.path.display());
+    let kind = unheard(&context.hub);
     accept(
         context,
+        kind,
         || bound.listener.accept(),
         |(stream, _), context, place| {
             // One whose user can not be told shares with all such.
             let user = stream.peer_cred().map_or(u32::MAX, |who| who.uid());
             duplex::spawn(stream, Peer::user(name.clone(), user), context, place);
         },
-        |(stream, _), context| duplex::spawn_dismissal(stream, &context),
+        |(stream, _), context, words| duplex::spawn_dismissal(stream, &context, words),
     )
     .await;
 }

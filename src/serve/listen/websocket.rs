@@ -3,17 +3,20 @@
 //! One message is one line or several; every answer and attitude is a message of its own, so that a
 //! page can hand it to `JSON.parse` as it is. Packed objects go in binary messages, one or more in each.
 
-use super::{Context, accept, in_room, now, prepare, too_many_clients};
+use super::stalling::Stalling;
+use super::{Context, accept, in_room, now, prepare};
 use crate::decode::packed;
-use crate::serve::admission::Web;
+use crate::serve::admission::{Denied, Web};
 use crate::serve::foxglove::{self, Framed};
 use crate::serve::http;
 use crate::serve::hub::{Client, Flood, Hub, count};
 use crate::serve::peer::Peer;
+use crate::serve::places::{Kind, Place};
 use crate::serve::samples::Posters;
 use crate::serve::session::Session;
 use crate::serve::shutdown::Running;
 use crate::serve::viewer::Viewer;
+use crate::serve::wire;
 use axum::body::Body;
 use axum::extract::ws::{Message, Utf8Bytes, WebSocket};
 use axum::http::{Request, Response, StatusCode, header};
@@ -29,10 +32,10 @@ use std::pin::{Pin, pin};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::task::Poll;
+use std::time::Duration;
 use tokio::net::TcpListener;
-use tokio::sync::OwnedSemaphorePermit;
 use tokio::task::yield_now;
-use tokio::time::{Instant, MissedTickBehavior, interval_at, timeout};
+use tokio::time::{Instant, MissedTickBehavior, interval_at, sleep, timeout};
 
 /// Longest message that is read: a line that is too long is still answered, up to here.
 pub(crate) const MAX_MESSAGE: usize = 128 << 10;
@@ -42,6 +45,8 @@ pub(crate) const READ_BUFFER: usize = 4 << 10;
 pub(crate) const WRITE_BUFFER: usize = 16 << 10;
 /// Most bytes waiting for one write.
 pub(crate) const MAX_WRITE_BUFFER: usize = 512 << 10;
+/// How long somebody who lost its place may take to hear it.
+const LAST_WORDS: Duration = Duration::from_millis(250);
 /// Attitudes taken from the outbox at once.
 const TAKE: usize = 64 << 10;
 
@@ -57,7 +62,7 @@ pub(crate) struct Connection {
     pub(crate) trusted: bool,
     pub(crate) running: Running,
     /// Held as long as the connection, or the WebSocket it becomes, lives.
-    pub(crate) _place: Arc<OwnedSemaphorePermit>,
+    pub(crate) place: Arc<Place>,
 }
 
 pub(super) async fn serve(listener: TcpListener, context: Context) {
@@ -68,9 +73,13 @@ pub(super) async fn serve(listener: TcpListener, context: Context) {
         .map_or(IpAddr::from([127, 0, 0, 1]), |a| a.ip());
     accept(
         context,
+        Kind::Http,
         || listener.accept(),
         |(stream, peer), context, place| {
             prepare(&stream);
+            let place = Arc::new(place);
+            let limits = *context.hub.limits();
+            let stream = Stalling::new(stream, limits.no_progress, place.clone());
             let connection = Connection {
                 hub: context.hub.clone(),
                 peer: Peer::at("ws", peer),
@@ -78,19 +87,18 @@ pub(super) async fn serve(listener: TcpListener, context: Context) {
                 posters: posters.clone(),
                 trusted: false,
                 running: context.running.clone(),
-                _place: Arc::new(place),
+                place: place.clone(),
             };
             let (router, web) = (router.clone(), context.web.clone());
             let service = hyper::service::service_fn(move |request: Request<Incoming>| {
                 answer(request, router.clone(), web.clone(), bound, connection.clone())
             });
-            let first_line = context.hub.limits().first_line;
             let mut running = context.running.clone();
             tokio::spawn(async move {
                 let mut serving = pin!(
                     hyper::server::conn::http1::Builder::new()
                         .timer(TokioTimer::new())
-                        .header_read_timeout(first_line)
+                        .header_read_timeout(limits.first_line)
                         .max_buf_size(MAX_MESSAGE)
                         .serve_connection(TokioIo::new(stream), service)
                         .with_upgrades()
@@ -98,6 +106,8 @@ pub(super) async fn serve(listener: TcpListener, context: Context) {
                 // What the peer does wrong is its own loss.
                 tokio::select! {
                     _ = serving.as_mut() => {}
+                    // Nobody waits for an answer any more, or takes it.
+                    () = place.lost() => {}
                     () = running.asked() => {
                         serving.as_mut().graceful_shutdown();
                         let _ = serving.await;
@@ -105,8 +115,7 @@ pub(super) async fn serve(listener: TcpListener, context: Context) {
                 }
             });
         },
-        |(stream, _), context| {
-            let words = too_many_clients(&context.hub);
+        |(stream, _), context, words| {
             let running = context.running.clone();
             tokio::spawn(async move {
                 let head = format!(
@@ -157,10 +166,17 @@ async fn answer(
     }
     if let (Some(token), Some(shown)) = (connection.hub.token(), text(header::AUTHORIZATION)) {
         let shown = shown.strip_prefix("Bearer ").unwrap_or_default();
-        match token.judge(shown, std::time::Instant::now()) {
-            Ok(()) => connection.trusted = true,
-            Err(fault) => {
+        match token.judge(shown, connection.peer.address(), std::time::Instant::now()) {
+            Ok(()) => {
+                connection.trusted = true;
+                connection.place.has_shown_token();
+            }
+            Err(Denied { fault, delay }) => {
                 count(&connection.hub.counters.refused, 1);
+                tokio::select! {
+                    () = sleep(delay) => {}
+                    () = connection.running.asked() => {}
+                }
                 return Ok(http::refusal(
                     StatusCode::UNAUTHORIZED,
                     fault.code,
@@ -183,7 +199,7 @@ pub(crate) async fn converse(socket: WebSocket, connection: Connection, foxglove
         peer,
         trusted,
         mut running,
-        _place,
+        place,
         ..
     } = connection;
     let limits = *hub.limits();
@@ -192,6 +208,8 @@ pub(crate) async fn converse(socket: WebSocket, connection: Connection, foxglove
         Some(controls) => Talk::Foxglove(Viewer::new(&hub, peer, controls)),
     };
     let client = session.client().clone();
+    place.serves(&client);
+    let mut has_place = session.is_authorised();
     let (mut sink, mut stream) = socket.split();
     let closing = AtomicBool::new(false);
 
@@ -232,10 +250,29 @@ pub(crate) async fn converse(socket: WebSocket, connection: Connection, foxglove
                 Err(_) => return Some("nothing was heard from it for too long"),
                 Ok(None | Some(Err(_))) => return None,
                 Ok(Some(Ok(Message::Close(_)))) => return None,
-                Ok(Some(Ok(message))) => session.take_all(&message, &hub).await,
+                Ok(Some(Ok(message))) => {
+                    session.take_all(&message, &hub).await;
+                    if payload(&message).is_some() {
+                        place.heard();
+                    }
+                }
+            }
+            if session.is_authorised() && !has_place {
+                has_place = true;
+                if let Err(fault) = place.become_of(Kind::Served, true) {
+                    client.outbox.reply(wire::error(&fault, 0, &[], 0));
+                    return Some("there is no place for it");
+                }
             }
             flood.wait(&hub).await;
             if session.is_over() {
+                if let Some((delay, words)) = session.last_words() {
+                    tokio::select! {
+                        () = sleep(delay) => {}
+                        () = running.asked() => {}
+                    }
+                    client.outbox.reply(words);
+                }
                 return Some("bad lines or no token");
             }
         }
@@ -303,6 +340,14 @@ pub(crate) async fn converse(socket: WebSocket, connection: Connection, foxglove
 
     let mut writer = Box::pin(writer);
     let reason = tokio::select! {
+        () = place.lost() => {
+            client.outbox.reply(wire::error(&place.made_room(), 0, &[], 0));
+            closing.store(true, Ordering::Release);
+            client.outbox.nudge();
+            // It waited for nothing, so that this finds room, or it is owed none.
+            let _ = timeout(LAST_WORDS, &mut writer).await;
+            Some("others needed its place")
+        }
         reason = reader => {
             closing.store(true, Ordering::Release);
             client.outbox.nudge();
@@ -346,6 +391,21 @@ impl Talk {
         match self {
             Talk::Lines(session) => session.end().is_some(),
             Talk::Foxglove(viewer) => viewer.is_over(),
+        }
+    }
+
+    /// Whether it has shown the token, or need not: a viewer does so before it is one.
+    fn is_authorised(&self) -> bool {
+        match self {
+            Talk::Lines(session) => session.is_authorised(),
+            Talk::Foxglove(_) => true,
+        }
+    }
+
+    fn last_words(&mut self) -> Option<(Duration, Bytes)> {
+        match self {
+            Talk::Lines(session) => session.last_words(),
+            Talk::Foxglove(_) => None,
         }
     }
 
