@@ -19,6 +19,7 @@ pub mod replay;
 pub mod report;
 pub mod serve;
 pub mod serving;
+pub mod shell;
 pub mod simulate;
 pub mod watch;
 

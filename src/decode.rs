@@ -36,8 +36,10 @@ pub use crate::condition::GyroUnit;
 pub use fields::{BadFieldPath, FieldPath, FieldRole};
 pub use json::line::{Class, Line, LineDecoder, MAX_LINE, decode_line};
 pub use json::objects::{Object, Objects};
-pub use refusal::{MAX_NEAR, Undecodable, Unsupported, exact_name, printable, snippet};
-pub use role::{Rank, Role, role};
+pub use refusal::{
+    MAX_NEAR, Undecodable, Unsupported, exact_name, is_printable, printable, snippet,
+};
+pub use role::{Rank, Role, role, role_of};
 pub use stamp::{Ambiguous, Bare, MOST_WAITING, TimeUnit, unit_of};
 pub use stated::{AccelUnit, BodyAxes, Stated, WorldAxes};
 
@@ -47,6 +49,7 @@ use schema::rosmsg::Dialect;
 use schema::{Schema, builtin, descriptor, idl, ros_name, rosmsg};
 use select::names::{self, Px4};
 use select::{Found, Selection, select};
+use std::sync::Arc;
 
 /// Most samples one message may hold.
 pub const MAX_BATCH: usize = 65_536;
@@ -92,10 +95,12 @@ pub struct Decoded {
     pub stamps_carried: usize,
 }
 
-/// Reads the messages of one channel.
+/// Reads the messages of one channel. A copy shares what was compiled.
 #[derive(Debug, Clone)]
 pub struct Decoder {
     plan: Plan,
+    /// How registers become samples; of JSON the plan knows.
+    form: Form,
     /// Finds the frame in messages that have a schema.
     frame: Option<Plan>,
     stated: Stated,
@@ -109,9 +114,42 @@ pub struct Decoder {
 
 #[derive(Debug, Clone)]
 enum Plan {
-    Ros(ros::Plan),
-    Protobuf(protobuf::Plan),
+    Ros(Arc<ros::Plan>),
+    Protobuf(Arc<protobuf::Plan>),
     Json(json::Plan),
+}
+
+/// What may be spent on the schemas of one log: a few kilobytes of schema can spell out to tens of thousands of
+/// fields, and a log can hold thousands of schemas. Those of a hundred recordings together spell out to fewer.
+#[derive(Debug, Clone)]
+pub struct Effort {
+    fields: usize,
+}
+
+impl Default for Effort {
+    fn default() -> Self {
+        Effort { fields: 2_000_000 }
+    }
+}
+
+impl Effort {
+    /// Most fields one schema counts for: beyond, none is compiled.
+    const ONE: usize = 50_000;
+
+    fn spend(&mut self, schema: Schema) -> Result<Schema, (String, &'static str)> {
+        let spelled = schema.spelled(Effort::ONE);
+        match self.fields.checked_sub(spelled) {
+            Some(left) => {
+                self.fields = left;
+                Ok(schema)
+            }
+            None => Err((
+                "the schemas of this log spell out to more fields than are gone over for one log"
+                    .to_owned(),
+                "",
+            )),
+        }
+    }
 }
 
 impl Decoder {
@@ -122,13 +160,26 @@ impl Decoder {
     /// without body rate or orientation, a `--field` that leads nowhere (with the fields there are).
     /// A JSON channel always compiles: what it holds shows in its messages ([`Decoder::settle`]).
     pub fn compile(channel: &Channel<'_>, options: &Options) -> Result<Decoder, Unsupported> {
+        Decoder::compile_within(channel, options, &mut Effort::default())
+    }
+
+    /// The same for one of many channels, as long as `effort` lasts.
+    ///
+    /// # Errors
+    /// As [`Decoder::compile`], and when the effort is spent.
+    pub fn compile_within(
+        channel: &Channel<'_>,
+        options: &Options,
+        effort: &mut Effort,
+    ) -> Result<Decoder, Unsupported> {
         let label = label(channel);
         let refuse = |(why, help): (String, &str)| unsupported(&label, why, help);
         if channel.message_encoding == "json" {
             return Ok(Decoder::json(channel, options, label));
         }
         // A recorder may leave a well-known type's text out, or shorten it to a stub.
-        let (schema, selection) = understand(channel, read_schema(channel), options)
+        let read = read_schema(channel).and_then(|schema| effort.spend(schema));
+        let (schema, selection) = understand(channel, read, options)
             .or_else(|why| understand(channel, well_known(channel), options).map_err(|_| why))
             .map_err(refuse)?;
         let plan =
@@ -137,15 +188,22 @@ impl Decoder {
             .frame
             .as_deref()
             .and_then(|path| match channel.message_encoding {
-                "protobuf" => protobuf::plan::text(&schema, path).ok().map(Plan::Protobuf),
+                "protobuf" => protobuf::plan::text(&schema, path)
+                    .ok()
+                    .map(|plan| Plan::Protobuf(Arc::new(plan))),
                 "ros1" => ros::compile::text(&schema, path, ros::compile::Layout::Ros1)
                     .ok()
-                    .map(Plan::Ros),
+                    .map(|plan| Plan::Ros(Arc::new(plan))),
                 _ => ros::compile::text(&schema, path, ros::compile::Layout::Cdr)
                     .ok()
-                    .map(Plan::Ros),
+                    .map(|plan| Plan::Ros(Arc::new(plan))),
             });
         Ok(Decoder {
+            form: match &plan {
+                Plan::Ros(plan) => plan.form(),
+                Plan::Protobuf(plan) => plan.form(),
+                Plan::Json(_) => Form::default(),
+            },
             plan,
             frame,
             stated: state(channel.schema_name, &selection),
@@ -172,6 +230,7 @@ impl Decoder {
         };
         Decoder {
             plan: Plan::Json(json::Plan::compile(channel.schema_name, options)),
+            form: Form::default(),
             frame: None,
             stated,
             found,
@@ -193,8 +252,8 @@ impl Decoder {
         out: &mut Vec<RawSample>,
     ) -> Result<Decoded, Undecodable> {
         match &self.plan {
-            Plan::Ros(plan) => plan.decode(payload, log, publish, out),
-            Plan::Protobuf(plan) => plan.decode(payload, log, publish, out),
+            Plan::Ros(plan) => plan.decode(&self.form, payload, log, publish, out),
+            Plan::Protobuf(plan) => plan.decode(&self.form, payload, log, publish, out),
             Plan::Json(plan) => plan.decode(payload, log, publish, out),
         }
     }
@@ -265,9 +324,8 @@ impl Decoder {
     }
 
     fn form(&mut self) -> Option<&mut Form> {
-        match &mut self.plan {
-            Plan::Ros(plan) => Some(plan.form_mut()),
-            Plan::Protobuf(plan) => Some(plan.form_mut()),
+        match self.plan {
+            Plan::Ros(_) | Plan::Protobuf(_) => Some(&mut self.form),
             Plan::Json(_) => None,
         }
     }
@@ -343,6 +401,14 @@ impl Decoder {
                 ))
             }
         }
+    }
+
+    /// The same for another topic's messages of the same type, which share what was compiled.
+    #[must_use]
+    pub fn of_topic(&self, topic: &str) -> Decoder {
+        let mut other = self.clone();
+        other.label[0] = printable(topic);
+        other
     }
 
     /// What type and schema state, and which fields were chosen.
@@ -523,12 +589,15 @@ fn compile_plan(
 ) -> Result<Plan, String> {
     let child = options.child_frame.as_deref();
     let layout = match channel.message_encoding {
-        "protobuf" => return protobuf::plan::samples(schema, selection, child).map(Plan::Protobuf),
+        "protobuf" => {
+            return protobuf::plan::samples(schema, selection, child)
+                .map(|plan| Plan::Protobuf(Arc::new(plan)));
+        }
         "ros1" => ros::compile::Layout::Ros1,
         _ => ros::compile::Layout::Cdr,
     };
     let plan = ros::compile::samples(schema, selection, child, layout)?;
-    Ok(Plan::Ros(plan.recognised()))
+    Ok(Plan::Ros(Arc::new(plan.recognised())))
 }
 
 fn state(type_name: &str, selection: &Selection) -> Stated {

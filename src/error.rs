@@ -103,7 +103,7 @@ pub enum Error {
         what: String,
     },
     /// A run over this input can not be carried out with these settings.
-    #[error("{}: {topic}: {what}", path.display())]
+    #[error("{}: {}: {what}", path.display(), crate::decode::printable(topic))]
     Topic {
         /// Which file.
         path: PathBuf,

@@ -4,6 +4,8 @@ pub mod against;
 pub mod audience;
 pub mod check;
 mod chosen;
+pub mod decoders;
+mod each;
 pub mod estimator;
 pub mod history;
 mod intervals;

@@ -6,6 +6,8 @@
 #[path = "check/faults.rs"]
 mod faults;
 mod made_logs;
+#[path = "check/many.rs"]
+mod many;
 #[path = "check/recordings.rs"]
 mod recordings;
 mod replays;

@@ -13,6 +13,8 @@ mod made_logs;
 mod manual;
 #[path = "cli/outputs.rs"]
 mod outputs;
+#[path = "cli/paste.rs"]
+mod paste;
 mod replays;
 #[allow(unreachable_pub)]
 mod shared_data;

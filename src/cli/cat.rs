@@ -7,16 +7,17 @@ use crate::client::remote::Remote;
 use crate::config::Plan;
 use crate::decode::{FieldPath, Options};
 use crate::error::{Error, Result};
+use crate::pipeline::decoders::Decoders;
 use crate::pipeline::log::{Log, problems};
 use crate::pipeline::pool::Pool;
 use crate::pipeline::preparation::Resolved;
 use crate::pipeline::route::{Item, Noticed, Route, Taker};
-use crate::pipeline::sources::is_same;
 use crate::pipeline::topics;
 use crate::record::{RawSample, SampleKind};
 use crate::source::mcap::{self, WalkOptions};
 use clap::{Args, ValueEnum};
 use serde_json::json;
+use std::collections::BTreeMap;
 use std::io::{BufWriter, Write};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -118,15 +119,22 @@ pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
     let choice = log.choose(&args.source, args.topic.as_deref())?;
     let topic = choice.topics.into_iter().next().unwrap_or_default();
     let source = log.source(&topic);
+    let mut by_id = BTreeMap::new();
     let mut decoders = Vec::new();
     let mut meanings = Vec::new();
+    let mut compiled = Decoders::new(&options);
     for known in source.iter().flat_map(|s| log.channels_of(s)) {
-        let decoder = known.decoder(&options).map_err(|why| Error::Unsupported {
-            path: args.source.clone(),
-            what: why.to_string(),
-        })?;
+        let decoder = known
+            .decoder(&mut compiled)
+            .map_err(|why| Error::Unsupported {
+                path: args.source.clone(),
+                what: why.to_string(),
+            })?;
         meanings.push(Resolved::new(&Plan::default(), decoder.stated()));
-        decoders.push((known.channel.clone(), decoder));
+        by_id
+            .entry((known.channel.id, known.channel.schema_id))
+            .or_insert(decoders.len());
+        decoders.push(decoder);
     }
     let (Some(source), false) = (source, decoders.is_empty()) else {
         return Err(Error::NoSuchTopic {
@@ -149,12 +157,11 @@ pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
             ..WalkOptions::default()
         },
         |channel| {
-            let (stream, (_, decoder)) = decoders
-                .iter()
-                .enumerate()
-                .find(|(_, (known, _))| is_same(known, channel))?;
+            let id = (channel.id, channel.schema_id);
+            let stream = *by_id.get(&id).filter(|_| channel.topic == source.topic)?;
             let noticed = noticed.clone();
-            Some(Route::to(decoder.clone(), vec![Taker { stream, noticed }]))
+            let taker = Taker { stream, noticed };
+            Some(Route::to(decoders.get(stream)?.clone(), vec![taker]))
         },
         Route::map,
         |items| {

@@ -53,14 +53,16 @@ pub fn run(global: &Global, args: &Info) -> Result<Outcome> {
             topics: topics::listing(&log.candidates()),
         });
     }
-    let (looked, survey) = look(&args.file, &log, args.topic.as_deref(), &options, &pool)?;
+    let looks = look(&args.file, &log, args.topic.as_deref(), &options, &pool)?;
+    let survey = &looks.survey;
     let lossy = survey.problems.losses() > 0;
     let report = words::Report {
         path: &args.file,
-        survey: &survey,
-        problems: problems(&survey),
+        survey,
+        problems: problems(survey),
         channels: &log.channels,
-        looked: &looked,
+        looked: &looks.topics,
+        left_out: &looks.left_out,
     };
     if global.json {
         print(&format!("{}\n", report.json()))?;

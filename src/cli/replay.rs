@@ -230,7 +230,7 @@ impl Replay {
             out_rate: self.out_rate,
             speed: served.speed,
             against: self.against_recorded.clone(),
-            command: std::env::args().collect::<Vec<_>>().join(" "),
+            command: super::shell::own_command(),
         };
         Ok((run, served))
     }

@@ -5,10 +5,9 @@ use super::progress::Reporter;
 use super::{Global, Outcome, allan, print};
 use crate::config::{Bias, Plan};
 use crate::error::{Error, Result};
-use crate::pipeline::check::{CheckedTopic, Examination, examine};
+use crate::pipeline::check::{CheckedTopic, Drawing, Examination, examine};
 use crate::pipeline::pool::Pool;
 use crate::pipeline::provenance::sha256;
-use crate::pipeline::replay::Drawing;
 use crate::pipeline::track::{self, Side, Track};
 use crate::report::findings::findings;
 use crate::report::page::{Noise, Page, STRETCHES, Told, longest_rest};
@@ -94,7 +93,7 @@ pub fn run(global: &Global, args: &Report) -> Result<Outcome> {
             stretches: STRETCHES,
             reference: reference.as_ref(),
         }),
-        command: std::env::args().collect::<Vec<_>>().join(" "),
+        command: super::shell::own_command(),
     };
     let mut reporter = Reporter::new(global, &args.file.display().to_string());
     let checked = examine(&args.file, &asked, &pool, &mut |position| {

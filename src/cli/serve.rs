@@ -287,10 +287,9 @@ impl Serve {
             Some(text) => Some(text.parse().map_err(|e| named("record-split", e))?),
             None => None,
         };
-        let command: Vec<String> = std::env::args().collect();
         settings.provenance.metadata = [
             ("version", env!("CARGO_PKG_VERSION").to_owned()),
-            ("command", command.join(" ")),
+            ("command", super::shell::own_command()),
         ]
         .map(|(key, value)| (key.to_owned(), value))
         .into();

@@ -19,6 +19,7 @@ use wire::{Broken, Reader, Value};
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Plan {
     nodes: Vec<Node>,
+    /// As compiled; what a message taught of it is the caller's.
     form: Form,
     batched: bool,
     child: Option<Box<str>>,
@@ -65,6 +66,7 @@ const MAX_COUNTERS: usize = 8;
 
 struct Walk<'a, 'o> {
     plan: &'a Plan,
+    form: &'a Form,
     registers: Registers,
     counters: [u32; MAX_COUNTERS],
     text: Option<&'a [u8]>,
@@ -77,9 +79,10 @@ struct Walk<'a, 'o> {
 }
 
 impl Plan {
-    /// Reads one payload; pushes nothing when it fails.
+    /// Reads one payload, its registers as `form` says; pushes nothing when it fails.
     pub(crate) fn decode(
         &self,
+        form: &Form,
         payload: &[u8],
         log: Nanos,
         publish: Nanos,
@@ -87,7 +90,7 @@ impl Plan {
     ) -> Result<Decoded, Undecodable> {
         let before = out.len();
         let result = self
-            .walk(payload, log, publish, out)
+            .walk(form, payload, log, publish, out)
             .map(|(outcome, _)| outcome);
         if result.is_err() {
             out.truncate(before);
@@ -96,18 +99,21 @@ impl Plan {
     }
 
     /// How registers become samples.
-    pub(crate) fn form_mut(&mut self) -> &mut Form {
-        &mut self.form
+    pub(crate) fn form(&self) -> Form {
+        self.form
     }
 
     /// The string this plan was compiled to capture.
     pub(crate) fn text<'a>(&'a self, payload: &'a [u8]) -> Option<&'a [u8]> {
         let mut none = Vec::new();
-        self.walk(payload, Nanos(0), Nanos(0), &mut none).ok()?.1
+        self.walk(&self.form, payload, Nanos(0), Nanos(0), &mut none)
+            .ok()?
+            .1
     }
 
     fn walk<'a>(
         &'a self,
+        form: &'a Form,
         payload: &'a [u8],
         log: Nanos,
         publish: Nanos,
@@ -116,6 +122,7 @@ impl Plan {
         let before = out.len();
         let mut walk = Walk {
             plan: self,
+            form,
             registers: Registers::default(),
             counters: [0; MAX_COUNTERS],
             text: None,
@@ -129,8 +136,8 @@ impl Plan {
         walk.message(0, payload, 0)?;
         if !self.batched {
             walk.emit();
-        } else if self.form.stamp_outside {
-            let stamp = self.form.stamp(&walk.registers, &mut walk.outcome);
+        } else if form.stamp_outside {
+            let stamp = form.stamp(&walk.registers, &mut walk.outcome);
             for sample in walk.out.iter_mut().skip(before) {
                 sample.header = stamp;
             }
@@ -302,8 +309,9 @@ impl<'a> Walk<'a, '_> {
     }
 
     fn emit(&mut self) {
-        let form = &self.plan.form;
-        let sample = form.sample(&self.registers, self.log, self.publish, &mut self.outcome);
+        let sample = self
+            .form
+            .sample(&self.registers, self.log, self.publish, &mut self.outcome);
         self.out.push(sample);
         self.outcome.samples += 1;
     }

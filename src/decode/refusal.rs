@@ -152,6 +152,12 @@ pub fn exact_name(text: &str) -> Result<String, Undecodable> {
     Ok(shown)
 }
 
+/// Whether every character of `text` can be shown as it is.
+#[must_use]
+pub fn is_printable(text: &str) -> bool {
+    !text.chars().any(|c| c.is_control() || is_invisible(c))
+}
+
 /// Characters that reorder or hide the text around them.
 fn is_invisible(c: char) -> bool {
     matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}')

@@ -5,7 +5,7 @@
 
 use super::schema::last_name;
 use super::select::Found;
-use super::{Channel, Decoder, Options, Stated};
+use super::{Channel, Decoder, Options, Stated, Unsupported};
 use crate::record::Nanos;
 
 /// How good a source of body rates a channel is; the best rank in a log is taken, and when two
@@ -47,12 +47,23 @@ impl Role {
 /// A channel that can not be decoded serves as nothing.
 #[must_use]
 pub fn role(channel: &Channel<'_>, first: Option<(&[u8], Nanos)>) -> Role {
+    let decoder = Decoder::compile(channel, &Options::default());
+    role_of(channel, decoder, first)
+}
+
+/// The same where its decoder, with default options, has been compiled.
+#[must_use]
+pub fn role_of(
+    channel: &Channel<'_>,
+    decoder: Result<Decoder, Unsupported>,
+    first: Option<(&[u8], Nanos)>,
+) -> Role {
     let nothing = Role {
         has_rate: false,
         has_orientation: false,
         rank: Rank::ByNameOnly,
     };
-    let Ok(mut decoder) = Decoder::compile(channel, &Options::default()) else {
+    let Ok(mut decoder) = decoder else {
         return nothing;
     };
     if let Some((payload, log)) = first {

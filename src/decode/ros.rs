@@ -34,6 +34,7 @@ pub(crate) struct Plan {
     cdr: bool,
     /// The layout is that of `sensor_msgs/Imu`.
     imu: bool,
+    /// As compiled; what a message taught of it is the caller's.
     form: Form,
     child: Option<Box<str>>,
 }
@@ -110,6 +111,7 @@ enum Fault {
 /// One walk through one payload.
 struct Walk<'a, 'o> {
     plan: &'a Plan,
+    form: &'a Form,
     /// The payload without its encapsulation.
     data: &'a [u8],
     pos: usize,
@@ -123,9 +125,10 @@ struct Walk<'a, 'o> {
 }
 
 impl Plan {
-    /// Reads one payload; pushes nothing when it fails.
+    /// Reads one payload, its registers as `form` says; pushes nothing when it fails.
     pub(crate) fn decode(
         &self,
+        form: &Form,
         payload: &[u8],
         log: Nanos,
         publish: Nanos,
@@ -134,14 +137,14 @@ impl Plan {
         if self.imu {
             let mut outcome = Decoded::default();
             let read = if self.cdr { imu::cdr } else { imu::ros1 };
-            if let Some(sample) = read(payload, &self.form, log, publish, &mut outcome) {
+            if let Some(sample) = read(payload, form, log, publish, &mut outcome) {
                 out.push(sample);
                 return Ok(outcome);
             }
         }
         let before = out.len();
         let result = self
-            .walk(payload, log, publish, out)
+            .walk(form, payload, log, publish, out)
             .map(|(outcome, _)| outcome);
         if result.is_err() {
             out.truncate(before);
@@ -156,18 +159,21 @@ impl Plan {
     }
 
     /// How registers become samples.
-    pub(crate) fn form_mut(&mut self) -> &mut Form {
-        &mut self.form
+    pub(crate) fn form(&self) -> Form {
+        self.form
     }
 
     /// The string this plan was compiled to capture.
     pub(crate) fn text<'a>(&'a self, payload: &'a [u8]) -> Option<&'a [u8]> {
         let mut none = Vec::new();
-        self.walk(payload, Nanos(0), Nanos(0), &mut none).ok()?.1
+        self.walk(&self.form, payload, Nanos(0), Nanos(0), &mut none)
+            .ok()?
+            .1
     }
 
     fn walk<'a>(
         &'a self,
+        form: &'a Form,
         payload: &'a [u8],
         log: Nanos,
         publish: Nanos,
@@ -181,6 +187,7 @@ impl Plan {
         let before = out.len();
         let mut walk = Walk {
             plan: self,
+            form,
             data: payload.get(head..).unwrap_or(&[]),
             pos: 0,
             registers: Registers::default(),
@@ -208,8 +215,8 @@ impl Plan {
         }
         if !self.batched {
             walk.emit();
-        } else if self.form.stamp_outside {
-            let stamp = self.form.stamp(&walk.registers, &mut walk.outcome);
+        } else if form.stamp_outside {
+            let stamp = form.stamp(&walk.registers, &mut walk.outcome);
             for sample in walk.out.iter_mut().skip(before) {
                 sample.header = stamp;
             }
@@ -406,8 +413,9 @@ impl<'a> Walk<'a, '_> {
 
     #[inline]
     fn emit(&mut self) {
-        let form = &self.plan.form;
-        let sample = form.sample(&self.registers, self.log, self.publish, &mut self.outcome);
+        let sample = self
+            .form
+            .sample(&self.registers, self.log, self.publish, &mut self.outcome);
         self.out.push(sample);
         self.outcome.samples += 1;
     }

@@ -129,6 +129,41 @@ impl Schema {
     pub(crate) fn get(&self, index: usize) -> Option<&Struct> {
         self.structs.get(index)
     }
+
+    /// Fields there are once every nested type is written out in its place, at most `limit`; so many where the
+    /// types nest in a circle. The work is that of reading the schema, whatever it spells out to.
+    pub(crate) fn spelled(&self, limit: usize) -> usize {
+        let mut known: Vec<Option<usize>> = vec![None; self.structs.len()];
+        let mut begun = vec![false; self.structs.len()];
+        // Inner types first, without recursion: they may nest as deep as there are types.
+        let mut open = vec![self.root];
+        while let Some(&at) = open.last() {
+            let (Some(structure), Some(None), Some(is_begun)) =
+                (self.get(at), known.get(at), begun.get_mut(at))
+            else {
+                open.pop();
+                continue;
+            };
+            let inner = structure.fields.iter().map(|field| match field.kind {
+                Kind::Struct(index) => Some(index),
+                _ => None,
+            });
+            if !std::mem::replace(is_begun, true) {
+                let is_new = |index: &usize| begun.get(*index) == Some(&false);
+                open.extend(inner.flatten().filter(is_new));
+                continue;
+            }
+            let of = |index| known.get(index).copied().flatten().unwrap_or(limit);
+            let sum = inner
+                .map(|index| 1 + index.map_or(0, of))
+                .fold(0, usize::saturating_add);
+            if let Some(slot) = known.get_mut(at) {
+                *slot = Some(sum.min(limit));
+            }
+            open.pop();
+        }
+        known.get(self.root).copied().flatten().unwrap_or(0)
+    }
 }
 
 impl Struct {

@@ -135,6 +135,7 @@ fn take_given(schema: &Schema, field: &FieldPath, selection: &mut Selection) -> 
         let list = if list.is_empty() {
             "none that fits".to_owned()
         } else {
+            let list: Vec<String> = list.iter().map(|path| super::printable(path)).collect();
             list.join(", ")
         };
         format!(

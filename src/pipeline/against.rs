@@ -20,6 +20,9 @@ use std::collections::HashMap;
 /// stays bounded on any log.
 const MOST: usize = 1 << 17;
 
+/// Comparisons at once for which there is that much room; more share it.
+const ROOMY: usize = 8;
+
 /// Attitudes kept while the samples have brought no orientation yet.
 const BEFORE: usize = 1024;
 
@@ -66,6 +69,7 @@ pub struct AgainstRecorded {
 #[derive(Debug)]
 struct Thinned {
     entries: Vec<Stamped>,
+    most: usize,
     stride: u64,
     seen: u64,
 }
@@ -74,6 +78,7 @@ impl Thinned {
     fn new() -> Thinned {
         Thinned {
             entries: Vec::new(),
+            most: MOST,
             stride: 1,
             seen: 0,
         }
@@ -81,7 +86,7 @@ impl Thinned {
 
     fn push(&mut self, entry: Stamped) {
         if self.seen.is_multiple_of(self.stride) {
-            if self.entries.len() >= MOST {
+            if self.entries.len() >= self.most {
                 let mut keep = false;
                 self.entries.retain(|_| {
                     keep = !keep;
@@ -134,6 +139,21 @@ impl AgainstRecorded {
             moved: HashMap::new(),
             unusable: 0,
         })
+    }
+
+    /// It is one of so many comparisons at once: together they hold no more than a few would.
+    pub fn share_room(&mut self, comparisons: usize) {
+        let most = MOST.min(ROOMY * MOST / comparisons.max(1));
+        let tracks = self.tracks.iter_mut();
+        tracks
+            .chain([&mut self.reference])
+            .for_each(|track| track.most = most);
+    }
+
+    /// Whether the reference is not the samples' own.
+    #[must_use]
+    pub fn is_held_against_another(&self) -> bool {
+        !self.own_reference
     }
 
     /// The reference comes from a topic of its own, whose orientations are in `recorded`'s convention.

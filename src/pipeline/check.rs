@@ -1,14 +1,15 @@
 //! A log -> everything that is known about its quality: looked at, then integrated once. I/O.
 //!
-//! The second pass is an ordinary replay without outputs, so that what `check` says about verdicts,
+//! The second pass is a replay of all topics at once without outputs, so that what `check` says about verdicts,
 //! gaps and turns per step is what a replay would do, and not another program's opinion.
 
+use super::each::{Told, each};
 use super::log::{Log, problems};
 use super::look::{Looked, look_as};
 use super::pool::Pool;
 use super::position::Position;
-use super::replay::{self, Drawing};
 use super::run::{Replay, Source};
+use super::track::Track;
 use crate::config::Plan;
 use crate::decode;
 use crate::error::{Error, Result};
@@ -31,6 +32,8 @@ pub struct Checked {
     pub refused: Vec<String>,
     /// Its topics of samples.
     pub topics: Vec<CheckedTopic>,
+    /// Topics of samples beyond those, which were not examined.
+    pub left_out: Vec<String>,
 }
 
 /// A topic of samples, looked at and replayed.
@@ -40,6 +43,15 @@ pub struct CheckedTopic {
     pub looked: Looked,
     /// What a replay with default flags makes of them, or why it refuses.
     pub replayed: std::result::Result<Box<TopicSummary>, String>,
+}
+
+/// What a report wants of the replays beside their summaries.
+#[derive(Clone, Copy, Debug)]
+pub struct Drawing<'a> {
+    /// Stretches of time each series is drawn in.
+    pub stretches: usize,
+    /// A reference from another file; `None` = as the run says.
+    pub reference: Option<&'a Track>,
 }
 
 /// How a log is examined.
@@ -102,13 +114,13 @@ pub fn examine(
             });
         }
     }
-    let (looked, survey) = look_as(path, &log, named, &asked.plan, pool)?;
+    let looks = look_as(path, &log, named, &asked.plan, pool)?;
     let has_reference = asked.drawing.is_some_and(|d| d.reference.is_some())
         || log
             .channels
             .iter()
             .any(|k| k.role.has_orientation && k.messages > 0);
-    let refused = if looked.is_empty() {
+    let refused = if looks.topics.is_empty() {
         // With what it says about channels that only sound like one.
         log.choose(path, None)
             .err()
@@ -118,39 +130,48 @@ pub fn examine(
     } else {
         Vec::new()
     };
-    let topics = looked
+    let looked: Vec<Looked> = looks
+        .topics
         .into_iter()
         .filter(|l| named.is_none_or(|name| l.topic == name || l.of == name))
-        .map(|looked| CheckedTopic {
-            replayed: integrate(path, &looked.topic, asked, has_reference, pool, watch),
-            looked,
-        })
         .collect();
+    let names: Vec<String> = looked.iter().map(|l| l.topic.clone()).collect();
+    let replayed = integrate((path, &log), &names, asked, has_reference, pool, watch)?;
+    let topics = looked
+        .into_iter()
+        .zip(replayed)
+        .map(|(looked, replayed)| CheckedTopic { looked, replayed })
+        .collect();
+    let survey = &looks.survey;
     Ok(Checked {
-        problems: problems(&survey),
+        problems: problems(survey),
         file_losses: survey.problems.losses(),
         file_size: survey.file_size,
         profile: survey.facts.profile.clone(),
         refused,
         topics,
+        left_out: match named {
+            Some(_) => Vec::new(),
+            None => looks.left_out,
+        },
     })
 }
 
 fn integrate(
-    path: &Path,
-    topic: &str,
+    (path, log): (&Path, &Log),
+    topics: &[String],
     asked: &Examination<'_>,
     has_reference: bool,
     pool: &Pool,
     watch: &mut dyn FnMut(&Position),
-) -> std::result::Result<Box<TopicSummary>, String> {
+) -> Result<Vec<Told>> {
+    if topics.is_empty() {
+        return Ok(Vec::new());
+    }
     let run = Replay {
         source: Source::File(path.to_owned()),
         targets: Vec::new(),
-        plan: Plan {
-            topic: Some(topic.to_owned()),
-            ..asked.plan.clone()
-        },
+        plan: asked.plan.clone(),
         options: sink::Options::default(),
         copy_input: false,
         out_rate: None,
@@ -159,16 +180,12 @@ fn integrate(
         against: has_reference.then(|| asked.reference_topic.clone()),
         command: asked.command.clone(),
     };
-    let summary = match &asked.drawing {
-        None => replay::run(&run, pool, watch),
-        Some(drawing) => replay::drawn(&run, drawing, pool, watch),
-    };
-    let found = summary
-        .map_err(|e| e.to_string())?
-        .topics
-        .into_iter()
-        .next();
-    found
-        .map(Box::new)
-        .ok_or_else(|| "the replay gave nothing".to_owned())
+    each(
+        &run,
+        (path, log),
+        topics,
+        asked.drawing.as_ref(),
+        pool,
+        watch,
+    )
 }

@@ -3,6 +3,7 @@
 //! Apart from the replay because it is all choice and no work: which topics, under which names, held
 //! against which reference.
 
+use super::decoders::Decoders;
 use super::log::{Known, Log, described, rank};
 use super::preparation::Resolved;
 use super::route::{Noticed, Route, Taker};
@@ -14,7 +15,7 @@ use crate::decode::Decoder;
 use crate::error::{Error, Result};
 use crate::sink::{Stream, output_topic};
 use crate::source::mcap::Channel;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -23,7 +24,9 @@ pub(super) struct Chosen {
     pub(super) found: Found,
     pub(super) stream: Stream,
     source: Source,
-    channels: Vec<(Arc<Channel>, Decoder)>,
+    /// By id and schema id: the index of a channel met in a walk may differ from the survey's, since the
+    /// summary lists them in another order.
+    channels: BTreeMap<(u16, u16), Decoder>,
 }
 
 pub(super) fn choose(
@@ -36,22 +39,38 @@ pub(super) fn choose(
     if run.copy_input {
         taken.extend(log.channels.iter().map(|c| c.channel.topic.clone()));
     }
+    let mut decoders = Decoders::new(&run.plan.decode);
     names
         .iter()
         .map(|name| {
-            let chosen = choose_one(run, path, log, name, &taken)?;
+            let chosen = choose_one(run, (path, log), name, &taken, &mut decoders)?;
             taken.insert(chosen.found.output_topic.clone());
             Ok(chosen)
         })
         .collect()
 }
 
-fn choose_one(
+/// The same for topics that have nothing to do with each other.
+pub(super) fn choose_each(
     run: &Replay,
     path: &Path,
     log: &Log,
+    names: &[String],
+    decoders: &mut Decoders,
+) -> Vec<Result<Chosen>> {
+    let taken = BTreeSet::new();
+    names
+        .iter()
+        .map(|name| choose_one(run, (path, log), name, &taken, decoders))
+        .collect()
+}
+
+fn choose_one(
+    run: &Replay,
+    (path, log): (&Path, &Log),
     name: &str,
     taken: &BTreeSet<String>,
+    decoders: &mut Decoders,
 ) -> Result<Chosen> {
     let mut channels = Vec::new();
     let mut refusals = Vec::new();
@@ -63,7 +82,7 @@ fn choose_one(
         });
     };
     for known in log.channels_of(&source) {
-        match known.decoder(&run.plan.decode) {
+        match known.decoder(decoders) {
             Ok(decoder) => channels.push((known, decoder)),
             Err(why) => refusals.push(why.to_string()),
         }
@@ -79,7 +98,8 @@ fn choose_one(
         return Err(Error::Unsupported {
             path: path.to_owned(),
             what: format!(
-                "{name} ({}): carries no body rate\n  help: --field gyro=PATH names one",
+                "{} ({}): carries no body rate\n  help: --field gyro=PATH names one",
+                crate::decode::printable(name),
                 described(&first.channel)
             ),
         });
@@ -100,15 +120,16 @@ fn choose_one(
         noticed: Arc::new(Noticed::of(&source)),
         warnings: refusals.into_iter().chain(which_stamp(decoder)).collect(),
     };
-    let channels = channels
-        .into_iter()
-        .map(|(k, d)| (k.channel.clone(), d))
-        .collect();
+    let mut by_id = BTreeMap::new();
+    for (known, decoder) in channels {
+        let id = (known.channel.id, known.channel.schema_id);
+        by_id.entry(id).or_insert(decoder);
+    }
     Ok(Chosen {
         found,
         stream,
         source,
-        channels,
+        channels: by_id,
     })
 }
 
@@ -147,17 +168,27 @@ pub(super) struct Reference {
     pub(super) resolved: Resolved,
 }
 
-/// The channel whose orientations the estimate is held against; `None` = the samples' own.
+impl Reference {
+    /// Whether it lies on the very topic of the samples.
+    pub(super) fn is_of(&self, chosen: &Chosen) -> bool {
+        self.channel.topic == chosen.source.topic
+    }
+}
+
+/// The channel whose orientations the estimate is held against; `None` = the samples' own. Where each of the
+/// topics is by itself (`apart`), one of them may be the reference of the others.
 pub(super) fn reference(
     run: &Replay,
     path: &Path,
     log: &Log,
     chosen: &[Chosen],
+    apart: bool,
 ) -> Result<Option<Reference>> {
     let Some(asked) = &run.against else {
         return Ok(None);
     };
-    let taken = |k: &&Known| chosen.iter().any(|c| c.source.topic == k.channel.topic);
+    let names: BTreeSet<&str> = chosen.iter().map(|c| c.source.topic.as_str()).collect();
+    let taken = |k: &&Known| names.contains(k.channel.topic.as_str());
     let found = if asked.is_empty() {
         let mut others = log.channels.iter().filter(|k| {
             !taken(k) && k.role.has_orientation && rank(&k.role) <= 1 && k.messages > 0
@@ -175,13 +206,13 @@ pub(super) fn reference(
                 topics: topics::listing(&log.candidates()),
             });
         };
-        if taken(&named) {
+        if taken(&named) && !apart {
             return Ok(None);
         }
         named
     };
     let decoder = found
-        .decoder(&crate::decode::Options::default())
+        .decoder(&mut Decoders::default())
         .map_err(|why| Error::Unsupported {
             path: path.to_owned(),
             what: why.to_string(),
@@ -198,8 +229,11 @@ pub(super) fn reference(
 fn find<'c>(chosen: &'c [Chosen], channel: &Channel) -> Option<(&'c Decoder, Vec<usize>)> {
     let mut decoder = None;
     let mut streams = Vec::new();
+    let id = (channel.id, channel.schema_id);
     for (stream, c) in chosen.iter().enumerate() {
-        if let Some((_, own)) = c.channels.iter().find(|(known, _)| is_same(known, channel)) {
+        if c.source.topic == channel.topic
+            && let Some(own) = c.channels.get(&id)
+        {
             decoder.get_or_insert(own);
             streams.push(stream);
         }
@@ -228,6 +262,8 @@ pub(super) fn route(
     channel: &Arc<Channel>,
 ) -> Option<Route> {
     let copied = copy_input.then(|| channel.clone());
+    let compared = reference.filter(|r| is_same(&r.channel, channel));
+    let compared = compared.map(|r| r.decoder.clone());
     if let Some((decoder, streams)) = find(chosen, channel) {
         let taker = |stream: usize| {
             let noticed = chosen.get(stream).map(|c| c.found.noticed.clone());
@@ -237,10 +273,11 @@ pub(super) fn route(
             }
         };
         let takers = streams.into_iter().map(taker).collect();
-        return Some(Route::to(decoder.clone(), takers).copying(copied));
+        let route = Route::to(decoder.clone(), takers);
+        return Some(route.comparing(compared).copying(copied));
     }
-    match reference.filter(|r| is_same(&r.channel, channel)) {
-        Some(r) => Some(Route::reference(r.decoder.clone()).copying(copied)),
+    match compared {
+        Some(decoder) => Some(Route::reference(decoder).copying(copied)),
         None => copied.map(Route::only_copied),
     }
 }

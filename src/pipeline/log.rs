@@ -3,13 +3,15 @@
 //! Apart from the replay because `info`, `cat` and `compare` ask the same questions first: which
 //! channels, which of them carry a rate or an orientation, and a decoder that has seen a message.
 
+use super::decoders::Decoders;
 use super::pool::Pool;
 use super::sources::{self, Source};
 use super::topics::{self, Candidate, Choice, PICKED_UNNAMED};
-use crate::decode::{self, Decoder, Rank, Role, Unsupported, role};
+use crate::decode::{self, Decoder, Rank, Role, Unsupported, role_of};
 use crate::error::{Error, Result};
 use crate::record::Nanos;
 use crate::source::mcap::{self, Channel, Reader, Survey, WalkOptions};
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
@@ -67,15 +69,21 @@ impl Log {
             Some(again) => first_messages(again, &survey)?,
             None => (Vec::new(), Vec::new()),
         };
+        let mut by_channel = BTreeMap::new();
+        for first in &firsts {
+            by_channel
+                .entry((first.id, first.topic.as_str()))
+                .or_insert(first);
+        }
+        let mut decoders = Decoders::default();
         let channels: Vec<Known> = survey
             .channels
             .iter()
             .map(|found| {
-                let first = firsts
-                    .iter()
-                    .find(|f| f.id == found.channel.id && f.topic == found.channel.topic)
+                let first = by_channel
+                    .get(&(found.channel.id, found.channel.topic.as_str()))
                     .map(|f| (f.log, f.data.clone()));
-                known(&found.channel, found.messages, first)
+                known(&found.channel, found.messages, first, &mut decoders)
             })
             .collect();
         Ok(Log {
@@ -178,14 +186,49 @@ impl Log {
     /// For the choice of topics: one for each source.
     #[must_use]
     pub fn candidates(&self) -> Vec<Candidate> {
-        self.sources.iter().map(|s| self.candidate(s)).collect()
-    }
-
-    fn candidate(&self, source: &Source) -> Candidate {
+        let provenance = self.survey.facts.provenance.iter();
+        let outputs: BTreeSet<&str> = provenance
+            .filter(|(key, _)| *key == "output_topic" || key.ends_with(" output_topic"))
+            .map(|(_, topic)| topic.as_str())
+            .collect();
+        let inputs: BTreeSet<&str> = self
+            .channels
+            .iter()
+            .filter(|k| k.role.has_rate)
+            .filter_map(|k| k.channel.topic.strip_suffix("/data_raw"))
+            .collect();
+        // What a run put out, by its metadata or by its name beside the input's: its rates are another
+        // channel's, less the bias.
+        let is_our_attitude = |known: &Known| {
+            let topic = known.channel.topic.as_str();
+            known.channel.metadata.contains_key("rotates")
+                || outputs.contains(topic)
+                || topic
+                    .strip_suffix("/data")
+                    .is_some_and(|name| inputs.contains(name))
+        };
         let rank_of = |known: &Known| match rank(&known.role) {
-            best if self.is_our_attitude(known) => best.min(PICKED_UNNAMED),
+            best if is_our_attitude(known) => best.min(PICKED_UNNAMED),
             best => best,
         };
+        let mut users: BTreeMap<usize, usize> = BTreeMap::new();
+        for channel in self.sources.iter().flat_map(|s| &s.channels) {
+            *users.entry(*channel).or_default() += 1;
+        }
+        let is_shared = |channel: &usize| users.get(channel).is_some_and(|n| *n > 1);
+        self.sources
+            .iter()
+            .map(|s| self.candidate(s, s.channels.iter().any(is_shared), &rank_of))
+            .collect()
+    }
+
+    /// `is_shared`: another source has messages on its channels.
+    fn candidate(
+        &self,
+        source: &Source,
+        is_shared: bool,
+        rank_of: &dyn Fn(&Known) -> u8,
+    ) -> Candidate {
         let first = self.channels_of(source).next();
         let mut said = first.map_or_else(String::new, |k| described(&k.channel));
         if !source.label.is_empty() {
@@ -199,35 +242,14 @@ impl Log {
                 }
             }
         }
-        let shared = self
-            .sources
-            .iter()
-            .any(|s| s != source && s.channels.iter().any(|c| source.channels.contains(c)));
         Candidate {
             topic: source.name.clone(),
             of: source.topic.clone(),
             described: said,
             // How many of a channel's messages are whose is known at the end.
-            messages: (!shared).then(|| self.channels_of(source).map(|k| k.messages).sum()),
+            messages: (!is_shared).then(|| self.channels_of(source).map(|k| k.messages).sum()),
             rank: self.channels_of(source).map(rank_of).max().unwrap_or(0),
         }
-    }
-
-    /// Whether a channel holds what a run put out, by its metadata or by its name beside the input's:
-    /// its rates are another channel's, less the bias.
-    fn is_our_attitude(&self, known: &Known) -> bool {
-        let topic = known.channel.topic.as_str();
-        let is_output = |(key, value): (&String, &String)| {
-            value == topic && (key == "output_topic" || key.ends_with(" output_topic"))
-        };
-        let has_input = |name: &str| {
-            let input = format!("{name}/data_raw");
-            let mut channels = self.channels.iter();
-            channels.any(|k| k.role.has_rate && k.channel.topic == input)
-        };
-        known.channel.metadata.contains_key("rotates")
-            || self.survey.facts.provenance.iter().any(is_output)
-            || topic.strip_suffix("/data").is_some_and(has_input)
     }
 }
 
@@ -248,15 +270,11 @@ impl Known {
     ///
     /// # Errors
     /// The channel can not be decoded: which, why, and the flag that helps.
-    pub fn decoder(&self, options: &decode::Options) -> std::result::Result<Decoder, Unsupported> {
-        let own = self.decoder_of(options)?;
+    pub fn decoder(&self, decoders: &mut Decoders) -> std::result::Result<Decoder, Unsupported> {
+        let own = self.settled(decoders.of(&self.channel)?)?;
         // The message's own stamp, unless it is none and a nested one is.
-        for nth_stamp in 0..own.stamps().len() {
-            let options = decode::Options {
-                nth_stamp,
-                ..options.clone()
-            };
-            let decoder = self.decoder_of(&options)?;
+        for nth in 0..own.stamps().len() {
+            let decoder = self.settled(decoders.with_stamp(&self.channel, nth)?)?;
             if !self.openings.is_empty() && decoder.has_good_stamps(&self.openings) {
                 return Ok(decoder);
             }
@@ -264,8 +282,7 @@ impl Known {
         Ok(own)
     }
 
-    fn decoder_of(&self, options: &decode::Options) -> std::result::Result<Decoder, Unsupported> {
-        let mut decoder = Decoder::compile(&plain(&self.channel), options)?;
+    fn settled(&self, mut decoder: Decoder) -> std::result::Result<Decoder, Unsupported> {
         if let Some((log, payload)) = &self.first {
             decoder.settle(payload, *log)?;
         }
@@ -321,10 +338,11 @@ pub fn explained(error: Error, channels: &[Known], problems: &[String]) -> Error
         let name = k.channel.schema.as_deref().map_or("", |s| &s.name);
         !k.role.has_rate && name.to_ascii_lowercase().contains("imu")
     };
+    let mut decoders = Decoders::default();
     let refusals = channels
         .iter()
         .filter(sounds_like_one)
-        .filter_map(|k| k.decoder(&decode::Options::default()).err())
+        .filter_map(|k| k.decoder(&mut decoders).err())
         .map(|why| why.to_string());
     for why in refusals.take(SAID) {
         // Its own help is about naming a field; so is the error's.
@@ -337,11 +355,17 @@ pub fn explained(error: Error, channels: &[Known], problems: &[String]) -> Error
     Error::NoImuTopic { path, topics }
 }
 
-/// A channel with what it can serve as.
+/// A channel with what it can serve as; `decoders` are those of default options.
 #[must_use]
-pub fn known(channel: &Arc<Channel>, messages: u64, first: Option<(Nanos, Vec<u8>)>) -> Known {
-    let role = role(
+pub fn known(
+    channel: &Arc<Channel>,
+    messages: u64,
+    first: Option<(Nanos, Vec<u8>)>,
+    decoders: &mut Decoders,
+) -> Known {
+    let role = role_of(
         &plain(channel),
+        decoders.of(channel),
         first.as_ref().map(|(log, data)| (data.as_slice(), *log)),
     );
     Known {

@@ -3,13 +3,14 @@
 //! Apart from the replay because it integrates nothing: `info` (and later `check`) look before
 //! anyone leaps.
 
+use super::decoders::Decoders;
 use super::log::{Known, Log, described, rank};
 use super::passes::{Conditioned, FEW};
 use super::pool::Pool;
 use super::preparation::Resolved;
 use super::route::{Item, Noticed, Route, Taker};
-use super::sources::{Source, is_same};
-use super::topics::PICKED_UNNAMED;
+use super::sources::Source;
+use super::topics::{MOST_TOPICS, PICKED_UNNAMED};
 use crate::condition::quality::{Quality, QualitySummary};
 use crate::condition::regularise;
 use crate::condition::stillness::{self, Limits, Rests, Stillness};
@@ -19,6 +20,7 @@ use crate::decode::{self, Options};
 use crate::error::{Error, Result};
 use crate::record::RawSample;
 use crate::source::mcap::{self, Survey, WalkOptions};
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
@@ -50,6 +52,17 @@ pub struct Looked {
     pub clock: Clock,
     /// What was noticed about the clock.
     pub clock_warning: Option<String>,
+}
+
+/// What was looked at.
+#[derive(Debug)]
+pub struct Looks {
+    /// The topics of samples, in the order of the log.
+    pub topics: Vec<Looked>,
+    /// Those beyond [`MOST_TOPICS`], which were not looked at; the best are looked at first.
+    pub left_out: Vec<String>,
+    /// What is in the log.
+    pub survey: Survey,
 }
 
 /// A topic being looked at.
@@ -134,7 +147,7 @@ pub fn look(
     named: Option<&str>,
     options: &Options,
     pool: &Pool,
-) -> Result<(Vec<Looked>, Survey)> {
+) -> Result<Looks> {
     let plan = Plan {
         decode: options.clone(),
         ..Plan::default()
@@ -152,18 +165,19 @@ pub fn look_as(
     named: Option<&str>,
     plan: &Plan,
     pool: &Pool,
-) -> Result<(Vec<Looked>, Survey)> {
+) -> Result<Looks> {
+    let (wanted, left_out) = wanted(log, named);
     let mut looks: Vec<Look> = Vec::new();
-    let mut decoders: Vec<(Arc<mcap::Channel>, decode::Decoder, Vec<Taker>)> = Vec::new();
-    for source in &log.sources {
-        let is_named = named.is_some_and(|name| name == source.name || name == source.topic);
+    let mut compiled = Decoders::new(&plan.decode);
+    let mut decoders: BTreeMap<Id<'_>, (decode::Decoder, Vec<Taker>)> = BTreeMap::new();
+    for (source, is_named) in wanted {
         let noticed = Arc::new(Noticed::of(source));
         let mut begun = None;
         for known in log.channels_of(source) {
             if rank(&known.role) < PICKED_UNNAMED && !is_named {
                 continue;
             }
-            let decoder = match known.decoder(&plan.decode) {
+            let decoder = match known.decoder(&mut compiled) {
                 Ok(decoder) => decoder,
                 Err(why) if named.is_some() => {
                     return Err(Error::Unsupported {
@@ -180,14 +194,13 @@ pub fn look_as(
                 looks.push(begin(source, known, &decoder, plan));
                 looks.len() - 1
             });
-            let taker = Taker {
+            let (_, takers) = decoders
+                .entry(id(&known.channel))
+                .or_insert_with(|| (decoder, Vec::new()));
+            takers.push(Taker {
                 stream,
                 noticed: noticed.clone(),
-            };
-            match decoders.iter_mut().find(|d| is_same(&d.0, &known.channel)) {
-                Some((_, _, takers)) => takers.push(taker),
-                None => decoders.push((known.channel.clone(), decoder, vec![taker])),
-            }
+            });
         }
     }
     let mut failure = None;
@@ -199,7 +212,7 @@ pub fn look_as(
             ..WalkOptions::default()
         },
         |channel| {
-            let (_, decoder, takers) = decoders.iter().find(|d| is_same(&d.0, channel))?;
+            let (decoder, takers) = decoders.get(&id(channel))?;
             Some(Route::to(decoder.clone(), takers.clone()))
         },
         Route::map,
@@ -232,11 +245,45 @@ pub fn look_as(
     if let Some(what) = failure {
         return Err(unsupported(what));
     }
-    let looked = looks
+    let topics = looks
         .into_iter()
         .map(|look| look.finish().map_err(unsupported))
         .collect::<Result<Vec<_>>>()?;
-    Ok((looked, report.survey))
+    Ok(Looks {
+        topics,
+        left_out,
+        survey: report.survey,
+    })
+}
+
+/// What a channel of the survey and one met in a walk have in common; the index may differ.
+type Id<'c> = (u16, u16, &'c str);
+
+fn id(channel: &mcap::Channel) -> Id<'_> {
+    (channel.id, channel.schema_id, channel.topic.as_str())
+}
+
+/// The sources to look at, with whether they are named, in the order of the log; and the names of those that are
+/// too many: what is named and the best ranks come first.
+fn wanted<'l>(log: &'l Log, named: Option<&str>) -> (Vec<(&'l Source, bool)>, Vec<String>) {
+    let best = |s: &Source| log.channels_of(s).map(|k| rank(&k.role)).max();
+    let mut found: Vec<_> = log
+        .sources
+        .iter()
+        .enumerate()
+        .map(|(at, source)| {
+            let is_named = named.is_some_and(|name| name == source.name || name == source.topic);
+            (is_named, best(source).unwrap_or(0), at, source)
+        })
+        .filter(|(is_named, rank, ..)| *is_named || *rank >= PICKED_UNNAMED)
+        .collect();
+    found.sort_by_key(|(is_named, rank, ..)| std::cmp::Reverse((*is_named, *rank)));
+    let rest = found.split_off(found.len().min(MOST_TOPICS));
+    found.sort_by_key(|(_, _, at, _)| *at);
+    (
+        found.into_iter().map(|(named, .., s)| (s, named)).collect(),
+        rest.into_iter().map(|(.., s)| s.name.clone()).collect(),
+    )
 }
 
 fn begin(source: &Source, known: &Known, decoder: &decode::Decoder, plan: &Plan) -> Look {

@@ -4,7 +4,6 @@
 //! through stamps, then to integrate. A stream is read once; its first samples wait until these are known.
 
 use super::chosen::{Chosen, choose, looked_at, reference, route};
-use super::history::History;
 use super::log::Log;
 use super::opening::{begin, labelled};
 use super::pool::Pool;
@@ -12,10 +11,9 @@ use super::position::Position;
 use super::preparation::{Patience, Preparation, Prepared};
 use super::route::{Item, Route};
 use super::run::{Replay, Source, refused};
-use super::session::{Found, Topic};
+use super::session::Found;
 use super::stamps::StampPass;
 use super::summarise;
-use super::track::Track;
 use super::{lines, streamed};
 use crate::error::{Error, Result};
 use crate::report::summary::RunSummary;
@@ -32,37 +30,6 @@ use std::time::Instant;
 /// Whatever kept it from being carried out. Bad samples and damaged files are no error: they are
 /// counted in the summary.
 pub fn run(run: &Replay, pool: &Pool, watch: &mut dyn FnMut(&Position)) -> Result<RunSummary> {
-    whole(run, None, pool, watch)
-}
-
-/// What a report wants of a replay beside its summary.
-#[derive(Clone, Copy, Debug)]
-pub struct Drawing<'a> {
-    /// Stretches of time each series is drawn in.
-    pub stretches: usize,
-    /// A reference from another file; `None` = as the run says.
-    pub reference: Option<&'a Track>,
-}
-
-/// The same for an MCAP file, with what is to be drawn in each topic's summary.
-///
-/// # Errors
-/// As [`run`].
-pub fn drawn(
-    run: &Replay,
-    drawing: &Drawing<'_>,
-    pool: &Pool,
-    watch: &mut dyn FnMut(&Position),
-) -> Result<RunSummary> {
-    whole(run, Some(drawing), pool, watch)
-}
-
-fn whole(
-    run: &Replay,
-    drawing: Option<&Drawing<'_>>,
-    pool: &Pool,
-    watch: &mut dyn FnMut(&Position),
-) -> Result<RunSummary> {
     let begun = Instant::now();
     let mut summary = match &run.source {
         Source::File(path) if is_lines(path) => {
@@ -78,7 +45,7 @@ fn whole(
             let pipe = lines::open(path)?;
             piped(run, pipe, pool, watch)?
         }
-        Source::File(path) => file(run, path, drawing, pool, watch)?,
+        Source::File(path) => file(run, path, pool, watch)?,
         Source::Stdin => piped(run, std::io::stdin(), pool, watch)?,
     };
     summary.elapsed_secs = begun.elapsed().as_secs_f64();
@@ -134,7 +101,6 @@ fn piped(
 fn file(
     run: &Replay,
     path: &Path,
-    drawing: Option<&Drawing<'_>>,
     pool: &Pool,
     watch: &mut dyn FnMut(&Position),
 ) -> Result<RunSummary> {
@@ -144,12 +110,10 @@ fn file(
     if let (Some(note), Some(first)) = (choice.note, chosen.first_mut()) {
         first.found.warnings.push(note);
     }
-    let elsewhere = drawing.and_then(|d| d.reference);
-    let reference = match elsewhere {
-        Some(_) => None,
-        None => reference(run, path, &log, &chosen)?,
-    };
-    let prepared = prepare(run, path, &log, &chosen, pool)?;
+    let reference = reference(run, path, &log, &chosen, false)?;
+    let prepared = prepare(run, path, &log, &chosen, pool)?
+        .into_iter()
+        .collect::<Result<Vec<Prepared>>>()?;
 
     let streams: Vec<Stream> = chosen
         .iter()
@@ -162,12 +126,6 @@ fn file(
         && let Some(against) = &mut topic.against
     {
         against.take_reference_from(&reference.resolved);
-    }
-    if let Some(drawing) = drawing {
-        session
-            .topics
-            .iter_mut()
-            .for_each(|topic| draw(topic, drawing));
     }
     let span = log.survey.times;
     if let Some((first, last)) = span {
@@ -185,13 +143,7 @@ fn file(
         |channel| route(&chosen, reference.as_ref(), run.copy_input, channel),
         Route::map,
         |items| {
-            let done = items
-                .last()
-                .and_then(log_time)
-                .zip(span)
-                .map(|(now, (first, last))| {
-                    (now.saturating_sub(first)) as f64 / last.saturating_sub(first).max(1) as f64
-                });
+            let done = done(items, span);
             match session.consume(items.drain(..), pool) {
                 Ok(Flow::Continue) => {
                     watch(&session.position(done.filter(|_| total > 0)));
@@ -211,21 +163,20 @@ fn file(
     Ok(summarise::run(run, session.finish(pool)?, &report.survey))
 }
 
-fn draw(topic: &mut Topic, drawing: &Drawing<'_>) {
-    topic.history = Some(History::new(topic.prepared.clock, drawing.stretches));
-    if let (Some(against), Some(track)) = (&mut topic.against, drawing.reference) {
-        against.take_reference_track(&track.entries);
-    }
+/// How much of a log of this span lies before the last of `items`.
+pub(super) fn done(items: &[Item], span: Option<(u64, u64)>) -> Option<f64> {
+    let (now, (first, last)) = items.last().and_then(log_time).zip(span)?;
+    Some(now.saturating_sub(first) as f64 / last.saturating_sub(first).max(1) as f64)
 }
 
-/// Reads as far as needed to know clock, bias and initial attitude of every topic.
-fn prepare(
+/// Reads as far as needed to know clock, bias and initial attitude of every topic, or why one is refused.
+pub(super) fn prepare(
     run: &Replay,
     path: &Path,
     log: &Log,
     chosen: &[Chosen],
     pool: &Pool,
-) -> Result<Vec<Prepared>> {
+) -> Result<Vec<Result<Prepared>>> {
     let mut preparations: Vec<Preparation> = chosen
         .iter()
         .map(|c| {
@@ -233,7 +184,7 @@ fn prepare(
                 .with_stamps(StampPass::new(run, &c.found.resolved))
         })
         .collect();
-    let mut failure = None;
+    let mut failures: Vec<Option<String>> = chosen.iter().map(|_| None).collect();
     mcap::walk(
         again(log, path)?,
         // A little ahead is enough: this usually ends at once.
@@ -249,15 +200,14 @@ fn prepare(
                 let Item::Sample(stream, raw) = item else {
                     continue;
                 };
-                let Some(preparation) = preparations.get_mut(stream) else {
-                    continue;
-                };
-                if let Err(what) = preparation.take(&raw) {
-                    failure = Some((stream, what));
-                    return ControlFlow::Break(());
+                if let (Some(preparation), Some(failure @ None)) =
+                    (preparations.get_mut(stream), failures.get_mut(stream))
+                {
+                    *failure = preparation.take(&raw).err();
                 }
             }
-            if preparations.iter().any(Preparation::wants_more) {
+            let mut open = preparations.iter().zip(&failures);
+            if open.any(|(preparation, failure)| failure.is_none() && preparation.wants_more()) {
                 ControlFlow::Continue(())
             } else {
                 ControlFlow::Break(())
@@ -265,14 +215,16 @@ fn prepare(
         },
     )?;
     let name = |stream: usize| chosen.get(stream).map_or("", |c| c.found.name.as_str());
-    if let Some((stream, what)) = failure {
-        return Err(refused(path, name(stream), what));
-    }
-    preparations
+    Ok(preparations
         .into_iter()
+        .zip(failures)
         .enumerate()
-        .map(|(stream, p)| p.decide().map_err(|what| refused(path, name(stream), what)))
-        .collect()
+        .map(|(stream, (preparation, failure))| {
+            failure
+                .map_or_else(|| preparation.decide(), Err)
+                .map_err(|what| refused(path, name(stream), what))
+        })
+        .collect())
 }
 
 fn log_time(item: &Item) -> Option<u64> {
@@ -283,7 +235,7 @@ fn log_time(item: &Item) -> Option<u64> {
     }
 }
 
-fn again(log: &Log, path: &Path) -> Result<Reader> {
+pub(super) fn again(log: &Log, path: &Path) -> Result<Reader> {
     match log.reader() {
         Some(reader) => Ok(reader),
         None => Reader::open(path),

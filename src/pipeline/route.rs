@@ -13,14 +13,14 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 /// What a channel's messages are used for.
 #[derive(Debug)]
 pub struct Route {
-    /// Reads them; `None` when they are only copied.
+    /// Reads the samples in them; `None` when there are none.
     pub decoder: Option<Decoder>,
     /// Which of the run's streams they belong to; of several, the one of the frame that a message names.
     takers: Vec<Taker>,
     /// The channel's number, where it is not known beforehand whether channels take turns.
     turn: Option<usize>,
-    /// Whether they are a recorded orientation to compare with, not samples.
-    pub is_reference: bool,
+    /// Reads the recorded orientations in them to compare with.
+    pub reference: Option<Decoder>,
     /// The channel, when its messages are copied to the output.
     pub copied: Option<Arc<Channel>>,
 }
@@ -156,7 +156,7 @@ impl Route {
             decoder: Some(decoder),
             takers,
             turn: None,
-            is_reference: false,
+            reference: None,
             copied: None,
         }
     }
@@ -165,7 +165,8 @@ impl Route {
     #[must_use]
     pub fn reference(decoder: Decoder) -> Route {
         Route {
-            is_reference: true,
+            decoder: None,
+            reference: Some(decoder.clone()),
             ..Route::samples(decoder, 0)
         }
     }
@@ -177,9 +178,15 @@ impl Route {
             decoder: None,
             takers: Vec::new(),
             turn: None,
-            is_reference: false,
+            reference: None,
             copied: Some(channel),
         }
+    }
+
+    /// The same, what the messages hold also compared with where a decoder is given.
+    #[must_use]
+    pub fn comparing(self, reference: Option<Decoder>) -> Route {
+        Route { reference, ..self }
     }
 
     /// The same, the messages also copied where a channel is given.
@@ -205,6 +212,9 @@ impl Route {
         if let Some(decoder) = &self.decoder {
             self.decode(decoder, message, out);
         }
+        if let Some(decoder) = &self.reference {
+            recorded(decoder, message, out);
+        }
         if let Some(channel) = &self.copied {
             out.push(Item::Copy(Box::new(Copied {
                 channel: channel.clone(),
@@ -221,13 +231,6 @@ impl Route {
         let publish = nanos(message.publish_time);
         SCRATCH.with_borrow_mut(|samples| {
             samples.clear();
-            if self.is_reference {
-                // A reference that can not be read is one row less to compare with.
-                if decoder.decode(message.data, log, publish, samples).is_ok() {
-                    out.extend(samples.drain(..).map(Item::Reference));
-                }
-                return;
-            }
             let Some(Taker { stream, noticed }) = self.taker(decoder, message.data) else {
                 return;
             };
@@ -273,4 +276,15 @@ impl Route {
         let of = |taker: &&Taker| taker.noticed.frame_id.get() == Some(&frame);
         self.takers.iter().find(of).or(first)
     }
+}
+
+/// The orientations in a message; one that can not be read is one row less to compare with.
+fn recorded(decoder: &Decoder, message: &Message<'_>, out: &mut Vec<Item>) {
+    let (log, publish) = (nanos(message.log_time), nanos(message.publish_time));
+    SCRATCH.with_borrow_mut(|samples| {
+        samples.clear();
+        if decoder.decode(message.data, log, publish, samples).is_ok() {
+            out.extend(samples.drain(..).map(Item::Reference));
+        }
+    });
 }

@@ -38,12 +38,34 @@ pub struct Topic {
     pub estimator: Estimator,
     /// What came out of it.
     pub output: Output,
+    /// Samples without any rate amid others.
+    pub zeros: LoneZeros,
     /// The first payload that could not be decoded.
     pub first_undecodable: Option<(Nanos, Undecodable)>,
     /// Its comparison with the recorded orientation.
     pub against: Option<AgainstRecorded>,
     /// What is kept to be drawn, for a report.
     pub history: Option<History>,
+}
+
+/// Samples that are exactly zero about all axes between two that are not: what a driver without data says. A
+/// rest is longer.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LoneZeros {
+    /// How many.
+    pub count: u64,
+    previous: Option<[f64; 3]>,
+    last_is_lone: bool,
+}
+
+impl LoneZeros {
+    fn take(&mut self, gyro: Option<[f64; 3]>) {
+        let Some(gyro) = gyro else { return };
+        let is_zero = gyro == [0.0; 3];
+        self.count += u64::from(self.last_is_lone && !is_zero);
+        self.last_is_lone = is_zero && self.previous.is_some_and(|p| p != [0.0; 3]);
+        self.previous = Some(gyro);
+    }
 }
 
 /// What came out of an estimator.
@@ -105,6 +127,7 @@ impl Topic {
             warnings: found.warnings,
             estimator,
             output: Output::default(),
+            zeros: LoneZeros::default(),
             first_undecodable: None,
             against,
             history: None,
@@ -134,8 +157,6 @@ pub struct Found {
 pub struct Session {
     /// The topics.
     pub topics: Vec<Topic>,
-    /// References of a topic of their own come here.
-    pub reference_for: usize,
     outlet: Outlet,
     samples: u64,
     /// Whether a reader of an output has gone.
@@ -148,7 +169,6 @@ impl Session {
     pub fn new(topics: Vec<Topic>, outlet: Outlet) -> Session {
         Session {
             topics,
-            reference_for: 0,
             outlet,
             samples: 0,
             closed: false,
@@ -179,6 +199,7 @@ impl Session {
                     return Ok(());
                 };
                 topic.estimator.take(&raw);
+                topic.zeros.take(raw.gyro);
                 if let Some(history) = &mut topic.history {
                     history.took(Some(&raw), &topic.estimator.conditioning().counts);
                 }
@@ -198,8 +219,8 @@ impl Session {
                 topic.first_undecodable.get_or_insert(*why);
             }
             Item::Reference(raw) => {
-                let topic = self.topics.get_mut(self.reference_for);
-                if let Some(against) = topic.and_then(|t| t.against.as_mut()) {
+                let against = self.topics.iter_mut().filter_map(|t| t.against.as_mut());
+                for against in against.filter(|a| a.is_held_against_another()) {
                     against.take_reference(&raw);
                 }
             }

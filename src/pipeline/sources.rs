@@ -5,6 +5,7 @@
 //! other is one source. Channels that take turns, or name another publisher, and messages that name
 //! another frame, are several, and each gets a name: `TOPIC@FRAME`, `TOPIC@PUBLISHER`.
 
+use super::decoders::Decoders;
 use super::log::{Known, nanos};
 use super::pool::Pool;
 use super::topics::PICKED_UNNAMED;
@@ -91,6 +92,7 @@ pub(super) fn tell_apart(
     pool: &Pool,
 ) -> Result<Vec<Source>> {
     let sources = by_topic(channels);
+    let mut decoders = Decoders::new(options);
     let mut looked: Vec<(Arc<Channel>, usize, Decoder)> = Vec::new();
     let mut speakers: BTreeMap<usize, Speakers> = BTreeMap::new();
     let mut missing = 0;
@@ -107,11 +109,13 @@ pub(super) fn tell_apart(
             .collect();
         let several = speaking.len() > 1;
         for (index, known) in speaking {
-            let Ok(decoder) = known.decoder(options) else {
+            if looked.len() >= MOST_CHANNELS {
+                break;
+            }
+            let Ok(decoder) = known.decoder(&mut decoders) else {
                 continue;
             };
-            let is_worth_it = several || decoder.names_frames() || decoder.stamps().len() > 1;
-            if looked.len() < MOST_CHANNELS && is_worth_it {
+            if several || decoder.names_frames() || decoder.stamps().len() > 1 {
                 missing += known.messages.min(FIRST);
                 speakers
                     .entry(place)

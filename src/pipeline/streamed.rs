@@ -4,7 +4,8 @@
 //! clock, bias and initial attitude are known.
 
 use super::chosen::which_stamp;
-use super::log::{Known, described, explained, known, plain, problems, rank};
+use super::decoders::Decoders;
+use super::log::{Known, described, explained, known, problems, rank};
 use super::pool::Pool;
 use super::position::Position;
 use super::preparation::Resolved;
@@ -15,7 +16,6 @@ use super::sources::publisher;
 use super::summarise;
 use super::topics::{self, PICKED_UNNAMED};
 use super::waiting::Waiting;
-use crate::decode::Decoder;
 use crate::error::{Error, Result};
 use crate::report::summary::RunSummary;
 use crate::sink::{Flow, Stream, output_topic};
@@ -35,7 +35,10 @@ pub(super) fn replay(
     let path = run.source.name();
     let mut waiting = Waiting::new(run, &path, None);
     let mut failure = None;
-    let picked = std::cell::RefCell::new(Picked::default());
+    let picked = std::cell::RefCell::new(Picked {
+        decoders: Decoders::new(&run.plan.decode),
+        ..Picked::default()
+    });
     let report = mcap::walk(
         reader,
         // On this thread: what is learnt from a first message must not depend on who was faster.
@@ -90,12 +93,15 @@ struct Picked {
     found: Option<(Found, Stream)>,
     others: BTreeSet<String>,
     refusals: Vec<String>,
+    /// Decoders with the run's options, and with none.
+    decoders: Decoders,
+    plain: Decoders,
 }
 
 impl Picked {
     fn route(&mut self, run: &Replay, channel: &Arc<Channel>) -> Option<Route> {
         let copied = run.copy_input.then(|| channel.clone());
-        let found = known(channel, 0, None);
+        let found = known(channel, 0, None, &mut self.plain);
         let named = run.plan.topic.as_deref().filter(|t| *t != "all");
         let wanted = match (&self.topic, named) {
             (Some(topic), _) => {
@@ -118,7 +124,7 @@ impl Picked {
             }
             return copied.map(Route::only_copied);
         }
-        match Decoder::compile(&plain(channel), &run.plan.decode) {
+        match self.decoders.of(channel) {
             Ok(decoder) => {
                 if self.topic.is_none() {
                     self.topic = Some(channel.topic.clone());
@@ -178,10 +184,11 @@ impl Picked {
                 what,
             };
         }
+        let mut decoders = Decoders::default();
         let channels: Vec<Known> = survey
             .channels
             .iter()
-            .map(|c| known(&c.channel, c.messages, None))
+            .map(|c| known(&c.channel, c.messages, None, &mut decoders))
             .collect();
         let candidates: Vec<_> = channels.iter().map(Known::candidate).collect();
         let error = match topics::choose(path, &candidates, run.plan.topic.as_deref()) {

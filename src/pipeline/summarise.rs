@@ -48,6 +48,15 @@ pub fn run(run: &Replay, ended: Ended, survey: &Survey) -> RunSummary {
     }
 }
 
+/// What became of each topic of a run without outputs.
+pub(super) fn topics(run: &Replay, ended: Ended) -> Vec<TopicSummary> {
+    let mut topics = ended.topics;
+    topics
+        .iter_mut()
+        .map(|topic| of_topic(run, topic))
+        .collect()
+}
+
 fn of_topic(run: &Replay, topic: &mut Topic) -> TopicSummary {
     let drawn = drawn(topic);
     let conditioning = topic.estimator.conditioning();
@@ -231,6 +240,12 @@ fn warnings(topic: &Topic, summary: &TopicSummary) -> Vec<String> {
     if marked > 0 {
         said.push(format!(
             "{marked} samples mark their gyro as absent (covariance -1), which some drivers do wrongly: --ignore-covariance-flag uses it all the same"
+        ));
+    }
+    if topic.zeros.count > 0 {
+        said.push(format!(
+            "{} samples are exactly zero about all axes between others that are not: a driver that has no data says so this way; they are integrated as rest",
+            topic.zeros.count
         ));
     }
     let carried = topic.noticed.stamps_carried.load(Ordering::Relaxed);

@@ -4,6 +4,7 @@
 //! be made the error lists what is there.
 
 use crate::error::{Error, Result};
+use std::collections::BTreeSet;
 use std::path::Path;
 
 /// What the choice needs to know of one channel.
@@ -24,6 +25,10 @@ pub struct Candidate {
 /// A rank from which a topic is picked without being named.
 pub const PICKED_UNNAMED: u8 = 2;
 
+/// Most topics that are looked at or integrated at once: each takes memory and a part of every step. Robots
+/// have a few IMUs, and the largest body suits some dozens.
+pub const MOST_TOPICS: usize = 256;
+
 /// The topics to estimate from, and what to say about the choice.
 #[derive(Clone, Debug, PartialEq, Eq, Default)]
 pub struct Choice {
@@ -40,19 +45,28 @@ pub struct Choice {
 pub fn choose(path: &Path, candidates: &[Candidate], named: Option<&str>) -> Result<Choice> {
     let best = candidates.iter().map(|c| c.rank).max().unwrap_or(0);
     let imus = |least: u8| {
-        let mut topics: Vec<String> = Vec::new();
-        for c in candidates.iter().filter(|c| c.rank >= least) {
-            if !topics.contains(&c.topic) {
-                topics.push(c.topic.clone());
-            }
-        }
-        topics
+        let mut seen = BTreeSet::new();
+        candidates
+            .iter()
+            .filter(|c| c.rank >= least && seen.insert(c.topic.as_str()))
+            .map(|c| c.topic.clone())
+            .collect::<Vec<String>>()
     };
     match named {
-        Some("all") if best >= PICKED_UNNAMED => Ok(Choice {
-            topics: imus(PICKED_UNNAMED),
-            note: None,
-        }),
+        Some("all") if best >= PICKED_UNNAMED => {
+            let topics = imus(PICKED_UNNAMED);
+            if topics.len() > MOST_TOPICS {
+                return Err(Error::Unsupported {
+                    path: path.to_owned(),
+                    what: format!(
+                        "{} topics carry a rate, and at most {MOST_TOPICS} are taken at once: {}\n  help: --topic NAME takes one of them",
+                        topics.len(),
+                        named_few(&topics)
+                    ),
+                });
+            }
+            Ok(Choice { topics, note: None })
+        }
         Some(topic) if topic != "all" => {
             if candidates.iter().any(|c| c.topic == topic) {
                 return Ok(Choice {
@@ -90,13 +104,29 @@ pub fn choose(path: &Path, candidates: &[Candidate], named: Option<&str>) -> Res
             let note = (!others.is_empty()).then(|| {
                 format!(
                     "took {}; {} could be taken too with --topic",
-                    topics.join(", "),
-                    others.join(", ")
+                    named_few(&topics),
+                    named_few(&others)
                 )
             });
             Ok(Choice { topics, note })
         }
     }
+}
+
+/// The names of topics, fit for a terminal: the first ten, and how many more there are.
+#[must_use]
+pub fn named_few<T: AsRef<str>>(topics: &[T]) -> String {
+    const FEW: usize = 10;
+    let names: Vec<String> = topics
+        .iter()
+        .take(FEW)
+        .map(|topic| crate::decode::printable(topic.as_ref()))
+        .collect();
+    let mut out = names.join(", ");
+    if topics.len() > FEW {
+        out.push_str(&format!(" and {} more", topics.len() - FEW));
+    }
+    out
 }
 
 /// One indented line per channel, at most 40.
@@ -113,7 +143,8 @@ pub fn listing(candidates: &[Candidate]) -> String {
             let count = c
                 .messages
                 .map_or_else(String::new, |n| format!("  {n} messages"));
-            format!("\n    {}  {}{count}", c.topic, c.described)
+            let topic = crate::decode::printable(&c.topic);
+            format!("\n    {topic}  {}{count}", c.described)
         })
         .collect();
     if candidates.len() > MOST {

@@ -2,13 +2,14 @@
 //!
 //! NDJSON and CSV are our own outputs; MCAP goes through the same walk and decoders as a replay.
 
+use super::decoders::Decoders;
 use super::log::{Known, Log, problems, rank};
 use super::pool::Pool;
 use super::preparation::orientation_convention;
 use super::route::{Item, Route};
 use super::simulate::{TRUTH_ID, TRUTH_TOPIC};
 use super::topics;
-use crate::decode::{Options, Role};
+use crate::decode::{Role, printable};
 use crate::error::{Error, Result};
 use crate::model::attitude::Quaternion;
 use crate::model::frames::{Body, Convention, Nav, World};
@@ -67,7 +68,7 @@ fn from_mcap(path: &Path, side: Side, topic: Option<&str>, pool: &Pool) -> Resul
     let log = Log::open(path, pool)?;
     let known = attitude_channel(path, &log, side, topic)?;
     let decoder = known
-        .decoder(&Options::default())
+        .decoder(&mut Decoders::default())
         .map_err(|why| Error::Unsupported {
             path: path.to_owned(),
             what: why.to_string(),
@@ -147,10 +148,11 @@ fn attitude_channel<'l>(
                 topics: topics::listing(&log.candidates()),
             });
     }
+    let mut decoders = Decoders::default();
     let mut all: Vec<(u8, &Known)> = log
         .channels
         .iter()
-        .filter(|k| k.role.has_orientation && carries_orientation(k))
+        .filter(|k| k.role.has_orientation && carries_orientation(k, &mut decoders))
         .map(|k| (goodness(&k.role, side, &k.channel.topic), k))
         .collect();
     all.sort_by_key(|(goodness, _)| std::cmp::Reverse(*goodness));
@@ -192,9 +194,8 @@ fn goodness(role: &Role, side: Side, topic: &str) -> u8 {
 
 /// Whether the first message really has one: an Imu may mark it as absent. A track whose first rows
 /// are NaN still counts.
-fn carries_orientation(known: &Known) -> bool {
-    let (Some((log, payload)), Ok(decoder)) = (&known.first, known.decoder(&Options::default()))
-    else {
+fn carries_orientation(known: &Known, decoders: &mut Decoders) -> bool {
+    let (Some((log, payload)), Ok(decoder)) = (&known.first, known.decoder(decoders)) else {
         return false;
     };
     let mut samples = Vec::new();
@@ -241,7 +242,7 @@ pub fn from_ndjson(path: &Path, side: Side, id: Option<&str>) -> Result<Vec<Entr
     let mut track = Vec::new();
     let mut seen: Option<String> = None;
     let mut line = Vec::new();
-    let mut number = 0u64;
+    let (mut number, mut offset) = (0u64, 0u64);
     loop {
         line.clear();
         number += 1;
@@ -249,9 +250,10 @@ pub fn from_ndjson(path: &Path, side: Side, id: Option<&str>) -> Result<Vec<Entr
             .read_until(b'\n', &mut line)
             .map_err(|source| Error::Read {
                 path: path.to_owned(),
-                offset: number,
+                offset,
                 source,
             })?;
+        offset += read as u64;
         if read == 0 {
             return Ok(track);
         }
@@ -279,8 +281,9 @@ pub fn from_ndjson(path: &Path, side: Side, id: Option<&str>) -> Result<Vec<Entr
                         path,
                         number,
                         &format!(
-                            "attitudes of both `{first}` and `{}`; --topic ID takes one",
-                            att.id
+                            "attitudes of both `{}` and `{}`; --topic ID takes one",
+                            printable(first),
+                            printable(&att.id)
                         ),
                     ));
                 }

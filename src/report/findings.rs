@@ -8,6 +8,7 @@ mod orientation;
 mod samples;
 
 use crate::pipeline::check::{Checked, CheckedTopic};
+use crate::pipeline::topics::named_few;
 use serde_json::{Map, Value, json};
 
 /// How bad a finding is.
@@ -136,10 +137,26 @@ pub fn findings(checked: &Checked) -> Vec<Finding> {
             Finding::new(
                 Severity::Note,
                 "several-topics",
-                format!("several topics carry a rate: {}", names.join(", ")),
+                format!("several topics carry a rate: {}", named_few(&names)),
             )
             .with("topics", names.clone())
             .advise("choose one, or `all`")
+            .flags("--topic NAME"),
+        );
+    }
+    if !checked.left_out.is_empty() {
+        found.push(
+            Finding::new(
+                Severity::Warning,
+                "topics-left-out",
+                format!(
+                    "{} more topics carry a rate and were not examined: {}",
+                    checked.left_out.len(),
+                    named_few(&checked.left_out)
+                ),
+            )
+            .with("topics", checked.left_out.clone())
+            .advise("examine one by its name")
             .flags("--topic NAME"),
         );
     }

@@ -301,3 +301,35 @@ fn every_figure_of_noise_is_in_the_sigma_of_the_summary() {
     );
     assert!(coarse.done().json()["topics"][0]["integration_error_deg"].is_null());
 }
+
+#[test]
+fn a_message_of_zeros_amid_motion_is_said() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut samples = crate::made_logs::motion(300);
+    for n in [100, 200] {
+        samples[n].gyro = [0.0; 3];
+    }
+    crate::made_logs::written(dir.path(), "log.mcap", &samples);
+    let ran = strapd(dir.path(), "replay log.mcap -o null:");
+    assert!(
+        ran.done().out.contains("2 samples are exactly zero"),
+        "{ran:?}"
+    );
+    // A body that rests, without noise, is another thing.
+    samples[100..200].iter_mut().for_each(|s| s.gyro = [0.0; 3]);
+    crate::made_logs::written(dir.path(), "log.mcap", &samples);
+    let ran = strapd(dir.path(), "replay log.mcap -o null:");
+    assert!(!ran.done().out.contains("exactly zero"), "{ran:?}");
+}
+
+#[test]
+fn a_line_that_can_not_be_read_is_named_by_its_line_and_a_failed_read_by_its_byte() {
+    let dir = bench();
+    std::fs::write(
+        dir.path().join("t.ndjson"),
+        "{\"class\":\"X\"}\n\n{\"class\":5}\n",
+    )
+    .unwrap();
+    strapd(dir.path(), "replay log.mcap -o a.csv").done();
+    strapd(dir.path(), "compare a.csv t.ndjson").refused(1, &["t.ndjson: line 3:"]);
+}

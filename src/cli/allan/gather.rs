@@ -5,15 +5,16 @@ use crate::condition::{ClockWarning, Conditioner, Report, choose_clock};
 use crate::config::Plan;
 use crate::error::{Error, Result};
 use crate::model::allan::AngleRecord;
+use crate::pipeline::decoders::Decoders;
 use crate::pipeline::log::{Log, described, problems};
 use crate::pipeline::pool::Pool;
 use crate::pipeline::preparation::Resolved;
 use crate::pipeline::route::{Item, Noticed, Route, Taker};
-use crate::pipeline::sources::is_same;
 use crate::record::{Join, Nanos, RateSample, RawSample, SampleKind};
 use crate::report::summary::significant;
 use crate::source::mcap::{self, WalkOptions};
 use nalgebra::Vector3;
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
@@ -77,12 +78,17 @@ pub(super) fn gather(path: &Path, plan: &Plan, capacity: usize, pool: &Pool) -> 
         path: path.to_owned(),
         what,
     };
+    let mut by_id = BTreeMap::new();
     let mut decoders = Vec::new();
+    let mut compiled = Decoders::new(&plan.decode);
     let source = log.source(&topic);
     for known in source.iter().flat_map(|s| log.channels_of(s)) {
         let decoder = known
-            .decoder(&plan.decode)
+            .decoder(&mut compiled)
             .map_err(|why| unsupported(why.to_string()))?;
+        by_id
+            .entry((known.channel.id, known.channel.schema_id))
+            .or_insert_with(|| decoder.clone());
         decoders.push((known.channel.clone(), decoder));
     }
     let Some((channel, decoder)) = decoders.first() else {
@@ -106,13 +112,14 @@ pub(super) fn gather(path: &Path, plan: &Plan, capacity: usize, pool: &Pool) -> 
             ..WalkOptions::default()
         },
         |met| {
-            decoders
-                .iter()
-                .find(|(known, _)| is_same(known, met))
-                .map(|(_, decoder)| {
-                    let noticed = noticed.clone();
-                    Route::to(decoder.clone(), vec![Taker { stream: 0, noticed }])
-                })
+            let id = (met.id, met.schema_id);
+            let is_own = source.as_ref().is_some_and(|s| s.topic == met.topic);
+            let decoder = by_id.get(&id).filter(|_| is_own)?;
+            let noticed = noticed.clone();
+            Some(Route::to(
+                decoder.clone(),
+                vec![Taker { stream: 0, noticed }],
+            ))
         },
         Route::map,
         |items| {

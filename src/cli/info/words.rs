@@ -1,11 +1,14 @@
 //! What `info` found -> text or JSON. Pure.
 
+use crate::cli::shell::{flag, quoted_file};
 use crate::pipeline::log::{Known, described, rank};
 use crate::pipeline::look::Looked;
+use crate::pipeline::topics::named_few;
 use crate::report::calendar::{date, duration};
 use crate::report::summary::{human_bytes, significant};
 use crate::source::mcap::Survey;
 use serde_json::{Value, json};
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -25,6 +28,8 @@ pub(super) struct Report<'a> {
     pub(super) channels: &'a [Known],
     /// Its topics of samples.
     pub(super) looked: &'a [Looked],
+    /// Topics of samples that were too many to look at.
+    pub(super) left_out: &'a [String],
 }
 
 impl Report<'_> {
@@ -89,10 +94,19 @@ impl Report<'_> {
     }
 
     fn write_others(&self, out: &mut String) {
+        if !self.left_out.is_empty() {
+            let _ = writeln!(
+                out,
+                "{} more topics carry a rate and were not looked at: {}",
+                self.left_out.len(),
+                named_few(self.left_out)
+            );
+        }
+        let looked: BTreeSet<&str> = self.looked.iter().map(|l| l.of.as_str()).collect();
         let others: Vec<&Known> = self
             .channels
             .iter()
-            .filter(|k| !self.looked.iter().any(|l| l.of == k.channel.topic))
+            .filter(|k| !looked.contains(k.channel.topic.as_str()))
             .collect();
         for known in others.iter().take(OTHERS) {
             let what = match (rank(&known.role), known.role.has_orientation) {
@@ -115,29 +129,29 @@ impl Report<'_> {
 
     /// The command to run next, with the flags this log needs.
     fn next(&self) -> String {
-        let file = self.path.display();
+        let file = quoted_file(self.path);
         let best = match self.looked {
             [] => {
                 return format!(
-                    "no IMU topic here; strapd replay {file} --topic NAME --field gyro=PATH names a rate in any message"
+                    "strapd replay {file} --topic NAME --field gyro=PATH   # no IMU topic here; this names a rate in any message"
                 );
             }
             [one] => one,
             several => {
-                let of = |l: &Looked| {
-                    self.channels
-                        .iter()
-                        .find(|k| k.channel.topic == l.of)
-                        .map_or(0, |k| rank(&k.role))
-                };
+                let mut ranks = BTreeMap::new();
+                for known in self.channels {
+                    let topic = known.channel.topic.as_str();
+                    ranks.entry(topic).or_insert_with(|| rank(&known.role));
+                }
+                let of = |l: &Looked| ranks.get(l.of.as_str()).copied().unwrap_or(0);
                 let best = several.iter().map(of).max().unwrap_or(0);
                 let mut likely = several.iter().filter(|l| of(l) == best);
                 match (likely.next(), likely.next()) {
                     (Some(one), None) => one,
                     (first, _) => {
                         return format!(
-                            "strapd replay {file} --topic {} -o attitude.mcap   (or another topic, or all)",
-                            first.map_or_else(String::new, |l| crate::decode::printable(&l.topic))
+                            "strapd replay {file} {} -o attitude.mcap   # or another topic, or all",
+                            flag("--topic", first.map_or("", |l| l.topic.as_str()))
                         );
                     }
                 }
@@ -198,6 +212,7 @@ impl Report<'_> {
                 "carries_rate": k.role.has_rate,
                 "carries_orientation": k.role.has_orientation,
             })).collect::<Vec<_>>(),
+            "not_looked_at": self.left_out,
             "imu": self.looked.iter().map(topic_json).collect::<Vec<_>>(),
             "next": self.next(),
         })

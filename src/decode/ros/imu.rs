@@ -192,7 +192,7 @@ mod tests {
             let (layout, dialect) = if cdr { (Layout::Cdr, Dialect::Ros2) } else { (Layout::Ros1, Dialect::Ros1) };
             let read = plans(layout, dialect, ignore).map(|plan| {
                 let mut out = Vec::new();
-                let outcome = plan.decode(&payload, Nanos(1), Nanos(2), &mut out);
+                let outcome = plan.decode(&plan.form, &payload, Nanos(1), Nanos(2), &mut out);
                 // As text, because NaN differs from itself.
                 format!("{outcome:?} {out:?}")
             });

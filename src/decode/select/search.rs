@@ -15,9 +15,10 @@ use crate::decode::stamp::TimeUnit;
 use crate::record::SampleKind;
 use std::collections::{BTreeSet, VecDeque};
 
-/// Deepest nesting that is searched, and most structs.
+/// Deepest nesting that is searched, most structs, and most fields of them.
 const MAX_DEPTH: usize = 8;
 const MAX_SITES: usize = 4096;
+const MAX_FIELDS: usize = 50_000;
 
 /// A struct, and the way to it.
 #[derive(Clone)]
@@ -131,6 +132,7 @@ pub(super) fn check(schema: &Schema, selection: &mut Selection) -> Result<(), St
 
 fn sites(schema: &Schema) -> Vec<Site> {
     let mut found = Vec::new();
+    let mut visited = 0;
     let mut seen = BTreeSet::new();
     let mut queue = VecDeque::from([Site {
         path: Vec::new(),
@@ -143,7 +145,8 @@ fn sites(schema: &Schema) -> Vec<Site> {
         if !seen.insert((site.structure, site.each)) && site.depth > 2 {
             continue;
         }
-        if found.len() >= MAX_SITES {
+        visited += fields.len();
+        if found.len() >= MAX_SITES || visited > MAX_FIELDS {
             break;
         }
         for (index, field) in fields.iter().enumerate() {

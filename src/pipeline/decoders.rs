@@ -1,0 +1,77 @@
+//! A log's channels -> their decoders, each schema compiled once. Pure.
+//!
+//! Apart from the log because how its messages are understood is asked again for each run, and a log may
+//! have tens of thousands of channels of one schema, or as many schemas.
+
+use super::log::plain;
+use crate::decode::{Decoder, Effort, Options, Unsupported};
+use crate::source::mcap::{Channel, Schema};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Decoders under the same options. All of a log together cost no more than one [`Effort`].
+#[derive(Debug, Default)]
+pub struct Decoders {
+    options: Options,
+    effort: Effort,
+    /// By place in memory of the schema, which is kept, message encoding, and which stamp was asked for.
+    compiled: BTreeMap<(usize, String, Option<usize>), Compiled>,
+}
+
+#[derive(Debug)]
+struct Compiled {
+    _schema: Arc<Schema>,
+    decoder: Result<Decoder, Unsupported>,
+}
+
+impl Decoders {
+    /// None yet.
+    #[must_use]
+    pub fn new(options: &Options) -> Decoders {
+        Decoders {
+            options: options.clone(),
+            ..Decoders::default()
+        }
+    }
+
+    /// The decoder of a channel, which has seen no message.
+    ///
+    /// # Errors
+    /// As [`Decoder::compile_within`].
+    pub fn of(&mut self, channel: &Channel) -> Result<Decoder, Unsupported> {
+        self.compiled(channel, None)
+    }
+
+    /// The same that takes the stamp of this number, of several ([`Options::nth_stamp`]).
+    ///
+    /// # Errors
+    /// As [`Decoder::compile_within`].
+    pub fn with_stamp(&mut self, channel: &Channel, nth: usize) -> Result<Decoder, Unsupported> {
+        self.compiled(channel, Some(nth))
+    }
+
+    fn compiled(&mut self, channel: &Channel, nth: Option<usize>) -> Result<Decoder, Unsupported> {
+        let options = Options {
+            nth_stamp: nth.unwrap_or(self.options.nth_stamp),
+            ..self.options.clone()
+        };
+        let plain = plain(channel);
+        let Some(schema) = &channel.schema else {
+            return Decoder::compile_within(&plain, &options, &mut self.effort);
+        };
+        let encoding = channel.message_encoding.clone();
+        let key = (Arc::as_ptr(schema) as usize, encoding, nth);
+        let effort = &mut self.effort;
+        let known = self.compiled.entry(key).or_insert_with(|| Compiled {
+            _schema: Arc::clone(schema),
+            decoder: Decoder::compile_within(&plain, &options, effort),
+        });
+        match &known.decoder {
+            Ok(decoder) => Ok(decoder.of_topic(&channel.topic)),
+            Err(why) => Err(Unsupported {
+                topic: crate::decode::printable(&channel.topic),
+                ..why.clone()
+            }),
+        }
+    }
+}

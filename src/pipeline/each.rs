@@ -1,0 +1,160 @@
+//! A log -> what a replay makes of each of several topics, all in one pass. I/O.
+//!
+//! Apart from the replay because nothing is written, every topic is by itself (one that is refused does not
+//! keep the others from being told about), and a log may have hundreds: a pass for each would cost the
+//! square of its size.
+
+use super::check::Drawing;
+use super::chosen::{Chosen, choose_each, reference, route};
+use super::decoders::Decoders;
+use super::history::History;
+use super::log::Log;
+use super::opening::labelled;
+use super::outlet::{Delivery, Outlet};
+use super::pool::Pool;
+use super::position::Position;
+use super::replay::{again, done, prepare};
+use super::route::Route;
+use super::run::Replay;
+use super::session::{Session, Topic};
+use super::summarise;
+use crate::error::Result;
+use crate::report::summary::TopicSummary;
+use crate::sink::{Provenance, Stream};
+use crate::source::mcap::{self, WalkOptions};
+use std::ops::ControlFlow;
+use std::path::Path;
+
+/// What became of a topic, or why nothing did.
+pub(super) type Told = std::result::Result<Box<TopicSummary>, String>;
+
+/// Integrates the topics called `names`, without outputs; by name, in their order.
+///
+/// # Errors
+/// The log can not be read.
+pub(super) fn each(
+    run: &Replay,
+    (path, log): (&Path, &Log),
+    names: &[String],
+    drawing: Option<&Drawing<'_>>,
+    pool: &Pool,
+    watch: &mut dyn FnMut(&Position),
+) -> Result<Vec<Told>> {
+    let mut decoders = Decoders::new(&run.plan.decode);
+    let mut told: Vec<Option<Told>> = Vec::new();
+    let mut chosen: Vec<Chosen> = Vec::new();
+    for found in choose_each(run, path, log, names, &mut decoders) {
+        told.push(found.map_or_else(
+            |refused| Some(Err(refused.to_string())),
+            |found| {
+                chosen.push(found);
+                None
+            },
+        ));
+    }
+    let elsewhere = drawing.and_then(|d| d.reference).is_some();
+    let reference = match reference(run, path, log, &chosen, true) {
+        _ if elsewhere => None,
+        Ok(reference) => reference,
+        Err(refused) => {
+            let refused = refused.to_string();
+            let all = told
+                .into_iter()
+                .map(|told| told.unwrap_or_else(|| Err(refused.clone())));
+            return Ok(all.collect());
+        }
+    };
+
+    let prepared = prepare(run, path, log, &chosen, pool)?;
+    let mut topics = Vec::new();
+    let mut streams: Vec<Stream> = Vec::new();
+    let mut kept = Vec::new();
+    let mut open = told.iter_mut().filter(|told| told.is_none());
+    for (chosen, prepared) in chosen.into_iter().zip(prepared) {
+        let begun = prepared.and_then(|prepared| {
+            let (plan, found) = (&run.plan, chosen.found.clone());
+            let stream = labelled(chosen.stream.clone(), plan, &found.resolved, &prepared);
+            let topic = Topic::new(path, plan, found, prepared, run.against.is_some())?;
+            Ok((topic, stream))
+        });
+        let slot = open.next();
+        match begun {
+            Ok((topic, stream)) => {
+                topics.push(topic);
+                streams.push(stream);
+                kept.push(chosen);
+            }
+            Err(refused) => {
+                if let Some(slot) = slot {
+                    *slot = Some(Err(refused.to_string()));
+                }
+            }
+        }
+    }
+    let together = topics.len();
+    for (topic, chosen) in topics.iter_mut().zip(&kept) {
+        if let Some(against) = &mut topic.against {
+            against.share_room(together);
+            let own = reference.as_ref().is_some_and(|r| r.is_of(chosen));
+            if let Some(reference) = reference.as_ref().filter(|_| !own) {
+                against.take_reference_from(&reference.resolved);
+            }
+        }
+        if let Some(drawing) = drawing {
+            draw(topic, drawing);
+        }
+    }
+    let provenance = Provenance::default();
+    let outlet = Outlet::open(
+        &[],
+        &[],
+        run.options,
+        &streams,
+        &provenance,
+        Delivery::default(),
+    )?;
+    let mut session = Session::new(topics, outlet);
+    let span = log.survey.times;
+    let mut failure = None;
+    mcap::walk(
+        again(log, path)?,
+        &WalkOptions {
+            pool: Some(pool.rayon()),
+            ..WalkOptions::default()
+        },
+        |channel| route(&kept, reference.as_ref(), false, channel),
+        Route::map,
+        |items| {
+            let done = done(items, span);
+            match session.consume(items.drain(..), pool) {
+                Ok(_) => {
+                    watch(&session.position(done));
+                    ControlFlow::Continue(())
+                }
+                Err(e) => {
+                    failure = Some(e);
+                    ControlFlow::Break(())
+                }
+            }
+        },
+    )?;
+    if let Some(e) = failure {
+        return Err(e);
+    }
+    let mut summaries = summarise::topics(run, session.finish(pool)?).into_iter();
+    let mut next = || {
+        let summary = summaries.next().map(Box::new);
+        summary.ok_or_else(|| "the replay gave nothing".to_owned())
+    };
+    Ok(told
+        .into_iter()
+        .map(|told| told.unwrap_or_else(&mut next))
+        .collect())
+}
+
+fn draw(topic: &mut Topic, drawing: &Drawing<'_>) {
+    topic.history = Some(History::new(topic.prepared.clock, drawing.stretches));
+    if let (Some(against), Some(track)) = (&mut topic.against, drawing.reference) {
+        against.take_reference_track(&track.entries);
+    }
+}
