@@ -128,7 +128,7 @@ pub struct Effort {
 
 impl Default for Effort {
     fn default() -> Self {
-        Effort { fields: 2_000_000 }
+        Effort { fields: 5_000_000 }
     }
 }
 
@@ -136,8 +136,15 @@ impl Effort {
     /// Most fields one schema counts for: beyond, none is compiled.
     const ONE: usize = 50_000;
 
-    fn spend(&mut self, schema: Schema) -> Result<Schema, (String, &'static str)> {
-        let spelled = schema.spelled(Effort::ONE);
+    fn spend(&mut self, schema: Schema, encoding: &str) -> Result<Schema, (String, &'static str)> {
+        // Protobuf's types may hold themselves, and are not written out; elsewhere that is no schema, and is
+        // found out only by going round.
+        let circle = if encoding == "protobuf" {
+            0
+        } else {
+            Effort::ONE
+        };
+        let spelled = schema.spelled(Effort::ONE, circle);
         match self.fields.checked_sub(spelled) {
             Some(left) => {
                 self.fields = left;
@@ -178,7 +185,8 @@ impl Decoder {
             return Ok(Decoder::json(channel, options, label));
         }
         // A recorder may leave a well-known type's text out, or shorten it to a stub.
-        let read = read_schema(channel).and_then(|schema| effort.spend(schema));
+        let read =
+            read_schema(channel).and_then(|schema| effort.spend(schema, channel.message_encoding));
         let (schema, selection) = understand(channel, read, options)
             .or_else(|why| understand(channel, well_known(channel), options).map_err(|_| why))
             .map_err(refuse)?;

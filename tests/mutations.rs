@@ -1,11 +1,16 @@
 //! Promise: no bytes from outside make anything panic, hang or lie (service.md 6.3 I1). Every parser, fed with its
 //! good inputs (`fuzz/seeds`) changed at random: the functions are those of the fuzzers in `fuzz/`.
 //!
-//! `STRAPD_MUTATIONS=1000000 cargo test --release --test mutations` runs as many cases for each.
+//! `STRAPD_MUTATIONS=1000000 cargo test --release --test mutations` runs as many cases for each;
+//! `STRAPD_MUTANTS=200000` as many changed logs through all commands.
 
 #![cfg(feature = "service")]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
+#[cfg(target_os = "linux")]
+#[path = "mutations/commands.rs"]
+mod commands;
+mod made_logs;
 #[path = "../fuzz/parsers.rs"]
 mod parsers;
 

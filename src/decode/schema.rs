@@ -130,9 +130,9 @@ impl Schema {
         self.structs.get(index)
     }
 
-    /// Fields there are once every nested type is written out in its place, at most `limit`; so many where the
-    /// types nest in a circle. The work is that of reading the schema, whatever it spells out to.
-    pub(crate) fn spelled(&self, limit: usize) -> usize {
+    /// Fields there are once every nested type is written out in its place, at most `limit`; `circle` for one whose
+    /// type holds itself. The work is that of reading the schema, whatever it spells out to.
+    pub(crate) fn spelled(&self, limit: usize, circle: usize) -> usize {
         let mut known: Vec<Option<usize>> = vec![None; self.structs.len()];
         let mut begun = vec![false; self.structs.len()];
         // Inner types first, without recursion: they may nest as deep as there are types.
@@ -153,7 +153,7 @@ impl Schema {
                 open.extend(inner.flatten().filter(is_new));
                 continue;
             }
-            let of = |index| known.get(index).copied().flatten().unwrap_or(limit);
+            let of = |index| known.get(index).copied().flatten().unwrap_or(circle);
             let sum = inner
                 .map(|index| 1 + index.map_or(0, of))
                 .fold(0, usize::saturating_add);

@@ -29,7 +29,7 @@ pub const LARGEST: usize = 2_000_000;
 /// Stretches of time a series is drawn in: about two to a pixel.
 pub const STRETCHES: usize = 1400;
 /// Topics that are drawn; of the others the numbers are told.
-const DRAWN: usize = 6;
+pub const DRAWN: usize = 6;
 /// Fewest stretches, when all must fit.
 const FEWEST: usize = 64;
 

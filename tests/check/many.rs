@@ -22,7 +22,7 @@ fn several(dir: &Path, topics: usize, samples: usize) -> PathBuf {
             let own = motion.iter().skip(n).zip(stamps);
             let own: Vec<_> = own
                 .map(|(sample, stamp)| {
-                    let mut sample = sample.clone();
+                    let mut sample = *sample;
                     sample.stamp = stamp;
                     sample
                 })
@@ -199,11 +199,11 @@ fn a_schema_of_many_channels_is_compiled_once_and_all_schemas_within_a_bound() {
     let understood = log.channels.iter().filter(|k| k.role.has_rate).count();
     eprintln!("{understood} of 2000 schemas: {:?}", start.elapsed());
     assert!(
-        start.elapsed() < Duration::from_secs(20),
+        start.elapsed() < Duration::from_secs(60),
         "{:?}",
         start.elapsed()
     );
-    assert!((30..100).contains(&understood), "{understood}");
+    assert!((60..150).contains(&understood), "{understood}");
     let mut decoders = strapd::pipeline::decoders::Decoders::default();
     let refused = log
         .channels

@@ -197,6 +197,9 @@ impl Buffers {
                 let (declared, actual) = (size as u64, packed.len() as u64);
                 return Ok(Err(ProblemKind::ChunkSize { declared, actual }));
             }
+            Compression::Zstd if is_packed_nothing(packed, size) => {
+                return Ok(Err(ProblemKind::NoInnerRecord { at: 0 }));
+            }
             Compression::Lz4 | Compression::Zstd => {
                 let plain = room(&mut self.plain, size);
                 let actual = match compression {
@@ -236,6 +239,19 @@ impl Buffers {
             }
         }
     }
+}
+
+/// Whether a chunk is packed as only zeros and the like can be, and begins with opcode 0: then it is not worth
+/// the memory it asks for. Of 2 kB of it, 64 MiB would be unpacked, and none of them used.
+fn is_packed_nothing(packed: &[u8], size: usize) -> bool {
+    const SUSPECT: usize = 1000;
+    if packed.len() > size / SUSPECT {
+        return false;
+    }
+    let mut first = [1];
+    let decoder = zstd::stream::read::Decoder::with_buffer(packed);
+    let read = decoder.and_then(|mut decoder| io::Read::read_exact(&mut decoder, &mut first));
+    read.is_ok() && first == [0]
 }
 
 fn unzstd(

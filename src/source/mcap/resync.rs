@@ -12,6 +12,8 @@ use std::io;
 
 /// Bytes searched at a time.
 const WINDOW: usize = 256 << 10;
+/// Bytes searched first: where chunks and garbage take turns, the next chunk is near, and each search starts anew.
+const FIRST: usize = 4 << 10;
 /// Bytes needed to judge a candidate: head, fields, the longest name known.
 const SIGNATURE: usize = HEAD + 40 + 4;
 
@@ -23,9 +25,10 @@ pub(super) fn next_chunk(tape: &mut Tape, from: u64, limit: u64) -> io::Result<b
     } else {
         tape.skip(from.saturating_sub(tape.position()))?;
     }
+    let mut window = FIRST;
     loop {
         let left = tape.remaining();
-        let ahead = tape.available(WINDOW, WINDOW)?;
+        let ahead = tape.available(window, window)?;
         let found = (0..ahead.len()).find(|&i| {
             ahead.get(i) == Some(&op::CHUNK)
                 && ahead
@@ -40,11 +43,12 @@ pub(super) fn next_chunk(tape: &mut Tape, from: u64, limit: u64) -> io::Result<b
             tape.skip(i as u64)?;
             return Ok(true);
         }
-        if have < WINDOW {
+        if have < window {
             tape.skip(have as u64)?;
             return Ok(false);
         }
         tape.skip((have - SIGNATURE + 1) as u64)?;
+        window = WINDOW.min(2 * window);
     }
 }
 

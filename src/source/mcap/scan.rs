@@ -420,6 +420,8 @@ impl Scanner {
             .unwrap_or(self.tape.available(1, 1)?.len() as u64);
         let from = self.trusted.take().unwrap_or(at);
         self.crc = None;
+        // What was read ahead is given up; where that happens often, little is read ahead.
+        self.peek = PEEK;
         if self.section != Section::Data {
             // Nothing but repetition follows the end of data.
             let kind = if self.tape.may_have(total) {

@@ -1,0 +1,365 @@
+//! Parsers, and inputs of any length on which each could go wrong: the same thing again and again, or one thing
+//! that is long beside many that refer to it.
+
+use crate::parsers;
+use std::ops::ControlFlow;
+use strapd::decode::framing::Framer;
+use strapd::decode::{Channel, FieldPath, decode_line, role};
+use strapd::record::Nanos;
+use strapd::source::mcap::{MAGIC, Reader, WalkOptions, op, walk};
+
+/// A parser and what it is fed.
+pub(crate) struct Case {
+    pub name: &'static str,
+    pub parse: fn(&[u8]),
+    pub input: fn(usize) -> Vec<u8>,
+}
+
+macro_rules! cases {
+    ($($parse:expr => { $($name:literal: $input:expr;)* })*) => {
+        &[$($(Case { name: $name, parse: $parse, input: $input },)*)*]
+    };
+}
+
+/// `head`, `piece` as often as it fits into `length`, `tail`.
+fn again(head: &str, piece: &str, tail: &str, length: usize) -> Vec<u8> {
+    let times = length.saturating_sub(head.len() + tail.len()) / piece.len();
+    format!("{head}{}{tail}", piece.repeat(times)).into_bytes()
+}
+
+/// Numbered pieces, as many as fit.
+fn numbered(head: &str, length: usize, piece: impl Fn(usize) -> String) -> Vec<u8> {
+    let mut out = head.to_owned();
+    for n in 0.. {
+        let next = piece(n);
+        if out.len() + next.len() > length.max(head.len()) {
+            break;
+        }
+        out.push_str(&next);
+    }
+    out.into_bytes()
+}
+
+fn compile(message_encoding: &str, schema_encoding: &str, schema_name: &str, schema_data: &[u8]) {
+    let channel = Channel {
+        topic: "/t",
+        message_encoding,
+        schema_name,
+        schema_encoding,
+        schema_data,
+    };
+    let _ = role(&channel, None);
+}
+
+fn idl(data: &[u8]) {
+    compile("cdr", "ros2idl", "a/msg/A", data);
+}
+
+fn rosmsg(data: &[u8]) {
+    compile("cdr", "ros2msg", "a/msg/A", data);
+}
+
+fn json_schema(data: &[u8]) {
+    compile("json", "jsonschema", "A", data);
+}
+
+fn descriptors(data: &[u8]) {
+    compile("protobuf", "protobuf", "p.A", data);
+}
+
+fn line(data: &[u8]) {
+    let mut out = Vec::new();
+    let _ = decode_line(data, Nanos(0), &mut out);
+}
+
+fn framed(data: &[u8]) {
+    let mut framer = Framer::new();
+    let mut out = Vec::new();
+    for piece in data.chunks(7) {
+        framer.feed(piece, &mut |framed| {
+            if let strapd::decode::framing::Framed::Line(_, line) = framed {
+                let _ = decode_line(line, Nanos(0), &mut out);
+                out.clear();
+            }
+            true
+        });
+    }
+    framer.finish(&mut |_| true);
+}
+
+/// A log as a stream: every record of it.
+fn mcap(data: &[u8]) {
+    let Ok(reader) = Reader::from_stream("m", Box::new(std::io::Cursor::new(data.to_vec()))) else {
+        return;
+    };
+    let mut items = 0;
+    let report = walk(
+        reader,
+        &WalkOptions::default(),
+        |_| Some(()),
+        |(), message, out: &mut Vec<u64>| out.push(message.log_time),
+        |times| {
+            items += times.len();
+            ControlFlow::Continue(())
+        },
+    );
+    assert!(report.is_ok());
+}
+
+/// The same as a file: with its summary, and a way back.
+fn mcap_file(data: &[u8]) {
+    let mut file = tempfile::NamedTempFile::new().unwrap();
+    std::io::Write::write_all(&mut file, data).unwrap();
+    let Ok(reader) = Reader::open(file.path()) else {
+        return;
+    };
+    let report = walk(
+        reader,
+        &WalkOptions::default(),
+        |_| Some(()),
+        |(), message, out: &mut Vec<u64>| out.push(message.log_time),
+        |_| ControlFlow::Continue(()),
+    );
+    assert!(report.is_ok());
+}
+
+/// Everything a command line takes as text.
+fn arguments(data: &[u8]) {
+    let text = std::str::from_utf8(data).unwrap();
+    let _ = text.parse::<FieldPath>();
+    let _ = strapd::sink::Target::parse(text);
+    let _ = strapd::sink::address::Listen::parse(text);
+    let _ = strapd::client::remote::Remote::parse(text);
+    let _ = strapd::config::Initial::parse(text);
+    let _ = strapd::config::Bias::parse(text);
+    let _ = strapd::config::Noise::parse(text);
+    let _ = text.parse::<strapd::propagate::Method>();
+    let _ = strapd::cli::shell::quoted(text);
+}
+
+fn sized(bytes: &[u8]) -> Vec<u8> {
+    [&(bytes.len() as u32).to_le_bytes(), bytes].concat()
+}
+
+fn record(opcode: u8, body: &[u8]) -> Vec<u8> {
+    [&[opcode][..], &(body.len() as u64).to_le_bytes(), body].concat()
+}
+
+/// Records behind the head of a log, as many as fit.
+fn records(length: usize, record: impl Fn(usize) -> Vec<u8>) -> Vec<u8> {
+    let mut out = MAGIC.to_vec();
+    for n in 0.. {
+        let next = record(n);
+        if out.len() + next.len() > length {
+            return out;
+        }
+        out.extend(next);
+    }
+    out
+}
+
+fn schema_record(n: usize, text: &str) -> Vec<u8> {
+    let id = (1 + n as u16).to_le_bytes();
+    let rest = [sized(b"a/msg/A"), sized(b"ros2msg"), sized(text.as_bytes())].concat();
+    record(op::SCHEMA, &[&id[..], &rest].concat())
+}
+
+fn channel_record(n: usize, topic: &str) -> Vec<u8> {
+    let id = (n as u16).to_le_bytes();
+    let rest = [sized(topic.as_bytes()), sized(b"cdr"), sized(b"")].concat();
+    record(
+        op::CHANNEL,
+        &[&id[..], &1_u16.to_le_bytes(), &rest].concat(),
+    )
+}
+
+fn message_record(n: usize) -> Vec<u8> {
+    let head = [&(n as u16).to_le_bytes()[..], &[0; 20]].concat();
+    record(op::MESSAGE, &head)
+}
+
+fn chunk_record(records: &[u8]) -> Vec<u8> {
+    let size = (records.len() as u64).to_le_bytes();
+    let head = [&[0; 16][..], &size, &[0; 4], &sized(b""), &size].concat();
+    record(op::CHUNK, &[&head, records].concat())
+}
+
+/// A protobuf field of bytes.
+fn field(number: u8, bytes: &[u8]) -> Vec<u8> {
+    let mut out = vec![number << 3 | 2];
+    let mut n = bytes.len();
+    while n >= 0x80 {
+        out.push(n as u8 | 0x80);
+        n >>= 7;
+    }
+    out.push(n as u8);
+    out.extend(bytes);
+    out
+}
+
+/// A descriptor set of one file with these messages.
+fn file_set(package: &[u8], messages: &[u8]) -> Vec<u8> {
+    field(1, &[field(2, package), messages.to_vec()].concat())
+}
+
+fn repeated(length: usize, piece: impl Fn(usize) -> Vec<u8>) -> Vec<u8> {
+    let mut out = Vec::new();
+    for n in 0.. {
+        let next = piece(n);
+        if out.len() + next.len() + 60 > length {
+            break;
+        }
+        out.extend(next);
+    }
+    out
+}
+
+const IMU_JSON: &str = r#""gyro":[0.1,2,3],"#;
+
+pub(crate) const CASES: &[Case] = cases! {
+    idl => {
+        "IDL: tokens on one line": |n| again("struct A { double x; }; ", "; ", "", n);
+        "IDL: members": |n| again("struct A { ", "double x; ", "};", n);
+        "IDL: names of one type": |n| again("struct B { double x; }; struct A { ", "B x; ", "};", n);
+        "IDL: a long name for many members": |n| again(&format!("struct A {{ {} ", "b::".repeat(200)), "x,", "x; };", n);
+        "IDL: structs in deep modules": |n| again(&"module mmmmmmmm { ".repeat(30), "struct A { B b; }; ", "", n);
+        "IDL: typedefs of typedefs": |n| numbered("struct A { T9 x; }; ", n, |k| format!("typedef T{} T{k}; ", k + 1));
+        "IDL: enums and constants": |n| again("", "enum E { A, B }; const long C = 5; ", "", n);
+        "IDL: comments that do not end": |n| again("", "/* ", "", n);
+        "IDL: line comments": |n| again("", "//\n", "", n);
+        "IDL: strings": |n| again("@a (x=\"", "\\\" ", "\")", n);
+        "IDL: annotations": |n| again("", "@a(b) ", "", n);
+        "IDL: sequences in each other": |n| again("struct A { ", "sequence<", "", n);
+        "IDL: modules opened again": |n| again("", "module a { };", "", n);
+        "IDL: arrays": |n| again("struct A { double x", "[2]", "; };", n);
+    }
+    rosmsg => {
+        "msg: fields": |n| again("", "float64 x\n", "", n);
+        "msg: fields of one type": |n| again("B b\n=====\nMSG: a/B\n", "C c\n", "=====\nMSG: a/C\nbyte x\n", n);
+        "msg: a long package": |n| again(&format!("=====\nMSG: {}/A\n", "p".repeat(1000)), "B b\n", "", n);
+        "msg: sections": |n| numbered("float64 x\n", n, |k| format!("=====\nMSG: a/B{k}\nfloat64 x\n"));
+        "msg: types in types": |n| numbered("B0 b\n", n, |k| format!("=====\nMSG: a/B{k}\nB{} b\n", k + 1));
+        "msg: types twice in types": |n| numbered("B0 b\n", n, |k| format!("=====\nMSG: a/B{k}\nB{0} b\nB{0} c\n", k + 1));
+        "msg: many of many": |n| {
+            let half = |kind: &str| String::from_utf8(again("", &format!("{kind} x\n"), "", n / 2 - 20)).unwrap();
+            format!("{}=====\nMSG: a/B\n{}", half("B"), half("byte")).into_bytes()
+        };
+        "msg: comments": |n| again("", "# # #\n", "", n);
+        "msg: one long line": |n| again("float64 ", "x", "", n);
+        "msg: a long type": |n| again("", "a/", " x\n", n);
+    }
+    descriptors => {
+        "descriptors: messages": |n| file_set(b"p", &repeated(n, |_| field(4, &field(1, b"A"))));
+        "descriptors: fields": |n| file_set(b"p", &field(4, &repeated(n, |_| field(2, &field(1, b"x")))));
+        "descriptors: types of one name": |n| file_set(b"p", &field(4, &[field(1, b"A"), repeated(n, |_| field(2, &[&field(1, b"x")[..], &[0x18, 1, 0x28, 11], &field(6, b".p.A")].concat()))].concat()));
+        "descriptors: files": |n| repeated(n, |_| field(1, &field(2, b"p")));
+        "descriptors: a long package": |n| file_set(&vec![b'p'; n / 2], &repeated(n / 2, |_| field(4, &field(1, b"A"))));
+        "descriptors: messages in messages": |n| {
+            let inner = repeated(n, |_| field(3, &field(1, b"B")));
+            file_set(b"p", &field(4, &[field(1, b"A"), inner].concat()))
+        };
+    }
+    json_schema => {
+        "JSON schema: keys": |n| numbered("{", n, |k| format!("\"k{k}\":0,"));
+        "JSON schema: empty objects under a long key": |n| again(&format!("{{\"{}\":{{", "k".repeat(250)), "\"\":{},", "", n);
+        "JSON schema: arrays": |n| again("{\"a\":", "[{},", "", n);
+    }
+    parsers::json => {
+        "JSON: keys": |n| again("\0{", "\"gyro_x\":1,", "\"z\":0}", n);
+        "JSON: objects in objects": |n| again("\0", "{\"imu\":", "", n);
+        "JSON: samples in an array": |n| again("\0{\"a\":[", "{\"gyro\":[1,2,3]},", "{}]}", n);
+        "JSON: samples with samples in them": |n| again("\0{\"a\":[", "{\"gyro\":[1,2,3],\"b\":[{\"gyro\":[1,2,3]}]},", "{}]}", n);
+        "JSON: escapes": |n| again("\0{\"frame_id\":\"", "\\u0041\\\\", "\"}", n);
+        "JSON: stamps again and again": |n| again("\0{", "\"header\":{\"stamp\":{\"sec\":1,\"nanosec\":2}},", "\"z\":0}", n);
+        "JSON: a number of many digits": |n| again("\0{\"gyro\":[", "1", ",2,3]}", n);
+        "JSON: a stamp of many digits": |n| again("\0{\"gyro\":[1,2,3],\"stamp\":\"", "1", "\"}", n);
+        "JSON: brackets": |n| again("\0", "[", "", n);
+        "JSON: spaces": |n| again("\0{\"gyro\"", " ", ":[1,2,3]}", n);
+    }
+    parsers::cdr => {
+        "CDR: empty strings": |n| {
+            let count = (n / 4) as u32;
+            [&[2, 0, 1, 0, 0][..], &count.to_le_bytes(), &vec![0; n]].concat()
+        };
+        "CDR: empty samples": |n| {
+            let count = (n / 40) as u32;
+            [&[2, 0, 1, 0, 0, 0, 0, 0, 0][..], &count.to_le_bytes(), &vec![0; n]].concat()
+        };
+        "CDR: transforms": |n| {
+            let count = (n / 80) as u32;
+            [&[1, 0, 1, 0, 0][..], &count.to_le_bytes(), &vec![0; n]].concat()
+        };
+    }
+    parsers::ros1 => {
+        "ROS 1: empty strings": |n| {
+            let count = (n / 4) as u32;
+            [&[1][..], &count.to_le_bytes(), &vec![0; n]].concat()
+        };
+        "ROS 1: samples": |n| {
+            let count = (n / 40) as u32;
+            [&[1, 0, 0, 0, 0][..], &count.to_le_bytes(), &vec![0; n]].concat()
+        };
+    }
+    parsers::protobuf => {
+        "protobuf: samples": |n| [vec![0], repeated(n, |_| field(4, &field(1, &[0; 12])))].concat();
+        "protobuf: one sample's numbers": |n| [vec![0], field(4, &repeated(n, |_| field(1, &[0; 4])))].concat();
+        "protobuf: unknown fields": |n| [vec![0], vec![0x28; n]].concat();
+    }
+    line => {
+        "a line: keys": |n| again("{\"class\":\"RATE\",", IMU_JSON, "\"stamp\":1}", n);
+        "a line: a long id": |n| again("{\"class\":\"RATE\",\"id\":\"", "\\u0007", "\",\"gyro\":[1,2,3]}", n);
+    }
+    framed => {
+        "lines: short": |n| again("", "{}\n", "", n);
+        "lines: one in small pieces": |n| again("{", IMU_JSON, "\"stamp\":1}\n", n);
+        "lines: blank": |n| again("", "\n", "", n);
+        "lines: none ends": |n| again("", "x", "", n);
+    }
+    parsers::lines => {
+        "packed: objects": |n| b"\xf8\x01\x08\0\0\0\0\0".repeat(n / 8);
+        "packed: broken objects": |n| b"\xf8\x01\0\0\n".repeat(n / 5);
+    }
+    mcap => {
+        "log: channels": |n| records(n, |k| channel_record(k, &format!("/t{k}")));
+        "log: channels of one topic": |n| records(n, |k| channel_record(k, "/t"));
+        "log: one channel again": |n| records(n, |_| channel_record(1, "/t"));
+        "log: a channel that changes": |n| records(n, |k| channel_record(1, &format!("/t{k}")));
+        "log: schemas": |n| records(n, |k| schema_record(k, "float64 x"));
+        "log: one schema again": |n| records(n, |_| schema_record(1, "float64 x"));
+        "log: messages of no channel": |n| records(n, message_record);
+        "log: messages of one channel": |n| records(n, |k| match k { 0 => channel_record(0, "/t"), _ => message_record(0) });
+        "log: chunks of nothing": |n| records(n, |_| chunk_record(&[]));
+        "log: chunks of one message": |n| records(n, |_| chunk_record(&message_record(0)));
+        "log: a chunk of definitions": |n| records(n + 100, |k| match k { 0 => chunk_record(&records(n - 100, |k| channel_record(k, &format!("/t{k}")))[8..]), _ => vec![0; n] });
+        "log: a chunk of zeros": |n| records(n + 100, |k| match k { 0 => chunk_record(&vec![0; n - 100]), _ => vec![0; n] });
+        "log: metadata": |n| records(n, |_| record(op::METADATA, &[sized(b""), sized(b"")].concat()));
+        "log: pairs of one channel": |n| records(n + 100, |k| match k { 0 => record(op::CHANNEL, &[&[1, 0, 0, 0][..], &sized(b"t"), &sized(b""), &sized(&vec![0; (n - 100) / 8 * 8])].concat()), _ => vec![0; n] });
+        "log: logs joined": |n| records(n, |_| [record(op::DATA_END, &[0; 4]), record(op::FOOTER, &[0; 20]), MAGIC.to_vec(), MAGIC.to_vec()].concat());
+        "log: nothing but heads of chunks": |n| records(n, |_| vec![op::CHUNK; 9]);
+        "log: garbage": |n| records(n, |_| vec![0x55; 9]);
+    }
+    mcap_file => {
+        "file: garbage after each chunk": |n| records(n, |_| [chunk_record(&[]), vec![0; 9]].concat());
+        "file: records that skip to garbage": |n| {
+            let mut out = records(n - 40, |_| [chunk_record(&[]), record(0x20, &[0; 8])].concat());
+            let end = out.len() as u64;
+            for at in 8..out.len().saturating_sub(9) {
+                if out[at] == 0x20 && out[at + 1..at + 9] == 8_u64.to_le_bytes() {
+                    let length = (end - at as u64 - 9).to_le_bytes();
+                    out[at + 1..at + 9].copy_from_slice(&length);
+                }
+            }
+            out.extend([0; 30]);
+            out
+        };
+    }
+    arguments => {
+        "arguments: a path of fields": |n| again("gyro=", "a.", "b", n);
+        "arguments: elements": |n| again("gyro=a", "[1]", "", n);
+        "arguments: commas": |n| again("gyro=", "a,", "a", n);
+        "arguments: an address": |n| again("tcp://", "[::1]:", "80?a=b", n);
+        "arguments: parameters": |n| again("udp://127.0.0.1:1?", "a=b&", "", n);
+        "arguments: numbers": |n| again("", "1,", "1", n);
+        "arguments: quotes": |n| again("", "'\n", "", n);
+    }
+};
