@@ -26,7 +26,7 @@ fn samples(path: &Path) -> Vec<RawSample> {
         .iter()
         .find(|k| k.channel.topic == topic)
         .unwrap();
-    let decoder = known.decoder(&Default::default()).unwrap();
+    let decoder = known.decoder(&mut Default::default()).unwrap();
     let mut all = Vec::new();
     walk(
         log.reader().unwrap(),
