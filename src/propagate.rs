@@ -23,7 +23,6 @@
 )]
 
 mod accumulate;
-mod bridge;
 mod classical;
 mod collocation;
 pub mod covariance;

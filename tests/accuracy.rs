@@ -3,8 +3,6 @@
 #![allow(clippy::print_stdout, reason = "figures, with --nocapture")]
 #![allow(clippy::unwrap_used, clippy::expect_used, unreachable_pub)]
 
-#[path = "accuracy/bursts.rs"]
-mod bursts;
 #[path = "accuracy/coning.rs"]
 mod coning;
 #[path = "accuracy/double.rs"]
@@ -23,9 +21,6 @@ mod orders;
 mod peers;
 #[path = "accuracy/random.rs"]
 mod random;
-#[cfg(feature = "service")]
-#[path = "accuracy/recordings.rs"]
-mod recordings;
 #[path = "accuracy/run.rs"]
 mod run;
 #[path = "shared_data/mod.rs"]
