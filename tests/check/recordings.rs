@@ -13,7 +13,7 @@ const FINDINGS: [(&str, &[&str]); 24] = [
     ("real/husky_ros1_lz4", &[]),
     (
         "real/px4_fmuv6c_json_zstd",
-        &["jitter", "large-turn-per-step", "sample-kind"],
+        &["jitter", "refused", "sample-kind"],
     ),
     ("real/ximu3_ros2_zstd", &["sample-kind"]),
     ("real/xio_fusion_ros2_lz4", &["jitter", "missing"]),
