@@ -97,7 +97,7 @@ fn instructions(dir: &Path) -> Vec<u64> {
 }
 
 #[test]
-#[ignore = "needs valgrind"]
+#[ignore = "counts instructions under valgrind; .ci/run does it on its own"]
 fn twice_the_input_is_at_most_twice_the_work() {
     let dir = tempfile::tempdir().unwrap();
     let counts = instructions(dir.path());

@@ -25,7 +25,7 @@ pub struct Log {
     pub survey: Survey,
     /// Its channels, with what they can serve as.
     pub channels: Vec<Known>,
-    /// Who speaks on its topics: one for each until [`Log::tell_apart`] has looked.
+    /// Who speaks on its topics: one for each until `sources::tell_apart` has looked.
     pub sources: Vec<Source>,
     /// What was wrong with it as far as it was read: all of it when it has no summary, otherwise up
     /// to the first message of the last channel.

@@ -450,13 +450,14 @@ impl SensorStream {
             before = Some(attitude.stamp);
             // A step over missing samples is a gap.
             if let (Some(spacing), Some(step)) = (spacing, step)
-                && step < 2 * spacing
+                && step < spacing.saturating_mul(2)
             {
-                let off = (step - spacing).abs() as f64 * 1e-9;
+                // A saved stamp may be anything.
+                let off = step.saturating_sub(spacing).unsigned_abs() as f64 * 1e-9;
                 self.jitter_secs += (off - self.jitter_secs) / 16.0;
             }
         }
-        self.next_seq += attitudes.len() as u64;
+        self.next_seq = self.next_seq.saturating_add(attitudes.len() as u64);
         self.last = attitudes.last().copied().or(self.last);
         (first, attitudes, &self.channel)
     }
