@@ -23,6 +23,7 @@
 )]
 
 mod accumulate;
+mod bridge;
 mod classical;
 mod collocation;
 pub mod covariance;

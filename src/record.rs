@@ -108,7 +108,7 @@ pub enum Join {
     /// The ordinary next sample.
     #[default]
     Continuous,
-    /// Samples are missing, but few enough: integrate across, order reduced, flagged.
+    /// Samples are missing, but few enough: integrate across, flagged.
     Bridge,
     /// Gap or clock jump beyond the limit: no rotation is added, integration restarts here
     /// from the attitude held.

@@ -3,6 +3,8 @@
 #![allow(clippy::print_stdout, reason = "figures, with --nocapture")]
 #![allow(clippy::unwrap_used, clippy::expect_used, unreachable_pub)]
 
+#[path = "accuracy/bursts.rs"]
+mod bursts;
 #[path = "accuracy/coning.rs"]
 mod coning;
 #[path = "accuracy/double.rs"]
@@ -21,6 +23,9 @@ mod orders;
 mod peers;
 #[path = "accuracy/random.rs"]
 mod random;
+#[cfg(feature = "service")]
+#[path = "accuracy/recordings.rs"]
+mod recordings;
 #[path = "accuracy/run.rs"]
 mod run;
 #[path = "shared_data/mod.rs"]

@@ -221,14 +221,9 @@ impl Covariance {
         self.attitude = saved.upper();
     }
 
-    /// Adds what a bridged gap may hide: rad^2 about every axis, and seconds of white noise.
-    pub(crate) fn bridge(&mut self, variance: f64, noise_secs: f64) {
-        self.alike += variance + self.alike_arw * noise_secs;
-        if self.alike_arw == 0.0 {
-            // Two halves.
-            self.attitude = self.halfway(noise_secs);
-            self.attitude = self.halfway(noise_secs);
-        }
+    /// Adds what a bridged gap may hide: rad^2 about every axis.
+    pub(crate) fn bridge(&mut self, variance: f64) {
+        self.alike += variance;
     }
 
     /// Adds what may have been turned about any axis in `secs` during which no sample was seen, were the

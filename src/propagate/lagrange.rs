@@ -77,6 +77,11 @@ impl Quadrature {
         &self.g[..self.nodes]
     }
 
+    /// Weights of the values at the nodes in their mean over the interval.
+    pub(crate) fn mean_weights(&self) -> &[f64] {
+        &self.rate[0][..self.nodes]
+    }
+
     /// Values of the rate at the nodes, interval length in seconds -> moments.
     #[inline(always)]
     pub(crate) fn of_rate<const N: usize>(

@@ -420,7 +420,7 @@ impl Propagator {
                     ahead.turn(step.turn);
                     difference.add(&ahead, step.outer);
                     covariance.advance(step.turn, self.track.step(self.next + i));
-                    covariance.bridge(step.gap_variance, step.gap_noise);
+                    covariance.bridge(step.gap_variance);
                 }
                 if let (true, Some(step)) = (turns, self.scratch.last()) {
                     self.state.added = self.state.added.with(step.status());

@@ -24,7 +24,7 @@ pub(crate) struct Track {
     same: Vec<u8>,
     /// How many increments in a row, the last one ending here, join without holes.
     joined: Vec<u8>,
-    /// Samples are missing before this one: lower the order.
+    /// Samples are missing before this one.
     pub(crate) bridged: Vec<bool>,
 }
 

@@ -33,8 +33,6 @@ pub(crate) struct Step {
     pub(crate) angle: f64,
     /// Variance to add for what was interpolated across a gap, rad^2.
     pub(crate) gap_variance: f64,
-    /// Seconds of white noise that bridging has added to those of the interval.
-    pub(crate) gap_noise: f64,
     /// What the outermost samples of the window have changed, rad, in the body axes at the end.
     pub(crate) outer: [f64; 3],
     /// What the careful path did.
@@ -104,7 +102,6 @@ impl Step {
                 turn: turn.parts(),
                 angle,
                 gap_variance: 0.0,
-                gap_noise: 0.0,
                 outer: [0.0; 3],
                 note,
             };
@@ -113,7 +110,6 @@ impl Step {
             turn: [0.0; 4],
             angle: 0.0,
             gap_variance: 0.0,
-            gap_noise: 0.0,
             outer: [0.0; 3],
             note: Note::Refused,
         }
@@ -295,7 +291,6 @@ impl Plan {
                     turn: turn.lane(i).parts(),
                     angle: angle.0[i],
                     gap_variance: 0.0,
-                    gap_noise: 0.0,
                     outer: [outer.x.0[i], outer.y.0[i], outer.z.0[i]],
                     note: Note::Ordinary,
                 });

@@ -141,7 +141,7 @@ impl State {
             Note::Reduced => self.report.reduced += 1,
             Note::Bridged => {
                 self.report.bridged += 1;
-                self.covariance.bridge(step.gap_variance, step.gap_noise);
+                self.covariance.bridge(step.gap_variance);
             }
             Note::Refused => self.report.refused += 1,
         }

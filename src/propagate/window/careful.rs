@@ -2,10 +2,12 @@
 //! stamps. As many samples as the data support. Pure.
 
 use super::{Note, Plan, Step};
+use crate::propagate::bridge::{self, NEIGHBOURS, Observation};
 use crate::propagate::collocation;
-use crate::propagate::magnus::{self, Moments};
+use crate::propagate::lanes::Lanes;
+use crate::propagate::magnus::{self, MOMENTS, Moments};
 use crate::propagate::method::{LARGEST_WINDOW, Placement};
-use crate::propagate::track::Track;
+use crate::propagate::track::{Track, secs};
 
 /// Moments, and what is known about them.
 #[derive(Clone, Copy, Debug)]
@@ -13,19 +15,6 @@ struct Settled {
     moments: Moments<1>,
     gain: f64,
     used: usize,
-    /// How far the delta angle moved with the last enlargement of the window, rad.
-    change: f64,
-}
-
-/// What is integrated over.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Target {
-    /// The interval of rates, or of the increment itself.
-    Interval,
-    /// The interval, but samples are missing in it.
-    Bridge,
-    /// The stretch before an increment that no increment covers.
-    Hole,
 }
 
 impl Plan {
@@ -34,7 +23,7 @@ impl Plan {
         let hole = self.increments && track.has_hole(k);
         let bridged = hole || track.bridged[k];
         if !bridged {
-            let own = self.settle(track, k, self.window, Target::Interval);
+            let own = self.settle(track, k, self.window);
             let note = if own.used < self.window {
                 Note::Reduced
             } else {
@@ -51,63 +40,168 @@ impl Plan {
             let outer = self.outer(&moments);
             return Step::new(turn, own.moments.b[0].norm(), note).with_outer(outer);
         }
-        let missing = self.missing(track, k);
-        let cap = self.window.min(bridge_window(missing));
-        let mut noise = bridge_noise(missing);
-        let (turn, delta, change) = if hole {
-            let gap = self.settle(track, k, cap, Target::Hole);
-            let own = self.settle(track, k, self.window, Target::Interval);
-            let delta = (gap.moments.b[0] + own.moments.b[0]).norm();
-            let own = magnus::turn(&own.moments, self.order);
-            let turn = magnus::turn(&gap.moments, self.order).then(own);
-            (turn, delta, gap.change)
-        } else if self.increments {
+        if self.increments && !hole {
             // Its increment covers the whole interval: marked, but nothing is missing.
-            let own = self.settle(track, k, self.window, Target::Interval);
+            let own = self.settle(track, k, self.window);
             let turn = magnus::turn(&own.moments, self.order);
-            (turn, own.moments.b[0].norm(), 0.0)
-        } else {
-            let own = self.settle(track, k, cap, Target::Bridge);
-            let turn = magnus::turn(&own.moments, self.order);
-            if own.used > QUIET_BRIDGE {
-                // The mid-interval gain bounds that of the rate over the gap, of `missing + 1` spacings.
-                noise = noise.max(own.gain * (missing + 1.0));
-            }
-            (turn, own.moments.b[0].norm(), own.change)
-        };
-        let mut step = Step::new(turn, delta, Note::Bridged);
-        if step.note == Note::Bridged && (hole || !self.increments) {
-            let spread = 0.5 * change.min(std::f64::consts::PI);
-            step.gap_variance = if spread.is_finite() {
-                spread * spread
-            } else {
-                0.0
-            };
-            step.gap_noise = track.step(k) * noise;
+            return Step::new(turn, own.moments.b[0].norm(), Note::Bridged);
+        }
+        let (gap, variance) = self.bridge(track, k);
+        let mut turn = magnus::turn(&gap, self.order);
+        let mut delta = gap.b[0];
+        if hole {
+            let own = self.settle(track, k, self.window).moments;
+            turn = turn.then(magnus::turn(&own, self.order));
+            delta = delta + own.b[0];
+        }
+        let mut step = Step::new(turn, delta.norm(), Note::Bridged);
+        if step.note == Note::Bridged {
+            // Half a turn is as wrong as an attitude can be.
+            let most = std::f64::consts::PI * std::f64::consts::PI;
+            step.gap_variance = if variance < most { variance } else { most };
         }
         step
     }
 
-    /// How many samples are missing in interval k, by the median spacing around it; 0.5 or more.
-    fn missing(&self, track: &Track, k: usize) -> f64 {
-        let reach = k.saturating_sub(8).max(1)..(k + 1 + self.look_ahead).min(track.len());
-        let spacing =
-            |i: usize| track.stamp[i].saturating_sub(track.start[i].max(track.stamp[i - 1]));
-        let mut around: Vec<i64> = reach
-            .filter(|&i| (i != k || self.increments) && !track.bridged[i])
-            .map(spacing)
-            .filter(|&spacing| spacing > 0)
-            .collect();
+    /// The rate over the samples missing in interval k, and the variance of what was turned there about each
+    /// axis, rad^2.
+    ///
+    /// From what the samples around are like; by a polynomial where that is so smooth and free of noise that
+    /// two orders differ by far less than a random motion would leave open.
+    fn bridge(&self, track: &Track, k: usize) -> (Moments<1>, f64) {
+        let (from, to) = self.gap(track, k);
+        let (missing, step) = self.missing(track, k);
+        let mut around = [Observation::NONE; NEIGHBOURS];
+        let (first, count) = self.neighbours(track, k);
+        for (sample, i) in around.iter_mut().zip(first..first + count) {
+            *sample = self.observation(track, i, (from, to), step);
+        }
+        let quadrature = &self.quadratures[MOMENTS];
+        let span = to.saturating_sub(from);
+        let length = span as f64 / step;
+        let h = secs(span);
+        let Some(bridge) = bridge::across(&around[..count], length, missing, quadrature) else {
+            let straight = self.over_gap(track, k, 2);
+            return (straight, straight.b[0].size().0[0].powi(2));
+        };
+        let variance = bridge.variance * h * h;
+        if let Some((size, open)) = self.by_polynomial(track, k, step)
+            && open < SMOOTH * SMOOTH * variance
+        {
+            return (self.over_gap(track, k, size), open);
+        }
+        (quadrature.of_rate(&bridge.values, Lanes([h])), variance)
+    }
+
+    /// Element i beside a gap, in ordinary steps.
+    fn observation(
+        &self,
+        track: &Track,
+        i: usize,
+        (from, to): (i64, i64),
+        step: f64,
+    ) -> Observation {
+        let begin = if self.increments {
+            track.start[i]
+        } else {
+            track.stamp[i]
+        };
+        let length = track.stamp[i].saturating_sub(begin) as f64 / step;
+        let twice = track.stamp[i].saturating_sub(to) as f64 + begin.saturating_sub(from) as f64;
+        Observation {
+            at: 0.5 * twice / step,
+            spread: 0.5 * length / 3f64.sqrt(),
+            rate: track.rate(i),
+        }
+    }
+
+    /// From where to where no sample tells what interval k was like, nanoseconds.
+    fn gap(&self, track: &Track, k: usize) -> (i64, i64) {
+        let to = if self.increments {
+            track.start[k]
+        } else {
+            track.stamp[k]
+        };
+        (track.stamp[k - 1], to)
+    }
+
+    /// First element and number of those around the gap in interval k that are looked at: as many after it
+    /// as before it, if the method waits for them.
+    fn neighbours(&self, track: &Track, k: usize) -> (usize, usize) {
+        let before = k - track.first();
+        let after = (self.known(track, k) - k).min(self.look_ahead + 1);
+        let after = after.min((NEIGHBOURS / 2).max(NEIGHBOURS.saturating_sub(before)));
+        let before = before.min(NEIGHBOURS - after);
+        (k - before, before + after)
+    }
+
+    /// How many samples a polynomial over the gap in interval k is best laid through, and the square of what it
+    /// leaves open, rad^2: where one more order changes less and less, and less than the noise of its samples.
+    fn by_polynomial(&self, track: &Track, k: usize, step: f64) -> Option<(usize, f64)> {
+        let cap = if self.increments {
+            collocation::UNKNOWNS
+        } else {
+            self.window.max(10)
+        };
+        let gap = self.gap(track, k);
+        let (_, cap) = self.place(track, k, cap, true);
+        let mut last = self.over_gap(track, k, 2);
+        let mut before = f64::INFINITY;
+        // By size: what the next order would change, rad, and how much louder than a sample it is.
+        let mut orders = [(f64::INFINITY, 0.0); LARGEST_WINDOW + 1];
+        let mut noise = f64::INFINITY;
+        for size in (4..cap).step_by(2).chain((cap > 2).then_some(cap)) {
+            let this = self.over_gap(track, k, size);
+            let change = (this.b[0] - last.b[0]).norm() + (this.b[1] - last.b[1]).norm();
+            let (first, _) = self.place(track, k, size, true);
+            let mut at = [0.0; LARGEST_WINDOW];
+            for (at, i) in at.iter_mut().zip(first..first + size) {
+                *at = self.observation(track, i, gap, step).at;
+            }
+            let gain = gain(&at[..size]);
+            // All of a change may be noise, and none is more than the least.
+            noise = noise.min(change * change / gain);
+            if change < 0.5 * before && before.is_finite() {
+                // The next change is to this one as this is to the one before.
+                orders[size] = (change * (change / before), gain);
+            }
+            (last, before) = (this, change);
+        }
+        let open = |&(change, gain): &(f64, f64)| change * change + 4.0 * noise * gain;
+        orders
+            .iter()
+            .map(open)
+            .enumerate()
+            .filter(|(_, open)| open.is_finite())
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    /// How many samples are missing in interval k, 0.5 or more, and the ordinary step, ns: the median around.
+    fn missing(&self, track: &Track, k: usize) -> (f64, f64) {
+        let (first, count) = self.neighbours(track, k);
+        let mut around = [0; NEIGHBOURS];
+        let mut found = 0;
+        for i in first.max(1)..first + count {
+            let spacing = track.stamp[i].saturating_sub(track.start[i].max(track.stamp[i - 1]));
+            if (i != k || self.increments) && !track.bridged[i] && spacing > 0 {
+                around[found] = spacing;
+                found += 1;
+            }
+        }
+        let around = &mut around[..found];
         around.sort_unstable();
-        let Some(&median) = around.get(around.len() / 2) else {
-            return 1.0;
+        let (from, to) = self.gap(track, k);
+        let empty = to.saturating_sub(from);
+        let Some(&step) = around.get(found / 2) else {
+            // One of two steps.
+            return (1.0, (0.5 * empty as f64).max(1.0));
         };
         let empty = if self.increments {
-            track.start[k].saturating_sub(track.stamp[k - 1])
+            empty
         } else {
-            track.spacing(k).saturating_sub(median)
+            empty.saturating_sub(step)
         };
-        (empty as f64 / median as f64).max(0.5)
+        ((empty as f64 / step as f64).max(0.5), step as f64)
     }
 
     /// Moments from a window of up to `cap` samples: all of them if that is quiet, otherwise as many as
@@ -117,18 +211,14 @@ impl Plan {
     /// corrections shrink; where they are noise they grow, about fourfold with each pair of samples, and
     /// without bound among irregular stamps. The last window whose correction still shrank is taken; the
     /// first correction is held against what the rate varies by around the interval.
-    fn settle(&self, track: &Track, k: usize, cap: usize, target: Target) -> Settled {
-        let smallest = if self.increments && target == Target::Interval {
-            1
-        } else {
-            2
-        };
+    fn settle(&self, track: &Track, k: usize, cap: usize) -> Settled {
+        let smallest = if self.increments { 1 } else { 2 };
         let mut cap = cap.max(smallest);
-        if target == Target::Hole || (self.increments && self.beside_hole(track, k)) {
+        if self.increments && self.beside_hole(track, k) {
             cap = cap.min(collocation::UNKNOWNS);
         }
-        let (first, cap) = self.place(track, k, cap, target);
-        let full = self.over(track, k, cap, target);
+        let (first, cap) = self.place(track, k, cap, false);
+        let full = self.over(track, k, cap);
         // A provisional step is one-sided by its nature, and gone with the next samples.
         let provisional = if cap == self.window {
             self.provisional_gain(k - first)
@@ -139,41 +229,28 @@ impl Plan {
             Some(gain) => (self.loud.max(1.5 * gain), 0.9),
             None => (self.loud, 0.5),
         };
-        if full.gain <= loud && target == Target::Interval {
+        if full.gain <= loud {
             return full;
         }
-        // A bridge of two samples still wants to know what four would have said.
-        let probe = smallest + 2;
-        let probe = (target != Target::Interval && probe > cap).then_some(probe);
-        let sizes = (smallest..cap).step_by(2).chain([cap]).chain(probe);
-        let variation = self.variation(track, k, smallest + 2, target);
+        let variation = self.variation(track, k, smallest + 2);
         // The first moment itself, which one increment does not know: at the edge of three equal spacings up
         // to 1.25 times what rates vary by, among jittered ones 2. Its noise moves no delta angle.
         let unknown = if smallest == 1 { 4.0 } else { 2.0 };
         let (mut before, mut last) = (0.0, unknown * variation);
         let mut best: Option<Settled> = None;
-        for size in sizes {
-            let mut this = if size == cap {
+        for size in (smallest..cap).step_by(2).chain([cap]) {
+            let this = if size == cap {
                 full
             } else {
-                self.over(track, k, size, target)
+                self.over(track, k, size)
             };
             if let Some(best) = best {
                 let moved = |j: usize| (this.moments.b[j] - best.moments.b[j]).norm();
-                let (change, turned) = (moved(0) + moved(1), moved(0));
+                let change = moved(0) + moved(1);
                 let shrank = change <= shrinking * f64::max(last, 0.25 * before);
-                if !shrank || size > cap {
-                    // What this size would have changed is what is not known.
-                    // Two samples leave open all the rate is seen to vary by.
-                    let least = if best.used == smallest {
-                        variation
-                    } else {
-                        best.change
-                    };
-                    let change = turned.max(least);
-                    return Settled { change, ..best };
+                if !shrank {
+                    return best;
                 }
-                this.change = turned;
                 (before, last) = (last, change);
             }
             best = Some(this);
@@ -182,8 +259,8 @@ impl Plan {
     }
 
     /// The largest difference of rates over `size` samples around interval k, times its length, rad.
-    fn variation(&self, track: &Track, k: usize, size: usize, target: Target) -> f64 {
-        let (first, size) = self.place(track, k, size, target);
+    fn variation(&self, track: &Track, k: usize, size: usize) -> f64 {
+        let (first, size) = self.place(track, k, size, false);
         let reference = track.rate(k);
         let largest = (first..first + size)
             .map(|i| (track.rate(i) - reference).norm())
@@ -193,20 +270,17 @@ impl Plan {
 
     /// Whether increments are missing within reach of interval k.
     fn beside_hole(&self, track: &Track, k: usize) -> bool {
-        let (first, size) = self.place(track, k, self.window, Target::Interval);
+        let (first, size) = self.place(track, k, self.window, false);
         (first + 1..first + size).any(|i| track.has_hole(i))
     }
 
-    /// First element and length of a window of up to `size` elements around interval k, as central as
-    /// the run allows. It never reaches beyond what this method may wait for, so that nothing depends
-    /// on how much happens to be known already.
-    fn place(&self, track: &Track, k: usize, size: usize, target: Target) -> (usize, usize) {
+    /// First element and length of a window of up to `size` elements around interval k, or around the gap in
+    /// it, as central as the run allows. It never reaches beyond what this method may wait for, so that
+    /// nothing depends on how much happens to be known already.
+    fn place(&self, track: &Track, k: usize, size: usize, gap: bool) -> (usize, usize) {
         let (lo, hi) = (track.first(), track.len());
-        // A method that never waits must not look ahead at the start of a run either.
-        let waits = self.placement == Placement::Centred && self.look_ahead > 0;
-        let known = if waits { hi } else { k + 1 };
-        let size = size.min(known - lo);
-        let ahead = if self.increments && target != Target::Hole {
+        let size = size.min(self.known(track, k) - lo);
+        let ahead = if self.increments && !gap {
             size.saturating_sub(1) / 2
         } else {
             (size / 2).saturating_sub(1)
@@ -215,63 +289,61 @@ impl Plan {
         (end - size, size)
     }
 
-    /// From `size` samples around interval k.
-    fn over(&self, track: &Track, k: usize, size: usize, target: Target) -> Settled {
-        let (first, size) = self.place(track, k, size, target);
+    /// End of what may be looked at for interval k.
+    fn known(&self, track: &Track, k: usize) -> usize {
+        // A method that never waits must not look ahead at the start of a run either.
+        let waits = self.placement == Placement::Centred && self.look_ahead > 0;
+        if waits { track.len() } else { k + 1 }
+    }
+
+    /// Interval k from `size` samples around it.
+    fn over(&self, track: &Track, k: usize, size: usize) -> Settled {
+        let (first, size) = self.place(track, k, size, false);
         let settled = |moments, gain| Settled {
             moments,
             gain,
             used: size,
-            change: 0.0,
         };
         let table = self.skewed.get(k - first).and_then(Option::as_ref);
         if table.is_some()
-            && (size, target) == (self.window, Target::Interval)
+            && size == self.window
             && track.is_uniform(first, size)
             && let Some(moments) = self.tabulated::<1>(track, k, first)
         {
             // The method's own window on perfect stamps, one-sided because it was asked to be.
             return settled(moments, 0.0);
         }
-        if target != Target::Hole && track.is_joined(first, size) {
+        if track.is_joined(first, size) {
             let (moments, gain) = self.interpolate::<1>(track, k, first, size);
             return settled(moments, gain.0[0]);
         }
+        let range = (track.start[k], track.stamp[k]);
         let quadrature = &self.quadratures[size];
-        let range = match target {
-            Target::Hole => (track.stamp[k - 1], track.start[k]),
-            _ => (track.start[k], track.stamp[k]),
-        };
         let mut moments = collocation::moments(track, first, size, range, quadrature);
-        if target != Target::Hole {
-            moments.b[0] = track.value(k);
-        }
+        moments.b[0] = track.value(k);
         settled(moments, f64::INFINITY)
     }
-}
 
-/// Largest window [`bridge_noise`] has a figure for.
-const QUIET_BRIDGE: usize = 8;
-
-/// The largest window for a gap of `missing` samples (attitude.md 6.4): high order wins across short gaps
-/// and loses across long ones. Across one or two missing samples a full window of 16 is hardly louder
-/// than one of 8 (2.6 against 1.6 for one), so there the data alone decide, see `settle`.
-fn bridge_window(missing: f64) -> usize {
-    match missing {
-        m if m < 2.5 => LARGEST_WINDOW,
-        m if m < 4.5 => 6,
-        m if m < 8.5 => 4,
-        _ => 2,
+    /// The gap in interval k from `size` samples around it.
+    fn over_gap(&self, track: &Track, k: usize, size: usize) -> Moments<1> {
+        let (first, size) = self.place(track, k, size, true);
+        if self.increments {
+            let quadrature = &self.quadratures[size];
+            collocation::moments(track, first, size, self.gap(track, k), quadrature)
+        } else {
+            self.interpolate::<1>(track, k, first, size).0
+        }
     }
 }
 
-/// Variance of the bridge over that of white noise integrated as long (attitude.md 6.4, squared and
-/// rounded up); for two samples it is half the number missing.
-fn bridge_noise(missing: f64) -> f64 {
-    match missing {
-        m if m < 2.5 => 4.0,
-        m if m < 4.5 => 20.0,
-        m if m < 8.5 => 34.0,
-        m => 0.5 * m,
-    }
+/// Sum of the squares of Lagrange's coefficients at 0 of the polynomial through these instants.
+fn gain(at: &[f64]) -> f64 {
+    let coefficient = |i: usize| -> f64 {
+        let others = at.iter().enumerate().filter(|&(j, _)| j != i);
+        others.map(|(_, x)| x / (x - at[i])).product()
+    };
+    (0..at.len()).map(|i| coefficient(i).powi(2)).sum()
 }
+
+/// A polynomial bridges where what it leaves open is less than this part of what a random motion would.
+const SMOOTH: f64 = 0.1;

@@ -1,0 +1,335 @@
+//! Samples on both sides of missing ones -> the rate between them, and how well it is known. Pure.
+//!
+//! A polynomial of what order? Too low and the motion is cut short, too high and noise is multiplied. What the
+//! samples around are like says more than how many are missing: how far they vary, over what time, and how
+//! much of it is noise. Each axis of the rate is taken for a Gaussian process of unknown constant mean with
+//! Matérn's covariance of order 7/2; its scale of time and its share of noise are those under which the
+//! samples are most likely. The rate between them is then their best linear combination, and its
+//! uncertainty comes with it, from the same numbers.
+//!
+//! # Source
+//! Rasmussen & Williams, Gaussian Processes for Machine Learning (2006), 2.2, 2.7 (unknown mean), 4.2.1 (Matérn),
+//! 5.4.1 (likelihood); the variance is profiled out. Polynomials are the limit of long scales without noise,
+//! and exacter there: see `window::careful`.
+//!
+//! # Accuracy
+//! On recordings, bursts of 1 to 50 samples cut out: docs/accuracy.md, "Missing samples".
+
+use super::lagrange::Quadrature;
+use super::lanes::Triple;
+use super::magnus::MOMENTS;
+
+/// Samples looked at, on both sides together. More tell nothing more (docs/accuracy.md).
+pub(crate) const NEIGHBOURS: usize = 12;
+
+/// Scales of time tried, in ordinary steps: from noise-like to nearly a parabola.
+const SCALES: [f64; 9] = [1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0, 256.0];
+/// Shares of noise tried: its variance over that of the motion.
+const NOISES: [f64; 6] = [1e-11, 1e-8, 1e-6, 1e-4, 1e-2, 1.0];
+
+/// A sample: the rate at an instant, or its mean over an interval around it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Observation {
+    /// The instant, or the middle of the interval, in ordinary steps from the middle of the gap.
+    pub(crate) at: f64,
+    /// Half the distance of the two instants whose mean stands for that of the interval (Gauss); 0 at an instant.
+    pub(crate) spread: f64,
+    /// Rate, rad/s.
+    pub(crate) rate: Triple<1>,
+}
+
+impl Observation {
+    /// A place to be filled.
+    pub(crate) const NONE: Observation = Observation {
+        at: 0.0,
+        spread: 0.0,
+        rate: Triple::ZERO,
+    };
+}
+
+/// The rate within a gap.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Bridge {
+    /// Rates at the nodes of the quadrature, rad/s.
+    pub(crate) values: [Triple<1>; MOMENTS],
+    /// Variance of their mean over the gap against that of the samples that are missing, about each axis,
+    /// (rad/s)^2.
+    pub(crate) variance: f64,
+}
+
+/// Over a gap of `length` ordinary steps in which `missing` samples would have been, from `around` (at most
+/// [`NEIGHBOURS`]); `None` of fewer than two.
+pub(crate) fn across(
+    around: &[Observation],
+    length: f64,
+    missing: f64,
+    quadrature: &Quadrature,
+) -> Option<Bridge> {
+    let n = around.len().min(NEIGHBOURS);
+    let around = around.get(..n).filter(|around| around.len() > 1)?;
+    // Only differences from a rate nearby meet rounding.
+    let reference = around[n / 2].rate;
+    let mut model = Model::new(around, reference);
+    let (scale, noise) = model.likeliest()?;
+    let mut bridge = model.between(0.5 * length, SCALES[scale], quadrature);
+    let of_sample = model.variance * NOISES[noise];
+    bridge.variance += of_sample * missing / (length * length);
+    for value in &mut bridge.values {
+        *value = *value + reference;
+    }
+    Some(bridge)
+}
+
+/// Lower triangle of a matrix over the samples.
+type Matrix = [[f64; NEIGHBOURS]; NEIGHBOURS];
+
+/// The samples under one scale and one noise.
+struct Model<'a> {
+    around: &'a [Observation],
+    /// Rates less the reference, by sample and axis.
+    rates: [[f64; 3]; NEIGHBOURS],
+    /// Covariances of the samples under the scale tried last, of a motion of variance 1.
+    covariance: Matrix,
+    scale: usize,
+    /// Cholesky's factor L of them with noise.
+    factor: Matrix,
+    /// L^-1 times ones, and its square.
+    ones: [f64; NEIGHBOURS],
+    information: f64,
+    /// L^-1 times the rates less their mean.
+    whitened: [[f64; 3]; NEIGHBOURS],
+    mean: [f64; 3],
+    /// Of the motion, (rad/s)^2.
+    variance: f64,
+}
+
+impl<'a> Model<'a> {
+    fn new(around: &'a [Observation], reference: Triple<1>) -> Self {
+        let mut rates = [[0.0; 3]; NEIGHBOURS];
+        for (rate, sample) in rates.iter_mut().zip(around) {
+            let w = sample.rate - reference;
+            *rate = [w.x.0[0], w.y.0[0], w.z.0[0]];
+        }
+        Model {
+            around,
+            rates,
+            covariance: [[0.0; NEIGHBOURS]; NEIGHBOURS],
+            scale: usize::MAX,
+            factor: [[0.0; NEIGHBOURS]; NEIGHBOURS],
+            ones: [0.0; NEIGHBOURS],
+            information: 0.0,
+            whitened: [[0.0; 3]; NEIGHBOURS],
+            mean: [0.0; 3],
+            variance: 0.0,
+        }
+    }
+
+    /// Scale and noise under which the samples are most likely, uphill from the middle; the model is left
+    /// there. `None` where no number says so.
+    fn likeliest(&mut self) -> Option<(usize, usize)> {
+        let start = SCALES.len() / 2;
+        let mut scale = start;
+        let (mut best, mut noise) = self.likeliest_noise(start, NOISES.len() / 2);
+        for next in start + 1..SCALES.len() {
+            let (likelihood, under) = self.likeliest_noise(next, noise);
+            if likelihood <= best {
+                break;
+            }
+            (best, scale, noise) = (likelihood, next, under);
+        }
+        if scale == start {
+            for next in (0..start).rev() {
+                let (likelihood, under) = self.likeliest_noise(next, noise);
+                if likelihood <= best {
+                    break;
+                }
+                (best, scale, noise) = (likelihood, next, under);
+            }
+        }
+        self.likelihood(scale, noise)
+            .is_finite()
+            .then_some((scale, noise))
+    }
+
+    /// The largest likelihood under one scale, uphill from a noise, and the noise there.
+    fn likeliest_noise(&mut self, scale: usize, from: usize) -> (f64, usize) {
+        let mut best = (self.likelihood(scale, from), from);
+        for noise in from + 1..NOISES.len() {
+            let likelihood = self.likelihood(scale, noise);
+            if likelihood <= best.0 {
+                break;
+            }
+            best = (likelihood, noise);
+        }
+        if best.1 == from {
+            for noise in (0..from).rev() {
+                let likelihood = self.likelihood(scale, noise);
+                if likelihood <= best.0 {
+                    break;
+                }
+                best = (likelihood, noise);
+            }
+        }
+        best
+    }
+
+    /// Logarithm of how likely the samples are, but for a constant; leaves the model at this scale and noise.
+    fn likelihood(&mut self, scale: usize, noise: usize) -> f64 {
+        let n = self.around.len();
+        if scale != self.scale {
+            self.scale = scale;
+            for (i, a) in self.around.iter().enumerate() {
+                for (j, b) in self.around[..=i].iter().enumerate() {
+                    self.covariance[i][j] = between_means(a, b, SCALES[scale]);
+                }
+            }
+        }
+        let mut determinant = 1.0;
+        for i in 0..n {
+            for j in 0..=i {
+                let mut sum = self.covariance[i][j];
+                if i == j {
+                    sum += NOISES[noise];
+                }
+                for k in 0..j {
+                    sum -= self.factor[i][k] * self.factor[j][k];
+                }
+                self.factor[i][j] = if i == j {
+                    sum.sqrt()
+                } else {
+                    sum / self.factor[j][j]
+                };
+            }
+            // At most 24 factors, none below 1e-6 by much.
+            determinant *= self.factor[i][i];
+            if determinant.is_nan() || determinant <= 0.0 {
+                return f64::NEG_INFINITY;
+            }
+        }
+        let mut ones = [1.0; NEIGHBOURS];
+        self.solve(&mut ones);
+        let mut whitened = self.rates;
+        self.solve_all(&mut whitened);
+        self.information = ones[..n].iter().map(|u| u * u).sum();
+        let mut squares = 0.0;
+        for axis in 0..3 {
+            let product: f64 = (0..n).map(|i| ones[i] * whitened[i][axis]).sum();
+            self.mean[axis] = product / self.information;
+            for i in 0..n {
+                whitened[i][axis] -= self.mean[axis] * ones[i];
+                squares += whitened[i][axis] * whitened[i][axis];
+            }
+        }
+        (self.ones, self.whitened) = (ones, whitened);
+        let freedom = (n - 1) as f64;
+        self.variance = squares / (3.0 * freedom);
+        // Samples that are all equal are as likely under any scale.
+        let spread = self.variance.max(f64::MIN_POSITIVE);
+        -0.5 * (freedom * spread.ln() + 2.0 * determinant.ln() + self.information.ln())
+    }
+
+    /// The rates in a gap from -half to half.
+    fn between(&self, half: f64, scale: f64, quadrature: &Quadrature) -> Bridge {
+        let n = self.around.len();
+        // L^-T L^-1 (rates - mean).
+        let mut weighted = self.whitened;
+        for i in (0..n).rev() {
+            for axis in 0..3 {
+                let sum: f64 = (i + 1..n)
+                    .map(|k| self.factor[k][i] * weighted[k][axis])
+                    .sum();
+                weighted[i][axis] = (weighted[i][axis] - sum) / self.factor[i][i];
+            }
+        }
+        let nodes = quadrature.nodes();
+        let weights = quadrature.mean_weights();
+        let mut values = [Triple::ZERO; MOMENTS];
+        let mut of_mean = [0.0; NEIGHBOURS];
+        for (value, (g, weight)) in values.iter_mut().zip(nodes.iter().zip(weights)) {
+            let mut rate = self.mean;
+            for (i, sample) in self.around.iter().enumerate() {
+                let covariance = with_instant(sample, half * g, scale);
+                of_mean[i] += weight * covariance;
+                for axis in 0..3 {
+                    rate[axis] += covariance * weighted[i][axis];
+                }
+            }
+            *value = Triple::new(rate[0], rate[1], rate[2]);
+        }
+        self.solve(&mut of_mean);
+        let explained: f64 = of_mean[..n].iter().map(|v| v * v).sum();
+        let product: f64 = (0..n).map(|i| self.ones[i] * of_mean[i]).sum();
+        let mean_unknown = (1.0 - product) * (1.0 - product) / self.information;
+        let own = variance_of_mean(half, scale, quadrature);
+        Bridge {
+            values,
+            variance: self.variance * ((own - explained).max(0.0) + mean_unknown),
+        }
+    }
+
+    /// L^-1 times a column.
+    fn solve(&self, column: &mut [f64; NEIGHBOURS]) {
+        for i in 0..self.around.len() {
+            let sum: f64 = (0..i).map(|k| self.factor[i][k] * column[k]).sum();
+            column[i] = (column[i] - sum) / self.factor[i][i];
+        }
+    }
+
+    /// L^-1 times three columns.
+    fn solve_all(&self, columns: &mut [[f64; 3]; NEIGHBOURS]) {
+        for i in 0..self.around.len() {
+            let mut column = columns[i];
+            for k in 0..i {
+                for axis in 0..3 {
+                    column[axis] -= self.factor[i][k] * columns[k][axis];
+                }
+            }
+            columns[i] = column.map(|v| v / self.factor[i][i]);
+        }
+    }
+}
+
+/// Matérn's covariance of order 7/2 of a motion of variance 1, at a distance in time.
+fn matern(distance: f64, scale: f64) -> f64 {
+    let a = 7f64.sqrt() * distance.abs() / scale;
+    (1.0 + a * (1.0 + a * (0.4 + a / 15.0))) * (-a).exp()
+}
+
+fn between_means(a: &Observation, b: &Observation, scale: f64) -> f64 {
+    let apart = a.at - b.at;
+    if a.spread + b.spread == 0.0 {
+        return matern(apart, scale);
+    }
+    let (near, far) = (a.spread - b.spread, a.spread + b.spread);
+    let at = |off: f64| matern(apart + off, scale);
+    0.25 * (at(near) + at(-near) + at(far) + at(-far))
+}
+
+fn with_instant(a: &Observation, t: f64, scale: f64) -> f64 {
+    let apart = a.at - t;
+    if a.spread == 0.0 {
+        return matern(apart, scale);
+    }
+    0.5 * (matern(apart + a.spread, scale) + matern(apart - a.spread, scale))
+}
+
+/// Variance of the mean from -half to half.
+fn variance_of_mean(half: f64, scale: f64, quadrature: &Quadrature) -> f64 {
+    let nodes = quadrature.nodes();
+    let weights = quadrature.mean_weights();
+    let mut of_nodes = 0.0;
+    for (a, wa) in nodes.iter().zip(weights) {
+        for (b, wb) in nodes.iter().zip(weights) {
+            of_nodes += wa * wb * matern(half * (a - b), scale);
+        }
+    }
+    // Where the motion changes between two nodes they see it too rarely: by distance instead, over what
+    // distance there is covariance.
+    let reach = (2.0 * half).min(8.0 * scale);
+    let mut by_distance = 0.0;
+    for (g, weight) in nodes.iter().zip(weights) {
+        let apart = 0.5 * reach * (1.0 + g);
+        by_distance += weight * (1.0 - apart / (2.0 * half)) * matern(apart, scale);
+    }
+    of_nodes.min(by_distance * reach / half)
+}
