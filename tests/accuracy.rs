@@ -23,7 +23,6 @@ mod orders;
 mod peers;
 #[path = "accuracy/random.rs"]
 mod random;
-#[cfg(feature = "service")]
 #[path = "accuracy/recordings.rs"]
 mod recordings;
 #[path = "accuracy/run.rs"]

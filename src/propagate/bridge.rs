@@ -3,9 +3,10 @@
 //! A polynomial of what order? Too low and the motion is cut short, too high and noise is multiplied. What the
 //! samples around are like says more than how many are missing: how far they vary, over what time, and how
 //! much of it is noise. Each axis of the rate is taken for a Gaussian process of unknown constant mean with
-//! Matérn's covariance of order 7/2; its scale of time and its share of noise are those under which the
-//! samples are most likely. The rate between them is then their best linear combination, and its
-//! uncertainty comes with it, from the same numbers.
+//! Matérn's covariance of order 7/2, or the Gaussian one where there is too little noise to hide the
+//! difference; shape, scale of time and share of noise are those under which the samples are most
+//! likely. The rate between them is then their best linear combination, and its uncertainty comes with it,
+//! from the same numbers.
 //!
 //! # Source
 //! Rasmussen & Williams, Gaussian Processes for Machine Learning (2006), 2.2, 2.7 (unknown mean), 4.2.1 (Matérn),
@@ -23,16 +24,26 @@ use super::magnus::MOMENTS;
 pub(crate) const NEIGHBOURS: usize = 12;
 
 /// Scales of time tried, in ordinary steps: from noise-like to nearly a parabola.
-const SCALES: [f64; 9] = [1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0, 128.0, 256.0];
+const SCALES: [f64; 17] = [
+    1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 11.0, 16.0, 22.0, 32.0, 45.0, 64.0, 90.0, 128.0, 180.0,
+    256.0,
+];
 /// Shares of noise tried: its variance over that of the motion.
-const NOISES: [f64; 6] = [1e-11, 1e-8, 1e-6, 1e-4, 1e-2, 1.0];
+const NOISES: [f64; 7] = [1e-13, 1e-10, 1e-8, 1e-6, 1e-4, 1e-2, 1.0];
+
+/// The largest of them that lets one see whether a motion is as smooth as can be.
+const QUIET: usize = 3;
+
+/// A mean from three instants: place in spreads from the middle, weight (Gauss).
+const OF_MEAN: [(f64, f64); 3] = [(-1.0, 5.0 / 18.0), (0.0, 4.0 / 9.0), (1.0, 5.0 / 18.0)];
 
 /// A sample: the rate at an instant, or its mean over an interval around it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Observation {
     /// The instant, or the middle of the interval, in ordinary steps from the middle of the gap.
     pub(crate) at: f64,
-    /// Half the distance of the two instants whose mean stands for that of the interval (Gauss); 0 at an instant.
+    /// How far from the middle the outer two of the three instants lie whose mean stands for that of the interval
+    /// (Gauss); 0 at an instant.
     pub(crate) spread: f64,
     /// Rate, rad/s.
     pub(crate) rate: Triple<1>,
@@ -55,6 +66,8 @@ pub(crate) struct Bridge {
     /// Variance of their mean over the gap against that of the samples that are missing, about each axis,
     /// (rad/s)^2.
     pub(crate) variance: f64,
+    /// The samples show no noise above their own rounding.
+    pub(crate) noiseless: bool,
 }
 
 /// Over a gap of `length` ordinary steps in which `missing` samples would have been, from `around` (at most
@@ -70,10 +83,11 @@ pub(crate) fn across(
     // Only differences from a rate nearby meet rounding.
     let reference = around[n / 2].rate;
     let mut model = Model::new(around, reference);
-    let (scale, noise) = model.likeliest()?;
-    let mut bridge = model.between(0.5 * length, SCALES[scale], quadrature);
+    let noise = model.likeliest()?;
+    let mut bridge = model.between(0.5 * length, quadrature);
     let of_sample = model.variance * NOISES[noise];
     bridge.variance += of_sample * missing / (length * length);
+    bridge.noiseless = noise == 0;
     for value in &mut bridge.values {
         *value = *value + reference;
     }
@@ -88,7 +102,9 @@ struct Model<'a> {
     around: &'a [Observation],
     /// Rates less the reference, by sample and axis.
     rates: [[f64; 3]; NEIGHBOURS],
-    /// Covariances of the samples under the scale tried last, of a motion of variance 1.
+    /// What the motion is like under the scale tried last.
+    process: Process,
+    /// Covariances of the samples then, of a motion of variance 1.
     covariance: Matrix,
     scale: usize,
     /// Cholesky's factor L of them with noise.
@@ -113,6 +129,10 @@ impl<'a> Model<'a> {
         Model {
             around,
             rates,
+            process: Process {
+                shape: Shape::Matern,
+                scale: SCALES[0],
+            },
             covariance: [[0.0; NEIGHBOURS]; NEIGHBOURS],
             scale: usize::MAX,
             factor: [[0.0; NEIGHBOURS]; NEIGHBOURS],
@@ -124,9 +144,30 @@ impl<'a> Model<'a> {
         }
     }
 
-    /// Scale and noise under which the samples are most likely, uphill from the middle; the model is left
-    /// there. `None` where no number says so.
-    fn likeliest(&mut self) -> Option<(usize, usize)> {
+    /// Leaves the model at the shape, scale and noise under which the samples are most likely, and says which
+    /// noise. `None` where no number says so.
+    fn likeliest(&mut self) -> Option<usize> {
+        let (rough, mut scale, mut noise) = self.likeliest_scale(Shape::Matern);
+        // How smooth a motion is shows only below the noise.
+        if noise <= QUIET {
+            let (smooth, of_smooth, noise_of_smooth) = self.likeliest_scale(Shape::Gaussian);
+            if smooth > rough {
+                (scale, noise) = (of_smooth, noise_of_smooth);
+            } else {
+                self.shape(Shape::Matern);
+            }
+        }
+        self.likelihood(scale, noise).is_finite().then_some(noise)
+    }
+
+    fn shape(&mut self, shape: Shape) {
+        self.process.shape = shape;
+        self.scale = usize::MAX;
+    }
+
+    /// The largest likelihood under one shape, uphill from the middle, and the scale and noise there.
+    fn likeliest_scale(&mut self, shape: Shape) -> (f64, usize, usize) {
+        self.shape(shape);
         let start = SCALES.len() / 2;
         let mut scale = start;
         let (mut best, mut noise) = self.likeliest_noise(start, NOISES.len() / 2);
@@ -146,9 +187,7 @@ impl<'a> Model<'a> {
                 (best, scale, noise) = (likelihood, next, under);
             }
         }
-        self.likelihood(scale, noise)
-            .is_finite()
-            .then_some((scale, noise))
+        (best, scale, noise)
     }
 
     /// The largest likelihood under one scale, uphill from a noise, and the noise there.
@@ -178,9 +217,10 @@ impl<'a> Model<'a> {
         let n = self.around.len();
         if scale != self.scale {
             self.scale = scale;
+            self.process.scale = SCALES[scale];
             for (i, a) in self.around.iter().enumerate() {
                 for (j, b) in self.around[..=i].iter().enumerate() {
-                    self.covariance[i][j] = between_means(a, b, SCALES[scale]);
+                    self.covariance[i][j] = self.process.between_means(a, b);
                 }
             }
         }
@@ -200,7 +240,7 @@ impl<'a> Model<'a> {
                     sum / self.factor[j][j]
                 };
             }
-            // At most 24 factors, none below 1e-6 by much.
+            // At most 24 factors, none below 3e-7 by much.
             determinant *= self.factor[i][i];
             if determinant.is_nan() || determinant <= 0.0 {
                 return f64::NEG_INFINITY;
@@ -229,7 +269,7 @@ impl<'a> Model<'a> {
     }
 
     /// The rates in a gap from -half to half.
-    fn between(&self, half: f64, scale: f64, quadrature: &Quadrature) -> Bridge {
+    fn between(&self, half: f64, quadrature: &Quadrature) -> Bridge {
         let n = self.around.len();
         // L^-T L^-1 (rates - mean).
         let mut weighted = self.whitened;
@@ -248,7 +288,7 @@ impl<'a> Model<'a> {
         for (value, (g, weight)) in values.iter_mut().zip(nodes.iter().zip(weights)) {
             let mut rate = self.mean;
             for (i, sample) in self.around.iter().enumerate() {
-                let covariance = with_instant(sample, half * g, scale);
+                let covariance = self.process.with_instant(sample, half * g);
                 of_mean[i] += weight * covariance;
                 for axis in 0..3 {
                     rate[axis] += covariance * weighted[i][axis];
@@ -260,9 +300,10 @@ impl<'a> Model<'a> {
         let explained: f64 = of_mean[..n].iter().map(|v| v * v).sum();
         let product: f64 = (0..n).map(|i| self.ones[i] * of_mean[i]).sum();
         let mean_unknown = (1.0 - product) * (1.0 - product) / self.information;
-        let own = variance_of_mean(half, scale, quadrature);
+        let own = self.process.variance_of_mean(half, quadrature);
         Bridge {
             values,
+            noiseless: false,
             variance: self.variance * ((own - explained).max(0.0) + mean_unknown),
         }
     }
@@ -289,47 +330,73 @@ impl<'a> Model<'a> {
     }
 }
 
-/// Matérn's covariance of order 7/2 of a motion of variance 1, at a distance in time.
-fn matern(distance: f64, scale: f64) -> f64 {
-    let a = 7f64.sqrt() * distance.abs() / scale;
-    (1.0 + a * (1.0 + a * (0.4 + a / 15.0))) * (-a).exp()
+/// How the covariance of a motion falls with the distance in time.
+#[derive(Clone, Copy, Debug)]
+enum Shape {
+    /// Matérn's of order 7/2: three times differentiable, as shaken and carried sensors are.
+    Matern,
+    /// As smooth as can be: limited in band.
+    Gaussian,
 }
 
-fn between_means(a: &Observation, b: &Observation, scale: f64) -> f64 {
-    let apart = a.at - b.at;
-    if a.spread + b.spread == 0.0 {
-        return matern(apart, scale);
-    }
-    let (near, far) = (a.spread - b.spread, a.spread + b.spread);
-    let at = |off: f64| matern(apart + off, scale);
-    0.25 * (at(near) + at(-near) + at(far) + at(-far))
+/// A motion of variance 1.
+#[derive(Clone, Copy, Debug)]
+struct Process {
+    shape: Shape,
+    /// In ordinary steps.
+    scale: f64,
 }
 
-fn with_instant(a: &Observation, t: f64, scale: f64) -> f64 {
-    let apart = a.at - t;
-    if a.spread == 0.0 {
-        return matern(apart, scale);
-    }
-    0.5 * (matern(apart + a.spread, scale) + matern(apart - a.spread, scale))
-}
-
-/// Variance of the mean from -half to half.
-fn variance_of_mean(half: f64, scale: f64, quadrature: &Quadrature) -> f64 {
-    let nodes = quadrature.nodes();
-    let weights = quadrature.mean_weights();
-    let mut of_nodes = 0.0;
-    for (a, wa) in nodes.iter().zip(weights) {
-        for (b, wb) in nodes.iter().zip(weights) {
-            of_nodes += wa * wb * matern(half * (a - b), scale);
+impl Process {
+    /// Covariance at a distance in time.
+    fn covariance(&self, distance: f64) -> f64 {
+        match self.shape {
+            Shape::Matern => {
+                let a = 7f64.sqrt() * distance.abs() / self.scale;
+                (1.0 + a * (1.0 + a * (0.4 + a / 15.0))) * (-a).exp()
+            }
+            Shape::Gaussian => (-0.5 * (distance / self.scale).powi(2)).exp(),
         }
     }
-    // Where the motion changes between two nodes they see it too rarely: by distance instead, over what
-    // distance there is covariance.
-    let reach = (2.0 * half).min(8.0 * scale);
-    let mut by_distance = 0.0;
-    for (g, weight) in nodes.iter().zip(weights) {
-        let apart = 0.5 * reach * (1.0 + g);
-        by_distance += weight * (1.0 - apart / (2.0 * half)) * matern(apart, scale);
+
+    fn between_means(&self, a: &Observation, b: &Observation) -> f64 {
+        let apart = a.at - b.at;
+        if a.spread + b.spread == 0.0 {
+            return self.covariance(apart);
+        }
+        OF_MEAN
+            .iter()
+            .map(|(place, weight)| weight * self.with_instant(a, b.at + place * b.spread))
+            .sum()
     }
-    of_nodes.min(by_distance * reach / half)
+
+    fn with_instant(&self, a: &Observation, t: f64) -> f64 {
+        let apart = a.at - t;
+        if a.spread == 0.0 {
+            return self.covariance(apart);
+        }
+        let at = |(place, weight): &(f64, f64)| weight * self.covariance(apart + place * a.spread);
+        OF_MEAN.iter().map(at).sum()
+    }
+
+    /// Variance of the mean from -half to half.
+    fn variance_of_mean(&self, half: f64, quadrature: &Quadrature) -> f64 {
+        let nodes = quadrature.nodes();
+        let weights = quadrature.mean_weights();
+        let mut of_nodes = 0.0;
+        for (a, wa) in nodes.iter().zip(weights) {
+            for (b, wb) in nodes.iter().zip(weights) {
+                of_nodes += wa * wb * self.covariance(half * (a - b));
+            }
+        }
+        // Where the motion changes between two nodes they see it too rarely: by distance instead, over what
+        // distance there is covariance.
+        let reach = (2.0 * half).min(8.0 * self.scale);
+        let mut by_distance = 0.0;
+        for (g, weight) in nodes.iter().zip(weights) {
+            let apart = 0.5 * reach * (1.0 + g);
+            by_distance += weight * (1.0 - apart / (2.0 * half)) * self.covariance(apart);
+        }
+        of_nodes.min(by_distance * reach / half)
+    }
 }

@@ -85,8 +85,10 @@ impl Plan {
             return (straight, straight.b[0].size().0[0].powi(2));
         };
         let variance = bridge.variance * h * h;
+        // Where there is noise, orders may agree by luck.
+        let part = if bridge.noiseless { 1.0 } else { SMOOTH };
         if let Some((size, open)) = self.by_polynomial(track, k, step)
-            && open < SMOOTH * SMOOTH * variance
+            && open < 3.0 * variance * part * part
         {
             return (self.over_gap(track, k, size), open);
         }
@@ -110,7 +112,7 @@ impl Plan {
         let twice = track.stamp[i].saturating_sub(to) as f64 + begin.saturating_sub(from) as f64;
         Observation {
             at: 0.5 * twice / step,
-            spread: 0.5 * length / 3f64.sqrt(),
+            spread: 0.5 * length * 0.6f64.sqrt(),
             rate: track.rate(i),
         }
     }
@@ -146,10 +148,12 @@ impl Plan {
         let gap = self.gap(track, k);
         let (_, cap) = self.place(track, k, cap, true);
         let mut last = self.over_gap(track, k, 2);
-        let mut before = f64::INFINITY;
+        // The changes of the two orders before.
+        let (mut before, mut earlier) = (f64::INFINITY, 0.0);
         // By size: what the next order would change, rad, and how much louder than a sample it is.
         let mut orders = [(f64::INFINITY, 0.0); LARGEST_WINDOW + 1];
         let mut noise = f64::INFINITY;
+        let mut narrower = 2;
         for size in (4..cap).step_by(2).chain((cap > 2).then_some(cap)) {
             let this = self.over_gap(track, k, size);
             let change = (this.b[0] - last.b[0]).norm() + (this.b[1] - last.b[1]).norm();
@@ -161,19 +165,27 @@ impl Plan {
             let gain = gain(&at[..size]);
             // All of a change may be noise, and none is more than the least.
             noise = noise.min(change * change / gain);
-            if change < 0.5 * before && before.is_finite() {
+            // A small change may be luck: what the next order does change is known better.
+            orders[narrower].0 = orders[narrower].0.max(change);
+            let usual = f64::max(before, 0.25 * earlier);
+            if change < 0.5 * usual && before.is_finite() {
                 // The next change is to this one as this is to the one before.
-                orders[size] = (change * (change / before), gain);
+                orders[size] = (change * (change / usual), gain);
             }
-            (last, before) = (this, change);
+            if before.is_finite() {
+                earlier = before;
+            }
+            (last, before, narrower) = (this, change, size);
         }
-        let open = |&(change, gain): &(f64, f64)| change * change + 4.0 * noise * gain;
-        orders
-            .iter()
-            .map(open)
-            .enumerate()
+        let open = |noises: f64| {
+            move |&(change, gain): &(f64, f64)| change * change + noises * noise * gain
+        };
+        let sizes = orders.iter().map(open(1.0)).enumerate();
+        let (size, _) = sizes
             .filter(|(_, open)| open.is_finite())
-            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .min_by(|a, b| a.1.total_cmp(&b.1))?;
+        // The least of several changes is less than noise makes one.
+        Some((size, open(4.0)(&orders[size])))
     }
 
     /// How many samples are missing in interval k, 0.5 or more, and the ordinary step, ns: the median around.
@@ -345,5 +357,6 @@ fn gain(at: &[f64]) -> f64 {
     (0..at.len()).map(|i| coefficient(i).powi(2)).sum()
 }
 
-/// A polynomial bridges where what it leaves open is less than this part of what a random motion would.
-const SMOOTH: f64 = 0.1;
+/// Among noise a polynomial bridges where what it leaves open is less than this part of what a random motion
+/// would.
+const SMOOTH: f64 = 0.06;
