@@ -422,7 +422,12 @@ fn every_fault_of_a_chunk_is_named() {
     type Case = (Vec<u8>, fn(&ProblemKind) -> bool);
     let zeros = zstd::bulk::compress(&vec![0; 8 << 20], 1).unwrap();
     let none = chunk_head(8 << 20, 0, "zstd", zeros.len() as u64);
-    let cases: [Case; 10] = [
+    let skipped = record(0x80, b"a record of a kind that is stepped over");
+    let after = [skipped.as_slice(), &vec![0; 8 << 20]].concat();
+    let size = after.len() as u64;
+    let after = zstd::bulk::compress(&after, 1).unwrap();
+    let behind = chunk_head(size, 0, "zstd", after.len() as u64);
+    let cases: [Case; 11] = [
         (chunk(chunk_head(1000, 1, "zstd", n), &packed), |k| {
             matches!(k, ProblemKind::ChunkCrc { stored: 1, .. })
         }),
@@ -464,6 +469,9 @@ fn every_fault_of_a_chunk_is_named() {
         // Eight megabytes of them in a few hundred bytes are not even unpacked.
         (chunk(none, &zeros), |k| {
             *k == ProblemKind::NoInnerRecord { at: 0 }
+        }),
+        (chunk(behind, &after), |k| {
+            *k == ProblemKind::NoInnerRecord { at: 48 }
         }),
     ];
     for (i, (chunk, expected)) in cases.into_iter().enumerate() {

@@ -197,11 +197,15 @@ impl Buffers {
                 let (declared, actual) = (size as u64, packed.len() as u64);
                 return Ok(Err(ProblemKind::ChunkSize { declared, actual }));
             }
-            Compression::Zstd if is_packed_nothing(packed, size) => {
-                return Ok(Err(ProblemKind::NoInnerRecord { at: 0 }));
-            }
             Compression::Lz4 | Compression::Zstd => {
                 let plain = room(&mut self.plain, size);
+                if compression == Compression::Zstd
+                    && packed.len() <= size / SUSPECT
+                    && let Some(end) = end_of_records(packed, plain)
+                {
+                    // As far as there are records; what follows them says itself what it is.
+                    return Ok(Ok(plain.get(..end).unwrap_or(&[])));
+                }
                 let actual = match compression {
                     Compression::Lz4 => unlz4(packed, plain, crc),
                     _ => unzstd(&mut self.zstd, packed, plain),
@@ -241,17 +245,34 @@ impl Buffers {
     }
 }
 
-/// Whether a chunk is packed as only zeros and the like can be, and begins with opcode 0: then it is not worth
-/// the memory it asks for. Of 2 kB of it, 64 MiB would be unpacked, and none of them used.
-fn is_packed_nothing(packed: &[u8], size: usize) -> bool {
-    const SUSPECT: usize = 1000;
-    if packed.len() > size / SUSPECT {
-        return false;
+/// Bytes a packed one stands for from which on a chunk is looked at before it is unpacked: only zeros and the
+/// like can be packed so.
+const SUSPECT: usize = 1000;
+
+/// Unpacks the records of a chunk until one has opcode 0, which none has; how far that is, the head of that
+/// one with it. `None` where there is none. Of 2 kB of zeros, 64 MiB would be unpacked, and none of them used.
+fn end_of_records(packed: &[u8], plain: &mut [u8]) -> Option<usize> {
+    const HEAD: usize = 9;
+    let mut decoder = zstd::stream::read::Decoder::with_buffer(packed).ok()?;
+    let (mut have, mut at) = (0, 0_usize);
+    loop {
+        while let Some(head) = plain
+            .get(at..at.checked_add(HEAD)?)
+            .filter(|_| at + HEAD <= have)
+        {
+            let (opcode, length) = head.split_first_chunk::<1>()?;
+            if *opcode == [0] {
+                return Some(at + HEAD);
+            }
+            let length = u64::from_le_bytes(length.try_into().ok()?);
+            at = (at + HEAD).checked_add(usize::try_from(length).ok()?)?;
+        }
+        let end = plain.len().min(have + PIECE);
+        match io::Read::read(&mut decoder, plain.get_mut(have..end)?).ok()? {
+            0 => return None,
+            n => have += n,
+        }
     }
-    let mut first = [1];
-    let decoder = zstd::stream::read::Decoder::with_buffer(packed);
-    let read = decoder.and_then(|mut decoder| io::Read::read_exact(&mut decoder, &mut first));
-    read.is_ok() && first == [0]
 }
 
 fn unzstd(
@@ -293,3 +314,6 @@ fn unlz4(packed: &[u8], plain: &mut [u8], crc: u32) -> io::Result<usize> {
         _ => Ok(done + 1),
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,46 @@
+use super::*;
+
+/// A record of this opcode with so many bytes.
+fn record(opcode: u8, len: usize) -> Vec<u8> {
+    let mut record = vec![opcode];
+    record.extend((len as u64).to_le_bytes());
+    record.resize(9 + len, 7);
+    record
+}
+
+#[test]
+fn a_chunk_is_unpacked_no_further_than_there_are_records() {
+    const SIZE: usize = 16 << 20;
+    // Records that end far from a piece's end, at one, and one across several.
+    for lengths in [
+        vec![],
+        vec![300; 3],
+        vec![PIECE - 9],
+        vec![1, 5 * PIECE, 40],
+    ] {
+        let mut plain: Vec<u8> = lengths.iter().flat_map(|n| record(5, *n)).collect();
+        let records = plain.len();
+        plain.resize(SIZE, 0);
+        let packed = zstd::bulk::compress(&plain, 19).unwrap();
+        let mut out = vec![1; SIZE];
+        let end = end_of_records(&packed, &mut out).unwrap();
+        assert_eq!(end, records + 9, "{lengths:?}");
+        assert!(out.starts_with(&plain[..end]));
+        let untouched = out.iter().rev().take_while(|b| **b == 1).count();
+        assert!(
+            SIZE - untouched <= records + 3 * PIECE,
+            "{lengths:?}: {untouched} bytes left alone"
+        );
+    }
+}
+
+#[test]
+fn a_chunk_of_records_alone_has_no_such_end() {
+    let plain: Vec<u8> = (0..2000).flat_map(|_| record(0x80, 5000)).collect();
+    let packed = zstd::bulk::compress(&plain, 19).unwrap();
+    assert!(packed.len() < plain.len() / SUSPECT);
+    assert_eq!(end_of_records(&packed, &mut vec![0; plain.len()]), None);
+    // A length beyond everything is for who reads the records to name.
+    let huge = zstd::bulk::compress(&[5, 255, 255, 255, 255, 255, 255, 255, 255, 0], 1).unwrap();
+    assert_eq!(end_of_records(&huge, &mut [0; 10]), None);
+}
