@@ -1,4 +1,4 @@
-//! Changed logs through every command that reads one: each ends, in bounded time and memory, without a panic.
+//! Changed logs through the commands that read one: each ends, in bounded time and memory, without a panic.
 //!
 //! In a process of its own, whose standard output nobody reads; one thread, so that its time is all there is.
 
@@ -140,22 +140,21 @@ fn work(from: usize, cases: usize) {
             changed
         };
         std::fs::write(&log, &changed).unwrap();
-        for command in COMMANDS {
-            let before = (spent(), number("/proc/self/io", "rchar: "));
-            let outcome = catch_unwind(AssertUnwindSafe(|| run(command, &log, &out)));
-            let secs = spent() - before.0;
-            let read = number("/proc/self/io", "rchar: ") - before.1;
-            let memory = number("/proc/self/status", "VmHWM:") >> 10;
-            slowest = slowest.max(secs);
-            reads = reads.max(read);
-            if outcome.is_err() || secs > SECS || read > READ || memory > MEMORY {
-                let kept = std::env::temp_dir().join(format!("strapd-mutant-{case}.mcap"));
-                std::fs::write(&kept, &changed).unwrap();
-                panic!(
-                    "case {case}, strapd {command}: {secs:.2} s, {read} bytes read, {memory} MiB; kept as {}",
-                    kept.display()
-                );
-            }
+        let command = COMMANDS[rng.random_range(0..COMMANDS.len())];
+        let before = (spent(), number("/proc/self/io", "rchar: "));
+        let outcome = catch_unwind(AssertUnwindSafe(|| run(command, &log, &out)));
+        let secs = spent() - before.0;
+        let read = number("/proc/self/io", "rchar: ") - before.1;
+        let memory = number("/proc/self/status", "VmHWM:") >> 10;
+        slowest = slowest.max(secs);
+        reads = reads.max(read);
+        if outcome.is_err() || secs > SECS || read > READ || memory > MEMORY {
+            let kept = std::env::temp_dir().join(format!("strapd-mutant-{case}.mcap"));
+            std::fs::write(&kept, &changed).unwrap();
+            panic!(
+                "case {case}, strapd {command}: {secs:.2} s, {read} bytes read, {memory} MiB; kept as {}",
+                kept.display()
+            );
         }
         if (case + 1).is_multiple_of(10_000) {
             eprintln!(
@@ -166,7 +165,7 @@ fn work(from: usize, cases: usize) {
         }
     }
     eprintln!(
-        "{cases} changed logs, each through {} commands: {:.0} s, the slowest {slowest:.3} s, most read {reads} bytes, {} MiB",
+        "{cases} changed logs, each through one of {} commands: {:.0} s, the slowest {slowest:.3} s, most read {reads} bytes, {} MiB",
         COMMANDS.len(),
         start.elapsed().as_secs_f64(),
         number("/proc/self/status", "VmHWM:") >> 10
@@ -195,15 +194,15 @@ fn survive(cases: usize) {
     assert!(ran.success(), "{ran}");
 }
 
-/// As many as a quiet core does in a minute (33 ms each, of a debug build).
+/// As many as a quiet core does in a minute (3 ms each, of a debug build).
 #[test]
 fn changed_logs_harm_no_command() {
     let asked = std::env::var(COUNT).ok().and_then(|n| n.parse().ok());
-    survive(asked.unwrap_or(2_000));
+    survive(asked.unwrap_or(20_000));
 }
 
 #[test]
-#[ignore = "long: a million changed logs, hours"]
+#[ignore = "long: a million changed logs, half an hour to an hour"]
 fn a_million_changed_logs_harm_no_command() {
     survive(1_000_000);
 }
