@@ -38,7 +38,7 @@ export class Link {
       if (message.class === "VERSION") this.failures = 0;
       // Greeted is not yet watching: from here on nothing is lost.
       if (message.class === "WATCH" && message.enable) this.changed("open", "connected");
-      if (message.class === "ERROR" && /^(unauthorised|too_many_attempts|bad_auth)$/.test(message.code)) {
+      if (message.class === "ERROR" && /^(unauthorised|bad_auth)$/.test(message.code)) {
         this.refused = true;
         this.changed("token", message.message);
       }

@@ -40,8 +40,8 @@ fn programme() -> String {
 }
 
 impl Browser {
-    /// Starts one with an empty page of 1280 x 1000 pixels. Never `None`: without Chromium it fails.
-    pub(crate) fn start() -> Option<Browser> {
+    /// Starts one with an empty page of 1280 x 1000 pixels. Without Chromium it fails.
+    pub(crate) fn start() -> Browser {
         let programme = programme();
         let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
         let profile = tempfile::tempdir().unwrap();
@@ -90,7 +90,7 @@ impl Browser {
             _turn: turn,
         };
         browser.page();
-        Some(browser)
+        browser
     }
 
     /// A new page, from now on the one spoken to.

@@ -67,9 +67,7 @@ fn wxyz(att: &Value) -> [f64; 4] {
 #[test]
 #[cfg_attr(not(has_chromium), ignore = "needs chromium")]
 fn the_page_shows_what_the_command_line_says() {
-    let Some(mut browser) = Browser::start() else {
-        return;
-    };
+    let mut browser = Browser::start();
     let daemon = Daemon::start(listening(&[TCP, WS]));
     browser.go(daemon.address(1), "/");
     browser.until_open();
@@ -151,9 +149,7 @@ fn the_page_shows_what_the_command_line_says() {
 #[test]
 #[cfg_attr(not(has_chromium), ignore = "needs chromium")]
 fn the_error_is_the_angle_from_the_truth() {
-    let Some(mut browser) = Browser::start() else {
-        return;
-    };
+    let mut browser = Browser::start();
     let daemon = Daemon::start(listening(&[TCP, WS]));
     browser.go(daemon.address(1), "/");
     browser.until_open();
