@@ -7,6 +7,7 @@ mod chosen;
 pub mod decoders;
 mod each;
 pub mod estimator;
+mod held;
 pub mod history;
 mod intervals;
 pub mod lines;
