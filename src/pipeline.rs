@@ -9,7 +9,7 @@ mod each;
 pub mod estimator;
 mod held;
 pub mod history;
-mod intervals;
+pub(crate) mod intervals;
 pub mod lines;
 pub mod log;
 pub mod look;
