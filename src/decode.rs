@@ -29,6 +29,7 @@ mod role;
 mod ros;
 mod schema;
 mod select;
+mod settle;
 mod stamp;
 mod stated;
 
@@ -105,6 +106,8 @@ pub struct Decoder {
     frame: Option<Plan>,
     stated: Stated,
     found: Found,
+    /// Stamps are numbers whose unit nothing states; of JSON before its first message: they may be.
+    has_bare_stamps: bool,
     /// Where stamps lie; the one that is read is [`Options::nth_stamp`].
     stamps: Vec<String>,
     options: Options,
@@ -206,12 +209,17 @@ impl Decoder {
                     .ok()
                     .map(|plan| Plan::Ros(Arc::new(plan))),
             });
+        let form = match &plan {
+            Plan::Ros(plan) => plan.form(),
+            Plan::Protobuf(plan) => plan.form(),
+            Plan::Json(_) => Form::default(),
+        };
         Ok(Decoder {
-            form: match &plan {
-                Plan::Ros(plan) => plan.form(),
-                Plan::Protobuf(plan) => plan.form(),
-                Plan::Json(_) => Form::default(),
-            },
+            has_bare_stamps: matches!(
+                form.stamp,
+                StampForm::Count(TimeUnit::ByMagnitude) | StampForm::Float(TimeUnit::ByMagnitude)
+            ),
+            form,
             plan,
             frame,
             stated: state(channel.schema_name, &selection),
@@ -242,6 +250,7 @@ impl Decoder {
             frame: None,
             stated,
             found,
+            has_bare_stamps: true,
             stamps: Vec::new(),
             options: options.clone(),
             label,
@@ -259,9 +268,20 @@ impl Decoder {
         publish: Nanos,
         out: &mut Vec<RawSample>,
     ) -> Result<Decoded, Undecodable> {
+        self.decode_as(&self.form, payload, log, publish, out)
+    }
+
+    fn decode_as(
+        &self,
+        form: &Form,
+        payload: &[u8],
+        log: Nanos,
+        publish: Nanos,
+        out: &mut Vec<RawSample>,
+    ) -> Result<Decoded, Undecodable> {
         match &self.plan {
-            Plan::Ros(plan) => plan.decode(&self.form, payload, log, publish, out),
-            Plan::Protobuf(plan) => plan.decode(&self.form, payload, log, publish, out),
+            Plan::Ros(plan) => plan.decode(form, payload, log, publish, out),
+            Plan::Protobuf(plan) => plan.decode(form, payload, log, publish, out),
             Plan::Json(plan) => plan.decode(payload, log, publish, out),
         }
     }
@@ -288,127 +308,6 @@ impl Decoder {
             return Ok(None);
         }
         self.decode(payload, log, publish, out).map(Some)
-    }
-
-    /// Learns from one message (the first of the topic) what no schema says: the unit of a stamp
-    /// that is a bare number, by the recorder's clock and else by its magnitude, and for JSON what
-    /// the messages hold. Without this call such stamps are read by magnitude, one by one.
-    ///
-    /// # Errors
-    /// [`Unsupported`] when a JSON message lacks a `--field` path, or holds neither body rate nor
-    /// orientation; it lists the keys there are. A message that can not be decoded is no error here.
-    pub fn settle(&mut self, payload: &[u8], log: Nanos) -> Result<(), Unsupported> {
-        if let Plan::Json(_) = &self.plan {
-            return self.settle_json(payload, log);
-        }
-        let Some(form) = self.form() else {
-            return Ok(());
-        };
-        let given = *form;
-        // Read the bare number as nanoseconds to see what it is.
-        form.stamp = match given.stamp {
-            StampForm::Count(TimeUnit::ByMagnitude) => StampForm::Count(TimeUnit::Nano),
-            StampForm::Float(TimeUnit::ByMagnitude) => StampForm::Float(TimeUnit::Nano),
-            _ => return Ok(()),
-        };
-        let mut samples = Vec::new();
-        let read = self.decode(payload, log, log, &mut samples);
-        let count = samples
-            .first()
-            .and_then(|s| s.header)
-            .filter(|_| read.is_ok());
-        let Some(form) = self.form() else {
-            return Ok(());
-        };
-        *form = given;
-        if let Some(Nanos(count)) = count.filter(|n| n.0 != 0) {
-            let unit = settled_unit(Bare::whole(count), log);
-            form.stamp = match given.stamp {
-                StampForm::Count(_) => StampForm::Count(unit),
-                _ => StampForm::Float(unit),
-            };
-        }
-        Ok(())
-    }
-
-    fn form(&mut self) -> Option<&mut Form> {
-        match self.plan {
-            Plan::Ros(_) | Plan::Protobuf(_) => Some(&mut self.form),
-            Plan::Json(_) => None,
-        }
-    }
-
-    fn settle_json(&mut self, payload: &[u8], log: Nanos) -> Result<(), Unsupported> {
-        let Plan::Json(plan) = &mut self.plan else {
-            return Ok(());
-        };
-        let learnt = match plan.find(payload) {
-            Ok(found) => found,
-            Err(_) => return Ok(()),
-        };
-        let one = match learnt.batch.first() {
-            Some(first) if !learnt.has_gyro() => first,
-            _ => &learnt,
-        };
-        let stamped = if one.stamp.is_some() { one } else { &learnt };
-        let unit = stamped.unlabelled().map(|bare| settled_unit(bare, log));
-        let missing = self.options.fields.iter().find(|field| match field.role {
-            FieldRole::Gyro => !one.has_gyro(),
-            FieldRole::Accel => !one.registers.has(Slot::ACCEL, 3),
-            FieldRole::Orientation => !one.has_orientation(),
-            FieldRole::Stamp => stamped.stamp.is_none(),
-            FieldRole::Interval => !one.registers.has(Slot::INTERVAL, 1),
-        });
-        let complaint = match missing {
-            Some(field) => Some(format!(
-                "no {} at `{}`",
-                field.role.name(),
-                printable(&field.text)
-            )),
-            None if !one.has_gyro() && !one.has_orientation() => Some(
-                "the message has no body rate and no orientation under a name this program knows"
-                    .to_owned(),
-            ),
-            None => None,
-        };
-        let stated = &mut self.stated;
-        stated.has_gyro = one.has_gyro();
-        stated.has_accel = one.registers.has(Slot::ACCEL, 3);
-        stated.has_orientation = one.has_orientation();
-        stated.has_stamp = stamped.stamp.is_some();
-        stated.has_interval = one.registers.has(Slot::INTERVAL, 1);
-        stated.interval = one
-            .registers
-            .has(Slot::INTERVAL, 1)
-            .then(|| ("PATH".to_owned(), one.interval));
-        stated.batched = !learnt.has_gyro() && !learnt.batch.is_empty();
-        stated.gyro_unit = one.unit.or(stated.gyro_unit);
-        stated.sample_kind = one.kind.or(stated.sample_kind);
-        self.found = match one.gyro_rank {
-            None => Found::Nothing,
-            Some(5) if plan.vector_stamped => Found::Vector,
-            Some(5) if plan.px4.is_none() => Found::Twist,
-            Some(_) => Found::Named,
-        };
-        let rivals = learnt.has_rival_stamps;
-        drop(learnt);
-        if rivals && !plan.trie.gives(FieldRole::Stamp) {
-            self.stamps = ["the outer stamp", "the nested stamp"]
-                .map(str::to_owned)
-                .into();
-        }
-        plan.settled = unit.or(plan.settled);
-        match complaint {
-            None => Ok(()),
-            Some(why) => {
-                let keys = json::keys::keys(payload).join(", ");
-                Err(unsupported(
-                    &self.label,
-                    format!("{why}; its keys: {keys}"),
-                    "name it: --field gyro=PATH",
-                ))
-            }
-        }
     }
 
     /// The same for another topic's messages of the same type, which share what was compiled.
@@ -487,11 +386,6 @@ impl Decoder {
     fn found(&self) -> Found {
         self.found
     }
-}
-
-fn settled_unit(bare: Bare, log: Nanos) -> TimeUnit {
-    let count = bare.count();
-    TimeUnit::nearest(count, log).unwrap_or_else(|| TimeUnit::of_magnitude(count))
 }
 
 fn label(channel: &Channel<'_>) -> [String; 3] {

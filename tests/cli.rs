@@ -4,6 +4,8 @@
 #![cfg(feature = "service")]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
+#[path = "cli/bare_stamps.rs"]
+mod bare_stamps;
 #[path = "cli/flags.rs"]
 mod flags;
 #[path = "cli/inputs.rs"]
@@ -20,6 +22,9 @@ mod replays;
 mod shared_data;
 #[path = "cli/summaries.rs"]
 mod summaries;
+#[allow(dead_code)]
+#[path = "decode/writer.rs"]
+mod writer;
 
 use std::path::Path;
 

@@ -22,6 +22,7 @@ mod serve {
     mod documentation;
     mod faults;
     mod frames;
+    mod intervals;
     mod late;
     mod limits;
     mod opening;

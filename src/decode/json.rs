@@ -133,8 +133,21 @@ impl Plan {
         out: &mut Vec<RawSample>,
         bare: &mut Vec<Option<Bare>>,
     ) -> Decoded {
+        self.push_in(self.settled, found, log, publish, out, bare)
+    }
+
+    /// The same with bare numbers in this unit.
+    pub(crate) fn push_in(
+        &self,
+        settled: Option<TimeUnit>,
+        found: &Found<'_>,
+        log: Nanos,
+        publish: Nanos,
+        out: &mut Vec<RawSample>,
+        bare: &mut Vec<Option<Bare>>,
+    ) -> Decoded {
         let mut outcome = Decoded::default();
-        let header = found.instant(self.settled, &mut outcome);
+        let header = found.instant(settled, &mut outcome);
         let form = &self.form;
         let mut stamped = |n: usize, instant: Option<Instant>| match instant {
             None => None,
@@ -152,7 +165,7 @@ impl Plan {
             return outcome;
         }
         for element in found.batch.iter().take(MAX_BATCH) {
-            let own = element.instant(self.settled, &mut outcome);
+            let own = element.instant(settled, &mut outcome);
             let stamp = if element.stamp.is_some() { own } else { header };
             let stamp = stamped(outcome.samples, stamp);
             out.push(element.sample(form, stamp, log, publish, &mut outcome));

@@ -7,6 +7,7 @@
 mod unit;
 
 pub use unit::{Ambiguous, Bare, MOST_WAITING, unit_of};
+pub(crate) use unit::{Told, unit_in_log};
 
 use crate::record::Nanos;
 

@@ -39,7 +39,7 @@ pub(super) fn choose(
     if run.copy_input {
         taken.extend(log.channels.iter().map(|c| c.channel.topic.clone()));
     }
-    let mut decoders = Decoders::new(&run.plan.decode);
+    let mut decoders = Decoders::of_run(&run.plan);
     names
         .iter()
         .map(|name| {

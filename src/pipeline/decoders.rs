@@ -4,7 +4,10 @@
 //! have tens of thousands of channels of one schema, or as many schemas.
 
 use super::log::plain;
+use crate::condition::Clock;
+use crate::config::Plan;
 use crate::decode::{Decoder, Effort, Options, Unsupported};
+use crate::record::Nanos;
 use crate::source::mcap::{Channel, Schema};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -13,9 +16,22 @@ use std::sync::Arc;
 #[derive(Debug, Default)]
 pub struct Decoders {
     options: Options,
+    stamps: Stamps,
     effort: Effort,
     /// By place in memory of the schema, which is kept, message encoding, and which stamp was asked for.
     compiled: BTreeMap<(usize, String, Option<usize>), Compiled>,
+}
+
+/// What the stamps in messages are to their reader.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+enum Stamps {
+    /// The samples' time, and no flag says anything about them.
+    #[default]
+    Read,
+    /// The same; `--field` may state their unit.
+    Stated,
+    /// Nothing: the time is another.
+    Unread,
 }
 
 #[derive(Debug)]
@@ -30,7 +46,40 @@ impl Decoders {
     pub fn new(options: &Options) -> Decoders {
         Decoders {
             options: options.clone(),
+            stamps: Stamps::Stated,
             ..Decoders::default()
+        }
+    }
+
+    /// None yet, for a run of `plan`.
+    #[must_use]
+    pub fn of_run(plan: &Plan) -> Decoders {
+        Decoders {
+            stamps: match plan.clock {
+                Clock::Header => Stamps::Stated,
+                Clock::Log | Clock::Publish | Clock::Index { .. } => Stamps::Unread,
+            },
+            ..Decoders::new(&plan.decode)
+        }
+    }
+
+    /// What only the first messages of a channel tell. Nobody needs the unit of stamps that are not read.
+    ///
+    /// # Errors
+    /// As [`Decoder::settle_unit`].
+    pub fn settle_unit(
+        &self,
+        decoder: &mut Decoder,
+        first: &[(Nanos, Vec<u8>)],
+    ) -> Result<(), Unsupported> {
+        match (decoder.settle_unit(first), self.stamps) {
+            (Err(why), Stamps::Read) => Err(Unsupported {
+                help: "a name that states it (stamp_ns, stamp_us, stamp_ms, stamp_s) is read as it says"
+                    .to_owned(),
+                ..why
+            }),
+            (Err(_), Stamps::Unread) => Ok(()),
+            (settled, _) => settled,
         }
     }
 

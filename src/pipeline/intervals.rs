@@ -1,7 +1,7 @@
 //! Recorded intervals beside the steps of the stamps -> whether they can both be true. Pure.
 //!
 //! Apart from the preparation because an interval read in the wrong unit makes every sample a point and
-//! every step a gap, and nothing behind it can tell.
+//! every step a gap, and nothing behind it can tell; and because a daemon looks at them, too.
 
 use crate::condition::Clock;
 use crate::decode::TimeUnit;
@@ -11,11 +11,11 @@ use crate::report::summary::significant;
 /// How far an interval and a step may be apart: samples are lost and stamps jitter, but not by this.
 const MOST: f64 = 3.0;
 /// Fewer intervals than this prove nothing.
-const LEAST: usize = 8;
+pub(crate) const LEAST: usize = 8;
 
 /// Intervals and steps that disagree, in seconds (medians).
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(super) struct Mismatch {
+pub(crate) struct Mismatch {
     interval: f64,
     step: f64,
     looked_at: usize,
@@ -28,9 +28,18 @@ impl Mismatch {
         if kind == SampleKind::Rate {
             return None;
         }
-        let mut intervals: Vec<f64> = first
-            .iter()
-            .filter_map(|s| s.interval_nanos)
+        let intervals = first.iter().filter_map(|s| s.interval_nanos);
+        let stamps = first.iter().filter_map(|s| clock.read(s)).map(|s| s.0);
+        Mismatch::of(intervals, stamps, clock)
+    }
+
+    /// The same of intervals and stamps in nanoseconds, by the clock the stamps are of.
+    pub(crate) fn of(
+        intervals: impl Iterator<Item = i64>,
+        stamps: impl Iterator<Item = i64>,
+        clock: Clock,
+    ) -> Option<Mismatch> {
+        let mut intervals: Vec<f64> = intervals
             .filter(|nanos| *nanos > 0)
             .map(|nanos| nanos as f64 * 1e-9)
             .collect();
@@ -39,7 +48,7 @@ impl Mismatch {
             return None;
         }
         let interval = median(&mut intervals)?;
-        let step = step(first, clock)?;
+        let step = step(stamps, clock)?;
         let ratio = step / interval;
         (!(1.0 / MOST..=MOST).contains(&ratio)).then_some(Mismatch {
             interval,
@@ -97,15 +106,11 @@ fn nanos_in(unit: TimeUnit) -> f64 {
 }
 
 /// The ordinary step of the stamps, s: the median, or where most stamps are shared the mean.
-fn step(first: &[RawSample], clock: Clock) -> Option<f64> {
+fn step(stamps: impl Iterator<Item = i64>, clock: Clock) -> Option<f64> {
     if let Clock::Index { rate_hz } = clock {
         return Some(1.0 / rate_hz);
     }
-    let mut stamps: Vec<i64> = first
-        .iter()
-        .filter_map(|s| clock.read(s))
-        .map(|s| s.0)
-        .collect();
+    let mut stamps: Vec<i64> = stamps.collect();
     stamps.retain(|stamp| *stamp != 0);
     stamps.sort_unstable();
     let mut steps: Vec<f64> = stamps

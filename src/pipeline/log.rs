@@ -271,10 +271,14 @@ impl Known {
     /// # Errors
     /// The channel can not be decoded: which, why, and the flag that helps.
     pub fn decoder(&self, decoders: &mut Decoders) -> std::result::Result<Decoder, Unsupported> {
-        let own = self.settled(decoders.of(&self.channel)?)?;
+        let own = decoders.of(&self.channel)?;
+        let own = self.settled(own, decoders)?;
         // The message's own stamp, unless it is none and a nested one is.
         for nth in 0..own.stamps().len() {
-            let decoder = self.settled(decoders.with_stamp(&self.channel, nth)?)?;
+            let decoder = decoders.with_stamp(&self.channel, nth)?;
+            let Ok(decoder) = self.settled(decoder, decoders) else {
+                continue;
+            };
             if !self.openings.is_empty() && decoder.has_good_stamps(&self.openings) {
                 return Ok(decoder);
             }
@@ -282,10 +286,20 @@ impl Known {
         Ok(own)
     }
 
-    fn settled(&self, mut decoder: Decoder) -> std::result::Result<Decoder, Unsupported> {
+    fn settled(
+        &self,
+        mut decoder: Decoder,
+        decoders: &Decoders,
+    ) -> std::result::Result<Decoder, Unsupported> {
         if let Some((log, payload)) = &self.first {
             decoder.settle(payload, *log)?;
         }
+        let first = match self.openings.as_slice() {
+            // A batch tells as much by itself.
+            [] => self.first.as_slice(),
+            openings => openings,
+        };
+        decoders.settle_unit(&mut decoder, first)?;
         Ok(decoder)
     }
 }

@@ -168,7 +168,7 @@ pub fn look_as(
 ) -> Result<Looks> {
     let (wanted, left_out) = wanted(log, named);
     let mut looks: Vec<Look> = Vec::new();
-    let mut compiled = Decoders::new(&plan.decode);
+    let mut compiled = Decoders::of_run(plan);
     let mut decoders: BTreeMap<Id<'_>, (decode::Decoder, Vec<Taker>)> = BTreeMap::new();
     for (source, is_named) in wanted {
         let noticed = Arc::new(Noticed::of(source));

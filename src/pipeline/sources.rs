@@ -69,9 +69,10 @@ pub(super) fn by_topic(channels: &[Known]) -> Vec<Source> {
 const FIRST: u64 = 512;
 /// Messages of all channels together after which those that are slow are not waited for.
 const ENOUGH: u64 = 16_384;
-/// First messages that are kept of a channel whose stamps are to be chosen, and the largest of them.
-const OPENINGS: usize = 64;
-const OPENING_LIMIT: usize = 1 << 14;
+/// First messages that are kept of a channel whose stamps are to be chosen, or whose unit is to be told,
+/// and bytes of all of them.
+pub(super) const OPENINGS: usize = 64;
+pub(super) const OPENINGS_LIMIT: usize = 1 << 20;
 /// Channels whose messages are looked at.
 const MOST_CHANNELS: usize = 256;
 /// More names than this on one topic are no frames.
@@ -93,21 +94,17 @@ pub(super) fn tell_apart(
 ) -> Result<Vec<Source>> {
     let sources = by_topic(channels);
     let mut decoders = Decoders::new(options);
-    let mut looked: Vec<(Arc<Channel>, usize, Decoder)> = Vec::new();
+    let mut looked: Vec<Looked> = Vec::new();
     let mut speakers: BTreeMap<usize, Speakers> = BTreeMap::new();
-    let mut missing = 0;
-    for (place, source) in sources.iter().enumerate() {
-        let is_named = named
-            .and_then(|name| name.strip_prefix(source.topic.as_str()))
-            .is_some_and(|rest| rest.is_empty() || rest.starts_with('@'));
+    let (mut missing, mut unsettled) = (0, 0);
+    for (place, source, standing) in in_turn(&sources, named) {
         let speaking: Vec<(usize, &Known)> = source
             .channels
             .iter()
             .filter_map(|index| Some((*index, channels.get(*index)?)))
-            .filter(|(_, k)| k.messages > 0)
-            .filter(|(_, k)| super::log::rank(&k.role) >= PICKED_UNNAMED || is_named)
+            .filter(|(_, k)| k.messages > 0 && standing.is_of(k))
             .collect();
-        let several = speaking.len() > 1;
+        let several = speaking.len() > 1 && standing != Standing::Shown;
         for (index, known) in speaking {
             if looked.len() >= MOST_CHANNELS {
                 break;
@@ -115,14 +112,29 @@ pub(super) fn tell_apart(
             let Ok(decoder) = known.decoder(&mut decoders) else {
                 continue;
             };
-            if several || decoder.names_frames() || decoder.stamps().len() > 1 {
+            let is_bare = decoder.has_bare_stamps();
+            let is_opened = is_bare || decoder.stamps().len() > 1;
+            let speaks = standing != Standing::Shown && (several || decoder.names_frames());
+            if !speaks && !is_opened {
+                continue;
+            }
+            if standing != Standing::Shown {
                 missing += known.messages.min(FIRST);
                 speakers
                     .entry(place)
                     .or_insert_with(|| Speakers::new(several))
                     .add(index, &known.channel);
-                looked.push((known.channel.clone(), index, decoder));
             }
+            if is_bare {
+                unsettled += known.messages.min(OPENINGS as u64);
+            }
+            looked.push(Looked {
+                channel: known.channel.clone(),
+                index,
+                decoder,
+                is_opened,
+                is_bare,
+            });
         }
     }
     if looked.is_empty() {
@@ -143,35 +155,37 @@ pub(super) fn tell_apart(
             in_flight: 4 << 20,
             ..WalkOptions::default()
         },
-        |met| looked.iter().find(|(known, ..)| is_same(known, met)),
-        |(_, index, decoder), message, out: &mut Vec<Met>| {
-            let may_be_kept = decoder.stamps().len() > 1 && message.data.len() < OPENING_LIMIT;
+        |met| looked.iter().find(|looked| is_same(&looked.channel, met)),
+        |looked, message, out: &mut Vec<Met>| {
+            let may_be_kept = looked.is_opened && message.data.len() < OPENINGS_LIMIT;
             out.push(Met {
-                channel: *index,
-                frame: decoder.frame_id(message.data),
+                channel: looked.index,
+                frame: looked.decoder.frame_id(message.data),
                 digest: digest(message.data),
                 opening: may_be_kept.then(|| (nanos(message.log_time), message.data.to_vec())),
+                is_bare: looked.is_bare,
             });
         },
         |items| {
             for mut met in items.drain(..) {
                 if let Some(opening) = met.opening.take()
                     && let Some(known) = channels.get_mut(met.channel)
-                    && known.openings.len() < OPENINGS
                 {
-                    known.openings.push(opening);
+                    keep(&mut known.openings, opening);
                 }
                 let count = counts.entry(met.channel).or_default();
                 *count += 1;
                 total += 1;
                 missing = missing.saturating_sub(u64::from(*count <= FIRST));
+                let settles = met.is_bare && *count <= OPENINGS as u64;
+                unsettled = unsettled.saturating_sub(u64::from(settles));
                 if let Some(place) = place_of.get(&met.channel)
                     && let Some(speakers) = speakers.get_mut(place)
                 {
                     speakers.take(met);
                 }
             }
-            if !to_the_end && (missing == 0 || total >= ENOUGH) {
+            if !to_the_end && unsettled == 0 && (missing == 0 || total >= ENOUGH) {
                 ControlFlow::Break(())
             } else {
                 ControlFlow::Continue(())
@@ -186,6 +200,67 @@ pub(super) fn tell_apart(
         }
     }
     Ok(told)
+}
+
+/// A channel whose first messages are looked at.
+struct Looked {
+    channel: Arc<Channel>,
+    index: usize,
+    decoder: Decoder,
+    /// They are kept.
+    is_opened: bool,
+    /// Its stamps are bare numbers.
+    is_bare: bool,
+}
+
+/// Why a topic is looked at.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Standing {
+    /// It is asked for.
+    Named,
+    /// It may be integrated.
+    Rate,
+    /// It has orientations to compare with: only its stamps matter.
+    Shown,
+}
+
+impl Standing {
+    fn is_of(self, known: &Known) -> bool {
+        let may_be_integrated = super::log::rank(&known.role) >= PICKED_UNNAMED;
+        match self {
+            Standing::Named => true,
+            Standing::Rate => may_be_integrated,
+            Standing::Shown => !may_be_integrated && known.role.has_orientation,
+        }
+    }
+}
+
+/// The topics in the order in which they are looked at, since that is not without end.
+fn in_turn<'s>(
+    sources: &'s [Source],
+    named: Option<&str>,
+) -> impl Iterator<Item = (usize, &'s Source, Standing)> {
+    let is_named = |source: &Source| {
+        named
+            .and_then(|name| name.strip_prefix(source.topic.as_str()))
+            .is_some_and(|rest| rest.is_empty() || rest.starts_with('@'))
+    };
+    let (first, rest): (Vec<_>, Vec<_>) =
+        sources.iter().enumerate().partition(|(_, s)| is_named(s));
+    let of = |standing| move |(place, source): (usize, &'s Source)| (place, source, standing);
+    first
+        .into_iter()
+        .map(of(Standing::Named))
+        .chain(rest.clone().into_iter().map(of(Standing::Rate)))
+        .chain(rest.into_iter().map(of(Standing::Shown)))
+}
+
+/// Keeps a first message, as long as there are few.
+pub(super) fn keep(openings: &mut Vec<(Nanos, Vec<u8>)>, opening: (Nanos, Vec<u8>)) {
+    let bytes: usize = openings.iter().map(|(_, payload)| payload.len()).sum();
+    if openings.len() < OPENINGS && bytes + opening.1.len() <= OPENINGS_LIMIT {
+        openings.push(opening);
+    }
 }
 
 /// Whether a channel met in a walk is the one the survey knows: the index may differ, since the
@@ -224,6 +299,7 @@ struct Met {
     digest: u64,
     /// Log time and payload, where first messages are kept.
     opening: Option<(Nanos, Vec<u8>)>,
+    is_bare: bool,
 }
 
 /// A payload in a number: the same payload in two channels was recorded twice.

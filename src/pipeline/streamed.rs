@@ -5,17 +5,19 @@
 
 use super::chosen::which_stamp;
 use super::decoders::Decoders;
+use super::held::Held;
 use super::log::{Known, described, explained, known, problems, rank};
 use super::pool::Pool;
 use super::position::Position;
 use super::preparation::Resolved;
-use super::route::{Noticed, Route, Taker};
+use super::route::{Item, Noticed, Route, Taker};
 use super::run::Replay;
 use super::session::Found;
 use super::sources::publisher;
 use super::summarise;
 use super::topics::{self, PICKED_UNNAMED};
 use super::waiting::Waiting;
+use crate::decode::{Decoder, Unsupported};
 use crate::error::{Error, Result};
 use crate::report::summary::RunSummary;
 use crate::sink::{Flow, Stream, output_topic};
@@ -36,7 +38,7 @@ pub(super) fn replay(
     let mut waiting = Waiting::new(run, &path, None);
     let mut failure = None;
     let picked = std::cell::RefCell::new(Picked {
-        decoders: Decoders::new(&run.plan.decode),
+        decoders: Decoders::of_run(&run.plan),
         ..Picked::default()
     });
     let report = mcap::walk(
@@ -50,8 +52,9 @@ pub(super) fn replay(
         |channel| picked.borrow_mut().route(run, channel),
         Route::map,
         |items| {
-            let met = waiting.meet(&mut picked.borrow_mut().found);
-            let step = met
+            let fed = picked.borrow_mut().feed(run, &path, items);
+            let step = fed
+                .and_then(|()| waiting.meet(&mut picked.borrow_mut().found))
                 .and_then(|()| picked.borrow().is_one_body(&path))
                 .and_then(|()| waiting.consume(items.drain(..), pool));
             match step {
@@ -70,7 +73,13 @@ pub(super) fn replay(
     if let Some(e) = failure {
         return Err(e);
     }
-    let picked = picked.into_inner();
+    let mut picked = picked.into_inner();
+    let mut last = Vec::new();
+    picked.release(run, &path, &mut last)?;
+    waiting.meet(&mut picked.found)?;
+    if !last.is_empty() {
+        let _ = waiting.consume(last.drain(..), pool)?;
+    }
     if waiting.is_idle() {
         return Err(picked.nothing(run, &path, &report.survey));
     }
@@ -91,6 +100,10 @@ struct Picked {
     /// Channels of the topic so far.
     channels: usize,
     found: Option<(Found, Stream)>,
+    /// Whether there is or was such a find.
+    is_met: bool,
+    /// Channels of the topic whose first messages tell how to read them.
+    held: Vec<Held>,
     others: BTreeSet<String>,
     refusals: Vec<String>,
     /// Decoders with the run's options, and with none.
@@ -129,24 +142,19 @@ impl Picked {
                 if self.topic.is_none() {
                     self.topic = Some(channel.topic.clone());
                     self.publisher = publisher(channel);
-                    let resolved = Resolved::new(&run.plan, decoder.stated());
-                    self.found = Some((
-                        Found {
-                            name: channel.topic.clone(),
-                            output_topic: output_topic(&channel.topic, &BTreeSet::new()),
-                            described: described(channel),
-                            resolved,
-                            noticed: self.noticed.clone(),
-                            warnings: which_stamp(&decoder).into_iter().collect(),
-                        },
-                        Stream::new(&channel.topic, ""),
-                    ));
                 }
                 let taker = Taker {
                     stream: 0,
                     noticed: self.noticed.clone(),
                 };
                 self.channels += 1;
+                if decoder.has_bare_stamps() {
+                    let held = Held::new(channel, decoder, taker, self.channels, copied);
+                    let route = held.route();
+                    self.held.push(held);
+                    return Some(route);
+                }
+                self.meet(run, channel, &decoder);
                 Some(
                     Route::to(decoder, vec![taker])
                         .taking_turns(self.channels)
@@ -158,6 +166,63 @@ impl Picked {
                 copied.map(Route::only_copied)
             }
         }
+    }
+
+    /// How the topic is read is known: by the decoder of its first channel.
+    fn meet(&mut self, run: &Replay, channel: &Channel, decoder: &Decoder) {
+        if std::mem::replace(&mut self.is_met, true) {
+            return;
+        }
+        self.found = Some((
+            Found {
+                name: channel.topic.clone(),
+                output_topic: output_topic(&channel.topic, &BTreeSet::new()),
+                described: described(channel),
+                resolved: Resolved::new(&run.plan, decoder.stated()),
+                noticed: self.noticed.clone(),
+                warnings: which_stamp(decoder).into_iter().collect(),
+            },
+            Stream::new(&channel.topic, ""),
+        ));
+    }
+
+    /// Hands messages of channels whose first ones wait to these, and takes what comes of it.
+    fn feed(&mut self, run: &Replay, path: &Path, items: &mut Vec<Item>) -> Result<()> {
+        if self.held.is_empty() {
+            return Ok(());
+        }
+        for item in std::mem::take(items) {
+            let place = match &item {
+                Item::Copy(copied) => self.held.iter().position(|held| held.is_of(copied)),
+                _ => None,
+            };
+            match (item, place.and_then(|place| self.held.get_mut(place))) {
+                (Item::Copy(copied), Some(held)) => {
+                    let was_waiting = held.is_waiting();
+                    held.take(*copied, &self.decoders, items)
+                        .map_err(|why| unsupported(path, &why))?;
+                    if was_waiting && !held.is_waiting() {
+                        let (channel, decoder) = held.known();
+                        self.meet(run, &channel, &decoder);
+                    }
+                }
+                (item, _) => items.push(item),
+            }
+        }
+        Ok(())
+    }
+
+    /// The stream has ended: nothing waits any longer.
+    fn release(&mut self, run: &Replay, path: &Path, items: &mut Vec<Item>) -> Result<()> {
+        for mut held in std::mem::take(&mut self.held) {
+            if held.is_waiting() {
+                held.release(&self.decoders, items)
+                    .map_err(|why| unsupported(path, &why))?;
+                let (channel, decoder) = held.known();
+                self.meet(run, &channel, &decoder);
+            }
+        }
+        Ok(())
     }
 
     /// Whether the topic's channels so far are one publisher's.
@@ -217,5 +282,12 @@ impl Picked {
                 names.join(", ")
             )
         })
+    }
+}
+
+fn unsupported(path: &Path, why: &Unsupported) -> Error {
+    Error::Unsupported {
+        path: path.to_owned(),
+        what: why.to_string(),
     }
 }

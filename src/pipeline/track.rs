@@ -9,7 +9,7 @@ use super::preparation::orientation_convention;
 use super::route::{Item, Route};
 use super::simulate::{TRUTH_ID, TRUTH_TOPIC};
 use super::topics;
-use crate::decode::{Role, printable};
+use crate::decode::{Options, Role, printable};
 use crate::error::{Error, Result};
 use crate::model::attitude::Quaternion;
 use crate::model::frames::{Body, Convention, Nav, World};
@@ -65,7 +65,7 @@ pub fn read(path: &Path, side: Side, topic: Option<&str>, pool: &Pool) -> Result
 }
 
 fn from_mcap(path: &Path, side: Side, topic: Option<&str>, pool: &Pool) -> Result<Track> {
-    let log = Log::open(path, pool)?;
+    let log = Log::told_apart(path, topic, &Options::default(), pool)?;
     let known = attitude_channel(path, &log, side, topic)?;
     let decoder = known
         .decoder(&mut Decoders::default())
@@ -195,8 +195,12 @@ fn goodness(role: &Role, side: Side, topic: &str) -> u8 {
 /// Whether the first message really has one: an Imu may mark it as absent. A track whose first rows
 /// are NaN still counts.
 fn carries_orientation(known: &Known, decoders: &mut Decoders) -> bool {
-    let (Some((log, payload)), Ok(decoder)) = (&known.first, known.decoder(decoders)) else {
+    let Some((log, payload)) = &known.first else {
         return false;
+    };
+    let Ok(decoder) = known.decoder(decoders) else {
+        // By its first message it has one; what is wrong with its stamps is said when it is read.
+        return true;
     };
     let mut samples = Vec::new();
     decoder.decode(payload, *log, *log, &mut samples).is_ok()

@@ -4,6 +4,7 @@
 //! sample, no sample is held back, nothing is looked at before the first attitude leaves, and senders
 //! come and go ([`run`]).
 
+mod intervals;
 pub mod run;
 pub mod stamps;
 
@@ -22,6 +23,7 @@ use crate::serve::recorder::stream_of;
 use crate::serve::state::Saved;
 use crate::serve::wire::Fault;
 use crate::sink::Stream;
+use intervals::Intervals;
 use run::{Placed, Span, Standing};
 use stamps::{Stamps, Taken};
 use std::sync::Arc;
@@ -52,6 +54,8 @@ pub struct SensorStream {
     stamps: Stamps,
     /// What is to be said of them.
     ambiguous: Option<Fault>,
+    /// Whether the samples' intervals can be true.
+    intervals: Intervals,
     /// First stamp of the run.
     first: Option<Nanos>,
     /// Runs begun by a connection since the start.
@@ -154,6 +158,7 @@ impl SensorStream {
             joining: Joining::Undecided,
             stamps: Stamps::new(saved.as_ref().and_then(Saved::unit)),
             ambiguous: None,
+            intervals: Intervals::default(),
             saved,
             first: None,
             runs: 0,
@@ -214,6 +219,7 @@ impl SensorStream {
         self.joining = Joining::Undecided;
         self.told = 0;
         self.counted = self.conditioning().counts;
+        self.intervals.reopen();
     }
 
     /// The samples of a run whose stamps are known by now: `None` where these are all that came, as they
@@ -378,6 +384,7 @@ impl SensorStream {
         (self.estimator, self.prepared) = (estimator, prepared);
         (self.first, self.last) = (None, None);
         self.joining = Joining::Joined;
+        self.intervals.begin();
         self.runs += 1;
         let secs = |nanos: Nanos| nanos.0 as f64 * 1e-9;
         let seen = match before.first {
@@ -429,6 +436,7 @@ impl SensorStream {
         for raw in samples {
             if self.joining == Joining::Joined || !self.is_again(plan, raw) {
                 self.estimator.take(raw);
+                self.intervals.take(raw, plan.clock, self.resolved.kind);
             }
         }
         self.first = self.first.or(self.conditioning().first);
@@ -462,10 +470,12 @@ impl SensorStream {
         (first, attitudes, &self.channel)
     }
 
-    /// The kinds of loss that have happened for the first time to who sends it, since this was asked last.
+    /// What has been found wrong, and the kinds of loss that have happened, for the first time to who sends it, since
+    /// this was asked last.
     pub fn news(&mut self) -> Vec<Fault> {
         let counts = self.estimator.conditioning().counts;
         let mut news = Vec::from_iter(self.ambiguous.take());
+        news.extend(self.intervals.news(&self.id));
         for verdict in Verdict::ALL {
             let bit = 1 << verdict as u32;
             let is_new = counts.get(verdict) > self.counted.get(verdict);
@@ -498,6 +508,12 @@ impl SensorStream {
             .filter(|v| report.counts.get(*v) > 0)
             .map(|v| (v.name().to_owned(), report.counts.get(v).into()))
             .collect();
+        let warnings = &self.prepared.warnings;
+        let warnings: Vec<String> = warnings
+            .iter()
+            .cloned()
+            .chain(self.intervals.warning())
+            .collect();
         let stamp = |s: Nanos| {
             let (sec, nsec) = s.to_sec_nanosec();
             serde_json::json!({"sec": sec, "nsec": nsec})
@@ -524,7 +540,8 @@ impl SensorStream {
             "body": self.channel.stream().body_axes,
             "initial": self.prepared.initial_origin,
             "bias": self.prepared.bias_origin,
-            "warnings": self.prepared.warnings,
+            "interval_mismatches": self.intervals.found(),
+            "warnings": warnings,
         })
     }
 }

@@ -98,3 +98,32 @@ fn a_bare_number_keeps_every_nanosecond_until_its_unit_is_known() {
         assert_eq!(out[0].header, Some(exact), "{name}");
     }
 }
+
+#[test]
+fn what_looks_like_our_time_in_the_next_larger_unit_is_a_clock_of_11_to_47_days_at_500_hz_or_more()
+{
+    let day = 86_400;
+    for (n, (unit, name, per_sec)) in UNITS.into_iter().enumerate().take(3) {
+        let larger = UNITS[n + 1].0;
+        for (days, rate, expected) in [
+            (10, 1_000, None),
+            (11, 1_000, Some(larger)),
+            (20, 500, Some(larger)),
+            (47, 500, Some(larger)),
+            (48, 1_000, None),
+            (20, 250, Some(unit)),
+            (20, 100, Some(unit)),
+        ] {
+            let found =
+                unit_of((0..9).map(|k| Bare::whole(days * day * per_sec + k * per_sec / rate)));
+            assert_eq!(found.ok(), expected, "{days} days, {rate} Hz in {name}");
+        }
+    }
+}
+
+#[test]
+fn a_number_no_clock_can_show_is_in_no_unit() {
+    // Microseconds of our time, in pairs: as milliseconds it would be the year 55,000.
+    let pairs = (0..9).map(|n| Bare::whole(1_700_000_000_000_000 + n / 2 * 5_000 + n % 2 * 3));
+    assert!(unit_of(pairs).is_err());
+}

@@ -182,6 +182,7 @@ fn every_object_shown_is_one_the_daemon_sends_or_takes() {
         .map(|text| serde_json::from_str(text).unwrap())
         .collect();
     let of = |class: &str| shown.iter().find(|v| v["class"] == class).unwrap();
+    let error_of = |code: &str| shown.iter().find(|v| v["code"] == code).unwrap();
     client.send(&of("WATCH").to_string());
     seen.push(client.object("WATCH"));
     client.send(&of("RATE").to_string());
@@ -204,8 +205,19 @@ fn every_object_shown_is_one_the_daemon_sends_or_takes() {
         };
         assert_eq!(keys(object), keys(example), "{class}");
     }
-    assert_eq!(error["message"], of("ERROR")["message"]);
-    assert_eq!(error["near"], of("ERROR")["near"]);
+    assert_eq!(error["message"], error_of("bad_json")["message"]);
+    assert_eq!(error["near"], error_of("bad_json")["near"]);
+    let mut sender = Client::tcp(daemon.address(0));
+    sender.object("VERSION");
+    for n in 0..8 {
+        let stamp = 1_700_000_000_000_u64 + n * 5;
+        sender.send(&format!(
+            "{{\"id\":\"imu1\",\"sample_kind\":\"average\",\"stamp_ms\":{stamp},\"gyro\":[0,0,0],\"dt\":5}}"
+        ));
+    }
+    let mut mismatch = sender.object("ERROR");
+    mismatch["id"] = "imu0".into();
+    assert_eq!(mismatch, *error_of("interval_mismatch"));
 }
 
 #[test]

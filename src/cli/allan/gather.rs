@@ -80,7 +80,7 @@ pub(super) fn gather(path: &Path, plan: &Plan, capacity: usize, pool: &Pool) -> 
     };
     let mut by_id = BTreeMap::new();
     let mut decoders = Vec::new();
-    let mut compiled = Decoders::new(&plan.decode);
+    let mut compiled = Decoders::of_run(plan);
     let source = log.source(&topic);
     for known in source.iter().flat_map(|s| log.channels_of(s)) {
         let decoder = known

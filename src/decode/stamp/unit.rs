@@ -40,6 +40,11 @@ impl Bare {
         Nanos(i64::try_from(nanos).unwrap_or(if nanos < 0 { i64::MIN } else { i64::MAX }))
     }
 
+    /// So many billionths.
+    pub(crate) fn billionths(count: i64) -> Bare {
+        Bare(i128::from(count))
+    }
+
     /// The number.
     #[must_use]
     pub fn count(self) -> f64 {
@@ -82,28 +87,94 @@ pub struct Ambiguous {
     fits: Vec<&'static str>,
 }
 
+impl Ambiguous {
+    /// What is known, without what helps.
+    #[must_use]
+    pub fn what(&self) -> String {
+        let number = |billionths: i128| billionths as f64 * 1e-9;
+        let steps = self.step.map(|step| format!(", steps of {}", number(step)));
+        let may_be = match self.fits.as_slice() {
+            [] => ": in none are the steps those of a gyro (20 us to 2 s)".to_owned(),
+            fits => format!(": it may be {}", fits.join(" or ")),
+        };
+        format!(
+            "the unit of a stamp that is a bare number ({}{}) can not be told{may_be}",
+            number(self.first),
+            steps.unwrap_or_default()
+        )
+    }
+}
+
 impl std::fmt::Display for Ambiguous {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let number = |billionths: i128| billionths as f64 * 1e-9;
         write!(
             f,
-            "the unit of a stamp that is a bare number ({}",
-            number(self.first)
-        )?;
-        if let Some(step) = self.step {
-            write!(f, ", steps of {}", number(step))?;
-        }
-        match self.fits.as_slice() {
-            [] => write!(
-                f,
-                ") can not be told: in none are the steps those of a gyro (20 us to 2 s)"
-            )?,
-            fits => write!(f, ") can not be told: it may be {}", fits.join(" or "))?,
-        }
-        write!(
-            f,
-            "; name it stamp_ns, stamp_us, stamp_ms or stamp_s, or send {{\"sec\",\"nsec\"}}"
+            "{}; name it stamp_ns, stamp_us, stamp_ms or stamp_s, or send {{\"sec\",\"nsec\"}}",
+            self.what()
         )
+    }
+}
+
+/// The first stamps of a stream.
+struct Opening {
+    first: i128,
+    /// The ordinary step; `None` where they are all the same.
+    step: Option<i128>,
+    /// The units in which that is a step of a gyro's samples.
+    fits: Vec<(TimeUnit, &'static str)>,
+}
+
+impl Opening {
+    fn of(stamps: impl IntoIterator<Item = Bare>) -> Opening {
+        let stamps: Vec<i128> = stamps.into_iter().map(|bare| bare.0).collect();
+        // Samples that share a stamp say nothing of its unit.
+        let mut steps: Vec<i128> = stamps
+            .windows(2)
+            .map(|pair| match pair {
+                [a, b] => b.saturating_sub(*a).saturating_abs(),
+                _ => 0,
+            })
+            .filter(|step| *step > 0)
+            .collect();
+        steps.sort_unstable();
+        let step = steps.get(steps.len().saturating_sub(1) / 2).copied();
+        let first = stamps.first().copied().unwrap_or(0);
+        let fits = |(unit, _): &(TimeUnit, &str)| {
+            let is_an_instant = i64::try_from(Bare(first).nanos(*unit)).is_ok();
+            is_an_instant && step.is_none_or(|step| STEPS.contains(&Bare(step).nanos(*unit)))
+        };
+        Opening {
+            first,
+            step,
+            fits: UNITS.into_iter().filter(fits).collect(),
+        }
+    }
+
+    fn fits(&self, unit: TimeUnit) -> bool {
+        self.fits.iter().any(|(fits, _)| *fits == unit)
+    }
+
+    /// Of those that fit, the one whose instants are of our time.
+    fn of_our_time(&self) -> Option<TimeUnit> {
+        let is_ours = |unit: &TimeUnit| OUR_TIME.contains(&Bare(self.first).nanos(*unit));
+        let mut ours = self.fits.iter().map(|(unit, _)| *unit).filter(is_ours);
+        ours.next().filter(|_| ours.next().is_none())
+    }
+
+    /// The same where this unit is possible, too.
+    fn or(mut self, unit: Option<TimeUnit>) -> Opening {
+        let name = unit.map(|unit| (unit, unit.name()));
+        let other = name.filter(|(unit, _)| !self.fits(*unit));
+        self.fits.extend(other);
+        self
+    }
+
+    fn ambiguous(&self) -> Ambiguous {
+        Ambiguous {
+            first: self.first,
+            step: self.step,
+            fits: self.fits.iter().map(|(_, name)| *name).collect(),
+        }
     }
 }
 
@@ -113,32 +184,68 @@ impl std::fmt::Display for Ambiguous {
 /// # Errors
 /// Still several, or none.
 pub fn unit_of(stamps: impl IntoIterator<Item = Bare>) -> Result<TimeUnit, Ambiguous> {
-    let stamps: Vec<i128> = stamps.into_iter().map(|bare| bare.0).collect();
-    let first = stamps.first().copied().unwrap_or(0);
-    // Samples that share a stamp say nothing of its unit.
-    let mut steps: Vec<i128> = stamps
-        .windows(2)
-        .map(|pair| match pair {
-            [a, b] => b.saturating_sub(*a).saturating_abs(),
-            _ => 0,
-        })
-        .filter(|step| *step > 0)
-        .collect();
-    steps.sort_unstable();
-    let step = steps.get(steps.len().saturating_sub(1) / 2).copied();
-    let fits = |(unit, _): &(TimeUnit, &str)| {
-        step.is_none_or(|step| STEPS.contains(&Bare(step).nanos(*unit)))
-    };
-    let is_ours = |(unit, _): &(TimeUnit, &str)| OUR_TIME.contains(&Bare(first).nanos(*unit));
-    let by_steps: Vec<_> = UNITS.into_iter().filter(fits).collect();
-    let mut ours = by_steps.iter().filter(|unit| is_ours(unit));
-    match (by_steps.as_slice(), ours.next(), ours.next()) {
-        ([(unit, _)], ..) => Ok(*unit),
-        (_, Some((unit, _)), None) => Ok(*unit),
-        (several, ..) => Err(Ambiguous {
-            first,
-            step,
-            fits: several.iter().map(|(_, name)| *name).collect(),
-        }),
+    let opening = Opening::of(stamps);
+    match opening.fits.as_slice() {
+        [(unit, _)] => Ok(*unit),
+        _ => opening.of_our_time().ok_or_else(|| opening.ambiguous()),
     }
+}
+
+/// What the first messages of a log tell.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Told {
+    /// The unit of their stamps.
+    Unit(TimeUnit),
+    /// There are no two different stamps.
+    Nothing,
+}
+
+/// The unit of the stamps of a log: when each of its first messages was recorded, and its stamps. The
+/// recorder's clock tells it where stamps are instants of it and go on as fast; else the steps of the first
+/// `few` messages do, as in [`unit_of`], and of several units the one in which they go on as fast.
+///
+/// # Errors
+/// Several or none, or what speaks for one does so for different ones.
+pub(crate) fn unit_in_log(first: &[(Nanos, Vec<Bare>)], few: usize) -> Result<Told, Ambiguous> {
+    let opening = Opening::of(first.iter().take(few).flat_map(|(_, bare)| bare).copied());
+    if opening.step.is_none() {
+        return Ok(Told::Nothing);
+    }
+    let by_clock = first.iter().find_map(|(log, bare)| {
+        let bare = bare.first().filter(|bare| bare.0 != 0)?;
+        recorded_at(*bare, *log)
+    });
+    let by_speed = as_fast(first);
+    let told = match (opening.fits.as_slice(), by_clock, by_speed) {
+        (_, Some(unit), Some(same)) if unit == same => Some(unit),
+        // Too slow for a gyro, but so it was recorded: poses may be.
+        ([(unit, _)], _, Some(slower)) if slower.nanos(0.0) > unit.nanos(0.0) => None,
+        ([(unit, _)], ..) => Some(*unit),
+        ([], ..) => by_speed.or(by_clock),
+        _ => {
+            let recorder = by_speed.or(by_clock).filter(|unit| opening.fits(*unit));
+            let ours = opening.of_our_time();
+            recorder
+                .or(ours)
+                .filter(|unit| ours.is_none_or(|ours| ours == *unit))
+        }
+    };
+    let told = told.map(Told::Unit);
+    told.ok_or_else(|| opening.or(by_speed).ambiguous())
+}
+
+/// The unit in which a stamp is about when it was recorded. A recorder of our time knows only stamps of
+/// our time: any other number is near some unit of it by chance.
+fn recorded_at(bare: Bare, log: Nanos) -> Option<TimeUnit> {
+    let is_ours = |nanos: i128| OUR_TIME.contains(&nanos);
+    TimeUnit::nearest(bare.count(), log)
+        .filter(|unit| !is_ours(i128::from(log.0)) || is_ours(bare.nanos(*unit)))
+}
+
+/// The unit in which stamps go on as fast as the recorder's clock.
+fn as_fast(first: &[(Nanos, Vec<Bare>)]) -> Option<TimeUnit> {
+    let of = |(log, bare): &(Nanos, Vec<Bare>)| Some((*log, *bare.first()?));
+    let (from, to) = (first.first().and_then(of)?, first.last().and_then(of)?);
+    let (recorded, stamped) = (to.0.since(from.0), to.1.0.saturating_sub(from.1.0));
+    TimeUnit::nearest(Bare(stamped).count(), Nanos(recorded))
 }
