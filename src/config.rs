@@ -197,7 +197,7 @@ pub struct Noise {
 const DEG: f64 = std::f64::consts::PI / 180.0;
 
 /// Named noise presets: name, ARW in deg/sqrt(h), bias instability in deg/h, an example.
-/// Sources: `theory/attitude.md` 9 (Bosch BMI088 class, ADIS16465, STIM300, HG9900 class).
+/// Sources: `docs/theory/attitude.md` 9 (Bosch BMI088 class, ADIS16465, STIM300, HG9900 class).
 pub const NOISE_PRESETS: [(&str, f64, f64); 4] = [
     ("consumer", 0.84, 5.0),
     ("industrial", 0.15, 2.0),

@@ -1,5 +1,5 @@
 //! How far from truth the propagator is, in degrees and arc seconds, against motions known otherwise.
-//! The tables are those of `attitude.md` 6 and `top.md` 4.
+//! The tables are those of `docs/theory/attitude.md` 6 and docs/top.md.
 #![allow(clippy::print_stdout, reason = "figures, with --nocapture")]
 #![allow(clippy::unwrap_used, clippy::expect_used, unreachable_pub)]
 
@@ -383,7 +383,7 @@ fn the_coning_table_is_reproduced() {
 #[test]
 fn a_90_degree_cone_is_followed_to_1e_6_arcsec_by_nine_increments() {
     // PSINS's comparison of attitude updates: half angle 90 degrees, 2 Hz, 100 Hz, error after 1 s. Best
-    // four-sample block method there: 0.107 arcsec (attitude.md 10).
+    // four-sample block method there: 0.107 arcsec (docs/theory/attitude.md 10).
     let cone = Coning {
         a: 90f64.to_radians(),
         cone: 2,
@@ -419,7 +419,7 @@ fn a_90_degree_cone_is_followed_to_1e_6_arcsec_by_nine_increments() {
 #[test]
 fn block_algorithms_drift_as_miller_and_yan_say() {
     // eps = a^2 (W ts)^(2n+1) n n! / (2^(n+1) prod (2k-1)) / (n ts), k = 1 .. n + 1, rad/s about x
-    // (attitude.md 10), for tiny half angles.
+    // (docs/theory/attitude.md 10), for tiny half angles.
     // Half angles, degrees, so small that terms in its fourth power stay below a hundredth.
     for (method, n, half_angle) in [
         (Method::DcmRight, 1, 0.5_f64),
@@ -453,7 +453,7 @@ fn block_algorithms_drift_as_miller_and_yan_say() {
         let odd: f64 = (1..=n + 1).map(|k| f64::from(2 * k - 1)).product();
         let per_block = a * a * wt.powi(2 * n + 1) * nf * factorial / (2f64.powi(n + 1) * odd);
         let expected = per_block * count as f64 / nf;
-        // attitude.md 10: exact over closed form .9995 ... .9957 at W ts = 0.1.
+        // docs/theory/attitude.md 10: exact over closed form .9995 ... .9957 at W ts = 0.1.
         assert_near(drift, expected, 0.01, &format!("{n} samples"));
     }
 }

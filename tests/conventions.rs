@@ -1,6 +1,6 @@
 //! What every sign, order and direction means, each with a witness that a transpose, a swapped order
 //! or a half conversion would fail. The seed's wrong equations are named and refuted
-//! (`../shared/theory/top.md` 5).
+//! (docs/top.md).
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 use nalgebra::{Matrix3, Vector3};
@@ -123,7 +123,7 @@ fn a_positive_body_rate_turns_the_right_handed_way() {
 
 #[test]
 fn ned_frd_becomes_enu_flu_by_the_formula_of_the_books() {
-    // formats.md 3.7: q(0, s, s, 0) q q(0, 1, 0, 0).
+    // q(0, s, s, 0) q q(0, 1, 0, 0).
     let q = Quaternion::<Ned, Frd>::assume_unit([0.3, -0.5, 0.1, 0.8]).normalised();
     let by_formula = Quaternion::<Enu, Ned>::assume_unit([0.0, H, H, 0.0])
         * q

@@ -1,4 +1,4 @@
-//! Promise: on a turning Earth the attitude is that relative to the site, exactly (`attitude.md` 6.4).
+//! Promise: on a turning Earth the attitude is that relative to the site, exactly (`docs/theory/attitude.md` 6.4).
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 #[cfg(feature = "service")]

@@ -155,7 +155,7 @@ fn mutated_logs_end() {
             }
             let start = Instant::now();
             read_both(&broken, dir.path(), &pool);
-            // service.md I1: 200 ms per 100 kB; these logs have 10 kB and are read twice. A busy
+            // Promised are 200 ms per 100 kB; these logs have 10 kB and are read twice. A busy
             // machine may stall a thread, so the bound here only tells a hang from a delay.
             assert!(
                 start.elapsed() < Duration::from_secs(5),

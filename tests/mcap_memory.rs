@@ -132,7 +132,7 @@ fn memory_is_bounded_by_what_is_in_flight_whatever_the_file() {
             grown.push(peak() - before);
         }
         // 17 MB and 173 MB of messages. In flight are at most 32 MiB, held for order another 8 + 4,
-        // and items are smaller than their messages; service.md M2 allows 64.
+        // and items are smaller than their messages; 64 are promised.
         assert!(
             grown[0] <= 64 && grown[1] <= 64,
             "{compression:?}: {grown:?} MiB"

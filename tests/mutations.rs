@@ -1,4 +1,4 @@
-//! Promise: no bytes from outside make anything panic, hang or lie (service.md 6.3 I1). Every parser, fed with its
+//! Promise: no bytes from outside make anything panic, hang or lie. Every parser, fed with its
 //! good inputs (`fuzz/seeds`) changed at random: the functions are those of the fuzzers in `fuzz/`.
 //!
 //! `STRAPD_MUTATIONS=1000000 cargo test --release --test mutations` runs as many cases for each;

@@ -1,4 +1,4 @@
-//! Promise: what a browser shows is what the daemon said (service.md 9).
+//! Promise: what a browser shows is what the daemon said.
 //!
 //! A headless Chromium on real pages of a real daemon, everything on loopback.
 

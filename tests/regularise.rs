@@ -1,5 +1,5 @@
 //! Promise: where a sensor samples evenly and its stamps jitter, `--regularise-stamps` gives back
-//! nearly all the accuracy (`attitude.md` 6.4); it is never done unasked, and never silently.
+//! nearly all the accuracy (`docs/theory/attitude.md` 6.4); it is never done unasked, and never silently.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 #[cfg(feature = "service")]
@@ -181,7 +181,7 @@ const EIGHT: Method = Method::Magnus {
 
 #[test]
 fn lines_restore_what_noisy_stamps_cost_and_the_tracker_most_of_it() {
-    // sigma of the stamps in steps: raw, lines, tracker, arc seconds (attitude.md 6.4). The greatest error
+    // sigma of the stamps in steps: raw, lines, tracker, arc seconds (docs/theory/attitude.md 6.4). The greatest error
     // of a minute hangs on the motion drawn: the median of three is within twice of the theory's one.
     let logs = [1, 2, 3].map(|seed| log(seed, SampleKind::Rate, EVEN));
     for (sigma, raw, lines, tracker) in [

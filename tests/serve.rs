@@ -1,5 +1,5 @@
 //! Promise: what goes in over a socket comes out as attitude over a socket, the same bits as from a
-//! file; what is wrong is answered, counted and never stops anybody else (service.md 6).
+//! file; what is wrong is answered, counted and never stops anybody else.
 //!
 //! Real sockets on loopback, port 0, every wait bounded.
 

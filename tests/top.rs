@@ -275,7 +275,7 @@ fn steady_cases_do_not_nutate_and_precess_at_their_root() {
 
 #[test]
 fn each_classic_motion_nutates_where_it_is_known_to() {
-    // top.md 2: degrees, two decimals given.
+    // docs/top.md: degrees, two decimals given.
     for (case, low, high) in [(Case::Cusped, 54.57, 62.81), (Case::Looping, 54.57, 70.78)] {
         let (top, start) = start(case);
         let (a, b) = ClosedForm::new(&top, &start).unwrap().nutation_range();
@@ -391,7 +391,7 @@ fn a_disk_on_an_arm_has_the_seed_script_inertia() {
 
 // ---- the methods ----
 
-/// theory/top.md, section 4: axis / attitude in degrees, in the order of the three held rates.
+/// docs/top.md: axis / attitude in degrees, in the order of the three held rates.
 type Row = (f64, u64, [(f64, f64); 6]);
 const TABLE: [Row; 2] = [
     (
@@ -541,7 +541,7 @@ fn each_integrator_has_its_order() {
 
 #[test]
 fn the_integrators_are_as_good_as_was_measured() {
-    // attitude.md 6.2: 1.0e-4 and 4.0e-10 degrees at 2000 Hz, one digit given.
+    // docs/theory/attitude.md 6.2: 1.0e-4 and 4.0e-10 degrees at 2000 Hz, one digit given.
     let rk4 = error_of(Method::Rk4, 2000);
     let gl6 = error_of(Method::GaussLegendre6, 2000);
     assert!((rk4 / 1.0e-4 - 1.0).abs() < 0.1, "{rk4:e}");

@@ -76,7 +76,7 @@ impl Run {
         ))
     }
 
-    /// Random motion of 2 rad/s rms an axis up to 10 Hz, sampled at 200 Hz (`attitude.md` 6.3), at instants off by up
+    /// Random motion of 2 rad/s rms an axis up to 10 Hz, sampled at 200 Hz (`docs/theory/attitude.md` 6.3), at instants off by up
     /// to `jitter` of the interval.
     pub fn random(seed: u64, jitter: f64, seconds: u64) -> Result<Self, Failure> {
         let mut motion = Motion::BandLimited(Box::new(BandLimited::random(seed, 2.0, 10.0, 40)?));

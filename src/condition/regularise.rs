@@ -3,7 +3,7 @@
 //! A stage of its own because it replaces what was recorded by what must have been: a sensor with a
 //! clock of its own samples evenly, and what jitters is how its samples were stamped. Then a straight
 //! line through the stamps is worth a factor of thousands (5 % of a step of stamp noise: 7000 arcsec
-//! after a minute whatever the integrator's order, 0.2 behind the line; `attitude.md` 6.4).
+//! after a minute whatever the integrator's order, 0.2 behind the line; `docs/theory/attitude.md` 6.4).
 //! Where the sampling itself jitters and the stamps are true, the same line does that harm. No
 //! statistic of the stamps tells the two apart, so this is never done unasked.
 //!

@@ -2,7 +2,7 @@
 //!
 //! A quaternion with the part its last addition could not hold (four Kahan sums): the error of
 //! a step is |phi| 1e-16 instead of 1e-16, which over 1e8 steps is 1e-14 instead of 1e-12 rad, and
-//! on a body turning with the Earth 1e-17 instead of 2e-11 (`attitude.md` 5). It is normalised on
+//! on a body turning with the Earth 1e-17 instead of 2e-11 (`docs/theory/attitude.md` 5). It is normalised on
 //! output, never in the recursion, where normalising makes constant rotation worse.
 
 /// Attitude q_nb under accumulation.

@@ -1,7 +1,7 @@
 //! Samples -> turns the way others do it: the seed's rules and textbook coning algorithms. Pure.
 //!
 //! Kept for comparison and to reproduce published figures; none is a good default
-//! (`attitude.md` 1, 6).
+//! (`docs/theory/attitude.md` 1, 6).
 
 use super::lanes::Triple;
 use super::method::Method;
@@ -9,7 +9,7 @@ use super::track::Track;
 use super::turn::Turn;
 use super::window::{Note, Step};
 
-/// Coning-optimal weights by lag, for blocks of 2, 3 and 4 increments (Miller 1983; attitude.md 4.4).
+/// Coning-optimal weights by lag, for blocks of 2, 3 and 4 increments (Miller 1983; docs/theory/attitude.md 4.4).
 const KAPPA: [&[f64]; 5] = [
     &[],
     &[],

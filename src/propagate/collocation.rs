@@ -2,14 +2,14 @@
 //!
 //! Where increments do not join, their sum is no longer a function that could be interpolated. Instead
 //! the polynomial rate is solved for whose integrals over the recorded intervals are the increments
-//! (`attitude.md` 3.2), in Legendre polynomials over the whole window, which keeps the system mild.
+//! (`docs/theory/attitude.md` 3.2), in Legendre polynomials over the whole window, which keeps the system mild.
 
 use super::lagrange::{Quadrature, legendre};
 use super::lanes::{Lanes, Triple};
 use super::magnus::{MOMENTS, Moments};
 use super::track::{Track, secs};
 
-/// Unknowns at most: enough beside a hole, where more would only amplify noise (attitude.md 6.4).
+/// Unknowns at most: enough beside a hole, where more would only amplify noise (docs/theory/attitude.md 6.4).
 pub(crate) const UNKNOWNS: usize = 9;
 
 /// Moments over `target` (nanoseconds from, to) from increments `first .. first + count` of the track,

@@ -1,7 +1,7 @@
 //! Gyro noise, turns and time -> how well attitude and bias are known. Pure.
 //!
 //! The error is `e`, rad, in body axes: `q_true = q_est exp(e)`; the bias that was not removed is `b`,
-//! rad/s. Over a step of h seconds and rotation vector phi (attitude.md 8):
+//! rad/s. Over a step of h seconds and rotation vector phi (docs/theory/attitude.md 8):
 //!
 //! ```text
 //! e' = R^T e - h J_r b - noise        R = exp([phi x]), J_r the right Jacobian of phi
@@ -368,7 +368,7 @@ struct Wander {
 
 impl Wander {
     /// # Source
-    /// Integrals of exp(-t/tau); for tau = infinity K^2 h^3/3, K^2 h^2/2 and K^2 h (attitude.md 8).
+    /// Integrals of exp(-t/tau); for tau = infinity K^2 h^3/3, K^2 h^2/2 and K^2 h (docs/theory/attitude.md 8).
     #[inline(always)]
     fn over(h: f64, tau: Option<f64>) -> Wander {
         match tau {

@@ -2,7 +2,7 @@
 //!
 //! Both windows interpolate the rate; where they differ the narrower one errs, and the wider one, of
 //! higher order, errs less: so the attitude by which they differ bounds the error of the one that is
-//! used (`attitude.md` 6.4). The second attitude is not integrated. To first order it is the sum, in fixed
+//! used (`docs/theory/attitude.md` 6.4). The second attitude is not integrated. To first order it is the sum, in fixed
 //! axes, of what the outer samples changed about each step, and that is one more number from the same
 //! interpolation.
 //!

@@ -6,7 +6,7 @@
 //!
 //! # Source
 //! Magnus 1954; Blanes, Casas, Ros 2000 (time-symmetric truncation); coefficients for Legendre
-//! moments as in `attitude.md` 3, checked here against the power series and golden vectors.
+//! moments as in `docs/theory/attitude.md` 3, checked here against the power series and golden vectors.
 
 use super::lanes::{Lanes, Triple};
 use super::method::Order;
@@ -238,7 +238,7 @@ const SHARE: f64 = 1e-3;
 
 /// A bound on what order 8 leaves out, rad; infinite where all sizes together exceed one radian.
 ///
-/// Left out are brackets of n = 3, 4, .. moments whose indices sum to at least 9 - n (attitude.md 3:
+/// Left out are brackets of n = 3, 4, .. moments whose indices sum to at least 9 - n (docs/theory/attitude.md 3:
 /// grade nine and more). A bracket of n moments is bounded by the product of their sizes, whatever
 /// their directions; `s[k]` is the sum of sizes from b_k on, so each product below covers every
 /// combination of that shape. The constants are three times the largest ratios a search found for

@@ -23,7 +23,7 @@ pub enum Method {
         placement: Placement,
     },
     /// Zero latency with the drift of centred windows: what is committed comes from centred windows,
-    /// and the few intervals not yet centred are added provisionally (`attitude.md` 4.3).
+    /// and the few intervals not yet centred are added provisionally (`docs/theory/attitude.md` 4.3).
     CommitProvisional {
         /// Samples in the window.
         window: usize,

@@ -395,7 +395,7 @@ impl Propagator {
     }
 
     /// Commit/provisional: after each sample, commits what has its look-ahead and outputs the newest
-    /// attitude with provisional steps on top (attitude.md 4.3).
+    /// attitude with provisional steps on top (docs/theory/attitude.md 4.3).
     fn advance_live(&mut self, out: &mut Vec<AttitudeSample>) {
         let known = self.known(false);
         self.commit(known, out);

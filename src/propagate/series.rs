@@ -2,7 +2,7 @@
 //!
 //! The reference the closed forms are held against, and what `exact` falls back on when the turn
 //! per interval is large. Expanded about the middle: about the start it loses every digit to
-//! cancellation on coarse data (`attitude.md` 3).
+//! cancellation on coarse data (`docs/theory/attitude.md` 3).
 
 use super::lanes::Triple;
 use super::magnus::{MOMENTS, Moments, halves};

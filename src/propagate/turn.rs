@@ -19,7 +19,7 @@ pub(crate) struct Turn<const N: usize> {
 const SMALL: f64 = 0.0625;
 
 impl<const N: usize> Turn<N> {
-    /// exp of the rotation vector (attitude.md 2).
+    /// exp of the rotation vector (docs/theory/attitude.md 2).
     #[inline(always)]
     pub(crate) fn exp(phi: Triple<N>) -> Self {
         let z = phi.norm_squared() * 0.25;

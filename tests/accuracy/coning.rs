@@ -1,5 +1,5 @@
 //! Classical coning: the body axis x runs round a cone of half angle `a` at `W` rad/s while the body does
-//! not turn about it on average. Attitude, rate and delta angle in closed form (`attitude.md` 10).
+//! not turn about it on average. Attitude, rate and delta angle in closed form (`docs/theory/attitude.md` 10).
 //!
 //! q = [cos(a/2), 0, sin(a/2) cos Wt, sin(a/2) sin Wt].
 

@@ -47,7 +47,7 @@ fn error(kind: SampleKind, missing: i64, method: Method) -> (f64, Vec<AttitudeSa
 fn short_gaps_are_bridged_with_the_order_they_support() {
     for kind in [SampleKind::Rate, SampleKind::DeltaAngle] {
         // Arc seconds: some three times what was found; a bridge one order lower misses each by far
-        // more (attitude.md 6.4: factors of 50 for one missing sample, 15 for four).
+        // more (docs/theory/attitude.md 6.4: factors of 50 for one missing sample, 15 for four).
         for (missing, allowed) in [
             (1, 0.05),
             (2, 0.5),

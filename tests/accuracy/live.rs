@@ -1,4 +1,4 @@
-//! Commit/provisional: which window, and what its final outputs are (`attitude.md` 4.3).
+//! Commit/provisional: which window, and what its final outputs are (`docs/theory/attitude.md` 4.3).
 
 use crate::centred;
 use crate::coning::Coning;

@@ -42,7 +42,7 @@ fn white_noise_is_not_amplified_by_wide_windows() {
     let even = |_: &mut ChaCha8Rng| (0..1000).map(|k| k * 5_000_000).collect();
     let auto = drift(Method::Auto, 100, even);
     let trapezoid = drift(Method::DcmMean, 100, even);
-    // attitude.md 6.4: 808.9 against 808.7 arcsec. The same noise goes through both, so they differ by
+    // docs/theory/attitude.md 6.4: 808.9 against 808.7 arcsec. The same noise goes through both, so they differ by
     // the ends alone: a few samples of a thousand.
     assert!(
         (auto / trapezoid - 1.0).abs() < 0.01,

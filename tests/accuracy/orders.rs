@@ -1,5 +1,5 @@
 //! How fast errors fall with the sampling interval, method by method, on the top and on random smooth motion; and
-//! the columns of the coning table (`attitude.md` 6.1) that one sampling rate and ten degrees do not show.
+//! the columns of the coning table (`docs/theory/attitude.md` 6.1) that one sampling rate and ten degrees do not show.
 
 use crate::coning::Coning;
 use crate::run::{propagate, sample, worst_inside};

@@ -80,7 +80,7 @@ fn on_top(peer: Peer, kind: SampleKind, rate: usize) -> f64 {
 const NONE: f64 = f64::NAN;
 
 /// A peer, what it reads, and the tables' figures: 10 degrees with cone over sampling frequency .001, .01, .03,
-/// 1 degree with .01, .1, .2 (`attitude.md` 6.1, arcsec); the top at 500, 1000, 2000, 4000 Hz (6.2, degrees).
+/// 1 degree with .01, .1, .2 (`docs/theory/attitude.md` 6.1, arcsec); the top at 500, 1000, 2000, 4000 Hz (6.2, degrees).
 type Row = (&'static str, Peer, SampleKind, [f64; 6], [f64; 4]);
 
 const ROWS: [Row; 8] = {

@@ -1,4 +1,4 @@
-//! Random band-limited motion, 200 Hz, 2 rad/s rms per axis, 60 s, of `attitude.md` 6.3: equal spacings (U),
+//! Random band-limited motion, 200 Hz, 2 rad/s rms per axis, 60 s, of `docs/theory/attitude.md` 6.3: equal spacings (U),
 //! true sampling jitter (J), and jitter with lost samples (D). Truth by power series (`model::motion`).
 
 use crate::run::{ARCSEC, propagate, sample, worst_inside};

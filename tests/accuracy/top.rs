@@ -28,7 +28,7 @@ fn at(series: &Series, h: Double) -> Double {
         .fold(Double::ZERO, |sum, c| sum * h + *c)
 }
 
-/// The cusped case of `top.md` 2: released with no precession at a tilt of 54.57 degrees about +x.
+/// The cusped case of docs/top.md: released with no precession at a tilt of 54.57 degrees about +x.
 /// One step every 1/`rate` s; Taylor's series of 20 terms leaves 1e-26 per step at 500 Hz.
 pub fn cusped(rate: usize, steps: usize) -> Top {
     let d = Double::from;

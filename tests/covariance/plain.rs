@@ -1,4 +1,4 @@
-//! The 6x6 recursion written down as it stands in attitude.md 8, with exponentials as power series. White noise
+//! The 6x6 recursion written down as it stands in docs/theory/attitude.md 8, with exponentials as power series. White noise
 //! comes half before and half after the turn: the same where the axes are equal, second order where not.
 
 use nalgebra::{Matrix3, Matrix6, Vector3};

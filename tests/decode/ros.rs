@@ -20,7 +20,7 @@ fn an_imu_decodes_with_every_frame_length_in_both_byte_orders() {
         for n in 0..=40 {
             let frame = "abcdefghijklmnopqrstuvwxyz0123456789_-./"[..n].to_owned();
             let payload = Writer::cdr(big).imu(&frame).bytes;
-            // formats.md 3.1: base = 4 + align8(12 + n + 1), length = base + 296.
+            // base = 4 + align8(12 + n + 1), length = base + 296.
             assert_eq!(payload.len(), 4 + (13 + n).next_multiple_of(8) + 296);
             let sample = decode_one(&decoder, &payload);
             assert_eq!(sample.header, Some(Nanos(STAMP)));
@@ -214,7 +214,7 @@ fn ros_1_packs_without_alignment_and_has_a_sequence_number() {
     for n in 0..=17 {
         let frame = "x".repeat(n);
         let payload = Writer::ros1().imu(&frame).bytes;
-        assert_eq!(payload.len(), 16 + n + 296, "formats.md 3.2");
+        assert_eq!(payload.len(), 16 + n + 296, "head, frame, 296 bytes");
         let sample = decode_one(&decoder, &payload);
         assert_eq!(
             (sample.header, sample.gyro, sample.accel, sample.orientation),

@@ -1,5 +1,5 @@
 //! NaN, infinity and numbers no gyro can have, anywhere: the state stays finite, and under policy
-//! `bridge` the attitude is that of the log without the sample (service.md T2).
+//! `bridge` the attitude is that of the log without the sample.
 
 use crate::made_logs::{ImuSample, TOPIC, motion, written};
 use crate::replays::{Bits, assert_rotations, attitudes, only, replay_with};

@@ -1,5 +1,5 @@
 //! A log cut at any byte, or with any byte changed: no panic, no error but those documented, and
-//! exactly the samples that stand wholly inside intact chunks (service.md I1, I2).
+//! exactly the samples that stand wholly inside intact chunks.
 //!
 //! CI takes some of the offsets; `STRAPD_EVERY_OFFSET=1` takes all of them.
 

@@ -72,7 +72,7 @@ fn every_recording_replays_into_every_format_with_the_same_attitudes_in_each() {
     }
 }
 
-/// dot(q_k, q_k-1) >= 0: a reader may interpolate without looking at signs (service.md T5).
+/// dot(q_k, q_k-1) >= 0: a reader may interpolate without looking at signs.
 fn assert_sign_continuous(attitudes: &[Bits], what: &str) {
     for pair in attitudes.windows(2) {
         let (a, b) = (pair[0].numbers(), pair[1].numbers());

@@ -133,7 +133,7 @@ pub fn fixture(name: &str) -> PathBuf {
 }
 
 /// Every number finite, every quaternion a rotation. 1e-12: the bound of the promise "unit norm"
-/// (service.md T5); one rounding of a norm is 1e-16.
+///; one rounding of a norm is 1e-16.
 pub fn assert_rotations(attitudes: &[Bits], what: &str) {
     for a in attitudes {
         let norm = a.numbers().iter().map(|v| v * v).sum::<f64>().sqrt();

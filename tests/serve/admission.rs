@@ -1,4 +1,4 @@
-//! Who may come in (service.md X1 to X4).
+//! Who may come in.
 
 use super::client::{Client, ask, get, rate};
 use super::daemon::{Daemon, Process, TCP, UDP, WS, listening, strapd};

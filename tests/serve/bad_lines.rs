@@ -1,4 +1,4 @@
-//! What is wrong is answered with line and column, counted, and stops nobody (service.md I4, T6).
+//! What is wrong is answered with line and column, counted, and stops nobody.
 
 use super::client::{Client, rate};
 use super::daemon::{Daemon, eventually};

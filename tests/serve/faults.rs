@@ -1,4 +1,4 @@
-//! Faults in number, exactly counted, with the time injected (service.md 6.5 T1, T6).
+//! Faults in number, exactly counted, with the time injected.
 
 use super::client::rate;
 use rand::{RngExt, SeedableRng};

@@ -1,4 +1,4 @@
-//! WebSocket frames nobody should send (service.md 6.3 I1): 100,000 of them end their own connections and nothing
+//! WebSocket frames nobody should send: 100,000 of them end their own connections and nothing
 //! else.
 
 use super::client::{Client, rate};

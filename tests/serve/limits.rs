@@ -1,4 +1,4 @@
-//! Whoever takes a place and does nothing with it loses it (service.md I6 to I8).
+//! Whoever takes a place and does nothing with it loses it.
 
 use super::client::{Client, get, rate};
 use super::daemon::{Daemon, PATIENCE, TCP, WS, eventually, listening};

@@ -1,4 +1,4 @@
-//! Starting, looking at and stopping the daemon (service.md D2, O1, O2, X7).
+//! Starting, looking at and stopping the daemon.
 
 use super::client::{Client, get, rate};
 use super::daemon::{Daemon, PATIENCE, Process, TCP, WS, eventually, listening, strapd};

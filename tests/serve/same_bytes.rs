@@ -1,4 +1,4 @@
-//! The way in changes no byte of the attitude (service.md T3).
+//! The way in changes no byte of the attitude.
 
 use super::client::Client;
 use super::daemon::{Daemon, Process, TCP, UDP, WS, listening, strapd};

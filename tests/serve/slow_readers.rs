@@ -1,4 +1,4 @@
-//! A reader that does not read is nobody else's matter (service.md 6.2 M3, M5).
+//! A reader that does not read is nobody else's matter.
 
 use super::client::{Client, rate};
 use super::daemon::{Daemon, PATIENCE, TCP, WS, eventually, listening};

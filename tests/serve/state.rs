@@ -1,4 +1,4 @@
-//! `--state`: a restart loses no attitude (service.md 6.4 D6).
+//! `--state`: a restart loses no attitude.
 
 use super::client::{Client, rate};
 use super::daemon::{Daemon, Process, TCP, eventually};

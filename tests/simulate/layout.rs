@@ -56,7 +56,7 @@ fn an_mcap_has_samples_truth_and_its_parameters_where_they_are_documented() {
         );
     }
     let third = |topic: &str| &seen[topic][3].1;
-    // imu_link: numbers from 28 on (formats.md 3.1). Half-angle 10 deg, 3 turns a second.
+    // imu_link: numbers from 28 on. Half-angle 10 deg, 3 turns a second.
     let imu = third(topics[0]);
     assert_eq!(imu.len(), 324);
     let (a, w) = (10_f64.to_radians(), 6.0 * std::f64::consts::PI);

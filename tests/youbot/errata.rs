@@ -495,7 +495,7 @@ fn y21_the_encoders_count_the_other_way_from_the_folded_pose() {
     assert!(arm.limits().contain(&home));
     let (p, _) = apart(&arm.forward(&home), &arm.forward(&SeedJoints::ZERO));
     assert!(p > 0.1);
-    // Driver soft limits in seed angles, models.md 4.
+    // Driver soft limits in seed angles (docs/youbot.md).
     let soft = Limits::driver(zero);
     near(
         &soft.min().map(f64::to_degrees),

@@ -190,7 +190,7 @@ const STILL_DEVIATION: f64 = 0.025;
 const STUCK_SAMPLES: u64 = 100;
 const DRIFT_PPM: f64 = 200.0;
 /// Part of a step, rms, above which stamp noise is worth a flag: 1750 arcsec a minute of lively motion
-/// (`attitude.md` 6.4). What carries its own intervals is nearly immune.
+/// (`docs/theory/attitude.md` 6.4). What carries its own intervals is nearly immune.
 const NOISY_STAMPS: f64 = 0.01;
 /// Below this correlation the accelerometer reads too much besides gravity.
 const MIN_CORRELATION: f64 = 0.7;

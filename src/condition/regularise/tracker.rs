@@ -17,7 +17,7 @@ const BETA: f64 = 6.0 * (ALPHA / 4.0) * (ALPHA / 4.0);
 /// An alpha-beta tracker of phase and step.
 ///
 /// # Source
-/// `attitude.md` 6.4: gains max(alpha, 2(2k-1)/(k(k+1))) and max(beta, 6/(k(k+1))), those of an
+/// `docs/theory/attitude.md` 6.4: gains max(alpha, 2(2k-1)/(k(k+1))) and max(beta, 6/(k(k+1))), those of an
 /// expanding-memory line fit (Morrison, Introduction to Sequential Smoothing and Prediction, 1969)
 /// until the steady ones are larger.
 #[derive(Clone, Copy, Debug)]

@@ -38,7 +38,7 @@ fn horner(coefficients: &[f64; 6], y: f64) -> f64 {
 /// `exp(phi) - 1` as a quaternion `[cos(a/2) - 1, sin(a/2)/a * phi]`, a = |phi|.
 ///
 /// The first number is what a compensated product needs: `q exp(phi) = q + q (exp(phi) - 1)`
-/// rounds at `|phi|` times the unit roundoff, not at the unit roundoff (`theory/attitude.md` 5).
+/// rounds at `|phi|` times the unit roundoff, not at the unit roundoff (`docs/theory/attitude.md` 5).
 ///
 /// # Accuracy
 /// Every component to 3e-16 relative below half a radian; above, absolute, 2e-16 (1 + a).

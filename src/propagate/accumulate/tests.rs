@@ -40,13 +40,13 @@ fn drift(n: u32) -> f64 {
 
 #[test]
 fn a_million_random_turns_stay_within_the_rounding_of_the_output() {
-    // attitude.md 5: 5.5e-16 rad after 1e6, where a plain quaternion has 6e-14.
+    // docs/theory/attitude.md 5: 5.5e-16 rad after 1e6, where a plain quaternion has 6e-14.
     let error = 2.0 * drift(1_000_000);
     assert!(error < 2e-15, "{error:e} rad");
 }
 
 #[test]
-#[ignore = "ten seconds; the gate of attitude.md 7"]
+#[ignore = "ten seconds; the gate of docs/theory/attitude.md 7"]
 fn a_hundred_million_random_turns_stay_below_5e_14_rad() {
     let error = 2.0 * drift(100_000_000);
     assert!(error < 5e-14, "{error:e} rad");

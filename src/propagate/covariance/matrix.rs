@@ -27,7 +27,7 @@ const SMALL: f64 = 0.01;
 
 impl Transition {
     /// # Source
-    /// attitude.md 8. In terms of v: `[phi x] = [v x] a/s`, so the coefficients become `2 s/a` and
+    /// docs/theory/attitude.md 8. In terms of v: `[phi x] = [v x] a/s`, so the coefficients become `2 s/a` and
     /// `(1 - sin a / a)/s^2`, both even and smooth in s = sin(a/2).
     #[inline(always)]
     pub(super) fn of([c, x, y, z]: [f64; 4]) -> Transition {

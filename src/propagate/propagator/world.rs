@@ -6,7 +6,7 @@
 //!
 //! `q_nb(t) = exp(-w_in^n (t - t0)) q_ib(t)`
 //!
-//! is exact whatever the body does (`attitude.md` 6.4). Taking C^T w_in from every sample instead
+//! is exact whatever the body does (`docs/theory/attitude.md` 6.4). Taking C^T w_in from every sample instead
 //! is off by 0.25 arcsec in 600 s with its coning term and by 2500 without.
 
 use crate::model::quaternion_kernel as quat;
