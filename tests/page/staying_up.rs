@@ -133,10 +133,13 @@ fn a_sensor_at_8_khz_is_drawn_smoothly_in_bounded_memory() {
         points < 0.2 * sent as f64,
         "{points} of {sent}: it was to be thinned"
     );
+    // What a page with no time to read has lost counts as thinned, too, and is said beside it.
+    let (thinning, dropped) = (browser.text("thinning"), browser.text("dropped"));
+    let part = thinning.split(' ').nth(2).and_then(|n| n.parse().ok());
+    let part: f64 = part.unwrap_or(0.0);
     assert!(
-        browser.text("thinning").starts_with("1 of 8"),
-        "{}",
-        browser.text("thinning")
+        (7.95..8.95).contains(&part) || (part > 8.0 && !dropped.is_empty()),
+        "{thinning}; {dropped}"
     );
     browser.is_unharmed();
 }
