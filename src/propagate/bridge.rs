@@ -84,14 +84,13 @@ pub(crate) fn across(
     let reference = around[n / 2].rate;
     let mut model = Model::new(around, reference);
     let noise = model.likeliest()?;
-    let mut bridge = model.between(0.5 * length, quadrature);
+    let (values, variance) = model.between(0.5 * length, quadrature);
     let of_sample = model.variance * NOISES[noise];
-    bridge.variance += of_sample * missing / (length * length);
-    bridge.noiseless = noise == 0;
-    for value in &mut bridge.values {
-        *value = *value + reference;
-    }
-    Some(bridge)
+    Some(Bridge {
+        values: values.map(|value| value + reference),
+        variance: variance + of_sample * missing / (length * length),
+        noiseless: noise == 0,
+    })
 }
 
 /// Lower triangle of a matrix over the samples.
@@ -240,7 +239,7 @@ impl<'a> Model<'a> {
                     sum / self.factor[j][j]
                 };
             }
-            // At most 24 factors, none below 3e-7 by much.
+            // At most twelve factors, none below 3e-7 by much.
             determinant *= self.factor[i][i];
             if determinant.is_nan() || determinant <= 0.0 {
                 return f64::NEG_INFINITY;
@@ -268,8 +267,8 @@ impl<'a> Model<'a> {
         -0.5 * (freedom * spread.ln() + 2.0 * determinant.ln() + self.information.ln())
     }
 
-    /// The rates in a gap from -half to half.
-    fn between(&self, half: f64, quadrature: &Quadrature) -> Bridge {
+    /// The rates at the nodes in a gap from -half to half, less the reference, and the variance of their mean.
+    fn between(&self, half: f64, quadrature: &Quadrature) -> ([Triple<1>; MOMENTS], f64) {
         let n = self.around.len();
         // L^-T L^-1 (rates - mean).
         let mut weighted = self.whitened;
@@ -301,11 +300,8 @@ impl<'a> Model<'a> {
         let product: f64 = (0..n).map(|i| self.ones[i] * of_mean[i]).sum();
         let mean_unknown = (1.0 - product) * (1.0 - product) / self.information;
         let own = self.process.variance_of_mean(half, quadrature);
-        Bridge {
-            values,
-            noiseless: false,
-            variance: self.variance * ((own - explained).max(0.0) + mean_unknown),
-        }
+        let unknown = (own - explained).max(0.0) + mean_unknown;
+        (values, self.variance * unknown)
     }
 
     /// L^-1 times a column.

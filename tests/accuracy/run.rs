@@ -34,7 +34,11 @@ pub fn propagate(
     initial: [f64; 4],
     samples: &[RateSample],
 ) -> Vec<AttitudeSample> {
-    let mut propagator = propagator(method, kind, initial);
+    attitudes(propagator(method, kind, initial), samples)
+}
+
+/// What a propagator makes of all samples of a run.
+pub fn attitudes(mut propagator: Propagator, samples: &[RateSample]) -> Vec<AttitudeSample> {
     let mut out = Vec::new();
     propagator.push(samples, &Sequential, &mut out);
     propagator.finish(&Sequential, &mut out);

@@ -6,7 +6,7 @@ use serde_json::Value;
 use std::io::Write;
 use std::process::{Command, Output, Stdio};
 
-fn replayed(lines: &str) -> Output {
+pub(crate) fn replayed(lines: &str) -> Output {
     let mut child = Command::new(strapd())
         .args(["replay", "-", "--method", "commit", "-o", "-"])
         .stdin(Stdio::piped())

@@ -1,10 +1,9 @@
 //! Intervals that disagree with the stamps: a replay refuses them, a daemon says so once and goes on.
 
+use super::bare_stamps::replayed;
 use super::client::Client;
-use super::daemon::{Daemon, eventually, strapd};
+use super::daemon::{Daemon, eventually};
 use serde_json::Value;
-use std::io::Write;
-use std::process::{Command, Stdio};
 
 /// Samples of 5 ms each, from the number `from` on, that say how long they last in the words of `dt`.
 fn lines(kind: &str, dt: &str, from: u64, n: u64) -> String {
@@ -136,17 +135,7 @@ fn a_few_samples_a_connection_are_looked_at_together() {
 
 #[test]
 fn what_a_daemon_complains_of_a_replay_refuses() {
-    let mut child = Command::new(strapd())
-        .args(["replay", "-", "--method", "commit", "-o", "-"])
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let sent = lines("delta-angle", "\"dt\":5", 0, 300);
-    // It may refuse before it has read all.
-    let _ = child.stdin.take().unwrap().write_all(sent.as_bytes());
-    let refused = child.wait_with_output().unwrap();
+    let refused = replayed(&lines("delta-angle", "\"dt\":5", 0, 300));
     let said = String::from_utf8(refused.stderr).unwrap();
     assert_eq!(refused.status.code(), Some(1), "{said}");
     assert!(

@@ -23,7 +23,7 @@ impl Plan {
         let hole = self.increments && track.has_hole(k);
         let bridged = hole || track.bridged[k];
         if !bridged {
-            let own = self.settle(track, k, self.window);
+            let own = self.settle(track, k);
             let note = if own.used < self.window {
                 Note::Reduced
             } else {
@@ -42,7 +42,7 @@ impl Plan {
         }
         if self.increments && !hole {
             // Its increment covers the whole interval: marked, but nothing is missing.
-            let own = self.settle(track, k, self.window);
+            let own = self.settle(track, k);
             let turn = magnus::turn(&own.moments, self.order);
             return Step::new(turn, own.moments.b[0].norm(), Note::Bridged);
         }
@@ -50,7 +50,7 @@ impl Plan {
         let mut turn = magnus::turn(&gap, self.order);
         let mut delta = gap.b[0];
         if hole {
-            let own = self.settle(track, k, self.window).moments;
+            let own = self.settle(track, k).moments;
             turn = turn.then(magnus::turn(&own, self.order));
             delta = delta + own.b[0];
         }
@@ -216,16 +216,16 @@ impl Plan {
         ((empty as f64 / step as f64).max(0.5), step as f64)
     }
 
-    /// Moments from a window of up to `cap` samples: all of them if that is quiet, otherwise as many as
+    /// Moments from the method's window: all of it if that is quiet, otherwise as many as
     /// the data support.
     ///
     /// Starting from the smallest window, each larger one corrects the result. On smooth data the
     /// corrections shrink; where they are noise they grow, about fourfold with each pair of samples, and
     /// without bound among irregular stamps. The last window whose correction still shrank is taken; the
     /// first correction is held against what the rate varies by around the interval.
-    fn settle(&self, track: &Track, k: usize, cap: usize) -> Settled {
+    fn settle(&self, track: &Track, k: usize) -> Settled {
         let smallest = if self.increments { 1 } else { 2 };
-        let mut cap = cap.max(smallest);
+        let mut cap = self.window.max(smallest);
         if self.increments && self.beside_hole(track, k) {
             cap = cap.min(collocation::UNKNOWNS);
         }

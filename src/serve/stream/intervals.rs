@@ -38,9 +38,7 @@ pub(super) struct Intervals {
 impl Intervals {
     /// Others will come: of another run, or of somebody else. A few of those before them count as well.
     pub(super) fn reopen(&mut self) {
-        if !matches!(self.verdict, Verdict::Open) {
-            self.verdict = Verdict::Open;
-        }
+        self.verdict = Verdict::Open;
     }
 
     /// A run begins.

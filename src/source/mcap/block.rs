@@ -199,20 +199,20 @@ impl Buffers {
             }
             Compression::Lz4 | Compression::Zstd => {
                 let plain = room(&mut self.plain, size);
-                if compression == Compression::Zstd
-                    && packed.len() <= size / SUSPECT
-                    && let Some(end) = end_of_records(packed, plain)
-                {
-                    // As far as there are records; what follows them says itself what it is.
-                    return Ok(Ok(plain.get(..end).unwrap_or(&[])));
-                }
-                let actual = match compression {
-                    Compression::Lz4 => unlz4(packed, plain, crc),
-                    _ => unzstd(&mut self.zstd, packed, plain),
+                let unpacked = match compression {
+                    Compression::Lz4 => unlz4(packed, plain, crc).map(Unpacked::All),
+                    _ if (1..=size / SUSPECT).contains(&packed.len()) => {
+                        unzstd_records(packed, plain)
+                    }
+                    _ => unzstd(&mut self.zstd, packed, plain).map(Unpacked::All),
                 };
-                match actual {
-                    Ok(n) if n == size => plain,
-                    Ok(n) => {
+                match unpacked {
+                    Ok(Unpacked::All(n)) if n == size => plain,
+                    // What follows the records says itself what it is.
+                    Ok(Unpacked::Records(end)) => {
+                        return Ok(Ok(plain.get(..end).unwrap_or(&[])));
+                    }
+                    Ok(Unpacked::All(n)) => {
                         let (declared, actual) = (size as u64, n as u64);
                         return Ok(Err(ProblemKind::ChunkSize { declared, actual }));
                     }
@@ -249,27 +249,40 @@ impl Buffers {
 /// like can be packed so.
 const SUSPECT: usize = 1000;
 
-/// Unpacks the records of a chunk until one has opcode 0, which none has; how far that is, the head of that
-/// one with it. `None` where there is none. Of 2 kB of zeros, 64 MiB would be unpacked, and none of them used.
-fn end_of_records(packed: &[u8], plain: &mut [u8]) -> Option<usize> {
+/// How much of a chunk was unpacked.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Unpacked {
+    /// All of it: so many bytes, or more than there is room for.
+    All(usize),
+    /// Its records, up to and with the head of one with opcode 0, which none has.
+    Records(usize),
+}
+
+/// Unpacks piece by piece, and no further than there are records. Of 2 kB of zeros, 64 MiB would be unpacked,
+/// and none of them used.
+fn unzstd_records(packed: &[u8], plain: &mut [u8]) -> io::Result<Unpacked> {
     const HEAD: usize = 9;
-    let mut decoder = zstd::stream::read::Decoder::with_buffer(packed).ok()?;
+    let mut decoder = zstd::stream::read::Decoder::with_buffer(packed)?;
     let (mut have, mut at) = (0, 0_usize);
     loop {
-        while let Some(head) = plain
-            .get(at..at.checked_add(HEAD)?)
-            .filter(|_| at + HEAD <= have)
+        let known = plain.get(..have).unwrap_or(&[]);
+        while let Some((opcode, rest)) = known.get(at..).and_then(<[u8]>::split_first)
+            && let Some(length) = rest.first_chunk()
         {
-            let (opcode, length) = head.split_first_chunk::<1>()?;
-            if *opcode == [0] {
-                return Some(at + HEAD);
+            if *opcode == 0 {
+                return Ok(Unpacked::Records(at + HEAD));
             }
-            let length = u64::from_le_bytes(length.try_into().ok()?);
-            at = (at + HEAD).checked_add(usize::try_from(length).ok()?)?;
+            let length = usize::try_from(u64::from_le_bytes(*length)).unwrap_or(usize::MAX);
+            at = (at + HEAD).saturating_add(length);
         }
         let end = plain.len().min(have + PIECE);
-        match io::Read::read(&mut decoder, plain.get_mut(have..end)?).ok()? {
-            0 => return None,
+        let Some(piece) = plain.get_mut(have..end).filter(|piece| !piece.is_empty()) else {
+            // One byte more would be one too many.
+            let more = io::Read::read(&mut decoder, &mut [0])?;
+            return Ok(Unpacked::All(have + more));
+        };
+        match io::Read::read(&mut decoder, piece)? {
+            0 => return Ok(Unpacked::All(have)),
             n => have += n,
         }
     }

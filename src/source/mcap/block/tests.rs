@@ -25,8 +25,12 @@ fn a_chunk_is_unpacked_no_further_than_there_are_records() {
         plain.resize(SIZE, 0);
         let packed = zstd::bulk::compress(&plain, 19).unwrap();
         let mut out = vec![1; SIZE];
-        let end = end_of_records(&packed, &mut out).unwrap();
-        assert_eq!(end, records + 9, "{lengths:?}");
+        let end = records + 9;
+        assert_eq!(
+            unzstd_records(&packed, &mut out).unwrap(),
+            Unpacked::Records(end),
+            "{lengths:?}"
+        );
         assert!(out.starts_with(&plain[..end]));
         let untouched = out.iter().rev().take_while(|b| **b == 1).count();
         assert!(
@@ -41,8 +45,13 @@ fn a_chunk_of_records_alone_has_no_such_end() {
     let plain: Vec<u8> = (0..2000).flat_map(|_| record(0x80, 5000)).collect();
     let packed = zstd::bulk::compress(&plain, 19).unwrap();
     assert!(packed.len() < plain.len() / SUSPECT);
-    assert_eq!(end_of_records(&packed, &mut vec![0; plain.len()]), None);
+    let unpacked = |packed: &[u8], size| unzstd_records(packed, &mut vec![0; size]).unwrap();
+    let all = Unpacked::All(plain.len());
+    assert_eq!(unpacked(&packed, plain.len()), all);
+    // More than is declared, and less.
+    assert_eq!(unpacked(&packed, plain.len() + 5), all);
+    assert_eq!(unpacked(&packed, 5000), Unpacked::All(5001));
     // A length beyond everything is for who reads the records to name.
     let huge = zstd::bulk::compress(&[5, 255, 255, 255, 255, 255, 255, 255, 255, 0], 1).unwrap();
-    assert_eq!(end_of_records(&huge, &mut [0; 10]), None);
+    assert_eq!(unpacked(&huge, 10), Unpacked::All(10));
 }
