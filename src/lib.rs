@@ -14,6 +14,7 @@
 //! | `decode` | bytes of one message -> raw samples | pure |
 //! | [`condition`] | raw samples -> SI, body axes, in order, finite | pure |
 //! | [`propagate`] | rates -> attitude: the hot loop | pure |
+//! | [`aid`] | specific force, field -> corrections of attitude and sensor | pure |
 //! | `sink` | attitude -> MCAP, NDJSON, CSV | I/O |
 //! | `pipeline` | the stages wired: replay, tracks, what a log holds | I/O |
 //! | `serve` | the daemon: samples in over sockets, attitude out | I/O |
@@ -25,6 +26,7 @@
 //! Reading order: [`record`], `pipeline::estimator`, then one stage.
 //! Without the default feature `service` the crate is the modules with links above, on nalgebra alone.
 
+pub mod aid;
 #[cfg(feature = "service")]
 pub mod cli;
 #[cfg(feature = "service")]

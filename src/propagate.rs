@@ -40,7 +40,7 @@ mod settings;
 #[cfg(test)]
 #[path = "../tests/shared_data/mod.rs"]
 #[allow(unreachable_pub, reason = "shared with the integration tests")]
-mod shared_data;
+pub(crate) mod shared_data;
 mod track;
 mod turn;
 mod uniform;

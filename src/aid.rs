@@ -1,0 +1,42 @@
+//! Specific force and field -> corrections of the attitude and of the sensor. Pure.
+//!
+//! A stage of its own because it decides what is believed: the propagator integrates what it is given, and
+//! this says what to give it and how far off the result is. A Kalman filter of 21 error states rides on the
+//! propagator and corrects tilt, gyro bias, scale and axes by gravity, and heading by a magnetometer.
+//!
+//! ```text
+//! rate - what is known of the sensor -> propagate -> attitude   calibration
+//! attitude, rate, force, field -> sums over 0.1 s               interval
+//! sums -> covariance a step on                                  covariance
+//! force less gravity -> tilt, calibration                       gravity
+//! rate at rest -> bias                                          rest
+//! heading of the field -> heading                               heading
+//! correction -> left of the attitude                            filter
+//! ```
+//!
+//! Rotations by a left factor commute with integration, so the propagator never sees the attitude jump.
+//!
+//! # Frames
+//! Earth axes E: z up, heading that of the start (of magnetic north with a magnetometer, x east). Body axes as
+//! the propagator's. The error is `R_true = Rz(heading) exp(tilt) R`: no gravity can touch heading but through
+//! what it learns of the sensor.
+//!
+//! # Source
+//! `docs/theory/filter.md`: the model, where it comes from, what it was judged on.
+
+mod aided;
+mod calibration;
+mod covariance;
+mod filter;
+mod gravity;
+mod heading;
+mod interval;
+mod rest;
+mod settings;
+#[cfg(test)]
+mod tests;
+
+pub use aided::{Aided, Start};
+pub use calibration::Calibration;
+pub use filter::{Filter, Measured, Report};
+pub use settings::Settings;

@@ -1,0 +1,220 @@
+//! Covariance of the error states: a step on, a scalar measurement, a restart. Pure.
+
+use nalgebra::Matrix3;
+
+/// Error states: tilt x, y and heading (rad, earth axes), velocity x, y, position x, y, gyro bias, scale, cross,
+/// accelerometer bias, its lead, disturbance of the field's heading (nothing without a magnetometer).
+pub(super) const STATES: usize = 21;
+/// Length of a row: a multiple of what a vector register holds.
+pub(super) const WIDTH: usize = 24;
+/// Of the states that change by themselves, the first so many.
+const MOVING: usize = 7;
+
+pub(super) const TILT: usize = 0;
+pub(super) const HEADING: usize = 2;
+pub(super) const VELOCITY: usize = 3;
+pub(super) const POSITION: usize = 5;
+pub(super) const BIAS: usize = 7;
+pub(super) const SCALE: usize = 10;
+pub(super) const CROSS: usize = 13;
+pub(super) const FORCE_BIAS: usize = 16;
+pub(super) const LEAD: usize = 19;
+pub(super) const FIELD: usize = 20;
+
+/// A correction of the error states, and of nothing beyond them.
+pub(super) type Correction = [f64; WIDTH];
+
+/// Rows of the transition from one update to the next that are not those of the identity, less those of it.
+#[derive(Clone, Debug)]
+pub(super) struct Transition(pub(super) [[f64; STATES]; MOVING]);
+
+impl Transition {
+    pub(super) fn none() -> Transition {
+        Transition([[0.0; STATES]; MOVING])
+    }
+}
+
+/// Symmetric, positive definite where a state is not known exactly.
+#[derive(Clone, Debug)]
+pub(super) struct Covariance([[f64; WIDTH]; STATES]);
+
+impl Covariance {
+    pub(super) fn zero() -> Covariance {
+        Covariance([[0.0; WIDTH]; STATES])
+    }
+
+    #[inline]
+    pub(super) fn variance(&self, state: usize) -> f64 {
+        self.0[state][state]
+    }
+
+    #[inline]
+    pub(super) fn between(&self, a: usize, b: usize) -> f64 {
+        self.0[a][b]
+    }
+
+    /// More is unknown of a state.
+    #[inline]
+    pub(super) fn add(&mut self, state: usize, variance: f64) {
+        self.0[state][state] += variance;
+    }
+
+    /// More is unknown of tilt and heading.
+    #[inline]
+    pub(super) fn add_to_attitude(&mut self, variance: f64) {
+        for axis in 0..3 {
+            self.0[axis][axis] += variance;
+        }
+    }
+
+    /// A state known to `variance`, and with no other in common.
+    pub(super) fn restart(&mut self, state: usize, variance: f64) {
+        for other in 0..STATES {
+            self.0[state][other] = 0.0;
+            self.0[other][state] = 0.0;
+        }
+        self.0[state][state] = variance;
+    }
+
+    /// Every row and column of a state, times `factor`.
+    pub(super) fn fade(&mut self, state: usize, factor: f64) {
+        for other in 0..STATES {
+            self.0[state][other] *= factor;
+            self.0[other][state] *= factor;
+        }
+    }
+
+    /// `F P F^T`.
+    pub(super) fn step(&mut self, by: &Transition) {
+        let mut moved = [[0.0; WIDTH]; MOVING];
+        for (a, row) in moved.iter_mut().enumerate() {
+            *row = self.0[a];
+            for (k, f) in by.0[a].iter().enumerate() {
+                if *f != 0.0 {
+                    for (out, p) in row.iter_mut().zip(&self.0[k]) {
+                        *out += f * p;
+                    }
+                }
+            }
+        }
+        let mut square = [[0.0; MOVING]; MOVING];
+        for a in 0..MOVING {
+            for b in 0..MOVING {
+                let mut sum = moved[a][b];
+                for (k, f) in by.0[b].iter().enumerate() {
+                    if *f != 0.0 {
+                        sum += f * moved[a][k];
+                    }
+                }
+                square[a][b] = sum;
+            }
+        }
+        for a in 0..MOVING {
+            for k in MOVING..STATES {
+                self.0[a][k] = moved[a][k];
+                self.0[k][a] = moved[a][k];
+            }
+            for b in 0..MOVING {
+                self.0[a][b] = 0.5 * (square[a][b] + square[b][a]);
+            }
+        }
+    }
+
+    /// One scalar measurement `h . error = innovation` of a variance; what has been corrected so far is in
+    /// `correction`, and what it adds, too.
+    pub(super) fn measure(
+        &mut self,
+        h: &[(usize, f64)],
+        innovation: f64,
+        variance: f64,
+        correction: &mut Correction,
+    ) {
+        let mut ph = [0.0; WIDTH];
+        for (state, factor) in h {
+            for (out, p) in ph.iter_mut().zip(&self.0[*state]) {
+                *out += factor * p;
+            }
+        }
+        let (mut spread, mut left) = (variance, innovation);
+        for (state, factor) in h {
+            spread += factor * ph[*state];
+            left -= factor * correction[*state];
+        }
+        let inverse = 1.0 / spread;
+        for state in 0..STATES {
+            let gain = ph[state] * inverse;
+            correction[state] += gain * left;
+            for (p, other) in self.0[state].iter_mut().zip(&ph) {
+                *p -= gain * other;
+            }
+        }
+    }
+
+    /// The earth axes of the estimate have turned about the vertical: the states in them turn back.
+    pub(super) fn turn(&mut self, cos: f64, sin: f64) {
+        for first in [TILT, VELOCITY, POSITION] {
+            for k in 0..WIDTH {
+                let (u, v) = (self.0[first][k], self.0[first + 1][k]);
+                self.0[first][k] = cos * u - sin * v;
+                self.0[first + 1][k] = sin * u + cos * v;
+            }
+            for k in 0..STATES {
+                let (u, v) = (self.0[k][first], self.0[k][first + 1]);
+                self.0[k][first] = cos * u - sin * v;
+                self.0[k][first + 1] = sin * u + cos * v;
+            }
+        }
+    }
+
+    /// Of tilt and heading, rad^2, earth axes.
+    pub(super) fn attitude(&self) -> Matrix3<f64> {
+        Matrix3::from_fn(|i, j| self.0[i][j])
+    }
+
+    /// Whether it can be one: every variance a number above zero, or zero where a state is known.
+    pub(super) fn is_sound(&self) -> bool {
+        (0..STATES).all(|i| self.0[i][i].is_finite() && self.0[i][i] >= 0.0)
+    }
+
+    /// Smallest pivot of the factor of the matrix scaled to ones on its diagonal, over the states that are not
+    /// known exactly; not above 0 where it is not positive definite.
+    #[cfg(test)]
+    pub(super) fn smallest_pivot(&self) -> f64 {
+        let open: Vec<usize> = (0..STATES).filter(|i| self.0[*i][*i] != 0.0).collect();
+        let scale = |i: usize| self.0[i][i].sqrt();
+        let mut a: Vec<Vec<f64>> = open
+            .iter()
+            .map(|i| {
+                open.iter()
+                    .map(|j| self.0[*i][*j] / (scale(*i) * scale(*j)))
+                    .collect()
+            })
+            .collect();
+        let mut smallest = f64::INFINITY;
+        for k in 0..open.len() {
+            smallest = smallest.min(a[k][k]);
+            for i in k + 1..open.len() {
+                let f = a[i][k] / a[k][k];
+                for j in k..open.len() {
+                    a[i][j] -= f * a[k][j];
+                }
+            }
+        }
+        smallest
+    }
+
+    /// Largest difference between a pair of entries that should be equal, as a share of their sigmas.
+    #[cfg(test)]
+    pub(super) fn asymmetry(&self) -> f64 {
+        let mut largest = 0.0_f64;
+        for i in 0..STATES {
+            for j in 0..STATES {
+                let scale = (self.0[i][i] * self.0[j][j]).sqrt();
+                if scale > 0.0 {
+                    largest = largest.max((self.0[i][j] - self.0[j][i]).abs() / scale);
+                }
+            }
+        }
+        largest
+    }
+}

@@ -1,0 +1,183 @@
+//! Mean specific force of an interval -> tilt, and what of the sensor made it wrong. Pure.
+//!
+//! A body that is held, worn or carried stays in a place: its velocity and position are bounded. So
+//! `a + 2 damping frequency v + frequency^2 p` is taken for white noise, not `a` itself, and low frequencies,
+//! where tilt lives, weigh far more than they would otherwise. How strong the noise is, the residual says.
+
+use super::covariance::{Correction, FORCE_BIAS, LEAD, POSITION, TILT, VELOCITY};
+use super::filter::Filter;
+use super::settings::Settings;
+use nalgebra::Vector3;
+
+/// Time constant of the mean acceleration that tells a wrong tilt, s.
+const MEAN_SECS: f64 = 2.0;
+
+/// What residuals have been like.
+#[derive(Clone, Debug)]
+pub(super) struct Residuals {
+    /// Power density, m^2/s^3.
+    density: f64,
+    /// Mean square of a residual, and mean product with the one before.
+    square: f64,
+    product: f64,
+    last: [f64; 2],
+}
+
+impl Residuals {
+    pub(super) fn new(settings: &Settings) -> Residuals {
+        Residuals {
+            density: settings.force_start,
+            square: 0.0,
+            product: 0.0,
+            last: [0.0; 2],
+        }
+    }
+
+    /// The reference was left: what comes has nothing to do with what was.
+    pub(super) fn restart(&mut self) {
+        (self.square, self.product, self.last) = (0.0, 0.0, [0.0; 2]);
+    }
+
+    /// Variance of the residual of an interval of `secs`, with the vertical acceleration.
+    fn variance(&mut self, secs: f64, residual: [f64; 2], up: f64, settings: &Settings) -> f64 {
+        let share = secs / (settings.force_secs + secs);
+        let [x, y] = residual;
+        let square = x * x + y * y;
+        let now = secs * (0.5 * square).max(settings.force_vertical * up * up);
+        self.density += share * (now - self.density);
+        let density = settings
+            .force_floor
+            .max(self.density)
+            .max(settings.force_instant * now);
+        self.square += share * (square - self.square);
+        let product = x * self.last[0] + y * self.last[1];
+        self.product += share * (product - self.product);
+        self.last = residual;
+        // What resembles the one before it says less than its number.
+        let likeness = if self.square > 0.0 {
+            (self.product / self.square).clamp(0.0, 0.98)
+        } else {
+            0.0
+        };
+        let colour = if settings.colour == 0.0 {
+            1.0
+        } else {
+            ((1.0 + likeness) / (1.0 - likeness)).powf(settings.colour)
+        };
+        density / secs * colour
+    }
+}
+
+/// The mean specific force of an interval.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Force {
+    /// Less gravity, m/s^2, earth axes.
+    pub(super) acceleration: Vector3<f64>,
+    /// Its vertical component, gravity included, m/s^2.
+    pub(super) up: f64,
+    /// What it changes by for an accelerometer bias of 1 m/s^2 (three columns) and a lead of 1 s.
+    pub(super) by_calibration: [[f64; 4]; 2],
+}
+
+impl Filter {
+    /// Mean acceleration over the last seconds. Levels where that says that down is up.
+    pub(super) fn judge_tilt(&mut self, force: &Force) -> bool {
+        let secs = self.interval.secs;
+        self.mean_acceleration +=
+            (force.acceleration - self.mean_acceleration) * (secs / (MEAN_SECS + secs));
+        let gravity = Vector3::z() * self.settings.gravity;
+        if self.wants_level && self.level(force.acceleration + gravity) {
+            self.wants_level = false;
+            return true;
+        }
+        let mean = self.mean_acceleration + gravity;
+        // The linear correction has a false equilibrium upside down.
+        mean.z < 0.0 && self.level(mean)
+    }
+
+    /// The measurement of tilt.
+    pub(super) fn use_gravity(&mut self, force: &Force, correction: &mut Correction) {
+        let settings = self.settings;
+        let secs = self.interval.secs;
+        for i in 0..2 {
+            self.position[i] += secs * self.velocity[i] + 0.5 * secs * secs * force.acceleration[i];
+            self.velocity[i] += secs * force.acceleration[i];
+        }
+        if self.reference_is_left() && self.leave_reference() {
+            return;
+        }
+        let by_velocity = 2.0 * settings.motion_damping * settings.motion_frequency;
+        let by_position = settings.motion_frequency * settings.motion_frequency;
+        let residual = [0, 1].map(|i| {
+            force.acceleration[i] + by_velocity * self.velocity[i] + by_position * self.position[i]
+        });
+        let mut variance = self
+            .residuals
+            .variance(secs, residual, force.acceleration.z, &settings);
+        if self.rest.is_at_rest(&settings) {
+            let (ax, ay) = (force.acceleration.x, force.acceleration.y);
+            let square = ax * ax + ay * ay;
+            let tilt = self.covariance.variance(TILT) + self.covariance.variance(TILT + 1);
+            let floor = settings.force_floor / secs;
+            if square > 9.0 * (force.up * force.up * tilt + 2.0 * floor + 0.09) {
+                // A wrong tilt at rest is found in a second.
+                let unknown = 0.1 * square / settings.gravity.powi(2);
+                self.covariance.add(TILT, unknown);
+                self.covariance.add(TILT + 1, unknown);
+                variance = floor + 0.01;
+            }
+        }
+        for i in 0..2 {
+            let [x, y, z, lead] = force.by_calibration[i];
+            // A tilt about y makes gravity seem to point along x, one about x against y.
+            let (tilt, by_tilt) = [(TILT + 1, force.up), (TILT, -force.up)][i];
+            let h = [
+                (tilt, by_tilt),
+                (FORCE_BIAS, x),
+                (FORCE_BIAS + 1, y),
+                (FORCE_BIAS + 2, z),
+                (LEAD, lead),
+                (VELOCITY + i, by_velocity),
+                (POSITION + i, by_position),
+            ];
+            self.covariance
+                .measure(&h, -residual[i], variance, correction);
+        }
+    }
+
+    fn reference_is_left(&self) -> bool {
+        let limit = self.settings.reference_limit.powi(2);
+        let squared = |v: [f64; 2]| v[0] * v[0] + v[1] * v[1];
+        squared(self.velocity) > limit || squared(self.position) > limit
+    }
+
+    /// Velocity or position are beyond what a held body has: either the tilt is wrong (the mean specific force
+    /// is as long as gravity), or it really travels. Whether it was levelled.
+    fn leave_reference(&mut self) -> bool {
+        let gravity = self.settings.gravity;
+        let mean = self.mean_acceleration;
+        let across = mean.x.hypot(mean.y);
+        let force = mean + Vector3::z() * gravity;
+        let length = force.norm();
+        let of_travel = gravity.hypot(across);
+        let is_tilt = across > self.settings.level_force
+            && length > 0.9 * gravity
+            && length < 0.5 * (gravity + of_travel);
+        if is_tilt && self.level(force) {
+            return true;
+        }
+        self.restart_reference(1.0, 1.0);
+        false
+    }
+
+    /// A velocity and position that are known to these variances and nothing more.
+    pub(super) fn restart_reference(&mut self, velocity: f64, position: f64) {
+        self.report.restarts += 1;
+        (self.velocity, self.position) = ([0.0; 2], [0.0; 2]);
+        for i in 0..2 {
+            self.covariance.restart(VELOCITY + i, velocity);
+            self.covariance.restart(POSITION + i, position);
+        }
+        self.residuals.restart();
+    }
+}

@@ -1,0 +1,146 @@
+//! Mean magnetic field of an interval -> heading. Pure.
+//!
+//! One scalar: the heading of the horizontal field. Indoors it is off by degrees over tens of seconds, so a
+//! state of its own stands for the disturbance. A field whose norm or dip is another than before counts less,
+//! and a heading far from the expected one too, until it has lasted long enough to be the truth.
+
+use super::covariance::{Correction, FIELD, HEADING, TILT};
+use super::filter::Filter;
+use super::settings::Settings;
+use nalgebra::Vector3;
+use std::f64::consts::{PI, TAU};
+
+/// Time constant of the mean of another field, s.
+const OTHER_SECS: f64 = 5.0;
+/// Time constant of the mean deviation, s.
+const DEVIATION_SECS: f64 = 3.0;
+/// A field steeper than this (horizontal share) has no heading.
+const STEEPEST: f64 = 0.1;
+
+/// Norm and dip of a field.
+#[derive(Clone, Copy, PartialEq, Debug)]
+struct Field {
+    norm: f64,
+    /// Downwards from horizontal, rad.
+    dip: f64,
+}
+
+impl Field {
+    /// Share of the norm, and angle, by which another differs.
+    fn off(&self, other: &Field) -> (f64, f64) {
+        (other.norm / self.norm - 1.0, other.dip - self.dip)
+    }
+
+    fn is_like(&self, other: &Field, settings: &Settings) -> bool {
+        let (norm, dip) = self.off(other);
+        norm.abs() < settings.field_same && dip.abs() < settings.field_same
+    }
+
+    fn approach(&mut self, other: &Field, share: f64) {
+        self.norm += share * (other.norm - self.norm);
+        self.dip += share * (other.dip - self.dip);
+    }
+}
+
+/// What the field has been like.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Surroundings {
+    /// The field that headings are believed in.
+    reference: Option<Field>,
+    /// Another that may be accepted, and for how long it has been the same, s.
+    other: Option<Field>,
+    other_secs: f64,
+    /// Mean square deviation from the reference.
+    deviation: f64,
+    /// For how long a good field has said another heading, s.
+    contradicted: f64,
+}
+
+impl Filter {
+    /// The measurement of heading, where there is one.
+    pub(super) fn use_field(&mut self, correction: &mut Correction) {
+        let settings = self.settings;
+        let secs = self.interval.secs;
+        let field: Vector3<f64> = self.interval.field / self.interval.fields;
+        let level = field.x.hypot(field.y);
+        let now = Field {
+            norm: level.hypot(field.z),
+            dip: (-field.z).atan2(level),
+        };
+        if now.norm.is_nan() || now.norm <= 0.0 {
+            return;
+        }
+        let at_rest = self.rest.is_at_rest(&settings);
+        let around = &mut self.surroundings;
+        let reference = around.reference.get_or_insert(now);
+        let (norm_off, dip_off) = reference.off(&now);
+        let fits = reference.is_like(&now, &settings);
+        if fits {
+            reference.approach(&now, secs / (settings.field_mean_secs + secs));
+        }
+        // Another homogeneous field is accepted in time, while the body moves.
+        let other = around.other.get_or_insert(now);
+        other.approach(&now, secs / (OTHER_SECS + secs));
+        if !fits && other.is_like(&now, &settings) {
+            if !at_rest {
+                around.other_secs += secs;
+            }
+            if around.other_secs >= settings.field_new_secs {
+                *reference = *other;
+                around.other_secs = 0.0;
+            }
+        } else if fits {
+            around.other_secs = 0.0;
+        } else {
+            around.other_secs = (around.other_secs - 2.0 * secs).max(0.0);
+        }
+        let horizontal = level / now.norm;
+        if horizontal < STEEPEST {
+            self.report.fields_rejected += 1;
+            return;
+        }
+        let deviation = (norm_off * norm_off + dip_off * dip_off) / (horizontal * horizontal);
+        around.deviation += (deviation - around.deviation) * (secs / (DEVIATION_SECS + secs));
+        let covariance = &mut self.covariance;
+        let steep = field.z / level;
+        let tilt = covariance.variance(TILT) + covariance.variance(TILT + 1);
+        let white = settings.field_noise.powi(2);
+        let mut variance = white / secs
+            + settings.field_gate * deviation.max(around.deviation) * 2.0 * settings.field_secs
+                / secs
+            + steep * steep * tilt / (2.0 * secs);
+        // The field is seen turned to the east by as much as the heading is off.
+        let residual = wrapped(field.x.atan2(field.y) - self.disturbance);
+        let expected = covariance.variance(HEADING)
+            + covariance.variance(FIELD)
+            + 2.0 * covariance.between(HEADING, FIELD);
+        let sigmas = residual.abs() / (expected + white).sqrt();
+        if sigmas > settings.field_robust {
+            self.report.fields_rejected += 1;
+            if fits {
+                around.contradicted += secs;
+            }
+            if around.contradicted >= settings.field_new_secs {
+                covariance.add(HEADING, residual * residual);
+                around.contradicted = 0.0;
+            } else {
+                let excess = sigmas / settings.field_robust;
+                variance += (expected + white) * excess * excess * settings.field_secs / secs;
+            }
+        } else {
+            around.contradicted = (around.contradicted - 2.0 * secs).max(0.0);
+        }
+        covariance.measure(
+            &[(HEADING, 1.0), (FIELD, 1.0)],
+            residual,
+            variance,
+            correction,
+        );
+    }
+}
+
+/// The same angle in -pi..=pi.
+fn wrapped(angle: f64) -> f64 {
+    let turns = (angle / TAU).round();
+    (angle - turns * TAU).clamp(-PI, PI)
+}

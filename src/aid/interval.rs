@@ -1,0 +1,76 @@
+//! Samples since the last correction -> sums. Pure.
+
+use super::calibration::Applied;
+use nalgebra::{Matrix3, Vector3};
+
+/// What is added up between two corrections. Earth axes but for `rate`.
+#[derive(Clone, Debug)]
+pub(super) struct Interval {
+    /// How long it is, s.
+    pub(super) secs: f64,
+    /// How much of it has a specific force, s.
+    pub(super) force_secs: f64,
+    /// Integral of the attitude matrix, s.
+    pub(super) attitude: Matrix3<f64>,
+    /// What the attitude changes by for a scale (columns 0 to 2) or a cross axis (3 to 5) of 1, rad.
+    pub(super) scaled: [[f64; 6]; 3],
+    /// Integral of the specific force, m/s.
+    pub(super) force: Vector3<f64>,
+    /// Its change for a lead of 1 s.
+    pub(super) lead: Vector3<f64>,
+    /// Integral of the measured rate, rad, body axes.
+    pub(super) rate: Vector3<f64>,
+    /// Sum of the field, and how many there are.
+    pub(super) field: Vector3<f64>,
+    pub(super) fields: f64,
+}
+
+impl Interval {
+    pub(super) fn new() -> Interval {
+        Interval {
+            secs: 0.0,
+            force_secs: 0.0,
+            attitude: Matrix3::zeros(),
+            scaled: [[0.0; 6]; 3],
+            force: Vector3::zeros(),
+            lead: Vector3::zeros(),
+            rate: Vector3::zeros(),
+            field: Vector3::zeros(),
+            fields: 0.0,
+        }
+    }
+
+    /// The attitude `r` at the end of `secs` in which the mean rate was measured as `rate`.
+    #[inline]
+    pub(super) fn turn(
+        &mut self,
+        secs: f64,
+        r: &Matrix3<f64>,
+        rate: &Vector3<f64>,
+        known: &Applied,
+    ) {
+        let left = rate - known.bias;
+        for (i, scaled) in self.scaled.iter_mut().enumerate() {
+            let [x, y, z] = [0, 1, 2].map(|j| r[(i, j)] * secs);
+            let more = [
+                x * left.x,
+                y * left.y,
+                z * left.z,
+                x * left.y + y * left.x,
+                x * left.z + z * left.x,
+                y * left.z + z * left.y,
+            ];
+            for (sum, more) in scaled.iter_mut().zip(more) {
+                *sum += more;
+            }
+        }
+        self.attitude += r * secs;
+        self.rate += rate * secs;
+        self.secs += secs;
+    }
+
+    /// Sum of the squares of what scale and cross axes do: how much was turned.
+    pub(super) fn turned_squared(&self) -> f64 {
+        self.scaled.iter().flatten().map(|s| s * s).sum()
+    }
+}

@@ -1,0 +1,70 @@
+//! Rate and force -> whether the sensor is at rest. Pure.
+
+use super::settings::Settings;
+use nalgebra::Vector3;
+
+/// Time constant of the means that deviations are from, s.
+const MEAN_SECS: f64 = 0.5;
+/// How long a specific force counts for the present, s.
+const FORCE_SECS: f64 = 0.5;
+
+/// Whether rate and force have been quiet for long enough.
+#[derive(Clone, Debug)]
+pub(super) struct Rest {
+    rate: Vector3<f64>,
+    force: Vector3<f64>,
+    /// How long all has been quiet, s.
+    quiet: f64,
+    /// Since the last specific force, s.
+    since_force: f64,
+}
+
+impl Rest {
+    pub(super) fn new(force: Vector3<f64>) -> Rest {
+        Rest {
+            rate: Vector3::zeros(),
+            force,
+            quiet: 0.0,
+            since_force: 0.0,
+        }
+    }
+
+    /// A sample `secs` after the one before. `bias`: as far as known, with its sigmas.
+    #[inline]
+    pub(super) fn take(
+        &mut self,
+        secs: f64,
+        rate: &Vector3<f64>,
+        force: Option<&Vector3<f64>>,
+        (bias, sigma): (&Vector3<f64>, &Vector3<f64>),
+        settings: &Settings,
+    ) {
+        let share = secs / (MEAN_SECS + secs);
+        self.rate += (rate - self.rate) * share;
+        let mut is_quiet = (rate - self.rate).norm_squared() <= settings.rest_gyro.powi(2)
+            && secs <= settings.gap_secs;
+        self.since_force += secs;
+        if let Some(force) = force {
+            self.since_force = 0.0;
+            self.force += (force - self.force) * share;
+            is_quiet &= (force - self.force).norm_squared() <= settings.rest_force.powi(2);
+        }
+        is_quiet &= (0..3).all(|i| {
+            if settings.rest_beside_bias {
+                (self.rate[i] - bias[i]).abs() <= settings.rest_rate + 3.0 * sigma[i]
+            } else {
+                self.rate[i].abs() <= settings.rest_rate
+            }
+        });
+        self.quiet = if is_quiet { self.quiet + secs } else { 0.0 };
+    }
+
+    /// A pause: what was before it says nothing.
+    pub(super) fn interrupt(&mut self) {
+        self.quiet = 0.0;
+    }
+
+    pub(super) fn is_at_rest(&self, settings: &Settings) -> bool {
+        self.quiet > settings.rest_secs && self.since_force <= FORCE_SECS
+    }
+}

@@ -1,0 +1,149 @@
+//! What the filter is told about sensors and motions. Pure.
+
+/// Settings of the [`Filter`](super::Filter), SI. The defaults are one set for every sensor and motion it was
+/// judged on.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Settings {
+    /// White noise density of the gyro, rad/s/sqrt(Hz).
+    pub gyro_noise: f64,
+    /// Random walk of its bias, rad/s/sqrt(s).
+    pub bias_walk: f64,
+    /// Noise in proportion to the rate: what three scales and three angles do not describe.
+    pub rate_noise: f64,
+    /// Prior sigma of the gyro's bias, rad/s. Of a sensor just switched on; smaller is better for a vehicle that
+    /// is never at rest.
+    pub bias_prior: f64,
+    /// Prior sigma of the gyro's scale factors.
+    pub scale_prior: f64,
+    /// Prior sigma of the angles between its axes, rad.
+    pub cross_prior: f64,
+    /// Prior sigma of the accelerometer's bias, m/s^2.
+    pub force_bias_prior: f64,
+    /// Its random walk, m/s^2/sqrt(s).
+    pub force_bias_walk: f64,
+    /// Prior sigma of the accelerometer's lead, s.
+    pub lead_prior: f64,
+    /// The same as a share of the time between samples, added in squares.
+    pub lead_share: f64,
+    /// Sigma of the tilt at the start, and after levelling, rad.
+    pub tilt_start: f64,
+    /// Sigma of the heading at the start, with a magnetometer, rad.
+    pub heading_start: f64,
+    /// The motion: `a = -2 damping frequency v - frequency^2 p + white`, rad/s.
+    pub motion_frequency: f64,
+    /// Its damping.
+    pub motion_damping: f64,
+    /// Wander of the velocity reference, m/s/sqrt(s).
+    pub velocity_walk: f64,
+    /// Limit of velocity (m/s) and of position (m); beyond, the body really travels.
+    pub reference_limit: f64,
+    /// Smallest mean acceleration that can mean a wrong tilt, m/s^2.
+    pub level_force: f64,
+    /// Sigma of tilt after a long gap that asks for levelling, rad.
+    pub level_sigma: f64,
+    /// Floor of the power density of accelerations, m^2/s^3.
+    pub force_floor: f64,
+    /// Its start.
+    pub force_start: f64,
+    /// Time over which it is averaged, s.
+    pub force_secs: f64,
+    /// Share of the last residual that it is never below.
+    pub force_instant: f64,
+    /// Share of the vertical residual.
+    pub force_vertical: f64,
+    /// How strongly residuals that resemble the ones before them are believed less; 0: not at all, 1: as for a
+    /// process of first order.
+    pub colour: f64,
+    /// Time between corrections, s.
+    pub update_secs: f64,
+    /// How long all must be quiet to be at rest, s.
+    pub rest_secs: f64,
+    /// Largest deviation of the rate at rest, rad/s.
+    pub rest_gyro: f64,
+    /// Largest deviation of the force at rest, m/s^2.
+    pub rest_force: f64,
+    /// Largest mean rate about an axis at rest, rad/s: beside the known bias and three of its sigmas where
+    /// [`rest_beside_bias`](Settings::rest_beside_bias).
+    pub rest_rate: f64,
+    /// Whether the mean rate at rest is judged beside the bias known by then.
+    pub rest_beside_bias: bool,
+    /// White noise of the rate at rest, rad/s/sqrt(Hz). Not below Earth's rate.
+    pub rest_noise: f64,
+    /// Local gravity, m/s^2.
+    pub gravity: f64,
+    /// White noise of the field's heading, rad sqrt(s).
+    pub field_noise: f64,
+    /// Disturbance of the field's heading: sigma, rad.
+    pub field_sigma: f64,
+    /// Its correlation time, s.
+    pub field_secs: f64,
+    /// Weight of a deviation of the field's norm or dip.
+    pub field_gate: f64,
+    /// Beyond so many sigmas a heading counts less.
+    pub field_robust: f64,
+    /// Largest deviation of the norm, as a share, and of the dip, rad, of the same field.
+    pub field_same: f64,
+    /// Time over which the field's norm and dip are averaged, s.
+    pub field_mean_secs: f64,
+    /// After so many seconds another field is accepted.
+    pub field_new_secs: f64,
+    /// Jumps of the rate beyond this add uncertainty, rad/s^2.
+    pub jerk: f64,
+    /// Steps longer than so many ordinary ones are gaps.
+    pub gap_factor: f64,
+    /// In gaps beyond this nothing is known, s.
+    pub gap_secs: f64,
+    /// The gyro's range, rad/s; at it, the turn is unknown. 0: not known.
+    pub gyro_range: f64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Settings {
+            gyro_noise: 1e-4,
+            bias_walk: 1.5e-4,
+            rate_noise: 7e-5,
+            bias_prior: 0.02,
+            scale_prior: 4e-3,
+            cross_prior: 2e-3,
+            force_bias_prior: 0.02,
+            force_bias_walk: 1.7e-4,
+            lead_prior: 5e-4,
+            lead_share: 0.1,
+            tilt_start: 0.3,
+            heading_start: 1.0,
+            motion_frequency: 0.75,
+            motion_damping: 1.5,
+            velocity_walk: 5e-3,
+            reference_limit: 8.0,
+            level_force: 2.5,
+            level_sigma: 0.6,
+            force_floor: 1e-4,
+            force_start: 1e-2,
+            force_secs: 9.0,
+            force_instant: 0.4,
+            force_vertical: 0.1,
+            colour: 0.8,
+            update_secs: 0.1,
+            rest_secs: 1.5,
+            rest_gyro: 0.0349,
+            rest_force: 0.5,
+            rest_rate: 0.008_73,
+            rest_beside_bias: true,
+            rest_noise: 1e-4,
+            gravity: 9.81,
+            field_noise: 0.03,
+            field_sigma: 0.1,
+            field_secs: 8.0,
+            field_gate: 0.4,
+            field_robust: 1.5,
+            field_same: 0.1,
+            field_mean_secs: 10.0,
+            field_new_secs: 20.0,
+            jerk: 1000.0,
+            gap_factor: 1.5,
+            gap_secs: 0.2,
+            gyro_range: 0.0,
+        }
+    }
+}
