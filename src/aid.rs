@@ -23,6 +23,10 @@
 //!
 //! # Source
 //! `docs/theory/filter.md`: the model, where it comes from, what it was judged on.
+#![allow(
+    clippy::needless_range_loop,
+    reason = "an index here is a state, and often runs through several arrays"
+)]
 
 mod aided;
 mod calibration;

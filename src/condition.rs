@@ -8,6 +8,7 @@
 //! ```text
 //! RawSample -> gate (one sample alone) -> order (in time) -> timing (interval, join) -> RateSample
 //! RateSample -> stillness (rests: bias, level)         RawSample -> quality (what `info` prints)
+//! RawSample -> truncation (did the driver cut?)
 //! ```
 //!
 //! # Policy
@@ -44,6 +45,7 @@ mod timing;
 pub mod quality;
 pub mod regularise;
 pub mod stillness;
+pub mod truncation;
 
 pub use clock::{Clock, ClockWarning, choose_clock};
 pub use memory::Memory;

@@ -48,10 +48,62 @@ pub struct Plan {
     pub gyro_range: Option<f64>,
     /// `--noise`.
     pub noise: Noise,
+    /// `--aid`.
+    pub aid: Aid,
+    /// `--undo-truncation`.
+    pub truncation: Truncation,
     /// `--start`, s.
     pub start: Option<f64>,
     /// `--until`, s.
     pub until: Option<f64>,
+}
+
+/// `--aid`: what corrects the attitude of the gyro.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Hash)]
+pub enum Aid {
+    /// Nothing.
+    #[default]
+    None,
+    /// The direction of gravity, from the accelerometer.
+    Gravity,
+}
+
+/// `--undo-truncation`: what becomes of rates that their driver cut towards zero.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub enum Truncation {
+    /// Decided by the data of a file where the attitude is aided; otherwise they stay.
+    #[default]
+    Unsaid,
+    /// Decided by the data of a file.
+    Auto,
+    /// It was; the data say in which steps.
+    On,
+    /// In these steps, rad/s.
+    Steps(f64),
+    /// They stay.
+    Off,
+}
+
+impl Truncation {
+    /// # Errors
+    /// [`Error::Usage`] for anything but `auto`, `on`, `on=STEP`, `off`.
+    pub fn parse(text: &str) -> Result<Truncation> {
+        Ok(match text {
+            "auto" => Truncation::Auto,
+            "on" => Truncation::On,
+            "off" => Truncation::Off,
+            _ => text
+                .strip_prefix("on=")
+                .and_then(|step| step.parse().ok())
+                .filter(|step: &f64| *step > 0.0 && *step < 1.0)
+                .map(Truncation::Steps)
+                .ok_or_else(|| {
+                    Error::Usage(format!(
+                        "--undo-truncation: `{text}` is none\n  help: auto, on, on=STEP in rad/s (below 1), or off"
+                    ))
+                })?,
+        })
+    }
 }
 
 impl Default for Plan {
@@ -75,6 +127,8 @@ impl Default for Plan {
             regularise_stamps: false,
             gyro_range: None,
             noise: Noise::preset(&NOISE_PRESETS[0]),
+            aid: Aid::None,
+            truncation: Truncation::Unsaid,
             start: None,
             until: None,
         }

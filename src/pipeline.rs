@@ -1,6 +1,7 @@
 //! Wires the stages: source -> decode -> condition -> propagate -> sink. I/O.
 
 pub mod against;
+pub mod aiding;
 pub mod audience;
 pub mod check;
 mod chosen;

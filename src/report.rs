@@ -1,5 +1,6 @@
 //! What a run says about itself, for people and for machines. Pure.
 
+pub mod aid;
 pub mod calendar;
 pub mod drawn;
 pub mod findings;

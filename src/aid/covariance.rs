@@ -98,15 +98,14 @@ impl Covariance {
             }
         }
         let mut square = [[0.0; MOVING]; MOVING];
-        for a in 0..MOVING {
-            for b in 0..MOVING {
-                let mut sum = moved[a][b];
+        for (out, row) in square.iter_mut().zip(&moved) {
+            for (b, sum) in out.iter_mut().enumerate() {
+                *sum = row[b];
                 for (k, f) in by.0[b].iter().enumerate() {
                     if *f != 0.0 {
-                        sum += f * moved[a][k];
+                        *sum += f * row[k];
                     }
                 }
-                square[a][b] = sum;
             }
         }
         for a in 0..MOVING {

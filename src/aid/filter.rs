@@ -192,8 +192,8 @@ impl Filter {
         (self.correction * *propagated).normalised()
     }
 
-    /// Begins at a first sample: level by its specific force and with the heading of the body's x axis, or north
-    /// by its field. Without a force the attitude is the propagator's for now.
+    /// Begins at a first sample: level by its specific force and with the heading of the propagator's attitude,
+    /// or north by its field. Without a force the attitude is the propagator's for now.
     pub fn begin(&mut self, first: &Measured, propagated: &Quaternion<Nav, Body>) {
         self.last_rate = first.rate;
         self.last_force = None;
@@ -212,7 +212,11 @@ impl Filter {
                 let rows = [east, up.cross(&east), up].map(|axis| axis.transpose());
                 Quaternion::from_dcm(&Dcm::assume(Matrix3::from_rows(&rows)))
             }
-            None => level(&force).unwrap_or_else(Quaternion::identity),
+            None => {
+                let tilted = level(&force).unwrap_or_else(Quaternion::identity);
+                let yaw = Vector3::z() * propagated.yaw_pitch_roll().yaw;
+                Quaternion::<Nav, Nav>::from_rotation_vector(&RotationVector(yaw)) * tilted
+            }
         };
         let heading = match (field, north) {
             (_, Some(_)) => self.settings.heading_start,

@@ -1,2 +1,4 @@
+#![allow(clippy::unwrap_used, reason = "tests")]
+
 mod golden;
 mod probes;

@@ -2,7 +2,7 @@
 //! checked once. Pure.
 
 use crate::condition::{Clock, GyroUnit, OnGap};
-use crate::config::{Bias, Initial, Noise, Plan, parse_mount};
+use crate::config::{Aid, Bias, Initial, Noise, Plan, Truncation, parse_mount};
 use crate::error::{Error, Result};
 use crate::propagate::{Method, Order, Placement};
 use crate::record::SampleKind;
@@ -39,6 +39,14 @@ pub struct Estimation {
     /// its stamp, or the integral over it [default: rate, unless the format says otherwise]
     #[arg(long, value_enum, env = "STRAPD_SAMPLE_KIND")]
     pub sample_kind: Option<KindArg>,
+    /// What corrects the attitude: none (the gyro alone), or gravity: level from the first sample, no
+    /// drift of the tilt, and the gyro's bias, scale and axes are learned. Heading stays the gyro's
+    #[arg(long, value_enum, default_value = "none", env = "STRAPD_AID")]
+    pub aid: AidArg,
+    /// Put back what a driver cut from the rates towards zero, half a step: auto (a file shows it), on,
+    /// on=STEP in rad/s, off [default: auto with --aid, else off]
+    #[arg(long, value_name = "WHEN", env = "STRAPD_UNDO_TRUNCATION")]
+    pub undo_truncation: Option<String>,
     /// Unit of the recorded rates [default: rad, unless the format says otherwise]
     #[arg(long, value_enum, env = "STRAPD_GYRO_UNIT")]
     pub gyro_unit: Option<UnitArg>,
@@ -46,7 +54,8 @@ pub struct Estimation {
     /// lower case = reversed) [default: flu, unless the format says otherwise]
     #[arg(long, value_name = "AXES", env = "STRAPD_BODY")]
     pub body: Option<String>,
-    /// World of the output: start (the attitude at the first sample), enu, ned, nwu
+    /// World of the output: start (the attitude at the first sample), level (z up, heading of the
+    /// start; what --aid gives unless told otherwise), enu, ned, nwu
     #[arg(
         long,
         value_name = "WORLD",
@@ -148,6 +157,24 @@ impl From<KindArg> for SampleKind {
     }
 }
 
+/// `--aid`.
+#[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AidArg {
+    /// The gyro alone.
+    None,
+    /// The accelerometer.
+    Gravity,
+}
+
+impl From<AidArg> for Aid {
+    fn from(aid: AidArg) -> Aid {
+        match aid {
+            AidArg::None => Aid::None,
+            AidArg::Gravity => Aid::Gravity,
+        }
+    }
+}
+
 /// `--gyro-unit`.
 #[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
 pub enum UnitArg {
@@ -244,6 +271,11 @@ impl Estimation {
             regularise_stamps: self.regularise_stamps,
             gyro_range: self.gyro_range,
             noise: Noise::parse(&self.noise)?,
+            aid: self.aid.into(),
+            truncation: self
+                .undo_truncation
+                .as_deref()
+                .map_or(Ok(Truncation::Unsaid), Truncation::parse)?,
             start: self.start,
             until: self.until,
         };

@@ -4,6 +4,7 @@
 //! samples with each other and may rely on every number being finite and every stamp subtractable.
 
 use super::settings::Settings;
+use super::truncation::undone;
 use crate::record::{Nanos, RawSample, SampleKind, Status, Verdict};
 use nalgebra::{Matrix3, Vector3};
 
@@ -53,6 +54,8 @@ pub(super) struct Gate {
     gyro: Option<Matrix3<f64>>,
     accel: Option<Matrix3<f64>>,
     to_rad: f64,
+    /// Step of truncation in the source's unit.
+    cut: Option<f64>,
     huge: f64,
     range: f64,
 }
@@ -66,6 +69,9 @@ impl Gate {
             gyro: unless_identity(axes * settings.unit.to_rad()),
             accel: unless_identity(axes * settings.accel_scale),
             to_rad: settings.unit.to_rad(),
+            cut: settings
+                .truncation_step
+                .map(|step| step / settings.unit.to_rad()),
             huge: match settings.kind {
                 SampleKind::DeltaAngle => HUGE_ANGLE,
                 SampleKind::Rate | SampleKind::Average => HUGE_RATE,
@@ -109,6 +115,10 @@ impl Gate {
         if self.range.is_finite() && self.is_saturated(largest, interval, spacing) {
             status = status.with(Status::SATURATED);
         }
+        let gyro = match self.cut {
+            None => gyro,
+            Some(step) => gyro.map(|rate| undone(rate, step)),
+        };
         let accel = raw.accel.map_or(NO_ACCEL, Vector3::from);
         Ok(Entry {
             stamp,

@@ -89,6 +89,9 @@ pub struct Settings {
     pub max_gap_secs: f64,
     /// What to do beyond it.
     pub on_gap: OnGap,
+    /// Step in rad/s (or rad of a delta angle), sensor axes, to which a driver has cut the rates towards
+    /// zero: half of it is put back. See [`truncation`](super::truncation).
+    pub truncation_step: Option<f64>,
     /// Gyro bias in rad/s, body axes, subtracted.
     pub bias: Vector3<f64>,
     /// Full scale of the gyro in rad/s, sensor axes: components at or beyond it are flagged.
@@ -114,6 +117,7 @@ impl Default for Settings {
             clock: Clock::Header,
             max_gap_secs: 0.5,
             on_gap: OnGap::Hold,
+            truncation_step: None,
             bias: Vector3::zeros(),
             gyro_range: None,
             start: None,
@@ -188,6 +192,13 @@ impl Settings {
             && !(range.is_finite() && range > 0.0)
         {
             return fail(format!("--gyro-range: {range} rad/s is not a range"));
+        }
+        if let Some(step) = self.truncation_step
+            && !(step.is_finite() && (0.0..1.0).contains(&step))
+        {
+            return fail(format!(
+                "--undo-truncation: {step} rad/s is not the step of a gyro"
+            ));
         }
         for (flag, value) in [("--start", self.start), ("--until", self.until)] {
             if let Some(secs) = value

@@ -116,6 +116,8 @@ impl AgainstRecorded {
         let mut prepared = prepared.clone();
         // The recorded attitude is brought to the convention everything is computed in.
         prepared.world = World::Start;
+        // What a sample means shows over a second; what corrects the attitude would hide it.
+        prepared.aiding = None;
         let estimators = MEANINGS
             .iter()
             .map(|(_, _, kind, method)| {

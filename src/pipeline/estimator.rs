@@ -4,6 +4,7 @@
 //! does no I/O.
 
 use super::preparation::{Prepared, Resolved};
+use crate::aid::{self, Aided};
 use crate::condition::regularise::{self, Regulariser};
 use crate::condition::{self, Conditioner};
 use crate::config::Plan;
@@ -17,7 +18,7 @@ use serde::{Deserialize, Serialize};
 pub struct Estimator {
     conditioner: Conditioner,
     regulariser: Option<Regulariser>,
-    propagator: Propagator,
+    integrator: Integrator,
     world: World,
     /// Tells settings apart under which a [`Memory`] means something else.
     settings: u64,
@@ -25,6 +26,30 @@ pub struct Estimator {
     /// The same with their new stamps.
     even: Vec<RateSample>,
     out: Vec<AttitudeSample>,
+}
+
+/// Rates -> attitudes.
+#[derive(Debug)]
+enum Integrator {
+    Alone(Box<Propagator>),
+    Aided(Box<Aided>),
+}
+
+impl Integrator {
+    fn push(&mut self, rates: &[RateSample], exec: &impl Executor, out: &mut Vec<AttitudeSample>) {
+        match self {
+            Integrator::Alone(propagator) => propagator.push(rates, exec, out),
+            // What a sample is corrected by hangs on those before it.
+            Integrator::Aided(aided) => aided.push(rates, out),
+        }
+    }
+
+    fn finish(&mut self, exec: &impl Executor, out: &mut Vec<AttitudeSample>) {
+        match self {
+            Integrator::Alone(propagator) => propagator.finish(exec, out),
+            Integrator::Aided(aided) => aided.finish(out),
+        }
+    }
 }
 
 /// What an estimator knows at one moment: a few kilobytes of text.
@@ -58,7 +83,7 @@ impl Estimator {
         ) {
             return Estimator::live(plan, resolved, prepared);
         }
-        let settings = resolved.conditioning(plan, prepared.clock, prepared.bias);
+        let settings = conditioning(plan, resolved, prepared);
         Estimator::with(plan, resolved, prepared, &settings)
     }
 
@@ -74,7 +99,7 @@ impl Estimator {
     ) -> Result<Estimator, String> {
         let settings = condition::Settings {
             reorder_window: condition::Settings::LIVE_WINDOW,
-            ..resolved.conditioning(plan, prepared.clock, prepared.bias)
+            ..conditioning(plan, resolved, prepared)
         };
         Estimator::with(plan, resolved, prepared, &settings)
     }
@@ -92,8 +117,13 @@ impl Estimator {
             world_rate: prepared.world_rate,
             noise: plan.noise.with_bias(prepared.bias_sigma.into()),
         };
-        let propagator = Propagator::new(propagation).map_err(|e| e.to_string())?;
         let noise = propagation.noise;
+        let integrator = match &prepared.aiding {
+            None => Propagator::new(propagation).map(|p| Integrator::Alone(Box::new(p))),
+            Some(aiding) => Aided::new(propagation, aiding.settings, aiding.start)
+                .map(|aided| Integrator::Aided(Box::new(aided))),
+        }
+        .map_err(|e| e.to_string())?;
         Ok(Estimator {
             settings: told_apart(&format!(
                 "{settings:?} {:?} {:?} {noise:?}",
@@ -101,7 +131,7 @@ impl Estimator {
             )),
             conditioner: Conditioner::new(settings).map_err(|e| e.to_string())?,
             regulariser: prepared.stamps.regulariser(resolved.kind)?,
-            propagator,
+            integrator,
             world: prepared.world,
             rates: Vec::new(),
             even: Vec::new(),
@@ -119,20 +149,27 @@ impl Estimator {
         if let Some(from) = self.world.convention() {
             last = relabelled(&last, from, Convention::EnuFlu);
         }
-        self.propagator.resume(&last).map_err(|e| e.to_string())
+        match &mut self.integrator {
+            Integrator::Alone(propagator) => propagator.resume(&last),
+            Integrator::Aided(aided) => aided.resume(&last),
+        }
+        .map_err(|e| e.to_string())
     }
 
     /// What it knows, for another estimator to go on exactly; `None` where there is nothing yet, and
-    /// where stamps are regularised, which is not kept.
+    /// where stamps are regularised or the attitude is aided, which is not kept.
     #[must_use]
     pub fn memory(&self) -> Option<Memory> {
+        let Integrator::Alone(propagator) = &self.integrator else {
+            return None;
+        };
         if self.regulariser.is_some() {
             return None;
         }
         Some(Memory {
             settings: self.settings,
             conditioning: self.conditioner.memory()?,
-            propagation: self.propagator.memory()?,
+            propagation: propagator.memory()?,
         })
     }
 
@@ -140,12 +177,15 @@ impl Estimator {
     /// is as before, when that had other settings or no estimator can have known it.
     #[must_use]
     pub fn recall(&mut self, memory: &Memory) -> bool {
+        let Integrator::Alone(propagator) = &mut self.integrator else {
+            return false;
+        };
         if self.regulariser.is_some() || self.settings != memory.settings {
             return false;
         }
         let mut conditioner = self.conditioner.clone();
         let fits =
-            conditioner.recall(&memory.conditioning) && self.propagator.recall(&memory.propagation);
+            conditioner.recall(&memory.conditioning) && propagator.recall(&memory.propagation);
         if fits {
             self.conditioner = conditioner;
         }
@@ -156,7 +196,10 @@ impl Estimator {
     /// that it was reset.
     pub fn succeed(&mut self, before: &condition::Report, resets: u32) {
         self.conditioner.succeed(before);
-        self.propagator.succeed(resets);
+        match &mut self.integrator {
+            Integrator::Alone(propagator) => propagator.succeed(resets),
+            Integrator::Aided(aided) => aided.succeed(resets),
+        }
     }
 
     /// See [`Conditioner::stamp_of`].
@@ -197,20 +240,20 @@ impl Estimator {
         self.propagate(exec);
         if let Some(regulariser) = &mut self.regulariser {
             regulariser.finish(&mut self.even);
-            self.propagator.push(&self.even, exec, &mut self.out);
+            self.integrator.push(&self.even, exec, &mut self.out);
             self.even.clear();
         }
-        self.propagator.finish(exec, &mut self.out);
+        self.integrator.finish(exec, &mut self.out);
         self.relabel();
         &self.out
     }
 
     fn propagate(&mut self, exec: &impl Executor) {
         match &mut self.regulariser {
-            None => self.propagator.push(&self.rates, exec, &mut self.out),
+            None => self.integrator.push(&self.rates, exec, &mut self.out),
             Some(regulariser) => {
                 regulariser.push(&self.rates, &mut self.even);
-                self.propagator.push(&self.even, exec, &mut self.out);
+                self.integrator.push(&self.even, exec, &mut self.out);
                 self.even.clear();
             }
         }
@@ -233,13 +276,28 @@ impl Estimator {
     /// What propagation did.
     #[must_use]
     pub fn propagation(&self) -> propagate::Report {
-        self.propagator.report()
+        match &self.integrator {
+            Integrator::Alone(propagator) => propagator.report(),
+            Integrator::Aided(aided) => aided.propagation(),
+        }
+    }
+
+    /// What corrects the attitude, where something does.
+    #[must_use]
+    pub fn filter(&self) -> Option<&aid::Filter> {
+        match &self.integrator {
+            Integrator::Alone(_) => None,
+            Integrator::Aided(aided) => Some(aided.filter()),
+        }
     }
 
     /// The method, with its window and order.
     #[must_use]
     pub fn method(&self) -> Method {
-        self.propagator.method()
+        match &self.integrator {
+            Integrator::Alone(propagator) => propagator.method(),
+            Integrator::Aided(aided) => aided.method(),
+        }
     }
 
     /// From the convention everything is computed in (ENU or start, FLU) to the one asked for. World
@@ -252,6 +310,16 @@ impl Estimator {
         for sample in &mut self.out {
             *sample = relabelled(sample, Convention::EnuFlu, to);
         }
+    }
+}
+
+fn conditioning(plan: &Plan, resolved: &Resolved, prepared: &Prepared) -> condition::Settings {
+    let settings = resolved.conditioning(plan, prepared.clock, prepared.bias);
+    let scale = prepared.aiding.map_or(1.0, |aiding| aiding.force_scale);
+    condition::Settings {
+        accel_scale: settings.accel_scale * scale,
+        truncation_step: prepared.truncation_step,
+        ..settings
     }
 }
 

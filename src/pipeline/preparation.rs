@@ -3,12 +3,14 @@
 //! Apart from the estimator because it is all about what is not known yet: when enough has been
 //! seen, and what to say when it can not be known.
 
+use super::aiding::{self, Aiding};
 use super::intervals::Mismatch;
 use super::passes::{FEW, RestPass};
 use super::stamps::{StampPass, Stamps};
 use crate::condition::stillness::{self, Limits, NoRest, Rests};
+use crate::condition::truncation::Grid;
 use crate::condition::{Clock, ClockWarning, GyroUnit, Settings, choose_clock};
-use crate::config::{Bias, Initial, Plan};
+use crate::config::{Aid, Bias, Initial, Plan, Truncation};
 use crate::decode::{self, Stated, TimeUnit};
 use crate::model::attitude::{Quaternion, YawPitchRoll};
 use crate::model::frames::{Body, BodyAxes, Convention, EARTH_RATE, In, Nav, Sensor, World};
@@ -18,8 +20,6 @@ use nalgebra::{Matrix3, Vector3};
 /// Samples, and seconds of data, in which rest is sought when the log can not be read twice.
 const MANY: usize = 200_000;
 const REST_SECS: f64 = 60.0;
-/// Standard gravity, m/s^2.
-const STANDARD_GRAVITY: f64 = 9.806_65;
 
 /// The flags and what the format states, put together: a flag wins.
 #[derive(Clone, Debug)]
@@ -32,6 +32,8 @@ pub struct Resolved {
     pub body: BodyAxes,
     /// Multiplies the recorded acceleration.
     pub accel_scale: f64,
+    /// Its unit, where the format says.
+    pub accel_unit_stated: Option<decode::AccelUnit>,
     /// The convention of recorded orientations.
     pub recorded: Convention,
     /// Where the samples' own interval lies, and its unit.
@@ -55,10 +57,8 @@ impl Resolved {
         Resolved {
             kind: plan.kind.or(stated.sample_kind).unwrap_or_default(),
             unit,
-            accel_scale: match stated.accel_unit {
-                Some(decode::AccelUnit::StandardGravity) => STANDARD_GRAVITY,
-                Some(decode::AccelUnit::MetresPerSecondSquared) | None => 1.0,
-            },
+            accel_scale: aiding::scale_of(stated.accel_unit),
+            accel_unit_stated: stated.accel_unit,
             recorded: orientation_convention(stated),
             interval: stated.interval.clone(),
             axes: body
@@ -173,6 +173,10 @@ pub struct Prepared {
     pub world: World,
     /// What becomes of the stamps.
     pub stamps: Stamps,
+    /// What corrects the attitude, where something does.
+    pub aiding: Option<Aiding>,
+    /// Step in which the driver cut the rates, rad/s, where that is undone.
+    pub truncation_step: Option<f64>,
     /// Things to know.
     pub warnings: Vec<String>,
 }
@@ -197,6 +201,8 @@ pub struct Preparation {
     last: Option<RawSample>,
     rest: Option<RestPass>,
     stamps: Option<StampPass>,
+    /// Rates (rad/s, sensor axes), where it is to be seen whether they were cut.
+    rates: Option<Vec<[f64; 3]>>,
     /// What a pass before this one found.
     known: Option<Stamps>,
 }
@@ -214,6 +220,10 @@ impl Preparation {
             last: None,
             rest: needs_rest(plan).then(|| RestPass::new(plan, resolved)),
             stamps: None,
+            rates: (looks_for_truncation(plan)
+                && patience == Patience::WholeLog
+                && resolved.kind != SampleKind::DeltaAngle)
+                .then(Vec::new),
             known: None,
         }
     }
@@ -246,6 +256,11 @@ impl Preparation {
         {
             pass.push(raw)?;
         }
+        if let (Some(rates), Some(gyro)) = (&mut self.rates, raw.gyro)
+            && rates.len() < MANY
+        {
+            rates.push(gyro.map(|w| w * self.resolved.unit.to_rad()));
+        }
         match &mut self.rest {
             Some(rest) => rest.push(std::slice::from_ref(raw)),
             None => Ok(()),
@@ -264,7 +279,10 @@ impl Preparation {
         let secs =
             |a: Option<Nanos>, b: Option<Nanos>| a.zip(b).map_or(0.0, |(a, b)| b.secs_since(a));
         match self.patience {
-            Patience::WholeLog => self.rest.is_some() || self.stamps.is_some(),
+            Patience::WholeLog => {
+                let wants_rates = self.rates.as_ref().is_some_and(|rates| rates.len() < MANY);
+                self.rest.is_some() || self.stamps.is_some() || wants_rates
+            }
             Patience::FirstMinute => {
                 self.rest.is_some()
                     && self.taken < MANY
@@ -286,6 +304,7 @@ impl Preparation {
             first,
             rest,
             stamps,
+            rates,
             known,
             ..
         } = self;
@@ -322,7 +341,11 @@ impl Preparation {
             (Some(stamps), _) => stamps,
         };
         warnings.extend(earth.and_then(|e| e.heading_warning(plan.initial)));
+        let aiding = Aiding::decide(&plan, &resolved, &first, &mut warnings)?;
+        let truncation_step = decide_truncation(plan.truncation, rates.as_deref(), &mut warnings)?;
         Ok(Prepared {
+            aiding,
+            truncation_step,
             clock,
             bias,
             bias_sigma,
@@ -366,7 +389,10 @@ pub fn at_once(plan: &Plan, resolved: &Resolved, first: &RawSample) -> Result<Pr
     } else {
         Stamps::AsRecorded
     };
+    let aiding = Aiding::decide(plan, resolved, std::slice::from_ref(first), &mut warnings)?;
     Ok(Prepared {
+        aiding,
+        truncation_step: decide_truncation(plan.truncation, None, &mut warnings)?,
         clock: plan.clock,
         bias,
         bias_sigma,
@@ -383,6 +409,47 @@ pub fn at_once(plan: &Plan, resolved: &Resolved, first: &RawSample) -> Result<Pr
 /// Whether the plan asks for something only rest can tell.
 fn needs_rest(plan: &Plan) -> bool {
     plan.bias == Bias::Auto || plan.initial == Initial::Gravity
+}
+
+/// Whether it is to be seen from the data if their driver has cut them.
+fn looks_for_truncation(plan: &Plan) -> bool {
+    match plan.truncation {
+        Truncation::Unsaid => plan.aid != Aid::None,
+        Truncation::Auto | Truncation::On => true,
+        Truncation::Steps(_) | Truncation::Off => false,
+    }
+}
+
+/// `rates` are those of a file that can be read twice, where they are looked at.
+fn decide_truncation(
+    asked: Truncation,
+    rates: Option<&[[f64; 3]]>,
+    warnings: &mut Vec<String>,
+) -> Result<Option<f64>, String> {
+    let grid = match (asked, rates) {
+        (Truncation::Steps(step), _) => return Ok(Some(step)),
+        (Truncation::On, None) => {
+            return Err("--undo-truncation on: what can not be read twice does not show its step in time\n  help: on=STEP in rad/s, as `strapd replay` of a file says it".to_owned());
+        }
+        (_, None) => return Ok(None),
+        (_, Some(rates)) => Grid::of(rates),
+    };
+    let is_asked = asked == Truncation::On;
+    match grid {
+        None if is_asked => Err("--undo-truncation on: these rates count in no steps\n  help: on=STEP in rad/s states them, off leaves the rates alone".to_owned()),
+        Some(grid) if is_asked || grid.is_truncated() => {
+            let degrees = grid.step.to_degrees();
+            let why = grid.zero_bin.map_or_else(String::new, |ratio| {
+                format!(" (the one about zero is {ratio:.1} times as wide)")
+            });
+            warnings.push(format!(
+                "the driver cut the rates towards zero in steps of {degrees:.4} deg/s{why}: half a step was put back; --undo-truncation off leaves them, on={:.6e} does it to a stream",
+                grid.step
+            ));
+            Ok(Some(grid.step))
+        }
+        _ => Ok(None),
+    }
 }
 
 /// `earth` is what the gyro feels of the Earth's rotation at the initial attitude, rad/s, where that is
@@ -442,7 +509,24 @@ fn decide_initial(
     // What the user gives is in the convention of the world asked for.
     let asked = plan.world.convention().unwrap_or(Convention::EnuFlu);
     let inside = |q: Quaternion<Nav, Body>| asked.convert(Convention::EnuFlu, q);
+    // Gravity gives the vertical, whatever it starts from.
+    let world = match (plan.aid, plan.world) {
+        (Aid::Gravity, World::Start) => World::Level,
+        (_, asked) => asked,
+    };
     match plan.initial {
+        Initial::Identity if plan.aid == Aid::Gravity => {
+            if world != World::Level {
+                warnings.push(format!(
+                    "the heading at the first sample was taken as 0 in {world}: gravity does not tell it; --init first-orientation, q=.. or rpy=.. gives a real one"
+                ));
+            }
+            Ok((
+                inside(Quaternion::identity()),
+                "level from the first specific force, heading 0".to_owned(),
+                world,
+            ))
+        }
         Initial::Identity => {
             if plan.world != World::Start {
                 warnings.push(format!(
@@ -459,7 +543,7 @@ fn decide_initial(
         Initial::Given(wxyz) => Ok((
             inside(Quaternion::assume_unit(wxyz)),
             "as given".to_owned(),
-            plan.world,
+            world,
         )),
         Initial::Gravity => {
             let level =
@@ -470,11 +554,7 @@ fn decide_initial(
             let shown = Convention::EnuFlu.convert(asked, level);
             let angles = shown.yaw_pitch_roll();
             let q = Quaternion::from_yaw_pitch_roll(&YawPitchRoll { yaw: 0.0, ..angles });
-            Ok((
-                inside(q),
-                "level from gravity, heading 0".to_owned(),
-                plan.world,
-            ))
+            Ok((inside(q), "level from gravity, heading 0".to_owned(), world))
         }
         Initial::FirstOrientation => {
             let found = gathered
@@ -485,8 +565,8 @@ fn decide_initial(
                 "--init first-orientation: the first samples carry no orientation\n  help: --init gravity, identity, q=w,x,y,z or rpy=roll,pitch,yaw".to_owned()
             })?;
             let world = match (plan.world, resolved.recorded) {
-                (World::Start, Convention::NedFrd) => World::Ned,
-                (World::Start, _) => World::Enu,
+                (World::Start | World::Level, Convention::NedFrd) => World::Ned,
+                (World::Start | World::Level, _) => World::Enu,
                 (asked, _) => asked,
             };
             Ok((q, "first recorded orientation".to_owned(), world))

@@ -4,6 +4,7 @@
 use super::preparation::Prepared;
 use super::run::{Replay, Source};
 use super::session::Found;
+use crate::config::Aid;
 use crate::error::{Error, Result};
 use crate::model::frames::EARTH_RATE;
 use crate::sink::{Provenance, Stream, Target};
@@ -34,6 +35,9 @@ pub fn of(
     put("input".to_owned(), run.source.name().display().to_string());
     put("method".to_owned(), run.plan.method.to_string());
     put("noise".to_owned(), run.plan.noise.name.clone());
+    if run.plan.aid == Aid::Gravity {
+        put("aid".to_owned(), "gravity".to_owned());
+    }
     // The ends are read only where there is something to write the result into, and never of a
     // pipe: opening it a second time would wait for a second writer.
     if let Source::File(path) = &run.source

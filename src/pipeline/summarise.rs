@@ -8,6 +8,7 @@ use crate::condition::regularise;
 use crate::model::attitude::Quaternion;
 use crate::propagate::Method;
 use crate::record::{Nanos, SampleKind, Verdict};
+use crate::report::aid::Aided;
 use crate::report::drawn::Drawn;
 use crate::report::stamps::{Regularised, Segment};
 use crate::report::summary::{Gaps, RunSummary, TopicSummary, significant};
@@ -97,6 +98,7 @@ fn of_topic(run: &Replay, topic: &mut Topic) -> TopicSummary {
         latitude_deg: run.plan.latitude_deg,
         bias: topic.prepared.bias.into(),
         bias_origin: topic.prepared.bias_origin.clone(),
+        aided: topic.estimator.filter().map(Aided::of),
         noise: run.plan.noise.name.clone(),
         drift: drift(run, topic, propagation.integrated_secs),
         integration_error: propagation.integration_error,

@@ -2,6 +2,7 @@
 //!
 //! Built by the pipeline, which knows the numbers; the words are here, in one place.
 
+use super::aid::Aided;
 use super::drawn::Drawn;
 use super::stamps::Regularised;
 use crate::compare::BodyAxesFit;
@@ -53,6 +54,8 @@ pub struct TopicSummary {
     pub bias: [f64; 3],
     /// Where the bias came from, with its sigma where it was estimated.
     pub bias_origin: String,
+    /// What corrected the attitude, where something did.
+    pub aided: Option<Aided>,
     /// Noise behind sigma.
     pub noise: String,
     /// Drift to be expected from what is not known of the bias, rad/s.
@@ -270,6 +273,18 @@ impl TopicSummary {
                 self.input_axes, self.body, self.world, self.initial
             ),
         );
+        match &self.aided {
+            None => line(
+                out,
+                "aid",
+                "none: the gyro alone, which drifts (--aid gravity corrects tilt by the accelerometer)",
+            ),
+            Some(aided) => {
+                for (i, words) in aided.lines().iter().enumerate() {
+                    line(out, if i == 0 { "aid" } else { "" }, words);
+                }
+            }
+        }
         line(out, "bias", &self.bias_text());
         if let Some(latitude) = self.latitude_deg {
             line(
@@ -305,12 +320,11 @@ impl TopicSummary {
             out,
             "sigma",
             &format!(
-                "{}, {}, {} deg about x, y, z at the end; drift of about {} deg/h to be expected ({} noise)",
+                "{}, {}, {} deg about x, y, z at the end; {}",
                 significant(sx, 2),
                 significant(sy, 2),
                 significant(sz, 2),
-                significant(self.drift.to_degrees() * 3600.0, 2),
-                self.noise
+                self.drift_text()
             ),
         );
         line(
@@ -367,6 +381,18 @@ impl TopicSummary {
                 ),
             );
         }
+    }
+
+    fn drift_text(&self) -> String {
+        if self.aided.is_some() {
+            return "of tilt and of heading relative to the start, as the filter knows them"
+                .to_owned();
+        }
+        format!(
+            "drift of about {} deg/h to be expected ({} noise)",
+            significant(self.drift.to_degrees() * 3600.0, 2),
+            self.noise
+        )
     }
 
     fn bias_text(&self) -> String {
@@ -436,6 +462,7 @@ impl TopicSummary {
             "earth_rate": self.latitude_deg.map(|latitude| json!({
                 "latitude_deg": latitude, "rad_s": EARTH_RATE,
             })),
+            "aid": self.aided.as_ref().map(Aided::json),
             "noise": self.noise,
             "drift_deg_per_h": self.drift.to_degrees() * 3600.0,
             "integration_error_deg": self.integration_error.map(f64::to_degrees),

@@ -17,6 +17,7 @@ use crate::pipeline::opening::labelled;
 use crate::pipeline::preparation::{Prepared, Resolved, at_once};
 use crate::propagate::{Method, Sequential};
 use crate::record::{AttitudeSample, Counts, Nanos, RawSample, Verdict};
+use crate::report::aid::Aided;
 use crate::serve::channel::Channel;
 use crate::serve::hub::Run;
 use crate::serve::recorder::stream_of;
@@ -538,6 +539,7 @@ impl SensorStream {
             "method": self.estimator.method().name(),
             "world": self.channel.stream().world_axes,
             "body": self.channel.stream().body_axes,
+            "aid": self.estimator.filter().map(|filter| Aided::of(filter).json()),
             "initial": self.prepared.initial_origin,
             "bias": self.prepared.bias_origin,
             "interval_mismatches": self.intervals.found(),

@@ -17,6 +17,8 @@ pub enum World {
     /// The attitude at the first sample: gyros alone know no other world.
     #[default]
     Start,
+    /// z up, heading as at the first sample, with an FLU body: what gravity and gyros know.
+    Level,
     /// x east, y north, z up, with an FLU body.
     Enu,
     /// x north, y east, z down, with an FRD body.
@@ -26,11 +28,12 @@ pub enum World {
 }
 
 impl World {
-    /// The pair of world and body axes; `None` for [`World::Start`], which names no directions.
+    /// The pair of world and body axes; `None` for [`World::Start`] and [`World::Level`], which name no
+    /// direction on the ground.
     #[must_use]
     pub fn convention(self) -> Option<Convention> {
         match self {
-            World::Start => None,
+            World::Start | World::Level => None,
             World::Enu => Some(Convention::EnuFlu),
             World::Ned => Some(Convention::NedFrd),
             World::Nwu => Some(Convention::NwuFlu),
@@ -42,12 +45,13 @@ impl FromStr for World {
     type Err = ParseWorldError;
 
     /// # Errors
-    /// [`ParseWorldError`] for anything but `enu`, `ned`, `nwu`, `start`.
+    /// [`ParseWorldError`] for anything but `enu`, `ned`, `nwu`, `level`, `start`.
     fn from_str(text: &str) -> Result<World, ParseWorldError> {
         match text.to_ascii_lowercase().as_str() {
             "enu" => Ok(World::Enu),
             "ned" => Ok(World::Ned),
             "nwu" => Ok(World::Nwu),
+            "level" => Ok(World::Level),
             "start" => Ok(World::Start),
             _ => Err(ParseWorldError { text: quoted(text) }),
         }
@@ -58,6 +62,7 @@ impl fmt::Display for World {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             World::Start => "start",
+            World::Level => "level",
             World::Enu => "enu",
             World::Ned => "ned",
             World::Nwu => "nwu",
@@ -75,7 +80,7 @@ impl fmt::Display for ParseWorldError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "`{}` is no world\n  help: enu, ned, nwu or start",
+            "`{}` is no world\n  help: enu, ned, nwu, level or start",
             self.text
         )
     }
