@@ -52,11 +52,16 @@ pub struct Plan {
     pub aid: Aid,
     /// `--undo-truncation`.
     pub truncation: Truncation,
+    /// `--sensor-delay`, s.
+    pub sensor_delay_secs: f64,
     /// `--start`, s.
     pub start: Option<f64>,
     /// `--until`, s.
     pub until: Option<f64>,
 }
+
+/// No sensor's own filters take longer, s.
+const LONGEST_DELAY: f64 = 0.1;
 
 /// `--aid`: what corrects the attitude of the gyro.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Hash)]
@@ -129,6 +134,7 @@ impl Default for Plan {
             noise: Noise::preset(&NOISE_PRESETS[0]),
             aid: Aid::None,
             truncation: Truncation::Unsaid,
+            sensor_delay_secs: 0.0,
             start: None,
             until: None,
         }
@@ -170,6 +176,12 @@ impl Plan {
         conditioning
             .validate()
             .map_err(|e| Error::Usage(e.to_string()))?;
+        if self.sensor_delay_secs.is_nan() || self.sensor_delay_secs.abs() > LONGEST_DELAY {
+            return Err(Error::Usage(format!(
+                "--sensor-delay: {} s is no delay of a sensor\n  help: seconds, at most {LONGEST_DELAY}: 0.0023 for 2.3 ms",
+                self.sensor_delay_secs
+            )));
+        }
         self.check_earth_rate()?;
         if self.regularise_stamps && matches!(self.clock, Clock::Index { .. }) {
             return Err(Error::Usage(

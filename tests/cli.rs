@@ -4,6 +4,8 @@
 #![cfg(feature = "service")]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
+#[path = "cli/aiding.rs"]
+mod aiding;
 #[path = "cli/bare_stamps.rs"]
 mod bare_stamps;
 #[path = "cli/flags.rs"]

@@ -76,37 +76,44 @@ def product(a, b):
     )
 
 
-def score(estimate, ref, moves, absolute):
-    """Total, heading, inclination, degrees."""
+def score(estimate, ref, moves, absolute, sigma=None):
+    """Total, heading, inclination, degrees; share of the errors about the body's axes within three sigma."""
     scored = moves & ~np.isnan(ref).any(axis=1)
     e, r = estimate[scored], ref[scored]
     if np.isnan(e).any():
-        return np.full(3, np.nan)
-    difference = product(e, r * [1, -1, -1, -1])
+        return np.full(4, np.nan)
     if not absolute:
-        w, z = difference[0, 0], difference[0, 3]
-        length = np.hypot(w, z)
-        turn = np.tile([w / length, 0.0, 0.0, -z / length], (len(e), 1))
-        difference = product(product(turn, e), r * [1, -1, -1, -1])
+        first = product(e[:1], r[:1] * [1, -1, -1, -1])[0]
+        length = np.hypot(first[0], first[3])
+        turn = np.tile([first[0] / length, 0.0, 0.0, -first[3] / length], (len(e), 1))
+        e = product(turn, e)
+    difference = product(e, r * [1, -1, -1, -1])
     difference /= np.linalg.norm(difference, axis=1)[:, None]
     w, z = np.abs(difference[:, 0]), np.abs(difference[:, 3])
     clip = lambda x: np.minimum(1.0, x)
     angles = [2 * np.arccos(clip(w)), 2 * np.arctan2(z, w), 2 * np.arccos(clip(np.hypot(w, z)))]
-    return np.array([np.degrees(np.sqrt(np.mean(a**2))) for a in angles])
+    within = np.nan
+    if sigma is not None:
+        body = product(e * [1, -1, -1, -1], r)
+        body *= np.where(body[:, :1] < 0, -1, 1)
+        within = 100 * np.mean(np.degrees(2 * np.abs(body[:, 1:])) <= 3 * sigma[scored])
+    return np.array([np.degrees(np.sqrt(np.mean(a**2))) for a in angles] + [within])
 
 
 def strapd(binary, flags, path, stamps):
-    """Attitude at each stamp through the command line, and the share of errors within three sigma of it."""
+    """Attitude and sigma (degrees, body axes) at each stamp through the command line."""
     with tempfile.TemporaryDirectory() as folder:
         out = os.path.join(folder, "attitude.csv")
         command = [binary, "replay", path, "-o", out, "--quiet", *shlex.split(flags)]
-        subprocess.run(command, check=False, stdout=subprocess.DEVNULL)
+        subprocess.run(command, check=False, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         with open(out, newline="", encoding="utf-8") as stream:
             rows = list(csv.DictReader(stream))
     at = {int(row["stamp_ns"]): row for row in rows}
-    names = next(iter(rows)).keys()
+    names = rows[0].keys()
     q = ["w", "x", "y", "z"] if "w" in names else ["qw", "qx", "qy", "qz"]
-    return np.array([[float(at[t][c]) if t in at else np.nan for c in q] for t in stamps])
+    columns = [*q, "sigma_x_deg", "sigma_y_deg", "sigma_z_deg"]
+    found = np.array([[float(at[t][c]) if t in at else np.nan for c in columns] for t in stamps])
+    return found[:, :4], found[:, 4:]
 
 
 @peer("VQF real time")
@@ -139,10 +146,11 @@ def imufusion(secs, gyr, acc, mag):
     steps = np.diff(secs, prepend=secs[0] - np.median(np.diff(secs)))
     six = []
     fusion = package.Ahrs()
-    for g, f, dt in zip(np.degrees(gyr), acc / 9.80665, steps):
-        fusion.update_no_magnetometer(g, f, dt)
-        q = fusion.quaternion
-        six.append([q.w, q.x, q.y, q.z])
+    degrees, g = np.degrees(gyr), acc / 9.80665
+    for rate, force, step in zip(degrees, g, steps):
+        fusion.set_sample_period(step)
+        fusion.update_no_magnetometer(rate, force)
+        six.append(np.array(fusion.get_quaternion(), float))
     return np.array(six), None
 
 
@@ -197,8 +205,8 @@ def main():
         secs = (stamps - stamps[0]) * 1e-9
         name = os.path.basename(path)[:-5]
         for flags in runs:
-            quaternions = strapd(args.strapd, flags, path, stamps)
-            table.setdefault(f"strapd {flags}", {})[name] = score(quaternions, ref, moves, False)
+            quaternions, sigma = strapd(args.strapd, flags, path, stamps)
+            table.setdefault(f"strapd {flags}", {})[name] = score(quaternions, ref, moves, False, sigma)
         for who, run in PEERS.items() if args.peers else []:
             try:
                 six, nine = run(secs, gyr, acc, mag)
@@ -208,9 +216,9 @@ def main():
             table.setdefault(f"{who} 6D", {})[name] = score(six, ref, moves, False)
             if nine is not None:
                 table.setdefault(f"{who} 9D", {})[name] = score(nine, ref, moves, True)
-    print("| deg, total / heading / inclination | mean |", " | ".join(os.path.basename(p)[:2] for p in paths), "|")
+    print("| deg, total / heading / inclination; within 3 sigma | mean |", " | ".join(os.path.basename(p)[:2] for p in paths), "|")
     print("|---|---|" + "---|" * len(paths))
-    words = lambda s: " / ".join(f"{v:.2f}" for v in s)
+    words = lambda s: " / ".join(f"{v:.2f}" for v in s[:3]) + ("" if np.isnan(s[3]) else f"; {s[3]:.1f} %")
     for who, trials in table.items():
         cells = [words(trials[os.path.basename(p)[:-5]]) for p in paths]
         print(f"| {who} | **{words(np.mean(list(trials.values()), axis=0))}** |", " | ".join(cells), "|")

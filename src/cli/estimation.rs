@@ -47,6 +47,14 @@ pub struct Estimation {
     /// on=STEP in rad/s, off [default: auto with --aid, else off]
     #[arg(long, value_name = "WHEN", env = "STRAPD_UNDO_TRUNCATION")]
     pub undo_truncation: Option<String>,
+    /// Delay of the sensor's own filters, in seconds: each attitude is turned on by its rate for so long
+    #[arg(
+        long,
+        value_name = "SECS",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
+    pub sensor_delay: f64,
     /// Unit of the recorded rates [default: rad, unless the format says otherwise]
     #[arg(long, value_enum, env = "STRAPD_GYRO_UNIT")]
     pub gyro_unit: Option<UnitArg>,
@@ -272,6 +280,7 @@ impl Estimation {
             gyro_range: self.gyro_range,
             noise: Noise::parse(&self.noise)?,
             aid: self.aid.into(),
+            sensor_delay_secs: self.sensor_delay,
             truncation: self
                 .undo_truncation
                 .as_deref()

@@ -8,6 +8,7 @@ use crate::aid::{self, Aided};
 use crate::condition::regularise::{self, Regulariser};
 use crate::condition::{self, Conditioner};
 use crate::config::Plan;
+use crate::model::attitude::RotationVector;
 use crate::model::frames::{Convention, World};
 use crate::propagate::{self, Executor, Method, Propagator};
 use crate::record::{AttitudeSample, Nanos, RateSample, RawSample};
@@ -19,6 +20,8 @@ pub struct Estimator {
     conditioner: Conditioner,
     regulariser: Option<Regulariser>,
     integrator: Integrator,
+    /// Of the sensor's own filters, s.
+    delay: f64,
     world: World,
     /// Tells settings apart under which a [`Memory`] means something else.
     settings: u64,
@@ -132,6 +135,7 @@ impl Estimator {
             conditioner: Conditioner::new(settings).map_err(|e| e.to_string())?,
             regulariser: prepared.stamps.regulariser(resolved.kind)?,
             integrator,
+            delay: plan.sensor_delay_secs,
             world: prepared.world,
             rates: Vec::new(),
             even: Vec::new(),
@@ -148,6 +152,10 @@ impl Estimator {
         let mut last = *last;
         if let Some(from) = self.world.convention() {
             last = relabelled(&last, from, Convention::EnuFlu);
+        }
+        if self.delay != 0.0 {
+            let back = RotationVector(last.rate * -self.delay);
+            last.q_nb = last.q_nb.advanced(&back).normalised();
         }
         match &mut self.integrator {
             Integrator::Alone(propagator) => propagator.resume(&last),
@@ -229,6 +237,7 @@ impl Estimator {
     pub fn attitudes(&mut self, exec: &impl Executor) -> &[AttitudeSample] {
         self.out.clear();
         self.propagate(exec);
+        self.catch_up();
         self.relabel();
         &self.out
     }
@@ -244,6 +253,7 @@ impl Estimator {
             self.even.clear();
         }
         self.integrator.finish(exec, &mut self.out);
+        self.catch_up();
         self.relabel();
         &self.out
     }
@@ -297,6 +307,17 @@ impl Estimator {
         match &self.integrator {
             Integrator::Alone(propagator) => propagator.method(),
             Integrator::Aided(aided) => aided.method(),
+        }
+    }
+
+    /// What a sensor measured late has happened at the stamp already.
+    fn catch_up(&mut self) {
+        if self.delay == 0.0 {
+            return;
+        }
+        for sample in &mut self.out {
+            let turn = RotationVector(sample.rate * self.delay);
+            sample.q_nb = sample.q_nb.advanced(&turn).normalised();
         }
     }
 
