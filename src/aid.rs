@@ -11,7 +11,8 @@
 //! force less gravity -> tilt, calibration                       gravity
 //! rate at rest -> bias                                          rest
 //! heading of the field -> heading                               heading
-//! correction -> left of the attitude                            filter
+//! correction -> left of the attitude                            update
+//! first force, field -> level, north                            start
 //! ```
 //!
 //! Rotations by a left factor commute with integration, so the propagator never sees the attitude jump.
@@ -37,8 +38,10 @@ mod heading;
 mod interval;
 mod rest;
 mod settings;
+mod start;
 #[cfg(test)]
 mod tests;
+mod update;
 
 pub use aided::{Aided, Start};
 pub use calibration::Calibration;

@@ -14,6 +14,7 @@ mod serve {
     pub(crate) mod daemon;
 
     mod admission;
+    mod aiding;
     mod bad_lines;
     mod bare_stamps;
     mod cat;

@@ -175,9 +175,9 @@ def ekf(secs, gyr, acc, mag):
     from ahrs.filters import EKF
 
     hz = 1.0 / float(np.median(np.diff(secs)))
-    # Its quaternion takes NED earth axes to the body's; half a turn about x + y makes it ours.
     q = EKF(gyr=gyr, acc=acc, frequency=hz, frame="ENU").Q
-    return q, None
+    # Its earth axes come out with z down: half a turn about x.
+    return product(np.tile([0.0, 1.0, 0.0, 0.0], (len(q), 1)), q), None
 
 
 @peer("AQUA (ahrs)")

@@ -4,9 +4,12 @@ use super::calibration::Applied;
 use super::filter::{Filter, Measured, Report};
 use super::settings::Settings;
 use crate::propagate::{self, Method, Propagator, Sequential, SettingsError};
-use crate::record::{AttitudeSample, Join, Nanos, RateSample, SampleKind, Status};
+use crate::record::{AttitudeSample, Join, Nanos, RateSample, SampleKind};
 use nalgebra::Vector3;
 use std::collections::VecDeque;
+
+/// Of an attitude that was saved, rad: it is never known better.
+const TILT_RESUMED: f64 = 0.02;
 
 /// What is known of the attitude at the first sample.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -59,6 +62,8 @@ pub struct Aided {
     filter: Filter,
     kind: SampleKind,
     start: Start,
+    /// The attitude is not that of this stream's beginning, but one that was saved.
+    is_resumed: bool,
     /// Given to the propagator, whose attitudes have not come out yet.
     given: VecDeque<Given>,
     last: Option<Nanos>,
@@ -92,6 +97,7 @@ impl Aided {
             propagator: Propagator::new(propagation)?,
             kind: propagation.kind,
             start,
+            is_resumed: false,
             given: VecDeque::new(),
             last: None,
             scratch: Vec::new(),
@@ -129,12 +135,7 @@ impl Aided {
     /// As there.
     pub fn resume(&mut self, last: &AttitudeSample) -> Result<(), SettingsError> {
         self.propagator.resume(last)?;
-        // Its tilt is no worse than one levelled anew; what it says of heading is kept.
-        let earth = last.covariance.in_navigation_axes(&last.q_nb);
-        self.start = Start::Known {
-            tilt: earth[(0, 0)].max(earth[(1, 1)]).sqrt().max(0.02),
-            heading: earth[(2, 2)].sqrt(),
-        };
+        self.is_resumed = true;
         Ok(())
     }
 
@@ -220,21 +221,32 @@ impl Aided {
 
     fn take(&mut self, given: &Given, propagated: &AttitudeSample) {
         let (measured, attitude) = (&given.measured, &propagated.q_nb);
-        let is_new = given.join == Join::Start && !propagated.status.has(Status::HELD);
         if given.join == Join::Reset {
             self.filter.reset();
         }
-        if is_new || given.join == Join::Reset {
-            match self.start {
+        if !self.filter.is_started() {
+            match self.start_at(propagated) {
                 Start::Level => self.filter.begin(measured, attitude),
                 Start::Known { tilt, heading } => {
                     self.filter.begin_known(measured, tilt, heading);
                 }
             }
         } else if matches!(given.join, Join::Hold | Join::Start) {
-            self.filter.hold(measured, attitude);
+            self.filter.hold(measured);
         } else if measured.secs > 0.0 {
             self.filter.take(measured, &given.applied, attitude);
+        }
+    }
+
+    /// What is known at a first sample: of an attitude that was saved, what the propagator says of it by now.
+    fn start_at(&mut self, propagated: &AttitudeSample) -> Start {
+        if !std::mem::take(&mut self.is_resumed) {
+            return self.start;
+        }
+        let earth = propagated.covariance.in_navigation_axes(&propagated.q_nb);
+        Start::Known {
+            tilt: earth[(0, 0)].max(earth[(1, 1)]).sqrt().max(TILT_RESUMED),
+            heading: earth[(2, 2)].sqrt(),
         }
     }
 }

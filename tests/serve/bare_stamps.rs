@@ -7,8 +7,14 @@ use std::io::Write;
 use std::process::{Command, Output, Stdio};
 
 pub(crate) fn replayed(lines: &str) -> Output {
+    replayed_with(lines, &[])
+}
+
+/// The same with these flags.
+pub(crate) fn replayed_with(lines: &str, flags: &[&str]) -> Output {
     let mut child = Command::new(strapd())
         .args(["replay", "-", "--method", "commit", "-o", "-"])
+        .args(flags)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())

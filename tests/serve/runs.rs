@@ -33,7 +33,7 @@ fn lively(n: u64) -> Option<String> {
 }
 
 /// A daemon without sockets.
-struct Fed {
+pub(crate) struct Fed {
     hub: Arc<Hub>,
     watcher: Session,
     scratch: Scratch,
@@ -41,8 +41,8 @@ struct Fed {
 
 /// What came of some lines.
 #[derive(Debug, Default)]
-struct Got {
-    attitudes: Vec<String>,
+pub(crate) struct Got {
+    pub(crate) attitudes: Vec<String>,
     /// To who sent them.
     said: Vec<Value>,
 }
@@ -79,7 +79,7 @@ impl Fed {
         }
     }
 
-    fn of(plan: &Plan) -> Fed {
+    pub(crate) fn of(plan: &Plan) -> Fed {
         Fed::new(Settings {
             plan: plan.clone(),
             ..Settings::default()
@@ -87,7 +87,7 @@ impl Fed {
     }
 
     /// Another daemon, after this one was ended: between the two there is text.
-    fn restarted(self, plan: &Plan) -> Fed {
+    pub(crate) fn restarted(self, plan: &Plan) -> Fed {
         let text = serde_json::to_string(&self.hub.saved()).unwrap();
         Fed::new(Settings {
             plan: plan.clone(),
@@ -101,7 +101,7 @@ impl Fed {
         self.lines(numbers.into_iter().filter_map(lively))
     }
 
-    fn lines(&mut self, lines: impl IntoIterator<Item = String>) -> Got {
+    pub(crate) fn lines(&mut self, lines: impl IntoIterator<Item = String>) -> Got {
         let mut sender = Session::new(&self.hub, "sender".to_owned(), true);
         let mut got = Got::default();
         let mut parts = VecDeque::new();
