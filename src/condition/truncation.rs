@@ -135,9 +135,9 @@ mod tests {
 
     const STEP: f64 = 0.001_065;
 
-    /// A hand's motion about three axes at 286 Hz, brought to a grid.
+    /// Nine minutes of a hand's motion about three axes at 286 Hz, brought to a grid.
     fn rates(on_grid: impl Fn(f64) -> f64) -> Vec<[f64; 3]> {
-        (0..20_000)
+        (0..150_000)
             .map(|k| {
                 let t = f64::from(k) * 0.0035;
                 [
