@@ -45,5 +45,5 @@ mod update;
 
 pub use aided::{Aided, Start};
 pub use calibration::Calibration;
-pub use filter::{Filter, Measured, Report};
+pub use filter::{Filter, Report};
 pub use settings::Settings;

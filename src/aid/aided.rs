@@ -1,7 +1,7 @@
 //! Propagator and filter together: corrected rates in, corrected attitudes out. Pure.
 
 use super::calibration::Applied;
-use super::filter::{Filter, Measured, Report};
+use super::filter::{Filter, Measured};
 use super::settings::Settings;
 use crate::propagate::{self, Method, Propagator, Sequential, SettingsError};
 use crate::record::{AttitudeSample, Join, Nanos, RateSample, SampleKind};
@@ -115,12 +115,6 @@ impl Aided {
     #[must_use]
     pub fn propagation(&self) -> propagate::Report {
         self.propagator.report()
-    }
-
-    /// What the filter did.
-    #[must_use]
-    pub fn report(&self) -> Report {
-        self.filter.report()
     }
 
     /// See [`Propagator::method`].

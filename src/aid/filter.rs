@@ -15,12 +15,14 @@ use nalgebra::{Matrix3, Vector3};
 const LARGEST_FORCE: f64 = 1000.0;
 /// A field beyond this (each component, whatever its unit) is none.
 const LARGEST_FIELD: f64 = 1e6;
+/// How long a specific force counts for the present, s.
+const FORCE_SECS: f64 = 0.5;
 /// After so many gaps in a row the sensor has become slower.
 const GAPS_IN_A_ROW: u32 = 20;
 
 /// One sample as it was measured, and the attitude it led to.
 #[derive(Clone, Copy, Debug)]
-pub struct Measured {
+pub(crate) struct Measured {
     /// Since the sample before, s.
     pub secs: f64,
     /// The gyro, rad/s, body axes: at the instant or its mean since the sample before.
@@ -93,7 +95,7 @@ impl Filter {
     /// For a gyro whose samples are rates at their instants (`is_instant`) or means since the sample before, in
     /// a world that turns at `world_rate` (rad/s).
     #[must_use]
-    pub fn new(settings: Settings, is_instant: bool, world_rate: In<Nav>) -> Filter {
+    pub(crate) fn new(settings: Settings, is_instant: bool, world_rate: In<Nav>) -> Filter {
         let calibration = Calibration::default();
         let mut filter = Filter {
             settings,
@@ -159,7 +161,12 @@ impl Filter {
     /// Whether the sensor has been at rest for long enough to say so.
     #[must_use]
     pub fn is_at_rest(&self) -> bool {
-        self.is_started && self.rest.is_at_rest(&self.settings)
+        self.is_started && self.rests()
+    }
+
+    /// The same for the filter itself, which asks only when it has begun.
+    pub(super) fn rests(&self) -> bool {
+        self.rest.is_quiet(&self.settings) && self.since_force <= FORCE_SECS
     }
 
     /// Whether tilt is known: a specific force has come.
@@ -170,7 +177,7 @@ impl Filter {
 
     /// The attitude that the propagator's is.
     #[must_use]
-    pub fn corrected(&self, propagated: &Quaternion<Nav, Body>) -> Quaternion<Nav, Body> {
+    pub(crate) fn corrected(&self, propagated: &Quaternion<Nav, Body>) -> Quaternion<Nav, Body> {
         (self.correction * *propagated).normalised()
     }
 
@@ -227,11 +234,13 @@ impl Filter {
     pub(crate) fn hold(&mut self, sample: &Measured) {
         self.interval = Interval::new();
         self.last_force = None;
-        let walk = self.settings.bias_walk.powi(2) * sample.secs;
+        // A clock that was set back does not say how long it was.
+        let secs = sample.secs.max(0.0);
+        let walk = self.settings.bias_walk.powi(2) * secs;
         for axis in 0..3 {
             self.covariance.add(BIAS + axis, walk);
         }
-        self.lose_sight(sample, sample.secs);
+        self.lose_sight(sample, secs);
         self.last_rate = sample.rate;
     }
 

@@ -59,11 +59,7 @@ impl Residuals {
         } else {
             0.0
         };
-        let colour = if settings.colour == 0.0 {
-            1.0
-        } else {
-            ((1.0 + likeness) / (1.0 - likeness)).powf(settings.colour)
-        };
+        let colour = ((1.0 + likeness) / (1.0 - likeness)).powf(settings.colour);
         density / secs * colour
     }
 }
@@ -114,7 +110,7 @@ impl Filter {
         let mut variance = self
             .residuals
             .variance(secs, residual, force.acceleration.z, &settings);
-        if self.rest.is_at_rest(&settings) {
+        if self.rests() {
             let (ax, ay) = (force.acceleration.x, force.acceleration.y);
             let square = ax * ax + ay * ay;
             let tilt = self.covariance.variance(TILT) + self.covariance.variance(TILT + 1);

@@ -70,7 +70,7 @@ impl Filter {
         if now.norm.is_nan() || now.norm <= 0.0 {
             return;
         }
-        let at_rest = self.rest.is_at_rest(&settings);
+        let at_rest = self.rests();
         let around = &mut self.surroundings;
         let reference = around.reference.get_or_insert(now);
         let (norm_off, dip_off) = reference.off(&now);

@@ -5,8 +5,6 @@ use nalgebra::Vector3;
 
 /// Time constant of the means that deviations are from, s.
 const MEAN_SECS: f64 = 0.5;
-/// How long a specific force counts for the present, s.
-const FORCE_SECS: f64 = 0.5;
 
 /// Whether rate and force have been quiet for long enough.
 #[derive(Clone, Debug)]
@@ -15,8 +13,6 @@ pub(super) struct Rest {
     force: Vector3<f64>,
     /// How long all has been quiet, s.
     quiet: f64,
-    /// Since the last specific force, s.
-    since_force: f64,
 }
 
 impl Rest {
@@ -25,7 +21,6 @@ impl Rest {
             rate: Vector3::zeros(),
             force,
             quiet: 0.0,
-            since_force: 0.0,
         }
     }
 
@@ -43,9 +38,7 @@ impl Rest {
         self.rate += (rate - self.rate) * share;
         let mut is_quiet = (rate - self.rate).norm_squared() <= settings.rest_gyro.powi(2)
             && secs <= settings.gap_secs;
-        self.since_force += secs;
         if let Some(force) = force {
-            self.since_force = 0.0;
             self.force += (force - self.force) * share;
             is_quiet &= (force - self.force).norm_squared() <= settings.rest_force.powi(2);
         }
@@ -64,7 +57,7 @@ impl Rest {
         self.quiet = 0.0;
     }
 
-    pub(super) fn is_at_rest(&self, settings: &Settings) -> bool {
-        self.quiet > settings.rest_secs && self.since_force <= FORCE_SECS
+    pub(super) fn is_quiet(&self, settings: &Settings) -> bool {
+        self.quiet > settings.rest_secs
     }
 }

@@ -25,7 +25,7 @@ const BIAS_AFTER_RESET: f64 = 8.7e-4;
 impl Filter {
     /// Begins at a first sample: level by its specific force and with the heading of the propagator's attitude,
     /// or north by its field. Without a force the attitude is the propagator's for now.
-    pub fn begin(&mut self, first: &Measured, propagated: &Quaternion<Nav, Body>) {
+    pub(crate) fn begin(&mut self, first: &Measured, propagated: &Quaternion<Nav, Body>) {
         self.last_rate = first.rate;
         self.last_force = None;
         self.since_force = 0.0;
@@ -58,7 +58,7 @@ impl Filter {
     }
 
     /// Begins with the attitude as the propagator has it, known to `tilt` and `heading` (rad).
-    pub fn begin_known(&mut self, first: &Measured, tilt: f64, heading: f64) {
+    pub(crate) fn begin_known(&mut self, first: &Measured, tilt: f64, heading: f64) {
         self.last_rate = first.rate;
         self.last_force = None;
         self.since_force = 0.0;
@@ -73,7 +73,7 @@ impl Filter {
     }
 
     /// What a new start keeps: the calibration, known a little less.
-    pub fn reset(&mut self) {
+    pub(crate) fn reset(&mut self) {
         self.is_started = false;
         self.correction = Quaternion::identity();
         for axis in 0..3 {
@@ -82,12 +82,7 @@ impl Filter {
         }
     }
 
-    pub(super) fn start(
-        &mut self,
-        correction: Quaternion<Nav, Nav>,
-        heading: f64,
-        force: Vector3<f64>,
-    ) {
+    fn start(&mut self, correction: Quaternion<Nav, Nav>, heading: f64, force: Vector3<f64>) {
         let settings = &self.settings;
         self.correction = correction.normalised();
         self.covariance

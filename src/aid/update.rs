@@ -38,7 +38,7 @@ impl Filter {
         if let Some(force) = force.filter(|_| !is_levelled && !self.wants_level) {
             self.use_gravity(&force, &mut correction);
         }
-        if self.rest.is_at_rest(&settings) {
+        if self.rests() {
             // What the gyro reads of a world that turns is no bias.
             let of_world = self.interval.attitude.transpose() * self.world_rate;
             let mean = (self.interval.rate - of_world) / secs;
@@ -197,7 +197,7 @@ impl Filter {
     /// Covariance of the error of the attitude `q_nb` at the corrected `rate`, rad^2, body axes. More than the
     /// filter's own: accelerations are not white, sensors are late, and their axes are not those of their case.
     #[must_use]
-    pub fn attitude_covariance(
+    pub(crate) fn attitude_covariance(
         &self,
         q_nb: &Quaternion<Nav, Body>,
         rate: &Vector3<f64>,
@@ -212,22 +212,15 @@ impl Filter {
             earth[(axis, axis)] += white;
         }
         let body = r.transpose() * earth * r * COLOURED + rate * rate.transpose() * (DELAY * DELAY);
-        let [xx, xy, xz, yy, yz, zz] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]
+        let upper = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]
             .map(|(i, j)| body[(i, j)] + if i == j { CASE * CASE } else { 0.0 });
-        AttitudeCovariance {
-            xx,
-            xy,
-            xz,
-            yy,
-            yz,
-            zz,
-        }
+        AttitudeCovariance::from_upper(upper)
     }
 
     /// Variances of tilt about east and north and of heading as the filter has them, rad^2: less than what
     /// [`Filter::attitude_covariance`] says.
-    #[must_use]
-    pub fn earth_variances(&self) -> [f64; 3] {
+    #[cfg(test)]
+    pub(super) fn earth_variances(&self) -> [f64; 3] {
         [TILT, TILT + 1, HEADING].map(|state| self.covariance.variance(state))
     }
 }

@@ -1,7 +1,8 @@
 //! The golden case of an independent implementation: motion by formula, a gyro with errors, the propagator
 //! that goes with the figures.
 
-use crate::aid::{Filter, Measured, Settings};
+use crate::aid::filter::Measured;
+use crate::aid::{Filter, Settings};
 use crate::model::attitude::{Quaternion, RotationVector};
 use crate::model::frames::{Body, Dcm, In, Nav};
 use crate::propagate::shared_data;

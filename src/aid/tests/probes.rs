@@ -228,7 +228,7 @@ fn a_held_gap_is_seen_in_sigma_and_levelled_after() {
         sigma(999),
         sigma(1000)
     );
-    assert!(aided.report().levelled > 0);
+    assert!(aided.filter().report().levelled > 0);
     // Tilt is back at the end; heading was lost, and is said to be.
     let last = out[out.len() - 1];
     let up = last.q_nb.to_dcm().as_matrix().transpose() * Vector3::z();
@@ -267,4 +267,23 @@ fn a_rotated_world_does_not_become_bias() {
     assert!(bias < 1e-4, "{bias}");
     let turned = out[2000].q_nb.angle_to(&Quaternion::identity());
     assert!(turned < 1e-3, "{turned}");
+}
+
+#[test]
+fn a_clock_that_is_set_back_is_a_gap_of_unknown_length() {
+    let mut samples = stream();
+    // An hour back, in the middle of it.
+    for sample in &mut samples[1000..] {
+        sample.stamp.0 -= 3_600_000_000_000;
+        sample.start.0 -= 3_600_000_000_000;
+    }
+    samples[1000].join = Join::Hold;
+    let mut aided = aided(propagate::Method::Auto);
+    let mut out = Vec::new();
+    aided.push(&samples, &mut out);
+    aided.finish(&mut out);
+    assert_eq!(out.len(), samples.len());
+    assert_eq!(aided.filter().report().failures, 0);
+    let sigma = aided.filter().calibration_sigma().bias;
+    assert!(sigma.iter().all(|s| *s > 0.0 && *s < 8.7e-3), "{sigma}");
 }
