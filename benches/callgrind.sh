@@ -7,7 +7,7 @@
 # so that the start of the program and the making of the log cancel.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-cargo build --release --quiet --no-default-features --example propagate_once
+cargo build --release --quiet -p strapd-attitude --example propagate_once
 program=target/release/examples/propagate_once
 [ $# -gt 0 ] || set -- rates jittered increments
 

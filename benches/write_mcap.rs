@@ -10,9 +10,9 @@ use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::time::Duration;
-use strapd::model::attitude::Quaternion;
-use strapd::record::{AttitudeCovariance, AttitudeSample, Nanos, Status};
 use strapd::sink::{Compression, Encoding, Flow, Options, Provenance, Sink, Stream, Target};
+use strapd_attitude::quaternion::Quaternion;
+use strapd_attitude::record::{AttitudeCovariance, AttitudeSample, Nanos, Status};
 
 /// A slow turn with full-entropy noise in rate and acceleration: the worst a compressor meets.
 fn samples(count: usize) -> Vec<AttitudeSample> {

@@ -25,7 +25,7 @@ use pictures::Amount;
 use runs::{Failure, MARGIN, Run, arcsec};
 use std::fmt::Write;
 use std::path::PathBuf;
-use strapd::record::SampleKind;
+use strapd_attitude::record::SampleKind;
 
 fn main() -> Result<(), Failure> {
     let mut amount = Amount::Whole;

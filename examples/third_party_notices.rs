@@ -79,14 +79,15 @@ fn linked(metadata: &Value) -> Outcome<Vec<&Value>> {
             );
         }
     }
-    seen.remove(root);
     let linked: Vec<_> = list(metadata, "packages")
         .filter(|package| seen.contains(text(package, "id")))
         .collect();
     if linked.len() < seen.len() {
         return Err("a dependency is not among the packages".into());
     }
-    Ok(linked)
+    // What comes from no registry is ours.
+    let of_others = |package: &&Value| !package["source"].is_null();
+    Ok(linked.into_iter().filter(of_others).collect())
 }
 
 fn notice(package: &Value) -> Outcome<Notice> {

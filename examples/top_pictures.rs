@@ -8,14 +8,14 @@
 #![allow(clippy::print_stdout)]
 
 use std::path::Path;
-use strapd::compare;
-use strapd::model::attitude::Quaternion;
-use strapd::model::frames::{Body, In, Nav};
-use strapd::model::rigid_body::{HeldRate, Spin};
-use strapd::model::top::{Case, EulerState, SymmetricTop, TopMethod, TopRun};
-use strapd::propagate::{Method, Order, Placement};
-use strapd::record::Nanos;
 use strapd::report::plot::{Axis, Chart, Look, Series};
+use strapd_attitude::frames::{Body, In, Nav};
+use strapd_attitude::propagate::{Method, Order, Placement};
+use strapd_attitude::quaternion::Quaternion;
+use strapd_attitude::record::Nanos;
+use strapd_bodies::rigid_body::{HeldRate, Spin};
+use strapd_bodies::top::method_errors;
+use strapd_bodies::top::{Case, EulerState, SymmetricTop, TopMethod, TopRun};
 
 type Failure = Box<dyn std::error::Error>;
 type Attitude = Quaternion<Nav, Body>;
@@ -64,7 +64,7 @@ fn propagated(method: Method, truth: &[Spin], rate_hz: f64) -> Result<Vec<Attitu
         .zip(0..)
         .map(|(spin, k)| (Nanos(nanos(k, rate_hz) as i64), *spin))
         .collect();
-    Ok(compare::top::attitudes(method, &stamped)?)
+    Ok(method_errors::attitudes(method, &stamped)?)
 }
 
 /// One of the model's own methods.

@@ -7,8 +7,8 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::path::Path;
-use strapd::model::youbot::{Arm, JointPath, SeedJoints};
 use strapd::report::plot::{Axis, Chart, Look, Series};
+use strapd_bodies::youbot::{Arm, JointPath, SeedJoints};
 
 fn main() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/pictures");

@@ -9,10 +9,10 @@ use std::sync::{Arc, LazyLock};
 use strapd::decode::framing::{Framed, Framer};
 use strapd::decode::packed::{self, Object};
 use strapd::decode::{Channel, Decoder, Options, decode_line, role};
-use strapd::record::{Nanos, RawSample};
 use strapd::serve::hub::Hub;
 use strapd::serve::session::{Scratch, Session};
 use strapd::source::mcap::{Reader, WalkOptions, walk};
+use strapd_attitude::record::{Nanos, RawSample};
 
 const NOW: Nanos = Nanos(1_700_000_000_000_000_000);
 

@@ -1,13 +1,14 @@
 //! What a run is: arguments as text -> values, parsed once and validated once. Pure.
 
-use crate::condition::{self, Clock, GyroUnit, OnGap};
 use crate::decode::{self, FieldRole};
 use crate::error::{Error, Result};
-use crate::model::attitude::{Quaternion, YawPitchRoll};
-use crate::model::frames::{Body, BodyAxes, Nav, World};
-use crate::propagate::{self, Method, Propagator};
-use crate::record::SampleKind;
 use nalgebra::Vector3;
+use strapd_attitude::condition::{self, Clock, GyroUnit, OnGap};
+use strapd_attitude::frames::{Body, BodyAxes, Nav};
+use strapd_attitude::propagate::{self, Method, Propagator};
+use strapd_attitude::quaternion::{Quaternion, YawPitchRoll};
+use strapd_attitude::record::SampleKind;
+use strapd_attitude::worlds::World;
 
 /// How the samples of a run are to be understood and integrated: the estimation flags, checked.
 /// `None` = the format decides where it states it, else the default.

@@ -33,7 +33,6 @@ mod settle;
 mod stamp;
 mod stated;
 
-pub use crate::condition::GyroUnit;
 pub use fields::{BadFieldPath, FieldPath, FieldRole};
 pub use json::line::{Class, Line, LineDecoder, MAX_LINE, decode_line};
 pub use json::objects::{Object, Objects};
@@ -43,14 +42,15 @@ pub use refusal::{
 pub use role::{Rank, Role, role, role_of};
 pub use stamp::{Ambiguous, Bare, MOST_WAITING, TimeUnit, unit_of};
 pub use stated::{AccelUnit, BodyAxes, Stated, WorldAxes};
+pub use strapd_attitude::condition::GyroUnit;
 
-use crate::record::{Nanos, RawSample};
 use registers::{Form, Slot, StampForm};
 use schema::rosmsg::Dialect;
 use schema::{Schema, builtin, descriptor, idl, ros_name, rosmsg};
 use select::names::{self, Px4};
 use select::{Found, Selection, select};
 use std::sync::Arc;
+use strapd_attitude::record::{Nanos, RawSample};
 
 /// Most samples one message may hold.
 pub const MAX_BATCH: usize = 65_536;
@@ -546,10 +546,10 @@ fn state_px4(px4: Option<Px4>, stated: &mut Stated) {
     stated.has_stamp = true;
     stated.has_orientation = px4 == Px4::VehicleAttitude;
     stated.sample_kind = Some(match px4 {
-        Px4::SensorCombined => crate::record::SampleKind::Average,
-        Px4::VehicleImu => crate::record::SampleKind::DeltaAngle,
+        Px4::SensorCombined => strapd_attitude::record::SampleKind::Average,
+        Px4::VehicleImu => strapd_attitude::record::SampleKind::DeltaAngle,
         Px4::VehicleAngularVelocity | Px4::SensorGyro | Px4::VehicleAttitude => {
-            crate::record::SampleKind::Rate
+            strapd_attitude::record::SampleKind::Rate
         }
     });
 }

@@ -1,5 +1,5 @@
 //! Everything that can end a run. One flat enum; each variant says what, where, why, and the
-//! flag that helps. Bad samples are not here: they are counted verdicts ([`crate::record::Verdict`]).
+//! flag that helps. Bad samples are not here: they are counted verdicts ([`strapd_attitude::record::Verdict`]).
 
 use std::path::PathBuf;
 

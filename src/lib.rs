@@ -26,30 +26,14 @@
 //! Reading order: [`record`], `pipeline::estimator`, then one stage.
 //! Without the default feature `service` the crate is the modules with links above, on nalgebra alone.
 
-pub mod aid;
-#[cfg(feature = "service")]
 pub mod cli;
-#[cfg(feature = "service")]
 pub mod client;
-pub mod compare;
-pub mod condition;
-#[cfg(feature = "service")]
 pub mod config;
-pub mod model;
-pub mod propagate;
-pub mod record;
 
-#[cfg(feature = "service")]
 pub mod decode;
-#[cfg(feature = "service")]
 pub mod error;
-#[cfg(feature = "service")]
 pub mod pipeline;
-#[cfg(feature = "service")]
 pub mod report;
-#[cfg(feature = "service")]
 pub mod serve;
-#[cfg(feature = "service")]
 pub mod sink;
-#[cfg(feature = "service")]
 pub mod source;

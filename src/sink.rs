@@ -39,7 +39,6 @@ pub use stream::{Content, Provenance, Stream, output_topic};
 pub use target::{Format, Profile, Target};
 
 use crate::error::{Error, Result};
-use crate::record::{AttitudeSample, Nanos, RawSample};
 use batch::{Batch, Form, Slot};
 use mcap::Layout;
 use mcap::chunk::Chunk;
@@ -48,6 +47,7 @@ use output::{Output, STDOUT_NAME};
 use rayon::ThreadPool;
 use rayon::iter::{IntoParallelRefMutIterator, ParallelIterator};
 use std::path::PathBuf;
+use strapd_attitude::record::{AttitudeSample, Nanos, RawSample};
 
 /// Samples in one batch: one chunk of about 1 MiB in MCAP.
 const BATCH_SAMPLES: usize = 2048;

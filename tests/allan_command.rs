@@ -1,5 +1,4 @@
 //! `strapd allan`: what it prints, writes, warns of and refuses.
-#![cfg(feature = "service")]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 mod made_logs;
@@ -7,8 +6,8 @@ mod made_logs;
 use made_logs::{ImuSample, START, STEP, written};
 use serde_json::Value;
 use std::path::Path;
-use strapd::model::imu_error::{ConstantErrors, GyroModel, ImuError, Truth};
-use strapd::record::{Nanos, SampleKind};
+use strapd_attitude::noise::sensor_error::{ConstantErrors, GyroModel, ImuError, Truth};
+use strapd_attitude::record::{Nanos, SampleKind};
 
 /// Stdout, stderr and exit code of `strapd allan` in `dir`.
 fn allan(dir: &Path, arguments: &str) -> (String, String, Option<i32>) {

@@ -5,20 +5,17 @@
 //! stream, `condition.rs` each rule by itself, `replay.rs` the same in files.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
-#[cfg(feature = "service")]
 #[path = "bad_input/files.rs"]
 mod files;
-#[cfg(feature = "service")]
 mod made_logs;
-#[cfg(feature = "service")]
 mod replays;
 
-use strapd::condition::{self, Conditioner, OnGap};
-use strapd::model::attitude::Quaternion;
-use strapd::propagate::{
+use strapd_attitude::condition::{self, Conditioner, OnGap};
+use strapd_attitude::propagate::{
     self, LARGEST_WINDOW, Method, Order, Placement, Propagator, Sequential, Settings,
 };
-use strapd::record::{AttitudeSample, Nanos, RawSample, SampleKind, Status, Verdict};
+use strapd_attitude::quaternion::Quaternion;
+use strapd_attitude::record::{AttitudeSample, Nanos, RawSample, SampleKind, Status, Verdict};
 
 const KINDS: [SampleKind; 3] = [
     SampleKind::Rate,
@@ -141,7 +138,7 @@ fn holed(kind: SampleKind, nanos: i64) -> Vec<RawSample> {
     samples
 }
 
-fn same(a: &Quaternion<strapd::model::frames::Nav, strapd::model::frames::Body>) -> f64 {
+fn same(a: &Quaternion<strapd_attitude::frames::Nav, strapd_attitude::frames::Body>) -> f64 {
     a.angle_to(&Quaternion::assume_unit(INITIAL))
 }
 

@@ -1,6 +1,5 @@
 //! Promise: `strapd check` finds what is wrong with a log, invents nothing, and its advice helps.
 
-#![cfg(feature = "service")]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 #[path = "check/faults.rs"]

@@ -1,7 +1,6 @@
 //! Promise: the command line says what it does, what went wrong and which flag helps, on the right
 //! stream and with the right exit code.
 
-#![cfg(feature = "service")]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 #[path = "cli/aiding.rs"]

@@ -25,7 +25,7 @@ mod writer;
 mod shared_data;
 
 use strapd::decode::{Channel, Decoder, Options, Undecodable};
-use strapd::record::{Nanos, RawSample};
+use strapd_attitude::record::{Nanos, RawSample};
 
 /// When the test's messages were received and sent.
 const LOG: Nanos = Nanos(1_700_000_000_500_000_000);

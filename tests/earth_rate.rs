@@ -1,24 +1,21 @@
 //! Promise: on a turning Earth the attitude is that relative to the site, exactly (`docs/theory/attitude.md` 6.4).
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
-#[cfg(feature = "service")]
 #[path = "earth_rate/files.rs"]
 mod files;
-#[cfg(feature = "service")]
 mod made_logs;
-#[cfg(feature = "service")]
 mod replays;
 
 use nalgebra::Vector3;
 use std::f64::consts::PI;
-use strapd::model::attitude::{Quaternion, RotationVector, YawPitchRoll};
-use strapd::model::frames::{
-    Attitude, Body, Convention, EARTH_RATE, In, Nav, earth_rate, enu_from_ned, enu_from_nwu,
-    nwu_from_enu,
+use strapd_attitude::frames::{Attitude, Body, In, Nav};
+use strapd_attitude::propagate::{Method, Order, Placement, Propagator, Sequential, Settings};
+use strapd_attitude::quaternion::{Quaternion, RotationVector, YawPitchRoll};
+use strapd_attitude::record::{AttitudeSample, Join, Nanos, RateSample, SampleKind, Status};
+use strapd_attitude::worlds::{
+    Convention, EARTH_RATE, earth_rate, enu_from_ned, enu_from_nwu, nwu_from_enu,
 };
-use strapd::model::motion::{Coning, ConstantRate};
-use strapd::propagate::{Method, Order, Placement, Propagator, Sequential, Settings};
-use strapd::record::{AttitudeSample, Join, Nanos, RateSample, SampleKind, Status};
+use strapd_bodies::motion::{Coning, ConstantRate};
 
 const LATITUDE: f64 = 48.0 * PI / 180.0;
 const ARCSEC: f64 = 180.0 * 3600.0 / PI;

@@ -3,7 +3,6 @@
 //! Messages are decoded here by offset (the layout of `sensor_msgs/msg/Imu` in CDR), not by this
 //! project's decoders: these files judge them.
 
-#![cfg(feature = "service")]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 #[path = "../examples/make_fixtures/catalogue.rs"]

@@ -5,7 +5,7 @@
 //! cargo test --test growth -- --ignored
 //! ```
 
-#![cfg(all(feature = "service", unix))]
+#![cfg(unix)]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 #[path = "growth/inputs.rs"]

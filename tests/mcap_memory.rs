@@ -10,9 +10,9 @@ use std::path::Path;
 use strapd::pipeline::pool::Pool;
 use strapd::pipeline::recover::{Recover, run};
 use strapd::pipeline::run::Source;
-use strapd::record::RawSample;
 use strapd::sink::{Options, Target};
 use strapd::source::mcap::{MAGIC, Message, ProblemKind, Reader, WalkOptions, op, walk};
+use strapd_attitude::record::RawSample;
 
 /// Peak resident memory of this process so far, MiB.
 fn peak() -> u64 {

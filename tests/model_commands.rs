@@ -1,6 +1,5 @@
 //! Promise: the model library answers at the command line what it answers in Rust, one line a request.
 
-#![cfg(feature = "service")]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout)]
 
 mod commands;

@@ -4,7 +4,6 @@
 //! `STRAPD_MUTATIONS=1000000 cargo test --release --test mutations` runs as many cases for each;
 //! `STRAPD_MUTANTS=200000` as many changed logs through all commands.
 
-#![cfg(feature = "service")]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 #[cfg(target_os = "linux")]

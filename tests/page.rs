@@ -2,7 +2,7 @@
 //!
 //! A headless Chromium on real pages of a real daemon, everything on loopback.
 
-#![cfg(all(feature = "service", unix))]
+#![cfg(unix)]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 #[allow(dead_code)]

@@ -1,5 +1,5 @@
 //! Promise: a recording survives what kills the process or fills the disk, and replays to the same attitude.
-#![cfg(all(feature = "service", unix))]
+#![cfg(unix)]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 #[path = "recorder/child.rs"]
@@ -16,12 +16,12 @@ mod rotation;
 use mcap::sans_io::{LinearReadEvent, LinearReader};
 use nalgebra::Vector3;
 use std::path::Path;
-use strapd::model::attitude::Quaternion;
 use strapd::pipeline::pool::Pool;
 use strapd::pipeline::recover::{Recover, Recovered, run};
 use strapd::pipeline::run::Source;
-use strapd::record::{AttitudeCovariance, AttitudeSample, Nanos, RawSample, Status};
 use strapd::sink::{Options, Target};
+use strapd_attitude::quaternion::Quaternion;
+use strapd_attitude::record::{AttitudeCovariance, AttitudeSample, Nanos, RawSample, Status};
 
 /// Sample `k` of a sensor that sends `rate_hz` a second. Its last digits differ from sample to sample, so
 /// that it packs as badly as a real one.

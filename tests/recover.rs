@@ -1,6 +1,5 @@
 //! Promise: `strapd recover` carries everything that is intact in a damaged log into an intact one, as it
 //! was and in its order, and says what was lost.
-#![cfg(feature = "service")]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 #[path = "recover/command.rs"]

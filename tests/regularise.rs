@@ -2,12 +2,9 @@
 //! nearly all the accuracy (`docs/theory/attitude.md` 6.4); it is never done unasked, and never silently.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
-#[cfg(feature = "service")]
 #[path = "regularise/files.rs"]
 mod files;
-#[cfg(feature = "service")]
 mod made_logs;
-#[cfg(feature = "service")]
 mod replays;
 #[path = "regularise/segments.rs"]
 mod segments;
@@ -15,13 +12,13 @@ mod segments;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::sync::Arc;
-use strapd::condition::regularise::{Lines, Regulariser, Report, Survey, Value};
-use strapd::condition::{Conditioner, Settings as Conditioning};
-use strapd::model::attitude::Quaternion;
-use strapd::model::frames::{Body, Nav};
-use strapd::model::motion::BandLimited;
-use strapd::propagate::{Method, Order, Placement, Propagator, Sequential, Settings};
-use strapd::record::{AttitudeSample, Nanos, RateSample, RawSample, SampleKind};
+use strapd_attitude::condition::regularise::{Lines, Regulariser, Report, Survey, Value};
+use strapd_attitude::condition::{Conditioner, Settings as Conditioning};
+use strapd_attitude::frames::{Body, Nav};
+use strapd_attitude::propagate::{Method, Order, Placement, Propagator, Sequential, Settings};
+use strapd_attitude::quaternion::Quaternion;
+use strapd_attitude::record::{AttitudeSample, Nanos, RateSample, RawSample, SampleKind};
+use strapd_bodies::motion::BandLimited;
 
 /// 200 Hz, 2024.
 const STEP: i64 = 5_000_000;

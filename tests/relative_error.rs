@@ -7,9 +7,9 @@
 mod shared_data;
 
 use nalgebra::Vector3;
-use strapd::compare::{Align, Stamped, compare};
-use strapd::model::attitude::{Quaternion, RotationVector};
-use strapd::record::Nanos;
+use strapd_attitude::compare::{Align, Stamped, compare};
+use strapd_attitude::quaternion::{Quaternion, RotationVector};
+use strapd_attitude::record::Nanos;
 
 struct Log {
     gyro: Vec<(Nanos, Vector3<f64>)>,

@@ -3,7 +3,6 @@
 //! Here the pipeline runs in this process; the command line is `cli.rs`, what must not change the
 //! result is `streams.rs`.
 
-#![cfg(feature = "service")]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 #[path = "replay/bad_values.rs"]

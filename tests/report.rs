@@ -1,7 +1,6 @@
 //! Promise: `strapd report` says on one self-contained page what is good and what is wrong about any log,
 //! and what it can not say it says so.
 
-#![cfg(feature = "service")]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 #[path = "report/browser.rs"]

@@ -3,7 +3,7 @@
 //!
 //! Real sockets on loopback, port 0, every wait bounded.
 
-#![cfg(all(feature = "service", unix))]
+#![cfg(unix)]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 mod made_logs;

@@ -1,7 +1,6 @@
 //! Promise: a synthetic log has the truth in it, replay finds it to rounding, and what a sensor's
 //! errors make of it stays within what replay says of itself.
 
-#![cfg(feature = "service")]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::print_stdout)]
 
 mod commands;

@@ -1,7 +1,6 @@
 //! What leaves strapd: whole files, the same bytes every time, readable by others, and nothing at
 //! all where there should be nothing.
 
-#![cfg(feature = "service")]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 use std::collections::BTreeMap;
@@ -13,12 +12,12 @@ use mcap::records::{MessageHeader, Record};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use nalgebra::Vector3;
 use proptest::prelude::*;
-use strapd::model::attitude::Quaternion;
-use strapd::record::{AttitudeCovariance, AttitudeSample, Nanos, Status};
 use strapd::sink::{
     Compression, Encoding, Flow, InputChannel, InputMessage, Options, Provenance, Sink, Stream,
     Target, Written,
 };
+use strapd_attitude::quaternion::Quaternion;
+use strapd_attitude::record::{AttitudeCovariance, AttitudeSample, Nanos, Status};
 
 #[path = "sinks/files.rs"]
 mod files;

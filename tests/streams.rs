@@ -1,7 +1,6 @@
 //! Promise: what must not change the result changes no bit of it: threads, speed, the form of the
 //! output, and the way the samples came in.
 
-#![cfg(feature = "service")]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 mod made_logs;

@@ -1,5 +1,4 @@
 //! `strapd model youbot` and `strapd simulate youbot` from outside: requests in, answers out.
-#![cfg(feature = "service")]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 use assert_cmd::Command;

@@ -1,12 +1,12 @@
 //! Who is compared: our methods and the peers' formulas, by what they read. Samples -> attitudes. Pure.
 
 use crate::peers::{self, Peer};
-use strapd::model::attitude::Quaternion;
-use strapd::model::frames::{Body, Nav};
-use strapd::propagate::{
+use strapd_attitude::frames::{Body, Nav};
+use strapd_attitude::propagate::{
     Method, Noise, Order, Placement, Propagator, Sequential, Settings, SettingsError,
 };
-use strapd::record::{RateSample, SampleKind};
+use strapd_attitude::quaternion::Quaternion;
+use strapd_attitude::record::{RateSample, SampleKind};
 
 /// One way from samples to attitude.
 #[derive(Clone, Copy)]

@@ -1,13 +1,13 @@
 //! Rates or delta angles -> attitude, the way other projects do it: their formulas, written anew. Pure.
 //!
 //! Each is what its project computes for attitude alone: no Earth rate, no bias, no correction. Projects and
-//! commits are those of `docs/theory/attitude.md` 1; `tests/accuracy/peers.rs` holds each to the figures measured there.
+//! commits are those of `docs/theory/attitude.md` 1; `crates/bodies/tests/bodies/accuracy/peers.rs` holds each to the figures measured there.
 //! The first sample has the initial attitude; interval k runs from sample k - 1 to k.
 
 use nalgebra::Vector3;
-use strapd::model::attitude::{Quaternion, RotationVector, YawPitchRoll};
-use strapd::model::frames::{Body, Nav};
-use strapd::record::RateSample;
+use strapd_attitude::frames::{Body, Nav};
+use strapd_attitude::quaternion::{Quaternion, RotationVector, YawPitchRoll};
+use strapd_attitude::record::RateSample;
 
 type Attitude = Quaternion<Nav, Body>;
 type Vector = Vector3<f64>;

@@ -2,8 +2,8 @@
 
 use crate::contenders::{Contender, OF_INCREMENTS, OF_RATES};
 use crate::runs::{Failure, MARGIN, Run, arcsec};
-use strapd::record::SampleKind;
 use strapd::report::plot::{Axis, Chart, Look, Series};
+use strapd_attitude::record::SampleKind;
 
 /// How much is computed: `Whole` for publication, `Quick` to see that it runs.
 #[derive(Clone, Copy, PartialEq, Eq)]

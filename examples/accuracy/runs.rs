@@ -3,11 +3,11 @@
 use crate::contenders::Contender;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use strapd::model::attitude::Quaternion;
-use strapd::model::frames::{Body, Nav};
-use strapd::model::motion::{BandLimited, Coning, Motion};
-use strapd::model::top::{Case, SymmetricTop};
-use strapd::record::{Join, Nanos, RateSample, SampleKind, Status};
+use strapd_attitude::frames::{Body, Nav};
+use strapd_attitude::quaternion::Quaternion;
+use strapd_attitude::record::{Join, Nanos, RateSample, SampleKind, Status};
+use strapd_bodies::motion::{BandLimited, Coning, Motion};
+use strapd_bodies::top::{Case, SymmetricTop};
 
 pub type Failure = Box<dyn std::error::Error>;
 

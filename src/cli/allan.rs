@@ -6,18 +6,18 @@ mod words;
 
 use super::estimation::{KindArg, TimeArg, UnitArg};
 use super::{Global, Outcome, print};
-use crate::condition::{Clock, GyroUnit};
 use crate::config::Plan;
 use crate::decode::Options;
 use crate::error::{Error, Result};
-use crate::model::allan::{AllanFit, Point, cluster_sizes, deviation, fit};
 use crate::pipeline::pool::Pool;
-use crate::record::SampleKind;
 use crate::report::page::Noise;
 use crate::sink::Document;
 use clap::Args;
 use gather::Gathered;
 use std::path::{Path, PathBuf};
+use strapd_attitude::condition::{Clock, GyroUnit};
+use strapd_attitude::noise::allan::{AllanFit, Point, cluster_sizes, deviation, fit};
+use strapd_attitude::record::SampleKind;
 
 /// Allan deviation of a recording at rest: angle random walk, bias instability, rate random walk,
 /// quantisation, ramp

@@ -13,7 +13,6 @@ use crate::pipeline::pool::Pool;
 use crate::pipeline::preparation::Resolved;
 use crate::pipeline::route::{Item, Noticed, Route, Taker};
 use crate::pipeline::topics;
-use crate::record::{RawSample, SampleKind};
 use crate::source::mcap::{self, WalkOptions};
 use clap::{Args, ValueEnum};
 use serde_json::json;
@@ -22,6 +21,7 @@ use std::io::{BufWriter, Write};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
+use strapd_attitude::record::{RawSample, SampleKind};
 
 /// Decoded samples of a file, or attitudes of a daemon, as NDJSON, CSV or a table: rad/s, m/s^2, axes FLU.
 #[derive(Args, Debug)]

@@ -1,7 +1,6 @@
 //! `strapd compare EST REF`: time-aligned angle error between two attitudes. I/O.
 
 use super::{Global, Outcome, print};
-use crate::compare::{Align, Comparison, ErrorStats, Errors, Stamped, compare, for_each_error};
 use crate::error::{Error, Result};
 use crate::pipeline::pool::Pool;
 use crate::pipeline::track::{self, Side};
@@ -14,6 +13,9 @@ use clap::Args;
 use serde_json::Value;
 use std::fmt::Write as _;
 use std::path::PathBuf;
+use strapd_attitude::compare::{
+    Align, Comparison, ErrorStats, Errors, Stamped, compare, for_each_error,
+};
 
 /// Time-aligned angle error between two attitudes.
 #[derive(Args, Debug)]
@@ -166,7 +168,7 @@ fn attitudes(track: &track::Track) -> Vec<Stamped> {
         .map(|(stamp, wxyz)| {
             (
                 *stamp,
-                crate::model::attitude::Quaternion::assume_unit(*wxyz),
+                strapd_attitude::quaternion::Quaternion::assume_unit(*wxyz),
             )
         })
         .collect()

@@ -1,12 +1,12 @@
 //! The estimation flags shared by `replay` (and, later, `serve` and `simulate`): text -> settings,
 //! checked once. Pure.
 
-use crate::condition::{Clock, GyroUnit, OnGap};
 use crate::config::{Aid, Bias, Initial, Noise, Plan, Truncation, parse_mount};
 use crate::error::{Error, Result};
-use crate::propagate::{Method, Order, Placement};
-use crate::record::SampleKind;
 use clap::{Args, ValueEnum};
+use strapd_attitude::condition::{Clock, GyroUnit, OnGap};
+use strapd_attitude::propagate::{Method, Order, Placement};
+use strapd_attitude::record::SampleKind;
 
 /// How the samples are to be understood and integrated.
 #[derive(Args, Debug, Clone)]

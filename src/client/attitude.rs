@@ -2,8 +2,8 @@
 //! a number that is absent or `null` is NaN.
 
 use crate::decode::printable;
-use crate::record::Nanos;
 use serde::Deserialize;
+use strapd_attitude::record::Nanos;
 
 /// One attitude as a daemon says it.
 #[derive(Clone, Debug, PartialEq)]

@@ -20,10 +20,10 @@ use super::schema::{last_name, ros_name};
 use super::select::names::{Px4, px4};
 use super::stamp::{Bare, TimeUnit};
 use super::{Decoded, MAX_BATCH, Options, Undecodable};
-use crate::record::{Nanos, RawSample};
 use found::{Found, Instant, StampRule};
 use scan::Scanner;
 use seek::Seeker;
+use strapd_attitude::record::{Nanos, RawSample};
 use trie::Trie;
 
 /// What is looked for in the messages of a channel.

@@ -13,7 +13,7 @@
 //! A `RATE` may end after any of its three parts. What is longer than known is read by its known part. In
 //! a vector NaN is no data, as `null` in a line.
 
-use crate::record::{AttitudeSample, Nanos, RawSample};
+use strapd_attitude::record::{AttitudeSample, Nanos, RawSample};
 
 /// The first byte of every packed object.
 pub const MARK: u8 = 0xF8;
@@ -75,7 +75,7 @@ pub struct Attitude {
     pub rate: [f64; 3],
     /// Standard deviation about each body axis, degrees.
     pub sigma_deg: [f64; 3],
-    /// The bits of [`crate::record::Status`].
+    /// The bits of [`strapd_attitude::record::Status`].
     pub status: u32,
     /// How often it has been reset or held.
     pub reset: u32,
@@ -279,10 +279,10 @@ fn some_vector(vector: [f64; 3]) -> Option<[f64; 3]> {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use crate::model::attitude::Quaternion;
-    use crate::record::{AttitudeCovariance, Status};
     use crate::sink::tests::sample;
     use nalgebra::Vector3;
+    use strapd_attitude::quaternion::Quaternion;
+    use strapd_attitude::record::{AttitudeCovariance, Status};
 
     fn hex(bytes: &[u8]) -> String {
         bytes.iter().map(|b| format!("{b:02x}")).collect()

@@ -12,7 +12,7 @@ pub(crate) mod wire;
 use super::registers::{Form, Registers, Slot};
 use super::schema::Number;
 use super::{Decoded, MAX_BATCH, Undecodable};
-use crate::record::{Nanos, RawSample};
+use strapd_attitude::record::{Nanos, RawSample};
 use wire::{Broken, Reader, Value};
 
 /// A message type as a tree of what is wanted of it; the root is node 0.

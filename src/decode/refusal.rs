@@ -41,7 +41,7 @@ impl std::fmt::Display for Unsupported {
 impl std::error::Error for Unsupported {}
 
 /// A payload that is not what its channel says. It is counted
-/// ([`crate::record::Verdict::Undecodable`]); the first one of a run is shown.
+/// ([`strapd_attitude::record::Verdict::Undecodable`]); the first one of a run is shown.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Undecodable {

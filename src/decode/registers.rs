@@ -5,7 +5,7 @@
 
 use super::Decoded;
 use super::stamp::{TimeUnit, from_count, from_float};
-use crate::record::{Nanos, RawSample};
+use strapd_attitude::record::{Nanos, RawSample};
 
 /// Where a number of a message goes. Three, three and four in a row are vectors and a quaternion.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Hash)]

@@ -6,7 +6,7 @@
 use super::schema::last_name;
 use super::select::Found;
 use super::{Channel, Decoder, Options, Stated, Unsupported};
-use crate::record::Nanos;
+use strapd_attitude::record::Nanos;
 
 /// How good a source of body rates a channel is; the best rank in a log is taken, and when two
 /// channels share it the user is asked.

@@ -15,8 +15,8 @@ mod read;
 
 use super::registers::{Form, Registers};
 use super::{Decoded, MAX_BATCH, Undecodable};
-use crate::record::{Nanos, RawSample};
 use read::{Read, bytes_of};
+use strapd_attitude::record::{Nanos, RawSample};
 
 /// Bytes after the last field that are still padding: writers round up to 4 or 8.
 const MAX_PADDING: usize = 7;

@@ -9,7 +9,7 @@ use super::registers::{Form, Slot, StampForm};
 use super::select::Found;
 use super::stamp::{Ambiguous, Bare, MOST_WAITING, TimeUnit, Told, unit_in_log};
 use super::{Decoder, FieldRole, Plan, Unsupported, printable, unsupported};
-use crate::record::Nanos;
+use strapd_attitude::record::Nanos;
 
 impl Decoder {
     /// Learns from one message (the first of the topic) what no schema says: the unit of a stamp

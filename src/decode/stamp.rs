@@ -9,7 +9,7 @@ mod unit;
 pub use unit::{Ambiguous, Bare, MOST_WAITING, unit_of};
 pub(crate) use unit::{Told, unit_in_log};
 
-use crate::record::Nanos;
+use strapd_attitude::record::Nanos;
 
 /// Unit of a stamp or of an interval held in one number.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Hash)]

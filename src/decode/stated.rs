@@ -4,8 +4,8 @@
 //! better: a flag given by hand wins over anything stated here.
 
 use super::stamp::TimeUnit;
-use crate::condition::GyroUnit;
-use crate::record::SampleKind;
+use strapd_attitude::condition::GyroUnit;
+use strapd_attitude::record::SampleKind;
 
 /// Unit of a specific force.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Hash)]

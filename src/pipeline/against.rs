@@ -5,16 +5,16 @@
 
 use super::estimator::Estimator;
 use super::preparation::{Prepared, Resolved};
-use crate::compare::{Align, Stamped, compare, fit_body_axes, for_each_error};
 use crate::config::Plan;
-use crate::model::attitude::Quaternion;
-use crate::model::frames::World;
-use crate::propagate::{Executor, Method};
-use crate::record::{Nanos, RawSample, SampleKind, Status};
 use crate::report::drawn::{ErrorTrace, Errors};
 use crate::report::summary::{Against, Recorded};
 use crate::report::trace::Traces;
 use std::collections::HashMap;
+use strapd_attitude::compare::{Align, Stamped, compare, fit_body_axes, for_each_error};
+use strapd_attitude::propagate::{Executor, Method};
+use strapd_attitude::quaternion::Quaternion;
+use strapd_attitude::record::{Nanos, RawSample, SampleKind, Status};
+use strapd_attitude::worlds::World;
 
 /// Most attitudes kept per track; beyond, every second one goes, again and again, so that memory
 /// stays bounded on any log.
@@ -53,7 +53,7 @@ const MEANINGS: [(&str, &str, SampleKind, Option<Method>); 4] = [
 #[derive(Debug)]
 pub struct AgainstRecorded {
     resolved: Resolved,
-    clock: crate::condition::Clock,
+    clock: strapd_attitude::condition::Clock,
     own_reference: bool,
     estimators: Vec<Estimator>,
     tracks: Vec<Thinned>,
@@ -187,7 +187,7 @@ impl AgainstRecorded {
 
     /// Takes a recorded orientation.
     pub fn take_reference(&mut self, raw: &RawSample) {
-        use crate::condition::Clock;
+        use strapd_attitude::condition::Clock;
         let stamp = match self.clock {
             Clock::Header => raw.header,
             Clock::Log | Clock::Index { .. } => Some(raw.log),

@@ -4,11 +4,11 @@
 //! specific force (phones export acceleration without gravity) would level to anything.
 
 use super::preparation::Resolved;
-use crate::aid::{Settings, Start};
 use crate::config::{Aid, Bias, Initial, Plan};
 use crate::decode::AccelUnit;
-use crate::record::RawSample;
 use nalgebra::Vector3;
+use strapd_attitude::aid::{Settings, Start};
+use strapd_attitude::record::RawSample;
 
 /// Standard gravity, m/s^2.
 pub(super) const STANDARD_GRAVITY: f64 = 9.806_65;

@@ -3,9 +3,9 @@
 //! The run knows them only by what they are shown and when: who they are, and over what, is the
 //! matter of `serve`, which is built on this and not below it.
 
-use crate::record::{AttitudeSample, Nanos, RawSample};
 use crate::sink::Stream;
 use std::fmt::Debug;
+use strapd_attitude::record::{AttitudeSample, Nanos, RawSample};
 
 /// What to do with the next items of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,13 +4,13 @@
 //! have tens of thousands of channels of one schema, or as many schemas.
 
 use super::log::plain;
-use crate::condition::Clock;
 use crate::config::Plan;
 use crate::decode::{Decoder, Effort, Options, Unsupported};
-use crate::record::Nanos;
 use crate::source::mcap::{Channel, Schema};
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use strapd_attitude::condition::Clock;
+use strapd_attitude::record::Nanos;
 
 /// Decoders under the same options. All of a log together cost no more than one [`Effort`].
 #[derive(Debug, Default)]

@@ -4,15 +4,15 @@
 //! does no I/O.
 
 use super::preparation::{Prepared, Resolved};
-use crate::aid::{self, Aided};
-use crate::condition::regularise::{self, Regulariser};
-use crate::condition::{self, Conditioner};
 use crate::config::Plan;
-use crate::model::attitude::RotationVector;
-use crate::model::frames::{Convention, World};
-use crate::propagate::{self, Executor, Method, Propagator};
-use crate::record::{AttitudeSample, Nanos, RateSample, RawSample};
 use serde::{Deserialize, Serialize};
+use strapd_attitude::aid::{self, Aided};
+use strapd_attitude::condition::regularise::{self, Regulariser};
+use strapd_attitude::condition::{self, Conditioner};
+use strapd_attitude::propagate::{self, Executor, Method, Propagator};
+use strapd_attitude::quaternion::RotationVector;
+use strapd_attitude::record::{AttitudeSample, Nanos, RateSample, RawSample};
+use strapd_attitude::worlds::{Convention, World};
 
 /// An estimator of one stream.
 #[derive(Debug)]

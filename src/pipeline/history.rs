@@ -2,11 +2,11 @@
 //!
 //! Beside the outlet because it sees every attitude, but keeps few: see [`Traces`].
 
-use crate::condition::Clock;
-use crate::record::{AttitudeSample, Counts, Nanos, RawSample, Status, Verdict};
 use crate::report::drawn::{Drawn, Elapsed, Mark};
 use crate::report::trace::Traces;
 use std::collections::VecDeque;
+use strapd_attitude::condition::Clock;
+use strapd_attitude::record::{AttitudeSample, Counts, Nanos, RawSample, Status, Verdict};
 
 /// Rejected samples that wait for the attitude after them to find their place.
 const WAITING: usize = 1 << 16;

@@ -14,7 +14,6 @@ use crate::decode::{
     Ambiguous, Bare, Class, LineDecoder, MAX_LINE, MOST_WAITING, Stated, TimeUnit, unit_of,
 };
 use crate::error::{Error, Result};
-use crate::record::{Nanos, RawSample};
 use crate::report::summary::RunSummary;
 use crate::sink::{Flow, Stream, output_topic};
 use crate::source::mcap::Survey;
@@ -23,6 +22,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 use std::sync::Arc;
+use strapd_attitude::record::{Nanos, RawSample};
 
 /// Samples that go through the pipeline together.
 const BATCH: usize = 2048;

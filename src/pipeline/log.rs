@@ -9,13 +9,13 @@ use super::sources::{self, Source};
 use super::topics::{self, Candidate, Choice, PICKED_UNNAMED};
 use crate::decode::{self, Decoder, Rank, Role, Unsupported, role_of};
 use crate::error::{Error, Result};
-use crate::record::Nanos;
 use crate::source::mcap::{self, Channel, Reader, Survey, WalkOptions};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use strapd_attitude::record::Nanos;
 
 /// A finished file, surveyed.
 #[derive(Debug)]

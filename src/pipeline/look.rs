@@ -11,19 +11,19 @@ use super::preparation::Resolved;
 use super::route::{Item, Noticed, Route, Taker};
 use super::sources::Source;
 use super::topics::{MOST_TOPICS, PICKED_UNNAMED};
-use crate::condition::quality::{Quality, QualitySummary};
-use crate::condition::regularise;
-use crate::condition::stillness::{self, Limits, Rests, Stillness};
-use crate::condition::{Clock, choose_clock};
 use crate::config::Plan;
 use crate::decode::{self, Options};
 use crate::error::{Error, Result};
-use crate::record::RawSample;
 use crate::source::mcap::{self, Survey, WalkOptions};
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
+use strapd_attitude::condition::quality::{Quality, QualitySummary};
+use strapd_attitude::condition::regularise;
+use strapd_attitude::condition::stillness::{self, Limits, Rests, Stillness};
+use strapd_attitude::condition::{Clock, choose_clock};
+use strapd_attitude::record::RawSample;
 
 /// One topic of samples, looked at.
 #[derive(Debug)]

@@ -5,7 +5,6 @@ use super::pace::Pace;
 use super::pool::Pool;
 use super::route::Copied;
 use crate::error::Result;
-use crate::record::{AttitudeSample, Nanos, RawSample};
 use crate::sink::{
     CopiedChannel, Decimator, Flow, InputChannel, InputMessage, Options, Provenance, Sink, Stream,
     Target, Written,
@@ -14,6 +13,7 @@ use rayon::ThreadPool;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
+use strapd_attitude::record::{AttitudeSample, Nanos, RawSample};
 
 /// What standard output is called in the summary.
 const STDOUT: &str = "standard output";

@@ -3,8 +3,8 @@
 //! After the integration, never before it: the speed of a replay changes when a result is written,
 //! not which bits it has.
 
-use crate::record::Nanos;
 use std::time::{Duration, Instant};
+use strapd_attitude::record::Nanos;
 
 /// Data handed on at once spans less than this, ns of data time at speed 1.
 const SLICE_NANOS: i64 = 1_000_000;

@@ -4,11 +4,11 @@
 //! the run, with no bias taken out, on the clock the first of them choose.
 
 use super::preparation::Resolved;
-use crate::condition::stillness::{Limits, Rests, Stillness};
-use crate::condition::{Conditioner, choose_clock};
 use crate::config::Plan;
-use crate::record::{RateSample, RawSample};
 use nalgebra::Vector3;
+use strapd_attitude::condition::stillness::{Limits, Rests, Stillness};
+use strapd_attitude::condition::{Conditioner, choose_clock};
+use strapd_attitude::record::{RateSample, RawSample};
 
 /// Samples that tell the clock and hold the first orientation.
 pub(super) const FEW: usize = 512;

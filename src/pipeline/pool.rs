@@ -2,9 +2,9 @@
 //! threads changes nothing but the time.
 
 use crate::error::{Error, Result};
-use crate::propagate::Executor;
 use rayon::prelude::*;
 use std::sync::Arc;
+use strapd_attitude::propagate::Executor;
 
 /// A pool of workers shared by reading, integrating and writing.
 #[derive(Clone, Debug)]

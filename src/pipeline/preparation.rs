@@ -7,15 +7,16 @@ use super::aiding::{self, Aiding};
 use super::intervals::Mismatch;
 use super::passes::{FEW, RestPass};
 use super::stamps::{StampPass, Stamps};
-use crate::condition::stillness::{self, Limits, NoRest, Rests};
-use crate::condition::truncation::Grid;
-use crate::condition::{Clock, ClockWarning, GyroUnit, Settings, choose_clock};
 use crate::config::{Aid, Bias, Initial, Plan, Truncation};
 use crate::decode::{self, Stated, TimeUnit};
-use crate::model::attitude::{Quaternion, YawPitchRoll};
-use crate::model::frames::{Body, BodyAxes, Convention, EARTH_RATE, In, Nav, Sensor, World};
-use crate::record::{Nanos, RawSample, SampleKind};
 use nalgebra::{Matrix3, Vector3};
+use strapd_attitude::condition::stillness::{self, Limits, NoRest, Rests};
+use strapd_attitude::condition::truncation::Grid;
+use strapd_attitude::condition::{Clock, ClockWarning, GyroUnit, Settings, choose_clock};
+use strapd_attitude::frames::{Body, BodyAxes, In, Nav, Sensor};
+use strapd_attitude::quaternion::{Quaternion, YawPitchRoll};
+use strapd_attitude::record::{Nanos, RawSample, SampleKind};
+use strapd_attitude::worlds::{Convention, EARTH_RATE, World};
 
 /// Samples, and seconds of data, in which rest is sought when the log can not be read twice.
 const MANY: usize = 200_000;
@@ -138,7 +139,7 @@ impl Resolved {
         let q: Quaternion<Nav, Body> = Quaternion::try_from_wxyz(wxyz).ok()?;
         let flu = self.recorded.convert(Convention::EnuFlu, q);
         let c_bs: Quaternion<Body, Body> =
-            Quaternion::from_dcm(&crate::model::frames::Dcm::assume(self.mount));
+            Quaternion::from_dcm(&strapd_attitude::frames::Dcm::assume(self.mount));
         Some((flu * c_bs.inverse()).normalised())
     }
 }

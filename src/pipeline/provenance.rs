@@ -6,12 +6,12 @@ use super::run::{Replay, Source};
 use super::session::Found;
 use crate::config::Aid;
 use crate::error::{Error, Result};
-use crate::model::frames::EARTH_RATE;
 use crate::sink::{Provenance, Stream, Target};
 use sha2::{Digest, Sha256};
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
+use strapd_attitude::worlds::EARTH_RATE;
 
 /// How much of each end of the input goes into its fingerprint.
 const END: u64 = 1 << 20;

@@ -3,12 +3,12 @@
 use super::log::nanos;
 use super::sources::{Source, Turns, digest};
 use crate::decode::{Decoder, Undecodable};
-use crate::record::{Nanos, RawSample};
 use crate::source::mcap::{Channel, Message};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use strapd_attitude::record::{Nanos, RawSample};
 
 /// What a channel's messages are used for.
 #[derive(Debug)]

@@ -12,10 +12,10 @@ use super::route::{Item, Noticed};
 use crate::config::Plan;
 use crate::decode::Undecodable;
 use crate::error::{Error, Result};
-use crate::record::{AttitudeSample, Nanos};
 use crate::sink::{Flow, Written};
 use std::path::Path;
 use std::sync::Arc;
+use strapd_attitude::record::{AttitudeSample, Nanos};
 
 /// One estimated topic of a run.
 #[derive(Debug)]

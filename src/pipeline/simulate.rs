@@ -5,12 +5,12 @@ use super::outlet::{Delivery, Outlet, broken};
 use super::pool::Pool;
 use super::position::Position;
 use crate::error::{Error, Result};
-use crate::record::{AttitudeCovariance, AttitudeSample, SampleKind, Status};
 use crate::report::simulation::SimulationSummary;
 use crate::sink::{Content, Flow, Options, Provenance, Stream, Target};
-use crate::source::synthetic::{Stretch, Synthetic, Truth};
 use std::sync::Arc;
 use std::time::Instant;
+use strapd_attitude::record::{AttitudeCovariance, AttitudeSample, SampleKind, Status};
+use strapd_bodies::synthetic::{Stretch, Synthetic, Truth};
 
 /// The topic of the samples.
 pub const TOPIC: &str = "/imu/data_raw";

@@ -11,12 +11,12 @@ use super::pool::Pool;
 use super::topics::PICKED_UNNAMED;
 use crate::decode::{Decoder, Options, printable};
 use crate::error::Result;
-use crate::record::Nanos;
 use crate::source::mcap::{self, Channel, Reader, WalkOptions};
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::ops::ControlFlow;
 use std::sync::Arc;
+use strapd_attitude::record::Nanos;
 
 /// One publisher's samples on a topic.
 #[derive(Clone, Debug, PartialEq, Eq)]

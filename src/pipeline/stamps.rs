@@ -7,9 +7,9 @@ use super::against;
 use super::passes::{Conditioned, FEW};
 use super::preparation::Resolved;
 use super::run::Replay;
-use crate::condition::regularise::{Lines, Regulariser, Survey, Value};
-use crate::record::{RawSample, SampleKind};
 use std::sync::Arc;
+use strapd_attitude::condition::regularise::{Lines, Regulariser, Survey, Value};
+use strapd_attitude::record::{RawSample, SampleKind};
 
 /// What becomes of the stamps.
 #[derive(Clone, Debug, Default)]

@@ -4,16 +4,16 @@ use super::lines;
 use super::outlet::broken;
 use super::run::Replay;
 use super::session::{Ended, Topic};
-use crate::condition::regularise;
-use crate::model::attitude::Quaternion;
-use crate::propagate::Method;
-use crate::record::{Nanos, SampleKind, Verdict};
 use crate::report::aid::Aided;
 use crate::report::drawn::Drawn;
 use crate::report::stamps::{Regularised, Segment};
 use crate::report::summary::{Gaps, RunSummary, TopicSummary, significant};
 use crate::source::mcap::Survey;
 use std::sync::atomic::Ordering;
+use strapd_attitude::condition::regularise;
+use strapd_attitude::propagate::Method;
+use strapd_attitude::quaternion::Quaternion;
+use strapd_attitude::record::{Nanos, SampleKind, Verdict};
 
 /// Above this a rate is probably not in rad/s: 200 rad/s is 11,500 deg/s, five times what most gyros
 /// can measure.

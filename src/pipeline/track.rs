@@ -11,14 +11,15 @@ use super::simulate::{TRUTH_ID, TRUTH_TOPIC};
 use super::topics;
 use crate::decode::{Options, Role, printable};
 use crate::error::{Error, Result};
-use crate::model::attitude::Quaternion;
-use crate::model::frames::{Body, Convention, Nav, World};
-use crate::record::Nanos;
 use crate::source::mcap::{self, WalkOptions};
 use serde::Deserialize;
 use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
+use strapd_attitude::frames::{Body, Nav};
+use strapd_attitude::quaternion::Quaternion;
+use strapd_attitude::record::Nanos;
+use strapd_attitude::worlds::{Convention, World};
 
 /// One attitude as found: `[w, x, y, z]`, unchecked.
 pub type Entry = (Nanos, [f64; 4]);

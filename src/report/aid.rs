@@ -1,9 +1,9 @@
 //! What corrected the attitude and what it learned -> words, JSON. Pure.
 
 use super::summary::significant;
-use crate::aid::{Calibration, Filter, Report};
 use nalgebra::Vector3;
 use serde_json::{Value, json};
+use strapd_attitude::aid::{Calibration, Filter, Report};
 
 /// The filter at the end of a run.
 #[derive(Clone, Copy, Debug)]

@@ -1,6 +1,6 @@
 //! Seconds and stamps -> the words people use for them. Pure.
 
-use crate::record::Nanos;
+use strapd_attitude::record::Nanos;
 
 /// `1 h 2 min 3 s`, or seconds with decimals below a minute.
 #[must_use]

@@ -3,8 +3,8 @@
 //! Filled by the pipeline while it runs, drawn by the page; bounded whatever the length of the run.
 
 use super::trace::Traces;
-use crate::compare::Comparison;
-use crate::record::Nanos;
+use strapd_attitude::compare::Comparison;
+use strapd_attitude::record::Nanos;
 
 /// What is drawn of one topic.
 #[derive(Clone, Debug)]

@@ -1,6 +1,6 @@
 //! What is known about a log -> findings: how bad, on what evidence, what to do. Pure.
 //!
-//! Thresholds are opinions; those about the samples themselves lie in [`crate::condition::quality`],
+//! Thresholds are opinions; those about the samples themselves lie in [`strapd_attitude::condition::quality`],
 //! those about the replay and the recorded orientation here. A finding's `code` is stable: scripts
 //! match on it.
 

@@ -179,7 +179,8 @@ impl Page<'_> {
         let first = spans.clone().map(|(first, _)| first).min();
         let last = spans.map(|(_, last)| last).max();
         if let (Some(first), Some(last)) = (first, last) {
-            let dated = |stamp: crate::record::Nanos| date(u64::try_from(stamp.0).unwrap_or(0));
+            let dated =
+                |stamp: strapd_attitude::record::Nanos| date(u64::try_from(stamp.0).unwrap_or(0));
             match (dated(first), dated(last)) {
                 (Some(first), Some(last)) => {
                     rows.add("time span, UTC", &format!("{first} to {last}"))

@@ -1,10 +1,10 @@
 //! Summary of a simulation -> text or JSON. Pure.
 
 use super::summary::{human_bytes, human_count, line, meaning};
-use crate::record::SampleKind;
-use crate::source::synthetic::Noticed;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
+use strapd_attitude::record::SampleKind;
+use strapd_bodies::synthetic::Noticed;
 
 /// What a simulation did.
 #[derive(Clone, Debug)]

@@ -5,11 +5,11 @@
 use super::aid::Aided;
 use super::drawn::Drawn;
 use super::stamps::Regularised;
-use crate::compare::BodyAxesFit;
-use crate::model::frames::EARTH_RATE;
-use crate::record::{Counts, SampleKind, Verdict};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
+use strapd_attitude::compare::BodyAxesFit;
+use strapd_attitude::record::{Counts, SampleKind, Verdict};
+use strapd_attitude::worlds::EARTH_RATE;
 
 /// What one topic of one log became.
 #[derive(Clone, Debug, Default)]

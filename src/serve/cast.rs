@@ -11,11 +11,11 @@ use super::shutdown::Signals;
 use super::{Server, Settings};
 use crate::error::{Error, Result};
 use crate::pipeline::audience::{self, Audience};
-use crate::record::{AttitudeSample, Nanos, RawSample};
 use crate::sink::Stream;
 use crate::sink::address::Listen;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
+use strapd_attitude::record::{AttitudeSample, Nanos, RawSample};
 use tokio::sync::oneshot;
 
 /// Items handed out at once: well below what may wait for a client.

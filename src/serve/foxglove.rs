@@ -11,11 +11,11 @@ use super::channel::Channel;
 use super::playback::{Action, Mode, Place};
 use super::subscriber::Dropped;
 use crate::decode::printable;
-use crate::record::Nanos;
 use crate::sink::payload::Topic;
 use bytes::{BufMut, Bytes};
 use serde::Deserialize;
 use serde_json::{Value, json};
+use strapd_attitude::record::Nanos;
 
 /// The sub-protocols: that of the SDK, and the one before it.
 pub const SUBPROTOCOLS: [&str; 2] = ["foxglove.sdk.v1", "foxglove.websocket.v1"];

@@ -7,7 +7,6 @@ use super::listen::{Connection, websocket};
 use super::places::Kind;
 use super::{page, quiet, samples, top};
 use crate::decode::printable;
-use crate::record::Verdict;
 use axum::Router;
 use axum::body::Body;
 use axum::extract::Extension;
@@ -15,6 +14,7 @@ use axum::extract::ws::WebSocketUpgrade;
 use axum::http::{HeaderMap, HeaderValue, Response, StatusCode, header};
 use axum::routing::{get, post};
 use std::fmt::Write;
+use strapd_attitude::record::Verdict;
 
 /// Lines, where a client names what it speaks.
 const OWN_SUBPROTOCOL: &str = "strapd.v1";

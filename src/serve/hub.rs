@@ -38,7 +38,6 @@ use crate::config::Plan;
 use crate::decode::packed::Form;
 use crate::decode::{self, Bare, Line, LineDecoder, exact_name, printable};
 use crate::error::{Error, Result};
-use crate::record::{Nanos, RawSample};
 use crate::sink::Profile;
 use bytes::Bytes;
 use std::collections::{BTreeMap, VecDeque};
@@ -46,6 +45,7 @@ use std::hash::{BuildHasher, RandomState};
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::Instant;
+use strapd_attitude::record::{Nanos, RawSample};
 use tokio::sync::Notify;
 
 /// The fault of samples that came when their sensor had just given way.

@@ -6,9 +6,9 @@
 use super::channel::{Channel, Clock, Items};
 use super::subscriber::Chunk;
 use crate::decode::packed::Form;
-use crate::record::{AttitudeSample, Status};
 use crate::sink::Profile;
 use std::sync::Arc;
+use strapd_attitude::record::{AttitudeSample, Status};
 
 /// How somebody wants it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -23,7 +23,6 @@ use super::shutdown::Running;
 use super::wire;
 use crate::client::link;
 use crate::error::{Error, Result};
-use crate::record::Nanos;
 use crate::sink::address::{Listen, Transport};
 use bytes::Bytes;
 use std::cell::RefCell;
@@ -31,6 +30,7 @@ use std::future::Future;
 use std::io;
 use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
+use strapd_attitude::record::Nanos;
 
 #[cfg(unix)]
 pub use passed::Passed;

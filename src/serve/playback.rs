@@ -6,9 +6,9 @@
 
 use super::wire::Fault;
 use crate::pipeline::pace::Pace;
-use crate::record::Nanos;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
+use strapd_attitude::record::Nanos;
 
 /// Between two notices of where it is.
 const TICK: Duration = Duration::from_millis(500);

@@ -18,7 +18,6 @@ mod sync;
 mod worker;
 
 use crate::error::{Error, Result};
-use crate::record::{AttitudeSample, RawSample};
 use crate::sink::{Compression, Provenance, Stream, output_topic};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -27,6 +26,7 @@ use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
+use strapd_attitude::record::{AttitudeSample, RawSample};
 use worker::Worker;
 
 /// When a recording goes on in a new file. The files are numbered: `name_0000.mcap`, `name_0001.mcap`.

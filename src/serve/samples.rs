@@ -13,7 +13,6 @@ use super::stream::NAMELESS;
 use super::stream::run::Placed;
 use super::wire::{self, Fault, Message};
 use crate::decode::{Bare, Line, Objects, exact_name, printable};
-use crate::record::{Nanos, RawSample};
 use axum::body::Body;
 use axum::extract::rejection::QueryRejection;
 use axum::extract::{Extension, Query};
@@ -24,6 +23,7 @@ use serde_json::{Value, json};
 use std::collections::{BTreeMap, HashMap};
 use std::net::IpAddr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use strapd_attitude::record::{Nanos, RawSample};
 use tokio::time::{Instant, sleep, timeout};
 
 /// Longest body.

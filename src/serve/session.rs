@@ -18,12 +18,12 @@ use super::upstream::{self, Event};
 use super::wire::{self, Fault, Message};
 use crate::decode::framing::Framer;
 use crate::decode::{Bare, Line, LineDecoder};
-use crate::record::{Nanos, RawSample};
 use bytes::Bytes;
 use opening::Opening;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
+use strapd_attitude::record::{Nanos, RawSample};
 use turn::{Held, Step};
 
 /// Errors said at once before they are thinned.

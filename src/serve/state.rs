@@ -8,9 +8,7 @@ use super::quiet;
 use super::stream::run::Span;
 use crate::decode::TimeUnit;
 use crate::error::{Error, Result};
-use crate::model::attitude::Quaternion;
 use crate::pipeline::estimator::Memory;
-use crate::record::{AttitudeCovariance, AttitudeSample, Nanos, Status};
 use crate::sink::{self, sync_directory};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -19,6 +17,8 @@ use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
+use strapd_attitude::quaternion::Quaternion;
+use strapd_attitude::record::{AttitudeCovariance, AttitudeSample, Nanos, Status};
 
 /// What this release writes. 1 had neither the run nor the memory.
 const FORMAT: u32 = 2;

@@ -8,15 +8,11 @@ mod intervals;
 pub mod run;
 pub mod stamps;
 
-use crate::condition::{Clock, Report};
 use crate::config::Plan;
 use crate::decode::{Ambiguous, Bare, Line, Stated, TimeUnit};
-use crate::model::attitude::Quaternion;
 use crate::pipeline::estimator::Estimator;
 use crate::pipeline::opening::labelled;
 use crate::pipeline::preparation::{Prepared, Resolved, at_once};
-use crate::propagate::{Method, Sequential};
-use crate::record::{AttitudeSample, Counts, Nanos, RawSample, Verdict};
 use crate::report::aid::Aided;
 use crate::serve::channel::Channel;
 use crate::serve::hub::Run;
@@ -29,6 +25,10 @@ use run::{Placed, Span, Standing};
 use stamps::{Stamps, Taken};
 use std::sync::Arc;
 use std::time::Duration;
+use strapd_attitude::condition::{Clock, Report};
+use strapd_attitude::propagate::{Method, Sequential};
+use strapd_attitude::quaternion::Quaternion;
+use strapd_attitude::record::{AttitudeSample, Counts, Nanos, RawSample, Verdict};
 
 /// Numbers a sample may come behind its turn. Further back, the sender counts anew.
 const OVERTAKEN: u64 = 64;
@@ -105,7 +105,8 @@ pub fn live_plan(plan: &Plan) -> Result<Plan, String> {
     // An orientation, so that only what no sample can bring is refused.
     let sample = RawSample {
         orientation: Some(
-            Quaternion::<crate::model::frames::Nav, crate::model::frames::Body>::identity().wxyz(),
+            Quaternion::<strapd_attitude::frames::Nav, strapd_attitude::frames::Body>::identity()
+                .wxyz(),
         ),
         ..RawSample::default()
     };

@@ -6,11 +6,6 @@
 
 use super::http::{refusal, response};
 use super::listen::Connection;
-use crate::compare::top::{self as compare, Course, How, MethodPath, Paths};
-use crate::model::attitude::Quaternion;
-use crate::model::frames::{Body, Nav};
-use crate::model::quaternion_kernel as quat;
-use crate::model::top::{Case, EulerAngles, EulerState, SymmetricTop};
 use axum::body::Body as Answer;
 use axum::extract::rejection::QueryRejection;
 use axum::extract::{Extension, Query};
@@ -20,6 +15,11 @@ use serde_json::{Map, Value, json};
 use std::f64::consts::TAU;
 use std::sync::LazyLock;
 use std::time::Duration;
+use strapd_attitude::frames::{Body, Nav};
+use strapd_attitude::quaternion::Quaternion;
+use strapd_attitude::quaternion::kernel as quat;
+use strapd_bodies::top::method_errors::{self as compare, Course, How, MethodPath, Paths};
+use strapd_bodies::top::{Case, EulerAngles, EulerState, SymmetricTop};
 use tokio::sync::Semaphore;
 
 /// Most samples of one request: with [`MOST_METHODS`] about a fifth of a second's work.

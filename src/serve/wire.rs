@@ -14,10 +14,10 @@ use crate::decode::packed::Form;
 use crate::decode::{
     Class, Line, LineDecoder, MAX_LINE, Undecodable, exact_name, printable, snippet,
 };
-use crate::record::{Nanos, RawSample};
 use bytes::Bytes;
 use serde::Deserialize;
 use serde_json::{Value, json};
+use strapd_attitude::record::{Nanos, RawSample};
 
 /// Version of the protocol.
 pub const PROTO: u32 = 1;

@@ -7,7 +7,7 @@ use super::csv;
 use super::json::Objects;
 use super::mcap::Layout;
 use super::mcap::chunk::{Chunk, Compression};
-use crate::record::{AttitudeSample, Nanos, RawSample};
+use strapd_attitude::record::{AttitudeSample, Nanos, RawSample};
 
 /// A run of samples of one stream, with what of its past their messages depend on.
 #[derive(Debug, Default)]

@@ -1,7 +1,7 @@
 //! AttitudeSample -> a CSV row. Pure.
 
 use super::json::{push_f64, push_i64, push_status};
-use crate::record::{AttitudeSample, RawSample};
+use strapd_attitude::record::{AttitudeSample, RawSample};
 
 /// The first row. Angles in degrees, rates in rad/s, stamps in nanoseconds; roll, pitch and yaw are
 /// turned about z, then y, then x (ZYX).
@@ -101,9 +101,9 @@ fn half_turn(angle: f64) -> f64 {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use crate::record::{AttitudeCovariance, Nanos, Status};
     use crate::sink::tests::sample;
     use nalgebra::{UnitQuaternion, Vector3};
+    use strapd_attitude::record::{AttitudeCovariance, Nanos, Status};
 
     /// Another way: nalgebra composes the three turns.
     fn quaternion(roll: f64, pitch: f64, yaw: f64) -> [f64; 4] {

@@ -2,7 +2,7 @@
 //!
 //! A stage of its own because `--out-rate` thins what is written and never what is integrated.
 
-use crate::record::{AttitudeSample, Nanos, Status};
+use strapd_attitude::record::{AttitudeSample, Nanos, Status};
 
 /// Thins a stream to about `--out-rate` samples a second.
 ///

@@ -8,8 +8,8 @@ use super::batch::Batch;
 use super::plot::PlotObject;
 use super::stream::{Content, Stream};
 use super::target::Profile;
-use crate::record::{AttitudeSample, Nanos, RawSample, SampleKind};
 use serde_json::ser::{CompactFormatter, Formatter};
+use strapd_attitude::record::{AttitudeSample, Nanos, RawSample, SampleKind};
 
 /// Appends the shortest decimal that reads back to the same bits, or `null`.
 pub(super) fn push_f64(out: &mut Vec<u8>, value: f64) {
@@ -261,10 +261,10 @@ impl FrameTransform {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use crate::model::attitude::Quaternion;
-    use crate::record::{AttitudeCovariance, Status};
     use crate::sink::tests::sample;
     use nalgebra::Vector3;
+    use strapd_attitude::quaternion::Quaternion;
+    use strapd_attitude::record::{AttitudeCovariance, Status};
 
     fn att(stream: &Stream, seq: u64, s: &AttitudeSample) -> String {
         let mut out = Vec::new();

@@ -16,10 +16,10 @@ use super::batch::Batch;
 use super::json::{AttObject, FrameTransform};
 use super::stream::{Content, Provenance, Stream, child_frames, named_frame, parent_frame};
 use crate::error::{Error, Result};
-use crate::record::Nanos;
 use chunk::Chunk;
 use file::McapFile;
 use std::collections::BTreeMap;
+use strapd_attitude::record::Nanos;
 
 /// What messages are made of.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]

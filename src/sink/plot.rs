@@ -9,7 +9,7 @@
 
 use super::json::{push_f64, push_i64, push_string};
 use super::stream::Stream;
-use crate::record::{AttitudeSample, Nanos, RawSample};
+use strapd_attitude::record::{AttitudeSample, Nanos, RawSample};
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 

@@ -1,7 +1,7 @@
 //! What an output stream is called: topics, frames, labels. Pure.
 
-use crate::record::SampleKind;
 use std::collections::{BTreeMap, BTreeSet};
+use strapd_attitude::record::SampleKind;
 
 /// The longest topic or frame written, in bytes. A hostile log can carry a name of 60 MB; it would
 /// be repeated in every message.

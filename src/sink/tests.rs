@@ -1,8 +1,8 @@
 //! Samples the tests of this stage share.
 
-use crate::model::attitude::Quaternion;
-use crate::record::{AttitudeCovariance, AttitudeSample, Nanos, Status};
 use nalgebra::Vector3;
+use strapd_attitude::quaternion::Quaternion;
+use strapd_attitude::record::{AttitudeCovariance, AttitudeSample, Nanos, Status};
 
 /// A sample with nothing special about it.
 pub(crate) fn sample(stamp: Nanos) -> AttitudeSample {

@@ -4,8 +4,8 @@
 use crate::made_logs::{motion, written};
 use crate::replays::{assert_rotations, attitudes, done, only, replay_with};
 use strapd::config::Plan;
-use strapd::propagate::{Method, Order, Placement};
-use strapd::record::SampleKind;
+use strapd_attitude::propagate::{Method, Order, Placement};
+use strapd_attitude::record::SampleKind;
 
 fn plan(method: Method, kind: SampleKind) -> Plan {
     Plan {

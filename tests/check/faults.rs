@@ -2,7 +2,7 @@
 
 use crate::made_logs::{ImuSample, PACKINGS, START, TOPIC, bytes, logged, written};
 use crate::{codes, found};
-use strapd::model::motion::BandLimited;
+use strapd_bodies::motion::BandLimited;
 
 /// A body on the table for 1.5 s, then moved at random; exact rates and orientation, gravity's reaction
 /// alone. Between 50 and 400 Hz, by the seed.

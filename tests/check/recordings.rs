@@ -4,7 +4,7 @@ use crate::replays::{done, only, replay_with};
 use crate::shared_data::shared;
 use crate::{codes, found, notes};
 use strapd::config::Plan;
-use strapd::record::SampleKind;
+use strapd_attitude::record::SampleKind;
 
 /// File, errors and warnings. The Xsens samples are averages (see `fixtures/README.md`), which is
 /// found in every variant of that log.

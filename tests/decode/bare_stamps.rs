@@ -1,7 +1,7 @@
 //! Stamps that are bare numbers: one unit for all of a stream, or none.
 
 use strapd::decode::{Bare, TimeUnit, decode_line, unit_of};
-use strapd::record::Nanos;
+use strapd_attitude::record::Nanos;
 
 const UNITS: [(TimeUnit, &str, i64); 4] = [
     (TimeUnit::Nano, "ns", 1_000_000_000),

@@ -2,7 +2,7 @@
 
 use super::{LOG, channel, decode, decode_one, options};
 use strapd::decode::{Class, Decoder, GyroUnit, LineDecoder, MAX_LINE, Options, decode_line};
-use strapd::record::{Nanos, SampleKind};
+use strapd_attitude::record::{Nanos, SampleKind};
 
 const GYRO: [f64; 3] = [1.5, -2.5, 0.1];
 

@@ -3,7 +3,7 @@
 use super::writer::Proto;
 use super::{LOG, decode, decode_one, options};
 use strapd::decode::{Channel, Decoder, Options};
-use strapd::record::Nanos;
+use strapd_attitude::record::Nanos;
 
 fn vector3(kind: u64) -> Proto {
     let axis = |name: &str, number| Proto::field(name, number, false, kind, "");

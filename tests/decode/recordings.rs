@@ -3,7 +3,7 @@
 use super::shared_data::shared;
 use std::collections::BTreeMap;
 use strapd::decode::{Channel, Decoded, Decoder, Options, role};
-use strapd::record::{Nanos, RawSample};
+use strapd_attitude::record::{Nanos, RawSample};
 
 /// A channel, owned.
 #[derive(Clone)]

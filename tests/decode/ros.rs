@@ -3,7 +3,7 @@
 use super::writer::*;
 use super::{channel, decode, decode_one, options};
 use strapd::decode::{Channel, Decoder, GyroUnit, Options, Undecodable};
-use strapd::record::{Nanos, SampleKind};
+use strapd_attitude::record::{Nanos, SampleKind};
 
 fn imu_decoder() -> Decoder {
     Decoder::compile(
@@ -339,7 +339,7 @@ fn a_batch_gives_one_sample_each_and_an_index_gives_that_one() {
     let payload = w.u8(1).bytes;
     let decoder = Decoder::compile(&channel, &Options::default()).unwrap();
     assert!(decoder.stated().batched);
-    let secs = |samples: Vec<strapd::record::RawSample>| -> Vec<i64> {
+    let secs = |samples: Vec<strapd_attitude::record::RawSample>| -> Vec<i64> {
         samples
             .iter()
             .map(|s| s.header.unwrap().0 / 1_000_000_000)

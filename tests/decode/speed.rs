@@ -5,7 +5,7 @@ use super::writer::{IMU, Proto, Writer, imu_section};
 use std::hint::black_box;
 use std::time::Instant;
 use strapd::decode::{Channel, Decoder, Options};
-use strapd::record::Nanos;
+use strapd_attitude::record::Nanos;
 
 fn decoder(
     message_encoding: &str,

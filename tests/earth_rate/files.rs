@@ -6,8 +6,9 @@ use crate::{LATITUDE, in_body, pose};
 use nalgebra::Vector3;
 use std::path::{Path, PathBuf};
 use strapd::config::{Bias, Initial, Plan};
-use strapd::model::attitude::{Quaternion, YawPitchRoll};
-use strapd::model::frames::{Body, Convention, In, Nav, World};
+use strapd_attitude::frames::{Body, In, Nav};
+use strapd_attitude::quaternion::{Quaternion, YawPitchRoll};
+use strapd_attitude::worlds::{Convention, World};
 
 const BIAS: [f64; 3] = [0.003, -0.002, 0.001];
 

@@ -5,8 +5,8 @@ use crate::parsers;
 use std::ops::ControlFlow;
 use strapd::decode::framing::Framer;
 use strapd::decode::{Channel, FieldPath, decode_line, role};
-use strapd::record::Nanos;
 use strapd::source::mcap::{MAGIC, Reader, WalkOptions, op, walk};
+use strapd_attitude::record::Nanos;
 
 /// A parser and what it is fed.
 pub(crate) struct Case {
@@ -133,7 +133,7 @@ fn arguments(data: &[u8]) {
     let _ = strapd::config::Initial::parse(text);
     let _ = strapd::config::Bias::parse(text);
     let _ = strapd::config::Noise::parse(text);
-    let _ = text.parse::<strapd::propagate::Method>();
+    let _ = text.parse::<strapd_attitude::propagate::Method>();
     let _ = strapd::cli::shell::quoted(text);
 }
 

@@ -11,11 +11,11 @@ use strapd::pipeline::pool::Pool;
 use strapd::pipeline::replay::run;
 use strapd::pipeline::route::{Item, Route};
 use strapd::pipeline::run::{Replay, Source};
-use strapd::record::RawSample;
 use strapd::serve::recorder::{Recorder, Settings};
 use strapd::sink::Compression;
 use strapd::sink::{Options, Target};
 use strapd::source::mcap::{WalkOptions, walk};
+use strapd_attitude::record::RawSample;
 
 /// The samples of a fixture, decoded as `replay` decodes them.
 fn samples(path: &Path) -> Vec<RawSample> {

@@ -6,10 +6,10 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
-use strapd::condition::Clock;
 use strapd::config::Plan;
 use strapd::pipeline::pool::Pool;
 use strapd::pipeline::replay::run;
+use strapd_attitude::condition::Clock;
 
 /// Stamps off even ones by up to 3 % of the step, as a lattice.
 fn jittered(n: usize) -> Vec<ImuSample> {

@@ -5,8 +5,8 @@ use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::sync::Arc;
-use strapd::condition::regularise::{Regulariser, Survey, Value};
-use strapd::record::{Join, Nanos, RateSample, RawSample, SampleKind};
+use strapd_attitude::condition::regularise::{Regulariser, Survey, Value};
+use strapd_attitude::record::{Join, Nanos, RateSample, RawSample, SampleKind};
 
 /// Samples with these stamps (after [`START`]), none like another.
 fn stamped(stamps: impl IntoIterator<Item = i64>) -> Vec<RawSample> {

@@ -5,10 +5,10 @@ use crate::made_logs::{ImuSample, TOPIC, motion, written};
 use crate::replays::{Bits, assert_rotations, attitudes, only, replay_with};
 use proptest::prelude::*;
 use std::path::Path;
-use strapd::condition::OnGap;
 use strapd::config::Plan;
-use strapd::propagate::Method;
-use strapd::record::{SampleKind, Verdict};
+use strapd_attitude::condition::OnGap;
+use strapd_attitude::propagate::Method;
+use strapd_attitude::record::{SampleKind, Verdict};
 
 const SAMPLES: usize = 60;
 
@@ -158,7 +158,7 @@ fn rates_in_degrees_are_integrated_and_the_flag_is_named() {
     let said = only(&summary).warnings.join("; ");
     assert!(said.contains("--gyro-unit deg"), "{said}");
     let plan = Plan {
-        unit: Some(strapd::condition::GyroUnit::Deg),
+        unit: Some(strapd_attitude::condition::GyroUnit::Deg),
         ..Plan::default()
     };
     let (summary, _) = attitudes(&replay_with(&path, plan), dir.path());

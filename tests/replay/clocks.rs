@@ -2,11 +2,11 @@
 
 use crate::made_logs::{ImuSample, PACKINGS, START, STEP, TOPIC, bytes, logged, motion, written};
 use crate::replays::{attitudes, done, only, replay_of, replay_with};
-use strapd::condition::Clock;
 use strapd::config::Plan;
 use strapd::error::Error;
-use strapd::propagate::{Method, Order, Placement};
-use strapd::record::{SampleKind, Verdict};
+use strapd_attitude::condition::Clock;
+use strapd_attitude::propagate::{Method, Order, Placement};
+use strapd_attitude::record::{SampleKind, Verdict};
 
 fn shifted(samples: &[ImuSample], by: i64) -> Vec<ImuSample> {
     samples

@@ -6,8 +6,8 @@ use crate::replays::{assert_rotations, attitudes, done, fixture, only, replay_of
 use crate::shared_data::shared;
 use std::time::{Duration, Instant};
 use strapd::error::Error;
-use strapd::record::Verdict;
 use strapd::report::summary::{RunSummary, TopicSummary};
+use strapd_attitude::record::Verdict;
 
 fn hostile(name: &str) -> Option<RunSummary> {
     let path = shared(&format!("logs/hostile/{name}.mcap"))?;

@@ -6,7 +6,7 @@ use crate::shared_data::shared;
 use std::collections::BTreeMap;
 use strapd::config::{Bias, Initial, Plan};
 use strapd::error::Error;
-use strapd::model::frames::World;
+use strapd_attitude::worlds::World;
 
 /// Largest difference of a component, either sign of the quaternion.
 fn apart(a: [f64; 4], b: [f64; 4]) -> f64 {

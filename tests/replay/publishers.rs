@@ -13,7 +13,7 @@ use strapd::decode::Options;
 use strapd::error::Error;
 use strapd::pipeline::check::check;
 use strapd::pipeline::pool::Pool;
-use strapd::record::Verdict;
+use strapd_attitude::record::Verdict;
 
 /// One message: the metadata of its channel, its frame, its sample.
 struct Sent {

@@ -7,8 +7,8 @@ use crate::replays::{
 use crate::shared_data::shared;
 use std::path::Path;
 use strapd::config::Plan;
-use strapd::propagate::{Method, Order, Placement};
-use strapd::record::{SampleKind, Verdict};
+use strapd_attitude::propagate::{Method, Order, Placement};
+use strapd_attitude::record::{SampleKind, Verdict};
 
 /// File, samples in it, samples used, where the attitude goes.
 const REAL: [(&str, u64, u64, &str); 7] = [

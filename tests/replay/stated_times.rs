@@ -11,8 +11,8 @@ use strapd::config::Plan;
 use strapd::decode::{Channel, Rank, role};
 use strapd::pipeline::check::check;
 use strapd::pipeline::pool::Pool;
-use strapd::record::{SampleKind, Verdict};
 use strapd::report::findings::findings;
+use strapd_attitude::record::{SampleKind, Verdict};
 
 const SECOND: i64 = 1_000_000_000;
 
@@ -429,8 +429,8 @@ fn the_filters_rates_of_an_older_px4_log_are_no_second_imu() {
 fn a_nameless_sensor_has_one_name_in_its_attitude_and_its_transform() {
     let dir = tempfile::tempdir().unwrap();
     for world in [
-        strapd::model::frames::World::Ned,
-        strapd::model::frames::World::Enu,
+        strapd_attitude::worlds::World::Ned,
+        strapd_attitude::worlds::World::Enu,
     ] {
         let path = px4_log(dir.path(), "us.mcap", 1_000);
         let out = dir.path().join("out.mcap");

@@ -6,10 +6,10 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
 use std::collections::VecDeque;
 use std::sync::Arc;
-use strapd::record::Nanos;
 use strapd::serve::Settings;
 use strapd::serve::hub::Hub;
 use strapd::serve::session::{Scratch, Session};
+use strapd_attitude::record::Nanos;
 
 /// A conversation without a socket: lines with the time each is received at -> what a watcher gets.
 fn conversation<'a>(lines: impl Iterator<Item = (i64, &'a str)>) -> (Vec<u8>, Value) {

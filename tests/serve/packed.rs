@@ -11,12 +11,12 @@ use std::io::Write;
 use std::net::TcpListener;
 use std::process::Command;
 use std::sync::Arc;
-use strapd::record::{Nanos, Status};
 use strapd::serve::Settings;
 use strapd::serve::admission::Token;
 use strapd::serve::hub::Hub;
 use strapd::serve::session::{Scratch, Session};
 use strapd::serve::source::Source;
+use strapd_attitude::record::{Nanos, Status};
 
 const WATCH: &str = r#"{"class":"WATCH"}"#;
 const WATCH_PACKED: &str = r#"{"class":"WATCH","packed":true}"#;

@@ -10,11 +10,11 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use strapd::config::{Noise, Plan};
 use strapd::pipeline::estimator::Memory;
-use strapd::record::{Nanos, SampleKind};
 use strapd::serve::Settings;
 use strapd::serve::hub::Hub;
 use strapd::serve::session::{Scratch, Session};
 use strapd::serve::state::{Saved, Sensors};
+use strapd_attitude::record::{Nanos, SampleKind};
 
 /// Number `n` of a lively motion at 200 Hz, in words of its own: jittered by up to 0.4 ms, one in 97 lost.
 fn lively(n: u64) -> Option<String> {
@@ -238,7 +238,7 @@ fn plans() -> Vec<(&'static str, Plan)> {
         ("with look-ahead", method("magnus")),
         (
             "a gap is a reset",
-            of(&|p| p.on_gap = strapd::condition::OnGap::Reset),
+            of(&|p| p.on_gap = strapd_attitude::condition::OnGap::Reset),
         ),
     ]
 }

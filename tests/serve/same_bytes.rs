@@ -7,7 +7,7 @@ use crate::shared_data;
 use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Stdio};
-use strapd::record::SampleKind;
+use strapd_attitude::record::SampleKind;
 
 /// `strapd ARGS` with this on standard input.
 fn output(args: &[&str], input: &[u8]) -> Vec<u8> {

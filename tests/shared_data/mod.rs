@@ -2,7 +2,7 @@
 //! needs them is marked `#[cfg_attr(not(has_shared), ignore = "needs ../shared")]` (`build.rs`), and is
 //! listed as ignored on a machine without them.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// `../shared/<relative>` beside the checkout. Never `None`: who runs without it fails.
 ///
@@ -10,7 +10,10 @@ use std::path::PathBuf;
 /// When it is absent.
 #[allow(dead_code, unreachable_pub)]
 pub fn shared(relative: &str) -> Option<PathBuf> {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+    // The checkout is where the lock file lies, in whichever crate this is compiled.
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .ancestors()
+        .find(|folder| folder.join("Cargo.lock").is_file())?
         .join("../shared")
         .join(relative);
     assert!(

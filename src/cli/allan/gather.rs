@@ -1,16 +1,12 @@
 //! One topic of a log -> angles at even intervals, and what was wrong with them. I/O.
 
-use crate::condition::stillness::{Limits, Rests, Stillness};
-use crate::condition::{ClockWarning, Conditioner, Report, choose_clock};
 use crate::config::Plan;
 use crate::error::{Error, Result};
-use crate::model::allan::AngleRecord;
 use crate::pipeline::decoders::Decoders;
 use crate::pipeline::log::{Log, described, problems};
 use crate::pipeline::pool::Pool;
 use crate::pipeline::preparation::Resolved;
 use crate::pipeline::route::{Item, Noticed, Route, Taker};
-use crate::record::{Join, Nanos, RateSample, RawSample, SampleKind};
 use crate::report::summary::significant;
 use crate::source::mcap::{self, WalkOptions};
 use nalgebra::Vector3;
@@ -18,6 +14,10 @@ use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
+use strapd_attitude::condition::stillness::{Limits, Rests, Stillness};
+use strapd_attitude::condition::{ClockWarning, Conditioner, Report, choose_clock};
+use strapd_attitude::noise::allan::AngleRecord;
+use strapd_attitude::record::{Join, Nanos, RateSample, RawSample, SampleKind};
 
 /// Angles held at most: 24 bytes each, 200 MB.
 pub(super) const CAPACITY: usize = 1 << 23;

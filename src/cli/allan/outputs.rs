@@ -10,7 +10,7 @@ const DEG_PER_H: f64 = std::f64::consts::PI / 180.0 / 3600.0;
 pub(super) fn chart(topic: &str, axes: &[Axis]) -> Chart {
     let mut series = Vec::new();
     for (i, axis) in axes.iter().enumerate() {
-        let points = |of: &dyn Fn(&crate::model::allan::Point) -> f64| {
+        let points = |of: &dyn Fn(&strapd_attitude::noise::allan::Point) -> f64| {
             axis.points
                 .iter()
                 .map(|p| [p.tau, of(p) / DEG_PER_H])

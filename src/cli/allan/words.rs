@@ -2,12 +2,12 @@
 
 use super::Axis;
 use super::gather::Gathered;
-use crate::model::allan::{AllanFit, FittedTerm, MAX_MISFIT, Point};
-use crate::model::imu_error::{ImuError, TERMS, Term};
 use crate::report::summary::{meaning, significant};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::Path;
+use strapd_attitude::noise::allan::{AllanFit, FittedTerm, MAX_MISFIT, Point};
+use strapd_attitude::noise::sensor_error::{ImuError, TERMS, Term};
 
 /// Which term of a fit.
 type Of = fn(&AllanFit) -> &FittedTerm;

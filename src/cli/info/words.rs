@@ -159,7 +159,7 @@ impl Report<'_> {
         };
         let mut flags = String::new();
         let advice = &best.quality.advice;
-        use crate::condition::quality::Advice;
+        use strapd_attitude::condition::quality::Advice;
         if advice
             .iter()
             .any(|a| matches!(a, Advice::RatesLookLikeDegrees { .. }))

@@ -3,11 +3,11 @@
 use super::filter::{self, Refusal};
 use crate::cli::Outcome;
 use crate::error::Result;
-use crate::model::inertia::{AddedMass, InertiaError, RigidBody};
 use clap::Args;
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 use serde::Deserialize;
 use serde_json::{Value, json};
+use strapd_bodies::inertia::{AddedMass, InertiaError, RigidBody};
 
 /// Mass, centre of gravity, inertia -> 6x6 matrices, Coriolis forces, acceleration.
 #[derive(Args, Debug)]

@@ -7,14 +7,14 @@ mod tables;
 use super::filter::{self, Refusal};
 use super::top_flags::TopFlags;
 use crate::cli::{Global, Outcome, print};
-use crate::compare::top::{self as compare, Course, How, MethodErrors};
 use crate::error::{Error, Result};
-use crate::model::top::{Case, EulerState, SymmetricTop};
 use crate::report::summary::significant;
 use clap::Args;
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 use std::fmt::Write as _;
+use strapd_bodies::top::method_errors::{self as compare, Course, How, MethodErrors};
+use strapd_bodies::top::{Case, EulerState, SymmetricTop};
 
 /// The symmetric top: its cases, and how well each method finds its attitude.
 #[derive(Args, Debug)]

@@ -1,11 +1,11 @@
 //! The flags that say which top, and how it starts: shared by `simulate top` and `model top`. Pure.
 
-use crate::compare::top::{body, case};
 use crate::config::numbers;
 use crate::error::{Error, Result};
-use crate::model::top::{Case, EulerAngles, EulerState, SymmetricTop};
 use clap::Args;
 use std::f64::consts::TAU;
+use strapd_bodies::top::method_errors::{body, case};
+use strapd_bodies::top::{Case, EulerAngles, EulerState, SymmetricTop};
 
 /// Which top, and how it starts. The defaults are the seed document's.
 #[derive(Args, Debug, Clone)]

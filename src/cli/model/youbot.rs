@@ -8,14 +8,14 @@ pub(crate) mod trajectory;
 use super::filter::{self, Refusal};
 use crate::cli::Outcome;
 use crate::error::Result;
-use crate::model::attitude::Quaternion;
-use crate::model::frames::Dcm;
-use crate::model::youbot::{Arm, ArmError, DriverJoints, DriverMotion, SeedJoints, SeedMotion};
 use clap::{Args, Subcommand};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::io::IsTerminal;
+use strapd_attitude::frames::Dcm;
+use strapd_attitude::quaternion::Quaternion;
+use strapd_bodies::youbot::{Arm, ArmError, DriverJoints, DriverMotion, SeedJoints, SeedMotion};
 
 /// The KUKA youBot's arm: kinematics, forces, paths.
 #[derive(Args, Debug)]
@@ -261,24 +261,7 @@ impl Setting {
 fn refusal(why: &ArmError) -> Refusal {
     Refusal {
         error: why.to_string(),
-        reason: Some(reason(why)),
-    }
-}
-
-fn reason(why: &ArmError) -> &'static str {
-    match why {
-        ArmError::NotFinite { .. } => "not-finite",
-        ArmError::TooLarge { .. } => "too-large",
-        ArmError::NotARotation(_) => "not-a-rotation",
-        ArmError::OutOfPlane { .. } => "out-of-plane",
-        ArmError::OutOfReach(_) => "out-of-reach",
-        ArmError::Limit { .. } => "limit",
-        ArmError::Singular(_) => "singular",
-        ArmError::InfeasibleTwist { .. } => "infeasible-twist",
-        ArmError::BranchChange { .. } => "branch-change",
-        ArmError::Inertia(_) => "not-physical",
-        ArmError::Path { why, .. } => reason(why),
-        ArmError::Impossible { .. } => "impossible",
+        reason: Some(why.code()),
     }
 }
 

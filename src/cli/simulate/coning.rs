@@ -2,8 +2,8 @@
 
 use super::{Made, parameter, sampling::Common};
 use crate::error::{Error, Result};
-use crate::model::motion::{self, Motion};
 use clap::Args;
+use strapd_bodies::motion::{self, Motion};
 
 /// The axis runs round a cone: the worst case of attitude integration.
 #[derive(Args, Debug)]

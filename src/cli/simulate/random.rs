@@ -2,8 +2,8 @@
 
 use super::{Made, parameter, sampling::Common};
 use crate::error::{Error, Result};
-use crate::model::motion::{BandLimited, Motion};
 use clap::Args;
+use strapd_bodies::motion::{BandLimited, Motion};
 
 /// Sums of sines about each axis, up to a highest frequency.
 #[derive(Args, Debug)]

@@ -3,13 +3,13 @@
 use super::{Made, parameter, sampling::Common};
 use crate::config::{Initial, numbers};
 use crate::error::{Error, Result};
-use crate::model::attitude::Quaternion;
-use crate::model::inertia::{self, InertiaError};
-use crate::model::motion::Motion;
-use crate::model::rigid_body::{HeavyBody, Rotor, Spin};
 use clap::Args;
 use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
+use strapd_attitude::quaternion::Quaternion;
+use strapd_bodies::inertia::{self, InertiaError};
+use strapd_bodies::motion::Motion;
+use strapd_bodies::rigid_body::{HeavyBody, Rotor, Spin};
 
 /// Any rigid body about a fixed point, free or under gravity.
 #[derive(Args, Debug)]

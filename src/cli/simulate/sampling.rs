@@ -5,12 +5,12 @@ use crate::cli::estimation::KindArg;
 use crate::cli::replay::CompressionArg;
 use crate::cli::serving::{Served, Serving};
 use crate::error::{Error, Result};
-use crate::model::imu_error::{ImuError, StampError};
 use crate::pipeline::simulate::Simulation;
-use crate::record::{Nanos, SampleKind};
 use crate::sink::{Options, Target};
-use crate::source::synthetic::{Sampling, Synthetic};
 use clap::Args;
+use strapd_attitude::noise::sensor_error::{ImuError, StampError};
+use strapd_attitude::record::{Nanos, SampleKind};
+use strapd_bodies::synthetic::{Sampling, Synthetic};
 
 /// Gravity where the motion does not say otherwise: standard gravity.
 const GRAVITY: f64 = 9.80665;

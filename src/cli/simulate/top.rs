@@ -3,8 +3,8 @@
 use super::{Made, parameter, sampling::Common};
 use crate::cli::model::top_flags::TopFlags;
 use crate::error::{Error, Result};
-use crate::model::motion::Motion;
 use clap::Args;
+use strapd_bodies::motion::Motion;
 
 /// A heavy symmetric top on a fixed pivot: spins, precesses, nods.
 #[derive(Args, Debug)]

@@ -3,10 +3,10 @@
 use super::{Made, parameter, sampling::Common};
 use crate::cli::model::youbot::{Unit, trajectory};
 use crate::error::{Error, Result};
-use crate::model::motion::Motion;
 use clap::Args;
 use std::io::Read;
 use std::path::{Path, PathBuf};
+use strapd_bodies::motion::Motion;
 
 /// Longest file taken for a path, bytes.
 const LONGEST: u64 = 1 << 22;

@@ -3,8 +3,8 @@
 use super::super::registers::{Form, Registers, Slot};
 use super::super::stamp::{self, Bare, TimeUnit, from_decimal, from_rfc3339};
 use super::super::{Decoded, GyroUnit};
-use crate::record::{Nanos, RawSample, SampleKind};
 use std::borrow::Cow;
+use strapd_attitude::record::{Nanos, RawSample, SampleKind};
 
 /// A stamp as it was written; its unit may depend on keys that come later.
 #[derive(Debug, Clone, PartialEq)]

@@ -9,7 +9,7 @@ use super::scan::Scanner;
 use super::seek::Seeker;
 use crate::decode::refusal::{exact_name, printable};
 use crate::decode::{Bare, Decoded, GyroUnit, Options, Undecodable};
-use crate::record::{Nanos, RawSample, SampleKind};
+use strapd_attitude::record::{Nanos, RawSample, SampleKind};
 
 /// Longest line that is read.
 pub const MAX_LINE: usize = 64 << 10;

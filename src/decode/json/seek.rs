@@ -9,8 +9,8 @@ use crate::decode::registers::Slot;
 use crate::decode::select::names::{Meaning, Px4, is_nanos, is_seconds, meaning};
 use crate::decode::stamp::TimeUnit;
 use crate::decode::{MAX_BATCH, Undecodable};
-use crate::record::SampleKind;
 use std::borrow::Cow;
+use strapd_attitude::record::SampleKind;
 
 /// How deep an object may lie whose keys are looked at by name.
 pub(super) const MAX_SEARCH: u32 = 6;

@@ -9,7 +9,7 @@ use crate::decode::Decoded;
 use crate::decode::registers::{Form, is_mark};
 use crate::decode::schema::{builtin, rosmsg::Dialect};
 use crate::decode::select::select;
-use crate::record::{Nanos, RawSample};
+use strapd_attitude::record::{Nanos, RawSample};
 
 /// Bytes behind the header: 37 doubles.
 const BODY: usize = 37 * 8;

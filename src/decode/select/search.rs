@@ -6,14 +6,14 @@
 use super::names::{self, Meaning, Px4};
 use super::shapes::{end_of, quaternion, stamp_at, stamp_in, structs_on, text_near, vector, with};
 use super::{End, Found, Pick, Selection, StampFields, Step, batch_of, path_text, px4_stamp};
-use crate::condition::GyroUnit;
 use crate::decode::Options;
 use crate::decode::fields::FieldRole;
 use crate::decode::registers::{Slot, StampForm};
 use crate::decode::schema::{Field, Kind, Many, Schema, Struct, last_name};
 use crate::decode::stamp::TimeUnit;
-use crate::record::SampleKind;
 use std::collections::{BTreeSet, VecDeque};
+use strapd_attitude::condition::GyroUnit;
+use strapd_attitude::record::SampleKind;
 
 /// Deepest nesting that is searched, most structs, and most fields of them.
 const MAX_DEPTH: usize = 8;

@@ -5,7 +5,7 @@
 //! that leaves two units, which of them makes instants of our time. Nothing is guessed beyond that.
 
 use super::TimeUnit;
-use crate::record::Nanos;
+use strapd_attitude::record::Nanos;
 
 /// Most samples that wait until the unit is settled.
 pub const MOST_WAITING: usize = 8;

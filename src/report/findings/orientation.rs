@@ -1,10 +1,10 @@
 //! A recorded orientation, and what it says about the samples -> findings. Pure.
 
 use super::{Finding, Severity};
-use crate::compare::BodyAxesFit;
 use crate::pipeline::check::CheckedTopic;
 use crate::report::summary::{Against, Recorded, significant};
 use serde_json::json;
+use strapd_attitude::compare::BodyAxesFit;
 
 /// A meaning is better when its median error is below this share of the other's.
 const CLEARLY: f64 = 0.95;

@@ -1,11 +1,11 @@
 //! Statistics of the samples as recorded -> findings. Pure.
 
 use super::{Finding, Severity};
-use crate::condition::quality::{Advice, AxisStats};
-use crate::model::frames::BodyAxes;
 use crate::pipeline::check::CheckedTopic;
 use crate::report::summary::significant;
 use serde_json::json;
+use strapd_attitude::condition::quality::{Advice, AxisStats};
+use strapd_attitude::frames::BodyAxes;
 
 /// Header and recorder's clock further apart than this are different clocks, s.
 const OTHER_CLOCK_SECS: f64 = 1.0;

@@ -1,9 +1,9 @@
 //! What was kept of a run -> charts over time. Pure.
 
-use crate::condition::quality::QualitySummary;
 use crate::report::drawn::{Drawn, ErrorTrace};
 use crate::report::plot::{Axis, Chart, Look, Series};
 use crate::report::trace::Traces;
+use strapd_attitude::condition::quality::QualitySummary;
 
 /// Size of a chart over time, pixels.
 const SIZE: (u32, u32) = (960, 300);

@@ -2,10 +2,10 @@
 
 use super::charts::{self, Time};
 use super::markup::{escaped, figure, table};
-use crate::compare::ErrorStats;
 use crate::report::drawn::Errors;
 use crate::report::summary::{TopicSummary, significant};
 use std::fmt::Write as _;
+use strapd_attitude::compare::ErrorStats;
 
 pub(super) fn section(
     summary: &TopicSummary,

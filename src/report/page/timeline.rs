@@ -2,10 +2,10 @@
 
 use super::charts::Time;
 use super::markup::escaped;
-use crate::condition::stillness::Rests;
 use crate::report::drawn::{Drawn, Mark};
 use crate::report::summary::significant;
 use std::fmt::Write as _;
+use strapd_attitude::condition::stillness::Rests;
 
 /// Pixels: left edge and width, those of the charts above; height of a row.
 const LEFT: f64 = 72.0;

@@ -222,7 +222,7 @@ mod tests {
     use super::super::super::session::{Scratch, Session};
     use super::super::{Hub, Shape};
     use super::*;
-    use crate::record::Nanos;
+    use strapd_attitude::record::Nanos;
 
     fn line(id: &str, n: u64) -> String {
         format!("{{\"id\":\"{id}\",\"stamp\":{{\"sec\":{n},\"nsec\":0}},\"gyro\":[0.1,0,0]}}\n")

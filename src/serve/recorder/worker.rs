@@ -5,7 +5,6 @@ use super::naming::Names;
 use super::sync::Syncer;
 use super::{Entry, Settings, Shared, Split, space, stream_of};
 use crate::error::{Error, Result};
-use crate::record::{AttitudeSample, RawSample};
 use crate::report::summary::human_bytes;
 use crate::sink::{LiveMcap, LiveStream, Stream};
 use std::collections::BTreeMap;
@@ -14,6 +13,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
+use strapd_attitude::record::{AttitudeSample, RawSample};
 
 /// A chunk is closed early at this size, so that a flood costs memory in the queue alone.
 const CHUNK_BYTES: usize = 1 << 20;

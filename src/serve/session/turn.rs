@@ -7,11 +7,11 @@
 use super::opening::Opening;
 use super::{Scratch, Session};
 use crate::decode::framing::Framed;
-use crate::record::Nanos;
 use crate::serve::hub::count;
 use crate::serve::wire;
 use bytes::{Buf, Bytes};
 use std::time::{Duration, Instant};
+use strapd_attitude::record::Nanos;
 
 /// Longest step, but for the line or run that was begun.
 const SLICE: Duration = Duration::from_micros(200);

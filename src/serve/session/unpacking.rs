@@ -3,8 +3,8 @@
 use super::{Scratch, Session, first_line_must_be_auth, goes_on};
 use crate::decode::Line;
 use crate::decode::packed::{self, Object};
-use crate::record::Nanos;
 use crate::serve::wire::{self, Fault};
+use strapd_attitude::record::Nanos;
 
 /// Numbers of packed streams one client may bind.
 const MAX_BOUND: usize = 256;

@@ -3,10 +3,10 @@
 //! Apart from the stream because a replay refuses a log whose intervals disagree ([`Mismatch`]), while a
 //! daemon goes on: all it can do is say so.
 
-use crate::condition::Clock;
 use crate::pipeline::intervals::{LEAST, Mismatch};
-use crate::record::{RawSample, SampleKind};
 use crate::serve::wire::Fault;
+use strapd_attitude::condition::Clock;
+use strapd_attitude::record::{RawSample, SampleKind};
 
 /// Intervals after which those that agree are not looked at any longer.
 const ENOUGH: usize = 512;

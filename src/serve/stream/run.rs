@@ -4,8 +4,8 @@
 //! again what was sent before, or may begin anew with stamps that were used already; only the
 //! stamps tell, and to integrate the same samples twice would be an attitude nobody has.
 
-use crate::record::Nanos;
 use std::time::Duration;
+use strapd_attitude::record::Nanos;
 
 /// Whether a sender's samples have a place of their own beside their stamps.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]

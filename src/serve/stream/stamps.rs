@@ -4,8 +4,8 @@
 //! [`MOST_WAITING`], and no longer than [`LONGEST_WAIT`].
 
 use crate::decode::{Ambiguous, Bare, MOST_WAITING, TimeUnit, unit_of};
-use crate::record::{Nanos, RawSample};
 use std::time::Duration;
+use strapd_attitude::record::{Nanos, RawSample};
 
 /// How long samples wait for others that tell their unit.
 pub const LONGEST_WAIT: Duration = Duration::from_secs(2);

@@ -3,11 +3,11 @@
 use super::{Fault, object};
 use crate::decode::packed::Unreadable;
 use crate::decode::{Class, GyroUnit, Line, printable};
-use crate::record::SampleKind;
 use crate::sink::{Content, Stream};
 use bytes::Bytes;
 use serde::Deserialize;
 use serde_json::Value;
+use strapd_attitude::record::SampleKind;
 
 #[derive(Deserialize)]
 struct PackedObject {

@@ -5,7 +5,7 @@
 //! stream lays its record out once and then copies and patches it: about 30 ns a message.
 
 use super::record::{MESSAGE_HEAD, message_head};
-use crate::record::{AttitudeSample, Nanos, RawSample};
+use strapd_attitude::record::{AttitudeSample, Nanos, RawSample};
 
 /// Where the numbers of a message record begin, and the record with zeros in their places.
 #[derive(Debug)]
@@ -278,10 +278,10 @@ impl Tf {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use crate::model::attitude::Quaternion;
-    use crate::record::AttitudeCovariance;
     use crate::sink::tests::sample;
     use nalgebra::Vector3;
+    use strapd_attitude::quaternion::Quaternion;
+    use strapd_attitude::record::AttitudeCovariance;
 
     fn f64_at(bytes: &[u8], at: usize) -> f64 {
         f64::from_le_bytes(bytes[at..at + 8].try_into().unwrap())

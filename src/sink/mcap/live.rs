@@ -11,10 +11,10 @@ use super::file::McapFile;
 use super::{Encoding, IMU_SCHEMA, Provenance, Stream, TF_SCHEMA, TF_TOPIC, push_head};
 use super::{log_time, too_many_channels};
 use crate::error::{Error, Result};
-use crate::record::{AttitudeSample, Nanos, RawSample};
 use crate::sink::stream::{child_frames, named_frame, parent_frame};
 use std::collections::BTreeMap;
 use std::path::Path;
+use strapd_attitude::record::{AttitudeSample, Nanos, RawSample};
 
 /// A stream of the recording.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -5,8 +5,8 @@
 use super::cdr::{self, ros_time};
 use super::record::MESSAGE_HEAD;
 use super::{IMU_SCHEMA, TF_SCHEMA, TF_TOPIC, schemas};
-use crate::record::{AttitudeSample, RawSample};
 use crate::sink::stream::{Content, Stream, child_frames, named_frame, parent_frame};
+use strapd_attitude::record::{AttitudeSample, RawSample};
 
 /// A topic and the type of its messages, all `cdr` described as `ros2msg`.
 #[derive(Clone, PartialEq, Eq, Debug)]

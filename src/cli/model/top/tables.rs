@@ -1,11 +1,11 @@
 //! The tables of `docs/top.md`, from live runs. Pure.
 
-use crate::compare::top::{Course, How, propagated};
-use crate::model::rigid_body::HeldRate;
-use crate::model::top::{Case, SymmetricTop, TopMethod};
-use crate::propagate::{Method, Order, Placement};
 use crate::report::summary::significant;
 use std::fmt::Write as _;
+use strapd_attitude::propagate::{Method, Order, Placement};
+use strapd_bodies::rigid_body::HeldRate;
+use strapd_bodies::top::method_errors::{Course, How, propagated};
+use strapd_bodies::top::{Case, SymmetricTop, TopMethod};
 
 /// Rate and length of the two figures of the seed document.
 const FIGURES: [(f64, f64); 2] = [(2000.0, 1.2), (2500.0, 1.45)];

@@ -1,12 +1,12 @@
 //! Requests for torques -> answers. Pure.
 
 use super::{Answer, Convention, Preset, Refusal, Setting, Unit, refusal};
-use crate::model::frames::In;
-use crate::model::inertia::RigidBody;
-use crate::model::youbot::{ArmError, Dynamics, ImuMount, Wrench, gripper, published_links};
 use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
 use serde_json::json;
+use strapd_attitude::frames::In;
+use strapd_bodies::inertia::RigidBody;
+use strapd_bodies::youbot::{ArmError, Dynamics, ImuMount, Wrench, gripper, published_links};
 
 /// Standard gravity on a level floor.
 pub(super) const GRAVITY: [f64; 3] = [0.0, 0.0, -9.80665];

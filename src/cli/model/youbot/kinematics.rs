@@ -1,12 +1,12 @@
 //! Requests for poses, joints and velocities -> answers. Pure.
 
 use super::{Answer, Convention, Preset, Setting, Unit, Wxyz, orientation, refusal};
-use crate::model::dh::Transform;
-use crate::model::frames::{Dcm, In};
-use crate::model::youbot::{BaseTurn, Elbow, Policy, Solution, Twist};
 use nalgebra::{Matrix3, SVector, Vector3};
 use serde::Deserialize;
 use serde_json::{Value, json};
+use strapd_attitude::frames::{Dcm, In};
+use strapd_bodies::dh::Transform;
+use strapd_bodies::youbot::{BaseTurn, Elbow, Policy, Solution, Twist};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]

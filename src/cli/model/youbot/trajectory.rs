@@ -3,14 +3,14 @@
 use super::{
     Answer, Convention, Preset, Refusal, Setting, Unit, Wxyz, dynamics, orientation, refusal,
 };
-use crate::model::dh::Transform;
-use crate::model::frames::{Dcm, In};
-use crate::model::youbot::{
-    ArmError, Gripper, ImuMount, JointPath, SeedJoints, Sinusoid, ToolPath, ToolTrack,
-};
 use nalgebra::Vector3;
 use serde::Deserialize;
 use serde_json::{Value, json};
+use strapd_attitude::frames::{Dcm, In};
+use strapd_bodies::dh::Transform;
+use strapd_bodies::youbot::{
+    ArmError, Gripper, ImuMount, JointPath, SeedJoints, Sinusoid, ToolPath, ToolTrack,
+};
 
 /// Most samples in one answer.
 const MOST: f64 = 1e5;

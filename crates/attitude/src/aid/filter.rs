@@ -1,0 +1,327 @@
+//! The filter: what it holds, what a sample adds, what a gap leaves unknown. Pure.
+
+use super::calibration::{Applied, Calibration};
+use super::covariance::{BIAS, CROSS, Covariance, FORCE_BIAS, LEAD, SCALE, TILT};
+use super::gravity::Residuals;
+use super::heading::Surroundings;
+use super::interval::Interval;
+use super::rest::Rest;
+use super::settings::Settings;
+use crate::frames::{Body, In, Nav};
+use crate::quaternion::Quaternion;
+use nalgebra::{Matrix3, Vector3};
+
+/// A specific force beyond this (each component, m/s^2) is none.
+const LARGEST_FORCE: f64 = 1000.0;
+/// A field beyond this (each component, whatever its unit) is none.
+const LARGEST_FIELD: f64 = 1e6;
+/// How long a specific force counts for the present, s.
+const FORCE_SECS: f64 = 0.5;
+/// After so many gaps in a row the sensor has become slower.
+const GAPS_IN_A_ROW: u32 = 20;
+
+/// One sample as it was measured, and the attitude it led to.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Measured {
+    /// Since the sample before, s.
+    pub secs: f64,
+    /// The gyro, rad/s, body axes: at the instant or its mean since the sample before.
+    pub rate: Vector3<f64>,
+    /// Specific force at the instant, m/s^2, body axes; up at rest.
+    pub force: Option<Vector3<f64>>,
+    /// Magnetic field at the instant, any linear unit, body axes. One that was measured only once comes once.
+    pub field: Option<Vector3<f64>>,
+}
+
+/// What happened.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Report {
+    /// Corrections made.
+    pub updates: u64,
+    /// Velocity references given up: the body travels.
+    pub restarts: u64,
+    /// Times the attitude was levelled at once: a tilt too wrong to be corrected.
+    pub levelled: u64,
+    /// Gaps passed over.
+    pub gaps: u64,
+    /// Specific forces that are none: not finite, or beyond what there is.
+    pub forces_rejected: u64,
+    /// Fields that were doubted or not used.
+    pub fields_rejected: u64,
+    /// Samples at the gyro's range.
+    pub saturated: u64,
+    /// Full starts because the numbers had become impossible.
+    pub failures: u64,
+}
+
+/// Corrects what a propagator integrates. See the [module](crate::aid).
+#[derive(Clone, Debug)]
+pub struct Filter {
+    pub(super) settings: Settings,
+    /// A rate is that at its instant, not the mean since the one before.
+    pub(super) is_instant: bool,
+    /// Rate of the world, rad/s, earth axes.
+    pub(super) world_rate: Vector3<f64>,
+    /// Whether tilt and heading have begun.
+    pub(super) is_started: bool,
+    pub(super) covariance: Covariance,
+    pub(super) calibration: Calibration,
+    pub(super) known: Applied,
+    /// What the propagator's attitude is turned by, from the left.
+    pub(super) correction: Quaternion<Nav, Nav>,
+    /// Of the motion, horizontal, m/s and m.
+    pub(super) velocity: [f64; 2],
+    pub(super) position: [f64; 2],
+    /// Of the field's heading, rad.
+    pub(super) disturbance: f64,
+    pub(super) interval: Interval,
+    pub(super) rest: Rest,
+    pub(super) residuals: Residuals,
+    pub(super) mean_acceleration: Vector3<f64>,
+    pub(super) surroundings: Surroundings,
+    /// A gap has been too long for the tilt to be known.
+    pub(super) wants_level: bool,
+    /// Time between samples, s; 0 before it is known.
+    pub(super) nominal: f64,
+    pub(super) gaps_in_a_row: u32,
+    pub(super) last_rate: Vector3<f64>,
+    /// The last specific force, earth axes, and how long ago it was, s.
+    pub(super) last_force: Option<Vector3<f64>>,
+    pub(super) since_force: f64,
+    pub(super) report: Report,
+}
+
+impl Filter {
+    /// For a gyro whose samples are rates at their instants (`is_instant`) or means since the sample before, in
+    /// a world that turns at `world_rate` (rad/s).
+    #[must_use]
+    pub(crate) fn new(settings: Settings, is_instant: bool, world_rate: In<Nav>) -> Filter {
+        let calibration = Calibration::default();
+        let mut filter = Filter {
+            settings,
+            is_instant,
+            world_rate: *world_rate.as_vector(),
+            is_started: false,
+            covariance: Covariance::zero(),
+            calibration,
+            known: Applied::of(&calibration),
+            correction: Quaternion::identity(),
+            velocity: [0.0; 2],
+            position: [0.0; 2],
+            disturbance: 0.0,
+            interval: Interval::new(),
+            rest: Rest::new(Vector3::zeros()),
+            residuals: Residuals::new(&settings),
+            mean_acceleration: Vector3::zeros(),
+            surroundings: Surroundings::default(),
+            wants_level: false,
+            nominal: 0.0,
+            gaps_in_a_row: 0,
+            last_rate: Vector3::zeros(),
+            last_force: None,
+            since_force: 0.0,
+            report: Report::default(),
+        };
+        filter.forget_calibration();
+        filter
+    }
+
+    /// What is known of the sensor by now.
+    #[must_use]
+    pub fn calibration(&self) -> &Calibration {
+        &self.calibration
+    }
+
+    /// One standard deviation of each number of the calibration.
+    #[must_use]
+    pub fn calibration_sigma(&self) -> Calibration {
+        let three = |first: usize| {
+            Vector3::from_fn(|i, _| self.covariance.variance(first + i).max(0.0).sqrt())
+        };
+        Calibration {
+            bias: three(BIAS),
+            scale: three(SCALE),
+            cross: three(CROSS),
+            force_bias: three(FORCE_BIAS),
+            lead: self.covariance.variance(LEAD).max(0.0).sqrt(),
+        }
+    }
+
+    /// What the rates that come now are to be corrected by.
+    pub(crate) fn applied(&self) -> Applied {
+        self.known
+    }
+
+    /// What happened so far.
+    #[must_use]
+    pub fn report(&self) -> Report {
+        self.report
+    }
+
+    /// Whether the sensor has been at rest for long enough to say so.
+    #[must_use]
+    pub fn is_at_rest(&self) -> bool {
+        self.is_started && self.rests()
+    }
+
+    /// The same for the filter itself, which asks only when it has begun.
+    pub(super) fn rests(&self) -> bool {
+        self.rest.is_quiet(&self.settings) && self.since_force <= FORCE_SECS
+    }
+
+    /// Whether tilt is known: a specific force has come.
+    #[must_use]
+    pub fn is_started(&self) -> bool {
+        self.is_started
+    }
+
+    /// The attitude that the propagator's is.
+    #[must_use]
+    pub(crate) fn corrected(&self, propagated: &Quaternion<Nav, Body>) -> Quaternion<Nav, Body> {
+        (self.correction * *propagated).normalised()
+    }
+
+    /// Takes the next sample after it has begun, whose rate the propagator was given corrected by `known`. `propagated` is its
+    /// attitude at the sample's instant.
+    pub(crate) fn take(
+        &mut self,
+        sample: &Measured,
+        known: &Applied,
+        propagated: &Quaternion<Nav, Body>,
+    ) {
+        let secs = sample.secs;
+        let is_gap = self.nominal > 0.0 && secs > self.settings.gap_factor * self.nominal;
+        let rate = if is_gap || self.is_instant {
+            0.5 * (sample.rate + self.last_rate)
+        } else {
+            sample.rate
+        };
+        let attitude = self.correction * *propagated;
+        let r = *attitude.to_dcm().as_matrix();
+        self.interval.turn(secs, &r, &rate, known);
+        let at_instant = if self.is_instant { sample.rate } else { rate };
+        let force = self.add_force(sample, &r, known.corrected(at_instant, 1.0), is_gap);
+        if let Some(field) = sample.field.filter(is_field) {
+            self.interval.field += r * field;
+            self.interval.fields += 1.0;
+        }
+        let sigma = Vector3::from_fn(|i, _| self.covariance.variance(BIAS + i).max(0.0).sqrt());
+        let bias = self.calibration.bias;
+        self.rest
+            .take(secs, &rate, force.as_ref(), (&bias, &sigma), &self.settings);
+        self.doubt_turn(sample, is_gap);
+        self.last_rate = sample.rate;
+        if !is_gap {
+            self.gaps_in_a_row = 0;
+            self.nominal = if self.nominal > 0.0 {
+                self.nominal + 0.05 * (secs - self.nominal)
+            } else {
+                secs
+            };
+        } else {
+            self.gaps_in_a_row += 1;
+            if self.gaps_in_a_row >= GAPS_IN_A_ROW {
+                self.nominal = secs;
+                self.gaps_in_a_row = 0;
+            }
+        }
+        if self.interval.secs >= self.settings.update_secs - 0.25 * secs {
+            self.update();
+        }
+    }
+
+    /// The propagator held the attitude over `secs` of which nothing is known.
+    pub(crate) fn hold(&mut self, sample: &Measured) {
+        self.interval = Interval::new();
+        self.last_force = None;
+        // A clock that was set back does not say how long it was.
+        let secs = sample.secs.max(0.0);
+        let walk = self.settings.bias_walk.powi(2) * secs;
+        for axis in 0..3 {
+            self.covariance.add(BIAS + axis, walk);
+        }
+        self.lose_sight(sample, secs);
+        self.last_rate = sample.rate;
+    }
+
+    /// The force of a sample in the sums; what of it can be used.
+    fn add_force(
+        &mut self,
+        sample: &Measured,
+        r: &Matrix3<f64>,
+        rate: Vector3<f64>,
+        is_gap: bool,
+    ) -> Option<Vector3<f64>> {
+        self.since_force += sample.secs;
+        let measured = sample.force?;
+        if !self.is_force(&measured) {
+            self.report.forces_rejected += 1;
+            return None;
+        }
+        // It stands for the time since the one before it.
+        let secs = self
+            .since_force
+            .min(sample.secs.max(self.settings.update_secs));
+        self.since_force = 0.0;
+        let turning = rate.cross(&measured);
+        let force = r * (measured - self.calibration.force_bias + turning * self.calibration.lead);
+        let mean = match self.last_force {
+            Some(last) if is_gap => 0.5 * (force + last),
+            _ => force,
+        };
+        self.last_force = Some(force);
+        self.interval.force += mean * secs;
+        self.interval.lead += r * turning * secs;
+        self.interval.force_secs += secs;
+        Some(measured)
+    }
+
+    /// What a gap, a jump or the end of the gyro's range leaves unknown of a turn.
+    fn doubt_turn(&mut self, sample: &Measured, is_gap: bool) {
+        let secs = sample.secs;
+        let jump = (sample.rate - self.last_rate).norm();
+        if is_gap {
+            self.report.gaps += 1;
+            self.covariance
+                .add_to_attitude(jump * jump * secs * secs / 36.0);
+            if secs > self.settings.gap_secs {
+                self.lose_sight(sample, secs - self.settings.gap_secs);
+            }
+        }
+        let ordinary = if is_gap || self.nominal <= 0.0 {
+            secs
+        } else {
+            self.nominal
+        };
+        let excess = jump - self.settings.jerk * ordinary;
+        if excess > 0.0 {
+            self.covariance.add_to_attitude((excess * secs).powi(2));
+        }
+        let range = self.settings.gyro_range;
+        if range > 0.0 && sample.rate.amax() >= range {
+            self.report.saturated += 1;
+            for rate in sample.rate.iter().filter(|rate| rate.abs() >= range) {
+                self.covariance.add_to_attitude((0.5 * rate * secs).powi(2));
+            }
+        }
+    }
+
+    /// Nothing is known of what the body did for `secs`.
+    fn lose_sight(&mut self, sample: &Measured, secs: f64) {
+        let fastest = |i: usize| sample.rate[i].powi(2).max(self.last_rate[i].powi(2));
+        let squared: f64 = (0..3).map(fastest).sum();
+        let unknown = ((squared / 3.0 + 0.01) * secs * secs).min(3.0);
+        self.covariance.add_to_attitude(unknown);
+        self.wants_level |= self.covariance.variance(TILT) > self.settings.level_sigma.powi(2);
+        self.restart_reference(1.0, 1.0);
+        self.rest.interrupt();
+    }
+
+    pub(super) fn is_force(&self, force: &Vector3<f64>) -> bool {
+        force.iter().all(|f| f.abs() <= LARGEST_FORCE)
+    }
+}
+
+pub(super) fn is_field(field: &Vector3<f64>) -> bool {
+    field.iter().all(|m| m.abs() <= LARGEST_FIELD) && field.norm_squared() > 0.0
+}

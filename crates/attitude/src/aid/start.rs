@@ -1,0 +1,132 @@
+//! How the filter begins, and begins anew. Pure.
+
+use super::calibration::{Applied, Calibration};
+use super::covariance::{
+    BIAS, CROSS, Covariance, FIELD, FORCE_BIAS, HEADING, LEAD, POSITION, SCALE, TILT, VELOCITY,
+};
+use super::filter::{Filter, Measured, is_field};
+use super::gravity::Residuals;
+use super::heading::Surroundings;
+use super::interval::Interval;
+use super::rest::Rest;
+use crate::condition::stillness::level;
+use crate::frames::{Body, Dcm, Nav};
+use crate::quaternion::{Quaternion, RotationVector};
+use nalgebra::{Matrix3, Vector3};
+
+/// Variances of velocity and position where the reference starts, (m/s)^2, m^2.
+pub(super) const VELOCITY_START: f64 = 0.01;
+pub(super) const POSITION_START: f64 = 1e-4;
+/// Sigma of the heading where the first sample has no field, rad.
+const HEADING_UNKNOWN: f64 = 3.0;
+/// What may be wrong with a bias after a reset, rad/s.
+const BIAS_AFTER_RESET: f64 = 8.7e-4;
+
+impl Filter {
+    /// Begins at a first sample: level by its specific force and with the heading of the propagator's attitude,
+    /// or north by its field. Without a force the attitude is the propagator's for now.
+    pub(crate) fn begin(&mut self, first: &Measured, propagated: &Quaternion<Nav, Body>) {
+        self.last_rate = first.rate;
+        self.last_force = None;
+        self.since_force = 0.0;
+        self.interval = Interval::new();
+        let Some(force) = first.force.filter(|f| self.is_force(f) && f.norm() > 0.0) else {
+            return;
+        };
+        let field = first.field.filter(is_field);
+        let up = force.normalize();
+        let north =
+            field.filter(|field| field.cross(&up).norm_squared() > 1e-4 * field.norm_squared());
+        let attitude = match north {
+            Some(north) => {
+                let east = north.cross(&up).normalize();
+                let rows = [east, up.cross(&east), up].map(|axis| axis.transpose());
+                Quaternion::from_dcm(&Dcm::assume(Matrix3::from_rows(&rows)))
+            }
+            None => {
+                let tilted = level(&force).unwrap_or_else(Quaternion::identity);
+                let yaw = Vector3::z() * propagated.yaw_pitch_roll().yaw;
+                Quaternion::<Nav, Nav>::from_rotation_vector(&RotationVector(yaw)) * tilted
+            }
+        };
+        let heading = match (field, north) {
+            (_, Some(_)) => self.settings.heading_start,
+            (Some(_), None) => HEADING_UNKNOWN,
+            (None, _) => 0.0,
+        };
+        self.start(attitude * propagated.inverse(), heading * heading, force);
+    }
+
+    /// Begins with the attitude as the propagator has it, known to `tilt` and `heading` (rad).
+    pub(crate) fn begin_known(&mut self, first: &Measured, tilt: f64, heading: f64) {
+        self.last_rate = first.rate;
+        self.last_force = None;
+        self.since_force = 0.0;
+        let force = first
+            .force
+            .filter(|f| self.is_force(f))
+            .unwrap_or(Vector3::z() * self.settings.gravity);
+        self.start(Quaternion::identity(), heading * heading, force);
+        for axis in [TILT, TILT + 1] {
+            self.covariance.restart(axis, tilt * tilt);
+        }
+    }
+
+    /// What a new start keeps: the calibration, known a little less.
+    pub(crate) fn reset(&mut self) {
+        self.is_started = false;
+        self.correction = Quaternion::identity();
+        for axis in 0..3 {
+            self.covariance
+                .add(BIAS + axis, BIAS_AFTER_RESET * BIAS_AFTER_RESET);
+        }
+    }
+
+    fn start(&mut self, correction: Quaternion<Nav, Nav>, heading: f64, force: Vector3<f64>) {
+        let settings = &self.settings;
+        self.correction = correction.normalised();
+        self.covariance
+            .restart(TILT, settings.tilt_start * settings.tilt_start);
+        self.covariance
+            .restart(TILT + 1, settings.tilt_start * settings.tilt_start);
+        self.covariance.restart(HEADING, heading);
+        for i in 0..2 {
+            self.covariance.restart(VELOCITY + i, VELOCITY_START);
+            self.covariance.restart(POSITION + i, POSITION_START);
+        }
+        let disturbed = if heading > 0.0 {
+            settings.field_sigma * settings.field_sigma
+        } else {
+            0.0
+        };
+        self.covariance.restart(FIELD, disturbed);
+        (self.velocity, self.position, self.disturbance) = ([0.0; 2], [0.0; 2], 0.0);
+        self.interval = Interval::new();
+        self.rest = Rest::new(force);
+        self.residuals = Residuals::new(settings);
+        self.mean_acceleration = Vector3::zeros();
+        self.surroundings = Surroundings::default();
+        self.wants_level = false;
+        self.is_started = true;
+    }
+
+    /// The sensor as it was switched on.
+    pub(super) fn forget_calibration(&mut self) {
+        let settings = self.settings;
+        self.calibration = Calibration::default();
+        self.known = Applied::of(&self.calibration);
+        self.covariance = Covariance::zero();
+        for (first, sigma) in [
+            (BIAS, settings.bias_prior),
+            (SCALE, settings.scale_prior),
+            (CROSS, settings.cross_prior),
+            (FORCE_BIAS, settings.force_bias_prior),
+        ] {
+            for axis in 0..3 {
+                self.covariance.add(first + axis, sigma * sigma);
+            }
+        }
+        self.covariance
+            .add(LEAD, settings.lead_prior * settings.lead_prior);
+    }
+}

@@ -1,0 +1,226 @@
+//! What a tenth of a second says: covariance on, measurements, correction. Pure.
+
+use super::calibration::Applied;
+use super::covariance::{
+    BIAS, CROSS, Correction, FIELD, FORCE_BIAS, HEADING, LEAD, POSITION, SCALE, TILT, Transition,
+    VELOCITY, WIDTH,
+};
+use super::filter::Filter;
+use super::gravity::Force;
+use super::interval::Interval;
+use super::start::{POSITION_START, VELOCITY_START};
+use crate::frames::{Body, Nav};
+use crate::quaternion::{Quaternion, RotationVector};
+use crate::record::AttitudeCovariance;
+use nalgebra::Vector3;
+
+/// Accelerations are not white, which makes errors larger than they are thought to be.
+const COLOURED: f64 = 2.0;
+/// Delay of a sensor's own filters, s.
+const DELAY: f64 = 2e-3;
+/// Between the axes of sensor and case, rad.
+const CASE: f64 = 3.5e-3;
+
+impl Filter {
+    /// Corrects by what has been added up.
+    pub(super) fn update(&mut self) {
+        let settings = self.settings;
+        let secs = self.interval.secs;
+        if self.report.updates == 0 {
+            self.covariance
+                .add(LEAD, (settings.lead_share * self.nominal).powi(2));
+        }
+        self.report.updates += 1;
+        let force = self.mean_force();
+        let is_levelled = force.is_some_and(|force| self.judge_tilt(&force));
+        self.predict(force.as_ref());
+        let mut correction: Correction = [0.0; WIDTH];
+        if let Some(force) = force.filter(|_| !is_levelled && !self.wants_level) {
+            self.use_gravity(&force, &mut correction);
+        }
+        if self.rests() {
+            // What the gyro reads of a world that turns is no bias.
+            let of_world = self.interval.attitude.transpose() * self.world_rate;
+            let mean = (self.interval.rate - of_world) / secs;
+            for axis in 0..3 {
+                let innovation = mean[axis] - self.calibration.bias[axis];
+                self.covariance.measure(
+                    &[(BIAS + axis, 1.0)],
+                    innovation,
+                    settings.rest_noise.powi(2) / secs,
+                    &mut correction,
+                );
+            }
+        }
+        if self.interval.fields > 0.0 {
+            self.use_field(&mut correction);
+        }
+        self.inject(&correction);
+        self.interval = Interval::new();
+        let attitude = self.correction.wxyz();
+        if !self.covariance.is_sound() || !attitude.iter().all(|c| c.is_finite()) {
+            self.report.failures += 1;
+            self.forget_calibration();
+            self.reset();
+        }
+    }
+
+    fn mean_force(&self) -> Option<Force> {
+        let sums = &self.interval;
+        if sums.force_secs <= 0.5 * sums.secs {
+            return None;
+        }
+        let mean = sums.force / sums.force_secs;
+        let lead = sums.lead / sums.force_secs;
+        let by_calibration = [0, 1].map(|i| {
+            let bias = |j: usize| -sums.attitude[(i, j)] / sums.secs;
+            [bias(0), bias(1), bias(2), lead[i]]
+        });
+        Some(Force {
+            acceleration: mean - Vector3::z() * self.settings.gravity,
+            up: mean.z,
+            by_calibration,
+        })
+    }
+
+    /// Takes the covariance over the interval.
+    fn predict(&mut self, force: Option<&Force>) {
+        let settings = self.settings;
+        let secs = self.interval.secs;
+        let half_square = 0.5 * secs * secs;
+        let mut transition = Transition::none();
+        let rows = &mut transition.0;
+        let by_bias = self.interval.attitude * self.known.matrix;
+        for axis in 0..3 {
+            for j in 0..3 {
+                rows[axis][BIAS + j] = -by_bias[(axis, j)];
+                rows[axis][SCALE + j] = self.interval.scaled[axis][j];
+                rows[axis][CROSS + j] = self.interval.scaled[axis][3 + j];
+            }
+        }
+        for i in 0..2 {
+            rows[POSITION + i][VELOCITY + i] = secs;
+        }
+        if let Some(force) = force {
+            for i in 0..2 {
+                for (j, by) in force.by_calibration[i].iter().enumerate() {
+                    rows[VELOCITY + i][FORCE_BIAS + j] = secs * by;
+                    rows[POSITION + i][FORCE_BIAS + j] = half_square * by;
+                }
+            }
+            rows[VELOCITY][TILT + 1] = secs * force.up;
+            rows[VELOCITY + 1][TILT] = -secs * force.up;
+            rows[POSITION][TILT + 1] = half_square * force.up;
+            rows[POSITION + 1][TILT] = -half_square * force.up;
+        }
+        self.covariance.step(&transition);
+        let turned = settings.rate_noise.powi(2) * self.interval.turned_squared() / 9.0;
+        self.covariance
+            .add_to_attitude(settings.gyro_noise.powi(2) * secs + turned);
+        for axis in 0..3 {
+            self.covariance
+                .add(BIAS + axis, settings.bias_walk.powi(2) * secs);
+            self.covariance
+                .add(FORCE_BIAS + axis, settings.force_bias_walk.powi(2) * secs);
+        }
+        for i in 0..2 {
+            self.covariance
+                .add(VELOCITY + i, settings.velocity_walk.powi(2) * secs);
+        }
+        if self.covariance.variance(FIELD) > 0.0 {
+            let left = (-secs / settings.field_secs).exp();
+            self.covariance.fade(FIELD, left);
+            self.covariance
+                .add(FIELD, settings.field_sigma.powi(2) * (1.0 - left * left));
+            self.disturbance *= left;
+        }
+    }
+
+    /// Corrects attitude and all else by what the measurements have found.
+    fn inject(&mut self, correction: &Correction) {
+        let tilt = Vector3::new(correction[TILT], correction[TILT + 1], 0.0);
+        let heading = Vector3::z() * correction[HEADING];
+        let turn =
+            |phi: Vector3<f64>| Quaternion::<Nav, Nav>::from_rotation_vector(&RotationVector(phi));
+        self.correction = (turn(heading) * (turn(tilt) * self.correction)).normalised();
+        let three = |first: usize| {
+            Vector3::from_fn(|i, _| correction.get(first + i).copied().unwrap_or(0.0))
+        };
+        for i in 0..2 {
+            self.velocity[i] += correction[VELOCITY + i];
+            self.position[i] += correction[POSITION + i];
+        }
+        let calibration = &mut self.calibration;
+        calibration.bias += three(BIAS);
+        calibration.scale += three(SCALE);
+        calibration.cross += three(CROSS);
+        calibration.force_bias += three(FORCE_BIAS);
+        calibration.lead += correction[LEAD];
+        self.disturbance += correction[FIELD];
+        self.known = Applied::of(calibration);
+        // The earth axes of the estimate have turned.
+        let (sin, cos) = correction[HEADING].sin_cos();
+        self.covariance.turn(cos, sin);
+        for pair in [&mut self.velocity, &mut self.position] {
+            let [x, y] = *pair;
+            *pair = [cos * x - sin * y, sin * x + cos * y];
+        }
+    }
+
+    /// Turns the attitude the short way so that `force` (earth axes) is vertical. `false`, and nothing is done,
+    /// where that is no gravity.
+    pub(super) fn level(&mut self, force: Vector3<f64>) -> bool {
+        let length = force.norm() / self.settings.gravity;
+        if !(0.5..=1.5).contains(&length) {
+            return false;
+        }
+        let across = force.x.hypot(force.y);
+        let phi = if across > 1e-9 {
+            Vector3::new(force.y, -force.x, 0.0) * (across.atan2(force.z) / across)
+        } else if force.z < 0.0 {
+            Vector3::x() * std::f64::consts::PI
+        } else {
+            Vector3::zeros()
+        };
+        let turn = Quaternion::<Nav, Nav>::from_rotation_vector(&RotationVector(phi));
+        self.correction = (turn * self.correction).normalised();
+        for axis in [TILT, TILT + 1] {
+            let variance = self.settings.tilt_start.powi(2);
+            self.covariance.restart(axis, variance);
+        }
+        self.restart_reference(VELOCITY_START, POSITION_START);
+        self.mean_acceleration = Vector3::zeros();
+        self.report.levelled += 1;
+        true
+    }
+
+    /// Covariance of the error of the attitude `q_nb` at the corrected `rate`, rad^2, body axes. More than the
+    /// filter's own: accelerations are not white, sensors are late, and their axes are not those of their case.
+    #[must_use]
+    pub(crate) fn attitude_covariance(
+        &self,
+        q_nb: &Quaternion<Nav, Body>,
+        rate: &Vector3<f64>,
+    ) -> AttitudeCovariance {
+        if !self.is_started {
+            return AttitudeCovariance::from_sigma(Vector3::repeat(std::f64::consts::PI));
+        }
+        let r = *q_nb.to_dcm().as_matrix();
+        let white = self.settings.gyro_noise.powi(2) * self.interval.secs;
+        let mut earth = self.covariance.attitude();
+        for axis in 0..3 {
+            earth[(axis, axis)] += white;
+        }
+        let body = r.transpose() * earth * r * COLOURED + rate * rate.transpose() * (DELAY * DELAY);
+        let upper = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]
+            .map(|(i, j)| body[(i, j)] + if i == j { CASE * CASE } else { 0.0 });
+        AttitudeCovariance::from_upper(upper)
+    }
+
+    /// Variances of tilt about east and north and of heading as the filter has them, rad^2: less than what
+    /// [`Filter::attitude_covariance`] says.
+    #[cfg(test)]
+    pub(super) fn earth_variances(&self) -> [f64; 3] {
+        [TILT, TILT + 1, HEADING].map(|state| self.covariance.variance(state))
+    }
+}

@@ -1,0 +1,489 @@
+//! The stream: runs, breaks, outputs in order. Pure.
+
+mod memory;
+mod state;
+mod world;
+
+pub use memory::Memory;
+
+use super::classical;
+use super::executor::Executor;
+use super::method::{LARGEST_WINDOW, Method, Order, Placement};
+use super::report::Report;
+use super::settings::{Settings, SettingsError};
+use super::track::{Track, secs};
+use super::window::{Plan, Step};
+use crate::record::{AttitudeSample, Join, RateSample, SampleKind, Status};
+use nalgebra::Vector3;
+use state::{State, Waiting};
+use std::collections::VecDeque;
+
+/// Intervals one call of the executor's function integrates.
+const SEGMENT: usize = 1024;
+/// Samples taken in before outputs are made: bounds memory, whatever is pushed at once.
+const BLOCK: usize = 32 * SEGMENT;
+/// Elements before the interval integrated next that a window may still hold.
+const LOOKED_BACK: usize = LARGEST_WINDOW + classical::LOOK_BACK + 8;
+/// Fastest rate, and largest increment, that is believed: those of [`crate::record::Verdict::Huge`].
+const FASTEST: f64 = 1e4;
+const LARGEST: f64 = 1e3;
+
+/// Integrates a stream of samples to attitude. See the [module](crate::propagate).
+///
+/// # Example
+/// ```
+/// use strapd_attitude::quaternion::Quaternion;
+/// use strapd_attitude::propagate::{Method, Propagator, Sequential, Settings};
+/// use strapd_attitude::record::{Join, Nanos, RateSample, SampleKind, Status};
+///
+/// let mut propagator = Propagator::new(Settings {
+///     method: Method::Auto,
+///     kind: SampleKind::Rate,
+///     initial: Quaternion::identity(),
+///     ..Settings::default()
+/// })?;
+/// // A quarter turn about z in one second.
+/// let samples: Vec<RateSample> = (0..=100)
+///     .map(|i| RateSample {
+///         stamp: Nanos(i * 10_000_000),
+///         start: Nanos(i * 10_000_000),
+///         value: [0.0, 0.0, std::f64::consts::FRAC_PI_2].into(),
+///         accel: None,
+///         join: if i == 0 { Join::Start } else { Join::Continuous },
+///         status: Status::OK,
+///         log: Nanos(i * 10_000_000),
+///     })
+///     .collect();
+/// let mut attitudes = Vec::new();
+/// propagator.push(&samples, &Sequential, &mut attitudes);
+/// propagator.finish(&Sequential, &mut attitudes);
+/// assert_eq!(attitudes.len(), 101);
+/// let [w, x, y, z] = attitudes[100].q_nb.wxyz();
+/// let half = std::f64::consts::FRAC_1_SQRT_2;
+/// assert!((w - half).abs() < 1e-15 && (z - half).abs() < 1e-15 && x == 0.0 && y == 0.0);
+/// # Ok::<(), strapd_attitude::propagate::SettingsError>(())
+/// ```
+#[derive(Debug)]
+pub struct Propagator {
+    method: Method,
+    engine: Engine,
+    initial: [f64; 4],
+    track: Track,
+    /// Samples not yet output. Those that turn nothing come out with the attitude before them.
+    queue: VecDeque<Waiting>,
+    /// Element whose interval is integrated next.
+    next: usize,
+    state: State,
+    started: bool,
+    /// The attitude is not that of this stream's beginning, but one that was saved.
+    resumed: bool,
+    last_rate: [f64; 3],
+    last_stamp: i64,
+    /// Provisional steps, kept for its memory.
+    scratch: Vec<Step>,
+}
+
+/// How steps are computed.
+#[derive(Debug)]
+enum Engine {
+    Sliding(Box<Plan>),
+    Commit {
+        plan: Box<Plan>,
+        /// Whether finals are wanted.
+        finals: bool,
+        /// What has come out provisionally and is to come out for good.
+        open: VecDeque<Waiting>,
+    },
+    Classical(Method),
+}
+
+impl Propagator {
+    /// Ready for the first sample.
+    ///
+    /// # Errors
+    /// A window out of range, an initial attitude that is no rotation, impossible noise.
+    pub fn new(settings: Settings) -> Result<Self, SettingsError> {
+        let increments = settings.kind != SampleKind::Rate;
+        let initial = settings.checked()?;
+        let method = settings.method.for_kind(settings.kind);
+        let engine = match method {
+            Method::Auto => {
+                let window = if increments { 15 } else { 16 };
+                let plan = plan(window, Order::Exact, Placement::Centred, increments)?;
+                Engine::Sliding(Box::new(plan))
+            }
+            Method::Magnus {
+                window,
+                order,
+                placement,
+            } => {
+                let plan = plan(window, order, placement, increments)?;
+                Engine::Sliding(Box::new(plan))
+            }
+            Method::CommitProvisional {
+                window,
+                order,
+                finals,
+            } => Engine::Commit {
+                plan: Box::new(
+                    plan(window, order, Placement::Centred, increments)?.with_provisional(),
+                ),
+                finals,
+                open: VecDeque::new(),
+            },
+            classical => Engine::Classical(classical),
+        };
+        Ok(Propagator {
+            method,
+            engine,
+            initial,
+            track: Track::new(increments),
+            queue: VecDeque::new(),
+            next: 1,
+            state: State::new(&settings, initial),
+            started: false,
+            resumed: false,
+            last_rate: [0.0; 3],
+            last_stamp: 0,
+            scratch: Vec::new(),
+        })
+    }
+
+    /// Goes on from the last attitude of a stream that has ended, before this one's first sample: it is
+    /// held until then, and less is known of it the longer that was, as over any gap; the first output
+    /// says [`Status::RESTARTED`] and is one reset further. A later reset goes to the initial attitude of
+    /// the settings all the same.
+    ///
+    /// # Errors
+    /// [`SettingsError::Initial`] when it is no rotation.
+    pub fn resume(&mut self, last: &AttitudeSample) -> Result<(), SettingsError> {
+        let wxyz = last.q_nb.wxyz();
+        let norm = wxyz.iter().map(|c| c * c).sum::<f64>().sqrt();
+        if (norm - 1.0).abs() > 1e-6 || norm.is_nan() {
+            return Err(SettingsError::Initial { wxyz });
+        }
+        self.state.resume(last);
+        self.resumed = true;
+        self.last_stamp = last.stamp.0;
+        if last.rate.iter().all(|w| w.abs() <= FASTEST) {
+            self.last_rate = last.rate.into();
+        }
+        Ok(())
+    }
+
+    /// Begins as the run after one that was reset so often: the first output says [`Status::RESET`].
+    pub fn succeed(&mut self, resets: u32) {
+        self.state.reset_count = resets.saturating_add(1);
+        self.state.added = self.state.added.with(Status::RESET);
+    }
+
+    /// Takes samples in and appends the attitudes that are ready: all but the last few, which wait
+    /// for the method's look-ahead.
+    pub fn push(
+        &mut self,
+        samples: &[RateSample],
+        exec: &impl Executor,
+        out: &mut Vec<AttitudeSample>,
+    ) {
+        for block in samples.chunks(BLOCK) {
+            for sample in block {
+                let breaks =
+                    !self.started || matches!(sample.join, Join::Start | Join::Hold | Join::Reset);
+                if breaks {
+                    self.advance(true, exec, out);
+                    self.begin(sample, out);
+                } else {
+                    self.admit(sample);
+                }
+                if matches!(self.engine, Engine::Commit { .. }) {
+                    self.advance_live(out);
+                }
+            }
+            self.advance(false, exec, out);
+            self.forget();
+        }
+    }
+
+    /// The stream has ended: appends the attitudes still waiting. More samples may follow; unless they
+    /// say otherwise, the attitude is held between.
+    pub fn finish(&mut self, exec: &impl Executor, out: &mut Vec<AttitudeSample>) {
+        self.advance(true, exec, out);
+        self.started = false;
+    }
+
+    /// What has happened so far.
+    #[must_use]
+    pub fn report(&self) -> Report {
+        let report = &self.state.report;
+        let tells = match &self.engine {
+            Engine::Sliding(plan) | Engine::Commit { plan, .. } => plan.tells_error(),
+            Engine::Classical(_) => false,
+        };
+        Report {
+            integration_error: tells.then(|| self.state.difference.worst(report.angle_turned)),
+            integrated_secs: secs(self.state.integrated_nanos),
+            ..*report
+        }
+    }
+
+    /// The method, with its window and order.
+    #[must_use]
+    pub fn method(&self) -> Method {
+        self.method
+    }
+
+    /// Samples the outputs lag behind the input.
+    #[must_use]
+    pub fn latency(&self) -> usize {
+        match &self.engine {
+            Engine::Sliding(plan) => plan.look_ahead,
+            Engine::Commit { .. } | Engine::Classical(_) => 0,
+        }
+    }
+
+    /// First sample of a run.
+    fn begin(&mut self, sample: &RateSample, out: &mut Vec<AttitudeSample>) {
+        self.track.clear();
+        self.next = 1;
+        let sample = self.trusted(sample);
+        let resumed = std::mem::take(&mut self.resumed);
+        let first = self.state.report.samples == 0 && !resumed;
+        self.state.begin(sample.stamp.0);
+        if sample.join == Join::Reset {
+            self.state.reset(self.initial);
+        }
+        if !first {
+            self.state.reset_count = self.state.reset_count.saturating_add(1);
+            let gap = secs(sample.stamp.0.saturating_sub(self.last_stamp));
+            let status = if sample.join == Join::Reset {
+                self.state.report.resets += 1;
+                self.state.covariance.pass(gap);
+                Status::RESET
+            } else {
+                self.state.report.holds += 1;
+                let [x, y, z] = self.last_rate;
+                self.state
+                    .covariance
+                    .hold(Vector3::new(x, y, z).norm(), gap);
+                Status::HELD
+            };
+            self.state.added = self.state.added.with(status);
+        }
+        if resumed {
+            self.state.added = self.state.added.with(Status::RESTARTED);
+        }
+        self.started = true;
+        self.append(&sample);
+        let rate = self.track.rate(0);
+        self.state.output_at(&sample, Some(rate), out);
+    }
+
+    /// Any later sample of a run.
+    fn admit(&mut self, sample: &RateSample) {
+        let mut sample = self.trusted(sample);
+        // Nothing is missing, or it was held: `begin` says so itself.
+        if std::mem::take(&mut self.resumed) && sample.join == Join::Bridge {
+            sample.status = sample.status.with(Status::RESTARTED);
+        }
+        let turns = sample.stamp.0 > self.last_stamp;
+        if turns {
+            self.append(&sample);
+        } else {
+            self.state.report.stalled += 1;
+        }
+        self.queue.push_back(Waiting { sample, turns });
+    }
+
+    fn append(&mut self, sample: &RateSample) {
+        let value = [sample.value.x, sample.value.y, sample.value.z];
+        let bridged = sample.join == Join::Bridge;
+        self.track
+            .push(sample.stamp.0, sample.start.0, value, bridged);
+        let rate = self.track.rate(self.track.len() - 1);
+        self.last_rate = [rate.x.0[0], rate.y.0[0], rate.z.0[0]];
+        self.last_stamp = sample.stamp.0;
+    }
+
+    /// The sample, with a value that can be calculated with: one that is not finite, or that no gyro
+    /// delivers, becomes the rate before, and says so.
+    fn trusted(&mut self, sample: &RateSample) -> RateSample {
+        let limit = if self.track.increments {
+            LARGEST
+        } else {
+            FASTEST
+        };
+        if sample.value.iter().all(|v| v.abs() <= limit) {
+            return *sample;
+        }
+        self.state.report.rejected += 1;
+        let mut sample = *sample;
+        sample.status = sample.status.with(Status::REJECTED_BEFORE);
+        let [x, y, z] = self.last_rate;
+        let factor = if self.track.increments {
+            secs(sample.stamp.since(sample.start).max(0))
+        } else {
+            1.0
+        };
+        sample.value = Vector3::new(x, y, z) * factor;
+        if !sample.value.iter().all(|v| v.abs() <= limit) {
+            sample.value = Vector3::zeros();
+        }
+        sample
+    }
+
+    /// Integrates every interval whose window is known: to the end of the run if it has `ended`.
+    fn advance(&mut self, ended: bool, exec: &impl Executor, out: &mut Vec<AttitudeSample>) {
+        let known = self.known(ended);
+        // Those at the front follow the sample output last.
+        self.state.flush_stalled(&mut self.queue, out);
+        match &self.engine {
+            Engine::Sliding(plan) => {
+                let (track, first) = (&self.track, self.next);
+                let count = known.saturating_sub(first);
+                let segments = exec.map(count.div_ceil(SEGMENT), |i| {
+                    let from = first + i * SEGMENT;
+                    plan.steps(track, from, (from + SEGMENT).min(known) - 1)
+                });
+                out.reserve(count);
+                for step in segments.iter().flatten() {
+                    self.next += 1;
+                    self.state.step(step, &self.track, self.next - 1);
+                    self.state
+                        .emit(&mut self.queue, &self.track, self.next - 1, out);
+                }
+            }
+            Engine::Classical(method) => {
+                for k in self.next..known {
+                    let step = classical::step(*method, &self.track, k);
+                    self.next += 1;
+                    self.state.step(&step, &self.track, k);
+                    self.state.emit(&mut self.queue, &self.track, k, out);
+                }
+            }
+            Engine::Commit { .. } => {
+                if ended {
+                    self.commit(known, out);
+                }
+            }
+        }
+    }
+
+    /// End of the intervals that can be integrated for good.
+    fn known(&self, ended: bool) -> usize {
+        let plan = match &self.engine {
+            Engine::Sliding(plan) | Engine::Commit { plan, .. } => plan,
+            Engine::Classical(_) => return self.track.len(),
+        };
+        if ended {
+            return self.track.len();
+        }
+        // A centred window at the start of a run is one-sided: its samples must all have come.
+        let starting = self.track.base == 0 && plan.look_ahead > 0;
+        if starting && self.track.len() < plan.window + self.track.first() {
+            return 0;
+        }
+        self.track.len().saturating_sub(plan.look_ahead)
+    }
+
+    /// Drops elements no window needs any more, now and then.
+    fn forget(&mut self) {
+        let needed = self.next.saturating_sub(LOOKED_BACK);
+        if needed >= 2 * SEGMENT {
+            self.track.drop_front(needed);
+            self.next -= needed;
+        }
+    }
+
+    /// Commit/provisional: after each sample, commits what has its look-ahead and outputs the newest
+    /// attitude with provisional steps on top (docs/theory/attitude.md 4.3).
+    fn advance_live(&mut self, out: &mut Vec<AttitudeSample>) {
+        let known = self.known(false);
+        self.commit(known, out);
+        let Engine::Commit { plan, finals, open } = &mut self.engine else {
+            return;
+        };
+        while let Some(Waiting { sample, turns }) = self.queue.pop_front() {
+            let newest = self.track.len() - 1;
+            let rate = if turns {
+                Some(self.track.rate(newest))
+            } else {
+                None
+            };
+            let committed_at = self.state.now;
+            let mut ahead = self.state.attitude;
+            let mut covariance = self.state.covariance;
+            let mut difference = self.state.difference;
+            if newest >= self.next {
+                self.scratch.clear();
+                plan.append_steps(&self.track, self.next, newest, &mut self.scratch);
+                for (i, step) in self.scratch.iter().enumerate() {
+                    ahead.turn(step.turn);
+                    difference.add(&ahead, step.outer);
+                    covariance.advance(step.turn, self.track.step(self.next + i));
+                    covariance.bridge(step.gap_variance);
+                }
+                if let (true, Some(step)) = (turns, self.scratch.last()) {
+                    self.state.added = self.state.added.with(step.status());
+                }
+            }
+            self.state.difference.seen(&difference);
+            let committed = (self.state.attitude, self.state.covariance);
+            (self.state.attitude, self.state.covariance) = (ahead, covariance);
+            self.state.now = self.track.stamp[newest];
+            if newest >= self.next {
+                self.state.added = self.state.added.with(Status::PROVISIONAL);
+                if *finals {
+                    open.push_back(Waiting { sample, turns });
+                }
+            }
+            self.state.output_at(&sample, rate, out);
+            (self.state.attitude, self.state.covariance) = committed;
+            self.state.now = committed_at;
+        }
+    }
+
+    fn commit(&mut self, known: usize, out: &mut Vec<AttitudeSample>) {
+        let Engine::Commit { plan, finals, open } = &mut self.engine else {
+            return;
+        };
+        if known <= self.next {
+            return;
+        }
+        self.scratch.clear();
+        plan.append_steps(&self.track, self.next, known - 1, &mut self.scratch);
+        for step in &self.scratch {
+            let k = self.next;
+            self.next += 1;
+            self.state.step(step, &self.track, k);
+            if !self.queue.is_empty() && k + 1 == self.track.len() {
+                // Without look-ahead the newest is final at once, and its output is still to come.
+                break;
+            }
+            if *finals {
+                // The second output of the same samples: they count once.
+                let counted = self.state.report.samples;
+                self.state.emit(open, &self.track, k, out);
+                self.state.report.samples = counted;
+            } else {
+                self.state.added = Status::OK;
+            }
+        }
+    }
+}
+
+fn plan(
+    window: usize,
+    order: Order,
+    placement: Placement,
+    increments: bool,
+) -> Result<Plan, SettingsError> {
+    let smallest = if increments { 1 } else { 2 };
+    if !(smallest..=LARGEST_WINDOW).contains(&window) {
+        return Err(SettingsError::Window {
+            given: window,
+            smallest,
+            largest: LARGEST_WINDOW,
+        });
+    }
+    Ok(Plan::new(window, order, placement, increments))
+}

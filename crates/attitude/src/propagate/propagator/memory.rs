@@ -1,0 +1,211 @@
+//! All a propagator needs to go on exactly <-> plain numbers. Pure.
+//!
+//! Apart from the propagator because it is read by another process: nothing in it is believed
+//! unseen. Of the samples only those are kept that a window may still hold.
+
+use super::{Engine, FASTEST, LARGEST, LOOKED_BACK, Propagator, Waiting};
+use crate::propagate::accumulate::Accumulator;
+use crate::propagate::classical::LOOK_BACK;
+use crate::propagate::covariance::Carried;
+use crate::propagate::lanes::Triple;
+use crate::record::{Join, Nanos, RateSample, Status};
+use nalgebra::Vector3;
+use std::collections::VecDeque;
+
+/// Most samples that wait for their successors: no window looks further ahead.
+const MOST_WAITING: usize = 64;
+
+/// What a propagator knows at one moment; [`Propagator::recall`] puts another there.
+#[derive(Clone, PartialEq, Debug)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(deny_unknown_fields)
+)]
+pub struct Memory {
+    /// Attitude a reset goes to, w, x, y, z.
+    initial: [f64; 4],
+    /// Attitude accumulated, w, x, y, z: relative to the world, or to where that stood at
+    /// `world_since`.
+    attitude: [f64; 4],
+    /// What is in it too much.
+    excess: [f64; 4],
+    /// Sum of rotation vectors, rad, where the method sums those.
+    sum: Option<[f64; 3]>,
+    world_since: Option<i64>,
+    /// Instant of the attitude, ns.
+    now: i64,
+    covariance: Carried,
+    /// Bits of the next output.
+    added: u16,
+    resets: u32,
+    /// Of the last output, and of the last sample, rad/s.
+    rates: [[f64; 3]; 2],
+    /// Stamp of the last sample, ns: the others are counted back from it.
+    last: i64,
+    /// Samples of this run before those in `samples`.
+    before: u64,
+    /// Of `samples`, the one that ends the next interval to be integrated.
+    next: usize,
+    samples: Vec<Element>,
+    /// Not yet output, and output but not for good.
+    waiting: Vec<Row>,
+    open: Vec<Row>,
+}
+
+/// ns before the last, ns it was measured over, value x, y, z, whether samples are missing before it.
+type Element = (i64, i64, f64, f64, f64, bool);
+
+/// Of a sample that waits: ns before the last, specific force, status bits, log time, whether it turns.
+type Row = (i64, Option<[f64; 3]>, u16, i64, bool);
+
+impl Propagator {
+    /// What it knows; `None` before the first sample of a run.
+    #[must_use]
+    pub fn memory(&self) -> Option<Memory> {
+        let open = match &self.engine {
+            Engine::Commit { open, .. } => open.iter().collect(),
+            Engine::Sliding(_) | Engine::Classical(_) => Vec::new(),
+        };
+        if !self.started || self.queue.len().max(open.len()) > MOST_WAITING {
+            return None;
+        }
+        let last = self.last_stamp;
+        let row = |waiting: &Waiting| {
+            let sample = &waiting.sample;
+            let accel = sample.accel.map(Into::into);
+            let age = last.saturating_sub(sample.stamp.0);
+            (age, accel, sample.status.0, sample.log.0, waiting.turns)
+        };
+        let track = &self.track;
+        let from = self.next.saturating_sub(LOOKED_BACK);
+        let (attitude, excess) = self.state.attitude.parts();
+        Some(Memory {
+            initial: self.initial,
+            attitude,
+            excess,
+            sum: self.state.sum.map(|s| [s.x.0[0], s.y.0[0], s.z.0[0]]),
+            world_since: self.state.world.map(|w| w.since()),
+            now: self.state.now,
+            covariance: self.state.covariance.carried(),
+            added: self.state.added.0,
+            resets: self.state.reset_count,
+            rates: [self.state.rate.into(), self.last_rate],
+            last,
+            before: (track.base + from) as u64,
+            next: self.next - from,
+            samples: (from..track.len())
+                .map(|k| {
+                    let stamp = track.stamp[k];
+                    (
+                        last.saturating_sub(stamp),
+                        stamp.saturating_sub(track.start[k]),
+                        track.x[k],
+                        track.y[k],
+                        track.z[k],
+                        track.bridged[k],
+                    )
+                })
+                .collect(),
+            waiting: self.queue.iter().map(row).collect(),
+            open: open.into_iter().map(row).collect(),
+        })
+    }
+
+    /// Goes on as the propagator with the same settings would have that knew this, before this one's
+    /// first sample. Should that begin with a gap, the first output says [`Status::RESTARTED`].
+    /// `false`, and nothing has changed, when no propagator can have known it.
+    #[must_use]
+    pub fn recall(&mut self, memory: &Memory) -> bool {
+        let mut covariance = self.state.covariance;
+        let fits = self.can_be(memory) && covariance.carry(&memory.covariance);
+        if !fits {
+            return false;
+        }
+        self.track.clear();
+        for &(age, length, x, y, z, bridged) in &memory.samples {
+            let stamp = memory.last.saturating_sub(age);
+            let start = stamp.saturating_sub(length);
+            self.track.push(stamp, start, [x, y, z], bridged);
+        }
+        self.track
+            .count_from(usize::try_from(memory.before).unwrap_or(usize::MAX / 2));
+        self.next = memory.next;
+        self.initial = memory.initial;
+        self.state.covariance = covariance;
+        self.state.attitude = Accumulator::from_parts(memory.attitude, memory.excess);
+        self.state.sum = memory.sum.map(|[x, y, z]| Triple::new(x, y, z));
+        if let (Some(world), Some(since)) = (&mut self.state.world, memory.world_since) {
+            world.count_from(since);
+        }
+        self.state.now = memory.now;
+        self.state.added = Status(memory.added);
+        self.state.reset_count = memory.resets;
+        self.state.rate = Vector3::from(memory.rates[0]);
+        self.last_rate = memory.rates[1];
+        self.last_stamp = memory.last;
+        let rows = |rows: &[Row]| -> VecDeque<Waiting> {
+            rows.iter().map(|row| waiting(memory.last, row)).collect()
+        };
+        self.queue = rows(&memory.waiting);
+        if let Engine::Commit { open, .. } = &mut self.engine {
+            *open = rows(&memory.open);
+        }
+        self.started = true;
+        self.resumed = true;
+        true
+    }
+
+    /// Whether a propagator with these settings can have known this: what is calculated with it can
+    /// neither fail nor grow.
+    fn can_be(&self, memory: &Memory) -> bool {
+        let limit = if self.track.increments {
+            LARGEST
+        } else {
+            FASTEST
+        };
+        let unit = |q: &[f64; 4]| {
+            let norm = q.iter().map(|c| c * c).sum::<f64>().sqrt();
+            (norm - 1.0).abs() < 1e-6
+        };
+        let small = |v: &f64| v.abs() <= limit;
+        let elements = memory.samples.iter();
+        let in_order = memory.samples.windows(2).all(|pair| match pair {
+            [a, b] => a.0 > b.0 && b.0 >= 0,
+            _ => true,
+        });
+        unit(&memory.attitude)
+            && unit(&memory.initial)
+            && memory.excess.iter().all(|c| c.abs() < 1e-6)
+            && memory.sum.is_some() == self.state.sum.is_some()
+            && memory.sum.iter().flatten().all(|c| c.is_finite())
+            && memory.world_since.is_some() == self.state.world.is_some()
+            && memory.rates.iter().flatten().all(|c| c.is_finite())
+            && elements.len() <= LOOKED_BACK + MOST_WAITING
+            && (1..=elements.len()).contains(&memory.next)
+            // Whoever has dropped some looks no further back than to what is there.
+            && (memory.before == 0 || memory.next > LOOK_BACK)
+            && memory.before < u64::MAX / 4
+            && in_order
+            && memory.samples.last().is_some_and(|last| last.0 == 0)
+            && elements.clone().all(|e| e.1 >= 0 && [e.2, e.3, e.4].iter().all(small))
+            && memory.waiting.len().max(memory.open.len()) <= MOST_WAITING
+    }
+}
+
+fn waiting(last: i64, &(age, accel, status, log, turns): &Row) -> Waiting {
+    let stamp = Nanos(last.saturating_sub(age));
+    Waiting {
+        // Its value is in the track.
+        sample: RateSample {
+            stamp,
+            start: stamp,
+            value: Vector3::zeros(),
+            accel: accel.map(Vector3::from),
+            join: Join::Continuous,
+            status: Status(status),
+            log: Nanos(log),
+        },
+        turns,
+    }
+}

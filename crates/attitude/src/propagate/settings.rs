@@ -1,0 +1,124 @@
+//! What a run of the propagator is to do -> checked once. Pure.
+
+use super::covariance::Noise;
+use super::method::Method;
+use crate::frames::{Body, In, Nav};
+use crate::quaternion::Quaternion;
+use crate::record::SampleKind;
+use nalgebra::Vector3;
+use std::fmt;
+
+/// What a propagator is to do.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    /// How samples become turns.
+    pub method: Method,
+    /// What the samples mean.
+    pub kind: SampleKind,
+    /// Attitude at the first sample, and after a reset.
+    pub initial: Quaternion<Nav, Body>,
+    /// Rate of the world relative to inertial space, w_in^n in rad/s, constant: Earth's for a fixed
+    /// site ([`Convention::earth_rate`](crate::worlds::Convention::earth_rate)). Zero for a
+    /// world that stands still, which changes no bit of the result.
+    pub world_rate: In<Nav>,
+    /// For the uncertainty that goes with every attitude; zeros for none.
+    pub noise: Noise,
+}
+
+/// Settings that can not be.
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[non_exhaustive]
+pub enum SettingsError {
+    /// The window is not in `smallest ..= largest` samples.
+    Window {
+        /// What was asked for.
+        given: usize,
+        /// What there is: two rates, one increment.
+        smallest: usize,
+        /// [`LARGEST_WINDOW`](super::LARGEST_WINDOW).
+        largest: usize,
+    },
+    /// The initial attitude is no rotation.
+    Initial {
+        /// Its `[w, x, y, z]`.
+        wxyz: [f64; 4],
+    },
+    /// The world's rate is not finite, or faster than anything turns.
+    WorldRate {
+        /// w_in^n, rad/s.
+        rate: [f64; 3],
+    },
+    /// A noise figure is negative, not finite, or absurd.
+    Noise {
+        /// Which.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+    },
+}
+
+impl fmt::Display for SettingsError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            SettingsError::Window {
+                given,
+                smallest,
+                largest,
+            } => write!(
+                f,
+                "a window of {given} samples can not be used\n  help: --window takes {smallest} to {largest}"
+            ),
+            SettingsError::Initial { wxyz } => write!(
+                f,
+                "the initial attitude {wxyz:?} (w, x, y, z) is not a unit quaternion\n  help: --init q=w,x,y,z with norm 1"
+            ),
+            SettingsError::WorldRate { rate } => write!(
+                f,
+                "the world can not turn at {rate:?} rad/s\n  help: --earth-rate takes a latitude in degrees, -90 to 90"
+            ),
+            SettingsError::Noise { name, value } => write!(
+                f,
+                "noise {name} = {value} can not be\n  help: --noise takes numbers from 0 up, in SI units"
+            ),
+        }
+    }
+}
+
+impl std::error::Error for SettingsError {}
+
+impl Default for Settings {
+    /// Rates, the default method, from identity, no noise, a world that stands still.
+    fn default() -> Self {
+        Settings {
+            method: Method::Auto,
+            kind: SampleKind::Rate,
+            initial: Quaternion::identity(),
+            world_rate: In::assume(Vector3::zeros()),
+            noise: Noise::default(),
+        }
+    }
+}
+
+/// Fastest world, rad/s: a turntable is no world, but a test may put one on it.
+const FASTEST_WORLD: f64 = 10.0;
+
+impl Settings {
+    /// The initial attitude, to the last bit of norm 1.
+    pub(crate) fn checked(&self) -> Result<[f64; 4], SettingsError> {
+        let wxyz = self.initial.wxyz();
+        let norm = wxyz.iter().map(|c| c * c).sum::<f64>().sqrt();
+        if (norm - 1.0).abs() > 1e-6 || norm.is_nan() {
+            return Err(SettingsError::Initial { wxyz });
+        }
+        let rate = self.world_rate.as_vector();
+        if !rate.iter().all(|w| w.abs() <= FASTEST_WORLD) {
+            return Err(SettingsError::WorldRate {
+                rate: (*rate).into(),
+            });
+        }
+        if let Some((name, value)) = self.noise.fault() {
+            return Err(SettingsError::Noise { name, value });
+        }
+        Ok(wxyz.map(|c| c / norm))
+    }
+}

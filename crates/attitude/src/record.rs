@@ -1,0 +1,368 @@
+//! What crosses the borders between stages. Pure.
+//!
+//! ```text
+//! source -> bytes -> decode -> RawSample -> condition -> RateSample -> propagate -> AttitudeSample -> sink
+//! ```
+//!
+//! Bad data never becomes an `Err`: it becomes a [`Verdict`], is counted in
+//! [`Counts`], and the run goes on.
+
+mod covariance;
+
+pub use covariance::AttitudeCovariance;
+
+use crate::frames::{Body, Nav};
+use crate::quaternion::Quaternion;
+use nalgebra::Vector3;
+
+/// An instant: integer nanoseconds since the epoch of the clock it was read from.
+///
+/// One `f64` step at today's Unix epoch in seconds is 2.4e-7 s, so stamps stay
+/// integers until two of them have been subtracted.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Default)]
+pub struct Nanos(pub i64);
+
+impl Nanos {
+    /// Nanoseconds from `earlier` to `self`, saturating at the ends of `i64`.
+    #[must_use]
+    pub fn since(self, earlier: Nanos) -> i64 {
+        self.0.saturating_sub(earlier.0)
+    }
+
+    /// Seconds from `earlier` to `self`; the difference is taken in integers first.
+    #[must_use]
+    pub fn secs_since(self, earlier: Nanos) -> f64 {
+        self.since(earlier) as f64 * 1e-9
+    }
+
+    /// From the seconds and nanoseconds of a ROS stamp; `nanosec >= 1e9` carries over.
+    #[must_use]
+    pub fn from_sec_nanosec(sec: i64, nanosec: u32) -> Nanos {
+        Nanos(
+            sec.saturating_mul(1_000_000_000)
+                .saturating_add(i64::from(nanosec)),
+        )
+    }
+
+    /// Whole seconds (towards minus infinity) and the nanoseconds above them.
+    #[must_use]
+    pub fn to_sec_nanosec(self) -> (i64, u32) {
+        (
+            self.0.div_euclid(1_000_000_000),
+            self.0.rem_euclid(1_000_000_000) as u32,
+        )
+    }
+}
+
+/// What a gyro sample means in time. It matters more than the order of the integrator
+/// (`docs/accuracy.md`), so it is explicit everywhere.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Hash)]
+pub enum SampleKind {
+    /// Instantaneous rate at the stamp, rad/s.
+    #[default]
+    Rate,
+    /// Mean rate over the interval that ends at the stamp, rad/s.
+    Average,
+    /// Integral of the rate over the interval that ends at the stamp, rad.
+    DeltaAngle,
+}
+
+impl SampleKind {
+    /// The name used by `--sample-kind` and in every summary.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            SampleKind::Rate => "rate",
+            SampleKind::Average => "average",
+            SampleKind::DeltaAngle => "delta-angle",
+        }
+    }
+}
+
+/// One sample as it was recorded: source units, source axes, every clock it carried.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct RawSample {
+    /// The stamp inside the message. `None` when the message has no such field;
+    /// a field that holds zero is `Some(Nanos(0))`.
+    pub header: Option<Nanos>,
+    /// When the recorder received it.
+    pub log: Nanos,
+    /// When the publisher sent it.
+    pub publish: Nanos,
+    /// Rate (or delta angle, see [`SampleKind`]) about the sensor's axes, in the source's unit.
+    /// `None` when the message marks it as absent or has none.
+    pub gyro: Option<[f64; 3]>,
+    /// Specific force along the sensor's axes, m/s^2 (or the source's unit).
+    pub accel: Option<[f64; 3]>,
+    /// Recorded orientation `[w, x, y, z]`, sensor to world, as found: not checked, not normalised.
+    pub orientation: Option<[f64; 4]>,
+    /// The message's own integration interval in nanoseconds (PX4 `gyro_integral_dt`, `delta_angle_dt`).
+    pub interval_nanos: Option<i64>,
+}
+
+/// How a sample connects to the one before it in the same stream.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Hash)]
+pub enum Join {
+    /// First sample of the stream.
+    Start,
+    /// The ordinary next sample.
+    #[default]
+    Continuous,
+    /// Samples are missing, but few enough: integrate across, flagged.
+    Bridge,
+    /// Gap or clock jump beyond the limit: no rotation is added, integration restarts here
+    /// from the attitude held.
+    Hold,
+    /// Gap or clock jump beyond the limit: attitude returns to the initial one.
+    Reset,
+}
+
+/// One conditioned sample: SI, body axes, bias removed, finite, stamps strictly increasing
+/// within a stream except across [`Join::Hold`] and [`Join::Reset`].
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct RateSample {
+    /// Instant of the rate, or end of the interval.
+    pub stamp: Nanos,
+    /// Start of the interval for [`SampleKind::Average`] and [`SampleKind::DeltaAngle`];
+    /// equals `stamp` for [`SampleKind::Rate`]. When it is later than the previous sample's
+    /// stamp, something between was not recorded.
+    pub start: Nanos,
+    /// [`SampleKind::Rate`]: rad/s. Increments (both other kinds): **delta angle in rad**
+    /// over `start..stamp`. Resolved in body axes.
+    pub value: Vector3<f64>,
+    /// Specific force in body axes, m/s^2.
+    pub accel: Option<Vector3<f64>>,
+    /// How it connects to its predecessor.
+    pub join: Join,
+    /// What was noticed about it.
+    pub status: Status,
+    /// When the recorder received it; outputs are logged at the same instant.
+    pub log: Nanos,
+}
+
+/// Bits that travel with a sample to the output's `status`.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Hash)]
+pub struct Status(pub u16);
+
+impl Status {
+    /// Nothing to say.
+    pub const OK: Status = Status(0);
+    /// The interval before this sample was bridged over missing samples.
+    pub const BRIDGED: Status = Status(1);
+    /// The attitude was held over a gap or jump before this sample.
+    pub const HELD: Status = Status(1 << 1);
+    /// The attitude was reset at this sample.
+    pub const RESET: Status = Status(1 << 2);
+    /// One or more bad samples were rejected just before this one.
+    pub const REJECTED_BEFORE: Status = Status(1 << 3);
+    /// The sample came out of order and was put back in place.
+    pub const REORDERED: Status = Status(1 << 4);
+    /// A component is at or beyond the stated gyro range.
+    pub const SATURATED: Status = Status(1 << 5);
+    /// More than half a turn in one step: under-sampled.
+    pub const UNDERSAMPLED: Status = Status(1 << 6);
+    /// Provisional output of streaming, to be followed by a final one.
+    pub const PROVISIONAL: Status = Status(1 << 7);
+
+    /// The sample shared its recorded stamp with another and was given one of its own.
+    pub const RESTAMPED: Status = Status(1 << 8);
+    /// The first after a restart: the attitude is the one that was saved, held since.
+    pub const RESTARTED: Status = Status(1 << 9);
+    /// Sent to a watcher that came after it: no news, but the last there was.
+    pub const LAST: Status = Status(1 << 10);
+
+    /// Both sets of bits.
+    #[must_use]
+    pub fn with(self, other: Status) -> Status {
+        Status(self.0 | other.0)
+    }
+
+    /// Whether any bit of `other` is set.
+    #[must_use]
+    pub fn has(self, other: Status) -> bool {
+        self.0 & other.0 != 0
+    }
+
+    /// The names of the bits that are set, in a fixed order; empty means `ok`.
+    pub fn names(self) -> impl Iterator<Item = &'static str> {
+        const NAMES: [(Status, &str); 11] = [
+            (Status::BRIDGED, "bridged"),
+            (Status::HELD, "held"),
+            (Status::RESET, "reset"),
+            (Status::REJECTED_BEFORE, "rejected-before"),
+            (Status::REORDERED, "reordered"),
+            (Status::SATURATED, "saturated"),
+            (Status::UNDERSAMPLED, "undersampled"),
+            (Status::PROVISIONAL, "provisional"),
+            (Status::RESTAMPED, "restamped"),
+            (Status::RESTARTED, "restarted"),
+            (Status::LAST, "last"),
+        ];
+        NAMES
+            .into_iter()
+            .filter(move |(bit, _)| self.has(*bit))
+            .map(|(_, name)| name)
+    }
+}
+
+/// One output: attitude at an instant, with what is known about it.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct AttitudeSample {
+    /// The instant the attitude holds for.
+    pub stamp: Nanos,
+    /// Body to navigation ("world"), Hamilton, unit norm to 1e-15, sign continuous with the
+    /// sample before.
+    pub q_nb: Quaternion<Nav, Body>,
+    /// Bias-corrected body rate in rad/s: the sample itself, or the increment divided by its interval.
+    /// What a gyro measures: relative to inertial space (w_ib), Earth's rotation included, also where
+    /// `q_nb` is relative to a world that turns with it.
+    pub rate: Vector3<f64>,
+    /// Specific force in body axes, m/s^2, copied through.
+    pub accel: Option<Vector3<f64>>,
+    /// Of its error, rad^2, body axes: see [`AttitudeCovariance::sigma`] for three numbers.
+    pub covariance: AttitudeCovariance,
+    /// What was noticed.
+    pub status: Status,
+    /// How often the attitude has been reset or held so far; a reader that sees it change must not
+    /// difference across.
+    pub reset_count: u32,
+    /// When the recorder received the sample this belongs to.
+    pub log: Nanos,
+}
+
+/// What became of one sample. Exactly one verdict per sample.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Hash)]
+pub enum Verdict {
+    /// Integrated.
+    Accepted,
+    /// Integrated, after being put back in time order.
+    Reordered,
+    /// The payload could not be decoded.
+    Undecodable,
+    /// The message marks its gyro as absent (covariance -1), or has none.
+    NoGyro,
+    /// NaN or infinity in the gyro.
+    NotFinite,
+    /// A finite rate no gyro can have (above 1e4 rad/s, or a delta angle above 1e3 rad).
+    Huge,
+    /// Same stamp and same data as its predecessor.
+    Repeated,
+    /// Same stamp as another, other data, and no longer step beside it to put it into.
+    DuplicateStamp,
+    /// Older than what was already integrated, beyond the reorder window.
+    Late,
+    /// Its stamp is absent, zero while others' are not, or more than 146 years from the epoch.
+    NoStamp,
+    /// Outside `--start`, `--until`.
+    Trimmed,
+    /// Integrated at a stamp of its own inside a longer step beside it, because it shared its
+    /// recorded stamp with another sample.
+    Restamped,
+    /// Its stamp leaps far ahead, and its successors carry on from its predecessors.
+    StrayStamp,
+}
+
+impl Verdict {
+    /// Every verdict, in the order of [`Counts`].
+    pub const ALL: [Verdict; 13] = [
+        Verdict::Accepted,
+        Verdict::Reordered,
+        Verdict::Undecodable,
+        Verdict::NoGyro,
+        Verdict::NotFinite,
+        Verdict::Huge,
+        Verdict::Repeated,
+        Verdict::DuplicateStamp,
+        Verdict::Late,
+        Verdict::NoStamp,
+        Verdict::Trimmed,
+        Verdict::Restamped,
+        Verdict::StrayStamp,
+    ];
+
+    /// The name in summaries and JSON.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Verdict::Accepted => "accepted",
+            Verdict::Reordered => "reordered",
+            Verdict::Undecodable => "undecodable",
+            Verdict::NoGyro => "no_gyro",
+            Verdict::NotFinite => "not_finite",
+            Verdict::Huge => "huge",
+            Verdict::Repeated => "repeated",
+            Verdict::DuplicateStamp => "duplicate_stamp",
+            Verdict::Late => "late",
+            Verdict::NoStamp => "no_stamp",
+            Verdict::Trimmed => "trimmed",
+            Verdict::Restamped => "restamped",
+            Verdict::StrayStamp => "stray_stamp",
+        }
+    }
+
+    /// Whether a sample with this verdict was integrated.
+    #[must_use]
+    pub fn is_used(self) -> bool {
+        matches!(
+            self,
+            Verdict::Accepted | Verdict::Reordered | Verdict::Restamped
+        )
+    }
+
+    /// Whether a sample with this verdict is data that was lost (exit code 3): everything that was
+    /// not used, but for exact repeats and what the user asked to leave out.
+    #[must_use]
+    pub fn is_loss(self) -> bool {
+        !self.is_used() && !matches!(self, Verdict::Repeated | Verdict::Trimmed)
+    }
+}
+
+/// How many samples got which verdict.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Counts([u64; Verdict::ALL.len()]);
+
+impl Counts {
+    /// One more.
+    pub fn add(&mut self, verdict: Verdict) {
+        self.add_many(verdict, 1);
+    }
+
+    /// `n` more.
+    pub fn add_many(&mut self, verdict: Verdict, n: u64) {
+        if let Some(count) = self.0.get_mut(verdict as usize) {
+            *count += n;
+        }
+    }
+
+    /// How many so far.
+    #[must_use]
+    pub fn get(&self, verdict: Verdict) -> u64 {
+        self.0.get(verdict as usize).copied().unwrap_or(0)
+    }
+
+    /// All samples seen.
+    #[must_use]
+    pub fn total(&self) -> u64 {
+        self.0.iter().sum()
+    }
+
+    /// Samples integrated.
+    #[must_use]
+    pub fn used(&self) -> u64 {
+        self.sum(Verdict::is_used)
+    }
+
+    /// Samples lost.
+    #[must_use]
+    pub fn lost(&self) -> u64 {
+        self.sum(Verdict::is_loss)
+    }
+
+    fn sum(&self, keep: fn(Verdict) -> bool) -> u64 {
+        Verdict::ALL
+            .iter()
+            .filter(|v| keep(**v))
+            .map(|v| self.get(*v))
+            .sum()
+    }
+}

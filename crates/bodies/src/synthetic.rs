@@ -1,0 +1,375 @@
+//! A motion with exact truth, and a sensor with known errors -> RawSample, and the truth beside it. Pure.
+//!
+//! A source like any other: what comes out takes the same way through conditioning and integration as
+//! a recording, and is the only source whose answer is known beforehand.
+//!
+//! # Convention
+//! The sensor sits at the origin of the body axes, its axes are theirs (FLU). Navigation z points up,
+//! whatever x points at is called east, so the world of the truth is ENU. The specific force is
+//! `f_b = C_nb^T (a_n - g_n)`: 9.8 m/s^2 upwards at rest.
+//!
+//! Sample k is taken at `round(k 1e9 / rate)` ns after the start (or beside it, with sampling jitter),
+//! and the motion is evaluated at that very nanosecond. Rates begin at k = 0; averages and delta
+//! angles are over the interval that ends at their stamp, and so begin at k = 1. Truth is given for
+//! every k from 0 on, at the instant itself: whatever the stamps say, and whether or not the sample
+//! arrives.
+
+use crate::motion::Motion;
+use crate::rigid_body::Spin;
+use nalgebra::Vector3;
+use std::fmt;
+use strapd_attitude::frames::{Body, In, Nav};
+use strapd_attitude::noise::sensor_error::{
+    self, GyroModel, ImuError, ImuErrorFault, MeasureError, StampError, StampModel,
+};
+use strapd_attitude::quaternion::Quaternion;
+use strapd_attitude::record::{Nanos, RawSample, SampleKind};
+
+/// How a motion is sampled.
+#[derive(Clone, Debug)]
+pub struct Sampling {
+    /// Samples a second.
+    pub rate_hz: f64,
+    /// Seconds from the first instant to the last.
+    pub duration_secs: f64,
+    /// What a sample is.
+    pub kind: SampleKind,
+    /// Stamp of the first instant.
+    pub start: Nanos,
+    /// Gravity, m/s^2, downwards.
+    pub gravity: f64,
+    /// The sensor's errors. Without any, samples are the motion's own numbers.
+    pub error: ImuError,
+    /// Errors of sampling instants and stamps, and losses.
+    pub stamps: StampError,
+    /// Seed of everything random.
+    pub seed: u64,
+}
+
+/// Fastest sampling: a nanosecond is then a thousandth of the interval.
+const FASTEST_HZ: f64 = 1e6;
+/// Longest run, s: 31 years.
+const LONGEST_SECS: f64 = 1e9;
+
+/// A sampling that can not be.
+#[derive(Clone, PartialEq, Debug)]
+#[non_exhaustive]
+pub enum SamplingError {
+    /// A number out of its range.
+    OutOfRange {
+        /// Which, with its unit.
+        what: &'static str,
+        /// As given.
+        value: f64,
+        /// What it may be.
+        allowed: &'static str,
+    },
+    /// The motion turns half a turn or more from sample to sample at its start.
+    UnderSampled {
+        /// As given, Hz.
+        rate_hz: f64,
+        /// The rate that must be exceeded, Hz.
+        needed_hz: f64,
+    },
+    /// Errors no sensor can have.
+    Errors(ImuErrorFault),
+    /// Stamps would run over the end of 64-bit nanoseconds.
+    StampOverflow {
+        /// The first one.
+        start: Nanos,
+    },
+}
+
+impl fmt::Display for SamplingError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            SamplingError::OutOfRange {
+                what,
+                value,
+                allowed,
+            } => write!(f, "{what} can not be {value}: {allowed}"),
+            SamplingError::UnderSampled { rate_hz, needed_hz } => write!(
+                f,
+                "at {rate_hz} Hz the motion turns half a turn or more from sample to sample\n  help: --rate-hz above {needed_hz:.1}, several times that for a good attitude"
+            ),
+            SamplingError::Errors(fault) => write!(f, "{fault}"),
+            SamplingError::StampOverflow { start } => write!(
+                f,
+                "the stamps, from {} ns on, run over the end of 64-bit nanoseconds\n  help: an earlier --start-stamp",
+                start.0
+            ),
+        }
+    }
+}
+
+impl std::error::Error for SamplingError {}
+
+impl From<ImuErrorFault> for SamplingError {
+    fn from(fault: ImuErrorFault) -> Self {
+        SamplingError::Errors(fault)
+    }
+}
+
+/// What truly was at an instant.
+#[derive(Clone, Copy, Debug)]
+pub struct Truth {
+    /// When.
+    pub stamp: Nanos,
+    /// Attitude and body rate; the quaternion's sign is continuous with the one before.
+    pub spin: Spin,
+}
+
+/// A stretch of samples and truth.
+#[derive(Clone, Debug, Default)]
+pub struct Stretch {
+    /// Every instant.
+    pub truth: Vec<Truth>,
+    /// What the sensor put out and was not lost. `orientation` holds the true one at the sample's
+    /// instant, `log` that instant.
+    pub samples: Vec<RawSample>,
+}
+
+/// What was noticed on the way.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct Noticed {
+    /// Instants so far.
+    pub instants: u64,
+    /// Samples put out.
+    pub samples: u64,
+    /// Samples lost on purpose.
+    pub dropped: u64,
+    /// Samples with an axis at the end of the sensor's range.
+    pub saturated: u64,
+    /// Steps of half a turn or more.
+    pub undersampled: u64,
+    /// Largest body rate, rad/s.
+    pub fastest: f64,
+}
+
+/// What the sensor reads at an instant: rate or delta angle, and specific force.
+struct Reading {
+    gyro: Vector3<f64>,
+    force_b: Vector3<f64>,
+}
+
+/// A motion being sampled.
+#[derive(Clone, Debug)]
+pub struct Synthetic {
+    motion: Motion,
+    sampling: Sampling,
+    ticks: StampModel,
+    /// `None` without errors.
+    sensor: Option<GyroModel>,
+    /// Instants in all.
+    count: u64,
+    /// The next one.
+    next: u64,
+    /// Nanoseconds since the start of the one before.
+    before: u64,
+    last_q_nb: Quaternion<Nav, Body>,
+    noticed: Noticed,
+}
+
+impl Synthetic {
+    /// Ready for the first sample.
+    ///
+    /// # Errors
+    /// [`SamplingError`].
+    pub fn new(mut motion: Motion, sampling: Sampling) -> Result<Self, SamplingError> {
+        let Sampling {
+            rate_hz,
+            duration_secs,
+            gravity,
+            start,
+            error,
+            stamps,
+            seed,
+            kind,
+        } = sampling;
+        let within = |what, value: f64, ok: bool, allowed| {
+            if ok {
+                Ok(())
+            } else {
+                Err(SamplingError::OutOfRange {
+                    what,
+                    value,
+                    allowed,
+                })
+            }
+        };
+        within(
+            "the sample rate (Hz)",
+            rate_hz,
+            rate_hz > 0.0 && rate_hz <= FASTEST_HZ,
+            "above 0, at most 1e6",
+        )?;
+        within(
+            "the duration (s)",
+            duration_secs,
+            (0.0..=LONGEST_SECS).contains(&duration_secs),
+            "0 to 1e9",
+        )?;
+        within(
+            "gravity (m/s^2)",
+            gravity,
+            gravity.abs() <= 1e6,
+            "at most 1e6",
+        )?;
+        let spin = motion.at_nanos(0);
+        let needed_hz = spin.w_nb_b.norm() / std::f64::consts::PI;
+        if needed_hz >= rate_hz {
+            return Err(SamplingError::UnderSampled { rate_hz, needed_hz });
+        }
+        let sensor = (error != ImuError::default())
+            .then(|| GyroModel::new(&error, kind, seed))
+            .transpose()?;
+        // A product that falls short of a whole number by rounding alone still reaches it.
+        let intervals = (duration_secs * rate_hz * (1.0 + 4.0 * f64::EPSILON)).floor() as u64;
+        let end = (intervals as f64 * 1e9 / rate_hz).ceil() as i64;
+        if start.0.checked_add(end).is_none() {
+            return Err(SamplingError::StampOverflow { start });
+        }
+        Ok(Synthetic {
+            motion,
+            ticks: StampModel::new(&stamps, start, rate_hz, seed)?,
+            sensor,
+            count: intervals + 1,
+            next: 0,
+            before: 0,
+            last_q_nb: spin.q_nb,
+            noticed: Noticed::default(),
+            sampling,
+        })
+    }
+
+    /// What this unit of the sensor drew of its constant errors, when it has errors.
+    #[must_use]
+    pub fn sensor(&self) -> Option<&GyroModel> {
+        self.sensor.as_ref()
+    }
+
+    /// How many instants there are, past ones included.
+    #[must_use]
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// What was noticed so far.
+    #[must_use]
+    pub fn noticed(&self) -> Noticed {
+        self.noticed
+    }
+
+    /// Replaces what is in `out` by the next `most` instants at most; says how many there were.
+    ///
+    /// # Errors
+    /// The motion is not finite at some instant.
+    pub fn next_stretch(&mut self, most: usize, out: &mut Stretch) -> Result<usize, MeasureError> {
+        out.truth.clear();
+        out.samples.clear();
+        let n = usize::try_from(self.count - self.next).map_or(most, |left| left.min(most));
+        for _ in 0..n {
+            self.one(out)?;
+        }
+        Ok(n)
+    }
+
+    fn one(&mut self, out: &mut Stretch) -> Result<(), MeasureError> {
+        let tick = self.ticks.tick();
+        // Jitter may not take the first sample to before the motion began.
+        let late = self.sampling.start.since(tick.instant).max(0);
+        let now = (tick.instant.since(self.sampling.start) + late) as u64;
+        let mut spin = self.motion.at_nanos(now);
+        spin.q_nb = spin.q_nb.same_sign_as(&self.last_q_nb);
+        self.last_q_nb = spin.q_nb;
+        let at = Nanos(self.sampling.start.0 + now as i64);
+        out.truth.push(Truth { stamp: at, spin });
+        let rate = spin.w_nb_b.norm();
+        self.noticed.fastest = self.noticed.fastest.max(rate);
+        self.noticed.undersampled +=
+            u64::from(rate >= std::f64::consts::PI * self.sampling.rate_hz);
+        self.noticed.instants += 1;
+
+        let held_n = In::<Nav>::assume(
+            self.motion.acceleration_n(now) + Vector3::new(0.0, 0.0, self.sampling.gravity),
+        );
+        let force_b = *(spin.q_nb.inverse() * held_n).as_vector();
+        if let Some(read) = self.measured(at, now, &spin, &force_b)? {
+            if tick.dropped {
+                self.noticed.dropped += 1;
+            } else {
+                let rates = self.sampling.kind == SampleKind::Rate;
+                out.samples.push(RawSample {
+                    header: Some(Nanos(tick.stamp.0.saturating_add(late))),
+                    log: at,
+                    publish: at,
+                    gyro: Some(read.gyro.into()),
+                    accel: Some(read.force_b.into()),
+                    orientation: Some(spin.q_nb.wxyz()),
+                    interval_nanos: (!rates).then_some((now - self.before) as i64),
+                });
+                self.noticed.samples += 1;
+            }
+        }
+        self.before = now;
+        self.next += 1;
+        Ok(())
+    }
+
+    /// What the sensor reads at `now`. `None` for the
+    /// interval before the start.
+    fn measured(
+        &mut self,
+        at: Nanos,
+        now: u64,
+        spin: &Spin,
+        force_b: &Vector3<f64>,
+    ) -> Result<Option<Reading>, MeasureError> {
+        let rates = self.sampling.kind == SampleKind::Rate;
+        let first = self.next == 0;
+        if first && !rates {
+            return Ok(None);
+        }
+        if self.sensor.is_none() && rates {
+            return Ok(Some(Reading {
+                gyro: spin.w_nb_b,
+                force_b: *force_b,
+            }));
+        }
+        // A rate at the start has no interval before it: as if the body had come at this rate.
+        let nanos = if first {
+            (1e9 / self.sampling.rate_hz).round().max(1.0) as u64
+        } else {
+            now - self.before
+        };
+        let secs = nanos as f64 / 1e9;
+        let delta_angle = if first {
+            spin.w_nb_b * secs
+        } else {
+            self.motion.delta_angle(self.before, now)
+        };
+        let Some(sensor) = &mut self.sensor else {
+            let gyro = match self.sampling.kind {
+                SampleKind::DeltaAngle => delta_angle,
+                SampleKind::Average | SampleKind::Rate => delta_angle / secs,
+            };
+            return Ok(Some(Reading {
+                gyro,
+                force_b: *force_b,
+            }));
+        };
+        let truth = sensor_error::Truth {
+            rate: spin.w_nb_b,
+            delta_angle,
+            specific_force: *force_b,
+            temperature: 0.0,
+        };
+        let from = Nanos(at.0.saturating_sub(nanos as i64));
+        let read = sensor.measure(from, at, &truth)?;
+        self.noticed.saturated += u64::from(read.saturated);
+        Ok(Some(Reading {
+            gyro: read.gyro,
+            force_b: read.specific_force,
+        }))
+    }
+}
