@@ -11,7 +11,7 @@ use std::io::BufWriter;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
-use strapd::source::mcap::{Message, Reader, WalkOptions, walk};
+use strapd_recording::mcap::{Message, Reader, WalkOptions, walk};
 
 const RUNS: usize = 5;
 

@@ -13,8 +13,8 @@ use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
-use strapd::decode::packed::{self, Form};
 use strapd_attitude::record::{Nanos, RawSample};
+use strapd_recording::decode::packed::{self, Form};
 
 /// Name, publishers, samples a second of each, subscribers, subscribers that never read.
 const PACED: [(&str, usize, u64, usize, usize); 5] = [

@@ -6,13 +6,13 @@ use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::sync::{Arc, LazyLock};
-use strapd::decode::framing::{Framed, Framer};
-use strapd::decode::packed::{self, Object};
-use strapd::decode::{Channel, Decoder, Options, decode_line, role};
 use strapd::serve::hub::Hub;
 use strapd::serve::session::{Scratch, Session};
-use strapd::source::mcap::{Reader, WalkOptions, walk};
 use strapd_attitude::record::{Nanos, RawSample};
+use strapd_recording::decode::framing::{Framed, Framer};
+use strapd_recording::decode::packed::{self, Object};
+use strapd_recording::decode::{Channel, Decoder, Options, decode_line, role};
+use strapd_recording::mcap::{Reader, WalkOptions, walk};
 
 const NOW: Nanos = Nanos(1_700_000_000_000_000_000);
 

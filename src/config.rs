@@ -1,6 +1,5 @@
 //! What a run is: arguments as text -> values, parsed once and validated once. Pure.
 
-use crate::decode::{self, FieldRole};
 use crate::error::{Error, Result};
 use nalgebra::Vector3;
 use strapd_attitude::condition::{self, Clock, GyroUnit, OnGap};
@@ -9,6 +8,7 @@ use strapd_attitude::propagate::{self, Method, Propagator};
 use strapd_attitude::quaternion::{Quaternion, YawPitchRoll};
 use strapd_attitude::record::SampleKind;
 use strapd_attitude::worlds::World;
+use strapd_recording::decode;
 
 /// How the samples of a run are to be understood and integrated: the estimation flags, checked.
 /// `None` = the format decides where it states it, else the default.
@@ -147,13 +147,6 @@ impl Plan {
     #[must_use]
     pub fn bridges(&self, nanos: i64) -> bool {
         self.on_gap == OnGap::Bridge || nanos as f64 <= self.max_gap_secs * 1e9
-    }
-
-    /// Whether the user says where the samples' own interval lies, and in which unit.
-    #[must_use]
-    pub fn states_interval_unit(&self) -> bool {
-        let mut fields = self.decode.fields.iter();
-        fields.any(|f| f.role == FieldRole::Interval && f.unit.is_some())
     }
 
     /// Checks what can be judged without the data.

@@ -7,24 +7,9 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A file could not be opened.
-    #[error("{}: cannot open: {source}", path.display())]
-    Open {
-        /// Which file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// Reading failed part way.
-    #[error("{}: reading at byte {offset}: {source}", path.display())]
-    Read {
-        /// Which file.
-        path: PathBuf,
-        /// Where in it.
-        offset: u64,
-        /// Why.
-        source: std::io::Error,
-    },
+    /// A log could not be read.
+    #[error(transparent)]
+    Recording(#[from] strapd_recording::Error),
     /// Writing failed (disk full, permission, ...).
     #[error("{}: cannot write: {source}", path.display())]
     Write {
@@ -32,26 +17,6 @@ pub enum Error {
         path: PathBuf,
         /// Why.
         source: std::io::Error,
-    },
-    /// The path is a directory.
-    #[error("{}: is a directory\n  help: name the .mcap file inside it", path.display())]
-    IsDirectory {
-        /// Which.
-        path: PathBuf,
-    },
-    /// The file has no bytes.
-    #[error("{}: the file is empty (0 bytes)", path.display())]
-    Empty {
-        /// Which file.
-        path: PathBuf,
-    },
-    /// The first bytes are not the MCAP magic.
-    #[error("{}: not an MCAP file: it begins with {found}, not with \\x89MCAP0\\r\\n", path.display())]
-    NotMcap {
-        /// Which file.
-        path: PathBuf,
-        /// The first bytes, escaped.
-        found: String,
     },
     /// The output is already there.
     #[error("{}: already exists\n  help: --force replaces it", path.display())]
@@ -103,7 +68,7 @@ pub enum Error {
         what: String,
     },
     /// A run over this input can not be carried out with these settings.
-    #[error("{}: {}: {what}", path.display(), crate::decode::printable(topic))]
+    #[error("{}: {}: {what}", path.display(), strapd_recording::text::printable(topic))]
     Topic {
         /// Which file.
         path: PathBuf,

@@ -30,10 +30,8 @@ pub mod cli;
 pub mod client;
 pub mod config;
 
-pub mod decode;
 pub mod error;
 pub mod pipeline;
 pub mod report;
 pub mod serve;
 pub mod sink;
-pub mod source;

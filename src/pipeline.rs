@@ -18,7 +18,6 @@ pub(crate) mod opening;
 pub mod outlet;
 pub mod pace;
 mod passes;
-pub mod pool;
 pub mod position;
 pub mod preparation;
 pub mod provenance;

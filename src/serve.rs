@@ -6,7 +6,7 @@
 //!
 //! | file | arrow | |
 //! |---|---|---|
-//! | [`wire`] | lines and packed objects (cut by [`crate::decode::framing`]) -> requests; answers -> lines | pure |
+//! | [`wire`] | lines and packed objects (cut by [`strapd_recording::decode::framing`]) -> requests; answers -> lines | pure |
 //! | [`stream`] | samples of one sensor -> attitudes | pure |
 //! | [`channel`], [`last`] | a stream as clients know it; its last attitude, for who comes late | pure |
 //! | [`cast`], [`playback`] | a replay or simulation served in place of sensors, and who moves it | I/O; locks |

@@ -14,10 +14,10 @@ mod replays;
 mod shared_data;
 
 use std::path::Path;
-use strapd::decode::Options;
 use strapd::pipeline::check::check;
-use strapd::pipeline::pool::Pool;
 use strapd::report::findings::{Finding, Severity, findings};
+use strapd_recording::decode::Options;
+use strapd_recording::pool::Pool;
 
 fn found(path: &Path) -> Vec<Finding> {
     let pool = Pool::new(2).unwrap();

@@ -24,7 +24,7 @@ mod shared_data;
 #[path = "cli/summaries.rs"]
 mod summaries;
 #[allow(dead_code)]
-#[path = "decode/writer.rs"]
+#[path = "../crates/recording/tests/recording/decode/writer.rs"]
 mod writer;
 
 use std::path::Path;

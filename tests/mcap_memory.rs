@@ -7,12 +7,12 @@
 use std::io::{BufWriter, Write};
 use std::ops::ControlFlow;
 use std::path::Path;
-use strapd::pipeline::pool::Pool;
 use strapd::pipeline::recover::{Recover, run};
 use strapd::pipeline::run::Source;
 use strapd::sink::{Options, Target};
-use strapd::source::mcap::{MAGIC, Message, ProblemKind, Reader, WalkOptions, op, walk};
 use strapd_attitude::record::RawSample;
+use strapd_recording::mcap::{MAGIC, Message, ProblemKind, Reader, WalkOptions, op, walk};
+use strapd_recording::pool::Pool;
 
 /// Peak resident memory of this process so far, MiB.
 fn peak() -> u64 {

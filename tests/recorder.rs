@@ -16,12 +16,12 @@ mod rotation;
 use mcap::sans_io::{LinearReadEvent, LinearReader};
 use nalgebra::Vector3;
 use std::path::Path;
-use strapd::pipeline::pool::Pool;
 use strapd::pipeline::recover::{Recover, Recovered, run};
 use strapd::pipeline::run::Source;
 use strapd::sink::{Options, Target};
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{AttitudeCovariance, AttitudeSample, Nanos, RawSample, Status};
+use strapd_recording::pool::Pool;
 
 /// Sample `k` of a sensor that sends `rate_hz` a second. Its last digits differ from sample to sample, so
 /// that it packs as badly as a real one.
@@ -104,7 +104,7 @@ fn linear(bytes: &[u8]) -> u64 {
                 rest = &rest[n..];
             }
             LinearReadEvent::Record { opcode, .. } => {
-                messages += u64::from(opcode == strapd::source::mcap::op::MESSAGE);
+                messages += u64::from(opcode == strapd_recording::mcap::op::MESSAGE);
             }
         }
     }

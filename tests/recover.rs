@@ -15,11 +15,11 @@ use mcap_logs::{Packing, Read, log, messages};
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use strapd::pipeline::pool::Pool;
 use strapd::pipeline::recover::{Recover, Recovered, run};
 use strapd::pipeline::run::Source;
 use strapd::sink::{Options, Target};
-use strapd::source::mcap::{Message, Order, Reader, Survey, WalkOptions, walk};
+use strapd_recording::mcap::{Message, Order, Reader, Survey, WalkOptions, walk};
+use strapd_recording::pool::Pool;
 
 /// Recovers `input` into `output` on so many threads.
 fn recover(input: &Path, output: &Path, threads: usize) -> Recovered {

@@ -14,9 +14,9 @@ use replays::{Bits, csv, fixture, mcap, ndjson, replay_of, target};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::Stdio;
-use strapd::pipeline::pool::Pool;
 use strapd::pipeline::replay::run;
 use strapd::sink::Compression;
+use strapd_recording::pool::Pool;
 
 fn strapd() -> Command {
     Command::cargo_bin("strapd").unwrap()

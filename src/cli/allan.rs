@@ -7,9 +7,7 @@ mod words;
 use super::estimation::{KindArg, TimeArg, UnitArg};
 use super::{Global, Outcome, print};
 use crate::config::Plan;
-use crate::decode::Options;
 use crate::error::{Error, Result};
-use crate::pipeline::pool::Pool;
 use crate::report::page::Noise;
 use crate::sink::Document;
 use clap::Args;
@@ -18,6 +16,8 @@ use std::path::{Path, PathBuf};
 use strapd_attitude::condition::{Clock, GyroUnit};
 use strapd_attitude::noise::allan::{AllanFit, Point, cluster_sizes, deviation, fit};
 use strapd_attitude::record::SampleKind;
+use strapd_recording::decode::Options;
+use strapd_recording::pool::Pool;
 
 /// Allan deviation of a recording at rest: angle random walk, bias instability, rate random walk,
 /// quantisation, ramp

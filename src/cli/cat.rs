@@ -5,15 +5,12 @@ mod url;
 use super::{Global, Outcome};
 use crate::client::remote::Remote;
 use crate::config::Plan;
-use crate::decode::{FieldPath, Options};
 use crate::error::{Error, Result};
 use crate::pipeline::decoders::Decoders;
 use crate::pipeline::log::{Log, problems};
-use crate::pipeline::pool::Pool;
 use crate::pipeline::preparation::Resolved;
 use crate::pipeline::route::{Item, Noticed, Route, Taker};
 use crate::pipeline::topics;
-use crate::source::mcap::{self, WalkOptions};
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -22,6 +19,9 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
 use strapd_attitude::record::{RawSample, SampleKind};
+use strapd_recording::decode::{FieldPath, Options};
+use strapd_recording::mcap::{self, WalkOptions};
+use strapd_recording::pool::Pool;
 
 /// Decoded samples of a file, or attitudes of a daemon, as NDJSON, CSV or a table: rad/s, m/s^2, axes FLU.
 #[derive(Args, Debug)]

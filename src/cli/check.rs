@@ -1,15 +1,16 @@
 //! `strapd check FILE`: every finding about a log, with the flag that helps. I/O.
 
 use super::{Global, Outcome, print};
-use crate::decode::{Options, printable};
 use crate::error::{Error, Result};
 use crate::pipeline::check::{Checked, check};
-use crate::pipeline::pool::Pool;
 use crate::report::findings::{Finding, Severity, findings};
 use clap::Args;
 use serde_json::json;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use strapd_recording::decode::Options;
+use strapd_recording::pool::Pool;
+use strapd_recording::text::printable;
 
 /// Everything that may spoil the attitude from a log: stamps, gaps, units, axes, bias, bad samples.
 #[derive(Args, Debug)]

@@ -2,7 +2,6 @@
 
 use super::{Global, Outcome, print};
 use crate::error::{Error, Result};
-use crate::pipeline::pool::Pool;
 use crate::pipeline::track::{self, Side};
 use crate::report::page::{STRETCHES, comparison_json};
 use crate::report::plot::{Axis, Chart, Look, Series};
@@ -16,6 +15,7 @@ use std::path::PathBuf;
 use strapd_attitude::compare::{
     Align, Comparison, ErrorStats, Errors, Stamped, compare, for_each_error,
 };
+use strapd_recording::pool::Pool;
 
 /// Time-aligned angle error between two attitudes.
 #[derive(Args, Debug)]

@@ -86,7 +86,7 @@ pub fn run(args: &Config) -> Result<Outcome> {
 /// Reads `file` into what `argv` (of `strapd serve`) leaves open.
 ///
 /// # Errors
-/// [`Error::Open`], [`Error::Usage`] naming file and key.
+/// [`strapd_recording::Error::Open`], [`Error::Usage`] naming file and key.
 pub fn layered(file: &Path, argv: Vec<OsString>) -> Result<Layered> {
     let mut table = read(file)?;
     let sensors = match table.remove("sensor") {
@@ -154,7 +154,7 @@ fn bad(file: &Path, what: &str) -> Error {
 }
 
 fn read(file: &Path) -> Result<Table> {
-    let open = |source| Error::Open {
+    let open = |source| strapd_recording::Error::Open {
         path: file.to_owned(),
         source,
     };

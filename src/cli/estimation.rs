@@ -251,14 +251,14 @@ impl Estimation {
         }
         let plan = Plan {
             topic: self.topic.clone(),
-            decode: crate::decode::Options {
+            decode: strapd_recording::decode::Options {
                 fields: self
                     .fields
                     .iter()
                     .map(|f| f.parse().map_err(|e| usage("--field", &e)))
                     .collect::<Result<_>>()?,
                 ignore_covariance_flag: self.ignore_covariance_flag,
-                ..crate::decode::Options::default()
+                ..strapd_recording::decode::Options::default()
             },
             method: self.method()?,
             kind: self.sample_kind.map(SampleKind::from),

@@ -3,14 +3,14 @@
 mod words;
 
 use super::{Global, Outcome, print};
-use crate::decode::Options;
 use crate::error::{Error, Result};
 use crate::pipeline::log::{Log, problems};
 use crate::pipeline::look::look;
-use crate::pipeline::pool::Pool;
 use crate::pipeline::topics;
 use clap::Args;
 use std::path::PathBuf;
+use strapd_recording::decode::Options;
+use strapd_recording::pool::Pool;
 
 /// What a log holds: topics, rates, clocks, frames, and what to do next.
 #[derive(Args, Debug)]

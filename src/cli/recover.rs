@@ -3,9 +3,7 @@
 use super::progress::Reporter;
 use super::replay::CompressionArg;
 use super::{Global, Outcome, print};
-use crate::decode::printable;
 use crate::error::Result;
-use crate::pipeline::pool::Pool;
 use crate::pipeline::recover::{self, Recovered};
 use crate::pipeline::run::Source;
 use crate::report::summary::human_bytes;
@@ -13,6 +11,8 @@ use crate::sink::{Encoding, Options, Target};
 use clap::Args;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
+use strapd_recording::pool::Pool;
+use strapd_recording::text::printable;
 
 /// Salvage every intact message of a damaged MCAP.
 #[derive(Args, Debug)]

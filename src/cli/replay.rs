@@ -7,13 +7,13 @@ use super::{Global, Outcome, outputs, print};
 use crate::config::Plan;
 use crate::config::Shard;
 use crate::error::{Error, Result};
-use crate::pipeline::pool::Pool;
 use crate::pipeline::replay;
 use crate::pipeline::run::{Replay as Run, Source};
 use crate::report::summary::RunSummary;
 use crate::sink::{Compression, Encoding, Options, Target};
 use clap::{Args, ValueEnum};
 use std::io::Write;
+use strapd_recording::pool::Pool;
 
 /// Turn recorded gyro samples into attitude.
 #[derive(Args, Debug)]

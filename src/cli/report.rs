@@ -6,7 +6,6 @@ use super::{Global, Outcome, allan, print};
 use crate::config::{Bias, Plan};
 use crate::error::{Error, Result};
 use crate::pipeline::check::{CheckedTopic, Drawing, Examination, examine};
-use crate::pipeline::pool::Pool;
 use crate::pipeline::provenance::sha256;
 use crate::pipeline::track::{self, Side, Track};
 use crate::report::findings::findings;
@@ -15,6 +14,7 @@ use crate::report::summary::significant;
 use crate::sink::Document;
 use clap::Args;
 use std::path::PathBuf;
+use strapd_recording::pool::Pool;
 
 /// Rest from which an Allan deviation is worth having, s.
 const ENOUGH: f64 = 600.0;

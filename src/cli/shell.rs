@@ -19,7 +19,7 @@ pub fn quoted(word: impl AsRef<OsStr>) -> String {
         {
             text.to_owned()
         }
-        Some(text) if crate::decode::is_printable(text) => {
+        Some(text) if strapd_recording::text::is_printable(text) => {
             format!("'{}'", text.replace('\'', r"'\''"))
         }
         _ => made_by_printf(word.as_encoded_bytes()),

@@ -12,13 +12,13 @@ mod youbot;
 use super::progress::Reporter;
 use super::{Global, Outcome, outputs, print};
 use crate::error::{Error, Result};
-use crate::pipeline::pool::Pool;
 use crate::pipeline::position::Position;
 use crate::pipeline::simulate;
 use clap::{Args, Subcommand};
 use sampling::Common;
 use std::io::Write;
 use strapd_bodies::motion::Motion;
+use strapd_recording::pool::Pool;
 
 /// Samples of a synthetic gyro whose true attitude is known exactly.
 #[derive(Args, Debug)]

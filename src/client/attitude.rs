@@ -1,9 +1,9 @@
 //! An `ATT` object -> numbers. Pure. Nothing in it is trusted: names are made fit for a terminal, and
 //! a number that is absent or `null` is NaN.
 
-use crate::decode::printable;
 use serde::Deserialize;
 use strapd_attitude::record::Nanos;
+use strapd_recording::text::printable;
 
 /// One attitude as a daemon says it.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,10 +1,10 @@
 //! Bytes and messages to and from a remote end, over any transport. I/O.
 
 use super::remote::{Place, Remote};
-use crate::decode::printable;
 use futures_util::{SinkExt, StreamExt};
 use std::io;
 use std::time::Duration;
+use strapd_recording::text::printable;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpStream, UdpSocket};
 use tokio::time::{Instant, timeout};

@@ -76,7 +76,7 @@ impl Remote {
         if text.len() > MAX_BYTES || text.chars().any(char::is_control) {
             return Err(Error::Usage(format!(
                 "{}: is no address\n  help: {KNOWN}",
-                crate::decode::printable(text)
+                strapd_recording::text::printable(text)
             )));
         }
         let (scheme, rest) = text.split_once("://").ok_or_else(|| refuse("no scheme"))?;

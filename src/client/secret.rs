@@ -25,7 +25,7 @@ impl Secret {
     /// # Errors
     /// It can not be read, others can read it, or it holds no token of 16 bytes.
     pub fn read(flag: &str, path: &Path) -> Result<Secret> {
-        let open = |source| Error::Open {
+        let open = |source| strapd_recording::Error::Open {
             path: path.to_owned(),
             source,
         };

@@ -3,10 +3,10 @@
 use super::link::{Heard, Link};
 use super::remote::Remote;
 use crate::client::secret::Secret;
-use crate::decode::framing::{Framed, Framer};
-use crate::decode::printable;
 use serde::Deserialize;
 use std::borrow::Cow;
+use strapd_recording::decode::framing::{Framed, Framer};
+use strapd_recording::text::printable;
 
 /// Longest line that is read: the `STATUS` of a thousand sensors.
 const MAX_LINE: usize = 4 << 20;
@@ -183,7 +183,7 @@ fn understood(line: &[u8]) -> Option<Said<'_>> {
         Err(_) => {
             return Some(Said::Complaint(format!(
                 "a line that is no JSON object: {}",
-                crate::decode::snippet(line)
+                strapd_recording::text::snippet(line)
             )));
         }
     };

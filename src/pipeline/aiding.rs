@@ -5,10 +5,10 @@
 
 use super::preparation::Resolved;
 use crate::config::{Aid, Bias, Initial, Plan};
-use crate::decode::AccelUnit;
 use nalgebra::Vector3;
 use strapd_attitude::aid::{Settings, Start};
 use strapd_attitude::record::RawSample;
+use strapd_recording::decode::AccelUnit;
 
 /// Standard gravity, m/s^2.
 pub(super) const STANDARD_GRAVITY: f64 = 9.806_65;

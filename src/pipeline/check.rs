@@ -6,16 +6,16 @@
 use super::each::{Told, each};
 use super::log::{Log, problems};
 use super::look::{Looked, look_as};
-use super::pool::Pool;
 use super::position::Position;
 use super::run::{Replay, Source};
 use super::track::Track;
 use crate::config::Plan;
-use crate::decode;
 use crate::error::{Error, Result};
 use crate::report::summary::TopicSummary;
 use crate::sink;
 use std::path::Path;
+use strapd_recording::decode;
+use strapd_recording::pool::Pool;
 
 /// A log, examined.
 #[derive(Debug)]

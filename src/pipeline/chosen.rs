@@ -11,13 +11,13 @@ use super::run::Replay;
 use super::session::Found;
 use super::sources::{Source, is_same};
 use super::topics;
-use crate::decode::Decoder;
 use crate::error::{Error, Result};
 use crate::sink::{Stream, output_topic};
-use crate::source::mcap::Channel;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::Arc;
+use strapd_recording::decode::Decoder;
+use strapd_recording::mcap::Channel;
 
 /// A topic that was chosen, and how its channels are read.
 pub(super) struct Chosen {
@@ -99,7 +99,7 @@ fn choose_one(
             path: path.to_owned(),
             what: format!(
                 "{} ({}): carries no body rate\n  help: --field gyro=PATH names one",
-                crate::decode::printable(name),
+                strapd_recording::text::printable(name),
                 described(&first.channel)
             ),
         });

@@ -5,12 +5,12 @@
 
 use super::log::plain;
 use crate::config::Plan;
-use crate::decode::{Decoder, Effort, Options, Unsupported};
-use crate::source::mcap::{Channel, Schema};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use strapd_attitude::condition::Clock;
 use strapd_attitude::record::Nanos;
+use strapd_recording::decode::{Decoder, Effort, Options, Unsupported};
+use strapd_recording::mcap::{Channel, Schema};
 
 /// Decoders under the same options. All of a log together cost no more than one [`Effort`].
 #[derive(Debug, Default)]
@@ -118,7 +118,7 @@ impl Decoders {
         match &known.decoder {
             Ok(decoder) => Ok(decoder.of_topic(&channel.topic)),
             Err(why) => Err(Unsupported {
-                topic: crate::decode::printable(&channel.topic),
+                topic: strapd_recording::text::printable(&channel.topic),
                 ..why.clone()
             }),
         }

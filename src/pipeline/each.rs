@@ -11,7 +11,6 @@ use super::history::History;
 use super::log::Log;
 use super::opening::labelled;
 use super::outlet::{Delivery, Outlet};
-use super::pool::Pool;
 use super::position::Position;
 use super::replay::{again, done, prepare};
 use super::route::Route;
@@ -21,9 +20,10 @@ use super::summarise;
 use crate::error::Result;
 use crate::report::summary::TopicSummary;
 use crate::sink::{Provenance, Stream};
-use crate::source::mcap::{self, WalkOptions};
 use std::ops::ControlFlow;
 use std::path::Path;
+use strapd_recording::mcap::{self, WalkOptions};
+use strapd_recording::pool::Pool;
 
 /// What became of a topic, or why nothing did.
 pub(super) type Told = std::result::Result<Box<TopicSummary>, String>;

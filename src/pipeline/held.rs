@@ -7,9 +7,9 @@ use super::decoders::Decoders;
 use super::log::nanos;
 use super::route::{Copied, Item, Route, Taker};
 use super::sources::{OPENINGS, OPENINGS_LIMIT, keep};
-use crate::decode::{Decoder, Unsupported};
-use crate::source::mcap::{Channel, Message};
 use std::sync::Arc;
+use strapd_recording::decode::{Decoder, Unsupported};
+use strapd_recording::mcap::{Channel, Message};
 
 /// Such a channel.
 #[derive(Debug)]

@@ -3,10 +3,10 @@
 //! Apart from the preparation because an interval read in the wrong unit makes every sample a point and
 //! every step a gap, and nothing behind it can tell; and because a daemon looks at them, too.
 
-use crate::decode::TimeUnit;
 use crate::report::summary::significant;
 use strapd_attitude::condition::Clock;
 use strapd_attitude::record::{RawSample, SampleKind};
+use strapd_recording::decode::TimeUnit;
 
 /// How far an interval and a step may be apart: samples are lost and stamps jitter, but not by this.
 const MOST: f64 = 3.0;

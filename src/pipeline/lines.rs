@@ -1,6 +1,5 @@
 //! NDJSON samples -> the same run as from a log. I/O.
 
-use super::pool::Pool;
 use super::position::Position;
 use super::preparation::Resolved;
 use super::route::Item;
@@ -10,19 +9,20 @@ use super::simulate::TRUTH_ID;
 use super::stamps::{StampPass, Stamps};
 use super::summarise;
 use super::waiting::Waiting;
-use crate::decode::{
-    Ambiguous, Bare, Class, LineDecoder, MAX_LINE, MOST_WAITING, Stated, TimeUnit, unit_of,
-};
 use crate::error::{Error, Result};
 use crate::report::summary::RunSummary;
 use crate::sink::{Flow, Stream, output_topic};
-use crate::source::mcap::Survey;
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 use std::sync::Arc;
 use strapd_attitude::record::{Nanos, RawSample};
+use strapd_recording::decode::{
+    Ambiguous, Bare, Class, LineDecoder, MAX_LINE, MOST_WAITING, Stated, TimeUnit, unit_of,
+};
+use strapd_recording::mcap::Survey;
+use strapd_recording::pool::Pool;
 
 /// Samples that go through the pipeline together.
 const BATCH: usize = 2048;
@@ -38,21 +38,23 @@ pub(super) const DESCRIBED: &str = "NDJSON";
 /// # Errors
 /// It is missing, a directory, or empty.
 pub fn open(path: &Path) -> Result<File> {
-    let fail = |source| Error::Open {
+    let fail = |source| strapd_recording::Error::Open {
         path: path.to_owned(),
         source,
     };
     let file = File::open(path).map_err(fail)?;
     let metadata = file.metadata().map_err(fail)?;
     if metadata.is_dir() {
-        return Err(Error::IsDirectory {
+        return Err(strapd_recording::Error::IsDirectory {
             path: path.to_owned(),
-        });
+        }
+        .into());
     }
     if metadata.is_file() && metadata.len() == 0 {
-        return Err(Error::Empty {
+        return Err(strapd_recording::Error::Empty {
             path: path.to_owned(),
-        });
+        }
+        .into());
     }
     Ok(file)
 }
@@ -366,7 +368,7 @@ impl Lines {
     fn next(&mut self, input: &mut dyn BufRead, path: &Path) -> Result<bool> {
         self.line.clear();
         let fail = |offset| {
-            move |source| Error::Read {
+            move |source| strapd_recording::Error::Read {
                 path: path.to_owned(),
                 offset,
                 source,

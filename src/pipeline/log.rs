@@ -4,18 +4,18 @@
 //! channels, which of them carry a rate or an orientation, and a decoder that has seen a message.
 
 use super::decoders::Decoders;
-use super::pool::Pool;
 use super::sources::{self, Source};
 use super::topics::{self, Candidate, Choice, PICKED_UNNAMED};
-use crate::decode::{self, Decoder, Rank, Role, Unsupported, role_of};
 use crate::error::{Error, Result};
-use crate::source::mcap::{self, Channel, Reader, Survey, WalkOptions};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use strapd_attitude::record::Nanos;
+use strapd_recording::decode::{self, Decoder, Rank, Role, Unsupported, role_of};
+use strapd_recording::mcap::{self, Channel, Reader, Survey, WalkOptions};
+use strapd_recording::pool::Pool;
 
 /// A finished file, surveyed.
 #[derive(Debug)]
@@ -324,7 +324,7 @@ pub fn described(channel: &Channel) -> String {
         .schema
         .as_deref()
         .map_or("(no type)", |s| s.name.as_str());
-    decode::printable(&format!("{name} [{}]", channel.message_encoding))
+    strapd_recording::text::printable(&format!("{name} [{}]", channel.message_encoding))
 }
 
 /// A role as a number: higher is more likely "the IMU" (see [`Candidate::rank`]).

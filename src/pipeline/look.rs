@@ -6,15 +6,12 @@
 use super::decoders::Decoders;
 use super::log::{Known, Log, described, rank};
 use super::passes::{Conditioned, FEW};
-use super::pool::Pool;
 use super::preparation::Resolved;
 use super::route::{Item, Noticed, Route, Taker};
 use super::sources::Source;
 use super::topics::{MOST_TOPICS, PICKED_UNNAMED};
 use crate::config::Plan;
-use crate::decode::{self, Options};
 use crate::error::{Error, Result};
-use crate::source::mcap::{self, Survey, WalkOptions};
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -24,6 +21,9 @@ use strapd_attitude::condition::regularise;
 use strapd_attitude::condition::stillness::{self, Limits, Rests, Stillness};
 use strapd_attitude::condition::{Clock, choose_clock};
 use strapd_attitude::record::RawSample;
+use strapd_recording::decode::{self, Options};
+use strapd_recording::mcap::{self, Survey, WalkOptions};
+use strapd_recording::pool::Pool;
 
 /// One topic of samples, looked at.
 #[derive(Debug)]

@@ -2,7 +2,6 @@
 
 use super::audience::{Audience, Turn};
 use super::pace::Pace;
-use super::pool::Pool;
 use super::route::Copied;
 use crate::error::Result;
 use crate::sink::{
@@ -14,6 +13,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 use strapd_attitude::record::{AttitudeSample, Nanos, RawSample};
+use strapd_recording::pool::Pool;
 
 /// What standard output is called in the summary.
 const STDOUT: &str = "standard output";

@@ -8,7 +8,6 @@ use super::intervals::Mismatch;
 use super::passes::{FEW, RestPass};
 use super::stamps::{StampPass, Stamps};
 use crate::config::{Aid, Bias, Initial, Plan, Truncation};
-use crate::decode::{self, Stated, TimeUnit};
 use nalgebra::{Matrix3, Vector3};
 use strapd_attitude::condition::stillness::{self, Limits, NoRest, Rests};
 use strapd_attitude::condition::truncation::Grid;
@@ -17,6 +16,7 @@ use strapd_attitude::frames::{Body, BodyAxes, In, Nav, Sensor};
 use strapd_attitude::quaternion::{Quaternion, YawPitchRoll};
 use strapd_attitude::record::{Nanos, RawSample, SampleKind};
 use strapd_attitude::worlds::{Convention, EARTH_RATE, World};
+use strapd_recording::decode::{self, Stated, TimeUnit};
 
 /// Samples, and seconds of data, in which rest is sought when the log can not be read twice.
 const MANY: usize = 200_000;
@@ -316,7 +316,7 @@ impl Preparation {
         }
         let mut warnings: Vec<String> = warning.iter().map(ToString::to_string).collect();
         if let Some(mismatch) = Mismatch::between(&first, clock, resolved.kind) {
-            if !plan.states_interval_unit() {
+            if !plan.decode.states_interval_unit() {
                 return Err(mismatch.refusal(resolved.interval.as_ref()));
             }
             warnings.push(format!("{mismatch}: what lies between is bridged"));

@@ -5,7 +5,7 @@ use super::preparation::Prepared;
 use super::run::{Replay, Source};
 use super::session::Found;
 use crate::config::Aid;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::sink::{Provenance, Stream, Target};
 use sha2::{Digest, Sha256};
 use std::fs::File;
@@ -92,7 +92,7 @@ pub fn of(
 /// It can not be read.
 pub fn sha256(path: &Path) -> Result<String> {
     let mut offset = 0;
-    let fail = |offset, source| Error::Read {
+    let fail = |offset, source| strapd_recording::Error::Read {
         path: path.to_owned(),
         offset,
         source,
@@ -108,7 +108,7 @@ pub fn sha256(path: &Path) -> Result<String> {
                 hash.update(block.get(..n).unwrap_or_default());
             }
             Err(e) if e.kind() == std::io::ErrorKind::Interrupted => {}
-            Err(e) => return Err(fail(offset, e)),
+            Err(e) => return Err(fail(offset, e).into()),
         }
     }
 }
@@ -120,7 +120,7 @@ fn hexadecimal(bytes: &[u8]) -> String {
 /// `sha256-ends:HEX`: SHA-256 over the length (8 bytes, little endian), the first and the last MiB.
 /// It names a log as surely as a hash of all of it would, without reading 10 GB for it.
 fn fingerprint(path: &Path) -> Result<String> {
-    let fail = |source| Error::Read {
+    let fail = |source| strapd_recording::Error::Read {
         path: path.to_owned(),
         offset: 0,
         source,

@@ -7,18 +7,18 @@
 //! tells which message it is in. A chunk without a CRC, and unchunked messages, are kept as they are
 //! found, and counted as unverified.
 
-use super::pool::Pool;
 use super::position::Position;
 use super::run::Source;
 use crate::error::{Error, Result};
 use crate::sink::{
     Attachment, CopiedChannel, Flow, InputChannel, InputMessage, Options, Sink, Target, Written,
 };
-use crate::source::mcap::{self, Channel, Message, Order, Reader, Record, Survey, WalkOptions};
 use std::cell::RefCell;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
+use strapd_recording::mcap::{self, Channel, Message, Order, Reader, Record, Survey, WalkOptions};
+use strapd_recording::pool::Pool;
 
 /// What is to be recovered, and where to.
 #[derive(Clone, Debug)]

@@ -6,7 +6,6 @@
 use super::chosen::{Chosen, choose, looked_at, reference, route};
 use super::log::Log;
 use super::opening::{begin, labelled};
-use super::pool::Pool;
 use super::position::Position;
 use super::preparation::{Patience, Preparation, Prepared};
 use super::route::{Item, Route};
@@ -15,14 +14,15 @@ use super::session::Found;
 use super::stamps::StampPass;
 use super::summarise;
 use super::{lines, streamed};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::report::summary::RunSummary;
 use crate::sink::{Flow, Stream};
-use crate::source::mcap::{self, Reader, WalkOptions};
 use std::io::{BufReader, Read};
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
+use strapd_recording::mcap::{self, Reader, WalkOptions};
+use strapd_recording::pool::Pool;
 
 /// Does it. `watch` is told where it is, often.
 ///
@@ -77,15 +77,16 @@ fn piped(
     let mut head = Vec::new();
     Read::take(&mut input, mcap::MAGIC.len() as u64)
         .read_to_end(&mut head)
-        .map_err(|source| Error::Read {
+        .map_err(|source| strapd_recording::Error::Read {
             path: run.source.name(),
             offset: 0,
             source,
         })?;
     if head.is_empty() {
-        return Err(Error::Empty {
+        return Err(strapd_recording::Error::Empty {
             path: run.source.name(),
-        });
+        }
+        .into());
     }
     let is_mcap = head == mcap::MAGIC;
     let whole = std::io::Cursor::new(head).chain(input);
@@ -238,6 +239,6 @@ fn log_time(item: &Item) -> Option<u64> {
 pub(super) fn again(log: &Log, path: &Path) -> Result<Reader> {
     match log.reader() {
         Some(reader) => Ok(reader),
-        None => Reader::open(path),
+        None => Ok(Reader::open(path)?),
     }
 }

@@ -2,13 +2,13 @@
 
 use super::log::nanos;
 use super::sources::{Source, Turns, digest};
-use crate::decode::{Decoder, Undecodable};
-use crate::source::mcap::{Channel, Message};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use strapd_attitude::record::{Nanos, RawSample};
+use strapd_recording::decode::{Decoder, Undecodable};
+use strapd_recording::mcap::{Channel, Message};
 
 /// What a channel's messages are used for.
 #[derive(Debug)]

@@ -5,17 +5,17 @@ use super::against::AgainstRecorded;
 use super::estimator::Estimator;
 use super::history::History;
 use super::outlet::Outlet;
-use super::pool::Pool;
 use super::position::Position;
 use super::preparation::{Prepared, Resolved};
 use super::route::{Item, Noticed};
 use crate::config::Plan;
-use crate::decode::Undecodable;
 use crate::error::{Error, Result};
 use crate::sink::{Flow, Written};
 use std::path::Path;
 use std::sync::Arc;
 use strapd_attitude::record::{AttitudeSample, Nanos};
+use strapd_recording::decode::Undecodable;
+use strapd_recording::pool::Pool;
 
 /// One estimated topic of a run.
 #[derive(Debug)]

@@ -2,7 +2,6 @@
 
 use super::audience::Audience;
 use super::outlet::{Delivery, Outlet, broken};
-use super::pool::Pool;
 use super::position::Position;
 use crate::error::{Error, Result};
 use crate::report::simulation::SimulationSummary;
@@ -11,6 +10,7 @@ use std::sync::Arc;
 use std::time::Instant;
 use strapd_attitude::record::{AttitudeCovariance, AttitudeSample, SampleKind, Status};
 use strapd_bodies::synthetic::{Stretch, Synthetic, Truth};
+use strapd_recording::pool::Pool;
 
 /// The topic of the samples.
 pub const TOPIC: &str = "/imu/data_raw";

@@ -7,16 +7,17 @@
 
 use super::decoders::Decoders;
 use super::log::{Known, nanos};
-use super::pool::Pool;
 use super::topics::PICKED_UNNAMED;
-use crate::decode::{Decoder, Options, printable};
 use crate::error::Result;
-use crate::source::mcap::{self, Channel, Reader, WalkOptions};
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use strapd_attitude::record::Nanos;
+use strapd_recording::decode::{Decoder, Options};
+use strapd_recording::mcap::{self, Channel, Reader, WalkOptions};
+use strapd_recording::pool::Pool;
+use strapd_recording::text::printable;
 
 /// One publisher's samples on a topic.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -7,7 +7,6 @@ use super::chosen::which_stamp;
 use super::decoders::Decoders;
 use super::held::Held;
 use super::log::{Known, described, explained, known, problems, rank};
-use super::pool::Pool;
 use super::position::Position;
 use super::preparation::Resolved;
 use super::route::{Item, Noticed, Route, Taker};
@@ -17,15 +16,16 @@ use super::sources::publisher;
 use super::summarise;
 use super::topics::{self, PICKED_UNNAMED};
 use super::waiting::Waiting;
-use crate::decode::{Decoder, Unsupported};
 use crate::error::{Error, Result};
 use crate::report::summary::RunSummary;
 use crate::sink::{Flow, Stream, output_topic};
-use crate::source::mcap::{self, Channel, Reader, Survey, WalkOptions};
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
+use strapd_recording::decode::{Decoder, Unsupported};
+use strapd_recording::mcap::{self, Channel, Reader, Survey, WalkOptions};
+use strapd_recording::pool::Pool;
 
 /// An MCAP that can be read only once.
 pub(super) fn replay(

@@ -8,12 +8,12 @@ use crate::report::aid::Aided;
 use crate::report::drawn::Drawn;
 use crate::report::stamps::{Regularised, Segment};
 use crate::report::summary::{Gaps, RunSummary, TopicSummary, significant};
-use crate::source::mcap::Survey;
 use std::sync::atomic::Ordering;
 use strapd_attitude::condition::regularise;
 use strapd_attitude::propagate::Method;
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{Nanos, SampleKind, Verdict};
+use strapd_recording::mcap::Survey;
 
 /// Above this a rate is probably not in rad/s: 200 rad/s is 11,500 deg/s, five times what most gyros
 /// can measure.

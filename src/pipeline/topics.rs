@@ -120,7 +120,7 @@ pub fn named_few<T: AsRef<str>>(topics: &[T]) -> String {
     let names: Vec<String> = topics
         .iter()
         .take(FEW)
-        .map(|topic| crate::decode::printable(topic.as_ref()))
+        .map(|topic| strapd_recording::text::printable(topic.as_ref()))
         .collect();
     let mut out = names.join(", ");
     if topics.len() > FEW {
@@ -143,7 +143,7 @@ pub fn listing(candidates: &[Candidate]) -> String {
             let count = c
                 .messages
                 .map_or_else(String::new, |n| format!("  {n} messages"));
-            let topic = crate::decode::printable(&c.topic);
+            let topic = strapd_recording::text::printable(&c.topic);
             format!("\n    {topic}  {}{count}", c.described)
         })
         .collect();

@@ -4,14 +4,11 @@
 
 use super::decoders::Decoders;
 use super::log::{Known, Log, problems, rank};
-use super::pool::Pool;
 use super::preparation::orientation_convention;
 use super::route::{Item, Route};
 use super::simulate::{TRUTH_ID, TRUTH_TOPIC};
 use super::topics;
-use crate::decode::{Options, Role, printable};
 use crate::error::{Error, Result};
-use crate::source::mcap::{self, WalkOptions};
 use serde::Deserialize;
 use std::fs::File;
 use std::io::{BufRead, BufReader};
@@ -20,6 +17,10 @@ use strapd_attitude::frames::{Body, Nav};
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::Nanos;
 use strapd_attitude::worlds::{Convention, World};
+use strapd_recording::decode::{Options, Role};
+use strapd_recording::mcap::{self, WalkOptions};
+use strapd_recording::pool::Pool;
+use strapd_recording::text::printable;
 
 /// One attitude as found: `[w, x, y, z]`, unchecked.
 pub type Entry = (Nanos, [f64; 4]);
@@ -253,7 +254,7 @@ pub fn from_ndjson(path: &Path, side: Side, id: Option<&str>) -> Result<Vec<Entr
         number += 1;
         let read = std::io::Read::take(&mut reader, LINE_LIMIT)
             .read_until(b'\n', &mut line)
-            .map_err(|source| Error::Read {
+            .map_err(|source| strapd_recording::Error::Read {
                 path: path.to_owned(),
                 offset,
                 source,
@@ -333,14 +334,16 @@ pub fn from_csv(path: &Path) -> Result<Vec<Entry>> {
 
 fn open(path: &Path) -> Result<File> {
     if path.is_dir() {
-        return Err(Error::IsDirectory {
+        return Err(strapd_recording::Error::IsDirectory {
             path: path.to_owned(),
-        });
+        }
+        .into());
     }
-    File::open(path).map_err(|source| Error::Open {
+    let opened = File::open(path).map_err(|source| strapd_recording::Error::Open {
         path: path.to_owned(),
         source,
-    })
+    })?;
+    Ok(opened)
 }
 
 fn bad_line(path: &Path, number: u64, what: &str) -> Error {

@@ -2,7 +2,6 @@
 //! only through the session.
 
 use super::opening::{begin, labelled};
-use super::pool::Pool;
 use super::position::Position;
 use super::preparation::{Patience, Preparation};
 use super::route::Item;
@@ -13,6 +12,7 @@ use super::topics;
 use crate::error::{Error, Result};
 use crate::sink::{Flow, Stream};
 use std::path::Path;
+use strapd_recording::pool::Pool;
 
 /// A run over a stream: first gathers, then runs.
 pub(super) struct Waiting<'r> {

@@ -5,7 +5,6 @@
 
 use super::subscriber::{Chunk, Class};
 use super::{foxglove, wire};
-use crate::decode::packed::{self, Form};
 use crate::sink::json::Objects;
 use crate::sink::payload::{Payloads, Topic};
 use crate::sink::{Content, Profile, Stream};
@@ -14,6 +13,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use strapd_attitude::record::{AttitudeSample, Nanos, RawSample};
+use strapd_recording::decode::packed::{self, Form};
 
 /// Bytes of one shared chunk of lines, about: small beside an outbox, so that little is dropped at once.
 const CHUNK_BYTES: usize = 16 << 10;

@@ -10,12 +10,12 @@
 use super::channel::Channel;
 use super::playback::{Action, Mode, Place};
 use super::subscriber::Dropped;
-use crate::decode::printable;
 use crate::sink::payload::Topic;
 use bytes::{BufMut, Bytes};
 use serde::Deserialize;
 use serde_json::{Value, json};
 use strapd_attitude::record::Nanos;
+use strapd_recording::text::printable;
 
 /// The sub-protocols: that of the SDK, and the one before it.
 pub const SUBPROTOCOLS: [&str; 2] = ["foxglove.sdk.v1", "foxglove.websocket.v1"];
@@ -90,7 +90,7 @@ pub fn read_text(text: &[u8]) -> Result<Request, String> {
         ("unsubscribe", _, None) => Err("unsubscribe: `subscriptionIds` is missing".to_owned()),
         (other, ..) => Err(format!(
             "`{}` is not offered here: messages can be subscribed to, nothing else",
-            crate::decode::snippet(other.as_bytes())
+            strapd_recording::text::snippet(other.as_bytes())
         )),
     }
 }

@@ -6,7 +6,6 @@ use super::hub::{Hub, count};
 use super::listen::{Connection, websocket};
 use super::places::Kind;
 use super::{page, quiet, samples, top};
-use crate::decode::printable;
 use axum::Router;
 use axum::body::Body;
 use axum::extract::Extension;
@@ -15,6 +14,7 @@ use axum::http::{HeaderMap, HeaderValue, Response, StatusCode, header};
 use axum::routing::{get, post};
 use std::fmt::Write;
 use strapd_attitude::record::Verdict;
+use strapd_recording::text::printable;
 
 /// Lines, where a client names what it speaks.
 const OWN_SUBPROTOCOL: &str = "strapd.v1";

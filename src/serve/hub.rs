@@ -35,8 +35,6 @@ use super::stream::{SensorStream, live_plan};
 use super::subscriber::{Chunk, Outbox};
 use super::wire::{self, Fault};
 use crate::config::Plan;
-use crate::decode::packed::Form;
-use crate::decode::{self, Bare, Line, LineDecoder, exact_name, printable};
 use crate::error::{Error, Result};
 use crate::sink::Profile;
 use bytes::Bytes;
@@ -46,6 +44,9 @@ use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, AtomicUsize, Ordering}
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::Instant;
 use strapd_attitude::record::{Nanos, RawSample};
+use strapd_recording::decode::packed::Form;
+use strapd_recording::decode::{self, Bare, Line, LineDecoder, exact_name};
+use strapd_recording::text::printable;
 use tokio::sync::Notify;
 
 /// The fault of samples that came when their sensor had just given way.

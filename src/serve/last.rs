@@ -5,10 +5,10 @@
 
 use super::channel::{Channel, Clock, Items};
 use super::subscriber::Chunk;
-use crate::decode::packed::Form;
 use crate::sink::Profile;
 use std::sync::Arc;
 use strapd_attitude::record::{AttitudeSample, Status};
+use strapd_recording::decode::packed::Form;
 
 /// How somebody wants it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

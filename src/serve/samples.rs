@@ -12,7 +12,6 @@ use super::quiet;
 use super::stream::NAMELESS;
 use super::stream::run::Placed;
 use super::wire::{self, Fault, Message};
-use crate::decode::{Bare, Line, Objects, exact_name, printable};
 use axum::body::Body;
 use axum::extract::rejection::QueryRejection;
 use axum::extract::{Extension, Query};
@@ -24,6 +23,8 @@ use std::collections::{BTreeMap, HashMap};
 use std::net::IpAddr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use strapd_attitude::record::{Nanos, RawSample};
+use strapd_recording::decode::{Bare, Line, Objects, exact_name};
+use strapd_recording::text::printable;
 use tokio::time::{Instant, sleep, timeout};
 
 /// Longest body.

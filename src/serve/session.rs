@@ -16,14 +16,14 @@ use super::stream::NAMELESS;
 use super::stream::run::Placed;
 use super::upstream::{self, Event};
 use super::wire::{self, Fault, Message};
-use crate::decode::framing::Framer;
-use crate::decode::{Bare, Line, LineDecoder};
 use bytes::Bytes;
 use opening::Opening;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 use strapd_attitude::record::{Nanos, RawSample};
+use strapd_recording::decode::framing::Framer;
+use strapd_recording::decode::{Bare, Line, LineDecoder};
 use turn::{Held, Step};
 
 /// Errors said at once before they are thinned.

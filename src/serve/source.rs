@@ -15,9 +15,10 @@
 
 use crate::client::remote::Remote;
 use crate::client::secret::Secret;
-use crate::decode::{LineDecoder, Options, exact_name, printable};
 use crate::error::{Error, Result};
 use std::path::Path;
+use strapd_recording::decode::{LineDecoder, Options, exact_name};
+use strapd_recording::text::printable;
 
 /// Longest name of a sensor, in bytes.
 const MAX_ID: usize = super::wire::MAX_ID;

@@ -6,7 +6,6 @@
 use super::hub::Hub;
 use super::quiet;
 use super::stream::run::Span;
-use crate::decode::TimeUnit;
 use crate::error::{Error, Result};
 use crate::pipeline::estimator::Memory;
 use crate::sink::{self, sync_directory};
@@ -19,6 +18,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{AttitudeCovariance, AttitudeSample, Nanos, Status};
+use strapd_recording::decode::TimeUnit;
 
 /// What this release writes. 1 had neither the run nor the memory.
 const FORMAT: u32 = 2;
@@ -179,16 +179,16 @@ impl StateFile {
     /// written.
     ///
     /// # Errors
-    /// [`Error::Open`], [`Error::Write`]; [`Error::Usage`] when it is no state file: to begin anew in
+    /// [`strapd_recording::Error::Open`], [`Error::Write`]; [`Error::Usage`] when it is no state file: to begin anew in
     /// silence would be to give an attitude nobody expects.
     pub fn open(path: &Path) -> Result<(StateFile, Sensors)> {
-        let failed = |source| Error::Open {
+        let failed = |source| strapd_recording::Error::Open {
             path: path.to_owned(),
             source,
         };
         let sensors = match std::fs::metadata(path) {
             Err(e) if e.kind() == io::ErrorKind::NotFound => Sensors::new(),
-            Err(source) => return Err(failed(source)),
+            Err(source) => return Err(failed(source).into()),
             // To open a FIFO is to wait for its other end, and what is replaced must be a file.
             Ok(found) if !found.is_file() => {
                 return Err(Error::Usage(format!(
@@ -250,7 +250,7 @@ impl StateFile {
 fn read(path: &Path, file: File) -> Result<Sensors> {
     let mut text = Vec::new();
     let read = file.take(MAX_BYTES).read_to_end(&mut text);
-    read.map_err(|source| Error::Open {
+    read.map_err(|source| strapd_recording::Error::Open {
         path: path.to_owned(),
         source,
     })?;

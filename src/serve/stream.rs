@@ -9,7 +9,6 @@ pub mod run;
 pub mod stamps;
 
 use crate::config::Plan;
-use crate::decode::{Ambiguous, Bare, Line, Stated, TimeUnit};
 use crate::pipeline::estimator::Estimator;
 use crate::pipeline::opening::labelled;
 use crate::pipeline::preparation::{Prepared, Resolved, at_once};
@@ -29,6 +28,7 @@ use strapd_attitude::condition::{Clock, Report};
 use strapd_attitude::propagate::{Method, Sequential};
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{AttitudeSample, Counts, Nanos, RawSample, Verdict};
+use strapd_recording::decode::{Ambiguous, Bare, Line, Stated, TimeUnit};
 
 /// Numbers a sample may come behind its turn. Further back, the sender counts anew.
 const OVERTAKEN: u64 = 64;

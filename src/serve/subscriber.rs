@@ -6,12 +6,12 @@
 
 use super::last::Last;
 use super::{foxglove, wire};
-use crate::decode::packed::Form;
 use crate::sink::Decimator;
 use bytes::Bytes;
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use strapd_attitude::record::{AttitudeSample, Nanos};
+use strapd_recording::decode::packed::Form;
 use tokio::sync::Notify;
 
 /// Most bytes of attitudes waiting for one client, what is being written included.

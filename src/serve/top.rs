@@ -245,7 +245,7 @@ pub(super) async fn answer(
     let request = match request {
         Ok(Query(request)) => request,
         Err(why) => {
-            let text = crate::decode::printable(&why.body_text());
+            let text = strapd_recording::text::printable(&why.body_text());
             return refusal(StatusCode::BAD_REQUEST, "bad_request", &text);
         }
     };

@@ -1,7 +1,7 @@
 //! What a daemon we are connected to says of itself. Pure.
 
-use crate::decode::printable;
 use serde::Deserialize;
+use strapd_recording::text::printable;
 
 /// Something to know of.
 #[derive(Clone, Debug, PartialEq, Eq)]

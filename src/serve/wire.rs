@@ -10,14 +10,13 @@ pub use packing::{broken_packed, packed_stream, unreadable};
 
 use super::playback::{Action, Place};
 use super::subscriber::{Class as Stream, Dropped, Filter, MAX_QUEUED};
-use crate::decode::packed::Form;
-use crate::decode::{
-    Class, Line, LineDecoder, MAX_LINE, Undecodable, exact_name, printable, snippet,
-};
 use bytes::Bytes;
 use serde::Deserialize;
 use serde_json::{Value, json};
 use strapd_attitude::record::{Nanos, RawSample};
+use strapd_recording::decode::packed::Form;
+use strapd_recording::decode::{Class, Line, LineDecoder, MAX_LINE, Undecodable, exact_name};
+use strapd_recording::text::{printable, snippet};
 
 /// Version of the protocol.
 pub const PROTO: u32 = 1;
@@ -632,7 +631,7 @@ mod tests {
             vec![0xff; 100],
             "é\u{202e}".repeat(99).into_bytes(),
         ] {
-            assert!(snippet(&hostile).len() <= crate::decode::MAX_NEAR);
+            assert!(snippet(&hostile).len() <= strapd_recording::text::MAX_NEAR);
         }
     }
 }

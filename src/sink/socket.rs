@@ -132,7 +132,7 @@ fn hear(name: &str, stream: TcpStream) {
             said += 1;
             tracing::warn!(
                 "{name}: answers {}",
-                crate::decode::printable(text.trim_end())
+                strapd_recording::text::printable(text.trim_end())
             );
         }
     }

@@ -5,12 +5,12 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use strapd::config::Plan;
-use strapd::decode::Options;
 use strapd::pipeline::check::{Checked, Examination, check, examine};
 use strapd::pipeline::log::Log;
 use strapd::pipeline::look::look;
-use strapd::pipeline::pool::Pool;
 use strapd::report::findings::findings;
+use strapd_recording::decode::Options;
+use strapd_recording::pool::Pool;
 
 /// `topics` IMUs, which take turns, each of a motion of its own.
 fn several(dir: &Path, topics: usize, samples: usize) -> PathBuf {

@@ -3,10 +3,10 @@
 
 use crate::parsers;
 use std::ops::ControlFlow;
-use strapd::decode::framing::Framer;
-use strapd::decode::{Channel, FieldPath, decode_line, role};
-use strapd::source::mcap::{MAGIC, Reader, WalkOptions, op, walk};
 use strapd_attitude::record::Nanos;
+use strapd_recording::decode::framing::Framer;
+use strapd_recording::decode::{Channel, FieldPath, decode_line, role};
+use strapd_recording::mcap::{MAGIC, Reader, WalkOptions, op, walk};
 
 /// A parser and what it is fed.
 pub(crate) struct Case {
@@ -77,7 +77,7 @@ fn framed(data: &[u8]) {
     let mut out = Vec::new();
     for piece in data.chunks(7) {
         framer.feed(piece, &mut |framed| {
-            if let strapd::decode::framing::Framed::Line(_, line) = framed {
+            if let strapd_recording::decode::framing::Framed::Line(_, line) = framed {
                 let _ = decode_line(line, Nanos(0), &mut out);
                 out.clear();
             }

@@ -4,7 +4,7 @@
 use std::io::Cursor;
 use std::ops::ControlFlow;
 use std::path::Path;
-use strapd::source::mcap::{Message, Reader, WalkOptions, WalkReport, walk};
+use strapd_recording::mcap::{Message, Reader, WalkOptions, WalkReport, walk};
 
 /// A message as it was read: topic, log time, sequence, payload.
 pub type Read = (String, u64, u32, Vec<u8>);
@@ -89,7 +89,7 @@ pub fn in_order(mut messages: Vec<Read>) -> Vec<Read> {
     messages
 }
 
-pub fn from_bytes(bytes: &[u8]) -> strapd::error::Result<Reader> {
+pub fn from_bytes(bytes: &[u8]) -> strapd_recording::Result<Reader> {
     Reader::from_stream("memory", Box::new(Cursor::new(bytes.to_vec())))
 }
 

@@ -11,7 +11,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::Instant;
-use strapd::source::mcap::{MAGIC, op};
+use strapd_recording::mcap::{MAGIC, op};
 
 /// What one command may take for one log of some 10 kB, in a debug build on any machine: processor time, s, and
 /// bytes read; they take 5 ms, and read the log a few times.

@@ -7,15 +7,15 @@ use std::sync::Arc;
 use std::time::Duration;
 use strapd::config::Plan;
 use strapd::pipeline::log::Log;
-use strapd::pipeline::pool::Pool;
 use strapd::pipeline::replay::run;
 use strapd::pipeline::route::{Item, Route};
 use strapd::pipeline::run::{Replay, Source};
 use strapd::serve::recorder::{Recorder, Settings};
 use strapd::sink::Compression;
 use strapd::sink::{Options, Target};
-use strapd::source::mcap::{WalkOptions, walk};
 use strapd_attitude::record::RawSample;
+use strapd_recording::mcap::{WalkOptions, walk};
+use strapd_recording::pool::Pool;
 
 /// The samples of a fixture, decoded as `replay` decodes them.
 fn samples(path: &Path) -> Vec<RawSample> {

@@ -4,7 +4,7 @@ use super::{Whole, by_the_crate, extras, furnished, recover, walked};
 use crate::mcap_logs::{PACKINGS, Read, log, messages, random, stretches};
 use crate::shared_data::shared;
 use std::path::{Path, PathBuf};
-use strapd::source::mcap::ProblemKind;
+use strapd_recording::mcap::ProblemKind;
 
 /// Recovers a file and holds the output against the walk of the input.
 fn same_as_walked(input: &Path, output: &Path) -> (usize, bool) {

@@ -6,10 +6,10 @@
 use crate::made_logs::{PACKINGS, TOPIC, bytes, logged, motion};
 use crate::replays::replay_of;
 use strapd::error::Error;
-use strapd::pipeline::pool::Pool;
 use strapd::pipeline::replay::run;
 use strapd::pipeline::run::Replay;
 use strapd::report::summary::RunSummary;
+use strapd_recording::pool::Pool;
 
 /// Samples in each log: some forty chunks' worth of bytes would only take longer.
 const SAMPLES: usize = 40;
@@ -114,8 +114,8 @@ fn assert_documented(result: &Result<RunSummary, Error>, what: &str) {
             let _ = (summary.text(), summary.json());
         }
         Err(
-            Error::Empty { .. }
-            | Error::NotMcap { .. }
+            Error::Recording(strapd_recording::Error::Empty { .. })
+            | Error::Recording(strapd_recording::Error::NotMcap { .. })
             | Error::NoImuTopic { .. }
             | Error::SeveralImuTopics { .. }
             | Error::Unsupported { .. }

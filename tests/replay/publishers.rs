@@ -9,11 +9,11 @@ use crate::replays::{Bits, attitudes, done, only, replay_of, replay_with};
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use strapd::config::Plan;
-use strapd::decode::Options;
 use strapd::error::Error;
 use strapd::pipeline::check::check;
-use strapd::pipeline::pool::Pool;
 use strapd_attitude::record::Verdict;
+use strapd_recording::decode::Options;
+use strapd_recording::pool::Pool;
 
 /// One message: the metadata of its channel, its frame, its sample.
 struct Sent {

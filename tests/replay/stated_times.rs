@@ -8,11 +8,11 @@ use crate::replays::{Bits, attitudes, done, only, replay_of, replay_with, target
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use strapd::config::Plan;
-use strapd::decode::{Channel, Rank, role};
 use strapd::pipeline::check::check;
-use strapd::pipeline::pool::Pool;
 use strapd::report::findings::findings;
 use strapd_attitude::record::{SampleKind, Verdict};
+use strapd_recording::decode::{Channel, Rank, role};
+use strapd_recording::pool::Pool;
 
 const SECOND: i64 = 1_000_000_000;
 

@@ -4,11 +4,11 @@
 use std::path::{Path, PathBuf};
 use strapd::config::Plan;
 use strapd::error::Result;
-use strapd::pipeline::pool::Pool;
 use strapd::pipeline::replay::run;
 use strapd::pipeline::run::{Replay, Source};
 use strapd::report::summary::{RunSummary, TopicSummary};
 use strapd::sink::{Options, Target};
+use strapd_recording::pool::Pool;
 
 /// A replay of a file into nothing, every setting at its default.
 pub fn replay_of(path: &Path) -> Replay {

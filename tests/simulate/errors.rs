@@ -7,7 +7,6 @@ use nalgebra::Vector3;
 use serde_json::Value;
 use std::path::Path;
 use strapd::config::Noise;
-use strapd::pipeline::pool::Pool;
 use strapd::pipeline::simulate::{self, Simulation};
 use strapd::sink::Options;
 use strapd_attitude::frames::{Body, Nav};
@@ -16,6 +15,7 @@ use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{Nanos, SampleKind};
 use strapd_bodies::motion::{BandLimited, Motion};
 use strapd_bodies::synthetic::{Sampling, Synthetic};
+use strapd_recording::pool::Pool;
 
 const SECS: f64 = 10.0;
 const RATE_HZ: f64 = 50.0;

@@ -4,11 +4,9 @@ use crate::config::Plan;
 use crate::error::{Error, Result};
 use crate::pipeline::decoders::Decoders;
 use crate::pipeline::log::{Log, described, problems};
-use crate::pipeline::pool::Pool;
 use crate::pipeline::preparation::Resolved;
 use crate::pipeline::route::{Item, Noticed, Route, Taker};
 use crate::report::summary::significant;
-use crate::source::mcap::{self, WalkOptions};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
@@ -18,6 +16,8 @@ use strapd_attitude::condition::stillness::{Limits, Rests, Stillness};
 use strapd_attitude::condition::{ClockWarning, Conditioner, Report, choose_clock};
 use strapd_attitude::noise::allan::AngleRecord;
 use strapd_attitude::record::{Join, Nanos, RateSample, RawSample, SampleKind};
+use strapd_recording::mcap::{self, WalkOptions};
+use strapd_recording::pool::Pool;
 
 /// Angles held at most: 24 bytes each, 200 MB.
 pub(super) const CAPACITY: usize = 1 << 23;

@@ -292,7 +292,7 @@ fn harmless(line: &[u8]) -> std::borrow::Cow<'_, [u8]> {
             out.push(' ');
             continue;
         }
-        let one = crate::decode::printable(c.encode_utf8(&mut [0; 4]));
+        let one = strapd_recording::text::printable(c.encode_utf8(&mut [0; 4]));
         match one.starts_with("\\u{") {
             // JSON's own escape, inside of a string: nowhere else can such a character stand.
             true => c

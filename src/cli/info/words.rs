@@ -6,11 +6,11 @@ use crate::pipeline::look::Looked;
 use crate::pipeline::topics::named_few;
 use crate::report::calendar::{date, duration};
 use crate::report::summary::{human_bytes, significant};
-use crate::source::mcap::Survey;
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::Path;
+use strapd_recording::mcap::Survey;
 
 /// Most other topics that are listed.
 const OTHERS: usize = 40;
@@ -54,7 +54,7 @@ impl Report<'_> {
         let size = survey.file_size.map_or_else(String::new, human_bytes);
         let profile = match survey.facts.profile.as_str() {
             "" => String::new(),
-            name => format!("  profile {}", crate::decode::printable(name)),
+            name => format!("  profile {}", strapd_recording::text::printable(name)),
         };
         let _ = write!(out, "file      {}  {size}{profile}", self.path.display());
         if let Some((first, last)) = survey.times {
@@ -86,7 +86,7 @@ impl Report<'_> {
             } else {
                 "; no summary section"
             },
-            match crate::decode::printable(&survey.facts.library).as_str() {
+            match strapd_recording::text::printable(&survey.facts.library).as_str() {
                 "" => String::new(),
                 library => format!("; written by {library}"),
             }
@@ -117,7 +117,7 @@ impl Report<'_> {
             let _ = writeln!(
                 out,
                 "{}  {}  {} messages{what}",
-                crate::decode::printable(&known.channel.topic),
+                strapd_recording::text::printable(&known.channel.topic),
                 described(&known.channel),
                 known.messages
             );
@@ -224,7 +224,7 @@ fn write_topic(looked: &Looked, out: &mut String) {
     let _ = write!(
         out,
         "{}  {}  {} samples",
-        crate::decode::printable(&looked.topic),
+        strapd_recording::text::printable(&looked.topic),
         looked.described,
         q.count
     );

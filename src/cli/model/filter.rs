@@ -123,7 +123,7 @@ fn put(out: &mut impl Write, bytes: &mut Vec<u8>) -> Result<()> {
 /// Reads a line; says how many bytes, and whether they are all of it. The rest of a longer one is
 /// skipped.
 fn next_line(input: &mut impl BufRead, line: &mut Vec<u8>) -> Result<(usize, bool)> {
-    let fail = |source| Error::Read {
+    let fail = |source| strapd_recording::Error::Read {
         path: PathBuf::from("standard input"),
         offset: 0,
         source,

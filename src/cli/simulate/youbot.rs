@@ -80,7 +80,7 @@ impl Youbot {
 
 /// The file's text: a path is short, and whatever is longer is not one.
 fn read(path: &Path) -> Result<String> {
-    let fail = |source| Error::Read {
+    let fail = |source| strapd_recording::Error::Read {
         path: path.to_owned(),
         offset: 0,
         source,

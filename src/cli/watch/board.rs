@@ -2,10 +2,10 @@
 
 use crate::client::attitude::Attitude;
 use crate::client::watcher::Said;
-use crate::decode::printable;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::time::Instant;
+use strapd_recording::text::printable;
 
 /// Most sensors that are shown; a daemon has no more.
 const MAX_SENSORS: usize = 1024;

@@ -5,7 +5,6 @@
 
 use super::stalling::Stalling;
 use super::{Context, accept, in_room, now, prepare};
-use crate::decode::packed;
 use crate::serve::admission::{Denied, Web};
 use crate::serve::foxglove::{self, Framed};
 use crate::serve::http;
@@ -33,6 +32,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::task::Poll;
 use std::time::Duration;
+use strapd_recording::decode::packed;
 use tokio::net::TcpListener;
 use tokio::task::yield_now;
 use tokio::time::{Instant, MissedTickBehavior, interval_at, sleep, timeout};

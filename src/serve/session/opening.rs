@@ -4,8 +4,8 @@
 //! request to any port, and what follows in its body would otherwise be lines like any others.
 
 use super::{End, Session, first_line_must_be_auth};
-use crate::decode::packed::MARK;
 use crate::serve::wire::{self, Fault};
+use strapd_recording::decode::packed::MARK;
 
 /// How far a conversation has come. Until its first object was seen nothing else is read: what a
 /// browser can be made to send (HTTP) begins otherwise, and so is refused before anything of it counts.

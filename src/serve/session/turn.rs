@@ -6,12 +6,12 @@
 
 use super::opening::Opening;
 use super::{Scratch, Session};
-use crate::decode::framing::Framed;
 use crate::serve::hub::count;
 use crate::serve::wire;
 use bytes::{Buf, Bytes};
 use std::time::{Duration, Instant};
 use strapd_attitude::record::Nanos;
+use strapd_recording::decode::framing::Framed;
 
 /// Longest step, but for the line or run that was begun.
 const SLICE: Duration = Duration::from_micros(200);

@@ -1,10 +1,10 @@
 //! Packed objects of a client -> samples, as its lines. Pure.
 
 use super::{Scratch, Session, first_line_must_be_auth, goes_on};
-use crate::decode::Line;
-use crate::decode::packed::{self, Object};
 use crate::serve::wire::{self, Fault};
 use strapd_attitude::record::Nanos;
+use strapd_recording::decode::Line;
+use strapd_recording::decode::packed::{self, Object};
 
 /// Numbers of packed streams one client may bind.
 const MAX_BOUND: usize = 256;

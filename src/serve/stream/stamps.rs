@@ -3,9 +3,9 @@
 //! Apart from the stream because samples wait here, and nowhere else in the daemon: at most
 //! [`MOST_WAITING`], and no longer than [`LONGEST_WAIT`].
 
-use crate::decode::{Ambiguous, Bare, MOST_WAITING, TimeUnit, unit_of};
 use std::time::Duration;
 use strapd_attitude::record::{Nanos, RawSample};
+use strapd_recording::decode::{Ambiguous, Bare, MOST_WAITING, TimeUnit, unit_of};
 
 /// How long samples wait for others that tell their unit.
 pub const LONGEST_WAIT: Duration = Duration::from_secs(2);

@@ -331,13 +331,13 @@ fn a_last_attitude_waits_its_turn_and_is_left_out_where_its_stream_came_meanwhil
     }));
     let mut out = VecDeque::new();
     let taken = outbox.take(usize::MAX, &mut out);
-    assert_eq!(taken, 4 + 4 + crate::decode::packed::ATT);
+    assert_eq!(taken, 4 + 4 + strapd_recording::decode::packed::ATT);
     let [before, meanwhile, label, last] = out.make_contiguous() else {
         unreachable!("{out:?}")
     };
     assert_eq!((&before[..], &meanwhile[..]), (&b"xxxx"[..], &b"xxxx"[..]));
     assert!(label.starts_with(b"{\"class\":\"PACKED\",\"stream\":1,"));
-    assert!(crate::decode::packed::is_packed(last));
+    assert!(strapd_recording::decode::packed::is_packed(last));
     for last in lasts(3, Form::Lines) {
         outbox.offer_last(last, 0);
     }

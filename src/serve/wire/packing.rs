@@ -1,13 +1,14 @@
 //! Lines that say what packed objects are, and what is wrong with them. Pure.
 
 use super::{Fault, object};
-use crate::decode::packed::Unreadable;
-use crate::decode::{Class, GyroUnit, Line, printable};
 use crate::sink::{Content, Stream};
 use bytes::Bytes;
 use serde::Deserialize;
 use serde_json::Value;
 use strapd_attitude::record::SampleKind;
+use strapd_recording::decode::packed::Unreadable;
+use strapd_recording::decode::{Class, GyroUnit, Line};
+use strapd_recording::text::printable;
 
 #[derive(Deserialize)]
 struct PackedObject {

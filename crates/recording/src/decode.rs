@@ -1,0 +1,563 @@
+//! Bytes of one message -> [`RawSample`]. Pure, total, no I/O.
+//!
+//! A stage of its own because it is where outside data enters: no payload and no schema, however
+//! broken, makes it panic, loop or allocate beyond a bound. What the bytes say is not judged here;
+//! NaN, zero stamps and absurd rates pass, and conditioning counts them.
+//!
+//! ```text
+//! schema text or descriptor -> schema (one graph for all languages)
+//!                              -> select (which fields)  -> plan, compiled once per channel
+//! payload                      -> plan -> registers -> RawSample
+//! ```
+//!
+//! | encoding | schema | decoder |
+//! |---|---|---|
+//! | `cdr` | `ros2msg`, `ros2idl`, `omgidl`, or none for well-known types | `decode::ros` |
+//! | `ros1` | `ros1msg`, or none for well-known types | `decode::ros` |
+//! | `json` | any or none | `decode::json` |
+//! | `protobuf` | `protobuf` (file descriptor set) | `decode::protobuf` |
+//! | lines, packed objects | cut from a stream by [`framing`] | [`LineDecoder`], [`packed`] |
+
+mod fields;
+pub mod framing;
+mod json;
+pub mod packed;
+mod protobuf;
+mod refusal;
+mod registers;
+mod role;
+mod ros;
+mod schema;
+mod select;
+mod settle;
+mod stamp;
+mod stated;
+
+pub use fields::{BadFieldPath, FieldPath, FieldRole};
+pub use json::line::{Class, Line, LineDecoder, MAX_LINE, decode_line};
+pub use json::objects::{Object, Objects};
+pub use refusal::{Undecodable, Unsupported, exact_name};
+pub use role::{Rank, Role, role, role_of};
+pub use stamp::{Ambiguous, Bare, MOST_WAITING, TimeUnit, unit_of};
+pub use stated::{AccelUnit, BodyAxes, Stated, WorldAxes};
+pub use strapd_attitude::condition::GyroUnit;
+
+use crate::text::printable;
+use registers::{Form, Slot, StampForm};
+use schema::rosmsg::Dialect;
+use schema::{Schema, builtin, descriptor, idl, ros_name, rosmsg};
+use select::names::{self, Px4};
+use select::{Found, Selection, select};
+use std::sync::Arc;
+use strapd_attitude::record::{Nanos, RawSample};
+
+/// Most samples one message may hold.
+pub const MAX_BATCH: usize = 65_536;
+
+/// A channel as its container describes it.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Channel<'a> {
+    /// Topic.
+    pub topic: &'a str,
+    /// `cdr`, `ros1`, `json`, `protobuf`.
+    pub message_encoding: &'a str,
+    /// Message type: `sensor_msgs/msg/Imu`.
+    pub schema_name: &'a str,
+    /// `ros2msg`, `ros1msg`, `jsonschema`, `protobuf`, or empty.
+    pub schema_encoding: &'a str,
+    /// The schema itself.
+    pub schema_data: &'a [u8],
+}
+
+/// What the user may say about messages.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// `--field` paths.
+    pub fields: Vec<FieldPath>,
+    /// Use data that its covariance (-1) marks as absent.
+    pub ignore_covariance_flag: bool,
+    /// Of several transforms in a message, take the one to this child frame; else the first.
+    pub child_frame: Option<String>,
+    /// Of several stamps in a message, which to read: 0 is the message's own, then those of nested
+    /// messages from the outside in ([`Decoder::stamps`]).
+    pub nth_stamp: usize,
+}
+
+impl Options {
+    /// Whether the user says where the samples' own interval lies, and in which unit.
+    #[must_use]
+    pub fn states_interval_unit(&self) -> bool {
+        let mut fields = self.fields.iter();
+        fields.any(|f| f.role == FieldRole::Interval && f.unit.is_some())
+    }
+}
+
+/// What became of one payload.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Decoded {
+    /// Samples pushed.
+    pub samples: usize,
+    /// Of these, those whose body rate the message marks as absent (covariance -1, Imu.msg): their
+    /// `gyro` is `None`, or kept where [`Options::ignore_covariance_flag`] says so.
+    pub gyro_marked_absent: usize,
+    /// Stamps whose nanoseconds were a second or more (or negative), carried into the seconds.
+    pub stamps_carried: usize,
+}
+
+/// Reads the messages of one channel. A copy shares what was compiled.
+#[derive(Debug, Clone)]
+pub struct Decoder {
+    plan: Plan,
+    /// How registers become samples; of JSON the plan knows.
+    form: Form,
+    /// Finds the frame in messages that have a schema.
+    frame: Option<Plan>,
+    stated: Stated,
+    found: Found,
+    /// Stamps are numbers whose unit nothing states; of JSON before its first message: they may be.
+    has_bare_stamps: bool,
+    /// Where stamps lie; the one that is read is [`Options::nth_stamp`].
+    stamps: Vec<String>,
+    options: Options,
+    /// For the messages about it: topic, type, encoding.
+    label: [String; 3],
+}
+
+#[derive(Debug, Clone)]
+enum Plan {
+    Ros(Arc<ros::Plan>),
+    Protobuf(Arc<protobuf::Plan>),
+    Json(json::Plan),
+}
+
+/// What may be spent on the schemas of one log: a few kilobytes of schema can spell out to tens of thousands of
+/// fields, and a log can hold thousands of schemas. Those of a hundred recordings together spell out to fewer.
+#[derive(Debug, Clone)]
+pub struct Effort {
+    fields: usize,
+}
+
+impl Default for Effort {
+    fn default() -> Self {
+        Effort { fields: 5_000_000 }
+    }
+}
+
+impl Effort {
+    /// Most fields one schema counts for: beyond, none is compiled.
+    const ONE: usize = 50_000;
+
+    fn spend(&mut self, schema: Schema, encoding: &str) -> Result<Schema, (String, &'static str)> {
+        // Protobuf's types may hold themselves, and are not written out; elsewhere that is no schema, and is
+        // found out only by going round.
+        let circle = if encoding == "protobuf" {
+            0
+        } else {
+            Effort::ONE
+        };
+        let spelled = schema.spelled(Effort::ONE, circle);
+        match self.fields.checked_sub(spelled) {
+            Some(left) => {
+                self.fields = left;
+                Ok(schema)
+            }
+            None => Err((
+                "the schemas of this log spell out to more fields than are gone over for one log"
+                    .to_owned(),
+                "",
+            )),
+        }
+    }
+}
+
+impl Decoder {
+    /// Compiles the decoder of a channel.
+    ///
+    /// # Errors
+    /// [`Unsupported`] with the reason: an encoding or schema this crate does not read, a schema
+    /// without body rate or orientation, a `--field` that leads nowhere (with the fields there are).
+    /// A JSON channel always compiles: what it holds shows in its messages ([`Decoder::settle`]).
+    pub fn compile(channel: &Channel<'_>, options: &Options) -> Result<Decoder, Unsupported> {
+        Decoder::compile_within(channel, options, &mut Effort::default())
+    }
+
+    /// The same for one of many channels, as long as `effort` lasts.
+    ///
+    /// # Errors
+    /// As [`Decoder::compile`], and when the effort is spent.
+    pub fn compile_within(
+        channel: &Channel<'_>,
+        options: &Options,
+        effort: &mut Effort,
+    ) -> Result<Decoder, Unsupported> {
+        let label = label(channel);
+        let refuse = |(why, help): (String, &str)| unsupported(&label, why, help);
+        if channel.message_encoding == "json" {
+            return Ok(Decoder::json(channel, options, label));
+        }
+        // A recorder may leave a well-known type's text out, or shorten it to a stub.
+        let read =
+            read_schema(channel).and_then(|schema| effort.spend(schema, channel.message_encoding));
+        let (schema, selection) = understand(channel, read, options)
+            .or_else(|why| understand(channel, well_known(channel), options).map_err(|_| why))
+            .map_err(refuse)?;
+        let plan =
+            compile_plan(channel, &schema, &selection, options).map_err(|why| refuse((why, "")))?;
+        let frame = selection
+            .frame
+            .as_deref()
+            .and_then(|path| match channel.message_encoding {
+                "protobuf" => protobuf::plan::text(&schema, path)
+                    .ok()
+                    .map(|plan| Plan::Protobuf(Arc::new(plan))),
+                "ros1" => ros::compile::text(&schema, path, ros::compile::Layout::Ros1)
+                    .ok()
+                    .map(|plan| Plan::Ros(Arc::new(plan))),
+                _ => ros::compile::text(&schema, path, ros::compile::Layout::Cdr)
+                    .ok()
+                    .map(|plan| Plan::Ros(Arc::new(plan))),
+            });
+        let form = match &plan {
+            Plan::Ros(plan) => plan.form(),
+            Plan::Protobuf(plan) => plan.form(),
+            Plan::Json(_) => Form::default(),
+        };
+        Ok(Decoder {
+            has_bare_stamps: matches!(
+                form.stamp,
+                StampForm::Count(TimeUnit::ByMagnitude) | StampForm::Float(TimeUnit::ByMagnitude)
+            ),
+            form,
+            plan,
+            frame,
+            stated: state(channel.schema_name, &selection),
+            found: selection.found,
+            stamps: selection.stamps.iter().map(|s| printable(s)).collect(),
+            options: options.clone(),
+            label,
+        })
+    }
+
+    fn json(channel: &Channel<'_>, options: &Options, label: [String; 3]) -> Decoder {
+        let mut stated = Stated::default();
+        state_by_type(channel.schema_name, &mut stated);
+        let px4 = names::px4(channel.schema_name);
+        state_px4(px4, &mut stated);
+        stated.description = "fields by name, in each message".to_owned();
+        let keys = json::keys::schema_keys(channel.schema_data);
+        stated.has_gyro |= keys.0;
+        stated.has_stamp |= keys.1;
+        let found = if stated.has_gyro {
+            Found::Named
+        } else {
+            Found::Nothing
+        };
+        Decoder {
+            plan: Plan::Json(json::Plan::compile(channel.schema_name, options)),
+            form: Form::default(),
+            frame: None,
+            stated,
+            found,
+            has_bare_stamps: true,
+            stamps: Vec::new(),
+            options: options.clone(),
+            label,
+        }
+    }
+
+    /// Reads one payload and pushes its samples; pushes nothing when it fails.
+    ///
+    /// # Errors
+    /// [`Undecodable`], to be counted; it says at which field or byte.
+    pub fn decode(
+        &self,
+        payload: &[u8],
+        log: Nanos,
+        publish: Nanos,
+        out: &mut Vec<RawSample>,
+    ) -> Result<Decoded, Undecodable> {
+        self.decode_as(&self.form, payload, log, publish, out)
+    }
+
+    fn decode_as(
+        &self,
+        form: &Form,
+        payload: &[u8],
+        log: Nanos,
+        publish: Nanos,
+        out: &mut Vec<RawSample>,
+    ) -> Result<Decoded, Undecodable> {
+        match &self.plan {
+            Plan::Ros(plan) => plan.decode(form, payload, log, publish, out),
+            Plan::Protobuf(plan) => plan.decode(form, payload, log, publish, out),
+            Plan::Json(plan) => plan.decode(payload, log, publish, out),
+        }
+    }
+
+    /// The same for a message that names this frame, or none; nothing of one that names another.
+    ///
+    /// # Errors
+    /// As [`Decoder::decode`].
+    pub fn decode_of(
+        &self,
+        frame: &str,
+        payload: &[u8],
+        log: Nanos,
+        publish: Nanos,
+        out: &mut Vec<RawSample>,
+    ) -> Result<Option<Decoded>, Undecodable> {
+        if let Plan::Json(plan) = &self.plan {
+            return plan.decode_of(frame, payload, log, publish, out);
+        }
+        let names_another = |named: &[u8]| {
+            named != frame.as_bytes() && printable(&String::from_utf8_lossy(named)) != frame
+        };
+        if self.frame_bytes(payload).is_some_and(names_another) {
+            return Ok(None);
+        }
+        self.decode(payload, log, publish, out).map(Some)
+    }
+
+    /// The same for another topic's messages of the same type, which share what was compiled.
+    #[must_use]
+    pub fn of_topic(&self, topic: &str) -> Decoder {
+        let mut other = self.clone();
+        other.label[0] = printable(topic);
+        other
+    }
+
+    /// What type and schema state, and which fields were chosen.
+    #[must_use]
+    pub fn stated(&self) -> &Stated {
+        &self.stated
+    }
+
+    /// Where messages carry stamps, the message's own at first, then those of messages nested in it; one
+    /// of them is read ([`Options::nth_stamp`]). Empty where `--field` names it.
+    #[must_use]
+    pub fn stamps(&self) -> &[String] {
+        &self.stamps
+    }
+
+    /// Which of [`Decoder::stamps`] is read.
+    #[must_use]
+    pub fn nth_stamp(&self) -> usize {
+        self.options
+            .nth_stamp
+            .min(self.stamps.len().saturating_sub(1))
+    }
+
+    /// Whether the stamp that is read is one: not zero, not shared by many samples, not in whole seconds
+    /// throughout. `first` are the first messages of the channel, with their log times.
+    #[must_use]
+    pub fn has_good_stamps(&self, first: &[(Nanos, Vec<u8>)]) -> bool {
+        let mut samples = Vec::new();
+        for (log, payload) in first {
+            // What can not be decoded says nothing about stamps.
+            let _ = self.decode(payload, *log, *log, &mut samples);
+        }
+        let mut stamps: Vec<i64> = samples.iter().filter_map(|s| Some(s.header?.0)).collect();
+        let n = stamps.len();
+        stamps.retain(|stamp| *stamp != 0);
+        let nonzero = stamps.len();
+        let whole = stamps.iter().filter(|s| *s % 1_000_000_000 == 0).count();
+        stamps.sort_unstable();
+        stamps.dedup();
+        // A few that collide are jitter; one that stands at a whole second is chance.
+        2 * nonzero > n && 10 * stamps.len() >= 9 * nonzero && (whole < 2 || whole < nonzero)
+    }
+
+    /// The frame a message names: at most 255 bytes, control characters escaped.
+    #[must_use]
+    pub fn frame_id(&self, payload: &[u8]) -> Option<String> {
+        if let Plan::Json(plan) = &self.plan {
+            return plan.find(payload).ok()?.frame.as_deref().map(printable);
+        }
+        let bytes = self.frame_bytes(payload)?;
+        Some(printable(&String::from_utf8_lossy(bytes)))
+    }
+
+    /// Whether messages may name a frame.
+    #[must_use]
+    pub fn names_frames(&self) -> bool {
+        self.frame.is_some() || matches!(self.plan, Plan::Json(_))
+    }
+
+    fn frame_bytes<'a>(&'a self, payload: &'a [u8]) -> Option<&'a [u8]> {
+        match self.frame.as_ref()? {
+            Plan::Ros(plan) => plan.text(payload),
+            Plan::Protobuf(plan) => plan.text(payload),
+            Plan::Json(_) => None,
+        }
+    }
+
+    fn found(&self) -> Found {
+        self.found
+    }
+}
+
+fn label(channel: &Channel<'_>) -> [String; 3] {
+    let encoding = if channel.schema_encoding.is_empty() {
+        printable(channel.message_encoding)
+    } else {
+        printable(&format!(
+            "{}/{}",
+            channel.message_encoding, channel.schema_encoding
+        ))
+    };
+    [
+        printable(channel.topic),
+        printable(channel.schema_name),
+        encoding,
+    ]
+}
+
+fn unsupported([topic, type_name, encoding]: &[String; 3], why: String, help: &str) -> Unsupported {
+    Unsupported {
+        topic: topic.clone(),
+        type_name: type_name.clone(),
+        encoding: encoding.clone(),
+        why,
+        help: help.to_owned(),
+    }
+}
+
+/// What the type of this name is everywhere.
+fn well_known(channel: &Channel<'_>) -> Result<Schema, (String, &'static str)> {
+    let dialect = match channel.message_encoding {
+        "cdr" => Dialect::Ros2,
+        _ => Dialect::Ros1,
+    };
+    builtin::schema(&ros_name(channel.schema_name), dialect)
+        .filter(|_| matches!(channel.message_encoding, "cdr" | "ros1"))
+        .ok_or((String::new(), ""))
+}
+
+/// The schema with the fields that are wanted of it.
+fn understand(
+    channel: &Channel<'_>,
+    schema: Result<Schema, (String, &'static str)>,
+    options: &Options,
+) -> Result<(Schema, Selection), (String, &'static str)> {
+    let schema = schema?;
+    let selection = select(&schema, channel.schema_name, options).map_err(|why| {
+        (
+            why,
+            "paths are names between dots: --field gyro=imu.angular_velocity",
+        )
+    })?;
+    if selection.has(Slot::GYRO, 3) || selection.has(Slot::ORIENTATION, 4) {
+        return Ok((schema, selection));
+    }
+    Err((
+        "the type has no body rate and no orientation under a name this program knows".to_owned(),
+        "name it: --field gyro=PATH",
+    ))
+}
+
+fn read_schema(channel: &Channel<'_>) -> Result<Schema, (String, &'static str)> {
+    let dialect = match channel.message_encoding {
+        "cdr" => Dialect::Ros2,
+        "ros1" => Dialect::Ros1,
+        "protobuf" => {
+            return descriptor::parse(channel.schema_data, channel.schema_name)
+                .map_err(|why| (why, ""));
+        }
+        _ => {
+            return Err((
+                "its message encoding is not one this program reads (cdr, ros1, json, protobuf)"
+                    .to_owned(),
+                "choose another topic with --topic",
+            ));
+        }
+    };
+    let text = std::str::from_utf8(channel.schema_data)
+        .map_err(|_| ("its schema is not UTF-8 text".to_owned(), ""))?;
+    if text.trim().is_empty() {
+        // std_msgs/Empty has an empty definition, too, but nothing in it is wanted.
+        return builtin::schema(&ros_name(channel.schema_name), dialect).ok_or((
+            "its schema text is empty, and the type is none of the well-known ones".to_owned(),
+            "",
+        ));
+    }
+    match channel.schema_encoding {
+        "ros2idl" | "omgidl" => idl::parse(text, channel.schema_name),
+        "ros2msg" | "ros1msg" => rosmsg::parse(text, channel.schema_name, dialect),
+        _ => Err(
+            "its schema encoding is not one this program reads (ros2msg, ros2idl, ros1msg)"
+                .to_owned(),
+        ),
+    }
+    .map_err(|why| (why, ""))
+}
+
+fn compile_plan(
+    channel: &Channel<'_>,
+    schema: &Schema,
+    selection: &Selection,
+    options: &Options,
+) -> Result<Plan, String> {
+    let child = options.child_frame.as_deref();
+    let layout = match channel.message_encoding {
+        "protobuf" => {
+            return protobuf::plan::samples(schema, selection, child)
+                .map(|plan| Plan::Protobuf(Arc::new(plan)));
+        }
+        "ros1" => ros::compile::Layout::Ros1,
+        _ => ros::compile::Layout::Cdr,
+    };
+    let plan = ros::compile::samples(schema, selection, child, layout)?;
+    Ok(Plan::Ros(Arc::new(plan.recognised())))
+}
+
+fn state(type_name: &str, selection: &Selection) -> Stated {
+    let mut stated = Stated::default();
+    state_by_type(type_name, &mut stated);
+    state_by_type(&selection.holder, &mut stated);
+    stated.gyro_unit = selection.unit.or(stated.gyro_unit);
+    state_px4(names::px4(type_name), &mut stated);
+    stated.sample_kind = selection.kind.or(stated.sample_kind);
+    stated.has_gyro = selection.has(Slot::GYRO, 3);
+    stated.has_accel = selection.has(Slot::ACCEL, 3);
+    stated.has_orientation = selection.has(Slot::ORIENTATION, 4);
+    stated.has_stamp = selection.form.stamp != StampForm::None;
+    stated.has_interval = selection.has(Slot::INTERVAL, 1);
+    stated.interval = stated
+        .has_interval
+        .then(|| (printable(&selection.interval), selection.form.interval));
+    stated.batched = selection
+        .batch
+        .as_ref()
+        .is_some_and(|batch| batch.element == select::Step::Each);
+    stated.description = printable(&selection.description.join(", "));
+    stated
+}
+
+/// Types whose units and axes a published text fixes.
+fn state_by_type(type_name: &str, stated: &mut Stated) {
+    let name = ros_name(type_name);
+    let package = name.split('/').next().unwrap_or("");
+    if matches!(
+        package,
+        "sensor_msgs" | "geometry_msgs" | "nav_msgs" | "tf2_msgs" | "tf"
+    ) {
+        stated.ros();
+        stated.has_gyro |= name == "sensor_msgs/Imu";
+        stated.has_stamp |= name == "sensor_msgs/Imu";
+    }
+}
+
+fn state_px4(px4: Option<Px4>, stated: &mut Stated) {
+    let Some(px4) = px4 else { return };
+    stated.px4();
+    stated.has_gyro = px4 != Px4::VehicleAttitude;
+    stated.has_stamp = true;
+    stated.has_orientation = px4 == Px4::VehicleAttitude;
+    stated.sample_kind = Some(match px4 {
+        Px4::SensorCombined => strapd_attitude::record::SampleKind::Average,
+        Px4::VehicleImu => strapd_attitude::record::SampleKind::DeltaAngle,
+        Px4::VehicleAngularVelocity | Px4::SensorGyro | Px4::VehicleAttitude => {
+            strapd_attitude::record::SampleKind::Rate
+        }
+    });
+}

@@ -1,0 +1,179 @@
+//! One line of NDJSON -> samples and what the line says of itself. Pure.
+//!
+//! For stdin and sockets: there a line has no channel, so class, sensor and sequence number travel
+//! in it. Takes our own `RATE` and `ATT`, gpsd's `IMU` and `ATT`, SensorServer, Sensor Logger, and any
+//! object with a body rate.
+
+use super::Plan;
+use super::scan::Scanner;
+use super::seek::Seeker;
+use crate::decode::refusal::exact_name;
+use crate::decode::{Bare, Decoded, GyroUnit, Options, Undecodable};
+use crate::text::printable;
+use strapd_attitude::record::{Nanos, RawSample, SampleKind};
+
+/// Longest line that is read.
+pub const MAX_LINE: usize = 64 << 10;
+
+/// What the `class` of a line says.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub enum Class {
+    /// No class: a bare sample.
+    #[default]
+    None,
+    /// Our own sample.
+    Rate,
+    /// Our own attitude, or gpsd's.
+    Att,
+    /// gpsd's IMU: deg/s.
+    Imu,
+    /// Another class, escaped for a terminal.
+    Other(String),
+}
+
+/// What one line held besides its samples.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Line {
+    /// Its class.
+    pub class: Class,
+    /// Which sensor, as it is: nothing in it needs to be escaped.
+    pub id: Option<String>,
+    /// Which of several sensors of one device, where a line says so (`android.sensor.gyroscope`);
+    /// escaped for a terminal.
+    pub sensor: Option<String>,
+    /// The sender's sequence number.
+    pub seq: Option<u64>,
+    /// What its samples mean in time, where it says so.
+    pub sample_kind: Option<SampleKind>,
+    /// Unit of its body rate, where it says so.
+    pub gyro_unit: Option<GyroUnit>,
+    /// How many samples, and what was noticed.
+    pub decoded: Decoded,
+    /// Stamps that are numbers without a unit, at the places of their samples, which have none until
+    /// [`unit_of`](crate::decode::unit_of) some of them is known; shorter where no more follow.
+    pub bare: Vec<Option<Bare>>,
+}
+
+impl Line {
+    /// Whether samples of a line like `next` are of the same run: of one sensor, and alike in meaning.
+    #[must_use]
+    pub fn goes_on_in(&self, next: &Line) -> bool {
+        self.id == next.id
+            && (self.sample_kind, self.gyro_unit) == (next.sample_kind, next.gyro_unit)
+    }
+}
+
+/// Reads lines; holds the paths of `--field`.
+#[derive(Debug, Clone, Default)]
+pub struct LineDecoder {
+    plan: Plan,
+}
+
+impl LineDecoder {
+    /// A decoder of lines with these options.
+    #[must_use]
+    pub fn new(options: &Options) -> Self {
+        LineDecoder {
+            plan: Plan::compile("", options),
+        }
+    }
+
+    /// The same for lines that do not say which sensor they are of: it is `sensor`, as Android names
+    /// it. One that does is believed.
+    #[must_use]
+    pub fn with_sensor(options: &Options, sensor: &str) -> Self {
+        let mut decoder = LineDecoder::new(options);
+        decoder.plan.sensor = Some(sensor.to_owned());
+        decoder
+    }
+
+    /// Reads one line, without or with its line end; `received` becomes the log and publish time.
+    ///
+    /// # Errors
+    /// Not a JSON object (or array of them), or longer than [`MAX_LINE`]; an `id` that could be taken for
+    /// another's.
+    pub fn decode(
+        &self,
+        line: &[u8],
+        received: Nanos,
+        out: &mut Vec<RawSample>,
+    ) -> Result<Line, Undecodable> {
+        if line.len() > MAX_LINE {
+            return Err(Undecodable::LongLine {
+                have: line.len() as u64,
+                limit: MAX_LINE as u64,
+            });
+        }
+        self.decode_object(line, received, out)
+    }
+
+    /// The same for an object whose length the caller bounds, and which may go over several lines.
+    ///
+    /// # Errors
+    /// Not a JSON object (or array of them).
+    pub fn decode_object(
+        &self,
+        line: &[u8],
+        received: Nanos,
+        out: &mut Vec<RawSample>,
+    ) -> Result<Line, Undecodable> {
+        let mut seeker = Seeker::new(&self.plan, Scanner::new(line)?);
+        let found = seeker.message()?;
+        let class = match seeker.class.as_deref() {
+            None => Class::None,
+            Some("RATE") => Class::Rate,
+            Some("ATT") => Class::Att,
+            Some("IMU") => Class::Imu,
+            Some(other) => Class::Other(printable(other)),
+        };
+        let of_rates = |find: &super::Found<'_>| (find.kind, find.unit);
+        let (kind, unit) = match found.batch.first() {
+            Some(first) if !found.has_gyro() => of_rates(first),
+            _ => of_rates(&found),
+        };
+        // Where there is no rate, its unit is not said either.
+        let has_rate = found.has_gyro() || found.batch.iter().any(|f| f.has_gyro());
+        let stated = match class {
+            _ if !has_rate => None,
+            Class::Imu => Some(GyroUnit::Deg),
+            Class::Rate | Class::Att => Some(GyroUnit::Rad),
+            Class::None | Class::Other(_) => None,
+        };
+        let id = seeker.id.as_deref().map(exact_name).transpose()?;
+        let mut bare = Vec::new();
+        let decoded = self.plan.push(&found, received, received, out, &mut bare);
+        Ok(Line {
+            class,
+            id,
+            sensor: seeker.sensor.as_deref().map(printable),
+            seq: seeker.seq,
+            sample_kind: kind_named(seeker.kind.as_deref()).or(kind),
+            gyro_unit: unit.or(stated),
+            decoded,
+            bare,
+        })
+    }
+}
+
+/// The `sample_kind` of a line: what a sample means, said outright.
+fn kind_named(name: Option<&str>) -> Option<SampleKind> {
+    [
+        SampleKind::Rate,
+        SampleKind::Average,
+        SampleKind::DeltaAngle,
+    ]
+    .into_iter()
+    .find(|kind| Some(kind.name()) == name)
+}
+
+/// Reads one line without any options: see [`LineDecoder::decode`].
+///
+/// # Errors
+/// As [`LineDecoder::decode`].
+pub fn decode_line(
+    line: &[u8],
+    received: Nanos,
+    out: &mut Vec<RawSample>,
+) -> Result<Line, Undecodable> {
+    LineDecoder::default().decode(line, received, out)
+}

@@ -1,0 +1,133 @@
+//! Why a channel or a payload could not be decoded. Pure.
+//!
+//! Apart from the decoders so that every one of them refuses in the same words: what, where, why,
+//! and the flag that helps.
+
+use crate::text::{printable, snippet};
+
+/// A channel this crate can not decode: named, explained, with the flag that helps.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Unsupported {
+    /// Topic of the channel, control characters escaped.
+    pub topic: String,
+    /// Its message type.
+    pub type_name: String,
+    /// Its message encoding, and its schema encoding after a slash where there is one.
+    pub encoding: String,
+    /// Why not.
+    pub why: String,
+    /// What the user can do about it; empty when nothing.
+    pub help: String,
+}
+
+impl std::fmt::Display for Unsupported {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let type_name = if self.type_name.is_empty() {
+            "no type name"
+        } else {
+            &self.type_name
+        };
+        let encoding = if self.encoding.is_empty() {
+            "no encoding"
+        } else {
+            &self.encoding
+        };
+        write!(f, "{} ({type_name}, {encoding}): {}", self.topic, self.why)?;
+        if !self.help.is_empty() {
+            write!(f, "\n  help: {}", self.help)?;
+        }
+        Ok(())
+    }
+}
+
+impl std::error::Error for Unsupported {}
+
+/// A payload that is not what its channel says. It is counted
+/// ([`strapd_attitude::record::Verdict::Undecodable`]); the first one of a run is shown.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Undecodable {
+    /// The payload ends inside a field.
+    #[error("{have} bytes, need {need}, at {field}")]
+    Short {
+        /// Bytes there are.
+        have: u64,
+        /// Bytes there would have to be, at least.
+        need: u64,
+        /// The field that does not fit.
+        field: String,
+    },
+    /// The payload goes on after its last field by more than padding.
+    #[error(
+        "{have} bytes, but the schema ends after {used}: this is not the schema it was written with"
+    )]
+    Long {
+        /// Bytes there are.
+        have: u64,
+        /// Bytes the schema accounts for.
+        used: u64,
+    },
+    /// A line beyond what one may be.
+    #[error("a line of {have} bytes, over the limit of {limit}")]
+    LongLine {
+        /// Bytes there are.
+        have: u64,
+        /// The most there may be.
+        limit: u64,
+    },
+    /// A CDR encapsulation this crate does not read.
+    #[error("CDR encapsulation {:02x} {:02x} is {what}; only plain CDR (00 00, 00 01) is read", found[0], found[1])]
+    Encapsulation {
+        /// The first two bytes.
+        found: [u8; 2],
+        /// What they mean.
+        what: &'static str,
+    },
+    /// More samples in one message than a message may hold.
+    #[error("more than {limit} samples in one message, at {field}")]
+    TooMany {
+        /// The most there may be.
+        limit: u64,
+        /// The repeated field.
+        field: String,
+    },
+    /// A sensor's name that, made fit for a terminal, would be another's.
+    #[error(
+        "`id` {near}: a sensor's name has at most 255 bytes, and no control or invisible characters"
+    )]
+    Name {
+        /// How it begins, fit for a terminal.
+        near: String,
+    },
+    /// Not JSON.
+    #[error("JSON, byte {offset}: {what}")]
+    Json {
+        /// Where, from the start of the payload.
+        offset: u64,
+        /// What was expected there.
+        what: &'static str,
+    },
+    /// Not the protobuf wire format.
+    #[error("protobuf, byte {offset}: {what}")]
+    Protobuf {
+        /// Where, from the start of the payload.
+        offset: u64,
+        /// What is wrong there.
+        what: &'static str,
+    },
+}
+
+/// A sensor's name as it is given: what would have to be cut or escaped for a terminal could be taken
+/// for another's.
+///
+/// # Errors
+/// [`Undecodable::Name`].
+pub fn exact_name(text: &str) -> Result<String, Undecodable> {
+    let shown = printable(text);
+    if shown != text {
+        return Err(Undecodable::Name {
+            near: snippet(text.as_bytes()),
+        });
+    }
+    Ok(shown)
+}

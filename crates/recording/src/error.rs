@@ -1,0 +1,65 @@
+//! Why a log can not be read, or not as a whole. Bad samples are not here: they are counted verdicts
+//! ([`strapd_attitude::record::Verdict`]).
+
+use std::path::PathBuf;
+
+/// A log that could not be read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A file could not be opened.
+    #[error("{}: cannot open: {source}", path.display())]
+    Open {
+        /// Which file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// Reading failed part way.
+    #[error("{}: reading at byte {offset}: {source}", path.display())]
+    Read {
+        /// Which file.
+        path: PathBuf,
+        /// Where in it.
+        offset: u64,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The path is a directory.
+    #[error("{}: is a directory\n  help: name the .mcap file inside it", path.display())]
+    IsDirectory {
+        /// Which.
+        path: PathBuf,
+    },
+    /// The file has no bytes.
+    #[error("{}: the file is empty (0 bytes)", path.display())]
+    Empty {
+        /// Which file.
+        path: PathBuf,
+    },
+    /// The first bytes are not the MCAP magic.
+    #[error("{}: not an MCAP file: it begins with {found}, not with \\x89MCAP0\\r\\n", path.display())]
+    NotMcap {
+        /// Which file.
+        path: PathBuf,
+        /// The first bytes, escaped.
+        found: String,
+    },
+    /// What can be read once was to be looked at first.
+    #[error("{}: a stream can not be surveyed before it is read", path.display())]
+    NotTwice {
+        /// What it is called.
+        path: PathBuf,
+    },
+    /// The operating system gives no threads.
+    #[error("cannot start {threads} threads: {source}\n  help: ask for fewer")]
+    Threads {
+        /// How many were asked for; 0 = one per core.
+        threads: usize,
+        /// Why not.
+        source: rayon::ThreadPoolBuildError,
+    },
+}
+
+/// Result of reading.
+pub type Result<T> = std::result::Result<T, Error>;

@@ -1,0 +1,193 @@
+//! A file -> what is in it, without decoding. I/O.
+//!
+//! A stage of its own because the question comes before any choice of topic. The summary answers
+//! at once where it can be believed; otherwise the whole file is walked, in bounded memory.
+
+use super::block::Compression;
+use super::channels::{Channel, Table};
+use super::messages::Tally;
+use super::problem::{ProblemKind, Problems};
+use super::record::op;
+use super::scan::{Besides, Facts, Scanner};
+use super::summary::{self, Summary};
+use super::tape::Input;
+use super::walk::{WalkOptions, walk};
+use super::{Reader, read_error};
+use crate::error::{Error, Result};
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+/// A channel and what its messages add up to.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct ChannelSurvey {
+    /// The channel.
+    pub channel: Arc<Channel>,
+    /// How many messages.
+    pub messages: u64,
+    /// Least and greatest log time, ns; unknown when the summary was asked.
+    pub times: Option<(u64, u64)>,
+    /// Bytes of payload; unknown when the summary was asked.
+    pub bytes: Option<u64>,
+}
+
+/// What is in a log.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub struct Survey {
+    /// What it says about itself.
+    pub facts: Facts,
+    /// Bytes of the file; unknown for a stream.
+    pub file_size: Option<u64>,
+    /// Channels, in order of definition (from the summary: by id).
+    pub channels: Vec<ChannelSurvey>,
+    /// Messages on all channels.
+    pub messages: u64,
+    /// Least and greatest log time, ns; `None` when there is no message.
+    pub times: Option<(u64, u64)>,
+    /// Whether the file has a summary that can be used.
+    pub has_summary: bool,
+    /// Whether the counts above are the summary's, not our own.
+    pub from_summary: bool,
+    /// What was wrong.
+    pub problems: Problems,
+}
+
+impl Survey {
+    pub(super) fn add_up<'a>(&mut self, channels: impl Iterator<Item = (&'a Arc<Channel>, Tally)>) {
+        let mut all = Tally::default();
+        for (channel, tally) in channels {
+            all.merge(&tally);
+            self.channels.push(ChannelSurvey {
+                channel: Arc::clone(channel),
+                messages: tally.messages,
+                times: (tally.messages > 0).then_some((tally.first, tally.last)),
+                bytes: Some(tally.bytes),
+            });
+        }
+        self.messages = all.messages;
+        self.times = (all.messages > 0).then_some((all.first, all.last));
+    }
+}
+
+/// What is in a file: from its summary when that holds together and has statistics, else by
+/// walking all of it. Damage in the data section shows only in a walk.
+///
+/// # Errors
+/// [`Error::Read`]; [`Error::NotTwice`] for a stream, whose survey is in the report of its [`walk()`].
+pub fn survey(reader: &Reader, options: &WalkOptions<'_>) -> Result<Survey> {
+    let (Input::File(file), Some(again)) = (&reader.input, reader.again()) else {
+        return Err(Error::NotTwice {
+            path: reader.name().to_owned(),
+        });
+    };
+    let found = summary::read(file, reader.limits).map_err(|e| read_error(&file.path, 0, e))?;
+    if let Ok(Some(summary)) = found
+        && let Some(survey) = from_summary(reader, summary)?
+    {
+        return Ok(survey);
+    }
+    let nothing = |_: &(), _: &super::Message<'_>, _: &mut Vec<()>| {};
+    let report = walk(
+        again,
+        options,
+        |_| None::<()>,
+        nothing,
+        |_| ControlFlow::Continue(()),
+    )?;
+    Ok(report.survey)
+}
+
+fn from_summary(reader: &Reader, summary: Summary) -> Result<Option<Survey>> {
+    let Some(statistics) = summary.statistics else {
+        return Ok(None);
+    };
+    let mut problems = Problems::default();
+    let mut table = Table::<()>::new(Default::default(), reader.limits.definitions);
+    let definitions = &summary.definitions;
+    let schemas = definitions.schemas.values().map(|body| (op::SCHEMA, body));
+    let channels = definitions
+        .channels
+        .values()
+        .map(|body| (op::CHANNEL, body));
+    for (opcode, body) in schemas.chain(channels) {
+        table.define(opcode, body, 0, &mut |_| None, &mut problems);
+    }
+    // Statistics about channels the summary does not define would be counts of unknown things.
+    let counts: BTreeMap<u16, u64> = statistics.channel_message_counts.iter().copied().collect();
+    let known = |id| definitions.channels.contains_key(id);
+    let sum = counts.values().try_fold(0u64, |sum, n| sum.checked_add(*n));
+    if !problems.is_empty()
+        || sum != Some(statistics.message_count)
+        || counts.iter().any(|(id, n)| *n > 0 && !known(id))
+    {
+        return Ok(None);
+    }
+    let mut survey = Survey {
+        file_size: reader.size(),
+        has_summary: true,
+        from_summary: true,
+        messages: statistics.message_count,
+        times: (statistics.message_count > 0)
+            .then_some((statistics.message_start_time, statistics.message_end_time)),
+        facts: header(reader)?,
+        problems,
+        ..Survey::default()
+    };
+    survey.facts.metadata = u64::from(statistics.metadata_count);
+    survey.facts.attachments = u64::from(statistics.attachment_count);
+    let mut chunks = 0;
+    for (name, n) in &summary.chunks {
+        let Some(compression) = Compression::named(name) else {
+            return Ok(None);
+        };
+        survey.facts.chunks.insert(compression, *n);
+        chunks += n;
+    }
+    if chunks != u64::from(statistics.chunk_count) {
+        return Ok(None);
+    }
+    survey.channels = table
+        .channels()
+        .map(|channel| ChannelSurvey {
+            channel: Arc::clone(channel),
+            messages: counts.get(&channel.id).copied().unwrap_or(0),
+            times: None,
+            bytes: None,
+        })
+        .collect();
+    Ok(Some(survey))
+}
+
+/// The facts known from the header alone.
+fn header(reader: &Reader) -> Result<Facts> {
+    let Some(again) = reader.again() else {
+        return Ok(Facts::default());
+    };
+    let name = again.name().to_owned();
+    let mut scanner = Scanner::new(again.input, again.limits, Besides::Everything);
+    scanner.next().map_err(|e| read_error(&name, 0, e))?;
+    Ok(Facts {
+        profile: scanner.facts.profile,
+        library: scanner.facts.library,
+        ..Facts::default()
+    })
+}
+
+/// Whether a file's summary can be used, and the definitions in it; what is wrong with it is noted.
+pub(super) fn fallback(
+    input: &Input,
+    limits: super::Limits,
+    problems: &mut Problems,
+) -> std::io::Result<(bool, super::channels::Fallback)> {
+    let Input::File(file) = input else {
+        return Ok(Default::default());
+    };
+    match summary::read(file, limits)? {
+        Ok(Some(summary)) => Ok((true, summary.definitions)),
+        Ok(None) => Ok(Default::default()),
+        Err(why) => {
+            problems.add(file.len, ProblemKind::BadSummary { why }, None);
+            Ok(Default::default())
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! Outside text -> what a terminal may show. Pure.
+//!
+//! A stage of its own because every name in a log is somebody else's: what could move the cursor, hide or
+//! reorder what is around it is escaped before it is printed, in one place.
+
+/// Most bytes of what is bad that are repeated in what is said of it.
+pub const MAX_NEAR: usize = 64;
+
+/// `text` fit for a terminal: at most 255 bytes, control and other invisible characters escaped.
+#[must_use]
+pub fn printable(text: &str) -> String {
+    let mut out = String::with_capacity(text.len().min(255));
+    for c in text.chars() {
+        let start = out.len();
+        if c.is_control() || is_invisible(c) {
+            out.extend(c.escape_unicode());
+        } else {
+            out.push(c);
+        }
+        if out.len() > 255 {
+            out.truncate(start);
+            break;
+        }
+    }
+    out
+}
+
+/// Whether every character of `text` can be shown as it is.
+#[must_use]
+pub fn is_printable(text: &str) -> bool {
+    !text.chars().any(|c| c.is_control() || is_invisible(c))
+}
+
+/// Characters that reorder or hide the text around them.
+fn is_invisible(c: char) -> bool {
+    matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}')
+}
+
+/// The beginning of a hostile line, fit for a terminal: at most 64 bytes.
+#[must_use]
+pub fn snippet(bytes: &[u8]) -> String {
+    let head = bytes.get(..bytes.len().min(MAX_NEAR)).unwrap_or_default();
+    let mut out = String::new();
+    for c in String::from_utf8_lossy(head).chars() {
+        let escaped = printable(c.encode_utf8(&mut [0; 4]));
+        if out.len() + escaped.len() > MAX_NEAR {
+            break;
+        }
+        out.push_str(&escaped);
+    }
+    out
+}

@@ -1,0 +1,13 @@
+//! Logs, whole, damaged and hostile: what is read of them, and that nothing in them is believed.
+#![allow(clippy::print_stdout, reason = "figures, with --nocapture")]
+#![allow(clippy::unwrap_used, clippy::expect_used, unreachable_pub)]
+
+mod conformance;
+mod decode;
+mod mcap_damage;
+#[path = "../../../../tests/mcap_logs/mod.rs"]
+mod mcap_logs;
+mod mcap_reader;
+mod relative_error;
+#[path = "../../../../tests/shared_data/mod.rs"]
+mod shared_data;
