@@ -5,7 +5,7 @@
 //! cargo run --example make_fixtures [-- OUTPUT_DIR]
 //! ```
 //!
-//! The same bytes on every machine; `tests/fixtures.rs` checks the committed files against this program.
+//! The same bytes on every machine; `tests/commands/fixtures.rs` checks the committed files against this program.
 
 #![allow(clippy::print_stdout)]
 

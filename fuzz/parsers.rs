@@ -1,5 +1,5 @@
 //! Everything that reads bytes from outside, each as a function of bytes alone: what the fuzzers of this folder and
-//! the mutation test (`tests/mutations.rs`) run. What must hold is asserted; a panic is a finding.
+//! the mutation test (`tests/hostile/mutations.rs`) run. What must hold is asserted; a panic is a finding.
 #![allow(dead_code, unreachable_pub)]
 
 use std::cell::RefCell;

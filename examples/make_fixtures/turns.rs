@@ -41,7 +41,7 @@ impl DoubleDouble {
 ///
 /// # Accuracy
 /// Summed to about 2^-100 and rounded once, so the nearest double but where two are all but equally near;
-/// swept against the platform's sine in `tests/fixtures.rs`.
+/// swept against the platform's sine in `tests/commands/fixtures.rs`.
 ///
 /// # Panics
 /// When `denominator` is not in `1..=2^50`: a mistake in a recipe.

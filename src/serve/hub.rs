@@ -324,6 +324,13 @@ impl Hub {
             if sensor.owner == Some(client.number) {
                 // Nothing follows that would tell more.
                 self.take_overdue(&mut sensor);
+            }
+        }
+        // All at once, so that who looks for a place meanwhile sees all of them left, or none.
+        let _sensors = read(&self.sensors);
+        for sensor in owned {
+            let mut sensor = lock(sensor);
+            if sensor.owner == Some(client.number) {
                 sensor.owner = None;
             }
         }

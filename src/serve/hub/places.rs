@@ -9,7 +9,7 @@ use crate::serve::stream::SensorStream;
 use crate::serve::wire::Fault;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::Ordering;
-use std::sync::{Arc, Mutex, TryLockError};
+use std::sync::{Arc, Mutex};
 
 /// Sensors that gave way last, in `STATUS`.
 const TOLD: usize = 16;
@@ -138,12 +138,8 @@ impl Hub {
         let silent = sensors
             .iter()
             .filter_map(|(id, sensor)| {
-                // One that is locked is at work.
-                let sensor = match sensor.try_lock() {
-                    Ok(sensor) => sensor,
-                    Err(TryLockError::Poisoned(sensor)) => sensor.into_inner(),
-                    Err(TryLockError::WouldBlock) => return None,
-                };
+                // One that is being looked at (`STATUS`) is waited for: it may be the one.
+                let sensor = lock(sensor);
                 sensor.owner.is_none().then(|| (sensor.heard, id.clone()))
             })
             .min();
@@ -226,6 +222,37 @@ mod tests {
 
     fn line(id: &str, n: u64) -> String {
         format!("{{\"id\":\"{id}\",\"stamp\":{{\"sec\":{n},\"nsec\":0}},\"gyro\":[0.1,0,0]}}\n")
+    }
+
+    #[test]
+    fn a_sensor_that_is_being_looked_at_gives_way_all_the_same() {
+        let limits = Limits {
+            sensors: 2,
+            ..Limits::default()
+        };
+        let settings = Settings {
+            limits,
+            ..Settings::default()
+        };
+        let hub = Arc::new(Hub::new(settings).unwrap());
+        let mut scratch = Scratch::default();
+        let mut send = |id: &str| {
+            let mut session = Session::new(&hub, "sender".to_owned(), true);
+            session.bytes(line(id, 1).as_bytes(), Nanos(0), &mut scratch);
+            assert_eq!(session.end(), None);
+        };
+        send("silent longest");
+        send("newer");
+        let looked_at = read(&hub.sensors)["silent longest"].clone();
+        let held = lock(&looked_at);
+        std::thread::scope(|scope| {
+            let sent = scope.spawn(|| send("newest"));
+            // Without the wait it would have been done long ago.
+            std::thread::sleep(std::time::Duration::from_millis(200));
+            drop(held);
+            sent.join().unwrap();
+        });
+        assert_eq!(hub.places()["gave_way_last"][0], "silent longest");
     }
 
     #[test]

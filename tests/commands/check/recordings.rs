@@ -1,0 +1,137 @@
+//! The recordings of `../shared/logs`: all that their README describes is found, and nothing else.
+
+use super::{codes, found, notes};
+use crate::replays::{done, only, replay_with};
+use crate::shared_data::shared;
+use strapd::config::Plan;
+use strapd_attitude::record::SampleKind;
+
+/// File, errors and warnings. The Xsens samples are averages (see `fixtures/README.md`), which is
+/// found in every variant of that log.
+const FINDINGS: [(&str, &[&str]); 24] = [
+    ("real/broad07_60s_ros2_zstd", &["sample-kind"]),
+    ("real/husky_ros1_lz4", &[]),
+    (
+        "real/px4_fmuv6c_json_zstd",
+        &["jitter", "refused", "sample-kind"],
+    ),
+    ("real/ximu3_ros2_zstd", &["sample-kind"]),
+    ("real/xio_fusion_ros2_lz4", &["jitter", "missing"]),
+    (
+        "real/xio_gait_short_walk_protobuf_batch",
+        &["missing", "repeats"],
+    ),
+    ("real/xsens_mti_ros2_none", &["sample-kind"]),
+    (
+        "native/mcap_explorer_demo_json_imu",
+        &["orientation-constant"],
+    ),
+    ("native/rosbag2_wrong_format", &["no-imu-topic"]),
+    ("native/rosbag2parquet_array_msgs", &["clock"]),
+    ("native/rosbags_rs_all_types", &["orientation-constant"]),
+    (
+        "native/tiryoh_test_sample_truncated",
+        &["file-damaged", "no-imu-topic"],
+    ),
+    ("hostile/01_no_summary", &["sample-kind"]),
+    (
+        "hostile/02_truncated_mid_chunk",
+        &["file-damaged", "sample-kind"],
+    ),
+    ("hostile/06_big_endian_cdr", &["sample-kind"]),
+    ("hostile/07_zero_header_stamps", &["clock", "sample-kind"]),
+    (
+        "hostile/08_duplicate_stamps",
+        &["sample-kind", "shared-stamps"],
+    ),
+    ("hostile/09_gap_2s", &["gap-held", "missing", "sample-kind"]),
+    ("hostile/10_nan_inf", &["not-finite", "sample-kind"]),
+    ("hostile/13_two_imu_topics", &["sample-kind"]),
+    (
+        "hostile/16_short_and_empty_payloads",
+        &["missing", "sample-kind", "undecodable"],
+    ),
+    ("hostile/25_header_only", &["no-imu-topic"]),
+    ("hostile/mcap-0.25.0-hang", &["file-damaged", "undecodable"]),
+    ("hostile/01_no_summary", &["sample-kind"]),
+];
+
+#[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+fn what_is_known_of_each_recording_is_found_and_nothing_else() {
+    for (name, expected) in FINDINGS {
+        let Some(path) = shared(&format!("logs/{name}.mcap")) else {
+            return;
+        };
+        let found = found(&path);
+        assert_eq!(codes(&found), expected, "{name}: {found:#?}");
+    }
+}
+
+#[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+fn choices_are_noted() {
+    for (name, note) in [
+        ("real/husky_ros1_lz4", "mounted-on-side"),
+        ("real/xio_fusion_ros2_lz4", "sample-kind-unknown"),
+        ("hostile/13_two_imu_topics", "several-topics"),
+    ] {
+        let Some(path) = shared(&format!("logs/{name}.mcap")) else {
+            return;
+        };
+        let found = found(&path);
+        assert!(notes(&found).contains(&note), "{name}: {found:#?}");
+    }
+}
+
+#[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+fn evidence_is_the_numbers_of_the_recording() {
+    let Some(path) = shared("logs/hostile/09_gap_2s.mcap") else {
+        return;
+    };
+    let found = found(&path);
+    let gap = found.iter().find(|f| f.code == "gap-held").unwrap();
+    let longest = gap.evidence["longest_s"].as_f64().unwrap();
+    assert!((longest - 2.02).abs() < 1e-9, "{gap:?}");
+    assert_eq!(gap.flags, "--on-gap bridge --max-gap 2.1");
+}
+
+/// x-IMU3, BROAD and PX4: followed, the advice brings the gyro closer to the recorded orientation.
+#[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+fn the_advice_on_the_meaning_of_a_sample_reduces_the_error() {
+    for (name, topic, at_most) in [
+        ("ximu3_ros2_zstd", "/imu", 0.4),
+        ("broad07_60s_ros2_zstd", "/imu", 0.7),
+        ("px4_fmuv6c_json_zstd", "/vehicle_angular_velocity", 0.95),
+    ] {
+        let Some(path) = shared(&format!("logs/real/{name}.mcap")) else {
+            return;
+        };
+        let found = found(&path);
+        let advice = found
+            .iter()
+            .find(|f| f.code == "sample-kind" && f.topic == topic)
+            .unwrap();
+        assert_eq!(advice.flags, "--sample-kind average", "{name}");
+        let median = |kind: Option<SampleKind>| {
+            let mut replay = replay_with(
+                &path,
+                Plan {
+                    topic: Some(topic.to_owned()),
+                    kind,
+                    ..Plan::default()
+                },
+            );
+            replay.against = Some(String::new());
+            let summary = done(&replay).unwrap();
+            let topic = only(&summary);
+            let used = topic.kind.name();
+            let row = topic.against.iter().find(|r| r.kind == used).unwrap();
+            row.median_deg
+        };
+        let (before, after) = (median(None), median(Some(SampleKind::Average)));
+        assert!(after < at_most * before, "{name}: {before} to {after} deg");
+    }
+}

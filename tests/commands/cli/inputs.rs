@@ -1,0 +1,245 @@
+//! Inputs that are none, each with the words a user needs.
+
+use super::{bench, strapd, strapd_fed};
+use crate::made_logs::{PACKINGS, bytes, logged, motion};
+use crate::replays::fixture;
+use crate::shared_data::shared;
+
+#[test]
+fn what_is_not_there_a_directory_empty_or_no_mcap_is_called_so_by_every_command() {
+    let dir = bench();
+    let at = dir.path();
+    std::fs::create_dir(at.join("folder")).unwrap();
+    std::fs::write(at.join("empty.mcap"), b"").unwrap();
+    std::fs::write(at.join("text.mcap"), b"timestamp,x,y,z\n").unwrap();
+    std::fs::write(at.join("short.mcap"), b"\x89MCAP").unwrap();
+    for command in ["replay -o out.csv", "replay", "info", "cat"] {
+        let on = |file: &str| strapd(at, &format!("{command} {file}"));
+        on("nowhere.mcap").refused(1, &["nowhere.mcap", "cannot open", "No such file"]);
+        on("folder").refused(
+            1,
+            &["folder", "is a directory", "help: name the .mcap file"],
+        );
+        on("empty.mcap").refused(1, &["empty.mcap", "is empty"]);
+        on("text.mcap").refused(1, &["text.mcap", "not an MCAP", "timestam"]);
+        on("short.mcap").refused(1, &["short.mcap", "not an MCAP"]);
+    }
+    assert!(!at.join("out.csv").exists());
+    strapd(at, "compare nowhere.mcap log.mcap").refused(1, &["nowhere.mcap", "cannot open"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_file_that_may_not_be_read_says_why() {
+    use std::os::unix::fs::PermissionsExt;
+    let dir = bench();
+    let log = dir.path().join("log.mcap");
+    std::fs::set_permissions(&log, std::fs::Permissions::from_mode(0o000)).unwrap();
+    if std::fs::File::open(&log).is_ok() {
+        eprintln!("SKIPPED: this user may read everything");
+        return;
+    }
+    strapd(dir.path(), "replay log.mcap").refused(1, &["log.mcap", "Permission denied"]);
+}
+
+#[test]
+fn standard_input_that_is_empty_or_no_log_is_called_so() {
+    let dir = bench();
+    let fed = |bytes: &[u8]| strapd_fed(dir.path(), "replay - -o null:", bytes.to_vec());
+    fed(b"").refused(1, &["standard input", "empty"]);
+    fed(b"hello\nworld\n").refused(
+        1,
+        &["standard input", "line 1", "help: one JSON object per line"],
+    );
+    fed(b"{\"class\":\"STATUS\"}\n").refused(1, &["standard input", "no line carries a body rate"]);
+    fed(&[0xff; 3000]).refused(1, &["standard input", "line 1"]);
+    // One line without end.
+    fed(&vec![b'7'; 3 << 20]).refused(1, &["standard input", "line 1"]);
+}
+
+#[test]
+fn two_sensors_in_one_stream_of_lines_are_not_mixed() {
+    let dir = bench();
+    let line = |id: &str, n: u64| {
+        format!(
+            "{{\"class\":\"RATE\",\"id\":\"{id}\",\"stamp\":{{\"sec\":{n},\"nsec\":0}},\"gyro\":[0.1,0,0]}}\n"
+        )
+    };
+    let text = line("left", 1) + &line("right", 1) + &line("left", 2);
+    strapd_fed(dir.path(), "replay - -o null:", text.clone().into_bytes())
+        .refused(1, &["line 2", "`right`", "--topic"]);
+    let one = strapd_fed(
+        dir.path(),
+        "replay - -o null: --topic left --json",
+        text.into_bytes(),
+    );
+    assert_eq!(one.json()["topics"][0]["samples"]["total"], 2, "{one:?}");
+}
+
+#[test]
+fn several_imu_topics_are_listed_and_each_can_be_taken() {
+    let dir = bench();
+    let at = dir.path();
+    let samples = motion(100);
+    let mut both = logged("/left/imu", &samples);
+    both.extend(logged("/right/imu", &samples));
+    both.sort_by_key(|m| m.log_time);
+    std::fs::write(at.join("two.mcap"), bytes(PACKINGS[2].1, 4096, &both)).unwrap();
+    for command in ["replay", "cat"] {
+        strapd(at, &format!("{command} two.mcap")).refused(
+            1,
+            &["/left/imu ", "/right/imu ", "100 messages", "--topic NAME"],
+        );
+    }
+    let one = strapd(at, "replay two.mcap --topic /right/imu --json");
+    assert_eq!(one.done().json()["topics"][0]["topic"], "/right/imu");
+    let all = strapd(at, "replay two.mcap --topic all --json -o all.ndjson");
+    let topics = all.done().json()["topics"].clone();
+    assert_eq!(topics.as_array().unwrap().len(), 2, "{topics}");
+    let text = std::fs::read_to_string(at.join("all.ndjson")).unwrap();
+    for id in ["/left/imu", "/right/imu"] {
+        assert_eq!(text.matches(&format!("\"id\":\"{id}\"")).count(), 100);
+    }
+}
+
+#[test]
+fn a_wrong_field_or_topic_lists_what_would_do() {
+    let dir = bench();
+    let at = dir.path();
+    strapd(at, "replay log.mcap --field gyro=gyroscope").refused(
+        1,
+        &[
+            "/imu/data_raw",
+            "`gyroscope`",
+            "angular_velocity",
+            "--field gyro=",
+        ],
+    );
+    strapd(at, "replay log.mcap --field gyroscope").refused(2, &["--field", "gyroscope"]);
+    strapd(at, "replay log.mcap --field speed=a.b").refused(2, &["--field", "speed"]);
+    strapd(at, "replay log.mcap --topic /imu").refused(1, &["no topic `/imu`", "/imu/data_raw"]);
+    strapd(at, "info log.mcap --topic /imu").refused(1, &["no topic `/imu`", "/imu/data_raw"]);
+    // The right one is taken, though it is not the usual one.
+    let accel = strapd(
+        at,
+        "replay log.mcap --field gyro=linear_acceleration --json",
+    );
+    assert_eq!(accel.done().json()["topics"][0]["samples"]["used"], 300);
+}
+
+#[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+fn an_encoding_nobody_knows_is_an_error_that_names_it() {
+    let Some(path) = shared("logs/native/rosbag2_wrong_format.mcap") else {
+        return;
+    };
+    let dir = bench();
+    strapd(dir.path(), &format!("replay {}", path.display()))
+        .refused(1, &["/test_topic", "wrong_format"]);
+}
+
+#[test]
+fn a_log_that_has_lost_samples_ends_with_3_and_says_what_even_when_quiet() {
+    let dir = bench();
+    let log = fixture("faults.mcap");
+    let log = log.display();
+    let ran = strapd(dir.path(), &format!("replay {log} -o null:"));
+    assert_eq!(ran.code, Some(3), "{ran:?}");
+    for word in [
+        "8 of 602 samples",
+        "2 not finite",
+        "1 huge",
+        "1 undecodable",
+        "1 held",
+    ] {
+        assert!(ran.out.contains(word), "`{word}` is missing: {}", ran.out);
+    }
+    // The stamp that is zero is no time: "at -1700000000 s" helps nobody.
+    assert!(!ran.out.contains("at -17"), "{}", ran.out);
+
+    let quiet = strapd(dir.path(), &format!("replay {log} -o null: --quiet"));
+    assert_eq!((quiet.code, quiet.out.as_str()), (Some(3), ""), "{quiet:?}");
+    for word in ["lost 8 of 602 samples", "1 gaps were not integrated over"] {
+        assert!(
+            quiet.err.contains(word),
+            "`{word}` is missing: {}",
+            quiet.err
+        );
+    }
+}
+
+#[test]
+fn one_bad_log_of_several_does_not_stop_the_others() {
+    let dir = bench();
+    let at = dir.path();
+    std::fs::copy(at.join("log.mcap"), at.join("more.mcap")).unwrap();
+    let ran = strapd(
+        at,
+        "replay log.mcap nowhere.mcap more.mcap -o {stem}.csv --json",
+    );
+    assert_eq!(ran.code, Some(1), "{ran:?}");
+    assert!(
+        ran.err.contains("error: nowhere.mcap: cannot open"),
+        "{ran:?}"
+    );
+    let sources: Vec<_> = ran
+        .json()
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|s| s["source"].clone())
+        .collect();
+    assert_eq!(sources, ["log.mcap", "more.mcap"]);
+    assert!(at.join("log.csv").exists() && at.join("more.csv").exists());
+}
+
+#[test]
+fn shards_take_every_log_once() {
+    let dir = bench();
+    let at = dir.path();
+    let logs: Vec<String> = (0..5).map(|k| format!("log{k}.mcap")).collect();
+    for log in &logs {
+        std::fs::copy(at.join("log.mcap"), at.join(log)).unwrap();
+    }
+    std::fs::create_dir(at.join("out")).unwrap();
+    let list = logs.join(" ");
+    let mut taken = Vec::new();
+    for shard in 0..3 {
+        let ran = strapd(
+            at,
+            &format!("replay {list} -o out/ --shard {shard}/3 --json"),
+        );
+        for summary in ran.done().json().as_array().unwrap() {
+            taken.push(summary["source"].as_str().unwrap().to_owned());
+        }
+    }
+    taken.sort();
+    assert_eq!(taken, logs);
+    assert_eq!(super::names(&at.join("out")).len(), 5);
+}
+
+#[test]
+fn of_samples_and_the_attitude_made_of_them_the_samples_are_taken() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let made = strapd(dir, "simulate top --duration 2 -q -o top.mcap");
+    assert_eq!(made.code, Some(0), "{made:?}");
+    // The input beside the output, as in a recording of the daemon.
+    let ran = strapd(dir, "replay top.mcap -q -o both.mcap --copy-input");
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    let again = strapd(dir, "replay both.mcap -o again.csv");
+    assert_eq!(again.code, Some(0), "{again:?}");
+    assert!(
+        again
+            .out
+            .contains("took /imu/data_raw; /imu/data could be taken too"),
+        "{again:?}"
+    );
+    strapd(dir, "replay top.mcap -q -o first.csv");
+    let read = |name: &str| std::fs::read_to_string(dir.join(name)).unwrap();
+    assert_eq!(read("first.csv"), read("again.csv"));
+    // Without the input it is the output that is taken.
+    strapd(dir, "replay top.mcap -q -o alone.mcap");
+    let alone = strapd(dir, "replay alone.mcap -o alone.csv");
+    assert_eq!(alone.code, Some(0), "{alone:?}");
+}

@@ -1,0 +1,38 @@
+//! What the command line does, as its users meet it: every command over logs of every kind, and what it writes.
+#![allow(clippy::print_stdout, reason = "figures, with --nocapture")]
+#![allow(
+    clippy::duplicate_mod,
+    reason = "the example's own modules, and those of the logs made here"
+)]
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
+mod allan;
+mod bad_input;
+mod check;
+mod cli;
+mod earth_rate;
+mod fixtures;
+mod model;
+mod recover;
+mod regularise;
+mod replay;
+mod report;
+mod simulate;
+mod sinks;
+mod streams;
+mod youbot;
+
+#[path = "../made_logs/mod.rs"]
+mod made_logs;
+#[path = "../mcap_logs/mod.rs"]
+mod mcap_logs;
+#[path = "../program/mod.rs"]
+mod program;
+#[path = "../replays/mod.rs"]
+mod replays;
+#[allow(dead_code, unreachable_pub)]
+#[path = "../shared_data/mod.rs"]
+mod shared_data;
+#[allow(dead_code)]
+#[path = "../../crates/recording/tests/recording/decode/writer.rs"]
+mod writer;

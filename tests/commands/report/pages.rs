@@ -1,0 +1,265 @@
+//! Made logs: spikes, silence, hostile names, outputs.
+
+use super::{figure, is_sound};
+use crate::made_logs::{ImuSample, PACKINGS, START, TOPIC, bytes, logged, motion, written};
+use crate::program::strapd;
+use serde_json::Value;
+use std::path::Path;
+
+/// The page about these samples.
+fn page(dir: &Path, samples: &[ImuSample], flags: &str) -> (String, Option<i32>) {
+    written(dir, "log.mcap", samples);
+    let ran = strapd(dir, &format!("report log.mcap -o r.html --force {flags}"));
+    assert!(matches!(ran.code, Some(0 | 3)), "{ran:?}");
+    let html = std::fs::read_to_string(dir.join("r.html")).unwrap();
+    is_sound(&html);
+    (html, ran.code)
+}
+
+/// Pixels `[x, y]` of every line of a chart.
+fn drawn(figure: &str) -> Vec<[f64; 2]> {
+    let lines = figure.split("points=\"").skip(1);
+    lines
+        .flat_map(|rest| rest.split('"').next().unwrap().split_whitespace())
+        .map(|pair| {
+            let (x, y) = pair.split_once(',').unwrap();
+            [x.parse().unwrap(), y.parse().unwrap()]
+        })
+        // To the left of the axes lie their ticks, to the right the legend.
+        .filter(|p: &[f64; 2]| (72.0..=808.0).contains(&p[0]))
+        .collect()
+}
+
+#[test]
+fn a_spike_of_one_sample_is_seen() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut samples = motion(30_000);
+    samples[12_345].gyro[1] = 30.0;
+    let (html, _) = page(dir.path(), &samples, "");
+    let rate = figure(&html, "rate").unwrap();
+    // Three lines of at most four points in each of 1400 stretches.
+    assert!(drawn(rate).len() < 17_000);
+    // The spike is of 1719 deg/s, all else below 100.
+    let labels = rate
+        .lines()
+        .filter_map(|line| line.trim().parse::<f64>().ok());
+    let largest = labels.fold(0.0, f64::max);
+    assert!(
+        (1000.0..1800.0).contains(&largest),
+        "the axis has {largest}"
+    );
+    let highest = drawn(rate)
+        .into_iter()
+        .min_by(|a, b| a[1].total_cmp(&b[1]))
+        .unwrap();
+    let above: Vec<_> = drawn(rate)
+        .into_iter()
+        .filter(|p| p[1] < highest[1] + 100.0)
+        .collect();
+    assert!(
+        above.len() <= 2,
+        "one spike alone reaches up there: {above:?}"
+    );
+    let places = drawn(rate).into_iter().map(|p| p[0]);
+    let (left, right) = (
+        places.clone().fold(f64::MAX, f64::min),
+        places.fold(0.0, f64::max),
+    );
+    let place = (highest[0] - left) / (right - left);
+    assert!((place - 12_345.0 / 30_000.0).abs() < 0.01, "{place}");
+}
+
+#[test]
+fn what_can_not_be_said_is_said_to_be_so() {
+    let dir = tempfile::tempdir().unwrap();
+    let (html, code) = page(dir.path(), &motion(1), "");
+    assert_eq!(code, Some(0));
+    assert!(html.contains("One sample is an instant") && html.contains("Fewer than two stamps"));
+    assert!(html.contains("the messages carry no orientation") && html.contains("never at rest"));
+    let mut samples = motion(300);
+    samples.iter_mut().for_each(|s| s.gyro[0] = f64::NAN);
+    let (html, code) = page(dir.path(), &samples, "");
+    assert_eq!(code, Some(3));
+    assert!(html.contains("No sample was used") && html.contains("No attitude could be had"));
+    assert_eq!(super::data(&html)["verdict"]["level"], "bad");
+    let mut samples = motion(300);
+    samples.iter_mut().for_each(|s| s.gyro_covariance_0 = -1.0);
+    let (html, _) = page(dir.path(), &samples, "");
+    assert!(html.contains("--ignore-covariance-flag"));
+    let (html, _) = page(dir.path(), &samples, "--ignore-covariance-flag");
+    assert!(figure(&html, "rate").is_some());
+}
+
+#[test]
+fn a_flag_answers_its_finding() {
+    let dir = tempfile::tempdir().unwrap();
+    let still: Vec<ImuSample> = motion(1500)
+        .into_iter()
+        .enumerate()
+        .map(|(i, s)| ImuSample {
+            gyro: [0.01, 1e-5 * (i % 7) as f64, -1e-5 * (i % 5) as f64],
+            accel: [0.0, 0.0, 9.80665],
+            ..s
+        })
+        .collect();
+    let level = |flags: &str| {
+        let (html, _) = page(dir.path(), &still, flags);
+        (super::data(&html), html)
+    };
+    let (with, html) = level("");
+    assert_eq!(with["verdict"]["level"], "warning", "{}", with["verdict"]);
+    assert!(
+        html.contains("so 585 s are missing"),
+        "15 s of rest are not 600"
+    );
+    let (without, html) = level("--bias auto");
+    assert_eq!(
+        without["verdict"]["level"], "good",
+        "{}",
+        without["verdict"]
+    );
+    assert!(html.contains("dealt with by <code>--bias</code>"));
+}
+
+#[test]
+fn ten_minutes_of_rest_give_an_allan_deviation() {
+    let dir = tempfile::tempdir().unwrap();
+    strapd(
+        dir.path(),
+        "simulate coning --half-angle-deg 0 --frequency-hz 0.001 --duration 640 --rate-hz 20 --noise arw=0.3 --seed 3 -q -o rest.mcap",
+    )
+    .done();
+    strapd(dir.path(), "report rest.mcap -o r.html").done();
+    let html = std::fs::read_to_string(dir.path().join("r.html")).unwrap();
+    let data = is_sound(&html);
+    assert!(figure(&html, "allan").is_some() && html.contains("arw, deg/sqrt(h)"));
+    let arw = |v: &Value| v["axes"][0]["terms_si"]["arw"]["value"].as_f64().unwrap();
+    let allan = strapd(dir.path(), "allan rest.mcap --json").json();
+    let (here, there) = (arw(&data["topics"][0]["allan"]), arw(&allan));
+    // Of nearly the same samples: the rest may be a window shorter than the record.
+    assert!((here / there - 1.0).abs() < 0.02, "{here} {there}");
+}
+
+#[test]
+fn a_reference_from_another_file_is_held_against() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    strapd(dir, "simulate top --duration 5 -q -o top.mcap").done();
+    strapd(dir, "replay top.mcap -q -o est.csv").done();
+    strapd(dir, "report top.mcap -o r.html --reference est.csv").done();
+    let html = std::fs::read_to_string(dir.join("r.html")).unwrap();
+    let data = is_sound(&html);
+    let error = &data["topics"][0]["reference_error"];
+    let used = error["kinds"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|k| k["used"] == true)
+        .unwrap();
+    assert!(
+        used["total"]["max_deg"].as_f64().unwrap() < 1e-5,
+        "the same run: {used}"
+    );
+    assert!(html.contains("est.csv"));
+    strapd(dir, "report top.mcap -o n.html --ref-topic /nowhere")
+        .refused(1, &["/nowhere", "/truth"]);
+    strapd(dir, "report top.mcap -o n.html --reference none.csv").refused(1, &["none.csv"]);
+    assert!(!dir.join("n.html").exists());
+}
+
+#[test]
+fn names_in_a_log_can_not_become_markup() {
+    let dir = tempfile::tempdir().unwrap();
+    const EVIL: &str = "</script><img src=x onerror=alert(1)>'\"&";
+    let mut messages = logged(EVIL, &motion(300));
+    messages.extend(logged(TOPIC, &motion(300)));
+    let path = dir.path().join("evil.mcap");
+    std::fs::write(path, bytes(PACKINGS[0].1, 4096, &messages)).unwrap();
+    let ran = strapd(dir.path(), "report evil.mcap -o -");
+    assert!(matches!(ran.code, Some(0 | 3)), "{ran:?}");
+    let data = is_sound(&ran.out);
+    assert!(!ran.out.contains("<img"));
+    assert!(
+        data["topics"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .any(|t| t["topic"] == EVIL)
+    );
+}
+
+#[test]
+fn a_clock_that_jumps_cuts_the_axis_and_hides_nothing() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut samples = motion(900);
+    for (i, s) in samples.iter_mut().enumerate() {
+        s.stamp += match i {
+            0..300 => -START,
+            300..600 => 0,
+            _ => -3_000_000_000,
+        };
+    }
+    let (html, code) = page(dir.path(), &samples, "");
+    assert_eq!(code, Some(3));
+    assert!(html.contains("the axis of time is cut there"));
+    let rate = drawn(figure(&html, "rate").unwrap());
+    let (left, right) = (rate[0][0], rate.iter().map(|p| p[0]).fold(0.0, f64::max));
+    let middle = |p: &&[f64; 2]| (0.3..0.7).contains(&((p[0] - left) / (right - left)));
+    assert!(
+        rate.iter().filter(middle).count() > 200,
+        "the samples fill the chart"
+    );
+}
+
+#[test]
+fn outputs_are_whole_or_absent() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    written(dir, "log.mcap", &motion(300));
+    strapd(dir, "report log.mcap").refused(2, &["-o report.html", "--json"]);
+    strapd(dir, "report log.mcap -o - --json").refused(2, &["stdout"]);
+    strapd(dir, "report log.mcap -o log.mcap --force").refused(1, &["is the input"]);
+    strapd(dir, "report none.mcap -o r.html").refused(1, &["none.mcap"]);
+    strapd(dir, "report log.mcap -o r.html");
+    strapd(dir, "report log.mcap -o r.html").refused(1, &["already exists", "--force"]);
+    strapd(dir, "report log.mcap -o r.html --init gravity").refused(1, &["already exists"]);
+    let mut names: Vec<_> = std::fs::read_dir(dir)
+        .unwrap()
+        .map(|e| e.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    assert_eq!(names, ["log.mcap", "r.html"]);
+}
+
+#[test]
+fn compare_draws_its_errors() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    strapd(dir, "simulate top --duration 5 -q -o top.mcap").done();
+    strapd(dir, "replay top.mcap -q -o est.csv --method dcm-right").done();
+    let ran = strapd(dir, "compare est.csv top.mcap --plot error.svg");
+    ran.done();
+    let svg = std::fs::read_to_string(dir.join("error.svg")).unwrap();
+    for word in [
+        "total, rms",
+        "heading, rms",
+        "inclination, rms",
+        "95 %",
+        "max",
+    ] {
+        assert!(svg.contains(word), "{word}");
+    }
+    // The numbers of the text stand in the title.
+    let total = ran
+        .out
+        .lines()
+        .find(|l| l.trim_start().starts_with("total"))
+        .unwrap();
+    for number in total.split_whitespace().skip(1) {
+        assert!(svg.contains(number), "{number}: {total}");
+    }
+    strapd(dir, "compare est.csv top.mcap --plot error.svg")
+        .refused(1, &["already exists", "--force"]);
+    strapd(dir, "compare est.csv top.mcap --plot error.png").refused(2, &["SVG", "error.svg"]);
+    strapd(dir, "compare est.csv top.mcap --plot error.svg --force").done();
+}

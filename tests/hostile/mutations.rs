@@ -1,0 +1,173 @@
+//! Promise: no bytes from outside make anything panic, hang or lie. Every parser, fed with its
+//! good inputs (`fuzz/seeds`) changed at random: the functions are those of the fuzzers in `fuzz/`.
+//!
+//! `STRAPD_MUTATIONS=1000000 cargo test --release --test hostile mutations` runs as many cases for each;
+//! `STRAPD_MUTANTS=200000` as many changed logs through all commands.
+
+#[cfg(target_os = "linux")]
+mod commands;
+
+use rand::{Rng, RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+fn seeds(target: &str) -> Vec<Vec<u8>> {
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+        .join("fuzz/seeds")
+        .join(target);
+    let mut files: Vec<_> = std::fs::read_dir(&folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .collect();
+    files.sort();
+    let seeds: Vec<_> = files
+        .iter()
+        .map(|file| std::fs::read(file).unwrap())
+        .collect();
+    assert!(!seeds.is_empty(), "{folder:?}");
+    seeds
+}
+
+/// Up to seven changes of the kinds that hurt: bits, cuts, counts that promise the world, words of the format in
+/// the wrong place, pieces of another input.
+fn mutate(bytes: &mut Vec<u8>, other: &[u8], rng: &mut ChaCha8Rng) {
+    const WORDS: [&[u8]; 13] = [
+        b"\n",
+        b"{",
+        b"}",
+        b"]",
+        b"\"",
+        b"\\u",
+        b"1e999",
+        b"-0",
+        b"null",
+        b"\xff",
+        b"\0\0\0\0",
+        b"\xff\xff\xff\x7f",
+        b"\xf8\x01\x30\0",
+    ];
+    for _ in 0..rng.random_range(1..8) {
+        let at = rng.random_range(0..bytes.len() + 1);
+        let end = (at + rng.random_range(0..20)).min(bytes.len());
+        match rng.random_range(0..9) {
+            0 | 1 if at < bytes.len() => bytes[at] ^= 1 << rng.random_range(0..8),
+            2 => bytes.truncate(at),
+            3 => bytes.insert(at, rng.random()),
+            4 => bytes[at..end.min(at + 8)].fill(if rng.random() { 0xff } else { 0x7f }),
+            5 => drop(bytes.drain(at..end)),
+            6 => {
+                let word = WORDS[rng.random_range(0..WORDS.len())];
+                bytes.splice(at..at, word.iter().copied());
+            }
+            7 if !other.is_empty() => {
+                let from = rng.random_range(0..other.len());
+                let piece = &other[from..(from + rng.random_range(1..40)).min(other.len())];
+                bytes.splice(at..end, piece.iter().copied());
+            }
+            _ => {
+                let piece = bytes[at..end].to_vec();
+                bytes.splice(at..at, piece);
+            }
+        }
+    }
+}
+
+fn survives(target: &str, cases: usize, parse: fn(&[u8])) {
+    let cases = std::env::var("STRAPD_MUTATIONS").map_or(cases, |n| n.parse().unwrap());
+    let seeds = seeds(target);
+    for seed in &seeds {
+        parse(seed);
+    }
+    // A fixed generator: the same bytes everywhere, every time.
+    let mut rng = ChaCha8Rng::seed_from_u64(target.bytes().map(u64::from).sum());
+    let mut slowest = Duration::ZERO;
+    for case in 0..cases {
+        let mut bytes = seeds[case % seeds.len()].clone();
+        mutate(
+            &mut bytes,
+            &seeds[rng.random_range(0..seeds.len())],
+            &mut rng,
+        );
+        if case % 50 == 0 {
+            // Noise, now and then.
+            bytes.truncate(200);
+            rng.fill_bytes(&mut bytes);
+        }
+        let start = Instant::now();
+        let outcome = catch_unwind(AssertUnwindSafe(|| parse(&bytes)));
+        slowest = slowest.max(start.elapsed());
+        assert!(
+            outcome.is_ok(),
+            "{target}, case {case}: {:?}",
+            bytes.escape_ascii().to_string()
+        );
+        // They take microseconds; a loop over a forged count would take minutes.
+        assert!(
+            start.elapsed() < Duration::from_secs(20),
+            "{target}, case {case}: {:?}",
+            bytes.escape_ascii().to_string()
+        );
+    }
+    eprintln!("{target}: {cases} cases, the slowest {slowest:?}");
+}
+
+/// Enough for every parser in CI; together within a minute on two quiet cores.
+const CASES: usize = 100_000;
+
+#[test]
+fn cdr() {
+    survives("cdr", CASES, crate::parsers::cdr);
+}
+
+#[test]
+fn ros1() {
+    survives("ros1", CASES, crate::parsers::ros1);
+}
+
+#[test]
+fn json() {
+    survives("json", CASES, crate::parsers::json);
+}
+
+#[test]
+fn protobuf() {
+    survives("protobuf", CASES, crate::parsers::protobuf);
+}
+
+#[test]
+fn schemas() {
+    survives("schema", CASES, crate::parsers::schema);
+}
+
+#[test]
+fn lines() {
+    survives("lines", CASES, crate::parsers::lines);
+}
+
+#[test]
+fn conversations() {
+    survives("session", CASES, crate::parsers::session);
+}
+
+#[test]
+fn viewers() {
+    survives("foxglove", CASES, crate::parsers::foxglove);
+}
+
+#[test]
+fn logs() {
+    survives("mcap", CASES, crate::parsers::mcap);
+}
+
+/// The mutations reach both sides: what is accepted, and what is not.
+#[test]
+fn a_bug_would_be_found() {
+    let found = catch_unwind(|| {
+        survives("json", 2_000, |bytes| {
+            assert!(!bytes.windows(5).any(|w| w == b"1e999"), "found");
+        });
+    });
+    assert!(found.is_err());
+}

@@ -1,0 +1,347 @@
+//! Foxglove's protocol on every `ws-listen://`.
+
+use super::lines::{LOG, lines_of};
+use super::watched::paused;
+use crate::serve::client::{Client, rate};
+use crate::serve::daemon::{Daemon, PATIENCE, TCP, WS, listening};
+use serde_json::{Value, json};
+use std::collections::VecDeque;
+use std::net::{SocketAddr, TcpStream};
+use std::process::Command;
+use tungstenite::client::IntoClientRequest;
+use tungstenite::{Message, WebSocket};
+
+/// A viewer that speaks one of the sub-protocols.
+struct Viewer {
+    socket: WebSocket<TcpStream>,
+    /// What came while something else was waited for: an answer overtakes data, or not.
+    passed_over: VecDeque<Message>,
+}
+
+impl Viewer {
+    fn connect(address: SocketAddr, protocols: &str) -> (Viewer, Option<String>) {
+        let stream = TcpStream::connect(address).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        let mut request = format!("ws://{address}/").into_client_request().unwrap();
+        let name = "Sec-WebSocket-Protocol";
+        request
+            .headers_mut()
+            .insert(name, protocols.parse().unwrap());
+        let (socket, response) = tungstenite::client(request, stream).unwrap();
+        let spoken = response.headers().get(name);
+        let spoken = spoken.map(|s| s.to_str().unwrap().to_owned());
+        let viewer = Viewer {
+            socket,
+            passed_over: VecDeque::new(),
+        };
+        (viewer, spoken)
+    }
+
+    fn send(&mut self, value: &Value) {
+        self.socket.send(Message::text(value.to_string())).unwrap();
+    }
+
+    fn next(&mut self) -> Message {
+        loop {
+            match self.socket.read().unwrap() {
+                Message::Ping(_) | Message::Pong(_) => {}
+                message => return message,
+            }
+        }
+    }
+
+    /// The first message not yet found of which `find` makes something.
+    fn first<T>(&mut self, find: impl Fn(&Message) -> Option<T>) -> T {
+        let known = self.passed_over.iter().enumerate();
+        if let Some((n, found)) = known.filter_map(|(n, m)| Some((n, find(m)?))).next() {
+            self.passed_over.remove(n);
+            return found;
+        }
+        loop {
+            let message = self.next();
+            if let Some(found) = find(&message) {
+                return found;
+            }
+            self.passed_over.push_back(message);
+            assert!(self.passed_over.len() < 50_000, "it does not come");
+        }
+    }
+
+    /// The next text message with this `op`.
+    fn text(&mut self, op: &str) -> Value {
+        self.first(|message| {
+            let value: Value = serde_json::from_str(message.to_text().ok()?).ok()?;
+            (value["op"] == op).then_some(value)
+        })
+    }
+
+    /// The next binary message that begins with this byte.
+    fn binary(&mut self, op: u8) -> Vec<u8> {
+        self.first(|message| match message {
+            Message::Binary(bytes) if bytes[0] == op => Some(bytes.to_vec()),
+            _ => None,
+        })
+    }
+
+    /// Asks for playback; the state that answers.
+    fn control(&mut self, command: u8, speed: f32, seek: Option<u64>) -> Vec<u8> {
+        let mut message = vec![3, command];
+        message.extend(speed.to_le_bytes());
+        message.push(u8::from(seek.is_some()));
+        message.extend(seek.unwrap_or_default().to_le_bytes());
+        message.extend(3u32.to_le_bytes());
+        message.extend(b"now");
+        self.socket.send(Message::binary(message)).unwrap();
+        self.first(|message| match message {
+            Message::Binary(bytes) if bytes[0] == 5 && bytes.ends_with(b"now") => {
+                Some(bytes.to_vec())
+            }
+            _ => None,
+        })
+    }
+}
+
+fn time_of(frame: &[u8], at: usize) -> u64 {
+    u64::from_le_bytes(frame[at..at + 8].try_into().unwrap())
+}
+
+#[test]
+fn the_first_sub_protocol_offered_that_is_known_is_spoken() {
+    let daemon = Daemon::start(listening(&[WS]));
+    for (offered, spoken) in [
+        ("foxglove.sdk.v1", "foxglove.sdk.v1"),
+        (
+            "foxglove.websocket.v1, foxglove.sdk.v1",
+            "foxglove.websocket.v1",
+        ),
+        ("x, foxglove.sdk.v1", "foxglove.sdk.v1"),
+    ] {
+        let (mut viewer, answer) = Viewer::connect(daemon.address(0), offered);
+        assert_eq!(answer.as_deref(), Some(spoken));
+        assert_eq!(viewer.text("serverInfo")["capabilities"], json!([]));
+    }
+    let (mut plain, answer) = Viewer::connect(daemon.address(0), "strapd.v1");
+    assert_eq!(answer.as_deref(), Some("strapd.v1"));
+    let Message::Text(greeting) = plain.next() else {
+        unreachable!("a line")
+    };
+    assert!(greeting.contains("VERSION"));
+}
+
+#[test]
+fn the_sensors_of_a_daemon_are_channels_as_they_come_and_what_is_not_offered_is_answered() {
+    let daemon = Daemon::start(listening(&[TCP, WS]));
+    let (mut viewer, _) = Viewer::connect(daemon.address(1), "foxglove.sdk.v1");
+    let first = viewer.text("advertise");
+    assert_eq!(first["channels"][0]["topic"], "/tf");
+    let mut sender = Client::tcp(daemon.address(0)).watching(r#"{"class":"WATCH"}"#);
+    sender.send(&rate("imu0", 0, 0.5));
+    sender.next_of("ATT");
+    let channel = viewer.text("advertise")["channels"][0].clone();
+    assert_eq!(channel["topic"], "imu0/data");
+    assert_eq!(channel["schemaName"], "sensor_msgs/msg/Imu");
+    let id = channel["id"].clone();
+    for bad in [
+        json!({"op": "publish"}),
+        json!({"op": "subscribe", "subscriptions": [{"id": 1, "channelId": 99}]}),
+        json!([]),
+    ] {
+        viewer.send(&bad);
+        assert_eq!(viewer.text("status")["level"], 2, "{bad}");
+    }
+    viewer.send(&json!({"op": "subscribe", "subscriptions": [{"id": 7, "channelId": id}]}));
+    // Subscribed, once the next answer comes.
+    viewer.send(&json!({"op": "x"}));
+    viewer.text("status");
+    viewer.binary(1);
+    sender.send(&rate("imu0", 1, 0.5));
+    let frame = viewer.binary(1);
+    assert_eq!(frame[1..5], 7u32.to_le_bytes());
+    assert_eq!(&frame[13..17], &[0, 1, 0, 0], "CDR, little endian");
+    assert_eq!(frame[21..25], 1_000_000_u32.to_le_bytes());
+    viewer.send(&json!({"op": "unsubscribe", "subscriptionIds": [7]}));
+    viewer.send(&json!({"op": "x"}));
+    viewer.text("status");
+    // Nothing that can be done here moves it.
+    viewer
+        .socket
+        .send(Message::binary([&[3u8, 0][..], &[0; 17]].concat()))
+        .unwrap();
+    assert!(
+        viewer.text("status")["message"]
+            .as_str()
+            .unwrap()
+            .contains("replay")
+    );
+    for _ in 0..30 {
+        let _ = viewer.socket.send(Message::text("nonsense"));
+    }
+    let closed = std::iter::from_fn(|| viewer.socket.read().ok())
+        .take(1000)
+        .count();
+    assert!(closed < 1000, "it is closed after too much nonsense");
+}
+
+#[test]
+fn a_new_subscription_gets_the_last_message_of_its_channel_at_once() {
+    let daemon = Daemon::start(listening(&[TCP, WS]));
+    let mut sender = Client::tcp(daemon.address(0)).watching(r#"{"class":"WATCH"}"#);
+    for (id, until) in [("ended", 4), ("imu0", 7)] {
+        for n in 0..until {
+            sender.send(&rate(id, n, 0.5));
+            sender.next_of("ATT");
+        }
+    }
+    let (mut viewer, _) = Viewer::connect(daemon.address(1), "foxglove.sdk.v1");
+    let channels = viewer.text("advertise")["channels"].clone();
+    let of = |topic: &str| {
+        let known = channels.as_array().unwrap().iter();
+        let found = known.clone().find(|c| c["topic"] == topic);
+        found.expect("no such topic")["id"].clone()
+    };
+    // The stamp in the header is the first of an Imu, behind the encapsulation.
+    let second = |frame: &[u8]| i32::from_le_bytes(frame[17..21].try_into().unwrap());
+    let nanos = |frame: &[u8]| u32::from_le_bytes(frame[21..25].try_into().unwrap());
+    let subscribe = |viewer: &mut Viewer, id: u32, channel: &Value| {
+        viewer
+            .send(&json!({"op": "subscribe", "subscriptions": [{"id": id, "channelId": channel}]}));
+    };
+    subscribe(&mut viewer, 7, &of("ended/data"));
+    let frame = viewer.binary(1);
+    assert_eq!(frame[1..5], 7u32.to_le_bytes());
+    assert_eq!((second(&frame), nanos(&frame)), (1_700_000_000, 3_000_000));
+    // Of the transforms one of each sensor, and of what was subscribed to before nothing again.
+    subscribe(&mut viewer, 8, &of("/tf"));
+    for _ in 0..2 {
+        assert_eq!(viewer.binary(1)[1..5], 8u32.to_le_bytes());
+    }
+    subscribe(&mut viewer, 9, &of("imu0/data"));
+    let frame = viewer.binary(1);
+    assert_eq!((frame[1], nanos(&frame)), (9, 6_000_000));
+    sender.send(&rate("imu0", 7, 0.5));
+    let frame = viewer.binary(1);
+    assert_eq!((frame[1], nanos(&frame)), (9, 7_000_000));
+    assert_eq!(viewer.binary(1)[1..5], 8u32.to_le_bytes());
+}
+
+#[test]
+fn a_token_is_asked_for_before_anything_is_said() {
+    let mut settings = listening(&[WS]);
+    settings.token = Some(strapd::serve::admission::Token::new("0123456789abcdef"));
+    let daemon = Daemon::start(settings);
+    let stream = TcpStream::connect(daemon.address(0)).unwrap();
+    let mut request = format!("ws://{}/", daemon.address(0))
+        .into_client_request()
+        .unwrap();
+    let headers = request.headers_mut();
+    headers.insert("Sec-WebSocket-Protocol", "foxglove.sdk.v1".parse().unwrap());
+    let refused = tungstenite::client(request, stream)
+        .unwrap_err()
+        .to_string();
+    assert!(refused.contains("401"), "{refused}");
+}
+
+#[test]
+fn a_viewer_plays_pauses_and_seeks_and_a_seek_backward_is_another_session() {
+    let process = paused(&format!("replay {LOG} --loop"), &[WS]);
+    let mut plain = Client::web(process.address(0));
+    while plain.next_of("PLAYBACK")["start"].is_null() {
+        plain.send(r#"{"class":"PLAYBACK","action":"pause"}"#);
+    }
+    let (mut viewer, _) = Viewer::connect(process.address(0), "foxglove.sdk.v1");
+    let info = viewer.text("serverInfo");
+    assert_eq!(info["capabilities"], json!(["time", "playbackControl"]));
+    let start = &info["dataStartTime"];
+    let start = start["sec"].as_u64().unwrap() * 1_000_000_000 + start["nsec"].as_u64().unwrap();
+    viewer.send(&json!({"op": "subscribe", "subscriptions": [{"id": 5, "channelId": 2}, {"id": 6, "channelId": 1}]}));
+    let state = viewer.control(1, 0.0, Some(start + 4_000_000_000));
+    assert_eq!((state[1], state[14]), (1, 1), "paused, and it did seek");
+    assert_eq!(time_of(&viewer.binary(1), 5), start + 4_000_000_000);
+    let state = viewer.control(0, 5.0, None);
+    assert_eq!((state[1], &state[10..14]), (0, &5f32.to_le_bytes()[..]));
+    assert!(time_of(&viewer.binary(2), 1) >= start + 4_000_000_000);
+    viewer.control(1, 5.0, Some(start + 1_000_000_000));
+    assert_ne!(viewer.text("serverInfo")["sessionId"], info["sessionId"]);
+    loop {
+        if time_of(&viewer.binary(1), 5) == start + 1_000_000_000 {
+            break;
+        }
+    }
+}
+
+/// The bits of a number: `1` is what `1.0` is called in JavaScript, and `0` is `-0` there too.
+fn number(value: &Value) -> u64 {
+    (value.as_f64().unwrap() + 0.0).to_bits()
+}
+
+#[test]
+#[cfg_attr(
+    not(has_foxglove),
+    ignore = "needs node, and what .ci/run installs in target/foxglove"
+)]
+fn foxgloves_own_client_reads_every_attitude_as_it_stands_in_the_lines() {
+    // The client Foxglove publishes, from npm.
+    let modules = concat!(env!("CARGO_MANIFEST_DIR"), "/target/foxglove/node_modules");
+    let expected = lines_of(&format!("replay {LOG}"));
+    let process = paused(&format!("replay {LOG}"), &[WS]);
+    let output = Command::new("node")
+        .arg(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/tests/oracles/foxglove_client.mjs"
+        ))
+        .arg(format!("ws://{}/", process.address(0)))
+        .arg(expected.len().to_string())
+        .env("NODE_PATH", modules)
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{output:?}");
+    let said: Vec<Value> = String::from_utf8(output.stdout)
+        .unwrap()
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    let info = &said[0];
+    assert_eq!(info["protocol"], "foxglove.websocket.v1");
+    assert_eq!(info["capabilities"], json!(["time"]));
+    let status = said.iter().find(|v| v["op"] == "status").unwrap();
+    assert!(
+        status["message"]
+            .as_str()
+            .unwrap()
+            .contains("getParameters")
+    );
+    assert!(said.last().unwrap()["times"].as_u64().unwrap() > 100);
+
+    let on = |topic: &str| -> Vec<&Value> { said.iter().filter(|v| v["topic"] == topic).collect() };
+    let (imu, tf) = (on("/imu/data/attitude"), on("/tf"));
+    assert_eq!(imu.len(), expected.len());
+    // The last transform may come behind the last attitude.
+    assert!(tf.len() + 1 >= imu.len());
+    for (n, (found, line)) in imu.iter().zip(&expected).enumerate() {
+        let line: Value = serde_json::from_str(line).unwrap();
+        let message = &found["message"];
+        for axis in ["w", "x", "y", "z"] {
+            assert_eq!(
+                number(&message["orientation"][axis]),
+                number(&line["q"][axis]),
+                "{n}"
+            );
+        }
+        for (n, axis) in ["x", "y", "z"].iter().enumerate() {
+            assert_eq!(
+                number(&message["angular_velocity"][axis]),
+                number(&line["rate"][n])
+            );
+        }
+        let stamp = &message["header"]["stamp"];
+        assert_eq!(stamp["sec"], line["stamp"]["sec"]);
+        assert_eq!(
+            stamp["nanosec"].as_u64().or(stamp["nsec"].as_u64()),
+            line["stamp"]["nsec"].as_u64()
+        );
+        if let Some(tf) = tf.get(n) {
+            let rotation = &tf["message"]["transforms"][0]["transform"]["rotation"];
+            assert_eq!(rotation, &message["orientation"]);
+        }
+    }
+}

@@ -1,0 +1,177 @@
+//! `-o tcp-listen://`, `unix-listen://`, `ws-listen://`.
+
+use super::lines::{LOG, SIMULATION, lines_of, of_class};
+use crate::program::strapd;
+use crate::serve::client::{Client, get};
+use crate::serve::daemon::{Process, TCP, WS, eventually};
+use std::path::Path;
+
+/// Started, and waiting for a client to say `play`.
+pub(crate) fn paused(arguments: &str, sinks: &[&str]) -> Process {
+    let mut args: Vec<&str> = arguments.split(' ').collect();
+    for sink in sinks {
+        args.extend(["-o", sink]);
+    }
+    args.extend(["--speed", "10", "--paused"]);
+    Process::of(&args)
+}
+
+#[test]
+fn every_transport_of_a_replay_brings_the_bytes_of_standard_output_and_then_closes() {
+    let dir = tempfile::tempdir().unwrap();
+    let socket = dir.path().join("s.sock");
+    let unix = format!("unix-listen://{}", socket.display());
+    let file = dir.path().join("beside.ndjson");
+    let mut process = paused(
+        &format!("replay {LOG}"),
+        &[TCP, WS, &unix, file.to_str().unwrap()],
+    );
+    let watch = r#"{"class":"WATCH"}"#;
+    let mut clients = [
+        Client::tcp(process.address(0)).watching(watch),
+        Client::web(process.address(1)).watching(watch),
+        Client::unix(&socket).watching(watch),
+    ];
+    assert_eq!(
+        get(process.address(1), "/healthz", &[("Host", "localhost")]),
+        (200, "ok\n".to_owned())
+    );
+    clients[0].send(r#"{"class":"PLAYBACK","action":"play"}"#);
+    let expected = lines_of(&format!("replay {LOG}"));
+    assert_eq!(expected.len(), 953);
+    // All at once: a Unix socket holds less than the run.
+    let readers = clients
+        .into_iter()
+        .map(|mut client| std::thread::spawn(move || client.lines()));
+    for reader in readers.collect::<Vec<_>>() {
+        let lines = reader.join().unwrap();
+        assert_eq!(of_class(&lines, "GAP"), [""; 0]);
+        assert!(of_class(&lines, "ATT") == expected, "other bytes");
+        assert!(lines.last().unwrap().contains("\"state\":\"ended\""));
+    }
+    assert_eq!(process.exit(), Some(0));
+    assert!(!socket.exists());
+    let written = std::fs::read_to_string(file).unwrap();
+    assert!(written.lines().eq(expected), "the file beside");
+}
+
+#[test]
+fn whoever_watches_a_simulation_gets_samples_and_truth_or_one_of_them() {
+    let process = paused(SIMULATION, &[TCP]);
+    let mut all = Client::tcp(process.address(0)).watching(r#"{"class":"WATCH"}"#);
+    let watching = |request: &str, answer: &str| {
+        let mut client = Client::tcp(process.address(0));
+        client.send(request);
+        assert_eq!(client.next_of("WATCH")["streams"].to_string(), answer);
+        client
+    };
+    let mut rates = watching(r#"{"class":"WATCH","streams":["RATE"]}"#, r#"["RATE"]"#);
+    let mut truth = watching(r#"{"class":"WATCH","id":"truth"}"#, r#"["ATT","RATE"]"#);
+    all.send(r#"{"class":"PLAYBACK","action":"play"}"#);
+    let expected = lines_of(SIMULATION);
+    let of = |class| of_class(&expected, class);
+    assert!(of("RATE").len() > 350 && of("ATT").len() == 401);
+    let lines = all.lines();
+    assert!(of_class(&lines, "RATE") == of("RATE") && of_class(&lines, "ATT") == of("ATT"));
+    let lines = rates.lines();
+    assert!(of_class(&lines, "RATE") == of("RATE") && of_class(&lines, "ATT").is_empty());
+    let lines = truth.lines();
+    assert!(of_class(&lines, "RATE").is_empty() && of_class(&lines, "ATT") == of("ATT"));
+}
+
+#[test]
+fn a_replay_takes_no_samples_and_says_so() {
+    let process = paused(&format!("replay {LOG}"), &[TCP]);
+    let mut client = Client::tcp(process.address(0));
+    assert_eq!(client.object("VERSION")["proto"], 1);
+    assert_eq!(client.object("PLAYBACK")["state"], "paused");
+    client.send(r#"{"class":"RATE","gyro":[1,0,0],"stamp":{"sec":1,"nsec":0}}"#);
+    let error = client.object("ERROR");
+    assert_eq!(error["code"], "samples_not_taken");
+    assert!(error["message"].as_str().unwrap().contains("strapd serve"));
+    client.send(r#"{"class":"WATCH","streams":["RATE"]}"#);
+    assert_eq!(client.object("ERROR")["code"], "bad_watch");
+    let mut status = serde_json::Value::Null;
+    eventually("its stream", || {
+        client.send(r#"{"class":"POLL"}"#);
+        status = client.next_of("STATUS");
+        status["sources"][0]["class"] == "ATT"
+    });
+    assert_eq!(status["counters"]["samples_refused"], 1);
+    // More than a slip: the daemon's limit holds here too.
+    for _ in 0..21 {
+        client.send(r#"{"class":"RATE","gyro":[1,0,0],"stamp":{"sec":1,"nsec":0}}"#);
+    }
+    assert_eq!(client.rest().last().unwrap()["code"], "too_many_errors");
+}
+
+#[test]
+fn a_watcher_that_takes_nothing_loses_the_oldest_and_is_told_and_the_others_lose_nothing() {
+    let arguments = "simulate top --rate-hz 4000 --duration 10";
+    let process = paused(arguments, &[TCP]);
+    let mut slow = Client::tcp(process.address(0)).watching(r#"{"class":"WATCH"}"#);
+    let mut other = Client::tcp(process.address(0)).watching(r#"{"class":"WATCH","id":"truth"}"#);
+    // Until the end: what a socket and an outbox hold is a fraction of it.
+    other.send(r#"{"class":"PLAYBACK","action":"play"}"#);
+    let lines = other.lines();
+    assert_eq!(
+        of_class(&lines, "ATT").len() + dropped(&lines, "truth"),
+        40_001
+    );
+    let lines = slow.lines();
+    let lost = dropped(&lines, "truth") + dropped(&lines, "imu");
+    assert!(lost > 0, "nothing was lost");
+    let got = of_class(&lines, "ATT").len() + of_class(&lines, "RATE").len();
+    assert!(got + lost <= 80_002 && got > 0);
+}
+
+fn dropped(lines: &[String], id: &str) -> usize {
+    of_class(lines, "GAP")
+        .iter()
+        .map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap())
+        .filter(|gap| gap["id"] == id)
+        .map(|gap| gap["dropped"].as_u64().unwrap() as usize)
+        .sum()
+}
+
+#[test]
+fn a_signal_ends_a_run_in_order_and_no_part_of_a_file_is_left() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("out.mcap");
+    for (sinks, code) in [(vec![TCP], 0), (vec![TCP, file.to_str().unwrap()], 1)] {
+        let mut process = paused(&format!("replay {LOG}"), &sinks);
+        let mut client = Client::tcp(process.address(0)).watching(r#"{"class":"WATCH"}"#);
+        process.signal("TERM");
+        client.lines();
+        assert_eq!(process.exit(), Some(code));
+    }
+    eventually("an empty directory", || {
+        std::fs::read_dir(dir.path()).unwrap().next().is_none()
+    });
+}
+
+#[test]
+fn what_can_not_be_served_is_refused_with_the_way_out() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    for (arguments, words) in [
+        (
+            "-o tcp-listen://0.0.0.0:0",
+            &["-o tcp-listen://0.0.0.0:0", "--token-file"][..],
+        ),
+        ("-o udp-listen://127.0.0.1:0", &["udp://HOST:PORT sends"]),
+        ("-o ws://127.0.0.1:1", &["unknown scheme", "ws-listen://"]),
+        ("--paused -o null:", &["--paused", "--page"]),
+        ("--loop", &["--loop", "nobody is served"]),
+        (
+            "--paused --speed max -o tcp-listen://127.0.0.1:0",
+            &["--speed 1"],
+        ),
+        ("--page=nowhere", &["--page ws-listen://nowhere", "known"]),
+        (
+            "fixtures/ximu3.mcap -o tcp-listen://127.0.0.1:0",
+            &["each of the 2 logs"],
+        ),
+    ] {
+        strapd(root, &format!("replay {LOG} {arguments}")).refused(2, words);
+    }
+}

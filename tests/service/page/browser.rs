@@ -1,0 +1,258 @@
+//! Chromium by the DevTools protocol: JSON over a WebSocket, of which a dozen methods are needed here.
+//!
+//! The crates that wrap all of the protocol bring two hundred others and a megabyte of generated
+//! code; this brings none.
+
+use crate::serve::daemon::PATIENCE;
+use serde_json::{Value, json};
+use std::io::{BufRead, BufReader};
+use std::net::{SocketAddr, TcpStream};
+use std::process::{Child, Command, Stdio};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+use tungstenite::{Message, WebSocket};
+
+/// One browser at a time: two share two cores badly.
+static TURN: Mutex<()> = Mutex::new(());
+
+/// A browser with one page.
+pub(crate) struct Browser {
+    child: Child,
+    socket: WebSocket<TcpStream>,
+    session: Option<String>,
+    next: u64,
+    /// What the page did, as the browser told: `method` and `params`.
+    pub(crate) events: Vec<Value>,
+    _profile: tempfile::TempDir,
+    _turn: MutexGuard<'static, ()>,
+}
+
+/// The programme. A test that needs it is marked `#[cfg_attr(not(has_chromium), ignore = "needs
+/// chromium")]` (`build.rs`).
+fn programme() -> String {
+    let named = std::env::var("STRAPD_CHROMIUM").ok();
+    let known = ["chromium", "chromium-browser", "google-chrome"].map(str::to_owned);
+    let found = named.into_iter().chain(known).find(|name| {
+        let version = Command::new(name).arg("--version").output();
+        version.is_ok_and(|v| v.status.success())
+    });
+    found.expect("no Chromium (apt-get install chromium, or STRAPD_CHROMIUM=PATH)")
+}
+
+impl Browser {
+    /// Starts one with an empty page of 1280 x 1000 pixels. Without Chromium it fails.
+    pub(crate) fn start() -> Browser {
+        let programme = programme();
+        let turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
+        let profile = tempfile::tempdir().unwrap();
+        let mut child = Command::new(programme)
+            .args(["--headless", "--no-sandbox", "--disable-gpu"])
+            .args(["--no-first-run", "--disable-extensions", "--disable-sync"])
+            .args([
+                "--disable-background-networking",
+                "--disable-component-update",
+            ])
+            .args(["--disable-dev-shm-usage", "--hide-scrollbars"])
+            .arg("--remote-debugging-port=0")
+            .arg(format!("--user-data-dir={}", profile.path().display()))
+            .arg("about:blank")
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut said = BufReader::new(child.stderr.take().unwrap()).lines();
+        let address = said
+            .by_ref()
+            .map(Result::unwrap)
+            .find_map(|line| {
+                line.strip_prefix("DevTools listening on ")
+                    .map(str::to_owned)
+            })
+            .expect("Chromium did not start");
+        // It goes on talking, and must not wait for a reader.
+        std::thread::spawn(move || said.for_each(drop));
+        let host = address
+            .trim_start_matches("ws://")
+            .split('/')
+            .next()
+            .unwrap();
+        let stream = TcpStream::connect(host).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        let (socket, _) = tungstenite::client(&address, stream).unwrap();
+        let mut browser = Browser {
+            child,
+            socket,
+            session: None,
+            next: 0,
+            events: Vec::new(),
+            _profile: profile,
+            _turn: turn,
+        };
+        browser.page();
+        browser
+    }
+
+    /// A new page, from now on the one spoken to.
+    pub(crate) fn page(&mut self) {
+        self.session = None;
+        self.events.clear();
+        let made = self.call("Target.createTarget", json!({"url": "about:blank"}));
+        let attached = self.call(
+            "Target.attachToTarget",
+            json!({"targetId": made["targetId"], "flatten": true}),
+        );
+        self.session = attached["sessionId"].as_str().map(str::to_owned);
+        for domain in ["Page", "Runtime", "Network", "Log"] {
+            self.call(&format!("{domain}.enable"), json!({}));
+        }
+        self.call(
+            "Page.addScriptToEvaluateOnNewDocument",
+            json!({"source": "window.__violations = []; addEventListener('securitypolicyviolation', (e) => __violations.push(e.violatedDirective + ' ' + e.blockedURI));"}),
+        );
+        self.size(1280, 1000);
+    }
+
+    /// The page's size in pixels.
+    pub(crate) fn size(&mut self, width: u32, height: u32) {
+        self.call(
+            "Emulation.setDeviceMetricsOverride",
+            json!({"width": width, "height": height, "deviceScaleFactor": 1, "mobile": false}),
+        );
+    }
+
+    /// Calls a method; events that come before its answer are kept.
+    pub(crate) fn call(&mut self, method: &str, params: Value) -> Value {
+        self.next += 1;
+        let mut request = json!({"id": self.next, "method": method, "params": params});
+        if let Some(session) = &self.session {
+            request["sessionId"] = json!(session);
+        }
+        self.socket
+            .send(Message::text(request.to_string()))
+            .unwrap();
+        loop {
+            let Message::Text(text) = self.socket.read().unwrap() else {
+                continue;
+            };
+            let mut answer: Value = serde_json::from_str(text.as_str()).unwrap();
+            if answer["id"] == self.next {
+                assert!(answer["error"].is_null(), "{method}: {}", answer["error"]);
+                return answer["result"].take();
+            }
+            if !answer["method"].is_null() {
+                self.events.push(answer);
+            }
+        }
+    }
+
+    pub(crate) fn go(&mut self, address: SocketAddr, path: &str) {
+        let url = format!("http://{address}{path}");
+        let gone = self.call("Page.navigate", json!({"url": url}));
+        assert!(gone["errorText"].is_null(), "{url}: {gone}");
+        self.until("the page is loaded", "document.readyState === 'complete'");
+    }
+
+    /// The value of an expression, promises awaited.
+    pub(crate) fn eval(&mut self, expression: &str) -> Value {
+        let mut answer = self.call(
+            "Runtime.evaluate",
+            json!({"expression": expression, "returnByValue": true, "awaitPromise": true}),
+        );
+        let thrown = &answer["exceptionDetails"];
+        assert!(thrown.is_null(), "{expression}: {thrown}");
+        answer["result"]["value"].take()
+    }
+
+    pub(crate) fn number(&mut self, expression: &str) -> f64 {
+        let value = self.eval(expression);
+        value
+            .as_f64()
+            .unwrap_or_else(|| unreachable!("{expression} is {value}"))
+    }
+
+    /// Waits until an expression holds.
+    pub(crate) fn until(&mut self, what: &str, expression: &str) {
+        let start = Instant::now();
+        // While a page is being replaced there is nothing to ask.
+        let guarded = format!(
+            "(() => {{ try {{ return Boolean({expression}); }} catch {{ return false; }} }})()"
+        );
+        while self.eval(&guarded) != true {
+            assert!(
+                start.elapsed() < PATIENCE,
+                "waited in vain: {what}: {expression}; the page says: {}",
+                self.eval("document.body.innerText.slice(0, 600)")
+            );
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    /// Waits for the connection.
+    pub(crate) fn until_open(&mut self) {
+        self.until("connected", "__strapd.state === 'open'");
+    }
+
+    /// A picture, as base64 of a PNG.
+    pub(crate) fn screenshot(&mut self) -> String {
+        let taken = self.call("Page.captureScreenshot", json!({"format": "png"}));
+        taken["data"].as_str().unwrap().to_owned()
+    }
+
+    /// The whole value behind a number on the page.
+    pub(crate) fn shown(&mut self, testid: &str) -> f64 {
+        let value = self.eval(&format!(
+            "document.querySelector('[data-testid={testid}]').value"
+        ));
+        let text = value.as_str().unwrap();
+        text.parse()
+            .unwrap_or_else(|_| unreachable!("{testid} shows {text:?}"))
+    }
+
+    pub(crate) fn text(&mut self, testid: &str) -> String {
+        let value = self.eval(&format!(
+            "document.querySelector('[data-testid={testid}]').textContent"
+        ));
+        value.as_str().unwrap().to_owned()
+    }
+
+    /// Everything that was asked of the network.
+    pub(crate) fn requests(&self) -> Vec<String> {
+        let of = |event: &Value| match event["method"].as_str()? {
+            "Network.requestWillBeSent" => event["params"]["request"]["url"]
+                .as_str()
+                .map(str::to_owned),
+            "Network.webSocketCreated" => event["params"]["url"].as_str().map(str::to_owned),
+            _ => None,
+        };
+        self.events.iter().filter_map(of).collect()
+    }
+
+    /// No script threw, nothing was refused by the policy.
+    pub(crate) fn is_unharmed(&mut self) {
+        assert_eq!(self.eval("window.__violations"), json!([]));
+        for event in &self.events {
+            let is_thrown = event["method"] == "Runtime.exceptionThrown";
+            let entry = &event["params"]["entry"];
+            let is_refused = entry["source"] == "security" || entry["source"] == "javascript";
+            assert!(!is_thrown && !is_refused, "{event}");
+        }
+    }
+}
+
+impl Drop for Browser {
+    fn drop(&mut self) {
+        // The socket may be gone, and so may the browser.
+        self.session = None;
+        let close = json!({"id": 0, "method": "Browser.close"});
+        let _ = self.socket.send(Message::text(close.to_string()));
+        for _ in 0..100 {
+            if matches!(self.child.try_wait(), Ok(Some(_))) {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}

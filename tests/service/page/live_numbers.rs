@@ -1,0 +1,188 @@
+//! The numbers of the live page are those of the command line.
+
+use super::browser::Browser;
+use crate::serve::client::Client;
+use crate::serve::daemon::{Daemon, TCP, WS, listening, strapd};
+use serde_json::{Value, json};
+use std::io::Write as _;
+use std::process::{Command, Stdio};
+
+/// Samples at 100 Hz about all axes, with a repeated gap and a NaN.
+fn samples(id: &str, scale: f64) -> Vec<String> {
+    (0..300_u32)
+        .filter(|n| !(120..150).contains(n))
+        .map(|n| {
+            let t = f64::from(n) * 0.01;
+            let gyro = if n == 200 {
+                "null".to_owned()
+            } else {
+                let w = [(1.3 * t).sin(), 0.7 * (2.1 * t).cos(), 0.4].map(|w| w * scale);
+                json!(w).to_string()
+            };
+            format!(
+                "{{\"class\":\"RATE\",\"id\":\"{id}\",\"seq\":{n},\"stamp\":{{\"sec\":{},\"nsec\":{}}},\"gyro\":{gyro}}}",
+                1_700_000_000 + n / 100,
+                n % 100 * 10_000_000
+            )
+        })
+        .collect()
+}
+
+/// The attitudes a replay of the same lines gives.
+fn replayed(lines: &[String]) -> Vec<Value> {
+    let mut child = Command::new(strapd())
+        .args(["replay", "-", "-o", "-", "--method", "commit", "--quiet"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let text = lines.join("\n") + "\n";
+    let mut stdin = child.stdin.take().unwrap();
+    let writer = std::thread::spawn(move || stdin.write_all(text.as_bytes()).unwrap());
+    let output = child.wait_with_output().unwrap();
+    writer.join().unwrap();
+    String::from_utf8(output.stdout)
+        .unwrap()
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect()
+}
+
+/// Roll, pitch, yaw in degrees (z-y'-x''), by the matrix.
+fn roll_pitch_yaw(q: [f64; 4]) -> [f64; 3] {
+    let [w, x, y, z] = q;
+    let c21 = 2.0 * (x * y + w * z);
+    let c11 = w * w + x * x - y * y - z * z;
+    let c31 = 2.0 * (x * z - w * y);
+    let c32 = 2.0 * (y * z + w * x);
+    let c33 = w * w - x * x - y * y + z * z;
+    [c32.atan2(c33), (-c31).asin(), c21.atan2(c11)].map(f64::to_degrees)
+}
+
+fn wxyz(att: &Value) -> [f64; 4] {
+    ["w", "x", "y", "z"].map(|name| att["q"][name].as_f64().unwrap())
+}
+
+#[test]
+#[cfg_attr(not(has_chromium), ignore = "needs chromium")]
+fn the_page_shows_what_the_command_line_says() {
+    let mut browser = Browser::start();
+    let daemon = Daemon::start(listening(&[TCP, WS]));
+    browser.go(daemon.address(1), "/");
+    browser.until_open();
+    assert_eq!(
+        browser.eval("document.querySelectorAll('[data-testid=sensor]').length"),
+        0
+    );
+    let lines = samples("imu0", 1.0);
+    let expected = replayed(&lines);
+    let last = expected.last().unwrap();
+    let mut sender = Client::tcp(daemon.address(0));
+    sender.send(&lines.join("\n"));
+    browser.until(
+        "everything has come",
+        &format!(
+            "__strapd.seq === {0} && document.querySelector('[data-testid=seq]').value === '{0}'",
+            last["seq"]
+        ),
+    );
+    let q = wxyz(last);
+    for (name, expected) in ["q-w", "q-x", "q-y", "q-z"].into_iter().zip(q) {
+        let shown = browser.shown(name);
+        assert!(
+            (shown - expected).abs() <= 1e-9,
+            "{name}: {shown}, {expected}"
+        );
+        let text = browser.text(name).replace('−', "-");
+        assert_eq!(text, format!("{expected:.9}"), "{name} as people read it");
+    }
+    for (name, expected) in ["roll", "pitch", "yaw"].into_iter().zip(roll_pitch_yaw(q)) {
+        let shown = browser.shown(name);
+        assert!(
+            (shown - expected).abs() <= 1e-9,
+            "{name}: {shown}, {expected}"
+        );
+        let text = browser.text(name).replace('−', "-");
+        assert_eq!(text, format!("{expected:.4}"), "{name} as people read it");
+    }
+    for (n, name) in ["rate-x", "rate-y", "rate-z"].into_iter().enumerate() {
+        let expected = last["rate"][n].as_f64().unwrap().to_degrees();
+        assert!((browser.shown(name) - expected).abs() <= 1e-9, "{name}");
+    }
+    // Every sample was drawn, and what was wrong with the input is told.
+    assert_eq!(
+        browser.number("__strapd.sensors.imu0.points"),
+        expected.len() as f64
+    );
+    assert_eq!(browser.text("thinning"), "every sample");
+    browser.until(
+        "STATUS has come",
+        "document.querySelector('[data-testid=nan]').textContent === '1'",
+    );
+    let source = &daemon.status()["sources"][0];
+    for name in ["gaps", "lost"] {
+        assert!(source[name].as_u64().unwrap() > 0, "{source}");
+        assert_eq!(browser.text(name), source[name].to_string(), "{name}");
+    }
+    browser.is_unharmed();
+
+    // Nothing was asked of anybody else.
+    let origin = daemon.address(1).to_string();
+    let requests = browser.requests();
+    assert!(
+        requests.iter().any(|url| url.ends_with("/ws")),
+        "{requests:?}"
+    );
+    for url in requests.iter().filter(|url| *url != "about:blank") {
+        let host = url
+            .split("://")
+            .nth(1)
+            .and_then(|rest| rest.split('/').next());
+        assert_eq!(host, Some(&*origin), "{url}");
+    }
+    // And the policy would have refused it, and told us: the tests above can fail.
+    browser.eval("document.body.setAttribute('style', 'margin: 1px'); fetch('http://127.0.0.1:9/').catch(() => 0)");
+    browser.until("refusals", "__violations.length >= 2");
+}
+
+#[test]
+#[cfg_attr(not(has_chromium), ignore = "needs chromium")]
+fn the_error_is_the_angle_from_the_truth() {
+    let mut browser = Browser::start();
+    let daemon = Daemon::start(listening(&[TCP, WS]));
+    browser.go(daemon.address(1), "/");
+    browser.until_open();
+    let (own, truth) = (samples("imu0", 1.02), samples("truth", 1.0));
+    let (expected, exact) = (replayed(&own), replayed(&truth));
+    let mixed: Vec<&str> = own
+        .iter()
+        .zip(&truth)
+        .flat_map(|(a, b)| [&**a, &**b])
+        .collect();
+    // Kept to the end: who closes before he has read takes back what he said.
+    let mut sender = Client::tcp(daemon.address(0));
+    sender.send(&mixed.join("\n"));
+    let (a, b) = (wxyz(expected.last().unwrap()), wxyz(exact.last().unwrap()));
+    let d = {
+        let [w, x, y, z] = a;
+        let [bw, bx, by, bz] = b;
+        // The vector part of conj(a) b, whose length is the sine of half the angle.
+        [
+            w * bx - x * bw - y * bz + z * by,
+            w * by + x * bz - y * bw - z * bx,
+            w * bz - x * by + y * bx - z * bw,
+        ]
+    };
+    let sine = d.iter().map(|v| v * v).sum::<f64>().sqrt();
+    let angle = (2.0 * sine.asin()).to_degrees();
+    assert!(angle > 0.1, "{angle}");
+    browser.until(
+        "both have come",
+        &format!("Math.abs(document.querySelector('[data-id=imu0] [data-testid=error]').value - {angle}) < 1e-9"),
+    );
+    let titles = browser
+        .eval("[...document.querySelectorAll('[data-testid=sensor]')].map((e) => e.dataset.id)");
+    assert_eq!(titles, json!(["imu0", "truth"]));
+    browser.is_unharmed();
+}

@@ -1,0 +1,36 @@
+//! Promise: what goes in over a socket comes out as attitude over a socket, the same bits as from a
+//! file; what is wrong is answered, counted and never stops anybody else.
+//!
+//! Real sockets on loopback, port 0, every wait bounded.
+
+pub(crate) mod client;
+pub(crate) mod daemon;
+
+mod admission;
+mod aiding;
+mod bad_lines;
+mod bare_stamps;
+mod cat;
+mod config;
+mod connecting;
+mod documentation;
+mod faults;
+mod frames;
+mod intervals;
+mod late;
+mod limits;
+mod opening;
+mod operations;
+mod packaging;
+mod packed;
+mod places;
+mod posting;
+mod recording;
+mod runs;
+mod same_bytes;
+mod slow_readers;
+mod state;
+mod storms;
+mod strangers;
+mod transports;
+mod watch;
