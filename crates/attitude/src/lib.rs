@@ -18,6 +18,37 @@
 //! | [`aid`] | specific force, field -> corrections of attitude and sensor |
 //! | [`noise`] | what a sensor adds: measured, and put in on purpose |
 //! | [`compare`] | two attitudes -> how far apart |
+//!
+//! # From raw samples to attitude
+//! A quarter turn about z in a second, in degrees a second and with one reading that is none:
+//! ```
+//! use strapd_attitude::condition::{Conditioner, GyroUnit, Settings};
+//! use strapd_attitude::propagate::{self, Propagator, Sequential};
+//! use strapd_attitude::record::{Nanos, RawSample};
+//!
+//! let raw: Vec<RawSample> = (0..=100)
+//!     .map(|i| RawSample {
+//!         header: Some(Nanos(i * 10_000_000)),
+//!         gyro: Some([0.0, 0.0, if i == 50 { f64::NAN } else { 90.0 }]),
+//!         ..RawSample::default()
+//!     })
+//!     .collect();
+//! let mut conditioner = Conditioner::new(&Settings { unit: GyroUnit::Deg, ..Settings::default() })?;
+//! let mut rates = Vec::new();
+//! conditioner.push(&raw, &mut rates);
+//! conditioner.finish(&mut rates);
+//!
+//! let mut propagator = Propagator::new(propagate::Settings::default())?;
+//! let mut attitudes = Vec::new();
+//! propagator.push(&rates, &Sequential, &mut attitudes);
+//! propagator.finish(&Sequential, &mut attitudes);
+//!
+//! let last = attitudes.last().expect("a hundred came");
+//! let heading = last.q_nb.yaw_pitch_roll().yaw.to_degrees();
+//! assert!((heading - 90.0).abs() < 1e-9, "the hole is bridged: {heading}");
+//! assert_eq!(conditioner.report().counts.lost(), 1);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod aid;
 pub mod compare;
