@@ -1,37 +1,61 @@
-//! strapd: gyro samples in, attitude you can trust out.
+//! The command and the daemon `strapd`: gyro samples in, attitude you can trust out.
 //!
-//! The folders are the data flow:
+//! One function is public, [`main`]. What it is made of is in the crates below it, each with a page of its own:
 //!
 //! ```text
-//! source -> decode -> condition -> propagate -> sink      wired by pipeline
-//!                          model: the mathematics beside it, pure
+//! strapd-recording -> strapd-attitude <- strapd-bodies
+//!            \               |               /
+//!             pipeline -> sink -> serve, client, report -> cli      here
 //! ```
 //!
 //! | module | arrow | |
 //! |---|---|---|
-//! | [`record`] | what crosses the borders between stages | pure |
-//! | `source` | files and streams -> messages | I/O |
-//! | `decode` | bytes of one message -> raw samples | pure |
-//! | [`condition`] | raw samples -> SI, body axes, in order, finite | pure |
-//! | [`propagate`] | rates -> attitude: the hot loop | pure |
-//! | [`aid`] | specific force, field -> corrections of attitude and sensor | pure |
-//! | `sink` | attitude -> MCAP, NDJSON, CSV | I/O |
-//! | `pipeline` | the stages wired: replay, tracks, what a log holds | I/O |
+//! | `config` | how samples are to be understood and integrated, checked | pure |
+//! | `pipeline` | a recording -> attitudes: replay, tracks, what a log holds | I/O |
+//! | `sink` | attitude -> MCAP, NDJSON, CSV, sockets | I/O |
 //! | `serve` | the daemon: samples in over sockets, attitude out | I/O |
 //! | `client` | the other end: a daemon, or whatever sends samples -> lines | I/O |
-//! | [`compare`] | two attitudes -> how far apart | pure |
-//! | `config`, `report`, `cli` | arguments -> a run -> its summary | |
-//! | [`model`] | frames, attitude, rigid body, top, inertia, the youBot's arm, motions with exact truth | pure |
+//! | `report` | a run -> its summary, its findings, its page | pure |
+//! | `cli` | arguments -> a run -> what is printed | I/O |
 //!
-//! Reading order: [`record`], `pipeline::estimator`, then one stage.
-//! Without the default feature `service` the crate is the modules with links above, on nalgebra alone.
+//! Reading order: `pipeline::estimator`, `pipeline::replay`, then one module. Tests, benches, examples and fuzzers see
+//! inside by the feature `inside`; nobody else is to.
 
-pub mod cli;
-pub mod client;
-pub mod config;
+#![allow(
+    unreachable_pub,
+    reason = "what is public here is so for the feature `inside`"
+)]
 
-pub mod error;
-pub mod pipeline;
-pub mod report;
-pub mod serve;
-pub mod sink;
+/// Declares a module that is public for those who ask for the feature `inside`, and for nobody else.
+macro_rules! private {
+    ($($module:ident),* $(,)?) => {
+        $(
+            #[cfg(feature = "inside")]
+            #[doc(hidden)]
+            pub mod $module;
+            #[cfg(not(feature = "inside"))]
+            mod $module;
+        )*
+    };
+}
+
+private!(cli, client, config, error, pipeline, report, serve, sink);
+
+use clap::Parser;
+use std::process::ExitCode;
+
+/// Parses the arguments, starts the diagnostics, runs, and says the outcome as an exit code.
+#[must_use]
+pub fn main() -> ExitCode {
+    let cli = cli::Cli::parse();
+    cli::start_diagnostics(&cli.global);
+    sink::make_size_limit_an_error();
+    match cli::run(cli) {
+        Ok(outcome) => outcome.into(),
+        Err(error) if error.is_broken_pipe() => ExitCode::SUCCESS,
+        Err(error) => {
+            cli::say_error(&error);
+            ExitCode::from(error.exit_code())
+        }
+    }
+}

@@ -169,8 +169,8 @@ impl Elapsed {
     }
 
     /// First and last stamp.
-    #[must_use]
-    pub fn ends(&self) -> Option<(Nanos, Nanos)> {
+    #[cfg(test)]
+    fn ends(&self) -> Option<(Nanos, Nanos)> {
         self.first.zip(self.last)
     }
 }

@@ -144,8 +144,8 @@ impl<const N: usize> Traces<N> {
     }
 
     /// First and last time, ns.
-    #[must_use]
-    pub fn ends(&self) -> Option<(i64, i64)> {
+    #[cfg(test)]
+    fn ends(&self) -> Option<(i64, i64)> {
         let times = |s: &Stretch<N>| {
             let found = || s.series.iter().flatten();
             let first = found().map(|e| e.first.0).min();

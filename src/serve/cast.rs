@@ -135,7 +135,7 @@ impl Cast {
 
     fn hand(&self, lane: &mut Lane, items: Items<'_>, shown: bool) {
         let mut seq = lane.next;
-        lane.next += items.len() as u64;
+        lane.next += items.count() as u64;
         if !shown {
             return;
         }
@@ -146,7 +146,7 @@ impl Cast {
                 lane.flood.hold();
                 lane.flood.wait_in_thread(&self.hub);
             }
-            seq += some.len() as u64;
+            seq += some.count() as u64;
         }
     }
 

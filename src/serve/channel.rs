@@ -56,7 +56,7 @@ pub enum Items<'a> {
 impl Items<'_> {
     /// How many.
     #[must_use]
-    pub fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         match self {
             Items::Attitudes(items) => items.len(),
             Items::Samples(items) => items.len(),
@@ -66,19 +66,13 @@ impl Items<'_> {
     /// The same in pieces of at most `most`.
     pub fn chunks(&self, most: usize) -> impl Iterator<Item = Items<'_>> + use<'_> {
         let pieces = |n: usize| (0..n).step_by(most.max(1));
-        pieces(self.len()).map(move |from| {
-            let until = (from + most.max(1)).min(self.len());
+        pieces(self.count()).map(move |from| {
+            let until = (from + most.max(1)).min(self.count());
             match self {
                 Items::Attitudes(items) => Items::Attitudes(&items[from..until]),
                 Items::Samples(items) => Items::Samples(&items[from..until]),
             }
         })
-    }
-
-    /// Whether there are none.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 }
 
@@ -141,7 +135,7 @@ impl Channel {
         first_seq: u64,
         items: Items<'_>,
     ) {
-        self.sent.fetch_add(items.len() as u64, Ordering::Relaxed);
+        self.sent.fetch_add(items.count() as u64, Ordering::Relaxed);
         if let Items::Attitudes([before @ .., newest]) = items {
             *last = Some((first_seq + before.len() as u64, *newest));
         }
@@ -192,7 +186,7 @@ impl Channel {
         };
         let mut chunks = Vec::new();
         let mut from = first_seq;
-        let end = first_seq + items.len() as u64;
+        let end = first_seq + items.count() as u64;
         for (n, seq) in (first_seq..end).enumerate() {
             match items {
                 Items::Attitudes(items) => {
@@ -305,7 +299,7 @@ impl Channel {
             text.clear();
             from = until;
         };
-        let end = first_seq + items.len() as u64;
+        let end = first_seq + items.count() as u64;
         for (n, seq) in (first_seq..end).enumerate() {
             match (items, form) {
                 (Items::Attitudes(items), _) => {

@@ -13,7 +13,7 @@ mod report;
 mod room;
 mod telling;
 
-pub use counters::{Counter, Counters, count};
+pub use counters::{Counters, count};
 use places::Absent;
 use polling::Polling;
 use report::StateStatus;
@@ -556,7 +556,7 @@ impl Hub {
         }
         channel.passed(&mut last, first_seq, items);
         if matches!(items, Items::Attitudes(_)) {
-            count(&self.counters.attitudes, items.len());
+            count(&self.counters.attitudes, items.count());
         }
     }
 

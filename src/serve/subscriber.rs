@@ -560,9 +560,9 @@ impl Outbox {
         state.is_stalled = state.queued > CROWDED;
     }
 
-    /// Whether anything waits.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
+    /// Whether nothing waits.
+    #[cfg(test)]
+    fn is_empty(&self) -> bool {
         let state = self.state();
         state.control.is_empty()
             && !matches!(state.status, Asked::Made(_))

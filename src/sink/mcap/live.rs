@@ -204,12 +204,6 @@ impl LiveMcap {
         self.has_chunk = false;
     }
 
-    /// Messages booked.
-    #[must_use]
-    pub fn messages(&self) -> u64 {
-        self.file.messages()
-    }
-
     /// What ends the file: first the whole closing, then, for a disk that has no room for it, the
     /// shortest there is, without summary or index.
     #[must_use]
