@@ -1,25 +1,20 @@
 //! Wires the stages: source -> decode -> condition -> propagate -> sink. I/O.
 
 pub mod against;
-pub mod aiding;
 pub mod audience;
 pub mod check;
 mod chosen;
 pub mod decoders;
 mod each;
-pub mod estimator;
 mod held;
 pub mod history;
-pub(crate) mod intervals;
 pub mod lines;
 pub mod log;
 pub mod look;
 pub(crate) mod opening;
 pub mod outlet;
 pub mod pace;
-mod passes;
 pub mod position;
-pub mod preparation;
 pub mod provenance;
 pub mod recover;
 pub mod replay;
@@ -28,7 +23,6 @@ pub mod run;
 pub mod session;
 pub mod simulate;
 pub mod sources;
-pub mod stamps;
 mod streamed;
 pub mod summarise;
 pub mod topics;

@@ -55,7 +55,7 @@ pub mod upstream;
 pub mod viewer;
 pub mod wire;
 
-use crate::config::Plan;
+use strapd_attitude::estimate::Plan;
 use crate::error::{Error, Result};
 use crate::sink::Target;
 use crate::sink::address::Listen;
@@ -74,8 +74,9 @@ use std::time::Duration;
 /// What a daemon is to do.
 #[derive(Debug, Default)]
 pub struct Settings {
-    /// How samples are understood and integrated. Its `--field` paths hold for every sensor: a line is
-    /// read before it is known whose it is.
+    /// How lines are read, for every sensor: that is done before it is known whose they are.
+    pub decode: strapd_recording::decode::Options,
+    /// How samples are understood and integrated.
     pub plan: Plan,
     /// For sensors that are understood in another way, by `id`.
     pub plans: BTreeMap<String, Plan>,

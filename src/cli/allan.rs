@@ -6,7 +6,8 @@ mod words;
 
 use super::estimation::{KindArg, TimeArg, UnitArg};
 use super::{Global, Outcome, print};
-use crate::config::Plan;
+use crate::config::{Selection, selection};
+use strapd_attitude::estimate::Plan;
 use crate::error::{Error, Result};
 use crate::report::page::Noise;
 use crate::sink::Document;
@@ -16,7 +17,6 @@ use std::path::{Path, PathBuf};
 use strapd_attitude::condition::{Clock, GyroUnit};
 use strapd_attitude::noise::allan::{AllanFit, Point, cluster_sizes, deviation, fit};
 use strapd_attitude::record::SampleKind;
-use strapd_recording::decode::Options;
 use strapd_recording::pool::Pool;
 
 /// Allan deviation of a recording at rest: angle random walk, bias instability, rate random walk,
@@ -97,6 +97,7 @@ struct Axis {
 /// The log can not be read, holds no rate, or too few samples; an output exists.
 pub fn run(global: &Global, args: &Allan) -> Result<Outcome> {
     let plan = args.plan()?;
+    let selection = selection(args.topic.as_ref(), &args.fields, args.ignore_covariance_flag)?;
     args.plot
         .iter()
         .try_for_each(|p| super::outputs::check_chart(p))?;
@@ -107,7 +108,7 @@ pub fn run(global: &Global, args: &Allan) -> Result<Outcome> {
     };
     let (plot, csv) = (open(&args.plot)?, open(&args.csv)?);
     let pool = Pool::new(global.threads)?;
-    let gathered = gather::gather(&args.file, &plan, gather::CAPACITY, &pool)?;
+    let gathered = gather::gather(&args.file, (&selection, &plan), gather::CAPACITY, &pool)?;
     let axes = analyse(&gathered).map_err(|what| Error::Topic {
         path: args.file.clone(),
         topic: gathered.topic.clone(),
@@ -147,8 +148,8 @@ const FOR_REPORT: usize = 1 << 20;
 ///
 /// # Errors
 /// As [`run`], but for outputs.
-pub(super) fn examined(path: &Path, plan: &Plan, pool: &Pool) -> Result<Noise> {
-    let gathered = gather::gather(path, plan, FOR_REPORT, pool)?;
+pub(super) fn examined(path: &Path, asked: (&Selection, &Plan), pool: &Pool) -> Result<Noise> {
+    let gathered = gather::gather(path, asked, FOR_REPORT, pool)?;
     let fails = |what| Error::Topic {
         path: path.to_owned(),
         topic: gathered.topic.clone(),
@@ -225,16 +226,6 @@ impl Allan {
             (TimeArg::Publish, None) => Clock::Publish,
         };
         let plan = Plan {
-            topic: self.topic.clone(),
-            decode: Options {
-                fields: self
-                    .fields
-                    .iter()
-                    .map(|f| f.parse().map_err(|e| Error::Usage(format!("--field: {e}"))))
-                    .collect::<Result<_>>()?,
-                ignore_covariance_flag: self.ignore_covariance_flag,
-                ..Options::default()
-            },
             kind: self.sample_kind.map(SampleKind::from),
             unit: self.gyro_unit.map(GyroUnit::from),
             clock,
@@ -243,7 +234,7 @@ impl Allan {
             until: self.until,
             ..Plan::default()
         };
-        plan.check()?;
+        plan.check().map_err(Error::Usage)?;
         Ok(plan)
     }
 }

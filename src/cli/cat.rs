@@ -4,11 +4,11 @@ mod url;
 
 use super::{Global, Outcome};
 use crate::client::remote::Remote;
-use crate::config::Plan;
+use strapd_attitude::estimate::Plan;
 use crate::error::{Error, Result};
 use crate::pipeline::decoders::Decoders;
 use crate::pipeline::log::{Log, problems};
-use crate::pipeline::preparation::Resolved;
+use strapd_attitude::estimate::Meaning;
 use crate::pipeline::route::{Item, Noticed, Route, Taker};
 use crate::pipeline::topics;
 use clap::{Args, ValueEnum};
@@ -130,7 +130,7 @@ pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
                 path: args.source.clone(),
                 what: why.to_string(),
             })?;
-        meanings.push(Resolved::new(&Plan::default(), decoder.stated()));
+        meanings.push(Meaning::new(&Plan::default(), &decoder.stated().declared));
         by_id
             .entry((known.channel.id, known.channel.schema_id))
             .or_insert(decoders.len());

@@ -312,7 +312,10 @@ impl Layered {
     pub fn settings(&self) -> Result<Settings> {
         let mut settings = self.serve.settings()?;
         for (id, estimation, _) in &self.sensors {
-            settings.plans.insert(id.clone(), estimation.plan()?);
+            let plan = estimation.live_plan().map_err(|why| {
+                Error::Usage(format!("sensor {}: {why}", strapd_recording::text::printable(id)))
+            })?;
+            settings.plans.insert(id.clone(), plan);
         }
         Ok(settings)
     }

@@ -1,7 +1,8 @@
 //! The estimation flags shared by `replay` (and, later, `serve` and `simulate`): text -> settings,
 //! checked once. Pure.
 
-use crate::config::{Aid, Bias, Initial, Noise, Plan, Truncation, parse_mount};
+use strapd_attitude::estimate::{Aid, Plan, Truncation};
+use crate::config::{Selection, parse_bias, parse_initial, parse_mount, parse_noise, parse_truncation, selection};
 use crate::error::{Error, Result};
 use clap::{Args, ValueEnum};
 use strapd_attitude::condition::{Clock, GyroUnit, OnGap};
@@ -250,16 +251,6 @@ impl Estimation {
             ));
         }
         let plan = Plan {
-            topic: self.topic.clone(),
-            decode: strapd_recording::decode::Options {
-                fields: self
-                    .fields
-                    .iter()
-                    .map(|f| f.parse().map_err(|e| usage("--field", &e)))
-                    .collect::<Result<_>>()?,
-                ignore_covariance_flag: self.ignore_covariance_flag,
-                ..strapd_recording::decode::Options::default()
-            },
             method: self.method()?,
             kind: self.sample_kind.map(SampleKind::from),
             unit: self.gyro_unit.map(GyroUnit::from),
@@ -271,25 +262,47 @@ impl Estimation {
             world: self.world.parse().map_err(|e| usage("--world", &e))?,
             mount: self.mount.as_deref().map(parse_mount).transpose()?,
             clock,
-            initial: Initial::parse(&self.init)?,
-            bias: Bias::parse(&self.bias)?,
+            initial: parse_initial(&self.init)?,
+            bias: parse_bias(&self.bias)?,
             max_gap_secs: self.max_gap,
             on_gap: self.on_gap.into(),
             latitude_deg: self.earth_rate,
             regularise_stamps: self.regularise_stamps,
             gyro_range: self.gyro_range,
-            noise: Noise::parse(&self.noise)?,
+            noise: parse_noise(&self.noise)?,
             aid: self.aid.into(),
             sensor_delay_secs: self.sensor_delay,
             truncation: self
                 .undo_truncation
                 .as_deref()
-                .map_or(Ok(Truncation::Unsaid), Truncation::parse)?,
+                .map_or(Ok(Truncation::Unsaid), parse_truncation)?,
             start: self.start,
             until: self.until,
         };
-        plan.check()?;
+        plan.check().map_err(Error::Usage)?;
         Ok(plan)
+    }
+
+    /// Which samples, and how messages are read.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a `--field` that is none.
+    pub fn selection(&self) -> Result<Selection> {
+        selection(self.topic.as_ref(), &self.fields, self.ignore_covariance_flag)
+    }
+
+    /// The plan of a live stream, which has no topic.
+    ///
+    /// # Errors
+    /// As [`Estimation::plan`].
+    pub fn live_plan(&self) -> Result<Plan> {
+        if self.topic.is_some() {
+            return Err(Error::Usage(
+                "--topic: a sensor is named by `id` in its samples, and chosen with WATCH"
+                    .to_owned(),
+            ));
+        }
+        self.plan()
     }
 
     fn method(&self) -> Result<Method> {

@@ -4,7 +4,7 @@ use super::estimation::Estimation;
 use super::progress::Reporter;
 use super::serving::{Served, Serving};
 use super::{Global, Outcome, outputs, print};
-use crate::config::Plan;
+use strapd_attitude::estimate::Plan;
 use crate::config::Shard;
 use crate::error::{Error, Result};
 use crate::pipeline::replay;
@@ -217,6 +217,7 @@ impl Replay {
             source,
             targets: served.targets.clone(),
             audience: served.audience(),
+            selection: self.estimation.selection()?,
             plan,
             options: Options {
                 force: self.force,

@@ -3,7 +3,8 @@
 use super::estimation::Estimation;
 use super::progress::Reporter;
 use super::{Global, Outcome, allan, print};
-use crate::config::{Bias, Plan};
+use crate::config::Selection;
+use strapd_attitude::estimate::{Bias, Plan};
 use crate::error::{Error, Result};
 use crate::pipeline::check::{CheckedTopic, Drawing, Examination, examine};
 use crate::pipeline::provenance::sha256;
@@ -73,6 +74,7 @@ pub fn run(global: &Global, args: &Report) -> Result<Outcome> {
         _ => {}
     }
     let plan = args.estimation.plan()?;
+    let selection = args.estimation.selection()?;
     let inputs: Vec<PathBuf> = Some(&args.file)
         .into_iter()
         .chain(&args.reference)
@@ -84,6 +86,7 @@ pub fn run(global: &Global, args: &Report) -> Result<Outcome> {
     let pool = Pool::new(global.threads)?;
     let reference = args.read_reference(&pool)?;
     let asked = Examination {
+        selection,
         plan,
         reference_topic: match &reference {
             Some(_) => String::new(),
@@ -120,7 +123,7 @@ pub fn run(global: &Global, args: &Report) -> Result<Outcome> {
             .iter()
             .enumerate()
             .map(|(n, topic)| match n {
-                0..DRAWN => args.noise(&asked.plan, topic, &pool),
+                0..DRAWN => args.noise((&asked.selection, &asked.plan), topic, &pool),
                 // Each takes a pass over the log.
                 _ => Noise::Missing(
                     "Not measured of so many topics: strapd report --topic NAME does.".to_owned(),
@@ -155,7 +158,7 @@ impl Report {
     }
 
     /// The Allan deviation of a topic's longest rest, or what is missing.
-    fn noise(&self, plan: &Plan, topic: &CheckedTopic, pool: &Pool) -> Noise {
+    fn noise(&self, (selection, plan): (&Selection, &Plan), topic: &CheckedTopic, pool: &Pool) -> Noise {
         let Some((begins, secs)) = longest_rest(topic) else {
             return Noise::Missing(format!(
                 "Needs {ENOUGH:.0} s of rest, and there is none in this log."
@@ -170,12 +173,15 @@ impl Report {
         }
         let begins = plan.start.unwrap_or(0.0) + begins;
         let plan = Plan {
-            topic: Some(topic.looked.topic.clone()),
             start: Some(begins),
             until: Some(begins + secs),
             ..plan.clone()
         };
-        allan::examined(&self.file, &plan, pool).unwrap_or_else(|why| {
+        let selection = Selection {
+            topic: Some(topic.looked.topic.clone()),
+            ..selection.clone()
+        };
+        allan::examined(&self.file, (&selection, &plan), pool).unwrap_or_else(|why| {
             let why = why.to_string().replace('\n', " ");
             Noise::Missing(format!("It could not be had: {why}"))
         })

@@ -334,7 +334,8 @@ impl Serve {
             self.listen.iter().map(String::as_str).collect()
         };
         self.admission.apply(Settings {
-            plan: self.estimation.plan()?,
+            decode: self.estimation.selection()?.decode,
+            plan: self.estimation.live_plan()?,
             listen: given
                 .into_iter()
                 .map(Listen::parse)

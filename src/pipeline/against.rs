@@ -3,9 +3,9 @@
 //! What a sample means in time matters more than the order of the integrator and is written in no
 //! log; where an orientation was recorded too, it can be seen.
 
-use super::estimator::Estimator;
-use super::preparation::{Prepared, Resolved};
-use crate::config::Plan;
+use strapd_attitude::estimate::Estimator;
+use strapd_attitude::estimate::{Prepared, Meaning};
+use strapd_attitude::estimate::Plan;
 use crate::report::drawn::{ErrorTrace, Errors};
 use crate::report::summary::{Against, Recorded};
 use crate::report::trace::Traces;
@@ -52,7 +52,7 @@ const MEANINGS: [(&str, &str, SampleKind, Option<Method>); 4] = [
 /// A comparison under way.
 #[derive(Debug)]
 pub struct AgainstRecorded {
-    resolved: Resolved,
+    resolved: Meaning,
     clock: strapd_attitude::condition::Clock,
     own_reference: bool,
     estimators: Vec<Estimator>,
@@ -112,7 +112,7 @@ impl AgainstRecorded {
     ///
     /// # Errors
     /// In words: settings that can not be.
-    pub fn new(plan: &Plan, resolved: &Resolved, prepared: &Prepared) -> Result<Self, String> {
+    pub fn new(plan: &Plan, resolved: &Meaning, prepared: &Prepared) -> Result<Self, String> {
         let mut prepared = prepared.clone();
         // The recorded attitude is brought to the convention everything is computed in.
         prepared.world = World::Start;
@@ -159,7 +159,7 @@ impl AgainstRecorded {
     }
 
     /// The reference comes from a topic of its own, whose orientations are in `recorded`'s convention.
-    pub fn take_reference_from(&mut self, recorded: &Resolved) {
+    pub fn take_reference_from(&mut self, recorded: &Meaning) {
         self.own_reference = false;
         self.resolved.recorded = recorded.recorded;
     }

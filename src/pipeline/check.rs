@@ -9,7 +9,8 @@ use super::look::{Looked, look_as};
 use super::position::Position;
 use super::run::{Replay, Source};
 use super::track::Track;
-use crate::config::Plan;
+use crate::config::Selection;
+use strapd_attitude::estimate::Plan;
 use crate::error::{Error, Result};
 use crate::report::summary::TopicSummary;
 use crate::sink;
@@ -57,7 +58,9 @@ pub struct Drawing<'a> {
 /// How a log is examined.
 #[derive(Clone, Debug)]
 pub struct Examination<'a> {
-    /// How its samples are understood and integrated; [`Plan::topic`] names the only topic looked at.
+    /// Its topic is the only one looked at.
+    pub selection: Selection,
+    /// How samples are understood and integrated.
     pub plan: Plan,
     /// The topic of the reference in the log, empty = found.
     pub reference_topic: String,
@@ -78,11 +81,11 @@ pub fn check(
     pool: &Pool,
 ) -> Result<Checked> {
     let examination = Examination {
-        plan: Plan {
+        selection: Selection {
             topic: named.map(str::to_owned),
             decode: options.clone(),
-            ..Plan::default()
         },
+        plan: Plan::default(),
         reference_topic: String::new(),
         drawing: None,
         command: "strapd check".to_owned(),
@@ -100,8 +103,8 @@ pub fn examine(
     pool: &Pool,
     watch: &mut dyn FnMut(&Position),
 ) -> Result<Checked> {
-    let named = asked.plan.topic.as_deref().filter(|name| *name != "all");
-    let log = Log::told_apart(path, named, &asked.plan.decode, pool)?;
+    let named = asked.selection.topic.as_deref().filter(|name| *name != "all");
+    let log = Log::told_apart(path, named, &asked.selection.decode, pool)?;
     for topic in named
         .into_iter()
         .chain(Some(asked.reference_topic.as_str()).filter(|name| !name.is_empty()))
@@ -114,7 +117,7 @@ pub fn examine(
             });
         }
     }
-    let looks = look_as(path, &log, named, &asked.plan, pool)?;
+    let looks = look_as(path, &log, named, (&asked.selection.decode, &asked.plan), pool)?;
     let has_reference = asked.drawing.is_some_and(|d| d.reference.is_some())
         || log
             .channels
@@ -171,6 +174,7 @@ fn integrate(
     let run = Replay {
         source: Source::File(path.to_owned()),
         targets: Vec::new(),
+        selection: asked.selection.clone(),
         plan: asked.plan.clone(),
         options: sink::Options::default(),
         copy_input: false,

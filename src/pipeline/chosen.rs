@@ -5,7 +5,7 @@
 
 use super::decoders::Decoders;
 use super::log::{Known, Log, described, rank};
-use super::preparation::Resolved;
+use strapd_attitude::estimate::Meaning;
 use super::route::{Noticed, Route, Taker};
 use super::run::Replay;
 use super::session::Found;
@@ -39,7 +39,7 @@ pub(super) fn choose(
     if run.copy_input {
         taken.extend(log.channels.iter().map(|c| c.channel.topic.clone()));
     }
-    let mut decoders = Decoders::of_run(&run.plan);
+    let mut decoders = Decoders::of_run(&run.plan, &run.selection.decode);
     names
         .iter()
         .map(|name| {
@@ -116,7 +116,7 @@ fn choose_one(
         name: name.to_owned(),
         output_topic: topic,
         described: described(&first.channel),
-        resolved: Resolved::new(&run.plan, decoder.stated()),
+        resolved: Meaning::new(&run.plan, &decoder.stated().declared),
         noticed: Arc::new(Noticed::of(&source)),
         warnings: refusals.into_iter().chain(which_stamp(decoder)).collect(),
     };
@@ -165,7 +165,7 @@ pub(super) struct Reference {
     channel: Arc<Channel>,
     decoder: Decoder,
     /// How its orientations are understood.
-    pub(super) resolved: Resolved,
+    pub(super) resolved: Meaning,
 }
 
 impl Reference {
@@ -219,7 +219,7 @@ pub(super) fn reference(
         })?;
     Ok(Some(Reference {
         channel: found.channel.clone(),
-        resolved: Resolved::new(&run.plan, decoder.stated()),
+        resolved: Meaning::new(&run.plan, &decoder.stated().declared),
         decoder,
     }))
 }

@@ -4,7 +4,7 @@
 //! have tens of thousands of channels of one schema, or as many schemas.
 
 use super::log::plain;
-use crate::config::Plan;
+use strapd_attitude::estimate::Plan;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use strapd_attitude::condition::Clock;
@@ -53,13 +53,13 @@ impl Decoders {
 
     /// None yet, for a run of `plan`.
     #[must_use]
-    pub fn of_run(plan: &Plan) -> Decoders {
+    pub fn of_run(plan: &Plan, options: &Options) -> Decoders {
         Decoders {
             stamps: match plan.clock {
                 Clock::Header => Stamps::Stated,
                 Clock::Log | Clock::Publish | Clock::Index { .. } => Stamps::Unread,
             },
-            ..Decoders::new(&plan.decode)
+            ..Decoders::new(options)
         }
     }
 

@@ -40,7 +40,7 @@ pub(super) fn each(
     pool: &Pool,
     watch: &mut dyn FnMut(&Position),
 ) -> Result<Vec<Told>> {
-    let mut decoders = Decoders::of_run(&run.plan);
+    let mut decoders = Decoders::of_run(&run.plan, &run.selection.decode);
     let mut told: Vec<Option<Told>> = Vec::new();
     let mut chosen: Vec<Chosen> = Vec::new();
     for found in choose_each(run, path, log, names, &mut decoders) {

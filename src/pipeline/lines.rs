@@ -1,12 +1,12 @@
 //! NDJSON samples -> the same run as from a log. I/O.
 
 use super::position::Position;
-use super::preparation::Resolved;
+use strapd_attitude::estimate::Meaning;
 use super::route::Item;
 use super::run::{Replay, refused};
 use super::session::Found;
 use super::simulate::TRUTH_ID;
-use super::stamps::{StampPass, Stamps};
+use strapd_attitude::estimate::{StampPass, Stamps};
 use super::summarise;
 use super::waiting::Waiting;
 use crate::error::{Error, Result};
@@ -18,9 +18,8 @@ use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 use std::sync::Arc;
 use strapd_attitude::record::{Nanos, RawSample};
-use strapd_recording::decode::{
-    Ambiguous, Bare, Class, LineDecoder, MAX_LINE, MOST_WAITING, Stated, TimeUnit, unit_of,
-};
+use strapd_recording::decode::{Ambiguous, Bare, Class, LineDecoder, MAX_LINE, MOST_WAITING, unit_of};
+use strapd_attitude::record::{Declared, TimeUnit};
 use strapd_recording::mcap::Survey;
 use strapd_recording::pool::Pool;
 
@@ -145,7 +144,7 @@ struct Looking<'r> {
 
 impl Taker for Looking<'_> {
     fn meet(&mut self, found: Found, _: Stream) -> Result<()> {
-        self.pass = StampPass::new(self.run, &found.resolved).map(|pass| (found.name, pass));
+        self.pass = StampPass::new(&self.run.plan, &found.resolved, self.run.other_kinds()).map(|pass| (found.name, pass));
         Ok(())
     }
 
@@ -171,7 +170,7 @@ fn read(
     path: &Path,
     taker: &mut impl Taker,
 ) -> Result<()> {
-    let decoder = LineDecoder::new(&run.plan.decode);
+    let decoder = LineDecoder::new(&run.selection.decode);
     let mut lines = Lines {
         number: 0,
         offset: 0,
@@ -218,14 +217,12 @@ fn read(
                 let id = line.id.unwrap_or_default();
                 // An attitude carries the rate behind it, which makes it a sample where there is
                 // nothing else: not beside samples, and not when it is the truth about them.
-                let truth = id == TRUTH_ID && run.plan.topic.as_deref() != Some(TRUTH_ID);
+                let truth = id == TRUTH_ID && run.selection.topic.as_deref() != Some(TRUTH_ID);
                 if line.class == Class::Att && (has_rates || truth) {
                     samples.clear();
                     continue;
                 }
-                if run
-                    .plan
-                    .topic
+                if run.selection.topic
                     .as_deref()
                     .is_some_and(|t| t != "all" && t != id)
                 {
@@ -235,12 +232,13 @@ fn read(
                 has_rates |= line.class == Class::Rate;
                 match &sensor {
                     None => {
-                        let stated = Stated {
+                        let declared = Declared {
                             sample_kind: line.sample_kind,
                             gyro_unit: line.gyro_unit,
-                            ..Stated::default()
+                            interval_unit_given: run.selection.decode.states_interval_unit(),
+                            ..Declared::default()
                         };
-                        let (found, stream) = met(run, &id, &stated);
+                        let (found, stream) = met(run, &id, &declared);
                         taker.meet(found, stream)?;
                         sensor = Some(id);
                     }
@@ -343,13 +341,13 @@ fn nothing(path: &Path) -> Error {
     }
 }
 
-fn met(run: &Replay, id: &str, stated: &Stated) -> (Found, Stream) {
+fn met(run: &Replay, id: &str, declared: &Declared) -> (Found, Stream) {
     let name = if id.is_empty() { "imu" } else { id };
     let found = Found {
         name: name.to_owned(),
         output_topic: output_topic(name, &BTreeSet::new()),
         described: DESCRIBED.to_owned(),
-        resolved: Resolved::new(&run.plan, stated),
+        resolved: Meaning::new(&run.plan, declared),
         noticed: Arc::default(),
         warnings: Vec::new(),
     };

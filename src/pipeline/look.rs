@@ -5,12 +5,12 @@
 
 use super::decoders::Decoders;
 use super::log::{Known, Log, described, rank};
-use super::passes::{Conditioned, FEW};
-use super::preparation::Resolved;
+use strapd_attitude::estimate::{Conditioned, FEW};
+use strapd_attitude::estimate::Meaning;
 use super::route::{Item, Noticed, Route, Taker};
 use super::sources::Source;
 use super::topics::{MOST_TOPICS, PICKED_UNNAMED};
-use crate::config::Plan;
+use strapd_attitude::estimate::Plan;
 use crate::error::{Error, Result};
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
@@ -37,7 +37,7 @@ pub struct Looked {
     /// The frame its first message names.
     pub frame: String,
     /// How its samples are understood by default.
-    pub resolved: Resolved,
+    pub resolved: Meaning,
     /// Whether the format states the meaning of a sample.
     pub kind_stated: bool,
     /// Statistics.
@@ -72,7 +72,7 @@ struct Look {
     described: String,
     frame: String,
     kind_stated: bool,
-    resolved: Resolved,
+    resolved: Meaning,
     first: Vec<RawSample>,
     clock: Option<(Clock, Option<String>)>,
     asked: Clock,
@@ -148,11 +148,7 @@ pub fn look(
     options: &Options,
     pool: &Pool,
 ) -> Result<Looks> {
-    let plan = Plan {
-        decode: options.clone(),
-        ..Plan::default()
-    };
-    look_as(path, log, named, &plan, pool)
+    look_as(path, log, named, (options, &Plan::default()), pool)
 }
 
 /// The same with the samples understood as a run of `plan` understands them.
@@ -163,12 +159,12 @@ pub fn look_as(
     path: &Path,
     log: &Log,
     named: Option<&str>,
-    plan: &Plan,
+    (options, plan): (&Options, &Plan),
     pool: &Pool,
 ) -> Result<Looks> {
     let (wanted, left_out) = wanted(log, named);
     let mut looks: Vec<Look> = Vec::new();
-    let mut compiled = Decoders::of_run(plan);
+    let mut compiled = Decoders::of_run(plan, options);
     let mut decoders: BTreeMap<Id<'_>, (decode::Decoder, Vec<Taker>)> = BTreeMap::new();
     for (source, is_named) in wanted {
         let noticed = Arc::new(Noticed::of(source));
@@ -287,7 +283,7 @@ fn wanted<'l>(log: &'l Log, named: Option<&str>) -> (Vec<(&'l Source, bool)>, Ve
 }
 
 fn begin(source: &Source, known: &Known, decoder: &decode::Decoder, plan: &Plan) -> Look {
-    let resolved = Resolved::new(plan, decoder.stated());
+    let resolved = Meaning::new(plan, &decoder.stated().declared);
     let first_frame = || {
         let (_, payload) = known.first.as_ref()?;
         decoder.frame_id(payload)
@@ -301,7 +297,7 @@ fn begin(source: &Source, known: &Known, decoder: &decode::Decoder, plan: &Plan)
             .clone()
             .or_else(first_frame)
             .unwrap_or_default(),
-        kind_stated: decoder.stated().sample_kind.is_some(),
+        kind_stated: decoder.stated().declared.sample_kind.is_some(),
         first: Vec::new(),
         clock: None,
         quality: Quality::new(plan.clock),

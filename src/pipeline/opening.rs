@@ -3,11 +3,11 @@
 //! Apart from the sources because a file, a stream and lines all begin the same way.
 
 use super::outlet::{Delivery, Outlet};
-use super::preparation::{Prepared, Resolved};
+use strapd_attitude::estimate::{Prepared, Meaning};
 use super::provenance;
 use super::run::{Replay, Source};
 use super::session::{Found, Session, Topic};
-use crate::config::Plan;
+use strapd_attitude::estimate::Plan;
 use crate::error::Result;
 use crate::sink::Stream;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 pub(crate) fn labelled(
     mut stream: Stream,
     plan: &Plan,
-    resolved: &Resolved,
+    resolved: &Meaning,
     prepared: &Prepared,
 ) -> Stream {
     let (world, body) = resolved.labels(prepared.world);

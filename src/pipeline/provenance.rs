@@ -1,10 +1,10 @@
 //! What a reader of the output must be able to find out later -> its metadata. I/O: reads the ends
 //! of the input.
 
-use super::preparation::Prepared;
+use strapd_attitude::estimate::Prepared;
 use super::run::{Replay, Source};
 use super::session::Found;
-use crate::config::Aid;
+use strapd_attitude::estimate::Aid;
 use crate::error::Result;
 use crate::sink::{Provenance, Stream, Target};
 use sha2::{Digest, Sha256};

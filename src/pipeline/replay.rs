@@ -7,11 +7,11 @@ use super::chosen::{Chosen, choose, looked_at, reference, route};
 use super::log::Log;
 use super::opening::{begin, labelled};
 use super::position::Position;
-use super::preparation::{Patience, Preparation, Prepared};
+use strapd_attitude::estimate::{Patience, Preparation, Prepared};
 use super::route::{Item, Route};
 use super::run::{Replay, Source, refused};
 use super::session::Found;
-use super::stamps::StampPass;
+use strapd_attitude::estimate::StampPass;
 use super::summarise;
 use super::{lines, streamed};
 use crate::error::Result;
@@ -105,8 +105,8 @@ fn file(
     pool: &Pool,
     watch: &mut dyn FnMut(&Position),
 ) -> Result<RunSummary> {
-    let log = Log::told_apart(path, run.plan.topic.as_deref(), &run.plan.decode, pool)?;
-    let choice = log.choose(path, run.plan.topic.as_deref())?;
+    let log = Log::told_apart(path, run.selection.topic.as_deref(), &run.selection.decode, pool)?;
+    let choice = log.choose(path, run.selection.topic.as_deref())?;
     let mut chosen = choose(run, path, &log, &choice.topics)?;
     if let (Some(note), Some(first)) = (choice.note, chosen.first_mut()) {
         first.found.warnings.push(note);
@@ -182,7 +182,7 @@ pub(super) fn prepare(
         .iter()
         .map(|c| {
             Preparation::new(&run.plan, &c.found.resolved, Patience::WholeLog)
-                .with_stamps(StampPass::new(run, &c.found.resolved))
+                .with_stamps(StampPass::new(&run.plan, &c.found.resolved, run.other_kinds()))
         })
         .collect();
     let mut failures: Vec<Option<String>> = chosen.iter().map(|_| None).collect();

@@ -1,7 +1,8 @@
 //! What a replay is: from where, to where, how. Pure.
 
 use super::audience::Audience;
-use crate::config::Plan;
+use strapd_attitude::estimate::Plan;
+use crate::config::Selection;
 use crate::error::Error;
 use crate::sink::{self, Target};
 use std::path::{Path, PathBuf};
@@ -14,6 +15,8 @@ pub struct Replay {
     pub source: Source,
     /// To where.
     pub targets: Vec<Target>,
+    /// Which of them.
+    pub selection: Selection,
     /// How samples are understood and integrated.
     pub plan: Plan,
     /// How outputs are made.
@@ -30,6 +33,13 @@ pub struct Replay {
     pub against: Option<String>,
     /// The command as typed, for the output's metadata.
     pub command: String,
+}
+
+impl Replay {
+    /// What else samples are taken for, to compare.
+    pub(super) fn other_kinds(&self) -> impl Iterator<Item = strapd_attitude::record::SampleKind> {
+        self.against.iter().flat_map(|_| super::against::kinds())
+    }
 }
 
 /// Where a run's data comes from.

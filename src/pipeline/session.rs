@@ -2,13 +2,13 @@
 //! only through the outlet.
 
 use super::against::AgainstRecorded;
-use super::estimator::Estimator;
+use strapd_attitude::estimate::Estimator;
 use super::history::History;
 use super::outlet::Outlet;
 use super::position::Position;
-use super::preparation::{Prepared, Resolved};
+use strapd_attitude::estimate::{Prepared, Meaning};
 use super::route::{Item, Noticed};
-use crate::config::Plan;
+use strapd_attitude::estimate::Plan;
 use crate::error::{Error, Result};
 use crate::sink::{Flow, Written};
 use std::path::Path;
@@ -27,7 +27,7 @@ pub struct Topic {
     /// Type and encoding.
     pub described: String,
     /// How its samples are understood.
-    pub resolved: Resolved,
+    pub resolved: Meaning,
     /// What was decided before the first was integrated.
     pub prepared: Prepared,
     /// What was noticed in its payloads.
@@ -145,7 +145,7 @@ pub struct Found {
     /// Type and encoding.
     pub described: String,
     /// How its samples are understood.
-    pub resolved: Resolved,
+    pub resolved: Meaning,
     /// What is noticed in its payloads.
     pub noticed: Arc<Noticed>,
     /// Things to know.

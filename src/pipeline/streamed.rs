@@ -8,7 +8,7 @@ use super::decoders::Decoders;
 use super::held::Held;
 use super::log::{Known, described, explained, known, problems, rank};
 use super::position::Position;
-use super::preparation::Resolved;
+use strapd_attitude::estimate::Meaning;
 use super::route::{Item, Noticed, Route, Taker};
 use super::run::Replay;
 use super::session::Found;
@@ -38,7 +38,7 @@ pub(super) fn replay(
     let mut waiting = Waiting::new(run, &path, None);
     let mut failure = None;
     let picked = std::cell::RefCell::new(Picked {
-        decoders: Decoders::of_run(&run.plan),
+        decoders: Decoders::of_run(&run.plan, &run.selection.decode),
         ..Picked::default()
     });
     let report = mcap::walk(
@@ -115,7 +115,7 @@ impl Picked {
     fn route(&mut self, run: &Replay, channel: &Arc<Channel>) -> Option<Route> {
         let copied = run.copy_input.then(|| channel.clone());
         let found = known(channel, 0, None, &mut self.plain);
-        let named = run.plan.topic.as_deref().filter(|t| *t != "all");
+        let named = run.selection.topic.as_deref().filter(|t| *t != "all");
         let wanted = match (&self.topic, named) {
             (Some(topic), _) => {
                 let is_same = *topic == channel.topic;
@@ -178,7 +178,7 @@ impl Picked {
                 name: channel.topic.clone(),
                 output_topic: output_topic(&channel.topic, &BTreeSet::new()),
                 described: described(channel),
-                resolved: Resolved::new(&run.plan, decoder.stated()),
+                resolved: Meaning::new(&run.plan, &decoder.stated().declared),
                 noticed: self.noticed.clone(),
                 warnings: which_stamp(decoder).into_iter().collect(),
             },
@@ -256,7 +256,7 @@ impl Picked {
             .map(|c| known(&c.channel, c.messages, None, &mut decoders))
             .collect();
         let candidates: Vec<_> = channels.iter().map(Known::candidate).collect();
-        let error = match topics::choose(path, &candidates, run.plan.topic.as_deref()) {
+        let error = match topics::choose(path, &candidates, run.selection.topic.as_deref()) {
             Err(e) => e,
             Ok(choice) => Error::Unsupported {
                 path: path.to_owned(),

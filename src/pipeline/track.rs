@@ -4,7 +4,7 @@
 
 use super::decoders::Decoders;
 use super::log::{Known, Log, problems, rank};
-use super::preparation::orientation_convention;
+use strapd_attitude::estimate::orientation_convention;
 use super::route::{Item, Route};
 use super::simulate::{TRUTH_ID, TRUTH_TOPIC};
 use super::topics;
@@ -75,7 +75,7 @@ fn from_mcap(path: &Path, side: Side, topic: Option<&str>, pool: &Pool) -> Resul
             path: path.to_owned(),
             what: why.to_string(),
         })?;
-    let stated = orientation_convention(decoder.stated());
+    let stated = orientation_convention(&decoder.stated().declared);
     let mut entries: Vec<Entry> = Vec::new();
     let wanted = known.channel.clone();
     let reader = log.reader().map_or_else(|| mcap::Reader::open(path), Ok)?;

@@ -3,11 +3,11 @@
 
 use super::opening::{begin, labelled};
 use super::position::Position;
-use super::preparation::{Patience, Preparation};
+use strapd_attitude::estimate::{Patience, Preparation};
 use super::route::Item;
 use super::run::{Replay, refused};
 use super::session::{Found, Session};
-use super::stamps::{StampPass, Stamps};
+use strapd_attitude::estimate::{StampPass, Stamps};
 use super::topics;
 use crate::error::{Error, Result};
 use crate::sink::{Flow, Stream};
@@ -43,7 +43,7 @@ impl<'r> Waiting<'r> {
             let preparation =
                 Preparation::new(&self.run.plan, &found.resolved, Patience::FirstMinute);
             let preparation = match self.stamps.take() {
-                None => preparation.with_stamps(StampPass::new(self.run, &found.resolved)),
+                None => preparation.with_stamps(StampPass::new(&self.run.plan, &found.resolved, self.run.other_kinds())),
                 known => preparation.with_known_stamps(known),
             };
             self.gathering = Some((found, stream, preparation));

@@ -5,6 +5,7 @@
 use super::aid::Aided;
 use super::drawn::Drawn;
 use super::stamps::Regularised;
+pub use strapd_attitude::digits::significant;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use strapd_attitude::compare::BodyAxesFit;
@@ -549,20 +550,6 @@ pub(super) fn line(out: &mut String, label: &str, text: &str) {
         let _ = writeln!(out, "  {label:<8} {}", part.trim_start());
         label = "";
     }
-}
-
-/// `value` with about `digits` significant digits, without an exponent where that is short.
-#[must_use]
-pub fn significant(value: f64, digits: usize) -> String {
-    if !value.is_finite() || value == 0.0 {
-        return format!("{value}");
-    }
-    let exponent = value.abs().log10().floor() as i64;
-    if !(-4..7).contains(&exponent) {
-        return format!("{value:.*e}", digits.saturating_sub(1));
-    }
-    let decimals = usize::try_from(digits as i64 - 1 - exponent).unwrap_or(0);
-    format!("{value:.decimals$}")
 }
 
 /// `4.2 MB`.

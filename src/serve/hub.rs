@@ -34,7 +34,7 @@ use super::stream::stamps::Taken;
 use super::stream::{SensorStream, live_plan};
 use super::subscriber::{Chunk, Outbox};
 use super::wire::{self, Fault};
-use crate::config::Plan;
+use strapd_attitude::estimate::Plan;
 use crate::error::{Error, Result};
 use crate::sink::Profile;
 use bytes::Bytes;
@@ -59,6 +59,7 @@ pub struct Hub {
     /// Plans of sensors that have their own, by `id`.
     plans: BTreeMap<String, Plan>,
     decoder: LineDecoder,
+    decode_options: decode::Options,
     limits: Limits,
     token: Option<Token>,
     recorder: Option<Handle>,
@@ -193,7 +194,8 @@ impl Hub {
         // No secret: it only tells a reader that the daemon was restarted.
         let session = RandomState::new().hash_one(std::process::id()) as u32;
         Ok(Hub {
-            decoder: LineDecoder::new(&plan.decode),
+            decoder: LineDecoder::new(&settings.decode),
+            decode_options: settings.decode,
             plan,
             plans,
             limits: settings.limits,
@@ -250,7 +252,7 @@ impl Hub {
     /// How lines are read.
     #[must_use]
     pub fn decode_options(&self) -> &decode::Options {
-        &self.plan.decode
+        &self.decode_options
     }
 
     /// The sources it connects to.

@@ -7,7 +7,7 @@ use super::hub::Hub;
 use super::quiet;
 use super::stream::run::Span;
 use crate::error::{Error, Result};
-use crate::pipeline::estimator::Memory;
+use strapd_attitude::estimate::Memory;
 use crate::sink::{self, sync_directory};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -18,7 +18,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{AttitudeCovariance, AttitudeSample, Nanos, Status};
-use strapd_recording::decode::TimeUnit;
+use strapd_attitude::record::TimeUnit;
 
 /// What this release writes. 1 had neither the run nor the memory.
 const FORMAT: u32 = 2;

@@ -8,10 +8,10 @@ mod intervals;
 pub mod run;
 pub mod stamps;
 
-use crate::config::Plan;
-use crate::pipeline::estimator::Estimator;
+use strapd_attitude::estimate::Plan;
+use strapd_attitude::estimate::Estimator;
 use crate::pipeline::opening::labelled;
-use crate::pipeline::preparation::{Prepared, Resolved, at_once};
+use strapd_attitude::estimate::{Prepared, Meaning, at_once};
 use crate::report::aid::Aided;
 use crate::serve::channel::Channel;
 use crate::serve::hub::Run;
@@ -28,7 +28,8 @@ use strapd_attitude::condition::{Clock, Report};
 use strapd_attitude::propagate::{Method, Sequential};
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{AttitudeSample, Counts, Nanos, RawSample, Verdict};
-use strapd_recording::decode::{Ambiguous, Bare, Line, Stated, TimeUnit};
+use strapd_recording::decode::{Ambiguous, Bare, Line};
+use strapd_attitude::record::{Declared, TimeUnit};
 
 /// Numbers a sample may come behind its turn. Further back, the sender counts anew.
 const OVERTAKEN: u64 = 64;
@@ -45,7 +46,7 @@ pub struct SensorStream {
     id: Arc<str>,
     estimator: Estimator,
     channel: Arc<Channel>,
-    resolved: Resolved,
+    resolved: Meaning,
     prepared: Prepared,
     /// Who sends it has just come, and its first stamp is still to decide where it stands.
     joining: Joining,
@@ -92,16 +93,11 @@ enum Joining {
 /// # Errors
 /// In words, with the flag that helps: what a live stream can not do.
 pub fn live_plan(plan: &Plan) -> Result<Plan, String> {
-    if plan.topic.is_some() {
-        return Err(
-            "--topic: a sensor is named by `id` in its samples, and chosen with WATCH".to_owned(),
-        );
-    }
     let mut plan = plan.clone();
     if plan.method == Method::Auto {
         plan.method = "commit".parse::<Method>().map_err(|e| e.to_string())?;
     }
-    let resolved = Resolved::new(&plan, &Stated::default());
+    let resolved = Meaning::new(&plan, &Declared::default());
     // An orientation, so that only what no sample can bring is refused.
     let sample = RawSample {
         orientation: Some(
@@ -134,12 +130,12 @@ impl SensorStream {
             id: Some(id.to_string()),
             ..Fault::new("not_ready", what)
         };
-        let stated = Stated {
+        let declared = Declared {
             sample_kind: stated.sample_kind,
             gyro_unit: stated.gyro_unit,
-            ..Stated::default()
+            ..Declared::default()
         };
-        let resolved = Resolved::new(plan, &stated);
+        let resolved = Meaning::new(plan, &declared);
         let mut prepared = at_once(plan, &resolved, first).map_err(fault)?;
         let estimator = Estimator::live(plan, &resolved, &prepared).map_err(fault)?;
         let labels = labelled(stream_of(&id), plan, &resolved, &prepared);

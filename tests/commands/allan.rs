@@ -73,7 +73,7 @@ fn the_noise_of_a_log_comes_out_in_its_units_and_as_flags() {
     // Each flag is understood where it is to be pasted, and means the same.
     let simulate = ImuError::parse(summary["simulate_noise"].as_str().unwrap()).unwrap();
     assert!((simulate.arw / ARW - 1.0).abs() < 0.03);
-    let replay = strapd::config::Noise::parse(summary["replay_noise"].as_str().unwrap()).unwrap();
+    let replay = strapd::config::parse_noise(summary["replay_noise"].as_str().unwrap()).unwrap();
     for axis in replay.arw.iter() {
         assert!((axis / simulate.arw - 1.0).abs() < 0.03);
     }

@@ -2,12 +2,13 @@
 #![allow(dead_code, unreachable_pub, clippy::unwrap_used, clippy::expect_used)]
 
 use std::path::{Path, PathBuf};
-use strapd::config::Plan;
+use strapd::config::Selection;
 use strapd::error::Result;
 use strapd::pipeline::replay::run;
 use strapd::pipeline::run::{Replay, Source};
 use strapd::report::summary::{RunSummary, TopicSummary};
 use strapd::sink::{Options, Target};
+use strapd_attitude::estimate::Plan;
 use strapd_recording::pool::Pool;
 
 /// A replay of a file into nothing, every setting at its default.
@@ -15,6 +16,7 @@ pub fn replay_of(path: &Path) -> Replay {
     Replay {
         source: Source::File(path.to_owned()),
         targets: vec![Target::Null],
+        selection: Selection::default(),
         plan: Plan::default(),
         options: Options::default(),
         copy_input: false,
@@ -32,6 +34,20 @@ pub fn replay_with(path: &Path, plan: Plan) -> Replay {
         plan,
         ..replay_of(path)
     }
+}
+
+/// The same of one topic.
+pub fn replay_named(path: &Path, topic: &str) -> Replay {
+    let mut replay = replay_of(path);
+    replay.selection.topic = Some(topic.to_owned());
+    replay
+}
+
+/// The same with a `--field`.
+pub fn replay_by(path: &Path, field: &str) -> Replay {
+    let mut replay = replay_of(path);
+    replay.selection.decode.fields = vec![field.parse().unwrap()];
+    replay
 }
 
 /// Runs it on two threads, watched by nobody.

@@ -16,6 +16,7 @@
 //! | [`condition`] | raw samples -> SI, body axes, in order, finite |
 //! | [`propagate`] | rates -> attitude: the hot loop |
 //! | [`aid`] | specific force, field -> corrections of attitude and sensor |
+//! | [`estimate`] | all of these in one: what is asked for and the first samples -> an estimator -> attitude |
 //! | [`noise`] | what a sensor adds: measured, and put in on purpose |
 //! | [`compare`] | two attitudes -> how far apart |
 //!
@@ -53,6 +54,8 @@
 pub mod aid;
 pub mod compare;
 pub mod condition;
+pub mod digits;
+pub mod estimate;
 pub mod frames;
 pub mod noise;
 pub mod propagate;

@@ -8,8 +8,10 @@
 //! [`Counts`], and the run goes on.
 
 mod covariance;
+mod declared;
 
 pub use covariance::AttitudeCovariance;
+pub use declared::{AccelUnit, Declared, TimeUnit};
 
 use crate::frames::{Body, Nav};
 use crate::quaternion::Quaternion;

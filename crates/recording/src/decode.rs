@@ -38,8 +38,8 @@ pub use json::line::{Class, Line, LineDecoder, MAX_LINE, decode_line};
 pub use json::objects::{Object, Objects};
 pub use refusal::{Undecodable, Unsupported, exact_name};
 pub use role::{Rank, Role, role, role_of};
-pub use stamp::{Ambiguous, Bare, MOST_WAITING, TimeUnit, unit_of};
-pub use stated::{AccelUnit, BodyAxes, Stated, WorldAxes};
+pub use stamp::{Ambiguous, Bare, MOST_WAITING, unit_of};
+pub use stated::Stated;
 pub use strapd_attitude::condition::GyroUnit;
 
 use crate::text::printable;
@@ -49,7 +49,7 @@ use schema::{Schema, builtin, descriptor, idl, ros_name, rosmsg};
 use select::names::{self, Px4};
 use select::{Found, Selection, select};
 use std::sync::Arc;
-use strapd_attitude::record::{Nanos, RawSample};
+use strapd_attitude::record::{Nanos, RawSample, TimeUnit};
 
 /// Most samples one message may hold.
 pub const MAX_BATCH: usize = 65_536;
@@ -230,7 +230,7 @@ impl Decoder {
             form,
             plan,
             frame,
-            stated: state(channel.schema_name, &selection),
+            stated: state(channel.schema_name, &selection, options),
             found: selection.found,
             stamps: selection.stamps.iter().map(|s| printable(s)).collect(),
             options: options.clone(),
@@ -240,6 +240,7 @@ impl Decoder {
 
     fn json(channel: &Channel<'_>, options: &Options, label: [String; 3]) -> Decoder {
         let mut stated = Stated::default();
+        stated.declared.interval_unit_given = options.states_interval_unit();
         state_by_type(channel.schema_name, &mut stated);
         let px4 = names::px4(channel.schema_name);
         state_px4(px4, &mut stated);
@@ -510,19 +511,20 @@ fn compile_plan(
     Ok(Plan::Ros(Arc::new(plan.recognised())))
 }
 
-fn state(type_name: &str, selection: &Selection) -> Stated {
+fn state(type_name: &str, selection: &Selection, options: &Options) -> Stated {
     let mut stated = Stated::default();
+    stated.declared.interval_unit_given = options.states_interval_unit();
     state_by_type(type_name, &mut stated);
     state_by_type(&selection.holder, &mut stated);
-    stated.gyro_unit = selection.unit.or(stated.gyro_unit);
+    stated.declared.gyro_unit = selection.unit.or(stated.declared.gyro_unit);
     state_px4(names::px4(type_name), &mut stated);
-    stated.sample_kind = selection.kind.or(stated.sample_kind);
+    stated.declared.sample_kind = selection.kind.or(stated.declared.sample_kind);
     stated.has_gyro = selection.has(Slot::GYRO, 3);
     stated.has_accel = selection.has(Slot::ACCEL, 3);
     stated.has_orientation = selection.has(Slot::ORIENTATION, 4);
     stated.has_stamp = selection.form.stamp != StampForm::None;
     stated.has_interval = selection.has(Slot::INTERVAL, 1);
-    stated.interval = stated
+    stated.declared.interval = stated
         .has_interval
         .then(|| (printable(&selection.interval), selection.form.interval));
     stated.batched = selection
@@ -553,7 +555,7 @@ fn state_px4(px4: Option<Px4>, stated: &mut Stated) {
     stated.has_gyro = px4 != Px4::VehicleAttitude;
     stated.has_stamp = true;
     stated.has_orientation = px4 == Px4::VehicleAttitude;
-    stated.sample_kind = Some(match px4 {
+    stated.declared.sample_kind = Some(match px4 {
         Px4::SensorCombined => strapd_attitude::record::SampleKind::Average,
         Px4::VehicleImu => strapd_attitude::record::SampleKind::DeltaAngle,
         Px4::VehicleAngularVelocity | Px4::SensorGyro | Px4::VehicleAttitude => {

@@ -1,10 +1,11 @@
 //! One topic of a log -> angles at even intervals, and what was wrong with them. I/O.
 
-use crate::config::Plan;
+use crate::config::Selection;
+use strapd_attitude::estimate::Plan;
 use crate::error::{Error, Result};
 use crate::pipeline::decoders::Decoders;
 use crate::pipeline::log::{Log, described, problems};
-use crate::pipeline::preparation::Resolved;
+use strapd_attitude::estimate::Meaning;
 use crate::pipeline::route::{Item, Noticed, Route, Taker};
 use crate::report::summary::significant;
 use nalgebra::Vector3;
@@ -36,7 +37,7 @@ const UNEVEN: f64 = 0.05;
 pub(super) struct Gathered {
     pub(super) topic: String,
     pub(super) described: String,
-    pub(super) resolved: Resolved,
+    pub(super) resolved: Meaning,
     /// Angles; of rates in units of `interval`.
     pub(super) record: AngleRecord,
     /// How many it holds at most.
@@ -65,14 +66,19 @@ pub(super) struct Gathered {
 ///
 /// # Errors
 /// The log can not be read, no topic or several, or a topic without a rate.
-pub(super) fn gather(path: &Path, plan: &Plan, capacity: usize, pool: &Pool) -> Result<Gathered> {
-    if plan.topic.as_deref() == Some("all") {
+pub(super) fn gather(
+    path: &Path,
+    (selection, plan): (&Selection, &Plan),
+    capacity: usize,
+    pool: &Pool,
+) -> Result<Gathered> {
+    if selection.topic.as_deref() == Some("all") {
         return Err(Error::Usage(
             "--topic all: one topic at a time\n  help: --topic NAME".to_owned(),
         ));
     }
-    let log = Log::told_apart(path, plan.topic.as_deref(), &plan.decode, pool)?;
-    let choice = log.choose(path, plan.topic.as_deref())?;
+    let log = Log::told_apart(path, selection.topic.as_deref(), &selection.decode, pool)?;
+    let choice = log.choose(path, selection.topic.as_deref())?;
     let topic = choice.topics.into_iter().next().unwrap_or_default();
     let unsupported = |what: String| Error::Unsupported {
         path: path.to_owned(),
@@ -80,7 +86,7 @@ pub(super) fn gather(path: &Path, plan: &Plan, capacity: usize, pool: &Pool) -> 
     };
     let mut by_id = BTreeMap::new();
     let mut decoders = Vec::new();
-    let mut compiled = Decoders::of_run(plan);
+    let mut compiled = Decoders::of_run(plan, &selection.decode);
     let source = log.source(&topic);
     for known in source.iter().flat_map(|s| log.channels_of(s)) {
         let decoder = known
@@ -101,7 +107,7 @@ pub(super) fn gather(path: &Path, plan: &Plan, capacity: usize, pool: &Pool) -> 
         )));
     }
     let noticed = Arc::new(source.as_ref().map(Noticed::of).unwrap_or_default());
-    let mut gathering = Gathering::new(plan, Resolved::new(plan, decoder.stated()), capacity);
+    let mut gathering = Gathering::new(plan, Meaning::new(plan, &decoder.stated().declared), capacity);
     let described = described(channel);
     let mut failure = None;
     let reader = log.reader().map_or_else(|| mcap::Reader::open(path), Ok)?;
@@ -163,7 +169,7 @@ pub(super) fn gather(path: &Path, plan: &Plan, capacity: usize, pool: &Pool) -> 
 /// A record being gathered.
 struct Gathering {
     plan: Plan,
-    resolved: Resolved,
+    resolved: Meaning,
     first: Vec<RawSample>,
     running: Option<Conditioner>,
     conditioned: Vec<RateSample>,
@@ -186,7 +192,7 @@ struct Gathering {
 }
 
 impl Gathering {
-    fn new(plan: &Plan, resolved: Resolved, capacity: usize) -> Gathering {
+    fn new(plan: &Plan, resolved: Meaning, capacity: usize) -> Gathering {
         Gathering {
             plan: plan.clone(),
             detector: Stillness::new(resolved.kind, Limits::default()),

@@ -1,7 +1,8 @@
 //! `strapd simulate rigid-body`. Pure.
 
 use super::{Made, parameter, sampling::Common};
-use crate::config::{Initial, numbers};
+use strapd_attitude::estimate::Initial;
+use crate::config::{numbers, parse_initial};
 use crate::error::{Error, Result};
 use clap::Args;
 use nalgebra::{Matrix3, Vector3};
@@ -62,7 +63,7 @@ impl RigidBody {
         let refused = |e: InertiaError| Error::Usage(format!("--inertia {}: {e}", self.inertia));
         let (tensor, mass_times_r) = self.body()?;
         let rotor = Rotor::new(tensor).map_err(refused)?;
-        let q_nb = match Initial::parse(&self.attitude) {
+        let q_nb = match parse_initial(&self.attitude) {
             Ok(Initial::Identity) => Quaternion::identity(),
             Ok(Initial::Given(wxyz)) => Quaternion::assume_unit(wxyz),
             _ => {

@@ -3,7 +3,7 @@
 
 use crate::made_logs::{motion, written};
 use crate::replays::{assert_rotations, attitudes, done, only, replay_with};
-use strapd::config::Plan;
+use strapd_attitude::estimate::Plan;
 use strapd_attitude::propagate::{Method, Order, Placement};
 use strapd_attitude::record::SampleKind;
 

@@ -4,11 +4,11 @@ use crate::made_logs::{Logged, logged, motion};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-use strapd::config::Plan;
 use strapd::pipeline::check::{Checked, Examination, check, examine};
 use strapd::pipeline::log::Log;
 use strapd::pipeline::look::look;
 use strapd::report::findings::findings;
+use strapd_attitude::estimate::Plan;
 use strapd_recording::decode::Options;
 use strapd_recording::pool::Pool;
 
@@ -72,8 +72,9 @@ fn a_topic_that_is_refused_keeps_no_other_from_being_told_about() {
     let path = several(dir.path(), 3, 400);
     // None of them rests, so no bias can be found: each is refused, and each says so.
     let examination = Examination {
+        selection: strapd::config::Selection::default(),
         plan: Plan {
-            bias: strapd::config::Bias::Auto,
+            bias: strapd_attitude::estimate::Bias::Auto,
             ..Plan::default()
         },
         reference_topic: String::new(),
@@ -94,6 +95,7 @@ fn all_topics_are_replayed_in_one_pass() {
     let dir = tempfile::tempdir().unwrap();
     let path = several(dir.path(), 40, 300);
     let examination = Examination {
+        selection: strapd::config::Selection::default(),
         plan: Plan::default(),
         reference_topic: String::new(),
         drawing: None,

@@ -3,7 +3,7 @@
 use super::{codes, found, notes};
 use crate::replays::{done, only, replay_with};
 use crate::shared_data::shared;
-use strapd::config::Plan;
+use strapd_attitude::estimate::Plan;
 use strapd_attitude::record::SampleKind;
 
 /// File, errors and warnings. The Xsens samples are averages (see `fixtures/README.md`), which is
@@ -119,11 +119,11 @@ fn the_advice_on_the_meaning_of_a_sample_reduces_the_error() {
             let mut replay = replay_with(
                 &path,
                 Plan {
-                    topic: Some(topic.to_owned()),
                     kind,
                     ..Plan::default()
                 },
             );
+            replay.selection.topic = Some(topic.to_owned());
             replay.against = Some(String::new());
             let summary = done(&replay).unwrap();
             let topic = only(&summary);

@@ -5,7 +5,7 @@ use crate::made_logs::{ImuSample, START, STEP, written};
 use crate::replays::{attitudes, done, only, replay_with, target};
 use nalgebra::Vector3;
 use std::path::{Path, PathBuf};
-use strapd::config::{Bias, Initial, Plan};
+use strapd_attitude::estimate::{Bias, Initial, Plan};
 use strapd_attitude::frames::{Body, In, Nav};
 use strapd_attitude::quaternion::{Quaternion, YawPitchRoll};
 use strapd_attitude::worlds::{Convention, World};

@@ -6,9 +6,9 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
-use strapd::config::Plan;
 use strapd::pipeline::replay::run;
 use strapd_attitude::condition::Clock;
+use strapd_attitude::estimate::Plan;
 use strapd_recording::pool::Pool;
 
 /// Stamps off even ones by up to 3 % of the step, as a lattice.

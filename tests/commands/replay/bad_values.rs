@@ -5,8 +5,8 @@ use crate::made_logs::{ImuSample, TOPIC, motion, written};
 use crate::replays::{Bits, assert_rotations, attitudes, only, replay_with};
 use proptest::prelude::*;
 use std::path::Path;
-use strapd::config::Plan;
 use strapd_attitude::condition::OnGap;
+use strapd_attitude::estimate::Plan;
 use strapd_attitude::propagate::Method;
 use strapd_attitude::record::{SampleKind, Verdict};
 

@@ -2,9 +2,9 @@
 
 use crate::made_logs::{ImuSample, PACKINGS, START, STEP, TOPIC, bytes, logged, motion, written};
 use crate::replays::{attitudes, done, only, replay_of, replay_with};
-use strapd::config::Plan;
 use strapd::error::Error;
 use strapd_attitude::condition::Clock;
+use strapd_attitude::estimate::Plan;
 use strapd_attitude::propagate::{Method, Order, Placement};
 use strapd_attitude::record::{SampleKind, Verdict};
 

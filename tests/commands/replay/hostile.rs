@@ -225,7 +225,7 @@ fn an_unknown_message_encoding_is_named_with_its_topic() {
     );
     let path = shared("logs/native/rosbag2_wrong_format.mcap").unwrap();
     let mut replay = replay_of(&path);
-    replay.plan.topic = Some("/test_topic".to_owned());
+    replay.selection.topic = Some("/test_topic".to_owned());
     let said = done(&replay).unwrap_err().to_string();
     for word in ["/test_topic", "wrong_format", "test_msgs/msg/BasicTypes"] {
         assert!(said.contains(word), "{word} is missing: {said}");

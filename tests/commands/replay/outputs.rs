@@ -4,8 +4,8 @@ use crate::made_logs::{ImuSample, PACKINGS, START, TOPIC, bytes, logged, motion,
 use crate::replays::{Bits, attitudes, done, fixture, mcap, only, replay_of, replay_with, target};
 use crate::shared_data::shared;
 use std::collections::BTreeMap;
-use strapd::config::{Bias, Initial, Plan};
 use strapd::error::Error;
+use strapd_attitude::estimate::{Bias, Initial, Plan};
 use strapd_attitude::worlds::World;
 
 /// Largest difference of a component, either sign of the quaternion.
@@ -48,7 +48,7 @@ fn the_initial_attitude_multiplies_from_the_left() {
         ("identity", [1.0, 0.0, 0.0, 0.0]),
     ] {
         let plan = Plan {
-            initial: Initial::parse(text).unwrap(),
+            initial: strapd::config::parse_initial(text).unwrap(),
             world: World::Enu,
             ..Plan::default()
         };
@@ -264,7 +264,7 @@ fn every_imu_of_a_log_gets_an_output_topic_of_its_own_and_they_are_not_mixed() {
     std::fs::write(&path, bytes(PACKINGS[2].1, 4096, &both)).unwrap();
 
     let mut replay = replay_of(&path);
-    replay.plan.topic = Some("all".to_owned());
+    replay.selection.topic = Some("all".to_owned());
     let out = dir.path().join("out.mcap");
     replay.targets = vec![target(&out)];
     let summary = done(&replay).unwrap();
@@ -348,7 +348,7 @@ fn a_copied_input_is_whole_in_the_output_channels_schemas_and_bytes() {
 #[test]
 fn a_topic_that_is_not_there_lists_those_that_are() {
     let mut replay = replay_of(&fixture("xsens_mti.mcap"));
-    replay.plan.topic = Some("/imu".to_owned());
+    replay.selection.topic = Some("/imu".to_owned());
     let error = done(&replay).unwrap_err();
     assert!(matches!(error, Error::NoSuchTopic { .. }), "{error:?}");
     let said = error.to_string();
@@ -361,7 +361,7 @@ fn a_topic_that_is_not_there_lists_those_that_are() {
 #[test]
 fn a_field_that_is_not_there_lists_those_that_would_do() {
     let mut replay = replay_of(&fixture("xsens_mti.mcap"));
-    replay.plan.decode.fields = vec!["gyro=imu.rate".parse().unwrap()];
+    replay.selection.decode.fields = vec!["gyro=imu.rate".parse().unwrap()];
     let error = done(&replay).unwrap_err();
     let said = error.to_string();
     for word in [

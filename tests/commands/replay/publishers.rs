@@ -5,10 +5,9 @@
 //! files and a recorder started again leave channels that differ in nothing that matters.
 
 use crate::made_logs::{ImuSample, START, STEP, TOPIC, imu_definition, imu_message, motion};
-use crate::replays::{Bits, attitudes, done, only, replay_of, replay_with};
+use crate::replays::{Bits, attitudes, done, only, replay_named, replay_of};
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
-use strapd::config::Plan;
 use strapd::error::Error;
 use strapd::pipeline::check::check;
 use strapd_attitude::record::Verdict;
@@ -100,13 +99,6 @@ fn alone(dir: &Path, samples: &[ImuSample]) -> Vec<Bits> {
     attitudes(&replay_of(&path), dir).1
 }
 
-fn named(topic: &str) -> Plan {
-    Plan {
-        topic: Some(topic.to_owned()),
-        ..Plan::default()
-    }
-}
-
 /// The three ways in which two publishers share a topic, and the names they get.
 fn shared_topics(dir: &Path) -> Vec<(PathBuf, [String; 2])> {
     let at = |name: &str| {
@@ -141,8 +133,8 @@ fn shared_topics(dir: &Path) -> Vec<(PathBuf, [String; 2])> {
 fn two_publishers_on_one_topic_are_refused_and_both_are_named() {
     let dir = tempfile::tempdir().unwrap();
     for (path, names) in shared_topics(dir.path()) {
-        for plan in [Plan::default(), named(TOPIC)] {
-            let error = done(&replay_with(&path, plan)).unwrap_err();
+        for replay in [replay_of(&path), replay_named(&path, TOPIC)] {
+            let error = done(&replay).unwrap_err();
             assert!(matches!(error, Error::SeveralImuTopics { .. }), "{error:?}");
             let said = error.to_string();
             for name in &names {
@@ -162,7 +154,7 @@ fn each_of_two_publishers_on_one_topic_is_taken_by_its_name_and_all_are_taken_ap
     ];
     for (path, names) in shared_topics(dir.path()) {
         for (name, expected) in names.iter().zip(&expected) {
-            let (summary, found) = attitudes(&replay_with(&path, named(name)), dir.path());
+            let (summary, found) = attitudes(&replay_named(&path, name), dir.path());
             assert_eq!(only(&summary).topic, *name);
             assert_eq!(found, *expected, "{name}");
             assert!(
@@ -170,7 +162,7 @@ fn each_of_two_publishers_on_one_topic_is_taken_by_its_name_and_all_are_taken_ap
                 "the other was not asked for: {summary:?}"
             );
         }
-        let summary = done(&replay_with(&path, named("all"))).unwrap();
+        let summary = done(&replay_named(&path, "all")).unwrap();
         let of = |n: usize| (summary.topics[n].topic.clone(), summary.topics[n].written);
         assert_eq!(summary.topics.len(), 2);
         assert_eq!(of(0), (names[0].clone(), 600));
@@ -262,7 +254,7 @@ fn a_second_publisher_that_comes_late_is_left_out_counted_and_named() {
         "{said}"
     );
 
-    let (summary, found) = attitudes(&replay_with(&path, named(&name)), dir.path());
+    let (summary, found) = attitudes(&replay_named(&path, &name), dir.path());
     assert_eq!(found, alone(dir.path(), &other(1500)[1200..]));
     assert!(!summary.is_lossy());
 }

@@ -6,7 +6,7 @@ use crate::replays::{
 };
 use crate::shared_data::shared;
 use std::path::Path;
-use strapd::config::Plan;
+use strapd_attitude::estimate::Plan;
 use strapd_attitude::propagate::{Method, Order, Placement};
 use strapd_attitude::record::{SampleKind, Verdict};
 

@@ -4,12 +4,12 @@
 //! stamps cut to seconds, intervals in another unit than the name says.
 
 use crate::made_logs::{ImuSample, START, STEP, TOPIC, motion};
-use crate::replays::{Bits, attitudes, done, only, replay_of, replay_with, target};
+use crate::replays::{Bits, attitudes, done, only, replay_by, replay_of, replay_with, target};
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
-use strapd::config::Plan;
 use strapd::pipeline::check::check;
 use strapd::report::findings::findings;
+use strapd_attitude::estimate::Plan;
 use strapd_attitude::record::{SampleKind, Verdict};
 use strapd_recording::decode::{Channel, Rank, role};
 use strapd_recording::pool::Pool;
@@ -189,9 +189,7 @@ fn the_messages_own_stamp_is_taken_unless_it_is_none_and_a_nested_one_is() {
     }
     // Named, it is taken whatever it is.
     let path = nested_log(dir.path(), "nested.mcap", late, good);
-    let mut plan = Plan::default();
-    plan.decode.fields = vec!["stamp=imu.header.stamp".parse().unwrap()];
-    let (_, found) = attitudes(&replay_with(&path, plan), dir.path());
+    let (_, found) = attitudes(&replay_by(&path, "stamp=imu.header.stamp"), dir.path());
     let found: Vec<i64> = found.iter().map(|a| a.stamp).collect();
     assert_eq!(found, at(0));
 }
@@ -294,12 +292,6 @@ fn px4_log(dir: &Path, name: &str, unit: i64) -> PathBuf {
     )
 }
 
-fn with_field(field: &str) -> Plan {
-    let mut plan = Plan::default();
-    plan.decode.fields = vec![field.parse().unwrap()];
-    plan
-}
-
 #[test]
 fn an_interval_in_another_unit_than_thought_is_refused_with_the_flag_that_states_the_unit() {
     let dir = tempfile::tempdir().unwrap();
@@ -318,10 +310,7 @@ fn an_interval_in_another_unit_than_thought_is_refused_with_the_flag_that_states
     ] {
         assert!(error.contains(word), "{word} is missing: {error}");
     }
-    let (_, found) = attitudes(
-        &replay_with(&wrong, with_field("dt=gyro_integral_dt:ms")),
-        dir.path(),
-    );
+    let (_, found) = attitudes(&replay_by(&wrong, "dt=gyro_integral_dt:ms"), dir.path());
     let bits = |a: &[Bits]| a.iter().map(|a| a.wxyz).collect::<Vec<_>>();
     assert_eq!(bits(&found), bits(&expected));
 }
@@ -331,7 +320,7 @@ fn what_is_bridged_is_excluded_from_the_integration_error_in_words() {
     let dir = tempfile::tempdir().unwrap();
     let wrong = px4_log(dir.path(), "ms.mcap", 1_000_000);
     // Said outright, it is believed: points, and bridges between them.
-    let summary = done(&replay_with(&wrong, with_field("dt=gyro_integral_dt:us"))).unwrap();
+    let summary = done(&replay_by(&wrong, "dt=gyro_integral_dt:us")).unwrap();
     let topic = only(&summary);
     assert_eq!(topic.gaps.bridged, 599);
     let said = topic.warnings.join("; ");

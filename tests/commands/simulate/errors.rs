@@ -6,7 +6,6 @@ use crate::replays::{done, replay_of, target};
 use nalgebra::Vector3;
 use serde_json::Value;
 use std::path::Path;
-use strapd::config::Noise;
 use strapd::pipeline::simulate::{self, Simulation};
 use strapd::sink::Options;
 use strapd_attitude::frames::{Body, Nav};
@@ -66,7 +65,7 @@ fn error_in_sigmas(noise: &str, seed: u64, dir: &Path) -> Vector3<f64> {
     let (log, out) = (dir.join("noisy.ndjson"), dir.join("est.ndjson"));
     simulated(noise, seed, &log);
     let mut replay = replay_of(&log);
-    replay.plan.noise = Noise::parse(noise).unwrap();
+    replay.plan.noise = strapd::config::parse_noise(noise).unwrap();
     replay.targets = vec![target(&out)];
     replay.options.force = true;
     done(&replay).unwrap();

@@ -130,9 +130,9 @@ fn arguments(data: &[u8]) {
     let _ = strapd::sink::Target::parse(text);
     let _ = strapd::sink::address::Listen::parse(text);
     let _ = strapd::client::remote::Remote::parse(text);
-    let _ = strapd::config::Initial::parse(text);
-    let _ = strapd::config::Bias::parse(text);
-    let _ = strapd::config::Noise::parse(text);
+    let _ = strapd::config::parse_initial(text);
+    let _ = strapd::config::parse_bias(text);
+    let _ = strapd::config::parse_noise(text);
     let _ = text.parse::<strapd_attitude::propagate::Method>();
     let _ = strapd::cli::shell::quoted(text);
 }

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
-use strapd::config::Plan;
+use strapd::config::Selection;
 use strapd::pipeline::log::Log;
 use strapd::pipeline::replay::run;
 use strapd::pipeline::route::{Item, Route};
@@ -13,6 +13,7 @@ use strapd::pipeline::run::{Replay, Source};
 use strapd::serve::recorder::{Recorder, Settings};
 use strapd::sink::Compression;
 use strapd::sink::{Options, Target};
+use strapd_attitude::estimate::Plan;
 use strapd_attitude::record::RawSample;
 use strapd_recording::mcap::{WalkOptions, walk};
 use strapd_recording::pool::Pool;
@@ -51,10 +52,11 @@ fn attitudes(path: &Path, topic: Option<&str>, out: &Path) -> Vec<serde_json::Va
     let replay = Replay {
         source: Source::File(path.to_owned()),
         targets: vec![Target::parse(out.to_str().unwrap()).unwrap()],
-        plan: Plan {
+        selection: Selection {
             topic: topic.map(str::to_owned),
-            ..Plan::default()
+            ..Selection::default()
         },
+        plan: Plan::default(),
         options: Options {
             force: true,
             ..Options::default()

@@ -5,8 +5,8 @@ use super::client::Client;
 use super::daemon::{Daemon, TCP, listening};
 use super::runs::Fed;
 use serde_json::Value;
-use strapd::config::{Aid, Plan};
 use strapd::serve::Settings;
+use strapd_attitude::estimate::{Aid, Plan};
 
 /// A body that rolls slowly to and fro about 0.3 rad at 100 Hz, its gyro off by 0.5 deg/s.
 fn line(n: u64) -> String {

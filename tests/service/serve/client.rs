@@ -141,6 +141,8 @@ impl Client {
                     }
                     Ok(Message::Close(_)) => return None,
                     Ok(_) => {}
+                    Err(tungstenite::Error::Io(e))
+                        if e.kind() == std::io::ErrorKind::Interrupted => {}
                     Err(e) => {
                         assert!(!is_late(&e), "nothing came");
                         return None;
@@ -218,6 +220,8 @@ impl Client {
 
 /// A line, or what begins with the mark and is as long as it says.
 fn item(from: &mut impl BufRead) -> Option<Item> {
+    // A read that has a timeout is ended by any signal, and of the readers here this one alone does not go on.
+    while matches!(from.fill_buf(), Err(e) if e.kind() == std::io::ErrorKind::Interrupted) {}
     let first = *there(from.fill_buf())?.first()?;
     if first == 0xf8 {
         let mut object = vec![0; 4];

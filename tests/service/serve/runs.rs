@@ -8,12 +8,12 @@ use super::daemon::{Daemon, eventually};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
-use strapd::config::{Noise, Plan};
-use strapd::pipeline::estimator::Memory;
 use strapd::serve::Settings;
 use strapd::serve::hub::Hub;
 use strapd::serve::session::{Scratch, Session};
 use strapd::serve::state::{Saved, Sensors};
+use strapd_attitude::estimate::Memory;
+use strapd_attitude::estimate::Plan;
 use strapd_attitude::record::{Nanos, SampleKind};
 
 /// Number `n` of a lively motion at 200 Hz, in words of its own: jittered by up to 0.4 ms, one in 97 lost.
@@ -230,7 +230,7 @@ fn plans() -> Vec<(&'static str, Plan)> {
         ),
         (
             "no noise",
-            of(&|p| p.noise = Noise::parse("arw=0").unwrap()),
+            of(&|p| p.noise = strapd::config::parse_noise("arw=0").unwrap()),
         ),
         ("trapezoids", method("dcm-mean")),
         ("coning", method("coning3")),

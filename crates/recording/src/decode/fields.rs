@@ -2,7 +2,7 @@
 //!
 //! Apart from the decoders because every encoding takes the same paths.
 
-use super::stamp::TimeUnit;
+use strapd_attitude::record::TimeUnit;
 
 /// What a field is to us.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Hash)]

@@ -17,12 +17,13 @@ use super::fields::FieldRole;
 use super::registers::Form;
 use super::schema::{last_name, ros_name};
 use super::select::names::{Px4, px4};
-use super::stamp::{Bare, TimeUnit};
+use super::stamp::Bare;
 use super::{Decoded, MAX_BATCH, Options, Undecodable};
 use crate::text::printable;
 use found::{Found, Instant, StampRule};
 use scan::Scanner;
 use seek::Seeker;
+use strapd_attitude::record::TimeUnit;
 use strapd_attitude::record::{Nanos, RawSample};
 use trie::Trie;
 

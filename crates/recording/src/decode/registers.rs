@@ -4,7 +4,8 @@
 //! in one place and mean the same in every encoding.
 
 use super::Decoded;
-use super::stamp::{TimeUnit, from_count, from_float};
+use super::stamp::{from_count, from_float};
+use strapd_attitude::record::TimeUnit;
 use strapd_attitude::record::{Nanos, RawSample};
 
 /// Where a number of a message goes. Three, three and four in a row are vectors and a quaternion.

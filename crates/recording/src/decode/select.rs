@@ -10,9 +10,9 @@ mod shapes;
 use super::fields::{FieldPath, FieldRole, Segment};
 use super::registers::{Form, Slot, StampForm};
 use super::schema::{Field, Kind, Many, Schema, Struct};
-use super::stamp::TimeUnit;
 use strapd_attitude::condition::GyroUnit;
 use strapd_attitude::record::SampleKind;
+use strapd_attitude::record::TimeUnit;
 
 /// One step from a struct towards a number.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Hash)]

@@ -7,10 +7,11 @@
 use super::json;
 use super::registers::{Form, Slot, StampForm};
 use super::select::Found;
-use super::stamp::{Ambiguous, Bare, MOST_WAITING, TimeUnit, Told, unit_in_log};
+use super::stamp::{Ambiguous, Bare, MOST_WAITING, Told, unit_in_log};
 use super::{Decoder, FieldRole, Plan, Unsupported, unsupported};
 use crate::text::printable;
 use strapd_attitude::record::Nanos;
+use strapd_attitude::record::TimeUnit;
 
 impl Decoder {
     /// Learns from one message (the first of the topic) what no schema says: the unit of a stamp
@@ -171,13 +172,13 @@ impl Decoder {
         stated.has_orientation = one.has_orientation();
         stated.has_stamp = stamped.stamp.is_some();
         stated.has_interval = one.registers.has(Slot::INTERVAL, 1);
-        stated.interval = one
+        stated.declared.interval = one
             .registers
             .has(Slot::INTERVAL, 1)
             .then(|| ("PATH".to_owned(), one.interval));
         stated.batched = !learnt.has_gyro() && !learnt.batch.is_empty();
-        stated.gyro_unit = one.unit.or(stated.gyro_unit);
-        stated.sample_kind = one.kind.or(stated.sample_kind);
+        stated.declared.gyro_unit = one.unit.or(stated.declared.gyro_unit);
+        stated.declared.sample_kind = one.kind.or(stated.declared.sample_kind);
         self.found = match one.gyro_rank {
             None => Found::Nothing,
             Some(5) if plan.vector_stamped => Found::Vector,

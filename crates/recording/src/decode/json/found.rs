@@ -1,9 +1,10 @@
 //! What one JSON object held, and how the finds of nested objects join. Pure.
 
 use super::super::registers::{Form, Registers, Slot};
-use super::super::stamp::{self, Bare, TimeUnit, from_decimal, from_rfc3339};
+use super::super::stamp::{self, Bare, from_decimal, from_rfc3339};
 use super::super::{Decoded, GyroUnit};
 use std::borrow::Cow;
+use strapd_attitude::record::TimeUnit;
 use strapd_attitude::record::{Nanos, RawSample, SampleKind};
 
 /// A stamp as it was written; its unit may depend on keys that come later.

@@ -7,10 +7,10 @@ use super::trie::Target;
 use crate::decode::fields::FieldRole;
 use crate::decode::registers::Slot;
 use crate::decode::select::names::{Meaning, Px4, is_nanos, is_seconds, meaning};
-use crate::decode::stamp::TimeUnit;
 use crate::decode::{MAX_BATCH, Undecodable};
 use std::borrow::Cow;
 use strapd_attitude::record::SampleKind;
+use strapd_attitude::record::TimeUnit;
 
 /// How deep an object may lie whose keys are looked at by name.
 pub(super) const MAX_SEARCH: u32 = 6;

@@ -2,7 +2,7 @@
 
 use crate::decode::fields::{FieldPath, FieldRole, Segment};
 use crate::decode::registers::Slot;
-use crate::decode::stamp::TimeUnit;
+use strapd_attitude::record::TimeUnit;
 
 /// Nodes; 0 is the message.
 #[derive(Debug, Clone, Default)]

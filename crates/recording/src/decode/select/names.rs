@@ -3,8 +3,8 @@
 //! One table for schemas and for JSON keys. Names are compared without case, underscores and
 //! dashes: `angular_velocity`, `angularVelocity` and `AngularVelocity` are one name.
 
-use crate::decode::stamp::TimeUnit;
 use strapd_attitude::condition::GyroUnit;
+use strapd_attitude::record::TimeUnit;
 
 /// What a name says about the value behind it; `rank` orders rivals, 0 first.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -10,10 +10,10 @@ use crate::decode::Options;
 use crate::decode::fields::FieldRole;
 use crate::decode::registers::{Slot, StampForm};
 use crate::decode::schema::{Field, Kind, Many, Schema, Struct, last_name};
-use crate::decode::stamp::TimeUnit;
 use std::collections::{BTreeSet, VecDeque};
 use strapd_attitude::condition::GyroUnit;
 use strapd_attitude::record::SampleKind;
+use strapd_attitude::record::TimeUnit;
 
 /// Deepest nesting that is searched, most structs, and most fields of them.
 const MAX_DEPTH: usize = 8;

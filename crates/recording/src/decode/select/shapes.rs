@@ -6,7 +6,7 @@ use super::names::{self, Meaning, is_nanos, is_seconds};
 use super::{End, StampFields, Step};
 use crate::decode::registers::{Slot, StampForm};
 use crate::decode::schema::{Field, Kind, Many, Schema, Struct};
-use crate::decode::stamp::TimeUnit;
+use strapd_attitude::record::TimeUnit;
 
 /// Paths to x, y, z of what may be a vector: a struct with these fields, three numbers in an array,
 /// or a struct that wraps one of these in a field called `vec`, `value` or the like.

@@ -4,8 +4,8 @@
 //! or 1.7 s after a start in nanoseconds. What can tell is how far samples of a gyro are apart, and where
 //! that leaves two units, which of them makes instants of our time. Nothing is guessed beyond that.
 
-use super::TimeUnit;
 use strapd_attitude::record::Nanos;
+use strapd_attitude::record::TimeUnit;
 
 /// Most samples that wait until the unit is settled.
 pub const MOST_WAITING: usize = 8;

@@ -1,7 +1,8 @@
 //! Stamps that are bare numbers: one unit for all of a stream, or none.
 
 use strapd_attitude::record::Nanos;
-use strapd_recording::decode::{Bare, TimeUnit, decode_line, unit_of};
+use strapd_attitude::record::TimeUnit;
+use strapd_recording::decode::{Bare, decode_line, unit_of};
 
 const UNITS: [(TimeUnit, &str, i64); 4] = [
     (TimeUnit::Nano, "ns", 1_000_000_000),

@@ -189,7 +189,7 @@ fn ros_messages_in_json_keep_marks_and_frames() {
         decoder.frame_id(text.as_bytes()).as_deref(),
         Some("imu\\u{1b}")
     );
-    assert_eq!(decoder.stated().gyro_unit, Some(GyroUnit::Rad));
+    assert_eq!(decoder.stated().declared.gyro_unit, Some(GyroUnit::Rad));
 }
 
 #[test]
@@ -209,8 +209,11 @@ fn px4_messages_bring_their_own_interval_and_meaning() {
             (Some(Nanos(27_329_869_000)), Some(5_007_000)),
             "{name}"
         );
-        assert_eq!(decoder.stated().sample_kind, Some(SampleKind::Average));
-        assert_eq!(decoder.stated().gyro_unit, Some(GyroUnit::Rad));
+        assert_eq!(
+            decoder.stated().declared.sample_kind,
+            Some(SampleKind::Average)
+        );
+        assert_eq!(decoder.stated().declared.gyro_unit, Some(GyroUnit::Rad));
     }
     let imu = r#"{"timestamp":9,"timestamp_sample":5,"delta_angle":[0.1,0.2,0.3],"delta_velocity":[0.25,0.5,1],"delta_angle_dt":5000,"delta_velocity_dt":4000}"#;
     let mut vehicle_imu = decoder("px4.vehicle_imu");
@@ -221,7 +224,7 @@ fn px4_messages_bring_their_own_interval_and_meaning() {
         (Some(Nanos(5_000)), Some(5_000_000))
     );
     assert_eq!(
-        vehicle_imu.stated().sample_kind,
+        vehicle_imu.stated().declared.sample_kind,
         Some(SampleKind::DeltaAngle)
     );
     assert!(

@@ -286,7 +286,7 @@ fn a_nested_imu_is_found_behind_strings_and_sequences_of_every_size() {
             .contains("stamp imu.header.stamp")
     );
     assert_eq!(
-        decoder.stated().gyro_unit,
+        decoder.stated().declared.gyro_unit,
         Some(GyroUnit::Rad),
         "Imu.msg states it"
     );
@@ -468,7 +468,10 @@ fn px4_messages_bring_their_own_interval_and_meaning() {
         .u32(4871);
     let payload = payload.u8(0).u8(0).u8(2).u8(1).bytes;
     let sample = decode_one(&decoder, &payload);
-    assert_eq!(decoder.stated().sample_kind, Some(SampleKind::Average));
+    assert_eq!(
+        decoder.stated().declared.sample_kind,
+        Some(SampleKind::Average)
+    );
     assert_eq!(
         (sample.gyro, sample.accel),
         (Some([0.5, -0.25, 0.125]), Some([1.0, 2.0, -9.5]))
@@ -488,7 +491,10 @@ fn px4_messages_bring_their_own_interval_and_meaning() {
         .f32s(&[0.25, 0.5, -0.125]);
     let payload = payload.u32(5000).u32(4000).u8(0).u8(0).u8(0).u8(0).bytes;
     let sample = decode_one(&decoder, &payload);
-    assert_eq!(decoder.stated().sample_kind, Some(SampleKind::DeltaAngle));
+    assert_eq!(
+        decoder.stated().declared.sample_kind,
+        Some(SampleKind::DeltaAngle)
+    );
     assert_eq!(
         (sample.gyro, sample.interval_nanos),
         (Some([0.5, -0.25, 0.125]), Some(5_000_000))

@@ -3,16 +3,16 @@
 //! Conditions and propagates; what must be known first ([`Prepared`]) is given. Reads no clock and
 //! does no I/O.
 
-use super::preparation::{Prepared, Resolved};
-use crate::config::Plan;
-use serde::{Deserialize, Serialize};
-use strapd_attitude::aid::{self, Aided};
-use strapd_attitude::condition::regularise::{self, Regulariser};
-use strapd_attitude::condition::{self, Conditioner};
-use strapd_attitude::propagate::{self, Executor, Method, Propagator};
-use strapd_attitude::quaternion::RotationVector;
-use strapd_attitude::record::{AttitudeSample, Nanos, RateSample, RawSample};
-use strapd_attitude::worlds::{Convention, World};
+use super::meaning::Meaning;
+use super::plan::Plan;
+use super::preparation::Prepared;
+use crate::aid::{self, Aided};
+use crate::condition::regularise::{self, Regulariser};
+use crate::condition::{self, Conditioner};
+use crate::propagate::{self, Executor, Method, Propagator};
+use crate::quaternion::RotationVector;
+use crate::record::{AttitudeSample, Nanos, RateSample, RawSample};
+use crate::worlds::{Convention, World};
 
 /// An estimator of one stream.
 #[derive(Debug)]
@@ -56,7 +56,8 @@ impl Integrator {
 }
 
 /// What an estimator knows at one moment: a few kilobytes of text.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[derive(Clone, PartialEq, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Memory {
     settings: u64,
     conditioning: condition::Memory,
@@ -79,7 +80,7 @@ impl Estimator {
     ///
     /// # Errors
     /// In words, with the flag that helps: settings that can not be.
-    pub fn new(plan: &Plan, resolved: &Resolved, prepared: &Prepared) -> Result<Estimator, String> {
+    pub fn new(plan: &Plan, resolved: &Meaning, prepared: &Prepared) -> Result<Estimator, String> {
         if matches!(
             plan.method,
             Method::Live { .. } | Method::CommitProvisional { .. }
@@ -95,11 +96,7 @@ impl Estimator {
     ///
     /// # Errors
     /// As [`Estimator::new`].
-    pub fn live(
-        plan: &Plan,
-        resolved: &Resolved,
-        prepared: &Prepared,
-    ) -> Result<Estimator, String> {
+    pub fn live(plan: &Plan, resolved: &Meaning, prepared: &Prepared) -> Result<Estimator, String> {
         let settings = condition::Settings {
             reorder_window: condition::Settings::LIVE_WINDOW,
             ..conditioning(plan, resolved, prepared)
@@ -109,7 +106,7 @@ impl Estimator {
 
     fn with(
         plan: &Plan,
-        resolved: &Resolved,
+        resolved: &Meaning,
         prepared: &Prepared,
         settings: &condition::Settings,
     ) -> Result<Estimator, String> {
@@ -334,7 +331,7 @@ impl Estimator {
     }
 }
 
-fn conditioning(plan: &Plan, resolved: &Resolved, prepared: &Prepared) -> condition::Settings {
+fn conditioning(plan: &Plan, resolved: &Meaning, prepared: &Prepared) -> condition::Settings {
     let settings = resolved.conditioning(plan, prepared.clock, prepared.bias);
     let scale = prepared.aiding.map_or(1.0, |aiding| aiding.force_scale);
     condition::Settings {

@@ -3,12 +3,12 @@
 //! Apart from the rest of the preparation because a force says nothing of its own unit, and one that is no
 //! specific force (phones export acceleration without gravity) would level to anything.
 
-use super::preparation::Resolved;
-use crate::config::{Aid, Bias, Initial, Plan};
+use super::meaning::Meaning;
+use super::plan::{Aid, Bias, Initial, Plan};
+use crate::aid::{Settings, Start};
+use crate::record::AccelUnit;
+use crate::record::RawSample;
 use nalgebra::Vector3;
-use strapd_attitude::aid::{Settings, Start};
-use strapd_attitude::record::RawSample;
-use strapd_recording::decode::AccelUnit;
 
 /// Standard gravity, m/s^2.
 pub(super) const STANDARD_GRAVITY: f64 = 9.806_65;
@@ -42,7 +42,7 @@ impl Aiding {
     /// In words: no specific force, or none that can be.
     pub(super) fn decide(
         plan: &Plan,
-        resolved: &Resolved,
+        resolved: &Meaning,
         first: &[RawSample],
         warnings: &mut Vec<String>,
     ) -> Result<Option<Aiding>, String> {

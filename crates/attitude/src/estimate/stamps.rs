@@ -3,13 +3,12 @@
 //! Apart from the preparation because a recording needs a pass of its own for it, whatever else is
 //! known, and because a stream can not have one.
 
-use super::against;
-use super::passes::{Conditioned, FEW};
-use super::preparation::Resolved;
-use super::run::Replay;
+use super::first_pass::{Conditioned, FEW};
+use super::meaning::Meaning;
+use super::plan::Plan;
+use crate::condition::regularise::{Lines, Regulariser, Survey, Value};
+use crate::record::{RawSample, SampleKind};
 use std::sync::Arc;
-use strapd_attitude::condition::regularise::{Lines, Regulariser, Survey, Value};
-use strapd_attitude::record::{RawSample, SampleKind};
 
 /// What becomes of the stamps.
 #[derive(Clone, Debug, Default)]
@@ -91,21 +90,26 @@ pub struct StampPass {
 }
 
 impl StampPass {
-    /// For samples understood as `resolved`, and as every meaning they are compared under; `None`
-    /// where the run leaves stamps as they are.
+    /// For samples understood as `meaning`, and as each of `others` they are compared under; `None` where
+    /// the plan leaves stamps as they are.
     #[must_use]
-    pub fn new(run: &Replay, resolved: &Resolved) -> Option<StampPass> {
-        let mut kinds = vec![resolved.kind];
-        kinds.extend(run.against.iter().flat_map(|_| against::kinds()));
+    pub fn new(
+        plan: &Plan,
+        meaning: &Meaning,
+        others: impl IntoIterator<Item = SampleKind>,
+    ) -> Option<StampPass> {
+        if !plan.regularise_stamps {
+            return None;
+        }
         let mut surveys: Vec<(SampleKind, Conditioned, Survey)> = Vec::new();
-        for kind in kinds {
+        for kind in std::iter::once(meaning.kind).chain(others) {
             if surveys.iter().all(|(known, ..)| *known != kind) {
-                let mut resolved = resolved.clone();
-                resolved.kind = kind;
-                surveys.push((kind, Conditioned::new(&run.plan, &resolved), Survey::new()));
+                let mut meant = meaning.clone();
+                meant.kind = kind;
+                surveys.push((kind, Conditioned::new(plan, &meant), Survey::new()));
             }
         }
-        run.plan.regularise_stamps.then_some(StampPass {
+        Some(StampPass {
             surveys,
             taken: 0,
             states_interval: false,

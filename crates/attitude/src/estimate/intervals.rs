@@ -3,19 +3,19 @@
 //! Apart from the preparation because an interval read in the wrong unit makes every sample a point and
 //! every step a gap, and nothing behind it can tell; and because a daemon looks at them, too.
 
-use crate::report::summary::significant;
-use strapd_attitude::condition::Clock;
-use strapd_attitude::record::{RawSample, SampleKind};
-use strapd_recording::decode::TimeUnit;
+use crate::condition::Clock;
+use crate::digits::significant;
+use crate::record::TimeUnit;
+use crate::record::{RawSample, SampleKind};
 
 /// How far an interval and a step may be apart: samples are lost and stamps jitter, but not by this.
 const MOST: f64 = 3.0;
 /// Fewer intervals than this prove nothing.
-pub(crate) const LEAST: usize = 8;
+pub const LEAST: usize = 8;
 
 /// Intervals and steps that disagree, in seconds (medians).
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(crate) struct Mismatch {
+pub struct Mismatch {
     interval: f64,
     step: f64,
     looked_at: usize,
@@ -34,7 +34,8 @@ impl Mismatch {
     }
 
     /// The same of intervals and stamps in nanoseconds, by the clock the stamps are of.
-    pub(crate) fn of(
+    #[must_use]
+    pub fn of(
         intervals: impl Iterator<Item = i64>,
         stamps: impl Iterator<Item = i64>,
         clock: Clock,

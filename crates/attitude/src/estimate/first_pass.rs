@@ -3,28 +3,30 @@
 //! Apart from the preparation because it decides, and a pass only looks: at samples conditioned as in
 //! the run, with no bias taken out, on the clock the first of them choose.
 
-use super::preparation::Resolved;
-use crate::config::Plan;
+use super::meaning::Meaning;
+use super::plan::Plan;
+use crate::condition::stillness::{Limits, Rests, Stillness};
+use crate::condition::{Conditioner, choose_clock};
+use crate::record::{RateSample, RawSample};
 use nalgebra::Vector3;
-use strapd_attitude::condition::stillness::{Limits, Rests, Stillness};
-use strapd_attitude::condition::{Conditioner, choose_clock};
-use strapd_attitude::record::{RateSample, RawSample};
 
 /// Samples that tell the clock and hold the first orientation.
-pub(super) const FEW: usize = 512;
+pub const FEW: usize = 512;
 
 /// Samples as the run will condition them.
 #[derive(Debug)]
-pub(super) struct Conditioned {
+pub struct Conditioned {
     plan: Plan,
-    resolved: Resolved,
+    resolved: Meaning,
     gathered: Vec<RawSample>,
     running: Option<Conditioner>,
     rates: Vec<RateSample>,
 }
 
 impl Conditioned {
-    pub(super) fn new(plan: &Plan, resolved: &Resolved) -> Conditioned {
+    /// For samples understood as `resolved`.
+    #[must_use]
+    pub fn new(plan: &Plan, resolved: &Meaning) -> Conditioned {
         Conditioned {
             plan: plan.clone(),
             resolved: resolved.clone(),
@@ -35,11 +37,10 @@ impl Conditioned {
     }
 
     /// Takes samples; those that are conditioned are handed on.
-    pub(super) fn push(
-        &mut self,
-        raw: &[RawSample],
-        take: impl FnMut(&RateSample),
-    ) -> Result<(), String> {
+    ///
+    /// # Errors
+    /// In words, when the settings do not fit.
+    pub fn push(&mut self, raw: &[RawSample], take: impl FnMut(&RateSample)) -> Result<(), String> {
         match &mut self.running {
             Some(conditioner) => conditioner.push(raw, &mut self.rates),
             None => {
@@ -53,7 +54,11 @@ impl Conditioned {
         Ok(())
     }
 
-    pub(super) fn finish(&mut self, take: impl FnMut(&RateSample)) -> Result<(), String> {
+    /// Hands on what is left.
+    ///
+    /// # Errors
+    /// In words, when the settings do not fit.
+    pub fn finish(&mut self, take: impl FnMut(&RateSample)) -> Result<(), String> {
         if self.running.is_none() {
             self.begin()?;
         }
@@ -90,7 +95,7 @@ pub(super) struct RestPass {
 
 impl RestPass {
     /// For samples understood as `resolved`.
-    pub(super) fn new(plan: &Plan, resolved: &Resolved) -> RestPass {
+    pub(super) fn new(plan: &Plan, resolved: &Meaning) -> RestPass {
         RestPass {
             conditioned: Conditioned::new(plan, resolved),
             detector: Stillness::new(resolved.kind, Limits::default()),

@@ -3,155 +3,24 @@
 //! Apart from the estimator because it is all about what is not known yet: when enough has been
 //! seen, and what to say when it can not be known.
 
-use super::aiding::{self, Aiding};
+use super::aiding::Aiding;
+use super::first_pass::{FEW, RestPass};
 use super::intervals::Mismatch;
-use super::passes::{FEW, RestPass};
+use super::meaning::Meaning;
+use super::plan::{Aid, Bias, Initial, Plan, Truncation};
 use super::stamps::{StampPass, Stamps};
-use crate::config::{Aid, Bias, Initial, Plan, Truncation};
-use nalgebra::{Matrix3, Vector3};
-use strapd_attitude::condition::stillness::{self, Limits, NoRest, Rests};
-use strapd_attitude::condition::truncation::Grid;
-use strapd_attitude::condition::{Clock, ClockWarning, GyroUnit, Settings, choose_clock};
-use strapd_attitude::frames::{Body, BodyAxes, In, Nav, Sensor};
-use strapd_attitude::quaternion::{Quaternion, YawPitchRoll};
-use strapd_attitude::record::{Nanos, RawSample, SampleKind};
-use strapd_attitude::worlds::{Convention, EARTH_RATE, World};
-use strapd_recording::decode::{self, Stated, TimeUnit};
+use crate::condition::stillness::{self, Limits, NoRest, Rests};
+use crate::condition::truncation::Grid;
+use crate::condition::{Clock, ClockWarning, choose_clock};
+use crate::frames::{Body, In, Nav};
+use crate::quaternion::{Quaternion, YawPitchRoll};
+use crate::record::{Nanos, RawSample, SampleKind};
+use crate::worlds::{Convention, EARTH_RATE, World};
+use nalgebra::Vector3;
 
 /// Samples, and seconds of data, in which rest is sought when the log can not be read twice.
 const MANY: usize = 200_000;
 const REST_SECS: f64 = 60.0;
-
-/// The flags and what the format states, put together: a flag wins.
-#[derive(Clone, Debug)]
-pub struct Resolved {
-    /// What a sample means.
-    pub kind: SampleKind,
-    /// Unit of the rates.
-    pub unit: GyroUnit,
-    /// Axes of the input.
-    pub body: BodyAxes,
-    /// Multiplies the recorded acceleration.
-    pub accel_scale: f64,
-    /// Its unit, where the format says.
-    pub accel_unit_stated: Option<decode::AccelUnit>,
-    /// The convention of recorded orientations.
-    pub recorded: Convention,
-    /// Where the samples' own interval lies, and its unit.
-    pub interval: Option<(String, TimeUnit)>,
-    axes: Matrix3<f64>,
-    mount: Matrix3<f64>,
-}
-
-impl Resolved {
-    /// Puts `plan` and what the channel's format states together.
-    #[must_use]
-    pub fn new(plan: &Plan, stated: &Stated) -> Resolved {
-        let body = plan.body.unwrap_or(match stated.axes {
-            Some(decode::BodyAxes::Frd) => BodyAxes::Frd,
-            Some(decode::BodyAxes::Flu) | None => BodyAxes::Flu,
-        });
-        let unit = plan.unit.or(stated.gyro_unit).unwrap_or_default();
-        let mount: Quaternion<Body, Sensor> = plan
-            .mount
-            .map_or_else(Quaternion::identity, Quaternion::assume_unit);
-        Resolved {
-            kind: plan.kind.or(stated.sample_kind).unwrap_or_default(),
-            unit,
-            accel_scale: aiding::scale_of(stated.accel_unit),
-            accel_unit_stated: stated.accel_unit,
-            recorded: orientation_convention(stated),
-            interval: stated.interval.clone(),
-            axes: body
-                .c_bs()
-                .map_or_else(Matrix3::identity, |c| *c.as_matrix()),
-            mount: *mount.to_dcm().as_matrix(),
-            body,
-        }
-    }
-
-    /// The settings of the conditioning stage.
-    #[must_use]
-    pub fn conditioning(&self, plan: &Plan, clock: Clock, bias: Vector3<f64>) -> Settings {
-        Settings {
-            kind: self.kind,
-            unit: self.unit,
-            accel_scale: self.accel_scale,
-            axes: self.axes,
-            mount: self.mount,
-            clock,
-            max_gap_secs: plan.max_gap_secs,
-            on_gap: plan.on_gap,
-            bias,
-            gyro_range: plan.gyro_range,
-            start: plan.start,
-            until: plan.until,
-            ..Settings::default()
-        }
-    }
-
-    /// World and body of the output as labels. NED comes with FRD, everything else with FLU.
-    #[must_use]
-    pub fn labels(&self, world: World) -> (String, String) {
-        let body = if world == World::Ned { "frd" } else { "flu" };
-        (world.to_string(), body.to_owned())
-    }
-
-    /// The sample in rad/s, m/s^2 and FLU, its orientation from FLU to ENU: what a `RATE` line
-    /// promises. The same products as in conditioning, so that no bit is lost on the way through one.
-    #[must_use]
-    pub fn in_flu(&self, raw: &RawSample) -> RawSample {
-        let by = |m: Matrix3<f64>, v: [f64; 3]| {
-            if m == Matrix3::identity() {
-                v
-            } else {
-                (m * Vector3::from(v)).into()
-            }
-        };
-        RawSample {
-            gyro: raw.gyro.map(|v| by(self.axes * self.unit.to_rad(), v)),
-            accel: raw.accel.map(|v| by(self.axes * self.accel_scale, v)),
-            orientation: raw.orientation.map(|wxyz| {
-                match (self.recorded, Quaternion::<Nav, Body>::try_from_wxyz(wxyz)) {
-                    (Convention::EnuFlu, _) | (_, Err(_)) => wxyz,
-                    (other, Ok(q)) => other.convert(Convention::EnuFlu, q).wxyz(),
-                }
-            }),
-            ..*raw
-        }
-    }
-
-    /// Whether the output's body axes are other than the sensor's own.
-    #[must_use]
-    pub fn is_remapped(&self, plan: &Plan, world: World) -> bool {
-        let own = match self.body {
-            BodyAxes::Flu => "flu",
-            BodyAxes::Frd => "frd",
-            BodyAxes::Map(_) => "",
-        };
-        plan.mount.is_some() || self.labels(world).1 != own
-    }
-
-    /// A recorded orientation (sensor to its world) as the attitude of our body: convention and
-    /// mounting undone. `None` when it is no rotation.
-    #[must_use]
-    pub fn recorded_attitude(&self, wxyz: [f64; 4]) -> Option<Quaternion<Nav, Body>> {
-        let q: Quaternion<Nav, Body> = Quaternion::try_from_wxyz(wxyz).ok()?;
-        let flu = self.recorded.convert(Convention::EnuFlu, q);
-        let c_bs: Quaternion<Body, Body> =
-            Quaternion::from_dcm(&strapd_attitude::frames::Dcm::assume(self.mount));
-        Some((flu * c_bs.inverse()).normalised())
-    }
-}
-
-/// The convention of the orientations a format carries.
-#[must_use]
-pub fn orientation_convention(stated: &Stated) -> Convention {
-    match stated.world {
-        Some(decode::WorldAxes::Ned) => Convention::NedFrd,
-        Some(decode::WorldAxes::Enu) | None => Convention::EnuFlu,
-    }
-}
 
 /// What was decided before the first sample was integrated.
 #[derive(Clone, Debug)]
@@ -195,7 +64,7 @@ pub enum Patience {
 #[derive(Debug)]
 pub struct Preparation {
     plan: Plan,
-    resolved: Resolved,
+    resolved: Meaning,
     patience: Patience,
     first: Vec<RawSample>,
     taken: usize,
@@ -211,7 +80,7 @@ pub struct Preparation {
 impl Preparation {
     /// For samples understood as `resolved`.
     #[must_use]
-    pub fn new(plan: &Plan, resolved: &Resolved, patience: Patience) -> Preparation {
+    pub fn new(plan: &Plan, resolved: &Meaning, patience: Patience) -> Preparation {
         Preparation {
             plan: plan.clone(),
             resolved: resolved.clone(),
@@ -316,7 +185,7 @@ impl Preparation {
         }
         let mut warnings: Vec<String> = warning.iter().map(ToString::to_string).collect();
         if let Some(mismatch) = Mismatch::between(&first, clock, resolved.kind) {
-            if !plan.decode.states_interval_unit() {
+            if !resolved.interval_unit_given {
                 return Err(mismatch.refusal(resolved.interval.as_ref()));
             }
             warnings.push(format!("{mismatch}: what lies between is bridged"));
@@ -366,7 +235,7 @@ impl Preparation {
 ///
 /// # Errors
 /// In words: what only rest can tell was asked for, or the sample carries no orientation to begin with.
-pub fn at_once(plan: &Plan, resolved: &Resolved, first: &RawSample) -> Result<Prepared, String> {
+pub fn at_once(plan: &Plan, resolved: &Meaning, first: &RawSample) -> Result<Prepared, String> {
     if needs_rest(plan) {
         return Err("--bias auto and --init gravity look for rest before the first attitude, and a live stream waits for nothing\n  help: measure once (`strapd info LOG` shows the bias) and give --bias x,y,z; --init rpy=roll,pitch,yaw or identity".to_owned());
     }
@@ -502,7 +371,7 @@ fn decide_bias(
 
 fn decide_initial(
     plan: &Plan,
-    resolved: &Resolved,
+    resolved: &Meaning,
     gathered: &[RawSample],
     rests: &Rests,
     warnings: &mut Vec<String>,

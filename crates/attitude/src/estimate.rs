@@ -1,0 +1,28 @@
+//! Raw samples of one stream -> attitude, all stages in one. Pure.
+//!
+//! A stage of its own because what must be known first (which clock, which bias, which attitude to begin with) is
+//! found in the samples themselves, and because replay, serve and a library user are to get the same bits.
+//!
+//! ```text
+//! Plan, Declared -> Meaning
+//! first samples, or all of them -> Preparation -> Prepared
+//! samples, Meaning, Prepared -> Estimator -> AttitudeSample
+//! ```
+
+mod aiding;
+mod estimator;
+mod first_pass;
+mod intervals;
+mod meaning;
+mod plan;
+mod preparation;
+mod stamps;
+
+pub use aiding::Aiding;
+pub use estimator::{Estimator, Memory};
+pub use first_pass::{Conditioned, FEW};
+pub use intervals::{LEAST as LEAST_INTERVALS, Mismatch};
+pub use meaning::{Meaning, orientation_convention};
+pub use plan::{Aid, Bias, Initial, NOISE_PRESETS, Noise, Plan, Truncation};
+pub use preparation::{Patience, Preparation, Prepared, at_once};
+pub use stamps::{StampPass, Stamps};

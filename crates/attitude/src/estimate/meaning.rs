@@ -1,0 +1,139 @@
+//! What is asked for and what the format declares -> what a sample means. Pure.
+//!
+//! Apart from the preparation because it needs no sample: what is asked for wins over what is declared.
+
+use super::aiding;
+use super::plan::Plan;
+use crate::condition::{Clock, GyroUnit, Settings};
+use crate::frames::{Body, BodyAxes, Dcm, Nav, Sensor};
+use crate::quaternion::Quaternion;
+use crate::record::{AccelUnit, Declared, RawSample, SampleKind, TimeUnit};
+use crate::worlds::{Convention, World};
+use nalgebra::{Matrix3, Vector3};
+
+/// The flags and what the format states, put together: a flag wins.
+#[derive(Clone, Debug)]
+pub struct Meaning {
+    /// What a sample means.
+    pub kind: SampleKind,
+    /// Unit of the rates.
+    pub unit: GyroUnit,
+    /// Axes of the input.
+    pub body: BodyAxes,
+    /// Multiplies the recorded acceleration.
+    pub accel_scale: f64,
+    /// Its unit, where the format says.
+    pub accel_unit_stated: Option<AccelUnit>,
+    /// The convention of recorded orientations.
+    pub recorded: Convention,
+    /// Where the samples' own interval lies, and its unit.
+    pub interval: Option<(String, TimeUnit)>,
+    /// Whether the user stated that unit.
+    pub interval_unit_given: bool,
+    axes: Matrix3<f64>,
+    mount: Matrix3<f64>,
+}
+
+impl Meaning {
+    /// Puts `plan` and what the channel's format states together.
+    #[must_use]
+    pub fn new(plan: &Plan, declared: &Declared) -> Meaning {
+        let body = plan.body.or(declared.body).unwrap_or(BodyAxes::Flu);
+        let unit = plan.unit.or(declared.gyro_unit).unwrap_or_default();
+        let mount: Quaternion<Body, Sensor> = plan
+            .mount
+            .map_or_else(Quaternion::identity, Quaternion::assume_unit);
+        Meaning {
+            kind: plan.kind.or(declared.sample_kind).unwrap_or_default(),
+            unit,
+            accel_scale: aiding::scale_of(declared.accel_unit),
+            accel_unit_stated: declared.accel_unit,
+            recorded: orientation_convention(declared),
+            interval: declared.interval.clone(),
+            interval_unit_given: declared.interval_unit_given,
+            axes: body
+                .c_bs()
+                .map_or_else(Matrix3::identity, |c| *c.as_matrix()),
+            mount: *mount.to_dcm().as_matrix(),
+            body,
+        }
+    }
+
+    /// The settings of the conditioning stage.
+    #[must_use]
+    pub fn conditioning(&self, plan: &Plan, clock: Clock, bias: Vector3<f64>) -> Settings {
+        Settings {
+            kind: self.kind,
+            unit: self.unit,
+            accel_scale: self.accel_scale,
+            axes: self.axes,
+            mount: self.mount,
+            clock,
+            max_gap_secs: plan.max_gap_secs,
+            on_gap: plan.on_gap,
+            bias,
+            gyro_range: plan.gyro_range,
+            start: plan.start,
+            until: plan.until,
+            ..Settings::default()
+        }
+    }
+
+    /// World and body of the output as labels. NED comes with FRD, everything else with FLU.
+    #[must_use]
+    pub fn labels(&self, world: World) -> (String, String) {
+        let body = if world == World::Ned { "frd" } else { "flu" };
+        (world.to_string(), body.to_owned())
+    }
+
+    /// The sample in rad/s, m/s^2 and FLU, its orientation from FLU to ENU: what a `RATE` line
+    /// promises. The same products as in conditioning, so that no bit is lost on the way through one.
+    #[must_use]
+    pub fn in_flu(&self, raw: &RawSample) -> RawSample {
+        let by = |m: Matrix3<f64>, v: [f64; 3]| {
+            if m == Matrix3::identity() {
+                v
+            } else {
+                (m * Vector3::from(v)).into()
+            }
+        };
+        RawSample {
+            gyro: raw.gyro.map(|v| by(self.axes * self.unit.to_rad(), v)),
+            accel: raw.accel.map(|v| by(self.axes * self.accel_scale, v)),
+            orientation: raw.orientation.map(|wxyz| {
+                match (self.recorded, Quaternion::<Nav, Body>::try_from_wxyz(wxyz)) {
+                    (Convention::EnuFlu, _) | (_, Err(_)) => wxyz,
+                    (other, Ok(q)) => other.convert(Convention::EnuFlu, q).wxyz(),
+                }
+            }),
+            ..*raw
+        }
+    }
+
+    /// Whether the output's body axes are other than the sensor's own.
+    #[must_use]
+    pub fn is_remapped(&self, plan: &Plan, world: World) -> bool {
+        let own = match self.body {
+            BodyAxes::Flu => "flu",
+            BodyAxes::Frd => "frd",
+            BodyAxes::Map(_) => "",
+        };
+        plan.mount.is_some() || self.labels(world).1 != own
+    }
+
+    /// A recorded orientation (sensor to its world) as the attitude of our body: convention and
+    /// mounting undone. `None` when it is no rotation.
+    #[must_use]
+    pub fn recorded_attitude(&self, wxyz: [f64; 4]) -> Option<Quaternion<Nav, Body>> {
+        let q: Quaternion<Nav, Body> = Quaternion::try_from_wxyz(wxyz).ok()?;
+        let flu = self.recorded.convert(Convention::EnuFlu, q);
+        let c_bs: Quaternion<Body, Body> = Quaternion::from_dcm(&Dcm::assume(self.mount));
+        Some((flu * c_bs.inverse()).normalised())
+    }
+}
+
+/// The convention of the orientations a format carries.
+#[must_use]
+pub fn orientation_convention(declared: &Declared) -> Convention {
+    declared.world.unwrap_or(Convention::EnuFlu)
+}
