@@ -2,7 +2,7 @@
 
 pub mod aid;
 pub mod calendar;
-pub mod drawn;
+pub mod series;
 pub mod findings;
 pub mod page;
 pub mod plot;

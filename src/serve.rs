@@ -26,7 +26,6 @@
 //! The wire is described in `docs/protocol.md`.
 
 pub mod admission;
-pub mod cast;
 pub mod channel;
 pub mod connect;
 mod forward;
@@ -40,7 +39,7 @@ mod page;
 pub mod peer;
 pub mod places;
 pub mod playback;
-mod quiet;
+mod log_throttle;
 pub mod recorder;
 mod samples;
 pub mod session;
@@ -49,8 +48,8 @@ pub mod source;
 pub mod state;
 mod strangers;
 pub mod stream;
-pub mod subscriber;
-mod top;
+pub mod outbox;
+mod top_page;
 pub mod upstream;
 pub mod viewer;
 pub mod wire;
@@ -102,7 +101,7 @@ pub struct Settings {
     /// Whom to call and send every attitude to ([`Target::Tcp`], [`Target::Udp`]).
     pub outputs: Vec<Target>,
     /// The replay that is served; no samples are taken then.
-    pub playback: Option<Arc<playback::Playback>>,
+    pub playback: Option<Arc<playback::controls::Playback>>,
 }
 
 /// A daemon that listens, and serves when it is [run](Server::run).

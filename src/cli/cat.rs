@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::pipeline::decoders::Decoders;
 use crate::pipeline::log::{Log, problems};
 use strapd_attitude::estimate::Meaning;
-use crate::pipeline::route::{Item, Noticed, Route, Taker};
+use crate::pipeline::channel_route::{Item, Noticed, Route, Taker};
 use crate::pipeline::topics;
 use clap::{Args, ValueEnum};
 use serde_json::json;

@@ -2,7 +2,7 @@
 
 use super::{Global, Outcome, print};
 use crate::error::{Error, Result};
-use crate::pipeline::track::{self, Side};
+use crate::pipeline::attitude_track::{self, Side};
 use crate::report::page::{STRETCHES, comparison_json};
 use crate::report::plot::{Axis, Chart, Look, Series};
 use crate::report::summary::significant;
@@ -82,8 +82,8 @@ pub fn run(global: &Global, args: &Compare) -> Result<Outcome> {
         .map(|p| Document::create(p, &inputs, args.force))
         .transpose()?;
     let pool = Pool::new(global.threads)?;
-    let estimate = track::read(&args.estimate, Side::Estimate, args.topic.as_deref(), &pool)?;
-    let reference = track::read(
+    let estimate = attitude_track::read(&args.estimate, Side::Estimate, args.topic.as_deref(), &pool)?;
+    let reference = attitude_track::read(
         &args.reference,
         Side::Reference,
         args.ref_topic.as_deref(),
@@ -161,7 +161,7 @@ fn chart(estimate: &[Stamped], reference: &[Stamped], align: Align, errors: &Err
 }
 
 /// What is no rotation becomes one with NaN, so that the comparison counts it.
-fn attitudes(track: &track::Track) -> Vec<Stamped> {
+fn attitudes(track: &attitude_track::Track) -> Vec<Stamped> {
     track
         .entries
         .iter()
@@ -174,8 +174,8 @@ fn attitudes(track: &track::Track) -> Vec<Stamped> {
         .collect()
 }
 
-fn no_match(args: &Compare, estimate: &track::Track, reference: &track::Track) -> Error {
-    let span = |t: &track::Track| match (t.entries.first(), t.entries.last()) {
+fn no_match(args: &Compare, estimate: &attitude_track::Track, reference: &attitude_track::Track) -> Error {
+    let span = |t: &attitude_track::Track| match (t.entries.first(), t.entries.last()) {
         (Some((a, _)), Some((b, _))) => {
             format!(
                 "{}: {} attitudes, {} to {} ns",

@@ -5,7 +5,7 @@ mod words;
 use super::{Global, Outcome, print};
 use crate::error::{Error, Result};
 use crate::pipeline::log::{Log, problems};
-use crate::pipeline::look::look;
+use crate::pipeline::inspection::look;
 use crate::pipeline::topics;
 use clap::Args;
 use std::path::PathBuf;

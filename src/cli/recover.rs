@@ -5,7 +5,7 @@ use super::replay::CompressionArg;
 use super::{Global, Outcome, print};
 use crate::error::Result;
 use crate::pipeline::recover::{self, Recovered};
-use crate::pipeline::run::Source;
+use crate::pipeline::request::Source;
 use crate::report::summary::human_bytes;
 use crate::sink::{Encoding, Options, Target};
 use clap::Args;

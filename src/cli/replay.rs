@@ -8,7 +8,7 @@ use strapd_attitude::estimate::Plan;
 use crate::config::Shard;
 use crate::error::{Error, Result};
 use crate::pipeline::replay;
-use crate::pipeline::run::{Replay as Run, Source};
+use crate::pipeline::request::{ReplayRequest, Source};
 use crate::report::summary::RunSummary;
 use crate::sink::{Compression, Encoding, Options, Target};
 use clap::{Args, ValueEnum};
@@ -197,7 +197,7 @@ impl Replay {
     ///
     /// # Errors
     /// [`Error::Usage`] for a flag that can not be.
-    fn run(&self, log: &str, outputs: &[String], plan: Plan) -> Result<(Run, Served)> {
+    fn run(&self, log: &str, outputs: &[String], plan: Plan) -> Result<(ReplayRequest, Served)> {
         if self
             .out_rate
             .is_some_and(|hz| !(hz.is_finite() && hz > 0.0))
@@ -213,7 +213,7 @@ impl Replay {
         let served = self
             .serving
             .start(targets, self.speed.as_deref(), (log, can_rewind))?;
-        let run = Run {
+        let run = ReplayRequest {
             source,
             targets: served.targets.clone(),
             audience: served.audience(),

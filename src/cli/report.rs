@@ -8,7 +8,7 @@ use strapd_attitude::estimate::{Bias, Plan};
 use crate::error::{Error, Result};
 use crate::pipeline::check::{CheckedTopic, Drawing, Examination, examine};
 use crate::pipeline::provenance::sha256;
-use crate::pipeline::track::{self, Side, Track};
+use crate::pipeline::attitude_track::{self, Side, Track};
 use crate::report::findings::findings;
 use crate::report::page::{DRAWN, Noise, Page, STRETCHES, Told, longest_rest};
 use crate::report::summary::significant;
@@ -150,7 +150,7 @@ impl Report {
         let Some(path) = &self.reference else {
             return Ok(None);
         };
-        let track = track::read(path, Side::Reference, self.ref_topic.as_deref(), pool)?;
+        let track = attitude_track::read(path, Side::Reference, self.ref_topic.as_deref(), pool)?;
         for problem in &track.problems {
             tracing::warn!("{problem}");
         }

@@ -5,10 +5,10 @@
 
 use super::each::{Told, each};
 use super::log::{Log, problems};
-use super::look::{Looked, look_as};
+use super::inspection::{Inspection, look_as};
 use super::position::Position;
-use super::run::{Replay, Source};
-use super::track::Track;
+use super::request::{ReplayRequest, Source};
+use super::attitude_track::Track;
 use crate::config::Selection;
 use strapd_attitude::estimate::Plan;
 use crate::error::{Error, Result};
@@ -41,7 +41,7 @@ pub struct Checked {
 #[derive(Debug)]
 pub struct CheckedTopic {
     /// Statistics of the samples as recorded.
-    pub looked: Looked,
+    pub looked: Inspection,
     /// What a replay with default flags makes of them, or why it refuses.
     pub replayed: std::result::Result<Box<TopicSummary>, String>,
 }
@@ -133,7 +133,7 @@ pub fn examine(
     } else {
         Vec::new()
     };
-    let looked: Vec<Looked> = looks
+    let looked: Vec<Inspection> = looks
         .topics
         .into_iter()
         .filter(|l| named.is_none_or(|name| l.topic == name || l.of == name))
@@ -171,7 +171,7 @@ fn integrate(
     if topics.is_empty() {
         return Ok(Vec::new());
     }
-    let run = Replay {
+    let run = ReplayRequest {
         source: Source::File(path.to_owned()),
         targets: Vec::new(),
         selection: asked.selection.clone(),

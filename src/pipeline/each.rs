@@ -5,16 +5,16 @@
 //! square of its size.
 
 use super::check::Drawing;
-use super::chosen::{Chosen, choose_each, reference, route};
+use super::channel_choice::{Chosen, choose_each, reference, route};
 use super::decoders::Decoders;
 use super::history::History;
 use super::log::Log;
-use super::opening::labelled;
-use super::outlet::{Delivery, Outlet};
+use super::session_builder::labelled;
+use super::delivery::{Delivery, Outlet};
 use super::position::Position;
 use super::replay::{again, done, prepare};
-use super::route::Route;
-use super::run::Replay;
+use super::channel_route::Route;
+use super::request::ReplayRequest;
 use super::session::{Session, Topic};
 use super::summarise;
 use crate::error::Result;
@@ -33,7 +33,7 @@ pub(super) type Told = std::result::Result<Box<TopicSummary>, String>;
 /// # Errors
 /// The log can not be read.
 pub(super) fn each(
-    run: &Replay,
+    run: &ReplayRequest,
     (path, log): (&Path, &Log),
     names: &[String],
     drawing: Option<&Drawing<'_>>,

@@ -5,7 +5,7 @@
 
 use super::decoders::Decoders;
 use super::log::nanos;
-use super::route::{Copied, Item, Route, Taker};
+use super::channel_route::{Copied, Item, Route, Taker};
 use super::sources::{OPENINGS, OPENINGS_LIMIT, keep};
 use std::sync::Arc;
 use strapd_recording::decode::{Decoder, Unsupported};

@@ -2,7 +2,7 @@
 //!
 //! Beside the outlet because it sees every attitude, but keeps few: see [`Traces`].
 
-use crate::report::drawn::{Drawn, Elapsed, Mark};
+use crate::report::series::{Drawn, Elapsed, Mark};
 use crate::report::trace::Traces;
 use std::collections::VecDeque;
 use strapd_attitude::condition::Clock;

@@ -2,13 +2,13 @@
 
 use super::position::Position;
 use strapd_attitude::estimate::Meaning;
-use super::route::Item;
-use super::run::{Replay, refused};
+use super::channel_route::Item;
+use super::request::{ReplayRequest, refused};
 use super::session::Found;
 use super::simulate::TRUTH_ID;
 use strapd_attitude::estimate::{StampPass, Stamps};
 use super::summarise;
-use super::waiting::Waiting;
+use super::replay_start::Waiting;
 use crate::error::{Error, Result};
 use crate::report::summary::RunSummary;
 use crate::sink::{Flow, Stream, output_topic};
@@ -63,7 +63,7 @@ pub fn open(path: &Path) -> Result<File> {
 /// # Errors
 /// As [`super::replay::run`]; several sensors in one stream and none named.
 pub fn replay(
-    run: &Replay,
+    run: &ReplayRequest,
     input: BufReader<impl Read>,
     stamps: Option<Stamps>,
     pool: &Pool,
@@ -84,7 +84,7 @@ pub fn replay(
 ///
 /// # Errors
 /// As [`replay`]; there is no constant rate.
-pub fn stamps(run: &Replay, input: BufReader<impl Read>) -> Result<Option<Stamps>> {
+pub fn stamps(run: &ReplayRequest, input: BufReader<impl Read>) -> Result<Option<Stamps>> {
     if !run.plan.regularise_stamps {
         return Ok(None);
     }
@@ -137,7 +137,7 @@ impl Taker for Running<'_, '_> {
 
 /// A pass for the stamps.
 struct Looking<'r> {
-    run: &'r Replay,
+    run: &'r ReplayRequest,
     path: &'r Path,
     pass: Option<(String, StampPass)>,
 }
@@ -165,7 +165,7 @@ impl Taker for Looking<'_> {
 
 /// Reads lines to their end, or until nobody wants them.
 fn read(
-    run: &Replay,
+    run: &ReplayRequest,
     mut input: BufReader<impl Read>,
     path: &Path,
     taker: &mut impl Taker,
@@ -341,7 +341,7 @@ fn nothing(path: &Path) -> Error {
     }
 }
 
-fn met(run: &Replay, id: &str, declared: &Declared) -> (Found, Stream) {
+fn met(run: &ReplayRequest, id: &str, declared: &Declared) -> (Found, Stream) {
     let name = if id.is_empty() { "imu" } else { id };
     let found = Found {
         name: name.to_owned(),

@@ -24,7 +24,7 @@ pub struct Log {
     /// What is in it.
     pub survey: Survey,
     /// Its channels, with what they can serve as.
-    pub channels: Vec<Known>,
+    pub channels: Vec<LogChannel>,
     /// Who speaks on its topics: one for each until `sources::tell_apart` has looked.
     pub sources: Vec<Source>,
     /// What was wrong with it as far as it was read: all of it when it has no summary, otherwise up
@@ -34,7 +34,7 @@ pub struct Log {
 
 /// A channel and its first message.
 #[derive(Clone, Debug)]
-pub struct Known {
+pub struct LogChannel {
     /// The channel.
     pub channel: Arc<Channel>,
     /// Messages on it.
@@ -76,7 +76,7 @@ impl Log {
                 .or_insert(first);
         }
         let mut decoders = Decoders::default();
-        let channels: Vec<Known> = survey
+        let channels: Vec<LogChannel> = survey
             .channels
             .iter()
             .map(|found| {
@@ -146,7 +146,7 @@ impl Log {
     }
 
     /// The channels of a source.
-    pub fn channels_of<'l>(&'l self, source: &Source) -> impl Iterator<Item = &'l Known> {
+    pub fn channels_of<'l>(&'l self, source: &Source) -> impl Iterator<Item = &'l LogChannel> {
         let indices = source.channels.clone();
         indices.into_iter().filter_map(|n| self.channels.get(n))
     }
@@ -199,7 +199,7 @@ impl Log {
             .collect();
         // What a run put out, by its metadata or by its name beside the input's: its rates are another
         // channel's, less the bias.
-        let is_our_attitude = |known: &Known| {
+        let is_our_attitude = |known: &LogChannel| {
             let topic = known.channel.topic.as_str();
             known.channel.metadata.contains_key("rotates")
                 || outputs.contains(topic)
@@ -207,7 +207,7 @@ impl Log {
                     .strip_suffix("/data")
                     .is_some_and(|name| inputs.contains(name))
         };
-        let rank_of = |known: &Known| match rank(&known.role) {
+        let rank_of = |known: &LogChannel| match rank(&known.role) {
             best if is_our_attitude(known) => best.min(PICKED_UNNAMED),
             best => best,
         };
@@ -227,7 +227,7 @@ impl Log {
         &self,
         source: &Source,
         is_shared: bool,
-        rank_of: &dyn Fn(&Known) -> u8,
+        rank_of: &dyn Fn(&LogChannel) -> u8,
     ) -> Candidate {
         let first = self.channels_of(source).next();
         let mut said = first.map_or_else(String::new, |k| described(&k.channel));
@@ -253,7 +253,7 @@ impl Log {
     }
 }
 
-impl Known {
+impl LogChannel {
     /// For the choice of topics.
     #[must_use]
     pub fn candidate(&self) -> Candidate {
@@ -344,11 +344,11 @@ pub fn rank(role: &Role) -> u8 {
 
 /// "No IMU topic" with what is wrong with those that sound like one, and with the file.
 #[must_use]
-pub fn explained(error: Error, channels: &[Known], problems: &[String]) -> Error {
+pub fn explained(error: Error, channels: &[LogChannel], problems: &[String]) -> Error {
     let Error::NoImuTopic { path, mut topics } = error else {
         return error;
     };
-    let sounds_like_one = |k: &&Known| {
+    let sounds_like_one = |k: &&LogChannel| {
         let name = k.channel.schema.as_deref().map_or("", |s| &s.name);
         !k.role.has_rate && name.to_ascii_lowercase().contains("imu")
     };
@@ -376,13 +376,13 @@ pub fn known(
     messages: u64,
     first: Option<(Nanos, Vec<u8>)>,
     decoders: &mut Decoders,
-) -> Known {
+) -> LogChannel {
     let role = role_of(
         &plain(channel),
         decoders.of(channel),
         first.as_ref().map(|(log, data)| (data.as_slice(), *log)),
     );
-    Known {
+    LogChannel {
         channel: channel.clone(),
         messages,
         first,

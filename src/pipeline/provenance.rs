@@ -2,7 +2,7 @@
 //! of the input.
 
 use strapd_attitude::estimate::Prepared;
-use super::run::{Replay, Source};
+use super::request::{ReplayRequest, Source};
 use super::session::Found;
 use strapd_attitude::estimate::Aid;
 use crate::error::Result;
@@ -21,7 +21,7 @@ const END: u64 = 1 << 20;
 /// # Errors
 /// The input can not be read again.
 pub fn of(
-    run: &Replay,
+    run: &ReplayRequest,
     founds: &[Found],
     prepared: &[Prepared],
     streams: &[Stream],

@@ -8,7 +8,7 @@
 //! found, and counted as unverified.
 
 use super::position::Position;
-use super::run::Source;
+use super::request::Source;
 use crate::error::{Error, Result};
 use crate::sink::{
     Attachment, CopiedChannel, Flow, InputChannel, InputMessage, Options, Sink, Target, Written,

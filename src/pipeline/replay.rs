@@ -3,17 +3,17 @@
 //! A file is read twice: once as far as is needed to know clock, bias, initial attitude and lines
 //! through stamps, then to integrate. A stream is read once; its first samples wait until these are known.
 
-use super::chosen::{Chosen, choose, looked_at, reference, route};
+use super::channel_choice::{Chosen, choose, looked_at, reference, route};
 use super::log::Log;
-use super::opening::{begin, labelled};
+use super::session_builder::{begin, labelled};
 use super::position::Position;
 use strapd_attitude::estimate::{Patience, Preparation, Prepared};
-use super::route::{Item, Route};
-use super::run::{Replay, Source, refused};
+use super::channel_route::{Item, Route};
+use super::request::{ReplayRequest, Source, refused};
 use super::session::Found;
 use strapd_attitude::estimate::StampPass;
 use super::summarise;
-use super::{lines, streamed};
+use super::{lines, replay_stream};
 use crate::error::Result;
 use crate::report::summary::RunSummary;
 use crate::sink::{Flow, Stream};
@@ -29,7 +29,7 @@ use strapd_recording::pool::Pool;
 /// # Errors
 /// Whatever kept it from being carried out. Bad samples and damaged files are no error: they are
 /// counted in the summary.
-pub fn run(run: &Replay, pool: &Pool, watch: &mut dyn FnMut(&Position)) -> Result<RunSummary> {
+pub fn run(run: &ReplayRequest, pool: &Pool, watch: &mut dyn FnMut(&Position)) -> Result<RunSummary> {
     let begun = Instant::now();
     let mut summary = match &run.source {
         Source::File(path) if is_lines(path) => {
@@ -68,7 +68,7 @@ fn is_pipe(path: &Path) -> bool {
 
 /// Standard input or a named pipe: an MCAP or lines, told apart by the first bytes.
 fn piped(
-    run: &Replay,
+    run: &ReplayRequest,
     input: impl Read + Send + 'static,
     pool: &Pool,
     watch: &mut dyn FnMut(&Position),
@@ -92,7 +92,7 @@ fn piped(
     let whole = std::io::Cursor::new(head).chain(input);
     if is_mcap {
         let reader = Reader::from_stream(run.source.name(), Box::new(whole))?;
-        streamed::replay(run, reader, pool, watch)
+        replay_stream::replay(run, reader, pool, watch)
     } else {
         let input = BufReader::with_capacity(1 << 16, whole);
         lines::replay(run, input, None, pool, watch)
@@ -100,7 +100,7 @@ fn piped(
 }
 
 fn file(
-    run: &Replay,
+    run: &ReplayRequest,
     path: &Path,
     pool: &Pool,
     watch: &mut dyn FnMut(&Position),
@@ -172,7 +172,7 @@ pub(super) fn done(items: &[Item], span: Option<(u64, u64)>) -> Option<f64> {
 
 /// Reads as far as needed to know clock, bias and initial attitude of every topic, or why one is refused.
 pub(super) fn prepare(
-    run: &Replay,
+    run: &ReplayRequest,
     path: &Path,
     log: &Log,
     chosen: &[Chosen],

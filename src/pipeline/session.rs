@@ -1,13 +1,13 @@
 //! Items in order -> estimators -> outlet: the consuming half of a run, whatever the source. I/O
 //! only through the outlet.
 
-use super::against::AgainstRecorded;
+use super::sample_kinds::AgainstRecorded;
 use strapd_attitude::estimate::Estimator;
 use super::history::History;
-use super::outlet::Outlet;
+use super::delivery::Outlet;
 use super::position::Position;
 use strapd_attitude::estimate::{Prepared, Meaning};
-use super::route::{Item, Noticed};
+use super::channel_route::{Item, Noticed};
 use strapd_attitude::estimate::Plan;
 use crate::error::{Error, Result};
 use crate::sink::{Flow, Written};

@@ -1,7 +1,7 @@
 //! A synthetic gyro -> the sinks of a run. I/O, but for the samples themselves.
 
 use super::audience::Audience;
-use super::outlet::{Delivery, Outlet, broken};
+use super::delivery::{Delivery, Outlet, broken};
 use super::position::Position;
 use crate::error::{Error, Result};
 use crate::report::simulation::SimulationSummary;

@@ -6,7 +6,7 @@
 //! another frame, are several, and each gets a name: `TOPIC@FRAME`, `TOPIC@PUBLISHER`.
 
 use super::decoders::Decoders;
-use super::log::{Known, nanos};
+use super::log::{LogChannel, nanos};
 use super::topics::PICKED_UNNAMED;
 use crate::error::Result;
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
@@ -51,7 +51,7 @@ impl Source {
 }
 
 /// One source for each topic, in order of appearance.
-pub(super) fn by_topic(channels: &[Known]) -> Vec<Source> {
+pub(super) fn by_topic(channels: &[LogChannel]) -> Vec<Source> {
     let mut at: HashMap<&str, usize> = HashMap::new();
     let mut sources: Vec<Source> = Vec::new();
     for (index, known) in channels.iter().enumerate() {
@@ -88,7 +88,7 @@ const FEW: u64 = 3;
 /// The log can not be read.
 pub(super) fn tell_apart(
     reader: Reader,
-    channels: &mut [Known],
+    channels: &mut [LogChannel],
     named: Option<&str>,
     options: &Options,
     pool: &Pool,
@@ -99,7 +99,7 @@ pub(super) fn tell_apart(
     let mut speakers: BTreeMap<usize, Speakers> = BTreeMap::new();
     let (mut missing, mut unsettled) = (0, 0);
     for (place, source, standing) in in_turn(&sources, named) {
-        let speaking: Vec<(usize, &Known)> = source
+        let speaking: Vec<(usize, &LogChannel)> = source
             .channels
             .iter()
             .filter_map(|index| Some((*index, channels.get(*index)?)))
@@ -226,7 +226,7 @@ enum Standing {
 }
 
 impl Standing {
-    fn is_of(self, known: &Known) -> bool {
+    fn is_of(self, known: &LogChannel) -> bool {
         let may_be_integrated = super::log::rank(&known.role) >= PICKED_UNNAMED;
         match self {
             Standing::Named => true,

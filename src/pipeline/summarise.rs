@@ -1,11 +1,11 @@
 //! What the stages counted -> the summary of the run. Pure.
 
 use super::lines;
-use super::outlet::broken;
-use super::run::Replay;
+use super::delivery::broken;
+use super::request::ReplayRequest;
 use super::session::{Ended, Topic};
 use crate::report::aid::Aided;
-use crate::report::drawn::Drawn;
+use crate::report::series::Drawn;
 use crate::report::stamps::{Regularised, Segment};
 use crate::report::summary::{Gaps, RunSummary, TopicSummary, significant};
 use std::sync::atomic::Ordering;
@@ -21,7 +21,7 @@ const UNLIKELY_RATE: f64 = 200.0;
 
 /// The summary of a run.
 #[must_use]
-pub fn run(run: &Replay, ended: Ended, survey: &Survey) -> RunSummary {
+pub fn run(run: &ReplayRequest, ended: Ended, survey: &Survey) -> RunSummary {
     let Ended {
         mut topics,
         outputs,
@@ -50,7 +50,7 @@ pub fn run(run: &Replay, ended: Ended, survey: &Survey) -> RunSummary {
 }
 
 /// What became of each topic of a run without outputs.
-pub(super) fn topics(run: &Replay, ended: Ended) -> Vec<TopicSummary> {
+pub(super) fn topics(run: &ReplayRequest, ended: Ended) -> Vec<TopicSummary> {
     let mut topics = ended.topics;
     topics
         .iter_mut()
@@ -58,7 +58,7 @@ pub(super) fn topics(run: &Replay, ended: Ended) -> Vec<TopicSummary> {
         .collect()
 }
 
-fn of_topic(run: &Replay, topic: &mut Topic) -> TopicSummary {
+fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
     let drawn = drawn(topic);
     let conditioning = topic.estimator.conditioning();
     let propagation = topic.estimator.propagation();
@@ -122,12 +122,12 @@ fn of_topic(run: &Replay, topic: &mut Topic) -> TopicSummary {
         against: topic
             .against
             .as_ref()
-            .map(super::against::AgainstRecorded::rows)
+            .map(super::sample_kinds::AgainstRecorded::rows)
             .unwrap_or_default(),
         recorded: topic
             .against
             .as_ref()
-            .and_then(super::against::AgainstRecorded::recorded),
+            .and_then(super::sample_kinds::AgainstRecorded::recorded),
         warnings: topic.prepared.warnings.clone(),
         drawn,
     };
@@ -151,7 +151,7 @@ fn drawn(topic: &mut Topic) -> Option<Box<Drawn>> {
 
 /// What is not known of the bias at the end, about the worst axis, rad/s: what was not known at the start,
 /// and what it has wandered since.
-fn drift(run: &Replay, topic: &Topic, secs: f64) -> f64 {
+fn drift(run: &ReplayRequest, topic: &Topic, secs: f64) -> f64 {
     topic
         .prepared
         .bias_sigma

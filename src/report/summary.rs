@@ -3,7 +3,7 @@
 //! Built by the pipeline, which knows the numbers; the words are here, in one place.
 
 use super::aid::Aided;
-use super::drawn::Drawn;
+use super::series::Drawn;
 use super::stamps::Regularised;
 pub use strapd_attitude::digits::significant;
 use serde_json::{Value, json};

@@ -3,7 +3,7 @@
 //! Apart from where its samples come from: a sensor of the daemon and a stream of a replay reach
 //! whoever watches in the same way.
 
-use super::subscriber::{Chunk, Class};
+use super::outbox::{Chunk, Class};
 use super::{foxglove, wire};
 use crate::sink::json::Objects;
 use crate::sink::payload::{Payloads, Topic};

@@ -7,7 +7,7 @@
 
 use super::hub::{Flood, Hub};
 use super::listen::{in_room, now};
-use super::quiet;
+use super::log_throttle;
 use super::session::{End, Session, Side};
 use super::shutdown::Running;
 use super::source::{Protocol, Source};
@@ -111,7 +111,7 @@ impl Outgoing {
     fn complain(&self, what: &str) {
         self.state().last_error = Some(what.to_owned());
         let name = &self.source.name;
-        quiet::warn(&format!("{name} says"), &format!("{name}: {what}"));
+        log_throttle::warn(&format!("{name} says"), &format!("{name}: {what}"));
     }
 }
 
@@ -152,7 +152,7 @@ pub(super) async fn keep(outgoing: Arc<Outgoing>, hub: Arc<Hub>, mut running: Ru
             Ok(link) => {
                 let began = Instant::now();
                 outgoing.connected(link.peer());
-                quiet::info(&format!("{name} connected"), &format!("{name}: connected"));
+                log_throttle::info(&format!("{name} connected"), &format!("{name}: connected"));
                 let Some(why) = converse(link, &outgoing, &hub, &mut running).await else {
                     return;
                 };
@@ -164,7 +164,7 @@ pub(super) async fn keep(outgoing: Arc<Outgoing>, hub: Arc<Hub>, mut running: Ru
             Err(why) => why,
         };
         outgoing.lost(&why);
-        quiet::warn(
+        log_throttle::warn(
             &format!("{name} lost"),
             &format!("{name}: {why}; trying again until it is there"),
         );

@@ -3,11 +3,11 @@
 //! A client like any other, but that we call: its outbox is bounded, the oldest give way, and it slows
 //! nobody down. One that can not be reached, or goes, is called again.
 
-use super::hub::{Client, Hub, Shape, count};
+use super::hub::{Client, Hub, ClientProtocol, count};
 use super::listen::Context;
-use super::quiet;
+use super::log_throttle;
 use super::shutdown::Running;
-use super::subscriber::Filter;
+use super::outbox::Filter;
 use crate::sink::Target;
 use bytes::Bytes;
 use std::collections::VecDeque;
@@ -36,7 +36,7 @@ pub(super) async fn send(target: Target, context: Context) {
         Target::Udp { address, profile } => (format!("udp://{address}"), *profile),
         _ => return,
     };
-    let client = hub.join_as(name, Shape::Lines(profile));
+    let client = hub.join_as(name, ClientProtocol::Lines(profile));
     loop {
         let ended = match &target {
             Target::Tcp(address) => tcp(address, &hub, &client, &mut running).await,
@@ -46,7 +46,7 @@ pub(super) async fn send(target: Target, context: Context) {
         hub.watch(&client, None);
         client.outbox.forget();
         let Err(why) = ended else { break };
-        quiet::warn(
+        log_throttle::warn(
             "outgoing",
             &format!("-o {}: {why}; trying again", client.peer),
         );

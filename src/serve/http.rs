@@ -5,7 +5,7 @@ use super::foxglove::SUBPROTOCOLS;
 use super::hub::{Hub, count};
 use super::listen::{Connection, websocket};
 use super::places::Kind;
-use super::{page, quiet, samples, top};
+use super::{log_throttle, page, samples, top_page};
 use axum::Router;
 use axum::body::Body;
 use axum::extract::Extension;
@@ -31,7 +31,7 @@ pub(crate) fn router() -> Router {
             post(samples::post).fallback(samples::not_posted),
         )
         .merge(page::router())
-        .route("/model/top", get(top::answer))
+        .route("/model/top", get(top_page::answer))
         .fallback(|| async {
             refusal(
                 StatusCode::NOT_FOUND,
@@ -115,18 +115,18 @@ pub(crate) fn warn_of(why: Foreign, host: Option<&str>, origin: Option<&str>) {
     let named = |name: Option<&str>| printable(name.unwrap_or_default());
     match why {
         Foreign::NoHost => {}
-        Foreign::Host => quiet::warn(
+        Foreign::Host => log_throttle::warn(
             "foreign host",
             &format!(
                 "a request for the host {} was refused; --allow-host allows it",
                 named(host)
             ),
         ),
-        Foreign::Origin if origin == Some("null") => quiet::warn(
+        Foreign::Origin if origin == Some("null") => log_throttle::warn(
             "foreign origin",
             "a page from a file (origin null) was refused; serve it over HTTP, and --allow-origin with that address allows it",
         ),
-        Foreign::Origin => quiet::warn(
+        Foreign::Origin => log_throttle::warn(
             "foreign origin",
             &format!(
                 "pages of {origin} were refused; --allow-origin {origin} allows them",

@@ -10,14 +10,14 @@ mod latecomers;
 mod places;
 mod polling;
 mod report;
-mod room;
-mod telling;
+mod back_pressure;
+mod announce;
 
 pub use counters::{Counters, count};
 use places::Absent;
 use polling::Polling;
 use report::StateStatus;
-pub use room::Flood;
+pub use back_pressure::Flood;
 
 use super::Settings;
 use super::admission::Token;
@@ -26,13 +26,13 @@ use super::connect::Outgoing;
 use super::foxglove;
 use super::limits::Limits;
 use super::peer::Peer;
-use super::playback::Playback;
-use super::quiet;
+use super::playback::controls::Playback;
+use super::log_throttle;
 use super::recorder::Handle;
 use super::stream::run::Placed;
 use super::stream::stamps::Taken;
 use super::stream::{SensorStream, live_plan};
-use super::subscriber::{Chunk, Outbox};
+use super::outbox::{Chunk, Outbox};
 use super::wire::{self, Fault};
 use strapd_attitude::estimate::Plan;
 use crate::error::{Error, Result};
@@ -107,7 +107,7 @@ pub struct Sensor {
 
 /// What a client is told, and how.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Shape {
+pub enum ClientProtocol {
     /// Lines.
     Lines(Profile),
     /// Messages of the Foxglove protocol.
@@ -127,7 +127,7 @@ pub struct Client {
     /// What waits for it.
     pub outbox: Outbox,
     /// What it is told, and how.
-    shape: Shape,
+    shape: ClientProtocol,
     since: Instant,
     /// How many sensors it sends.
     sensors: AtomicUsize,
@@ -135,7 +135,7 @@ pub struct Client {
 
 /// Samples of one sensor from one client that came together.
 #[derive(Debug)]
-pub struct Run<'a> {
+pub struct SampleRun<'a> {
     /// From whom.
     pub client: u64,
     /// What the first of their lines said.
@@ -164,7 +164,7 @@ pub struct News {
 impl Client {
     /// Whether it is told things as Foxglove's viewers are.
     fn is_viewer(&self) -> bool {
-        matches!(self.shape, Shape::Foxglove { .. })
+        matches!(self.shape, ClientProtocol::Foxglove { .. })
     }
 
     /// It sends a sensor less.
@@ -283,20 +283,20 @@ impl Hub {
 
     /// Somebody has connected.
     pub fn join(&self, peer: impl Into<Peer>) -> Arc<Client> {
-        self.join_as(peer, Shape::Lines(Profile::Lines))
+        self.join_as(peer, ClientProtocol::Lines(Profile::Lines))
     }
 
     /// As [`Hub::join`], for somebody who is told things in another way. A viewer is told at once who
     /// we are and what there is.
-    pub fn join_as(&self, peer: impl Into<Peer>, shape: Shape) -> Arc<Client> {
+    pub fn join_as(&self, peer: impl Into<Peer>, shape: ClientProtocol) -> Arc<Client> {
         let outbox = match shape {
-            Shape::Lines(Profile::Lines) => Outbox::new(),
-            Shape::Lines(Profile::PlotJuggler) => Outbox::saying(|_, _| Bytes::new()),
-            Shape::Foxglove { .. } => Outbox::saying(foxglove::gap),
+            ClientProtocol::Lines(Profile::Lines) => Outbox::new(),
+            ClientProtocol::Lines(Profile::PlotJuggler) => Outbox::saying(|_, _| Bytes::new()),
+            ClientProtocol::Foxglove { .. } => Outbox::saying(foxglove::gap),
         }
         .telling(self.room_made.clone());
         let channels = read(&self.channels);
-        if let Shape::Foxglove { controls } = shape {
+        if let ClientProtocol::Foxglove { controls } = shape {
             outbox.reply(self.server_info(controls));
             outbox.reply(foxglove::channels(channels.values().map(|c| &**c), true));
             if let Some(place) = self.where_it_is().filter(|_| controls) {
@@ -363,7 +363,7 @@ impl Hub {
     pub fn publish(
         &self,
         sensor: &Mutex<Sensor>,
-        run: &Run<'_>,
+        run: &SampleRun<'_>,
         text: &mut Vec<u8>,
     ) -> std::result::Result<News, Fault> {
         let mut sensor = lock(sensor);
@@ -457,7 +457,7 @@ impl Hub {
         let clients = read(&self.clients);
         let owner = sensor.owner.and_then(|owner| clients.get(&owner));
         for fault in note.iter().chain(&faults) {
-            quiet::info(&format!("run {id}"), &format!("{id}: {}", fault.message));
+            log_throttle::info(&format!("run {id}"), &format!("{id}: {}", fault.message));
         }
         let Some(owner) = owner else { return };
         for said in note.iter().map(wire::note) {
@@ -523,8 +523,8 @@ impl Hub {
         let now = std::cell::LazyCell::new(|| self.where_it_is().and_then(|place| place.at));
         for client in &*watchers {
             let profile = match client.shape {
-                Shape::Lines(profile) => profile,
-                Shape::Foxglove { .. } => {
+                ClientProtocol::Lines(profile) => profile,
+                ClientProtocol::Foxglove { .. } => {
                     client.outbox.offer_frames(
                         |wanted| {
                             let of = |channel| wanted.get(&channel).copied();

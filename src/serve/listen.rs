@@ -191,7 +191,7 @@ async fn accept<S, A: Future<Output = io::Result<S>>>(
             Err(why) => {
                 let wait = backoff.failed();
                 count(&context.hub.counters.accept_failures, 1);
-                super::quiet::warn(
+                super::log_throttle::warn(
                     "accept",
                     &format!("cannot accept a connection: {why}; trying again in {wait:?}"),
                 );

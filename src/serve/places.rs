@@ -252,7 +252,7 @@ mod tests {
     use super::*;
     use crate::serve::Settings;
     use crate::serve::hub::Hub;
-    use crate::serve::subscriber::Filter;
+    use crate::serve::outbox::Filter;
     use futures_util::FutureExt;
 
     fn places(idle: Duration) -> Arc<Places> {

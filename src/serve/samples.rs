@@ -5,10 +5,10 @@
 //! elsewhere without having asked first.
 
 use super::http::{refusal, response, unauthorised};
-use super::hub::{Client, Flood, GAVE_WAY, Hub, News, Run, Sensor, count};
+use super::hub::{Client, Flood, GAVE_WAY, Hub, News, SampleRun, Sensor, count};
 use super::listen::{Connection, now};
 use super::peer::{Origin, Peer};
-use super::quiet;
+use super::log_throttle;
 use super::stream::NAMELESS;
 use super::stream::run::Placed;
 use super::wire::{self, Fault, Message};
@@ -105,7 +105,7 @@ pub(super) async fn post(
     let (parts, body) = request.into_parts();
     if let Err(why) = no_page(&parts.headers) {
         count(&hub.counters.refused, 1);
-        quiet::warn(
+        log_throttle::warn(
             "a page posts",
             &format!("POST /samples, from a page: refused ({why})"),
         );
@@ -398,7 +398,7 @@ impl Poster {
         let mut flood = Flood::default();
         for from in (0..until).step_by(AT_ONCE) {
             let to = (from + AT_ONCE).min(until);
-            let run = Run {
+            let run = SampleRun {
                 client: self.client.number,
                 head: &head,
                 received,
@@ -412,7 +412,7 @@ impl Poster {
                     taken.samples += run.samples.len() as u64;
                     if let Some(note) = note {
                         let id = head.id.as_deref().unwrap_or(NAMELESS);
-                        quiet::info(&format!("run {id}"), &format!("{id}: {}", note.message));
+                        log_throttle::info(&format!("run {id}"), &format!("{id}: {}", note.message));
                         taken.notes.push(format!("{id}: {}", note.message));
                     }
                     for fault in faults {
@@ -437,7 +437,7 @@ impl Poster {
         gathered.samples.drain(..until);
     }
 
-    fn hand_over(&mut self, run: &Run<'_>, text: &mut Vec<u8>) -> Result<News, Fault> {
+    fn hand_over(&mut self, run: &SampleRun<'_>, text: &mut Vec<u8>) -> Result<News, Fault> {
         let id = run.head.id.as_deref().filter(|id| !id.is_empty());
         let id = id.unwrap_or(NAMELESS);
         self.last = None;

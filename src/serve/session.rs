@@ -8,10 +8,10 @@ mod opening;
 mod turn;
 mod unpacking;
 
-use super::hub::{Client, GAVE_WAY, Hub, News, Run, Sensor, count};
+use super::hub::{Client, GAVE_WAY, Hub, News, SampleRun, Sensor, count};
 use super::limits::Allowance;
 use super::peer::Peer;
-use super::quiet;
+use super::log_throttle;
 use super::stream::NAMELESS;
 use super::stream::run::Placed;
 use super::upstream::{self, Event};
@@ -67,7 +67,7 @@ impl End {
     /// Says in the log that somebody speaks something else, for whoever wonders where its samples are.
     pub(super) fn warn_of(self, peer: &str) {
         if self == End::NoObject {
-            quiet::warn(
+            log_throttle::warn(
                 "no object",
                 &format!(
                     "{peer} did not begin with a JSON object and was closed; samples by HTTP go to POST /samples at a ws-listen:// address"
@@ -477,7 +477,7 @@ impl Session {
         };
         self.step.worked = true;
         let until = until.min(scratch.samples.len());
-        let run = Run {
+        let run = SampleRun {
             client: self.client.number,
             head: &head,
             received,
@@ -499,7 +499,7 @@ impl Session {
         match news {
             Ok(News { note, faults }) => {
                 if let Some(note) = note {
-                    quiet::info(&format!("run {id}"), &format!("{id}: {}", note.message));
+                    log_throttle::info(&format!("run {id}"), &format!("{id}: {}", note.message));
                     self.client.outbox.reply(wire::note(&note));
                 }
                 for fault in faults {
@@ -520,7 +520,7 @@ impl Session {
         scratch.lines.clear();
     }
 
-    fn sensor(&mut self, id: &str, run: &Run<'_>) -> Result<Arc<Mutex<Sensor>>, Fault> {
+    fn sensor(&mut self, id: &str, run: &SampleRun<'_>) -> Result<Arc<Mutex<Sensor>>, Fault> {
         if let Some(sensor) = self.owned.get(id) {
             return Ok(sensor.clone());
         }

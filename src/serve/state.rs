@@ -4,7 +4,7 @@
 //! one, at most a second old.
 
 use super::hub::Hub;
-use super::quiet;
+use super::log_throttle;
 use super::stream::run::Span;
 use crate::error::{Error, Result};
 use strapd_attitude::estimate::Memory;
@@ -293,7 +293,7 @@ pub fn save(file: &std::sync::Mutex<StateFile>, hub: &Hub) {
     let outcome = file.write(&sensors);
     drop(file);
     if let Err(e) = &outcome {
-        quiet::warn(
+        log_throttle::warn(
             "state",
             &format!("{e}; a restart would go on from an older attitude"),
         );

@@ -10,11 +10,11 @@ pub mod stamps;
 
 use strapd_attitude::estimate::Plan;
 use strapd_attitude::estimate::Estimator;
-use crate::pipeline::opening::labelled;
+use crate::pipeline::session_builder::labelled;
 use strapd_attitude::estimate::{Prepared, Meaning, at_once};
 use crate::report::aid::Aided;
 use crate::serve::channel::Channel;
-use crate::serve::hub::Run;
+use crate::serve::hub::SampleRun;
 use crate::serve::recorder::stream_of;
 use crate::serve::state::Saved;
 use crate::serve::wire::Fault;
@@ -222,7 +222,7 @@ impl SensorStream {
 
     /// The samples of a run whose stamps are known by now: `None` where these are all that came, as they
     /// are. Those whose stamps are bare numbers wait for the unit of all.
-    pub fn stamped(&mut self, run: &Run<'_>) -> Option<Taken> {
+    pub fn stamped(&mut self, run: &SampleRun<'_>) -> Option<Taken> {
         let bare = run.bare.iter().flatten().next();
         if self.joining == Joining::Undecided
             && let Some(bare) = bare

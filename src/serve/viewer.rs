@@ -3,10 +3,10 @@
 //! What [`super::session`] is for lines.
 
 use super::foxglove::{self, Level, MAX_SUBSCRIPTIONS, Request};
-use super::hub::{Client, Hub, Shape, count};
+use super::hub::{Client, Hub, ClientProtocol, count};
 use super::limits::Allowance;
 use super::peer::Peer;
-use super::playback::Action;
+use super::playback::controls::Action;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;
@@ -28,7 +28,7 @@ impl Viewer {
     /// there is.
     #[must_use]
     pub fn new(hub: &Arc<Hub>, peer: impl Into<Peer>, controls: bool) -> Viewer {
-        let client = hub.join_as(peer, Shape::Foxglove { controls });
+        let client = hub.join_as(peer, ClientProtocol::Foxglove { controls });
         Viewer {
             hub: hub.clone(),
             client,

@@ -8,7 +8,7 @@ use std::io::{BufWriter, Write};
 use std::ops::ControlFlow;
 use std::path::Path;
 use strapd::pipeline::recover::{Recover, run};
-use strapd::pipeline::run::Source;
+use strapd::pipeline::request::Source;
 use strapd::sink::{Options, Target};
 use strapd_attitude::record::RawSample;
 use strapd_recording::mcap::{MAGIC, Message, ProblemKind, Reader, WalkOptions, op, walk};

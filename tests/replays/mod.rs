@@ -5,15 +5,15 @@ use std::path::{Path, PathBuf};
 use strapd::config::Selection;
 use strapd::error::Result;
 use strapd::pipeline::replay::run;
-use strapd::pipeline::run::{Replay, Source};
+use strapd::pipeline::request::{ReplayRequest, Source};
 use strapd::report::summary::{RunSummary, TopicSummary};
 use strapd::sink::{Options, Target};
 use strapd_attitude::estimate::Plan;
 use strapd_recording::pool::Pool;
 
 /// A replay of a file into nothing, every setting at its default.
-pub fn replay_of(path: &Path) -> Replay {
-    Replay {
+pub fn replay_of(path: &Path) -> ReplayRequest {
+    ReplayRequest {
         source: Source::File(path.to_owned()),
         targets: vec![Target::Null],
         selection: Selection::default(),
@@ -29,29 +29,29 @@ pub fn replay_of(path: &Path) -> Replay {
 }
 
 /// The same with a plan.
-pub fn replay_with(path: &Path, plan: Plan) -> Replay {
-    Replay {
+pub fn replay_with(path: &Path, plan: Plan) -> ReplayRequest {
+    ReplayRequest {
         plan,
         ..replay_of(path)
     }
 }
 
 /// The same of one topic.
-pub fn replay_named(path: &Path, topic: &str) -> Replay {
+pub fn replay_named(path: &Path, topic: &str) -> ReplayRequest {
     let mut replay = replay_of(path);
     replay.selection.topic = Some(topic.to_owned());
     replay
 }
 
 /// The same with a `--field`.
-pub fn replay_by(path: &Path, field: &str) -> Replay {
+pub fn replay_by(path: &Path, field: &str) -> ReplayRequest {
     let mut replay = replay_of(path);
     replay.selection.decode.fields = vec![field.parse().unwrap()];
     replay
 }
 
 /// Runs it on two threads, watched by nobody.
-pub fn done(replay: &Replay) -> Result<RunSummary> {
+pub fn done(replay: &ReplayRequest) -> Result<RunSummary> {
     run(replay, &Pool::new(2).unwrap(), &mut |_| {})
 }
 
@@ -127,7 +127,7 @@ pub fn mcap(bytes: &[u8], topic: &str) -> Vec<Bits> {
 }
 
 /// Replays into an NDJSON file under `dir` and reads the attitudes back.
-pub fn attitudes(replay: &Replay, dir: &Path) -> (RunSummary, Vec<Bits>) {
+pub fn attitudes(replay: &ReplayRequest, dir: &Path) -> (RunSummary, Vec<Bits>) {
     let path = dir.join("attitudes.ndjson");
     let mut replay = replay.clone();
     replay.targets = vec![target(&path)];

@@ -10,7 +10,7 @@ use mcap::sans_io::{LinearReadEvent, LinearReader};
 use nalgebra::Vector3;
 use std::path::Path;
 use strapd::pipeline::recover::{Recover, Recovered, run};
-use strapd::pipeline::run::Source;
+use strapd::pipeline::request::Source;
 use strapd::sink::{Options, Target};
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{AttitudeCovariance, AttitudeSample, Nanos, RawSample, Status};

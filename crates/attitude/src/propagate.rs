@@ -26,6 +26,7 @@ mod accumulate;
 mod bridge;
 mod classical;
 mod collocation;
+mod columns;
 pub mod covariance;
 mod difference;
 mod executor;
@@ -41,7 +42,6 @@ mod settings;
 #[path = "../../../tests/shared_data/mod.rs"]
 #[allow(unreachable_pub, reason = "shared with the integration tests")]
 pub(crate) mod shared_data;
-mod track;
 mod turn;
 mod uniform;
 mod window;

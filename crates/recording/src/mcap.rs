@@ -20,6 +20,7 @@ mod attached;
 mod block;
 mod bytes;
 mod channels;
+mod input;
 mod list;
 mod lz4;
 mod messages;
@@ -30,7 +31,6 @@ mod resync;
 mod scan;
 mod summary;
 mod survey;
-mod tape;
 mod walk;
 mod workers;
 
@@ -49,11 +49,11 @@ pub use survey::{ChannelSurvey, Survey, survey};
 pub use walk::{WalkOptions, WalkReport, salvage, walk};
 
 use crate::error::{Error, Result};
+use input::{Input, LogFile};
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use tape::{Input, LogFile};
 
 /// What the reader believes a file's length fields up to.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

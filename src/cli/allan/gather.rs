@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::pipeline::decoders::Decoders;
 use crate::pipeline::log::{Log, described, problems};
 use strapd_attitude::estimate::Meaning;
-use crate::pipeline::route::{Item, Noticed, Route, Taker};
+use crate::pipeline::channel_route::{Item, Noticed, Route, Taker};
 use crate::report::summary::significant;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;

@@ -1,8 +1,8 @@
 //! What `info` found -> text or JSON. Pure.
 
 use crate::cli::shell::{flag, quoted_file};
-use crate::pipeline::log::{Known, described, rank};
-use crate::pipeline::look::Looked;
+use crate::pipeline::log::{LogChannel, described, rank};
+use crate::pipeline::inspection::Inspection;
 use crate::pipeline::topics::named_few;
 use crate::report::calendar::{date, duration};
 use crate::report::summary::{human_bytes, significant};
@@ -25,9 +25,9 @@ pub(super) struct Report<'a> {
     /// What is wrong with it.
     pub(super) problems: Vec<String>,
     /// Its channels.
-    pub(super) channels: &'a [Known],
+    pub(super) channels: &'a [LogChannel],
     /// Its topics of samples.
-    pub(super) looked: &'a [Looked],
+    pub(super) looked: &'a [Inspection],
     /// Topics of samples that were too many to look at.
     pub(super) left_out: &'a [String],
 }
@@ -103,7 +103,7 @@ impl Report<'_> {
             );
         }
         let looked: BTreeSet<&str> = self.looked.iter().map(|l| l.of.as_str()).collect();
-        let others: Vec<&Known> = self
+        let others: Vec<&LogChannel> = self
             .channels
             .iter()
             .filter(|k| !looked.contains(k.channel.topic.as_str()))
@@ -143,7 +143,7 @@ impl Report<'_> {
                     let topic = known.channel.topic.as_str();
                     ranks.entry(topic).or_insert_with(|| rank(&known.role));
                 }
-                let of = |l: &Looked| ranks.get(l.of.as_str()).copied().unwrap_or(0);
+                let of = |l: &Inspection| ranks.get(l.of.as_str()).copied().unwrap_or(0);
                 let best = several.iter().map(of).max().unwrap_or(0);
                 let mut likely = several.iter().filter(|l| of(l) == best);
                 match (likely.next(), likely.next()) {
@@ -219,7 +219,7 @@ impl Report<'_> {
     }
 }
 
-fn write_topic(looked: &Looked, out: &mut String) {
+fn write_topic(looked: &Inspection, out: &mut String) {
     let q = &looked.quality;
     let _ = write!(
         out,
@@ -321,7 +321,7 @@ fn write_topic(looked: &Looked, out: &mut String) {
     }
 }
 
-fn bad_counts(looked: &Looked) -> Vec<String> {
+fn bad_counts(looked: &Inspection) -> Vec<String> {
     let q = &looked.quality;
     [
         (looked.undecodable, "payloads can not be decoded"),
@@ -344,7 +344,7 @@ fn bad_counts(looked: &Looked) -> Vec<String> {
     .collect()
 }
 
-fn topic_json(looked: &Looked) -> Value {
+fn topic_json(looked: &Inspection) -> Value {
     let q = &looked.quality;
     json!({
         "topic": looked.topic,

@@ -1,6 +1,6 @@
 //! What was kept of a run -> charts over time. Pure.
 
-use crate::report::drawn::{Drawn, ErrorTrace};
+use crate::report::series::{Drawn, ErrorTrace};
 use crate::report::plot::{Axis, Chart, Look, Series};
 use crate::report::trace::Traces;
 use strapd_attitude::condition::quality::QualitySummary;

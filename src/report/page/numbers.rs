@@ -2,7 +2,7 @@
 
 use super::Noise;
 use crate::pipeline::check::CheckedTopic;
-use crate::report::drawn::{Drawn, Errors, Mark};
+use crate::report::series::{Drawn, Errors, Mark};
 use serde_json::{Value, json};
 use strapd_attitude::compare::{Comparison, ErrorStats};
 

@@ -2,7 +2,7 @@
 
 use super::charts::{self, Time};
 use super::markup::{escaped, figure, table};
-use crate::report::drawn::Errors;
+use crate::report::series::Errors;
 use crate::report::summary::{TopicSummary, significant};
 use std::fmt::Write as _;
 use strapd_attitude::compare::ErrorStats;

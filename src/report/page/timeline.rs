@@ -2,7 +2,7 @@
 
 use super::charts::Time;
 use super::markup::escaped;
-use crate::report::drawn::{Drawn, Mark};
+use crate::report::series::{Drawn, Mark};
 use crate::report::summary::significant;
 use std::fmt::Write as _;
 use strapd_attitude::condition::stillness::Rests;

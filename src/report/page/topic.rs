@@ -4,7 +4,7 @@ use super::charts::{self, Time};
 use super::markup::{Rows, escaped, figure, table};
 use super::{Noise, Page, numbers, reference, timeline};
 use crate::pipeline::check::CheckedTopic;
-use crate::report::drawn::Drawn;
+use crate::report::series::Drawn;
 use crate::report::summary::{TopicSummary, meaning, significant};
 use std::fmt::Write as _;
 use strapd_attitude::record::Verdict;

@@ -1,10 +1,10 @@
 //! Who comes late -> the last attitude of every stream it was not told of. Pure but for locks.
 
-use super::{Client, Hub, Shape, read};
+use super::{Client, Hub, ClientProtocol, read};
 use crate::serve::channel::{Channel, Clock};
 use crate::serve::foxglove;
 use crate::serve::last::{Last, Wanted};
-use crate::serve::subscriber::Filter;
+use crate::serve::outbox::Filter;
 use crate::sink::Profile;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -17,7 +17,7 @@ impl Hub {
         let before = client.outbox.watch(filter.clone());
         self.watch_changed();
         // What PlotJuggler reads has no place to say that it is the last.
-        let has_status = client.shape == Shape::Lines(Profile::Lines);
+        let has_status = client.shape == ClientProtocol::Lines(Profile::Lines);
         let Some(filter) = filter.filter(|f| f.last && has_status) else {
             return;
         };

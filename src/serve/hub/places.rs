@@ -1,6 +1,6 @@
 //! Places for sensors: who takes one, and who gives way. Pure but for locks.
 
-use super::{Client, Hub, Run, Sensor, count, lock, read, write};
+use super::{Client, Hub, SampleRun, Sensor, count, lock, read, write};
 use crate::serve::channel::Channel;
 use crate::serve::foxglove;
 use crate::serve::peer::Origin;
@@ -69,7 +69,7 @@ impl Hub {
         &self,
         id: &str,
         client: &Client,
-        run: &Run<'_>,
+        run: &SampleRun<'_>,
     ) -> Result<Arc<Mutex<Sensor>>, Fault> {
         self.check_share(client)?;
         if let Some(sensor) = read(&self.sensors).get(id) {
@@ -216,7 +216,7 @@ mod tests {
     use super::super::super::Settings;
     use super::super::super::limits::Limits;
     use super::super::super::session::{Scratch, Session};
-    use super::super::{Hub, Shape};
+    use super::super::{Hub, ClientProtocol};
     use super::*;
     use strapd_attitude::record::Nanos;
 
@@ -268,7 +268,7 @@ mod tests {
             })
             .unwrap(),
         );
-        let viewer = hub.join_as("viewer".to_owned(), Shape::Foxglove { controls: false });
+        let viewer = hub.join_as("viewer".to_owned(), ClientProtocol::Foxglove { controls: false });
         let watcher = hub.join("watcher".to_owned());
         watcher.outbox.watch(Some(Default::default()));
         hub.watch_changed();

@@ -9,7 +9,7 @@ use crate::serve::peer::Peer;
 use crate::serve::places::{Kind, Place};
 use crate::serve::session::Session;
 use crate::serve::shutdown::Running;
-use crate::serve::subscriber::Outbox;
+use crate::serve::outbox::Outbox;
 use crate::serve::wire::{self, Fault};
 use bytes::{Buf, Bytes};
 use std::collections::VecDeque;

@@ -31,7 +31,7 @@ pub fn read(hub: &Arc<Hub>, mut input: impl Read) {
                 let line = String::from_utf8_lossy(&line);
                 if line.contains("\"class\":\"ERROR\"") {
                     let what = format!("standard input: {}", line.trim_end());
-                    super::super::quiet::warn("stdin", &what);
+                    super::super::log_throttle::warn("stdin", &what);
                 }
             }
             if !session.is_held() {

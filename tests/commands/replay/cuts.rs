@@ -7,7 +7,7 @@ use crate::made_logs::{PACKINGS, TOPIC, bytes, logged, motion};
 use crate::replays::replay_of;
 use strapd::error::Error;
 use strapd::pipeline::replay::run;
-use strapd::pipeline::run::Replay;
+use strapd::pipeline::request::ReplayRequest;
 use strapd::report::summary::RunSummary;
 use strapd_recording::pool::Pool;
 
@@ -89,7 +89,7 @@ impl Bench {
         self.run(&replay_of(&path))
     }
 
-    fn run(&self, replay: &Replay) -> Result<RunSummary, Error> {
+    fn run(&self, replay: &ReplayRequest) -> Result<RunSummary, Error> {
         run(replay, &self.pool, &mut |_| {})
     }
 }

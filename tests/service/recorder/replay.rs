@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
 use strapd::config::Selection;
+use strapd::pipeline::channel_route::{Item, Route};
 use strapd::pipeline::log::Log;
 use strapd::pipeline::replay::run;
-use strapd::pipeline::route::{Item, Route};
-use strapd::pipeline::run::{Replay, Source};
+use strapd::pipeline::request::{ReplayRequest, Source};
 use strapd::serve::recorder::{Recorder, Settings};
 use strapd::sink::Compression;
 use strapd::sink::{Options, Target};
@@ -49,7 +49,7 @@ fn samples(path: &Path) -> Vec<RawSample> {
 
 /// The lines of the NDJSON a replay of `path` gives, without what names the stream.
 fn attitudes(path: &Path, topic: Option<&str>, out: &Path) -> Vec<serde_json::Value> {
-    let replay = Replay {
+    let replay = ReplayRequest {
         source: Source::File(path.to_owned()),
         targets: vec![Target::parse(out.to_str().unwrap()).unwrap()],
         selection: Selection {

@@ -3,9 +3,9 @@
 //! Kept for comparison and to reproduce published figures; none is a good default
 //! (`docs/theory/attitude.md` 1, 6).
 
+use super::columns::Track;
 use super::lanes::Triple;
 use super::method::Method;
-use super::track::Track;
 use super::turn::Turn;
 use super::window::{Note, Step};
 

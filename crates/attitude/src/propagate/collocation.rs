@@ -4,10 +4,10 @@
 //! the polynomial rate is solved for whose integrals over the recorded intervals are the increments
 //! (`docs/theory/attitude.md` 3.2), in Legendre polynomials over the whole window, which keeps the system mild.
 
+use super::columns::{Track, secs};
 use super::lagrange::{Quadrature, legendre};
 use super::lanes::{Lanes, Triple};
 use super::magnus::{MOMENTS, Moments};
-use super::track::{Track, secs};
 
 /// Unknowns at most: enough beside a hole, where more would only amplify noise (docs/theory/attitude.md 6.4).
 pub(crate) const UNKNOWNS: usize = 9;

@@ -7,11 +7,11 @@ mod world;
 pub use memory::Memory;
 
 use super::classical;
+use super::columns::{Track, secs};
 use super::executor::Executor;
 use super::method::{LARGEST_WINDOW, Method, Order, Placement};
 use super::report::Report;
 use super::settings::{Settings, SettingsError};
-use super::track::{Track, secs};
 use super::window::{Plan, Step};
 use crate::record::{AttitudeSample, Join, RateSample, SampleKind, Status};
 use nalgebra::Vector3;

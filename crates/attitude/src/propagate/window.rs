@@ -4,14 +4,14 @@
 //! arbitrary stamps (general interpolation), a careful one where the window is one-sided, irregular or
 //! bridges a gap, and collocation where increments are missing.
 
-mod careful;
+mod irregular;
 
+use super::columns::{Track, secs};
 use super::difference;
 use super::lagrange::{self, POINTS, Quadrature};
 use super::lanes::{Lanes, Triple};
 use super::magnus::{self, Moments};
 use super::method::{LARGEST_WINDOW, Order, Placement};
-use super::track::{Track, secs};
 use super::turn::Turn;
 use super::uniform::{Centred, Skewed};
 use crate::record::Status;

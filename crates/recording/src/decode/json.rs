@@ -5,12 +5,12 @@
 //! message came first. What only several messages could tell (the unit of an unlabelled stamp) is
 //! settled once, by [`super::Decoder::settle`].
 
+pub(crate) mod find;
 pub(crate) mod found;
 pub(crate) mod keys;
 pub(crate) mod line;
 pub(crate) mod objects;
 pub(crate) mod scan;
-pub(crate) mod seek;
 pub(crate) mod trie;
 
 use super::fields::FieldRole;
@@ -20,9 +20,9 @@ use super::select::names::{Px4, px4};
 use super::stamp::Bare;
 use super::{Decoded, MAX_BATCH, Options, Undecodable};
 use crate::text::printable;
+use find::Seeker;
 use found::{Found, Instant, StampRule};
 use scan::Scanner;
-use seek::Seeker;
 use strapd_attitude::record::TimeUnit;
 use strapd_attitude::record::{Nanos, RawSample};
 use trie::Trie;

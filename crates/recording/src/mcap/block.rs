@@ -3,8 +3,8 @@
 //! A stage of its own because it is what worker threads do, each with its own buffers: read,
 //! unpack within declared bounds, compare the CRC. Nothing of a chunk is used before its CRC holds.
 
+use super::input::{Held, LogFile};
 use super::problem::ProblemKind;
-use super::tape::{Held, LogFile};
 use std::io;
 use std::sync::Arc;
 

@@ -6,8 +6,8 @@
 
 use super::block::Compression;
 use super::bytes::{HEAD, head_at};
+use super::input::Tape;
 use super::record::{ChunkHead, op};
-use super::tape::Tape;
 use std::io;
 
 /// Bytes searched at a time.

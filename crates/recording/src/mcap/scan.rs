@@ -9,10 +9,10 @@ mod chunk;
 use super::Limits;
 use super::block::{Block, Compression, Kind, Payload};
 use super::bytes::{HEAD, head_at};
+use super::input::{Held, Input, Tape};
 use super::problem::{ProblemKind, Problems};
 use super::record::{MAGIC, Record, op};
 use super::resync;
-use super::tape::{Held, Input, Tape};
 use std::collections::BTreeMap;
 use std::io;
 

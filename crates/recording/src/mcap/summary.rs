@@ -6,8 +6,8 @@
 use super::Limits;
 use super::bytes::{HEAD, head_at};
 use super::channels::Fallback;
+use super::input::{Input, LogFile, Tape};
 use super::record::{Footer, MAGIC, Record, Statistics, op};
-use super::tape::{Input, LogFile, Tape};
 use std::collections::BTreeMap;
 use std::io;
 use std::sync::Arc;

@@ -5,12 +5,12 @@
 
 use super::block::Compression;
 use super::channels::{Channel, Table};
+use super::input::Input;
 use super::messages::Tally;
 use super::problem::{ProblemKind, Problems};
 use super::record::op;
 use super::scan::{Besides, Facts, Scanner};
 use super::summary::{self, Summary};
-use super::tape::Input;
 use super::walk::{WalkOptions, walk};
 use super::{Reader, read_error};
 use crate::error::{Error, Result};

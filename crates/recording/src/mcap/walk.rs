@@ -5,20 +5,20 @@
 //! that came before them, merged by time, and passed to the consumer on the calling thread, which
 //! works while the pool decodes ahead.
 
-mod course;
+mod state;
 
 use super::channels::{Channel, Table};
+use super::input::Input;
 use super::messages::Message;
 use super::order::{Batch, Lookahead, Merger, Order};
 use super::problem::Problems;
 use super::record::Record;
 use super::scan::{Besides, Scanner};
 use super::survey::{Survey, fallback};
-use super::tape::Input;
 use super::workers::{Shared, Ticket};
 use super::{Reader, read_error};
 use crate::error::Result;
-use course::Course;
+use state::Course;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::Arc;

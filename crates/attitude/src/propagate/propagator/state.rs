@@ -2,13 +2,13 @@
 
 use super::world::TurningWorld;
 use crate::propagate::accumulate::Accumulator;
+use crate::propagate::columns::{Track, secs};
 use crate::propagate::covariance::Covariance;
 use crate::propagate::difference::Difference;
 use crate::propagate::lanes::Triple;
 use crate::propagate::method::Method;
 use crate::propagate::report::Report;
 use crate::propagate::settings::Settings;
-use crate::propagate::track::{Track, secs};
 use crate::propagate::turn::Turn;
 use crate::propagate::window::{Note, Step};
 use crate::quaternion::Quaternion;

@@ -9,7 +9,7 @@
 //! is exact whatever the body does (`docs/theory/attitude.md` 6.4). Taking C^T w_in from every sample instead
 //! is off by 0.25 arcsec in 600 s with its coning term and by 2500 without.
 
-use crate::propagate::track::secs;
+use crate::propagate::columns::secs;
 use crate::quaternion::kernel as quat;
 use nalgebra::Vector3;
 

@@ -1,7 +1,7 @@
 //! The keys of a JSON text, for choosing a topic and for messages to the user. Pure.
 
+use super::find::MAX_SEARCH;
 use super::scan::Scanner;
-use super::seek::MAX_SEARCH;
 use crate::decode::Undecodable;
 use crate::decode::select::names::{Meaning, meaning};
 

@@ -5,8 +5,8 @@
 //! object with a body rate.
 
 use super::Plan;
+use super::find::Seeker;
 use super::scan::Scanner;
-use super::seek::Seeker;
 use crate::decode::refusal::exact_name;
 use crate::decode::{Bare, Decoded, GyroUnit, Options, Undecodable};
 use crate::text::printable;

@@ -5,10 +5,10 @@
 
 use super::super::block::{Block, Compression, Kind, Payload};
 use super::super::bytes::{HEAD, head_at};
+use super::super::input::Input;
 use super::super::problem::ProblemKind;
 use super::super::record::{ChunkHead, op};
 use super::super::resync;
-use super::super::tape::Input;
 use super::{Besides, Item, PEEK, SLACK, Scanner, Section};
 use std::io;
 use std::sync::Arc;

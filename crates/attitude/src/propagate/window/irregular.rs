@@ -4,10 +4,10 @@
 use super::{Note, Plan, Step};
 use crate::propagate::bridge::{self, NEIGHBOURS, Observation};
 use crate::propagate::collocation;
+use crate::propagate::columns::{Track, secs};
 use crate::propagate::lanes::Lanes;
 use crate::propagate::magnus::{self, MOMENTS, Moments};
 use crate::propagate::method::{LARGEST_WINDOW, Placement};
-use crate::propagate::track::{Track, secs};
 
 /// Moments, and what is known about them.
 #[derive(Clone, Copy, Debug)]

@@ -2,10 +2,10 @@
 //!
 //! Apart from the sources because a file, a stream and lines all begin the same way.
 
-use super::outlet::{Delivery, Outlet};
+use super::delivery::{Delivery, Outlet};
 use strapd_attitude::estimate::{Prepared, Meaning};
 use super::provenance;
-use super::run::{Replay, Source};
+use super::request::{ReplayRequest, Source};
 use super::session::{Found, Session, Topic};
 use strapd_attitude::estimate::Plan;
 use crate::error::Result;
@@ -34,7 +34,7 @@ pub(crate) fn labelled(
 }
 
 pub(super) fn begin(
-    run: &Replay,
+    run: &ReplayRequest,
     path: &Path,
     founds: Vec<Found>,
     prepared: Vec<Prepared>,

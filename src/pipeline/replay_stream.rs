@@ -3,19 +3,19 @@
 //! Nothing is known before it comes: the first IMU topic is taken, and its first samples wait until
 //! clock, bias and initial attitude are known.
 
-use super::chosen::which_stamp;
+use super::channel_choice::which_stamp;
 use super::decoders::Decoders;
 use super::held::Held;
-use super::log::{Known, described, explained, known, problems, rank};
+use super::log::{LogChannel, described, explained, known, problems, rank};
 use super::position::Position;
 use strapd_attitude::estimate::Meaning;
-use super::route::{Item, Noticed, Route, Taker};
-use super::run::Replay;
+use super::channel_route::{Item, Noticed, Route, Taker};
+use super::request::ReplayRequest;
 use super::session::Found;
 use super::sources::publisher;
 use super::summarise;
 use super::topics::{self, PICKED_UNNAMED};
-use super::waiting::Waiting;
+use super::replay_start::Waiting;
 use crate::error::{Error, Result};
 use crate::report::summary::RunSummary;
 use crate::sink::{Flow, Stream, output_topic};
@@ -29,7 +29,7 @@ use strapd_recording::pool::Pool;
 
 /// An MCAP that can be read only once.
 pub(super) fn replay(
-    run: &Replay,
+    run: &ReplayRequest,
     reader: Reader,
     pool: &Pool,
     watch: &mut dyn FnMut(&Position),
@@ -112,7 +112,7 @@ struct Picked {
 }
 
 impl Picked {
-    fn route(&mut self, run: &Replay, channel: &Arc<Channel>) -> Option<Route> {
+    fn route(&mut self, run: &ReplayRequest, channel: &Arc<Channel>) -> Option<Route> {
         let copied = run.copy_input.then(|| channel.clone());
         let found = known(channel, 0, None, &mut self.plain);
         let named = run.selection.topic.as_deref().filter(|t| *t != "all");
@@ -169,7 +169,7 @@ impl Picked {
     }
 
     /// How the topic is read is known: by the decoder of its first channel.
-    fn meet(&mut self, run: &Replay, channel: &Channel, decoder: &Decoder) {
+    fn meet(&mut self, run: &ReplayRequest, channel: &Channel, decoder: &Decoder) {
         if std::mem::replace(&mut self.is_met, true) {
             return;
         }
@@ -187,7 +187,7 @@ impl Picked {
     }
 
     /// Hands messages of channels whose first ones wait to these, and takes what comes of it.
-    fn feed(&mut self, run: &Replay, path: &Path, items: &mut Vec<Item>) -> Result<()> {
+    fn feed(&mut self, run: &ReplayRequest, path: &Path, items: &mut Vec<Item>) -> Result<()> {
         if self.held.is_empty() {
             return Ok(());
         }
@@ -213,7 +213,7 @@ impl Picked {
     }
 
     /// The stream has ended: nothing waits any longer.
-    fn release(&mut self, run: &Replay, path: &Path, items: &mut Vec<Item>) -> Result<()> {
+    fn release(&mut self, run: &ReplayRequest, path: &Path, items: &mut Vec<Item>) -> Result<()> {
         for mut held in std::mem::take(&mut self.held) {
             if held.is_waiting() {
                 held.release(&self.decoders, items)
@@ -242,7 +242,7 @@ impl Picked {
     }
 
     /// Why nothing was picked.
-    fn nothing(self, run: &Replay, path: &Path, survey: &Survey) -> Error {
+    fn nothing(self, run: &ReplayRequest, path: &Path, survey: &Survey) -> Error {
         if let Some(what) = self.refusals.into_iter().next() {
             return Error::Unsupported {
                 path: path.to_owned(),
@@ -250,12 +250,12 @@ impl Picked {
             };
         }
         let mut decoders = Decoders::default();
-        let channels: Vec<Known> = survey
+        let channels: Vec<LogChannel> = survey
             .channels
             .iter()
             .map(|c| known(&c.channel, c.messages, None, &mut decoders))
             .collect();
-        let candidates: Vec<_> = channels.iter().map(Known::candidate).collect();
+        let candidates: Vec<_> = channels.iter().map(LogChannel::candidate).collect();
         let error = match topics::choose(path, &candidates, run.selection.topic.as_deref()) {
             Err(e) => e,
             Ok(choice) => Error::Unsupported {

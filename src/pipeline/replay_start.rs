@@ -1,11 +1,11 @@
 //! Items of a stream that can be read only once -> a session, as soon as enough has been seen. I/O
 //! only through the session.
 
-use super::opening::{begin, labelled};
+use super::session_builder::{begin, labelled};
 use super::position::Position;
 use strapd_attitude::estimate::{Patience, Preparation};
-use super::route::Item;
-use super::run::{Replay, refused};
+use super::channel_route::Item;
+use super::request::{ReplayRequest, refused};
 use super::session::{Found, Session};
 use strapd_attitude::estimate::{StampPass, Stamps};
 use super::topics;
@@ -16,7 +16,7 @@ use strapd_recording::pool::Pool;
 
 /// A run over a stream: first gathers, then runs.
 pub(super) struct Waiting<'r> {
-    run: &'r Replay,
+    run: &'r ReplayRequest,
     path: &'r Path,
     /// What a pass over the file found, where it is one.
     stamps: Option<Stamps>,
@@ -26,7 +26,7 @@ pub(super) struct Waiting<'r> {
 }
 
 impl<'r> Waiting<'r> {
-    pub(super) fn new(run: &'r Replay, path: &'r Path, stamps: Option<Stamps>) -> Waiting<'r> {
+    pub(super) fn new(run: &'r ReplayRequest, path: &'r Path, stamps: Option<Stamps>) -> Waiting<'r> {
         Waiting {
             run,
             path,

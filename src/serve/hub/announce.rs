@@ -1,10 +1,10 @@
 //! What clients are told beside attitudes: which streams there are, and where a replay is. Pure but for locks.
 
-use super::{Hub, Shape, read, write};
+use super::{Hub, ClientProtocol, read, write};
 use crate::serve::channel::Channel;
 use crate::serve::foxglove;
-use crate::serve::playback::{Action, Place};
-use crate::serve::subscriber::Class;
+use crate::serve::playback::controls::{Action, Place};
+use crate::serve::outbox::Class;
 use crate::serve::wire::{self, Fault};
 use crate::sink::{Profile, Stream};
 use bytes::Bytes;
@@ -72,7 +72,7 @@ impl Hub {
         // Before the clients are locked: `control` locks the playback first, then them.
         let (plain, controlling) = (self.server_info(false), self.server_info(true));
         for client in read(&self.clients).values() {
-            if let Shape::Foxglove { controls } = client.shape {
+            if let ClientProtocol::Foxglove { controls } = client.shape {
                 let info = if controls { &controlling } else { &plain };
                 client.outbox.reply(info.clone());
             }
@@ -112,10 +112,10 @@ impl Hub {
         let clients = read(&self.clients);
         for client in clients.values().filter(|c| Some(c.number) != but) {
             match client.shape {
-                Shape::Lines(Profile::Lines) if client.outbox.level().watching => {
+                ClientProtocol::Lines(Profile::Lines) if client.outbox.level().watching => {
                     client.outbox.note(line.clone(), tick);
                 }
-                Shape::Foxglove { controls: true } => {
+                ClientProtocol::Foxglove { controls: true } => {
                     let state = foxglove::playback_state(&place, false, "");
                     client.outbox.note(state, tick);
                 }

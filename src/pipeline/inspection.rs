@@ -4,10 +4,10 @@
 //! anyone leaps.
 
 use super::decoders::Decoders;
-use super::log::{Known, Log, described, rank};
+use super::log::{LogChannel, Log, described, rank};
 use strapd_attitude::estimate::{Conditioned, FEW};
 use strapd_attitude::estimate::Meaning;
-use super::route::{Item, Noticed, Route, Taker};
+use super::channel_route::{Item, Noticed, Route, Taker};
 use super::sources::Source;
 use super::topics::{MOST_TOPICS, PICKED_UNNAMED};
 use strapd_attitude::estimate::Plan;
@@ -27,7 +27,7 @@ use strapd_recording::pool::Pool;
 
 /// One topic of samples, looked at.
 #[derive(Debug)]
-pub struct Looked {
+pub struct Inspection {
     /// Its name: the topic, or one of several sources on it.
     pub topic: String,
     /// The topic.
@@ -58,7 +58,7 @@ pub struct Looked {
 #[derive(Debug)]
 pub struct Looks {
     /// The topics of samples, in the order of the log.
-    pub topics: Vec<Looked>,
+    pub topics: Vec<Inspection>,
     /// Those beyond [`MOST_TOPICS`], which were not looked at; the best are looked at first.
     pub left_out: Vec<String>,
     /// What is in the log.
@@ -107,7 +107,7 @@ impl Look {
         self.clock = Some((clock, warning.map(|w| w.to_string())));
     }
 
-    fn finish(mut self) -> std::result::Result<Looked, String> {
+    fn finish(mut self) -> std::result::Result<Inspection, String> {
         if self.clock.is_none() {
             self.settle();
         }
@@ -119,7 +119,7 @@ impl Look {
         let rests = self.stillness.finish();
         let mut quality = self.quality.summary();
         quality.judge_lines(&self.stamps.finish());
-        Ok(Looked {
+        Ok(Inspection {
             topic: self.topic,
             of: self.of,
             described: self.described,
@@ -282,7 +282,7 @@ fn wanted<'l>(log: &'l Log, named: Option<&str>) -> (Vec<(&'l Source, bool)>, Ve
     )
 }
 
-fn begin(source: &Source, known: &Known, decoder: &decode::Decoder, plan: &Plan) -> Look {
+fn begin(source: &Source, known: &LogChannel, decoder: &decode::Decoder, plan: &Plan) -> Look {
     let resolved = Meaning::new(plan, &decoder.stated().declared);
     let first_frame = || {
         let (_, payload) = known.first.as_ref()?;

@@ -1,14 +1,14 @@
 //! A replay or a simulation -> whoever connects: its server, on a thread of its own. I/O.
 //!
 //! The same listeners, sessions, outboxes and limits as the daemon's; what differs is that the samples
-//! are the run's own, and that the run can be stopped, moved and begun anew ([`super::playback`]).
+//! are the run's own, and that the run can be stopped, moved and begun anew ([`crate::serve::playback`]).
 //! To the run it is an [`Audience`].
 
-use super::channel::{Channel, Items};
-use super::hub::{Flood, Hub};
-use super::playback::{News, Playback, Turn};
-use super::shutdown::Signals;
-use super::{Server, Settings};
+use crate::serve::channel::{Channel, Items};
+use crate::serve::hub::{Flood, Hub};
+use super::controls::{News, Playback, Turn};
+use crate::serve::shutdown::Signals;
+use crate::serve::{Server, Settings};
 use crate::error::{Error, Result};
 use crate::pipeline::audience::{self, Audience};
 use crate::sink::Stream;

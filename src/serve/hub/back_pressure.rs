@@ -173,7 +173,7 @@ impl Hub {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::super::super::Settings;
-    use super::super::super::subscriber::{Chunk, Filter, MAX_QUEUED};
+    use super::super::super::outbox::{Chunk, Filter, MAX_QUEUED};
     use super::*;
     use std::collections::VecDeque;
 

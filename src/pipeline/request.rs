@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 /// A replay to be done.
 #[derive(Clone, Debug)]
-pub struct Replay {
+pub struct ReplayRequest {
     /// From where.
     pub source: Source,
     /// To where.
@@ -35,10 +35,10 @@ pub struct Replay {
     pub command: String,
 }
 
-impl Replay {
+impl ReplayRequest {
     /// What else samples are taken for, to compare.
     pub(super) fn other_kinds(&self) -> impl Iterator<Item = strapd_attitude::record::SampleKind> {
-        self.against.iter().flat_map(|_| super::against::kinds())
+        self.against.iter().flat_map(|_| super::sample_kinds::kinds())
     }
 }
 

@@ -4,10 +4,10 @@
 //! against which reference.
 
 use super::decoders::Decoders;
-use super::log::{Known, Log, described, rank};
+use super::log::{LogChannel, Log, described, rank};
 use strapd_attitude::estimate::Meaning;
-use super::route::{Noticed, Route, Taker};
-use super::run::Replay;
+use super::channel_route::{Noticed, Route, Taker};
+use super::request::ReplayRequest;
 use super::session::Found;
 use super::sources::{Source, is_same};
 use super::topics;
@@ -30,7 +30,7 @@ pub(super) struct Chosen {
 }
 
 pub(super) fn choose(
-    run: &Replay,
+    run: &ReplayRequest,
     path: &Path,
     log: &Log,
     names: &[String],
@@ -52,7 +52,7 @@ pub(super) fn choose(
 
 /// The same for topics that have nothing to do with each other.
 pub(super) fn choose_each(
-    run: &Replay,
+    run: &ReplayRequest,
     path: &Path,
     log: &Log,
     names: &[String],
@@ -66,7 +66,7 @@ pub(super) fn choose_each(
 }
 
 fn choose_one(
-    run: &Replay,
+    run: &ReplayRequest,
     (path, log): (&Path, &Log),
     name: &str,
     taken: &BTreeSet<String>,
@@ -178,7 +178,7 @@ impl Reference {
 /// The channel whose orientations the estimate is held against; `None` = the samples' own. Where each of the
 /// topics is by itself (`apart`), one of them may be the reference of the others.
 pub(super) fn reference(
-    run: &Replay,
+    run: &ReplayRequest,
     path: &Path,
     log: &Log,
     chosen: &[Chosen],
@@ -188,7 +188,7 @@ pub(super) fn reference(
         return Ok(None);
     };
     let names: BTreeSet<&str> = chosen.iter().map(|c| c.source.topic.as_str()).collect();
-    let taken = |k: &&Known| names.contains(k.channel.topic.as_str());
+    let taken = |k: &&LogChannel| names.contains(k.channel.topic.as_str());
     let found = if asked.is_empty() {
         let mut others = log.channels.iter().filter(|k| {
             !taken(k) && k.role.has_orientation && rank(&k.role) <= 1 && k.messages > 0

@@ -6,7 +6,7 @@
 use strapd_attitude::estimate::Estimator;
 use strapd_attitude::estimate::{Prepared, Meaning};
 use strapd_attitude::estimate::Plan;
-use crate::report::drawn::{ErrorTrace, Errors};
+use crate::report::series::{ErrorTrace, Errors};
 use crate::report::summary::{Against, Recorded};
 use crate::report::trace::Traces;
 use std::collections::HashMap;

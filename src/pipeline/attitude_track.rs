@@ -3,9 +3,9 @@
 //! NDJSON and CSV are our own outputs; MCAP goes through the same walk and decoders as a replay.
 
 use super::decoders::Decoders;
-use super::log::{Known, Log, problems, rank};
+use super::log::{LogChannel, Log, problems, rank};
 use strapd_attitude::estimate::orientation_convention;
-use super::route::{Item, Route};
+use super::channel_route::{Item, Route};
 use super::simulate::{TRUTH_ID, TRUTH_TOPIC};
 use super::topics;
 use crate::error::{Error, Result};
@@ -138,7 +138,7 @@ fn attitude_channel<'l>(
     log: &'l Log,
     side: Side,
     topic: Option<&str>,
-) -> Result<&'l Known> {
+) -> Result<&'l LogChannel> {
     if let Some(name) = topic {
         return log
             .channels
@@ -151,7 +151,7 @@ fn attitude_channel<'l>(
             });
     }
     let mut decoders = Decoders::default();
-    let mut all: Vec<(u8, &Known)> = log
+    let mut all: Vec<(u8, &LogChannel)> = log
         .channels
         .iter()
         .filter(|k| k.role.has_orientation && carries_orientation(k, &mut decoders))
@@ -196,7 +196,7 @@ fn goodness(role: &Role, side: Side, topic: &str) -> u8 {
 
 /// Whether the first message really has one: an Imu may mark it as absent. A track whose first rows
 /// are NaN still counts.
-fn carries_orientation(known: &Known, decoders: &mut Decoders) -> bool {
+fn carries_orientation(known: &LogChannel, decoders: &mut Decoders) -> bool {
     let Some((log, payload)) = &known.first else {
         return false;
     };

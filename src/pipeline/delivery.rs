@@ -2,7 +2,7 @@
 
 use super::audience::{Audience, Turn};
 use super::pace::Pace;
-use super::route::Copied;
+use super::channel_route::Copied;
 use crate::error::Result;
 use crate::sink::{
     CopiedChannel, Decimator, Flow, InputChannel, InputMessage, Options, Provenance, Sink, Stream,

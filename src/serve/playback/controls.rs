@@ -1,0 +1,535 @@
+//! Where a replay is, and who tells it to stop, go on, or be elsewhere. Pure but for locks and the clock.
+//!
+//! One thread runs the replay and asks before it hands anything on ([`Playback::turn`]); clients ask
+//! for changes from the tasks that serve them. A seek changes no bit of any attitude: forward, the run
+//! integrates on without showing; backward, it is begun again and does not show until it is there.
+
+use crate::serve::wire::Fault;
+use crate::pipeline::pace::Pace;
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+use strapd_attitude::record::Nanos;
+
+/// Between two notices of where it is.
+const TICK: Duration = Duration::from_millis(500);
+
+/// Fastest and slowest a client may ask for.
+const SPEEDS: std::ops::RangeInclusive<f64> = 1e-3..=1e4;
+
+/// What may go on now.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Turn {
+    /// So many items, to everybody.
+    Show(usize),
+    /// So many items, to nobody who watches: a seek is under way.
+    Mute(usize),
+    /// Nothing more in this run.
+    End,
+}
+
+/// What watchers should be told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum News {
+    /// Nothing.
+    Nothing,
+    /// It goes on.
+    Tick,
+    /// It is in another state.
+    Changed,
+}
+
+/// Whether it moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mode {
+    /// It does.
+    Playing,
+    /// It waits for a client.
+    Paused,
+    /// There is nothing more.
+    Ended,
+}
+
+impl Mode {
+    /// Its name on the wire.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Mode::Playing => "playing",
+            Mode::Paused => "paused",
+            Mode::Ended => "ended",
+        }
+    }
+}
+
+/// What a client asks for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Action {
+    /// Go on; after the end, from the start.
+    Play,
+    /// Wait.
+    Pause,
+    /// Be there.
+    Seek(Nanos),
+    /// Be so many times as fast as the data.
+    Speed(f64),
+}
+
+/// Where it is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Place {
+    /// Whether it moves.
+    pub mode: Mode,
+    /// Stamp of what was shown last, or of where it is going.
+    pub at: Option<Nanos>,
+    /// First stamp.
+    pub start: Option<Nanos>,
+    /// Last stamp, as far as it is known.
+    pub end: Option<Nanos>,
+    /// How many times as fast as the data.
+    pub speed: f64,
+    /// What is played.
+    pub file: String,
+    /// How often it was begun anew: attitudes before and after a change do not belong together.
+    pub run: u64,
+}
+
+/// A replay that is served.
+#[derive(Debug)]
+pub struct Playback {
+    state: Mutex<State>,
+    changed: Condvar,
+    file: String,
+}
+
+#[derive(Debug)]
+struct State {
+    /// `None`: as fast as possible, and not to be controlled.
+    pace: Option<Pace>,
+    speed: f64,
+    mode: Mode,
+    at: Option<Nanos>,
+    start: Option<Nanos>,
+    end: Option<Nanos>,
+    /// From the start to the end, about.
+    length: Option<Nanos>,
+    /// Nothing before it is shown.
+    until: Option<Nanos>,
+    /// One item is shown although it is paused: where a seek has led.
+    glimpse: bool,
+    /// This run is to end, for another to begin.
+    restart: bool,
+    /// Why it can not go back, if it can not.
+    forward_only: Option<&'static str>,
+    stopped: bool,
+    run: u64,
+    told: Option<Instant>,
+}
+
+impl Playback {
+    /// Of `file`; `speed` `None` = as fast as possible, and not to be controlled.
+    #[must_use]
+    pub fn new(file: &str, speed: Option<f64>, paused: bool) -> Playback {
+        Playback {
+            state: Mutex::new(State {
+                pace: Pace::new(speed),
+                speed: speed.unwrap_or_default(),
+                mode: if paused && speed.is_some() {
+                    Mode::Paused
+                } else {
+                    Mode::Playing
+                },
+                at: None,
+                start: None,
+                end: None,
+                length: None,
+                until: None,
+                glimpse: false,
+                restart: false,
+                forward_only: None,
+                stopped: false,
+                run: 0,
+                told: None,
+            }),
+            changed: Condvar::new(),
+            file: file.to_owned(),
+        }
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        // Every change of the state is whole before anything in it could panic.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Whether clients may control it.
+    #[must_use]
+    pub fn is_controlled(&self) -> bool {
+        self.state().pace.is_some()
+    }
+
+    /// It can not go back, for this reason (`None`: it can).
+    pub fn forward_only(&self, why: Option<&'static str>) {
+        self.state().forward_only = why;
+    }
+
+    /// How long the data is, about; what is known better stays.
+    pub fn length(&self, secs: f64) {
+        self.state().length = Some(Nanos((secs * 1e9) as i64));
+    }
+
+    /// Where it is; `None` where nobody may control it.
+    #[must_use]
+    pub fn place(&self) -> Option<Place> {
+        let state = self.state();
+        state.pace.as_ref()?;
+        Some(Place {
+            mode: state.mode,
+            at: state.until.or(state.at).or(state.start),
+            start: state.start,
+            end: state.end,
+            speed: state.speed,
+            file: self.file.clone(),
+            run: state.run,
+        })
+    }
+
+    /// How often it was begun anew.
+    #[must_use]
+    pub fn run(&self) -> u64 {
+        self.state().run
+    }
+
+    /// Waits until items with these stamps are due, and says how many of them are.
+    pub fn turn(&self, mut stamps: impl Iterator<Item = Nanos> + Clone) -> (Turn, News) {
+        let mut state = self.state();
+        let Some(first) = stamps.clone().next() else {
+            return (Turn::Show(0), News::Nothing);
+        };
+        let mut news = News::Nothing;
+        if state.start.is_none() {
+            state.start = Some(first);
+            state.end = state.length.map(|l| Nanos(first.0.saturating_add(l.0)));
+            news = News::Changed;
+        }
+        loop {
+            if state.stopped || state.restart {
+                return (Turn::End, news);
+            }
+            match state.until {
+                Some(until) if first < until => {
+                    return (
+                        Turn::Mute(stamps.take_while(|stamp| *stamp < until).count()),
+                        news,
+                    );
+                }
+                Some(_) => {
+                    state.until = None;
+                    state.at = Some(first);
+                    state.glimpse = state.mode == Mode::Paused;
+                    if let Some(pace) = &mut state.pace {
+                        pace.restart();
+                    }
+                    news = News::Changed;
+                }
+                None => {}
+            }
+            if state.mode != Mode::Playing && !std::mem::take(&mut state.glimpse) {
+                if news == News::Changed {
+                    // Said before it waits; the same items are asked for again.
+                    return (Turn::Show(0), news);
+                }
+                state = self
+                    .changed
+                    .wait(state)
+                    .unwrap_or_else(PoisonError::into_inner);
+                continue;
+            }
+            let paused = state.mode != Mode::Playing;
+            let Some(pace) = &mut state.pace else {
+                return (Turn::Show(stamps.count()), news);
+            };
+            if paused {
+                state.at = Some(first);
+                return (Turn::Show(1), News::Changed);
+            }
+            let wait = pace.until(first, Instant::now());
+            if wait > Duration::ZERO {
+                (state, _) = self
+                    .changed
+                    .wait_timeout(state, wait)
+                    .unwrap_or_else(PoisonError::into_inner);
+                continue;
+            }
+            let n = pace.take(stamps.clone());
+            state.at = stamps.nth(n.saturating_sub(1)).or(Some(first));
+            if news == News::Nothing && state.told.is_none_or(|told| told.elapsed() >= TICK) {
+                news = News::Tick;
+            }
+            if news != News::Nothing {
+                state.told = Some(Instant::now());
+            }
+            return (Turn::Show(n), news);
+        }
+    }
+
+    /// A client asks for something. `stale` is called where what waits for the watchers is out of date by that,
+    /// before the run goes on: what it shows next is not.
+    ///
+    /// # Errors
+    /// The fault to answer with.
+    pub fn ask(&self, action: Action, stale: impl FnOnce()) -> Result<(), Fault> {
+        let refuse = |what: &str| Err(Fault::new("bad_playback", what.to_owned()));
+        let mut state = self.state();
+        if state.pace.is_none() {
+            return Err(Fault::new(
+                "not_paced",
+                "this run goes as fast as it can; --speed 1 makes it one that can be controlled",
+            ));
+        }
+        let mut leaps = false;
+        match action {
+            Action::Pause if state.mode == Mode::Playing => state.mode = Mode::Paused,
+            Action::Pause => {}
+            Action::Play if state.mode == Mode::Ended => {
+                state.rewind(None)?;
+                leaps = true;
+                state.mode = Mode::Playing;
+            }
+            Action::Play => {
+                if state.mode == Mode::Paused
+                    && let Some(pace) = &mut state.pace
+                {
+                    pace.restart();
+                }
+                state.mode = Mode::Playing;
+            }
+            Action::Speed(speed) => {
+                if !SPEEDS.contains(&speed) {
+                    return refuse("speed: a factor from 0.001 to 10000 is needed");
+                }
+                state.speed = speed;
+                if let Some(pace) = &mut state.pace {
+                    pace.set_speed(speed, Instant::now());
+                }
+            }
+            Action::Seek(to) => {
+                let Some(start) = state.start else {
+                    return refuse("nothing has been read yet, so there is no place to go to");
+                };
+                let to = to.max(start);
+                let is_ahead = state.mode != Mode::Ended
+                    && !state.restart
+                    && state.at.is_none_or(|at| to > at);
+                if is_ahead {
+                    state.until = Some(to);
+                } else {
+                    state.rewind(Some(to))?;
+                }
+                if state.mode == Mode::Ended {
+                    state.mode = Mode::Paused;
+                }
+                leaps = true;
+            }
+        }
+        if leaps {
+            stale();
+        }
+        drop(state);
+        self.changed.notify_all();
+        Ok(())
+    }
+
+    /// From now on nothing is handed on.
+    pub fn stop(&self) {
+        self.state().stopped = true;
+        self.changed.notify_all();
+    }
+
+    /// Whether it was stopped.
+    #[must_use]
+    pub fn is_stopped(&self) -> bool {
+        self.state().stopped
+    }
+
+    /// Whether the run is to end for another to begin.
+    #[must_use]
+    pub fn is_cut(&self) -> bool {
+        let state = self.state();
+        state.stopped || state.restart
+    }
+
+    /// The run has come to its end; what has been asked for meanwhile may make it begin anew.
+    /// `true`: watchers should be told.
+    pub fn ended(&self) -> bool {
+        let mut state = self.state();
+        if state.stopped || state.restart {
+            return false;
+        }
+        // A seek may have led beyond the end.
+        state.until = None;
+        state.mode = Mode::Ended;
+        if let Some(at) = state.at {
+            state.end = Some(at);
+        }
+        true
+    }
+
+    /// The last stamp there was, shown or not.
+    pub fn passed(&self, last: Nanos) {
+        let mut state = self.state();
+        if state.until.is_some() {
+            state.at = Some(last);
+        }
+    }
+
+    /// Waits until it is to begin anew, or stopped. `false`: stopped.
+    #[must_use]
+    pub fn wait_for_restart(&self) -> bool {
+        let mut state = self.state();
+        while !state.stopped && !state.restart {
+            state = self
+                .changed
+                .wait(state)
+                .unwrap_or_else(PoisonError::into_inner);
+        }
+        !state.stopped
+    }
+
+    /// Begins anew from the start.
+    pub fn again(&self) {
+        let mut state = self.state();
+        state.restart = true;
+        state.until = None;
+        state.mode = Mode::Playing;
+    }
+
+    /// A new run begins, if one is to. `false`: the last one was the last.
+    #[must_use]
+    pub fn begin_anew(&self) -> bool {
+        let mut state = self.state();
+        if state.stopped || !state.restart {
+            return false;
+        }
+        state.restart = false;
+        state.at = None;
+        state.run += 1;
+        if let Some(pace) = &mut state.pace {
+            pace.restart();
+        }
+        true
+    }
+}
+
+impl State {
+    /// To run again from the start, unseen up to `to`.
+    fn rewind(&mut self, to: Option<Nanos>) -> Result<(), Fault> {
+        if let Some(why) = self.forward_only {
+            return Err(Fault::new("forward_only", why));
+        }
+        self.restart = true;
+        self.until = to;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    fn stamps(from: i64, n: i64) -> impl Iterator<Item = Nanos> + Clone {
+        (from..from + n).map(|k| Nanos(k * 1_000_000))
+    }
+
+    #[test]
+    fn a_seek_forward_is_mute_up_to_its_stamp_and_then_shows() {
+        let playback = Playback::new("f", Some(1000.0), false);
+        assert!(matches!(playback.turn(stamps(0, 1)), (Turn::Show(1), _)));
+        let mut stale = false;
+        playback
+            .ask(Action::Seek(Nanos(50_000_000)), || stale = true)
+            .unwrap();
+        assert!(stale);
+        assert_eq!(playback.turn(stamps(1, 100)).0, Turn::Mute(49));
+        let (turn, news) = playback.turn(stamps(50, 1));
+        assert_eq!((turn, news), (Turn::Show(1), News::Changed));
+    }
+
+    #[test]
+    fn a_seek_backward_ends_the_run_and_the_next_one_is_mute_up_to_its_stamp() {
+        let playback = Playback::new("f", Some(1000.0), false);
+        assert!(matches!(playback.turn(stamps(5, 5)), (Turn::Show(5), _)));
+        let mut stale = false;
+        playback
+            .ask(Action::Seek(Nanos(7_000_000)), || stale = true)
+            .unwrap();
+        assert!(stale);
+        assert_eq!(playback.turn(stamps(10, 5)).0, Turn::End);
+        assert!(!playback.ended(), "it is not the end");
+        assert!(playback.wait_for_restart() && playback.begin_anew());
+        assert_eq!(playback.turn(stamps(5, 5)).0, Turn::Mute(2));
+        assert!(matches!(playback.turn(stamps(7, 1)), (Turn::Show(1), _)));
+        assert_eq!(playback.run(), 1);
+        playback.forward_only(Some("because"));
+        let refused = playback.ask(Action::Seek(Nanos(0)), || {}).unwrap_err();
+        assert_eq!(refused.code, "forward_only");
+    }
+
+    #[test]
+    fn while_paused_nothing_goes_on_but_one_item_where_a_seek_has_led() {
+        let playback = Playback::new("f", Some(1000.0), true);
+        // That it waits, and where, is said first.
+        assert_eq!(playback.turn(stamps(0, 9)), (Turn::Show(0), News::Changed));
+        assert_eq!(playback.place().unwrap().at, Some(Nanos(0)));
+        playback.ask(Action::Seek(Nanos(3_000_000)), || {}).unwrap();
+        assert_eq!(playback.turn(stamps(0, 9)).0, Turn::Mute(3));
+        assert_eq!(playback.turn(stamps(3, 6)), (Turn::Show(1), News::Changed));
+        playback.ask(Action::Play, || {}).unwrap();
+        assert!(matches!(playback.turn(stamps(4, 5)), (Turn::Show(5), _)));
+    }
+
+    #[test]
+    fn what_can_not_be_is_refused() {
+        let unpaced = Playback::new("f", None, true);
+        assert_eq!(
+            unpaced.ask(Action::Pause, || {}).unwrap_err().code,
+            "not_paced"
+        );
+        assert_eq!(unpaced.place(), None);
+        assert_eq!(unpaced.turn(stamps(0, 9)).0, Turn::Show(9));
+        let playback = Playback::new("f", Some(1.0), false);
+        for speed in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(
+                playback.ask(Action::Speed(speed), || {}).is_err(),
+                "{speed}"
+            );
+        }
+        assert!(
+            playback.ask(Action::Seek(Nanos(0)), || {}).is_err(),
+            "no start yet"
+        );
+        playback.stop();
+        assert_eq!(playback.turn(stamps(0, 9)).0, Turn::End);
+        assert!(!playback.wait_for_restart());
+    }
+
+    #[test]
+    fn what_is_shown_after_a_seek_is_not_forgotten_with_what_came_before() {
+        let playback = std::sync::Arc::new(Playback::new("f", Some(1.0), true));
+        let (turn, _) = playback.turn(stamps(0, 10));
+        assert_eq!(turn, Turn::Show(0));
+        let run = playback.clone();
+        let forgotten = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(false));
+        let seen = forgotten.clone();
+        let shown = std::thread::spawn(move || {
+            while run.turn(stamps(0, 10)).0 != Turn::Show(1) {}
+            seen.load(std::sync::atomic::Ordering::SeqCst)
+        });
+        std::thread::sleep(Duration::from_millis(20));
+        let forget = || {
+            std::thread::sleep(Duration::from_millis(50));
+            forgotten.store(true, std::sync::atomic::Ordering::SeqCst);
+        };
+        playback.ask(Action::Seek(Nanos(0)), forget).unwrap();
+        assert!(shown.join().unwrap());
+    }
+}
