@@ -18,7 +18,7 @@
 //! | `report` | a run -> its summary, its findings, its page | pure |
 //! | `cli` | arguments -> a run -> what is printed | I/O |
 //!
-//! Reading order: `pipeline::estimator`, `pipeline::replay`, then one module. Tests, benches, examples and fuzzers see
+//! Reading order: `strapd_attitude::estimate`, `pipeline::replay`, then one module. Tests, benches, examples and fuzzers see
 //! inside by the feature `inside`; nobody else is to.
 
 #![allow(

@@ -1,30 +1,43 @@
-//! Wires the stages: source -> decode -> condition -> propagate -> sink. I/O.
+//! A recording -> attitudes: wires what the crates below give. I/O.
+//!
+//! ```text
+//! request -> log (what is in it) -> channel_choice -> estimate::Preparation -> session_builder
+//!         -> channel_route (messages -> items, on the workers) -> session -> delivery -> sink
+//! ```
+//!
+//! | file | |
+//! |---|---|
+//! | [`replay`], `replay_stream`, [`lines`] | the same run over a file, a stream that comes once, and lines |
+//! | [`log`], [`sources`], [`topics`], `channel_choice`, [`decoders`], [`channel_route`] | which channels are read, as what, by which decoder |
+//! | `replay_start`, `session_builder`, [`session`], [`delivery`], [`pace`], [`position`], [`audience`] | a run under way: what waits, what goes out, when, and who may stop it |
+//! | [`inspection`], [`check`], `each`, [`history`], [`sample_kinds`], [`attitude_track`] | looking at a log, and holding it against others |
+//! | [`recover`], [`simulate`], [`summarise`], [`provenance`] | the other runs, and what is said at their end |
 
-pub mod sample_kinds;
+pub mod attitude_track;
 pub mod audience;
-pub mod check;
 mod channel_choice;
+pub mod channel_route;
+pub mod check;
 pub mod decoders;
+pub mod delivery;
 mod each;
 mod held;
 pub mod history;
+pub mod inspection;
 pub mod lines;
 pub mod log;
-pub mod inspection;
-pub(crate) mod session_builder;
-pub mod delivery;
 pub mod pace;
 pub mod position;
 pub mod provenance;
 pub mod recover;
 pub mod replay;
-pub mod channel_route;
+mod replay_start;
+mod replay_stream;
 pub mod request;
+pub mod sample_kinds;
 pub mod session;
+pub(crate) mod session_builder;
 pub mod simulate;
 pub mod sources;
-mod replay_stream;
 pub mod summarise;
 pub mod topics;
-pub mod attitude_track;
-mod replay_start;

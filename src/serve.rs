@@ -9,16 +9,16 @@
 //! | [`wire`] | lines and packed objects (cut by [`strapd_recording::decode::framing`]) -> requests; answers -> lines | pure |
 //! | [`stream`] | samples of one sensor -> attitudes | pure |
 //! | [`channel`], [`last`] | a stream as clients know it; its last attitude, for who comes late | pure |
-//! | [`cast`], [`playback`] | a replay or simulation served in place of sensors, and who moves it | I/O; locks |
+//! | [`playback`] | a replay or simulation served in place of sensors, and who moves it | I/O; locks |
 //! | [`session`] | one client's lines -> hub, answers | sans-I/O |
 //! | [`hub`] | samples -> attitudes -> outboxes | locks |
-//! | [`subscriber`] | attitudes -> what one client gets, bounded | locks |
+//! | [`outbox`] | attitudes -> what one client gets, bounded | locks |
 //! | [`recorder`] | what goes through -> MCAP files that survive a crash | a queue; I/O on threads of its own |
 //! | [`state`] | attitudes <-> the file a restarted daemon goes on from | I/O |
 //! | [`limits`], [`admission`], [`peer`], `strangers` | every bound; who may come in, and from where; who shows wrong tokens | pure |
 //! | [`places`] | which connection has a place, and who gives it up | locks |
 //! | [`foxglove`], [`viewer`] | the same for Foxglove's viewers: messages in place of lines | pure; sans-I/O |
-//! | `page`, `top` | what a browser gets | pure |
+//! | `page`, `top_page` | what a browser gets | pure |
 //! | [`listen`], `http`, `samples` | sockets others come to; samples by `POST` | I/O |
 //! | [`source`], [`connect`], [`upstream`]; `forward` | sockets others listen on: samples from there; attitudes to there | I/O |
 //! | [`shutdown`] | signals -> an orderly end | I/O |
