@@ -82,7 +82,12 @@ fn instructions(dir: &Path) -> Vec<u64> {
     );
     (1..)
         .map_while(|n| std::fs::read_to_string(dir.join(format!("out.{n}"))).ok())
-        .filter(|dump| dump.contains("Trigger: --dump-after=growth::counted_parse"))
+        .filter(|dump| {
+            let mut lines = dump
+                .lines()
+                .filter(|line| line.contains("Trigger: --dump-after="));
+            lines.any(|line| line.contains("counted_parse"))
+        })
         .map(|dump| {
             let total = dump.lines().find_map(|line| line.strip_prefix("totals: "));
             total.unwrap().trim().parse().unwrap()
