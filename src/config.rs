@@ -16,6 +16,8 @@ pub struct Selection {
     pub decode: decode::Options,
 }
 
+/// `--undo-truncation`: `auto`, `on`, `on=STEP` (rad/s), `off`.
+///
 /// # Errors
 /// [`Error::Usage`] for anything but `auto`, `on`, `on=STEP`, `off`.
 pub fn parse_truncation(text: &str) -> Result<Truncation> {

@@ -26,20 +26,47 @@
     reason = "what is public here is so for the feature `inside`"
 )]
 
-/// Declares a module that is public for those who ask for the feature `inside`, and for nobody else.
-macro_rules! private {
-    ($($module:ident),* $(,)?) => {
-        $(
-            #[cfg(feature = "inside")]
-            #[doc(hidden)]
-            pub mod $module;
-            #[cfg(not(feature = "inside"))]
-            mod $module;
-        )*
-    };
-}
-
-private!(cli, client, config, error, pipeline, report, serve, sink);
+// Written out: what a macro declares, rustfmt does not see.
+#[cfg(not(feature = "inside"))]
+mod cli;
+#[cfg(feature = "inside")]
+#[doc(hidden)]
+pub mod cli;
+#[cfg(not(feature = "inside"))]
+mod client;
+#[cfg(feature = "inside")]
+#[doc(hidden)]
+pub mod client;
+#[cfg(not(feature = "inside"))]
+mod config;
+#[cfg(feature = "inside")]
+#[doc(hidden)]
+pub mod config;
+#[cfg(not(feature = "inside"))]
+mod error;
+#[cfg(feature = "inside")]
+#[doc(hidden)]
+pub mod error;
+#[cfg(not(feature = "inside"))]
+mod pipeline;
+#[cfg(feature = "inside")]
+#[doc(hidden)]
+pub mod pipeline;
+#[cfg(not(feature = "inside"))]
+mod report;
+#[cfg(feature = "inside")]
+#[doc(hidden)]
+pub mod report;
+#[cfg(not(feature = "inside"))]
+mod serve;
+#[cfg(feature = "inside")]
+#[doc(hidden)]
+pub mod serve;
+#[cfg(not(feature = "inside"))]
+mod sink;
+#[cfg(feature = "inside")]
+#[doc(hidden)]
+pub mod sink;
 
 use clap::Parser;
 use std::process::ExitCode;

@@ -2,10 +2,10 @@
 
 pub mod aid;
 pub mod calendar;
-pub mod series;
 pub mod findings;
 pub mod page;
 pub mod plot;
+pub mod series;
 pub mod simulation;
 pub mod stamps;
 pub mod summary;

@@ -35,11 +35,12 @@ pub mod hub;
 pub mod last;
 pub mod limits;
 pub mod listen;
+mod log_throttle;
+pub mod outbox;
 mod page;
 pub mod peer;
 pub mod places;
 pub mod playback;
-mod log_throttle;
 pub mod recorder;
 mod samples;
 pub mod session;
@@ -48,13 +49,11 @@ pub mod source;
 pub mod state;
 mod strangers;
 pub mod stream;
-pub mod outbox;
 mod top_page;
 pub mod upstream;
 pub mod viewer;
 pub mod wire;
 
-use strapd_attitude::estimate::Plan;
 use crate::error::{Error, Result};
 use crate::sink::Target;
 use crate::sink::address::Listen;
@@ -69,6 +68,7 @@ use std::collections::BTreeMap;
 use std::future::Future;
 use std::sync::Arc;
 use std::time::Duration;
+use strapd_attitude::estimate::Plan;
 
 /// What a daemon is to do.
 #[derive(Debug, Default)]

@@ -7,7 +7,6 @@ mod words;
 use super::estimation::{KindArg, TimeArg, UnitArg};
 use super::{Global, Outcome, print};
 use crate::config::{Selection, selection};
-use strapd_attitude::estimate::Plan;
 use crate::error::{Error, Result};
 use crate::report::page::Noise;
 use crate::sink::Document;
@@ -15,6 +14,7 @@ use clap::Args;
 use gather::Gathered;
 use std::path::{Path, PathBuf};
 use strapd_attitude::condition::{Clock, GyroUnit};
+use strapd_attitude::estimate::Plan;
 use strapd_attitude::noise::allan::{AllanFit, Point, cluster_sizes, deviation, fit};
 use strapd_attitude::record::SampleKind;
 use strapd_recording::pool::Pool;
@@ -97,7 +97,11 @@ struct Axis {
 /// The log can not be read, holds no rate, or too few samples; an output exists.
 pub fn run(global: &Global, args: &Allan) -> Result<Outcome> {
     let plan = args.plan()?;
-    let selection = selection(args.topic.as_ref(), &args.fields, args.ignore_covariance_flag)?;
+    let selection = selection(
+        args.topic.as_ref(),
+        &args.fields,
+        args.ignore_covariance_flag,
+    )?;
     args.plot
         .iter()
         .try_for_each(|p| super::outputs::check_chart(p))?;

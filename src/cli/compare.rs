@@ -82,7 +82,8 @@ pub fn run(global: &Global, args: &Compare) -> Result<Outcome> {
         .map(|p| Document::create(p, &inputs, args.force))
         .transpose()?;
     let pool = Pool::new(global.threads)?;
-    let estimate = attitude_track::read(&args.estimate, Side::Estimate, args.topic.as_deref(), &pool)?;
+    let estimate =
+        attitude_track::read(&args.estimate, Side::Estimate, args.topic.as_deref(), &pool)?;
     let reference = attitude_track::read(
         &args.reference,
         Side::Reference,
@@ -174,7 +175,11 @@ fn attitudes(track: &attitude_track::Track) -> Vec<Stamped> {
         .collect()
 }
 
-fn no_match(args: &Compare, estimate: &attitude_track::Track, reference: &attitude_track::Track) -> Error {
+fn no_match(
+    args: &Compare,
+    estimate: &attitude_track::Track,
+    reference: &attitude_track::Track,
+) -> Error {
     let span = |t: &attitude_track::Track| match (t.entries.first(), t.entries.last()) {
         (Some((a, _)), Some((b, _))) => {
             format!(

@@ -1,11 +1,13 @@
 //! The estimation flags shared by `replay` (and, later, `serve` and `simulate`): text -> settings,
 //! checked once. Pure.
 
-use strapd_attitude::estimate::{Aid, Plan, Truncation};
-use crate::config::{Selection, parse_bias, parse_initial, parse_mount, parse_noise, parse_truncation, selection};
+use crate::config::{
+    Selection, parse_bias, parse_initial, parse_mount, parse_noise, parse_truncation, selection,
+};
 use crate::error::{Error, Result};
 use clap::{Args, ValueEnum};
 use strapd_attitude::condition::{Clock, GyroUnit, OnGap};
+use strapd_attitude::estimate::{Aid, Plan, Truncation};
 use strapd_attitude::propagate::{Method, Order, Placement};
 use strapd_attitude::record::SampleKind;
 
@@ -288,7 +290,11 @@ impl Estimation {
     /// # Errors
     /// [`Error::Usage`] for a `--field` that is none.
     pub fn selection(&self) -> Result<Selection> {
-        selection(self.topic.as_ref(), &self.fields, self.ignore_covariance_flag)
+        selection(
+            self.topic.as_ref(),
+            &self.fields,
+            self.ignore_covariance_flag,
+        )
     }
 
     /// The plan of a live stream, which has no topic.

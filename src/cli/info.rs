@@ -4,8 +4,8 @@ mod words;
 
 use super::{Global, Outcome, print};
 use crate::error::{Error, Result};
-use crate::pipeline::log::{Log, problems};
 use crate::pipeline::inspection::look;
+use crate::pipeline::log::{Log, problems};
 use crate::pipeline::topics;
 use clap::Args;
 use std::path::PathBuf;

@@ -4,8 +4,7 @@ use super::estimation::Estimation;
 use super::progress::Reporter;
 use super::serving::{Served, Serving};
 use super::{Global, Outcome, outputs, print};
-use strapd_attitude::estimate::Plan;
-use crate::config::Shard;
+use crate::config::{Selection, Shard};
 use crate::error::{Error, Result};
 use crate::pipeline::replay;
 use crate::pipeline::request::{ReplayRequest, Source};
@@ -13,6 +12,7 @@ use crate::report::summary::RunSummary;
 use crate::sink::{Compression, Encoding, Options, Target};
 use clap::{Args, ValueEnum};
 use std::io::Write;
+use strapd_attitude::estimate::Plan;
 use strapd_recording::pool::Pool;
 
 /// Turn recorded gyro samples into attitude.
@@ -145,12 +145,13 @@ pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
     }
     outputs::check_distinct(&args.outputs, &args.sources)?;
     let plan = args.estimation.plan()?;
+    let selection = args.estimation.selection()?;
     let pool = Pool::new(global.threads)?;
     let mut outcome = Outcome::Done;
     let mut summaries = Vec::new();
     for log in &logs {
         let result = outputs::resolve(&args.outputs, log, args.sources.len())
-            .and_then(|names| args.run(log, &names, plan.clone()))
+            .and_then(|names| args.run(log, &names, (selection.clone(), plan.clone())))
             .and_then(|(mut run, served)| {
                 served.run(|again| {
                     if again {
@@ -197,7 +198,12 @@ impl Replay {
     ///
     /// # Errors
     /// [`Error::Usage`] for a flag that can not be.
-    fn run(&self, log: &str, outputs: &[String], plan: Plan) -> Result<(ReplayRequest, Served)> {
+    fn run(
+        &self,
+        log: &str,
+        outputs: &[String],
+        (selection, plan): (Selection, Plan),
+    ) -> Result<(ReplayRequest, Served)> {
         if self
             .out_rate
             .is_some_and(|hz| !(hz.is_finite() && hz > 0.0))
@@ -217,7 +223,7 @@ impl Replay {
             source,
             targets: served.targets.clone(),
             audience: served.audience(),
-            selection: self.estimation.selection()?,
+            selection,
             plan,
             options: Options {
                 force: self.force,

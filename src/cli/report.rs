@@ -4,17 +4,17 @@ use super::estimation::Estimation;
 use super::progress::Reporter;
 use super::{Global, Outcome, allan, print};
 use crate::config::Selection;
-use strapd_attitude::estimate::{Bias, Plan};
 use crate::error::{Error, Result};
+use crate::pipeline::attitude_track::{self, Side, Track};
 use crate::pipeline::check::{CheckedTopic, Drawing, Examination, examine};
 use crate::pipeline::provenance::sha256;
-use crate::pipeline::attitude_track::{self, Side, Track};
 use crate::report::findings::findings;
 use crate::report::page::{DRAWN, Noise, Page, STRETCHES, Told, longest_rest};
 use crate::report::summary::significant;
 use crate::sink::Document;
 use clap::Args;
 use std::path::PathBuf;
+use strapd_attitude::estimate::{Bias, Plan};
 use strapd_recording::pool::Pool;
 
 /// Rest from which an Allan deviation is worth having, s.
@@ -158,7 +158,12 @@ impl Report {
     }
 
     /// The Allan deviation of a topic's longest rest, or what is missing.
-    fn noise(&self, (selection, plan): (&Selection, &Plan), topic: &CheckedTopic, pool: &Pool) -> Noise {
+    fn noise(
+        &self,
+        (selection, plan): (&Selection, &Plan),
+        topic: &CheckedTopic,
+        pool: &Pool,
+    ) -> Noise {
         let Some((begins, secs)) = longest_rest(topic) else {
             return Noise::Missing(format!(
                 "Needs {ENOUGH:.0} s of rest, and there is none in this log."

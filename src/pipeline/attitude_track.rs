@@ -2,10 +2,9 @@
 //!
 //! NDJSON and CSV are our own outputs; MCAP goes through the same walk and decoders as a replay.
 
-use super::decoders::Decoders;
-use super::log::{LogChannel, Log, problems, rank};
-use strapd_attitude::estimate::orientation_convention;
 use super::channel_route::{Item, Route};
+use super::decoders::Decoders;
+use super::log::{Log, LogChannel, problems, rank};
 use super::simulate::{TRUTH_ID, TRUTH_TOPIC};
 use super::topics;
 use crate::error::{Error, Result};
@@ -13,6 +12,7 @@ use serde::Deserialize;
 use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
+use strapd_attitude::estimate::orientation_convention;
 use strapd_attitude::frames::{Body, Nav};
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::Nanos;

@@ -3,10 +3,9 @@
 //! Apart from the replay because it is all choice and no work: which topics, under which names, held
 //! against which reference.
 
-use super::decoders::Decoders;
-use super::log::{LogChannel, Log, described, rank};
-use strapd_attitude::estimate::Meaning;
 use super::channel_route::{Noticed, Route, Taker};
+use super::decoders::Decoders;
+use super::log::{Log, LogChannel, described, rank};
 use super::request::ReplayRequest;
 use super::session::Found;
 use super::sources::{Source, is_same};
@@ -16,6 +15,7 @@ use crate::sink::{Stream, output_topic};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::Arc;
+use strapd_attitude::estimate::Meaning;
 use strapd_recording::decode::Decoder;
 use strapd_recording::mcap::Channel;
 

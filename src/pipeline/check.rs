@@ -3,18 +3,18 @@
 //! The second pass is a replay of all topics at once without outputs, so that what `check` says about verdicts,
 //! gaps and turns per step is what a replay would do, and not another program's opinion.
 
+use super::attitude_track::Track;
 use super::each::{Told, each};
-use super::log::{Log, problems};
 use super::inspection::{Inspection, look_as};
+use super::log::{Log, problems};
 use super::position::Position;
 use super::request::{ReplayRequest, Source};
-use super::attitude_track::Track;
 use crate::config::Selection;
-use strapd_attitude::estimate::Plan;
 use crate::error::{Error, Result};
 use crate::report::summary::TopicSummary;
 use crate::sink;
 use std::path::Path;
+use strapd_attitude::estimate::Plan;
 use strapd_recording::decode;
 use strapd_recording::pool::Pool;
 
@@ -103,7 +103,11 @@ pub fn examine(
     pool: &Pool,
     watch: &mut dyn FnMut(&Position),
 ) -> Result<Checked> {
-    let named = asked.selection.topic.as_deref().filter(|name| *name != "all");
+    let named = asked
+        .selection
+        .topic
+        .as_deref()
+        .filter(|name| *name != "all");
     let log = Log::told_apart(path, named, &asked.selection.decode, pool)?;
     for topic in named
         .into_iter()
@@ -117,7 +121,13 @@ pub fn examine(
             });
         }
     }
-    let looks = look_as(path, &log, named, (&asked.selection.decode, &asked.plan), pool)?;
+    let looks = look_as(
+        path,
+        &log,
+        named,
+        (&asked.selection.decode, &asked.plan),
+        pool,
+    )?;
     let has_reference = asked.drawing.is_some_and(|d| d.reference.is_some())
         || log
             .channels

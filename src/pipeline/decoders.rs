@@ -4,10 +4,10 @@
 //! have tens of thousands of channels of one schema, or as many schemas.
 
 use super::log::plain;
-use strapd_attitude::estimate::Plan;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use strapd_attitude::condition::Clock;
+use strapd_attitude::estimate::Plan;
 use strapd_attitude::record::Nanos;
 use strapd_recording::decode::{Decoder, Effort, Options, Unsupported};
 use strapd_recording::mcap::{Channel, Schema};

@@ -1,8 +1,8 @@
 //! Attitudes of every stream -> every sink of the run. I/O.
 
 use super::audience::{Audience, Turn};
-use super::pace::Pace;
 use super::channel_route::Copied;
+use super::pace::Pace;
 use crate::error::Result;
 use crate::sink::{
     CopiedChannel, Decimator, Flow, InputChannel, InputMessage, Options, Provenance, Sink, Stream,

@@ -4,18 +4,18 @@
 //! keep the others from being told about), and a log may have hundreds: a pass for each would cost the
 //! square of its size.
 
-use super::check::Drawing;
 use super::channel_choice::{Chosen, choose_each, reference, route};
+use super::channel_route::Route;
+use super::check::Drawing;
 use super::decoders::Decoders;
+use super::delivery::{Delivery, Outlet};
 use super::history::History;
 use super::log::Log;
-use super::session_builder::labelled;
-use super::delivery::{Delivery, Outlet};
 use super::position::Position;
 use super::replay::{again, done, prepare};
-use super::channel_route::Route;
 use super::request::ReplayRequest;
 use super::session::{Session, Topic};
+use super::session_builder::labelled;
 use super::summarise;
 use crate::error::Result;
 use crate::report::summary::TopicSummary;

@@ -3,9 +3,9 @@
 //!
 //! Apart from the stream because nothing else in it is looked at before it is read.
 
+use super::channel_route::{Copied, Item, Route, Taker};
 use super::decoders::Decoders;
 use super::log::nanos;
-use super::channel_route::{Copied, Item, Route, Taker};
 use super::sources::{OPENINGS, OPENINGS_LIMIT, keep};
 use std::sync::Arc;
 use strapd_recording::decode::{Decoder, Unsupported};

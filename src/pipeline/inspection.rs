@@ -3,14 +3,11 @@
 //! Apart from the replay because it integrates nothing: `info` (and later `check`) look before
 //! anyone leaps.
 
-use super::decoders::Decoders;
-use super::log::{LogChannel, Log, described, rank};
-use strapd_attitude::estimate::{Conditioned, FEW};
-use strapd_attitude::estimate::Meaning;
 use super::channel_route::{Item, Noticed, Route, Taker};
+use super::decoders::Decoders;
+use super::log::{Log, LogChannel, described, rank};
 use super::sources::Source;
 use super::topics::{MOST_TOPICS, PICKED_UNNAMED};
-use strapd_attitude::estimate::Plan;
 use crate::error::{Error, Result};
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
@@ -20,6 +17,9 @@ use strapd_attitude::condition::quality::{Quality, QualitySummary};
 use strapd_attitude::condition::regularise;
 use strapd_attitude::condition::stillness::{self, Limits, Rests, Stillness};
 use strapd_attitude::condition::{Clock, choose_clock};
+use strapd_attitude::estimate::Meaning;
+use strapd_attitude::estimate::Plan;
+use strapd_attitude::estimate::{Conditioned, FEW};
 use strapd_attitude::record::RawSample;
 use strapd_recording::decode::{self, Options};
 use strapd_recording::mcap::{self, Survey, WalkOptions};

@@ -1,14 +1,12 @@
 //! NDJSON samples -> the same run as from a log. I/O.
 
-use super::position::Position;
-use strapd_attitude::estimate::Meaning;
 use super::channel_route::Item;
+use super::position::Position;
+use super::replay_start::Waiting;
 use super::request::{ReplayRequest, refused};
 use super::session::Found;
 use super::simulate::TRUTH_ID;
-use strapd_attitude::estimate::{StampPass, Stamps};
 use super::summarise;
-use super::replay_start::Waiting;
 use crate::error::{Error, Result};
 use crate::report::summary::RunSummary;
 use crate::sink::{Flow, Stream, output_topic};
@@ -17,9 +15,13 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 use std::sync::Arc;
-use strapd_attitude::record::{Nanos, RawSample};
-use strapd_recording::decode::{Ambiguous, Bare, Class, LineDecoder, MAX_LINE, MOST_WAITING, unit_of};
+use strapd_attitude::estimate::Meaning;
+use strapd_attitude::estimate::{StampPass, Stamps};
 use strapd_attitude::record::{Declared, TimeUnit};
+use strapd_attitude::record::{Nanos, RawSample};
+use strapd_recording::decode::{
+    Ambiguous, Bare, Class, LineDecoder, MAX_LINE, MOST_WAITING, unit_of,
+};
 use strapd_recording::mcap::Survey;
 use strapd_recording::pool::Pool;
 
@@ -144,7 +146,8 @@ struct Looking<'r> {
 
 impl Taker for Looking<'_> {
     fn meet(&mut self, found: Found, _: Stream) -> Result<()> {
-        self.pass = StampPass::new(&self.run.plan, &found.resolved, self.run.other_kinds()).map(|pass| (found.name, pass));
+        self.pass = StampPass::new(&self.run.plan, &found.resolved, self.run.other_kinds())
+            .map(|pass| (found.name, pass));
         Ok(())
     }
 
@@ -222,7 +225,9 @@ fn read(
                     samples.clear();
                     continue;
                 }
-                if run.selection.topic
+                if run
+                    .selection
+                    .topic
                     .as_deref()
                     .is_some_and(|t| t != "all" && t != id)
                 {

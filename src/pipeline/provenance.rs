@@ -1,16 +1,16 @@
 //! What a reader of the output must be able to find out later -> its metadata. I/O: reads the ends
 //! of the input.
 
-use strapd_attitude::estimate::Prepared;
 use super::request::{ReplayRequest, Source};
 use super::session::Found;
-use strapd_attitude::estimate::Aid;
 use crate::error::Result;
 use crate::sink::{Provenance, Stream, Target};
 use sha2::{Digest, Sha256};
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
+use strapd_attitude::estimate::Aid;
+use strapd_attitude::estimate::Prepared;
 use strapd_attitude::worlds::EARTH_RATE;
 
 /// How much of each end of the input goes into its fingerprint.

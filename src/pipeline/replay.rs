@@ -4,14 +4,12 @@
 //! through stamps, then to integrate. A stream is read once; its first samples wait until these are known.
 
 use super::channel_choice::{Chosen, choose, looked_at, reference, route};
-use super::log::Log;
-use super::session_builder::{begin, labelled};
-use super::position::Position;
-use strapd_attitude::estimate::{Patience, Preparation, Prepared};
 use super::channel_route::{Item, Route};
+use super::log::Log;
+use super::position::Position;
 use super::request::{ReplayRequest, Source, refused};
 use super::session::Found;
-use strapd_attitude::estimate::StampPass;
+use super::session_builder::{begin, labelled};
 use super::summarise;
 use super::{lines, replay_stream};
 use crate::error::Result;
@@ -21,6 +19,8 @@ use std::io::{BufReader, Read};
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Instant;
+use strapd_attitude::estimate::StampPass;
+use strapd_attitude::estimate::{Patience, Preparation, Prepared};
 use strapd_recording::mcap::{self, Reader, WalkOptions};
 use strapd_recording::pool::Pool;
 
@@ -29,7 +29,11 @@ use strapd_recording::pool::Pool;
 /// # Errors
 /// Whatever kept it from being carried out. Bad samples and damaged files are no error: they are
 /// counted in the summary.
-pub fn run(run: &ReplayRequest, pool: &Pool, watch: &mut dyn FnMut(&Position)) -> Result<RunSummary> {
+pub fn run(
+    run: &ReplayRequest,
+    pool: &Pool,
+    watch: &mut dyn FnMut(&Position),
+) -> Result<RunSummary> {
     let begun = Instant::now();
     let mut summary = match &run.source {
         Source::File(path) if is_lines(path) => {
@@ -105,7 +109,12 @@ fn file(
     pool: &Pool,
     watch: &mut dyn FnMut(&Position),
 ) -> Result<RunSummary> {
-    let log = Log::told_apart(path, run.selection.topic.as_deref(), &run.selection.decode, pool)?;
+    let log = Log::told_apart(
+        path,
+        run.selection.topic.as_deref(),
+        &run.selection.decode,
+        pool,
+    )?;
     let choice = log.choose(path, run.selection.topic.as_deref())?;
     let mut chosen = choose(run, path, &log, &choice.topics)?;
     if let (Some(note), Some(first)) = (choice.note, chosen.first_mut()) {
@@ -181,8 +190,9 @@ pub(super) fn prepare(
     let mut preparations: Vec<Preparation> = chosen
         .iter()
         .map(|c| {
-            Preparation::new(&run.plan, &c.found.resolved, Patience::WholeLog)
-                .with_stamps(StampPass::new(&run.plan, &c.found.resolved, run.other_kinds()))
+            Preparation::new(&run.plan, &c.found.resolved, Patience::WholeLog).with_stamps(
+                StampPass::new(&run.plan, &c.found.resolved, run.other_kinds()),
+            )
         })
         .collect();
     let mut failures: Vec<Option<String>> = chosen.iter().map(|_| None).collect();

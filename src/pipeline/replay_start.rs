@@ -1,17 +1,17 @@
 //! Items of a stream that can be read only once -> a session, as soon as enough has been seen. I/O
 //! only through the session.
 
-use super::session_builder::{begin, labelled};
-use super::position::Position;
-use strapd_attitude::estimate::{Patience, Preparation};
 use super::channel_route::Item;
+use super::position::Position;
 use super::request::{ReplayRequest, refused};
 use super::session::{Found, Session};
-use strapd_attitude::estimate::{StampPass, Stamps};
+use super::session_builder::{begin, labelled};
 use super::topics;
 use crate::error::{Error, Result};
 use crate::sink::{Flow, Stream};
 use std::path::Path;
+use strapd_attitude::estimate::{Patience, Preparation};
+use strapd_attitude::estimate::{StampPass, Stamps};
 use strapd_recording::pool::Pool;
 
 /// A run over a stream: first gathers, then runs.
@@ -26,7 +26,11 @@ pub(super) struct Waiting<'r> {
 }
 
 impl<'r> Waiting<'r> {
-    pub(super) fn new(run: &'r ReplayRequest, path: &'r Path, stamps: Option<Stamps>) -> Waiting<'r> {
+    pub(super) fn new(
+        run: &'r ReplayRequest,
+        path: &'r Path,
+        stamps: Option<Stamps>,
+    ) -> Waiting<'r> {
         Waiting {
             run,
             path,
@@ -43,7 +47,11 @@ impl<'r> Waiting<'r> {
             let preparation =
                 Preparation::new(&self.run.plan, &found.resolved, Patience::FirstMinute);
             let preparation = match self.stamps.take() {
-                None => preparation.with_stamps(StampPass::new(&self.run.plan, &found.resolved, self.run.other_kinds())),
+                None => preparation.with_stamps(StampPass::new(
+                    &self.run.plan,
+                    &found.resolved,
+                    self.run.other_kinds(),
+                )),
                 known => preparation.with_known_stamps(known),
             };
             self.gathering = Some((found, stream, preparation));

@@ -4,18 +4,17 @@
 //! clock, bias and initial attitude are known.
 
 use super::channel_choice::which_stamp;
+use super::channel_route::{Item, Noticed, Route, Taker};
 use super::decoders::Decoders;
 use super::held::Held;
 use super::log::{LogChannel, described, explained, known, problems, rank};
 use super::position::Position;
-use strapd_attitude::estimate::Meaning;
-use super::channel_route::{Item, Noticed, Route, Taker};
+use super::replay_start::Waiting;
 use super::request::ReplayRequest;
 use super::session::Found;
 use super::sources::publisher;
 use super::summarise;
 use super::topics::{self, PICKED_UNNAMED};
-use super::replay_start::Waiting;
 use crate::error::{Error, Result};
 use crate::report::summary::RunSummary;
 use crate::sink::{Flow, Stream, output_topic};
@@ -23,6 +22,7 @@ use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
+use strapd_attitude::estimate::Meaning;
 use strapd_recording::decode::{Decoder, Unsupported};
 use strapd_recording::mcap::{self, Channel, Reader, Survey, WalkOptions};
 use strapd_recording::pool::Pool;

@@ -1,12 +1,12 @@
 //! What a replay is: from where, to where, how. Pure.
 
 use super::audience::Audience;
-use strapd_attitude::estimate::Plan;
 use crate::config::Selection;
 use crate::error::Error;
 use crate::sink::{self, Target};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use strapd_attitude::estimate::Plan;
 
 /// A replay to be done.
 #[derive(Clone, Debug)]
@@ -38,7 +38,9 @@ pub struct ReplayRequest {
 impl ReplayRequest {
     /// What else samples are taken for, to compare.
     pub(super) fn other_kinds(&self) -> impl Iterator<Item = strapd_attitude::record::SampleKind> {
-        self.against.iter().flat_map(|_| super::sample_kinds::kinds())
+        self.against
+            .iter()
+            .flat_map(|_| super::sample_kinds::kinds())
     }
 }
 

@@ -3,14 +3,14 @@
 //! What a sample means in time matters more than the order of the integrator and is written in no
 //! log; where an orientation was recorded too, it can be seen.
 
-use strapd_attitude::estimate::Estimator;
-use strapd_attitude::estimate::{Prepared, Meaning};
-use strapd_attitude::estimate::Plan;
 use crate::report::series::{ErrorTrace, Errors};
 use crate::report::summary::{Against, Recorded};
 use crate::report::trace::Traces;
 use std::collections::HashMap;
 use strapd_attitude::compare::{Align, Stamped, compare, fit_body_axes, for_each_error};
+use strapd_attitude::estimate::Estimator;
+use strapd_attitude::estimate::Plan;
+use strapd_attitude::estimate::{Meaning, Prepared};
 use strapd_attitude::propagate::{Executor, Method};
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{Nanos, RawSample, SampleKind, Status};

@@ -1,18 +1,18 @@
 //! Items in order -> estimators -> outlet: the consuming half of a run, whatever the source. I/O
 //! only through the outlet.
 
-use super::sample_kinds::AgainstRecorded;
-use strapd_attitude::estimate::Estimator;
-use super::history::History;
-use super::delivery::Outlet;
-use super::position::Position;
-use strapd_attitude::estimate::{Prepared, Meaning};
 use super::channel_route::{Item, Noticed};
-use strapd_attitude::estimate::Plan;
+use super::delivery::Outlet;
+use super::history::History;
+use super::position::Position;
+use super::sample_kinds::AgainstRecorded;
 use crate::error::{Error, Result};
 use crate::sink::{Flow, Written};
 use std::path::Path;
 use std::sync::Arc;
+use strapd_attitude::estimate::Estimator;
+use strapd_attitude::estimate::Plan;
+use strapd_attitude::estimate::{Meaning, Prepared};
 use strapd_attitude::record::{AttitudeSample, Nanos};
 use strapd_recording::decode::Undecodable;
 use strapd_recording::pool::Pool;

@@ -3,14 +3,14 @@
 //! Apart from the sources because a file, a stream and lines all begin the same way.
 
 use super::delivery::{Delivery, Outlet};
-use strapd_attitude::estimate::{Prepared, Meaning};
 use super::provenance;
 use super::request::{ReplayRequest, Source};
 use super::session::{Found, Session, Topic};
-use strapd_attitude::estimate::Plan;
 use crate::error::Result;
 use crate::sink::Stream;
 use std::path::{Path, PathBuf};
+use strapd_attitude::estimate::Plan;
+use strapd_attitude::estimate::{Meaning, Prepared};
 
 /// The output's labels: frames and axes as they will be in the numbers.
 pub(crate) fn labelled(

@@ -1,7 +1,7 @@
 //! What the stages counted -> the summary of the run. Pure.
 
-use super::lines;
 use super::delivery::broken;
+use super::lines;
 use super::request::ReplayRequest;
 use super::session::{Ended, Topic};
 use crate::report::aid::Aided;

@@ -5,10 +5,10 @@
 use super::aid::Aided;
 use super::series::Drawn;
 use super::stamps::Regularised;
-pub use strapd_attitude::digits::significant;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use strapd_attitude::compare::BodyAxesFit;
+pub use strapd_attitude::digits::significant;
 use strapd_attitude::record::{Counts, SampleKind, Verdict};
 use strapd_attitude::worlds::EARTH_RATE;
 

@@ -3,11 +3,11 @@
 //! A client like any other, but that we call: its outbox is bounded, the oldest give way, and it slows
 //! nobody down. One that can not be reached, or goes, is called again.
 
-use super::hub::{Client, Hub, ClientProtocol, count};
+use super::hub::{Client, ClientProtocol, Hub, count};
 use super::listen::Context;
 use super::log_throttle;
-use super::shutdown::Running;
 use super::outbox::Filter;
+use super::shutdown::Running;
 use crate::sink::Target;
 use bytes::Bytes;
 use std::collections::VecDeque;

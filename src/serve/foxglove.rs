@@ -8,8 +8,8 @@
 //! ([`messages`]).
 
 use super::channel::Channel;
-use super::playback::controls::{Action, Mode, Place};
 use super::outbox::Dropped;
+use super::playback::controls::{Action, Mode, Place};
 use crate::sink::payload::Topic;
 use bytes::{BufMut, Bytes};
 use serde::Deserialize;

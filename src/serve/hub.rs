@@ -5,19 +5,19 @@
 //! the clients' outboxes. Sensors run side by side on as many cores as there are; within one the
 //! order is that of its lock.
 
+mod announce;
+mod back_pressure;
 mod counters;
 mod latecomers;
 mod places;
 mod polling;
 mod report;
-mod back_pressure;
-mod announce;
 
+pub use back_pressure::Flood;
 pub use counters::{Counters, count};
 use places::Absent;
 use polling::Polling;
 use report::StateStatus;
-pub use back_pressure::Flood;
 
 use super::Settings;
 use super::admission::Token;
@@ -25,16 +25,15 @@ use super::channel::{Channel, Items};
 use super::connect::Outgoing;
 use super::foxglove;
 use super::limits::Limits;
+use super::log_throttle;
+use super::outbox::{Chunk, Outbox};
 use super::peer::Peer;
 use super::playback::controls::Playback;
-use super::log_throttle;
 use super::recorder::Handle;
 use super::stream::run::Placed;
 use super::stream::stamps::Taken;
 use super::stream::{SensorStream, live_plan};
-use super::outbox::{Chunk, Outbox};
 use super::wire::{self, Fault};
-use strapd_attitude::estimate::Plan;
 use crate::error::{Error, Result};
 use crate::sink::Profile;
 use bytes::Bytes;
@@ -43,6 +42,7 @@ use std::hash::{BuildHasher, RandomState};
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::Instant;
+use strapd_attitude::estimate::Plan;
 use strapd_attitude::record::{Nanos, RawSample};
 use strapd_recording::decode::packed::Form;
 use strapd_recording::decode::{self, Bare, Line, LineDecoder, exact_name};

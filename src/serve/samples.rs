@@ -7,8 +7,8 @@
 use super::http::{refusal, response, unauthorised};
 use super::hub::{Client, Flood, GAVE_WAY, Hub, News, SampleRun, Sensor, count};
 use super::listen::{Connection, now};
-use super::peer::{Origin, Peer};
 use super::log_throttle;
+use super::peer::{Origin, Peer};
 use super::stream::NAMELESS;
 use super::stream::run::Placed;
 use super::wire::{self, Fault, Message};
@@ -412,7 +412,10 @@ impl Poster {
                     taken.samples += run.samples.len() as u64;
                     if let Some(note) = note {
                         let id = head.id.as_deref().unwrap_or(NAMELESS);
-                        log_throttle::info(&format!("run {id}"), &format!("{id}: {}", note.message));
+                        log_throttle::info(
+                            &format!("run {id}"),
+                            &format!("{id}: {}", note.message),
+                        );
                         taken.notes.push(format!("{id}: {}", note.message));
                     }
                     for fault in faults {

@@ -10,8 +10,8 @@ mod unpacking;
 
 use super::hub::{Client, GAVE_WAY, Hub, News, SampleRun, Sensor, count};
 use super::limits::Allowance;
-use super::peer::Peer;
 use super::log_throttle;
+use super::peer::Peer;
 use super::stream::NAMELESS;
 use super::stream::run::Placed;
 use super::upstream::{self, Event};

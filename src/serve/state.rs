@@ -7,7 +7,6 @@ use super::hub::Hub;
 use super::log_throttle;
 use super::stream::run::Span;
 use crate::error::{Error, Result};
-use strapd_attitude::estimate::Memory;
 use crate::sink::{self, sync_directory};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -16,9 +15,10 @@ use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
+use strapd_attitude::estimate::Memory;
 use strapd_attitude::quaternion::Quaternion;
-use strapd_attitude::record::{AttitudeCovariance, AttitudeSample, Nanos, Status};
 use strapd_attitude::record::TimeUnit;
+use strapd_attitude::record::{AttitudeCovariance, AttitudeSample, Nanos, Status};
 
 /// What this release writes. 1 had neither the run nor the memory.
 const FORMAT: u32 = 2;

@@ -8,10 +8,7 @@ mod intervals;
 pub mod run;
 pub mod stamps;
 
-use strapd_attitude::estimate::Plan;
-use strapd_attitude::estimate::Estimator;
 use crate::pipeline::session_builder::labelled;
-use strapd_attitude::estimate::{Prepared, Meaning, at_once};
 use crate::report::aid::Aided;
 use crate::serve::channel::Channel;
 use crate::serve::hub::SampleRun;
@@ -25,11 +22,14 @@ use stamps::{Stamps, Taken};
 use std::sync::Arc;
 use std::time::Duration;
 use strapd_attitude::condition::{Clock, Report};
+use strapd_attitude::estimate::Estimator;
+use strapd_attitude::estimate::Plan;
+use strapd_attitude::estimate::{Meaning, Prepared, at_once};
 use strapd_attitude::propagate::{Method, Sequential};
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{AttitudeSample, Counts, Nanos, RawSample, Verdict};
-use strapd_recording::decode::{Ambiguous, Bare, Line};
 use strapd_attitude::record::{Declared, TimeUnit};
+use strapd_recording::decode::{Ambiguous, Bare, Line};
 
 /// Numbers a sample may come behind its turn. Further back, the sender counts anew.
 const OVERTAKEN: u64 = 64;

@@ -3,7 +3,7 @@
 //! What [`super::session`] is for lines.
 
 use super::foxglove::{self, Level, MAX_SUBSCRIPTIONS, Request};
-use super::hub::{Client, Hub, ClientProtocol, count};
+use super::hub::{Client, ClientProtocol, Hub, count};
 use super::limits::Allowance;
 use super::peer::Peer;
 use super::playback::controls::Action;

@@ -8,8 +8,8 @@ mod packing;
 
 pub use packing::{broken_packed, packed_stream, unreadable};
 
-use super::playback::controls::{Action, Place};
 use super::outbox::{Class as Stream, Dropped, Filter, MAX_QUEUED};
+use super::playback::controls::{Action, Place};
 use bytes::Bytes;
 use serde::Deserialize;
 use serde_json::{Value, json};

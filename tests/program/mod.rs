@@ -44,11 +44,12 @@ impl Ran {
         self
     }
 
-    /// Ended with `code` and an error that says each of these.
+    /// Ended with `code`, said each of these on stderr, nothing on stdout, and no panic.
     #[track_caller]
     pub fn refused(&self, code: i32, words: &[&str]) {
         assert_eq!(self.code, Some(code), "{self:?}");
-        assert!(self.err.contains("error: "), "{self:?}");
+        assert_eq!(self.out, "", "an error belongs on stderr: {self:?}");
+        assert!(self.err.starts_with("error: "), "{self:?}");
         assert!(!self.err.contains("panicked"), "{self:?}");
         for word in words {
             assert!(self.err.contains(word), "`{word}` is missing: {}", self.err);

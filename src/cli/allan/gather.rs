@@ -1,12 +1,10 @@
 //! One topic of a log -> angles at even intervals, and what was wrong with them. I/O.
 
 use crate::config::Selection;
-use strapd_attitude::estimate::Plan;
 use crate::error::{Error, Result};
+use crate::pipeline::channel_route::{Item, Noticed, Route, Taker};
 use crate::pipeline::decoders::Decoders;
 use crate::pipeline::log::{Log, described, problems};
-use strapd_attitude::estimate::Meaning;
-use crate::pipeline::channel_route::{Item, Noticed, Route, Taker};
 use crate::report::summary::significant;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
@@ -15,6 +13,8 @@ use std::path::Path;
 use std::sync::Arc;
 use strapd_attitude::condition::stillness::{Limits, Rests, Stillness};
 use strapd_attitude::condition::{ClockWarning, Conditioner, Report, choose_clock};
+use strapd_attitude::estimate::Meaning;
+use strapd_attitude::estimate::Plan;
 use strapd_attitude::noise::allan::AngleRecord;
 use strapd_attitude::record::{Join, Nanos, RateSample, RawSample, SampleKind};
 use strapd_recording::mcap::{self, WalkOptions};
@@ -107,7 +107,11 @@ pub(super) fn gather(
         )));
     }
     let noticed = Arc::new(source.as_ref().map(Noticed::of).unwrap_or_default());
-    let mut gathering = Gathering::new(plan, Meaning::new(plan, &decoder.stated().declared), capacity);
+    let mut gathering = Gathering::new(
+        plan,
+        Meaning::new(plan, &decoder.stated().declared),
+        capacity,
+    );
     let described = described(channel);
     let mut failure = None;
     let reader = log.reader().map_or_else(|| mcap::Reader::open(path), Ok)?;

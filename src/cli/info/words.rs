@@ -1,8 +1,8 @@
 //! What `info` found -> text or JSON. Pure.
 
 use crate::cli::shell::{flag, quoted_file};
-use crate::pipeline::log::{LogChannel, described, rank};
 use crate::pipeline::inspection::Inspection;
+use crate::pipeline::log::{LogChannel, described, rank};
 use crate::pipeline::topics::named_few;
 use crate::report::calendar::{date, duration};
 use crate::report::summary::{human_bytes, significant};

@@ -1,12 +1,12 @@
 //! `strapd simulate rigid-body`. Pure.
 
 use super::{Made, parameter, sampling::Common};
-use strapd_attitude::estimate::Initial;
 use crate::config::{numbers, parse_initial};
 use crate::error::{Error, Result};
 use clap::Args;
 use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
+use strapd_attitude::estimate::Initial;
 use strapd_attitude::quaternion::Quaternion;
 use strapd_bodies::inertia::{self, InertiaError};
 use strapd_bodies::motion::Motion;

@@ -1,7 +1,7 @@
 //! What was kept of a run -> charts over time. Pure.
 
-use crate::report::series::{Drawn, ErrorTrace};
 use crate::report::plot::{Axis, Chart, Look, Series};
+use crate::report::series::{Drawn, ErrorTrace};
 use crate::report::trace::Traces;
 use strapd_attitude::condition::quality::QualitySummary;
 

@@ -1,10 +1,10 @@
 //! What clients are told beside attitudes: which streams there are, and where a replay is. Pure but for locks.
 
-use super::{Hub, ClientProtocol, read, write};
+use super::{ClientProtocol, Hub, read, write};
 use crate::serve::channel::Channel;
 use crate::serve::foxglove;
-use crate::serve::playback::controls::{Action, Place};
 use crate::serve::outbox::Class;
+use crate::serve::playback::controls::{Action, Place};
 use crate::serve::wire::{self, Fault};
 use crate::sink::{Profile, Stream};
 use bytes::Bytes;

@@ -1,6 +1,6 @@
 //! Who comes late -> the last attitude of every stream it was not told of. Pure but for locks.
 
-use super::{Client, Hub, ClientProtocol, read};
+use super::{Client, ClientProtocol, Hub, read};
 use crate::serve::channel::{Channel, Clock};
 use crate::serve::foxglove;
 use crate::serve::last::{Last, Wanted};

@@ -216,7 +216,7 @@ mod tests {
     use super::super::super::Settings;
     use super::super::super::limits::Limits;
     use super::super::super::session::{Scratch, Session};
-    use super::super::{Hub, ClientProtocol};
+    use super::super::{ClientProtocol, Hub};
     use super::*;
     use strapd_attitude::record::Nanos;
 
@@ -268,7 +268,10 @@ mod tests {
             })
             .unwrap(),
         );
-        let viewer = hub.join_as("viewer".to_owned(), ClientProtocol::Foxglove { controls: false });
+        let viewer = hub.join_as(
+            "viewer".to_owned(),
+            ClientProtocol::Foxglove { controls: false },
+        );
         let watcher = hub.join("watcher".to_owned());
         watcher.outbox.watch(Some(Default::default()));
         hub.watch_changed();

@@ -5,11 +5,11 @@
 
 use super::{Context, in_room, now};
 use crate::serve::hub::{Flood, count};
+use crate::serve::outbox::Outbox;
 use crate::serve::peer::Peer;
 use crate::serve::places::{Kind, Place};
 use crate::serve::session::Session;
 use crate::serve::shutdown::Running;
-use crate::serve::outbox::Outbox;
 use crate::serve::wire::{self, Fault};
 use bytes::{Buf, Bytes};
 use std::collections::VecDeque;

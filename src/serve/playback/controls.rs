@@ -4,8 +4,8 @@
 //! for changes from the tasks that serve them. A seek changes no bit of any attitude: forward, the run
 //! integrates on without showing; backward, it is begun again and does not show until it is there.
 
-use crate::serve::wire::Fault;
 use crate::pipeline::pace::Pace;
+use crate::serve::wire::Fault;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use strapd_attitude::record::Nanos;

@@ -4,13 +4,13 @@
 //! are the run's own, and that the run can be stopped, moved and begun anew ([`crate::serve::playback`]).
 //! To the run it is an [`Audience`].
 
-use crate::serve::channel::{Channel, Items};
-use crate::serve::hub::{Flood, Hub};
 use super::controls::{News, Playback, Turn};
-use crate::serve::shutdown::Signals;
-use crate::serve::{Server, Settings};
 use crate::error::{Error, Result};
 use crate::pipeline::audience::{self, Audience};
+use crate::serve::channel::{Channel, Items};
+use crate::serve::hub::{Flood, Hub};
+use crate::serve::shutdown::Signals;
+use crate::serve::{Server, Settings};
 use crate::sink::Stream;
 use crate::sink::address::Listen;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

@@ -3,9 +3,9 @@
 //! Apart from the stream because a replay refuses a log whose intervals disagree ([`Mismatch`]), while a
 //! daemon goes on: all it can do is say so.
 
-use strapd_attitude::estimate::{LEAST_INTERVALS as LEAST, Mismatch};
 use crate::serve::wire::Fault;
 use strapd_attitude::condition::Clock;
+use strapd_attitude::estimate::{LEAST_INTERVALS, Mismatch};
 use strapd_attitude::record::{RawSample, SampleKind};
 
 /// Intervals after which those that agree are not looked at any longer.
@@ -59,7 +59,7 @@ impl Intervals {
         let stamp = clock.read(raw).map_or(0, |stamp| stamp.0);
         self.first.push((interval, stamp));
         let count = self.first.len();
-        if count < LEAST || !count.is_power_of_two() {
+        if count < LEAST_INTERVALS || !count.is_power_of_two() {
             return;
         }
         let intervals = self.first.iter().map(|(interval, _)| *interval);

@@ -4,9 +4,9 @@
 //! [`MOST_WAITING`], and no longer than [`LONGEST_WAIT`].
 
 use std::time::Duration;
+use strapd_attitude::record::TimeUnit;
 use strapd_attitude::record::{Nanos, RawSample};
 use strapd_recording::decode::{Ambiguous, Bare, MOST_WAITING, unit_of};
-use strapd_attitude::record::TimeUnit;
 
 /// How long samples wait for others that tell their unit.
 pub const LONGEST_WAIT: Duration = Duration::from_secs(2);

@@ -11,7 +11,7 @@ use crate::record::{RawSample, SampleKind};
 /// How far an interval and a step may be apart: samples are lost and stamps jitter, but not by this.
 const MOST: f64 = 3.0;
 /// Fewer intervals than this prove nothing.
-pub const LEAST: usize = 8;
+pub const LEAST_INTERVALS: usize = 8;
 
 /// Intervals and steps that disagree, in seconds (medians).
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -45,7 +45,7 @@ impl Mismatch {
             .map(|nanos| nanos as f64 * 1e-9)
             .collect();
         let looked_at = intervals.len();
-        if looked_at < LEAST {
+        if looked_at < LEAST_INTERVALS {
             return None;
         }
         let interval = median(&mut intervals)?;
