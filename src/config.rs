@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use strapd_attitude::estimate::{Bias, Initial, NOISE_PRESETS, Noise, Truncation};
 use strapd_attitude::frames::{Body, Nav};
 use strapd_attitude::quaternion::{Quaternion, YawPitchRoll};
-use strapd_recording::decode;
+use strapd_recording::decode::{self, FieldPath, FieldRole};
 
 /// Which samples of a recording, and how its messages are read.
 #[derive(Clone, Debug, Default)]
@@ -14,6 +14,19 @@ pub struct Selection {
     pub topic: Option<String>,
     /// `--field`, `--ignore-covariance-flag`.
     pub decode: decode::Options,
+    /// `--accel-topic`.
+    pub accel: Option<TopicBeside>,
+    /// `--mag-topic`.
+    pub mag: Option<TopicBeside>,
+}
+
+/// A topic whose specific forces, or magnetic fields, belong to the samples of another.
+#[derive(Clone, Debug)]
+pub struct TopicBeside {
+    /// Its name.
+    pub topic: String,
+    /// Where the vector lies: the `--field` of its role.
+    pub fields: Vec<FieldPath>,
 }
 
 /// `--undo-truncation`: `auto`, `on`, `on=STEP` (rad/s), `off`.
@@ -150,7 +163,8 @@ pub fn parse_bias(text: &str) -> Result<Bias> {
     }
 }
 
-/// `--topic`, `--field` and `--ignore-covariance-flag`, as given.
+/// `--topic`, `--field` and `--ignore-covariance-flag`, as given; `--accel-topic` and `--mag-topic` (`beside`),
+/// to which the fields of their roles belong.
 ///
 /// # Errors
 /// [`Error::Usage`] for a field that is none.
@@ -158,12 +172,22 @@ pub fn selection(
     topic: Option<&String>,
     fields: &[String],
     ignore_covariance_flag: bool,
+    beside: [Option<&String>; 2],
 ) -> Result<Selection> {
-    let fields = fields
+    let mut fields: Vec<FieldPath> = fields
         .iter()
         .map(|f| f.parse().map_err(|e| Error::Usage(format!("--field: {e}"))))
         .collect::<Result<_>>()?;
+    let mut of = |role: FieldRole, topic: Option<&String>| {
+        let topic = topic?.clone();
+        let fields = fields.extract_if(.., |field| field.role == role).collect();
+        Some(TopicBeside { topic, fields })
+    };
+    let [accel, mag] = beside;
+    let (accel, mag) = (of(FieldRole::Accel, accel), of(FieldRole::Mag, mag));
     Ok(Selection {
+        accel,
+        mag,
         topic: topic.cloned(),
         decode: decode::Options {
             fields,
@@ -171,14 +195,6 @@ pub fn selection(
             ..decode::Options::default()
         },
     })
-}
-
-/// `--mount q=w,x,y,z` (the `q=` may be left out).
-///
-/// # Errors
-/// [`Error::Usage`] when it is not four finite numbers of about unit norm.
-pub fn parse_mount(text: &str) -> Result<[f64; 4]> {
-    unit_quaternion("--mount", text.strip_prefix("q=").unwrap_or(text))
 }
 
 /// `--shard i/n`: this process takes inputs i, i + n, i + 2n, ... of the list, i from 0.
@@ -229,8 +245,13 @@ pub(crate) fn numbers<const N: usize>(flag: &str, list: &str) -> Result<[f64; N]
         })
 }
 
-/// Four numbers of about unit norm, normalised. A norm off by more than 1 % is a mistake, not rounding.
-fn unit_quaternion(flag: &str, list: &str) -> Result<[f64; 4]> {
+/// Four numbers of about unit norm, normalised, the value of `flag`; an initial `q=` may be left out. A norm
+/// off by more than 1 % is a mistake, not rounding.
+///
+/// # Errors
+/// [`Error::Usage`] when it is not four finite numbers of about unit norm.
+pub fn unit_quaternion(flag: &str, list: &str) -> Result<[f64; 4]> {
+    let list = list.strip_prefix("q=").unwrap_or(list);
     let q = numbers::<4>(flag, list)?;
     let norm = q.iter().map(|v| v * v).sum::<f64>().sqrt();
     if (norm - 1.0).abs() > 0.01 {

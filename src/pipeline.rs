@@ -15,6 +15,7 @@
 
 pub mod attitude_track;
 pub mod audience;
+mod beside;
 mod channel_choice;
 pub mod channel_route;
 pub mod check;

@@ -206,7 +206,7 @@ def main():
         name = os.path.basename(path)[:-5]
         for flags in runs:
             quaternions, sigma = strapd(args.strapd, flags, path, stamps)
-            table.setdefault(f"strapd {flags}", {})[name] = score(quaternions, ref, moves, False, sigma)
+            table.setdefault(f"strapd {flags}", {})[name] = score(quaternions, ref, moves, "+mag" in flags, sigma)
         for who, run in PEERS.items() if args.peers else []:
             try:
                 six, nine = run(secs, gyr, acc, mag)

@@ -101,6 +101,7 @@ pub fn run(global: &Global, args: &Allan) -> Result<Outcome> {
         args.topic.as_ref(),
         &args.fields,
         args.ignore_covariance_flag,
+        [None, None],
     )?;
     args.plot
         .iter()

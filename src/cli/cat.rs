@@ -188,7 +188,7 @@ pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
                         }
                         undecodable += 1;
                     }
-                    Item::Reference(_) | Item::Copy(_) => {}
+                    Item::Reference(_) | Item::Beside(_) | Item::Copy(_) => {}
                 }
             }
             ControlFlow::Continue(())

@@ -2,7 +2,7 @@
 //! checked once. Pure.
 
 use crate::config::{
-    Selection, parse_bias, parse_initial, parse_mount, parse_noise, parse_truncation, selection,
+    Selection, parse_bias, parse_initial, parse_noise, parse_truncation, selection, unit_quaternion,
 };
 use crate::error::{Error, Result};
 use clap::{Args, ValueEnum};
@@ -25,7 +25,7 @@ pub struct Estimation {
     /// Sample rate for --time index
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     pub rate_hz: Option<f64>,
-    /// Where a value lies in the message: ROLE=PATH, ROLE one of gyro, accel, orientation, stamp, dt
+    /// Where a value lies in the message: ROLE=PATH, ROLE one of gyro, accel, mag, orientation, stamp, dt
     #[arg(long = "field", value_name = "ROLE=PATH")]
     pub fields: Vec<String>,
     /// auto, magnus, causal, commit, dcm-left, dcm-right, dcm-mean, rotvec-sum. `commit` is that of
@@ -42,12 +42,37 @@ pub struct Estimation {
     /// its stamp, or the integral over it [default: rate, unless the format says otherwise]
     #[arg(long, value_enum, env = "STRAPD_SAMPLE_KIND")]
     pub sample_kind: Option<KindArg>,
-    /// What corrects the attitude: none (the gyro alone), or gravity: level from the first sample, no
-    /// drift of the tilt, and the gyro's bias, scale and axes are learned. Heading stays the gyro's
-    #[arg(long, value_enum, default_value = "none", env = "STRAPD_AID")]
+    /// What corrects the attitude: auto (gravity where the samples carry a specific force), none (the gyro
+    /// alone), gravity, gravity+mag
+    ///
+    /// By gravity it is level from the first sample, its tilt does not drift, and the gyro's bias, scale and
+    /// axes are learned; the heading stays the gyro's. By gravity+mag the heading is that of the magnetic field.
+    #[arg(long, value_enum, default_value = "auto", env = "STRAPD_AID")]
     pub aid: AidArg,
+    /// Topic of the specific force, where it comes in messages of its own
+    #[arg(long, value_name = "NAME")]
+    pub accel_topic: Option<String>,
+    /// What the accelerometer says at rest: specific force (up, as most do) or kinematic acceleration (down)
+    #[arg(long, value_enum, default_value = "specific")]
+    pub accel_sign: SignArg,
+    /// Topic of the magnetic field for --aid gravity+mag, where it comes in messages of its own [default: the
+    /// one there is]
+    #[arg(long, value_name = "NAME")]
+    pub mag_topic: Option<String>,
+    /// Rotation from the magnetometer's to body axes, as --mount [default: as the gyro's]
+    #[arg(long, value_name = "q=W,X,Y,Z")]
+    pub mag_mount: Option<String>,
+    /// How far magnetic north lies east of true north, in degrees: the heading by --aid gravity+mag is
+    /// true then
+    #[arg(
+        long,
+        value_name = "DEG",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
+    pub declination: f64,
     /// Put back what a driver cut from the rates towards zero, half a step: auto (a file shows it), on,
-    /// on=STEP in rad/s, off [default: auto with --aid, else off]
+    /// on=STEP in rad/s, off [default: auto where the attitude is aided, else off]
     #[arg(long, value_name = "WHEN", env = "STRAPD_UNDO_TRUNCATION")]
     pub undo_truncation: Option<String>,
     /// Delay of the sensor's own filters, in seconds: each attitude is turned on by its rate for so long
@@ -171,17 +196,33 @@ impl From<KindArg> for SampleKind {
 /// `--aid`.
 #[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AidArg {
+    /// The accelerometer, where the samples carry a specific force.
+    Auto,
     /// The gyro alone.
     None,
     /// The accelerometer.
     Gravity,
+    /// The same, and a magnetometer.
+    #[value(name = "gravity+mag")]
+    GravityAndMag,
+}
+
+/// `--accel-sign`.
+#[derive(ValueEnum, Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SignArg {
+    /// Up at rest.
+    Specific,
+    /// Down at rest.
+    Kinematic,
 }
 
 impl From<AidArg> for Aid {
     fn from(aid: AidArg) -> Aid {
         match aid {
+            AidArg::Auto => Aid::Auto,
             AidArg::None => Aid::None,
             AidArg::Gravity => Aid::Gravity,
+            AidArg::GravityAndMag => Aid::GravityAndField,
         }
     }
 }
@@ -262,7 +303,11 @@ impl Estimation {
                 .map(|b| b.parse().map_err(|e| usage("--body", &e)))
                 .transpose()?,
             world: self.world.parse().map_err(|e| usage("--world", &e))?,
-            mount: self.mount.as_deref().map(parse_mount).transpose()?,
+            mount: self
+                .mount
+                .as_deref()
+                .map(|text| unit_quaternion("--mount", text))
+                .transpose()?,
             clock,
             initial: parse_initial(&self.init)?,
             bias: parse_bias(&self.bias)?,
@@ -273,6 +318,14 @@ impl Estimation {
             gyro_range: self.gyro_range,
             noise: parse_noise(&self.noise)?,
             aid: self.aid.into(),
+            is_accel_kinematic: self.accel_sign == SignArg::Kinematic,
+            has_forces_beside: self.accel_topic.is_some(),
+            mag_mount: self
+                .mag_mount
+                .as_deref()
+                .map(|text| unit_quaternion("--mag-mount", text))
+                .transpose()?,
+            declination: self.declination.to_radians(),
             sensor_delay_secs: self.sensor_delay,
             truncation: self
                 .undo_truncation
@@ -294,6 +347,7 @@ impl Estimation {
             self.topic.as_ref(),
             &self.fields,
             self.ignore_covariance_flag,
+            [self.accel_topic.as_ref(), self.mag_topic.as_ref()],
         )
     }
 

@@ -3,6 +3,7 @@
 //! Apart from the replay because it is all choice and no work: which topics, under which names, held
 //! against which reference.
 
+use super::beside::{self, Besides};
 use super::channel_route::{Noticed, Route, Taker};
 use super::decoders::Decoders;
 use super::log::{Log, LogChannel, described, rank};
@@ -133,6 +134,34 @@ fn choose_one(
     })
 }
 
+/// What is read beside the samples of the one topic chosen.
+///
+/// # Errors
+/// As [`beside::choose`]; several topics, of which it could belong to any.
+pub(super) fn besides(
+    run: &ReplayRequest,
+    path: &Path,
+    log: &Log,
+    chosen: &mut [Chosen],
+) -> Result<Besides> {
+    let asked = run.selection.accel.as_ref().or(run.selection.mag.as_ref());
+    let [one] = chosen else {
+        if let Some(asked) = asked {
+            return Err(Error::Usage(format!(
+                "{} could belong to any of {} topics\n  help: --topic NAME takes one of them",
+                strapd_recording::text::printable(&asked.topic),
+                chosen.len()
+            )));
+        }
+        return Ok(Besides::default());
+    };
+    let has_field = one.channels.values().any(|d| d.stated().has_mag);
+    let own = (one.source.topic.as_str(), has_field);
+    let mut besides = beside::choose((&run.plan, &run.selection), path, log, own)?;
+    one.found.warnings.append(&mut besides.notes);
+    Ok(besides)
+}
+
 /// Which of several stamps is read, in words.
 pub(super) fn which_stamp(decoder: &Decoder) -> Option<String> {
     let stamps = decoder.stamps();
@@ -258,9 +287,11 @@ pub(super) fn looked_at(chosen: &[Chosen], channel: &Channel) -> Option<Route> {
 pub(super) fn route(
     chosen: &[Chosen],
     reference: Option<&Reference>,
+    besides: &Besides,
     copy_input: bool,
     channel: &Arc<Channel>,
 ) -> Option<Route> {
+    let beside = besides.decoder(channel).cloned();
     let copied = copy_input.then(|| channel.clone());
     let compared = reference.filter(|r| is_same(&r.channel, channel));
     let compared = compared.map(|r| r.decoder.clone());
@@ -274,10 +305,10 @@ pub(super) fn route(
         };
         let takers = streams.into_iter().map(taker).collect();
         let route = Route::to(decoder.clone(), takers);
-        return Some(route.comparing(compared).copying(copied));
+        return Some(route.comparing(compared).beside(beside).copying(copied));
     }
     match compared {
-        Some(decoder) => Some(Route::reference(decoder).copying(copied)),
-        None => copied.map(Route::only_copied),
+        Some(decoder) => Some(Route::reference(decoder).beside(beside).copying(copied)),
+        None => Route::other(beside, copied),
     }
 }

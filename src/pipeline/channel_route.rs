@@ -21,6 +21,8 @@ pub struct Route {
     turn: Option<usize>,
     /// Reads the recorded orientations in them to compare with.
     pub reference: Option<Decoder>,
+    /// Reads the specific forces, or magnetic fields, in them that belong to the samples of others.
+    pub beside: Option<Decoder>,
     /// The channel, when its messages are copied to the output.
     pub copied: Option<Arc<Channel>>,
 }
@@ -108,6 +110,8 @@ pub enum Item {
     Undecodable(usize, Box<(Nanos, Undecodable)>),
     /// A recorded orientation to compare with.
     Reference(RawSample),
+    /// A specific force, or a magnetic field, of a message that is no sample.
+    Beside(RawSample),
     /// A message to be copied.
     Copy(Box<Copied>),
 }
@@ -157,6 +161,7 @@ impl Route {
             takers,
             turn: None,
             reference: None,
+            beside: None,
             copied: None,
         }
     }
@@ -179,6 +184,7 @@ impl Route {
             takers: Vec::new(),
             turn: None,
             reference: None,
+            beside: None,
             copied: Some(channel),
         }
     }
@@ -187,6 +193,25 @@ impl Route {
     #[must_use]
     pub fn comparing(self, reference: Option<Decoder>) -> Route {
         Route { reference, ..self }
+    }
+
+    /// The same, what the messages hold also taken beside the samples where a decoder is given.
+    #[must_use]
+    pub fn beside(self, beside: Option<Decoder>) -> Route {
+        Route { beside, ..self }
+    }
+
+    /// Messages that are neither samples nor compared with.
+    #[must_use]
+    pub fn other(beside: Option<Decoder>, copied: Option<Arc<Channel>>) -> Option<Route> {
+        (beside.is_some() || copied.is_some()).then_some(Route {
+            decoder: None,
+            takers: Vec::new(),
+            turn: None,
+            reference: None,
+            beside,
+            copied,
+        })
     }
 
     /// The same, the messages also copied where a channel is given.
@@ -209,11 +234,15 @@ impl Route {
 
     /// Appends what `message` becomes.
     pub fn map(&self, message: &Message<'_>, out: &mut Vec<Item>) {
+        // Before the samples of the same message: it may be for them.
+        if let Some(decoder) = &self.beside {
+            recorded(decoder, message, Item::Beside, out);
+        }
         if let Some(decoder) = &self.decoder {
             self.decode(decoder, message, out);
         }
         if let Some(decoder) = &self.reference {
-            recorded(decoder, message, out);
+            recorded(decoder, message, Item::Reference, out);
         }
         if let Some(channel) = &self.copied {
             out.push(Item::Copy(Box::new(Copied {
@@ -278,13 +307,18 @@ impl Route {
     }
 }
 
-/// The orientations in a message; one that can not be read is one row less to compare with.
-fn recorded(decoder: &Decoder, message: &Message<'_>, out: &mut Vec<Item>) {
+/// The orientations, or the vectors beside samples, in a message; one that can not be read is one less.
+fn recorded(
+    decoder: &Decoder,
+    message: &Message<'_>,
+    item: fn(RawSample) -> Item,
+    out: &mut Vec<Item>,
+) {
     let (log, publish) = (nanos(message.log_time), nanos(message.publish_time));
     SCRATCH.with_borrow_mut(|samples| {
         samples.clear();
         if decoder.decode(message.data, log, publish, samples).is_ok() {
-            out.extend(samples.drain(..).map(Item::Reference));
+            out.extend(samples.drain(..).map(item));
         }
     });
 }

@@ -84,6 +84,7 @@ pub fn check(
         selection: Selection {
             topic: named.map(str::to_owned),
             decode: options.clone(),
+            ..Selection::default()
         },
         plan: Plan::default(),
         reference_topic: String::new(),

@@ -4,7 +4,8 @@
 //! keep the others from being told about), and a log may have hundreds: a pass for each would cost the
 //! square of its size.
 
-use super::channel_choice::{Chosen, choose_each, reference, route};
+use super::beside::Besides;
+use super::channel_choice::{Chosen, besides, choose_each, reference, route};
 use super::channel_route::Route;
 use super::check::Drawing;
 use super::decoders::Decoders;
@@ -91,6 +92,10 @@ pub(super) fn each(
             }
         }
     }
+    let besides = match kept.as_mut_slice() {
+        [_] => besides(run, path, log, &mut kept)?,
+        _ => Besides::default(),
+    };
     let together = topics.len();
     for (topic, chosen) in topics.iter_mut().zip(&kept) {
         if let Some(against) = &mut topic.against {
@@ -122,7 +127,7 @@ pub(super) fn each(
             pool: Some(pool.rayon()),
             ..WalkOptions::default()
         },
-        |channel| route(&kept, reference.as_ref(), false, channel),
+        |channel| route(&kept, reference.as_ref(), &besides, false, channel),
         Route::map,
         |items| {
             let done = done(items, span);

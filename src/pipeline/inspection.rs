@@ -224,7 +224,7 @@ pub fn look_as(
                         }
                         Ok(())
                     }
-                    Item::Reference(_) | Item::Copy(_) => Ok(()),
+                    Item::Reference(_) | Item::Beside(_) | Item::Copy(_) => Ok(()),
                 };
                 if let Err(what) = result {
                     failure = Some(what);

@@ -15,7 +15,7 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 use std::sync::Arc;
-use strapd_attitude::estimate::Meaning;
+use strapd_attitude::estimate::{Aid, Meaning};
 use strapd_attitude::estimate::{StampPass, Stamps};
 use strapd_attitude::record::{Declared, TimeUnit};
 use strapd_attitude::record::{Nanos, RawSample};
@@ -181,6 +181,7 @@ fn read(
     };
     let mut sensor: Option<String> = None;
     let mut bare = BareStamps::default();
+    let is_beside = run.plan.aid == Aid::GravityAndField || run.plan.has_forces_beside;
     let mut has_rates = false;
     let mut samples = Vec::new();
     let mut items = Vec::with_capacity(BATCH);
@@ -209,7 +210,13 @@ fn read(
                 // A sample of our own whose rate is null was one with NaN: it is counted, not
                 // passed over.
                 let is_sample = line.class == Class::Rate && !samples.is_empty();
-                if !is_sample && samples.iter().all(|s| s.gyro.is_none()) {
+                let has_rate = samples.iter().any(|s| s.gyro.is_some());
+                if !is_sample && !has_rate {
+                    // Of the same device between its samples, with a stamp that says its unit.
+                    let id = line.id.as_deref().unwrap_or_default();
+                    if is_beside && sensor.as_deref() == Some(id) && line.bare.is_empty() {
+                        items.extend(samples.drain(..).map(|raw| Item::Beside(in_its_time(raw))));
+                    }
                     // Attitudes, status and the like between the samples.
                     samples.clear();
                     if sensor.is_none() && lines.number > PATIENCE {
@@ -314,19 +321,19 @@ impl BareStamps {
         let unit = self.unit.unwrap_or_default();
         let item = |(raw, bare): (RawSample, Option<Bare>)| {
             let header = raw.header.or(bare.map(|bare| bare.in_unit(unit)));
-            // A line has no time but the one in it.
-            let stamp = header.unwrap_or(Nanos(0));
-            Item::Sample(
-                0,
-                RawSample {
-                    header,
-                    log: stamp,
-                    publish: stamp,
-                    ..raw
-                },
-            )
+            Item::Sample(0, in_its_time(RawSample { header, ..raw }))
         };
         Ok(self.waiting.drain(..).map(item).collect())
+    }
+}
+
+/// A line has no time but the one in it.
+fn in_its_time(raw: RawSample) -> RawSample {
+    let stamp = raw.header.unwrap_or(Nanos(0));
+    RawSample {
+        log: stamp,
+        publish: stamp,
+        ..raw
     }
 }
 

@@ -9,7 +9,6 @@ use sha2::{Digest, Sha256};
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
-use strapd_attitude::estimate::Aid;
 use strapd_attitude::estimate::Prepared;
 use strapd_attitude::worlds::EARTH_RATE;
 
@@ -35,9 +34,6 @@ pub fn of(
     put("input".to_owned(), run.source.name().display().to_string());
     put("method".to_owned(), run.plan.method.to_string());
     put("noise".to_owned(), run.plan.noise.name.clone());
-    if run.plan.aid == Aid::Gravity {
-        put("aid".to_owned(), "gravity".to_owned());
-    }
     // The ends are read only where there is something to write the result into, and never of a
     // pipe: opening it a second time would wait for a second writer.
     if let Source::File(path) = &run.source
@@ -58,6 +54,9 @@ pub fn of(
         put(key("sample_kind"), found.resolved.kind.name().to_owned());
         put(key("gyro_unit"), found.resolved.unit.name().to_owned());
         put(key("input_axes"), found.resolved.body.to_string());
+        if let Some(aiding) = &prepared.aiding {
+            put(key("aid"), aiding.name().to_owned());
+        }
         put(key("clock"), prepared.clock.name().to_owned());
         if let Some(words) = prepared.stamps.words(found.resolved.kind) {
             put(key("stamps"), words);

@@ -3,7 +3,7 @@
 //! A file is read twice: once as far as is needed to know clock, bias, initial attitude and lines
 //! through stamps, then to integrate. A stream is read once; its first samples wait until these are known.
 
-use super::channel_choice::{Chosen, choose, looked_at, reference, route};
+use super::channel_choice::{Chosen, besides, choose, looked_at, reference, route};
 use super::channel_route::{Item, Route};
 use super::log::Log;
 use super::position::Position;
@@ -121,6 +121,7 @@ fn file(
         first.found.warnings.push(note);
     }
     let reference = reference(run, path, &log, &chosen, false)?;
+    let besides = besides(run, path, &log, &mut chosen)?;
     let prepared = prepare(run, path, &log, &chosen, pool)?
         .into_iter()
         .collect::<Result<Vec<Prepared>>>()?;
@@ -150,7 +151,10 @@ fn file(
             pool: Some(pool.rayon()),
             ..WalkOptions::default()
         },
-        |channel| route(&chosen, reference.as_ref(), run.copy_input, channel),
+        |channel| {
+            let copied = run.copy_input;
+            route(&chosen, reference.as_ref(), &besides, copied, channel)
+        },
         Route::map,
         |items| {
             let done = done(items, span);
@@ -240,7 +244,9 @@ pub(super) fn prepare(
 
 fn log_time(item: &Item) -> Option<u64> {
     match item {
-        Item::Sample(_, raw) | Item::Reference(raw) => u64::try_from(raw.log.0).ok(),
+        Item::Sample(_, raw) | Item::Reference(raw) | Item::Beside(raw) => {
+            u64::try_from(raw.log.0).ok()
+        }
         Item::Undecodable(_, why) => u64::try_from(why.0.0).ok(),
         Item::Copy(message) => Some(message.log_time),
     }

@@ -3,6 +3,7 @@
 //! Nothing is known before it comes: the first IMU topic is taken, and its first samples wait until
 //! clock, bias and initial attitude are known.
 
+use super::beside;
 use super::channel_choice::which_stamp;
 use super::channel_route::{Item, Noticed, Route, Taker};
 use super::decoders::Decoders;
@@ -15,6 +16,7 @@ use super::session::Found;
 use super::sources::publisher;
 use super::summarise;
 use super::topics::{self, PICKED_UNNAMED};
+use crate::config::TopicBeside;
 use crate::error::{Error, Result};
 use crate::report::summary::RunSummary;
 use crate::sink::{Flow, Stream, output_topic};
@@ -22,8 +24,8 @@ use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
-use strapd_attitude::estimate::Meaning;
-use strapd_recording::decode::{Decoder, Unsupported};
+use strapd_attitude::estimate::{Aid, Meaning};
+use strapd_recording::decode::{Decoder, Unsupported, Wanted};
 use strapd_recording::mcap::{self, Channel, Reader, Survey, WalkOptions};
 use strapd_recording::pool::Pool;
 
@@ -105,6 +107,8 @@ struct Picked {
     /// Channels of the topic whose first messages tell how to read them.
     held: Vec<Held>,
     others: BTreeSet<String>,
+    /// Where the magnetic field comes from, where no flag says it.
+    field_topic: Option<String>,
     refusals: Vec<String>,
     /// Decoders with the run's options, and with none.
     decoders: Decoders,
@@ -114,6 +118,7 @@ struct Picked {
 impl Picked {
     fn route(&mut self, run: &ReplayRequest, channel: &Arc<Channel>) -> Option<Route> {
         let copied = run.copy_input.then(|| channel.clone());
+        let beside = self.beside(run, channel);
         let found = known(channel, 0, None, &mut self.plain);
         let named = run.selection.topic.as_deref().filter(|t| *t != "all");
         let wanted = match (&self.topic, named) {
@@ -122,7 +127,7 @@ impl Picked {
                 if is_same && publisher(channel) != self.publisher {
                     let other = format!("{topic} published by `{}`", publisher(channel));
                     self.others.insert(other);
-                    return copied.map(Route::only_copied);
+                    return Route::other(beside, copied);
                 }
                 is_same
             }
@@ -135,7 +140,7 @@ impl Picked {
             if rank(&found.role) >= PICKED_UNNAMED {
                 self.others.insert(channel.topic.clone());
             }
-            return copied.map(Route::only_copied);
+            return Route::other(beside, copied);
         }
         match self.decoders.of(channel) {
             Ok(decoder) => {
@@ -158,14 +163,48 @@ impl Picked {
                 Some(
                     Route::to(decoder, vec![taker])
                         .taking_turns(self.channels)
+                        .beside(beside)
                         .copying(copied),
                 )
             }
             Err(why) => {
                 self.refusals.push(why.to_string());
-                copied.map(Route::only_copied)
+                Route::other(beside, copied)
             }
         }
+    }
+
+    /// What is read of a channel beside the samples: of the topics named, or of the first with a field.
+    fn beside(&mut self, run: &ReplayRequest, channel: &Arc<Channel>) -> Option<Decoder> {
+        let of = |wanted, beside: Option<&TopicBeside>| {
+            let options = beside::options(wanted, beside);
+            Decoders::of_run(&run.plan, &options).of(channel)
+        };
+        let named = [
+            (Wanted::Forces, &run.selection.accel),
+            (Wanted::Fields, &run.selection.mag),
+        ];
+        for (wanted, beside) in named {
+            if let Some(beside) = beside.as_ref().filter(|b| b.topic == channel.topic) {
+                return of(wanted, Some(beside))
+                    .map_err(|why| self.refusals.push(why.to_string()))
+                    .ok();
+            }
+        }
+        let is_open = run.plan.aid == Aid::GravityAndField && run.selection.mag.is_none();
+        // JSON says what it holds only in its messages, which are still to come.
+        if !is_open || channel.message_encoding == "json" || !beside::may_be_field(channel) {
+            return None;
+        }
+        let topic = self.field_topic.as_ref();
+        if topic.is_some_and(|topic| *topic != channel.topic) {
+            return None;
+        }
+        let decoder = of(Wanted::Fields, None).ok()?;
+        let has_rate = self.decoders.of(channel).is_ok_and(|d| d.stated().has_gyro);
+        self.field_topic = Some(channel.topic.clone());
+        // Of the samples' own messages it comes with them.
+        (!has_rate).then_some(decoder)
     }
 
     /// How the topic is read is known: by the decoder of its first channel.

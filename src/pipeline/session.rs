@@ -224,6 +224,11 @@ impl Session {
                     against.take_reference(&raw);
                 }
             }
+            Item::Beside(raw) => {
+                for topic in &mut self.topics {
+                    topic.estimator.take_beside(&raw);
+                }
+            }
             Item::Copy(message) => self.outlet.copy(&message, pool)?,
         }
         Ok(())

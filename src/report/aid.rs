@@ -9,6 +9,8 @@ use strapd_attitude::aid::{Calibration, Filter, Report};
 #[derive(Clone, Copy, Debug)]
 pub struct Aided {
     started: bool,
+    has_field: bool,
+    is_implausible: bool,
     report: Report,
     calibration: Calibration,
     sigma: Calibration,
@@ -23,6 +25,8 @@ impl Aided {
     pub fn of(filter: &Filter) -> Aided {
         Aided {
             started: filter.is_started(),
+            has_field: filter.has_field(),
+            is_implausible: filter.is_force_implausible(),
             report: filter.report(),
             calibration: *filter.calibration(),
             sigma: filter.calibration_sigma(),
@@ -37,6 +41,10 @@ impl Aided {
         }
         let Report {
             updates,
+            fields,
+            fields_rejected,
+            fields_unpaired,
+            forces_unpaired,
             levelled,
             restarts,
             forces_rejected,
@@ -44,10 +52,32 @@ impl Aided {
             failures,
             ..
         } = self.report;
-        let mut did = format!(
-            "gravity: tilt corrected {updates} times, heading the gyro's (--aid none: the gyro alone)"
-        );
+        let mut did = if self.has_field {
+            format!(
+                "gravity and field: corrected {updates} times, heading by {fields} fields of the magnetometer (--aid gravity: without)"
+            )
+        } else {
+            format!(
+                "gravity: tilt corrected {updates} times, heading the gyro's (--aid none: the gyro alone)"
+            )
+        };
+        if self.is_implausible {
+            did +=
+                "; GIVEN UP: what the accelerometer says has no gravity in it (force_implausible)";
+        }
+        if self.has_field && fields == 0 {
+            did += "; NO FIELD belonged to a sample";
+        }
         for (n, what) in [
+            (
+                fields_unpaired,
+                "fields half a second off every sample, or no numbers",
+            ),
+            (
+                forces_unpaired,
+                "forces half a second off every sample, or no numbers",
+            ),
+            (fields_rejected, "corrections by the field doubted"),
             (levelled, "times levelled anew"),
             (restarts, "times taken to travel"),
             (forces_rejected, "forces rejected"),
@@ -72,6 +102,16 @@ impl Aided {
         ]
     }
 
+    /// What the sigma of the attitude is of.
+    #[must_use]
+    pub fn sigma_text(&self) -> &'static str {
+        if self.has_field {
+            "of tilt and of heading from north, as the filter knows them"
+        } else {
+            "of tilt and of heading relative to the start, as the filter knows them"
+        }
+    }
+
     /// For machines.
     #[must_use]
     pub fn json(&self) -> Value {
@@ -86,7 +126,12 @@ impl Aided {
             })
         };
         json!({
-            "by": "gravity",
+            "by": if self.has_field { "gravity+mag" } else { "gravity" },
+            "force_implausible": self.is_implausible,
+            "fields": self.report.fields,
+            "fields_doubted": self.report.fields_rejected,
+            "fields_unpaired": self.report.fields_unpaired,
+            "forces_unpaired": self.report.forces_unpaired,
             "started": self.started,
             "corrections": self.report.updates,
             "levelled": self.report.levelled,

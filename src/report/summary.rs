@@ -385,9 +385,8 @@ impl TopicSummary {
     }
 
     fn drift_text(&self) -> String {
-        if self.aided.is_some() {
-            return "of tilt and of heading relative to the start, as the filter knows them"
-                .to_owned();
+        if let Some(aided) = &self.aided {
+            return aided.sigma_text().to_owned();
         }
         format!(
             "drift of about {} deg/h to be expected ({} noise)",

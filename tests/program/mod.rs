@@ -20,6 +20,8 @@ pub fn strapd_fed(dir: &Path, arguments: &str, stdin: impl Into<Vec<u8>>) -> Ran
         .env_remove("STRAPD_TIME")
         .env_remove("STRAPD_SAMPLE_KIND")
         .env_remove("STRAPD_LOG")
+        // Tests of the integration: the gyro alone, unless one asks for more by --aid.
+        .env("STRAPD_AID", "none")
         .env("NO_COLOR", "1")
         .args(arguments.split_whitespace())
         .write_stdin(stdin)

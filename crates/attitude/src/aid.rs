@@ -13,6 +13,8 @@
 //! heading of the field -> heading                               heading
 //! correction -> left of the attitude                            update
 //! first force, field -> level, north                            start
+//! vectors at stamps of their own -> those of a gyro sample      beside
+//! first forces -> whether they are specific forces              plausibility
 //! ```
 //!
 //! Rotations by a left factor commute with integration, so the propagator never sees the attitude jump.
@@ -30,12 +32,15 @@
 )]
 
 mod aided;
+mod beside;
 mod calibration;
 mod covariance;
 mod filter;
 mod gravity;
 mod heading;
 mod interval;
+mod memory;
+mod plausibility;
 mod rest;
 mod settings;
 mod start;
@@ -46,4 +51,6 @@ mod update;
 pub use aided::{Aided, Start};
 pub use calibration::Calibration;
 pub use filter::{Filter, Report};
+pub use memory::Memory;
+pub(crate) use plausibility::is_gravity;
 pub use settings::Settings;

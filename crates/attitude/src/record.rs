@@ -22,6 +22,7 @@ use nalgebra::Vector3;
 /// One `f64` step at today's Unix epoch in seconds is 2.4e-7 s, so stamps stay
 /// integers until two of them have been subtracted.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Nanos(pub i64);
 
 impl Nanos {
@@ -96,6 +97,8 @@ pub struct RawSample {
     pub gyro: Option<[f64; 3]>,
     /// Specific force along the sensor's axes, m/s^2 (or the source's unit).
     pub accel: Option<[f64; 3]>,
+    /// Magnetic field along the magnetometer's axes, any linear unit.
+    pub mag: Option<[f64; 3]>,
     /// Recorded orientation `[w, x, y, z]`, sensor to world, as found: not checked, not normalised.
     pub orientation: Option<[f64; 4]>,
     /// The message's own integration interval in nanoseconds (PX4 `gyro_integral_dt`, `delta_angle_dt`).
@@ -104,6 +107,7 @@ pub struct RawSample {
 
 /// How a sample connects to the one before it in the same stream.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Join {
     /// First sample of the stream.
     Start,

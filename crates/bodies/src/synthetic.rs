@@ -305,6 +305,7 @@ impl Synthetic {
                     publish: at,
                     gyro: Some(read.gyro.into()),
                     accel: Some(read.force_b.into()),
+                    mag: None,
                     orientation: Some(spin.q_nb.wxyz()),
                     interval_nanos: (!rates).then_some((now - self.before) as i64),
                 });

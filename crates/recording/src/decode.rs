@@ -69,9 +69,34 @@ pub struct Channel<'a> {
     pub schema_data: &'a [u8],
 }
 
+/// What a channel's messages are read for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
+pub enum Wanted {
+    /// Body rates and what stands beside them, or orientations.
+    #[default]
+    Rates,
+    /// Specific forces, in messages of their own.
+    Forces,
+    /// Magnetic fields, in messages of their own.
+    Fields,
+}
+
+impl Wanted {
+    /// Role and slots of the vector that is wanted.
+    fn vector(self) -> (FieldRole, Slot) {
+        match self {
+            Wanted::Rates => (FieldRole::Gyro, Slot::GYRO),
+            Wanted::Forces => (FieldRole::Accel, Slot::ACCEL),
+            Wanted::Fields => (FieldRole::Mag, Slot::MAG),
+        }
+    }
+}
+
 /// What the user may say about messages.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
+    /// What they are read for.
+    pub wanted: Wanted,
     /// `--field` paths.
     pub fields: Vec<FieldPath>,
     /// Use data that its covariance (-1) marks as absent.
@@ -447,13 +472,23 @@ fn understand(
             "paths are names between dots: --field gyro=imu.angular_velocity",
         )
     })?;
-    if selection.has(Slot::GYRO, 3) || selection.has(Slot::ORIENTATION, 4) {
+    let (_, slot) = options.wanted.vector();
+    let is_reference = options.wanted == Wanted::Rates && selection.has(Slot::ORIENTATION, 4);
+    if selection.has(slot, 3) || is_reference {
         return Ok((schema, selection));
     }
-    Err((
-        "the type has no body rate and no orientation under a name this program knows".to_owned(),
-        "name it: --field gyro=PATH",
-    ))
+    Err(nothing_wanted("type", options.wanted))
+}
+
+/// Why a type or message is of no use, and what helps.
+fn nothing_wanted(what: &str, wanted: Wanted) -> (String, &'static str) {
+    let (lacks, help) = match wanted {
+        Wanted::Rates => ("body rate and no orientation", "name it: --field gyro=PATH"),
+        Wanted::Forces => ("specific force", "name it: --field accel=PATH"),
+        Wanted::Fields => ("magnetic field", "name it: --field mag=PATH"),
+    };
+    let why = format!("the {what} has no {lacks} under a name this program knows");
+    (why, help)
 }
 
 fn read_schema(channel: &Channel<'_>) -> Result<Schema, (String, &'static str)> {
@@ -521,6 +556,7 @@ fn state(type_name: &str, selection: &Selection, options: &Options) -> Stated {
     stated.declared.sample_kind = selection.kind.or(stated.declared.sample_kind);
     stated.has_gyro = selection.has(Slot::GYRO, 3);
     stated.has_accel = selection.has(Slot::ACCEL, 3);
+    stated.has_mag = selection.has(Slot::MAG, 3);
     stated.has_orientation = selection.has(Slot::ORIENTATION, 4);
     stated.has_stamp = selection.form.stamp != StampForm::None;
     stated.has_interval = selection.has(Slot::INTERVAL, 1);
@@ -552,14 +588,21 @@ fn state_by_type(type_name: &str, stated: &mut Stated) {
 fn state_px4(px4: Option<Px4>, stated: &mut Stated) {
     let Some(px4) = px4 else { return };
     stated.px4();
-    stated.has_gyro = px4 != Px4::VehicleAttitude;
+    let is_beside = matches!(
+        px4,
+        Px4::SensorAccel | Px4::SensorMag | Px4::VehicleMagnetometer
+    );
+    stated.has_gyro = px4 != Px4::VehicleAttitude && !is_beside;
     stated.has_stamp = true;
     stated.has_orientation = px4 == Px4::VehicleAttitude;
     stated.declared.sample_kind = Some(match px4 {
         Px4::SensorCombined => strapd_attitude::record::SampleKind::Average,
         Px4::VehicleImu => strapd_attitude::record::SampleKind::DeltaAngle,
-        Px4::VehicleAngularVelocity | Px4::SensorGyro | Px4::VehicleAttitude => {
-            strapd_attitude::record::SampleKind::Rate
-        }
+        Px4::VehicleAngularVelocity
+        | Px4::SensorGyro
+        | Px4::SensorAccel
+        | Px4::SensorMag
+        | Px4::VehicleMagnetometer
+        | Px4::VehicleAttitude => strapd_attitude::record::SampleKind::Rate,
     });
 }

@@ -140,7 +140,7 @@ pub(super) fn gather(
                         gathering.undecodable();
                         Ok(())
                     }
-                    Item::Reference(_) | Item::Copy(_) => Ok(()),
+                    Item::Reference(_) | Item::Beside(_) | Item::Copy(_) => Ok(()),
                 };
                 if let Err(what) = taken {
                     failure = Some(what);

@@ -182,8 +182,8 @@ fn one_bad_log_of_several_does_not_stop_the_others() {
         ran.err.contains("error: nowhere.mcap: cannot open"),
         "{ran:?}"
     );
-    let sources: Vec<_> = ran
-        .json()
+    let json: serde_json::Value = serde_json::from_str(&ran.out).unwrap();
+    let sources: Vec<_> = json
         .as_array()
         .unwrap()
         .iter()

@@ -282,6 +282,7 @@ fn a_cut_pipe_gives_what_a_cut_file_gives() {
         let output = assert_cmd::Command::cargo_bin("strapd")
             .unwrap()
             .args(["replay", "-", "-o", "null:", "--json", "--threads", "1"])
+            .env("STRAPD_AID", "none")
             .write_stdin(&whole[..cut])
             .output()
             .unwrap();

@@ -186,6 +186,7 @@ fn a_replay_is_moved_from_the_page_and_ends_where_a_file_ends() {
     let mut browser = Browser::start();
     let output = std::process::Command::new(strapd())
         .args(["replay", LOG, "-o", "-", "--quiet"])
+        .env("STRAPD_AID", "none")
         .output()
         .unwrap();
     let text = String::from_utf8(output.stdout).unwrap();

@@ -73,10 +73,37 @@ fn roll(attitude: &str) -> f64 {
 }
 
 #[test]
-fn after_a_restart_it_is_level_at_once() {
+fn after_a_restart_it_goes_on_to_the_bit_with_all_that_was_learned() {
+    let field = |plan: Plan| Plan {
+        aid: Aid::GravityAndField,
+        ..plan
+    };
+    for plan in [aided(), field(aided())] {
+        let sent = |numbers: std::ops::Range<u64>| {
+            numbers
+                .map(|n| line(n).replace('}', &format!(",\"mag\":[{},20,-40]}}", n as f64 * 1e-3)))
+        };
+        let whole = Fed::of(&plan).lines(sent(0..1600)).attitudes;
+        let mut daemon = Fed::of(&plan);
+        let mut parts = daemon.lines(sent(0..1500)).attitudes;
+        for cut in [1500..1501, 1501..1555, 1555..1600] {
+            daemon = daemon.restarted(&plan);
+            parts.extend(daemon.lines(sent(cut)).attitudes);
+        }
+        assert_eq!(parts.len(), 1600);
+        assert!(parts == whole);
+    }
+}
+
+#[test]
+fn what_another_plan_had_learned_leaves_it_level_at_once() {
+    let other = Plan {
+        max_gap_secs: 0.25,
+        ..aided()
+    };
     let mut daemon = Fed::of(&aided());
     let before = daemon.lines((0..1500).map(line));
-    let mut daemon = daemon.restarted(&aided());
+    let mut daemon = daemon.restarted(&other);
     let after = daemon.lines((1500..1600).map(line));
     let truth = |n: u64| (0.3 + 0.2 * (0.9 * n as f64 * 0.01).sin()).to_degrees();
     let at_the_end = roll(before.attitudes.last().unwrap());

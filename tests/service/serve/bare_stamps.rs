@@ -14,6 +14,7 @@ pub(crate) fn replayed(lines: &str) -> Output {
 pub(crate) fn replayed_with(lines: &str, flags: &[&str]) -> Output {
     let mut child = Command::new(strapd())
         .args(["replay", "-", "--method", "commit", "-o", "-"])
+        .env("STRAPD_AID", "none")
         .args(flags)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())

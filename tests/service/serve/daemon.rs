@@ -161,6 +161,8 @@ impl Process {
             .args(["--log-format", "json"])
             .env_remove("STRAPD_LOG")
             .env_remove("STRAPD_LOG_FORMAT")
+            // The gyro alone, unless a test asks for more by --aid.
+            .env("STRAPD_AID", "none")
             .stdin(stdin)
             .stdout(Stdio::null())
             .stderr(Stdio::piped())

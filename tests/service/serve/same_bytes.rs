@@ -1,4 +1,4 @@
-//! The way in changes no byte of the attitude.
+//! The way in changes no byte of the attitude, as it is corrected by default.
 
 use super::client::Client;
 use super::daemon::{Daemon, Process, TCP, UDP, WS, listening, strapd};
@@ -7,6 +7,7 @@ use crate::shared_data;
 use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Stdio};
+use strapd_attitude::estimate::Aid;
 use strapd_attitude::record::SampleKind;
 
 /// `strapd ARGS` with this on standard input.
@@ -77,7 +78,9 @@ fn check(log: &Path) {
         ("unix", 64),
     ] {
         // A sensor goes on where it stopped: each way gets a daemon of its own.
-        let daemon = Daemon::start(listening(&[TCP, UDP, WS, &unix]));
+        let mut settings = listening(&[TCP, UDP, WS, &unix]);
+        settings.plan.aid = Aid::Auto;
+        let daemon = Daemon::start(settings);
         let watcher = if way == "tcp" {
             Client::web(daemon.address(2))
         } else {
@@ -94,7 +97,7 @@ fn check(log: &Path) {
         assert!(got == expected, "{name} over {way}, {piece} at once");
     }
 
-    let mut process = Process::start(&["-", "--listen", TCP, "--threads", "1"]);
+    let mut process = Process::start(&["-", "--listen", TCP, "--threads", "1", "--aid", "auto"]);
     let mut stdin = process.child.stdin.take().unwrap();
     let mut watcher = Client::tcp(process.address(0)).watching("{\"class\":\"WATCH\"}");
     let got = through(
@@ -128,6 +131,7 @@ fn printed(args: &[&str], input: &[u8]) -> Option<Vec<u8>> {
 fn served(kind: SampleKind, lines: &[&[u8]]) -> Vec<u8> {
     let mut settings = listening(&[TCP]);
     settings.plan.kind = Some(kind);
+    settings.plan.aid = Aid::Auto;
     let daemon = Daemon::start(settings);
     let mut watcher = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");
     let mut sender = Client::tcp(daemon.address(0));

@@ -1,9 +1,12 @@
 //! Propagator and filter together: corrected rates in, corrected attitudes out. Pure.
 
+use super::beside::Beside;
 use super::calibration::Applied;
 use super::filter::{Filter, Measured};
 use super::settings::Settings;
+use crate::frames::{Body, Nav};
 use crate::propagate::{self, Method, Propagator, Sequential, SettingsError};
+use crate::quaternion::Quaternion;
 use crate::record::{AttitudeSample, Join, Nanos, RateSample, SampleKind};
 use nalgebra::Vector3;
 use std::collections::VecDeque;
@@ -58,23 +61,27 @@ pub enum Start {
 /// ```
 #[derive(Debug)]
 pub struct Aided {
-    propagator: Propagator,
-    filter: Filter,
+    pub(super) propagator: Propagator,
+    pub(super) filter: Filter,
     kind: SampleKind,
     start: Start,
     /// The attitude is not that of this stream's beginning, but one that was saved.
-    is_resumed: bool,
+    pub(super) is_resumed: bool,
+    /// Specific forces that do not come with the gyro samples.
+    pub(super) forces: Option<Beside>,
+    pub(super) fields: Beside,
     /// Given to the propagator, whose attitudes have not come out yet.
-    given: VecDeque<Given>,
-    last: Option<Nanos>,
+    pub(super) given: VecDeque<Given>,
+    pub(super) last: Option<Nanos>,
     /// What comes out of the propagator for one sample.
     scratch: Vec<AttitudeSample>,
-    last_out: Option<AttitudeSample>,
+    pub(super) last_out: Option<Quaternion<Nav, Body>>,
 }
 
 /// A sample and what it was corrected by.
-#[derive(Clone, Copy, Debug)]
-struct Given {
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct Given {
     stamp: Nanos,
     measured: Measured,
     applied: Applied,
@@ -98,11 +105,35 @@ impl Aided {
             kind: propagation.kind,
             start,
             is_resumed: false,
+            forces: None,
+            fields: Beside::with_repeats(),
             given: VecDeque::new(),
             last: None,
             scratch: Vec::new(),
             last_out: None,
         })
+    }
+
+    /// The same where specific forces come by [`Aided::take_force`], and not with the gyro samples.
+    #[must_use]
+    pub fn with_forces_beside(self) -> Aided {
+        Aided {
+            forces: Some(Beside::default()),
+            ..self
+        }
+    }
+
+    /// Takes a specific force (m/s^2, body axes) measured at `stamp`: it is used at the first gyro sample at or
+    /// after that, turned on by the rate. One that is half a second from any is counted and not used.
+    pub fn take_force(&mut self, stamp: Nanos, force: Vector3<f64>) {
+        if let Some(forces) = &mut self.forces {
+            forces.take(stamp, force);
+        }
+    }
+
+    /// The same for a magnetic field, any linear unit, body axes.
+    pub fn take_field(&mut self, stamp: Nanos, field: Vector3<f64>) {
+        self.fields.take(stamp, field);
     }
 
     /// The filter, for what it has learned.
@@ -152,6 +183,11 @@ impl Aided {
     pub fn finish(&mut self, out: &mut Vec<AttitudeSample>) {
         self.propagator.finish(&Sequential, &mut self.scratch);
         self.correct(out);
+        self.fields.finish();
+        if let Some(forces) = &mut self.forces {
+            forces.finish();
+        }
+        self.filter.count_beside(self.forces.as_ref(), &self.fields);
     }
 
     /// The sample as the propagator is to have it.
@@ -168,13 +204,20 @@ impl Aided {
         } else {
             Vector3::zeros()
         };
+        let turning = applied.corrected(rate, 1.0);
+        let force = match &mut self.forces {
+            None => sample.accel,
+            Some(forces) => forces.at(sample.stamp, &turning),
+        };
+        let field = self.fields.at(sample.stamp, &turning);
+        self.filter.count_beside(self.forces.as_ref(), &self.fields);
         self.given.push_back(Given {
             stamp: sample.stamp,
             measured: Measured {
                 secs,
                 rate,
-                force: sample.accel,
-                field: None,
+                force,
+                field,
             },
             applied,
             join: sample.join,
@@ -190,6 +233,10 @@ impl Aided {
     fn correct(&mut self, out: &mut Vec<AttitudeSample>) {
         let mut scratch = std::mem::take(&mut self.scratch);
         for sample in &scratch {
+            // Of one that was recalled: what its propagator does not know belongs to nothing.
+            while self.given.front().is_some_and(|g| g.stamp < sample.stamp) {
+                self.given.pop_front();
+            }
             let is_first = self
                 .given
                 .front()
@@ -199,14 +246,14 @@ impl Aided {
             }
             let mut q_nb = self.filter.corrected(&sample.q_nb);
             if let Some(last) = &self.last_out {
-                q_nb = q_nb.same_sign_as(&last.q_nb);
+                q_nb = q_nb.same_sign_as(last);
             }
             let corrected = AttitudeSample {
                 q_nb,
                 covariance: self.filter.attitude_covariance(&q_nb, &sample.rate),
                 ..*sample
             };
-            self.last_out = Some(corrected);
+            self.last_out = Some(q_nb);
             out.push(corrected);
         }
         scratch.clear();

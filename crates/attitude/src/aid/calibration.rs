@@ -8,6 +8,7 @@ use nalgebra::{Matrix3, Vector3};
 /// symmetric, since a rotation between the axes of gyro and accelerometer is mounting.
 /// Accelerometer: `force = measured - force_bias`, and it belongs to the attitude `lead` after its stamp.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Calibration {
     /// Gyro bias, rad/s.
     pub bias: Vector3<f64>,
@@ -42,6 +43,7 @@ impl Calibration {
 
 /// What of a calibration a rate is corrected by.
 #[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Applied {
     pub(super) bias: Vector3<f64>,
     pub(super) matrix: Matrix3<f64>,

@@ -34,9 +34,46 @@ impl Transition {
     }
 }
 
-/// Symmetric, positive definite where a state is not known exactly.
-#[derive(Clone, Debug)]
+/// Symmetric to the bit, positive definite where a state is not known exactly.
+#[derive(Clone, PartialEq, Debug)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(into = "Vec<f64>", try_from = "Vec<f64>")
+)]
 pub(super) struct Covariance([[f64; WIDTH]; STATES]);
+
+/// The rows of its lower half, one after the other.
+impl From<Covariance> for Vec<f64> {
+    fn from(covariance: Covariance) -> Vec<f64> {
+        let rows = covariance.0.iter().enumerate();
+        rows.flat_map(|(i, row)| row[..=i].to_vec()).collect()
+    }
+}
+
+impl TryFrom<Vec<f64>> for Covariance {
+    type Error = String;
+
+    fn try_from(half: Vec<f64>) -> Result<Covariance, String> {
+        let need = STATES * (STATES + 1) / 2;
+        if half.len() != need {
+            return Err(format!(
+                "a covariance of {} numbers, not {need}",
+                half.len()
+            ));
+        }
+        let mut covariance = Covariance::zero();
+        let mut numbers = half.into_iter();
+        for i in 0..STATES {
+            for j in 0..=i {
+                let number = numbers.next().unwrap_or(f64::NAN);
+                covariance.0[i][j] = number;
+                covariance.0[j][i] = number;
+            }
+        }
+        Ok(covariance)
+    }
+}
 
 impl Covariance {
     pub(super) fn zero() -> Covariance {
@@ -140,11 +177,13 @@ impl Covariance {
             left -= factor * correction[*state];
         }
         let inverse = 1.0 / spread;
+        // A product of two equals that of the two in another order: the matrix stays symmetric to the bit.
+        let root = inverse.sqrt();
+        let scaled = ph.map(|p| p * root);
         for state in 0..STATES {
-            let gain = ph[state] * inverse;
-            correction[state] += gain * left;
-            for (p, other) in self.0[state].iter_mut().zip(&ph) {
-                *p -= gain * other;
+            correction[state] += ph[state] * inverse * left;
+            for (p, other) in self.0[state].iter_mut().zip(&scaled) {
+                *p -= scaled[state] * other;
             }
         }
     }
@@ -162,6 +201,9 @@ impl Covariance {
                 self.0[k][first] = cos * u - sin * v;
                 self.0[k][first + 1] = sin * u + cos * v;
             }
+            let mean = 0.5 * (self.0[first][first + 1] + self.0[first + 1][first]);
+            self.0[first][first + 1] = mean;
+            self.0[first + 1][first] = mean;
         }
     }
 
@@ -173,6 +215,14 @@ impl Covariance {
     /// Whether it can be one: every variance a number above zero, or zero where a state is known.
     pub(super) fn is_sound(&self) -> bool {
         (0..STATES).all(|i| self.0[i][i].is_finite() && self.0[i][i] >= 0.0)
+    }
+
+    /// Whether no correlation is more than one, beside what makes it [sound](Covariance::is_sound): what a file
+    /// says may be anything.
+    pub(super) fn is_plausible(&self) -> bool {
+        let within =
+            |i: usize, j: usize| self.0[i][j].powi(2) <= self.0[i][i] * self.0[j][j] * (1.0 + 1e-9);
+        self.is_sound() && (0..STATES).all(|i| (0..i).all(|j| within(i, j)))
     }
 
     /// Smallest pivot of the factor of the matrix scaled to ones on its diagonal, over the states that are not

@@ -1,10 +1,12 @@
 //! The filter: what it holds, what a sample adds, what a gap leaves unknown. Pure.
 
+use super::beside::Beside;
 use super::calibration::{Applied, Calibration};
 use super::covariance::{BIAS, CROSS, Covariance, FORCE_BIAS, LEAD, SCALE, TILT};
 use super::gravity::Residuals;
 use super::heading::Surroundings;
 use super::interval::Interval;
+use super::plausibility::Plausibility;
 use super::rest::Rest;
 use super::settings::Settings;
 use crate::frames::{Body, In, Nav};
@@ -21,7 +23,8 @@ const FORCE_SECS: f64 = 0.5;
 const GAPS_IN_A_ROW: u32 = 20;
 
 /// One sample as it was measured, and the attitude it led to.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Measured {
     /// Since the sample before, s.
     pub secs: f64,
@@ -35,6 +38,7 @@ pub(crate) struct Measured {
 
 /// What happened.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Report {
     /// Corrections made.
     pub updates: u64,
@@ -46,8 +50,14 @@ pub struct Report {
     pub gaps: u64,
     /// Specific forces that are none: not finite, or beyond what there is.
     pub forces_rejected: u64,
+    /// Specific forces with stamps of their own that are no numbers, or that no gyro sample was near.
+    pub forces_unpaired: u64,
+    /// Fields that reached a gyro sample.
+    pub fields: u64,
     /// Fields that were doubted or not used.
     pub fields_rejected: u64,
+    /// Fields that are no numbers, or that no gyro sample was near: another clock, or a gap.
+    pub fields_unpaired: u64,
     /// Samples at the gyro's range.
     pub saturated: u64,
     /// Full starts because the numbers had become impossible.
@@ -88,6 +98,7 @@ pub struct Filter {
     /// The last specific force, earth axes, and how long ago it was, s.
     pub(super) last_force: Option<Vector3<f64>>,
     pub(super) since_force: f64,
+    pub(super) plausibility: Plausibility,
     pub(super) report: Report,
 }
 
@@ -120,6 +131,7 @@ impl Filter {
             last_rate: Vector3::zeros(),
             last_force: None,
             since_force: 0.0,
+            plausibility: Plausibility::default(),
             report: Report::default(),
         };
         filter.forget_calibration();
@@ -152,10 +164,24 @@ impl Filter {
         self.known
     }
 
+    /// Whether a magnetometer is to tell the heading.
+    #[must_use]
+    pub fn has_field(&self) -> bool {
+        self.settings.has_field
+    }
+
     /// What happened so far.
     #[must_use]
     pub fn report(&self) -> Report {
         self.report
+    }
+
+    /// What became of vectors that were measured beside the gyro.
+    pub(super) fn count_beside(&mut self, forces: Option<&Beside>, fields: &Beside) {
+        self.report.fields = fields.paired;
+        self.report.fields_unpaired = fields.unpaired + fields.not_finite;
+        self.report.forces_unpaired =
+            forces.map_or(0, |forces| forces.unpaired + forces.not_finite);
     }
 
     /// Whether the sensor has been at rest for long enough to say so.
@@ -167,6 +193,12 @@ impl Filter {
     /// The same for the filter itself, which asks only when it has begun.
     pub(super) fn rests(&self) -> bool {
         self.rest.is_quiet(&self.settings) && self.since_force <= FORCE_SECS
+    }
+
+    /// Whether what was taken for a specific force was found to be none: nothing is corrected by it.
+    #[must_use]
+    pub fn is_force_implausible(&self) -> bool {
+        self.plausibility.is_denied()
     }
 
     /// Whether tilt is known: a specific force has come.
@@ -254,6 +286,9 @@ impl Filter {
     ) -> Option<Vector3<f64>> {
         self.since_force += sample.secs;
         let measured = sample.force?;
+        if self.plausibility.is_denied() {
+            return None;
+        }
         if !self.is_force(&measured) {
             self.report.forces_rejected += 1;
             return None;
@@ -263,6 +298,13 @@ impl Filter {
             .since_force
             .min(sample.secs.max(self.settings.update_secs));
         self.since_force = 0.0;
+        if self
+            .plausibility
+            .denies(secs, &(r * measured), self.settings.gravity)
+        {
+            self.give_gravity_up();
+            return None;
+        }
         let turning = rate.cross(&measured);
         let force = r * (measured - self.calibration.force_bias + turning * self.calibration.lead);
         let mean = match self.last_force {

@@ -13,7 +13,8 @@ use nalgebra::Vector3;
 const MEAN_SECS: f64 = 2.0;
 
 /// What residuals have been like.
-#[derive(Clone, Debug)]
+#[derive(Clone, PartialEq, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Residuals {
     /// Power density, m^2/s^3.
     density: f64,

@@ -19,6 +19,7 @@ const STEEPEST: f64 = 0.1;
 
 /// Norm and dip of a field.
 #[derive(Clone, Copy, PartialEq, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Field {
     norm: f64,
     /// Downwards from horizontal, rad.
@@ -43,7 +44,8 @@ impl Field {
 }
 
 /// What the field has been like.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, PartialEq, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Surroundings {
     /// The field that headings are believed in.
     reference: Option<Field>,

@@ -4,7 +4,8 @@ use super::calibration::Applied;
 use nalgebra::{Matrix3, Vector3};
 
 /// What is added up between two corrections. Earth axes but for `rate`.
-#[derive(Clone, Debug)]
+#[derive(Clone, PartialEq, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Interval {
     /// How long it is, s.
     pub(super) secs: f64,

@@ -7,7 +7,8 @@ use nalgebra::Vector3;
 const MEAN_SECS: f64 = 0.5;
 
 /// Whether rate and force have been quiet for long enough.
-#[derive(Clone, Debug)]
+#[derive(Clone, PartialEq, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Rest {
     rate: Vector3<f64>,
     force: Vector3<f64>,

@@ -71,6 +71,8 @@ pub struct Settings {
     pub rest_noise: f64,
     /// Local gravity, m/s^2.
     pub gravity: f64,
+    /// A magnetometer tells the heading: until its first field that is not known, instead of that of the start.
+    pub has_field: bool,
     /// White noise of the field's heading, rad sqrt(s).
     pub field_noise: f64,
     /// Disturbance of the field's heading: sigma, rad.
@@ -132,6 +134,7 @@ impl Default for Settings {
             rest_beside_bias: true,
             rest_noise: 1e-4,
             gravity: 9.81,
+            has_field: false,
             field_noise: 0.03,
             field_sigma: 0.1,
             field_secs: 8.0,

@@ -19,6 +19,8 @@ pub(super) const VELOCITY_START: f64 = 0.01;
 pub(super) const POSITION_START: f64 = 1e-4;
 /// Sigma of the heading where the first sample has no field, rad.
 const HEADING_UNKNOWN: f64 = 3.0;
+/// Sigma of a tilt that nothing has told, rad.
+const TILT_UNKNOWN: f64 = 1.5;
 /// What may be wrong with a bias after a reset, rad/s.
 const BIAS_AFTER_RESET: f64 = 8.7e-4;
 
@@ -52,6 +54,7 @@ impl Filter {
         let heading = match (field, north) {
             (_, Some(_)) => self.settings.heading_start,
             (Some(_), None) => HEADING_UNKNOWN,
+            (None, _) if self.settings.has_field => HEADING_UNKNOWN,
             (None, _) => 0.0,
         };
         self.start(attitude * propagated.inverse(), heading * heading, force);
@@ -70,6 +73,15 @@ impl Filter {
         for axis in [TILT, TILT + 1] {
             self.covariance.restart(axis, tilt * tilt);
         }
+    }
+
+    /// What levelled was no specific force: nothing is known of the tilt but what the gyro says of its changes.
+    pub(super) fn give_gravity_up(&mut self) {
+        for axis in [TILT, TILT + 1] {
+            self.covariance.restart(axis, TILT_UNKNOWN * TILT_UNKNOWN);
+        }
+        self.last_force = None;
+        self.rest.interrupt();
     }
 
     /// What a new start keeps: the calibration, known a little less.

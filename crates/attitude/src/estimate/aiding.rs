@@ -5,9 +5,10 @@
 
 use super::meaning::Meaning;
 use super::plan::{Aid, Bias, Initial, Plan};
-use crate::aid::{Settings, Start};
-use crate::record::AccelUnit;
-use crate::record::RawSample;
+use crate::aid::{self, Settings, Start};
+use crate::frames::{Body, Nav};
+use crate::quaternion::{Quaternion, RotationVector};
+use crate::record::{AccelUnit, Nanos, RawSample, SampleKind};
 use nalgebra::Vector3;
 
 /// Standard gravity, m/s^2.
@@ -22,6 +23,16 @@ const BIAS_LEFT: f64 = 1e-3;
 /// Of an initial attitude that was given, or found at rest, rad.
 const TILT_GIVEN: f64 = 0.3;
 const TILT_AT_REST: f64 = 0.05;
+/// Of a heading that was given where a field tells it too, rad.
+const HEADING_GIVEN: f64 = 0.5;
+
+/// Why gravity can not be used.
+enum Unaided {
+    /// There is no specific force.
+    NoForce,
+    /// There is something else: in words.
+    Implausible(String),
+}
 
 /// What corrects the attitude.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -35,71 +46,116 @@ pub struct Aiding {
 }
 
 impl Aiding {
+    /// What corrects, as `--aid` calls it.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        if self.settings.has_field {
+            "gravity+mag"
+        } else {
+            "gravity"
+        }
+    }
+
     /// What `plan` asks for, with the first samples of the stream: all there are within a second or so; of a
     /// live stream the first alone, whose mean says nothing yet. What is to be said is added to `warnings`.
     ///
     /// # Errors
-    /// In words: no specific force, or none that can be.
+    /// In words: no specific force, or none that can be. With [`Aid::Auto`] that is a warning.
     pub(super) fn decide(
         plan: &Plan,
         resolved: &Meaning,
         first: &[RawSample],
         warnings: &mut Vec<String>,
     ) -> Result<Option<Aiding>, String> {
-        if plan.aid == Aid::None {
-            return Ok(None);
-        }
-        let forces = || {
-            first
-                .iter()
-                .filter_map(|raw| raw.accel)
-                .map(|f| (Vector3::from(f) * resolved.accel_scale).norm())
-                .filter(|length| length.is_finite() && *length > 0.0)
+        let asked = match plan.aid {
+            Aid::None => return Ok(None),
+            Aid::Auto => "--aid auto",
+            Aid::Gravity => "--aid gravity",
+            Aid::GravityAndField => "--aid gravity+mag",
         };
-        let Some(length) = forces().next() else {
-            if first.len() <= 1 {
-                warnings.push("--aid gravity: the first sample carries no specific force: the attitude is the gyro's until one comes".to_owned());
-                return Ok(Some(Aiding::with_scale(plan, 1.0)));
+        let found = Aiding::by_force(plan, resolved, first, warnings);
+        match found {
+            Ok(found) => Ok(Some(found)),
+            Err(Unaided::NoForce) if plan.aid == Aid::Auto => Ok(None),
+            Err(Unaided::NoForce) if first.len() <= 1 => {
+                warnings.push(format!("{asked}: the first sample carries no specific force: the attitude is the gyro's until one comes"));
+                Ok(Some(Aiding::with_scale(plan, 1.0)))
             }
-            return Err(format!(
-                "--aid gravity: none of the first {} samples carries a specific force\n  help: --field accel=PATH says where it is, --aid none does without",
+            Err(Unaided::NoForce) => Err(format!(
+                "{asked}: none of the first {} samples carries a specific force\n  help: --field accel=PATH or --accel-topic NAME says where it is, --aid none does without",
                 first.len()
-            ));
-        };
-        let mean = forces().sum::<f64>() / forces().count() as f64;
-        let in_g = resolved.accel_unit_stated.is_none() && IN_G.contains(&length);
-        let scale = if in_g { STANDARD_GRAVITY } else { 1.0 };
-        if in_g {
+            )),
+            Err(Unaided::Implausible(why)) if plan.aid == Aid::Auto => {
+                warnings.push(format!("{why}: the attitude is the gyro's alone"));
+                Ok(None)
+            }
+            Err(Unaided::Implausible(why)) => Err(format!(
+                "{asked}: {why}\n  help: --field accel=PATH or --accel-topic NAME names another, --aid none does without"
+            )),
+        }
+    }
+
+    fn by_force(
+        plan: &Plan,
+        resolved: &Meaning,
+        first: &[RawSample],
+        warnings: &mut Vec<String>,
+    ) -> Result<Aiding, Unaided> {
+        if plan.has_forces_beside {
+            // Its unit shows in its first, its plausibility in the filter.
+            return Ok(Aiding::with_scale(plan, 1.0));
+        }
+        let mut lengths = first
+            .iter()
+            .filter_map(|raw| raw.accel)
+            .map(|f| resolved.force(f).norm())
+            .filter(|length| length.is_finite() && *length > 0.0);
+        let length = lengths.next().ok_or(Unaided::NoForce)?;
+        let (more, sum) = lengths.fold((1.0, length), |(n, sum), length| (n + 1.0, sum + length));
+        let mean = sum / more;
+        let scale = force_scale(resolved, length);
+        if scale != 1.0 {
             warnings.push(format!(
                 "the first specific force has length {length:.3}: taken to be in g, not in m/s^2"
             ));
         }
-        let is_gravity = if first.len() > 1 {
+        let is_plausible = if first.len() > 1 {
             (mean * scale / STANDARD_GRAVITY - 1.0).abs() <= FAR
+                || not_turning(resolved, first).is_some_and(|(mean, secs)| {
+                    aid::is_gravity(mean * scale, secs, STANDARD_GRAVITY)
+                })
         } else {
             IN_SI.contains(&(length * scale))
         };
-        if !is_gravity {
-            return Err(format!(
-                "--aid gravity: the specific force has a mean length of {:.3} m/s^2 in the first {} samples, and gravity {STANDARD_GRAVITY}: acceleration without gravity can not level (force_implausible)\n  help: --field accel=PATH names another, --aid none does without",
+        if !is_plausible {
+            return Err(Unaided::Implausible(format!(
+                "the specific force has a mean length of {:.3} m/s^2 in the first {} samples, and gravity {STANDARD_GRAVITY}: acceleration without gravity can not level (force_implausible)",
                 mean * scale,
-                forces().count()
-            ));
+                first.len(),
+            )));
         }
-        Ok(Some(Aiding::with_scale(plan, scale)))
+        Ok(Aiding::with_scale(plan, scale))
     }
 
     fn with_scale(plan: &Plan, force_scale: f64) -> Aiding {
         let mut settings = Settings {
             gyro_range: plan.gyro_range.unwrap_or(0.0),
+            has_field: plan.aid == Aid::GravityAndField,
             ..Settings::default()
         };
         if plan.bias != Bias::None {
             settings.bias_prior = BIAS_LEFT;
         }
-        let known = |tilt| Start::Known { tilt, heading: 0.0 };
+        // By a field the heading is that of north, and what was given may be another.
+        let heading = if settings.has_field {
+            HEADING_GIVEN
+        } else {
+            0.0
+        };
+        let known = |tilt| Start::Known { tilt, heading };
         let start = match plan.initial {
             Initial::Identity => Start::Level,
+            Initial::Gravity if settings.has_field => Start::Level,
             Initial::Gravity => known(TILT_AT_REST),
             Initial::Given(_) | Initial::FirstOrientation => known(TILT_GIVEN),
         };
@@ -109,6 +165,48 @@ impl Aiding {
             force_scale,
         }
     }
+}
+
+/// Multiplies a specific force into m/s^2 whose first has this length: of one in g it shows, where the format
+/// does not state its unit.
+pub(super) fn force_scale(resolved: &Meaning, length: f64) -> f64 {
+    if resolved.accel_unit_stated.is_none() && IN_G.contains(&length) {
+        STANDARD_GRAVITY
+    } else {
+        1.0
+    }
+}
+
+/// Length of the mean specific force in a frame that does not turn, and over how many seconds: gravity and what
+/// the velocity changed by, however the body shakes. By sums, which over a second is good enough.
+fn not_turning(resolved: &Meaning, first: &[RawSample]) -> Option<(f64, f64)> {
+    let mut attitude: Quaternion<Nav, Body> = Quaternion::identity();
+    let (mut sum, mut secs) = (Vector3::zeros(), 0.0);
+    let mut last: Option<Nanos> = None;
+    for raw in first {
+        let stamp = raw.header.unwrap_or(raw.log);
+        let step = last.map_or(0.0, |last| stamp.secs_since(last));
+        last = Some(stamp);
+        let (Some(gyro), Some(force)) = (raw.gyro, raw.accel) else {
+            continue;
+        };
+        if !(0.0..1.0).contains(&step) {
+            return None;
+        }
+        let turn = resolved.rate(gyro)
+            * match resolved.kind {
+                SampleKind::Rate | SampleKind::Average => step,
+                SampleKind::DeltaAngle => 1.0,
+            };
+        let force = resolved.force(force);
+        if !turn.iter().chain(force.iter()).all(|v| v.is_finite()) {
+            continue;
+        }
+        attitude = attitude.advanced(&RotationVector(turn));
+        sum += attitude.to_dcm().as_matrix() * force * step;
+        secs += step;
+    }
+    (secs > 0.2).then(|| (sum.norm() / secs, secs))
 }
 
 /// Multiplies a recorded force into m/s^2, as far as its format states the unit.

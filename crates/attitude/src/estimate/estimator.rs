@@ -3,16 +3,19 @@
 //! Conditions and propagates; what must be known first ([`Prepared`]) is given. Reads no clock and
 //! does no I/O.
 
+use super::aiding;
 use super::meaning::Meaning;
 use super::plan::Plan;
 use super::preparation::Prepared;
 use crate::aid::{self, Aided};
 use crate::condition::regularise::{self, Regulariser};
-use crate::condition::{self, Conditioner};
+use crate::condition::{self, Clock, Conditioner};
+use crate::frames::Nav;
 use crate::propagate::{self, Executor, Method, Propagator};
-use crate::quaternion::RotationVector;
+use crate::quaternion::{Quaternion, RotationVector};
 use crate::record::{AttitudeSample, Nanos, RateSample, RawSample};
 use crate::worlds::{Convention, World};
+use nalgebra::Vector3;
 
 /// An estimator of one stream.
 #[derive(Debug)]
@@ -23,12 +26,38 @@ pub struct Estimator {
     /// Of the sensor's own filters, s.
     delay: f64,
     world: World,
+    /// True north to the axes of the filter, whose north is magnetic; `None` = the same.
+    north: Option<Quaternion<Nav, Nav>>,
+    /// Vectors that came between the rates, each before the rate of this number.
+    beside: Vec<(usize, Nanos, Beside)>,
+    /// How what comes beside the rates is understood; `None` where nothing of it is used.
+    besides: Option<Besides>,
     /// Tells settings apart under which a [`Memory`] means something else.
     settings: u64,
     rates: Vec<RateSample>,
     /// The same with their new stamps.
     even: Vec<RateSample>,
     out: Vec<AttitudeSample>,
+}
+
+/// A vector measured beside the gyro, body axes.
+#[derive(Clone, Copy, Debug)]
+enum Beside {
+    /// Specific force, m/s^2.
+    Force(Vector3<f64>),
+    /// Magnetic field.
+    Field(Vector3<f64>),
+}
+
+/// What is taken beside the rates.
+#[derive(Debug)]
+struct Besides {
+    resolved: Meaning,
+    clock: Clock,
+    has_forces: bool,
+    has_field: bool,
+    /// Multiplies forces, once the first has come.
+    force_scale: Option<f64>,
 }
 
 /// Rates -> attitudes.
@@ -47,6 +76,14 @@ impl Integrator {
         }
     }
 
+    fn take_beside(&mut self, stamp: Nanos, beside: Beside) {
+        match (self, beside) {
+            (Integrator::Alone(_), _) => {}
+            (Integrator::Aided(aided), Beside::Force(force)) => aided.take_force(stamp, force),
+            (Integrator::Aided(aided), Beside::Field(field)) => aided.take_field(stamp, field),
+        }
+    }
+
     fn finish(&mut self, exec: &impl Executor, out: &mut Vec<AttitudeSample>) {
         match self {
             Integrator::Alone(propagator) => propagator.finish(exec, out),
@@ -62,6 +99,16 @@ pub struct Memory {
     settings: u64,
     conditioning: condition::Memory,
     propagation: propagate::Memory,
+    #[cfg_attr(
+        feature = "serde",
+        serde(default, skip_serializing_if = "Option::is_none")
+    )]
+    aiding: Option<aid::Memory>,
+    #[cfg_attr(
+        feature = "serde",
+        serde(default, skip_serializing_if = "Option::is_none")
+    )]
+    force_scale: Option<f64>,
 }
 
 impl Memory {
@@ -120,20 +167,41 @@ impl Estimator {
         let noise = propagation.noise;
         let integrator = match &prepared.aiding {
             None => Propagator::new(propagation).map(|p| Integrator::Alone(Box::new(p))),
-            Some(aiding) => Aided::new(propagation, aiding.settings, aiding.start)
-                .map(|aided| Integrator::Aided(Box::new(aided))),
+            Some(aiding) => Aided::new(propagation, aiding.settings, aiding.start).map(|aided| {
+                Integrator::Aided(Box::new(if plan.has_forces_beside {
+                    aided.with_forces_beside()
+                } else {
+                    aided
+                }))
+            }),
         }
         .map_err(|e| e.to_string())?;
         Ok(Estimator {
             settings: told_apart(&format!(
-                "{settings:?} {:?} {:?} {noise:?}",
-                plan.method, prepared.world_rate
+                "{settings:?} {:?} {:?} {noise:?}{}",
+                plan.method,
+                prepared.world_rate,
+                // Nothing for a gyro alone: what was saved before there was more goes on.
+                prepared.aiding.map_or_else(String::new, |aiding| format!(
+                    " {aiding:?} {} {} {:?}",
+                    plan.has_forces_beside, plan.declination, plan.mag_mount
+                ))
             )),
             conditioner: Conditioner::new(settings).map_err(|e| e.to_string())?,
             regulariser: prepared.stamps.regulariser(resolved.kind)?,
             integrator,
             delay: plan.sensor_delay_secs,
             world: prepared.world,
+            north: (plan.declination != 0.0 && prepared.aiding.is_some())
+                .then(|| turned_north(plan.declination)),
+            beside: Vec::new(),
+            besides: prepared.aiding.map(|aiding| Besides {
+                resolved: resolved.clone(),
+                clock: prepared.clock,
+                has_forces: plan.has_forces_beside,
+                has_field: aiding.settings.has_field,
+                force_scale: None,
+            }),
             rates: Vec::new(),
             even: Vec::new(),
             out: Vec::new(),
@@ -150,6 +218,9 @@ impl Estimator {
         if let Some(from) = self.world.convention() {
             last = relabelled(&last, from, Convention::EnuFlu);
         }
+        if let Some(north) = &self.north {
+            last.q_nb = (north.inverse() * last.q_nb).normalised();
+        }
         if self.delay != 0.0 {
             let back = RotationVector(last.rate * -self.delay);
             last.q_nb = last.q_nb.advanced(&back).normalised();
@@ -162,19 +233,25 @@ impl Estimator {
     }
 
     /// What it knows, for another estimator to go on exactly; `None` where there is nothing yet, and
-    /// where stamps are regularised or the attitude is aided, which is not kept.
+    /// where stamps are regularised, which is not kept.
     #[must_use]
     pub fn memory(&self) -> Option<Memory> {
-        let Integrator::Alone(propagator) = &self.integrator else {
-            return None;
-        };
-        if self.regulariser.is_some() {
+        if self.regulariser.is_some() || !self.beside.is_empty() {
             return None;
         }
+        let (propagation, aiding) = match &self.integrator {
+            Integrator::Alone(propagator) => (propagator.memory()?, None),
+            Integrator::Aided(aided) => {
+                let (propagation, aiding) = aided.memory()?;
+                (propagation, Some(aiding))
+            }
+        };
         Some(Memory {
             settings: self.settings,
             conditioning: self.conditioner.memory()?,
-            propagation: propagator.memory()?,
+            propagation,
+            aiding,
+            force_scale: self.besides.as_ref().and_then(|b| b.force_scale),
         })
     }
 
@@ -182,17 +259,23 @@ impl Estimator {
     /// is as before, when that had other settings or no estimator can have known it.
     #[must_use]
     pub fn recall(&mut self, memory: &Memory) -> bool {
-        let Integrator::Alone(propagator) = &mut self.integrator else {
-            return false;
-        };
         if self.regulariser.is_some() || self.settings != memory.settings {
             return false;
         }
         let mut conditioner = self.conditioner.clone();
-        let fits =
-            conditioner.recall(&memory.conditioning) && propagator.recall(&memory.propagation);
+        let fits = conditioner.recall(&memory.conditioning)
+            && match (&mut self.integrator, &memory.aiding) {
+                (Integrator::Alone(propagator), None) => propagator.recall(&memory.propagation),
+                (Integrator::Aided(aided), Some(aiding)) => {
+                    aided.recall((&memory.propagation, aiding))
+                }
+                _ => false,
+            };
         if fits {
             self.conditioner = conditioner;
+            if let Some(besides) = &mut self.besides {
+                besides.force_scale = memory.force_scale.filter(|s| s.is_finite());
+            }
         }
         fits
     }
@@ -221,8 +304,41 @@ impl Estimator {
     /// Takes the next sample.
     #[inline]
     pub fn take(&mut self, raw: &RawSample) {
+        if raw.mag.is_some() {
+            self.take_field(raw);
+        }
         self.conditioner
             .push(std::slice::from_ref(raw), &mut self.rates);
+    }
+
+    /// Takes the specific force, or the magnetic field, of a message that carries no rate: of topics, and at
+    /// rates, of their own. What is not asked for ([`Plan::has_forces_beside`], [`Plan::aid`]) is passed over.
+    pub fn take_beside(&mut self, raw: &RawSample) {
+        self.take_field(raw);
+        let Some(besides) = self.besides.as_mut().filter(|b| b.has_forces) else {
+            return;
+        };
+        let (Some(force), Some(stamp)) = (raw.accel, besides.clock.read(raw)) else {
+            return;
+        };
+        let force = besides.resolved.force(force);
+        let scale = *besides
+            .force_scale
+            .get_or_insert_with(|| aiding::force_scale(&besides.resolved, force.norm()));
+        let place = self.rates.len();
+        self.beside
+            .push((place, stamp, Beside::Force(force * scale)));
+    }
+
+    fn take_field(&mut self, raw: &RawSample) {
+        let Some(besides) = self.besides.as_ref().filter(|b| b.has_field) else {
+            return;
+        };
+        let Some((field, stamp)) = raw.mag.zip(besides.clock.read(raw)) else {
+            return;
+        };
+        let field = Beside::Field(besides.resolved.field(field));
+        self.beside.push((self.rates.len(), stamp, field));
     }
 
     /// A payload that could not be decoded stood here in the stream.
@@ -256,6 +372,25 @@ impl Estimator {
     }
 
     fn propagate(&mut self, exec: &impl Executor) {
+        if self.beside.is_empty() {
+            self.push_rates(exec);
+            return;
+        }
+        let rates = std::mem::take(&mut self.rates);
+        let mut from = 0;
+        for (place, stamp, beside) in std::mem::take(&mut self.beside) {
+            self.rates
+                .extend_from_slice(rates.get(from..place).unwrap_or(&[]));
+            self.push_rates(exec);
+            self.integrator.take_beside(stamp, beside);
+            from = place;
+        }
+        self.rates
+            .extend_from_slice(rates.get(from..).unwrap_or(&[]));
+        self.push_rates(exec);
+    }
+
+    fn push_rates(&mut self, exec: &impl Executor) {
         match &mut self.regulariser {
             None => self.integrator.push(&self.rates, exec, &mut self.out),
             Some(regulariser) => {
@@ -321,6 +456,11 @@ impl Estimator {
     /// From the convention everything is computed in (ENU or start, FLU) to the one asked for. World
     /// and body change together.
     fn relabel(&mut self) {
+        if let Some(north) = &self.north {
+            for sample in &mut self.out {
+                sample.q_nb = (*north * sample.q_nb).normalised();
+            }
+        }
         let to = match self.world.convention() {
             None | Some(Convention::EnuFlu) => return,
             Some(to) => to,
@@ -339,6 +479,11 @@ fn conditioning(plan: &Plan, resolved: &Meaning, prepared: &Prepared) -> conditi
         truncation_step: prepared.truncation_step,
         ..settings
     }
+}
+
+/// True north in axes whose north is magnetic: what a magnetic attitude is turned by, from the left.
+fn turned_north(declination: f64) -> Quaternion<Nav, Nav> {
+    Quaternion::from_rotation_vector(&RotationVector(Vector3::z() * -declination))
 }
 
 /// A number for a text, the same in every release (FNV-1a).

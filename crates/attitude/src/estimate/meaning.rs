@@ -32,6 +32,8 @@ pub struct Meaning {
     pub interval_unit_given: bool,
     axes: Matrix3<f64>,
     mount: Matrix3<f64>,
+    /// Magnetometer to body axes.
+    mag_axes: Matrix3<f64>,
 }
 
 impl Meaning {
@@ -43,18 +45,23 @@ impl Meaning {
         let mount: Quaternion<Body, Sensor> = plan
             .mount
             .map_or_else(Quaternion::identity, Quaternion::assume_unit);
+        let axes = body
+            .c_bs()
+            .map_or_else(Matrix3::identity, |c| *c.as_matrix());
+        let mount = *mount.to_dcm().as_matrix();
+        let mag_mount = plan.mag_mount.map(Quaternion::<Body, Sensor>::assume_unit);
         Meaning {
+            mag_axes: mag_mount.map_or(mount * axes, |q| *q.to_dcm().as_matrix()),
             kind: plan.kind.or(declared.sample_kind).unwrap_or_default(),
             unit,
-            accel_scale: aiding::scale_of(declared.accel_unit),
+            accel_scale: aiding::scale_of(declared.accel_unit)
+                * if plan.is_accel_kinematic { -1.0 } else { 1.0 },
             accel_unit_stated: declared.accel_unit,
             recorded: orientation_convention(declared),
             interval: declared.interval.clone(),
             interval_unit_given: declared.interval_unit_given,
-            axes: body
-                .c_bs()
-                .map_or_else(Matrix3::identity, |c| *c.as_matrix()),
-            mount: *mount.to_dcm().as_matrix(),
+            axes,
+            mount,
             body,
         }
     }
@@ -77,6 +84,21 @@ impl Meaning {
             until: plan.until,
             ..Settings::default()
         }
+    }
+
+    /// A recorded rate in rad/s (or delta angle in rad) and body axes.
+    pub(super) fn rate(&self, recorded: [f64; 3]) -> Vector3<f64> {
+        self.mount * self.axes * Vector3::from(recorded) * self.unit.to_rad()
+    }
+
+    /// A recorded specific force in m/s^2 and body axes, as far as the format states its unit.
+    pub(super) fn force(&self, recorded: [f64; 3]) -> Vector3<f64> {
+        self.mount * self.axes * Vector3::from(recorded) * self.accel_scale
+    }
+
+    /// A recorded magnetic field in body axes.
+    pub(super) fn field(&self, recorded: [f64; 3]) -> Vector3<f64> {
+        self.mag_axes * Vector3::from(recorded)
     }
 
     /// World and body of the output as labels. NED comes with FRD, everything else with FLU.

@@ -48,6 +48,14 @@ pub struct Plan {
     pub noise: Noise,
     /// `--aid`.
     pub aid: Aid,
+    /// `--accel-sign`: the accelerometer says down at rest, not up.
+    pub is_accel_kinematic: bool,
+    /// Specific forces come by [`Estimator::take_force`](super::Estimator::take_force), not with the rates.
+    pub has_forces_beside: bool,
+    /// `--mag-mount`: magnetometer to body, `[w, x, y, z]`; `None` = as the gyro.
+    pub mag_mount: Option<[f64; 4]>,
+    /// `--declination`, rad: how far magnetic north lies east of true north.
+    pub declination: f64,
     /// `--undo-truncation`.
     pub truncation: Truncation,
     /// `--sensor-delay`, s.
@@ -69,6 +77,10 @@ pub enum Aid {
     None,
     /// The direction of gravity, from the accelerometer.
     Gravity,
+    /// The same, and the heading of the magnetic field.
+    GravityAndField,
+    /// Gravity where the stream carries a plausible specific force, else nothing.
+    Auto,
 }
 
 /// `--undo-truncation`: what becomes of rates that their driver cut towards zero.
@@ -88,7 +100,7 @@ pub enum Truncation {
 }
 
 impl Default for Plan {
-    /// What the command line's defaults say.
+    /// What the command line's defaults say, but for [`Aid::None`].
     fn default() -> Plan {
         Plan {
             method: Method::Auto,
@@ -107,6 +119,10 @@ impl Default for Plan {
             gyro_range: None,
             noise: Noise::preset(&NOISE_PRESETS[0]),
             aid: Aid::None,
+            is_accel_kinematic: false,
+            has_forces_beside: false,
+            mag_mount: None,
+            declination: 0.0,
             truncation: Truncation::Unsaid,
             sensor_delay_secs: 0.0,
             start: None,
@@ -148,6 +164,7 @@ impl Plan {
             ));
         }
         self.check_earth_rate()?;
+        self.check_field()?;
         if self.regularise_stamps && matches!(self.clock, Clock::Index { .. }) {
             return Err("--regularise-stamps: the stamps of --time index are even already\n  help: leave one of the two out".to_owned());
         }
@@ -160,6 +177,32 @@ impl Plan {
             ..propagate::Settings::default()
         })
         .map_err(|e| e.to_string())?;
+        Ok(())
+    }
+
+    /// A field needs stamps to find its gyro sample by, and a declination a field.
+    fn check_field(&self) -> Result<(), String> {
+        let has_field = self.aid == Aid::GravityAndField;
+        if self.declination != 0.0 && !has_field {
+            return Err("--declination: only a heading by the magnetic field has one\n  help: --aid gravity+mag".to_owned());
+        }
+        if self.declination.is_nan() || self.declination.abs() > std::f64::consts::PI {
+            return Err(
+                "--declination: degrees from -180 to 180, east of true north positive".to_owned(),
+            );
+        }
+        if self.mag_mount.is_some() && !has_field {
+            return Err(
+                "--mag-mount: no magnetic field is used\n  help: --aid gravity+mag".to_owned(),
+            );
+        }
+        let is_beside = has_field || self.has_forces_beside;
+        if is_beside && matches!(self.clock, Clock::Index { .. }) {
+            return Err("--time index: samples without stamps can not be paired with a field, or a specific force of its own\n  help: --time header, log or publish".to_owned());
+        }
+        if has_field && self.world == World::Level {
+            return Err("--world level: with a magnetic field the heading is that of north\n  help: --world enu, ned or nwu; --aid gravity for the heading of the start".to_owned());
+        }
         Ok(())
     }
 

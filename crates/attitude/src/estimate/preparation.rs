@@ -13,6 +13,7 @@ use crate::condition::stillness::{self, Limits, NoRest, Rests};
 use crate::condition::truncation::Grid;
 use crate::condition::{Clock, ClockWarning, choose_clock};
 use crate::frames::{Body, In, Nav};
+use crate::propagate::Method;
 use crate::quaternion::{Quaternion, YawPitchRoll};
 use crate::record::{Nanos, RawSample, SampleKind};
 use crate::worlds::{Convention, EARTH_RATE, World};
@@ -191,8 +192,21 @@ impl Preparation {
             warnings.push(format!("{mismatch}: what lies between is bridged"));
         }
         let rests = rest.map_or_else(|| Ok(Rests::default()), RestPass::finish)?;
-        let (initial, initial_origin, world) =
-            decide_initial(&plan, &resolved, &first, &rests, &mut warnings)?;
+        // The method of a daemon decides as a daemon: by the first sample.
+        let looked_at = match plan.method {
+            Method::Live { .. } | Method::CommitProvisional { .. } if plan.aid == Aid::Auto => {
+                first.get(..1).unwrap_or(&first)
+            }
+            _ => &first,
+        };
+        let aiding = Aiding::decide(&plan, &resolved, looked_at, &mut warnings)?;
+        let (initial, initial_origin, world) = decide_initial(
+            (&plan, aiding.as_ref()),
+            &resolved,
+            &first,
+            &rests,
+            &mut warnings,
+        )?;
         let earth = plan.latitude_deg.map(|deg| Earth::at(deg.to_radians()));
         let (bias, bias_sigma, bias_origin) =
             decide_bias(&plan, &rests, earth.map(|e| e.felt_by(&initial)))?;
@@ -211,8 +225,10 @@ impl Preparation {
             (Some(stamps), _) => stamps,
         };
         warnings.extend(earth.and_then(|e| e.heading_warning(plan.initial)));
-        let aiding = Aiding::decide(&plan, &resolved, &first, &mut warnings)?;
-        let truncation_step = decide_truncation(plan.truncation, rates.as_deref(), &mut warnings)?;
+        // What was gathered for an attitude that is aided is of no use to another.
+        let is_wanted = aiding.is_some() || plan.truncation != Truncation::Unsaid;
+        let rates = rates.as_deref().filter(|_| is_wanted);
+        let truncation_step = decide_truncation(plan.truncation, rates, &mut warnings)?;
         Ok(Prepared {
             aiding,
             truncation_step,
@@ -241,10 +257,12 @@ pub fn at_once(plan: &Plan, resolved: &Meaning, first: &RawSample) -> Result<Pre
     }
     let rests = Rests::default();
     let mut warnings = Vec::new();
+    let first_alone = std::slice::from_ref(first);
+    let aiding = Aiding::decide(plan, resolved, first_alone, &mut warnings)?;
     let (initial, initial_origin, world) = decide_initial(
-        plan,
+        (plan, aiding.as_ref()),
         resolved,
-        std::slice::from_ref(first),
+        first_alone,
         &rests,
         &mut warnings,
     )?;
@@ -259,7 +277,6 @@ pub fn at_once(plan: &Plan, resolved: &Meaning, first: &RawSample) -> Result<Pre
     } else {
         Stamps::AsRecorded
     };
-    let aiding = Aiding::decide(plan, resolved, std::slice::from_ref(first), &mut warnings)?;
     Ok(Prepared {
         aiding,
         truncation_step: decide_truncation(plan.truncation, None, &mut warnings)?,
@@ -370,7 +387,7 @@ fn decide_bias(
 }
 
 fn decide_initial(
-    plan: &Plan,
+    (plan, aiding): (&Plan, Option<&Aiding>),
     resolved: &Meaning,
     gathered: &[RawSample],
     rests: &Rests,
@@ -379,13 +396,27 @@ fn decide_initial(
     // What the user gives is in the convention of the world asked for.
     let asked = plan.world.convention().unwrap_or(Convention::EnuFlu);
     let inside = |q: Quaternion<Nav, Body>| asked.convert(Convention::EnuFlu, q);
-    // Gravity gives the vertical, whatever it starts from.
-    let world = match (plan.aid, plan.world) {
-        (Aid::Gravity, World::Start) => World::Level,
+    let has_field = aiding.is_some_and(|aiding| aiding.settings.has_field);
+    // Gravity gives the vertical, whatever it starts from, and a field north.
+    let world = match (aiding, plan.world) {
+        (Some(_), World::Start) if has_field => World::Enu,
+        (Some(_), World::Start) => World::Level,
         (_, asked) => asked,
     };
     match plan.initial {
-        Initial::Identity if plan.aid == Aid::Gravity => {
+        Initial::Identity | Initial::Gravity if has_field => {
+            if plan.declination == 0.0 {
+                warnings.push(format!(
+                    "{world}: north is magnetic north; --declination DEG makes it true north"
+                ));
+            }
+            Ok((
+                Quaternion::identity(),
+                "level from the first specific force, north by the field".to_owned(),
+                world,
+            ))
+        }
+        Initial::Identity if aiding.is_some() => {
             if world != World::Level {
                 warnings.push(format!(
                     "the heading at the first sample was taken as 0 in {world}: gravity does not tell it; --init first-orientation, q=.. or rpy=.. gives a real one"

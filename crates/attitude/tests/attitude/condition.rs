@@ -220,6 +220,7 @@ fn any_sample() -> impl Strategy<Value = RawSample> {
             gyro,
             accel,
             orientation: None,
+            mag: None,
             interval_nanos,
         })
 }

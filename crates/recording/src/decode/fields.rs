@@ -11,6 +11,8 @@ pub enum FieldRole {
     Gyro,
     /// Specific force: three numbers.
     Accel,
+    /// Magnetic field: three numbers.
+    Mag,
     /// Orientation: an object with `w`, `x`, `y`, `z`, or four paths in this order.
     Orientation,
     /// The instant of the sample.
@@ -26,6 +28,7 @@ impl FieldRole {
         match self {
             FieldRole::Gyro => "gyro",
             FieldRole::Accel => "accel",
+            FieldRole::Mag => "mag",
             FieldRole::Orientation => "orientation",
             FieldRole::Stamp => "stamp",
             FieldRole::Interval => "dt",
@@ -36,6 +39,7 @@ impl FieldRole {
         [
             FieldRole::Gyro,
             FieldRole::Accel,
+            FieldRole::Mag,
             FieldRole::Orientation,
             FieldRole::Stamp,
             FieldRole::Interval,
@@ -47,7 +51,7 @@ impl FieldRole {
     /// How many scalars it is made of, when they are given one by one.
     fn scalars(self) -> usize {
         match self {
-            FieldRole::Gyro | FieldRole::Accel => 3,
+            FieldRole::Gyro | FieldRole::Accel | FieldRole::Mag => 3,
             FieldRole::Orientation => 4,
             FieldRole::Stamp | FieldRole::Interval => 1,
         }
@@ -108,7 +112,7 @@ impl std::str::FromStr for FieldPath {
             .split_once('=')
             .ok_or_else(|| bad("write it as role=path, for example gyro=imu.angular_velocity"))?;
         let role = FieldRole::named(role.trim())
-            .ok_or_else(|| bad("the roles are gyro, accel, orientation, stamp, dt"))?;
+            .ok_or_else(|| bad("the roles are gyro, accel, mag, orientation, stamp, dt"))?;
         let (list, unit) = match right.rsplit_once(':') {
             None => (right, None),
             Some(_) if !matches!(role, FieldRole::Stamp | FieldRole::Interval) => {

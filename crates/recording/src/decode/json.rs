@@ -18,7 +18,7 @@ use super::registers::Form;
 use super::schema::{last_name, ros_name};
 use super::select::names::{Px4, px4};
 use super::stamp::Bare;
-use super::{Decoded, MAX_BATCH, Options, Undecodable};
+use super::{Decoded, MAX_BATCH, Options, Undecodable, Wanted};
 use crate::text::printable;
 use find::Seeker;
 use found::{Found, Instant, StampRule};
@@ -33,7 +33,8 @@ pub(crate) struct Plan {
     /// The paths of `--field`.
     pub(crate) trie: Trie,
     pub(crate) px4: Option<Px4>,
-    /// The channel's type is `Vector3Stamped`: its `vector` may be a body rate.
+    pub(crate) wanted: Wanted,
+    /// The channel's type is `Vector3Stamped`: its `vector` is what is wanted, or may be a body rate.
     pub(crate) vector_stamped: bool,
     pub(crate) child: Option<String>,
     pub(crate) form: Form,
@@ -50,6 +51,7 @@ impl Plan {
         Plan {
             trie: Trie::new(&options.fields),
             px4: px4(type_name),
+            wanted: options.wanted,
             vector_stamped: last_name(&ros_name(type_name)) == "Vector3Stamped",
             child: options.child_frame.clone(),
             form: Form {

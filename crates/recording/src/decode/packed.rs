@@ -6,11 +6,11 @@
 //!
 //! ```text
 //!        0 u8 mark 0xF8 | 1 u8 kind | 2 u16 length, of all | 4 u32 stream | 8 u64 seq | 16 i64 stamp ns
-//! RATE 1 24 3 x f64 gyro (48) | 48 3 x f64 accel (72) | 72 i64 interval ns (80)
+//! RATE 1 24 3 x f64 gyro (48) | 48 3 x f64 accel (72) | 72 i64 interval ns (80) | 80 3 x f64 mag (104)
 //! ATT  2 24 4 x f64 q w, x, y, z | 56 3 x f64 rate | 80 3 x f64 sigma_deg | 104 u32 status | 108 u32 reset (112)
 //! ```
 //!
-//! A `RATE` may end after any of its three parts. What is longer than known is read by its known part. In
+//! A `RATE` may end after any of its four parts. What is longer than known is read by its known part. In
 //! a vector NaN is no data, as `null` in a line.
 
 use strapd_attitude::record::{AttitudeSample, Nanos, RawSample};
@@ -21,8 +21,8 @@ pub const MARK: u8 = 0xF8;
 pub const HEAD: usize = 8;
 /// Bytes of an attitude.
 pub const ATT: usize = 112;
-/// Bytes of a sample, with a specific force, and with an interval too.
-pub const RATE: [usize; 3] = [48, 72, 80];
+/// Bytes of a sample, with a specific force, with an interval too, and with a magnetic field.
+pub const RATE: [usize; 4] = [48, 72, 80, 104];
 /// The stamp, or interval, that is none.
 pub const NO_TIME: i64 = i64::MIN;
 /// The sequence number that is none.
@@ -176,6 +176,7 @@ pub fn read(object: &[u8], received: Nanos) -> Result<Object, Unreadable> {
             publish: received,
             gyro: some_vector(floats_at(object, 24)?),
             accel: floats_at(object, 48).and_then(some_vector),
+            mag: floats_at(object, 80).and_then(some_vector),
             orientation: None,
             interval_nanos: u64_at(object, 72).and_then(|n| some_time(n.cast_signed())),
         };
@@ -205,9 +206,9 @@ pub fn push_attitude(out: &mut Vec<u8>, stream: u32, seq: u64, sample: &Attitude
 /// Appends a sample, number `seq` of its stream, as short as what it has allows. Stamped as its line
 /// would be: with its own stamp, else with when it was logged.
 pub fn push_sample(out: &mut Vec<u8>, stream: u32, seq: u64, sample: &RawSample) {
-    let [bare, with_accel, with_interval] = RATE;
+    let [bare, with_accel, with_interval, with_mag] = RATE;
     let stamp = sample.header.unwrap_or(sample.log).0;
-    let mut object = [0; RATE[2]];
+    let mut object = [0; RATE[3]];
     put_floats(&mut object, 24, sample.gyro.unwrap_or([f64::NAN; 3]));
     put_floats(&mut object, 48, sample.accel.unwrap_or([f64::NAN; 3]));
     put(
@@ -215,10 +216,12 @@ pub fn push_sample(out: &mut Vec<u8>, stream: u32, seq: u64, sample: &RawSample)
         72,
         sample.interval_nanos.unwrap_or(NO_TIME).to_le_bytes(),
     );
-    let length = match (sample.accel, sample.interval_nanos) {
-        (None, None) => bare,
-        (Some(_), None) => with_accel,
-        (_, Some(_)) => with_interval,
+    put_floats(&mut object, 80, sample.mag.unwrap_or([f64::NAN; 3]));
+    let length = match (sample.accel, sample.interval_nanos, sample.mag) {
+        (_, _, Some(_)) => with_mag,
+        (_, Some(_), None) => with_interval,
+        (Some(_), None, None) => with_accel,
+        (None, None, None) => bare,
     };
     let object = &mut object[..length];
     begin(object, KIND_RATE, stream, seq, stamp);
@@ -380,13 +383,19 @@ mod tests {
         let received = Nanos(5);
         for gyro in [None, Some([0.1, -0.2, 5e-324])] {
             for accel in [None, Some([0.0, -0.0, 9.81])] {
-                for interval_nanos in [None, Some(0), Some(-7)] {
+                for (interval_nanos, mag) in [
+                    (None, None),
+                    (Some(0), None),
+                    (Some(-7), Some([2e-5, -0.0, 4.5e-5])),
+                    (None, Some([1.0, 2.0, 3.0])),
+                ] {
                     let raw = RawSample {
                         header: Some(Nanos(-3)),
                         log: received,
                         publish: received,
                         gyro,
                         accel,
+                        mag,
                         orientation: None,
                         interval_nanos,
                     };

@@ -31,10 +31,14 @@ impl Slot {
     pub(crate) const INTERVAL: Slot = Slot(14);
     /// The interval of a delta velocity.
     pub(crate) const ACCEL_INTERVAL: Slot = Slot(15);
+    /// x of the magnetic field; y, z follow.
+    pub(crate) const MAG: Slot = Slot(16);
+    /// First element of its covariance.
+    pub(crate) const MAG_MARK: Slot = Slot(19);
     /// A stamp's seconds, or its only integer.
-    pub(crate) const STAMP: Slot = Slot(16);
+    pub(crate) const STAMP: Slot = Slot(20);
     /// A stamp's nanoseconds.
-    pub(crate) const STAMP_NANOS: Slot = Slot(17);
+    pub(crate) const STAMP_NANOS: Slot = Slot(21);
 
     /// The slot `n` further on.
     pub(crate) fn plus(self, n: u8) -> Slot {
@@ -52,10 +56,13 @@ impl Slot {
     }
 }
 
+/// Places for floating-point numbers: a power of two, so that a mask is the bound.
+const FLOATS: usize = 32;
+
 /// The numbers themselves, and which of them the payload had.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Registers {
-    floats: [f64; 16],
+    floats: [f64; FLOATS],
     integers: [i64; 2],
     /// One bit for each slot.
     pub(crate) seen: u32,
@@ -65,15 +72,15 @@ impl Registers {
     /// Puts a floating-point number.
     #[inline]
     pub(crate) fn float(&mut self, slot: Slot, value: f64) {
-        // The mask is the bound: slots are made by this crate, and below 16 here.
-        self.floats[usize::from(slot.0 & 15)] = value;
+        // The mask is the bound: slots are made by this crate, and lower here.
+        self.floats[usize::from(slot.0) & (FLOATS - 1)] = value;
         self.seen |= 1 << (slot.0 & 31);
     }
 
     /// Puts floating-point numbers in a row.
     #[inline]
     pub(crate) fn floats<const N: usize>(&mut self, slot: Slot, values: [f64; N]) {
-        let from = usize::from(slot.0 & 15);
+        let from = usize::from(slot.0) & (FLOATS - 1);
         if let Some(row) = self.floats.get_mut(from..from + N) {
             row.copy_from_slice(&values);
             self.seen |= slot.bits(N as u32);
@@ -111,7 +118,7 @@ impl Registers {
 
     #[inline]
     fn get(&self, slot: Slot) -> f64 {
-        self.floats[usize::from(slot.0 & 15)]
+        self.floats[usize::from(slot.0) & (FLOATS - 1)]
     }
 
     #[inline]
@@ -206,6 +213,9 @@ impl Form {
             publish,
             gyro,
             accel,
+            mag: registers
+                .vector(Slot::MAG)
+                .filter(|_| !marked(Slot::MAG_MARK) || self.ignore_covariance_flag),
             orientation: registers
                 .has(Slot::ORIENTATION, 4)
                 .then_some(())

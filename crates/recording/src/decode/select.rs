@@ -7,6 +7,7 @@ pub(crate) mod names;
 pub(crate) mod search;
 mod shapes;
 
+use super::Wanted;
 use super::fields::{FieldPath, FieldRole, Segment};
 use super::registers::{Form, Slot, StampForm};
 use super::schema::{Field, Kind, Many, Schema, Struct};
@@ -120,7 +121,7 @@ pub(crate) fn select(
     let mut given: Vec<&FieldPath> = options.fields.iter().collect();
     given.sort_by_key(|field| field.role);
     for field in given {
-        take_given(schema, field, &mut selection)?;
+        take_given(schema, field, options.wanted, &mut selection)?;
     }
     selection.given = selection.picks.len();
     search::complete(schema, type_name, options, &mut selection);
@@ -129,7 +130,12 @@ pub(crate) fn select(
     Ok(selection)
 }
 
-fn take_given(schema: &Schema, field: &FieldPath, selection: &mut Selection) -> Result<(), String> {
+fn take_given(
+    schema: &Schema,
+    field: &FieldPath,
+    wanted: Wanted,
+    selection: &mut Selection,
+) -> Result<(), String> {
     let nowhere = |path: &str| {
         let list = search::available(schema, field.role);
         let list = if list.is_empty() {
@@ -153,6 +159,7 @@ fn take_given(schema: &Schema, field: &FieldPath, selection: &mut Selection) -> 
     let slot = match field.role {
         FieldRole::Gyro => Slot::GYRO,
         FieldRole::Accel => Slot::ACCEL,
+        FieldRole::Mag => Slot::MAG,
         FieldRole::Orientation => Slot::ORIENTATION,
         FieldRole::Stamp => return take_stamp(schema, field, &ends, selection, &nowhere),
         FieldRole::Interval => Slot::INTERVAL,
@@ -169,7 +176,7 @@ fn take_given(schema: &Schema, field: &FieldPath, selection: &mut Selection) -> 
         all.then(|| ends.into_iter().map(|(path, _)| path).collect())
     };
     selection.take(paths.ok_or_else(|| nowhere(&field.text))?, slot);
-    if field.role == FieldRole::Gyro {
+    if field.role == wanted.vector().0 {
         selection.found = Found::Given;
     }
     if matches!(field.role, FieldRole::Gyro | FieldRole::Orientation) && selection.batch.is_none() {

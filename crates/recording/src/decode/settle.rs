@@ -8,7 +8,7 @@ use super::json;
 use super::registers::{Form, Slot, StampForm};
 use super::select::Found;
 use super::stamp::{Ambiguous, Bare, MOST_WAITING, Told, unit_in_log};
-use super::{Decoder, FieldRole, Plan, Unsupported, unsupported};
+use super::{Decoder, FieldRole, Plan, Unsupported, Wanted, nothing_wanted, unsupported};
 use crate::text::printable;
 use strapd_attitude::record::Nanos;
 use strapd_attitude::record::TimeUnit;
@@ -147,9 +147,13 @@ impl Decoder {
         };
         let stamped = if one.stamp.is_some() { one } else { &learnt };
         let unit = stamped.unlabelled().map(|bare| settled_unit(bare, log));
+        let wanted = self.options.wanted;
+        let (_, slot) = wanted.vector();
+        let is_reference = wanted == Wanted::Rates && one.has_orientation();
         let missing = self.options.fields.iter().find(|field| match field.role {
             FieldRole::Gyro => !one.has_gyro(),
             FieldRole::Accel => !one.registers.has(Slot::ACCEL, 3),
+            FieldRole::Mag => !one.registers.has(Slot::MAG, 3),
             FieldRole::Orientation => !one.has_orientation(),
             FieldRole::Stamp => stamped.stamp.is_none(),
             FieldRole::Interval => !one.registers.has(Slot::INTERVAL, 1),
@@ -160,15 +164,15 @@ impl Decoder {
                 field.role.name(),
                 printable(&field.text)
             )),
-            None if !one.has_gyro() && !one.has_orientation() => Some(
-                "the message has no body rate and no orientation under a name this program knows"
-                    .to_owned(),
-            ),
+            None if !one.registers.has(slot, 3) && !is_reference => {
+                Some(nothing_wanted("message", wanted).0)
+            }
             None => None,
         };
         let stated = &mut self.stated;
         stated.has_gyro = one.has_gyro();
         stated.has_accel = one.registers.has(Slot::ACCEL, 3);
+        stated.has_mag = one.registers.has(Slot::MAG, 3);
         stated.has_orientation = one.has_orientation();
         stated.has_stamp = stamped.stamp.is_some();
         stated.has_interval = one.registers.has(Slot::INTERVAL, 1);
@@ -201,7 +205,7 @@ impl Decoder {
                 Err(unsupported(
                     &self.label,
                     format!("{why}; its keys: {keys}"),
-                    "name it: --field gyro=PATH",
+                    nothing_wanted("message", wanted).1,
                 ))
             }
         }

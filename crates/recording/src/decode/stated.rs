@@ -17,6 +17,8 @@ pub struct Stated {
     pub has_gyro: bool,
     /// Whether they carry a specific force.
     pub has_accel: bool,
+    /// Whether they carry a magnetic field.
+    pub has_mag: bool,
     /// Whether they carry an orientation.
     pub has_orientation: bool,
     /// Whether they carry a stamp of their own.

@@ -7,7 +7,7 @@ use super::trie::Target;
 use crate::decode::fields::FieldRole;
 use crate::decode::registers::Slot;
 use crate::decode::select::names::{Meaning, Px4, is_nanos, is_seconds, meaning};
-use crate::decode::{MAX_BATCH, Undecodable};
+use crate::decode::{MAX_BATCH, Undecodable, Wanted};
 use std::borrow::Cow;
 use strapd_attitude::record::SampleKind;
 use strapd_attitude::record::TimeUnit;
@@ -24,6 +24,7 @@ pub(crate) struct Seeker<'a, 'p> {
     plan: &'p Plan,
     auto_gyro: bool,
     auto_accel: bool,
+    auto_mag: bool,
     auto_orientation: bool,
     auto_stamp: bool,
     auto_interval: bool,
@@ -46,6 +47,7 @@ impl<'a, 'p> Seeker<'a, 'p> {
             plan,
             auto_gyro: auto(FieldRole::Gyro),
             auto_accel: auto(FieldRole::Accel),
+            auto_mag: auto(FieldRole::Mag),
             auto_orientation: auto(FieldRole::Orientation),
             auto_stamp: auto(FieldRole::Stamp),
             auto_interval: auto(FieldRole::Interval),
@@ -126,6 +128,7 @@ impl<'a, 'p> Seeker<'a, 'p> {
                 let vector = self.vector(1, found)?;
                 match (role, vector) {
                     (FieldRole::Gyro, Some(v)) => found.gyro(0, None, None, v),
+                    (FieldRole::Mag, Some(v)) => found.vector(Slot::MAG, v),
                     (_, Some(v)) => found.vector(Slot::ACCEL, v),
                     _ => {}
                 }
@@ -162,6 +165,16 @@ impl<'a, 'p> Seeker<'a, 'p> {
             Some(Meaning::AccelAxis { axis }) if self.auto_accel => {
                 if let Some(value) = self.scanner.float()? {
                     found.registers.float(Slot::ACCEL.plus(axis), value);
+                }
+            }
+            Some(Meaning::Mag) if self.auto_mag => {
+                if let Some(v) = self.vector(1, &mut Found::default())? {
+                    found.vector(Slot::MAG, v);
+                }
+            }
+            Some(Meaning::MagAxis { axis }) if self.auto_mag => {
+                if let Some(value) = self.scanner.float()? {
+                    found.registers.float(Slot::MAG.plus(axis), value);
                 }
             }
             Some(Meaning::Orientation { .. }) if self.auto_orientation => {
@@ -207,7 +220,11 @@ impl<'a, 'p> Seeker<'a, 'p> {
         });
         match key {
             "angular" if twist => gyro,
-            "vector" if self.plan.vector_stamped => gyro,
+            "vector" if self.plan.vector_stamped => match self.plan.wanted {
+                Wanted::Rates => gyro,
+                Wanted::Forces => Some(Meaning::Accel { rank: 5 }),
+                Wanted::Fields => Some(Meaning::Mag),
+            },
             "xyz" if self.plan.px4 == Some(Px4::VehicleAngularVelocity) => gyro,
             _ => meaning(key),
         }
@@ -219,6 +236,7 @@ impl<'a, 'p> Seeker<'a, 'p> {
         match (key, first) {
             ("angular_velocity_covariance", Some(b'[')) => self.mark(Slot::GYRO_MARK, found),
             ("linear_acceleration_covariance", Some(b'[')) => self.mark(Slot::ACCEL_MARK, found),
+            ("magnetic_field_covariance", Some(b'[')) => self.mark(Slot::MAG_MARK, found),
             ("orientation_covariance", Some(b'[')) => self.mark(Slot::ORIENTATION_MARK, found),
             ("values", Some(b'[' | b'{')) => {
                 let values = match first {

@@ -38,6 +38,7 @@ impl Trie {
             let base = match field.role {
                 FieldRole::Gyro => Slot::GYRO,
                 FieldRole::Accel => Slot::ACCEL,
+                FieldRole::Mag => Slot::MAG,
                 FieldRole::Orientation => Slot::ORIENTATION,
                 FieldRole::Stamp | FieldRole::Interval => Slot::INTERVAL,
             };

@@ -130,6 +130,7 @@ fn sample<const BIG: bool>(
             outcome,
         ),
         accel: (!accel_is_absent).then(|| [double(25), double(26), double(27)]),
+        mag: None,
         orientation: form.orientation(
             [double(3), double(0), double(1), double(2)],
             is_mark(double(4)),

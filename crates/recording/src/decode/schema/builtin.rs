@@ -43,6 +43,10 @@ const LAYOUTS: &[(&str, &str)] = &[
          geometry_msgs/Vector3 linear_acceleration;float64[9] linear_acceleration_covariance",
     ),
     (
+        "sensor_msgs/MagneticField",
+        "std_msgs/Header header;geometry_msgs/Vector3 magnetic_field;float64[9] magnetic_field_covariance",
+    ),
+    (
         "geometry_msgs/Vector3Stamped",
         "std_msgs/Header header;Vector3 vector",
     ),

@@ -25,6 +25,10 @@ pub(crate) enum Meaning {
     DeltaVelocity,
     /// One axis of a specific force.
     AccelAxis { axis: u8 },
+    /// A magnetic field, x, y, z.
+    Mag,
+    /// One axis of a magnetic field.
+    MagAxis { axis: u8 },
     /// An orientation.
     Orientation { rank: u8 },
     /// A stamp.
@@ -94,6 +98,22 @@ fn gyro_tail(tail: &str, rank: u8) -> Option<Meaning> {
         Some(axis) => Meaning::GyroAxis { axis, rank, unit },
         None => Meaning::Gyro { rank, unit },
     })
+}
+
+/// A magnetic field whose name goes on with an axis, a unit, or both: its unit says nothing about north.
+fn mag_tail(tail: &str) -> Option<Meaning> {
+    let (axis, tail) = match tail.as_bytes().first() {
+        Some(letter @ b'x'..=b'z') => (Some(letter - b'x'), tail.get(1..)?),
+        _ => (None, tail),
+    };
+    match (axis, tail) {
+        (None, "raw" | "data" | "calibrated") => Some(Meaning::Mag),
+        (
+            axis,
+            "" | "t" | "ut" | "nt" | "mt" | "g" | "ga" | "mg" | "gauss" | "tesla" | "microtesla",
+        ) => Some(axis.map_or(Meaning::Mag, |axis| Meaning::MagAxis { axis })),
+        _ => None,
+    }
 }
 
 fn accel_tail(tail: &str, rank: u8) -> Option<Meaning> {
@@ -166,6 +186,16 @@ fn misc_names(name: &str) -> Option<Meaning> {
         "rotation" => Some(Meaning::Orientation { rank: 2 }),
         "rate" | "rates" => gyro(2),
         "rollspeed" => gyro_tail("x", 3),
+        "mx" | "my" | "mz" => mag_tail(name.get(1..)?),
+        _ if name.starts_with("mag") => [
+            "magneticfield",
+            "magnetometer",
+            "magfield",
+            "magnetic",
+            "mag",
+        ]
+        .into_iter()
+        .find_map(|head| mag_tail(name.strip_prefix(head)?)),
         "measurementtime" => Some(Meaning::Stamp {
             rank: 3,
             unit: TimeUnit::ByMagnitude,
@@ -187,7 +217,7 @@ fn rare_names(name: &str) -> Option<Meaning> {
         "wx" | "wy" | "wz" => gyro_tail(name.get(1..)?, 3),
         "pitchspeed" => gyro_tail("y", 3),
         "yawspeed" => gyro_tail("z", 3),
-        "ygyro" | "yacc" => axis_first(name),
+        "ygyro" | "yacc" | "ymag" => axis_first(name),
         _ => gyro_tail(
             name.strip_prefix("omega")
                 .or_else(|| name.strip_prefix("imugyro"))?,
@@ -206,6 +236,7 @@ fn axis_first(name: &str) -> Option<Meaning> {
             unit: None,
         }),
         "acc" => Some(Meaning::AccelAxis { axis }),
+        "mag" => Some(Meaning::MagAxis { axis }),
         _ => None,
     }
 }
@@ -257,6 +288,12 @@ pub(crate) enum Px4 {
     VehicleAngularVelocity,
     /// `x`, `y`, `z` at `timestamp_sample`.
     SensorGyro,
+    /// The same of specific force, m/s^2.
+    SensorAccel,
+    /// The same of the magnetic field, gauss.
+    SensorMag,
+    /// `magnetometer_ga`.
+    VehicleMagnetometer,
     /// `q` as w, x, y, z: FRD to NED.
     VehicleAttitude,
 }
@@ -270,6 +307,9 @@ pub(crate) fn px4(type_name: &str) -> Option<Px4> {
         b"vehicleimu" => Some(Px4::VehicleImu),
         b"vehicleangularvelocity" => Some(Px4::VehicleAngularVelocity),
         b"sensorgyro" => Some(Px4::SensorGyro),
+        b"sensoraccel" => Some(Px4::SensorAccel),
+        b"sensormag" => Some(Px4::SensorMag),
+        b"vehiclemagnetometer" => Some(Px4::VehicleMagnetometer),
         b"vehicleattitude" => Some(Px4::VehicleAttitude),
         _ => None,
     }
@@ -296,6 +336,12 @@ mod tests {
                 unit: Some(GyroUnit::Rad)
             })
         );
+        for name in ["magnetic_field", "mag", "magnetometer_ga", "mag_uT"] {
+            assert_eq!(meaning(name), Some(Meaning::Mag), "{name}");
+        }
+        for name in ["my", "mag_y", "ymag", "magnetometer_y_uT"] {
+            assert_eq!(meaning(name), Some(Meaning::MagAxis { axis: 1 }), "{name}");
+        }
         let stamp = |rank, unit| Some(Meaning::Stamp { rank, unit });
         assert_eq!(meaning("timestamp_us"), stamp(1, TimeUnit::Micro));
         assert_eq!(meaning("t_ns"), stamp(3, TimeUnit::Nano));
@@ -312,7 +358,9 @@ mod tests {
             "gyro_bias_x",
             "accelerometer_timestamp_relative",
             "xyz",
-            "mag",
+            "magnitude",
+            "magnetic_declination",
+            "mag_device_id",
             "temperature",
             "timestamp_valid",
             "tag",

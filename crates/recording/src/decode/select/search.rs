@@ -6,10 +6,10 @@
 use super::names::{self, Meaning, Px4};
 use super::shapes::{end_of, quaternion, stamp_at, stamp_in, structs_on, text_near, vector, with};
 use super::{End, Found, Pick, Selection, StampFields, Step, batch_of, path_text, px4_stamp};
-use crate::decode::Options;
 use crate::decode::fields::FieldRole;
 use crate::decode::registers::{Slot, StampForm};
 use crate::decode::schema::{Field, Kind, Many, Schema, Struct, last_name};
+use crate::decode::{Options, Wanted};
 use std::collections::{BTreeSet, VecDeque};
 use strapd_attitude::condition::GyroUnit;
 use strapd_attitude::record::SampleKind;
@@ -42,13 +42,16 @@ pub(super) fn complete(
     let given = selection.found == Found::Given;
     let around = if given {
         selection.picks.first().map(|p| p.path.clone())
-    } else {
+    } else if options.wanted == Wanted::Rates {
         find_gyro(schema, &sites, px4, selection)
+    } else {
+        find_alone(schema, &sites, px4, options.wanted, selection)
     };
-    if let Some(path) = &around {
+    let is_rate = options.wanted == Wanted::Rates;
+    if let Some(path) = around.as_ref().filter(|_| is_rate) {
         beside_gyro(schema, path, given, selection);
     }
-    if !selection.has(Slot::ORIENTATION, 4) {
+    if is_rate && !selection.has(Slot::ORIENTATION, 4) {
         find_orientation(schema, &sites, px4, by_child, selection);
     }
     let around = around.or_else(|| {
@@ -312,6 +315,7 @@ fn beside_gyro(schema: &Schema, gyro: &[Step], given: bool, selection: &mut Sele
     };
     let named = gyro.get(site.len()).copied();
     let mut accel_axes: [Option<Vec<Step>>; 3] = [None, None, None];
+    let mut mag_axes: [Option<Vec<Step>>; 3] = [None, None, None];
     let mut velocity = None;
     for (index, field) in structure.fields.iter().enumerate() {
         let step = Step::Field(index);
@@ -326,6 +330,17 @@ fn beside_gyro(schema: &Schema, gyro: &[Step], given: bool, selection: &mut Sele
                     selection.take(paths, Slot::ACCEL);
                     selection.describe(FieldRole::Accel, schema, &path);
                     take_mark(structure, field, &site, Slot::ACCEL_MARK, selection);
+                }
+            }
+            Some(Meaning::Mag) if !selection.has(Slot::MAG, 3) => {
+                if let Some(paths) = vector(schema, &path, End::from(field), 2) {
+                    selection.take(paths, Slot::MAG);
+                    selection.describe(FieldRole::Mag, schema, &path);
+                }
+            }
+            Some(Meaning::MagAxis { axis }) if number => {
+                if let Some(slot) = mag_axes.get_mut(usize::from(axis)) {
+                    slot.get_or_insert(path);
                 }
             }
             Some(Meaning::DeltaVelocity) => velocity = vector(schema, &path, End::from(field), 2),
@@ -364,7 +379,82 @@ fn beside_gyro(schema: &Schema, gyro: &[Step], given: bool, selection: &mut Sele
     if let ([Some(x), Some(y), Some(z)], false) = (accel_axes, selection.has(Slot::ACCEL, 3)) {
         selection.take(vec![x, y, z], Slot::ACCEL);
     }
+    if let ([Some(x), Some(y), Some(z)], false) = (mag_axes, selection.has(Slot::MAG, 3)) {
+        selection.take(vec![x, y, z], Slot::MAG);
+    }
     take_delta_velocity(structure, &site, velocity, selection);
+}
+
+/// The vector of a message without a body rate: a specific force, or a magnetic field. The shallowest counts.
+fn find_alone(
+    schema: &Schema,
+    sites: &[Site],
+    px4: Option<Px4>,
+    wanted: Wanted,
+    selection: &mut Selection,
+) -> Option<Vec<Step>> {
+    let (role, slot) = wanted.vector();
+    let is_root = matches!(
+        (px4, wanted),
+        (Some(Px4::SensorAccel), Wanted::Forces) | (Some(Px4::SensorMag), Wanted::Fields)
+    );
+    for site in sites {
+        let structure = schema.get(site.structure)?;
+        let mut axes: [Option<Vec<Step>>; 3] = [None, None, None];
+        let mut found = None;
+        let is_vector = last_name(&structure.name) == "Vector3Stamped";
+        for (index, field) in structure.fields.iter().enumerate() {
+            let path = with(&site.path, Step::Field(index));
+            let axis = match (names::meaning(&field.name), wanted) {
+                (Some(Meaning::Accel { .. }), Wanted::Forces)
+                | (Some(Meaning::Mag), Wanted::Fields) => {
+                    let paths = vector(schema, &path, End::from(field), 2);
+                    found = found.or(paths.map(|paths| (paths, path, Some(field))));
+                    continue;
+                }
+                _ if is_vector && field.name == "vector" => {
+                    let paths = vector(schema, &path, End::from(field), 0);
+                    found = found.or(paths.map(|paths| (paths, path, None)));
+                    continue;
+                }
+                (Some(Meaning::AccelAxis { axis }), Wanted::Forces)
+                | (Some(Meaning::MagAxis { axis }), Wanted::Fields) => axis,
+                _ if is_root && site.depth == 0 => match field.name.as_str() {
+                    "x" => 0,
+                    "y" => 1,
+                    "z" => 2,
+                    _ => continue,
+                },
+                _ => continue,
+            };
+            if let (Some(place), Some(_)) =
+                (axes.get_mut(usize::from(axis)), End::from(field).number())
+            {
+                place.get_or_insert(path);
+            }
+        }
+        if let [Some(x), Some(y), Some(z)] = axes {
+            found = found.or(Some((vec![x.clone(), y, z], x, None)));
+        }
+        if let Some((paths, whole, marked)) = found {
+            selection.found = Found::Named;
+            selection.holder = structure.name.clone();
+            selection.batch = paths.first().and_then(|path| batch_of(schema, path));
+            selection.describe(role, schema, &whole);
+            if let Some(field) = marked {
+                let mark = if wanted == Wanted::Forces {
+                    Slot::ACCEL_MARK
+                } else {
+                    Slot::MAG_MARK
+                };
+                take_mark(structure, field, &site.path, mark, selection);
+            }
+            let first = paths.first().cloned();
+            selection.take(paths, slot);
+            return first;
+        }
+    }
+    None
 }
 
 /// A delta velocity is a specific force only with its interval.
@@ -483,7 +573,9 @@ pub(super) fn available(schema: &Schema, role: FieldRole) -> Vec<String> {
             let path = with(&site.path, Step::Field(index));
             let end = End::from(field);
             let fits = match role {
-                FieldRole::Gyro | FieldRole::Accel => vector(schema, &path, end, 0).is_some(),
+                FieldRole::Gyro | FieldRole::Accel | FieldRole::Mag => {
+                    vector(schema, &path, end, 0).is_some()
+                }
                 FieldRole::Orientation => quaternion(schema, &path, end).is_some(),
                 FieldRole::Stamp => {
                     stamp_at(schema, &path, end, TimeUnit::ByMagnitude, 2).is_some()

@@ -1,0 +1,100 @@
+//! The first forces of a stream -> whether they are specific forces at all. Pure.
+//!
+//! A stage of its own because nothing else can tell: an acceleration without gravity, as phones export it, levels
+//! to anything, and the filter would believe it.
+//!
+//! In a frame that does not turn, the mean specific force over `T` is gravity and the change of velocity over
+//! `T`: a body that walks, runs or is shaken passes after a second or a few, and no length of a single sample
+//! has to be gravity's.
+
+use nalgebra::Vector3;
+
+/// First and last time at which it is judged, s.
+const FIRST: f64 = 1.0;
+const LAST: f64 = 4.0;
+/// How far the mean may be from gravity, as a share: what sensors are off by.
+const SHARE: f64 = 0.15;
+/// Change of velocity that bodies are capable of meanwhile, m/s.
+const VELOCITY: f64 = 0.7;
+
+/// Whether a mean specific force of this length over `secs` can be gravity (m/s^2).
+pub(crate) fn is_gravity(length: f64, secs: f64, gravity: f64) -> bool {
+    (length - gravity).abs() <= SHARE * gravity + VELOCITY / secs
+}
+
+/// What has been seen of the forces.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) enum Plausibility {
+    /// Not enough: integral of the force in earth axes (m/s), and of time.
+    #[default]
+    Open,
+    /// The same, begun.
+    Seen(Vector3<f64>, f64),
+    /// They are specific forces.
+    Given,
+    /// They are none.
+    Denied,
+}
+
+impl Plausibility {
+    /// Takes a force in earth axes that stands for `secs`. Says whether it has just been found to be none.
+    pub(super) fn denies(&mut self, secs: f64, force: &Vector3<f64>, gravity: f64) -> bool {
+        let (sum, before) = match *self {
+            Plausibility::Given | Plausibility::Denied => return false,
+            Plausibility::Open => (Vector3::zeros(), 0.0),
+            Plausibility::Seen(sum, secs) => (sum, secs),
+        };
+        let (sum, seen) = (sum + force * secs, before + secs);
+        *self = Plausibility::Seen(sum, seen);
+        let is_time = (before < FIRST && seen >= FIRST) || seen >= LAST;
+        if is_time && is_gravity(sum.norm() / seen, seen, gravity) {
+            *self = Plausibility::Given;
+        } else if seen >= LAST {
+            *self = Plausibility::Denied;
+        }
+        *self == Plausibility::Denied
+    }
+
+    pub(super) fn is_denied(self) -> bool {
+        self == Plausibility::Denied
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const G: f64 = 9.81;
+
+    fn judged(force: impl Fn(f64) -> f64) -> Plausibility {
+        let mut plausibility = Plausibility::default();
+        for i in 0..1000 {
+            let up = Vector3::z() * force(f64::from(i) * 0.01);
+            let _ = plausibility.denies(0.01, &up, G);
+        }
+        plausibility
+    }
+
+    #[test]
+    fn a_running_person_has_gravity_in_the_mean_and_linear_acceleration_has_none() {
+        let stride = |secs: f64| 15.0 * (17.0 * secs + 0.4).sin();
+        assert_eq!(judged(|secs| G + stride(secs)), Plausibility::Given);
+        assert_eq!(judged(stride), Plausibility::Denied);
+        assert_eq!(judged(|_| 0.0), Plausibility::Denied);
+        // A start at half a g for two seconds is taken in the end.
+        assert_eq!(
+            judged(|secs| if secs < 1.5 { 1.2 * G } else { G }),
+            Plausibility::Given
+        );
+    }
+
+    #[test]
+    fn what_was_decided_stays() {
+        let mut plausibility = Plausibility::Given;
+        for _ in 0..1000 {
+            assert!(!plausibility.denies(0.01, &Vector3::zeros(), G));
+        }
+        assert_eq!(plausibility, Plausibility::Given);
+    }
+}

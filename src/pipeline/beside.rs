@@ -1,0 +1,162 @@
+//! A log's channels -> those with specific forces and magnetic fields that belong to the samples of another
+//! topic. Pure.
+//!
+//! Apart from the choice of topics because these are no samples: they have stamps and rates of their own, and
+//! correct what is integrated.
+
+use super::decoders::Decoders;
+use super::log::{Log, LogChannel, described};
+use super::sources::is_same;
+use super::topics;
+use crate::config::{Selection, TopicBeside};
+use crate::error::{Error, Result};
+use std::path::Path;
+use std::sync::Arc;
+use strapd_attitude::condition::Clock;
+use strapd_attitude::estimate::{Aid, Plan};
+use strapd_recording::decode::{Decoder, Options, Wanted};
+use strapd_recording::mcap::Channel;
+use strapd_recording::text::printable;
+
+/// Channels that are read beside those of the samples.
+#[derive(Debug, Default)]
+pub(super) struct Besides {
+    channels: Vec<(Arc<Channel>, Decoder)>,
+    /// What was taken unnamed, in words.
+    pub(super) notes: Vec<String>,
+}
+
+impl Besides {
+    /// What is read of this channel beside the samples.
+    pub(super) fn decoder(&self, channel: &Channel) -> Option<&Decoder> {
+        let mut channels = self.channels.iter();
+        let (_, decoder) = channels.find(|(known, _)| is_same(known, channel))?;
+        Some(decoder)
+    }
+
+    fn add(&mut self, found: (&LogChannel, Decoder)) {
+        self.channels.push((found.0.channel.clone(), found.1));
+    }
+}
+
+/// How messages are read that a topic named by a flag carries.
+pub(super) fn options(wanted: Wanted, beside: Option<&TopicBeside>) -> Options {
+    Options {
+        wanted,
+        fields: beside
+            .map(|beside| beside.fields.clone())
+            .unwrap_or_default(),
+        ..Options::default()
+    }
+}
+
+/// Chooses. `own` is the topic of the samples, and whether its messages carry a field themselves.
+///
+/// # Errors
+/// A topic that is not there, or carries nothing of the kind; several that may be meant.
+pub(super) fn choose(
+    (plan, selection): (&Plan, &Selection),
+    path: &Path,
+    log: &Log,
+    (own, has_field): (&str, bool),
+) -> Result<Besides> {
+    let mut besides = Besides::default();
+    if let Some(beside) = &selection.accel {
+        besides.add(named(plan, Wanted::Forces, beside, path, log)?);
+    }
+    if let Some(beside) = &selection.mag {
+        besides.add(named(plan, Wanted::Fields, beside, path, log)?);
+    } else if plan.aid == Aid::GravityAndField && !has_field {
+        let found = unnamed(plan, path, log, own)?;
+        besides.notes.push(format!(
+            "the magnetic field was taken from {} (--mag-topic NAME takes another)",
+            printable(&found.0.channel.topic)
+        ));
+        besides.add(found);
+    }
+    Ok(besides)
+}
+
+fn named<'l>(
+    plan: &Plan,
+    wanted: Wanted,
+    beside: &TopicBeside,
+    path: &Path,
+    log: &'l Log,
+) -> Result<(&'l LogChannel, Decoder)> {
+    let mut channels = log.channels.iter();
+    let Some(known) = channels.find(|k| k.channel.topic == beside.topic) else {
+        return Err(Error::NoSuchTopic {
+            path: path.to_owned(),
+            topic: beside.topic.clone(),
+            topics: topics::listing(&log.candidates()),
+        });
+    };
+    let refuse = |what: String| Error::Unsupported {
+        path: path.to_owned(),
+        what,
+    };
+    let mut decoders = Decoders::of_run(plan, &options(wanted, Some(beside)));
+    let decoder = known
+        .decoder(&mut decoders)
+        .map_err(|why| refuse(why.to_string()))?;
+    if plan.clock == Clock::Header && !decoder.stated().has_stamp {
+        return Err(refuse(format!(
+            "{} ({}): its messages carry no stamp to find their gyro sample by\n  help: --time log",
+            printable(&beside.topic),
+            described(&known.channel)
+        )));
+    }
+    Ok((known, decoder))
+}
+
+/// The one topic with a field, or of several the one beside the samples: `/imu/mag` beside `/imu/data`.
+fn unnamed<'l>(
+    plan: &Plan,
+    path: &Path,
+    log: &'l Log,
+    own: &str,
+) -> Result<(&'l LogChannel, Decoder)> {
+    let mut decoders = Decoders::of_run(plan, &options(Wanted::Fields, None));
+    let has_stamp = |decoder: &Decoder| decoder.stated().has_stamp || plan.clock != Clock::Header;
+    let mut found: Vec<(&LogChannel, Decoder)> = log
+        .channels
+        .iter()
+        .filter(|known| known.messages > 0 && may_be_field(&known.channel))
+        .filter_map(|known| Some((known, known.decoder(&mut decoders).ok()?)))
+        .filter(|(_, decoder)| has_stamp(decoder))
+        .collect();
+    if found.len() > 1 {
+        let folder = |topic: &str| topic.rsplit_once('/').map(|(folder, _)| folder.to_owned());
+        let beside =
+            |(known, _): &(&LogChannel, Decoder)| folder(&known.channel.topic) == folder(own);
+        if found.iter().filter(|k| beside(k)).count() == 1 {
+            found.retain(beside);
+        }
+    }
+    let names: Vec<&str> = found
+        .iter()
+        .map(|(k, _)| k.channel.topic.as_str())
+        .collect();
+    let what = match names.as_slice() {
+        [] => "--aid gravity+mag: no topic carries a magnetic field\n  help: --mag-topic NAME, with --field mag=PATH where it has another name; --aid gravity does without".to_owned(),
+        [_] => String::new(),
+        several => format!(
+            "--aid gravity+mag: several topics carry a magnetic field: {}\n  help: --mag-topic NAME",
+            topics::named_few(several)
+        ),
+    };
+    match (found.pop(), what) {
+        (Some(one), what) if what.is_empty() => Ok(one),
+        (_, what) => Err(Error::Unsupported {
+            path: path.to_owned(),
+            what,
+        }),
+    }
+}
+
+/// Whether a topic's fields may be taken unnamed: a vector of no name may be anything.
+pub(super) fn may_be_field(channel: &Channel) -> bool {
+    let schema = channel.schema.as_deref().map_or("", |s| &s.name);
+    !schema.ends_with("Vector3Stamped")
+}
