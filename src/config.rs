@@ -52,18 +52,18 @@ pub fn parse_truncation(text: &str) -> Result<Truncation> {
 }
 
 /// `consumer`, ..., or `arw=..` and any of `bias-instability`, `rrw`, `turn-on-bias`, `initial`,
-/// in SI; each one number, or three joined by `/` for the body axes x, y, z.
+/// in SI; each one number, or three joined by `/` for the body axes x, y, z. And `scale`, `misalignment`, `tilt`.
 ///
 /// # Errors
 /// [`Error::Usage`] naming the part that is wrong.
 pub fn parse_noise(text: &str) -> Result<Noise> {
-    if let Some(preset) = NOISE_PRESETS.iter().find(|(name, ..)| *name == text) {
+    if let Some(preset) = NOISE_PRESETS.iter().find(|preset| preset.name == text) {
         return Ok(Noise::preset(preset));
     }
     let wrong = |what: String| {
-        let names: Vec<&str> = NOISE_PRESETS.iter().map(|p| p.0).collect();
+        let names: Vec<&str> = NOISE_PRESETS.iter().map(|p| p.name).collect();
         Error::Usage(format!(
-            "--noise {text}: {what}\n  help: a preset ({}), or arw=RAD_PER_SQRT_S[,bias-instability=RAD_S][,rrw=RAD_S_PER_SQRT_S][,turn-on-bias=RAD_S][,initial=RAD], each one number or three x/y/z",
+            "--noise {text}: {what}\n  help: a preset ({}), or arw=RAD_PER_SQRT_S[,bias-instability=RAD_S][,rrw=RAD_S_PER_SQRT_S][,turn-on-bias=RAD_S][,initial=RAD][,scale=SHARE][,misalignment=RAD][,tilt=RAD], each one number or, but for the last three, three x/y/z",
             names.join(", ")
         ))
     };
@@ -89,7 +89,26 @@ pub fn parse_noise(text: &str) -> Result<Noise> {
             ))
         })?);
     }
-    let [arw, bias_instability, rrw, turn_on_bias, initial] = given;
+    let [
+        arw,
+        bias_instability,
+        rrw,
+        turn_on_bias,
+        initial,
+        scale,
+        misalignment,
+        tilt,
+    ] = given;
+    for (key, axes) in [
+        ("scale", scale),
+        ("misalignment", misalignment),
+        ("tilt", tilt),
+    ] {
+        if axes.is_some_and(|[x, y, z]| x != y || y != z) {
+            return Err(wrong(format!("{key} is one number")));
+        }
+    }
+    let one = |axes: Option<[f64; 3]>| axes.map_or(0.0, |[x, ..]| x);
     let Some(arw) = arw else {
         return Err(wrong("arw is missing".to_owned()));
     };
@@ -100,11 +119,23 @@ pub fn parse_noise(text: &str) -> Result<Noise> {
         rrw: rrw.unwrap_or_default(),
         turn_on_bias: turn_on_bias.unwrap_or_default(),
         initial: initial.unwrap_or_default(),
+        scale: one(scale),
+        misalignment: one(misalignment),
+        tilt: one(tilt),
     })
 }
 
 /// What `--noise` takes, in the order of the fields.
-const NOISE_KEYS: [&str; 5] = ["arw", "bias-instability", "rrw", "turn-on-bias", "initial"];
+const NOISE_KEYS: [&str; 8] = [
+    "arw",
+    "bias-instability",
+    "rrw",
+    "turn-on-bias",
+    "initial",
+    "scale",
+    "misalignment",
+    "tilt",
+];
 
 /// One number for all axes, or three joined by `/`; finite and not negative.
 fn by_axis(text: &str) -> Option<[f64; 3]> {
@@ -295,6 +326,7 @@ mod tests {
             "arw=-1",
             "arw=NaN",
             "arw=1e-4,x=2",
+            "arw=1e-4,scale=1/2/3",
         ] {
             assert!(parse_noise(bad).is_err(), "{bad}");
         }
@@ -302,10 +334,14 @@ mod tests {
 
     #[test]
     fn every_figure_of_noise_reaches_the_propagator() {
-        let noise = parse_noise("arw=1,rrw=2,turn-on-bias=3/0/0,bias-instability=4,initial=5/6/7");
+        let noise = parse_noise(
+            "arw=1,rrw=2,turn-on-bias=3/0/0,bias-instability=4,initial=5/6/7,scale=0.25,misalignment=0.5,tilt=1",
+        );
         let noise = noise.unwrap();
-        // 3 and 4 are independent: 5. An estimate removes the turn-on bias, and only that.
-        assert_eq!(noise.unremoved_bias(), [5.0, 4.0, 4.0]);
+        // Independent of each other: 1.7 B of flicker, and what an estimate leaves of the turn-on bias.
+        let left = 6.8_f64.hypot(0.09);
+        assert_eq!(noise.unstable_bias(), [left, 6.8, 6.8]);
+        assert_eq!(noise.unremoved_bias(), [3.0_f64.hypot(left), 6.8, 6.8]);
         assert_eq!(
             noise.with_bias([8.0; 3]),
             propagate::Noise {
@@ -313,6 +349,8 @@ mod tests {
                 arw: [1.0; 3],
                 bias: [8.0; 3],
                 rrw: [2.0; 3],
+                scale: 0.25,
+                misalignment: 0.5,
                 bias_tau: None,
             }
         );

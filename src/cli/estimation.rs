@@ -148,7 +148,8 @@ pub struct Estimation {
     ///
     /// arw=RAD_PER_SQRT_S and any of bias-instability=RAD_S, rrw=RAD_S_PER_SQRT_S, turn-on-bias=RAD_S and
     /// initial=RAD, with commas between; each one number, or three x/y/z for the body axes. The turn-on bias counts unless a bias is removed
-    /// (--bias); initial is the uncertainty of the initial attitude.
+    /// (--bias); initial is the uncertainty of the initial attitude. And one number each: scale=SHARE and misalignment=RAD,
+    /// which grow with the angle turned, tilt=RAD of --init gravity.
     #[arg(long, value_name = "NOISE", default_value = "consumer")]
     pub noise: String,
     /// Skip the first seconds of the data

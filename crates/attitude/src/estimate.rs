@@ -23,6 +23,6 @@ pub use estimator::{Estimator, Memory};
 pub use first_pass::{Conditioned, FEW};
 pub use intervals::{LEAST_INTERVALS, Mismatch};
 pub use meaning::{Meaning, orientation_convention};
-pub use plan::{Aid, Bias, Initial, NOISE_PRESETS, Noise, Plan, Truncation};
+pub use plan::{Aid, Bias, Initial, NOISE_PRESETS, Noise, NoisePreset, Plan, Truncation};
 pub use preparation::{Patience, Preparation, Prepared, at_once};
 pub use stamps::{StampPass, Stamps};

@@ -176,6 +176,12 @@ impl Status {
     pub const RESTARTED: Status = Status(1 << 9);
     /// Sent to a watcher that came after it: no news, but the last there was.
     pub const LAST: Status = Status(1 << 10);
+    /// Gravity (and a field) corrects the attitude.
+    pub const AIDED: Status = Status(1 << 11);
+    /// The body has been at rest for long enough to say so.
+    pub const REST: Status = Status(1 << 12);
+    /// The tilt was too wrong to be corrected, and was set anew at this sample.
+    pub const LEVELLED: Status = Status(1 << 13);
 
     /// Both sets of bits.
     #[must_use]
@@ -191,7 +197,7 @@ impl Status {
 
     /// The names of the bits that are set, in a fixed order; empty means `ok`.
     pub fn names(self) -> impl Iterator<Item = &'static str> {
-        const NAMES: [(Status, &str); 11] = [
+        const NAMES: [(Status, &str); 14] = [
             (Status::BRIDGED, "bridged"),
             (Status::HELD, "held"),
             (Status::RESET, "reset"),
@@ -203,6 +209,9 @@ impl Status {
             (Status::RESTAMPED, "restamped"),
             (Status::RESTARTED, "restarted"),
             (Status::LAST, "last"),
+            (Status::AIDED, "aided"),
+            (Status::REST, "rest"),
+            (Status::LEVELLED, "levelled"),
         ];
         NAMES
             .into_iter()

@@ -244,12 +244,14 @@ impl Aided {
             if is_first && let Some(given) = self.given.pop_front() {
                 self.take(&given, sample);
             }
+            let status = sample.status.with(self.filter.status());
             let mut q_nb = self.filter.corrected(&sample.q_nb);
             if let Some(last) = &self.last_out {
                 q_nb = q_nb.same_sign_as(last);
             }
             let corrected = AttitudeSample {
                 q_nb,
+                status,
                 covariance: self.filter.attitude_covariance(&q_nb, &sample.rate),
                 ..*sample
             };

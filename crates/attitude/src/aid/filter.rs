@@ -11,6 +11,7 @@ use super::rest::Rest;
 use super::settings::Settings;
 use crate::frames::{Body, In, Nav};
 use crate::quaternion::Quaternion;
+use crate::record::Status;
 use nalgebra::{Matrix3, Vector3};
 
 /// A specific force beyond this (each component, m/s^2) is none.
@@ -99,6 +100,8 @@ pub struct Filter {
     pub(super) last_force: Option<Vector3<f64>>,
     pub(super) since_force: f64,
     pub(super) plausibility: Plausibility,
+    /// Since the sample before.
+    pub(super) has_levelled: bool,
     pub(super) report: Report,
 }
 
@@ -132,6 +135,7 @@ impl Filter {
             last_force: None,
             since_force: 0.0,
             plausibility: Plausibility::default(),
+            has_levelled: false,
             report: Report::default(),
         };
         filter.forget_calibration();
@@ -201,6 +205,21 @@ impl Filter {
         self.plausibility.is_denied()
     }
 
+    /// What it is to say of an attitude, which is that of the last sample it took.
+    pub(crate) fn status(&self) -> Status {
+        if !self.is_started || self.is_force_implausible() {
+            return Status::OK;
+        }
+        let mut status = Status::AIDED;
+        if self.rests() {
+            status = status.with(Status::REST);
+        }
+        if self.has_levelled {
+            status = status.with(Status::LEVELLED);
+        }
+        status
+    }
+
     /// Whether tilt is known: a specific force has come.
     #[must_use]
     pub fn is_started(&self) -> bool {
@@ -222,6 +241,7 @@ impl Filter {
         propagated: &Quaternion<Nav, Body>,
     ) {
         let secs = sample.secs;
+        self.has_levelled = false;
         let is_gap = self.nominal > 0.0 && secs > self.settings.gap_factor * self.nominal;
         let rate = if is_gap || self.is_instant {
             0.5 * (sample.rate + self.last_rate)
@@ -266,6 +286,7 @@ impl Filter {
     pub(crate) fn hold(&mut self, sample: &Measured) {
         self.interval = Interval::new();
         self.last_force = None;
+        self.has_levelled = false;
         // A clock that was set back does not say how long it was.
         let secs = sample.secs.max(0.0);
         let walk = self.settings.bias_walk.powi(2) * secs;

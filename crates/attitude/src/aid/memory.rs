@@ -265,7 +265,7 @@ mod tests {
     fn plain(memory: &Memory) -> Memory {
         let text = serde_json::to_string(memory).unwrap();
         // Each sample that waits has what it was corrected by.
-        let most = 8192 + 520 * memory.given.len().saturating_sub(1);
+        let most = 8192 + 700 * memory.given.len().saturating_sub(1);
         assert!(text.len() < most, "{} {}", text.len(), memory.given.len());
         serde_json::from_str(&text).unwrap()
     }

@@ -191,6 +191,7 @@ impl Filter {
         self.restart_reference(VELOCITY_START, POSITION_START);
         self.mean_acceleration = Vector3::zeros();
         self.report.levelled += 1;
+        self.has_levelled = true;
         true
     }
 

@@ -143,8 +143,23 @@ impl Aiding {
             has_field: plan.aid == Aid::GravityAndField,
             ..Settings::default()
         };
+        // The filter's own priors are those of the class that is the default; who names another knows better.
+        if plan.noise != Plan::default().noise {
+            for (prior, known) in [
+                (
+                    &mut settings.bias_prior,
+                    plan.noise.unremoved_bias().into_iter().fold(0.0, f64::max),
+                ),
+                (&mut settings.scale_prior, plan.noise.scale),
+                (&mut settings.cross_prior, plan.noise.misalignment),
+            ] {
+                if known > 0.0 {
+                    *prior = known;
+                }
+            }
+        }
         if plan.bias != Bias::None {
-            settings.bias_prior = BIAS_LEFT;
+            settings.bias_prior = settings.bias_prior.min(BIAS_LEFT);
         }
         // By a field the heading is that of north, and what was given may be another.
         let heading = if settings.has_field {

@@ -5,7 +5,7 @@
 
 use super::aiding;
 use super::meaning::Meaning;
-use super::plan::Plan;
+use super::plan::{Initial, Noise, Plan};
 use super::preparation::Prepared;
 use crate::aid::{self, Aided};
 use crate::condition::regularise::{self, Regulariser};
@@ -157,12 +157,22 @@ impl Estimator {
         prepared: &Prepared,
         settings: &condition::Settings,
     ) -> Result<Estimator, String> {
+        // What corrects the attitude has a noise of its own.
+        let noise = match (prepared.aiding.is_some(), plan.initial) {
+            (true, _) => Noise {
+                scale: 0.0,
+                misalignment: 0.0,
+                ..plan.noise.clone()
+            },
+            (false, Initial::Gravity) => plan.noise.levelled(),
+            (false, _) => plan.noise.clone(),
+        };
         let propagation = propagate::Settings {
             method: plan.method,
             kind: resolved.kind,
             initial: prepared.initial,
             world_rate: prepared.world_rate,
-            noise: plan.noise.with_bias(prepared.bias_sigma.into()),
+            noise: noise.with_bias(prepared.bias_sigma.into()),
         };
         let noise = propagation.noise;
         let integrator = match &prepared.aiding {

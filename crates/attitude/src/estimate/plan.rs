@@ -254,7 +254,7 @@ pub struct Noise {
     pub name: String,
     /// Angle random walk N, rad/sqrt(s).
     pub arw: [f64; 3],
-    /// Bias instability B, rad/s; taken as the uncertainty of a constant bias that no estimate removes.
+    /// Bias instability B, rad/s; 1.7 of it is taken as the uncertainty of a constant bias that no estimate removes.
     pub bias_instability: [f64; 3],
     /// Rate random walk K, rad/s/sqrt(s).
     pub rrw: [f64; 3],
@@ -262,39 +262,128 @@ pub struct Noise {
     pub turn_on_bias: [f64; 3],
     /// Uncertainty of the initial attitude, rad.
     pub initial: [f64; 3],
+    /// Error of the scale factors, as a share.
+    pub scale: f64,
+    /// Angles between the axes, rad.
+    pub misalignment: f64,
+    /// What an attitude levelled by the accelerometer is off by, rad.
+    pub tilt: f64,
 }
 
 const DEG: f64 = std::f64::consts::PI / 180.0;
 
-/// Named noise presets: name, ARW in deg/sqrt(h), bias instability in deg/h, an example.
-/// Sources: `docs/theory/attitude.md` 9 (Bosch BMI088 class, ADIS16465, STIM300, HG9900 class).
-pub const NOISE_PRESETS: [(&str, f64, f64); 4] = [
-    ("consumer", 0.84, 5.0),
-    ("industrial", 0.15, 2.0),
-    ("tactical", 0.15, 0.5),
-    ("navigation", 0.002, 0.01),
+/// A named class of gyros, by data sheets.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct NoisePreset {
+    /// Its name.
+    pub name: &'static str,
+    /// Angle random walk, deg/sqrt(h).
+    pub arw: f64,
+    /// Bias instability, deg/h.
+    pub bias_instability: f64,
+    /// Bias after switching on, one standard deviation, deg/s.
+    pub turn_on_bias: f64,
+    /// Error of the scale factors, as a share.
+    pub scale: f64,
+    /// Angle between the axes, rad.
+    pub misalignment: f64,
+    /// Bias of the accelerometer beside it, as a share of gravity: what levelling by it is off by.
+    pub tilt: f64,
+}
+
+/// The named classes. One standard deviation is a third of a data sheet's limit, or its typical value.
+///
+/// Sources: `docs/theory/attitude.md` 9 (Bosch BMI088: offset 1 deg/s, sensitivity 1 %, cross-axis 1 %, accelerometer
+/// offset 20 mg; ADIS16465: repeatability 0.14 deg/s, sensitivity 0.25 %, misalignment 0.25 deg, 1.4 mg; STIM300: 10 deg/h,
+/// 500 ppm, 1 mrad, 0.75 mg; HG9900 class: 0.003 deg/h, 5 ppm, 10 urad, 25 ug).
+pub const NOISE_PRESETS: [NoisePreset; 4] = [
+    NoisePreset {
+        name: "consumer",
+        arw: 0.84,
+        bias_instability: 5.0,
+        turn_on_bias: 1.0,
+        scale: 5e-3,
+        misalignment: 5e-3,
+        tilt: 0.02,
+    },
+    NoisePreset {
+        name: "industrial",
+        arw: 0.15,
+        bias_instability: 2.0,
+        turn_on_bias: 0.14,
+        scale: 1e-3,
+        misalignment: 1.5e-3,
+        tilt: 1.4e-3,
+    },
+    NoisePreset {
+        name: "tactical",
+        arw: 0.15,
+        bias_instability: 0.5,
+        turn_on_bias: 2.8e-3,
+        scale: 3e-4,
+        misalignment: 5e-4,
+        tilt: 7.5e-4,
+    },
+    NoisePreset {
+        name: "navigation",
+        arw: 0.002,
+        bias_instability: 0.01,
+        turn_on_bias: 8e-7,
+        scale: 5e-6,
+        misalignment: 1e-5,
+        tilt: 2.5e-5,
+    },
 ];
 
+/// How far a bias of instability B is off after an hour or so, in B: its flicker has the Allan floor 0.664 B, and
+/// 1.6 to 1.8 B of standard deviation over the decades of time a run has (`docs/theory/attitude.md` 9).
+const FLICKER: f64 = 1.7;
+
+/// What is left of a turn-on bias once it was measured at rest, as a share. Chosen on 14 recordings of BROAD (`docs/estimation.md`):
+/// without it one of them has 80 % of its errors within three sigma, with it every one all.
+const LEFT: f64 = 0.03;
+
 impl Noise {
-    /// By its row.
+    /// Of a class.
     #[must_use]
-    pub fn preset((name, arw, bias): &(&str, f64, f64)) -> Noise {
+    pub fn preset(class: &NoisePreset) -> Noise {
         Noise {
-            name: (*name).to_owned(),
-            arw: [arw * DEG / 60.0; 3],
-            bias_instability: [bias * DEG / 3600.0; 3],
+            name: class.name.to_owned(),
+            arw: [class.arw * DEG / 60.0; 3],
+            bias_instability: [class.bias_instability * DEG / 3600.0; 3],
             rrw: [0.0; 3],
-            turn_on_bias: [0.0; 3],
+            turn_on_bias: [class.turn_on_bias * DEG; 3],
             initial: [0.0; 3],
+            scale: class.scale,
+            misalignment: class.misalignment,
+            tilt: class.tilt,
         }
+    }
+
+    /// What is left of a bias that was removed, rad/s: flicker in full, and a share of the turn-on bias, since
+    /// that of a body at rest is not that of one in motion (temperature, acceleration, what drivers cut off).
+    #[must_use]
+    pub fn unstable_bias(&self) -> [f64; 3] {
+        let axis =
+            |i: usize| (FLICKER * self.bias_instability[i]).hypot(LEFT * self.turn_on_bias[i]);
+        [axis(0), axis(1), axis(2)]
     }
 
     /// What is not known of the bias, rad/s, when none is removed: turn-on bias and instability.
     #[must_use]
     pub fn unremoved_bias(&self) -> [f64; 3] {
         let [x, y, z] = self.turn_on_bias;
-        let [u, v, w] = self.bias_instability;
+        let [u, v, w] = self.unstable_bias();
         [x.hypot(u), y.hypot(v), z.hypot(w)]
+    }
+
+    /// The same for an attitude that begins level by the accelerometer at rest.
+    #[must_use]
+    pub fn levelled(&self) -> Noise {
+        Noise {
+            initial: self.initial.map(|sigma| sigma.hypot(self.tilt)),
+            ..self.clone()
+        }
     }
 
     /// What the propagator is told, when `bias` (rad/s) is not known of the bias.
@@ -305,6 +394,8 @@ impl Noise {
             arw: self.arw,
             bias,
             rrw: self.rrw,
+            scale: self.scale,
+            misalignment: self.misalignment,
             bias_tau: None,
         }
     }

@@ -355,7 +355,7 @@ fn decide_bias(
         )),
         Bias::Given(bias) => Ok((
             bias,
-            plan.noise.bias_instability.into(),
+            plan.noise.unstable_bias().into(),
             "as given".to_owned(),
         )),
         Bias::Auto => {
@@ -373,7 +373,7 @@ fn decide_bias(
             }
             let sigma = estimate.sigma.max();
             // Known to the estimate's sigma at rest, and not stable since.
-            let instability = Vector3::from(plan.noise.bias_instability);
+            let instability = Vector3::from(plan.noise.unstable_bias());
             Ok((
                 estimate.bias,
                 estimate.sigma.zip_map(&instability, f64::hypot),

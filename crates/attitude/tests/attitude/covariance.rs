@@ -131,6 +131,7 @@ fn the_matrix_is_symmetric_and_has_no_negative_variance_in_any_direction() {
         bias: [0.0, 3e-3, 1e-3],
         rrw: [1e-3, 0.0, 0.0],
         bias_tau: None,
+        ..Noise::default()
     };
     let mut covariance = Covariance::new(noise);
     for k in 0..20_000 {
@@ -279,6 +280,7 @@ fn the_propagator_carries_the_covariance_of_its_own_turns() {
         bias: [1e-3, 2e-3, 0.0],
         rrw: [1e-3, 0.0, 2e-3],
         bias_tau: None,
+        ..Noise::default()
     };
     let samples = tumbling(3000);
     let live = Method::CommitProvisional {

@@ -66,6 +66,7 @@ fn propagator(method: Method, kind: SampleKind) -> Propagator {
             bias: [1e-3; 3],
             rrw: [1e-5; 3],
             bias_tau: None,
+            ..Noise::default()
         },
         ..Settings::default()
     })

@@ -4,8 +4,9 @@ use std::fmt;
 
 /// Noise of the gyro, one standard deviation, SI, by body axis.
 ///
-/// `w_measured = w_true + b + n`: white noise n of density [`arw`](Self::arw), and a bias b that begins
-/// with [`bias`](Self::bias) and is driven by white noise of density [`rrw`](Self::rrw).
+/// `w_measured = (1 + G) w_true + b + n`: white noise n of density [`arw`](Self::arw), a bias b that begins
+/// with [`bias`](Self::bias) and is driven by white noise of density [`rrw`](Self::rrw), and a matrix G that does
+/// not change: [`scale`](Self::scale) on its diagonal, [`misalignment`](Self::misalignment) beside it.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Noise {
     /// Uncertainty of the initial attitude, rad, about the body axes of that moment.
@@ -16,6 +17,10 @@ pub struct Noise {
     pub bias: [f64; 3],
     /// Rate random walk K, rad/s/sqrt(s).
     pub rrw: [f64; 3],
+    /// Error of each scale factor, as a share: what grows with the angle turned.
+    pub scale: f64,
+    /// Angle by which each axis is off towards each other, rad.
+    pub misalignment: f64,
     /// Time constant of the bias, s: `db/dt = -b/tau + K n`, a Gauss-Markov process of standard deviation
     /// `K sqrt(tau/2)` in the end. `None`: the bias is a random walk.
     pub bias_tau: Option<f64>,
@@ -39,6 +44,8 @@ impl Noise {
             return Some(("bias tau", tau));
         }
         [
+            ("scale", [self.scale; 3]),
+            ("misalignment", [self.misalignment; 3]),
             ("initial", self.initial),
             ("arw", self.arw),
             ("bias", self.bias),
@@ -73,6 +80,12 @@ impl fmt::Display for Noise {
             axes(self.bias),
             axes(self.rrw),
             axes(self.initial)
-        )
+        )?;
+        for (name, value) in [("scale", self.scale), ("misalignment", self.misalignment)] {
+            if value != 0.0 {
+                write!(f, ",{name}={value:e}")?;
+            }
+        }
+        Ok(())
     }
 }

@@ -17,6 +17,8 @@ const NOISE: Noise = Noise {
     arw: [1e-3, 3e-3, 5e-4],
     bias: [2e-3, 5e-4, 1e-3],
     rrw: [3e-4, 1e-4, 5e-4],
+    scale: 0.0,
+    misalignment: 0.0,
     bias_tau: None,
 };
 
@@ -229,4 +231,43 @@ fn with_known_white_noise_the_errors_lie_within_three_sigma() {
     // 99.7 % of normal numbers; errors along one run go together, so 40 runs scatter. And not all: that
     // would be a sigma too large.
     assert!((0.95..0.99999).contains(&part), "{part}");
+}
+
+/// Of 400 gyros, each with errors of scale and axes of its own, on a body that tumbles for 15 s.
+#[test]
+fn errors_of_scale_and_axes_have_the_covariance_that_is_reported() {
+    let noise = Noise {
+        scale: 2e-3,
+        misalignment: 7e-4,
+        ..Noise::default()
+    };
+    const GYROS: u64 = 400;
+    let mut sum = 0.0;
+    for seed in 0..GYROS {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let g = Matrix3::from_fn(|i, j| {
+            normal(&mut rng)
+                * if i == j {
+                    noise.scale
+                } else {
+                    noise.misalignment
+                }
+        });
+        let mut truth: Quaternion<Nav, Body> = Quaternion::identity();
+        let mut estimate = truth;
+        let mut covariance = Covariance::new(noise);
+        for k in 0..1500 {
+            let phi = rate(f64::from(k) + 0.5) * STEP;
+            let measured = RotationVector(phi + g * phi);
+            truth = truth.advanced(&RotationVector(phi));
+            estimate = estimate.advanced(&measured);
+            covariance.step(measured, STEP);
+        }
+        let e = error(&estimate, &truth);
+        let p: Matrix3<f64> = covariance.matrix().fixed_view::<3, 3>(0, 0).into();
+        sum += e.dot(&(p.try_inverse().unwrap() * e));
+    }
+    // Chi-square of 1200 degrees of freedom: 0.041 about one.
+    let mean = sum / (3.0 * GYROS as f64);
+    assert!((mean - 1.0).abs() < 0.13, "{mean}");
 }
