@@ -2,6 +2,7 @@
 //!
 //! A motion is a subcommand, a file of flags and a row in `Simulate::made`.
 
+mod carried;
 mod coning;
 mod random;
 mod rigid_body;
@@ -17,7 +18,8 @@ use crate::pipeline::simulate;
 use clap::{Args, Subcommand};
 use sampling::Common;
 use std::io::Write;
-use strapd_bodies::motion::Motion;
+use strapd_bodies::motion::{Carrier, Motion};
+use strapd_bodies::synthetic::ForceSampling;
 use strapd_recording::pool::Pool;
 
 /// Samples of a synthetic gyro whose true attitude is known exactly.
@@ -26,6 +28,7 @@ use strapd_recording::pool::Pool;
   strapd simulate top -o top.mcap                        the seed's top, cusped, 2000 Hz
   strapd simulate top --case looping --duration 60 -o top.ndjson
   strapd simulate coning --half-angle-deg 1 --frequency-hz 10 --rate-hz 400 -o coning.mcap
+  strapd simulate walking --worn foot --rate-hz 200 --duration 120 --noise consumer_mems -o walk.mcap
   strapd simulate top -o truth.mcap -o - | strapd replay - -o est.mcap \\
     && strapd compare est.mcap truth.mcap                how good is the integration?
   strapd simulate top --speed 1 -o tcp://127.0.0.1:4550  feeds a strapd serve
@@ -49,12 +52,32 @@ pub enum Which {
     Youbot(youbot::Youbot),
     /// Sums of sines about each axis, up to a highest frequency
     Random(random::Random),
+    /// A person who walks, turns off, stops now and then
+    Walking(carried::Gait),
+    /// A person who runs
+    Running(carried::Gait),
+    /// A cart on a circle of 10 m at 4 m/s
+    Circling(carried::Carried),
+    /// The tool of an arm with two links: from place to place, with rests
+    Arm(carried::Carried),
+    /// A car in town: pulls away, brakes, turns, stands, its engine running
+    Car(carried::Carried),
+    /// A machine that shakes: 6 m/s^2 on each axis from 12 to 45 Hz
+    Vibration(carried::Carried),
+    /// A drone, whose force stays along its own z axis
+    Drone(carried::Carried),
+    /// A thing in a hand, turned every way, laid down now and then
+    Hand(carried::Carried),
+    /// A boat on waves of six to twelve seconds
+    Boat(carried::Carried),
 }
 
 /// A motion, and what is to be said about it.
 #[derive(Debug)]
 struct Made {
     motion: Motion,
+    /// What a reading of the accelerometer is unless the user says.
+    force: ForceSampling,
     /// m/s^2, downwards, where the motion itself depends on it.
     gravity: Option<f64>,
     /// What was asked for, as it will stand in the metadata.
@@ -72,6 +95,15 @@ impl Simulate {
             Which::Coning(m) => ("coning", &m.common, m.made()?),
             Which::Youbot(m) => ("youbot", &m.common, m.made()?),
             Which::Random(m) => ("random", &m.common, m.made()?),
+            Which::Walking(m) => ("walking", &m.common, m.made(Carrier::Walking)),
+            Which::Running(m) => ("running", &m.common, m.made(Carrier::Running)),
+            Which::Circling(m) => ("circling", &m.common, m.made(Carrier::Circling)),
+            Which::Arm(m) => ("arm", &m.common, m.made(Carrier::Arm)),
+            Which::Car(m) => ("car", &m.common, m.made(Carrier::Car)),
+            Which::Vibration(m) => ("vibration", &m.common, m.made(Carrier::Vibration)),
+            Which::Drone(m) => ("drone", &m.common, m.made(Carrier::Drone)),
+            Which::Hand(m) => ("hand", &m.common, m.made(Carrier::Hand)),
+            Which::Boat(m) => ("boat", &m.common, m.made(Carrier::Boat)),
         })
     }
 }

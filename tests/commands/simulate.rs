@@ -1,6 +1,7 @@
 //! Promise: a synthetic log has the truth in it, replay finds it to rounding, and what a sensor's
 //! errors make of it stays within what replay says of itself.
 
+mod carried;
 mod errors;
 mod layout;
 mod refused;

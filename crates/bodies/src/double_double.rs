@@ -73,6 +73,17 @@ impl DoubleDouble {
         self.hi
     }
 
+    /// What is left without the whole number below it, in `[0, 1]`.
+    pub(crate) fn fraction(self) -> f64 {
+        let rest = self - Self::from(self.hi.floor());
+        // The low part may lie below a whole high one.
+        if rest.hi < 0.0 {
+            rest.hi + 1.0
+        } else {
+            rest.hi
+        }
+    }
+
     /// Square root; zero for zero and for negative numbers.
     pub(crate) fn sqrt(self) -> Self {
         if self.hi <= 0.0 {

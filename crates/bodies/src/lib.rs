@@ -13,6 +13,7 @@
 pub mod dh;
 mod double_double;
 mod elliptic;
+mod gauss;
 pub mod inertia;
 pub mod motion;
 pub mod rigid_body;

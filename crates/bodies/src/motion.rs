@@ -13,16 +13,25 @@
 //! | [`FreeBody`] | Jacobi's functions | closed form |
 //! | [`HeavyBody`] (the top) | power series in 32 digits | power series |
 //! | [`Gripper`] (the youBot's arm) | closed form | Gauss's rule to rounding |
+//! | [`Carried`] (gaits, vehicles, machines, hands) | closed form | Gauss's rule to rounding |
 //!
 //! Time is integer nanoseconds since the start.
 
 mod band_limited;
+mod carried;
+mod carriers;
 mod coning;
+mod course;
 mod free_body;
+mod jet;
+mod specific_force;
 
 pub use band_limited::{BandLimited, Sine};
+pub use carried::Carried;
+pub use carriers::{Carrier, Worn};
 pub use coning::{Coning, ConstantRate};
 pub use free_body::FreeBody;
+pub use specific_force::Accelerometer;
 
 use super::rigid_body::{HeavyBody, Spin};
 use super::youbot::Gripper;
@@ -73,6 +82,19 @@ pub enum Motion {
     HeavyBody(Box<HeavyBody>),
     /// An IMU on the gripper of the youBot's arm.
     Gripper(Box<Gripper>),
+    /// Carried by somebody or something that accelerates.
+    Carried(Box<Carried>),
+}
+
+/// What a sensor at the origin of the body axes feels at an instant.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Kinematics {
+    /// Attitude and body rate.
+    pub spin: Spin,
+    /// Rate of change of the body rate, rad/s^2, body axes.
+    pub rate_change: Vector3<f64>,
+    /// Acceleration of the origin, m/s^2, navigation axes.
+    pub acceleration_n: Vector3<f64>,
 }
 
 impl Motion {
@@ -85,6 +107,7 @@ impl Motion {
             Self::FreeBody(m) => m.at_nanos(nanos),
             Self::HeavyBody(m) => m.at_nanos(nanos),
             Self::Gripper(m) => m.at_nanos(nanos),
+            Self::Carried(m) => m.at_nanos(nanos),
         }
     }
 
@@ -97,20 +120,32 @@ impl Motion {
             Self::FreeBody(m) => m.delta_angle(from, to),
             Self::HeavyBody(m) => m.delta_angle(from, to),
             Self::Gripper(m) => m.delta_angle(from, to).0,
+            Self::Carried(m) => m.delta_angle(from, to),
         }
     }
 
-    /// Acceleration of the origin of the body axes at `nanos` nanoseconds, m/s^2, navigation axes.
-    /// All but the gripper turn about a point that stays where it is.
-    #[must_use]
-    pub fn acceleration_n(&self, nanos: u64) -> Vector3<f64> {
-        match self {
-            Self::Gripper(m) => *m.acceleration(nanos).as_vector(),
-            Self::ConstantRate(_)
-            | Self::Coning(_)
-            | Self::BandLimited(_)
-            | Self::FreeBody(_)
-            | Self::HeavyBody(_) => Vector3::zeros(),
+    /// All that is felt at `nanos` nanoseconds. What is neither held by an arm nor carried turns about a
+    /// point that stays where it is.
+    pub fn kinematics(&mut self, nanos: u64) -> Kinematics {
+        let (spin, rate_change) = match self {
+            Self::Gripper(m) => return m.kinematics(nanos),
+            Self::Carried(m) => return m.at(nanos, 0.0),
+            Self::ConstantRate(m) => (m.at_nanos(nanos), Vector3::zeros()),
+            Self::Coning(m) => (m.at_nanos(nanos), m.rate_change(nanos)),
+            Self::BandLimited(m) => (m.at_nanos(nanos), m.rate_change(nanos)),
+            Self::FreeBody(m) => {
+                let spin = m.at_nanos(nanos);
+                (spin, m.rate_change(&spin.w_nb_b))
+            }
+            Self::HeavyBody(m) => {
+                let spin = m.at_nanos(nanos);
+                (spin, m.rate_change(&spin))
+            }
+        };
+        Kinematics {
+            spin,
+            rate_change,
+            acceleration_n: Vector3::zeros(),
         }
     }
 }

@@ -4,9 +4,11 @@
 //! a recording, and is the only source whose answer is known beforehand.
 //!
 //! # Convention
-//! The sensor sits at the origin of the body axes, its axes are theirs (FLU). Navigation z points up,
-//! whatever x points at is called east, so the world of the truth is ENU. The specific force is
-//! `f_b = C_nb^T (a_n - g_n)`: 9.8 m/s^2 upwards at rest.
+//! The sensor sits at the origin of the body axes (its accelerometer at the end of a lever arm from
+//! there), its axes are theirs (FLU). Navigation z points up, whatever x points at is called east, so the
+//! world of the truth is ENU. The specific force is `f_b = C_nb^T (a_n - g_n)` and what the lever arm adds
+//! ([`Accelerometer`]): 9.8 m/s^2 upwards at rest. It is that of the instant, or a mean over the interval
+//! as the gyro's is ([`ForceSampling`]).
 //!
 //! Sample k is taken at `round(k 1e9 / rate)` ns after the start (or beside it, with sampling jitter),
 //! and the motion is evaluated at that very nanosecond. Rates begin at k = 0; averages and delta
@@ -14,16 +16,26 @@
 //! every k from 0 on, at the instant itself: whatever the stamps say, and whether or not the sample
 //! arrives.
 
-use crate::motion::Motion;
+use crate::motion::{Accelerometer, Motion};
 use crate::rigid_body::Spin;
 use nalgebra::Vector3;
 use std::fmt;
-use strapd_attitude::frames::{Body, In, Nav};
+use strapd_attitude::frames::{Body, Nav};
 use strapd_attitude::noise::sensor_error::{
     self, GyroModel, ImuError, ImuErrorFault, MeasureError, StampError, StampModel,
 };
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{Nanos, RawSample, SampleKind};
+
+/// What a reading of the accelerometer is.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum ForceSampling {
+    /// The specific force at the instant, whatever the gyro's sample is.
+    #[default]
+    Instant,
+    /// As the gyro's: of the instant beside a rate; else its mean over the interval, m/s^2.
+    AsGyro,
+}
 
 /// How a motion is sampled.
 #[derive(Clone, Debug)]
@@ -38,6 +50,10 @@ pub struct Sampling {
     pub start: Nanos,
     /// Gravity, m/s^2, downwards.
     pub gravity: f64,
+    /// Where the accelerometer sits: from the origin of the body axes, m, body axes.
+    pub lever_b: Vector3<f64>,
+    /// What its readings are.
+    pub force: ForceSampling,
     /// The sensor's errors. Without any, samples are the motion's own numbers.
     pub error: ImuError,
     /// Errors of sampling instants and stamps, and losses.
@@ -152,6 +168,12 @@ struct Reading {
     force_b: Vector3<f64>,
 }
 
+/// The specific force at the end of an interval, and as the accelerometer takes it, m/s^2.
+struct Forces {
+    at_end: Vector3<f64>,
+    sampled: Vector3<f64>,
+}
+
 /// A motion being sampled.
 #[derive(Clone, Debug)]
 pub struct Synthetic {
@@ -185,6 +207,8 @@ impl Synthetic {
             stamps,
             seed,
             kind,
+            lever_b,
+            force: _,
         } = sampling;
         let within = |what, value: f64, ok: bool, allowed| {
             if ok {
@@ -214,6 +238,12 @@ impl Synthetic {
             gravity,
             gravity.abs() <= 1e6,
             "at most 1e6",
+        )?;
+        within(
+            "the lever arm (m)",
+            lever_b.norm(),
+            lever_b.norm() <= 1e3,
+            "at most 1000",
         )?;
         let spin = motion.at_nanos(0);
         let needed_hz = spin.w_nb_b.norm() / std::f64::consts::PI;
@@ -279,8 +309,13 @@ impl Synthetic {
         // Jitter may not take the first sample to before the motion began.
         let late = self.sampling.start.since(tick.instant).max(0);
         let now = (tick.instant.since(self.sampling.start) + late) as u64;
-        let mut spin = self.motion.at_nanos(now);
-        spin.q_nb = spin.q_nb.same_sign_as(&self.last_q_nb);
+        let accelerometer = Accelerometer {
+            lever_b: self.sampling.lever_b,
+            gravity: self.sampling.gravity,
+        };
+        let mut felt = accelerometer.felt(&mut self.motion, now);
+        felt.spin.q_nb = felt.spin.q_nb.same_sign_as(&self.last_q_nb);
+        let spin = felt.spin;
         self.last_q_nb = spin.q_nb;
         let at = Nanos(self.sampling.start.0 + now as i64);
         out.truth.push(Truth { stamp: at, spin });
@@ -290,15 +325,18 @@ impl Synthetic {
             u64::from(rate >= std::f64::consts::PI * self.sampling.rate_hz);
         self.noticed.instants += 1;
 
-        let held_n = In::<Nav>::assume(
-            self.motion.acceleration_n(now) + Vector3::new(0.0, 0.0, self.sampling.gravity),
-        );
-        let force_b = *(spin.q_nb.inverse() * held_n).as_vector();
-        if let Some(read) = self.measured(at, now, &spin, &force_b)? {
+        let force_b = accelerometer.read(&felt);
+        let rates = self.sampling.kind == SampleKind::Rate;
+        let averaged = self.sampling.force == ForceSampling::AsGyro && !rates && self.next > 0;
+        let mean_b = averaged.then(|| accelerometer.mean(&mut self.motion, self.before, now));
+        let forces = Forces {
+            at_end: force_b,
+            sampled: mean_b.unwrap_or(force_b),
+        };
+        if let Some(read) = self.measured(at, now, &spin, &forces)? {
             if tick.dropped {
                 self.noticed.dropped += 1;
             } else {
-                let rates = self.sampling.kind == SampleKind::Rate;
                 out.samples.push(RawSample {
                     header: Some(Nanos(tick.stamp.0.saturating_add(late))),
                     log: at,
@@ -324,7 +362,7 @@ impl Synthetic {
         at: Nanos,
         now: u64,
         spin: &Spin,
-        force_b: &Vector3<f64>,
+        forces: &Forces,
     ) -> Result<Option<Reading>, MeasureError> {
         let rates = self.sampling.kind == SampleKind::Rate;
         let first = self.next == 0;
@@ -334,7 +372,7 @@ impl Synthetic {
         if self.sensor.is_none() && rates {
             return Ok(Some(Reading {
                 gyro: spin.w_nb_b,
-                force_b: *force_b,
+                force_b: forces.sampled,
             }));
         }
         // A rate at the start has no interval before it: as if the body had come at this rate.
@@ -356,13 +394,14 @@ impl Synthetic {
             };
             return Ok(Some(Reading {
                 gyro,
-                force_b: *force_b,
+                force_b: forces.sampled,
             }));
         };
         let truth = sensor_error::Truth {
             rate: spin.w_nb_b,
             delta_angle,
-            specific_force: *force_b,
+            specific_force: forces.at_end,
+            sampled_force: forces.sampled,
             temperature: 0.0,
         };
         let from = Nanos(at.0.saturating_sub(nanos as i64));

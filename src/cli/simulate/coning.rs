@@ -4,6 +4,7 @@ use super::{Made, parameter, sampling::Common};
 use crate::error::{Error, Result};
 use clap::Args;
 use strapd_bodies::motion::{self, Motion};
+use strapd_bodies::synthetic::ForceSampling;
 
 /// The axis runs round a cone: the worst case of attitude integration.
 #[derive(Args, Debug)]
@@ -39,6 +40,7 @@ impl Coning {
             })?;
         Ok(Made {
             motion: Motion::Coning(coning),
+            force: ForceSampling::Instant,
             gravity: None,
             parameters: vec![
                 parameter("half_angle_deg", self.half_angle_deg),

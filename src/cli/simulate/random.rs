@@ -4,6 +4,7 @@ use super::{Made, parameter, sampling::Common};
 use crate::error::{Error, Result};
 use clap::Args;
 use strapd_bodies::motion::{BandLimited, Motion};
+use strapd_bodies::synthetic::ForceSampling;
 
 /// Sums of sines about each axis, up to a highest frequency.
 #[derive(Args, Debug)]
@@ -54,6 +55,7 @@ impl Random {
             })?;
         Ok(Made {
             motion: Motion::BandLimited(Box::new(motion)),
+            force: ForceSampling::Instant,
             gravity: None,
             parameters: vec![
                 parameter("rms_rad_s", self.rms),

@@ -11,6 +11,7 @@ use strapd_attitude::quaternion::Quaternion;
 use strapd_bodies::inertia::{self, InertiaError};
 use strapd_bodies::motion::Motion;
 use strapd_bodies::rigid_body::{HeavyBody, Rotor, Spin};
+use strapd_bodies::synthetic::ForceSampling;
 
 /// Any rigid body about a fixed point, free or under gravity.
 #[derive(Args, Debug)]
@@ -82,6 +83,7 @@ impl RigidBody {
             .map_err(|e| Error::Usage(format!("simulate rigid-body: {e}")))?;
         Ok(Made {
             motion: Motion::HeavyBody(Box::new(body)),
+            force: ForceSampling::Instant,
             gravity: Some(self.gravity),
             parameters: vec![
                 parameter("inertia", &self.inertia),

@@ -4,16 +4,35 @@ use super::{Made, parameter};
 use crate::cli::estimation::KindArg;
 use crate::cli::replay::CompressionArg;
 use crate::cli::serving::{Served, Serving};
+use crate::config::numbers;
 use crate::error::{Error, Result};
 use crate::pipeline::simulate::Simulation;
 use crate::sink::{Options, Target};
-use clap::Args;
+use clap::{Args, ValueEnum};
 use strapd_attitude::noise::sensor_error::{ImuError, StampError};
 use strapd_attitude::record::{Nanos, SampleKind};
-use strapd_bodies::synthetic::{Sampling, Synthetic};
+use strapd_bodies::synthetic::{ForceSampling, Sampling, Synthetic};
 
 /// Gravity where the motion does not say otherwise: standard gravity.
-const GRAVITY: f64 = 9.80665;
+pub(super) const GRAVITY: f64 = 9.80665;
+
+/// What a reading of the accelerometer is.
+#[derive(ValueEnum, Clone, Copy, PartialEq, Eq, Debug)]
+pub enum ForceArg {
+    /// Of the instant, whatever the gyro's sample is
+    Instant,
+    /// As the gyro's: of the instant beside a rate, else the mean over the interval
+    AsGyro,
+}
+
+impl From<ForceArg> for ForceSampling {
+    fn from(arg: ForceArg) -> Self {
+        match arg {
+            ForceArg::Instant => ForceSampling::Instant,
+            ForceArg::AsGyro => ForceSampling::AsGyro,
+        }
+    }
+}
 
 /// How a motion is sampled, and where the samples go.
 #[derive(Args, Debug, Clone)]
@@ -63,6 +82,17 @@ pub struct Common {
     /// the integral over it
     #[arg(long, value_enum, default_value = "rate")]
     pub sample_kind: KindArg,
+    /// Where the accelerometer sits: from the point whose motion it is, m, body axes (ahead, left, up)
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        default_value = "0,0,0",
+        allow_hyphen_values = true
+    )]
+    pub lever_arm: String,
+    /// What a reading of the accelerometer is [default: as-gyro where the sensor is carried, else instant]
+    #[arg(long, value_enum)]
+    pub force_sampling: Option<ForceArg>,
     /// Seed of everything random; the same seed gives the same bytes
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
@@ -154,12 +184,16 @@ impl Common {
             .map_err(|e| Error::Usage(format!("--noise {}: {e}", self.noise)))?;
         let stamps = self.stamps()?;
         let gravity = made.gravity.unwrap_or(GRAVITY);
+        let lever = numbers::<3>("--lever-arm", &self.lever_arm)?;
+        let force = self.force_sampling.map_or(made.force, ForceSampling::from);
         let sampling = Sampling {
             rate_hz: self.rate_hz,
             duration_secs: self.duration,
             kind,
             start,
             gravity,
+            lever_b: lever.into(),
+            force,
             error,
             stamps,
             seed: self.seed,
@@ -175,6 +209,13 @@ impl Common {
             parameter("start_stamp_ns", start.0),
             parameter("noise", error.text()),
         ]);
+        if lever != [0.0; 3] {
+            let [x, y, z] = lever;
+            parameters.push(parameter("lever_arm_m", format!("{x},{y},{z}")));
+        }
+        if force == ForceSampling::AsGyro {
+            parameters.push(parameter("force_sampling", "as-gyro"));
+        }
         for (name, value, plain) in [
             ("jitter", stamps.sampling_jitter, 0.0),
             ("stamp_jitter", stamps.stamp_jitter, 0.0),

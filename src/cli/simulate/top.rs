@@ -5,6 +5,7 @@ use crate::cli::model::top_flags::TopFlags;
 use crate::error::{Error, Result};
 use clap::Args;
 use strapd_bodies::motion::Motion;
+use strapd_bodies::synthetic::ForceSampling;
 
 /// A heavy symmetric top on a fixed pivot: spins, precesses, nods.
 #[derive(Args, Debug)]
@@ -29,6 +30,7 @@ impl Top {
         let motion = top.exact(&start).map_err(refused)?;
         Ok(Made {
             motion: Motion::HeavyBody(Box::new(motion)),
+            force: ForceSampling::Instant,
             gravity: Some(top.gravity()),
             parameters: self
                 .top

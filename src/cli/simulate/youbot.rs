@@ -7,6 +7,7 @@ use clap::Args;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use strapd_bodies::motion::Motion;
+use strapd_bodies::synthetic::ForceSampling;
 
 /// Longest file taken for a path, bytes.
 const LONGEST: u64 = 1 << 22;
@@ -71,6 +72,7 @@ impl Youbot {
         }
         Ok(Made {
             motion: Motion::Gripper(Box::new(prepared.gripper)),
+            force: ForceSampling::Instant,
             gravity: Some(-z),
             parameters,
             notes,

@@ -13,7 +13,7 @@ use strapd_attitude::noise::sensor_error::{ImuError, StampError};
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{Nanos, SampleKind};
 use strapd_bodies::motion::{BandLimited, Motion};
-use strapd_bodies::synthetic::{Sampling, Synthetic};
+use strapd_bodies::synthetic::{ForceSampling, Sampling, Synthetic};
 use strapd_recording::pool::Pool;
 
 const SECS: f64 = 10.0;
@@ -28,6 +28,8 @@ fn simulated(noise: &str, seed: u64, path: &Path) {
         kind: SampleKind::Average,
         start: Nanos(1_700_000_000_000_000_000),
         gravity: 9.8,
+        lever_b: Vector3::zeros(),
+        force: ForceSampling::Instant,
         error: ImuError::parse(noise).unwrap(),
         stamps: StampError::default(),
         seed,

@@ -56,6 +56,9 @@ fn what_can_not_be_is_refused_with_its_numbers_and_leaves_nothing() {
         ("random --rms=-1", &["--rms"]),
         ("random --sines 0", &["--sines"]),
         ("random --sines 100000", &["--sines", "1000"]),
+        ("walking --worn hat", &["hat", "waist", "foot"]),
+        ("car --lever-arm 1,2", &["--lever-arm", "3"]),
+        ("car --lever-arm 1000,1000,0", &["lever arm", "1000"]),
         ("random --start-stamp now", &["--start-stamp", "now"]),
         (
             "random --start-stamp 9223372036",

@@ -108,6 +108,21 @@ impl BandLimited {
         }
     }
 
+    /// Rate of change of the body rate, rad/s^2.
+    #[must_use]
+    pub fn rate_change(&self, nanos: u64) -> Vector3<f64> {
+        let t = DoubleDouble::from_nanos(nanos);
+        Vector3::from_fn(|i, _| {
+            self.axes[i]
+                .iter()
+                .map(|s| {
+                    let phase = t * s.omega + DoubleDouble::from(s.phase);
+                    s.amplitude * s.omega * phase.sin_cos().1
+                })
+                .sum()
+        })
+    }
+
     /// Integral of the body rate, rad.
     #[must_use]
     pub fn delta_angle(&self, from: u64, to: u64) -> Vector3<f64> {
@@ -129,11 +144,11 @@ impl BandLimited {
 }
 
 /// SplitMix64 (Steele, Lea, Flood, OOPSLA 2014): integer arithmetic only, so every platform agrees.
-struct SplitMix(u64);
+pub(super) struct SplitMix(pub(super) u64);
 
 impl SplitMix {
     /// In `[0, 1)`, 53 bits.
-    fn unit(&mut self) -> f64 {
+    pub(super) fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

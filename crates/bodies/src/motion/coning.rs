@@ -120,6 +120,14 @@ impl Coning {
         }
     }
 
+    /// Rate of change of the body rate, rad/s^2.
+    #[must_use]
+    pub fn rate_change(&self, nanos: u64) -> Vector3<f64> {
+        let (s, c) = (DoubleDouble::from_nanos(nanos) * self.omega).sin_cos();
+        let across = self.omega * self.omega * self.sin_angle();
+        Vector3::new(0.0, -across * c, -across * s)
+    }
+
     /// Integral of the body rate, rad.
     #[must_use]
     pub fn delta_angle(&self, from: u64, to: u64) -> Vector3<f64> {

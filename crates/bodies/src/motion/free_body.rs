@@ -112,6 +112,17 @@ impl FreeBody {
         }
     }
 
+    /// Rate of change of a body rate `w`, by Euler's equations, rad/s^2.
+    #[must_use]
+    pub fn rate_change(&self, w: &Vector3<f64>) -> Vector3<f64> {
+        let [x, y, z] = self.moments;
+        Vector3::new(
+            (y - z) / x * w.y * w.z,
+            (z - x) / y * w.z * w.x,
+            (x - y) / z * w.x * w.y,
+        )
+    }
+
     /// Integral of the body rate, rad.
     #[must_use]
     pub fn delta_angle(&self, from: u64, to: u64) -> Vector3<f64> {

@@ -105,6 +105,13 @@ impl HeavyBody {
             .cross(&(quat::matrix(&q_nb.wxyz()).transpose() * self.gravity_n))
     }
 
+    /// Rate of change of the body rate, by Euler's equations, rad/s^2.
+    #[must_use]
+    pub fn rate_change(&self, spin: &Spin) -> Vector3<f64> {
+        self.rotor
+            .angular_acceleration(&spin.w_nb_b, &self.torque(&spin.q_nb))
+    }
+
     /// Kinetic plus potential energy, J; zero height is that of the fixed point.
     #[must_use]
     pub fn energy(&self, spin: &Spin) -> f64 {

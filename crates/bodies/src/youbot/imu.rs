@@ -6,6 +6,8 @@ use super::joints::SeedMotion;
 use super::path::JointPath;
 use super::{Arm, ArmError, Base, Tool};
 use crate::dh::Transform;
+use crate::gauss::NODES;
+use crate::motion::Kinematics;
 use crate::rigid_body::Spin;
 use nalgebra::Vector3;
 use strapd_attitude::frames::{Dcm, In, NotARotation, Sensor};
@@ -186,6 +188,20 @@ impl Gripper {
         In::assume(f.as_vector() + self.g_b.as_vector())
     }
 
+    /// All that is felt at the IMU at `nanos` nanoseconds from the start.
+    #[must_use]
+    pub fn kinematics(&self, nanos: u64) -> Kinematics {
+        let motion = self.joints(nanos);
+        let [.., tool] = self.arm.link_motions(&motion);
+        let c_imu_tool = self.mount.t_tool_imu.rotation().transpose();
+        Kinematics {
+            spin: self.at_nanos(nanos),
+            rate_change: *(c_imu_tool * In::<Tool>::assume(*tool.rate_change.as_vector()))
+                .as_vector(),
+            acceleration_n: *self.acceleration(nanos).as_vector(),
+        }
+    }
+
     /// Integral of the angular rate over `from..to` nanoseconds, sensor axes: what an integrating gyro
     /// puts out.
     ///
@@ -206,7 +222,7 @@ impl Gripper {
         let mut sum = Vector3::zeros();
         for piece in 0..pieces {
             let middle = start + half * (2.0 * f64::from(piece) + 1.0);
-            for (node, weight) in GAUSS {
+            for (node, weight) in NODES {
                 for at in [middle - half * node, middle + half * node] {
                     sum += self.mount.rate(&self.arm, &self.path.motion(at)).0 * weight;
                 }
@@ -215,14 +231,6 @@ impl Gripper {
         DeltaAngle(sum * (half * sign))
     }
 }
-
-/// Positive nodes and weights of Gauss-Legendre quadrature with eight points on (-1, 1).
-const GAUSS: [(f64, f64); 4] = [
-    (0.183_434_642_495_649_8, 0.362_683_783_378_362),
-    (0.525_532_409_916_329, 0.313_706_645_877_887_3),
-    (0.796_666_477_413_626_7, 0.222_381_034_453_374_48),
-    (0.960_289_856_497_536_3, 0.101_228_536_290_376_26),
-];
 
 /// One rounding.
 fn secs(nanos: u64) -> f64 {

@@ -54,7 +54,7 @@ impl Sinusoid {
 
 /// The way from one rest to the next: `s(x) = 10 x^3 - 15 x^4 + 6 x^5`, least jerk, rate and
 /// acceleration zero at both ends. Fraction of the way and its two derivatives over `duration` s.
-pub(super) fn rest_to_rest(secs: f64, duration: f64) -> [f64; 3] {
+pub(crate) fn rest_to_rest(secs: f64, duration: f64) -> [f64; 3] {
     let x = (secs / duration).clamp(0.0, 1.0);
     let y = 1.0 - x;
     [

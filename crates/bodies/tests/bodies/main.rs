@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, unreachable_pub)]
 
 mod accuracy;
+mod carried;
 mod inertia;
 mod motions;
 #[path = "../../../../tests/shared_data/mod.rs"]

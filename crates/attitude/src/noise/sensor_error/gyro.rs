@@ -18,6 +18,8 @@ pub struct Truth {
     pub delta_angle: Vector3<f64>,
     /// Specific force at the end of the interval, m/s^2.
     pub specific_force: Vector3<f64>,
+    /// The same as the accelerometer takes it, at the instant or as a mean, m/s^2.
+    pub sampled_force: Vector3<f64>,
     /// Kelvin away from the temperature of calibration.
     pub temperature: f64,
 }
@@ -29,6 +31,7 @@ impl Default for Truth {
             rate: Vector3::zeros(),
             delta_angle: Vector3::zeros(),
             specific_force: Vector3::zeros(),
+            sampled_force: Vector3::zeros(),
             temperature: 0.0,
         }
     }
@@ -39,7 +42,7 @@ impl Default for Truth {
 pub struct Measured {
     /// rad/s for rates and averages, rad for delta angles.
     pub gyro: Vector3<f64>,
-    /// Specific force at the end of the interval, m/s^2.
+    /// Specific force, m/s^2.
     pub specific_force: Vector3<f64>,
     /// A component was clipped at the range.
     pub saturated: bool,
@@ -186,6 +189,7 @@ impl GyroModel {
             .iter()
             .chain(truth.delta_angle.iter())
             .chain(truth.specific_force.iter())
+            .chain(truth.sampled_force.iter())
             .chain([&truth.temperature])
             .all(|v| v.abs() <= FASTEST);
         if !possible {
@@ -266,7 +270,7 @@ impl GyroModel {
             rate.apply(|v| *v = v.clamp(-range, range));
         }
         let gyro = quantised(error, self.kind, &mut running.remainder, rate, secs);
-        let mut specific_force = truth.specific_force + constants.accel_bias;
+        let mut specific_force = truth.sampled_force + constants.accel_bias;
         if error.accel_noise > 0.0 {
             specific_force += error.accel_noise / secs.sqrt() * vector(&mut self.acceleration);
         }

@@ -115,6 +115,7 @@ fn acceleration_and_temperature_are_read_as_rate() {
     );
     let truth = Truth {
         specific_force: Vector3::new(0.0, 0.0, 9.81),
+        sampled_force: Vector3::new(0.0, 0.0, 9.81),
         temperature: -20.0,
         ..Truth::default()
     };
