@@ -16,6 +16,8 @@ use strapd_recording::pool::Pool;
 pub const TOPIC: &str = "/imu/data_raw";
 /// The topic of the true attitude; the true rate is on `/truth/rate`.
 pub const TRUTH_TOPIC: &str = "/truth";
+/// The topic of the magnetic field.
+pub const FIELD_TOPIC: &str = "/imu/mag";
 /// What lines call the samples.
 const ID: &str = "imu";
 /// What lines call the truth.
@@ -67,7 +69,7 @@ pub fn run(
         &simulation.targets,
         &[],
         simulation.options,
-        &streams(simulation.kind, &simulation.frame_id),
+        &streams(&simulation),
         &provenance(&simulation),
         Delivery {
             out_rate: None,
@@ -126,18 +128,21 @@ pub fn run(
     })
 }
 
-fn streams(kind: SampleKind, frame_id: &str) -> [Stream; 2] {
+fn streams(simulation: &Simulation) -> [Stream; 2] {
+    let has_field = simulation.source.magnetometer().is_some();
     let samples = Stream {
-        content: Content::Samples(kind),
+        content: Content::Samples(simulation.kind),
         id: ID.to_owned(),
         output_topic: TOPIC.to_owned(),
+        field_topic: has_field.then(|| FIELD_TOPIC.to_owned()),
         world_axes: "enu".to_owned(),
-        ..Stream::new(TOPIC, frame_id)
+        ..Stream::new(TOPIC, &simulation.frame_id)
     };
     let truth = Stream {
         content: Content::Truth,
         id: TRUTH_ID.to_owned(),
         output_topic: TRUTH_TOPIC.to_owned(),
+        field_topic: None,
         ..samples.clone()
     };
     [samples, truth]

@@ -53,6 +53,12 @@ impl SimulationSummary {
                 n.saturated, n.samples
             ));
         }
+        if n.force_saturated > 0 {
+            warnings.push(format!(
+                "{} of {} specific forces are at the end of the accelerometer's range; --noise PRESET,accel-range=G widens it",
+                n.force_saturated, n.samples
+            ));
+        }
         if self.stamps_out_of_range > 0 {
             warnings.push(format!(
                 "{} stamps do not fit into the 32-bit seconds of ROS messages (1901 to 2038); --start-stamp",
@@ -120,6 +126,8 @@ impl SimulationSummary {
             "samples": n.samples,
             "dropped": n.dropped,
             "saturated": n.saturated,
+            "force_saturated": n.force_saturated,
+            "fields": n.fields,
             "rate_hz": self.rate_hz,
             "sample_kind": self.kind.name(),
             "fastest_rad_s": n.fastest,

@@ -109,7 +109,7 @@ impl Objects {
 }
 
 /// The `RATE` object of one stream: what is absent is left out. Rate in rad/s (a delta angle in
-/// rad), specific force in m/s^2.
+/// rad), specific force in m/s^2, field in T.
 #[derive(Debug)]
 pub(crate) struct RateObject {
     head: Vec<u8>,
@@ -138,6 +138,7 @@ impl RateObject {
         for (name, vector) in [
             (&b",\"gyro\":"[..], sample.gyro),
             (b",\"accel\":", sample.accel),
+            (b",\"mag\":", sample.mag),
         ] {
             if let Some(vector) = vector {
                 out.extend_from_slice(name);

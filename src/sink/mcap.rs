@@ -120,6 +120,8 @@ enum Messages {
     Samples {
         channel: u16,
         imu: cdr::Imu,
+        /// The field and its nine covariances.
+        field: Option<(u16, cdr::Stamped<12>)>,
     },
     Truth {
         attitude: u16,
@@ -189,6 +191,13 @@ impl Layout {
                 Content::Attitude | Content::Samples(_) => Ok(0),
             })
             .collect::<Result<Vec<u16>>>()?;
+        let fields = streams
+            .iter()
+            .map(|stream| match (&stream.content, &stream.field_topic) {
+                (Content::Samples(_), Some(topic)) => declare(topic, FIELD_SCHEMA).map(Some),
+                _ => Ok(None),
+            })
+            .collect::<Result<Vec<Option<u16>>>>()?;
         let transform = if streams.iter().any(|s| s.content == Content::Attitude) {
             declare(TF_TOPIC, transform_schema)?
         } else {
@@ -200,14 +209,16 @@ impl Layout {
             .iter()
             .zip(attitudes)
             .zip(rates)
+            .zip(fields)
             .zip(&children)
-            .map(|(((stream, attitude), rate), child)| {
+            .map(|((((stream, attitude), rate), field), child)| {
                 let parent = parent_frame(stream);
                 match stream.content {
                     Content::Samples(_) => {
                         return Messages::Samples {
                             channel: attitude,
                             imu: cdr::Imu::new(attitude, &stream.frame_id),
+                            field: field.map(|id| (id, cdr::Stamped::new(id, &stream.frame_id))),
                         };
                     }
                     Content::Truth => {
@@ -288,8 +299,13 @@ impl Layout {
                     }
                 }
             }
-            Messages::Samples { channel, imu } => {
+            Messages::Samples {
+                channel,
+                imu,
+                field,
+            } => {
                 let lane = chunk.lane(*channel);
+                let field = field.as_ref().map(|(id, field)| (chunk.lane(*id), field));
                 chunk.plain.reserve(batch.raw.len() * imu.len());
                 for (n, sample) in (batch.first..).zip(&batch.raw) {
                     let log_time = log_time(sample.log);
@@ -297,6 +313,12 @@ impl Layout {
                     chunk.stamps_out_of_range += u64::from(!fits);
                     chunk.note(lane, log_time);
                     imu.append_raw(&mut chunk.plain, n as u32, log_time, stamp, sample);
+                    if let (Some((lane, field)), Some([x, y, z])) = (&field, sample.mag) {
+                        // A covariance of zeros is an unknown one.
+                        let numbers = [x, y, z, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+                        chunk.note(*lane, log_time);
+                        field.append(&mut chunk.plain, n as u32, log_time, stamp, numbers);
+                    }
                 }
             }
             Messages::Truth {
@@ -327,6 +349,11 @@ impl Layout {
 
 /// Name, encoding and text of our ROS 2 types.
 const IMU_SCHEMA: [&str; 3] = ["sensor_msgs/msg/Imu", "ros2msg", schemas::IMU];
+const FIELD_SCHEMA: [&str; 3] = [
+    "sensor_msgs/msg/MagneticField",
+    "ros2msg",
+    schemas::MAGNETIC_FIELD,
+];
 const TF_SCHEMA: [&str; 3] = ["tf2_msgs/msg/TFMessage", "ros2msg", schemas::TF_MESSAGE];
 
 /// Writes the header and what is known about the run; returns the metadata of our channels.

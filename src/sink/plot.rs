@@ -59,10 +59,14 @@ impl PlotObject {
         out.extend_from_slice(b"}}");
     }
 
-    /// Appends what a sensor put out: `gyro`, `accel`.
+    /// Appends what a sensor put out: `gyro`, `accel`, `mag`.
     pub(crate) fn push_raw(&self, out: &mut Vec<u8>, sample: &RawSample) {
         self.begin(out, sample.header.unwrap_or(sample.log));
-        for (name, vector) in [("gyro", sample.gyro), ("accel", sample.accel)] {
+        for (name, vector) in [
+            ("gyro", sample.gyro),
+            ("accel", sample.accel),
+            ("mag", sample.mag),
+        ] {
             if let Some(vector) = vector {
                 push_group(out, name, &AXES, &vector);
             }

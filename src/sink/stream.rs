@@ -38,6 +38,8 @@ pub struct Stream {
     pub input_topic: String,
     /// Where the attitude goes ([`output_topic`]).
     pub output_topic: String,
+    /// Where the magnetic field goes that samples carry; `None`: no channel is declared for it.
+    pub field_topic: Option<String>,
     /// The frame whose attitude this is: `header.frame_id` of the Imu, child of the transform.
     pub frame_id: String,
     /// The frame it is given in: parent of the transform.
@@ -59,6 +61,7 @@ impl Stream {
             id: input_topic.to_owned(),
             input_topic: input_topic.to_owned(),
             output_topic: output_topic(input_topic, &BTreeSet::new()),
+            field_topic: None,
             frame_id: frame_id.to_owned(),
             world_frame: "world".to_owned(),
             rotates: "sensor_to_world".to_owned(),
@@ -74,6 +77,7 @@ impl Stream {
             id: bounded(&self.id),
             input_topic: bounded(&self.input_topic),
             output_topic: bounded(&self.output_topic),
+            field_topic: self.field_topic.as_deref().map(bounded),
             frame_id: bounded(&self.frame_id),
             world_frame: bounded(&self.world_frame),
             rotates: bounded(&self.rotates),

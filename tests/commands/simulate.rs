@@ -4,6 +4,7 @@
 mod carried;
 mod errors;
 mod layout;
+mod magnetometer;
 mod refused;
 mod truth;
 

@@ -8,11 +8,13 @@
 //! | [`dh`] | Denavit-Hartenberg rows -> poses |
 //! | [`youbot`] | the KUKA youBot's arm: kinematics, dynamics, paths |
 //! | [`motion`] | motions with exact truth at any instant |
+//! | [`field`] | a time -> the magnetic field |
 //! | [`synthetic`] | a motion and a sensor's errors -> samples, and the truth beside them |
 
 pub mod dh;
 mod double_double;
 mod elliptic;
+pub mod field;
 mod gauss;
 pub mod inertia;
 pub mod motion;

@@ -16,13 +16,15 @@
 //! every k from 0 on, at the instant itself: whatever the stamps say, and whether or not the sample
 //! arrives.
 
+use crate::field::Field;
 use crate::motion::{Accelerometer, Motion};
 use crate::rigid_body::Spin;
 use nalgebra::Vector3;
 use std::fmt;
-use strapd_attitude::frames::{Body, Nav};
+use strapd_attitude::frames::{Body, In, Nav};
 use strapd_attitude::noise::sensor_error::{
-    self, GyroModel, ImuError, ImuErrorFault, MeasureError, StampError, StampModel,
+    self, GyroModel, ImuError, ImuErrorFault, MagnetometerModel, MeasureError, StampError,
+    StampModel,
 };
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{Nanos, RawSample, SampleKind};
@@ -35,6 +37,15 @@ pub enum ForceSampling {
     Instant,
     /// As the gyro's: of the instant beside a rate; else its mean over the interval, m/s^2.
     AsGyro,
+}
+
+/// A magnetometer beside the gyro.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Magnetometer {
+    /// Readings a second: each goes with the first sample that is due by then.
+    pub rate_hz: f64,
+    /// What it is in.
+    pub field: Field,
 }
 
 /// How a motion is sampled.
@@ -54,6 +65,8 @@ pub struct Sampling {
     pub lever_b: Vector3<f64>,
     /// What its readings are.
     pub force: ForceSampling,
+    /// A magnetometer, where there is one; its axes are the body's.
+    pub magnetometer: Option<Magnetometer>,
     /// The sensor's errors. Without any, samples are the motion's own numbers.
     pub error: ImuError,
     /// Errors of sampling instants and stamps, and losses.
@@ -156,6 +169,10 @@ pub struct Noticed {
     pub dropped: u64,
     /// Samples with an axis at the end of the sensor's range.
     pub saturated: u64,
+    /// Samples with a specific force at the end of the accelerometer's range.
+    pub force_saturated: u64,
+    /// Readings of the magnetometer put out.
+    pub fields: u64,
     /// Steps of half a turn or more.
     pub undersampled: u64,
     /// Largest body rate, rad/s.
@@ -166,6 +183,13 @@ pub struct Noticed {
 struct Reading {
     gyro: Vector3<f64>,
     force_b: Vector3<f64>,
+}
+
+/// A magnetometer being read.
+#[derive(Clone, Debug)]
+struct Compass {
+    stated: Magnetometer,
+    sensor: MagnetometerModel,
 }
 
 /// The specific force at the end of an interval, and as the accelerometer takes it, m/s^2.
@@ -182,6 +206,7 @@ pub struct Synthetic {
     ticks: StampModel,
     /// `None` without errors.
     sensor: Option<GyroModel>,
+    compass: Option<Compass>,
     /// Instants in all.
     count: u64,
     /// The next one.
@@ -209,6 +234,7 @@ impl Synthetic {
             kind,
             lever_b,
             force: _,
+            ref magnetometer,
         } = sampling;
         let within = |what, value: f64, ok: bool, allowed| {
             if ok {
@@ -245,6 +271,21 @@ impl Synthetic {
             lever_b.norm() <= 1e3,
             "at most 1000",
         )?;
+        let compass = match magnetometer {
+            None => None,
+            Some(stated) => {
+                within(
+                    "the rate of the magnetometer (Hz)",
+                    stated.rate_hz,
+                    stated.rate_hz > 0.0 && stated.rate_hz <= rate_hz,
+                    "above 0, at most that of the samples",
+                )?;
+                Some(Compass {
+                    stated: stated.clone(),
+                    sensor: MagnetometerModel::new(&error, seed)?,
+                })
+            }
+        };
         let spin = motion.at_nanos(0);
         let needed_hz = spin.w_nb_b.norm() / std::f64::consts::PI;
         if needed_hz >= rate_hz {
@@ -263,6 +304,7 @@ impl Synthetic {
             motion,
             ticks: StampModel::new(&stamps, start, rate_hz, seed)?,
             sensor,
+            compass,
             count: intervals + 1,
             next: 0,
             before: 0,
@@ -276,6 +318,12 @@ impl Synthetic {
     #[must_use]
     pub fn sensor(&self) -> Option<&GyroModel> {
         self.sensor.as_ref()
+    }
+
+    /// The magnetometer, where there is one.
+    #[must_use]
+    pub fn magnetometer(&self) -> Option<&MagnetometerModel> {
+        self.compass.as_ref().map(|c| &c.sensor)
     }
 
     /// How many instants there are, past ones included.
@@ -333,6 +381,7 @@ impl Synthetic {
             at_end: force_b,
             sampled: mean_b.unwrap_or(force_b),
         };
+        let mag = self.field(now, &spin);
         if let Some(read) = self.measured(at, now, &spin, &forces)? {
             if tick.dropped {
                 self.noticed.dropped += 1;
@@ -343,16 +392,30 @@ impl Synthetic {
                     publish: at,
                     gyro: Some(read.gyro.into()),
                     accel: Some(read.force_b.into()),
-                    mag: None,
+                    mag: mag.map(Into::into),
                     orientation: Some(spin.q_nb.wxyz()),
                     interval_nanos: (!rates).then_some((now - self.before) as i64),
                 });
                 self.noticed.samples += 1;
+                self.noticed.fields += u64::from(mag.is_some());
             }
         }
         self.before = now;
         self.next += 1;
         Ok(())
+    }
+
+    /// What the magnetometer reads at `now`, when it is due.
+    fn field(&mut self, now: u64, spin: &Spin) -> Option<Vector3<f64>> {
+        let compass = self.compass.as_mut()?;
+        let ratio = compass.stated.rate_hz / self.sampling.rate_hz;
+        let readings = |instants: u64| (instants as f64 * ratio).floor();
+        if self.next > 0 && readings(self.next) == readings(self.next - 1) {
+            return None;
+        }
+        let field_n = In::<Nav>::assume(compass.stated.field.at(now as f64 * 1e-9));
+        let field_b = *(spin.q_nb.inverse() * field_n).as_vector();
+        Some(compass.sensor.measure(&field_b))
     }
 
     /// What the sensor reads at `now`. `None` for the
@@ -407,6 +470,7 @@ impl Synthetic {
         let from = Nanos(at.0.saturating_sub(nanos as i64));
         let read = sensor.measure(from, at, &truth)?;
         self.noticed.saturated += u64::from(read.saturated);
+        self.noticed.force_saturated += u64::from(read.force_saturated);
         Ok(Some(Reading {
             gyro: read.gyro,
             force_b: read.specific_force,

@@ -9,9 +9,11 @@ use crate::error::{Error, Result};
 use crate::pipeline::simulate::Simulation;
 use crate::sink::{Options, Target};
 use clap::{Args, ValueEnum};
+use nalgebra::Vector3;
 use strapd_attitude::noise::sensor_error::{ImuError, StampError};
 use strapd_attitude::record::{Nanos, SampleKind};
-use strapd_bodies::synthetic::{ForceSampling, Sampling, Synthetic};
+use strapd_bodies::field::{Disturbance, Field};
+use strapd_bodies::synthetic::{ForceSampling, Magnetometer, Sampling, Synthetic};
 
 /// Gravity where the motion does not say otherwise: standard gravity.
 pub(super) const GRAVITY: f64 = 9.80665;
@@ -93,11 +95,32 @@ pub struct Common {
     /// What a reading of the accelerometer is [default: as-gyro where the sensor is carried, else instant]
     #[arg(long, value_enum)]
     pub force_sampling: Option<ForceArg>,
+    /// A magnetometer too, so many readings a second [default: one with every sample]
+    #[arg(long, value_name = "HZ", num_args = 0..=1, allow_negative_numbers = true)]
+    pub mag: Option<Option<f64>>,
+    /// The Earth's magnetic field: strength in uT, dip (down is positive) and declination (east is
+    /// positive) in degrees; north is the world's y
+    #[arg(
+        long,
+        value_name = "UT,DEG,DEG",
+        default_value = "48,60,0",
+        allow_hyphen_values = true
+    )]
+    pub field: String,
+    /// Something of iron comes near: FROM,TO in s, and what it adds to the field, uT, east, north, up.
+    /// May be given several times
+    #[arg(
+        long,
+        value_name = "FROM,TO,X,Y,Z",
+        allow_hyphen_values = true,
+        requires = "mag"
+    )]
+    pub field_disturbance: Vec<String>,
     /// Seed of everything random; the same seed gives the same bytes
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
-    /// Errors of the sensor: none, a preset (consumer_mems, industrial_mems, tactical, navigation, ...),
-    /// or terms in the units of data sheets: arw=0.15,bias-instability=0.5,...
+    /// Errors of the sensor: none, a preset (consumer_mems, industrial_mems, tactical, navigation, ...; with
+    /// accelerometer and magnetometer consumer_imu, industrial_imu, rough_imu), or terms in the units of data sheets: arw=0.15,bias-instability=0.5,...
     #[arg(
         long,
         value_name = "NOISE",
@@ -194,6 +217,7 @@ impl Common {
             gravity,
             lever_b: lever.into(),
             force,
+            magnetometer: self.magnetometer()?,
             error,
             stamps,
             seed: self.seed,
@@ -215,6 +239,13 @@ impl Common {
         }
         if force == ForceSampling::AsGyro {
             parameters.push(parameter("force_sampling", "as-gyro"));
+        }
+        if let Some(rate) = self.mag {
+            parameters.push(parameter("mag_rate_hz", rate.unwrap_or(self.rate_hz)));
+            parameters.push(parameter("field_ut_deg_deg", &self.field));
+            for disturbance in &self.field_disturbance {
+                parameters.push(parameter("field_disturbance", disturbance));
+            }
         }
         for (name, value, plain) in [
             ("jitter", stamps.sampling_jitter, 0.0),
@@ -266,6 +297,50 @@ impl Common {
 }
 
 impl Common {
+    fn magnetometer(&self) -> Result<Option<Magnetometer>> {
+        let Some(rate) = self.mag else {
+            return Ok(None);
+        };
+        let refused = |flag: &str, why: String| Error::Usage(format!("{flag} {why}"));
+        let [strength, dip, declination] = numbers::<3>("--field", &self.field)?;
+        if !((0.0..=1e6).contains(&strength) && dip.abs() <= 90.0 && declination.abs() <= 360.0) {
+            return Err(refused(
+                "--field",
+                format!(
+                    "{}: 0 to 1e6 uT, a dip of at most 90 and a declination of at most 360 degrees are needed",
+                    self.field
+                ),
+            ));
+        }
+        let disturbance = |text: &String| {
+            let flag = "--field-disturbance";
+            let [from, to, x, y, z] = numbers::<5>(flag, text)?;
+            let added = Vector3::new(x, y, z);
+            if !(0.0 <= from && from < to && added.amax() <= 1e6) {
+                return Err(refused(
+                    flag,
+                    format!("{text}: 0 <= FROM < TO and at most 1e6 uT are needed"),
+                ));
+            }
+            Ok(Disturbance {
+                from,
+                to,
+                added_n: added * 1e-6,
+            })
+        };
+        let disturbances = self.field_disturbance.iter().map(disturbance);
+        let disturbances = disturbances.collect::<Result<Vec<_>>>()?;
+        Ok(Some(Magnetometer {
+            rate_hz: rate.unwrap_or(self.rate_hz),
+            field: Field::new(
+                strength * 1e-6,
+                dip.to_radians(),
+                declination.to_radians(),
+                disturbances,
+            ),
+        }))
+    }
+
     fn stamps(&self) -> Result<StampError> {
         let stamps = StampError {
             offset_nanos: stamp("--stamp-offset", &self.stamp_offset)?.0,

@@ -1,4 +1,4 @@
-//! Samples -> `sensor_msgs/msg/Imu`, `tf2_msgs/msg/TFMessage`, `geometry_msgs/msg/QuaternionStamped` and
+//! Samples -> `sensor_msgs/msg/Imu`, `sensor_msgs/msg/MagneticField`, `tf2_msgs/msg/TFMessage`, `geometry_msgs/msg/QuaternionStamped` and
 //! `geometry_msgs/msg/Vector3Stamped` message records in CDR. Pure.
 //!
 //! Within a stream only numbers change from message to message, always at the same places. So each
@@ -177,8 +177,8 @@ impl Imu {
     }
 }
 
-/// A header and `N` numbers: `geometry_msgs/msg/QuaternionStamped` (x, y, z, w) and
-/// `geometry_msgs/msg/Vector3Stamped` of one stream.
+/// A header and `N` numbers: `geometry_msgs/msg/QuaternionStamped` (x, y, z, w),
+/// `geometry_msgs/msg/Vector3Stamped` and `sensor_msgs/msg/MagneticField` (and its covariance) of one stream.
 #[derive(Debug)]
 pub(crate) struct Stamped<const N: usize>(Template);
 

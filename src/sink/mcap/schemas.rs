@@ -64,6 +64,16 @@ pub(super) const IMU: &str = concat!(
     header!(), quaternion!(), vector!(),
 );
 
+/// `sensor_msgs/msg/MagneticField`, as `ros2msg`.
+#[rustfmt::skip]
+pub(super) const MAGNETIC_FIELD: &str = concat!(
+    "# Field in tesla along the axes of frame_id. Covariance row-major; all zeros: unknown.\n",
+    "std_msgs/Header header\n",
+    "geometry_msgs/Vector3 magnetic_field\n",
+    "float64[9] magnetic_field_covariance\n",
+    header!(), vector!(),
+);
+
 /// `tf2_msgs/msg/TFMessage`, as `ros2msg`.
 #[rustfmt::skip]
 pub(super) const TF_MESSAGE: &str = concat!(

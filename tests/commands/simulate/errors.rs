@@ -30,6 +30,7 @@ fn simulated(noise: &str, seed: u64, path: &Path) {
         gravity: 9.8,
         lever_b: Vector3::zeros(),
         force: ForceSampling::Instant,
+        magnetometer: None,
         error: ImuError::parse(noise).unwrap(),
         stamps: StampError::default(),
         seed,

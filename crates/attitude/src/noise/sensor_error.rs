@@ -8,7 +8,14 @@
 //! ```text
 //! true rate -> bandwidth -> scale and misalignment -> non-linearity -> g-sensitivity
 //!           -> bias: turn-on, temperature -> drift: flicker, Gauss-Markov, random walk, ramp -> white
-//!           -> saturation -> quantisation                                    (stamps: StampError)
+//!           -> saturation -> quantisation or truncation                      (stamps: StampError)
+//! ```
+//!
+//! The accelerometer and the magnetometer have a shorter chain each:
+//!
+//! ```text
+//! true force -> scale and misalignment -> bias -> white -> saturation -> quantisation
+//! true field -> soft iron -> hard iron -> white -> quantisation
 //! ```
 //!
 //! [`ImuError`] holds the sizes, [`ConstantErrors`] what one unit drew of them, `GyroModel` the
@@ -32,6 +39,8 @@ mod gyro;
 #[cfg(feature = "random")]
 mod low_pass;
 #[cfg(feature = "random")]
+mod magnetometer;
+#[cfg(feature = "random")]
 mod normal;
 #[cfg(feature = "random")]
 mod sampling;
@@ -44,6 +53,8 @@ pub use terms::{TERMS, Term};
 pub use constants::ConstantErrors;
 #[cfg(feature = "random")]
 pub use gyro::{GyroModel, MeasureError, Measured, Truth};
+#[cfg(feature = "random")]
+pub use magnetometer::MagnetometerModel;
 #[cfg(feature = "random")]
 pub use sampling::{StampModel, Tick};
 
@@ -94,10 +105,30 @@ pub struct ImuError {
     pub quantization: f64,
     /// Step of the output: rad/s for rates and averages; rad for delta angles, remainder carried.
     pub lsb: f64,
+    /// Step to which the output is cut towards zero, as a cast to an integer does: rad/s for rates and
+    /// averages, rad for delta angles; nothing is carried.
+    pub truncation: f64,
     /// White noise of the specific force (velocity random walk), m/s/sqrt(s).
     pub accel_noise: f64,
     /// Constant bias of the specific force, 1 sigma, m/s^2.
     pub accel_bias: f64,
+    /// Scale-factor error of the specific force, 1 sigma, of one.
+    pub accel_scale: f64,
+    /// Misalignment of the accelerometer, 1 sigma of each of the six off-diagonal elements, rad.
+    pub accel_misalignment: f64,
+    /// The specific force is clipped to plus and minus this, m/s^2.
+    pub accel_range: Option<f64>,
+    /// Step of the specific force, m/s^2.
+    pub accel_lsb: f64,
+    /// White noise of the magnetic field, 1 sigma of a sample, T.
+    pub mag_noise: f64,
+    /// Field of iron that turns with the sensor, 1 sigma of each axis, T.
+    pub mag_hard_iron: f64,
+    /// Answer of iron that turns with the sensor to the field it is in, 1 sigma of each of the six
+    /// elements of a symmetric matrix, of one.
+    pub mag_soft_iron: f64,
+    /// Step of the magnetic field, T.
+    pub mag_lsb: f64,
 }
 
 impl Default for ImuError {
@@ -122,8 +153,17 @@ impl Default for ImuError {
             range: None,
             quantization: 0.0,
             lsb: 0.0,
+            truncation: 0.0,
             accel_noise: 0.0,
             accel_bias: 0.0,
+            accel_scale: 0.0,
+            accel_misalignment: 0.0,
+            accel_range: None,
+            accel_lsb: 0.0,
+            mag_noise: 0.0,
+            mag_hard_iron: 0.0,
+            mag_soft_iron: 0.0,
+            mag_lsb: 0.0,
         }
     }
 }
@@ -171,17 +211,27 @@ impl ImuError {
                 ));
             }
         }
-        for (key, value) in [("range", self.range), ("bandwidth_hz", self.bandwidth_hz)] {
+        for (key, value) in [
+            ("range", self.range),
+            ("bandwidth_hz", self.bandwidth_hz),
+            ("accel_range", self.accel_range),
+        ] {
             if value.is_some_and(|v| v < LEAST_PASSED) {
                 return fault(format!(
                     "{key}: so little that nothing would come through; leave it out"
                 ));
             }
         }
-        for (key, step) in [("quantization", self.quantization), ("lsb", self.lsb)] {
+        for (key, step) in [
+            ("quantization", self.quantization),
+            ("lsb", self.lsb),
+            ("truncation", self.truncation),
+            ("accel_lsb", self.accel_lsb),
+            ("mag_lsb", self.mag_lsb),
+        ] {
             if step > 0.0 && step < FINEST {
                 return fault(format!(
-                    "{key}: finer than {FINEST} rad is no step; leave it out"
+                    "{key}: finer than {FINEST} is no step; leave it out"
                 ));
             }
         }
@@ -197,9 +247,11 @@ impl ImuError {
         if (self.nonlinearity > 0.0 || self.nonlinearity3 > 0.0) && self.range.is_none() {
             return fault("nonlinearity_ppm is a part of the range: give range as well".to_owned());
         }
-        if self.quantization > 0.0 && self.lsb > 0.0 {
+        let steps = [self.quantization, self.lsb, self.truncation];
+        if steps.iter().filter(|step| **step > 0.0).count() > 1 {
             return fault(
-                "quantization and lsb are both the step of the output: give one of them".to_owned(),
+                "quantization, lsb and truncation are each the step of the output: give one of them"
+                    .to_owned(),
             );
         }
         if let Some([least, most]) = self.flicker_tau

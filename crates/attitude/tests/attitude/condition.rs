@@ -219,8 +219,8 @@ fn any_sample() -> impl Strategy<Value = RawSample> {
             publish: Nanos(log),
             gyro,
             accel,
-            orientation: None,
             mag: None,
+            orientation: None,
             interval_nanos,
         })
 }

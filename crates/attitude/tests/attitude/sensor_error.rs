@@ -1,6 +1,7 @@
 //! The gyro error model: what each term does, that a seed means the same everywhere, what is refused.
 
 mod chain;
+mod magnetometer;
 mod numbers;
 mod parameters;
 mod stamps;

@@ -67,23 +67,27 @@ fn the_rate_is_that_of_the_attitude_and_its_change_that_of_the_rate() {
         let mut worst = (0.0_f64, 0.0_f64);
         for seed in [1, 2] {
             let mut m = motion(carrier, seed);
-            // Primes apart, so that no instant is a joint of steps.
-            for k in 1..400_u64 {
-                let t = k * 311_311_117;
+            let mut off = |t: u64| {
                 let felt = m.kinematics(t);
                 let [change, _] = differences(t, 100_000, |t| rotation(&m.at_nanos(t)));
                 let cross = rotation(&felt.spin).transpose() * change;
                 let w = Vector3::new(cross[(2, 1)], cross[(0, 2)], cross[(1, 0)]);
-                worst.0 = worst.0.max((w - felt.spin.w_nb_b).amax());
                 let [change, _] = differences(t, 100_000, |t| m.at_nanos(t).w_nb_b);
-                worst.1 = worst.1.max((change - felt.rate_change).amax());
+                let of_rate = (change - felt.rate_change).amax();
+                ((w - felt.spin.w_nb_b).amax(), of_rate)
+            };
+            for k in 1..400_u64 {
+                // Differences fail across the end of a step, where a derivative jumps: never at both.
+                let (a, b) = (off(k * 311_311_117), off(k * 311_311_117 + 5_000_000));
+                worst.0 = worst.0.max(a.0.min(b.0));
+                worst.1 = worst.1.max(a.1.min(b.1));
             }
         }
         println!("{carrier:?}: {:e} rad/s, {:e} rad/s^2", worst.0, worst.1);
         // Roundings of 1 over 0.1 ms, some together; (0.06 rad)^6 / 140 of a few rad/s at 94 Hz is less.
         assert!(worst.0 < 1e-10, "{carrier:?} {worst:?}");
-        // The same of 10 rad/s and of 6000 rad/s^2, and an instant or two near the end of a step.
-        assert!(worst.1 < 1e-5, "{carrier:?} {worst:?}");
+        // The same of 10 rad/s and of 6000 rad/s^2.
+        assert!(worst.1 < 1e-6, "{carrier:?} {worst:?}");
     }
 }
 
@@ -105,8 +109,8 @@ fn a_delta_angle_is_the_integral_of_the_rate_and_a_mean_that_of_the_force() {
         let mut worst = (0.0_f64, 0.0_f64);
         let held = accelerometer([0.1, -0.05, 0.2]);
         // From 1 s on, over the joints of steps too.
-        for k in 0..300_u64 {
-            let from = SEC + k * 97_000_003;
+        for k in 0..100_u64 {
+            let from = SEC + k * 291_000_011;
             let to = from + 10_000_000;
             let by_trapezes = trapezes(from, to, &mut |t| m.at_nanos(t).w_nb_b);
             worst.0 = worst.0.max((m.delta_angle(from, to) - by_trapezes).amax());

@@ -4,6 +4,7 @@
 
 mod accuracy;
 mod carried;
+mod field;
 mod inertia;
 mod motions;
 #[path = "../../../../tests/shared_data/mod.rs"]

@@ -22,6 +22,8 @@ pub struct ConstantErrors {
     pub temperature_coefficient: Vector3<f64>,
     /// Bias of the specific force, m/s^2.
     pub accel_bias: Vector3<f64>,
+    /// The specific force read is this times the true one, and the bias.
+    pub accel_sensitivity: Matrix3<f64>,
 }
 
 impl ConstantErrors {
@@ -36,6 +38,7 @@ impl ConstantErrors {
             bias: Vector3::zeros(),
             temperature_coefficient: Vector3::zeros(),
             accel_bias: Vector3::zeros(),
+            accel_sensitivity: Matrix3::identity(),
         }
     }
 
@@ -47,13 +50,17 @@ impl ConstantErrors {
             let mut streams = Stream::axes(seed, purpose);
             sigma * Matrix3::from_fn(|row, _| streams[row].normal())
         };
-        let mut misalignment = matrix(Purpose::Misalignment, error.misalignment);
-        misalignment.fill_diagonal(0.0);
-        let scale = spread(Purpose::Scale, error.scale);
+        let sensitivity = |scale: Vector3<f64>, mut misalignment: Matrix3<f64>| {
+            misalignment.fill_diagonal(0.0);
+            Matrix3::identity() + Matrix3::from_diagonal(&scale) + misalignment
+        };
         // Without a range there is no non-linearity: `ImuError::check`.
         let range = error.range.unwrap_or(1.0);
         ConstantErrors {
-            sensitivity: Matrix3::identity() + Matrix3::from_diagonal(&scale) + misalignment,
+            sensitivity: sensitivity(
+                spread(Purpose::Scale, error.scale),
+                matrix(Purpose::Misalignment, error.misalignment),
+            ),
             nonlinear2: spread(Purpose::Nonlinearity, error.nonlinearity / range),
             nonlinear3: spread(
                 Purpose::Nonlinearity3,
@@ -66,6 +73,10 @@ impl ConstantErrors {
                 error.temperature_coefficient,
             ),
             accel_bias: spread(Purpose::AccelerationBias, error.accel_bias),
+            accel_sensitivity: sensitivity(
+                spread(Purpose::AccelerationScale, error.accel_scale),
+                matrix(Purpose::AccelerationMisalignment, error.accel_misalignment),
+            ),
         }
     }
 
@@ -78,6 +89,7 @@ impl ConstantErrors {
             .chain(self.bias.iter())
             .chain(self.temperature_coefficient.iter())
             .chain(self.accel_bias.iter())
+            .chain(self.accel_sensitivity.iter())
             .all(|v| v.is_finite())
     }
 }

@@ -44,8 +44,10 @@ pub struct Measured {
     pub gyro: Vector3<f64>,
     /// Specific force, m/s^2.
     pub specific_force: Vector3<f64>,
-    /// A component was clipped at the range.
+    /// A component of the rate was clipped at the range.
     pub saturated: bool,
+    /// A component of the specific force was.
+    pub force_saturated: bool,
 }
 
 /// A reading that can not be.
@@ -270,9 +272,18 @@ impl GyroModel {
             rate.apply(|v| *v = v.clamp(-range, range));
         }
         let gyro = quantised(error, self.kind, &mut running.remainder, rate, secs);
-        let mut specific_force = truth.sampled_force + constants.accel_bias;
+        let mut specific_force =
+            constants.accel_sensitivity * truth.sampled_force + constants.accel_bias;
         if error.accel_noise > 0.0 {
             specific_force += error.accel_noise / secs.sqrt() * vector(&mut self.acceleration);
+        }
+        let mut force_saturated = false;
+        if let Some(range) = error.accel_range {
+            force_saturated = specific_force.amax() > range;
+            specific_force.apply(|v| *v = v.clamp(-range, range));
+        }
+        if error.accel_lsb > 0.0 {
+            specific_force.apply(|v| *v = (*v / error.accel_lsb).round() * error.accel_lsb);
         }
         running.last = to;
         running.rate = truth.rate;
@@ -282,6 +293,7 @@ impl GyroModel {
             gyro,
             specific_force,
             saturated,
+            force_saturated,
         })
     }
 }
@@ -305,6 +317,10 @@ fn quantised(
     secs: f64,
 ) -> Vector3<f64> {
     let increments = kind == SampleKind::DeltaAngle;
+    if error.truncation > 0.0 {
+        let cut = |v: f64| (v / error.truncation).trunc() * error.truncation;
+        return if increments { rate * secs } else { rate }.map(cut);
+    }
     let angle_step = match error.quantization {
         q if q > 0.0 => q * 12f64.sqrt(),
         _ if increments => error.lsb,

@@ -75,6 +75,11 @@ pub(super) enum Purpose {
     SamplingJitter = 14,
     StampJitter = 15,
     Drops = 16,
+    AccelerationScale = 17,
+    AccelerationMisalignment = 18,
+    MagneticNoise = 19,
+    HardIron = 20,
+    SoftIron = 21,
 }
 
 impl Stream {

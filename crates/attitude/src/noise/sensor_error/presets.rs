@@ -24,7 +24,7 @@ impl Preset {
 }
 
 /// The presets. All values 1 sigma.
-pub static PRESETS: [Preset; 12] = [
+pub static PRESETS: [Preset; 15] = [
     Preset {
         name: "consumer_mems",
         terms: "arw=0.84,bias_instability=5,scale_ppm=10000,misalignment=1,g_sensitivity=360,range=2000",
@@ -74,6 +74,22 @@ pub static PRESETS: [Preset; 12] = [
         name: "navigation_psins",
         terms: "arw=0.001,turn_on_bias=0.01,gm_sigma=0.001,gm_tau=300,scale_ppm=10,misalignment=0.00277778",
         source: "PSINS `imuerrset`, case 2: 0.01 deg/h constant, 0.001 deg/h with 300 to 1000 s",
+    },
+    // Whole units: accelerometer and magnetometer, turn-on bias and resolution with them.
+    Preset {
+        name: "consumer_imu",
+        terms: "arw=0.84,bias_instability=5,turn_on_bias=1800,scale_ppm=10000,misalignment=1,g_sensitivity=360,range=2000,lsb=0.061,accel_noise=190,accel_bias=20,accel_scale_ppm=5000,accel_misalignment=0.5,accel_range=24,accel_lsb=0.73,mag_noise=0.5,mag_hard_iron=1,mag_soft_iron=1,mag_lsb=0.15",
+        source: "consumer_mems and its accelerometer (BMI088: 190 ug/sqrt(Hz), 20 mg, 24 g), a magnetometer calibrated to 1 uT; scale and axes filled in",
+    },
+    Preset {
+        name: "industrial_imu",
+        terms: "arw=0.15,bias_instability=2,turn_on_bias=500,scale_ppm=1000,misalignment=0.05,g_sensitivity=36,range=125,accel_noise=23,accel_bias=2,accel_scale_ppm=1000,accel_misalignment=0.05,accel_range=8,mag_noise=0.2,mag_hard_iron=0.3,mag_soft_iron=0.3",
+        source: "industrial_mems and its accelerometer (ADIS16465: 23 ug/sqrt(Hz), 8 g, 0.14 deg/s turn-on); the rest filled in",
+    },
+    Preset {
+        name: "rough_imu",
+        terms: "arw=0.84,bias_instability=20,turn_on_bias=18000,scale_ppm=20000,misalignment=1,g_sensitivity=360,range=250,truncation=0.061,accel_noise=300,accel_bias=40,accel_scale_ppm=20000,accel_misalignment=1,accel_range=4,accel_lsb=1,mag_noise=1,mag_hard_iron=5,mag_soft_iron=5,mag_lsb=0.3",
+        source: "a cheap unit as it comes, uncalibrated: 5 deg/s of bias, 2 % of scale, clipping at 250 deg/s and 4 g, cut towards zero",
     },
     // The names and numbers `replay --noise` has for its covariance: noise alone.
     Preset {

@@ -49,7 +49,7 @@ macro_rules! term {
 }
 
 /// Every key, in the order of [`ImuError::text`]: the noise first.
-pub static TERMS: [Term; 22] = [
+pub static TERMS: [Term; 31] = [
     term!("arw", arw, "deg/sqrt(h)", DEG / 60.0, 1e4),
     term!(
         "bias_instability",
@@ -110,6 +110,21 @@ pub static TERMS: [Term; 22] = [
     },
     term!("accel_noise", accel_noise, "ug/sqrt(Hz)", G * 1e-6, 1e7),
     term!("accel_bias", accel_bias, "mg", G * 1e-3, 1e5),
+    term!("accel_scale_ppm", accel_scale, "ppm", 1e-6, 2e5),
+    term!("accel_misalignment", accel_misalignment, "deg", DEG, 20.0),
+    term!(some "accel_range", accel_range, "g", G, 1e5),
+    term!("accel_lsb", accel_lsb, "mg", G * 1e-3, 1e6),
+    term!(
+        "truncation",
+        truncation,
+        "deg/s, or deg for delta angles",
+        DEG,
+        1e4
+    ),
+    term!("mag_noise", mag_noise, "uT", 1e-6, 1e6),
+    term!("mag_hard_iron", mag_hard_iron, "uT", 1e-6, 1e6),
+    term!("mag_soft_iron", mag_soft_iron, "%", 1e-2, 20.0),
+    term!("mag_lsb", mag_lsb, "uT", 1e-6, 1e6),
 ];
 
 impl ImuError {

@@ -299,3 +299,57 @@ fn the_accelerometer_has_its_own_noise() {
     let sigma = (squares / n as f64).sqrt();
     assert!((sigma / (9.80665e-6 / 0.1) - 1.0).abs() < 0.02, "{sigma}");
 }
+
+#[test]
+fn the_accelerometer_is_scaled_turned_clipped_and_cut_into_steps() {
+    let text = "accel-range=2,accel-lsb=10";
+    let mut constants = ConstantErrors::none();
+    constants.accel_sensitivity[(0, 0)] = 1.01;
+    constants.accel_sensitivity[(1, 0)] = 0.1;
+    constants.accel_bias.y = 0.05;
+    let error = ImuError::parse(text).unwrap();
+    let mut gyro = GyroModel::with_constants(&error, constants, Rate, 0).unwrap();
+    let mut measure = |n: i64, force: [f64; 3]| {
+        let truth = Truth {
+            sampled_force: Vector3::from(force),
+            ..Truth::default()
+        };
+        gyro.measure(Nanos(n * STEP), Nanos((n + 1) * STEP), &truth)
+            .unwrap()
+    };
+    let lsb = 0.01 * 9.80665;
+    let m = measure(0, [5.0, 0.0, -9.0]);
+    let steps = m.specific_force / lsb;
+    assert!((steps - steps.map(f64::round)).amax() < 1e-12, "{steps}");
+    // Half a step.
+    let expected = Vector3::new(5.05, 0.55, -9.0);
+    assert!(
+        (m.specific_force - expected).amax() <= 0.5 * lsb,
+        "{}",
+        m.specific_force
+    );
+    assert!(!m.force_saturated);
+    let m = measure(1, [30.0, 0.0, -100.0]);
+    assert!(m.force_saturated && !m.saturated);
+    assert!((m.specific_force.x - 2.0 * 9.80665).abs() < 1e-12);
+    assert!((m.specific_force.z + 2.0 * 9.80665).abs() < 1e-12);
+}
+
+#[test]
+fn truncation_cuts_towards_zero_and_carries_nothing() {
+    let rate = |_: f64| Vector3::new(0.019, -0.019, 0.0004);
+    let angle = |t: f64| Vector3::new(0.019, -0.019, 0.0004) * t;
+    let step = 0.06_f64.to_radians();
+    for kind in [Rate, Average] {
+        for m in read(
+            &mut sensor("truncation=0.06", kind, 0),
+            STEP,
+            100,
+            rate,
+            angle,
+        ) {
+            let expected = Vector3::new(18.0, -18.0, 0.0) * step;
+            assert!((m.gyro - expected).amax() < 1e-15, "{}", m.gyro);
+        }
+    }
+}

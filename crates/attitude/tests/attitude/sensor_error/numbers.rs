@@ -9,6 +9,8 @@ use strapd_attitude::record::SampleKind::{self, Average, DeltaAngle, Rate};
 const ALL: &str = "arw=0.3,bias-instability=20,rrw=60,rate-ramp=100,gm-sigma=10,gm-tau=3,turn-on-bias=50,\
 temperature-coefficient=5,scale-ppm=2000,misalignment=0.5,nonlinearity-ppm=300,nonlinearity3-ppm=200,\
 g-sensitivity=30,range=200,bandwidth-hz=60,quantization=0.5,accel-noise=100,accel-bias=3";
+/// What else constant errors have.
+const MORE: &str = "accel-scale-ppm=4000,accel-misalignment=0.3";
 
 /// FNV-1a of the bits of all readings.
 fn digest(text: &str, kind: SampleKind, seed: u64) -> u64 {
@@ -154,14 +156,14 @@ fn terms_do_not_share_their_draws() {
 
 #[test]
 fn constant_errors_have_the_spread_of_their_sizes() {
-    let error = ImuError::parse(ALL).unwrap();
+    let error = ImuError::parse(&format!("{ALL},{MORE}")).unwrap();
     let units: Vec<_> = (0..2000)
         .map(|seed| *GyroModel::new(&error, Rate, seed).unwrap().constants())
         .collect();
     let range = error.range.unwrap();
     type Drawn = strapd_attitude::noise::sensor_error::ConstantErrors;
     type Value = fn(&Drawn) -> f64;
-    let values: [(&str, f64, Value); 8] = [
+    let values: [(&str, f64, Value); 10] = [
         ("bias", error.turn_on_bias, |u| u.bias.y),
         ("scale", error.scale, |u| u.sensitivity[(2, 2)] - 1.0),
         ("misalignment", error.misalignment, |u| {
@@ -176,6 +178,12 @@ fn constant_errors_have_the_spread_of_their_sizes() {
             u.nonlinear3.x
         }),
         ("accelerometer", error.accel_bias, |u| u.accel_bias.x),
+        ("its scale", error.accel_scale, |u| {
+            u.accel_sensitivity[(1, 1)] - 1.0
+        }),
+        ("its axes", error.accel_misalignment, |u| {
+            u.accel_sensitivity[(2, 0)]
+        }),
     ];
     for (name, size, of) in values {
         let rms = (units.iter().map(|u| of(u).powi(2)).sum::<f64>() / 2000.0).sqrt();
