@@ -24,7 +24,7 @@ mod target;
 pub(crate) mod tests;
 
 pub use copy::CopiedChannel;
-pub(crate) use csv::roll_pitch_yaw;
+pub(crate) use csv::{RAW_HEADER, push_raw_row, roll_pitch_yaw};
 pub use decimate::Decimator;
 pub use document::Document;
 pub use mcap::chunk::Compression;
@@ -140,7 +140,7 @@ impl Sink {
         provenance: &Provenance,
     ) -> Result<Sink> {
         let mut tables = streams.iter().filter(|s| s.content != Content::Truth);
-        let table = tables.next().map(|s| s.content);
+        let table = tables.next();
         if target.format() == Some(Format::Csv) && tables.next().is_some() {
             return Err(Error::Usage(format!(
                 "a CSV has no column for the topic and {} topics are estimated\n  help: choose one with --topic, or write .ndjson or .mcap",
@@ -162,11 +162,13 @@ impl Sink {
                 Form::Ndjson(objects.collect())
             }
             Some(Format::Csv) => {
-                head.extend_from_slice(match table {
-                    Some(Content::Samples(_)) => csv::RAW_HEADER,
-                    _ => csv::HEADER,
-                });
-                Form::Csv
+                let (header, last) = match table.map(|s| (s.content, s.world_axes.clone())) {
+                    Some((Content::Samples(kind), _)) => (csv::RAW_HEADER, kind.name().to_owned()),
+                    Some((_, world)) => (csv::HEADER, world),
+                    None => (csv::HEADER, String::new()),
+                };
+                head.extend_from_slice(header);
+                Form::Csv(last)
             }
             Some(Format::Mcap) => Form::Mcap {
                 layout: Layout::begin(
@@ -182,7 +184,7 @@ impl Sink {
         // A table has no rows for truth.
         let left_out: Vec<bool> = streams
             .iter()
-            .map(|s| matches!(form, Form::Csv) && s.content == Content::Truth)
+            .map(|s| matches!(form, Form::Csv(_)) && s.content == Content::Truth)
             .collect();
         Sink::begin(output, form, file, &head, &left_out)
     }

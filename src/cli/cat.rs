@@ -9,6 +9,7 @@ use crate::pipeline::channel_route::{Item, Noticed, Route, Taker};
 use crate::pipeline::decoders::Decoders;
 use crate::pipeline::log::{Log, problems};
 use crate::pipeline::topics;
+use crate::sink::{RAW_HEADER, push_raw_row};
 use clap::{Args, ValueEnum};
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -28,7 +29,7 @@ use strapd_recording::pool::Pool;
 #[command(after_help = "Examples:
   strapd cat flight.mcap -n 5 --format table
   strapd cat flight.mcap --topic /imu > samples.ndjson     (strapd replay samples.ndjson reads it)
-  strapd cat flight.mcap --topic /odom --format csv
+  strapd cat flight.mcap --topic /odom --format csv        (so it does a CSV)
   strapd cat tcp://127.0.0.1:4550 -n 100                   attitudes of a daemon as they come
   strapd cat ws://127.0.0.1:8765 --id imu0 --rate-hz 10 -x 60 --format csv
   strapd cat udp-listen://127.0.0.1:9870                   attitudes that somebody sends here")]
@@ -77,9 +78,6 @@ pub enum Format {
     /// Aligned columns for people.
     Table,
 }
-
-const CSV_HEADER: &str =
-    "stamp_ns,log_ns,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z,qw,qx,qy,qz,interval_ns\n";
 
 /// Runs it.
 ///
@@ -130,7 +128,11 @@ pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
                 path: args.source.clone(),
                 what: why.to_string(),
             })?;
-        meanings.push(Meaning::new(&Plan::default(), &decoder.stated().declared));
+        let declared = &decoder.stated().declared;
+        meanings.push((
+            Meaning::new(&Plan::default(), declared),
+            declared.sample_kind,
+        ));
         by_id
             .entry((known.channel.id, known.channel.schema_id))
             .or_insert(decoders.len());
@@ -169,7 +171,7 @@ pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
                 match item {
                     Item::Sample(stream, raw) => match meanings
                         .get(stream)
-                        .map_or(Ok(true), |m| printer.print(&m.in_flu(&raw), m.kind))
+                        .map_or(Ok(true), |(m, kind)| printer.print(&m.in_flu(&raw), *kind))
                     {
                         Ok(true) => {}
                         Ok(false) => return ControlFlow::Break(()),
@@ -227,19 +229,20 @@ struct Printer {
     topic: String,
     left: u64,
     seq: u64,
+    row: Vec<u8>,
 }
 
 impl Printer {
     fn new(format: Format, topic: &str, count: Option<u64>) -> Result<Printer> {
         let mut out = BufWriter::with_capacity(1 << 16, std::io::stdout());
         let head = match format {
-            Format::Ndjson => "",
-            Format::Csv => CSV_HEADER,
+            Format::Ndjson => b"".as_slice(),
+            Format::Csv => RAW_HEADER,
             Format::Table => {
-                "               stamp s            gyro x            y            z      accel x            y            z           qw       qx       qy       qz\n"
+                b"               stamp s            gyro x            y            z      accel x            y            z           qw       qx       qy       qz\n"
             }
         };
-        out.write_all(head.as_bytes())
+        out.write_all(head)
             .map_err(|e| Error::writing("stdout", e))?;
         Ok(Printer {
             out,
@@ -247,18 +250,23 @@ impl Printer {
             topic: topic.to_owned(),
             left: count.unwrap_or(u64::MAX),
             seq: 0,
+            row: Vec::new(),
         })
     }
 
-    /// Prints one; says whether more are wanted.
-    fn print(&mut self, raw: &RawSample, kind: SampleKind) -> std::io::Result<bool> {
+    /// Prints one, with what the format says it means; says whether more are wanted.
+    fn print(&mut self, raw: &RawSample, kind: Option<SampleKind>) -> std::io::Result<bool> {
         if self.left == 0 {
             return Ok(false);
         }
         self.left -= 1;
         match self.format {
             Format::Ndjson => self.ndjson(raw, kind)?,
-            Format::Csv => self.csv(raw)?,
+            Format::Csv => {
+                self.row.clear();
+                push_raw_row(&mut self.row, raw, kind.map_or("", SampleKind::name));
+                self.out.write_all(&self.row)?;
+            }
             Format::Table => self.table(raw)?,
         }
         self.seq += 1;
@@ -266,7 +274,7 @@ impl Printer {
     }
 
     /// A `RATE` object as the service reads it: what is absent is left out, NaN becomes null.
-    fn ndjson(&mut self, raw: &RawSample, kind: SampleKind) -> std::io::Result<()> {
+    fn ndjson(&mut self, raw: &RawSample, kind: Option<SampleKind>) -> std::io::Result<()> {
         let (sec, nsec) = raw.header.unwrap_or(raw.log).to_sec_nanosec();
         let mut object = json!({
             "class": "RATE", "id": self.topic, "seq": self.seq,
@@ -286,34 +294,11 @@ impl Printer {
             if let Some(interval) = raw.interval_nanos {
                 put("dt_ns", json!(interval));
             }
-            if kind != SampleKind::default() {
+            if let Some(kind) = kind {
                 put("sample_kind", json!(kind.name()));
             }
         }
         writeln!(self.out, "{object}")
-    }
-
-    fn csv(&mut self, raw: &RawSample) -> std::io::Result<()> {
-        write!(
-            self.out,
-            "{},{}",
-            raw.header.unwrap_or(raw.log).0,
-            raw.log.0
-        )?;
-        for vector in [raw.gyro, raw.accel] {
-            match vector {
-                Some([x, y, z]) => write!(self.out, ",{x},{y},{z}")?,
-                None => write!(self.out, ",,,")?,
-            }
-        }
-        match raw.orientation {
-            Some([w, x, y, z]) => write!(self.out, ",{w},{x},{y},{z}")?,
-            None => write!(self.out, ",,,,")?,
-        }
-        match raw.interval_nanos {
-            Some(interval) => writeln!(self.out, ",{interval}"),
-            None => writeln!(self.out, ","),
-        }
     }
 
     fn table(&mut self, raw: &RawSample) -> std::io::Result<()> {

@@ -5,11 +5,11 @@
 use super::channel_route::{Item, Route};
 use super::decoders::Decoders;
 use super::log::{Log, LogChannel, problems, rank};
+use super::replay::recognised;
 use super::simulate::{TRUTH_ID, TRUTH_TOPIC};
 use super::topics;
 use crate::error::{Error, Result};
 use serde::Deserialize;
-use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use strapd_attitude::estimate::orientation_convention;
@@ -18,6 +18,7 @@ use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::Nanos;
 use strapd_attitude::worlds::{Convention, World};
 use strapd_recording::decode::{Options, Role};
+use strapd_recording::format::{Format, open};
 use strapd_recording::mcap::{self, WalkOptions};
 use strapd_recording::pool::Pool;
 use strapd_recording::text::printable;
@@ -46,23 +47,20 @@ pub enum Side {
     Reference,
 }
 
-/// Reads a track by the file's extension: `.ndjson`, `.jsonl`, `.csv`, else MCAP.
+/// Reads a track: NDJSON, CSV or MCAP, by what the file holds.
 ///
 /// # Errors
 /// The file can not be read, or holds no attitude, or several and none named.
 pub fn read(path: &Path, side: Side, topic: Option<&str>, pool: &Pool) -> Result<Track> {
-    let extension = path
-        .extension()
-        .map(|e| e.to_string_lossy().to_ascii_lowercase());
     let plain = |entries| Track {
         name: path.display().to_string(),
         entries,
         problems: Vec::new(),
     };
-    match extension.as_deref() {
-        Some("ndjson" | "jsonl") => from_ndjson(path, side, topic).map(plain),
-        Some("csv") => from_csv(path).map(plain),
-        _ => from_mcap(path, side, topic, pool),
+    match recognised(path)? {
+        Format::Lines => from_ndjson(path, side, topic).map(plain),
+        Format::Table => from_csv(path).map(plain),
+        Format::Mcap => from_mcap(path, side, topic, pool),
     }
 }
 
@@ -309,13 +307,20 @@ struct Row {
     stamp_ns: i64,
     /// Beside a sample whose stamp may be wrong: the instant the attitude is of.
     log_ns: Option<i64>,
-    w: f64,
-    x: f64,
-    y: f64,
-    z: f64,
+    // As they were called at first.
+    #[serde(alias = "w")]
+    qw: f64,
+    #[serde(alias = "x")]
+    qx: f64,
+    #[serde(alias = "y")]
+    qy: f64,
+    #[serde(alias = "z")]
+    qz: f64,
+    #[serde(default)]
+    world: String,
 }
 
-/// Reads a CSV file with at least the columns `stamp_ns,w,x,y,z`.
+/// Reads a CSV file with at least the columns `stamp_ns,qw,qx,qy,qz`.
 ///
 /// # Errors
 /// The file can not be read, a column is missing, or a cell is not a number.
@@ -323,27 +328,23 @@ pub fn from_csv(path: &Path) -> Result<Vec<Entry>> {
     csv::Reader::from_reader(BufReader::new(open(path)?))
         .deserialize::<Row>()
         .map(|row| {
-            row.map(|r| (Nanos(r.log_ns.unwrap_or(r.stamp_ns)), [r.w, r.x, r.y, r.z]))
-                .map_err(|e| Error::Unsupported {
-                    path: path.to_owned(),
-                    what: format!("{e}\n  help: columns stamp_ns,w,x,y,z are needed"),
-                })
+            row.map(|r| {
+                let wxyz = [r.qw, r.qx, r.qy, r.qz];
+                let stamp = Nanos(r.log_ns.unwrap_or(r.stamp_ns));
+                (
+                    stamp,
+                    match convention_of(&r.world) {
+                        Convention::EnuFlu => wxyz,
+                        other => in_flu(other, wxyz),
+                    },
+                )
+            })
+            .map_err(|e| Error::Unsupported {
+                path: path.to_owned(),
+                what: format!("{e}\n  help: columns stamp_ns,qw,qx,qy,qz are needed"),
+            })
         })
         .collect()
-}
-
-fn open(path: &Path) -> Result<File> {
-    if path.is_dir() {
-        return Err(strapd_recording::Error::IsDirectory {
-            path: path.to_owned(),
-        }
-        .into());
-    }
-    let opened = File::open(path).map_err(|source| strapd_recording::Error::Open {
-        path: path.to_owned(),
-        source,
-    })?;
-    Ok(opened)
 }
 
 fn bad_line(path: &Path, number: u64, what: &str) -> Error {

@@ -1,4 +1,4 @@
-//! NDJSON samples -> the same run as from a log. I/O.
+//! Samples from lines of JSON, or rows of a table -> the same run as from a log. I/O.
 
 use super::channel_route::Item;
 use super::position::Position;
@@ -11,17 +11,17 @@ use crate::error::{Error, Result};
 use crate::report::summary::RunSummary;
 use crate::sink::{Flow, Stream, output_topic};
 use std::collections::BTreeSet;
-use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
+use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
 use strapd_attitude::estimate::{Aid, Meaning};
 use strapd_attitude::estimate::{StampPass, Stamps};
 use strapd_attitude::record::{Declared, TimeUnit};
 use strapd_attitude::record::{Nanos, RawSample};
-use strapd_recording::decode::{
-    Ambiguous, Bare, Class, LineDecoder, MAX_LINE, MOST_WAITING, unit_of,
-};
+use strapd_recording::decode::Options;
+use strapd_recording::decode::{Ambiguous, Bare, Class, MOST_WAITING, Undecodable, unit_of};
+use strapd_recording::format::Format;
+use strapd_recording::lines::Lines;
 use strapd_recording::mcap::Survey;
 use strapd_recording::pool::Pool;
 
@@ -30,34 +30,18 @@ const BATCH: usize = 2048;
 /// Lines without any sample before the first, after which this is no log of samples.
 const PATIENCE: u64 = 1000;
 
-/// What lines are called in the summary. Their undecodable payloads carry the line's number where
-/// others carry a time.
-pub(super) const DESCRIBED: &str = "NDJSON";
-
-/// Opens a file of lines.
+/// Begins to read lines or rows.
 ///
 /// # Errors
-/// It is missing, a directory, or empty.
-pub fn open(path: &Path) -> Result<File> {
-    let fail = |source| strapd_recording::Error::Open {
-        path: path.to_owned(),
-        source,
-    };
-    let file = File::open(path).map_err(fail)?;
-    let metadata = file.metadata().map_err(fail)?;
-    if metadata.is_dir() {
-        return Err(strapd_recording::Error::IsDirectory {
+/// They can not be read; `--field` for a table, whose columns have names.
+pub fn open<R: Read>(path: &Path, format: Format, input: R, options: &Options) -> Result<Lines<R>> {
+    if format == Format::Table && !options.fields.is_empty() {
+        return Err(Error::Unsupported {
             path: path.to_owned(),
-        }
-        .into());
+            what: "--field is for messages, and this is a CSV\n  help: its first row names its columns: stamp_ns, gyro_x, gyro_y, gyro_z".to_owned(),
+        });
     }
-    if metadata.is_file() && metadata.len() == 0 {
-        return Err(strapd_recording::Error::Empty {
-            path: path.to_owned(),
-        }
-        .into());
-    }
-    Ok(file)
+    Ok(Lines::new(path, format, input, options)?)
 }
 
 /// Replays lines; `stamps` is what [`stamps`] found.
@@ -66,7 +50,7 @@ pub fn open(path: &Path) -> Result<File> {
 /// As [`super::replay::run`]; several sensors in one stream and none named.
 pub fn replay(
     run: &ReplayRequest,
-    input: BufReader<impl Read>,
+    input: Lines<impl Read>,
     stamps: Option<Stamps>,
     pool: &Pool,
     watch: &mut dyn FnMut(&Position),
@@ -86,7 +70,7 @@ pub fn replay(
 ///
 /// # Errors
 /// As [`replay`]; there is no constant rate.
-pub fn stamps(run: &ReplayRequest, input: BufReader<impl Read>) -> Result<Option<Stamps>> {
+pub fn stamps(run: &ReplayRequest, input: Lines<impl Read>) -> Result<Option<Stamps>> {
     if !run.plan.regularise_stamps {
         return Ok(None);
     }
@@ -169,16 +153,11 @@ impl Taker for Looking<'_> {
 /// Reads lines to their end, or until nobody wants them.
 fn read(
     run: &ReplayRequest,
-    mut input: BufReader<impl Read>,
+    mut lines: Lines<impl Read>,
     path: &Path,
     taker: &mut impl Taker,
 ) -> Result<()> {
-    let decoder = LineDecoder::new(&run.selection.decode);
-    let mut lines = Lines {
-        number: 0,
-        offset: 0,
-        line: Vec::new(),
-    };
+    let format = lines.format();
     let mut sensor: Option<String> = None;
     let mut bare = BareStamps::default();
     let is_beside = run.plan.aid == Aid::GravityAndField || run.plan.has_forces_beside;
@@ -186,24 +165,11 @@ fn read(
     let mut samples = Vec::new();
     let mut items = Vec::with_capacity(BATCH);
     let mut closed = false;
-    while !closed && lines.next(&mut input, path)? {
-        if lines.is_blank() {
-            continue;
-        }
-        // A line has no time but the one in it.
-        let received = Nanos(0);
-        match decoder.decode(&lines.line, received, &mut samples) {
-            Err(why) if sensor.is_none() => {
-                return Err(Error::Unsupported {
-                    path: path.to_owned(),
-                    what: format!(
-                        "line {}: {why}\n  help: one JSON object per line, with gyro and stamp; or an MCAP",
-                        lines.number
-                    ),
-                });
-            }
+    while !closed && let Some(line) = lines.next(&mut samples)? {
+        match line {
+            Err(why) if sensor.is_none() => return Err(no_samples(path, &lines, &why)),
             Err(why) => {
-                let number = Nanos(i64::try_from(lines.number).unwrap_or(i64::MAX));
+                let number = Nanos(i64::try_from(lines.number()).unwrap_or(i64::MAX));
                 items.push(Item::Undecodable(0, Box::new((number, why))));
             }
             Ok(line) => {
@@ -219,8 +185,8 @@ fn read(
                     }
                     // Attitudes, status and the like between the samples.
                     samples.clear();
-                    if sensor.is_none() && lines.number > PATIENCE {
-                        return Err(nothing(path));
+                    if sensor.is_none() && lines.number() > PATIENCE {
+                        return Err(nothing(path, format));
                     }
                     continue;
                 }
@@ -250,7 +216,7 @@ fn read(
                             interval_unit_given: run.selection.decode.states_interval_unit(),
                             ..Declared::default()
                         };
-                        let (found, stream) = met(run, &id, &declared);
+                        let (found, stream) = met(run, &id, format, &declared);
                         taker.meet(found, stream)?;
                         sensor = Some(id);
                     }
@@ -260,7 +226,7 @@ fn read(
                             first,
                             format!(
                                 "line {}: samples of another sensor, `{id}`\n  help: --topic ID takes one of them",
-                                lines.number
+                                lines.number()
                             ),
                         ));
                     }
@@ -273,7 +239,7 @@ fn read(
         }
         // With nothing left in the buffer the next line may be long in coming: what is known goes
         // out first.
-        let may_wait = input.buffer().is_empty();
+        let may_wait = lines.may_wait();
         if items.len() >= BATCH || may_wait {
             closed = taker.take(&mut items)? == Flow::Closed;
         }
@@ -282,7 +248,7 @@ fn read(
         }
     }
     if sensor.is_none() {
-        return Err(nothing(path));
+        return Err(nothing(path, format));
     }
     items.extend(bare.settle().map_err(|what| unclear(path, &what))?);
     let _ = taker.take(&mut items)?;
@@ -327,12 +293,13 @@ impl BareStamps {
     }
 }
 
-/// A line has no time but the one in it.
+/// A line has no time but the one in it; a row may.
 fn in_its_time(raw: RawSample) -> RawSample {
     let stamp = raw.header.unwrap_or(Nanos(0));
+    let log = Some(raw.log).filter(|log| log.0 != 0).unwrap_or(stamp);
     RawSample {
-        log: stamp,
-        publish: stamp,
+        log,
+        publish: log,
         ..raw
     }
 }
@@ -346,57 +313,44 @@ fn unclear(path: &Path, what: &Ambiguous) -> Error {
     }
 }
 
-fn nothing(path: &Path) -> Error {
+/// What begins with no line of samples.
+pub(super) fn no_samples(path: &Path, lines: &Lines<impl Read>, why: &Undecodable) -> Error {
+    let help = match lines.format() {
+        Format::Table => {
+            "one row per sample under a row of names, as strapd cat --format csv writes them"
+        }
+        _ => "one JSON object per line, with gyro and stamp; or an MCAP",
+    };
     Error::Unsupported {
         path: path.to_owned(),
-        what: "no line carries a body rate\n  help: {\"class\":\"RATE\",\"stamp\":{\"sec\":1,\"nsec\":0},\"gyro\":[0.1,0,0]}, or --field gyro=PATH".to_owned(),
+        what: format!("line {}: {why}\n  help: {help}", lines.number()),
     }
 }
 
-fn met(run: &ReplayRequest, id: &str, declared: &Declared) -> (Found, Stream) {
+pub(super) fn nothing(path: &Path, format: Format) -> Error {
+    let what = match format {
+        Format::Table => {
+            "no row carries a body rate\n  help: columns gyro_x, gyro_y, gyro_z, in rad/s"
+        }
+        _ => {
+            "no line carries a body rate\n  help: {\"class\":\"RATE\",\"stamp\":{\"sec\":1,\"nsec\":0},\"gyro\":[0.1,0,0]}, or --field gyro=PATH"
+        }
+    };
+    Error::Unsupported {
+        path: path.to_owned(),
+        what: what.to_owned(),
+    }
+}
+
+fn met(run: &ReplayRequest, id: &str, format: Format, declared: &Declared) -> (Found, Stream) {
     let name = if id.is_empty() { "imu" } else { id };
     let found = Found {
         name: name.to_owned(),
         output_topic: output_topic(name, &BTreeSet::new()),
-        described: DESCRIBED.to_owned(),
+        described: format.name().to_owned(),
         resolved: Meaning::new(&run.plan, declared),
         noticed: Arc::default(),
         warnings: Vec::new(),
     };
     (found, Stream::new(name, ""))
-}
-
-struct Lines {
-    number: u64,
-    offset: u64,
-    line: Vec<u8>,
-}
-
-impl Lines {
-    /// Reads the next line, at most [`MAX_LINE`] and one byte of it; the rest of a longer one is
-    /// skipped.
-    fn next(&mut self, input: &mut dyn BufRead, path: &Path) -> Result<bool> {
-        self.line.clear();
-        let fail = |offset| {
-            move |source| strapd_recording::Error::Read {
-                path: path.to_owned(),
-                offset,
-                source,
-            }
-        };
-        let limit = MAX_LINE as u64 + 1;
-        let read = Read::take(&mut *input, limit)
-            .read_until(b'\n', &mut self.line)
-            .map_err(fail(self.offset))?;
-        self.number += 1;
-        self.offset += read as u64;
-        if read as u64 == limit && self.line.last() != Some(&b'\n') {
-            self.offset += input.skip_until(b'\n').map_err(fail(self.offset))? as u64;
-        }
-        Ok(read > 0)
-    }
-
-    fn is_blank(&self) -> bool {
-        self.line.iter().all(u8::is_ascii_whitespace)
-    }
 }

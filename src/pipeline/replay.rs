@@ -21,6 +21,8 @@ use std::path::Path;
 use std::time::Instant;
 use strapd_attitude::estimate::StampPass;
 use strapd_attitude::estimate::{Patience, Preparation, Prepared};
+use strapd_recording::format::{Format, head_of, open};
+use strapd_recording::lines::Lines;
 use strapd_recording::mcap::{self, Reader, WalkOptions};
 use strapd_recording::pool::Pool;
 
@@ -36,33 +38,33 @@ pub fn run(
 ) -> Result<RunSummary> {
     let begun = Instant::now();
     let mut summary = match &run.source {
-        Source::File(path) if is_lines(path) => {
-            let file = lines::open(path)?;
-            let stamps = if path.is_file() {
-                lines::stamps(run, BufReader::new(lines::open(path)?))?
-            } else {
-                None
-            };
-            lines::replay(run, BufReader::new(file), stamps, pool, watch)?
-        }
-        Source::File(path) if is_pipe(path) => {
-            let pipe = lines::open(path)?;
-            piped(run, pipe, pool, watch)?
-        }
-        Source::File(path) => file(run, path, pool, watch)?,
+        Source::File(path) if is_pipe(path) => piped(run, open(path)?, pool, watch)?,
+        Source::File(path) => match recognised(path)? {
+            format @ (Format::Lines | Format::Table) => {
+                let text = || lines_of(run, format, open(path)?);
+                let stamps = lines::stamps(run, text()?)?;
+                lines::replay(run, text()?, stamps, pool, watch)?
+            }
+            Format::Mcap => file(run, path, pool, watch)?,
+        },
         Source::Stdin => piped(run, std::io::stdin(), pool, watch)?,
     };
     summary.elapsed_secs = begun.elapsed().as_secs_f64();
     Ok(summary)
 }
 
-/// Whether a file is NDJSON, by its extension.
-fn is_lines(path: &Path) -> bool {
-    path.extension().is_some_and(|e| {
-        ["ndjson", "jsonl"]
-            .iter()
-            .any(|known| e.eq_ignore_ascii_case(known))
-    })
+/// What a file is, by its first bytes; where its name says otherwise, that is said. What nobody knows is taken for an
+/// MCAP, whose reader says what is wrong with it.
+pub(super) fn recognised(path: &Path) -> Result<Format> {
+    let format = Format::of_file(path)?.unwrap_or(Format::Mcap);
+    if let Some(said) = format.contradiction(path) {
+        tracing::warn!("{}: {said}", path.display());
+    }
+    Ok(format)
+}
+
+fn lines_of<R: Read>(run: &ReplayRequest, format: Format, input: R) -> Result<Lines<R>> {
+    lines::open(&run.source.name(), format, input, &run.selection.decode)
 }
 
 /// Whether a path names what can be read only once: a named pipe, a shell's `<(...)`, a device.
@@ -70,7 +72,7 @@ fn is_pipe(path: &Path) -> bool {
     std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
 }
 
-/// Standard input or a named pipe: an MCAP or lines, told apart by the first bytes.
+/// Standard input or a named pipe, told by the first bytes.
 fn piped(
     run: &ReplayRequest,
     input: impl Read + Send + 'static,
@@ -78,28 +80,28 @@ fn piped(
     watch: &mut dyn FnMut(&Position),
 ) -> Result<RunSummary> {
     let mut input = BufReader::with_capacity(1 << 16, input);
-    let mut head = Vec::new();
-    Read::take(&mut input, mcap::MAGIC.len() as u64)
-        .read_to_end(&mut head)
-        .map_err(|source| strapd_recording::Error::Read {
-            path: run.source.name(),
-            offset: 0,
-            source,
-        })?;
+    let head = head_of(&mut input).map_err(|source| strapd_recording::Error::Read {
+        path: run.source.name(),
+        offset: 0,
+        source,
+    })?;
     if head.is_empty() {
         return Err(strapd_recording::Error::Empty {
             path: run.source.name(),
         }
         .into());
     }
-    let is_mcap = head == mcap::MAGIC;
+    // What has no name and tells nothing may still be lines, of which the first is damaged.
+    let format = Format::of_bytes(&head).unwrap_or(Format::Lines);
     let whole = std::io::Cursor::new(head).chain(input);
-    if is_mcap {
-        let reader = Reader::from_stream(run.source.name(), Box::new(whole))?;
-        replay_stream::replay(run, reader, pool, watch)
-    } else {
-        let input = BufReader::with_capacity(1 << 16, whole);
-        lines::replay(run, input, None, pool, watch)
+    match format {
+        Format::Mcap => {
+            let reader = Reader::from_stream(run.source.name(), Box::new(whole))?;
+            replay_stream::replay(run, reader, pool, watch)
+        }
+        Format::Lines | Format::Table => {
+            lines::replay(run, lines_of(run, format, whole)?, None, pool, watch)
+        }
     }
 }
 

@@ -1,7 +1,6 @@
 //! What the stages counted -> the summary of the run. Pure.
 
 use super::delivery::broken;
-use super::lines;
 use super::request::ReplayRequest;
 use super::session::{Ended, Topic};
 use crate::report::aid::Aided;
@@ -13,6 +12,7 @@ use strapd_attitude::condition::regularise;
 use strapd_attitude::propagate::Method;
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{Nanos, SampleKind, Verdict};
+use strapd_recording::format::Format;
 use strapd_recording::mcap::Survey;
 
 /// Above this a rate is probably not in rad/s: 200 rad/s is 11,500 deg/s, five times what most gyros
@@ -212,13 +212,20 @@ fn first_losses(topic: &Topic, start: Nanos) -> Vec<String> {
         })
         .collect();
     if let Some((log, why)) = &topic.first_undecodable {
-        said.push(if topic.described == lines::DESCRIBED {
+        said.push(if is_text(&topic.described) {
             format!("first undecodable, line {}: {why}", log.0)
         } else {
             format!("first undecodable, logged at {} ns: {why}", log.0)
         });
     }
     said
+}
+
+/// Whether it was read from lines or rows: their undecodable payloads carry the line's number where others carry a time.
+fn is_text(described: &str) -> bool {
+    [Format::Lines, Format::Table]
+        .iter()
+        .any(|format| format.name() == described)
 }
 
 fn warnings(topic: &Topic, summary: &TopicSummary) -> Vec<String> {

@@ -40,7 +40,8 @@ pub(super) enum Form {
         compression: Compression,
     },
     Ndjson(Vec<Objects>),
-    Csv,
+    /// With what is in the last column of every row.
+    Csv(String),
     Null,
 }
 
@@ -74,12 +75,12 @@ impl Slot {
                     objects.push(&mut self.text, &self.batch);
                 }
             }
-            Form::Csv => {
+            Form::Csv(last) => {
                 for sample in &self.batch.samples {
-                    csv::push_row(&mut self.text, sample);
+                    csv::push_row(&mut self.text, sample, last);
                 }
                 for sample in &self.batch.raw {
-                    csv::push_raw_row(&mut self.text, sample);
+                    csv::push_raw_row(&mut self.text, sample, last);
                 }
             }
             Form::Null => {}

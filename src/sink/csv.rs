@@ -1,19 +1,21 @@
 //! AttitudeSample -> a CSV row. Pure.
+//!
+//! The names of the columns are those that [`strapd_recording::table`] reads.
 
 use super::json::{push_f64, push_i64, push_status};
 use strapd_attitude::record::{AttitudeSample, RawSample};
 
 /// The first row. Angles in degrees, rates in rad/s, stamps in nanoseconds; roll, pitch and yaw are
 /// turned about z, then y, then x (ZYX).
-pub(super) const HEADER: &[u8] = b"stamp_ns,w,x,y,z,roll_deg,pitch_deg,yaw_deg,wx,wy,wz,sigma_x_deg,sigma_y_deg,sigma_z_deg,status\n";
+pub(super) const HEADER: &[u8] = b"stamp_ns,qw,qx,qy,qz,roll_deg,pitch_deg,yaw_deg,wx,wy,wz,sigma_x_deg,sigma_y_deg,sigma_z_deg,status,world\n";
 
 /// The first row over samples of a gyro. Rates in rad/s (delta angles in rad), specific force in
-/// m/s^2; `w,x,y,z` is the orientation that goes with the sample, where there is one.
-pub(super) const RAW_HEADER: &[u8] =
-    b"stamp_ns,log_ns,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z,w,x,y,z,interval_ns\n";
+/// m/s^2; `qw,qx,qy,qz` is the orientation that goes with the sample, where there is one.
+pub(crate) const RAW_HEADER: &[u8] =
+    b"stamp_ns,log_ns,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z,qw,qx,qy,qz,interval_ns,sample_kind\n";
 
-/// Appends one row with its line end; what is absent is an empty cell.
-pub(super) fn push_raw_row(out: &mut Vec<u8>, sample: &RawSample) {
+/// Appends one row with its line end; what is absent is an empty cell. `kind` is what the sample means.
+pub(crate) fn push_raw_row(out: &mut Vec<u8>, sample: &RawSample, kind: &str) {
     push_i64(out, sample.header.unwrap_or(sample.log).0);
     out.push(b',');
     push_i64(out, sample.log.0);
@@ -29,11 +31,11 @@ pub(super) fn push_raw_row(out: &mut Vec<u8>, sample: &RawSample) {
     if let Some(interval) = sample.interval_nanos {
         push_i64(out, interval);
     }
-    out.push(b'\n');
+    end_row(out, kind);
 }
 
-/// Appends one row with its line end. Several status names are joined by `|`.
-pub(super) fn push_row(out: &mut Vec<u8>, sample: &AttitudeSample) {
+/// Appends one row with its line end. Several status names are joined by `|`; `world` is what it is relative to.
+pub(super) fn push_row(out: &mut Vec<u8>, sample: &AttitudeSample, world: &str) {
     push_i64(out, sample.stamp.0);
     let q = sample.q_nb.wxyz();
     let [roll, pitch, yaw] = roll_pitch_yaw(q).map(f64::to_degrees);
@@ -49,6 +51,12 @@ pub(super) fn push_row(out: &mut Vec<u8>, sample: &AttitudeSample) {
     }
     out.push(b',');
     push_status(out, sample, b"", b"|");
+    end_row(out, world);
+}
+
+fn end_row(out: &mut Vec<u8>, last: &str) {
+    out.push(b',');
+    out.extend_from_slice(last.as_bytes());
     out.push(b'\n');
 }
 
@@ -157,15 +165,15 @@ mod tests {
         s.covariance = AttitudeCovariance::from_sigma(Vector3::new(f64::NAN, f64::INFINITY, 0.0));
         s.status = Status::HELD.with(Status::SATURATED);
         let mut out = HEADER.to_vec();
-        push_row(&mut out, &s);
+        push_row(&mut out, &s, "enu");
         let mut reader = csv::Reader::from_reader(out.as_slice());
-        assert_eq!(reader.headers().unwrap().len(), 15);
+        assert_eq!(reader.headers().unwrap().len(), 16);
         let row = reader.records().next().unwrap().unwrap();
-        assert_eq!(row.len(), 15, "{row:?}");
+        assert_eq!(row.len(), 16, "{row:?}");
         assert_eq!(&row[0], "1700000000000000001", "exact to the nanosecond");
         let w: f64 = row[1].parse().unwrap();
         assert_eq!(w.to_bits(), s.q_nb.wxyz()[0].to_bits());
         assert_eq!((&row[11], &row[12]), ("nan", "inf"));
-        assert_eq!(&row[14], "held|saturated");
+        assert_eq!((&row[14], &row[15]), ("held|saturated", "enu"));
     }
 }

@@ -12,6 +12,7 @@ mod check;
 mod cli;
 mod earth_rate;
 mod fixtures;
+mod formats;
 mod model;
 mod recover;
 mod regularise;

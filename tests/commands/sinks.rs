@@ -319,7 +319,7 @@ fn no_samples_still_give_a_whole_file() {
     assert!(
         fs::read_to_string(&path)
             .unwrap()
-            .starts_with("stamp_ns,w,x,y,z,roll_deg")
+            .starts_with("stamp_ns,qw,qx,qy,qz,roll_deg")
     );
 }
 

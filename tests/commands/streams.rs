@@ -89,6 +89,7 @@ fn file_standard_input_and_cat_in_a_pipe_give_the_same_attitudes() {
         fixture("coning_jitter.mcap"),
         fixture("constant_rate_json.mcap"),
         fixture("constant_rate_ros1.mcap"),
+        fixture("coning_average.mcap"),
     ] {
         same_every_way(&log, dir.path());
     }
@@ -97,10 +98,16 @@ fn file_standard_input_and_cat_in_a_pipe_give_the_same_attitudes() {
 /// Axes FRD, means with an interval of their own: a line must carry what the format says.
 #[test]
 #[cfg_attr(not(has_shared), ignore = "needs ../shared")]
-fn a_format_that_says_more_than_a_line_gives_the_same_attitudes_through_lines() {
+fn a_format_that_says_more_than_a_line_gives_the_same_attitudes_through_lines_and_rows() {
     let dir = tempfile::tempdir().unwrap();
-    let log = crate::shared_data::shared("logs/real/px4_fmuv6c_json_zstd.mcap");
-    same_every_way(&log.unwrap(), dir.path());
+    for log in [
+        "px4_fmuv6c_json_zstd",
+        "xsens_mti_ros2_none",
+        "ximu3_ros2_zstd",
+    ] {
+        let log = crate::shared_data::shared(&format!("logs/real/{log}.mcap"));
+        same_every_way(&log.unwrap(), dir.path());
+    }
 }
 
 /// From the file, standard input, `cat` in a pipe and a file of its lines.
@@ -123,6 +130,23 @@ fn same_every_way(log: &Path, dir: &Path) {
     std::fs::write(&lines, &cat.stdout).unwrap();
     let from_lines = printed(strapd().arg("replay").arg(&lines).args(["-o", "-"]));
     assert_eq!(from_lines, from_file, "{what} through a file of lines");
+    let cat = strapd()
+        .arg("cat")
+        .arg(log)
+        .args(["--format", "csv"])
+        .output()
+        .unwrap();
+    assert!(cat.status.success(), "{what}: {cat:?}");
+    let rows = dir.join("samples.csv");
+    std::fs::write(&rows, &cat.stdout).unwrap();
+    let from_rows = printed(strapd().arg("replay").arg(&rows).args(["-o", "-"]));
+    assert_eq!(from_rows, from_file, "{what} through a file of rows");
+    let from_cat = printed(
+        strapd()
+            .args(["replay", "-", "-o", "-"])
+            .write_stdin(cat.stdout),
+    );
+    assert_eq!(from_cat, from_file, "{what} through rows in a pipe");
 }
 
 #[test]

@@ -80,6 +80,18 @@ impl SampleKind {
             SampleKind::DeltaAngle => "delta-angle",
         }
     }
+
+    /// The kind of this name.
+    #[must_use]
+    pub fn named(name: &str) -> Option<SampleKind> {
+        [
+            SampleKind::Rate,
+            SampleKind::Average,
+            SampleKind::DeltaAngle,
+        ]
+        .into_iter()
+        .find(|kind| kind.name() == name)
+    }
 }
 
 /// One sample as it was recorded: source units, source axes, every clock it carried.

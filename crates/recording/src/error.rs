@@ -45,6 +45,14 @@ pub enum Error {
         /// The first bytes, escaped.
         found: String,
     },
+    /// A table without the columns that are needed.
+    #[error("{}: no table that can be read: {why}\n  help: columns stamp_ns and gyro_x, gyro_y, gyro_z (rad/s), as strapd cat --format csv writes them", path.display())]
+    NotTable {
+        /// Which file.
+        path: PathBuf,
+        /// What is missing.
+        why: String,
+    },
     /// What can be read once was to be looked at first.
     #[error("{}: a stream can not be surveyed before it is read", path.display())]
     NotTwice {

@@ -1,13 +1,17 @@
 //! Logs of every kind -> samples, with no byte believed before it is checked.
 //!
 //! ```text
-//! file, stream -> mcap -> decode -> RawSample
+//! file, stream -> format -> mcap  -> decode -> RawSample
+//!                        -> lines -> decode, table
 //!                                   text, error: beside it
 //! ```
 //!
 //! | module | arrow | |
 //! |---|---|---|
 //! | [`mcap`] | MCAP logs, whole or damaged -> messages in a stable order | I/O |
+//! | [`format`] | first bytes and name -> which format | pure |
+//! | [`lines`] | lines of JSON, rows of a table -> what each holds | I/O |
+//! | [`table`] | rows of strapd's own CSV -> raw samples | pure |
 //! | [`decode`] | bytes of one message, one line, one packed object -> raw samples | pure |
 //! | [`text`] | outside text -> what a terminal may show | pure |
 //! | [`pool`] | workers shared by reading, integrating and writing; how many changes no bit | |
@@ -15,8 +19,11 @@
 
 pub mod decode;
 pub mod error;
+pub mod format;
+pub mod lines;
 pub mod mcap;
 pub mod pool;
+pub mod table;
 pub mod text;
 
 pub use error::{Error, Result};

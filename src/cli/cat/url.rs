@@ -14,7 +14,7 @@ use std::collections::BTreeSet;
 use std::io::{BufWriter, Stdout, Write};
 use std::time::{Duration, Instant};
 
-const CSV_HEADER: &str = "id,stamp_ns,w,x,y,z,roll_deg,pitch_deg,yaw_deg,wx,wy,wz,sigma_x_deg,sigma_y_deg,sigma_z_deg,status\n";
+const CSV_HEADER: &str = "id,stamp_ns,qw,qx,qy,qz,roll_deg,pitch_deg,yaw_deg,wx,wy,wz,sigma_x_deg,sigma_y_deg,sigma_z_deg,status,world\n";
 const TABLE_HEADER: &str = "               stamp s        qw        qx        qy        qz    roll deg   pitch deg     yaw deg     rate x        y        z  status, id\n";
 
 /// Runs it.
@@ -253,7 +253,13 @@ impl Printer {
                 false => write!(self.out, ",nan")?,
             }
         }
-        writeln!(self.out, ",{}", a.status.join("|").replace([',', '"'], "_"))
+        let plain = |text: &str| text.replace([',', '"'], "_");
+        writeln!(
+            self.out,
+            ",{},{}",
+            plain(&a.status.join("|")),
+            plain(&a.world)
+        )
     }
 
     fn table(&mut self, a: &Attitude) -> std::io::Result<()> {

@@ -63,7 +63,7 @@ fn attitudes(csv: &Path) -> HashMap<i64, (Wxyz, [f64; 3])> {
     let mut reader = csv::Reader::from_path(csv).unwrap();
     let names = reader.headers().unwrap().clone();
     let column = |name: &str| names.iter().position(|n| n == name).unwrap();
-    let q = ["w", "x", "y", "z"].map(column);
+    let q = ["qw", "qx", "qy", "qz"].map(column);
     let sigma = ["sigma_x_deg", "sigma_y_deg", "sigma_z_deg"].map(column);
     let stamp = column("stamp_ns");
     reader

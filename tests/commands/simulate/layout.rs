@@ -131,11 +131,11 @@ fn a_table_has_a_row_a_sample_with_the_truth_beside_it() {
     let mut lines = text.lines();
     assert_eq!(
         lines.next().unwrap(),
-        "stamp_ns,log_ns,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z,w,x,y,z,interval_ns"
+        "stamp_ns,log_ns,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z,qw,qx,qy,qz,interval_ns,sample_kind"
     );
     let rows: Vec<Vec<&str>> = lines.map(|l| l.split(',').collect()).collect();
     assert_eq!(rows.len(), 10);
-    assert!(rows.iter().all(|r| r.len() == 13 && r[12] == "100000000"));
+    assert!(rows.iter().all(|r| r[12..] == ["100000000", "average"]));
     assert_eq!(rows[9][0], "1700000001000000000");
 }
 

@@ -183,12 +183,12 @@ fn steady_precession_keeps_its_tilt_from_a_case_and_from_euler_rates() {
     assert_eq!(angles.len(), 40_001);
 }
 
-/// Columns w, x, y, z of a table of samples.
+/// Columns qw, qx, qy, qz of a table of samples.
 fn csv_rows(text: &str) -> Vec<[f64; 4]> {
     let mut lines = text.lines();
     let head: Vec<&str> = lines.next().unwrap().split(',').collect();
     let at = |name: &str| head.iter().position(|h| *h == name).unwrap();
-    let columns = ["w", "x", "y", "z"].map(at);
+    let columns = ["qw", "qx", "qy", "qz"].map(at);
     lines
         .map(|line| {
             let cells: Vec<&str> = line.split(',').collect();

@@ -99,6 +99,24 @@ pub enum Undecodable {
         /// How it begins, fit for a terminal.
         near: String,
     },
+    /// A row that has not the cells of its table.
+    #[error("{have} cells, but {need} columns")]
+    Row {
+        /// Cells there are.
+        have: u64,
+        /// Columns of the table.
+        need: u64,
+    },
+    /// A cell that is not what its column holds.
+    #[error("column `{column}`: `{near}` {why}")]
+    Cell {
+        /// Which column.
+        column: String,
+        /// How the cell begins, fit for a terminal.
+        near: String,
+        /// What is wrong with it.
+        why: &'static str,
+    },
     /// Not JSON.
     #[error("JSON, byte {offset}: {what}")]
     Json {

@@ -147,23 +147,12 @@ impl LineDecoder {
             id,
             sensor: seeker.sensor.as_deref().map(printable),
             seq: seeker.seq,
-            sample_kind: kind_named(seeker.kind.as_deref()).or(kind),
+            sample_kind: seeker.kind.as_deref().and_then(SampleKind::named).or(kind),
             gyro_unit: unit.or(stated),
             decoded,
             bare,
         })
     }
-}
-
-/// The `sample_kind` of a line: what a sample means, said outright.
-fn kind_named(name: Option<&str>) -> Option<SampleKind> {
-    [
-        SampleKind::Rate,
-        SampleKind::Average,
-        SampleKind::DeltaAngle,
-    ]
-    .into_iter()
-    .find(|kind| Some(kind.name()) == name)
 }
 
 /// Reads one line without any options: see [`LineDecoder::decode`].

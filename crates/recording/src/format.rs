@@ -1,0 +1,161 @@
+//! The first bytes of a recording, then its name -> which format it is. Pure but for [`Format::of_file`].
+//!
+//! Apart from the readers because it comes before all of them: files are called whatever somebody called them, and a
+//! pipe has no name. What the bytes say wins over what the name says.
+
+use crate::error::{Error, Result};
+use crate::mcap::MAGIC;
+use crate::table::Table;
+use std::fs::File;
+use std::io::{BufRead, Read};
+use std::path::Path;
+
+/// A format of recordings.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Hash)]
+pub enum Format {
+    /// MCAP.
+    Mcap,
+    /// One JSON object per line.
+    Lines,
+    /// The CSV that strapd writes itself. A reader of other people's tables has its place beside it.
+    Table,
+}
+
+/// Bytes that tell a format by themselves, at the beginning.
+const MAGICS: [(&[u8], Format); 1] = [(&MAGIC, Format::Mcap)];
+
+/// Endings of names, for what the bytes do not tell.
+const ENDINGS: [(&str, Format); 4] = [
+    ("mcap", Format::Mcap),
+    ("ndjson", Format::Lines),
+    ("jsonl", Format::Lines),
+    ("csv", Format::Table),
+];
+
+/// Bytes that are looked at: the first line of a table is shorter.
+pub const HEAD: usize = 4096;
+
+impl Format {
+    /// What people call it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Format::Mcap => "MCAP",
+            Format::Lines => "NDJSON",
+            Format::Table => "CSV",
+        }
+    }
+
+    /// The format of which these are the first bytes; `None` where they tell nothing.
+    #[must_use]
+    pub fn of_bytes(head: &[u8]) -> Option<Format> {
+        if let Some((_, format)) = MAGICS.iter().find(|(magic, _)| head.starts_with(magic)) {
+            return Some(*format);
+        }
+        let text = without_mark(head).trim_ascii_start();
+        if matches!(text.first(), Some(b'{' | b'[')) {
+            return Some(Format::Lines);
+        }
+        let first = text.split(|b| *b == b'\n').next().unwrap_or_default();
+        Table::is_header(first).then_some(Format::Table)
+    }
+
+    /// The format that a name's ending stands for.
+    #[must_use]
+    pub fn of_name(path: &Path) -> Option<Format> {
+        let ending = path.extension()?;
+        let mut known = ENDINGS.iter();
+        known
+            .find(|(known, _)| ending.eq_ignore_ascii_case(known))
+            .map(|(_, format)| *format)
+    }
+
+    /// The format of a regular file: by its first bytes, and where these tell nothing by its name.
+    ///
+    /// # Errors
+    /// It can not be opened or read, is a directory, or empty.
+    pub fn of_file(path: &Path) -> Result<Option<Format>> {
+        let file = open(path)?;
+        let mut head = Vec::new();
+        file.take(HEAD as u64)
+            .read_to_end(&mut head)
+            .map_err(|source| Error::Read {
+                path: path.to_owned(),
+                offset: 0,
+                source,
+            })?;
+        Ok(Format::of_bytes(&head).or_else(|| Format::of_name(path)))
+    }
+
+    /// What to say of a file whose name stands for another format than its bytes.
+    #[must_use]
+    pub fn contradiction(self, path: &Path) -> Option<String> {
+        let named = Format::of_name(path).filter(|named| *named != self)?;
+        Some(format!(
+            "it is called {}, but holds {}, and is read as that",
+            named.name(),
+            self.name()
+        ))
+    }
+}
+
+/// Reads the first bytes of a stream, no more than are needed: a sender of lines may wait for an answer before the
+/// second. Empty when nothing comes.
+///
+/// # Errors
+/// The stream can not be read.
+pub fn head_of(input: &mut impl BufRead) -> std::io::Result<Vec<u8>> {
+    let mut head = Vec::new();
+    while head.len() < HEAD && !tells_enough(&head) {
+        let wanted = HEAD - head.len();
+        let found = match input.fill_buf() {
+            Err(e) if e.kind() == std::io::ErrorKind::Interrupted => continue,
+            found => found?,
+        };
+        let taken = found.len().min(wanted);
+        if taken == 0 {
+            break;
+        }
+        head.extend_from_slice(found.get(..taken).unwrap_or_default());
+        input.consume(taken);
+    }
+    Ok(head)
+}
+
+/// Whether more bytes would tell no more.
+fn tells_enough(head: &[u8]) -> bool {
+    let text = without_mark(head).trim_ascii_start();
+    let begins_magic = MAGICS
+        .iter()
+        .any(|(magic, _)| magic.starts_with(head) && head.len() < magic.len());
+    !begins_magic && (Format::of_bytes(head).is_some() || text.contains(&b'\n'))
+}
+
+/// A text without the byte order mark that spreadsheets put before it.
+pub(crate) fn without_mark(text: &[u8]) -> &[u8] {
+    text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text)
+}
+
+/// Opens a file to be read from its beginning.
+///
+/// # Errors
+/// It is missing, a directory, or empty.
+pub fn open(path: &Path) -> Result<File> {
+    let fail = |source| Error::Open {
+        path: path.to_owned(),
+        source,
+    };
+    let file = File::open(path).map_err(fail)?;
+    let metadata = file.metadata().map_err(fail)?;
+    if metadata.is_dir() {
+        return Err(Error::IsDirectory {
+            path: path.to_owned(),
+        });
+    }
+    if metadata.is_file() && metadata.len() == 0 {
+        return Err(Error::Empty {
+            path: path.to_owned(),
+        });
+    }
+    Ok(file)
+}
