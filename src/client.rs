@@ -6,11 +6,9 @@
 //! | [`link`] | bytes and messages both ways, over any transport | I/O |
 //! | [`secret`] | a file -> the token in it | reads it |
 //! | [`watcher`] | what a daemon says -> attitudes, state, complaints | I/O |
-//! | [`attitude`] | an `ATT` object -> numbers; nothing in it is trusted | pure |
 //!
 //! `serve` connects out to its sources through [`link`] too; `cat` and `watch` do.
 
-pub mod attitude;
 pub mod link;
 pub mod remote;
 pub mod secret;

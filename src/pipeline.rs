@@ -8,6 +8,7 @@
 //! | file | |
 //! |---|---|
 //! | [`replay`], `replay_stream`, [`lines`] | the same run over a file, a stream that comes once, and lines |
+//! | [`input`], `text_log`, `bare_stamps`, [`topic_reading`] | what can be read again, the log in a text, one topic of a log |
 //! | [`log`], [`sources`], [`topics`], `channel_choice`, [`decoders`], [`channel_route`] | which channels are read, as what, by which decoder |
 //! | `replay_start`, `session_builder`, [`session`], [`delivery`], [`pace`], [`position`], [`audience`] | a run under way: what waits, what goes out, when, and who may stop it |
 //! | [`inspection`], [`check`], `each`, [`history`], [`sample_kinds`], [`attitude_track`] | looking at a log, and holding it against others |
@@ -15,6 +16,7 @@
 
 pub mod attitude_track;
 pub mod audience;
+mod bare_stamps;
 mod beside;
 mod channel_choice;
 pub mod channel_route;
@@ -24,6 +26,7 @@ pub mod delivery;
 mod each;
 mod held;
 pub mod history;
+pub mod input;
 pub mod inspection;
 pub mod lines;
 pub mod log;
@@ -41,4 +44,6 @@ pub(crate) mod session_builder;
 pub mod simulate;
 pub mod sources;
 pub mod summarise;
+mod text_log;
+pub mod topic_reading;
 pub mod topics;

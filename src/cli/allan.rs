@@ -8,11 +8,12 @@ use super::estimation::{KindArg, TimeArg, UnitArg};
 use super::{Global, Outcome, print};
 use crate::config::{Selection, selection};
 use crate::error::{Error, Result};
+use crate::pipeline::input::Input;
 use crate::report::page::Noise;
 use crate::sink::Document;
 use clap::Args;
 use gather::Gathered;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use strapd_attitude::condition::{Clock, GyroUnit};
 use strapd_attitude::estimate::Plan;
 use strapd_attitude::noise::allan::{AllanFit, Point, cluster_sizes, deviation, fit};
@@ -30,7 +31,7 @@ use strapd_recording::pool::Pool;
 Record for at least nine times the longest time that matters, the sensor fixed and warm.
 At most 8 million angles are held (200 MB); a longer record is thinned, which is said.")]
 pub struct Allan {
-    /// An MCAP file
+    /// A recording: MCAP, NDJSON or CSV; - is standard input
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
     /// IMU topic; needed only when a log has several
@@ -113,9 +114,10 @@ pub fn run(global: &Global, args: &Allan) -> Result<Outcome> {
     };
     let (plot, csv) = (open(&args.plot)?, open(&args.csv)?);
     let pool = Pool::new(global.threads)?;
-    let gathered = gather::gather(&args.file, (&selection, &plan), gather::CAPACITY, &pool)?;
+    let input = Input::open(&args.file)?;
+    let gathered = gather::gather(&input, (&selection, &plan), gather::CAPACITY, &pool)?;
     let axes = analyse(&gathered).map_err(|what| Error::Topic {
-        path: args.file.clone(),
+        path: input.name().to_owned(),
         topic: gathered.topic.clone(),
         what,
     })?;
@@ -125,7 +127,7 @@ pub fn run(global: &Global, args: &Allan) -> Result<Outcome> {
     if let Some(document) = plot {
         let chart = outputs::chart(&gathered.topic, &axes);
         let svg = chart.svg().map_err(|e| Error::Topic {
-            path: args.file.clone(),
+            path: input.name().to_owned(),
             topic: gathered.topic.clone(),
             what: e.to_string(),
         })?;
@@ -137,7 +139,7 @@ pub fn run(global: &Global, args: &Allan) -> Result<Outcome> {
     if global.json {
         print(&format!("{}\n", words::json(&gathered, &axes)))?;
     } else if !global.quiet {
-        print(&words::text(&args.file, &gathered, &axes))?;
+        print(&words::text(input.name(), &gathered, &axes))?;
     }
     Ok(if gathered.is_lossy() {
         Outcome::Lossy
@@ -153,10 +155,10 @@ const FOR_REPORT: usize = 1 << 20;
 ///
 /// # Errors
 /// As [`run`], but for outputs.
-pub(super) fn examined(path: &Path, asked: (&Selection, &Plan), pool: &Pool) -> Result<Noise> {
-    let gathered = gather::gather(path, asked, FOR_REPORT, pool)?;
+pub(super) fn examined(input: &Input, asked: (&Selection, &Plan), pool: &Pool) -> Result<Noise> {
+    let gathered = gather::gather(input, asked, FOR_REPORT, pool)?;
     let fails = |what| Error::Topic {
-        path: path.to_owned(),
+        path: input.name().to_owned(),
         topic: gathered.topic.clone(),
         what,
     };
@@ -164,7 +166,7 @@ pub(super) fn examined(path: &Path, asked: (&Selection, &Plan), pool: &Pool) -> 
     let svg = outputs::chart(&gathered.topic, &axes)
         .svg()
         .map_err(|e| fails(e.to_string()))?;
-    let mut text = words::text(path, &gathered, &axes);
+    let mut text = words::text(input.name(), &gathered, &axes);
     for warning in gathered.warnings().iter().chain(&words::doubts(&axes)) {
         text.push_str(&format!("  warning  {warning}\n"));
     }

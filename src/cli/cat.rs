@@ -5,23 +5,20 @@ mod url;
 use super::{Global, Outcome};
 use crate::client::remote::Remote;
 use crate::error::{Error, Result};
-use crate::pipeline::channel_route::{Item, Noticed, Route, Taker};
 use crate::pipeline::decoders::Decoders;
+use crate::pipeline::input::Input;
 use crate::pipeline::log::{Log, problems};
-use crate::pipeline::topics;
+use crate::pipeline::topic_reading::{Taken, TopicReading};
 use crate::sink::{RAW_HEADER, push_raw_row};
 use clap::{Args, ValueEnum};
 use serde_json::json;
-use std::collections::BTreeMap;
 use std::io::{BufWriter, Write};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
-use std::sync::Arc;
 use strapd_attitude::estimate::Meaning;
 use strapd_attitude::estimate::Plan;
 use strapd_attitude::record::{RawSample, SampleKind};
 use strapd_recording::decode::{FieldPath, Options};
-use strapd_recording::mcap::{self, WalkOptions};
 use strapd_recording::pool::Pool;
 
 /// Decoded samples of a file, or attitudes of a daemon, as NDJSON, CSV or a table: rad/s, m/s^2, axes FLU.
@@ -34,7 +31,7 @@ use strapd_recording::pool::Pool;
   strapd cat ws://127.0.0.1:8765 --id imu0 --rate-hz 10 -x 60 --format csv
   strapd cat udp-listen://127.0.0.1:9870                   attitudes that somebody sends here")]
 pub struct Cat {
-    /// An MCAP file; or a daemon: tcp://HOST:PORT, ws://HOST:PORT, unix:///PATH, udp-listen://HOST:PORT
+    /// A recording (MCAP, NDJSON or CSV; - is standard input); or a daemon: tcp://HOST:PORT, ws://HOST:PORT, unix:///PATH, udp-listen://HOST:PORT
     #[arg(value_name = "SOURCE")]
     pub source: PathBuf,
     /// Topic; the IMU topic by default
@@ -113,100 +110,55 @@ pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
         ..Options::default()
     };
     let pool = Pool::new(global.threads)?;
-    let log = Log::told_apart(&args.source, args.topic.as_deref(), &options, &pool)?;
-    let choice = log.choose(&args.source, args.topic.as_deref())?;
-    let topic = choice.topics.into_iter().next().unwrap_or_default();
-    let source = log.source(&topic);
-    let mut by_id = BTreeMap::new();
-    let mut decoders = Vec::new();
-    let mut meanings = Vec::new();
-    let mut compiled = Decoders::new(&options);
-    for known in source.iter().flat_map(|s| log.channels_of(s)) {
-        let decoder = known
-            .decoder(&mut compiled)
-            .map_err(|why| Error::Unsupported {
-                path: args.source.clone(),
-                what: why.to_string(),
-            })?;
-        let declared = &decoder.stated().declared;
-        meanings.push((
-            Meaning::new(&Plan::default(), declared),
-            declared.sample_kind,
-        ));
-        by_id
-            .entry((known.channel.id, known.channel.schema_id))
-            .or_insert(decoders.len());
-        decoders.push(decoder);
-    }
-    let (Some(source), false) = (source, decoders.is_empty()) else {
-        return Err(Error::NoSuchTopic {
-            path: args.source.clone(),
-            topic,
-            topics: topics::listing(&log.candidates()),
-        });
-    };
-    let noticed = Arc::new(Noticed::of(&source));
-    let mut printer = Printer::new(args.format, &topic, args.count)?;
-    let mut failure = None;
-    let mut undecodable = 0u64;
-    let reader = log
-        .reader()
-        .map_or_else(|| mcap::Reader::open(&args.source), Ok)?;
-    let report = mcap::walk(
-        reader,
-        &WalkOptions {
-            pool: Some(pool.rayon()),
-            ..WalkOptions::default()
-        },
-        |channel| {
-            let id = (channel.id, channel.schema_id);
-            let stream = *by_id.get(&id).filter(|_| channel.topic == source.topic)?;
-            let noticed = noticed.clone();
-            let taker = Taker { stream, noticed };
-            Some(Route::to(decoders.get(stream)?.clone(), vec![taker]))
-        },
-        Route::map,
-        |items| {
-            for item in items.drain(..) {
-                match item {
-                    Item::Sample(stream, raw) => match meanings
-                        .get(stream)
-                        .map_or(Ok(true), |(m, kind)| printer.print(&m.in_flu(&raw), *kind))
-                    {
-                        Ok(true) => {}
-                        Ok(false) => return ControlFlow::Break(()),
-                        Err(e) => {
-                            failure = Some(e);
-                            return ControlFlow::Break(());
-                        }
-                    },
-                    Item::Undecodable(_, why) => {
-                        if undecodable == 0 {
-                            tracing::warn!(
-                                "first undecodable payload, logged at {} ns: {}",
-                                why.0.0,
-                                why.1
-                            );
-                        }
-                        undecodable += 1;
-                    }
-                    Item::Reference(_) | Item::Beside(_) | Item::Copy(_) => {}
-                }
-            }
-            ControlFlow::Continue(())
-        },
+    let log = Log::told_apart(
+        &Input::open(&args.source)?,
+        args.topic.as_deref(),
+        &options,
+        &pool,
     )?;
-    if let Some(e) = failure {
-        return Err(Error::writing("stdout", e));
-    }
+    let mut decoders = Decoders::new(&options);
+    let reading = TopicReading::new(&log, args.topic.as_deref(), &mut decoders)?;
+    let meanings: Vec<(Meaning, Option<SampleKind>)> = reading
+        .channels
+        .iter()
+        .map(|(_, decoder)| {
+            let declared = &decoder.stated().declared;
+            (
+                Meaning::new(&Plan::default(), declared),
+                declared.sample_kind,
+            )
+        })
+        .collect();
+    let mut printer = Printer::new(args.format, reading.name(), args.count)?;
+    let mut undecodable = 0u64;
+    let survey = reading.walk(&pool, |taken| {
+        let wants_more = match taken {
+            Taken::Sample(place, raw) => meanings
+                .get(place)
+                .map_or(Ok(true), |(m, kind)| printer.print(&m.in_flu(&raw), *kind))
+                .map_err(|e| Error::writing("stdout", e))?,
+            Taken::Undecodable(at, why) => {
+                if undecodable == 0 {
+                    tracing::warn!("first undecodable payload, {}: {why}", log.place_of(at));
+                }
+                undecodable += 1;
+                true
+            }
+        };
+        Ok(if wants_more {
+            ControlFlow::Continue(())
+        } else {
+            ControlFlow::Break(())
+        })
+    })?;
     printer
         .out
         .flush()
         .map_err(|e| Error::writing("stdout", e))?;
-    for problem in problems(&report.survey) {
-        tracing::warn!("{}: {problem}", args.source.display());
+    for problem in problems(&survey) {
+        tracing::warn!("{}: {problem}", log.name().display());
     }
-    if undecodable > 0 || report.survey.problems.losses() > 0 {
+    if undecodable > 0 || survey.problems.losses() > 0 {
         tracing::warn!("{undecodable} payloads could not be decoded");
         return Ok(Outcome::Lossy);
     }

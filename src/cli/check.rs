@@ -3,6 +3,7 @@
 use super::{Global, Outcome, print};
 use crate::error::{Error, Result};
 use crate::pipeline::check::{Checked, check};
+use crate::pipeline::input::Input;
 use crate::report::findings::{Finding, Severity, findings};
 use clap::Args;
 use serde_json::json;
@@ -20,7 +21,7 @@ use strapd_recording::text::printable;
 
 Exit codes: 0 nothing found; 3 errors or warnings found. Notes alone are no finding.")]
 pub struct Check {
-    /// An MCAP file
+    /// A recording: MCAP, NDJSON or CSV; - is standard input
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
     /// Only this topic, though it be not obviously an IMU's
@@ -45,18 +46,19 @@ pub fn run(global: &Global, args: &Check) -> Result<Outcome> {
             .collect::<Result<_>>()?,
         ..Options::default()
     };
-    let checked = check(&args.file, args.topic.as_deref(), &options, &pool)?;
+    let input = Input::open(&args.file)?;
+    let checked = check(&input, args.topic.as_deref(), &options, &pool)?;
     let found = findings(&checked);
     let worst = found.iter().map(|f| f.severity).max();
     if global.json {
         let value = json!({
-            "file": args.file.display().to_string(),
+            "file": input.name().display().to_string(),
             "findings": found.iter().map(Finding::json).collect::<Vec<_>>(),
             "worst": worst.map(Severity::name),
         });
         print(&format!("{value}\n"))?;
     } else {
-        print(&text(&args.file, &checked, &found))?;
+        print(&text(input.name(), &checked, &found))?;
     }
     Ok(if worst > Some(Severity::Note) {
         Outcome::Lossy

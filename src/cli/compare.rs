@@ -3,6 +3,7 @@
 use super::{Global, Outcome, print};
 use crate::error::{Error, Result};
 use crate::pipeline::attitude_track::{self, Side};
+use crate::pipeline::input::Input;
 use crate::report::page::{STRETCHES, comparison_json};
 use crate::report::plot::{Axis, Chart, Look, Series};
 use crate::report::summary::significant;
@@ -11,7 +12,7 @@ use crate::sink::Document;
 use clap::Args;
 use serde_json::Value;
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use strapd_attitude::compare::{
     Align, Comparison, ErrorStats, Errors, Stamped, compare, for_each_error,
 };
@@ -28,10 +29,10 @@ use strapd_recording::pool::Pool;
 
 Exit code 4 when --max-angle is exceeded.")]
 pub struct Compare {
-    /// The attitude under test: .mcap, .ndjson or .csv
+    /// The attitude under test: MCAP, NDJSON or CSV; - is standard input
     #[arg(value_name = "EST")]
     pub estimate: PathBuf,
-    /// The attitude it is held against: .mcap, .ndjson or .csv
+    /// The attitude it is held against: the same
     #[arg(value_name = "REF")]
     pub reference: PathBuf,
     /// Topic (MCAP) or id (NDJSON) of the estimate; needed only when there are several
@@ -82,14 +83,16 @@ pub fn run(global: &Global, args: &Compare) -> Result<Outcome> {
         .map(|p| Document::create(p, &inputs, args.force))
         .transpose()?;
     let pool = Pool::new(global.threads)?;
-    let estimate =
-        attitude_track::read(&args.estimate, Side::Estimate, args.topic.as_deref(), &pool)?;
-    let reference = attitude_track::read(
-        &args.reference,
-        Side::Reference,
-        args.ref_topic.as_deref(),
-        &pool,
-    )?;
+    if args.estimate == args.reference && args.estimate.as_os_str() == "-" {
+        return Err(Error::Usage(
+            "compare - -: standard input comes once\n  help: give one of the two a file".to_owned(),
+        ));
+    }
+    let read = |path: &Path, side, topic: &Option<String>| {
+        attitude_track::read(&Input::open(path)?, side, topic.as_deref(), &pool)
+    };
+    let estimate = read(&args.estimate, Side::Estimate, &args.topic)?;
+    let reference = read(&args.reference, Side::Reference, &args.ref_topic)?;
     for problem in estimate.problems.iter().chain(&reference.problems) {
         tracing::warn!("{problem}");
     }

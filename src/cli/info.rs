@@ -4,6 +4,7 @@ mod words;
 
 use super::{Global, Outcome, print};
 use crate::error::{Error, Result};
+use crate::pipeline::input::Input;
 use crate::pipeline::inspection::look;
 use crate::pipeline::log::{Log, problems};
 use crate::pipeline::topics;
@@ -18,7 +19,7 @@ use strapd_recording::pool::Pool;
   strapd info flight.mcap
   strapd info flight.mcap --json | jq '.imu[0].rate_hz'")]
 pub struct Info {
-    /// An MCAP file
+    /// A recording: MCAP, NDJSON or CSV; - is standard input
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
     /// Look at this topic too, though it is not obviously an IMU's
@@ -43,21 +44,22 @@ pub fn run(global: &Global, args: &Info) -> Result<Outcome> {
             .collect::<Result<_>>()?,
         ..Options::default()
     };
-    let log = Log::told_apart(&args.file, args.topic.as_deref(), &options, &pool)?;
+    let input = Input::open(&args.file)?;
+    let log = Log::told_apart(&input, args.topic.as_deref(), &options, &pool)?;
     if let Some(topic) = &args.topic
         && !log.has(topic)
     {
         return Err(Error::NoSuchTopic {
-            path: args.file.clone(),
+            path: input.name().to_owned(),
             topic: topic.clone(),
             topics: topics::listing(&log.candidates()),
         });
     }
-    let looks = look(&args.file, &log, args.topic.as_deref(), &options, &pool)?;
+    let looks = look(&log, args.topic.as_deref(), &options, &pool)?;
     let survey = &looks.survey;
     let lossy = survey.problems.losses() > 0;
     let report = words::Report {
-        path: &args.file,
+        input: &input,
         survey,
         problems: problems(survey),
         channels: &log.channels,

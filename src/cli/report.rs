@@ -7,6 +7,7 @@ use crate::config::Selection;
 use crate::error::{Error, Result};
 use crate::pipeline::attitude_track::{self, Side, Track};
 use crate::pipeline::check::{CheckedTopic, Drawing, Examination, examine};
+use crate::pipeline::input::Input;
 use crate::pipeline::provenance::sha256;
 use crate::report::findings::findings;
 use crate::report::page::{DRAWN, Noise, Page, STRETCHES, Told, longest_rest};
@@ -32,7 +33,7 @@ const ENOUGH: f64 = 600.0;
 The page needs no network and no script; it opens from a file, prints, and is at most 2 MB for any log.
 Exit codes: 0 done; 3 done, but samples were lost or could not be read.")]
 pub struct Report {
-    /// An MCAP file
+    /// A recording: MCAP, NDJSON or CSV; - is standard input
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
     /// The page; - is standard output
@@ -84,6 +85,7 @@ pub fn run(global: &Global, args: &Report) -> Result<Outcome> {
         .map(|path| Document::create(path, &inputs, args.force))
         .transpose()?;
     let pool = Pool::new(global.threads)?;
+    let input = Input::open(&args.file)?;
     let reference = args.read_reference(&pool)?;
     let asked = Examination {
         selection,
@@ -98,8 +100,8 @@ pub fn run(global: &Global, args: &Report) -> Result<Outcome> {
         }),
         command: super::shell::own_command(),
     };
-    let mut reporter = Reporter::new(global, &args.file.display().to_string());
-    let checked = examine(&args.file, &asked, &pool, &mut |position| {
+    let mut reporter = Reporter::new(global, &input.name().display().to_string());
+    let checked = examine(&input, &asked, &pool, &mut |position| {
         reporter.update(position);
     });
     reporter.finish();
@@ -109,8 +111,8 @@ pub fn run(global: &Global, args: &Report) -> Result<Outcome> {
         finding,
     });
     let page = Page {
-        file: args.file.display().to_string(),
-        sha256: sha256(&args.file)?,
+        file: input.name().display().to_string(),
+        sha256: sha256(input.name(), input.bytes()?)?,
         command: asked.command.clone(),
         reference: match (&reference, asked.reference_topic.as_str()) {
             (Some(track), _) => track.name.clone(),
@@ -123,7 +125,7 @@ pub fn run(global: &Global, args: &Report) -> Result<Outcome> {
             .iter()
             .enumerate()
             .map(|(n, topic)| match n {
-                0..DRAWN => args.noise((&asked.selection, &asked.plan), topic, &pool),
+                0..DRAWN => args.noise(&input, (&asked.selection, &asked.plan), topic, &pool),
                 // Each takes a pass over the log.
                 _ => Noise::Missing(
                     "Not measured of so many topics: strapd report --topic NAME does.".to_owned(),
@@ -150,7 +152,12 @@ impl Report {
         let Some(path) = &self.reference else {
             return Ok(None);
         };
-        let track = attitude_track::read(path, Side::Reference, self.ref_topic.as_deref(), pool)?;
+        let track = attitude_track::read(
+            &Input::open(path)?,
+            Side::Reference,
+            self.ref_topic.as_deref(),
+            pool,
+        )?;
         for problem in &track.problems {
             tracing::warn!("{problem}");
         }
@@ -160,6 +167,7 @@ impl Report {
     /// The Allan deviation of a topic's longest rest, or what is missing.
     fn noise(
         &self,
+        input: &Input,
         (selection, plan): (&Selection, &Plan),
         topic: &CheckedTopic,
         pool: &Pool,
@@ -186,7 +194,7 @@ impl Report {
             topic: Some(topic.looked.topic.clone()),
             ..selection.clone()
         };
-        allan::examined(&self.file, (&selection, &plan), pool).unwrap_or_else(|why| {
+        allan::examined(input, (&selection, &plan), pool).unwrap_or_else(|why| {
             let why = why.to_string().replace('\n', " ");
             Noise::Missing(format!("It could not be had: {why}"))
         })

@@ -1,11 +1,11 @@
 //! Attitude files -> a track of attitudes over time, for `compare`. I/O.
 //!
-//! NDJSON and CSV are our own outputs; MCAP goes through the same walk and decoders as a replay.
+//! Attitudes in NDJSON and CSV are our own outputs; all else goes through the same walk and decoders as a replay.
 
 use super::channel_route::{Item, Route};
 use super::decoders::Decoders;
-use super::log::{Log, LogChannel, problems, rank};
-use super::replay::recognised;
+use super::input::Input;
+use super::log::{AHEAD, Log, LogChannel, problems, rank};
 use super::simulate::{TRUTH_ID, TRUTH_TOPIC};
 use super::topics;
 use crate::error::{Error, Result};
@@ -17,9 +17,9 @@ use strapd_attitude::frames::{Body, Nav};
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::Nanos;
 use strapd_attitude::worlds::{Convention, World};
+use strapd_recording::attitude_line::Attitude;
 use strapd_recording::decode::{Options, Role};
-use strapd_recording::format::{Format, open};
-use strapd_recording::mcap::{self, WalkOptions};
+use strapd_recording::format::Format;
 use strapd_recording::pool::Pool;
 use strapd_recording::text::printable;
 
@@ -51,21 +51,26 @@ pub enum Side {
 ///
 /// # Errors
 /// The file can not be read, or holds no attitude, or several and none named.
-pub fn read(path: &Path, side: Side, topic: Option<&str>, pool: &Pool) -> Result<Track> {
+pub fn read(input: &Input, side: Side, topic: Option<&str>, pool: &Pool) -> Result<Track> {
     let plain = |entries| Track {
-        name: path.display().to_string(),
+        name: input.name().display().to_string(),
         entries,
         problems: Vec::new(),
     };
-    match recognised(path)? {
-        Format::Lines => from_ndjson(path, side, topic).map(plain),
-        Format::Table => from_csv(path).map(plain),
-        Format::Mcap => from_mcap(path, side, topic, pool),
+    match input.format() {
+        Format::Table => from_csv(input).map(plain),
+        Format::Lines => match from_ndjson(input, side, topic)? {
+            // Samples may have orientations beside them.
+            none if none.is_empty() => from_log(input, side, topic, pool),
+            some => Ok(plain(some)),
+        },
+        Format::Mcap => from_log(input, side, topic, pool),
     }
 }
 
-fn from_mcap(path: &Path, side: Side, topic: Option<&str>, pool: &Pool) -> Result<Track> {
-    let log = Log::told_apart(path, topic, &Options::default(), pool)?;
+fn from_log(input: &Input, side: Side, topic: Option<&str>, pool: &Pool) -> Result<Track> {
+    let path = input.name();
+    let log = Log::told_apart(input, topic, &Options::default(), pool)?;
     let known = attitude_channel(path, &log, side, topic)?;
     let decoder = known
         .decoder(&mut Decoders::default())
@@ -76,18 +81,13 @@ fn from_mcap(path: &Path, side: Side, topic: Option<&str>, pool: &Pool) -> Resul
     let stated = orientation_convention(&decoder.stated().declared);
     let mut entries: Vec<Entry> = Vec::new();
     let wanted = known.channel.clone();
-    let reader = log.reader().map_or_else(|| mcap::Reader::open(path), Ok)?;
-    let report = mcap::walk(
-        reader,
-        &WalkOptions {
-            pool: Some(pool.rayon()),
-            ..WalkOptions::default()
-        },
+    let survey = log.walk(
+        AHEAD,
+        pool,
         |channel| {
             (channel.topic == wanted.topic && channel.id == wanted.id)
                 .then(|| Route::reference(decoder.clone()))
         },
-        Route::map,
         |items| {
             entries.extend(items.drain(..).filter_map(|item| match item {
                 Item::Reference(raw) => {
@@ -96,11 +96,11 @@ fn from_mcap(path: &Path, side: Side, topic: Option<&str>, pool: &Pool) -> Resul
                 }
                 _ => None,
             }));
-            std::ops::ControlFlow::Continue(())
+            Ok(std::ops::ControlFlow::Continue(()))
         },
     )?;
     // Our own outputs say what world their numbers are in.
-    let labels = &report.survey.facts.provenance;
+    let labels = &survey.facts.provenance;
     let world = labels
         .get("world")
         .or_else(|| labels.get(&format!("{} world", known.channel.topic)));
@@ -111,7 +111,7 @@ fn from_mcap(path: &Path, side: Side, topic: Option<&str>, pool: &Pool) -> Resul
     Ok(Track {
         name: format!("{} {}", path.display(), known.channel.topic),
         entries,
-        problems: problems(&report.survey),
+        problems: problems(&survey),
     })
 }
 
@@ -195,6 +195,9 @@ fn goodness(role: &Role, side: Side, topic: &str) -> u8 {
 /// Whether the first message really has one: an Imu may mark it as absent. A track whose first rows
 /// are NaN still counts.
 fn carries_orientation(known: &LogChannel, decoders: &mut Decoders) -> bool {
+    if let Some(stated) = &known.stated {
+        return stated.has_orientation;
+    }
     let Some((log, payload)) = &known.first else {
         return false;
     };
@@ -210,38 +213,14 @@ fn carries_orientation(known: &LogChannel, decoders: &mut Decoders) -> bool {
 /// The longest line read from an NDJSON file.
 const LINE_LIMIT: u64 = 64 * 1024;
 
-#[derive(Deserialize)]
-struct Stamp {
-    sec: i64,
-    nsec: u32,
-}
-
-#[derive(Deserialize)]
-struct Q {
-    w: f64,
-    x: f64,
-    y: f64,
-    z: f64,
-}
-
-#[derive(Deserialize)]
-struct Att {
-    class: String,
-    #[serde(default)]
-    id: String,
-    #[serde(default)]
-    world: String,
-    stamp: Option<Stamp>,
-    q: Option<Q>,
-}
-
 /// Reads the `ATT` lines of an NDJSON file; `id` picks one of several streams, of which the truth is
 /// taken for a reference and left for an estimate.
 ///
 /// # Errors
 /// The file can not be read, a line is not JSON or is too long, or several ids and none named.
-pub fn from_ndjson(path: &Path, side: Side, id: Option<&str>) -> Result<Vec<Entry>> {
-    let file = open(path)?;
+fn from_ndjson(input: &Input, side: Side, id: Option<&str>) -> Result<Vec<Entry>> {
+    let path = input.name();
+    let file = input.bytes()?;
     let mut reader = BufReader::new(file);
     let mut track = Vec::new();
     let mut seen: Option<String> = None;
@@ -267,11 +246,10 @@ pub fn from_ndjson(path: &Path, side: Side, id: Option<&str>) -> Result<Vec<Entr
         if read as u64 == LINE_LIMIT {
             return Err(bad_line(path, number, "longer than 64 KiB"));
         }
-        let att: Att =
-            serde_json::from_slice(&line).map_err(|e| bad_line(path, number, &e.to_string()))?;
-        if att.class != "ATT" || id.is_some_and(|id| id != att.id) {
+        let read = Attitude::read(&line).map_err(|what| bad_line(path, number, &what))?;
+        let Some(att) = read.filter(|att| id.is_none_or(|id| id == att.id)) else {
             continue;
-        }
+        };
         let wanted = |id: &str| (id == TRUTH_ID) == (side == Side::Reference);
         match &seen {
             Some(first) if *first != att.id => match (wanted(first), wanted(&att.id)) {
@@ -295,9 +273,8 @@ pub fn from_ndjson(path: &Path, side: Side, id: Option<&str>) -> Result<Vec<Entr
             Some(_) => {}
             None => seen = Some(att.id.clone()),
         }
-        if let (Some(stamp), Some(q)) = (att.stamp, att.q) {
-            let wxyz = in_flu(convention_of(&att.world), [q.w, q.x, q.y, q.z]);
-            track.push((Nanos::from_sec_nanosec(stamp.sec, stamp.nsec), wxyz));
+        if let Some(stamp) = att.stamp {
+            track.push((stamp, in_flu(convention_of(&att.world), att.q)));
         }
     }
 }
@@ -324,8 +301,9 @@ struct Row {
 ///
 /// # Errors
 /// The file can not be read, a column is missing, or a cell is not a number.
-pub fn from_csv(path: &Path) -> Result<Vec<Entry>> {
-    csv::Reader::from_reader(BufReader::new(open(path)?))
+fn from_csv(input: &Input) -> Result<Vec<Entry>> {
+    let path = input.name();
+    csv::Reader::from_reader(BufReader::new(input.bytes()?))
         .deserialize::<Row>()
         .map(|row| {
             row.map(|r| {

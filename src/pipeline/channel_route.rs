@@ -255,6 +255,26 @@ impl Route {
         }
     }
 
+    /// The same for samples that came as such.
+    pub(super) fn pass(&self, samples: &[RawSample], out: &mut Vec<Item>) {
+        if self.beside.is_some() {
+            out.extend(samples.iter().map(|raw| Item::Beside(*raw)));
+        }
+        if let (Some(_), Some(taker)) = (&self.decoder, self.takers.first()) {
+            out.extend(samples.iter().map(|raw| Item::Sample(taker.stream, *raw)));
+        }
+        if self.reference.is_some() {
+            out.extend(samples.iter().map(|raw| Item::Reference(*raw)));
+        }
+    }
+
+    /// The same for a line that holds none; `number` is its number.
+    pub(super) fn lose(&self, number: Nanos, why: Undecodable, out: &mut Vec<Item>) {
+        if let (Some(_), Some(taker)) = (&self.decoder, self.takers.first()) {
+            out.push(Item::Undecodable(taker.stream, Box::new((number, why))));
+        }
+    }
+
     fn decode(&self, decoder: &Decoder, message: &Message<'_>, out: &mut Vec<Item>) {
         let log = nanos(message.log_time);
         let publish = nanos(message.publish_time);

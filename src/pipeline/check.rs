@@ -5,15 +5,15 @@
 
 use super::attitude_track::Track;
 use super::each::{Told, each};
+use super::input::Input;
 use super::inspection::{Inspection, look_as};
 use super::log::{Log, problems};
 use super::position::Position;
-use super::request::{ReplayRequest, Source};
+use super::request::ReplayRequest;
 use crate::config::Selection;
 use crate::error::{Error, Result};
 use crate::report::summary::TopicSummary;
 use crate::sink;
-use std::path::Path;
 use strapd_attitude::estimate::Plan;
 use strapd_recording::decode;
 use strapd_recording::pool::Pool;
@@ -75,7 +75,7 @@ pub struct Examination<'a> {
 /// # Errors
 /// It can not be read, or holds no such topic.
 pub fn check(
-    path: &Path,
+    input: &Input,
     named: Option<&str>,
     options: &decode::Options,
     pool: &Pool,
@@ -91,7 +91,7 @@ pub fn check(
         drawing: None,
         command: "strapd check".to_owned(),
     };
-    examine(path, &examination, pool, &mut |_| {})
+    examine(input, &examination, pool, &mut |_| {})
 }
 
 /// Examines a log, or one topic of it.
@@ -99,7 +99,7 @@ pub fn check(
 /// # Errors
 /// It can not be read, or holds no such topic.
 pub fn examine(
-    path: &Path,
+    input: &Input,
     asked: &Examination<'_>,
     pool: &Pool,
     watch: &mut dyn FnMut(&Position),
@@ -109,7 +109,8 @@ pub fn examine(
         .topic
         .as_deref()
         .filter(|name| *name != "all");
-    let log = Log::told_apart(path, named, &asked.selection.decode, pool)?;
+    let path = input.name();
+    let log = Log::told_apart(input, named, &asked.selection.decode, pool)?;
     for topic in named
         .into_iter()
         .chain(Some(asked.reference_topic.as_str()).filter(|name| !name.is_empty()))
@@ -122,13 +123,7 @@ pub fn examine(
             });
         }
     }
-    let looks = look_as(
-        path,
-        &log,
-        named,
-        (&asked.selection.decode, &asked.plan),
-        pool,
-    )?;
+    let looks = look_as(&log, named, (&asked.selection.decode, &asked.plan), pool)?;
     let has_reference = asked.drawing.is_some_and(|d| d.reference.is_some())
         || log
             .channels
@@ -150,7 +145,7 @@ pub fn examine(
         .filter(|l| named.is_none_or(|name| l.topic == name || l.of == name))
         .collect();
     let names: Vec<String> = looked.iter().map(|l| l.topic.clone()).collect();
-    let replayed = integrate((path, &log), &names, asked, has_reference, pool, watch)?;
+    let replayed = integrate(&log, &names, asked, has_reference, pool, watch)?;
     let topics = looked
         .into_iter()
         .zip(replayed)
@@ -172,7 +167,7 @@ pub fn examine(
 }
 
 fn integrate(
-    (path, log): (&Path, &Log),
+    log: &Log,
     topics: &[String],
     asked: &Examination<'_>,
     has_reference: bool,
@@ -183,7 +178,7 @@ fn integrate(
         return Ok(Vec::new());
     }
     let run = ReplayRequest {
-        source: Source::File(path.to_owned()),
+        source: log.input().source().clone(),
         targets: Vec::new(),
         selection: asked.selection.clone(),
         plan: asked.plan.clone(),
@@ -195,12 +190,5 @@ fn integrate(
         against: has_reference.then(|| asked.reference_topic.clone()),
         command: asked.command.clone(),
     };
-    each(
-        &run,
-        (path, log),
-        topics,
-        asked.drawing.as_ref(),
-        pool,
-        watch,
-    )
+    each(&run, log, topics, asked.drawing.as_ref(), pool, watch)
 }

@@ -6,14 +6,13 @@
 
 use super::beside::Besides;
 use super::channel_choice::{Chosen, besides, choose_each, reference, route};
-use super::channel_route::Route;
 use super::check::Drawing;
 use super::decoders::Decoders;
 use super::delivery::{Delivery, Outlet};
 use super::history::History;
-use super::log::Log;
+use super::log::{AHEAD, Log};
 use super::position::Position;
-use super::replay::{again, done, prepare};
+use super::replay::{done, prepare};
 use super::request::ReplayRequest;
 use super::session::{Session, Topic};
 use super::session_builder::labelled;
@@ -22,8 +21,6 @@ use crate::error::Result;
 use crate::report::summary::TopicSummary;
 use crate::sink::{Provenance, Stream};
 use std::ops::ControlFlow;
-use std::path::Path;
-use strapd_recording::mcap::{self, WalkOptions};
 use strapd_recording::pool::Pool;
 
 /// What became of a topic, or why nothing did.
@@ -35,12 +32,13 @@ pub(super) type Told = std::result::Result<Box<TopicSummary>, String>;
 /// The log can not be read.
 pub(super) fn each(
     run: &ReplayRequest,
-    (path, log): (&Path, &Log),
+    log: &Log,
     names: &[String],
     drawing: Option<&Drawing<'_>>,
     pool: &Pool,
     watch: &mut dyn FnMut(&Position),
 ) -> Result<Vec<Told>> {
+    let path = log.name();
     let mut decoders = Decoders::of_run(&run.plan, &run.selection.decode);
     let mut told: Vec<Option<Told>> = Vec::new();
     let mut chosen: Vec<Chosen> = Vec::new();
@@ -66,7 +64,7 @@ pub(super) fn each(
         }
     };
 
-    let prepared = prepare(run, path, log, &chosen, pool)?;
+    let prepared = prepare(run, log, &chosen, pool)?;
     let mut topics = Vec::new();
     let mut streams: Vec<Stream> = Vec::new();
     let mut kept = Vec::new();
@@ -120,32 +118,17 @@ pub(super) fn each(
     )?;
     let mut session = Session::new(topics, outlet);
     let span = log.survey.times;
-    let mut failure = None;
-    mcap::walk(
-        again(log, path)?,
-        &WalkOptions {
-            pool: Some(pool.rayon()),
-            ..WalkOptions::default()
-        },
+    log.walk(
+        AHEAD,
+        pool,
         |channel| route(&kept, reference.as_ref(), &besides, false, channel),
-        Route::map,
         |items| {
             let done = done(items, span);
-            match session.consume(items.drain(..), pool) {
-                Ok(_) => {
-                    watch(&session.position(done));
-                    ControlFlow::Continue(())
-                }
-                Err(e) => {
-                    failure = Some(e);
-                    ControlFlow::Break(())
-                }
-            }
+            let _ = session.consume(items.drain(..), pool)?;
+            watch(&session.position(done));
+            Ok(ControlFlow::Continue(()))
         },
     )?;
-    if let Some(e) = failure {
-        return Err(e);
-    }
     let mut summaries = summarise::topics(run, session.finish(pool)?).into_iter();
     let mut next = || {
         let summary = summaries.next().map(Box::new);

@@ -5,13 +5,12 @@
 
 use super::channel_route::{Item, Noticed, Route, Taker};
 use super::decoders::Decoders;
-use super::log::{Log, LogChannel, described, rank};
+use super::log::{AHEAD, Log, LogChannel, described, rank};
 use super::sources::Source;
 use super::topics::{MOST_TOPICS, PICKED_UNNAMED};
 use crate::error::{Error, Result};
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
-use std::path::Path;
 use std::sync::Arc;
 use strapd_attitude::condition::quality::{Quality, QualitySummary};
 use strapd_attitude::condition::regularise;
@@ -22,7 +21,7 @@ use strapd_attitude::estimate::Plan;
 use strapd_attitude::estimate::{Conditioned, FEW};
 use strapd_attitude::record::RawSample;
 use strapd_recording::decode::{self, Options};
-use strapd_recording::mcap::{self, Survey, WalkOptions};
+use strapd_recording::mcap::{self, Survey};
 use strapd_recording::pool::Pool;
 
 /// One topic of samples, looked at.
@@ -141,14 +140,8 @@ impl Look {
 ///
 /// # Errors
 /// The log can not be read, or `named` not decoded.
-pub fn look(
-    path: &Path,
-    log: &Log,
-    named: Option<&str>,
-    options: &Options,
-    pool: &Pool,
-) -> Result<Looks> {
-    look_as(path, log, named, (options, &Plan::default()), pool)
+pub fn look(log: &Log, named: Option<&str>, options: &Options, pool: &Pool) -> Result<Looks> {
+    look_as(log, named, (options, &Plan::default()), pool)
 }
 
 /// The same with the samples understood as a run of `plan` understands them.
@@ -156,12 +149,12 @@ pub fn look(
 /// # Errors
 /// As [`look`].
 pub fn look_as(
-    path: &Path,
     log: &Log,
     named: Option<&str>,
     (options, plan): (&Options, &Plan),
     pool: &Pool,
 ) -> Result<Looks> {
+    let path = log.name();
     let (wanted, left_out) = wanted(log, named);
     let mut looks: Vec<Look> = Vec::new();
     let mut compiled = Decoders::of_run(plan, options);
@@ -199,48 +192,36 @@ pub fn look_as(
             });
         }
     }
-    let mut failure = None;
-    let reader = log.reader().map_or_else(|| mcap::Reader::open(path), Ok)?;
-    let report = mcap::walk(
-        reader,
-        &WalkOptions {
-            pool: Some(pool.rayon()),
-            ..WalkOptions::default()
-        },
+    let unsupported = |what| Error::Unsupported {
+        path: path.to_owned(),
+        what,
+    };
+    let survey = log.walk(
+        AHEAD,
+        pool,
         |channel| {
             let (decoder, takers) = decoders.get(&id(channel))?;
             Some(Route::to(decoder.clone(), takers.clone()))
         },
-        Route::map,
         |items| {
             for item in items.drain(..) {
-                let result = match item {
+                match item {
                     Item::Sample(stream, raw) => {
-                        looks.get_mut(stream).map_or(Ok(()), |look| look.take(&raw))
+                        let look = looks.get_mut(stream);
+                        look.map_or(Ok(()), |look| look.take(&raw))
+                            .map_err(unsupported)?;
                     }
                     Item::Undecodable(stream, _) => {
                         if let Some(look) = looks.get_mut(stream) {
                             look.undecodable += 1;
                         }
-                        Ok(())
                     }
-                    Item::Reference(_) | Item::Beside(_) | Item::Copy(_) => Ok(()),
-                };
-                if let Err(what) = result {
-                    failure = Some(what);
-                    return ControlFlow::Break(());
+                    Item::Reference(_) | Item::Beside(_) | Item::Copy(_) => {}
                 }
             }
-            ControlFlow::Continue(())
+            Ok(ControlFlow::Continue(()))
         },
     )?;
-    let unsupported = |what| Error::Unsupported {
-        path: path.to_owned(),
-        what,
-    };
-    if let Some(what) = failure {
-        return Err(unsupported(what));
-    }
     let topics = looks
         .into_iter()
         .map(|look| look.finish().map_err(unsupported))
@@ -248,7 +229,7 @@ pub fn look_as(
     Ok(Looks {
         topics,
         left_out,
-        survey: report.survey,
+        survey,
     })
 }
 

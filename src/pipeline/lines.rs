@@ -1,5 +1,6 @@
 //! Samples from lines of JSON, or rows of a table -> the same run as from a log. I/O.
 
+use super::bare_stamps::{BareStamps, at_its_stamp};
 use super::channel_route::Item;
 use super::position::Position;
 use super::replay_start::Waiting;
@@ -16,10 +17,9 @@ use std::path::Path;
 use std::sync::Arc;
 use strapd_attitude::estimate::{Aid, Meaning};
 use strapd_attitude::estimate::{StampPass, Stamps};
-use strapd_attitude::record::{Declared, TimeUnit};
-use strapd_attitude::record::{Nanos, RawSample};
+use strapd_attitude::record::{Declared, Nanos};
 use strapd_recording::decode::Options;
-use strapd_recording::decode::{Ambiguous, Bare, Class, MOST_WAITING, Undecodable, unit_of};
+use strapd_recording::decode::{Ambiguous, Class, Undecodable};
 use strapd_recording::format::Format;
 use strapd_recording::lines::Lines;
 use strapd_recording::mcap::Survey;
@@ -172,7 +172,7 @@ fn read(
                 let number = Nanos(i64::try_from(lines.number()).unwrap_or(i64::MAX));
                 items.push(Item::Undecodable(0, Box::new((number, why))));
             }
-            Ok(line) => {
+            Ok(mut line) => {
                 // A sample of our own whose rate is null was one with NaN: it is counted, not
                 // passed over.
                 let is_sample = line.class == Class::Rate && !samples.is_empty();
@@ -181,7 +181,7 @@ fn read(
                     // Of the same device between its samples, with a stamp that says its unit.
                     let id = line.id.as_deref().unwrap_or_default();
                     if is_beside && sensor.as_deref() == Some(id) && line.bare.is_empty() {
-                        items.extend(samples.drain(..).map(|raw| Item::Beside(in_its_time(raw))));
+                        items.extend(samples.drain(..).map(|raw| Item::Beside(at_its_stamp(raw))));
                     }
                     // Attitudes, status and the like between the samples.
                     samples.clear();
@@ -190,7 +190,7 @@ fn read(
                     }
                     continue;
                 }
-                let id = line.id.unwrap_or_default();
+                let id = line.id.take().unwrap_or_default();
                 // An attitude carries the rate behind it, which makes it a sample where there is
                 // nothing else: not beside samples, and not when it is the truth about them.
                 let truth = id == TRUTH_ID && run.selection.topic.as_deref() != Some(TRUTH_ID);
@@ -232,9 +232,9 @@ fn read(
                     }
                     Some(_) => {}
                 }
-                let numbers = line.bare.into_iter().chain(std::iter::repeat(None));
-                let known = bare.take(samples.drain(..).zip(numbers));
-                items.extend(known.map_err(|what| unclear(path, &what))?);
+                let known = bare.take(&mut samples, &line);
+                let known = known.map_err(|what| unclear(path, &what))?;
+                items.extend(known.map(|raw| Item::Sample(0, raw)));
             }
         }
         // With nothing left in the buffer the next line may be long in coming: what is known goes
@@ -250,61 +250,13 @@ fn read(
     if sensor.is_none() {
         return Err(nothing(path, format));
     }
-    items.extend(bare.settle().map_err(|what| unclear(path, &what))?);
+    let last = bare.settle().map_err(|what| unclear(path, &what))?;
+    items.extend(last.map(|raw| Item::Sample(0, raw)));
     let _ = taker.take(&mut items)?;
     Ok(())
 }
 
-/// Stamps that are bare numbers: their samples wait until the unit of all is known.
-#[derive(Default)]
-struct BareStamps {
-    unit: Option<TimeUnit>,
-    waiting: Vec<(RawSample, Option<Bare>)>,
-}
-
-impl BareStamps {
-    /// The samples whose stamps are known by now.
-    fn take(
-        &mut self,
-        samples: impl Iterator<Item = (RawSample, Option<Bare>)>,
-    ) -> std::result::Result<Vec<Item>, Ambiguous> {
-        self.waiting.extend(samples);
-        let mut numbers = self.waiting.iter().filter_map(|(_, bare)| *bare);
-        let (first, ninth) = (numbers.next(), numbers.nth(MOST_WAITING - 1));
-        self.unit = self.unit.or(first.and_then(Bare::certain_unit));
-        match (self.unit, first, ninth) {
-            (None, Some(_), None) => Ok(Vec::new()),
-            _ => self.settle(),
-        }
-    }
-
-    /// The unit is that of those there are.
-    fn settle(&mut self) -> std::result::Result<Vec<Item>, Ambiguous> {
-        let mut numbers = self.waiting.iter().filter_map(|(_, bare)| *bare);
-        if self.unit.is_none() && numbers.clone().next().is_some() {
-            self.unit = Some(unit_of(numbers.by_ref().take(MOST_WAITING + 1))?);
-        }
-        let unit = self.unit.unwrap_or_default();
-        let item = |(raw, bare): (RawSample, Option<Bare>)| {
-            let header = raw.header.or(bare.map(|bare| bare.in_unit(unit)));
-            Item::Sample(0, in_its_time(RawSample { header, ..raw }))
-        };
-        Ok(self.waiting.drain(..).map(item).collect())
-    }
-}
-
-/// A line has no time but the one in it; a row may.
-fn in_its_time(raw: RawSample) -> RawSample {
-    let stamp = raw.header.unwrap_or(Nanos(0));
-    let log = Some(raw.log).filter(|log| log.0 != 0).unwrap_or(stamp);
-    RawSample {
-        log,
-        publish: log,
-        ..raw
-    }
-}
-
-fn unclear(path: &Path, what: &Ambiguous) -> Error {
+pub(super) fn unclear(path: &Path, what: &Ambiguous) -> Error {
     Error::Unsupported {
         path: path.to_owned(),
         what: format!(
@@ -327,7 +279,7 @@ pub(super) fn no_samples(path: &Path, lines: &Lines<impl Read>, why: &Undecodabl
     }
 }
 
-pub(super) fn nothing(path: &Path, format: Format) -> Error {
+fn nothing(path: &Path, format: Format) -> Error {
     let what = match format {
         Format::Table => {
             "no row carries a body rate\n  help: columns gyro_x, gyro_y, gyro_z, in rad/s"

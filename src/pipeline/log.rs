@@ -3,8 +3,11 @@
 //! Apart from the replay because `info`, `cat` and `compare` ask the same questions first: which
 //! channels, which of them carry a rate or an orientation, and a decoder that has seen a message.
 
+use super::channel_route::{Item, Route};
 use super::decoders::Decoders;
+use super::input::Input;
 use super::sources::{self, Source};
+use super::text_log::TextLog;
 use super::topics::{self, Candidate, Choice, PICKED_UNNAMED};
 use crate::error::{Error, Result};
 use std::collections::{BTreeMap, BTreeSet};
@@ -13,14 +16,16 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use strapd_attitude::record::Nanos;
-use strapd_recording::decode::{self, Decoder, Rank, Role, Unsupported, role_of};
+use strapd_recording::decode::{self, Decoder, Options, Rank, Role, Stated, Unsupported, role_of};
+use strapd_recording::format::Format;
 use strapd_recording::mcap::{self, Channel, Reader, Survey, WalkOptions};
 use strapd_recording::pool::Pool;
 
-/// A finished file, surveyed.
+/// A recording, surveyed.
 #[derive(Debug)]
 pub struct Log {
-    reader: Reader,
+    input: Input,
+    body: Body,
     /// What is in it.
     pub survey: Survey,
     /// Its channels, with what they can serve as.
@@ -30,6 +35,13 @@ pub struct Log {
     /// What was wrong with it as far as it was read: all of it when it has no summary, otherwise up
     /// to the first message of the last channel.
     pub problems: Vec<String>,
+}
+
+/// How a log is read again.
+#[derive(Debug)]
+enum Body {
+    Mcap(Reader),
+    Text(Box<TextLog>),
 }
 
 /// A channel and its first message.
@@ -45,21 +57,42 @@ pub struct LogChannel {
     pub openings: Vec<(Nanos, Vec<u8>)>,
     /// What it can serve as.
     pub role: Role,
+    /// What its samples are, where they come as such.
+    pub stated: Option<Stated>,
 }
 
 impl Log {
-    /// Opens and surveys a file.
+    /// Opens and surveys what a command line names.
     ///
     /// # Errors
-    /// It can not be opened or read, or is no MCAP.
+    /// It can not be opened or read, or is no recording.
     pub fn open(path: &Path, pool: &Pool) -> Result<Log> {
-        let reader = Reader::open(path)?;
-        if reader.again().is_none() {
-            return Err(Error::Unsupported {
-                path: path.to_owned(),
-                what: "a pipe can be read only once, and this needs to look twice\n  help: save it to a file first; strapd replay reads pipes".to_owned(),
-            });
+        Log::of(&Input::open(path)?, &Options::default(), pool)
+    }
+
+    /// Surveys a recording.
+    ///
+    /// # Errors
+    /// It can not be read, or is none.
+    pub fn of(input: &Input, options: &Options, pool: &Pool) -> Result<Log> {
+        match input.format() {
+            Format::Mcap => Log::of_mcap(input, pool),
+            Format::Lines | Format::Table => {
+                let (text, channels) = TextLog::survey(input, options)?;
+                Ok(Log {
+                    input: input.clone(),
+                    survey: text.surveyed().clone(),
+                    body: Body::Text(Box::new(text)),
+                    sources: sources::by_topic(&channels),
+                    channels,
+                    problems: Vec::new(),
+                })
+            }
         }
+    }
+
+    fn of_mcap(input: &Input, pool: &Pool) -> Result<Log> {
+        let reader = input.mcap()?;
         let options = WalkOptions {
             pool: Some(pool.rayon()),
             ..WalkOptions::default()
@@ -91,26 +124,27 @@ impl Log {
                 none if none.is_empty() => met,
                 whole => whole,
             },
-            reader,
+            input: input.clone(),
+            body: Body::Mcap(reader),
             survey,
             sources: sources::by_topic(&channels),
             channels,
         })
     }
 
-    /// Opens and surveys a file, and looks at who speaks on its topics: whatever integrates samples must
+    /// Surveys a recording, and looks at who speaks on its topics: whatever integrates samples must
     /// know. `named` is `--topic`.
     ///
     /// # Errors
-    /// As [`Log::open`].
+    /// As [`Log::of`].
     pub fn told_apart(
-        path: &Path,
+        input: &Input,
         named: Option<&str>,
-        options: &decode::Options,
+        options: &Options,
         pool: &Pool,
     ) -> Result<Log> {
-        let mut log = Log::open(path, pool)?;
-        if let Some(again) = log.reader.again() {
+        let mut log = Log::of(input, options, pool)?;
+        if let Some(again) = log.reader() {
             log.sources = sources::tell_apart(again, &mut log.channels, named, options, pool)?;
         }
         Ok(log)
@@ -177,10 +211,76 @@ impl Log {
             .map_err(|error| explained(error, &self.channels, &self.problems))
     }
 
-    /// The file once more, from its beginning.
+    /// What it is called in messages.
+    #[must_use]
+    pub fn name(&self) -> &Path {
+        self.input.name()
+    }
+
+    /// Where a payload lies, in words: of a line its number stands where others have a time.
+    #[must_use]
+    pub fn place_of(&self, at: Nanos) -> String {
+        match self.body {
+            Body::Mcap(_) => format!("logged at {} ns", at.0),
+            Body::Text(_) => format!("line {}", at.0),
+        }
+    }
+
+    /// The recording.
+    #[must_use]
+    pub fn input(&self) -> &Input {
+        &self.input
+    }
+
+    /// An MCAP once more, from its beginning.
     #[must_use]
     pub fn reader(&self) -> Option<Reader> {
-        self.reader.again()
+        match &self.body {
+            Body::Mcap(reader) => reader.again(),
+            Body::Text(_) => None,
+        }
+    }
+
+    /// Reads it once. `select` says the way of a channel's messages, `take` gets what becomes of them in order, and may
+    /// take it out of the vector; what it fails with ends it. At most `ahead` bytes are on their way at once. What was met.
+    ///
+    /// # Errors
+    /// It can not be read; as `take`.
+    pub fn walk(
+        &self,
+        ahead: usize,
+        pool: &Pool,
+        select: impl FnMut(&Arc<Channel>) -> Option<Route>,
+        mut take: impl FnMut(&mut Vec<Item>) -> Result<ControlFlow<()>>,
+    ) -> Result<Survey> {
+        let reader = match &self.body {
+            Body::Mcap(reader) => reader.again().map_or_else(|| self.input.mcap(), Ok)?,
+            Body::Text(text) => {
+                text.walk(select, take)?;
+                return Ok(self.survey.clone());
+            }
+        };
+        let mut failure = None;
+        let report = mcap::walk(
+            reader,
+            &WalkOptions {
+                pool: Some(pool.rayon()),
+                in_flight: ahead,
+                ..WalkOptions::default()
+            },
+            select,
+            Route::map,
+            |items| {
+                take(items).unwrap_or_else(|why| {
+                    failure = Some(why);
+                    ControlFlow::Break(())
+                })
+            },
+        )?;
+        match failure {
+            Some(why) => Err(why),
+            None => Ok(report.survey),
+        }
     }
 
     /// For the choice of topics: one for each source.
@@ -271,6 +371,9 @@ impl LogChannel {
     /// # Errors
     /// The channel can not be decoded: which, why, and the flag that helps.
     pub fn decoder(&self, decoders: &mut Decoders) -> std::result::Result<Decoder, Unsupported> {
+        if let Some(stated) = &self.stated {
+            return Ok(Decoder::of_samples(&plain(&self.channel), stated.clone()));
+        }
         let own = decoders.of(&self.channel)?;
         let own = self.settled(own, decoders)?;
         // The message's own stamp, unless it is none and a nested one is.
@@ -388,6 +491,7 @@ pub fn known(
         first,
         openings: Vec::new(),
         role,
+        stated: None,
     }
 }
 
@@ -396,6 +500,11 @@ pub fn known(
 pub fn nanos(time: u64) -> Nanos {
     Nanos(i64::try_from(time).unwrap_or(i64::MAX))
 }
+
+/// Bytes on their way at once through a walk to the end.
+pub const AHEAD: usize = 32 << 20;
+/// The same for a walk that usually ends at once.
+pub const A_LITTLE_AHEAD: usize = 4 << 20;
 
 /// Largest first message that is kept, and all of them together: an IMU's is small, and a log may
 /// have thousands of channels of images.

@@ -89,14 +89,13 @@ pub fn of(
 ///
 /// # Errors
 /// It can not be read.
-pub fn sha256(path: &Path) -> Result<String> {
+pub fn sha256(path: &Path, mut file: impl Read) -> Result<String> {
     let mut offset = 0;
     let fail = |offset, source| strapd_recording::Error::Read {
         path: path.to_owned(),
         offset,
         source,
     };
-    let mut file = File::open(path).map_err(|e| fail(0, e))?;
     let mut hash = Sha256::new();
     let mut block = vec![0; 1 << 20];
     loop {

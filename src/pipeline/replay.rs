@@ -4,8 +4,9 @@
 //! through stamps, then to integrate. A stream is read once; its first samples wait until these are known.
 
 use super::channel_choice::{Chosen, besides, choose, looked_at, reference, route};
-use super::channel_route::{Item, Route};
-use super::log::Log;
+use super::channel_route::Item;
+use super::input::{Input, is_pipe};
+use super::log::{A_LITTLE_AHEAD, AHEAD, Log};
 use super::position::Position;
 use super::request::{ReplayRequest, Source, refused};
 use super::session::Found;
@@ -17,13 +18,11 @@ use crate::report::summary::RunSummary;
 use crate::sink::{Flow, Stream};
 use std::io::{BufReader, Read};
 use std::ops::ControlFlow;
-use std::path::Path;
 use std::time::Instant;
 use strapd_attitude::estimate::StampPass;
 use strapd_attitude::estimate::{Patience, Preparation, Prepared};
 use strapd_recording::format::{Format, head_of, open};
-use strapd_recording::lines::Lines;
-use strapd_recording::mcap::{self, Reader, WalkOptions};
+use strapd_recording::mcap::Reader;
 use strapd_recording::pool::Pool;
 
 /// Does it. `watch` is told where it is, often.
@@ -39,37 +38,21 @@ pub fn run(
     let begun = Instant::now();
     let mut summary = match &run.source {
         Source::File(path) if is_pipe(path) => piped(run, open(path)?, pool, watch)?,
-        Source::File(path) => match recognised(path)? {
-            format @ (Format::Lines | Format::Table) => {
-                let text = || lines_of(run, format, open(path)?);
-                let stamps = lines::stamps(run, text()?)?;
-                lines::replay(run, text()?, stamps, pool, watch)?
+        Source::File(path) => {
+            let input = Input::open(path)?;
+            match input.format() {
+                Format::Lines | Format::Table => {
+                    let text = || input.lines(&run.selection.decode);
+                    let stamps = lines::stamps(run, text()?)?;
+                    lines::replay(run, text()?, stamps, pool, watch)?
+                }
+                Format::Mcap => file(run, &input, pool, watch)?,
             }
-            Format::Mcap => file(run, path, pool, watch)?,
-        },
+        }
         Source::Stdin => piped(run, std::io::stdin(), pool, watch)?,
     };
     summary.elapsed_secs = begun.elapsed().as_secs_f64();
     Ok(summary)
-}
-
-/// What a file is, by its first bytes; where its name says otherwise, that is said. What nobody knows is taken for an
-/// MCAP, whose reader says what is wrong with it.
-pub(super) fn recognised(path: &Path) -> Result<Format> {
-    let format = Format::of_file(path)?.unwrap_or(Format::Mcap);
-    if let Some(said) = format.contradiction(path) {
-        tracing::warn!("{}: {said}", path.display());
-    }
-    Ok(format)
-}
-
-fn lines_of<R: Read>(run: &ReplayRequest, format: Format, input: R) -> Result<Lines<R>> {
-    lines::open(&run.source.name(), format, input, &run.selection.decode)
-}
-
-/// Whether a path names what can be read only once: a named pipe, a shell's `<(...)`, a device.
-fn is_pipe(path: &Path) -> bool {
-    std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
 }
 
 /// Standard input or a named pipe, told by the first bytes.
@@ -100,19 +83,21 @@ fn piped(
             replay_stream::replay(run, reader, pool, watch)
         }
         Format::Lines | Format::Table => {
-            lines::replay(run, lines_of(run, format, whole)?, None, pool, watch)
+            let text = lines::open(&run.source.name(), format, whole, &run.selection.decode)?;
+            lines::replay(run, text, None, pool, watch)
         }
     }
 }
 
 fn file(
     run: &ReplayRequest,
-    path: &Path,
+    input: &Input,
     pool: &Pool,
     watch: &mut dyn FnMut(&Position),
 ) -> Result<RunSummary> {
+    let path = input.name();
     let log = Log::told_apart(
-        path,
+        input,
         run.selection.topic.as_deref(),
         &run.selection.decode,
         pool,
@@ -124,7 +109,7 @@ fn file(
     }
     let reference = reference(run, path, &log, &chosen, false)?;
     let besides = besides(run, path, &log, &mut chosen)?;
-    let prepared = prepare(run, path, &log, &chosen, pool)?
+    let prepared = prepare(run, &log, &chosen, pool)?
         .into_iter()
         .collect::<Result<Vec<Prepared>>>()?;
 
@@ -145,38 +130,24 @@ fn file(
         session.length(last.saturating_sub(first) as f64 * 1e-9);
     }
     let total: u64 = log.survey.channels.iter().map(|c| c.messages).sum();
-    let reader = again(&log, path)?;
-    let mut failure = None;
-    let report = mcap::walk(
-        reader,
-        &WalkOptions {
-            pool: Some(pool.rayon()),
-            ..WalkOptions::default()
-        },
+    let survey = log.walk(
+        AHEAD,
+        pool,
         |channel| {
             let copied = run.copy_input;
             route(&chosen, reference.as_ref(), &besides, copied, channel)
         },
-        Route::map,
         |items| {
             let done = done(items, span);
-            match session.consume(items.drain(..), pool) {
-                Ok(Flow::Continue) => {
-                    watch(&session.position(done.filter(|_| total > 0)));
-                    ControlFlow::Continue(())
-                }
-                Ok(Flow::Closed) => ControlFlow::Break(()),
-                Err(e) => {
-                    failure = Some(e);
-                    ControlFlow::Break(())
-                }
+            let flow = session.consume(items.drain(..), pool)?;
+            if flow == Flow::Closed {
+                return Ok(ControlFlow::Break(()));
             }
+            watch(&session.position(done.filter(|_| total > 0)));
+            Ok(ControlFlow::Continue(()))
         },
     )?;
-    if let Some(e) = failure {
-        return Err(e);
-    }
-    Ok(summarise::run(run, session.finish(pool)?, &report.survey))
+    Ok(summarise::run(run, session.finish(pool)?, &survey))
 }
 
 /// How much of a log of this span lies before the last of `items`.
@@ -188,7 +159,6 @@ pub(super) fn done(items: &[Item], span: Option<(u64, u64)>) -> Option<f64> {
 /// Reads as far as needed to know clock, bias and initial attitude of every topic, or why one is refused.
 pub(super) fn prepare(
     run: &ReplayRequest,
-    path: &Path,
     log: &Log,
     chosen: &[Chosen],
     pool: &Pool,
@@ -202,16 +172,10 @@ pub(super) fn prepare(
         })
         .collect();
     let mut failures: Vec<Option<String>> = chosen.iter().map(|_| None).collect();
-    mcap::walk(
-        again(log, path)?,
-        // A little ahead is enough: this usually ends at once.
-        &WalkOptions {
-            pool: Some(pool.rayon()),
-            in_flight: 4 << 20,
-            ..WalkOptions::default()
-        },
+    log.walk(
+        A_LITTLE_AHEAD,
+        pool,
         |channel| looked_at(chosen, channel),
-        Route::map,
         |items| {
             for item in items.drain(..) {
                 let Item::Sample(stream, raw) = item else {
@@ -224,11 +188,14 @@ pub(super) fn prepare(
                 }
             }
             let mut open = preparations.iter().zip(&failures);
-            if open.any(|(preparation, failure)| failure.is_none() && preparation.wants_more()) {
-                ControlFlow::Continue(())
-            } else {
-                ControlFlow::Break(())
-            }
+            Ok(
+                if open.any(|(preparation, failure)| failure.is_none() && preparation.wants_more())
+                {
+                    ControlFlow::Continue(())
+                } else {
+                    ControlFlow::Break(())
+                },
+            )
         },
     )?;
     let name = |stream: usize| chosen.get(stream).map_or("", |c| c.found.name.as_str());
@@ -239,7 +206,7 @@ pub(super) fn prepare(
         .map(|(stream, (preparation, failure))| {
             failure
                 .map_or_else(|| preparation.decide(), Err)
-                .map_err(|what| refused(path, name(stream), what))
+                .map_err(|what| refused(log.name(), name(stream), what))
         })
         .collect())
 }
@@ -251,12 +218,5 @@ fn log_time(item: &Item) -> Option<u64> {
         }
         Item::Undecodable(_, why) => u64::try_from(why.0.0).ok(),
         Item::Copy(message) => Some(message.log_time),
-    }
-}
-
-pub(super) fn again(log: &Log, path: &Path) -> Result<Reader> {
-    match log.reader() {
-        Some(reader) => Ok(reader),
-        None => Ok(Reader::open(path)?),
     }
 }

@@ -225,7 +225,8 @@ fn first_losses(topic: &Topic, start: Nanos) -> Vec<String> {
 fn is_text(described: &str) -> bool {
     [Format::Lines, Format::Table]
         .iter()
-        .any(|format| format.name() == described)
+        .map(|format| format.name())
+        .any(|name| described == name || described.ends_with(&format!("[{name}]")))
 }
 
 fn warnings(topic: &Topic, summary: &TopicSummary) -> Vec<String> {

@@ -6,13 +6,22 @@ mod recordings;
 
 use std::path::Path;
 use strapd::pipeline::check::check;
+use strapd::pipeline::input::Input;
 use strapd::report::findings::{Finding, Severity, findings};
 use strapd_recording::decode::Options;
 use strapd_recording::pool::Pool;
 
 fn found(path: &Path) -> Vec<Finding> {
     let pool = Pool::new(2).unwrap();
-    findings(&check(path, None, &Options::default(), &pool).unwrap())
+    findings(
+        &check(
+            &Input::open(path).unwrap(),
+            None,
+            &Options::default(),
+            &pool,
+        )
+        .unwrap(),
+    )
 }
 
 /// The codes of errors and warnings, each once, sorted.

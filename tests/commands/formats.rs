@@ -177,3 +177,205 @@ fn a_table_of_attitudes_is_one_of_rates_where_there_is_nothing_else() {
     let topic = ran.json()["topics"][0].clone();
     assert_eq!(topic["samples"]["used"], 2001, "{topic}");
 }
+
+/// Every command that reads a recording, over every format, from a file and from standard input: the same answer. What is
+/// said of the file itself and of what its samples are called may differ.
+#[test]
+fn every_command_reads_every_format_from_a_file_and_from_standard_input() {
+    let dir = bench();
+    let at = dir.path();
+    let samples = "s.mcap";
+    strapd(at, "replay s.mcap -o a.mcap -o a.ndjson -o truth.csv").done();
+    for (command, keys) in [
+        ("info FILE --json", &["/imu/0"][..]),
+        ("check FILE --json", &["/findings"][..]),
+        ("allan FILE --json", &["/axes", "/interval_s"][..]),
+        (
+            "report FILE --json --reference truth.csv",
+            &["/topics/0/replay/attitudes"][..],
+        ),
+        ("cat FILE", &[][..]),
+    ] {
+        let of = |file: &str, stdin: Vec<u8>| {
+            let ran = strapd_fed(at, &command.replace("FILE", file), stdin);
+            assert!(matches!(ran.code, Some(0 | 3)), "{command} {file}: {ran:?}");
+            assert!(!ran.out.is_empty(), "{command} {file}: {ran:?}");
+            (ran.code, same_but_for_names(&ran.out, keys))
+        };
+        let expected = of(samples, Vec::new());
+        for file in ["s.mcap", "s.ndjson", "s.csv"] {
+            assert_eq!(of(file, Vec::new()), expected, "{command} {file}");
+            assert_eq!(of("-", read(at, file)), expected, "{command} - <{file}");
+        }
+    }
+    for estimate in ["a.mcap", "a.ndjson", "truth.csv"] {
+        let compare = "--align none --max-angle 1e-12 --quiet";
+        strapd(at, &format!("compare {estimate} a.mcap {compare}")).done();
+        strapd_fed(
+            at,
+            &format!("compare - a.mcap {compare}"),
+            read(at, estimate),
+        )
+        .done();
+        strapd_fed(
+            at,
+            &format!("compare a.mcap - {compare}"),
+            read(at, estimate),
+        )
+        .done();
+    }
+    strapd(at, "compare - -").refused(2, &["standard input comes once"]);
+}
+
+/// The parts of a JSON answer that are about the samples, without what they are called; lines as they are but for the id.
+fn same_but_for_names(out: &str, keys: &[&str]) -> Vec<serde_json::Value> {
+    let mut values: Vec<serde_json::Value> = out
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    if !keys.is_empty() {
+        let whole = values.remove(0);
+        let part = |key: &&str| {
+            whole
+                .pointer(key)
+                .unwrap_or_else(|| panic!("{key}: {whole}"))
+                .clone()
+        };
+        values = keys.iter().map(part).collect();
+    }
+    for value in &mut values {
+        forget(value);
+    }
+    values
+}
+
+/// Takes out names, and what only an MCAP has: a frame, a log time of its own, a type that does not say what a sample is.
+fn forget(value: &mut serde_json::Value) {
+    match value {
+        serde_json::Value::Object(map) => {
+            for name in [
+                "topic",
+                "id",
+                "decoded_as",
+                "frame_id",
+                "sample_kind_stated",
+                "header_minus_log_s",
+            ] {
+                map.remove(name);
+            }
+            map.values_mut().for_each(forget);
+        }
+        serde_json::Value::Array(all) => all.iter_mut().for_each(forget),
+        _ => {}
+    }
+}
+
+#[test]
+fn what_is_no_recording_is_called_so_on_standard_input_too() {
+    let dir = bench();
+    let at = dir.path();
+    for command in ["info", "check", "allan", "cat", "report --json"] {
+        let fed = |bytes: &[u8]| strapd_fed(at, &format!("{command} -"), bytes.to_vec());
+        fed(b"").refused(1, &["standard input", "empty"]);
+        fed(b"hello\nworld\n").refused(1, &["standard input", "not an MCAP", "hello"]);
+        fed(&[0xff; 3000]).refused(1, &["standard input", "not an MCAP"]);
+        fed(b"{\"class\":\"STATUS\"}\n").refused(1, &["standard input", "no line carries"]);
+        fed(b"{]\n").refused(
+            1,
+            &["standard input", "line 1: JSON", "help: one JSON object"],
+        );
+        fed(b"stamp_ns,gyro_x,gyro_y,gyro_z\n").refused(1, &["standard input", "no row carries"]);
+        fed(b"stamp_ns,gyro_x,gyro_y,gyro_z\n1,2\n").refused(1, &["line 2: 2 cells"]);
+        // No end of a line in three megabytes.
+        fed(&[b"{", vec![b'7'; 3 << 20].as_slice()].concat()).refused(1, &["line 1"]);
+    }
+}
+
+#[test]
+fn a_recording_in_a_named_pipe_is_read_like_one_in_a_file() {
+    let dir = bench();
+    let at = dir.path();
+    let made = std::process::Command::new("mkfifo")
+        .arg(at.join("pipe"))
+        .status();
+    assert!(made.unwrap().success());
+    let expected = strapd(at, "info s.csv --json").json()["imu"].clone();
+    let writer = std::thread::spawn({
+        let (pipe, bytes) = (at.join("pipe"), read(at, "s.csv"));
+        move || std::fs::write(pipe, bytes).unwrap()
+    });
+    let got = strapd(at, "info pipe --json").json()["imu"].clone();
+    writer.join().unwrap();
+    assert_eq!(got, expected);
+}
+
+#[test]
+fn several_sensors_in_a_text_are_topics_of_which_one_is_named() {
+    let dir = bench();
+    let at = dir.path();
+    let mut text = String::new();
+    for n in 0..400u64 {
+        for (id, rate) in [("left", 0.1), ("right", 0.2)] {
+            text.push_str(&format!(
+                "{{\"class\":\"RATE\",\"id\":\"{id}\",\"stamp_ns\":{},\"gyro\":[{rate},0,0]}}\n",
+                1_700_000_000_000_000_000 + n * 10_000_000
+            ));
+        }
+    }
+    std::fs::write(at.join("two.txt"), &text).unwrap();
+    for command in ["cat", "allan"] {
+        strapd(at, &format!("{command} two.txt"))
+            .refused(1, &["left ", "right ", "400 messages", "--topic NAME"]);
+    }
+    let one = strapd(at, "cat two.txt --topic right");
+    assert_eq!(one.done().lines().len(), 400);
+    assert!(one.lines().iter().all(|line| line["gyro"][0] == 0.2));
+    let info = strapd(at, "info two.txt --json").json();
+    let counts = info["imu"].as_array().unwrap().iter();
+    let counts: Vec<_> = counts
+        .map(|t| (t["topic"].clone(), t["samples"].clone()))
+        .collect();
+    assert_eq!(
+        counts,
+        [("left".into(), 400.into()), ("right".into(), 400.into())]
+    );
+    strapd(at, "info two.txt --topic up").refused(1, &["no topic `up`", "left", "right"]);
+    let checked = strapd(at, "check two.txt");
+    assert!(
+        checked
+            .out
+            .contains("left (400 samples), right (400 samples)"),
+        "{checked:?}"
+    );
+}
+
+#[test]
+fn samples_with_their_truth_are_told_apart_in_lines_as_in_a_log() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    strapd(
+        at,
+        "simulate coning --duration 4 --rate-hz 100 -o c.mcap -o c.ndjson -o c.csv",
+    )
+    .done();
+    let summary = |file: &str| {
+        let report = strapd(at, &format!("report {file} --json")).json();
+        report["topics"].as_array().unwrap().len()
+    };
+    for file in ["c.mcap", "c.ndjson", "c.csv"] {
+        assert_eq!(summary(file), 1, "{file}");
+    }
+    let info = strapd(at, "info c.ndjson");
+    assert!(
+        info.done().out.contains("imu  RATE [NDJSON]  401 samples"),
+        "{info:?}"
+    );
+    assert!(
+        info.out.contains("truth  ATT [NDJSON]  401 messages"),
+        "{info:?}"
+    );
+    assert!(
+        info.out.contains("802 samples of 2 sensors; NDJSON"),
+        "{info:?}"
+    );
+}

@@ -153,6 +153,8 @@ enum Plan {
     Ros(Arc<ros::Plan>),
     Protobuf(Arc<protobuf::Plan>),
     Json(json::Plan),
+    /// Messages come as samples.
+    Samples,
 }
 
 /// What may be spent on the schemas of one log: a few kilobytes of schema can spell out to tens of thousands of
@@ -245,7 +247,7 @@ impl Decoder {
         let form = match &plan {
             Plan::Ros(plan) => plan.form(),
             Plan::Protobuf(plan) => plan.form(),
-            Plan::Json(_) => Form::default(),
+            Plan::Json(_) | Plan::Samples => Form::default(),
         };
         Ok(Decoder {
             has_bare_stamps: matches!(
@@ -291,6 +293,22 @@ impl Decoder {
         }
     }
 
+    /// Says what the samples of a channel are that has no messages to be read: lines and rows come as samples.
+    #[must_use]
+    pub fn of_samples(channel: &Channel<'_>, stated: Stated) -> Decoder {
+        Decoder {
+            plan: Plan::Samples,
+            form: Form::default(),
+            frame: None,
+            stated,
+            found: Found::Named,
+            has_bare_stamps: false,
+            stamps: Vec::new(),
+            options: Options::default(),
+            label: label(channel),
+        }
+    }
+
     /// Reads one payload and pushes its samples; pushes nothing when it fails.
     ///
     /// # Errors
@@ -317,6 +335,7 @@ impl Decoder {
             Plan::Ros(plan) => plan.decode(form, payload, log, publish, out),
             Plan::Protobuf(plan) => plan.decode(form, payload, log, publish, out),
             Plan::Json(plan) => plan.decode(payload, log, publish, out),
+            Plan::Samples => Ok(Decoded::default()),
         }
     }
 
@@ -413,7 +432,7 @@ impl Decoder {
         match self.frame.as_ref()? {
             Plan::Ros(plan) => plan.text(payload),
             Plan::Protobuf(plan) => plan.text(payload),
-            Plan::Json(_) => None,
+            Plan::Json(_) | Plan::Samples => None,
         }
     }
 

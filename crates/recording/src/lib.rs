@@ -11,12 +11,14 @@
 //! | [`mcap`] | MCAP logs, whole or damaged -> messages in a stable order | I/O |
 //! | [`format`] | first bytes and name -> which format | pure |
 //! | [`lines`] | lines of JSON, rows of a table -> what each holds | I/O |
+//! | [`attitude_line`] | a line that says an attitude -> numbers | pure |
 //! | [`table`] | rows of strapd's own CSV -> raw samples | pure |
 //! | [`decode`] | bytes of one message, one line, one packed object -> raw samples | pure |
 //! | [`text`] | outside text -> what a terminal may show | pure |
 //! | [`pool`] | workers shared by reading, integrating and writing; how many changes no bit | |
 //! | [`error`] | why a log can not be read | |
 
+pub mod attitude_line;
 pub mod decode;
 pub mod error;
 pub mod format;

@@ -101,6 +101,19 @@ impl Reader {
         if !meta.is_file() {
             return Reader::from_stream(path, Box::new(file));
         }
+        Reader::of_file(path, file)
+    }
+
+    /// Reads a regular file that is open, whatever its position; `name` is what errors call it.
+    ///
+    /// # Errors
+    /// [`Error::Open`], [`Error::Empty`], [`Error::NotMcap`], [`Error::Read`].
+    pub fn of_file(name: &Path, file: File) -> Result<Reader> {
+        let path = name;
+        let meta = file.metadata().map_err(|source| Error::Open {
+            path: path.to_owned(),
+            source,
+        })?;
         let file = LogFile::new(path, file, meta.len());
         let mut magic = [0; MAGIC.len()];
         let have = file

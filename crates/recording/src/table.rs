@@ -168,6 +168,8 @@ impl Table {
     }
 
     fn line(&self, read: Read, out: &mut Vec<RawSample>) -> Result<Line, Undecodable> {
+        // Before the sample: a row that is refused leaves none.
+        let id = read.id.as_deref().map(exact_name).transpose()?;
         let gyro = self.whole(read.gyro, Column::Gyro)?;
         let log = read.log.or(read.stamp).unwrap_or_default();
         out.push(RawSample {
@@ -186,7 +188,7 @@ impl Table {
             } else {
                 Class::Rate
             },
-            id: read.id.as_deref().map(exact_name).transpose()?,
+            id,
             sample_kind: read.kind,
             gyro_unit: gyro.map(|_| GyroUnit::Rad),
             ..Line::default()

@@ -2,22 +2,19 @@
 
 use crate::config::Selection;
 use crate::error::{Error, Result};
-use crate::pipeline::channel_route::{Item, Noticed, Route, Taker};
 use crate::pipeline::decoders::Decoders;
+use crate::pipeline::input::Input;
 use crate::pipeline::log::{Log, described, problems};
+use crate::pipeline::topic_reading::{Taken, TopicReading};
 use crate::report::summary::significant;
 use nalgebra::Vector3;
-use std::collections::BTreeMap;
 use std::ops::ControlFlow;
-use std::path::Path;
-use std::sync::Arc;
 use strapd_attitude::condition::stillness::{Limits, Rests, Stillness};
 use strapd_attitude::condition::{ClockWarning, Conditioner, Report, choose_clock};
 use strapd_attitude::estimate::Meaning;
 use strapd_attitude::estimate::Plan;
 use strapd_attitude::noise::allan::AngleRecord;
 use strapd_attitude::record::{Join, Nanos, RateSample, RawSample, SampleKind};
-use strapd_recording::mcap::{self, WalkOptions};
 use strapd_recording::pool::Pool;
 
 /// Angles held at most: 24 bytes each, 200 MB.
@@ -67,7 +64,7 @@ pub(super) struct Gathered {
 /// # Errors
 /// The log can not be read, no topic or several, or a topic without a rate.
 pub(super) fn gather(
-    path: &Path,
+    input: &Input,
     (selection, plan): (&Selection, &Plan),
     capacity: usize,
     pool: &Pool,
@@ -77,95 +74,48 @@ pub(super) fn gather(
             "--topic all: one topic at a time\n  help: --topic NAME".to_owned(),
         ));
     }
-    let log = Log::told_apart(path, selection.topic.as_deref(), &selection.decode, pool)?;
-    let choice = log.choose(path, selection.topic.as_deref())?;
-    let topic = choice.topics.into_iter().next().unwrap_or_default();
+    let log = Log::told_apart(input, selection.topic.as_deref(), &selection.decode, pool)?;
+    let mut decoders = Decoders::of_run(plan, &selection.decode);
+    let reading = TopicReading::new(&log, selection.topic.as_deref(), &mut decoders)?;
+    let topic = reading.name().to_owned();
     let unsupported = |what: String| Error::Unsupported {
-        path: path.to_owned(),
+        path: log.name().to_owned(),
         what,
     };
-    let mut by_id = BTreeMap::new();
-    let mut decoders = Vec::new();
-    let mut compiled = Decoders::of_run(plan, &selection.decode);
-    let source = log.source(&topic);
-    for known in source.iter().flat_map(|s| log.channels_of(s)) {
-        let decoder = known
-            .decoder(&mut compiled)
-            .map_err(|why| unsupported(why.to_string()))?;
-        by_id
-            .entry((known.channel.id, known.channel.schema_id))
-            .or_insert_with(|| decoder.clone());
-        decoders.push((known.channel.clone(), decoder));
-    }
-    let Some((channel, decoder)) = decoders.first() else {
+    let Some((known, decoder)) = reading.channels.first() else {
         return Err(unsupported(format!("{topic}: no channel of it")));
     };
+    let described = described(&known.channel);
     if !decoder.stated().has_gyro {
         return Err(unsupported(format!(
-            "{topic} ({}): carries no body rate\n  help: --field gyro=PATH names one",
-            described(channel)
+            "{topic} ({described}): carries no body rate\n  help: --field gyro=PATH names one"
         )));
     }
-    let noticed = Arc::new(source.as_ref().map(Noticed::of).unwrap_or_default());
     let mut gathering = Gathering::new(
         plan,
         Meaning::new(plan, &decoder.stated().declared),
         capacity,
     );
-    let described = described(channel);
-    let mut failure = None;
-    let reader = log.reader().map_or_else(|| mcap::Reader::open(path), Ok)?;
-    let walked = mcap::walk(
-        reader,
-        &WalkOptions {
-            pool: Some(pool.rayon()),
-            ..WalkOptions::default()
-        },
-        |met| {
-            let id = (met.id, met.schema_id);
-            let is_own = source.as_ref().is_some_and(|s| s.topic == met.topic);
-            let decoder = by_id.get(&id).filter(|_| is_own)?;
-            let noticed = noticed.clone();
-            Some(Route::to(
-                decoder.clone(),
-                vec![Taker { stream: 0, noticed }],
-            ))
-        },
-        Route::map,
-        |items| {
-            for item in items.drain(..) {
-                let taken = match item {
-                    Item::Sample(_, raw) => gathering.take(raw),
-                    Item::Undecodable(..) => {
-                        gathering.undecodable();
-                        Ok(())
-                    }
-                    Item::Reference(_) | Item::Beside(_) | Item::Copy(_) => Ok(()),
-                };
-                if let Err(what) = taken {
-                    failure = Some(what);
-                    return ControlFlow::Break(());
-                }
-            }
-            ControlFlow::Continue(())
-        },
-    )?;
     let fails = |what| Error::Topic {
-        path: path.to_owned(),
+        path: log.name().to_owned(),
         topic: topic.clone(),
         what,
     };
-    if let Some(what) = failure {
-        return Err(fails(what));
-    }
-    let mut notes: Vec<String> = choice.note.into_iter().collect();
-    notes.extend(problems(&walked.survey));
+    let survey = reading.walk(pool, |taken| {
+        match taken {
+            Taken::Sample(_, raw) => gathering.take(raw).map_err(fails)?,
+            Taken::Undecodable(..) => gathering.undecodable(),
+        }
+        Ok(ControlFlow::Continue(()))
+    })?;
+    let mut notes: Vec<String> = reading.note.iter().cloned().collect();
+    notes.extend(problems(&survey));
     gathering
         .finish(
             topic.clone(),
             described,
             notes,
-            walked.survey.problems.losses() > 0,
+            survey.problems.losses() > 0,
         )
         .map_err(fails)
 }

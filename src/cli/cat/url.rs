@@ -3,16 +3,17 @@
 use super::{Cat, Format};
 use crate::cli::Outcome;
 use crate::client;
-use crate::client::attitude::Attitude;
 use crate::client::remote::Remote;
 use crate::client::secret::Secret;
 use crate::client::watcher::{Said, Watcher, request};
 use crate::error::{Error, Result};
 use crate::serve::limits::Allowance;
 use crate::serve::shutdown::Signals;
+use crate::sink::roll_pitch_yaw;
 use std::collections::BTreeSet;
 use std::io::{BufWriter, Stdout, Write};
 use std::time::{Duration, Instant};
+use strapd_recording::attitude_line::Attitude;
 
 const CSV_HEADER: &str = "id,stamp_ns,qw,qx,qy,qz,roll_deg,pitch_deg,yaw_deg,wx,wy,wz,sigma_x_deg,sigma_y_deg,sigma_z_deg,status,world\n";
 const TABLE_HEADER: &str = "               stamp s        qw        qx        qy        qz    roll deg   pitch deg     yaw deg     rate x        y        z  status, id\n";
@@ -223,7 +224,8 @@ impl Printer {
             self.out.write_all(&harmless(line))?;
             return self.out.write_all(b"\n").map(|()| true);
         }
-        let a = match Attitude::read(line) {
+        let read = Attitude::read(line);
+        let a = match read.and_then(|read| read.ok_or_else(|| "no quaternion".to_owned())) {
             Ok(attitude) => attitude,
             Err(why) => {
                 self.complain(&format!("an attitude that is none: {why}"));
@@ -245,8 +247,8 @@ impl Printer {
             true => write!(self.out, "\"{}\"", a.id.replace('"', "\"\""))?,
             false => write!(self.out, "{}", a.id)?,
         }
-        write!(self.out, ",{}", a.stamp.0)?;
-        let numbers = a.q.into_iter().chain(a.roll_pitch_yaw_deg()).chain(a.rate);
+        write!(self.out, ",{}", a.stamp.unwrap_or_default().0)?;
+        let numbers = a.q.into_iter().chain(degrees(a)).chain(a.rate);
         for value in numbers.chain(a.sigma_deg) {
             match value.is_finite() {
                 true => write!(self.out, ",{value:?}")?,
@@ -263,10 +265,10 @@ impl Printer {
     }
 
     fn table(&mut self, a: &Attitude) -> std::io::Result<()> {
-        let (sec, nsec) = a.stamp.to_sec_nanosec();
+        let (sec, nsec) = a.stamp.unwrap_or_default().to_sec_nanosec();
         write!(self.out, "{sec:>12}.{nsec:09}")?;
         a.q.iter().try_for_each(|c| write!(self.out, " {c:>9.6}"))?;
-        a.roll_pitch_yaw_deg()
+        degrees(a)
             .iter()
             .try_for_each(|c| write!(self.out, " {c:>11.5}"))?;
         write!(self.out, "  ")?;
@@ -283,6 +285,11 @@ impl Printer {
             None => flushed.map_err(|e| Error::writing("stdout", e)),
         }
     }
+}
+
+/// Roll, pitch and yaw, turned about z, then y, then x.
+fn degrees(a: &Attitude) -> [f64; 3] {
+    roll_pitch_yaw(a.q).map(f64::to_degrees)
 }
 
 /// The same JSON, with every character that a terminal might obey, or that hides others, escaped. What

@@ -1,15 +1,17 @@
 //! What `info` found -> text or JSON. Pure.
 
 use crate::cli::shell::{flag, quoted_file};
+use crate::pipeline::input::Input;
 use crate::pipeline::inspection::Inspection;
 use crate::pipeline::log::{LogChannel, described, rank};
+use crate::pipeline::request::Source;
 use crate::pipeline::topics::named_few;
 use crate::report::calendar::{date, duration};
 use crate::report::summary::{human_bytes, significant};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
-use std::path::Path;
+use strapd_recording::format::Format;
 use strapd_recording::mcap::Survey;
 
 /// Most other topics that are listed.
@@ -18,8 +20,8 @@ const OTHERS: usize = 40;
 /// Everything `info` knows.
 #[derive(Clone, Debug)]
 pub(super) struct Report<'a> {
-    /// The file.
-    pub(super) path: &'a Path,
+    /// The file, or standard input.
+    pub(super) input: &'a Input,
     /// What is in it.
     pub(super) survey: &'a Survey,
     /// What is wrong with it.
@@ -56,7 +58,11 @@ impl Report<'_> {
             "" => String::new(),
             name => format!("  profile {}", strapd_recording::text::printable(name)),
         };
-        let _ = write!(out, "file      {}  {size}{profile}", self.path.display());
+        let _ = write!(
+            out,
+            "file      {}  {size}{profile}",
+            self.input.name().display()
+        );
         if let Some((first, last)) = survey.times {
             let secs = last.saturating_sub(first) as f64 * 1e-9;
             let _ = write!(out, "  {}", duration(secs));
@@ -65,6 +71,17 @@ impl Report<'_> {
             }
         }
         let _ = writeln!(out);
+        let format = self.input.format();
+        if format != Format::Mcap {
+            let _ = writeln!(
+                out,
+                "          {} samples of {} sensors; {}",
+                survey.messages,
+                survey.channels.len(),
+                format.name()
+            );
+            return;
+        }
         let chunks: Vec<String> = survey
             .facts
             .chunks
@@ -129,7 +146,10 @@ impl Report<'_> {
 
     /// The command to run next, with the flags this log needs.
     fn next(&self) -> String {
-        let file = quoted_file(self.path);
+        let file = match self.input.source() {
+            Source::File(path) => quoted_file(path),
+            Source::Stdin => "-".to_owned(),
+        };
         let best = match self.looked {
             [] => {
                 return format!(
@@ -191,7 +211,7 @@ impl Report<'_> {
     pub(super) fn json(&self) -> Value {
         let survey = self.survey;
         json!({
-            "file": self.path.display().to_string(),
+            "file": self.input.name().display().to_string(),
             "bytes": survey.file_size,
             "profile": survey.facts.profile,
             "library": survey.facts.library,

@@ -1,10 +1,10 @@
 //! What a daemon says -> what is known of every sensor. Pure: time is given.
 
-use crate::client::attitude::Attitude;
 use crate::client::watcher::Said;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::time::Instant;
+use strapd_recording::attitude_line::Attitude;
 use strapd_recording::text::printable;
 
 /// Most sensors that are shown; a daemon has no more.
@@ -102,7 +102,8 @@ impl Board {
     pub(super) fn take(&mut self, said: Said<'_>, now: Instant) {
         match said {
             Said::Attitude(line) => match Attitude::read(line) {
-                Ok(attitude) => {
+                Ok(None) => self.complaint = Some("an attitude without a quaternion".to_owned()),
+                Ok(Some(attitude)) => {
                     if let Some(sensor) = self.sensor(&attitude.id) {
                         // One of before we came: when it was made, nobody says.
                         if !attitude.is_last() {

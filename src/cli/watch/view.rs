@@ -3,6 +3,7 @@
 
 use super::board::{Board, LinkState, Sensor};
 use super::horizon::horizon;
+use crate::sink::roll_pitch_yaw;
 use std::time::{Duration, Instant};
 
 /// The horizon's size in characters.
@@ -137,11 +138,13 @@ fn shortened(id: &str) -> String {
 fn figures(sensor: &Sensor, now: Instant) -> Vec<String> {
     let mut lines = Vec::new();
     if let Some(a) = &sensor.attitude {
-        let [roll, pitch, yaw] = a.roll_pitch_yaw_deg().map(|v| figure(v, 9, 3));
+        let [roll, pitch, yaw] = roll_pitch_yaw(a.q)
+            .map(f64::to_degrees)
+            .map(|v| figure(v, 9, 3));
         let [w, x, y, z] = a.q.map(|v| figure(v, 10, 6));
         let [p, q, r] = a.rate.map(|v| figure(v.to_degrees(), 9, 3));
         let [sx, sy, sz] = a.sigma_deg.map(|v| figure(v, 9, 3).replace('+', " "));
-        let (sec, nsec) = a.stamp.to_sec_nanosec();
+        let (sec, nsec) = a.stamp.unwrap_or_default().to_sec_nanosec();
         lines.push(format!("roll {roll}  pitch {pitch}  yaw {yaw}  deg"));
         lines.push(format!("q  w{w}  x{x}  y{y}  z{z}"));
         lines.push(format!("rate x{p}  y{q}  z{r}  deg/s"));
@@ -190,7 +193,9 @@ pub(super) fn plain(board: &Board, now: Instant) -> String {
             ));
             continue;
         };
-        let [roll, pitch, yaw] = a.roll_pitch_yaw_deg().map(|v| figure(v, 9, 3));
+        let [roll, pitch, yaw] = roll_pitch_yaw(a.q)
+            .map(f64::to_degrees)
+            .map(|v| figure(v, 9, 3));
         let h = &sensor.health;
         let rate = h.rate_hz.map_or("?".to_owned(), |v| format!("{v:.1}"));
         let age = sensor.heard.map_or("?".to_owned(), |heard| {

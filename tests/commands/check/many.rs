@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use strapd::pipeline::check::{Checked, Examination, check, examine};
+use strapd::pipeline::input::Input;
 use strapd::pipeline::inspection::look;
 use strapd::pipeline::log::Log;
 use strapd::report::findings::findings;
@@ -38,7 +39,13 @@ fn several(dir: &Path, topics: usize, samples: usize) -> PathBuf {
 }
 
 fn checked(path: &Path, named: Option<&str>) -> Checked {
-    check(path, named, &Options::default(), &Pool::new(2).unwrap()).unwrap()
+    check(
+        &Input::open(path).unwrap(),
+        named,
+        &Options::default(),
+        &Pool::new(2).unwrap(),
+    )
+    .unwrap()
 }
 
 #[test]
@@ -82,7 +89,13 @@ fn a_topic_that_is_refused_keeps_no_other_from_being_told_about() {
         command: String::new(),
     };
     let pool = Pool::new(2).unwrap();
-    let checked = examine(&path, &examination, &pool, &mut |_| {}).unwrap();
+    let checked = examine(
+        &Input::open(&path).unwrap(),
+        &examination,
+        &pool,
+        &mut |_| {},
+    )
+    .unwrap();
     assert_eq!(checked.topics.len(), 3);
     for topic in &checked.topics {
         let refused = topic.replayed.as_ref().unwrap_err();
@@ -103,9 +116,14 @@ fn all_topics_are_replayed_in_one_pass() {
     };
     let mut places: Vec<f64> = Vec::new();
     let pool = Pool::new(2).unwrap();
-    let checked = examine(&path, &examination, &pool, &mut |position| {
-        places.extend(position.fraction);
-    })
+    let checked = examine(
+        &Input::open(&path).unwrap(),
+        &examination,
+        &pool,
+        &mut |position| {
+            places.extend(position.fraction);
+        },
+    )
     .unwrap();
     assert_eq!(checked.topics.len(), 40);
     assert!(places.len() > 2 && places.is_sorted(), "{places:?}");
@@ -124,14 +142,7 @@ fn beyond_256_topics_the_rest_is_named_and_counted() {
     assert_eq!(left_out.evidence["topics"].as_array().unwrap().len(), 44);
     let pool = Pool::new(2).unwrap();
     let log = Log::open(&path, &pool).unwrap();
-    let looks = look(
-        &path,
-        &log,
-        Some("/body299/imu"),
-        &Options::default(),
-        &pool,
-    )
-    .unwrap();
+    let looks = look(&log, Some("/body299/imu"), &Options::default(), &pool).unwrap();
     assert_eq!((looks.topics.len(), looks.left_out.len()), (256, 44));
     assert!(looks.topics.iter().any(|l| l.topic == "/body299/imu"));
     // Who asks for all of them is told that they are too many, and how many.

@@ -10,6 +10,7 @@ use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use strapd::error::Error;
 use strapd::pipeline::check::check;
+use strapd::pipeline::input::Input;
 use strapd_attitude::record::Verdict;
 use strapd_recording::decode::Options;
 use strapd_recording::pool::Pool;
@@ -184,7 +185,13 @@ fn a_check_of_two_publishers_looks_at_each_and_does_not_advise_to_straighten_the
     let dir = tempfile::tempdir().unwrap();
     for (path, names) in shared_topics(dir.path()) {
         let pool = Pool::new(2).unwrap();
-        let checked = check(&path, None, &Options::default(), &pool).unwrap();
+        let checked = check(
+            &Input::open(&path).unwrap(),
+            None,
+            &Options::default(),
+            &pool,
+        )
+        .unwrap();
         let found: Vec<&String> = checked.topics.iter().map(|t| &t.looked.topic).collect();
         assert_eq!(found, names.iter().collect::<Vec<_>>());
         for topic in &checked.topics {

@@ -1,19 +1,21 @@
-//! An `ATT` object -> numbers. Pure. Nothing in it is trusted: names are made fit for a terminal, and
+//! A line that says an attitude (`ATT`) -> numbers. Pure. Nothing in it is trusted: names are made fit for a terminal, and
 //! a number that is absent or `null` is NaN.
+//!
+//! Apart from the samples of lines because it is read for itself: what a daemon says, and what was written to be compared.
 
+use crate::text::printable;
 use serde::Deserialize;
 use strapd_attitude::record::Nanos;
-use strapd_recording::text::printable;
 
-/// One attitude as a daemon says it.
+/// One attitude as a line says it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Attitude {
     /// Which sensor.
     pub id: String,
     /// Its number.
     pub seq: u64,
-    /// When.
-    pub stamp: Nanos,
+    /// When; an attitude at no time is none to compare with.
+    pub stamp: Option<Nanos>,
     /// `[w, x, y, z]`, sensor (or body) to world.
     pub q: [f64; 4],
     /// Body rate, rad/s.
@@ -30,14 +32,22 @@ pub struct Attitude {
     pub body: String,
 }
 
+/// What is looked at before the rest is read: other classes have other values under the same names.
+#[derive(Deserialize)]
+struct Head {
+    #[serde(default)]
+    class: String,
+    /// gpsd's attitudes have none.
+    q: Option<serde::de::IgnoredAny>,
+}
+
 #[derive(Deserialize)]
 struct Object {
     #[serde(default)]
     id: String,
     #[serde(default)]
     seq: u64,
-    #[serde(default)]
-    stamp: Stamp,
+    stamp: Option<Stamp>,
     q: Quaternion,
     #[serde(default)]
     rate: [Option<f64>; 3],
@@ -53,7 +63,7 @@ struct Object {
     body: String,
 }
 
-#[derive(Deserialize, Default)]
+#[derive(Deserialize)]
 struct Stamp {
     sec: i64,
     #[serde(default)]
@@ -69,23 +79,24 @@ struct Quaternion {
 }
 
 impl Attitude {
-    /// Reads a line.
+    /// Reads a line; `None` where it is something else than an attitude with a quaternion.
     ///
     /// # Errors
     /// What is wrong with it, in words.
-    pub fn read(line: &[u8]) -> Result<Attitude, String> {
-        let object: Object = serde_json::from_slice(line).map_err(|e| printable(&e.to_string()))?;
+    pub fn read(line: &[u8]) -> Result<Option<Attitude>, String> {
+        let wrong = |e: serde_json::Error| printable(&e.to_string());
+        let head: Head = serde_json::from_slice(line).map_err(wrong)?;
+        if head.class != "ATT" || head.q.is_none() {
+            return Ok(None);
+        }
+        let object: Object = serde_json::from_slice(line).map_err(wrong)?;
         let number = |value: Option<f64>| value.unwrap_or(f64::NAN);
         let Quaternion { w, x, y, z } = object.q;
-        let nanos = object
-            .stamp
-            .sec
-            .saturating_mul(1_000_000_000)
-            .saturating_add(object.stamp.nsec);
-        Ok(Attitude {
+        let instant = |s: Stamp| Nanos(s.sec.saturating_mul(1_000_000_000).saturating_add(s.nsec));
+        Ok(Some(Attitude {
             id: printable(&object.id),
             seq: object.seq,
-            stamp: Nanos(nanos),
+            stamp: object.stamp.map(instant),
             q: [w, x, y, z].map(number),
             rate: object.rate.map(number),
             sigma_deg: object.sigma_deg.map(number),
@@ -98,18 +109,12 @@ impl Attitude {
             reset: object.reset,
             world: printable(&object.world),
             body: printable(&object.body),
-        })
+        }))
     }
 
     /// Whether it is no news, but the last there was before we came.
     #[must_use]
     pub fn is_last(&self) -> bool {
         self.status.iter().any(|s| s == "last")
-    }
-
-    /// Roll, pitch and yaw in degrees, turned about z, then y, then x.
-    #[must_use]
-    pub fn roll_pitch_yaw_deg(&self) -> [f64; 3] {
-        crate::sink::roll_pitch_yaw(self.q).map(f64::to_degrees)
     }
 }

@@ -1,0 +1,65 @@
+//! Samples of lines whose stamps are bare numbers -> the same with instants, once the unit of all is known. Pure.
+//!
+//! Apart from the lines because each sensor of a log has a unit of its own.
+
+use strapd_attitude::record::{Nanos, RawSample, TimeUnit};
+use strapd_recording::decode::{Ambiguous, Bare, Line, MOST_WAITING, unit_of};
+
+/// Stamps that are bare numbers: their samples wait until the unit of all is known.
+#[derive(Default, Debug)]
+pub(super) struct BareStamps {
+    unit: Option<TimeUnit>,
+    waiting: Vec<(RawSample, Option<Bare>)>,
+}
+
+impl BareStamps {
+    /// Takes the samples of a line; those whose stamps are known by now.
+    ///
+    /// # Errors
+    /// Several units would do, or none.
+    pub(super) fn take(
+        &mut self,
+        samples: &mut Vec<RawSample>,
+        line: &Line,
+    ) -> Result<impl Iterator<Item = RawSample>, Ambiguous> {
+        let bare = line.bare.iter().copied().chain(std::iter::repeat(None));
+        self.waiting.extend(samples.drain(..).zip(bare));
+        let mut numbers = self.waiting.iter().filter_map(|(_, bare)| *bare);
+        let (first, ninth) = (numbers.next(), numbers.nth(MOST_WAITING - 1));
+        self.unit = self.unit.or(first.and_then(Bare::certain_unit));
+        let are_known = !matches!((self.unit, first, ninth), (None, Some(_), None));
+        self.release(are_known)
+    }
+
+    /// There are no more: the unit is that of those there are.
+    ///
+    /// # Errors
+    /// Several units would do, or none.
+    pub(super) fn settle(&mut self) -> Result<impl Iterator<Item = RawSample>, Ambiguous> {
+        self.release(true)
+    }
+
+    fn release(&mut self, are_known: bool) -> Result<impl Iterator<Item = RawSample>, Ambiguous> {
+        let mut numbers = self.waiting.iter().filter_map(|(_, bare)| *bare);
+        if are_known && self.unit.is_none() && numbers.clone().next().is_some() {
+            self.unit = Some(unit_of(numbers.by_ref().take(MOST_WAITING + 1))?);
+        }
+        let unit = self.unit.unwrap_or_default();
+        let known = if are_known { self.waiting.len() } else { 0 };
+        Ok(self.waiting.drain(..known).map(move |(raw, bare)| {
+            let header = raw.header.or(bare.map(|bare| bare.in_unit(unit)));
+            at_its_stamp(RawSample { header, ..raw })
+        }))
+    }
+}
+
+/// The sample with the times it has not: a line has none but the one in it; a row may.
+pub(super) fn at_its_stamp(raw: RawSample) -> RawSample {
+    let stamp = raw.header.unwrap_or(Nanos(0));
+    let log = Some(raw.log).filter(|log| log.0 != 0).unwrap_or(stamp);
+    RawSample {
+        log,
+        publish: log,
+        ..raw
+    }
+}

@@ -1,0 +1,204 @@
+//! A file, a pipe or standard input -> what can be read as often as is needed. I/O.
+//!
+//! Apart from the log because it comes before anything is known of one: where the bytes are, and what they are. What comes
+//! only once is put into a file of its own that has no name and goes with this process: who looks twice sees the same bytes,
+//! and what is said of a log does not depend on how it came.
+
+use super::lines;
+use super::request::Source;
+use crate::error::{Error, Result};
+use std::fs::{File, OpenOptions};
+use std::io::{Read, Seek, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use strapd_recording::decode::Options;
+use strapd_recording::format::{Format, open};
+use strapd_recording::lines::Lines;
+use strapd_recording::mcap::Reader;
+
+/// Bytes of a stream that are kept at most.
+const MOST: u64 = 8 << 30;
+
+/// A recording that can be read again.
+#[derive(Clone, Debug)]
+pub struct Input {
+    source: Source,
+    name: PathBuf,
+    /// What came only once.
+    kept: Option<Arc<File>>,
+    format: Format,
+}
+
+impl Input {
+    /// Opens what a command line names: a file, a pipe, or `-`. A stream is read to its end.
+    ///
+    /// # Errors
+    /// It can not be opened or read, is a directory or empty; there is no room for a stream.
+    pub fn open(path: &Path) -> Result<Input> {
+        match Source::parse(&path.to_string_lossy()) {
+            source @ Source::Stdin => Input::keep(source, std::io::stdin()),
+            _ if is_pipe(path) => Input::keep(Source::File(path.to_owned()), open(path)?),
+            _ => Ok(Input {
+                source: Source::File(path.to_owned()),
+                name: path.to_owned(),
+                kept: None,
+                format: recognised(path)?,
+            }),
+        }
+    }
+
+    fn keep(source: Source, mut from: impl Read) -> Result<Input> {
+        let name = source.name();
+        let mut file = nameless().map_err(|e| no_room(&name, &e))?;
+        let mut block = vec![0; 1 << 18];
+        let mut head = Vec::new();
+        let mut have = 0;
+        loop {
+            let read = match from.read(&mut block) {
+                Ok(0) => break,
+                Ok(read) => read,
+                Err(e) if e.kind() == std::io::ErrorKind::Interrupted => continue,
+                Err(source) => {
+                    return Err(strapd_recording::Error::Read {
+                        path: name,
+                        offset: have,
+                        source,
+                    }
+                    .into());
+                }
+            };
+            let room = usize::try_from(MOST - have).unwrap_or(usize::MAX);
+            let taken = block.get(..read.min(room)).unwrap_or_default();
+            if head.len() < strapd_recording::format::HEAD {
+                head.extend_from_slice(taken);
+            }
+            file.write_all(taken).map_err(|e| no_room(&name, &e))?;
+            have += taken.len() as u64;
+            if taken.len() < read {
+                tracing::warn!(
+                    "{}: only the first {} GiB were looked at; save it to a file to look at all of it",
+                    name.display(),
+                    MOST >> 30
+                );
+                break;
+            }
+        }
+        if have == 0 {
+            return Err(strapd_recording::Error::Empty { path: name }.into());
+        }
+        let named = || Format::of_name(&name);
+        Ok(Input {
+            format: Format::of_bytes(&head)
+                .or_else(named)
+                .unwrap_or(Format::Mcap),
+            kept: Some(Arc::new(file)),
+            source,
+            name,
+        })
+    }
+
+    /// Where it came from.
+    #[must_use]
+    pub fn source(&self) -> &Source {
+        &self.source
+    }
+
+    /// What it is called in messages.
+    #[must_use]
+    pub fn name(&self) -> &Path {
+        &self.name
+    }
+
+    /// What it is.
+    #[must_use]
+    pub fn format(&self) -> Format {
+        self.format
+    }
+
+    /// Its bytes, from the first. Only one such reader of what came once is used at a time.
+    ///
+    /// # Errors
+    /// It can not be opened.
+    pub fn bytes(&self) -> Result<File> {
+        let Some(kept) = &self.kept else {
+            return Ok(open(&self.name)?);
+        };
+        let again = kept.try_clone().and_then(|mut file| {
+            file.rewind()?;
+            Ok(file)
+        });
+        let again = again.map_err(|source| strapd_recording::Error::Open {
+            path: self.name.clone(),
+            source,
+        })?;
+        Ok(again)
+    }
+
+    /// Its bytes as an MCAP.
+    ///
+    /// # Errors
+    /// As [`Reader::open`].
+    pub fn mcap(&self) -> Result<Reader> {
+        Ok(match &self.kept {
+            None => Reader::open(&self.name)?,
+            Some(_) => Reader::of_file(&self.name, self.bytes()?)?,
+        })
+    }
+
+    /// Its bytes as lines or rows.
+    ///
+    /// # Errors
+    /// As [`lines::open`].
+    pub fn lines(&self, options: &Options) -> Result<Lines<File>> {
+        lines::open(&self.name, self.format, self.bytes()?, options)
+    }
+}
+
+/// What a file is, by its first bytes; where its name says otherwise, that is said. What nobody knows is taken for an
+/// MCAP, whose reader says what is wrong with it.
+///
+/// # Errors
+/// As [`Format::of_file`].
+pub(super) fn recognised(path: &Path) -> Result<Format> {
+    let format = Format::of_file(path)?.unwrap_or(Format::Mcap);
+    if let Some(said) = format.contradiction(path) {
+        tracing::warn!("{}: {said}", path.display());
+    }
+    Ok(format)
+}
+
+/// Whether a path names what can be read only once: a named pipe, a shell's `<(...)`, a device.
+pub(super) fn is_pipe(path: &Path) -> bool {
+    std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
+}
+
+/// A file that nobody else can open, and that is gone when it is closed.
+fn nameless() -> std::io::Result<File> {
+    let folder = std::env::temp_dir();
+    let mut options = OpenOptions::new();
+    options.read(true).write(true).create_new(true);
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+    for attempt in 0..100 {
+        let path = folder.join(format!("strapd-{}-{attempt}.input", std::process::id()));
+        match options.open(&path) {
+            Ok(file) => {
+                std::fs::remove_file(&path)?;
+                return Ok(file);
+            }
+            Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => {}
+            Err(e) => return Err(e),
+        }
+    }
+    Err(std::io::ErrorKind::AlreadyExists.into())
+}
+
+fn no_room(name: &Path, why: &std::io::Error) -> Error {
+    Error::Unsupported {
+        path: name.to_owned(),
+        what: format!(
+            "what comes only once is kept in {} to be looked at twice: {why}\n  help: TMPDIR=FOLDER with room, or save it to a file first",
+            std::env::temp_dir().display()
+        ),
+    }
+}

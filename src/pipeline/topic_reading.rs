@@ -1,0 +1,121 @@
+//! One topic of a log -> its samples, each channel read by its own decoder. I/O.
+//!
+//! Apart from the replay for who looks at samples and integrates none: which topic, by which decoders, and the walk.
+
+use super::channel_route::{Item, Noticed, Route, Taker};
+use super::decoders::Decoders;
+use super::log::{AHEAD, Log, LogChannel};
+use super::sources::Source;
+use super::topics;
+use crate::error::{Error, Result};
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use strapd_attitude::record::{Nanos, RawSample};
+use strapd_recording::decode::{Decoder, Undecodable};
+use strapd_recording::mcap::Survey;
+use strapd_recording::pool::Pool;
+
+/// A topic, and how it is read.
+#[derive(Debug)]
+pub struct TopicReading<'l> {
+    log: &'l Log,
+    source: Source,
+    /// Something to know about the choice.
+    pub note: Option<String>,
+    /// Its channels, at least one, with their decoders.
+    pub channels: Vec<(&'l LogChannel, Decoder)>,
+    /// By id and schema id: the place among the channels.
+    places: BTreeMap<(u16, u16), usize>,
+}
+
+/// What is read.
+#[derive(Debug)]
+pub enum Taken {
+    /// A sample of the channel of this place.
+    Sample(usize, RawSample),
+    /// A payload that could not be decoded, and when it was logged (of a line: its number).
+    Undecodable(Nanos, Undecodable),
+}
+
+impl<'l> TopicReading<'l> {
+    /// The topic called `named`, or the log's IMU.
+    ///
+    /// # Errors
+    /// As [`Log::choose`]; a channel of it can not be decoded.
+    pub fn new(
+        log: &'l Log,
+        named: Option<&str>,
+        decoders: &mut Decoders,
+    ) -> Result<TopicReading<'l>> {
+        let choice = log.choose(log.name(), named)?;
+        let topic = choice.topics.into_iter().next().unwrap_or_default();
+        let source = log.source(&topic).ok_or_else(|| Error::NoSuchTopic {
+            path: log.name().to_owned(),
+            topic,
+            topics: topics::listing(&log.candidates()),
+        })?;
+        let mut channels = Vec::new();
+        let mut places = BTreeMap::new();
+        for known in log.channels_of(&source) {
+            let decoder = known.decoder(decoders).map_err(|why| Error::Unsupported {
+                path: log.name().to_owned(),
+                what: why.to_string(),
+            })?;
+            places
+                .entry((known.channel.id, known.channel.schema_id))
+                .or_insert(channels.len());
+            channels.push((known, decoder));
+        }
+        Ok(TopicReading {
+            log,
+            source,
+            note: choice.note,
+            channels,
+            places,
+        })
+    }
+
+    /// What `--topic` takes.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.source.name
+    }
+
+    /// Reads all of it, in order, until `take` has enough or fails.
+    ///
+    /// # Errors
+    /// As [`Log::walk`].
+    pub fn walk(
+        &self,
+        pool: &Pool,
+        mut take: impl FnMut(Taken) -> Result<ControlFlow<()>>,
+    ) -> Result<Survey> {
+        let noticed = Arc::new(Noticed::of(&self.source));
+        self.log.walk(
+            AHEAD,
+            pool,
+            |met| {
+                let id = (met.id, met.schema_id);
+                let is_own = met.topic == self.source.topic;
+                let stream = *self.places.get(&id).filter(|_| is_own)?;
+                let (_, decoder) = self.channels.get(stream)?;
+                let noticed = noticed.clone();
+                Some(Route::to(decoder.clone(), vec![Taker { stream, noticed }]))
+            },
+            |items| {
+                for item in items.drain(..) {
+                    let taken = match item {
+                        Item::Sample(place, raw) => Taken::Sample(place, raw),
+                        Item::Undecodable(_, why) => Taken::Undecodable(why.0, why.1),
+                        Item::Reference(_) | Item::Beside(_) | Item::Copy(_) => continue,
+                    };
+                    if take(taken)?.is_break() {
+                        return Ok(ControlFlow::Break(()));
+                    }
+                }
+                Ok(ControlFlow::Continue(()))
+            },
+        )
+    }
+}
