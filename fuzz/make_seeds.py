@@ -121,6 +121,14 @@ lines = [
     "",
 ]
 seed("lines", "samples", "\n".join(lines).encode())
+rows = [
+    "id,stamp_ns,log_ns,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z,qw,qx,qy,qz,interval_ns,sample_kind",
+    '"a, ""b""",1700000000000000000,1700000000000000007,0.1,-2e-3,nan,0,0,9.81,1,0,0,0,4000000,average',
+    "imu,1700000000004000000,,0.1,0.2,0.3,,,,,,,,,",
+    "imu,1700000000008000000,1700000000008000001,0.1,,0.3,,,,,,,,,rate",
+    "",
+]
+seed("lines", "rows", "\n".join(rows).encode())
 
 
 def packed(stream, seq, *more, kind=1, form="3d"):

@@ -13,6 +13,7 @@ use strapd_recording::decode::framing::{Framed, Framer};
 use strapd_recording::decode::packed::{self, Object};
 use strapd_recording::decode::{Channel, Decoder, Options, decode_line, role};
 use strapd_recording::mcap::{Reader, WalkOptions, walk};
+use strapd_recording::table::Table;
 
 const NOW: Nanos = Nanos(1_700_000_000_000_000_000);
 
@@ -137,7 +138,7 @@ pub fn schema(data: &[u8]) {
     }
 }
 
-/// NDJSON with packed objects: however the bytes are cut, the lines and objects are the same, and each is a sample or an
+/// NDJSON with packed objects, or a table: however the bytes are cut, the lines and objects are the same, and each is a sample or an
 /// error.
 pub fn lines(data: &[u8]) {
     let cut = |size: usize| {
@@ -172,6 +173,23 @@ pub fn lines(data: &[u8]) {
             }
             Item::Packed(object) => packed_object(object),
             Item::TooLong | Item::Broken => {}
+        }
+    }
+    rows(data);
+}
+
+/// A table, where the first line names its columns: each row is a sample, the first line again, or an error.
+fn rows(data: &[u8]) {
+    let mut lines = data.split(|b| *b == b'\n');
+    let Some(Ok(table)) = lines.next().map(Table::new) else {
+        return;
+    };
+    let mut out: Vec<RawSample> = Vec::new();
+    for row in lines {
+        out.clear();
+        match table.decode(row, &mut out) {
+            Ok(line) => assert_eq!(line.decoded.samples, out.len()),
+            Err(why) => assert!(out.is_empty() && !why.to_string().is_empty()),
         }
     }
 }

@@ -163,7 +163,9 @@ impl Sink {
             }
             Some(Format::Csv) => {
                 let (header, last) = match table.map(|s| (s.content, s.world_axes.clone())) {
-                    Some((Content::Samples(kind), _)) => (csv::RAW_HEADER, kind.name().to_owned()),
+                    Some((Content::Samples(kind), _)) => {
+                        (csv::SYNTHETIC_HEADER, kind.name().to_owned())
+                    }
                     Some((_, world)) => (csv::HEADER, world),
                     None => (csv::HEADER, String::new()),
                 };

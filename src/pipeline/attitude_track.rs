@@ -282,17 +282,17 @@ fn from_ndjson(input: &Input, side: Side, id: Option<&str>) -> Result<Vec<Entry>
 #[derive(Deserialize)]
 struct Row {
     stamp_ns: i64,
-    /// Beside a sample whose stamp may be wrong: the instant the attitude is of.
-    log_ns: Option<i64>,
+    /// Beside a synthetic sample whose stamp may be wrong: the instant the attitude is of.
+    true_ns: Option<i64>,
     // As they were called at first.
     #[serde(alias = "w")]
-    qw: f64,
+    qw: Option<f64>,
     #[serde(alias = "x")]
-    qx: f64,
+    qx: Option<f64>,
     #[serde(alias = "y")]
-    qy: f64,
+    qy: Option<f64>,
     #[serde(alias = "z")]
-    qz: f64,
+    qz: Option<f64>,
     #[serde(default)]
     world: String,
 }
@@ -300,29 +300,27 @@ struct Row {
 /// Reads a CSV file with at least the columns `stamp_ns,qw,qx,qy,qz`.
 ///
 /// # Errors
-/// The file can not be read, a column is missing, or a cell is not a number.
+/// The file can not be read, a cell is not a number, or no row has an attitude.
 fn from_csv(input: &Input) -> Result<Vec<Entry>> {
     let path = input.name();
-    csv::Reader::from_reader(BufReader::new(input.bytes()?))
-        .deserialize::<Row>()
-        .map(|row| {
-            row.map(|r| {
-                let wxyz = [r.qw, r.qx, r.qy, r.qz];
-                let stamp = Nanos(r.log_ns.unwrap_or(r.stamp_ns));
-                (
-                    stamp,
-                    match convention_of(&r.world) {
-                        Convention::EnuFlu => wxyz,
-                        other => in_flu(other, wxyz),
-                    },
-                )
-            })
-            .map_err(|e| Error::Unsupported {
-                path: path.to_owned(),
-                what: format!("{e}\n  help: columns stamp_ns,qw,qx,qy,qz are needed"),
-            })
-        })
-        .collect()
+    let refuse = |what: String| Error::Unsupported {
+        path: path.to_owned(),
+        what: format!("{what}\n  help: columns stamp_ns,qw,qx,qy,qz are needed"),
+    };
+    let mut track = Vec::new();
+    for row in csv::Reader::from_reader(BufReader::new(input.bytes()?)).deserialize::<Row>() {
+        let row = row.map_err(|e| refuse(e.to_string()))?;
+        // A sample without an orientation.
+        let (Some(w), Some(x), Some(y), Some(z)) = (row.qw, row.qx, row.qy, row.qz) else {
+            continue;
+        };
+        let stamp = Nanos(row.true_ns.unwrap_or(row.stamp_ns));
+        track.push((stamp, in_flu(convention_of(&row.world), [w, x, y, z])));
+    }
+    if track.is_empty() {
+        return Err(refuse("no row carries an attitude".to_owned()));
+    }
+    Ok(track)
 }
 
 fn bad_line(path: &Path, number: u64, what: &str) -> Error {

@@ -5,6 +5,9 @@
 use strapd_attitude::record::{Nanos, RawSample, TimeUnit};
 use strapd_recording::decode::{Ambiguous, Bare, Line, MOST_WAITING, unit_of};
 
+/// Samples that wait at most, where few of them have bare numbers.
+const MOST_HELD: usize = 1024;
+
 /// Stamps that are bare numbers: their samples wait until the unit of all is known.
 #[derive(Default, Debug)]
 pub(super) struct BareStamps {
@@ -27,8 +30,8 @@ impl BareStamps {
         let mut numbers = self.waiting.iter().filter_map(|(_, bare)| *bare);
         let (first, ninth) = (numbers.next(), numbers.nth(MOST_WAITING - 1));
         self.unit = self.unit.or(first.and_then(Bare::certain_unit));
-        let are_known = !matches!((self.unit, first, ninth), (None, Some(_), None));
-        self.release(are_known)
+        let are_open = matches!((self.unit, first, ninth), (None, Some(_), None));
+        self.release(!are_open || self.waiting.len() >= MOST_HELD)
     }
 
     /// There are no more: the unit is that of those there are.

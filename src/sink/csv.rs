@@ -14,6 +14,10 @@ pub(super) const HEADER: &[u8] = b"stamp_ns,qw,qx,qy,qz,roll_deg,pitch_deg,yaw_d
 pub(crate) const RAW_HEADER: &[u8] =
     b"stamp_ns,log_ns,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z,qw,qx,qy,qz,interval_ns,sample_kind\n";
 
+/// The same over samples of a synthetic gyro, whose stamps may be wrong: the orientation is the truth at the true instant.
+pub(super) const SYNTHETIC_HEADER: &[u8] =
+    b"stamp_ns,true_ns,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z,qw,qx,qy,qz,interval_ns,sample_kind\n";
+
 /// Appends one row with its line end; what is absent is an empty cell. `kind` is what the sample means.
 pub(crate) fn push_raw_row(out: &mut Vec<u8>, sample: &RawSample, kind: &str) {
     push_i64(out, sample.header.unwrap_or(sample.log).0);

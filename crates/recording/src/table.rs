@@ -24,9 +24,11 @@ enum Column {
 
 /// The columns that are read, by name. Those of a rate behind an attitude, and a quaternion's without their `q`, are in
 /// tables of attitudes.
-const COLUMNS: [(&str, Column); 22] = [
+const COLUMNS: [(&str, Column); 23] = [
     ("stamp_ns", Column::Stamp),
     ("log_ns", Column::Log),
+    // Of a synthetic gyro.
+    ("true_ns", Column::Log),
     ("interval_ns", Column::Interval),
     ("sample_kind", Column::Kind),
     ("id", Column::Id),

@@ -131,7 +131,7 @@ fn a_table_has_a_row_a_sample_with_the_truth_beside_it() {
     let mut lines = text.lines();
     assert_eq!(
         lines.next().unwrap(),
-        "stamp_ns,log_ns,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z,qw,qx,qy,qz,interval_ns,sample_kind"
+        "stamp_ns,true_ns,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z,qw,qx,qy,qz,interval_ns,sample_kind"
     );
     let rows: Vec<Vec<&str>> = lines.map(|l| l.split(',').collect()).collect();
     assert_eq!(rows.len(), 10);
