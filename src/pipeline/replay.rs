@@ -24,6 +24,7 @@ use strapd_attitude::estimate::{Patience, Preparation, Prepared};
 use strapd_recording::format::{Format, head_of, open};
 use strapd_recording::mcap::Reader;
 use strapd_recording::pool::Pool;
+use strapd_recording::recognise;
 
 /// Does it. `watch` is told where it is, often.
 ///
@@ -74,8 +75,13 @@ fn piped(
         }
         .into());
     }
+    let known = Format::of_bytes(&head);
+    if let Some(format) = recognise::marked(&head, &[]).filter(|_| known.is_none()) {
+        let path = run.source.name();
+        return Err(strapd_recording::Error::NotRead { path, format }.into());
+    }
     // What has no name and tells nothing may still be lines, of which the first is damaged.
-    let format = Format::of_bytes(&head).unwrap_or(Format::Lines);
+    let format = known.unwrap_or(Format::Lines);
     let whole = std::io::Cursor::new(head).chain(input);
     match format {
         Format::Mcap => {

@@ -1,6 +1,7 @@
 //! Why a log can not be read, or not as a whole. Bad samples are not here: they are counted verdicts
 //! ([`strapd_attitude::record::Verdict`]).
 
+use crate::recognise::Foreign;
 use std::path::PathBuf;
 
 /// A log that could not be read.
@@ -52,6 +53,14 @@ pub enum Error {
         path: PathBuf,
         /// What is missing.
         why: String,
+    },
+    /// The input is of a known format that is not read.
+    #[error("{}: is {}, which is not read\n  help: {}", path.display(), format.name, format.help(&path.to_string_lossy()))]
+    NotRead {
+        /// Which input.
+        path: PathBuf,
+        /// What it is, and the way in.
+        format: Foreign,
     },
     /// What can be read once was to be looked at first.
     #[error("{}: a stream can not be surveyed before it is read", path.display())]

@@ -14,6 +14,7 @@
 //! | [`attitude_line`] | a line that says an attitude -> numbers | pure |
 //! | [`table`] | rows of strapd's own CSV -> raw samples | pure |
 //! | [`decode`] | bytes of one message, one line, one packed object -> raw samples | pure |
+//! | [`recognise`] | first bytes of an input -> what it is, and the way in where it is not read | pure |
 //! | [`text`] | outside text -> what a terminal may show | pure |
 //! | [`pool`] | workers shared by reading, integrating and writing; how many changes no bit | |
 //! | [`error`] | why a log can not be read | |
@@ -25,6 +26,7 @@ pub mod format;
 pub mod lines;
 pub mod mcap;
 pub mod pool;
+pub mod recognise;
 pub mod table;
 pub mod text;
 

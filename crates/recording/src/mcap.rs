@@ -49,6 +49,7 @@ pub use survey::{ChannelSurvey, Survey, survey};
 pub use walk::{WalkOptions, WalkReport, salvage, walk};
 
 use crate::error::{Error, Result};
+use crate::recognise::{self, Foreign};
 use input::{Input, LogFile};
 use std::fs::File;
 use std::io::Read;
@@ -115,11 +116,7 @@ impl Reader {
             source,
         })?;
         let file = LogFile::new(path, file, meta.len());
-        let mut magic = [0; MAGIC.len()];
-        let have = file
-            .read_at(&mut magic, 0)
-            .map_err(|e| read_error(path, 0, e))?;
-        check_magic(path, magic.get(..have).unwrap_or(&[]))?;
+        check_file(&file)?;
         Ok(Reader {
             input: Input::File(Arc::new(file)),
             limits: Limits::default(),
@@ -137,7 +134,10 @@ impl Reader {
             .take(MAGIC.len() as u64)
             .read_to_end(&mut magic)
             .map_err(|e| read_error(&name, 0, e))?;
-        check_magic(&name, &magic)?;
+        if magic != MAGIC {
+            let known = recognise::marked(&magic, &[]);
+            return Err(refused(&name, &magic, known));
+        }
         Ok(Reader {
             input: Input::Stream { name, from },
             limits: Limits::default(),
@@ -186,17 +186,38 @@ fn read_error(path: &Path, offset: u64, source: std::io::Error) -> Error {
     }
 }
 
-fn check_magic(path: &Path, found: &[u8]) -> Result<()> {
-    let path = || path.to_owned();
-    if found.is_empty() {
-        return Err(Error::Empty { path: path() });
+/// Looks whether a file is a log, and if not, at both of its ends for what it is.
+fn check_file(file: &LogFile) -> Result<()> {
+    let read = |at: u64, most: usize| {
+        let mut bytes = vec![0; most];
+        let have = file
+            .read_at(&mut bytes, at)
+            .map_err(|e| read_error(&file.path, at, e))?;
+        bytes.truncate(have);
+        Ok(bytes)
+    };
+    if read(0, MAGIC.len())? == MAGIC {
+        return Ok(());
     }
-    if found != MAGIC {
-        let found = found.escape_ascii().to_string();
-        return Err(Error::NotMcap {
-            path: path(),
-            found,
-        });
+    let last = file.len.saturating_sub(recognise::LAST as u64);
+    let (first, last) = (read(0, recognise::FIRST)?, read(last, recognise::LAST)?);
+    Err(refused(
+        &file.path,
+        &first,
+        recognise::foreign(&first, &last),
+    ))
+}
+
+/// Why an input that begins with these bytes is not read.
+fn refused(path: &Path, first: &[u8], known: Option<Foreign>) -> Error {
+    let path = path.to_owned();
+    if first.is_empty() {
+        return Error::Empty { path };
     }
-    Ok(())
+    if let Some(format) = known {
+        return Error::NotRead { path, format };
+    }
+    let first = first.get(..MAGIC.len()).unwrap_or(first);
+    let found = first.escape_ascii().to_string();
+    Error::NotMcap { path, found }
 }

@@ -21,11 +21,74 @@ fn what_is_not_there_a_directory_empty_or_no_mcap_is_called_so_by_every_command(
             &["folder", "is a directory", "help: name the .mcap file"],
         );
         on("empty.mcap").refused(1, &["empty.mcap", "is empty"]);
-        on("text.mcap").refused(1, &["text.mcap", "not an MCAP", "timestam"]);
+        on("text.mcap").refused(1, &["text.mcap", "is a table of text", "help: mlr"]);
         on("short.mcap").refused(1, &["short.mcap", "not an MCAP"]);
     }
     assert!(!at.join("out.csv").exists());
     strapd(at, "compare nowhere.mcap log.mcap").refused(1, &["nowhere.mcap", "cannot open"]);
+}
+
+#[test]
+fn a_log_of_another_format_is_called_by_its_name_with_the_command_that_makes_it_readable() {
+    let dir = bench();
+    let at = dir.path();
+    let cases: [(&str, &[u8], &str, &str); 6] = [
+        (
+            "bag.db3",
+            b"SQLite format 3\0",
+            "an SQLite database",
+            "mcap convert bag.db3 log.mcap",
+        ),
+        (
+            "log.gz",
+            &[0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 3],
+            "a file packed with gzip",
+            "gunzip -c log.gz",
+        ),
+        (
+            "00000042.BIN",
+            &[0xa3, 0x95, 0x80, 0x80, 0x59, 0x46, 0x4d, 0x54],
+            "ArduPilot DataFlash",
+            "mavlogdump.py --types IMU --format json 00000042.BIN",
+        ),
+        (
+            "phone.csv",
+            b"\xff\xfet\0i\0m\0e\0",
+            "text in UTF-16",
+            "iconv -f UTF-16 -t UTF-8 phone.csv",
+        ),
+        (
+            "a b.mat",
+            b"MATLAB 5.0 MAT-file, Platform: GLNXA64",
+            "a MATLAB file",
+            "scipy.io.loadmat",
+        ),
+        (
+            "log.mcap",
+            b"version https://git-lfs.github.com/spec/v1\noid sha256:0\n",
+            "a pointer of Git LFS",
+            "git lfs pull",
+        ),
+    ];
+    for (file, bytes, name, way_in) in cases {
+        std::fs::write(at.join(file), bytes).unwrap();
+        for command in ["replay", "info", "cat", "check"] {
+            let run = std::process::Command::new(env!("CARGO_BIN_EXE_strapd"))
+                .args([command, file])
+                .current_dir(at)
+                .output()
+                .unwrap();
+            let said = String::from_utf8_lossy(&run.stderr).into_owned();
+            assert_eq!(run.status.code(), Some(1), "{command} {file}: {said}");
+            for words in [file, name, "help: ", way_in] {
+                assert!(said.contains(words), "{command} {file}: {said}");
+            }
+        }
+        if !name.contains("Git LFS") {
+            strapd_fed(at, "replay - -o null:", bytes.to_vec())
+                .refused(1, &["standard input", name, "help: "]);
+        }
+    }
 }
 
 #[cfg(unix)]

@@ -433,9 +433,9 @@ fn what_is_no_log_is_said_in_one_error() {
     std::fs::write(&file, b"").unwrap();
     assert!(matches!(Reader::open(&file), Err(Error::Empty { .. })));
     assert!(matches!(from_bytes(b""), Err(Error::Empty { .. })));
-    std::fs::write(&file, b"#ROSBAG V2.0\n").unwrap();
+    std::fs::write(&file, b"anything else\n").unwrap();
     let said = Reader::open(&file).unwrap_err().to_string();
-    assert!(said.contains("#ROSBAG "), "{said}");
+    assert!(said.contains("anything"), "{said}");
     assert!(matches!(from_bytes(b"\x89MCA"), Err(Error::NotMcap { .. })));
 }
 
