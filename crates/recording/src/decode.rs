@@ -44,6 +44,7 @@ pub use strapd_attitude::condition::GyroUnit;
 
 use crate::text::printable;
 use registers::{Form, Slot, StampForm};
+use ros::fifo::Fifo;
 use schema::rosmsg::Dialect;
 use schema::{Schema, builtin, descriptor, idl, ros_name, rosmsg};
 use select::names::{self, Px4};
@@ -151,6 +152,7 @@ pub struct Decoder {
 #[derive(Debug, Clone)]
 enum Plan {
     Ros(Arc<ros::Plan>),
+    Fifo(Arc<Fifo>),
     Protobuf(Arc<protobuf::Plan>),
     Json(json::Plan),
     /// Messages come as samples.
@@ -222,6 +224,9 @@ impl Decoder {
         if channel.message_encoding == "json" {
             return Ok(Decoder::json(channel, options, label));
         }
+        if let Some(fifo) = fifo(channel, options) {
+            return Ok(Decoder::fifo(fifo, label));
+        }
         // A recorder may leave a well-known type's text out, or shorten it to a stub.
         let read =
             read_schema(channel).and_then(|schema| effort.spend(schema, channel.message_encoding));
@@ -247,7 +252,7 @@ impl Decoder {
         let form = match &plan {
             Plan::Ros(plan) => plan.form(),
             Plan::Protobuf(plan) => plan.form(),
-            Plan::Json(_) | Plan::Samples => Form::default(),
+            Plan::Fifo(_) | Plan::Json(_) | Plan::Samples => Form::default(),
         };
         Ok(Decoder {
             has_bare_stamps: matches!(
@@ -263,6 +268,24 @@ impl Decoder {
             options: options.clone(),
             label,
         })
+    }
+
+    fn fifo(fifo: Fifo, label: [String; 3]) -> Decoder {
+        let mut stated = Stated::default();
+        state_px4(Some(Px4::SensorGyroFifo), &mut stated);
+        stated.batched = true;
+        stated.description = "gyro x, y, z, stamp timestamp_sample".to_owned();
+        Decoder {
+            plan: Plan::Fifo(Arc::new(fifo)),
+            form: Form::default(),
+            frame: None,
+            stated,
+            found: Found::Named,
+            has_bare_stamps: false,
+            stamps: Vec::new(),
+            options: Options::default(),
+            label,
+        }
     }
 
     fn json(channel: &Channel<'_>, options: &Options, label: [String; 3]) -> Decoder {
@@ -333,6 +356,7 @@ impl Decoder {
     ) -> Result<Decoded, Undecodable> {
         match &self.plan {
             Plan::Ros(plan) => plan.decode(form, payload, log, publish, out),
+            Plan::Fifo(fifo) => fifo.decode(payload, log, publish, out),
             Plan::Protobuf(plan) => plan.decode(form, payload, log, publish, out),
             Plan::Json(plan) => plan.decode(payload, log, publish, out),
             Plan::Samples => Ok(Decoded::default()),
@@ -432,7 +456,7 @@ impl Decoder {
         match self.frame.as_ref()? {
             Plan::Ros(plan) => plan.text(payload),
             Plan::Protobuf(plan) => plan.text(payload),
-            Plan::Json(_) | Plan::Samples => None,
+            Plan::Fifo(_) | Plan::Json(_) | Plan::Samples => None,
         }
     }
 
@@ -465,6 +489,18 @@ fn unsupported([topic, type_name, encoding]: &[String; 3], why: String, help: &s
         why,
         help: help.to_owned(),
     }
+}
+
+/// The reader of PX4's raw samples, where a channel has such and no flag says otherwise.
+fn fifo(channel: &Channel<'_>, options: &Options) -> Option<Fifo> {
+    let is_cdr = match channel.message_encoding {
+        "cdr" => true,
+        "ros1" => false,
+        _ => return None,
+    };
+    let is_fifo = names::px4(channel.schema_name) == Some(Px4::SensorGyroFifo);
+    let schema = (is_fifo && options.fields.is_empty()).then(|| read_schema(channel))?;
+    Fifo::compile(&schema.ok()?, is_cdr)
 }
 
 /// What the type of this name is everywhere.
@@ -622,6 +658,7 @@ fn state_px4(px4: Option<Px4>, stated: &mut Stated) {
         | Px4::SensorAccel
         | Px4::SensorMag
         | Px4::VehicleMagnetometer
+        | Px4::SensorGyroFifo
         | Px4::VehicleAttitude => strapd_attitude::record::SampleKind::Rate,
     });
 }

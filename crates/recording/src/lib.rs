@@ -13,6 +13,8 @@
 //! | [`lines`] | lines of JSON, rows of a table -> what each holds | I/O |
 //! | [`attitude_line`] | a line that says an attitude -> numbers | pure |
 //! | [`table`] | rows of strapd's own CSV -> raw samples | pure |
+//! | `bag` | ROS 1 bags -> the records MCAP has for them | pure |
+//! | `ulog` | ULog, the log of PX4 -> the records MCAP has for it | pure |
 //! | [`decode`] | bytes of one message, one line, one packed object -> raw samples | pure |
 //! | [`recognise`] | first bytes of an input -> what it is, and the way in where it is not read | pure |
 //! | [`text`] | outside text -> what a terminal may show | pure |
@@ -20,6 +22,7 @@
 //! | [`error`] | why a log can not be read | |
 
 pub mod attitude_line;
+mod bag;
 pub mod decode;
 pub mod error;
 pub mod format;
@@ -29,5 +32,6 @@ pub mod pool;
 pub mod recognise;
 pub mod table;
 pub mod text;
+mod ulog;
 
 pub use error::{Error, Result};

@@ -20,6 +20,7 @@ mod attached;
 mod block;
 mod bytes;
 mod channels;
+mod container;
 mod input;
 mod list;
 mod lz4;
@@ -31,10 +32,13 @@ mod resync;
 mod scan;
 mod summary;
 mod survey;
+pub(crate) mod transcript;
 mod walk;
 mod workers;
 
 pub use block::Compression;
+use block::Payload;
+pub(crate) use bytes::Bytes;
 pub use channels::{Channel, Schema};
 pub use list::{Listed, list};
 pub use messages::{Message, Tally};
@@ -49,7 +53,7 @@ pub use survey::{ChannelSurvey, Survey, survey};
 pub use walk::{WalkOptions, WalkReport, salvage, walk};
 
 use crate::error::{Error, Result};
-use crate::recognise::{self, Foreign};
+use crate::recognise::{self, Foreign, Format};
 use input::{Input, LogFile};
 use std::fs::File;
 use std::io::Read;
@@ -75,11 +79,12 @@ impl Default for Limits {
     }
 }
 
-/// A log that has been opened and is an MCAP file by its first bytes.
+/// A log that has been opened and is one by its first bytes.
 #[derive(Debug)]
 pub struct Reader {
     input: Input,
     limits: Limits,
+    format: Format,
 }
 
 impl Reader {
@@ -116,8 +121,8 @@ impl Reader {
             source,
         })?;
         let file = LogFile::new(path, file, meta.len());
-        check_file(&file)?;
         Ok(Reader {
+            format: format_of(&file)?,
             input: Input::File(Arc::new(file)),
             limits: Limits::default(),
         })
@@ -130,17 +135,26 @@ impl Reader {
     pub fn from_stream(name: impl Into<PathBuf>, from: Box<dyn Read + Send>) -> Result<Reader> {
         let (name, mut from) = (name.into(), from);
         let mut magic = Vec::with_capacity(MAGIC.len());
-        from.by_ref()
-            .take(MAGIC.len() as u64)
-            .read_to_end(&mut magic)
-            .map_err(|e| read_error(&name, 0, e))?;
-        if magic != MAGIC {
+        // Eight tell every format but a bag, of which they tell that five more follow.
+        for most in [MAGIC.len(), recognise::MAGIC] {
+            if most == MAGIC.len() || magic == crate::bag::MAGIC[..MAGIC.len()] {
+                let more = (most - magic.len()) as u64;
+                let read = from.by_ref().take(more).read_to_end(&mut magic);
+                read.map_err(|e| read_error(&name, 0, e))?;
+            }
+        }
+        let Some(format) = Format::of(&magic) else {
             let known = recognise::marked(&magic, &[]);
             return Err(refused(&name, &magic, known));
+        };
+        // Of an MCAP the walk begins behind the magic.
+        if format != Format::Mcap {
+            from = Box::new(std::io::Cursor::new(magic).chain(from));
         }
         Ok(Reader {
             input: Input::Stream { name, from },
             limits: Limits::default(),
+            format,
         })
     }
 
@@ -148,6 +162,12 @@ impl Reader {
     #[must_use]
     pub fn with_limits(self, limits: Limits) -> Reader {
         Reader { limits, ..self }
+    }
+
+    /// What it is.
+    #[must_use]
+    pub fn format(&self) -> Format {
+        self.format
     }
 
     /// The path, or the name given to the stream.
@@ -172,6 +192,7 @@ impl Reader {
             Input::File(file) => Some(Reader {
                 input: Input::File(Arc::clone(file)),
                 limits: self.limits,
+                format: self.format,
             }),
             Input::Stream { .. } => None,
         }
@@ -186,8 +207,8 @@ fn read_error(path: &Path, offset: u64, source: std::io::Error) -> Error {
     }
 }
 
-/// Looks whether a file is a log, and if not, at both of its ends for what it is.
-fn check_file(file: &LogFile) -> Result<()> {
+/// Which log a file is; if none, both of its ends tell what it is.
+fn format_of(file: &LogFile) -> Result<Format> {
     let read = |at: u64, most: usize| {
         let mut bytes = vec![0; most];
         let have = file
@@ -196,8 +217,8 @@ fn check_file(file: &LogFile) -> Result<()> {
         bytes.truncate(have);
         Ok(bytes)
     };
-    if read(0, MAGIC.len())? == MAGIC {
-        return Ok(());
+    if let Some(format) = Format::of(&read(0, recognise::MAGIC)?) {
+        return Ok(format);
     }
     let last = file.len.saturating_sub(recognise::LAST as u64);
     let (first, last) = (read(0, recognise::FIRST)?, read(last, recognise::LAST)?);

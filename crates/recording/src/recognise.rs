@@ -8,8 +8,47 @@ mod zip;
 /// How many of a file's first bytes are looked at. Of a stream eight are enough for most.
 pub const FIRST: usize = 1024;
 
+/// How many of an input's first bytes tell what is read.
+pub const MAGIC: usize = 13;
+
 /// How many of its last bytes tell what an archive holds.
 pub const LAST: usize = 64 << 10;
+
+/// A format that is read by messages on channels.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Format {
+    /// MCAP.
+    #[default]
+    Mcap,
+    /// ULog, the log of PX4.
+    Ulog,
+    /// A bag of ROS 1.
+    Bag,
+}
+
+impl Format {
+    /// The format of an input that begins with these bytes, [`MAGIC`] of them.
+    #[must_use]
+    pub fn of(first: &[u8]) -> Option<Format> {
+        if first.starts_with(&crate::mcap::MAGIC) {
+            return Some(Format::Mcap);
+        }
+        if first.starts_with(&crate::ulog::MAGIC) {
+            return Some(Format::Ulog);
+        }
+        first.starts_with(&crate::bag::MAGIC).then_some(Format::Bag)
+    }
+
+    /// What people call it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Format::Mcap => "MCAP",
+            Format::Ulog => "ULog",
+            Format::Bag => "ROS 1 bag",
+        }
+    }
+}
 
 /// A known format that is not read.
 #[derive(Clone, PartialEq, Eq, Debug)]

@@ -13,6 +13,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use strapd_recording::format::Format;
 use strapd_recording::mcap::Survey;
+use strapd_recording::recognise::Format;
 
 /// Most other topics that are listed.
 const OTHERS: usize = 40;
@@ -93,12 +94,12 @@ impl Report<'_> {
             "          {} messages on {} topics; {}{}{}",
             survey.messages,
             survey.channels.len(),
-            if chunks.is_empty() {
-                "no chunks".to_owned()
-            } else {
-                format!("chunks: {}", chunks.join(", "))
+            match survey.facts.format {
+                Format::Mcap if chunks.is_empty() => "no chunks".to_owned(),
+                Format::Mcap => format!("chunks: {}", chunks.join(", ")),
+                other => other.name().to_owned(),
             },
-            if survey.has_summary {
+            if survey.has_summary || survey.facts.format != Format::Mcap {
                 ""
             } else {
                 "; no summary section"
@@ -213,6 +214,7 @@ impl Report<'_> {
         json!({
             "file": self.input.name().display().to_string(),
             "bytes": survey.file_size,
+            "format": survey.facts.format.name(),
             "profile": survey.facts.profile,
             "library": survey.facts.library,
             "messages": survey.messages,

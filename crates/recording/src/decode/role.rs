@@ -14,11 +14,11 @@ use strapd_attitude::record::Nanos;
 pub enum Rank {
     /// An IMU: body rate under its own name, with a stamp.
     Imu,
-    /// An IMU's numbers processed or thinned out (PX4 `vehicle_imu`, `vehicle_angular_velocity`).
+    /// An IMU's numbers processed or thinned out (PX4 `vehicle_imu`).
     Processed,
-    /// A vector whose topic says it is a body rate.
+    /// A vector whose topic says it is a body rate; PX4's filtered rates, and those of its spare IMUs.
     RateByTopic,
-    /// A twist or vector that may be one: taken only when nothing better is there.
+    /// A twist or vector that may be one, PX4's single sensors: taken only when nothing better is there.
     Weak,
     /// Never taken unless `--topic` names it: odometry, commands, other vectors, rates without stamp.
     ByNameOnly,
@@ -78,6 +78,13 @@ pub fn role_of(
     }
 }
 
+/// Whether a topic is that of a second or later sensor of its kind: `vehicle_imu/1`.
+fn is_spare(topic: &str) -> bool {
+    let last = topic.rsplit_once('/').map(|(_, last)| last);
+    last.and_then(|last| last.parse().ok())
+        .is_some_and(|n: u8| n > 0)
+}
+
 fn rank(channel: &Channel<'_>, found: Found, stated: &Stated) -> Rank {
     let name = last_name(channel.schema_name)
         .to_ascii_lowercase()
@@ -95,7 +102,10 @@ fn rank(channel: &Channel<'_>, found: Found, stated: &Stated) -> Rank {
         Found::Given => Rank::Imu,
         Found::Named => match name.as_str() {
             _ if topic.contains("groundtruth") => Rank::ByNameOnly,
-            "vehicleimu" | "vehicleangularvelocity" | "vehicleodometry" => Rank::Processed,
+            "vehicleimu" if !is_spare(&topic) => Rank::Processed,
+            "vehicleimu" | "vehicleangularvelocity" | "vehicleodometry" => Rank::RateByTopic,
+            // One of several sensors as it is, thinned out unless it was asked for.
+            "sensorgyro" | "sensorgyrofifo" => Rank::Weak,
             // Older ones carry the filter's rates beside its attitude.
             "vehicleattitude" => Rank::Weak,
             _ => Rank::Imu,

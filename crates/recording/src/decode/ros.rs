@@ -10,6 +10,7 @@
 //! encapsulation. ROS 1: <http://wiki.ros.org/roscpp/Overview/MessagesSerializationAndAdaptingTypes>.
 
 pub(crate) mod compile;
+pub(crate) mod fifo;
 pub(crate) mod imu;
 mod read;
 

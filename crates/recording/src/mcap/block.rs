@@ -5,6 +5,8 @@
 
 use super::input::{Held, LogFile};
 use super::problem::ProblemKind;
+use super::transcript::Transcript;
+use crate::bag;
 use std::io;
 use std::sync::Arc;
 
@@ -20,6 +22,8 @@ pub enum Compression {
     Lz4,
     /// Zstandard.
     Zstd,
+    /// bzip2, in bags of ROS 1.
+    Bzip2,
 }
 
 impl Compression {
@@ -32,6 +36,16 @@ impl Compression {
         }
     }
 
+    /// By the name in a bag.
+    pub(super) fn of_bag(name: &str) -> Option<Self> {
+        match name {
+            "none" => Some(Compression::None),
+            "lz4" => Some(Compression::Lz4),
+            "bz2" => Some(Compression::Bzip2),
+            _ => None,
+        }
+    }
+
     /// The name in summaries.
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -39,6 +53,7 @@ impl Compression {
             Compression::None => "none",
             Compression::Lz4 => "lz4",
             Compression::Zstd => "zstd",
+            Compression::Bzip2 => "bz2",
         }
     }
 }
@@ -56,6 +71,18 @@ pub(super) struct Block {
 pub(super) enum Kind {
     /// Unchunked records, one after another; their framing has been checked.
     Run,
+    /// What another container holds, told as records.
+    Transcript,
+    /// A chunk of a bag of ROS 1, or one record of it.
+    Bag {
+        compression: Compression,
+        /// Unpacked size as declared, within the limit.
+        size: usize,
+        /// The input ends within it.
+        is_cut: bool,
+        /// Messages in it by the index behind it.
+        indexed: Option<u64>,
+    },
     /// The body of one record that a copy takes along: header, attachment, metadata.
     Attached { opcode: u8 },
     Chunk {
@@ -90,6 +117,11 @@ impl Block {
             Kind::Chunk {
                 compression, size, ..
             } if compression != Compression::None => packed + size,
+            Kind::Bag {
+                compression, size, ..
+            } if compression != Compression::None => packed + 2 * size,
+            // What is told of it is a copy.
+            Kind::Bag { .. } => 2 * packed,
             _ => packed,
         }
     }
@@ -104,8 +136,8 @@ impl Block {
 
     pub(super) fn indexed(&self) -> Option<u64> {
         match self.kind {
-            Kind::Chunk { indexed, .. } => indexed,
-            Kind::Run | Kind::Attached { .. } => None,
+            Kind::Chunk { indexed, .. } | Kind::Bag { indexed, .. } => indexed,
+            Kind::Run | Kind::Transcript | Kind::Attached { .. } => None,
         }
     }
 }
@@ -120,6 +152,7 @@ fn plain_crc(kind: &Kind) -> bool {
 pub(super) struct Buffers {
     raw: Vec<u8>,
     plain: Vec<u8>,
+    told: Transcript,
     zstd: Option<zstd::bulk::Decompressor<'static>>,
 }
 
@@ -182,6 +215,23 @@ impl Buffers {
                 raw
             }
         };
+        if let Kind::Bag {
+            compression,
+            size,
+            is_cut,
+            ..
+        } = block.kind
+        {
+            self.told.bytes.clear();
+            let told = open_bag(
+                packed,
+                compression,
+                (size, is_cut),
+                &mut self.plain,
+                &mut self.told,
+            );
+            return Ok(told.map(|()| self.told.bytes.as_slice()));
+        }
         let Kind::Chunk {
             compression,
             size,
@@ -196,6 +246,11 @@ impl Buffers {
             Compression::None => {
                 let (declared, actual) = (size as u64, packed.len() as u64);
                 return Ok(Err(ProblemKind::ChunkSize { declared, actual }));
+            }
+            // No chunk of an MCAP is packed so.
+            Compression::Bzip2 => {
+                let name = compression.name().to_owned();
+                return Ok(Err(ProblemKind::UnknownCompression { name }));
             }
             Compression::Lz4 | Compression::Zstd => {
                 let plain = room(&mut self.plain, size);
@@ -237,12 +292,79 @@ impl Buffers {
 
     /// Lets go of what one large chunk needed.
     pub(super) fn trim(&mut self) {
-        for buf in [&mut self.raw, &mut self.plain] {
+        for buf in [&mut self.raw, &mut self.plain, &mut self.told.bytes] {
             if buf.capacity() > KEEP {
                 *buf = Vec::new();
             }
         }
     }
+}
+
+/// Unpacks a bag's chunk no further than there are records, and tells them.
+fn open_bag(
+    packed: &[u8],
+    compression: Compression,
+    (size, is_cut): (usize, bool),
+    plain: &mut Vec<u8>,
+    told: &mut Transcript,
+) -> Result<(), ProblemKind> {
+    let mut lz4;
+    let mut bzip2;
+    let decoder: &mut dyn io::Read = match compression {
+        Compression::Lz4 => {
+            lz4 = lz4_flex::frame::FrameDecoder::new(packed);
+            &mut lz4
+        }
+        Compression::Bzip2 => {
+            bzip2 = bzip2::bufread::BzDecoder::new(packed);
+            &mut bzip2
+        }
+        Compression::None | Compression::Zstd => {
+            if packed.len() != size && !is_cut {
+                let (declared, actual) = (size as u64, packed.len() as u64);
+                return Err(ProblemKind::ChunkSize { declared, actual });
+            }
+            bag::transcribe(packed, is_cut, told);
+            return Ok(());
+        }
+    };
+    let plain = room(plain, size);
+    let (mut have, mut at, mut is_end) = (0, 0, false);
+    while !is_end {
+        let known = plain.get(..have).unwrap_or(&[]);
+        let is_none = loop {
+            match bag::next_record(known, at) {
+                Ok(end) => at = end,
+                Err(is_none) => break is_none,
+            }
+        };
+        if is_none && at < have {
+            // Nothing behind this can be a record: of 2 kB of zeros, 64 MiB would be unpacked.
+            break;
+        }
+        let end = size.min(have + PIECE);
+        let mut beyond = [0];
+        let piece = match plain.get_mut(have..end).filter(|piece| !piece.is_empty()) {
+            Some(piece) => piece,
+            // One byte more would be one too many; this also verifies what checksum there is at the end.
+            None => &mut beyond[..],
+        };
+        match decoder.read(piece) {
+            Ok(n) => {
+                have += n;
+                is_end = n == 0 || have > size;
+            }
+            Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+            Err(_) if is_cut => break,
+            Err(e) => return Err(ProblemKind::Unpack { why: e.to_string() }),
+        }
+    }
+    if is_end && have != size && !is_cut {
+        let (declared, actual) = (size as u64, have as u64);
+        return Err(ProblemKind::ChunkSize { declared, actual });
+    }
+    bag::transcribe(plain.get(..have.min(size)).unwrap_or(&[]), is_cut, told);
+    Ok(())
 }
 
 /// Bytes a packed one stands for from which on a chunk is looked at before it is unpacked: only zeros and the

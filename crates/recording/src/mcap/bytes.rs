@@ -5,14 +5,14 @@
 
 /// A read position in a byte slice.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Bytes<'a>(&'a [u8]);
+pub(crate) struct Bytes<'a>(&'a [u8]);
 
 impl<'a> Bytes<'a> {
-    pub(super) fn new(data: &'a [u8]) -> Self {
+    pub(crate) fn new(data: &'a [u8]) -> Self {
         Bytes(data)
     }
 
-    pub(super) fn take(&mut self, n: usize) -> Option<&'a [u8]> {
+    pub(crate) fn take(&mut self, n: usize) -> Option<&'a [u8]> {
         let (head, rest) = self.0.split_at_checked(n)?;
         self.0 = rest;
         Some(head)
@@ -24,41 +24,41 @@ impl<'a> Bytes<'a> {
         Some(*head)
     }
 
-    pub(super) fn u8(&mut self) -> Option<u8> {
+    pub(crate) fn u8(&mut self) -> Option<u8> {
         self.array::<1>().map(|[b]| b)
     }
 
-    pub(super) fn u16(&mut self) -> Option<u16> {
+    pub(crate) fn u16(&mut self) -> Option<u16> {
         self.array().map(u16::from_le_bytes)
     }
 
-    pub(super) fn u32(&mut self) -> Option<u32> {
+    pub(crate) fn u32(&mut self) -> Option<u32> {
         self.array().map(u32::from_le_bytes)
     }
 
-    pub(super) fn u64(&mut self) -> Option<u64> {
+    pub(crate) fn u64(&mut self) -> Option<u64> {
         self.array().map(u64::from_le_bytes)
     }
 
     /// Bytes with a `u32` length before them.
-    pub(super) fn blob(&mut self) -> Option<&'a [u8]> {
+    pub(crate) fn blob(&mut self) -> Option<&'a [u8]> {
         let n = usize::try_from(self.u32()?).ok()?;
         self.take(n)
     }
 
     /// Bytes with a `u64` length before them.
-    pub(super) fn long_blob(&mut self) -> Option<&'a [u8]> {
+    pub(crate) fn long_blob(&mut self) -> Option<&'a [u8]> {
         let n = usize::try_from(self.u64()?).ok()?;
         self.take(n)
     }
 
     /// UTF-8 with a `u32` length before it.
-    pub(super) fn text(&mut self) -> Option<&'a str> {
+    pub(crate) fn text(&mut self) -> Option<&'a str> {
         std::str::from_utf8(self.blob()?).ok()
     }
 
     /// The entries of a map or array: a `u32` length in bytes, then entries up to exactly there.
-    pub(super) fn entries<T>(
+    pub(crate) fn entries<T>(
         &mut self,
         mut entry: impl FnMut(&mut Bytes<'a>) -> Option<T>,
     ) -> Option<Vec<T>> {
@@ -70,7 +70,11 @@ impl<'a> Bytes<'a> {
         Some(out)
     }
 
-    pub(super) fn rest(self) -> &'a [u8] {
+    pub(crate) fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    pub(crate) fn rest(self) -> &'a [u8] {
         self.0
     }
 }

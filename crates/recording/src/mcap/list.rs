@@ -5,9 +5,10 @@
 
 use super::block::Buffers;
 use super::bytes::{HEAD, head_at};
+use super::container::Container;
 use super::problem::{ProblemKind, Problems};
 use super::record::Record;
-use super::scan::{Besides, Item, Scanner};
+use super::scan::{Besides, Item};
 use super::workers::place;
 use super::{Facts, Reader, read_error};
 use crate::error::Result;
@@ -36,7 +37,7 @@ pub fn list(
     mut visit: impl FnMut(Listed<'_>) -> ControlFlow<()>,
 ) -> Result<(Facts, Problems)> {
     let name = reader.name().to_owned();
-    let mut scanner = Scanner::new(reader.input, reader.limits, Besides::Everything);
+    let mut scanner = Container::new(reader, Besides::Everything);
     let mut buffers = Buffers::default();
     let mut problems = Problems::default();
     loop {
@@ -107,8 +108,9 @@ pub fn list(
             break;
         }
     }
-    problems.merge(scanner.problems);
-    Ok((scanner.facts, problems))
+    let (facts, found) = scanner.finish();
+    problems.merge(found);
+    Ok((facts, problems))
 }
 
 /// Calls `see` with offset, opcode and body of each record; one that runs over the end, or has the

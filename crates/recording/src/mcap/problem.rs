@@ -33,6 +33,8 @@ pub enum ProblemKind {
     },
     /// The file ends between two records, without a footer.
     NoFooter,
+    /// The recorder was stopped before it wrote the index (ROS 1 bag).
+    NoIndex,
     /// The writer died while writing this chunk: its length was never filled in.
     UnfinishedChunk {
         /// Whether its records were read all the same, unverified (uncompressed chunks only).
@@ -154,6 +156,24 @@ pub enum ProblemKind {
         /// Why.
         why: &'static str,
     },
+    /// A record of a type this program does not know, or without what its type must have, between records that
+    /// have (ULog).
+    WrongRecord {
+        /// Its type, a letter.
+        kind: u8,
+        /// Bytes of its body.
+        length: u64,
+    },
+    /// The logger was too slow, and dropped what came within this time (ULog).
+    Dropout {
+        /// How long, ms.
+        millis: u16,
+    },
+    /// A feature this program does not know, without which the rest may be misread (ULog).
+    UnknownFeature {
+        /// Its flags.
+        bits: u64,
+    },
     /// The summary at the end can not be used; nothing is lost by that.
     BadSummary {
         /// Why.
@@ -183,6 +203,9 @@ impl fmt::Display for ProblemKind {
                 write!(f, "the file is cut: a record of {need} bytes has {have}")
             }
             ProblemKind::NoFooter => write!(f, "the file is cut: it ends without a footer"),
+            ProblemKind::NoIndex => {
+                write!(f, "the recorder was stopped: the bag ends without an index")
+            }
             ProblemKind::UnfinishedChunk { read_on: true } => {
                 write!(
                     f,
@@ -196,10 +219,7 @@ impl fmt::Display for ProblemKind {
                 )
             }
             ProblemKind::Garbage { skipped } => {
-                write!(
-                    f,
-                    "no record here; {skipped} bytes skipped up to the next chunk"
-                )
+                write!(f, "no record here; {skipped} bytes skipped")
             }
             ProblemKind::RecordTooLong {
                 opcode,
@@ -282,6 +302,19 @@ impl fmt::Display for ProblemKind {
                 )
             }
             ProblemKind::Attached { what, why } => write!(f, "{what} record skipped: {why}"),
+            ProblemKind::WrongRecord { kind, length } => write!(
+                f,
+                "a record of type {:?} with {length} bytes that can not be used; skipped",
+                char::from(*kind)
+            ),
+            ProblemKind::Dropout { millis } => write!(
+                f,
+                "the logger was too slow and dropped what came within {millis} ms"
+            ),
+            ProblemKind::UnknownFeature { bits } => write!(
+                f,
+                "the log needs a feature this program does not know (flags {bits:#x})"
+            ),
             ProblemKind::BadSummary { why } => write!(f, "the summary can not be used: {why}"),
         }
     }

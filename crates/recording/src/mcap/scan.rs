@@ -13,6 +13,7 @@ use super::input::{Held, Input, Tape};
 use super::problem::{ProblemKind, Problems};
 use super::record::{MAGIC, Record, op};
 use super::resync;
+use crate::recognise::Format;
 use std::collections::BTreeMap;
 use std::io;
 
@@ -33,6 +34,8 @@ const METADATA_COPIED: u64 = 8 << 20;
 /// What a log says about itself outside its messages.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Facts {
+    /// What the container is.
+    pub format: Format,
     /// Profile in the header, such as `ros2`.
     pub profile: String,
     /// Library that wrote it, by the header.

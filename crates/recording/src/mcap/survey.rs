@@ -5,6 +5,7 @@
 
 use super::block::Compression;
 use super::channels::{Channel, Table};
+use super::container;
 use super::input::Input;
 use super::messages::Tally;
 use super::problem::{ProblemKind, Problems};
@@ -14,6 +15,7 @@ use super::summary::{self, Summary};
 use super::walk::{WalkOptions, walk};
 use super::{Reader, read_error};
 use crate::error::{Error, Result};
+use crate::recognise::Format;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -80,7 +82,11 @@ pub fn survey(reader: &Reader, options: &WalkOptions<'_>) -> Result<Survey> {
             path: reader.name().to_owned(),
         });
     };
-    let found = summary::read(file, reader.limits).map_err(|e| read_error(&file.path, 0, e))?;
+    let found = match reader.format {
+        Format::Mcap => summary::read(file, reader.limits),
+        Format::Ulog | Format::Bag => Ok(Ok(None)),
+    };
+    let found = found.map_err(|e| read_error(&file.path, 0, e))?;
     if let Ok(Some(summary)) = found
         && let Some(survey) = from_summary(reader, summary)?
     {
@@ -175,14 +181,18 @@ fn header(reader: &Reader) -> Result<Facts> {
 
 /// Whether a file's summary can be used, and the definitions in it; what is wrong with it is noted.
 pub(super) fn fallback(
-    input: &Input,
-    limits: super::Limits,
+    reader: &Reader,
     problems: &mut Problems,
 ) -> std::io::Result<(bool, super::channels::Fallback)> {
-    let Input::File(file) = input else {
+    let Input::File(file) = &reader.input else {
         return Ok(Default::default());
     };
-    match summary::read(file, limits)? {
+    match reader.format {
+        Format::Mcap => {}
+        Format::Ulog => return Ok(Default::default()),
+        Format::Bag => return Ok((false, container::bag::definitions(file, reader.limits)?)),
+    }
+    match summary::read(file, reader.limits)? {
         Ok(Some(summary)) => Ok((true, summary.definitions)),
         Ok(None) => Ok(Default::default()),
         Err(why) => {

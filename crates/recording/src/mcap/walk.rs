@@ -8,12 +8,12 @@
 mod state;
 
 use super::channels::{Channel, Table};
-use super::input::Input;
+use super::container::Container;
 use super::messages::Message;
 use super::order::{Batch, Lookahead, Merger, Order};
 use super::problem::Problems;
 use super::record::Record;
-use super::scan::{Besides, Scanner};
+use super::scan::Besides;
 use super::survey::{Survey, fallback};
 use super::workers::{Shared, Ticket};
 use super::{Reader, read_error};
@@ -165,16 +165,11 @@ where
     C: FnMut(&mut Vec<T>) -> ControlFlow<()>,
     A: FnMut(Record<'_>),
 {
-    let Reader { input, limits } = reader;
-    let name = input.name().to_owned();
-    let file_size = match &input {
-        Input::File(file) => Some(file.len),
-        Input::Stream { .. } => None,
-    };
+    let (name, file_size, limits) = (reader.name().to_owned(), reader.size(), reader.limits);
     let mut problems = Problems::default();
     let (has_summary, fallback) =
-        fallback(&input, limits, &mut problems).map_err(|e| read_error(&name, 0, e))?;
-    let is_stream = matches!(input, Input::Stream { .. });
+        fallback(&reader, &mut problems).map_err(|e| read_error(&name, 0, e))?;
+    let is_stream = file_size.is_none();
     let shared = Shared::new(Table::new(fallback, limits.definitions), map, options.order);
     let lookahead = match options.order {
         Order::LogTime => options.lookahead,
@@ -185,7 +180,7 @@ where
         select: &mut select,
         consume: &mut consume,
         attached: &mut attached,
-        scanner: Scanner::new(input, limits, besides),
+        scanner: Container::new(reader, besides),
         merger: Merger::new(lookahead),
         tallies: Vec::new(),
         unknown: BTreeMap::new(),

@@ -144,7 +144,7 @@ pub(super) enum Done<T> {
 pub(super) fn place(block: &Block) -> Place {
     Place {
         offset: block.offset,
-        chunked: matches!(block.kind, Kind::Chunk { .. }),
+        chunked: !matches!(block.kind, Kind::Run | Kind::Attached { .. }),
     }
 }
 

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, unreachable_pub)]
 
 mod conformance;
+mod containers;
 mod decode;
 mod mcap_damage;
 #[path = "../../../../tests/mcap_logs/mod.rs"]

@@ -294,6 +294,8 @@ pub(crate) enum Px4 {
     SensorMag,
     /// `magnetometer_ga`.
     VehicleMagnetometer,
+    /// Counts of up to 32 samples, the last at `timestamp_sample`.
+    SensorGyroFifo,
     /// `q` as w, x, y, z: FRD to NED.
     VehicleAttitude,
 }
@@ -310,6 +312,7 @@ pub(crate) fn px4(type_name: &str) -> Option<Px4> {
         b"sensoraccel" => Some(Px4::SensorAccel),
         b"sensormag" => Some(Px4::SensorMag),
         b"vehiclemagnetometer" => Some(Px4::VehicleMagnetometer),
+        b"sensorgyrofifo" => Some(Px4::SensorGyroFifo),
         b"vehicleattitude" => Some(Px4::VehicleAttitude),
         _ => None,
     }

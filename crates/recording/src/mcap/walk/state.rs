@@ -7,12 +7,13 @@ use super::super::attached::intact;
 use super::super::block::{Block, Kind};
 use super::super::bytes::{HEAD, head_at};
 use super::super::channels::{Channel, Table};
+use super::super::container::Container;
 use super::super::messages::{Message, Stop, Tally, pass};
 use super::super::order::{Batch, Merger};
 use super::super::problem::{ProblemKind, Problems};
 use super::super::read_error;
 use super::super::record::Record;
-use super::super::scan::{Item, Scanner};
+use super::super::scan::Item;
 use super::super::survey::Survey;
 use super::super::workers::{Done, Findings, Outcome, Shared, Ticket, place};
 use super::WalkReport;
@@ -35,7 +36,7 @@ pub(super) struct Course<'w, T, D, M> {
     pub(super) select: &'w mut dyn FnMut(&Arc<Channel>) -> Option<D>,
     pub(super) consume: &'w mut dyn FnMut(&mut Vec<T>) -> ControlFlow<()>,
     pub(super) attached: &'w mut dyn FnMut(Record<'_>),
-    pub(super) scanner: Scanner,
+    pub(super) scanner: Container,
     pub(super) merger: Merger<T>,
     pub(super) tallies: Vec<Tally>,
     /// Messages without a channel, by id, and where the first was.
@@ -294,8 +295,8 @@ where
     fn deliver(&mut self, batch: Batch<T>, block: Block) -> Result<ControlFlow<()>> {
         // Not `Block::cost`: this has to be the same for a file and a stream.
         let bytes = match block.kind {
-            Kind::Chunk { size, .. } => size,
-            Kind::Run | Kind::Attached { .. } => block.packed(),
+            Kind::Chunk { size, .. } | Kind::Bag { size, .. } => size,
+            Kind::Run | Kind::Transcript | Kind::Attached { .. } => block.packed(),
         };
         self.scanner.recycle(block.payload);
         self.merger.push(batch, bytes);
@@ -343,9 +344,10 @@ where
                 .add(offset, ProblemKind::ShortMessages, Some(n));
         }
         let (claimed, end) = (self.scanner.claimed(), self.scanner.tape().position());
-        self.problems.merge(self.scanner.problems);
+        let (facts, problems) = self.scanner.finish();
+        self.problems.merge(problems);
         let mut survey = Survey {
-            facts: self.scanner.facts,
+            facts,
             problems: self.problems,
             ..Survey::default()
         };

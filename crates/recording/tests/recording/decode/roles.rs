@@ -25,7 +25,15 @@ fn imus_come_before_processed_rates_before_vectors_before_twists() {
     assert_eq!(rank("/a", "px4_msgs/msg/VehicleImu"), Rank::Processed);
     assert_eq!(
         rank("/a", "px4_msgs/msg/VehicleAngularVelocity"),
+        Rank::RateByTopic
+    );
+    assert_eq!(
+        rank("vehicle_imu/0", "px4_msgs/msg/VehicleImu"),
         Rank::Processed
+    );
+    assert_eq!(
+        rank("vehicle_imu/1", "px4_msgs/msg/VehicleImu"),
+        Rank::RateByTopic
     );
     assert_eq!(
         rank("/imu/angular_velocity", "geometry_msgs/msg/Vector3Stamped"),

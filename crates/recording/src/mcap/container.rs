@@ -1,0 +1,79 @@
+//! An input of any container -> blocks of records, and what was wrong. I/O.
+//!
+//! A stage of its own so that the walk is one: containers differ in how they are cut, and in nothing behind that.
+
+pub(super) mod bag;
+mod ulog;
+
+use super::input::Tape;
+use super::problem::Problems;
+use super::scan::{Besides, Facts, Item, Scanner};
+use super::{Payload, Reader};
+use crate::recognise::Format;
+use std::io;
+
+/// The walk over an input, by its format.
+#[derive(Debug)]
+pub(super) enum Container {
+    Mcap(Box<Scanner>),
+    Ulog(Box<ulog::Scanner>),
+    Bag(Box<bag::Scanner>),
+}
+
+impl Container {
+    pub(super) fn new(reader: Reader, besides: Besides) -> Self {
+        let Reader {
+            input,
+            limits,
+            format,
+        } = reader;
+        match format {
+            Format::Mcap => Container::Mcap(Box::new(Scanner::new(input, limits, besides))),
+            Format::Ulog => Container::Ulog(Box::new(ulog::Scanner::new(input))),
+            Format::Bag => Container::Bag(Box::new(bag::Scanner::new(input, limits))),
+        }
+    }
+
+    /// The next block, or `None` at the end.
+    pub(super) fn next(&mut self) -> io::Result<Option<Item>> {
+        match self {
+            Container::Mcap(scanner) => scanner.next(),
+            Container::Ulog(scanner) => scanner.next(),
+            Container::Bag(scanner) => scanner.next(),
+        }
+    }
+
+    pub(super) fn tape(&self) -> &Tape {
+        match self {
+            Container::Mcap(scanner) => scanner.tape(),
+            Container::Ulog(scanner) => scanner.tape(),
+            Container::Bag(scanner) => scanner.tape(),
+        }
+    }
+
+    pub(super) fn recycle(&mut self, payload: Payload) {
+        match self {
+            Container::Mcap(scanner) => scanner.recycle(payload),
+            Container::Ulog(scanner) => scanner.recycle(payload),
+            Container::Bag(scanner) => scanner.recycle(payload),
+        }
+    }
+
+    /// Messages there should be, by what the log counts.
+    pub(super) fn claimed(&self) -> Option<u64> {
+        match self {
+            Container::Mcap(scanner) => scanner.claimed(),
+            Container::Ulog(_) => None,
+            Container::Bag(scanner) => scanner.claimed(),
+        }
+    }
+
+    /// What the log says about itself, and what was wrong with it.
+    pub(super) fn finish(self) -> (Facts, Problems) {
+        match self {
+            Container::Mcap(scanner) => (scanner.facts, scanner.problems),
+            Container::Ulog(scanner) => scanner.finish(),
+            Container::Bag(scanner) => scanner.finish(),
+        }
+    }
+}
