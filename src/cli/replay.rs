@@ -26,7 +26,7 @@ use strapd_recording::pool::Pool;
   strapd replay flight.mcap --page                          in a browser, with play, pause and seek
   strapd replay flight.mcap --speed 1 -o udp://127.0.0.1:9870?profile=plotjuggler")]
 pub struct Replay {
-    /// Logs: MCAP files, or - for a log on standard input (MCAP or NDJSON)
+    /// Logs: MCAP, ULog or ROS 1 bag, NDJSON, or - for one of these on standard input
     #[arg(required = true, value_name = "SOURCE")]
     pub sources: Vec<String>,
     /// Where the attitude goes: a .mcap, .ndjson or .csv file, a directory, - (NDJSON on stdout),

@@ -10,6 +10,7 @@ mod allan;
 mod bad_input;
 mod check;
 mod cli;
+mod containers;
 mod earth_rate;
 mod fixtures;
 mod formats;

@@ -499,7 +499,8 @@ fn fifo(channel: &Channel<'_>, options: &Options) -> Option<Fifo> {
         _ => return None,
     };
     let is_fifo = names::px4(channel.schema_name) == Some(Px4::SensorGyroFifo);
-    let schema = (is_fifo && options.fields.is_empty()).then(|| read_schema(channel))?;
+    let is_asked = options.fields.is_empty() && options.wanted == Wanted::Rates;
+    let schema = (is_fifo && is_asked).then(|| read_schema(channel))?;
     Fifo::compile(&schema.ok()?, is_cdr)
 }
 

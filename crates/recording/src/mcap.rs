@@ -1,4 +1,4 @@
-//! MCAP logs -> messages in a stable order. I/O.
+//! Logs -> messages in a stable order: MCAP, and what is told as MCAP (ULog, ROS 1 bags). I/O.
 //!
 //! A stage of its own because recordings come damaged, and general readers stop at the first
 //! fault, believe every length, or do not look at checksums. Here every length is held
