@@ -216,6 +216,49 @@ fn repeated(length: usize, piece: impl Fn(usize) -> Vec<u8>) -> Vec<u8> {
 
 const IMU_JSON: &str = r#""gyro":[0.1,2,3],"#;
 
+fn ulog_record(kind: u8, body: &[u8]) -> Vec<u8> {
+    let length = (body.len() as u16).to_le_bytes();
+    [&length[..], &[kind], body].concat()
+}
+
+/// A ULog of such pieces.
+fn ulog(length: usize, piece: impl Fn(usize) -> Vec<u8>) -> Vec<u8> {
+    let head = [&b"ULog\x01\x12\x35\x01"[..], &[0; 8]].concat();
+    pieces(head, length, piece)
+}
+
+/// A record of a bag whose data are said to be of `said` bytes.
+fn bag_record(op: u8, fields: &[(&str, &[u8])], said: u32, data: &[u8]) -> Vec<u8> {
+    let of = |(name, value): &(&str, &[u8])| {
+        let length = (name.len() + 1 + value.len()) as u32;
+        [&length.to_le_bytes()[..], name.as_bytes(), b"=", value].concat()
+    };
+    let fields: Vec<u8> = [("op", &[op][..])]
+        .iter()
+        .chain(fields)
+        .flat_map(of)
+        .collect();
+    let length = (fields.len() as u32).to_le_bytes();
+    [&length[..], &fields, &said.to_le_bytes(), data].concat()
+}
+
+/// A bag of such pieces.
+fn bag(length: usize, piece: impl Fn(usize) -> Vec<u8>) -> Vec<u8> {
+    pieces(b"#ROSBAG V2.0\n".to_vec(), length, piece)
+}
+
+fn pieces(head: Vec<u8>, length: usize, piece: impl Fn(usize) -> Vec<u8>) -> Vec<u8> {
+    let mut out = head;
+    for n in 0.. {
+        let next = piece(n);
+        if out.len() + next.len() > length {
+            break;
+        }
+        out.extend(next);
+    }
+    out
+}
+
 pub(crate) const CASES: &[Case] = cases! {
     idl => {
         "IDL: tokens on one line": |n| again("struct A { double x; }; ", "; ", "", n);
@@ -337,6 +380,31 @@ pub(crate) const CASES: &[Case] = cases! {
         "log: logs joined": |n| records(n, |_| [record(op::DATA_END, &[0; 4]), record(op::FOOTER, &[0; 20]), MAGIC.to_vec(), MAGIC.to_vec()].concat());
         "log: nothing but heads of chunks": |n| records(n, |_| vec![op::CHUNK; 9]);
         "log: garbage": |n| records(n, |_| vec![0x55; 9]);
+        "ULog: garbage": |n| ulog(n, |_| vec![0x55; 9]);
+        "ULog: zeros": |n| ulog(n, |_| vec![0; 9]);
+        "ULog: messages nothing defines": |n| ulog(n, |k| ulog_record(b'D', &[k as u8, 0, 1, 2, 3]));
+        "ULog: two records, then none": |n| ulog(n, |_| [ulog_record(b'R', &[0; 2]), ulog_record(b'R', &[0; 2]), vec![0xff; 5]].concat());
+        "ULog: records of no known type": |n| ulog(n, |_| ulog_record(b'z', &[0; 20]));
+        "ULog: texts that are none": |n| ulog(n, |_| ulog_record(b'L', &[0; 20]));
+        "ULog: formats": |n| ulog(n, |k| ulog_record(b'F', format!("f{k}:f{} x;", k + 1).as_bytes()));
+        "ULog: subscriptions of one format": |n| ulog(n, |k| match k {
+            0 => ulog_record(b'F', b"f:uint64_t timestamp;"),
+            _ => ulog_record(b'A', b"\0\0\0f"),
+        });
+        "ULog: subscriptions of a circle": |n| ulog(n, |k| match k {
+            0 => ulog_record(b'F', b"f:f x;f y;"),
+            _ => ulog_record(b'A', b"\0\0\0f"),
+        });
+        "ULog: messages": |n| ulog(n, |k| match k {
+            0 => [ulog_record(b'F', b"f:uint64_t timestamp;"), ulog_record(b'A', b"\0\0\0f")].concat(),
+            _ => ulog_record(b'D', &[0; 10]),
+        });
+        "bag: garbage": |n| bag(n, |_| vec![0x55; 9]);
+        "bag: heads of chunks that go on behind the end": |n| bag(n, |_| bag_record(5, &[("compression", b"none"), ("size", &[0, 0, 16, 0])], 1 << 20, &[]));
+        "bag: empty chunks": |n| bag(n, |_| bag_record(5, &[("compression", b"bz2"), ("size", &[1, 0, 0, 0])], 0, &[]));
+        "bag: index records": |n| bag(n, |_| bag_record(4, &[("conn", &[0; 4])], 0, &[]));
+        "bag: connections": |n| bag(n, |k| bag_record(7, &[("conn", &(k as u32).to_le_bytes()), ("topic", b"/t")], 0, &[]));
+        "bag: messages": |n| bag(n, |_| bag_record(2, &[("conn", &[0; 4]), ("time", &[0; 8])], 4, &[0; 4]));
     }
     mcap_file => {
         "file: garbage after each chunk": |n| records(n, |_| [chunk_record(&[]), vec![0; 9]].concat());

@@ -57,8 +57,9 @@ pub(crate) struct Transcriber {
     /// Where the next record begins in the file.
     at: u64,
     formats: Formats,
-    /// Bytes of schemas told so far, and how many.
+    /// Bytes of schemas told so far, and the number of the last.
     told: usize,
+    last_schema: u16,
     /// Number of the schema made of a format.
     schemas: BTreeMap<String, u16>,
     steps: usize,
@@ -322,14 +323,20 @@ impl Transcriber {
             Some(known) => Some(*known),
             None => {
                 let left = MAX_DEFINITIONS.saturating_sub(self.told);
-                let text = format.definition(&self.formats, left);
-                let number = u16::try_from(self.schemas.len() + 1).ok();
-                text.zip(number).map(|(text, number)| {
+                let text = (left > 0).then(|| format.definition(&self.formats, left));
+                let number = self.last_schema.checked_add(1);
+                let told = text.flatten().zip(number).map(|(text, number)| {
                     to.schema(number, &format.type_name(), "ros1msg", text.as_bytes());
-                    self.told += text.len();
+                    self.told = self.told.saturating_add(text.len().max(1));
+                    self.last_schema = number;
                     self.schemas.insert(name.to_owned(), number);
                     number
-                })
+                });
+                if told.is_none() {
+                    // What is beyond the limit once is not tried again.
+                    self.told = MAX_DEFINITIONS;
+                }
+                told
             }
         };
         let Some(schema) = schema else {

@@ -19,8 +19,11 @@ use std::sync::Arc;
 
 /// What is read to see a record's head and those that follow.
 const PEEK: usize = 4 << 10;
-/// Bytes searched at a time.
+/// Bytes searched at first, and at most at a time: where chunks and garbage take turns, the next chunk is near.
+const FIRST: usize = 4 << 10;
 const WINDOW: usize = 256 << 10;
+/// Longest head of an index record that is believed.
+const INDEX_HEAD: usize = 128;
 
 /// The walk over a bag.
 #[derive(Debug)]
@@ -177,21 +180,22 @@ impl Scanner {
         } else {
             Some(Compression::None)
         };
-        let limit = self.limits.record;
-        let largest = kept.total.max(u64::from(kept.size));
+        let (limit, size) = (self.limits.record, u64::from(kept.size));
+        if kept.total > limit {
+            // A stream can not be asked whether it is that long, and a file is to give the same.
+            self.lost(at, kept.total)?;
+            return Ok(None);
+        }
         let fault = match compression {
             None => Some(ProblemKind::UnknownCompression {
                 name: kept.name.clone(),
             }),
-            _ if largest > limit => Some(ProblemKind::ChunkTooBig {
-                size: largest,
-                limit,
-            }),
+            _ if size > limit => Some(ProblemKind::ChunkTooBig { size, limit }),
             _ => None,
         };
         let (Some(compression), None) = (compression, &fault) else {
             if let Some(kind) = fault {
-                if !self.tape.may_have(kept.total) {
+                if !self.has(kept.total)? {
                     self.lost(at, kept.total)?;
                     return Ok(None);
                 }
@@ -202,7 +206,7 @@ impl Scanner {
             }
             return Ok(None);
         };
-        if is_chunk && kept.size == 0 && kept.data_len == 0 && self.tape.may_have(kept.total + 1) {
+        if is_chunk && kept.size == 0 && kept.data_len == 0 && self.has(kept.total + 1)? {
             // Its sizes were never filled in: the recorder was killed, and what was in it follows.
             let read_on = compression == Compression::None;
             let kind = ProblemKind::UnfinishedChunk { read_on };
@@ -212,7 +216,7 @@ impl Scanner {
         }
         let total = usize::try_from(kept.total).unwrap_or(usize::MAX);
         let start = if is_chunk { kept.data_at } else { 0 };
-        let mut is_cut = !self.tape.may_have(kept.total);
+        let is_cut = !self.has(kept.total)?;
         if is_cut && self.resumes(at)? {
             // Not the end, but a damaged length: behind it there is a chunk.
             self.lost(at, kept.total)?;
@@ -231,11 +235,6 @@ impl Scanner {
             }
             Input::Stream { .. } => {
                 let have = self.tape.available(total, total)?.len().min(total);
-                is_cut = have < total;
-                if is_cut && self.resumes(at)? {
-                    self.lost(at, kept.total)?;
-                    return Ok(None);
-                }
                 let mut held = self.tape.hand_out(have);
                 held.range.start = (held.range.start + start).min(held.range.end);
                 Payload::Held(held)
@@ -267,10 +266,10 @@ impl Scanner {
 
     /// Whether a chunk begins behind the record at `at`, which does not end within the input.
     fn resumes(&mut self, at: u64) -> io::Result<bool> {
-        let mut window = WINDOW;
+        let mut window = FIRST;
         let mut from = 1;
         loop {
-            let ahead = self.tape.available(window, window)?;
+            let ahead = self.tape.available(window, 2 * window)?;
             let have = ahead.len();
             match bag::chunk_at(ahead.get(from..).unwrap_or(&[])) {
                 Ok(_) => return Ok(true),
@@ -288,17 +287,28 @@ impl Scanner {
         }
     }
 
+    /// Whether `total` more bytes, no more than one record may take, are there.
+    fn has(&mut self, total: u64) -> io::Result<bool> {
+        if let Some(left) = self.tape.remaining() {
+            return Ok(total <= left.min(self.limits.record));
+        }
+        let most = total.min(self.limits.record);
+        let most = usize::try_from(most).unwrap_or(usize::MAX);
+        let have = self.tape.available(most, most)?.len() as u64;
+        Ok(total <= have.min(self.limits.record))
+    }
+
     /// Counts messages by the index records behind a chunk.
     fn indexed(&mut self) -> io::Result<Option<u64>> {
         let mut messages: Option<u64> = None;
         loop {
-            let ahead = self.tape.available(PEEK, PEEK)?;
-            let Ok(head) = bag::head(ahead) else {
+            let ahead = self.tape.available(INDEX_HEAD, PEEK)?;
+            let Ok(head) = bag::head(ahead.get(..INDEX_HEAD).unwrap_or(ahead)) else {
                 return Ok(messages);
             };
             let (kind, total) = (head.op, head.total() as u64);
             let count = u64::from(head.count.unwrap_or(0));
-            if kind != op::INDEX || !self.tape.may_have(total) || total > self.limits.record {
+            if kind != op::INDEX || !self.has(total)? {
                 return Ok(messages);
             }
             messages = Some(messages.unwrap_or(0).saturating_add(count));
@@ -311,8 +321,7 @@ impl Scanner {
     /// Adds up the messages of one chunk by the index: pairs of connection and count.
     fn chunk_info(&mut self, at: u64, kept: &Kept) -> io::Result<()> {
         let total = usize::try_from(kept.total).unwrap_or(usize::MAX);
-        let known = kept.total <= self.limits.record && self.tape.may_have(kept.total);
-        if known && self.tape.available(total, total)?.len() >= total {
+        if self.has(kept.total)? {
             let ahead = self.tape.available(total, total)?;
             let pairs = ahead.get(kept.data_at..total).unwrap_or(&[]);
             let (pairs, _) = pairs.as_chunks::<8>();
@@ -327,7 +336,7 @@ impl Scanner {
 
     /// Moves over one record, on the word of its length.
     fn pass_over(&mut self, at: u64, total: u64) -> io::Result<()> {
-        if !self.tape.may_have(total) && self.resumes(at)? {
+        if total > self.limits.record || (!self.has(total)? && self.resumes(at)?) {
             return self.lost(at, total);
         }
         let have = self.tape.skip(total)?;
@@ -342,16 +351,18 @@ impl Scanner {
     /// What stands at `at` is no record, or goes on behind the end: find the next chunk, or end.
     fn lost(&mut self, at: u64, total: u64) -> io::Result<()> {
         self.tape.skip(1)?;
+        let mut window = FIRST;
         loop {
-            let ahead = self.tape.available(WINDOW, WINDOW)?;
+            let ahead = self.tape.available(window, 2 * window)?;
             let have = ahead.len();
             match bag::chunk_at(ahead) {
                 Ok(next) => {
                     self.tape.skip(next as u64)?;
                     break;
                 }
-                Err(next) if have == WINDOW => {
+                Err(next) if have >= window => {
                     self.tape.skip(next as u64)?;
+                    window = WINDOW.min(2 * window);
                 }
                 Err(_) => {
                     self.tape.skip(have as u64)?;

@@ -24,7 +24,12 @@ pub(in super::super) struct Scanner {
     /// Bytes that are needed to go on.
     need: usize,
     done: bool,
+    /// Memory of blocks that were used.
+    spare: Vec<Vec<u8>>,
 }
+
+/// Blocks whose memory is kept: as many as are on their way with few threads.
+const SPARE: usize = 8;
 
 impl Scanner {
     pub(super) fn new(input: Input) -> Self {
@@ -34,6 +39,7 @@ impl Scanner {
             problems: Problems::default(),
             need: 1,
             done: false,
+            spare: Vec::new(),
         }
     }
 
@@ -42,14 +48,19 @@ impl Scanner {
     }
 
     pub(super) fn recycle(&mut self, payload: Payload) {
-        if let Payload::Held(held) = payload {
-            self.tape.recycle(held);
+        if let Payload::Held(mut held) = payload
+            && self.spare.len() < SPARE
+        {
+            held.bytes.clear();
+            self.spare.push(held.bytes);
         }
     }
 
     pub(super) fn next(&mut self) -> io::Result<Option<Item>> {
         let offset = self.tape.position();
-        let mut to = Transcript::default();
+        let mut to = Transcript {
+            bytes: self.spare.pop().unwrap_or_default(),
+        };
         while !self.done && to.bytes.len() < RUN {
             let ahead = self.tape.available(self.need, RUN.max(2 * self.need))?;
             let is_end = ahead.len() < self.need;
