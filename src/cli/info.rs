@@ -19,7 +19,7 @@ use strapd_recording::pool::Pool;
   strapd info flight.mcap
   strapd info flight.mcap --json | jq '.imu[0].rate_hz'")]
 pub struct Info {
-    /// A recording: MCAP, NDJSON or CSV; - is standard input
+    /// A recording: MCAP, ULog, ROS 1 bag, NDJSON or CSV; - is standard input
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
     /// Look at this topic too, though it is not obviously an IMU's

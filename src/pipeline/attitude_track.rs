@@ -64,7 +64,7 @@ pub fn read(input: &Input, side: Side, topic: Option<&str>, pool: &Pool) -> Resu
             none if none.is_empty() => from_log(input, side, topic, pool),
             some => Ok(plain(some)),
         },
-        Format::Mcap => from_log(input, side, topic, pool),
+        Format::Mcap | Format::Ulog | Format::Bag => from_log(input, side, topic, pool),
     }
 }
 

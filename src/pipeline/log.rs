@@ -76,7 +76,7 @@ impl Log {
     /// It can not be read, or is none.
     pub fn of(input: &Input, options: &Options, pool: &Pool) -> Result<Log> {
         match input.format() {
-            Format::Mcap => Log::of_mcap(input, pool),
+            Format::Mcap | Format::Ulog | Format::Bag => Log::of_mcap(input, pool),
             Format::Lines | Format::Table => {
                 let (text, channels) = TextLog::survey(input, options)?;
                 Ok(Log {

@@ -47,7 +47,7 @@ pub fn run(
                     let stamps = lines::stamps(run, text()?)?;
                     lines::replay(run, text()?, stamps, pool, watch)?
                 }
-                Format::Mcap => file(run, &input, pool, watch)?,
+                Format::Mcap | Format::Ulog | Format::Bag => file(run, &input, pool, watch)?,
             }
         }
         Source::Stdin => piped(run, std::io::stdin(), pool, watch)?,
@@ -84,7 +84,7 @@ fn piped(
     let format = known.unwrap_or(Format::Lines);
     let whole = std::io::Cursor::new(head).chain(input);
     match format {
-        Format::Mcap => {
+        Format::Mcap | Format::Ulog | Format::Bag => {
             let reader = Reader::from_stream(run.source.name(), Box::new(whole))?;
             replay_stream::replay(run, reader, pool, watch)
         }

@@ -5,16 +5,23 @@
 
 use crate::error::{Error, Result};
 use crate::mcap::MAGIC;
+use crate::recognise;
 use crate::table::Table;
+use crate::{bag, ulog};
 use std::fs::File;
-use std::io::{BufRead, Read};
+use std::io::{BufRead, Read, Seek, SeekFrom};
 use std::path::Path;
 
 /// A format of recordings.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Hash)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Hash)]
 pub enum Format {
     /// MCAP.
+    #[default]
     Mcap,
+    /// ULog, the log of PX4.
+    Ulog,
+    /// A bag of ROS 1.
+    Bag,
     /// One JSON object per line.
     Lines,
     /// The CSV that strapd writes itself. A reader of other people's tables has its place beside it.
@@ -22,11 +29,21 @@ pub enum Format {
 }
 
 /// Bytes that tell a format by themselves, at the beginning.
-const MAGICS: [(&[u8], Format); 1] = [(&MAGIC, Format::Mcap)];
+const MAGICS: [(&[u8], Format); 3] = [
+    (&MAGIC, Format::Mcap),
+    (&ulog::MAGIC, Format::Ulog),
+    (&bag::MAGIC, Format::Bag),
+];
+
+/// The longest of them.
+pub(crate) const LONGEST_MAGIC: usize = bag::MAGIC.len();
 
 /// Endings of names, for what the bytes do not tell.
-const ENDINGS: [(&str, Format); 4] = [
+const ENDINGS: [(&str, Format); 7] = [
     ("mcap", Format::Mcap),
+    ("ulg", Format::Ulog),
+    ("ulog", Format::Ulog),
+    ("bag", Format::Bag),
     ("ndjson", Format::Lines),
     ("jsonl", Format::Lines),
     ("csv", Format::Table),
@@ -41,16 +58,27 @@ impl Format {
     pub fn name(self) -> &'static str {
         match self {
             Format::Mcap => "MCAP",
+            Format::Ulog => "ULog",
+            Format::Bag => "ROS 1 bag",
             Format::Lines => "NDJSON",
             Format::Table => "CSV",
         }
     }
 
+    /// The log of messages on channels of which these are the first bytes.
+    #[must_use]
+    pub(crate) fn of_magic(head: &[u8]) -> Option<Format> {
+        let mut known = MAGICS.iter();
+        known
+            .find(|(magic, _)| head.starts_with(magic))
+            .map(|(_, format)| *format)
+    }
+
     /// The format of which these are the first bytes; `None` where they tell nothing.
     #[must_use]
     pub fn of_bytes(head: &[u8]) -> Option<Format> {
-        if let Some((_, format)) = MAGICS.iter().find(|(magic, _)| head.starts_with(magic)) {
-            return Some(*format);
+        if let Some(format) = Format::of_magic(head) {
+            return Some(format);
         }
         let text = without_mark(head).trim_ascii_start();
         if matches!(text.first(), Some(b'{' | b'[')) {
@@ -73,18 +101,32 @@ impl Format {
     /// The format of a regular file: by its first bytes, and where these tell nothing by its name.
     ///
     /// # Errors
-    /// It can not be opened or read, is a directory, or empty.
+    /// It can not be opened or read, is a directory, or empty; it is of a format that is known and not read.
     pub fn of_file(path: &Path) -> Result<Option<Format>> {
-        let file = open(path)?;
+        let mut file = open(path)?;
+        let fail = |source| Error::Read {
+            path: path.to_owned(),
+            offset: 0,
+            source,
+        };
         let mut head = Vec::new();
-        file.take(HEAD as u64)
-            .read_to_end(&mut head)
-            .map_err(|source| Error::Read {
-                path: path.to_owned(),
-                offset: 0,
-                source,
-            })?;
-        Ok(Format::of_bytes(&head).or_else(|| Format::of_name(path)))
+        let first = file.by_ref().take(HEAD as u64).read_to_end(&mut head);
+        first.map_err(fail)?;
+        if let Some(format) = Format::of_bytes(&head) {
+            return Ok(Some(format));
+        }
+        // What an archive holds is said at its end.
+        let length = file.metadata().map_err(fail)?.len();
+        let last = length.saturating_sub(recognise::LAST as u64);
+        let mut tail = Vec::new();
+        file.seek(SeekFrom::Start(last)).map_err(fail)?;
+        let read = file.take(recognise::LAST as u64).read_to_end(&mut tail);
+        read.map_err(fail)?;
+        if let Some(format) = recognise::marked(&head, &tail) {
+            let path = path.to_owned();
+            return Err(Error::NotRead { path, format });
+        }
+        Ok(Format::of_name(path))
     }
 
     /// What to say of a file whose name stands for another format than its bytes.

@@ -53,7 +53,8 @@ pub use survey::{ChannelSurvey, Survey, survey};
 pub use walk::{WalkOptions, WalkReport, salvage, walk};
 
 use crate::error::{Error, Result};
-use crate::recognise::{self, Foreign, Format};
+use crate::format::{Format, LONGEST_MAGIC};
+use crate::recognise::{self, Foreign};
 use input::{Input, LogFile};
 use std::fs::File;
 use std::io::Read;
@@ -136,14 +137,14 @@ impl Reader {
         let (name, mut from) = (name.into(), from);
         let mut magic = Vec::with_capacity(MAGIC.len());
         // Eight tell every format but a bag, of which they tell that five more follow.
-        for most in [MAGIC.len(), recognise::MAGIC] {
+        for most in [MAGIC.len(), LONGEST_MAGIC] {
             if most == MAGIC.len() || magic == crate::bag::MAGIC[..MAGIC.len()] {
                 let more = (most - magic.len()) as u64;
                 let read = from.by_ref().take(more).read_to_end(&mut magic);
                 read.map_err(|e| read_error(&name, 0, e))?;
             }
         }
-        let Some(format) = Format::of(&magic) else {
+        let Some(format) = Format::of_magic(&magic) else {
             let known = recognise::marked(&magic, &[]);
             return Err(refused(&name, &magic, known));
         };
@@ -217,7 +218,7 @@ fn format_of(file: &LogFile) -> Result<Format> {
         bytes.truncate(have);
         Ok(bytes)
     };
-    if let Some(format) = Format::of(&read(0, recognise::MAGIC)?) {
+    if let Some(format) = Format::of_magic(&read(0, LONGEST_MAGIC)?) {
         return Ok(format);
     }
     let last = file.len.saturating_sub(recognise::LAST as u64);

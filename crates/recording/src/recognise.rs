@@ -1,4 +1,4 @@
-//! First bytes of an input -> which recording it is, and for those that are not read, the way in. Pure.
+//! First and last bytes of an input that is not read -> what it is, and the way in. Pure.
 //!
 //! A stage of its own because the name of a file says little: logs come as `.log`, `.bin`, `.dat`, or packed.
 //! What is known but not read is told with the command that makes something of it that is.
@@ -8,47 +8,8 @@ mod zip;
 /// How many of a file's first bytes are looked at. Of a stream eight are enough for most.
 pub const FIRST: usize = 1024;
 
-/// How many of an input's first bytes tell what is read.
-pub const MAGIC: usize = 13;
-
 /// How many of its last bytes tell what an archive holds.
 pub const LAST: usize = 64 << 10;
-
-/// A format that is read by messages on channels.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub enum Format {
-    /// MCAP.
-    #[default]
-    Mcap,
-    /// ULog, the log of PX4.
-    Ulog,
-    /// A bag of ROS 1.
-    Bag,
-}
-
-impl Format {
-    /// The format of an input that begins with these bytes, [`MAGIC`] of them.
-    #[must_use]
-    pub fn of(first: &[u8]) -> Option<Format> {
-        if first.starts_with(&crate::mcap::MAGIC) {
-            return Some(Format::Mcap);
-        }
-        if first.starts_with(&crate::ulog::MAGIC) {
-            return Some(Format::Ulog);
-        }
-        first.starts_with(&crate::bag::MAGIC).then_some(Format::Bag)
-    }
-
-    /// What people call it.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Format::Mcap => "MCAP",
-            Format::Ulog => "ULog",
-            Format::Bag => "ROS 1 bag",
-        }
-    }
-}
 
 /// A known format that is not read.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -274,12 +235,6 @@ fn of(name: &'static str, way_in: &str) -> Option<Foreign> {
 
 /// Text that is no lines of objects.
 fn text(first: &[u8]) -> Option<Foreign> {
-    if first.trim_ascii_start().starts_with(b"[") {
-        return of(
-            "one JSON array",
-            "jq -c '.[]' FILE > log.ndjson makes a line of each element",
-        );
-    }
     is_table(first).then_some(())?;
     of(
         "a table of text",
@@ -352,7 +307,6 @@ mod tests {
         .concat();
         assert_eq!(name(&tlog), Some("a MAVLink telemetry log (.tlog)"));
         assert!(name(b"\n <!DOCTYPE HTML><p>").unwrap().contains("web page"));
-        assert_eq!(name(b"[{\"gyro\":"), Some("one JSON array"));
         for table in [
             &b"time,gyro_x,gyro_y\n1,2,3"[..],
             b"\xef\xbb\xbf\"Time (s)\";\"Gyroscope x (rad/s)\";\"y\"\r\n",

@@ -13,7 +13,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use strapd_recording::format::Format;
 use strapd_recording::mcap::Survey;
-use strapd_recording::recognise::Format;
 
 /// Most other topics that are listed.
 const OTHERS: usize = 40;
@@ -73,7 +72,7 @@ impl Report<'_> {
         }
         let _ = writeln!(out);
         let format = self.input.format();
-        if format != Format::Mcap {
+        if matches!(format, Format::Lines | Format::Table) {
             let _ = writeln!(
                 out,
                 "          {} samples of {} sensors; {}",
@@ -94,12 +93,12 @@ impl Report<'_> {
             "          {} messages on {} topics; {}{}{}",
             survey.messages,
             survey.channels.len(),
-            match survey.facts.format {
+            match format {
                 Format::Mcap if chunks.is_empty() => "no chunks".to_owned(),
                 Format::Mcap => format!("chunks: {}", chunks.join(", ")),
                 other => other.name().to_owned(),
             },
-            if survey.has_summary || survey.facts.format != Format::Mcap {
+            if survey.has_summary || format != Format::Mcap {
                 ""
             } else {
                 "; no summary section"

@@ -9,7 +9,7 @@ use super::input::Tape;
 use super::problem::Problems;
 use super::scan::{Besides, Facts, Item, Scanner};
 use super::{Payload, Reader};
-use crate::recognise::Format;
+use crate::format::Format;
 use std::io;
 
 /// The walk over an input, by its format.
@@ -28,9 +28,12 @@ impl Container {
             format,
         } = reader;
         match format {
-            Format::Mcap => Container::Mcap(Box::new(Scanner::new(input, limits, besides))),
             Format::Ulog => Container::Ulog(Box::new(ulog::Scanner::new(input))),
             Format::Bag => Container::Bag(Box::new(bag::Scanner::new(input, limits))),
+            // Text is not opened here.
+            Format::Mcap | Format::Lines | Format::Table => {
+                Container::Mcap(Box::new(Scanner::new(input, limits, besides)))
+            }
         }
     }
 

@@ -13,7 +13,7 @@ use super::input::{Held, Input, Tape};
 use super::problem::{ProblemKind, Problems};
 use super::record::{MAGIC, Record, op};
 use super::resync;
-use crate::recognise::Format;
+use crate::format::Format;
 use std::collections::BTreeMap;
 use std::io;
 

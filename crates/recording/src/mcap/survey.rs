@@ -15,7 +15,7 @@ use super::summary::{self, Summary};
 use super::walk::{WalkOptions, walk};
 use super::{Reader, read_error};
 use crate::error::{Error, Result};
-use crate::recognise::Format;
+use crate::format::Format;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -84,7 +84,7 @@ pub fn survey(reader: &Reader, options: &WalkOptions<'_>) -> Result<Survey> {
     };
     let found = match reader.format {
         Format::Mcap => summary::read(file, reader.limits),
-        Format::Ulog | Format::Bag => Ok(Ok(None)),
+        _ => Ok(Ok(None)),
     };
     let found = found.map_err(|e| read_error(&file.path, 0, e))?;
     if let Ok(Some(summary)) = found
@@ -189,8 +189,8 @@ pub(super) fn fallback(
     };
     match reader.format {
         Format::Mcap => {}
-        Format::Ulog => return Ok(Default::default()),
         Format::Bag => return Ok((false, container::bag::definitions(file, reader.limits)?)),
+        _ => return Ok(Default::default()),
     }
     match summary::read(file, reader.limits)? {
         Ok(Some(summary)) => Ok((true, summary.definitions)),

@@ -9,8 +9,8 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use strapd_attitude::record::{Nanos, RawSample, SampleKind};
 use strapd_recording::decode::{Channel, Decoder, Options, role};
+use strapd_recording::format::Format;
 use strapd_recording::mcap::{Message, ProblemKind, Reader, WalkOptions, WalkReport, walk};
-use strapd_recording::recognise::Format;
 
 fn fixture(name: &str) -> PathBuf {
     PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures")).join(name)

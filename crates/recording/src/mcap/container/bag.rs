@@ -13,7 +13,7 @@ use super::super::record::op as record_op;
 use super::super::scan::{Facts, Item};
 use super::super::transcript::Transcript;
 use crate::bag::{self, Head, op};
-use crate::recognise::Format;
+use crate::format::Format;
 use std::io;
 use std::sync::Arc;
 

@@ -8,7 +8,7 @@ use super::super::problem::{ProblemKind, Problems};
 use super::super::record::op;
 use super::super::scan::{Facts, Item};
 use super::super::transcript::Transcript;
-use crate::recognise::Format;
+use crate::format::Format;
 use crate::ulog::{Fault, FaultKind, Step, Transcriber};
 use std::io;
 
