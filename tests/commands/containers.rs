@@ -73,7 +73,7 @@ fn a_flight_of_px4_is_looked_at_replayed_and_held_against_its_own_attitude() {
     let run = summary.get(0).unwrap_or(&summary);
     let topic = &run["topics"][0];
     assert_eq!(topic["topic"], "sensor_combined", "{topic:#}");
-    assert_eq!(topic["samples"]["in"], 3627, "{topic:#}");
+    assert_eq!(topic["samples"]["total"], 3627, "{topic:#}");
     assert_eq!(topic["sample_kind"], "average", "{topic:#}");
     // PX4's filter and the gyro alone agree over a second to some tenths of a degree: axes, units and the order of the
     // quaternion are right. With any of them wrong it is tens of degrees.
@@ -127,7 +127,7 @@ fn a_log_cut_short_gives_what_came_before_the_cut_says_so_and_exits_with_3() {
         let summary: serde_json::Value = serde_json::from_str(&lossy(&ran).out).unwrap();
         let run = summary.get(0).unwrap_or(&summary);
         assert!(
-            run["topics"][0]["samples"]["in"].as_u64() > Some(samples),
+            run["topics"][0]["samples"]["total"].as_u64() > Some(samples),
             "{run:#}"
         );
         assert!(run.to_string().contains("the file is cut"), "{run:#}");

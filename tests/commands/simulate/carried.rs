@@ -42,7 +42,11 @@ fn a_lever_arm_and_the_sampling_of_the_force_change_the_force_alone() {
         let rows: Vec<Vec<f64>> = text
             .lines()
             .skip(1)
-            .map(|l| l.split(',').map(|v| v.parse().unwrap()).collect())
+            .map(|l| {
+                // The last column is a word.
+                let numbers = l.rsplit_once(',').unwrap().0;
+                numbers.split(',').map(|v| v.parse().unwrap()).collect()
+            })
             .collect();
         assert_eq!(rows.len(), 600);
         rows
