@@ -158,8 +158,10 @@ pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
     for problem in problems(&survey) {
         tracing::warn!("{}: {problem}", log.name().display());
     }
-    if undecodable > 0 || survey.problems.losses() > 0 {
+    if undecodable > 0 {
         tracing::warn!("{undecodable} payloads could not be decoded");
+    }
+    if undecodable > 0 || survey.problems.losses() > 0 {
         return Ok(Outcome::Lossy);
     }
     Ok(Outcome::Done)
