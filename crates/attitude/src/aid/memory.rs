@@ -176,6 +176,7 @@ impl Memory {
             && self.nominal >= 0.0
             && self.interval.secs >= 0.0
             && self.given.len() <= MOST_GIVEN
+            && self.rest.is_bounded()
             && beside.into_iter().all(Beside::is_bounded)
     }
 }

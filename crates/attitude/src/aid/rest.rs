@@ -2,7 +2,10 @@
 
 use super::settings::Settings;
 use nalgebra::Vector3;
+use std::collections::VecDeque;
 
+/// Intervals whose rest is not certain.
+const MOST_OPEN: usize = 64;
 /// Time constant of the means that deviations are from, s.
 const MEAN_SECS: f64 = 0.5;
 
@@ -14,6 +17,8 @@ pub(super) struct Rest {
     force: Vector3<f64>,
     /// How long all has been quiet, s.
     quiet: f64,
+    /// Mean rates (rad/s) and lengths (s) of the last intervals at rest, whose end is not known yet.
+    open: VecDeque<(Vector3<f64>, f64)>,
 }
 
 impl Rest {
@@ -22,6 +27,7 @@ impl Rest {
             rate: Vector3::zeros(),
             force,
             quiet: 0.0,
+            open: VecDeque::new(),
         }
     }
 
@@ -56,6 +62,30 @@ impl Rest {
     /// A pause: what was before it says nothing.
     pub(super) fn interrupt(&mut self) {
         self.quiet = 0.0;
+        self.open.clear();
+    }
+
+    /// The mean rate over an interval at rest, and of the intervals before it that over which rest is certain by
+    /// now, with its length: the body has rested on for long enough since.
+    pub(super) fn certain(
+        &mut self,
+        mean: Vector3<f64>,
+        secs: f64,
+        settings: &Settings,
+    ) -> Option<(Vector3<f64>, f64)> {
+        self.open.push_back((mean, secs));
+        let waiting: f64 = self.open.iter().map(|(_, secs)| secs).sum();
+        (waiting > settings.rest_lag).then(|| self.open.pop_front())?
+    }
+
+    /// It moves: what was quiet just before may have been the beginning of it.
+    pub(super) fn moves(&mut self) {
+        self.open.clear();
+    }
+
+    /// Whether it can have come about.
+    pub(super) fn is_bounded(&self) -> bool {
+        self.open.len() <= MOST_OPEN
     }
 
     pub(super) fn is_quiet(&self, settings: &Settings) -> bool {

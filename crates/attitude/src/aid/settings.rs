@@ -58,6 +58,9 @@ pub struct Settings {
     pub update_secs: f64,
     /// How long all must be quiet to be at rest, s.
     pub rest_secs: f64,
+    /// What was measured at rest counts once the body has rested on for so long, s: a motion that sets in slowly
+    /// is quiet at first, and what the gyro reads of it is no bias.
+    pub rest_lag: f64,
     /// Largest deviation of the rate at rest, rad/s.
     pub rest_gyro: f64,
     /// Largest deviation of the force at rest, m/s^2.
@@ -123,14 +126,15 @@ impl Default for Settings {
             force_floor: 1e-4,
             force_start: 1e-2,
             force_secs: 9.0,
-            force_instant: 0.4,
+            force_instant: 0.8,
             force_vertical: 0.1,
             colour: 0.8,
             update_secs: 0.1,
             rest_secs: 1.5,
+            rest_lag: 0.5,
             rest_gyro: 0.0349,
             rest_force: 0.5,
-            rest_rate: 0.008_73,
+            rest_rate: 0.002,
             rest_beside_bias: true,
             rest_noise: 1e-4,
             gravity: 9.81,

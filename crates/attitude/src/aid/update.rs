@@ -42,15 +42,19 @@ impl Filter {
             // What the gyro reads of a world that turns is no bias.
             let of_world = self.interval.attitude.transpose() * self.world_rate;
             let mean = (self.interval.rate - of_world) / secs;
-            for axis in 0..3 {
-                let innovation = mean[axis] - self.calibration.bias[axis];
-                self.covariance.measure(
-                    &[(BIAS + axis, 1.0)],
-                    innovation,
-                    settings.rest_noise.powi(2) / secs,
-                    &mut correction,
-                );
+            if let Some((mean, secs)) = self.rest.certain(mean, secs, &settings) {
+                for axis in 0..3 {
+                    let innovation = mean[axis] - self.calibration.bias[axis];
+                    self.covariance.measure(
+                        &[(BIAS + axis, 1.0)],
+                        innovation,
+                        settings.rest_noise.powi(2) / secs,
+                        &mut correction,
+                    );
+                }
             }
+        } else {
+            self.rest.moves();
         }
         if self.interval.fields > 0.0 {
             self.use_field(&mut correction);

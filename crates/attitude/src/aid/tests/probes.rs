@@ -287,3 +287,39 @@ fn a_clock_that_is_set_back_is_a_gap_of_unknown_length() {
     let sigma = aided.filter().calibration_sigma().bias;
     assert!(sigma.iter().all(|s| *s > 0.0 && *s < 8.7e-3), "{sigma}");
 }
+
+/// A perfect gyro at rest for 10 s, then turned about the vertical, faster by a degree a second each second.
+fn bias_after_a_slow_start(settings: Settings) -> f64 {
+    let propagation = propagate::Settings::default();
+    let mut aided = Aided::new(propagation, settings, Start::Level).unwrap();
+    let mut out = Vec::new();
+    for i in 0..1300_i64 {
+        let rate = 0.02 * (i as f64 * 0.01 - 10.0).max(0.0);
+        let sample = RateSample {
+            stamp: Nanos(i * 10_000_000),
+            start: Nanos(i * 10_000_000),
+            value: Vector3::z() * rate,
+            accel: Some(Vector3::z() * 9.81),
+            join: if i == 0 {
+                Join::Start
+            } else {
+                Join::Continuous
+            },
+            status: Status::OK,
+            log: Nanos(i * 10_000_000),
+        };
+        aided.push(&[sample], &mut out);
+    }
+    aided.filter().calibration().bias.norm()
+}
+
+#[test]
+fn a_motion_that_sets_in_slowly_is_no_bias() {
+    let lagging = bias_after_a_slow_start(Settings::default());
+    assert!(lagging < 2e-5, "{lagging}");
+    let at_once = bias_after_a_slow_start(Settings {
+        rest_lag: 0.0,
+        ..Settings::default()
+    });
+    assert!(at_once > 1e-3, "{at_once}");
+}
