@@ -62,14 +62,6 @@ pub struct LogChannel {
 }
 
 impl Log {
-    /// Opens and surveys what a command line names.
-    ///
-    /// # Errors
-    /// It can not be opened or read, or is no recording.
-    pub fn open(path: &Path, pool: &Pool) -> Result<Log> {
-        Log::of(&Input::open(path)?, &Options::default(), pool)
-    }
-
     /// Surveys a recording.
     ///
     /// # Errors

@@ -38,6 +38,10 @@ fn several(dir: &Path, topics: usize, samples: usize) -> PathBuf {
     path
 }
 
+fn surveyed(path: &Path, pool: &Pool) -> Log {
+    Log::of(&Input::open(path).unwrap(), &Options::default(), pool).unwrap()
+}
+
 fn checked(path: &Path, named: Option<&str>) -> Checked {
     check(
         &Input::open(path).unwrap(),
@@ -141,7 +145,7 @@ fn beyond_256_topics_the_rest_is_named_and_counted() {
     assert!(left_out.what.starts_with("44 more topics"), "{left_out:?}");
     assert_eq!(left_out.evidence["topics"].as_array().unwrap().len(), 44);
     let pool = Pool::new(2).unwrap();
-    let log = Log::open(&path, &pool).unwrap();
+    let log = surveyed(&path, &pool);
     let looks = look(&log, Some("/body299/imu"), &Options::default(), &pool).unwrap();
     assert_eq!((looks.topics.len(), looks.left_out.len()), (256, 44));
     assert!(looks.topics.iter().any(|l| l.topic == "/body299/imu"));
@@ -194,7 +198,7 @@ fn a_schema_of_many_channels_is_compiled_once_and_all_schemas_within_a_bound() {
         (0..2_000).map(|n| (format!("/t{n}"), spelled_out(0))),
     );
     let start = Instant::now();
-    let log = Log::open(&path, &pool).unwrap();
+    let log = surveyed(&path, &pool);
     assert!(log.channels.iter().all(|k| k.role.has_rate));
     eprintln!("one schema: {:?}", start.elapsed());
     assert!(
@@ -208,7 +212,7 @@ fn a_schema_of_many_channels_is_compiled_once_and_all_schemas_within_a_bound() {
         (0..2_000).map(|n| (format!("/t{n}"), spelled_out(n))),
     );
     let start = Instant::now();
-    let log = Log::open(&path, &pool).unwrap();
+    let log = surveyed(&path, &pool);
     let understood = log.channels.iter().filter(|k| k.role.has_rate).count();
     eprintln!("{understood} of 2000 schemas: {:?}", start.elapsed());
     assert!(

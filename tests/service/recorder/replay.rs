@@ -7,6 +7,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use strapd::config::Selection;
 use strapd::pipeline::channel_route::{Item, Route};
+use strapd::pipeline::input::Input;
 use strapd::pipeline::log::Log;
 use strapd::pipeline::replay::run;
 use strapd::pipeline::request::{ReplayRequest, Source};
@@ -15,12 +16,18 @@ use strapd::sink::Compression;
 use strapd::sink::{Options, Target};
 use strapd_attitude::estimate::Plan;
 use strapd_attitude::record::RawSample;
+use strapd_recording::decode;
 use strapd_recording::mcap::{WalkOptions, walk};
 use strapd_recording::pool::Pool;
 
 /// The samples of a fixture, decoded as `replay` decodes them.
 fn samples(path: &Path) -> Vec<RawSample> {
-    let log = Log::open(path, &Pool::new(1).unwrap()).unwrap();
+    let log = Log::of(
+        &Input::open(path).unwrap(),
+        &decode::Options::default(),
+        &Pool::new(1).unwrap(),
+    )
+    .unwrap();
     let topic = log.choose(path, None).unwrap().topics.remove(0);
     let known = log
         .channels
