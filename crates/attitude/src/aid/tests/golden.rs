@@ -231,6 +231,7 @@ fn the_golden_case_with_coloured_residuals_comes_out_to_all_its_digits() {
         // From before what simulated motions asked for.
         let settings = Settings {
             rest_rate: 0.008_73,
+            colour: 0.8,
             force_instant: 0.4,
             rest_lag: 0.0,
             ..Settings::default()
