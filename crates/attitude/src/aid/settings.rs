@@ -128,7 +128,7 @@ impl Default for Settings {
             force_secs: 9.0,
             force_instant: 0.8,
             force_vertical: 0.1,
-            colour: 1.2,
+            colour: 0.8,
             update_secs: 0.1,
             rest_secs: 1.5,
             rest_lag: 0.5,
