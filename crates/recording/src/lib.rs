@@ -9,7 +9,7 @@
 //! | module | arrow | |
 //! |---|---|---|
 //! | [`mcap`] | MCAP logs, whole or damaged -> messages in a stable order | I/O |
-//! | [`format`] | first bytes and name -> which format | pure |
+//! | [`mod@format`] | first bytes and name -> which format | pure |
 //! | [`lines`] | lines of JSON, rows of a table -> what each holds | I/O |
 //! | [`attitude_line`] | a line that says an attitude -> numbers | pure |
 //! | [`table`] | rows of strapd's own CSV -> raw samples | pure |

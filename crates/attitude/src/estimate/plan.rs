@@ -50,7 +50,7 @@ pub struct Plan {
     pub aid: Aid,
     /// `--accel-sign`: the accelerometer says down at rest, not up.
     pub is_accel_kinematic: bool,
-    /// Specific forces come by [`Estimator::take_force`](super::Estimator::take_force), not with the rates.
+    /// Specific forces come by [`Estimator::take_beside`](super::Estimator::take_beside), not with the rates.
     pub has_forces_beside: bool,
     /// `--mag-mount`: magnetometer to body, `[w, x, y, z]`; `None` = as the gyro.
     pub mag_mount: Option<[f64; 4]>,
