@@ -10,7 +10,7 @@ same samples, and compared with the truth from 5 s on. Without a magnetometer he
 sample. Error e = q_est q_true* in earth axes: tilt 2 acos sqrt(w^2 + z^2), heading 2 atan z/w; mean of the size and root
 mean square over all samples of all runs, degrees. Coverage: share of the errors about the world's x and y (tilt) and z
 (heading) within three times the sigma of the same row. NEES: e^T P^-1 e over its degrees of freedom, mean over all
-samples: 1 where sigma is right, less where it is too large. Needs numpy, mcap; vqf for the peer.
+samples: 1 where sigma is right, less where it is too large. Needs numpy, mcap, mcap-ros2-support; vqf for the peer.
 """
 
 import argparse
@@ -23,6 +23,8 @@ import tempfile
 
 import numpy as np
 from mcap.reader import make_reader
+
+from broad import product
 
 MOTIONS = [
     "walking --worn waist",
@@ -56,20 +58,6 @@ def numbers(path, topic, count):
             stamps.append(sec * 10**9 + nsec)
             rows.append(struct.unpack_from(f"<{count}d", data, at))
     return np.array(stamps), np.array(rows).reshape(-1, count)
-
-
-def product(a, b):
-    aw, ax, ay, az = a.T
-    bw, bx, by, bz = b.T
-    return np.stack(
-        [
-            aw * bw - ax * bx - ay * by - az * bz,
-            aw * bx + ax * bw + ay * bz - az * by,
-            aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw,
-        ],
-        axis=1,
-    )
 
 
 CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])

@@ -276,6 +276,26 @@ impl Estimation {
     /// # Errors
     /// [`Error::Usage`] naming the flag, for anything that can be judged without the data.
     pub fn plan(&self) -> Result<Plan> {
+        for (flag, topic, is_used, help) in [
+            (
+                "--accel-topic",
+                &self.accel_topic,
+                self.aid != AidArg::None,
+                "gravity",
+            ),
+            (
+                "--mag-topic",
+                &self.mag_topic,
+                self.aid == AidArg::GravityAndMag,
+                "gravity+mag",
+            ),
+        ] {
+            if topic.is_some() && !is_used {
+                return Err(Error::Usage(format!(
+                    "{flag}: nothing is taken from it with this --aid\n  help: --aid {help}"
+                )));
+            }
+        }
         let usage = |flag: &str, e: &dyn std::fmt::Display| Error::Usage(format!("{flag}: {e}"));
         let clock = match (self.time, self.rate_hz) {
             (TimeArg::Header, _) => Clock::Header,
@@ -362,6 +382,16 @@ impl Estimation {
                 "--topic: a sensor is named by `id` in its samples, and chosen with WATCH"
                     .to_owned(),
             ));
+        }
+        for (flag, topic) in [
+            ("--accel-topic", &self.accel_topic),
+            ("--mag-topic", &self.mag_topic),
+        ] {
+            if topic.is_some() {
+                return Err(Error::Usage(format!(
+                    "{flag}: samples over a socket have no topics\n  help: `accel` and `mag` stand beside `gyro` in a sample"
+                )));
+            }
         }
         self.plan()
     }

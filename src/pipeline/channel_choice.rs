@@ -146,7 +146,7 @@ pub(super) fn besides(
 ) -> Result<Besides> {
     let asked = run.selection.accel.as_ref().or(run.selection.mag.as_ref());
     let [one] = chosen else {
-        if let Some(asked) = asked {
+        if let Some(asked) = asked.filter(|_| !chosen.is_empty()) {
             return Err(Error::Usage(format!(
                 "{} could belong to any of {} topics\n  help: --topic NAME takes one of them",
                 strapd_recording::text::printable(&asked.topic),

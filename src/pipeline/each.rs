@@ -4,7 +4,6 @@
 //! keep the others from being told about), and a log may have hundreds: a pass for each would cost the
 //! square of its size.
 
-use super::beside::Besides;
 use super::channel_choice::{Chosen, besides, choose_each, reference, route};
 use super::check::Drawing;
 use super::decoders::Decoders;
@@ -90,10 +89,7 @@ pub(super) fn each(
             }
         }
     }
-    let besides = match kept.as_mut_slice() {
-        [_] => besides(run, path, log, &mut kept)?,
-        _ => Besides::default(),
-    };
+    let besides = besides(run, path, log, &mut kept)?;
     let together = topics.len();
     for (topic, chosen) in topics.iter_mut().zip(&kept) {
         if let Some(against) = &mut topic.against {

@@ -7,7 +7,7 @@
 use super::lines;
 use super::request::Source;
 use crate::error::{Error, Result};
-use std::fs::{File, OpenOptions};
+use std::fs::File;
 use std::io::{Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -49,7 +49,7 @@ impl Input {
 
     fn keep(source: Source, mut from: impl Read) -> Result<Input> {
         let name = source.name();
-        let mut file = nameless().map_err(|e| no_room(&name, &e))?;
+        let mut file = tempfile::tempfile().map_err(|e| no_room(&name, &e))?;
         let mut block = vec![0; 1 << 18];
         let mut head = Vec::new();
         let mut have = 0;
@@ -170,27 +170,6 @@ pub(super) fn recognised(path: &Path) -> Result<Format> {
 /// Whether a path names what can be read only once: a named pipe, a shell's `<(...)`, a device.
 pub(super) fn is_pipe(path: &Path) -> bool {
     std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
-}
-
-/// A file that nobody else can open, and that is gone when it is closed.
-fn nameless() -> std::io::Result<File> {
-    let folder = std::env::temp_dir();
-    let mut options = OpenOptions::new();
-    options.read(true).write(true).create_new(true);
-    #[cfg(unix)]
-    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
-    for attempt in 0..100 {
-        let path = folder.join(format!("strapd-{}-{attempt}.input", std::process::id()));
-        match options.open(&path) {
-            Ok(file) => {
-                std::fs::remove_file(&path)?;
-                return Ok(file);
-            }
-            Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => {}
-            Err(e) => return Err(e),
-        }
-    }
-    Err(std::io::ErrorKind::AlreadyExists.into())
 }
 
 fn no_room(name: &Path, why: &std::io::Error) -> Error {

@@ -494,7 +494,7 @@ pub fn nanos(time: u64) -> Nanos {
 }
 
 /// Bytes on their way at once through a walk to the end.
-pub const AHEAD: usize = 32 << 20;
+pub const AHEAD: usize = WalkOptions::IN_FLIGHT;
 /// The same for a walk that usually ends at once.
 pub const A_LITTLE_AHEAD: usize = 4 << 20;
 

@@ -333,6 +333,14 @@ fn without_a_field_or_where_it_belongs_to_nothing_it_is_said() {
     assert!(ran.done().out.contains("NO FIELD"), "{}", ran.out);
     for (flags, words) in [
         (
+            "--aid none --accel-topic /a",
+            ["--accel-topic", "--aid gravity"],
+        ),
+        (
+            "--aid gravity --mag-topic /m",
+            ["--mag-topic", "--aid gravity+mag"],
+        ),
+        (
             "--aid gravity --declination 3",
             ["--declination", "gravity+mag"],
         ),

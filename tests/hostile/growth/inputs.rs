@@ -380,7 +380,8 @@ pub(crate) const CASES: &[Case] = cases! {
         "log: logs joined": |n| records(n, |_| [record(op::DATA_END, &[0; 4]), record(op::FOOTER, &[0; 20]), MAGIC.to_vec(), MAGIC.to_vec()].concat());
         "log: nothing but heads of chunks": |n| records(n, |_| vec![op::CHUNK; 9]);
         "log: garbage": |n| records(n, |_| vec![0x55; 9]);
-        "ULog: garbage": |n| ulog(n, |_| vec![0x55; 9]);
+        // The length it claims is shorter than any input: one between two of them costs a second look from there on.
+        "ULog: garbage": |n| ulog(n, |_| vec![5; 9]);
         "ULog: zeros": |n| ulog(n, |_| vec![0; 9]);
         "ULog: messages nothing defines": |n| ulog(n, |k| ulog_record(b'D', &[k as u8, 0, 1, 2, 3]));
         "ULog: two records, then none": |n| ulog(n, |_| [ulog_record(b'R', &[0; 2]), ulog_record(b'R', &[0; 2]), vec![0xff; 5]].concat());

@@ -134,10 +134,14 @@ impl Covariance {
     #[inline(always)]
     pub(crate) fn advance(&mut self, turn: [f64; 4], secs: f64) {
         self.alike += self.alike_arw * secs;
+        if self.kind == Kind::Alike && !self.is_distorted {
+            return;
+        }
+        let transition = Transition::of(turn);
         match self.kind {
             Kind::Alike => {}
             Kind::ConstantBias => {
-                let Transition { back, mean } = Transition::of(turn);
+                let Transition { back, mean } = transition;
                 let mut turned = product(&back, &self.turned);
                 for i in 0..3 {
                     for j in 0..3 {
@@ -146,21 +150,20 @@ impl Covariance {
                 }
                 self.turned = turned;
             }
-            Kind::Wandering => self.wander(turn, secs),
+            Kind::Wandering => self.wander(&transition, secs),
         }
         if self.is_distorted {
-            self.distort(turn);
+            self.distort(&transition, turn);
         }
     }
 
     /// What errors of scale and axes do to a turn.
-    fn distort(&mut self, turn: [f64; 4]) {
-        let Transition { back, mean } = Transition::of(turn);
+    fn distort(&mut self, Transition { back, mean }: &Transition, turn: [f64; 4]) {
         // The rotation vector: twice the sine of its half is 4 % short of it at a rad, which sigma does not show.
         let [_, x, y, z] = turn;
         for (distorted, component) in self.distorted.iter_mut().zip([x, y, z]) {
-            let mut next = product(&back, distorted);
-            for (row, mean) in next.iter_mut().zip(&mean) {
+            let mut next = product(back, distorted);
+            for (row, mean) in next.iter_mut().zip(mean) {
                 for (entry, mean) in row.iter_mut().zip(mean) {
                     *entry += 2.0 * component * mean;
                 }
@@ -184,8 +187,7 @@ impl Covariance {
         sum
     }
 
-    fn wander(&mut self, turn: [f64; 4], secs: f64) {
-        let Transition { back, mean } = Transition::of(turn);
+    fn wander(&mut self, Transition { back, mean }: &Transition, secs: f64) {
         let step = mean.map(|row| row.map(|m| m * secs));
         let Wander {
             alpha,
@@ -197,8 +199,8 @@ impl Covariance {
         let driven = self.noise.rrw.map(|k| k * k * secs);
         let axis = |f: &dyn Fn(usize) -> f64| [f(0), f(1), f(2)];
 
-        let before = congruent(&back, &self.halfway(secs));
-        let carried = product(&back, &self.cross);
+        let before = congruent(back, &self.halfway(secs));
+        let carried = product(back, &self.cross);
         let swept = columns_times(
             &step,
             axis(&|i| 0.5 * (held * held * self.bias[i] + driven[i] * own_attitude)),

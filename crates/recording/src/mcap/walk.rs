@@ -44,11 +44,16 @@ pub struct WalkOptions<'p> {
     pub order: Order,
 }
 
+impl WalkOptions<'_> {
+    /// [`WalkOptions::in_flight`] where a log is read to its end.
+    pub const IN_FLIGHT: usize = 32 << 20;
+}
+
 impl Default for WalkOptions<'_> {
     fn default() -> Self {
         WalkOptions {
             pool: None,
-            in_flight: 32 << 20,
+            in_flight: WalkOptions::IN_FLIGHT,
             hand_over: 256 << 10,
             batch: 1024,
             lookahead: Lookahead::default(),
