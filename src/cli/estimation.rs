@@ -144,7 +144,7 @@ pub struct Estimation {
     /// Use a gyro whose covariance is marked -1 (absent) all the same: some drivers set it wrongly
     #[arg(long)]
     pub ignore_covariance_flag: bool,
-    /// Noise for the covariance: consumer, industrial, tactical, navigation, or a list
+    /// Class of the sensor: consumer, uncalibrated, industrial, tactical, navigation, or a list
     ///
     /// arw=RAD_PER_SQRT_S and any of bias-instability=RAD_S, rrw=RAD_S_PER_SQRT_S, turn-on-bias=RAD_S and
     /// initial=RAD, with commas between; each one number, or three x/y/z for the body axes. The turn-on bias counts unless a bias is removed

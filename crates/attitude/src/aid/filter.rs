@@ -89,6 +89,8 @@ pub struct Filter {
     pub(super) rest: Rest,
     pub(super) residuals: Residuals,
     pub(super) mean_acceleration: Vector3<f64>,
+    /// The vertical in the interval before, body axes.
+    pub(super) last_up: Option<Vector3<f64>>,
     pub(super) surroundings: Surroundings,
     /// A gap has been too long for the tilt to be known.
     pub(super) wants_level: bool,
@@ -127,6 +129,7 @@ impl Filter {
             rest: Rest::new(Vector3::zeros()),
             residuals: Residuals::new(&settings),
             mean_acceleration: Vector3::zeros(),
+            last_up: None,
             surroundings: Surroundings::default(),
             wants_level: false,
             nominal: 0.0,

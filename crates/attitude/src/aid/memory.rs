@@ -48,6 +48,7 @@ pub struct Memory {
     rest: Rest,
     residuals: Residuals,
     mean_acceleration: Vector3<f64>,
+    last_up: Option<Vector3<f64>>,
     surroundings: Surroundings,
     wants_level: bool,
     nominal: f64,
@@ -83,6 +84,7 @@ impl Aided {
             rest: filter.rest.clone(),
             residuals: filter.residuals.clone(),
             mean_acceleration: filter.mean_acceleration,
+            last_up: filter.last_up,
             surroundings: filter.surroundings.clone(),
             wants_level: filter.wants_level,
             nominal: filter.nominal,
@@ -123,6 +125,7 @@ impl Aided {
             rest: memory.rest,
             residuals: memory.residuals,
             mean_acceleration: memory.mean_acceleration,
+            last_up: memory.last_up,
             surroundings: memory.surroundings,
             wants_level: memory.wants_level,
             nominal: memory.nominal,
@@ -159,6 +162,7 @@ impl Memory {
             self.mean_acceleration,
             self.last_rate,
             self.last_force.unwrap_or_default(),
+            self.last_up.unwrap_or_default(),
         ];
         let mut numbers = scalars
             .into_iter()

@@ -8,6 +8,9 @@ pub struct Settings {
     pub gyro_noise: f64,
     /// Random walk of its bias, rad/s/sqrt(s).
     pub bias_walk: f64,
+    /// How much its bias may change when the vertical moves through the body by 1, as when gravity changes by 1 g
+    /// along an axis, rad/s: proof masses have weight.
+    pub bias_by_tilt: f64,
     /// Noise in proportion to the rate: what three scales and three angles do not describe.
     pub rate_noise: f64,
     /// Prior sigma of the gyro's bias, rad/s. Of a sensor just switched on; smaller is better for a vehicle that
@@ -107,6 +110,7 @@ impl Default for Settings {
         Settings {
             gyro_noise: 1e-4,
             bias_walk: 1.5e-4,
+            bias_by_tilt: 2e-4,
             rate_noise: 7e-5,
             bias_prior: 0.02,
             scale_prior: 4e-3,
@@ -128,7 +132,7 @@ impl Default for Settings {
             force_secs: 9.0,
             force_instant: 0.8,
             force_vertical: 0.1,
-            colour: 0.8,
+            colour: 1.1,
             update_secs: 0.1,
             rest_secs: 1.5,
             rest_lag: 0.5,

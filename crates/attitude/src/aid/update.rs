@@ -121,9 +121,12 @@ impl Filter {
         let turned = settings.rate_noise.powi(2) * self.interval.turned_squared() / 9.0;
         self.covariance
             .add_to_attitude(settings.gyro_noise.powi(2) * secs + turned);
+        let up = self.interval.attitude.row(2).transpose() / secs;
+        let tilted = self.last_up.map_or(0.0, |last| (up - last).norm_squared());
+        self.last_up = Some(up);
+        let bias = settings.bias_walk.powi(2) * secs + settings.bias_by_tilt.powi(2) * tilted;
         for axis in 0..3 {
-            self.covariance
-                .add(BIAS + axis, settings.bias_walk.powi(2) * secs);
+            self.covariance.add(BIAS + axis, bias);
             self.covariance
                 .add(FORCE_BIAS + axis, settings.force_bias_walk.powi(2) * secs);
         }

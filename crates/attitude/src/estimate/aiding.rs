@@ -157,6 +157,10 @@ impl Aiding {
                 ),
                 (&mut settings.scale_prior, plan.noise.scale),
                 (&mut settings.cross_prior, plan.noise.misalignment),
+                (
+                    &mut settings.force_bias_prior,
+                    plan.noise.tilt * STANDARD_GRAVITY,
+                ),
             ] {
                 if known > 0.0 {
                     *prior = known;

@@ -294,9 +294,10 @@ pub struct NoisePreset {
 /// The named classes. One standard deviation is a third of a data sheet's limit, or its typical value.
 ///
 /// Sources: `docs/theory/attitude.md` 9 (Bosch BMI088: offset 1 deg/s, sensitivity 1 %, cross-axis 1 %, accelerometer
-/// offset 20 mg; ADIS16465: repeatability 0.14 deg/s, sensitivity 0.25 %, misalignment 0.25 deg, 1.4 mg; STIM300: 10 deg/h,
+/// offset 20 mg; `uncalibrated`, a cheap chip on a board that nobody has measured: InvenSense MPU-6050, scale 3 %,
+/// cross-axis 2 %, offset 50 mg, and 1 degree to its case; ADIS16465: repeatability 0.14 deg/s, sensitivity 0.25 %, misalignment 0.25 deg, 1.4 mg; STIM300: 10 deg/h,
 /// 500 ppm, 1 mrad, 0.75 mg; HG9900 class: 0.003 deg/h, 5 ppm, 10 urad, 25 ug).
-pub const NOISE_PRESETS: [NoisePreset; 4] = [
+pub const NOISE_PRESETS: [NoisePreset; 5] = [
     NoisePreset {
         name: "consumer",
         arw: 0.84,
@@ -304,6 +305,15 @@ pub const NOISE_PRESETS: [NoisePreset; 4] = [
         turn_on_bias: 1.0,
         scale: 5e-3,
         misalignment: 5e-3,
+        tilt: 0.02,
+    },
+    NoisePreset {
+        name: "uncalibrated",
+        arw: 0.84,
+        bias_instability: 10.0,
+        turn_on_bias: 2.0,
+        scale: 0.01,
+        misalignment: 0.012,
         tilt: 0.02,
     },
     NoisePreset {

@@ -22,6 +22,7 @@ pub(super) fn plain() -> Settings {
         rest_beside_bias: false,
         force_instant: 0.4,
         rest_lag: 0.0,
+        bias_by_tilt: 0.0,
         ..Settings::default()
     }
 }
@@ -234,6 +235,7 @@ fn the_golden_case_with_coloured_residuals_comes_out_to_all_its_digits() {
             colour: 0.8,
             force_instant: 0.4,
             rest_lag: 0.0,
+            bias_by_tilt: 0.0,
             ..Settings::default()
         };
         let worst = compare("golden_colour.txt", which, settings, [0, 1, 2, 3]);

@@ -323,3 +323,49 @@ fn a_motion_that_sets_in_slowly_is_no_bias() {
     });
     assert!(at_once > 1e-3, "{at_once}");
 }
+
+/// Largest sigma of the bias of a body that rested for 10 s and was then turned on its side within one.
+fn bias_sigma_on_the_side(settings: Settings) -> f64 {
+    let propagation = propagate::Settings::default();
+    let mut aided = Aided::new(propagation, settings, Start::Level).unwrap();
+    let mut out = Vec::new();
+    for i in 0..1100_i64 {
+        let roll = std::f64::consts::FRAC_PI_2 * (i as f64 * 0.01 - 10.0).max(0.0);
+        let sample = RateSample {
+            stamp: Nanos(i * 10_000_000),
+            start: Nanos(i * 10_000_000),
+            value: Vector3::x()
+                * if i < 1000 {
+                    0.0
+                } else {
+                    std::f64::consts::FRAC_PI_2
+                },
+            accel: Some(Vector3::new(0.0, roll.sin(), roll.cos()) * 9.81),
+            join: if i == 0 {
+                Join::Start
+            } else {
+                Join::Continuous
+            },
+            status: Status::OK,
+            log: Nanos(i * 10_000_000),
+        };
+        aided.push(&[sample], &mut out);
+    }
+    aided.filter().calibration_sigma().bias.max()
+}
+
+#[test]
+fn the_bias_of_one_side_is_not_wholly_that_of_another() {
+    let none = Settings {
+        bias_by_tilt: 0.0,
+        ..Settings::default()
+    };
+    let some = Settings {
+        bias_by_tilt: 1e-3,
+        ..Settings::default()
+    };
+    let [without, with] = [none, some].map(bias_sigma_on_the_side);
+    // Ten tenths of a second, in each of which the vertical moves by 0.157: 1e-3 * 0.157 * sqrt(10) beside what was known.
+    let more = (with * with - without * without).sqrt();
+    assert!((4e-4..6e-4).contains(&more), "{without} {with} {more}");
+}
