@@ -17,7 +17,7 @@
 pub mod attitude_track;
 pub mod audience;
 mod bare_stamps;
-mod beside;
+pub mod beside;
 mod channel_choice;
 pub mod channel_route;
 pub mod check;

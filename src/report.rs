@@ -1,11 +1,13 @@
 //! What a run says about itself, for people and for machines. Pure.
 
+pub mod against;
 pub mod aid;
 pub mod calendar;
 pub mod findings;
 pub mod page;
 pub mod plot;
 pub mod series;
+pub mod sigma;
 pub mod simulation;
 pub mod stamps;
 pub mod summary;

@@ -4,6 +4,7 @@ use super::{Global, Outcome, print};
 use crate::error::{Error, Result};
 use crate::pipeline::attitude_track::{self, Side};
 use crate::pipeline::input::Input;
+use crate::report::against;
 use crate::report::page::{STRETCHES, comparison_json};
 use crate::report::plot::{Axis, Chart, Look, Series};
 use crate::report::summary::significant;
@@ -14,7 +15,8 @@ use serde_json::Value;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use strapd_attitude::compare::{
-    Align, Comparison, ErrorStats, Errors, Stamped, compare, for_each_error,
+    Align, BiasFit, Comparison, Consistency, ErrorStats, Errors, Known, Stamped, compare,
+    consistency, fit_body_axes, fit_constant_bias, for_each_error,
 };
 use strapd_recording::pool::Pool;
 
@@ -42,7 +44,8 @@ pub struct Compare {
     #[arg(long, value_name = "NAME")]
     pub ref_topic: Option<String>,
     /// Constant rotation of the world to remove first: none, first (equal at the first common
-    /// instant), heading (about the vertical only), best (least squares)
+    /// instant), first-heading (the same, about the vertical only), heading (about the vertical, least
+    /// squares), best (least squares)
     #[arg(long, default_value = "first")]
     pub align: String,
     /// Fail (exit 4) when the largest total error exceeds this, in degrees
@@ -101,6 +104,7 @@ pub fn run(global: &Global, args: &Compare) -> Result<Outcome> {
     let Some(errors) = &result.errors else {
         return Err(no_match(args, &estimate, &reference));
     };
+    let told = Told::of(&estimate, (&estimated, &referred), align);
     if let Some(document) = plot {
         let chart = chart(&estimated, &referred, align, errors);
         document.write(&chart.svg().map_err(|e| Error::Unsupported {
@@ -114,10 +118,11 @@ pub fn run(global: &Global, args: &Compare) -> Result<Outcome> {
     if global.json {
         print(&format!(
             "{}\n",
-            as_json(&result, align, args.max_angle, exceeded)
+            as_json((&result, &told), align, args.max_angle, exceeded)
         ))?;
     } else if !global.quiet {
-        print(&as_text(&result, align, &estimate.name, &reference.name))?;
+        let text = as_text(&result, align, &estimate.name, &reference.name);
+        print(&(text + &told.text()))?;
     }
     if exceeded {
         tracing::error!(
@@ -128,6 +133,71 @@ pub fn run(global: &Global, args: &Compare) -> Result<Outcome> {
         return Ok(Outcome::LimitExceeded);
     }
     Ok(Outcome::Done)
+}
+
+/// What the errors say beside their size.
+struct Told {
+    /// Whether they lie within what the estimate says of them; `None` where it says nothing.
+    sigma: Option<Consistency>,
+    /// The constant bias that explains them.
+    bias: Option<BiasFit>,
+}
+
+/// Errors over a second that other axes explain to this share are no bias.
+const OTHER_AXES: f64 = 0.7;
+
+impl Told {
+    fn of(
+        estimate: &attitude_track::Track,
+        (estimated, referred): (&[Stamped], &[Stamped]),
+        align: Align,
+    ) -> Told {
+        let known: Vec<Known> = estimated
+            .iter()
+            .zip(&estimate.covariances)
+            .map(|((stamp, q_nb), covariance)| Known {
+                stamp: *stamp,
+                q_nb: *q_nb,
+                covariance: *covariance,
+            })
+            .collect();
+        let axes = fit_body_axes(estimated, referred);
+        // About one axis alone a bias and other axes can not be told apart.
+        let is_bias = |fit: &BiasFit| {
+            fit.is_worth_removing()
+                && axes.is_some_and(|axes| {
+                    !axes.inverse && axes.turned > OTHER_AXES * axes.as_recorded
+                })
+        };
+        Told {
+            sigma: consistency(&known, referred, align, |_| {}),
+            bias: fit_constant_bias(estimated, referred).filter(is_bias),
+        }
+    }
+
+    fn text(&self) -> String {
+        let mut out = String::new();
+        if let Some(found) = &self.sigma {
+            let _ = writeln!(out, "  sigma    {}", against::within_sigma(found));
+            if let Some(beyond) = against::beyond_sigma(found) {
+                let _ = writeln!(out, "  verdict  {beyond}");
+            }
+        }
+        if let Some(fit) = &self.bias {
+            let _ = writeln!(
+                out,
+                "  bias     {}: where this is the gyro alone, add ({:.6}, {:.6}, {:.6}) rad/s to its --bias",
+                against::bias_words(fit).replace(
+                    "the gyro leaves the recorded orientation",
+                    "the estimate leaves the reference"
+                ),
+                fit.bias.x,
+                fit.bias.y,
+                fit.bias.z
+            );
+        }
+        out
+    }
 }
 
 /// The errors over time, with their statistics in the legend.
@@ -262,12 +332,25 @@ fn degrees(stats: &ErrorStats) -> [String; 3] {
     [stats.rms, stats.p95, stats.max].map(|v| significant(v.to_degrees(), 4))
 }
 
-fn as_json(result: &Comparison, align: Align, limit: Option<f64>, exceeded: bool) -> Value {
+fn as_json(
+    (result, told): (&Comparison, &Told),
+    align: Align,
+    limit: Option<f64>,
+    exceeded: bool,
+) -> Value {
     let mut value = comparison_json(result);
     if let Some(object) = value.as_object_mut() {
         object.insert("align".to_owned(), align.name().into());
         object.insert("max_angle_deg".to_owned(), limit.into());
         object.insert("exceeded".to_owned(), exceeded.into());
+        object.insert(
+            "sigma".to_owned(),
+            told.sigma.as_ref().map(against::consistency_json).into(),
+        );
+        object.insert(
+            "bias_left".to_owned(),
+            told.bias.as_ref().map(against::bias_json).into(),
+        );
     }
     value
 }

@@ -1,5 +1,6 @@
 //! `strapd info FILE`: what a log holds, how good it is, and what to do next. I/O.
 
+mod aids;
 mod words;
 
 use super::{Global, Outcome, print};

@@ -9,13 +9,14 @@ use super::log::{AHEAD, Log, LogChannel, problems, rank};
 use super::simulate::{TRUTH_ID, TRUTH_TOPIC};
 use super::topics;
 use crate::error::{Error, Result};
+use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use strapd_attitude::estimate::orientation_convention;
 use strapd_attitude::frames::{Body, Nav};
 use strapd_attitude::quaternion::Quaternion;
-use strapd_attitude::record::Nanos;
+use strapd_attitude::record::{AttitudeCovariance, Nanos};
 use strapd_attitude::worlds::{Convention, World};
 use strapd_recording::attitude_line::Attitude;
 use strapd_recording::decode::{Options, Role};
@@ -33,6 +34,8 @@ pub struct Track {
     pub name: String,
     /// In file order; ENU (or start) and FLU.
     pub entries: Vec<Entry>,
+    /// What the file says of the error of each of them, in body axes (FLU); empty where it does not of all.
+    pub covariances: Vec<AttitudeCovariance>,
     /// What was wrong with the file.
     pub problems: Vec<String>,
 }
@@ -52,10 +55,19 @@ pub enum Side {
 /// # Errors
 /// The file can not be read, or holds no attitude, or several and none named.
 pub fn read(input: &Input, side: Side, topic: Option<&str>, pool: &Pool) -> Result<Track> {
-    let plain = |entries| Track {
-        name: input.name().display().to_string(),
-        entries,
-        problems: Vec::new(),
+    let plain = |read: Vec<(Entry, [f64; 3])>| {
+        let sigmas = || read.iter().map(|(_, sigma)| Vector3::from(*sigma));
+        Track {
+            name: input.name().display().to_string(),
+            covariances: if sigmas().all(|s| s.iter().all(|v| v.is_finite())) {
+                let radians = sigmas().map(|s| s.map(f64::to_radians));
+                radians.map(AttitudeCovariance::from_sigma).collect()
+            } else {
+                Vec::new()
+            },
+            entries: read.into_iter().map(|(entry, _)| entry).collect(),
+            problems: Vec::new(),
+        }
     };
     match input.format() {
         Format::Table => from_csv(input).map(plain),
@@ -80,19 +92,33 @@ fn from_log(input: &Input, side: Side, topic: Option<&str>, pool: &Pool) -> Resu
         })?;
     let stated = orientation_convention(&decoder.stated().declared);
     let mut entries: Vec<Entry> = Vec::new();
+    // Of an Imu, what it says of its error.
+    let is_imu = known.channel.message_encoding == "cdr"
+        && known
+            .channel
+            .schema
+            .as_deref()
+            .is_some_and(|s| s.name == "sensor_msgs/msg/Imu");
+    let mut said: Vec<Option<Matrix3<f64>>> = Vec::new();
     let wanted = known.channel.clone();
     let survey = log.walk(
         AHEAD,
         pool,
         |channel| {
-            (channel.topic == wanted.topic && channel.id == wanted.id)
-                .then(|| Route::reference(decoder.clone()))
+            (channel.topic == wanted.topic && channel.id == wanted.id).then(|| {
+                let copied = is_imu.then(|| channel.clone());
+                Route::reference(decoder.clone()).copying(copied)
+            })
         },
         |items| {
             entries.extend(items.drain(..).filter_map(|item| match item {
                 Item::Reference(raw) => {
                     let stamp = raw.header.filter(|s| s.0 != 0).unwrap_or(raw.log);
                     raw.orientation.map(|wxyz| (stamp, wxyz))
+                }
+                Item::Copy(message) => {
+                    said.push(imu_covariance(&message.data));
+                    None
                 }
                 _ => None,
             }));
@@ -105,12 +131,23 @@ fn from_log(input: &Input, side: Side, topic: Option<&str>, pool: &Pool) -> Resu
         .get("world")
         .or_else(|| labels.get(&format!("{} world", known.channel.topic)));
     let convention = world.map_or(stated, |world| convention_of(world));
+    // About which axes another program's are is known of none.
+    let covariances = if world.is_some() && said.len() == entries.len() {
+        let pairs = entries.iter().zip(&said);
+        pairs
+            .map(|((_, wxyz), said)| in_body((*said)?, convention, *wxyz))
+            .collect::<Option<Vec<_>>>()
+            .unwrap_or_default()
+    } else {
+        Vec::new()
+    };
     for (_, wxyz) in &mut entries {
         *wxyz = in_flu(convention, *wxyz);
     }
     Ok(Track {
         name: format!("{} {}", path.display(), known.channel.topic),
         entries,
+        covariances,
         problems: problems(&survey),
     })
 }
@@ -128,6 +165,45 @@ fn convention_of(world: &str) -> Convention {
 fn in_flu(recorded: Convention, wxyz: [f64; 4]) -> [f64; 4] {
     Quaternion::<Nav, Body>::try_from_wxyz(wxyz)
         .map_or(wxyz, |q| recorded.convert(Convention::EnuFlu, q).wxyz())
+}
+
+/// The covariance of the orientation in a `sensor_msgs/msg/Imu`, CDR, least byte first as everybody writes it;
+/// `None` where it is cut.
+fn imu_covariance(payload: &[u8]) -> Option<Matrix3<f64>> {
+    /// Encapsulation; then sec, nanosec and the length of the frame's name.
+    const HEAD: usize = 4;
+    let data = payload.get(HEAD..).filter(|_| payload.get(1) == Some(&1))?;
+    let length: [u8; 4] = data.get(8..12)?.try_into().ok()?;
+    let numbers = 12usize
+        .checked_add(u32::from_le_bytes(length) as usize)?
+        .next_multiple_of(8);
+    // Behind the four of the quaternion.
+    let covariance = data.get(numbers.checked_add(4 * 8)?..)?.get(..9 * 8)?;
+    let read = |n: usize| {
+        let bytes = covariance.get(8 * n..8 * n + 8)?.try_into().ok()?;
+        Some(f64::from_le_bytes(bytes))
+    };
+    let numbers: Option<Vec<f64>> = (0..9).map(read).collect();
+    Some(Matrix3::from_row_slice(&numbers?))
+}
+
+/// A covariance about the world's axes of `convention`, as our own Imu messages have it, about the body's (FLU).
+fn in_body(
+    said: Matrix3<f64>,
+    convention: Convention,
+    wxyz: [f64; 4],
+) -> Option<AttitudeCovariance> {
+    let q = Quaternion::<Nav, Body>::try_from_wxyz(wxyz).ok()?;
+    let c_nb = *q.to_dcm().as_matrix();
+    let p = c_nb.transpose() * said * c_nb;
+    let p = AttitudeCovariance::from_upper([p.m11, p.m12, p.m13, p.m22, p.m23, p.m33]);
+    p.upper()
+        .iter()
+        .all(|v| v.is_finite())
+        .then(|| match convention {
+            Convention::EnuFlu => p,
+            other => p.relabelled(|v| other.convert_body(Convention::EnuFlu, v)),
+        })
 }
 
 /// The channel to take attitudes from: the one named, else the best kind of which there is just one.
@@ -218,7 +294,7 @@ const LINE_LIMIT: u64 = 64 * 1024;
 ///
 /// # Errors
 /// The file can not be read, a line is not JSON or is too long, or several ids and none named.
-fn from_ndjson(input: &Input, side: Side, id: Option<&str>) -> Result<Vec<Entry>> {
+fn from_ndjson(input: &Input, side: Side, id: Option<&str>) -> Result<Vec<(Entry, [f64; 3])>> {
     let path = input.name();
     let file = input.bytes()?;
     let mut reader = BufReader::new(file);
@@ -274,7 +350,8 @@ fn from_ndjson(input: &Input, side: Side, id: Option<&str>) -> Result<Vec<Entry>
             None => seen = Some(att.id.clone()),
         }
         if let Some(stamp) = att.stamp {
-            track.push((stamp, in_flu(convention_of(&att.world), att.q)));
+            let entry = (stamp, in_flu(convention_of(&att.world), att.q));
+            track.push((entry, att.sigma_deg));
         }
     }
 }
@@ -293,6 +370,10 @@ struct Row {
     qy: Option<f64>,
     #[serde(alias = "z")]
     qz: Option<f64>,
+    /// About the body's axes.
+    sigma_x_deg: Option<f64>,
+    sigma_y_deg: Option<f64>,
+    sigma_z_deg: Option<f64>,
     #[serde(default)]
     world: String,
 }
@@ -301,7 +382,7 @@ struct Row {
 ///
 /// # Errors
 /// The file can not be read, a cell is not a number, or no row has an attitude.
-fn from_csv(input: &Input) -> Result<Vec<Entry>> {
+fn from_csv(input: &Input) -> Result<Vec<(Entry, [f64; 3])>> {
     let path = input.name();
     let refuse = |what: String| Error::Unsupported {
         path: path.to_owned(),
@@ -315,7 +396,9 @@ fn from_csv(input: &Input) -> Result<Vec<Entry>> {
             continue;
         };
         let stamp = Nanos(row.true_ns.unwrap_or(row.stamp_ns));
-        track.push((stamp, in_flu(convention_of(&row.world), [w, x, y, z])));
+        let sigma = [row.sigma_x_deg, row.sigma_y_deg, row.sigma_z_deg];
+        let entry = (stamp, in_flu(convention_of(&row.world), [w, x, y, z]));
+        track.push((entry, sigma.map(|s| s.unwrap_or(f64::NAN))));
     }
     if track.is_empty() {
         return Err(refuse("no row carries an attitude".to_owned()));

@@ -77,6 +77,70 @@ pub(super) fn choose(
     Ok(besides)
 }
 
+/// A topic of vectors that could correct the samples of another.
+#[derive(Clone, Debug)]
+pub struct TopicOfVectors {
+    /// Its name.
+    pub topic: String,
+    /// Type and encoding.
+    pub described: String,
+    /// Messages a second of the log; `None` where its length is not known.
+    pub rate_hz: Option<f64>,
+    /// Length of the first vector, in the unit of the file.
+    pub first: Option<f64>,
+}
+
+/// The topics beside `own` with magnetic fields, and with specific forces; and of the fields the one that
+/// `--aid gravity+mag` takes unnamed.
+#[must_use]
+pub fn vectors(log: &Log, own: &str) -> [(Vec<TopicOfVectors>, Option<String>); 2] {
+    let plan = Plan::default();
+    let secs = log
+        .survey
+        .times
+        .map(|(a, b)| b.saturating_sub(a) as f64 * 1e-9);
+    [Wanted::Fields, Wanted::Forces].map(|wanted| {
+        let mut decoders = Decoders::of_run(&plan, &options(wanted, None));
+        let channels = log.channels.iter().filter(|known| {
+            known.channel.topic != own && known.messages > 0 && may_be_field(&known.channel)
+        });
+        let found: Vec<TopicOfVectors> = channels
+            .filter_map(|known| {
+                let decoder = known.decoder(&mut decoders).ok()?;
+                let stated = decoder.stated();
+                // A rate beside it makes samples of their own.
+                if stated.has_gyro || known.role.has_rate || !stated.has_stamp {
+                    return None;
+                }
+                let mut samples = Vec::new();
+                if let Some((at, payload)) = &known.first {
+                    let _ = decoder.decode(payload, *at, *at, &mut samples);
+                }
+                let vector = samples.first().and_then(|raw| match wanted {
+                    Wanted::Fields => raw.mag,
+                    _ => raw.accel,
+                });
+                Some(TopicOfVectors {
+                    topic: known.channel.topic.clone(),
+                    described: described(&known.channel),
+                    rate_hz: secs
+                        .filter(|secs| *secs > 0.0)
+                        .map(|secs| known.messages.saturating_sub(1) as f64 / secs),
+                    first: vector.map(|[x, y, z]| x.hypot(y).hypot(z)),
+                })
+            })
+            .collect();
+        let taken = match wanted {
+            Wanted::Fields => unnamed(&plan, Path::new(""), log, own).ok(),
+            _ => None,
+        };
+        let taken = taken.map(|(known, _)| known.channel.topic.clone());
+        let is_listed = |name: &String| found.iter().any(|t| t.topic == *name);
+        let taken = taken.filter(is_listed);
+        (found, taken)
+    })
+}
+
 fn named<'l>(
     plan: &Plan,
     wanted: Wanted,

@@ -110,6 +110,7 @@ impl History {
         }
         let angles = sample.q_nb.yaw_pitch_roll();
         let [x, y, z]: [f64; 3] = sample.rate.into();
+        let p = sample.covariance.in_navigation_axes(&sample.q_nb);
         self.drawn.series.push(
             at,
             [
@@ -119,7 +120,8 @@ impl History {
                 angles.roll,
                 angles.pitch,
                 angles.yaw,
-                sample.covariance.sigma().max(),
+                p.m11.max(p.m22).sqrt(),
+                p.m33.sqrt(),
             ]
             .map(f64::to_degrees),
         );

@@ -3,6 +3,7 @@
 //! Apart from the replay because it integrates nothing: `info` (and later `check`) look before
 //! anyone leaps.
 
+use super::beside::{TopicOfVectors, vectors};
 use super::channel_route::{Item, Noticed, Route, Taker};
 use super::decoders::Decoders;
 use super::log::{AHEAD, Log, LogChannel, described, rank};
@@ -16,9 +17,7 @@ use strapd_attitude::condition::quality::{Quality, QualitySummary};
 use strapd_attitude::condition::regularise;
 use strapd_attitude::condition::stillness::{self, Limits, Rests, Stillness};
 use strapd_attitude::condition::{Clock, choose_clock};
-use strapd_attitude::estimate::Meaning;
-use strapd_attitude::estimate::Plan;
-use strapd_attitude::estimate::{Conditioned, FEW};
+use strapd_attitude::estimate::{Aid, Aiding, Conditioned, FEW, Meaning, Plan};
 use strapd_attitude::record::RawSample;
 use strapd_recording::decode::{self, Options};
 use strapd_recording::mcap::{self, Survey};
@@ -51,6 +50,61 @@ pub struct Inspection {
     pub clock: Clock,
     /// What was noticed about the clock.
     pub clock_warning: Option<String>,
+    /// What may correct its attitude.
+    pub aid: Aids,
+}
+
+/// What of the samples themselves, or beside them, may correct an attitude.
+#[derive(Clone, Debug, Default)]
+pub struct Aids {
+    /// Whether the samples carry specific forces.
+    pub has_force: bool,
+    /// Mean length of the forces in the first samples, as recorded in the unit the format states (else its own).
+    pub mean_force: Option<f64>,
+    /// What they are multiplied by to be m/s^2: 9.80665 of forces in g.
+    pub force_scale: f64,
+    /// Whether `--aid auto` takes gravity.
+    pub gravity: bool,
+    /// What there is to say of the forces.
+    pub notes: Vec<String>,
+    /// Length of the first field in the samples themselves.
+    pub own_field: Option<f64>,
+    /// Topics with fields, and the one that is taken unnamed.
+    pub fields: (Vec<TopicOfVectors>, Option<String>),
+    /// Topics with forces.
+    pub forces: Vec<TopicOfVectors>,
+}
+
+impl Aids {
+    /// From the first samples of a topic.
+    fn of(plan: &Plan, resolved: &Meaning, first: &[RawSample]) -> Aids {
+        let plan = Plan {
+            aid: Aid::Auto,
+            ..plan.clone()
+        };
+        let mut notes = Vec::new();
+        // With `auto` what can not be is a warning.
+        let aiding = Aiding::decide(&plan, resolved, first, &mut notes).unwrap_or_default();
+        let forces = || {
+            first
+                .iter()
+                .filter_map(|raw| raw.accel)
+                .map(|f| resolved.force(f).norm())
+        };
+        let (sum, n) = forces()
+            .filter(|length| length.is_finite())
+            .fold((0.0, 0.0), |(sum, n), length| (sum + length, n + 1.0));
+        let length = |[x, y, z]: [f64; 3]| x.hypot(y).hypot(z);
+        Aids {
+            has_force: forces().next().is_some(),
+            mean_force: (n > 0.0).then(|| sum / n),
+            force_scale: aiding.map_or(1.0, |aiding| aiding.force_scale),
+            gravity: aiding.is_some(),
+            notes,
+            own_field: first.iter().find_map(|raw| raw.mag).map(length),
+            ..Aids::default()
+        }
+    }
 }
 
 /// What was looked at.
@@ -80,6 +134,8 @@ struct Look {
     stillness: Stillness,
     stamps: regularise::Survey,
     undecodable: u64,
+    plan: Plan,
+    aid: Aids,
 }
 
 impl Look {
@@ -102,6 +158,7 @@ impl Look {
     fn settle(&mut self) {
         let (clock, warning) = choose_clock(&self.first, self.asked);
         self.quality = Quality::new(clock);
+        self.aid = Aids::of(&self.plan, &self.resolved, &self.first);
         self.first.drain(..).for_each(|raw| self.quality.push(&raw));
         self.clock = Some((clock, warning.map(|w| w.to_string())));
     }
@@ -131,6 +188,7 @@ impl Look {
             undecodable: self.undecodable,
             clock,
             clock_warning,
+            aid: self.aid,
         })
     }
 }
@@ -222,10 +280,14 @@ pub fn look_as(
             Ok(ControlFlow::Continue(()))
         },
     )?;
-    let topics = looks
+    let mut topics = looks
         .into_iter()
         .map(|look| look.finish().map_err(unsupported))
         .collect::<Result<Vec<_>>>()?;
+    for topic in &mut topics {
+        let [fields, (forces, _)] = vectors(log, &topic.of);
+        (topic.aid.fields, topic.aid.forces) = (fields, forces);
+    }
     Ok(Looks {
         topics,
         left_out,
@@ -288,5 +350,7 @@ fn begin(source: &Source, known: &LogChannel, decoder: &decode::Decoder, plan: &
         stamps: regularise::Survey::new(),
         resolved,
         undecodable: 0,
+        plan: plan.clone(),
+        aid: Aids::default(),
     }
 }

@@ -7,14 +7,16 @@ use crate::report::series::{ErrorTrace, Errors};
 use crate::report::summary::{Against, Recorded};
 use crate::report::trace::Traces;
 use std::collections::HashMap;
-use strapd_attitude::compare::{Align, Stamped, compare, fit_body_axes, for_each_error};
+use strapd_attitude::compare::{
+    Align, Consistency, Known, Stamped, compare, consistency, fit_body_axes, fit_constant_bias,
+    for_each_error,
+};
 use strapd_attitude::estimate::Estimator;
-use strapd_attitude::estimate::Plan;
-use strapd_attitude::estimate::{Meaning, Prepared};
+use strapd_attitude::estimate::{Initial, Meaning, Plan, Prepared};
 use strapd_attitude::propagate::{Executor, Method};
 use strapd_attitude::quaternion::Quaternion;
-use strapd_attitude::record::{Nanos, RawSample, SampleKind, Status};
-use strapd_attitude::worlds::World;
+use strapd_attitude::record::{AttitudeSample, Nanos, RawSample, SampleKind, Status};
+use strapd_attitude::worlds::{Convention, World};
 
 /// Most attitudes kept per track; beyond, every second one goes, again and again, so that memory
 /// stays bounded on any log.
@@ -56,8 +58,15 @@ pub struct AgainstRecorded {
     clock: strapd_attitude::condition::Clock,
     own_reference: bool,
     estimators: Vec<Estimator>,
-    tracks: Vec<Thinned>,
-    reference: Thinned,
+    tracks: Vec<Thinned<Stamped>>,
+    reference: Thinned<Stamped>,
+    /// What the run itself put out, in the world it was asked for, with what it says of its error.
+    own: Thinned<Known>,
+    world: World,
+    /// How its world lies to the reference's, by what it claims of it.
+    align: Align,
+    /// The bias that was removed, rad/s.
+    removed: [f64; 3],
     /// When the sample of each recorded orientation was received, as they lie in `reference`; and where
     /// samples that were given another stamp went.
     received: Vec<Nanos>,
@@ -67,15 +76,15 @@ pub struct AgainstRecorded {
 
 /// A track that halves itself when it grows too long.
 #[derive(Debug)]
-struct Thinned {
-    entries: Vec<Stamped>,
+struct Thinned<T> {
+    entries: Vec<T>,
     most: usize,
     stride: u64,
     seen: u64,
 }
 
-impl Thinned {
-    fn new() -> Thinned {
+impl<T> Thinned<T> {
+    fn new() -> Thinned<T> {
         Thinned {
             entries: Vec::new(),
             most: MOST,
@@ -84,7 +93,7 @@ impl Thinned {
         }
     }
 
-    fn push(&mut self, entry: Stamped) {
+    fn push(&mut self, entry: T) {
         if self.seen.is_multiple_of(self.stride) {
             if self.entries.len() >= self.most {
                 let mut keep = false;
@@ -114,6 +123,14 @@ impl AgainstRecorded {
     /// In words: settings that can not be.
     pub fn new(plan: &Plan, resolved: &Meaning, prepared: &Prepared) -> Result<Self, String> {
         let mut prepared = prepared.clone();
+        let world = prepared.world;
+        let align = match &prepared.aiding {
+            // Its north may be another's by a constant.
+            Some(aiding) if aiding.settings.has_field => Align::Heading,
+            Some(_) => Align::FirstHeading,
+            None if plan.initial == Initial::Gravity => Align::FirstHeading,
+            None => Align::First,
+        };
         // The recorded attitude is brought to the convention everything is computed in.
         prepared.world = World::Start;
         // What a sample means shows over a second; what corrects the attitude would hide it.
@@ -137,6 +154,10 @@ impl AgainstRecorded {
             tracks: estimators.iter().map(|_| Thinned::new()).collect(),
             estimators,
             reference: Thinned::new(),
+            own: Thinned::new(),
+            world,
+            align,
+            removed: prepared.bias.into(),
             received: Vec::new(),
             moved: HashMap::new(),
             unusable: 0,
@@ -150,6 +171,28 @@ impl AgainstRecorded {
         tracks
             .chain([&mut self.reference])
             .for_each(|track| track.most = most);
+        self.own.most = most;
+    }
+
+    /// Takes what the run put out.
+    pub fn take_estimates(&mut self, samples: &[AttitudeSample]) {
+        let from = self.world.convention().unwrap_or(Convention::EnuFlu);
+        for sample in samples {
+            let turned = |v| from.convert_body(Convention::EnuFlu, v);
+            self.own.push(Known {
+                stamp: sample.stamp,
+                q_nb: from.convert(Convention::EnuFlu, sample.q_nb),
+                covariance: match from {
+                    Convention::EnuFlu => sample.covariance,
+                    _ => sample.covariance.relabelled(turned),
+                },
+            });
+        }
+        // As with the other tracks: nothing to compare with has come yet, and none may come.
+        if self.own_reference && self.reference.entries.is_empty() {
+            let useless = self.own.entries.len().saturating_sub(BEFORE);
+            self.own.entries.drain(..useless);
+        }
     }
 
     /// Whether the reference is not the samples' own.
@@ -284,7 +327,44 @@ impl AgainstRecorded {
             constant: entries.len() > 1
                 && first.is_some_and(|first| entries.iter().all(|(_, q)| *q == first)),
             axes: best,
+            consistency: consistency(&self.own.entries, entries, self.align, |_| {}),
+            bias: self
+                .used()
+                .and_then(|track| fit_constant_bias(&track.entries, entries)),
+            removed: self.removed,
         })
+    }
+
+    /// The track of the meaning the run took.
+    fn used(&self) -> Option<&Thinned<Stamped>> {
+        let mut all = MEANINGS.iter().zip(&self.tracks);
+        let found =
+            all.find(|((_, _, kind, method), _)| method.is_none() && *kind == self.resolved.kind);
+        found.map(|(_, track)| track)
+    }
+
+    /// Error and three sigma over time: tilt, three sigma of it, heading (signed), three sigma of it, deg.
+    fn bounds(
+        &self,
+        stretches: usize,
+        x: impl Fn(Nanos) -> i64,
+    ) -> Option<(Consistency, Traces<4>)> {
+        let mut trace = Traces::new(stretches);
+        let mut last = i64::MIN;
+        let found = consistency(
+            &self.own.entries,
+            &self.reference.entries,
+            self.align,
+            |at| {
+                last = last.max(x(at.stamp));
+                let [tilt, heading] = [at.tilt, at.heading];
+                trace.push(
+                    last,
+                    [tilt[0], tilt[1], heading[0], heading[1]].map(f64::to_degrees),
+                );
+            },
+        )?;
+        Some((found, trace))
     }
 
     /// The errors over time after [`Align::First`], for each meaning that finds a reference: `x` places
@@ -293,7 +373,7 @@ impl AgainstRecorded {
     pub fn errors(&self, stretches: usize, used: SampleKind, x: impl Fn(Nanos) -> i64) -> Errors {
         let of = |((kind, meaning, sample_kind, method), track): (
             &(&'static str, &'static str, SampleKind, Option<Method>),
-            &Thinned,
+            &Thinned<Stamped>,
         )| {
             let reference = &self.reference.entries;
             let comparison = compare(&track.entries, reference, Align::First);
@@ -319,6 +399,7 @@ impl AgainstRecorded {
             stride: self.tracks.iter().map(|t| t.stride).max().unwrap_or(1),
             usable: self.references(),
             unusable: self.unusable,
+            bounds: self.bounds(stretches, &x),
             traces: MEANINGS.iter().zip(&self.tracks).filter_map(of).collect(),
         }
     }

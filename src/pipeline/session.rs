@@ -242,6 +242,9 @@ impl Session {
             if let Some(history) = &mut topic.history {
                 history.add(attitudes);
             }
+            if let Some(against) = &mut topic.against {
+                against.take_estimates(attitudes);
+            }
             if self.outlet.write(stream, attitudes, pool)? == Flow::Closed {
                 self.closed = true;
                 return Ok(Flow::Closed);
@@ -296,6 +299,9 @@ impl Session {
             topic.output.add(attitudes);
             if let Some(history) = &mut topic.history {
                 history.add(attitudes);
+            }
+            if let Some(against) = &mut topic.against {
+                against.take_estimates(attitudes);
             }
             let _ = self.outlet.write(stream, attitudes, pool)?;
             if let Some(against) = &mut topic.against {

@@ -4,7 +4,9 @@ use super::delivery::broken;
 use super::request::ReplayRequest;
 use super::session::{Ended, Topic};
 use crate::report::aid::Aided;
+use crate::report::findings::orientation;
 use crate::report::series::Drawn;
+use crate::report::sigma::SigmaTerms;
 use crate::report::stamps::{Regularised, Segment};
 use crate::report::summary::{Gaps, RunSummary, TopicSummary, significant};
 use std::sync::atomic::Ordering;
@@ -100,6 +102,11 @@ fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
         bias_origin: topic.prepared.bias_origin.clone(),
         aided: topic.estimator.filter().map(Aided::of),
         noise: run.plan.noise.name.clone(),
+        sigma_terms: Some(SigmaTerms::of(
+            &run.plan,
+            &topic.prepared,
+            gaps.count.saturating_sub(gaps.not_bridged),
+        )),
         drift: drift(run, topic, propagation.integrated_secs),
         integration_error: propagation.integration_error,
         input_axes: topic.resolved.body.to_string(),
@@ -133,6 +140,7 @@ fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
     };
     summary.warnings.extend(topic.warnings.iter().cloned());
     summary.warnings.extend(warnings(topic, &summary));
+    summary.warnings.extend(orientation::warnings(&summary));
     summary
 }
 

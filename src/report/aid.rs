@@ -102,6 +102,55 @@ impl Aided {
         ]
     }
 
+    /// The gyro's bias that was learned, beside what was removed before, rad/s.
+    #[must_use]
+    pub fn bias(&self) -> Vector3<f64> {
+        self.calibration.bias
+    }
+
+    /// What was learned, a row each: what and in which unit, about x, y, z, and one sigma of each; `None` where no
+    /// force came.
+    #[must_use]
+    pub fn learned(&self) -> Option<Vec<Vec<String>>> {
+        let (found, sigma) = (&self.calibration, &self.sigma);
+        let three = |name: &str, value: Vector3<f64>, sigma: Vector3<f64>| {
+            let numbers = value.iter().chain(sigma.iter());
+            let said = numbers.map(|v| significant(*v, 3));
+            std::iter::once(name.to_owned()).chain(said).collect()
+        };
+        let one = |name: &str, value: f64, sigma: f64| {
+            let mut row = vec![String::new(); 7];
+            for (cell, said) in row.iter_mut().step_by(3).zip([
+                name.to_owned(),
+                significant(value, 3),
+                significant(sigma, 3),
+            ]) {
+                *cell = said;
+            }
+            row.swap(3, 1);
+            row.swap(6, 4);
+            row
+        };
+        let deg = f64::to_degrees;
+        self.started.then(|| {
+            vec![
+                three("gyro bias, deg/s", found.bias.map(deg), sigma.bias.map(deg)),
+                three("gyro scale, %", found.scale * 100.0, sigma.scale * 100.0),
+                three(
+                    "between its axes, deg",
+                    found.cross.map(deg),
+                    sigma.cross.map(deg),
+                ),
+                three(
+                    "accelerometer bias, m/s^2",
+                    found.force_bias,
+                    sigma.force_bias,
+                ),
+                one("accelerometer lead, ms", found.lead * 1e3, sigma.lead * 1e3),
+            ]
+        })
+    }
+
     /// What the sigma of the attitude is of.
     #[must_use]
     pub fn sigma_text(&self) -> &'static str {

@@ -4,7 +4,7 @@
 //! those about the replay and the recorded orientation here. A finding's `code` is stable: scripts
 //! match on it.
 
-mod orientation;
+pub(crate) mod orientation;
 mod samples;
 
 use crate::pipeline::check::{Checked, CheckedTopic};

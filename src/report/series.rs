@@ -3,7 +3,7 @@
 //! Filled by the pipeline while it runs, drawn by the page; bounded whatever the length of the run.
 
 use super::trace::Traces;
-use strapd_attitude::compare::Comparison;
+use strapd_attitude::compare::{Comparison, Consistency};
 use strapd_attitude::record::Nanos;
 
 /// What is drawn of one topic.
@@ -11,8 +11,8 @@ use strapd_attitude::record::Nanos;
 pub struct Drawn {
     /// Stretches each series was given.
     pub stretches: usize,
-    /// Rate about x, y, z (deg/s, body axes, bias removed), roll, pitch, yaw (deg), largest sigma (deg).
-    pub series: Traces<7>,
+    /// Rate about x, y, z (deg/s, body axes, bias removed), roll, pitch, yaw (deg), sigma of tilt and of heading (deg).
+    pub series: Traces<8>,
     /// One per [`Mark`]: where, with its length in ns.
     pub marks: Vec<Traces<1>>,
     /// Stamps to the axis of time.
@@ -90,6 +90,8 @@ pub struct Errors {
     pub usable: usize,
     /// Those that are no rotation.
     pub unusable: u64,
+    /// Whether the run's own sigma holds, with tilt, three sigma of it, heading (signed), three sigma of it over time, deg.
+    pub bounds: Option<(Consistency, Traces<4>)>,
     /// One per meaning of a sample that found a reference.
     pub traces: Vec<ErrorTrace>,
 }

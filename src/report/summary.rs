@@ -4,10 +4,11 @@
 
 use super::aid::Aided;
 use super::series::Drawn;
+use super::sigma::SigmaTerms;
 use super::stamps::Regularised;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
-use strapd_attitude::compare::BodyAxesFit;
+use strapd_attitude::compare::{BiasFit, BodyAxesFit, Consistency};
 pub use strapd_attitude::digits::significant;
 use strapd_attitude::record::{Counts, SampleKind, Verdict};
 use strapd_attitude::worlds::EARTH_RATE;
@@ -59,6 +60,8 @@ pub struct TopicSummary {
     pub aided: Option<Aided>,
     /// Noise behind sigma.
     pub noise: String,
+    /// What sigma is made of.
+    pub sigma_terms: Option<SigmaTerms>,
     /// Drift to be expected from what is not known of the bias, rad/s.
     pub drift: f64,
     /// Bound on the worst attitude error of the integration itself, rad; `None` where the method can not tell.
@@ -134,6 +137,12 @@ pub struct Recorded {
     pub constant: bool,
     /// How its body axes lie to the gyro's; `None` = the motion does not tell.
     pub axes: Option<BodyAxesFit>,
+    /// Whether the run's errors lie within what it said of them; `None` = no instant in common, or no sigma.
+    pub consistency: Option<Consistency>,
+    /// The bias by which the gyro alone leaves it.
+    pub bias: Option<BiasFit>,
+    /// The bias that was removed before, rad/s.
+    pub removed: [f64; 3],
 }
 
 /// What one log became.
@@ -328,6 +337,9 @@ impl TopicSummary {
                 self.drift_text()
             ),
         );
+        if let Some(terms) = &self.sigma_terms {
+            line(out, "", &terms.text());
+        }
         line(
             out,
             "numeric",
@@ -381,6 +393,9 @@ impl TopicSummary {
                     row.kind, row.median_deg, row.p95_deg, row.meaning
                 ),
             );
+        }
+        if let Some(found) = self.recorded.and_then(|r| r.consistency) {
+            line(out, "", &super::against::within_sigma(&found));
         }
     }
 
@@ -464,6 +479,7 @@ impl TopicSummary {
             })),
             "aid": self.aided.as_ref().map(Aided::json),
             "noise": self.noise,
+            "sigma_terms": self.sigma_terms.as_ref().map(SigmaTerms::json),
             "drift_deg_per_h": self.drift.to_degrees() * 3600.0,
             "integration_error_deg": self.integration_error.map(f64::to_degrees),
             "gaps": {
@@ -486,6 +502,7 @@ impl TopicSummary {
             "against_recorded": self.against.iter().map(|a| json!({
                 "kind": a.kind, "median_deg": a.median_deg, "p95_deg": a.p95_deg, "pairs": a.pairs,
             })).collect::<Vec<_>>(),
+            "recorded": self.recorded.as_ref().map(Recorded::json),
             "warnings": self.warnings,
         })
     }

@@ -2,6 +2,7 @@
 
 mod faults;
 mod many;
+mod orientation;
 mod recordings;
 
 use std::path::Path;

@@ -256,7 +256,8 @@ fn same_but_for_names(out: &str, keys: &[&str]) -> Vec<serde_json::Value> {
     values
 }
 
-/// Takes out names, and what only an MCAP has: a frame, and a log time of its own, which lines have not.
+/// Takes out names, and what only an MCAP has: a frame, a log time of its own, and topics of fields beside the
+/// samples, which lines have not.
 fn forget(value: &mut serde_json::Value) {
     match value {
         serde_json::Value::Object(map) => {
@@ -269,6 +270,8 @@ fn forget(value: &mut serde_json::Value) {
                 "frame_id",
                 "output_topic",
                 "header_minus_log_s",
+                "field_topics",
+                "field_topic_taken",
             ] {
                 map.remove(name);
             }

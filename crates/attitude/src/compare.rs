@@ -13,12 +13,16 @@
 
 mod align;
 mod body_axes;
+mod consistency;
+mod constant_bias;
 mod matching;
 mod relative;
 mod statistics;
 
 pub use align::{Align, ParseAlignError};
 pub use body_axes::{BodyAxesFit, fit_body_axes};
+pub use consistency::{BoundedError, Consistency, ENOUGH_INSIDE, Known, WithinSigma, consistency};
+pub use constant_bias::{BiasFit, fit_constant_bias};
 pub use relative::RelativeError;
 pub use statistics::{Drift, ErrorStats};
 
@@ -162,7 +166,7 @@ fn each_error(
 ) -> (Quaternion<Nav, Nav>, LeftOut) {
     let alignment = align.rotation(estimate, reference);
     let back = alignment.inverse();
-    let left_out = for_each_match(estimate, reference, |stamp, q_ref_est| {
+    let left_out = for_each_match(estimate, reference, |stamp, q_ref_est, _| {
         let error = (q_ref_est * back).inverse();
         let error = error.same_sign_as(&Quaternion::identity());
         let [w, x, y, z] = error.wxyz();

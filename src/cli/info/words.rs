@@ -312,6 +312,9 @@ fn write_topic(looked: &Inspection, out: &mut String) {
             " (--sample-kind)"
         }
     );
+    for line in super::aids::lines(&looked.aid) {
+        let _ = writeln!(out, "   {line}");
+    }
     match (&looked.bias, looked.rests.kept.first(), looked.rests.first) {
         (Some(bias), Some(rest), Some(first)) => {
             let [x, y, z]: [f64; 3] = bias.bias.into();
@@ -396,6 +399,7 @@ fn topic_json(looked: &Inspection) -> Value {
             "min": a.min, "max": a.max, "mean": a.mean, "rms": a.rms })).collect::<Vec<_>>(),
         "gravity": q.gravity.map(|g| g.to_string()),
         "accel_when_quietest": q.accel_at_rest,
+        "aid": super::aids::aids_json(&looked.aid),
         "sample_kind": looked.resolved.kind.name(),
         "sample_kind_stated": looked.kind_stated,
         "gyro_unit": looked.resolved.unit.name(),

@@ -2,9 +2,11 @@
 
 use super::{Finding, Severity};
 use crate::pipeline::check::CheckedTopic;
-use crate::report::summary::{Against, Recorded, significant};
+use crate::report::against::{beyond_sigma, bias_flag, bias_json, bias_words, consistency_json};
+use crate::report::summary::{Against, Recorded, TopicSummary, significant};
+use nalgebra::Vector3;
 use serde_json::json;
-use strapd_attitude::compare::BodyAxesFit;
+use strapd_attitude::compare::{BiasFit, BodyAxesFit};
 
 /// A meaning is better when its median error is below this share of the other's.
 const CLEARLY: f64 = 0.95;
@@ -16,6 +18,10 @@ const SMALL: f64 = 0.035;
 const MOSTLY_THERE: f64 = 0.5;
 /// An orientation that misses the motion by this share of it does not follow the gyro.
 const ANOTHER_MOTION: f64 = 0.5;
+/// Of a motion about one axis other axes look like a bias; one below this share of the motion is believed.
+const SMALL_SHARE: f64 = 0.3;
+/// Two biases that differ by less than this share are the same.
+const SAME: f64 = 0.3;
 
 pub(super) fn find(topic: &CheckedTopic, out: &mut Vec<Finding>) {
     let Ok(summary) = &topic.replayed else {
@@ -35,6 +41,97 @@ pub(super) fn find(topic: &CheckedTopic, out: &mut Vec<Finding>) {
         _ if !topic.looked.kind_stated => out.push(meaning_unknown()),
         _ => {}
     }
+    if trusted {
+        let at_rest = topic.looked.bias.as_ref().map(|found| found.bias);
+        told_by_it(summary, recorded, at_rest, out);
+    }
+}
+
+/// What a replay says of the orientation it was held against, in lines; nothing where that is no truth.
+pub(crate) fn warnings(summary: &TopicSummary) -> Vec<String> {
+    let Some(recorded) = &summary.recorded else {
+        return Vec::new();
+    };
+    let is_seen = summary.gaps.total_secs <= MOSTLY_THERE * summary.duration_secs;
+    let (mut wrong, mut found) = (Vec::new(), Vec::new());
+    if is_truth(recorded, is_seen, &mut wrong) {
+        told_by_it(summary, recorded, None, &mut found);
+    }
+    let words = |f: &Finding| match f.flags.as_str() {
+        "" => format!("{}; {}", f.what, f.advice),
+        flags => format!("{}: {flags}", f.what),
+    };
+    found.iter().map(words).collect()
+}
+
+/// A bias by which the gyro leaves it, and a sigma that does not hold. `at_rest` is the bias that a rest shows.
+fn told_by_it(
+    summary: &TopicSummary,
+    recorded: &Recorded,
+    at_rest: Option<Vector3<f64>>,
+    out: &mut Vec<Finding>,
+) {
+    let mut flags = String::new();
+    // What the filter has learned needs no flag.
+    let is_learned = |fit: &BiasFit| {
+        let aided = summary.aided.as_ref();
+        aided.is_some_and(|aided| (aided.bias() - fit.bias).norm() < SAME * fit.bias.norm())
+    };
+    let bias = recorded
+        .bias
+        .filter(|fit| is_bias(recorded, fit) && !is_learned(fit));
+    if let Some(fit) = bias {
+        let left = |rest: Vector3<f64>| rest - Vector3::from(recorded.removed) - fit.bias;
+        if at_rest.is_some_and(|rest| left(rest).norm() < SAME * fit.bias.norm()) {
+            // Said already.
+            "--bias auto".clone_into(&mut flags);
+        } else {
+            flags = bias_flag(&fit, recorded.removed);
+            out.push(
+                Finding::new(Severity::Warning, "bias-by-orientation", bias_words(&fit))
+                    .with("fit", bias_json(&fit))
+                    .advise("remove it; of another run of the sensor it may be another")
+                    .flags(flags.clone()),
+            );
+        }
+    }
+    let Some(found) = &recorded.consistency else {
+        return;
+    };
+    let Some(what) = beyond_sigma(found) else {
+        return;
+    };
+    let advice = if !flags.is_empty() {
+        "without that bias it may hold"
+    } else if summary.aided.is_some() {
+        "this motion is not as the filter takes it, or the orientation is no truth"
+    } else {
+        "the sensor is worse than its class, or the orientation is no truth"
+    };
+    if flags.is_empty() && summary.aided.is_none() && summary.noise != "consumer" {
+        "--noise consumer".clone_into(&mut flags);
+    }
+    out.push(
+        Finding::new(Severity::Warning, "beyond-sigma", what)
+            .with("sigma", consistency_json(found))
+            .with("noise", summary.noise.clone())
+            .advise(advice)
+            .flags(flags),
+    );
+}
+
+/// Whether what was fitted is a bias: worth removing, and no other axes that look like one.
+fn is_bias(recorded: &Recorded, fit: &BiasFit) -> bool {
+    let one_axis = recorded.axes.is_none() && fit.turn > SMALL;
+    fit.is_worth_removing() && !(one_axis && fit.bias.norm() > SMALL_SHARE * fit.turn)
+}
+
+/// Whether a bias explains what other axes might.
+fn bias_explains(recorded: &Recorded) -> bool {
+    recorded.bias.is_some_and(|fit| {
+        let [before, after] = fit.over_1s;
+        is_bias(recorded, &fit) && after < EXPLAINED * before
+    })
 }
 
 fn meaning_unknown() -> Finding {
@@ -122,7 +219,7 @@ fn is_truth(recorded: &Recorded, is_seen: bool, out: &mut Vec<Finding>) -> bool 
         );
         return false;
     }
-    is_seen && recorded.axes.is_none_or(|fit| axes_agree(&fit, out))
+    is_seen && (bias_explains(recorded) || recorded.axes.is_none_or(|fit| axes_agree(&fit, out)))
 }
 
 fn axes_agree(fit: &BodyAxesFit, out: &mut Vec<Finding>) -> bool {

@@ -14,6 +14,9 @@ const FEW: usize = 60;
 /// Errors this many times the smallest would flatten the others.
 const FLATTENING: f64 = 6.0;
 
+/// Bounds are drawn up to this many times the largest error, or their own ordinary size.
+const ROOM: f64 = 1.5;
+
 /// The axis of time all charts of a topic share.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Time {
@@ -77,7 +80,7 @@ fn line(name: &str, color: usize, points: Vec<[f64; 2]>) -> Series {
 
 /// Some of a run's series in one chart.
 pub(super) fn series(
-    traces: &Traces<7>,
+    traces: &Traces<8>,
     time: Time,
     title: &str,
     unit: &str,
@@ -144,6 +147,48 @@ pub(super) fn parts(trace: &Traces<3>, time: Time) -> Result<String, String> {
     let lines = [(1, "heading"), (2, "inclination")]
         .map(|(index, name)| line(name, index, trace.points(index, time.nanos)));
     over_time(time, "Error as taken here, in parts", "deg", lines.into())
+}
+
+/// Errors of the run between three sigma of what it says of them: tilt, or heading, which has a sign.
+pub(super) fn bounds(trace: &Traces<4>, time: Time, part: Bounded) -> Result<String, String> {
+    let (error, three, title) = match part {
+        Bounded::Tilt => (0, 1, "Tilt: error and 3 sigma"),
+        Bounded::Heading => (2, 3, "Heading: error and 3 sigma"),
+    };
+    let errors = trace.points(error, time.nanos);
+    let mut above = trace.points(three, time.nanos);
+    // What was not known at the very beginning, or after a reset, would flatten all else.
+    let mut sizes: Vec<f64> = above
+        .iter()
+        .map(|p| p[1])
+        .filter(|v| v.is_finite())
+        .collect();
+    sizes.sort_by(f64::total_cmp);
+    let ordinary = sizes.get(sizes.len() * 9 / 10).copied().unwrap_or(0.0);
+    let largest = errors.iter().map(|p| p[1].abs()).fold(ordinary, f64::max);
+    for point in above.iter_mut().filter(|p| p[1] > ROOM * largest) {
+        point[1] = f64::NAN;
+    }
+    let bound = |points: Vec<[f64; 2]>, name: &str| Series {
+        name: name.to_owned(),
+        points,
+        look: Look::Dashed,
+        color: Some(2),
+    };
+    let mut lines = vec![line("error", 1, errors)];
+    if part == Bounded::Heading {
+        let below = above.iter().map(|[x, y]| [*x, -*y]).collect();
+        lines.push(bound(below, ""));
+    }
+    lines.push(bound(above, "3 sigma"));
+    over_time(time, title, "deg", lines)
+}
+
+/// Which part of an error.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Bounded {
+    Tilt,
+    Heading,
 }
 
 /// Deviations of the step from the ordinary one: how many, by octave.

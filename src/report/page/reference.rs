@@ -1,7 +1,8 @@
 //! Errors against a reference -> their part of the page. Pure.
 
-use super::charts::{self, Time};
-use super::markup::{escaped, figure, table};
+use super::charts::{self, Bounded, Time};
+use super::markup::{escaped, figure, sentence, table};
+use crate::report::against;
 use crate::report::series::Errors;
 use crate::report::summary::{TopicSummary, significant};
 use std::fmt::Write as _;
@@ -106,9 +107,29 @@ pub(super) fn section(
             errors.stride
         );
     }
+    if let Some((found, _)) = &errors.bounds {
+        let judged = against::beyond_sigma(found)
+            .map_or_else(|| "Sigma holds".to_owned(), |beyond| sentence(&beyond));
+        let _ = writeln!(
+            out,
+            "<p id=\"within-sigma\">{}. {}; {}.</p>",
+            escaped(&judged),
+            escaped(&sentence(&against::within_sigma(found))),
+            against::alignment(found.align)
+        );
+    }
     let Some((time, stretches)) = drawn else {
         return;
     };
+    if let Some((_, trace)) = &errors.bounds {
+        let trace = trace.reduced(stretches);
+        for (id, part) in [
+            ("tilt-bounds", Bounded::Tilt),
+            ("heading-bounds", Bounded::Heading),
+        ] {
+            out.push_str(&figure(id, charts::bounds(&trace, time, part)));
+        }
+    }
     let traces: Vec<_> = errors
         .traces
         .iter()

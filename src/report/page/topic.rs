@@ -4,6 +4,7 @@ use super::charts::{self, Time};
 use super::markup::{Rows, escaped, figure, table};
 use super::{Noise, Page, numbers, reference, timeline};
 use crate::pipeline::check::CheckedTopic;
+use crate::report::aid::Aided;
 use crate::report::series::Drawn;
 use crate::report::summary::{TopicSummary, meaning, significant};
 use std::fmt::Write as _;
@@ -130,10 +131,19 @@ fn integrated(s: &TopicSummary, stretches: Option<usize>, out: &mut String) {
             s.noise
         ),
     );
+    if let Some(terms) = &s.sigma_terms {
+        rows.add("sigma", &terms.text());
+    }
     for warning in &s.warnings {
         rows.add("warning", &warning.replace("\n  help: ", "; "));
     }
     out.push_str(&rows.html());
+    if let Some(learned) = s.aided.as_ref().and_then(Aided::learned) {
+        out.push_str("<h3>Calibration learned on the way</h3>\n");
+        let head = ["", "x", "y", "z", "+- x", "+- y", "+- z"];
+        out.push_str(&table("numbers", &head, &learned));
+        out.push_str("<p class=\"small\">One sigma. What the motion does not show stays near nothing, with the sigma it had at first.</p>\n");
+    }
     let drawn = s.drawn.as_deref().filter(|d| d.series.samples > 0);
     match (drawn, stretches) {
         (Some(drawn), Some(stretches)) => plots(s, drawn, stretches, out),
@@ -167,9 +177,9 @@ fn plots(s: &TopicSummary, drawn: &Drawn, stretches: usize, out: &mut String) {
     let sigma = charts::series(
         &traces,
         time,
-        "One sigma of the attitude, worst axis",
+        "One sigma of the attitude",
         "deg",
-        &[(6, "")],
+        &[(6, "tilt"), (7, "heading")],
     );
     out.push_str(&figure("sigma", sigma));
     if drawn.series.samples > stretches as u64 * 4 {

@@ -263,3 +263,46 @@ fn compare_draws_its_errors() {
     strapd(dir, "compare est.csv top.mcap --plot error.png").refused(2, &["SVG", "error.svg"]);
     strapd(dir, "compare est.csv top.mcap --plot error.svg --force").done();
 }
+
+#[test]
+fn errors_lie_between_their_three_sigma_and_what_was_learned_is_in_a_table() {
+    let dir = tempfile::tempdir().unwrap();
+    let samples: Vec<ImuSample> = motion(3000)
+        .into_iter()
+        .map(|sample| ImuSample {
+            orientation: None,
+            accel: [0.0, 0.0, 9.80665],
+            ..sample
+        })
+        .collect();
+    let (html, _) = page(dir.path(), &samples, "");
+    // Without a reference: sigma of tilt and of heading.
+    let sigma = figure(&html, "sigma").unwrap();
+    assert!(
+        sigma.contains("tilt") && sigma.contains("heading"),
+        "{sigma}"
+    );
+    assert!(figure(&html, "tilt-bounds").is_none() && !html.contains("within-sigma"));
+    assert!(!html.contains("Calibration learned"));
+    assert!(html.contains("class consumer, --noise"));
+    // Held against an attitude of its own: no error, which lies within.
+    strapd(dir.path(), "replay log.mcap -o truth.csv -q").done();
+    let (html, _) = page(dir.path(), &samples, "--reference truth.csv");
+    for id in ["tilt-bounds", "heading-bounds"] {
+        let figure = figure(&html, id).unwrap_or_else(|| panic!("{id}"));
+        assert!(
+            figure.contains("3 sigma") && figure.contains("error"),
+            "{figure}"
+        );
+    }
+    assert!(
+        html.contains("Sigma holds. Within 3 sigma: tilt 100 %"),
+        "no verdict"
+    );
+    // And against one that turns otherwise.
+    let (html, _) = page(dir.path(), &samples, "--reference truth.csv --bias 0,0,0.1");
+    assert!(html.contains("The error is beyond 3 sigma"), "no verdict");
+    assert!(html.contains("bias-by-orientation") && html.contains("beyond-sigma"));
+    let (html, _) = page(dir.path(), &samples, "--aid gravity");
+    assert!(html.contains("Calibration learned") && html.contains("accelerometer lead, ms"));
+}

@@ -18,6 +18,9 @@ pub enum Align {
     None,
     /// The one that makes the first matched sample agree: what a dead reckoner may ask for.
     First,
+    /// The turn about the vertical (z) that makes the heading of the first matched sample agree: what who is level and
+    /// knows no north may ask for.
+    FirstHeading,
     /// The turn about the vertical (z) that fits best over all samples: heading unknown, level known.
     Heading,
     /// The rotation that fits best over all samples.
@@ -26,7 +29,13 @@ pub enum Align {
 
 impl Align {
     /// Every choice.
-    pub const ALL: [Align; 4] = [Align::None, Align::First, Align::Heading, Align::Best];
+    pub const ALL: [Align; 5] = [
+        Align::None,
+        Align::First,
+        Align::FirstHeading,
+        Align::Heading,
+        Align::Best,
+    ];
 
     /// The name used by `--align`.
     #[must_use]
@@ -34,6 +43,7 @@ impl Align {
         match self {
             Align::None => "none",
             Align::First => "first",
+            Align::FirstHeading => "first-heading",
             Align::Heading => "heading",
             Align::Best => "best",
         }
@@ -47,13 +57,15 @@ impl Align {
     ) -> Quaternion<Nav, Nav> {
         match self {
             Align::None => Quaternion::identity(),
-            Align::First => {
-                let mut first = Quaternion::identity();
-                for_each_match(estimate, reference, |_, q_ref_est| {
-                    first = q_ref_est;
-                    ControlFlow::Break(())
-                });
-                first
+            Align::First => first(estimate, reference),
+            Align::FirstHeading => {
+                let [w, _, _, z] = first(estimate, reference).wxyz();
+                let size = w.hypot(z);
+                if size > 0.0 {
+                    Quaternion::assume_unit([w / size, 0.0, 0.0, z / size])
+                } else {
+                    Quaternion::identity()
+                }
             }
             Align::Heading => mean_heading(&scatter(estimate, reference)),
             Align::Best => mean_rotation(scatter(estimate, reference)),
@@ -86,16 +98,26 @@ pub struct ParseAlignError;
 
 impl fmt::Display for ParseAlignError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("no such alignment\n  help: none, first, heading or best")
+        f.write_str("no such alignment\n  help: none, first, first-heading, heading or best")
     }
 }
 
 impl std::error::Error for ParseAlignError {}
 
+/// At the first match; the identity when there is none.
+fn first(estimate: &Track<'_>, reference: &Track<'_>) -> Quaternion<Nav, Nav> {
+    let mut first = Quaternion::identity();
+    for_each_match(estimate, reference, |_, q_ref_est, _| {
+        first = q_ref_est;
+        ControlFlow::Break(())
+    });
+    first
+}
+
 /// Sum of `d d^T` over the matches: blind to the sign of each quaternion.
 fn scatter(estimate: &Track<'_>, reference: &Track<'_>) -> Matrix4<f64> {
     let mut sum = Matrix4::zeros();
-    for_each_match(estimate, reference, |_, q_ref_est| {
+    for_each_match(estimate, reference, |_, q_ref_est, _| {
         let d = Vector4::from(q_ref_est.wxyz());
         sum += d * d.transpose();
         ControlFlow::Continue(())

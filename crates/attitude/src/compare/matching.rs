@@ -41,6 +41,24 @@ impl<'a> Track<'a> {
     }
 }
 
+impl Track<'_> {
+    /// The attitude at an instant, interpolated, by the place of the first row after it; `None` outside, and in gaps.
+    pub(super) fn at(&self, stamp: Nanos, after: usize) -> Option<Quaternion<Nav, Body>> {
+        let (t0, q0) = self.rows.get(after.checked_sub(1)?)?;
+        if *t0 == stamp {
+            return Some(q0.normalised());
+        }
+        let (t1, q1) = self.rows.get(after)?;
+        let gap = t1.since(*t0);
+        if gap > self.spacing.saturating_mul(LONGEST_BRIDGE) {
+            return None;
+        }
+        // t0 < stamp < t1, so gap > 0.
+        let t = stamp.since(*t0) as f64 / gap as f64;
+        Some(q0.normalised().slerp(&q1.normalised(), t))
+    }
+}
+
 fn median_spacing(rows: &[Stamped]) -> i64 {
     let mut spacings: Vec<i64> = rows
         .windows(2)
@@ -58,11 +76,12 @@ fn median_spacing(rows: &[Stamped]) -> i64 {
 }
 
 /// Visits every reference sample inside the estimate, in time order, with the rotation from the
-/// world of the estimate to that of the reference, `q_ref q_est*`, the estimate interpolated.
+/// world of the estimate to that of the reference, `q_ref q_est*`, the estimate interpolated, and the place of the
+/// first estimate that is not before it.
 pub(super) fn for_each_match(
     estimate: &Track<'_>,
     reference: &Track<'_>,
-    mut visit: impl FnMut(Nanos, Quaternion<Nav, Nav>) -> ControlFlow<()>,
+    mut visit: impl FnMut(Nanos, Quaternion<Nav, Nav>, usize) -> ControlFlow<()>,
 ) -> LeftOut {
     let mut left_out = LeftOut {
         bad_estimates: estimate.bad,
@@ -76,8 +95,12 @@ pub(super) fn for_each_match(
             after += 1;
         }
         let before = after.checked_sub(1).and_then(|i| estimate.rows.get(i));
+        let mut place = after;
         let q_est = match (before, estimate.rows.get(after)) {
-            (Some((t, q)), _) if t == stamp => q.normalised(),
+            (Some((t, q)), _) if t == stamp => {
+                place -= 1; // there is one before
+                q.normalised()
+            }
             (Some((t0, q0)), Some((t1, q1))) => {
                 let gap = t1.since(*t0);
                 if gap > longest {
@@ -93,7 +116,7 @@ pub(super) fn for_each_match(
                 continue;
             }
         };
-        if visit(*stamp, q_ref.normalised() * q_est.inverse()).is_break() {
+        if visit(*stamp, q_ref.normalised() * q_est.inverse(), place).is_break() {
             break;
         }
     }

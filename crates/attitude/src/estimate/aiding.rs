@@ -61,7 +61,7 @@ impl Aiding {
     ///
     /// # Errors
     /// In words: no specific force, or none that can be. With [`Aid::Auto`] that is a warning.
-    pub(super) fn decide(
+    pub fn decide(
         plan: &Plan,
         resolved: &Meaning,
         first: &[RawSample],

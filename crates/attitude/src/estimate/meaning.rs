@@ -92,7 +92,8 @@ impl Meaning {
     }
 
     /// A recorded specific force in m/s^2 and body axes, as far as the format states its unit.
-    pub(super) fn force(&self, recorded: [f64; 3]) -> Vector3<f64> {
+    #[must_use]
+    pub fn force(&self, recorded: [f64; 3]) -> Vector3<f64> {
         self.mount * self.axes * Vector3::from(recorded) * self.accel_scale
     }
 

@@ -374,9 +374,20 @@ impl Noise {
     /// that of a body at rest is not that of one in motion (temperature, acceleration, what drivers cut off).
     #[must_use]
     pub fn unstable_bias(&self) -> [f64; 3] {
-        let axis =
-            |i: usize| (FLICKER * self.bias_instability[i]).hypot(LEFT * self.turn_on_bias[i]);
-        [axis(0), axis(1), axis(2)]
+        let ([x, y, z], [u, v, w]) = (self.flicker(), self.left_of_turn_on());
+        [x.hypot(u), y.hypot(v), z.hypot(w)]
+    }
+
+    /// The part of it that is flicker.
+    #[must_use]
+    pub fn flicker(&self) -> [f64; 3] {
+        self.bias_instability.map(|b| FLICKER * b)
+    }
+
+    /// The part of it that is the turn-on bias.
+    #[must_use]
+    pub fn left_of_turn_on(&self) -> [f64; 3] {
+        self.turn_on_bias.map(|b| LEFT * b)
     }
 
     /// What is not known of the bias, rad/s, when none is removed: turn-on bias and instability.

@@ -1,0 +1,250 @@
+//! What a recorded orientation says of the gyro's bias and of sigma, and what it must not be believed in.
+
+use super::{codes, found};
+use crate::made_logs::{ImuSample, START, written};
+use crate::program::strapd;
+use serde_json::Value;
+use std::path::Path;
+use strapd_attitude::frames::{Body, Nav};
+use strapd_attitude::quaternion::Quaternion;
+use strapd_bodies::motion::BandLimited;
+
+const HZ: i64 = 100;
+
+/// A minute in the hand, without a rest; exact but for what `spoil` does.
+fn moved(seed: u64, spoil: impl Fn(&mut ImuSample, Quaternion<Nav, Body>)) -> Vec<ImuSample> {
+    let mut motion = BandLimited::random(seed, 0.8, 1.5, 6).unwrap();
+    (0..60 * HZ)
+        .map(|k| {
+            let spin = motion.at_nanos((k * 1_000_000_000 / HZ) as u64);
+            let q = spin.q_nb.normalised();
+            let up = q.to_dcm().as_matrix().transpose() * nalgebra::Vector3::z();
+            let mut sample = ImuSample {
+                stamp: START + k * 1_000_000_000 / HZ,
+                orientation: Some(q.wxyz()),
+                gyro: spin.w_nb_b.into(),
+                gyro_covariance_0: 0.0,
+                accel: (up * 9.80665).into(),
+            };
+            spoil(&mut sample, q);
+            sample
+        })
+        .collect()
+}
+
+/// The ADIS16448 of EuRoC: 4.5 deg/s, 16,000 deg/h.
+const BIAS: [f64; 3] = [-0.0022, 0.0208, 0.0758];
+
+fn biased(sample: &mut ImuSample) {
+    sample.gyro = std::array::from_fn(|i| sample.gyro[i] + BIAS[i]);
+}
+
+/// `--against-recorded` of the log, with flags.
+fn against(dir: &Path, flags: &str) -> Value {
+    let ran = strapd(
+        dir,
+        &format!("replay log.mcap -o null: --json --against-recorded {flags}"),
+    );
+    ran.json()["topics"][0]["recorded"].clone()
+}
+
+fn after_long(recorded: &Value, at: usize) -> f64 {
+    recorded["bias_left"]["over_long_deg"][at].as_f64().unwrap()
+}
+
+#[test]
+fn a_gyro_that_is_off_by_16000_degrees_an_hour_is_told_with_the_bias_that_cures_it() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = written(dir.path(), "log.mcap", &moved(1, |s, _| biased(s)));
+    let found = found(&path);
+    assert_eq!(codes(&found), ["beyond-sigma", "bias-by-orientation"]);
+    let bias = found
+        .iter()
+        .find(|f| f.code == "bias-by-orientation")
+        .unwrap();
+    let given: Vec<f64> = bias
+        .flags
+        .strip_prefix("--bias ")
+        .unwrap()
+        .split(',')
+        .map(|v| v.parse().unwrap())
+        .collect();
+    for (given, bias) in given.iter().zip(BIAS) {
+        // Rates are taken for those of the stamp and interpolated: exact to 1e-5 rad/s.
+        assert!((given - bias).abs() < 2e-5, "{bias:?}");
+    }
+    let beyond = found.iter().find(|f| f.code == "beyond-sigma").unwrap();
+    assert_eq!(beyond.flags, bias.flags);
+
+    let before = against(dir.path(), "");
+    assert_eq!(before["sigma"]["beyond_3_sigma"], true, "{before}");
+    let after = against(dir.path(), &bias.flags);
+    assert_eq!(after["sigma"]["beyond_3_sigma"], false, "{after}");
+    assert_eq!(after["bias_left"]["worth_removing"], false, "{after}");
+    let (before, after) = (after_long(&before, 0), after_long(&after, 0));
+    assert!(before > 20.0 && after < 0.05, "{before} to {after} deg");
+}
+
+#[test]
+fn nothing_is_advised_where_there_is_no_bias_or_the_reference_is_of_something_else() {
+    let dir = tempfile::tempdir().unwrap();
+    let of = |samples: &[ImuSample]| codes(&found(&written(dir.path(), "log.mcap", samples)));
+    for seed in [1, 2, 3] {
+        assert_eq!(
+            of(&moved(seed, |_, _| ())),
+            Vec::<&str>::new(),
+            "seed {seed}"
+        );
+    }
+    // A tenth of a degree a second under a class that says one: a bias, but no lie.
+    let small = of(&moved(1, |s, _| s.gyro[2] += 0.0017));
+    assert_eq!(small, ["bias-by-orientation"]);
+    // The same bias, but the orientation is that of other axes.
+    let half = 0.5f64.sqrt();
+    let turn: Quaternion<Body, Body> = Quaternion::assume_unit([half, half, 0.0, 0.0]);
+    let turned = of(&moved(1, |s, q| {
+        biased(s);
+        s.orientation = Some((q * turn).normalised().wxyz());
+    }));
+    assert!(turned.contains(&"orientation-other-axes"), "{turned:?}");
+    assert!(!turned.contains(&"bias-by-orientation") && !turned.contains(&"beyond-sigma"));
+    // Of another body altogether.
+    let other = moved(7, |_, _| ());
+    let mut unrelated = moved(1, |_, _| ());
+    for (sample, other) in unrelated.iter_mut().zip(&other) {
+        sample.orientation = other.orientation;
+    }
+    let unrelated = of(&unrelated);
+    assert!(!unrelated.contains(&"bias-by-orientation"), "{unrelated:?}");
+    assert!(
+        unrelated
+            .iter()
+            .any(|code| code.starts_with("orientation-")),
+        "{unrelated:?}"
+    );
+}
+
+#[test]
+fn the_same_is_said_of_an_attitude_in_a_file_of_any_format() {
+    let dir = tempfile::tempdir().unwrap();
+    written(dir.path(), "log.mcap", &moved(1, |s, _| biased(s)));
+    for output in ["a.mcap", "a.ndjson", "a.csv"] {
+        strapd(dir.path(), &format!("replay log.mcap -o {output} --quiet")).done();
+        let said = strapd(dir.path(), &format!("compare {output} log.mcap --json")).json();
+        let sigma = &said["sigma"];
+        assert_eq!(sigma["beyond_3_sigma"], true, "{output}: {said}");
+        // MCAP has the whole covariance, the others its diagonal: turned into the world's axes that is near it.
+        let share = sigma["heading"]["within_3_sigma"].as_f64().unwrap();
+        assert!(share < 0.9, "{output}: {sigma}");
+        let left = said["bias_left"]["bias_rad_s"]["z"].as_f64().unwrap();
+        assert!((left - BIAS[2]).abs() < 2e-5, "{output}: {said}");
+        let text = strapd(dir.path(), &format!("compare {output} log.mcap"));
+        assert!(
+            text.done().out.contains("the error is beyond 3 sigma"),
+            "{text:?}"
+        );
+    }
+    // An attitude that is good says so, and nothing of a bias.
+    strapd(
+        dir.path(),
+        "replay log.mcap -o good.mcap --quiet --bias -0.0022,0.0208,0.0758",
+    )
+    .done();
+    let good = strapd(dir.path(), "compare good.mcap log.mcap --json").json();
+    assert_eq!(good["sigma"]["beyond_3_sigma"], false, "{good}");
+    assert_eq!(good["bias_left"], Value::Null, "{good}");
+}
+
+#[test]
+fn a_summary_says_what_its_sigma_is_made_of() {
+    let dir = tempfile::tempdir().unwrap();
+    written(dir.path(), "log.mcap", &moved(1, |_, _| ()));
+    let terms = |flags: &str| {
+        let ran = strapd(
+            dir.path(),
+            &format!("replay log.mcap -o null: --json {flags}"),
+        );
+        ran.json()["topics"][0]["sigma_terms"].clone()
+    };
+    let alone = terms("--noise tactical --bias 0,0,1e-3");
+    assert_eq!(alone["by"], "noise");
+    assert_eq!(alone["class"], "tactical");
+    for (name, value) in [
+        ("white_noise", 0.15),
+        ("flicker", 0.85),
+        ("turn_on_bias", 0.03 * 2.8e-3),
+        ("scale", 0.03),
+        ("axes", 5e-4f64.to_degrees()),
+        ("initial_tilt", 0.0),
+        ("bridged_gaps", 0.0),
+        ("rate_random_walk", 0.0),
+    ] {
+        let said = alone["terms"][name]["value"].as_f64();
+        let said = said.unwrap_or_else(|| panic!("{name}: {alone}"));
+        assert!(
+            (said - value).abs() < 1e-9 * value.max(1.0),
+            "{name}: {said}"
+        );
+    }
+    let aided = terms("--aid gravity");
+    assert_eq!(aided["by"], "filter", "{aided}");
+    assert!(
+        aided["terms"]["accelerometer_bias"]["value"]
+            .as_f64()
+            .unwrap()
+            > 0.0,
+        "{aided}"
+    );
+    let text = strapd(dir.path(), "replay log.mcap -o null:").out;
+    assert!(
+        text.contains("of (class consumer, --noise): white noise 0.84 deg/sqrt(h)"),
+        "{text}"
+    );
+}
+
+#[test]
+fn info_says_what_may_correct_the_attitude_from_file_and_pipe_alike() {
+    let dir = tempfile::tempdir().unwrap();
+    let lines = |force: f64, field: bool| {
+        (0..300)
+            .map(|k| {
+                let mag = if field { ",\"mag\":[0.2,0,-0.45]" } else { "" };
+                format!(
+                    "{{\"stamp\":{{\"sec\":100,\"nsec\":{}}},\"gyro\":[0,0.1,0],\"accel\":[0,0,{force}]{mag}}}\n",
+                    k * 3_000_000
+                )
+            })
+            .collect::<String>()
+    };
+    let said = |text: &str| {
+        std::fs::write(dir.path().join("log.ndjson"), text).unwrap();
+        let file = strapd(dir.path(), "info log.ndjson --json").json();
+        let piped = crate::program::strapd_fed(dir.path(), "info - --json", text).json();
+        assert_eq!(file["imu"][0]["aid"], piped["imu"][0]["aid"]);
+        (
+            file["imu"][0]["aid"].clone(),
+            strapd(dir.path(), "info log.ndjson").out,
+        )
+    };
+    let (aid, text) = said(&lines(9.8, false));
+    assert_eq!(aid["auto"], "gravity", "{aid}");
+    assert_eq!(aid["force"]["unit"], "m/s^2", "{aid}");
+    assert_eq!(aid["field"], Value::Null, "{aid}");
+    assert!(text.contains("--aid auto takes gravity"), "{text}");
+    let (aid, text) = said(&lines(1.0, true));
+    assert_eq!(aid["force"]["unit"], "g", "{aid}");
+    assert_eq!(aid["field"]["unit"], "G", "{aid}");
+    assert!(
+        text.contains("--aid gravity+mag takes the heading"),
+        "{text}"
+    );
+    // A phone's acceleration without gravity.
+    let (aid, text) = said(&lines(0.1, false));
+    assert_eq!(aid["auto"], "none", "{aid}");
+    assert_eq!(aid["force"]["plausible"], false, "{aid}");
+    assert!(text.contains("force_implausible"), "{text}");
+    // What auto would do it does.
+    std::fs::write(dir.path().join("log.ndjson"), lines(0.1, false)).unwrap();
+    let replayed = strapd(dir.path(), "replay log.ndjson -o null: --json --aid auto");
+    assert_eq!(replayed.json()["topics"][0]["aid"], Value::Null);
+}
