@@ -108,8 +108,14 @@ fn told_by_it(
     } else {
         "the sensor is worse than its class, or the orientation is no truth"
     };
-    if flags.is_empty() && summary.aided.is_none() && summary.noise != "consumer" {
-        "--noise consumer".clone_into(&mut flags);
+    // The next worse class; there is none behind the last, and a list is the user's own.
+    let worse = match summary.noise.as_str() {
+        "consumer" => "--noise uncalibrated",
+        "industrial" | "tactical" | "navigation" => "--noise consumer",
+        _ => "",
+    };
+    if flags.is_empty() && summary.aided.is_none() {
+        worse.clone_into(&mut flags);
     }
     out.push(
         Finding::new(Severity::Warning, "beyond-sigma", what)
