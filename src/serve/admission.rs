@@ -156,18 +156,23 @@ impl Web {
         match origin {
             None => Ok(()),
             Some(origin) if self.origins.iter().any(|o| o.eq_ignore_ascii_case(origin)) => Ok(()),
-            Some(origin) => {
-                let authority = origin
-                    .split_once("://")
-                    .filter(|(scheme, _)| matches!(*scheme, "http" | "https"))
-                    .map(|(_, authority)| authority);
-                if authority.is_some_and(|a| a.eq_ignore_ascii_case(host)) {
-                    Ok(())
-                } else {
-                    Err(Foreign::Origin)
-                }
-            }
+            Some(origin) if Web::is_own(Some(host), Some(origin)) => Ok(()),
+            Some(_) => Err(Foreign::Origin),
         }
+    }
+
+    /// Whether a page that says this `origin` came from the `host` it asks: no browser lets a page say so of
+    /// itself that did not.
+    #[must_use]
+    pub fn is_own(host: Option<&str>, origin: Option<&str>) -> bool {
+        let (Some(host), Some(origin)) = (host, origin) else {
+            return false;
+        };
+        let authority = origin
+            .split_once("://")
+            .filter(|(scheme, _)| matches!(*scheme, "http" | "https"))
+            .map(|(_, authority)| authority);
+        authority.is_some_and(|a| a.eq_ignore_ascii_case(host))
     }
 }
 

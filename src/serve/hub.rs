@@ -12,12 +12,14 @@ mod latecomers;
 mod places;
 mod polling;
 mod report;
+mod resetting;
 
 pub use back_pressure::Flood;
 pub use counters::{Counters, count};
 use places::Absent;
 use polling::Polling;
 use report::StateStatus;
+pub use resetting::Asker;
 
 use super::Settings;
 use super::admission::Token;

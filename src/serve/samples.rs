@@ -5,7 +5,7 @@
 //! elsewhere without having asked first.
 
 use super::http::{refusal, response, unauthorised};
-use super::hub::{Client, Flood, GAVE_WAY, Hub, News, SampleRun, Sensor, count};
+use super::hub::{Asker, Client, Flood, GAVE_WAY, Hub, News, SampleRun, Sensor, count};
 use super::listen::{Connection, now};
 use super::log_throttle;
 use super::peer::{Origin, Peer};
@@ -76,10 +76,17 @@ struct Poster {
 struct Taken {
     objects: u64,
     samples: u64,
+    resets: u64,
     errors: u64,
     first: Option<Value>,
     /// Which sensor's run began anew, and why.
     notes: Vec<String>,
+}
+
+/// What an object asks for.
+enum Posted {
+    Samples(Line),
+    Reset(Result<wire::Reset, Fault>),
 }
 
 /// Samples of one sensor on their way to the hub.
@@ -316,7 +323,18 @@ impl Poster {
             };
             count(&self.hub.counters.lines, 1);
             match read {
-                Ok(mut head) => {
+                Ok(Posted::Reset(mut asked)) => {
+                    self.publish(&mut gathered, usize::MAX, received, &mut taken)
+                        .await;
+                    if let Ok(asked) = &mut asked {
+                        asked.id = asked.id.take().or(name.map(str::to_owned));
+                    }
+                    match self.hub.reset(asked, Asker::Client(self.client.number)) {
+                        Ok(_) => (in_a_row, taken.resets) = (0, taken.resets + 1),
+                        Err(fault) => taken.fault(&self.hub, &fault, number, near),
+                    }
+                }
+                Ok(Posted::Samples(mut head)) => {
                     in_a_row = 0;
                     head.id = head.id.or(name.map(str::to_owned));
                     let bare = std::mem::take(&mut head.bare);
@@ -365,7 +383,7 @@ impl Poster {
         bytes: &[u8],
         received: Nanos,
         samples: &mut Vec<RawSample>,
-    ) -> Result<Line, Fault> {
+    ) -> Result<Posted, Fault> {
         let before = samples.len();
         match wire::read(self.hub.decoder(), bytes, received, samples)? {
             Message::Samples(_) if !self.hub.takes_samples() => {
@@ -373,10 +391,11 @@ impl Poster {
                 samples.truncate(before);
                 Err(wire::samples_not_taken())
             }
-            Message::Samples(head) => Ok(head),
+            Message::Samples(head) => Ok(Posted::Samples(head)),
+            Message::Reset(asked) => Ok(Posted::Reset(asked)),
             _ => Err(Fault::new(
                 "unknown_class",
-                "only samples are posted; what is answered is asked over a WebSocket at /ws",
+                "only samples and RESET are posted; what is answered is asked over a WebSocket at /ws",
             )),
         }
     }
@@ -499,6 +518,9 @@ impl Taken {
                 ("errors", self.errors),
             ] {
                 fields.insert(name.to_owned(), n.into());
+            }
+            if self.resets > 0 {
+                fields.insert("resets".to_owned(), self.resets.into());
             }
             if !self.notes.is_empty() {
                 fields.insert("notes".to_owned(), self.notes.into());

@@ -5,6 +5,7 @@
 //! many lines in a row were bad, whether it has shown the token.
 
 mod opening;
+mod resetting;
 mod turn;
 mod unpacking;
 
@@ -159,6 +160,8 @@ pub struct Session {
     framer: Framer,
     side: Side,
     authorised: bool,
+    /// Its pages are our own.
+    is_own_page: bool,
     opening: Opening,
     errors_in_a_row: u32,
     errors: Allowance,
@@ -200,6 +203,7 @@ impl Session {
         }
         Session {
             authorised,
+            is_own_page: false,
             opening,
             side,
             hub: hub.clone(),
@@ -297,7 +301,11 @@ impl Session {
         }
         self.step.asked |= matches!(
             read,
-            Ok(Message::Watch(_) | Message::Poll | Message::Playback(_) | Message::Auth(_))
+            Ok(Message::Watch(_)
+                | Message::Poll
+                | Message::Reset(_)
+                | Message::Playback(_)
+                | Message::Auth(_))
         );
         if !self.has_spoken() {
             if matches!(&read, Err(fault) if fault.code == "bad_json") {
@@ -357,6 +365,11 @@ impl Session {
                 self.errors_in_a_row = 0;
                 self.flush(received, scratch, usize::MAX);
                 self.poll();
+            }
+            Ok(Message::Reset(asked)) => {
+                // It holds for what comes after it.
+                self.flush(received, scratch, usize::MAX);
+                self.reset(asked, number, line);
             }
             Ok(Message::Playback(action)) => {
                 self.errors_in_a_row = 0;

@@ -4,7 +4,9 @@
 //! sample, no sample is held back, nothing is looked at before the first attitude leaves, and senders
 //! come and go ([`run`]).
 
+mod attitude_now;
 mod intervals;
+mod resetting;
 pub mod run;
 pub mod stamps;
 
@@ -16,7 +18,9 @@ use crate::serve::recorder::stream_of;
 use crate::serve::state::Saved;
 use crate::serve::wire::Fault;
 use crate::sink::Stream;
+use attitude_now::attitude_now;
 use intervals::Intervals;
+use resetting::Resetting;
 use run::{Placed, Span, Standing};
 use stamps::{Stamps, Taken};
 use std::sync::Arc;
@@ -58,6 +62,8 @@ pub struct SensorStream {
     ambiguous: Option<Fault>,
     /// Whether the samples' intervals can be true.
     intervals: Intervals,
+    /// What was asked of it.
+    resetting: Resetting,
     /// First stamp of the run.
     first: Option<Nanos>,
     /// Runs begun by a connection since the start.
@@ -98,8 +104,9 @@ pub fn live_plan(plan: &Plan) -> Result<Plan, String> {
         plan.method = "commit".parse::<Method>().map_err(|e| e.to_string())?;
     }
     let resolved = Meaning::new(&plan, &Declared::default());
-    // An orientation, so that only what no sample can bring is refused.
+    // An orientation and a specific force, so that only what no sample can bring is refused.
     let sample = RawSample {
+        accel: Some([0.0, 0.0, 9.81]),
         orientation: Some(
             Quaternion::<strapd_attitude::frames::Nav, strapd_attitude::frames::Body>::identity()
                 .wxyz(),
@@ -157,6 +164,7 @@ impl SensorStream {
             stamps: Stamps::new(saved.as_ref().and_then(Saved::unit)),
             ambiguous: None,
             intervals: Intervals::default(),
+            resetting: Resetting::default(),
             saved,
             first: None,
             runs: 0,
@@ -433,6 +441,7 @@ impl SensorStream {
         }
         for raw in samples {
             if self.joining == Joining::Joined || !self.is_again(plan, raw) {
+                self.reset_if_asked(plan, raw);
                 self.estimator.take(raw);
                 self.intervals.take(raw, plan.clock, self.resolved.kind);
             }
@@ -526,6 +535,7 @@ impl SensorStream {
             "not_bridged": report.gaps.not_bridged,
             "attitudes": self.next_seq - self.first_seq,
             "new_runs": self.runs,
+            "resets": self.resetting.taken,
             "reset": self.last.map_or(0, |l| l.reset_count),
             "last_stamp": self.last.map(|l| stamp(l.stamp)),
             "rate_hz": report.spacing_nanos.filter(|n| *n > 0).map(|n| 1e9 / n as f64),
@@ -537,6 +547,7 @@ impl SensorStream {
             "world": self.channel.stream().world_axes,
             "body": self.channel.stream().body_axes,
             "aid": self.estimator.filter().map(|filter| Aided::of(filter).json()),
+            "attitude": attitude_now(self.estimator.filter(), self.last.as_ref()),
             "initial": self.prepared.initial_origin,
             "bias": self.prepared.bias_origin,
             "interval_mismatches": self.intervals.found(),

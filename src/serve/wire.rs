@@ -5,8 +5,10 @@
 //! (`docs/protocol.md`).
 
 mod packing;
+mod resetting;
 
 pub use packing::{broken_packed, packed_stream, unreadable};
+pub use resetting::{Reset, reset_answer};
 
 use super::outbox::{Class as Stream, Dropped, Filter, MAX_QUEUED};
 use super::playback::controls::{Action, Place};
@@ -39,6 +41,8 @@ pub enum Message {
     Poll,
     /// Be elsewhere in a replay.
     Playback(Action),
+    /// Begin a sensor's attitude anew; or why that can not be, which is no fault of samples.
+    Reset(Result<Reset, Fault>),
     /// Here is the token.
     Auth(String),
 }
@@ -172,6 +176,7 @@ pub fn read_from(
         Some("WATCH") => watch(line).map(Message::Watch),
         Some("PACKED") => packing::read(line).map(|(stream, head)| Message::Packed(stream, head)),
         Some("POLL") => Ok(Message::Poll),
+        Some("RESET") => Ok(Message::Reset(resetting::read(line))),
         Some("PLAYBACK") => playback_action(line).map(Message::Playback),
         Some("AUTH") => {
             object::<AuthObject>(line, "bad_auth", "{\"class\":\"AUTH\",\"token\":\"...\"}")
@@ -180,7 +185,7 @@ pub fn read_from(
         Some(other) => Err(Fault::new(
             "unknown_class",
             format!(
-                "class `{other}` is none a client sends; known: RATE, PACKED, WATCH, POLL, PLAYBACK, AUTH"
+                "class `{other}` is none a client sends; known: RATE, PACKED, WATCH, POLL, RESET, PLAYBACK, AUTH"
             ),
         )),
         None => Err(Fault::new(

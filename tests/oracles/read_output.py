@@ -4,7 +4,8 @@
 
 Every message is decoded twice, by `mcap` + `mcap-ros2-support` and by `rosbags` (CDR), or by `mcap` and
 the standard JSON reader (--encoding json); checksums are checked. Quaternion, rate and stamp of every
-message must equal those of the NDJSON line with the same number. Exit code 0 and one line when they do.
+message must equal those of the NDJSON line with the same number; an orientation's covariance, about the
+fixed axes of the world, must have the line's sigma once scipy has turned it to body axes. Exit code 0 and one line when they do.
 
 Made and last run with: Python 3.13, mcap 1.6.0, mcap-ros2-support 0.6.0, rosbags 0.11.9, scipy 1.17.1.
 """
@@ -46,10 +47,10 @@ def expected(path):
 
 
 def compare(decoded, lines, transforms, reader):
-    """`decoded`: (topic, stamp in ns, wxyz, rate or None), in file order."""
+    """`decoded`: (topic, stamp in ns, wxyz, rate or None, sigma in degrees or None), in file order."""
     left, left_tf = iter(lines), iter(transforms)
     counts = [0, 0]
-    for topic, stamp, q, rate in decoded:
+    for topic, stamp, q, rate, sigma in decoded:
         is_tf = topic == "/tf"
         line = next(left_tf if is_tf else left, None)
         if line is None:
@@ -60,6 +61,8 @@ def compare(decoded, lines, transforms, reader):
         close(q, wxyz(line["q"]), what)
         if rate is not None:
             close(rate, line["rate"], what)
+        if sigma is not None and not np.allclose(sigma, line["sigma_deg"], rtol=1e-9, atol=1e-9):
+            sys.exit(f"{what}: sigma {sigma} is not {line['sigma_deg']}")
         counts[is_tf] += 1
     if counts != [len(lines), len(transforms)]:
         sys.exit(f"{reader}: {counts} messages, expected {[len(lines), len(transforms)]}")
@@ -76,7 +79,7 @@ def from_ros(topic, message):
         if (t.header.frame_id, t.child_frame_id) != ("world", "imu_link"):
             sys.exit(f"frames {t.header.frame_id} {t.child_frame_id}")
         close(xyz(t.transform.translation), [0, 0, 0], "translation")
-        return topic, ros_stamp(t.header), wxyz(t.transform.rotation), None
+        return topic, ros_stamp(t.header), wxyz(t.transform.rotation), None, None
     covariance = list(message.orientation_covariance)
     matrix = np.array(covariance).reshape(3, 3)
     if (matrix != matrix.T).any() or not (np.linalg.eigvalsh(matrix) > 0).all():
@@ -87,7 +90,9 @@ def from_ros(topic, message):
     q = wxyz(message.orientation)
     # The order the rest of the world reads: scipy takes x, y, z, w.
     close(Rotation.from_quat(q[1:] + q[:1]).as_quat(canonical=False), q[1:] + q[:1], "scipy")
-    return topic, ros_stamp(message.header), q, xyz(message.angular_velocity)
+    body = Rotation.from_quat(q[1:] + q[:1]).as_matrix()
+    sigma = np.degrees(np.sqrt(np.diag(body.T @ matrix @ body)))
+    return topic, ros_stamp(message.header), q, xyz(message.angular_velocity), sigma
 
 
 def from_json(channel, message):
@@ -96,7 +101,7 @@ def from_json(channel, message):
         stamp, q, rate = v["timestamp"], v["rotation"], None
     else:
         stamp, q, rate = v["stamp"], v["q"], v["rate"]
-    return channel.topic, stamp["sec"] * 10**9 + stamp["nsec"], wxyz(q), rate
+    return channel.topic, stamp["sec"] * 10**9 + stamp["nsec"], wxyz(q), rate, None
 
 
 def main(mcap_path, ndjson_path):

@@ -7,7 +7,7 @@ pub(crate) mod client;
 pub(crate) mod daemon;
 
 mod admission;
-mod aiding;
+pub(crate) mod aiding;
 mod bad_lines;
 mod bare_stamps;
 mod cat;
@@ -26,6 +26,7 @@ mod packed;
 mod places;
 mod posting;
 mod recording;
+mod resetting;
 mod runs;
 mod same_bytes;
 mod slow_readers;

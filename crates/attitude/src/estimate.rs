@@ -10,6 +10,7 @@
 //! ```
 
 mod aiding;
+mod anew;
 mod estimator;
 mod first_pass;
 mod intervals;
@@ -19,6 +20,7 @@ mod preparation;
 mod stamps;
 
 pub use aiding::Aiding;
+pub use anew::Anew;
 pub use estimator::{Estimator, Memory};
 pub use first_pass::{Conditioned, FEW};
 pub use intervals::{LEAST_INTERVALS, Mismatch};

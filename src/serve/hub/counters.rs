@@ -27,6 +27,10 @@ pub struct Counters {
     pub refused_samples: AtomicU64,
     /// Sensors whose place went to another.
     pub gave_way: AtomicU64,
+    /// Attitudes begun anew because somebody asked.
+    pub resets: AtomicU64,
+    /// Such requests that were refused.
+    pub refused_resets: AtomicU64,
     /// Attitudes made.
     pub attitudes: AtomicU64,
 }
@@ -34,7 +38,7 @@ pub struct Counters {
 impl Counters {
     /// Each, in a fixed order.
     #[must_use]
-    pub fn named(&self) -> [Counter; 12] {
+    pub fn named(&self) -> [Counter; 14] {
         let counter = |name, counts, n: &AtomicU64| Counter {
             name,
             counts,
@@ -95,6 +99,12 @@ impl Counters {
                 "sensors_gave_way",
                 "Sensors that nobody sent and whose place another took; they go on from there when they come back.",
                 &self.gave_way,
+            ),
+            counter("resets", "RESET requests taken.", &self.resets),
+            counter(
+                "resets_refused",
+                "RESET requests refused: of another's sensor, of none there is, or to an attitude that can not be.",
+                &self.refused_resets,
             ),
             counter(
                 "attitudes",

@@ -60,6 +60,8 @@ pub(crate) struct Connection {
     pub(crate) posters: Arc<Posters>,
     /// The client has shown the token with the request.
     pub(crate) trusted: bool,
+    /// A browser says that the request is of a page it has from here.
+    pub(crate) is_own_page: bool,
     pub(crate) running: Running,
     /// Held as long as the connection, or the WebSocket it becomes, lives.
     pub(crate) place: Arc<Place>,
@@ -86,6 +88,7 @@ pub(super) async fn serve(listener: TcpListener, context: Context) {
                 from: peer.ip().to_canonical(),
                 posters: posters.clone(),
                 trusted: false,
+                is_own_page: false,
                 running: context.running.clone(),
                 place: place.clone(),
             };
@@ -164,6 +167,7 @@ async fn answer(
             why.reason(),
         ));
     }
+    connection.is_own_page = Web::is_own(host.as_deref(), origin.as_deref());
     if let (Some(token), Some(shown)) = (connection.hub.token(), text(header::AUTHORIZATION)) {
         let shown = shown.strip_prefix("Bearer ").unwrap_or_default();
         match token.judge(shown, connection.peer.address(), std::time::Instant::now()) {
@@ -198,13 +202,16 @@ pub(crate) async fn converse(socket: WebSocket, connection: Connection, foxglove
         hub,
         peer,
         trusted,
+        is_own_page,
         mut running,
         place,
         ..
     } = connection;
     let limits = *hub.limits();
     let mut session = match foxglove {
-        None => Talk::Lines(Box::new(Session::new(&hub, peer, trusted))),
+        None => Talk::Lines(Box::new(
+            Session::new(&hub, peer, trusted).of_own_page(is_own_page),
+        )),
         Some(controls) => Talk::Foxglove(Viewer::new(&hub, peer, controls)),
     };
     let client = session.client().clone();

@@ -182,6 +182,90 @@ fn the_sensors_of_a_daemon_are_channels_as_they_come_and_what_is_not_offered_is_
     assert!(closed < 1000, "it is closed after too much nonsense");
 }
 
+/// The covariance of a `sensor_msgs/msg/Imu` in CDR, and its quaternion (w, x, y, z), as the definition lays them
+/// out: a header of stamp and text, and then numbers at multiples of eight bytes from behind the encapsulation.
+fn imu(cdr: &[u8]) -> ([f64; 9], [f64; 4]) {
+    let body = &cdr[4..];
+    let length = u32::from_le_bytes(body[8..12].try_into().unwrap()) as usize;
+    let at = (12 + length).next_multiple_of(8);
+    let number = |n: usize| {
+        let at = at + 8 * n;
+        f64::from_le_bytes(body[at..at + 8].try_into().unwrap())
+    };
+    let [x, y, z, w] = std::array::from_fn(number);
+    (std::array::from_fn(|n| number(4 + n)), [w, x, y, z])
+}
+
+#[test]
+fn an_aided_sensors_messages_have_the_filters_covariance_about_the_axes_of_the_world() {
+    let mut settings = listening(&[TCP, WS]);
+    settings.plan.aid = strapd_attitude::estimate::Aid::Gravity;
+    let daemon = Daemon::start(settings);
+    let mut sender = Client::tcp(daemon.address(0)).watching(r#"{"class":"WATCH"}"#);
+    // On its side, and turning about the vertical: which of its axes is which of the world's shows.
+    let line = |n: u64| {
+        format!(
+            "{{\"id\":\"imu0\",\"stamp_ns\":{},\"gyro\":[0.02,0.9,0.1],\"accel\":[0.3,9.8,0.1]}}",
+            1_700_000_000_000_000_000 + n * 10_000_000
+        )
+    };
+    sender.send(&line(0));
+    sender.next_of("ATT");
+    let (mut viewer, _) = Viewer::connect(daemon.address(1), "foxglove.sdk.v1");
+    let channel = viewer.text("advertise")["channels"][1].clone();
+    assert_eq!(channel["topic"], "imu0/data");
+    let subscription = json!({"id": 7, "channelId": channel["id"]});
+    viewer.send(&json!({"op": "subscribe", "subscriptions": [subscription]}));
+    viewer.send(&json!({"op": "x"}));
+    viewer.text("status");
+    viewer.binary(1);
+    let mut last = None;
+    for n in 1..3000 {
+        sender.send(&line(n));
+        let att = sender.next_of("ATT");
+        let (p, q) = imu(&viewer.binary(1)[13..]);
+        last = Some((p, q, att));
+    }
+    let (p, q, att) = last.unwrap();
+    for (n, name) in ["w", "x", "y", "z"].into_iter().enumerate() {
+        assert_eq!(att["q"][name], q[n]);
+    }
+    // To body axes by the quaternion's matrix, written out: its diagonal is what the line says.
+    let [w, x, y, z] = q;
+    let columns = [
+        [
+            1.0 - 2.0 * (y * y + z * z),
+            2.0 * (x * y + w * z),
+            2.0 * (x * z - w * y),
+        ],
+        [
+            2.0 * (x * y - w * z),
+            1.0 - 2.0 * (x * x + z * z),
+            2.0 * (y * z + w * x),
+        ],
+        [
+            2.0 * (x * z + w * y),
+            2.0 * (y * z - w * x),
+            1.0 - 2.0 * (x * x + y * y),
+        ],
+    ];
+    for (axis, column) in columns.into_iter().enumerate() {
+        let of = |i: usize, j: usize| column[i] * p[3 * i + j] * column[j];
+        let variance: f64 = (0..9).map(|n| of(n / 3, n % 3)).sum();
+        let said = att["sigma_deg"][axis].as_f64().unwrap();
+        let sigma = variance.sqrt().to_degrees();
+        assert!((sigma - said).abs() < 1e-9, "{axis}: {sigma} {said}");
+    }
+    // Gravity tells the tilt and not the heading.
+    assert!(p[8] > 4.0 * p[0].max(p[4]), "{p:?}");
+    let sigma = &daemon.status()["sources"][0]["attitude"]["sigma_deg"];
+    let heading = p[8].sqrt().to_degrees();
+    assert!(
+        (sigma["heading"].as_f64().unwrap() - heading).abs() < 1e-9,
+        "{sigma} {heading}"
+    );
+}
+
 #[test]
 fn a_new_subscription_gets_the_last_message_of_its_channel_at_once() {
     let daemon = Daemon::start(listening(&[TCP, WS]));

@@ -9,7 +9,7 @@ use strapd::serve::Settings;
 use strapd_attitude::estimate::{Aid, Plan};
 
 /// A body that rolls slowly to and fro about 0.3 rad at 100 Hz, its gyro off by 0.5 deg/s.
-fn line(n: u64) -> String {
+pub(crate) fn line(n: u64) -> String {
     let t = n as f64 * 0.01;
     let roll = 0.3 + 0.2 * (0.9 * t).sin();
     let rate = 0.18 * (0.9 * t).cos() + 0.5_f64.to_radians();
@@ -22,7 +22,7 @@ fn line(n: u64) -> String {
     )
 }
 
-fn aided() -> Plan {
+pub(crate) fn aided() -> Plan {
     Plan {
         aid: Aid::Gravity,
         ..Plan::default()
@@ -65,7 +65,7 @@ fn a_daemon_gives_the_bytes_of_a_replay_and_says_what_it_learned() {
 }
 
 /// Roll of an attitude, degrees.
-fn roll(attitude: &str) -> f64 {
+pub(crate) fn roll(attitude: &str) -> f64 {
     let value: Value = serde_json::from_str(attitude).unwrap();
     let [w, x, y, z] = ["w", "x", "y", "z"].map(|c| value["q"][c].as_f64().unwrap());
     let (sin, cos) = (2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y));

@@ -70,11 +70,11 @@ fn what_is_wrong_in_a_file_is_named_with_its_place() {
             "listen = \"tcp-listen://0.0.0.0:0\"",
             "--allow-insecure-remote",
         ),
-        ("bias = \"auto\"", "--bias x,y,z"),
+        ("aid = \"none\"\nbias = \"auto\"", "--bias x,y,z"),
         ("sensor = 1", "[sensor.ID]"),
         ("[sensor.a]\nlisten = \"x\"", "[sensor.a]"),
         ("[sensor.a]\nworld = \"up\"", "up"),
-        ("[sensor.a]\ninit = \"gravity\"", "sensor a"),
+        ("aid = \"none\"\n[sensor.a]\ninit = \"gravity\"", "sensor a"),
     ] {
         let path = file(dir.path(), text);
         let output = ask("check", &path, None);

@@ -34,7 +34,7 @@ fn lively(n: u64) -> Option<String> {
 
 /// A daemon without sockets.
 pub(crate) struct Fed {
-    hub: Arc<Hub>,
+    pub(crate) hub: Arc<Hub>,
     watcher: Session,
     scratch: Scratch,
 }
@@ -44,7 +44,7 @@ pub(crate) struct Fed {
 pub(crate) struct Got {
     pub(crate) attitudes: Vec<String>,
     /// To who sent them.
-    said: Vec<Value>,
+    pub(crate) said: Vec<Value>,
 }
 
 impl Got {
@@ -52,7 +52,7 @@ impl Got {
         serde_json::from_str(&self.attitudes[0]).unwrap()
     }
 
-    fn codes(&self, class: &str) -> Vec<&str> {
+    pub(crate) fn codes(&self, class: &str) -> Vec<&str> {
         let of = |v: &&Value| v["class"] == class;
         self.said
             .iter()
@@ -63,7 +63,7 @@ impl Got {
 }
 
 impl Fed {
-    fn new(settings: Settings) -> Fed {
+    pub(crate) fn new(settings: Settings) -> Fed {
         let hub = Arc::new(Hub::new(settings).unwrap());
         let mut watcher = Session::new(&hub, "watcher".to_owned(), true);
         let mut scratch = Scratch::default();
@@ -125,7 +125,7 @@ impl Fed {
 }
 
 /// The same attitudes, but for how often there was a reset, and their numbers.
-fn as_first(line: &str) -> Value {
+pub(crate) fn as_first(line: &str) -> Value {
     let mut value: Value = serde_json::from_str(line).unwrap();
     for changed in ["seq", "reset", "status"] {
         value.as_object_mut().unwrap().remove(changed);

@@ -166,6 +166,18 @@ fn polls_over_websockets_keep_nobody_waiting() {
 }
 
 #[test]
+fn four_megabytes_of_resets_keep_nobody_waiting() {
+    // Of a sensor of another: refused, each of them.
+    weathers(
+        "RESET",
+        0,
+        b"",
+        b"{\"class\":\"RESET\",\"id\":\"good\"}\n",
+        false,
+    );
+}
+
+#[test]
 fn four_megabytes_of_watches_keep_nobody_waiting() {
     let ids: Vec<String> = (0..1000).map(|n| format!("\"s0-{n}\"")).collect();
     let long = format!("{{\"class\":\"WATCH\",\"ids\":[{}]}}\n", ids.join(","));

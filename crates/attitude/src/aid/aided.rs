@@ -65,6 +65,9 @@ pub struct Aided {
     pub(super) filter: Filter,
     kind: SampleKind,
     start: Start,
+    /// What is known where the attitude begins that is begun with now, and where the next reset does.
+    begins: Start,
+    anew: Option<Start>,
     /// The attitude is not that of this stream's beginning, but one that was saved.
     pub(super) is_resumed: bool,
     /// Specific forces that do not come with the gyro samples.
@@ -104,6 +107,8 @@ impl Aided {
             propagator: Propagator::new(propagation)?,
             kind: propagation.kind,
             start,
+            begins: start,
+            anew: None,
             is_resumed: false,
             forces: None,
             fields: Beside::with_repeats(),
@@ -167,6 +172,13 @@ impl Aided {
     /// See [`Propagator::succeed`].
     pub fn succeed(&mut self, resets: u32) {
         self.propagator.succeed(resets);
+    }
+
+    /// The next sample that says [`Join::Reset`] begins with this attitude, of which `start` is known; what was
+    /// learned of the sensor stays known as well as it is.
+    pub fn begin_anew(&mut self, attitude: &Quaternion<Nav, Body>, start: Start) {
+        self.propagator.begin_anew(attitude);
+        self.anew = Some(start);
     }
 
     /// Takes samples in and appends the attitudes that are ready.
@@ -265,7 +277,18 @@ impl Aided {
     fn take(&mut self, given: &Given, propagated: &AttitudeSample) {
         let (measured, attitude) = (&given.measured, &propagated.q_nb);
         if given.join == Join::Reset {
-            self.filter.reset();
+            match self.anew.take() {
+                // Asked for: nothing has happened to the sensor.
+                Some(start) => {
+                    self.filter.begin_anew();
+                    self.begins = start;
+                    self.is_resumed = false;
+                }
+                None => {
+                    self.filter.reset();
+                    self.begins = self.start;
+                }
+            }
         }
         if !self.filter.is_started() {
             match self.start_at(propagated) {
@@ -284,7 +307,7 @@ impl Aided {
     /// What is known at a first sample: of an attitude that was saved, what the propagator says of it by now.
     fn start_at(&mut self, propagated: &AttitudeSample) -> Start {
         if !std::mem::take(&mut self.is_resumed) {
-            return self.start;
+            return self.begins;
         }
         let earth = propagated.covariance.in_navigation_axes(&propagated.q_nb);
         Start::Known {

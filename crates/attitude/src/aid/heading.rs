@@ -58,7 +58,30 @@ pub(super) struct Surroundings {
     contradicted: f64,
 }
 
+/// The magnetic field that headings are taken from.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct FieldQuality {
+    /// Length, in the unit of the measurements.
+    pub norm: f64,
+    /// Dip, downwards from horizontal, rad.
+    pub dip: f64,
+    /// Root mean square deviation of norm (as a share) and dip (rad) over the last seconds, per horizontal share:
+    /// of the size of the heading's error by it, rad.
+    pub deviation: f64,
+}
+
 impl Filter {
+    /// What the field is like; `None` before the first.
+    #[must_use]
+    pub fn field(&self) -> Option<FieldQuality> {
+        let Field { norm, dip } = self.surroundings.reference?;
+        Some(FieldQuality {
+            norm,
+            dip,
+            deviation: self.surroundings.deviation.max(0.0).sqrt(),
+        })
+    }
+
     /// The measurement of heading, where there is one.
     pub(super) fn use_field(&mut self, correction: &mut Correction) {
         let settings = self.settings;

@@ -32,7 +32,9 @@ impl Filter {
         self.last_force = None;
         self.since_force = 0.0;
         self.interval = Interval::new();
-        let Some(force) = first.force.filter(|f| self.is_force(f) && f.norm() > 0.0) else {
+        let is_denied = self.is_force_implausible();
+        let force = first.force.filter(|f| self.is_force(f) && f.norm() > 0.0);
+        let Some(force) = force.filter(|_| !is_denied) else {
             return;
         };
         let field = first.field.filter(is_field);
@@ -86,12 +88,18 @@ impl Filter {
 
     /// What a new start keeps: the calibration, known a little less.
     pub(crate) fn reset(&mut self) {
-        self.is_started = false;
-        self.correction = Quaternion::identity();
+        self.begin_anew();
         for axis in 0..3 {
             self.covariance
                 .add(BIAS + axis, BIAS_AFTER_RESET * BIAS_AFTER_RESET);
         }
+    }
+
+    /// The attitude is not known any more, the calibration as well as before.
+    pub(crate) fn begin_anew(&mut self) {
+        self.is_started = false;
+        self.has_levelled = false;
+        self.correction = Quaternion::identity();
     }
 
     fn start(&mut self, correction: Quaternion<Nav, Nav>, heading: f64, force: Vector3<f64>) {

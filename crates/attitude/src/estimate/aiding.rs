@@ -170,24 +170,24 @@ impl Aiding {
         if plan.bias != Bias::None {
             settings.bias_prior = settings.bias_prior.min(BIAS_LEFT);
         }
-        // By a field the heading is that of north, and what was given may be another.
-        let heading = if settings.has_field {
-            HEADING_GIVEN
-        } else {
-            0.0
-        };
-        let known = |tilt| Start::Known { tilt, heading };
-        let start = match plan.initial {
-            Initial::Identity => Start::Level,
-            Initial::Gravity if settings.has_field => Start::Level,
-            Initial::Gravity => known(TILT_AT_REST),
-            Initial::Given(_) | Initial::FirstOrientation => known(TILT_GIVEN),
-        };
         Aiding {
             settings,
-            start,
+            start: start(plan.initial, settings.has_field),
             force_scale,
         }
+    }
+}
+
+/// What is known of an initial attitude.
+pub(super) fn start(initial: Initial, has_field: bool) -> Start {
+    // By a field the heading is that of north, and what was given may be another.
+    let heading = if has_field { HEADING_GIVEN } else { 0.0 };
+    let known = |tilt| Start::Known { tilt, heading };
+    match initial {
+        Initial::Identity => Start::Level,
+        Initial::Gravity if has_field => Start::Level,
+        Initial::Gravity => known(TILT_AT_REST),
+        Initial::Given(_) | Initial::FirstOrientation => known(TILT_GIVEN),
     }
 }
 

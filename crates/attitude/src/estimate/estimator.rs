@@ -4,6 +4,7 @@
 //! does no I/O.
 
 use super::aiding;
+use super::anew::Anew;
 use super::meaning::Meaning;
 use super::plan::{Initial, Noise, Plan};
 use super::preparation::Prepared;
@@ -13,7 +14,7 @@ use crate::condition::{self, Clock, Conditioner};
 use crate::frames::Nav;
 use crate::propagate::{self, Executor, Method, Propagator};
 use crate::quaternion::{Quaternion, RotationVector};
-use crate::record::{AttitudeSample, Nanos, RateSample, RawSample};
+use crate::record::{AttitudeSample, Join, Nanos, RateSample, RawSample};
 use crate::worlds::{Convention, World};
 use nalgebra::Vector3;
 
@@ -34,6 +35,8 @@ pub struct Estimator {
     besides: Option<Besides>,
     /// Tells settings apart under which a [`Memory`] means something else.
     settings: u64,
+    /// The next sample begins anew.
+    begins_anew: bool,
     rates: Vec<RateSample>,
     /// The same with their new stamps.
     even: Vec<RateSample>,
@@ -212,6 +215,7 @@ impl Estimator {
                 has_field: aiding.settings.has_field,
                 force_scale: None,
             }),
+            begins_anew: false,
             rates: Vec::new(),
             even: Vec::new(),
             out: Vec::new(),
@@ -298,6 +302,18 @@ impl Estimator {
             Integrator::Alone(propagator) => propagator.succeed(resets),
             Integrator::Aided(aided) => aided.succeed(resets),
         }
+    }
+
+    /// The next sample begins the attitude anew, and says so ([`Status::RESET`]); the run and what was learned of
+    /// the sensor go on.
+    ///
+    /// [`Status::RESET`]: crate::record::Status::RESET
+    pub fn begin_anew(&mut self, anew: &Anew) {
+        match &mut self.integrator {
+            Integrator::Alone(propagator) => propagator.begin_anew(&anew.attitude),
+            Integrator::Aided(aided) => aided.begin_anew(&anew.attitude, anew.start),
+        }
+        self.begins_anew = true;
     }
 
     /// See [`Conditioner::stamp_of`].
@@ -401,14 +417,20 @@ impl Estimator {
     }
 
     fn push_rates(&mut self, exec: &impl Executor) {
-        match &mut self.regulariser {
-            None => self.integrator.push(&self.rates, exec, &mut self.out),
+        let rates = match &mut self.regulariser {
+            None => &mut self.rates,
             Some(regulariser) => {
                 regulariser.push(&self.rates, &mut self.even);
-                self.integrator.push(&self.even, exec, &mut self.out);
-                self.even.clear();
+                &mut self.even
             }
+        };
+        if let Some(first) = rates.first_mut()
+            && std::mem::take(&mut self.begins_anew)
+        {
+            first.join = Join::Reset;
         }
+        self.integrator.push(rates, exec, &mut self.out);
+        self.even.clear();
         self.rates.clear();
     }
 

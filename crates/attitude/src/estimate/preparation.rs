@@ -246,19 +246,37 @@ impl Preparation {
     }
 }
 
+/// What only rest tells, as the beginning of what a filter learns: level by the first specific force, no bias.
+pub(super) fn learned_on_the_way(plan: &Plan) -> Plan {
+    Plan {
+        initial: match plan.initial {
+            Initial::Gravity => Initial::Identity,
+            other => other,
+        },
+        bias: match plan.bias {
+            Bias::Auto => Bias::None,
+            other => other,
+        },
+        ..plan.clone()
+    }
+}
+
 /// Decides from the first sample alone, for a live stream: its attitude must not wait. The clock is
-/// the one asked for, and another never takes its place.
+/// the one asked for, and another never takes its place. What only rest tells begins level, without a bias,
+/// where a filter learns the rest.
 ///
 /// # Errors
-/// In words: what only rest can tell was asked for, or the sample carries no orientation to begin with.
+/// In words: what only rest can tell was asked for of a gyro alone, or the sample carries no orientation to begin with.
 pub fn at_once(plan: &Plan, resolved: &Meaning, first: &RawSample) -> Result<Prepared, String> {
-    if needs_rest(plan) {
-        return Err("--bias auto and --init gravity look for rest before the first attitude, and a live stream waits for nothing\n  help: measure once (`strapd info LOG` shows the bias) and give --bias x,y,z; --init rpy=roll,pitch,yaw or identity".to_owned());
-    }
+    let asked = plan;
+    let plan = &learned_on_the_way(asked);
     let rests = Rests::default();
     let mut warnings = Vec::new();
     let first_alone = std::slice::from_ref(first);
     let aiding = Aiding::decide(plan, resolved, first_alone, &mut warnings)?;
+    if aiding.is_none() && needs_rest(asked) {
+        return Err("--bias auto and --init gravity: without a specific force that corrects it the attitude needs to be found at rest beforehand, and a live stream waits for nothing\n  help: --aid gravity with a sensor that carries `accel` learns both on the way; else measure once (`strapd info LOG` shows the bias) and give --bias x,y,z; --init rpy=roll,pitch,yaw or identity".to_owned());
+    }
     let (initial, initial_origin, world) = decide_initial(
         (plan, aiding.as_ref()),
         resolved,
@@ -267,8 +285,11 @@ pub fn at_once(plan: &Plan, resolved: &Meaning, first: &RawSample) -> Result<Pre
         &mut warnings,
     )?;
     let earth = plan.latitude_deg.map(|deg| Earth::at(deg.to_radians()));
-    let (bias, bias_sigma, bias_origin) =
+    let (bias, bias_sigma, mut bias_origin) =
         decide_bias(plan, &rests, earth.map(|e| e.felt_by(&initial)))?;
+    if asked.bias == Bias::Auto {
+        "none to begin with, learned on the way".clone_into(&mut bias_origin);
+    }
     warnings.extend(earth.and_then(|e| e.heading_warning(plan.initial)));
     let stamps = if plan.regularise_stamps {
         Stamps::Causal {
@@ -386,7 +407,8 @@ fn decide_bias(
     }
 }
 
-fn decide_initial(
+/// `gathered` are the first samples.
+pub(super) fn decide_initial(
     (plan, aiding): (&Plan, Option<&Aiding>),
     resolved: &Meaning,
     gathered: &[RawSample],

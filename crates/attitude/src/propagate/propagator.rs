@@ -13,6 +13,8 @@ use super::method::{LARGEST_WINDOW, Method, Order, Placement};
 use super::report::Report;
 use super::settings::{Settings, SettingsError};
 use super::window::{Plan, Step};
+use crate::frames::{Body, Nav};
+use crate::quaternion::Quaternion;
 use crate::record::{AttitudeSample, Join, RateSample, SampleKind, Status};
 use nalgebra::Vector3;
 use state::{State, Waiting};
@@ -77,6 +79,8 @@ pub struct Propagator {
     started: bool,
     /// The attitude is not that of this stream's beginning, but one that was saved.
     resumed: bool,
+    /// Where the next reset goes instead of the initial attitude.
+    anew: Option<[f64; 4]>,
     last_rate: [f64; 3],
     last_stamp: i64,
     /// Provisional steps, kept for its memory.
@@ -143,6 +147,7 @@ impl Propagator {
             state: State::new(&settings, initial),
             started: false,
             resumed: false,
+            anew: None,
             last_rate: [0.0; 3],
             last_stamp: 0,
             scratch: Vec::new(),
@@ -175,6 +180,11 @@ impl Propagator {
     pub fn succeed(&mut self, resets: u32) {
         self.state.reset_count = resets.saturating_add(1);
         self.state.added = self.state.added.with(Status::RESET);
+    }
+
+    /// The next sample that says [`Join::Reset`] begins with this attitude, and not with the initial one.
+    pub fn begin_anew(&mut self, attitude: &Quaternion<Nav, Body>) {
+        self.anew = Some(attitude.wxyz());
     }
 
     /// Takes samples in and appends the attitudes that are ready: all but the last few, which wait
@@ -250,7 +260,7 @@ impl Propagator {
         let first = self.state.report.samples == 0 && !resumed;
         self.state.begin(sample.stamp.0);
         if sample.join == Join::Reset {
-            self.state.reset(self.initial);
+            self.state.reset(self.anew.take().unwrap_or(self.initial));
         }
         if !first {
             self.state.reset_count = self.state.reset_count.saturating_add(1);

@@ -1,0 +1,62 @@
+//! A stream that goes on -> the attitude it begins anew with, when it is asked to. Pure.
+//!
+//! Apart from the preparation because nothing else is decided anew: clock, bias, world and what corrects the
+//! attitude stay as they are.
+
+use super::aiding;
+use super::meaning::Meaning;
+use super::plan::{Initial, Plan};
+use super::preparation::{Prepared, decide_initial, learned_on_the_way};
+use crate::aid::Start;
+use crate::condition::stillness::Rests;
+use crate::frames::{Body, Nav};
+use crate::quaternion::Quaternion;
+use crate::record::RawSample;
+
+/// What a stream that goes on begins anew with.
+#[derive(Clone, Debug)]
+pub struct Anew {
+    /// q_nb at the next sample, ENU (or start) and FLU.
+    pub attitude: Quaternion<Nav, Body>,
+    /// What is known of it.
+    pub start: Start,
+    /// Where it came from.
+    pub origin: String,
+}
+
+impl Anew {
+    /// The attitude `initial` at the sample `next` of a stream that was understood as `resolved` and begun as
+    /// `prepared`, live: gravity is the next specific force.
+    ///
+    /// # Errors
+    /// In words: nothing levels the attitude, or the sample carries no orientation.
+    pub fn at(
+        plan: &Plan,
+        initial: Initial,
+        resolved: &Meaning,
+        prepared: &Prepared,
+        next: &RawSample,
+    ) -> Result<Anew, String> {
+        let aiding = prepared.aiding.as_ref();
+        if initial == Initial::Gravity && aiding.is_none() {
+            return Err("gravity: nothing levels this sensor's attitude (--aid none, or it carries no specific force)\n  help: identity, q=w,x,y,z or rpy=roll,pitch,yaw".to_owned());
+        }
+        let plan = learned_on_the_way(&Plan {
+            initial,
+            ..plan.clone()
+        });
+        let (attitude, origin, _) = decide_initial(
+            (&plan, aiding),
+            resolved,
+            std::slice::from_ref(next),
+            &Rests::default(),
+            &mut Vec::new(),
+        )?;
+        let has_field = aiding.is_some_and(|aiding| aiding.settings.has_field);
+        Ok(Anew {
+            attitude,
+            start: aiding::start(plan.initial, has_field),
+            origin,
+        })
+    }
+}
