@@ -31,6 +31,7 @@ const ASSETS: &[(&str, &str, &str)] = assets![
     "demonstration.js" SCRIPT,
     "history.js" SCRIPT,
     "horizon.js" SCRIPT,
+    "known.js" SCRIPT,
     "link.js" SCRIPT,
     "numbers.js" SCRIPT,
     "playback.js" SCRIPT,

@@ -252,7 +252,7 @@ export function upright(world) {
 }
 
 export function worldNames(world) {
-  return { enu: ["E", "N", "up"], nwu: ["N", "W", "up"], ned: ["N", "W", "up"] }[world] ?? ["x₀", "y₀", "z₀"];
+  return { enu: ["E", "N", "up"], nwu: ["N", "W", "up"], ned: ["N", "W", "up"], level: ["x₀", "y₀", "up"] }[world] ?? ["x₀", "y₀", "z₀"];
 }
 
 // At most this many points of a path.

@@ -73,7 +73,7 @@ function sensor(id) {
     left.add(id);
     return null;
   }
-  const made = new Sensor(id, parts.template, touch, () => draw(performance.now()));
+  const made = new Sensor(id, parts.template, touch, () => draw(performance.now()), () => anew(id));
   made.isPlayed = playback.isThere;
   sensors.set(id, made);
   // By name, but truth last: it is what the others are held against.
@@ -88,6 +88,11 @@ function sensor(id) {
   parts.sensors.dataset.count = String(sensors.size);
   watch();
   return made;
+}
+
+// Every reader of this sensor sees it begin anew; the daemon takes it from its own page alone.
+function anew(id) {
+  link?.send({ class: "RESET", id });
 }
 
 // Asks for what can be drawn.
@@ -124,6 +129,9 @@ function heard(message) {
       break;
     case "STATUS":
       told(message);
+      break;
+    case "RESET":
+      notice(`${message.id} begins anew: ${message.from}`);
       break;
     case "PLAYBACK":
       played(message);

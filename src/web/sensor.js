@@ -3,6 +3,7 @@
 import { Camera, Scene, steer, upright, worldNames, zLocus } from "./body3d.js";
 import { History } from "./history.js";
 import { drawHorizon } from "./horizon.js";
+import { Known } from "./known.js";
 import { fixed, measure, say, show, SECONDS, whole } from "./numbers.js";
 import { drawPlot, Scale } from "./plot.js";
 import { aboutZ, angleBetween, DEGREES, product, rollPitchYaw, rotate } from "./quaternion.js";
@@ -17,12 +18,15 @@ const STEPS = 512;
 // Seconds from one attitude of a recording to the next that are a leap.
 const LEAP = 1;
 
+// What a status may say without a need to be looked at.
+const USUAL = new Set(["ok", "provisional", "aided", "rest"]);
+
 // Samples so far, of a recording attitudes: STATUS knows one or the other.
 export const taken = (source) => source.samples ?? source.sent ?? 0;
 
 export class Sensor {
-  // moved(): draw soon; resized(): draw at once, a canvas that changes its size is empty.
-  constructor(id, template, moved, resized) {
+  // moved(): draw soon; resized(): draw at once, a canvas that changes its size is empty; ask(): begin it anew.
+  constructor(id, template, moved, resized, ask) {
     this.id = id;
     this.history = new History();
     this.view = { camera: new Camera(), yaw: 0 };
@@ -35,6 +39,7 @@ export class Sensor {
     this.parts = {};
     for (const part of this.element.querySelectorAll("[data-part]")) this.parts[part.dataset.part] = part;
     say(this.parts.name, id);
+    this.known = new Known(this.parts, ask);
     this.moved = () => {
       this.dirty = true;
       moved();
@@ -54,7 +59,7 @@ export class Sensor {
   // Once it is on the page, where its canvases have a size.
   placed() {
     const surfaces = {};
-    for (const name of ["body", "horizon", "rates", "angles", "errors"]) {
+    for (const name of ["body", "horizon", "rates", "angles", "errors", "ellipse"]) {
       surfaces[name] = new Surface(this.parts[name], this.resized);
     }
     this.surfaces = surfaces;
@@ -242,6 +247,7 @@ export class Sensor {
     const angles = rollPitchYaw(q);
     const heading = rollPitchYaw(seen)[2];
     drawHorizon(surfaces.horizon, colours, seen, world, heading);
+    this.known.draw(surfaces.ellipse, colours, angles[2], world);
     const axes = [colours.x, colours.y, colours.z];
     const common = { seconds, strokes: axes };
     const points = drawPlot(surfaces.rates, colours, history, { ...common, series: history.rate, scale: this.scales.rate });
@@ -291,7 +297,7 @@ export class Sensor {
     say(parts.seq, whole(last.seq));
     parts.seq.value = String(last.seq);
     say(parts.stamp, `${fixed(this.history.newestTime, 3)} s`);
-    const flags = (last.status ?? []).filter((flag) => flag !== "ok" && flag !== "provisional");
+    const flags = (last.status ?? []).filter((flag) => !USUAL.has(flag));
     say(parts.flags, flags.join(" "));
     parts.flags.title = flags.includes("last") ? "The last there was when this page came; none since." : "";
     say(parts.frame, `${last.body} → ${last.world}`);
@@ -335,5 +341,7 @@ export class Sensor {
       parts[name].closest("div").classList.toggle("bad", value > 0);
     }
     say(parts.method, source.method ?? "");
+    this.known.tell(source);
+    if (!parts.known.hidden) this.moved();
   }
 }

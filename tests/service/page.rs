@@ -7,6 +7,7 @@ pub(crate) mod browser;
 mod admission;
 mod controls;
 mod drawing;
+mod known;
 mod late;
 mod live_numbers;
 mod model_top;

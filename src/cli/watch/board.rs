@@ -60,6 +60,48 @@ pub(super) struct Health {
     pub(super) gaps: u64,
     pub(super) rate_hz: Option<f64>,
     pub(super) jitter_s: Option<f64>,
+    pub(super) attitude: Option<Knowledge>,
+    aid: Option<Aid>,
+}
+
+/// What the daemon says of an attitude that is not the gyro's alone.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Knowledge {
+    /// By what it is corrected.
+    pub(super) aided: Option<String>,
+    pub(super) rest: bool,
+    pub(super) sigma_deg: Tilt,
+}
+
+/// One sigma of tilt and heading, degrees.
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Tilt {
+    pub(super) tilt: Option<f64>,
+    pub(super) heading: Option<f64>,
+}
+
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default)]
+struct Aid {
+    learned: Learned,
+    sigma: Learned,
+}
+
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[serde(default)]
+struct Learned {
+    gyro_bias_rad_s: [Option<f64>; 3],
+}
+
+impl Health {
+    /// The gyro's bias and its sigma, rad/s, where the daemon learns it.
+    pub(super) fn bias(&self) -> Option<([f64; 3], [f64; 3])> {
+        let aid = self.aid.as_ref()?;
+        let whole = |learned: Learned| learned.gyro_bias_rad_s.map(|v| v.unwrap_or(f64::NAN));
+        Some((whole(aid.learned), whole(aid.sigma)))
+    }
 }
 
 #[derive(Deserialize)]

@@ -5,6 +5,7 @@ use super::board::{Board, LinkState, Sensor};
 use super::horizon::horizon;
 use crate::sink::roll_pitch_yaw;
 use std::time::{Duration, Instant};
+use strapd_recording::text::printable;
 
 /// The horizon's size in characters.
 const PICTURE: (usize, usize) = (21, 7);
@@ -85,6 +86,7 @@ pub(super) fn body(board: &Board, now: Instant, width: usize) -> Vec<Line> {
             );
         } else {
             let (columns, rows) = PICTURE;
+            let rows = rows.max(figures.len());
             let picture = match &sensor.attitude {
                 Some(a) => horizon(a.q, &a.world, &a.body, columns, rows),
                 None => vec![" ".repeat(columns); rows],
@@ -104,7 +106,7 @@ fn alarm(sensor: &Sensor, now: Instant) -> bool {
     let silent = sensor
         .heard
         .is_none_or(|heard| now.saturating_duration_since(heard) > SILENT);
-    let usual = |s: &String| matches!(s.as_str(), "ok" | "provisional");
+    let usual = |s: &String| matches!(s.as_str(), "ok" | "provisional" | "aided" | "rest");
     silent
         || sensor
             .attitude
@@ -149,6 +151,7 @@ fn figures(sensor: &Sensor, now: Instant) -> Vec<String> {
         lines.push(format!("q  w{w}  x{x}  y{y}  z{z}"));
         lines.push(format!("rate x{p}  y{q}  z{r}  deg/s"));
         lines.push(format!("sigma {sx}   {sy}   {sz}  deg (1 sigma, x y z)"));
+        lines.extend(knowledge(sensor));
         lines.push(format!(
             "stamp {sec}.{nsec:09}  seq {}  resets {}",
             a.seq, a.reset
@@ -170,6 +173,32 @@ fn figures(sensor: &Sensor, now: Instant) -> Vec<String> {
         "lost {}  missing {}  dropped {}  last {age} ago",
         h.lost, h.missing, sensor.dropped
     ));
+    lines
+}
+
+/// What corrects it, how well tilt and heading are known, and what was learned of the gyro.
+fn knowledge(sensor: &Sensor) -> Vec<String> {
+    let mut lines = Vec::new();
+    if let Some(known) = &sensor.health.attitude {
+        let by = match &known.aided {
+            Some(by) => format!("aided by {}", shortened(&printable(by))),
+            None => "NOT aided".to_owned(),
+        };
+        let rest = if known.rest { ", at rest" } else { "" };
+        let sigma = |v: Option<f64>| figure(v.unwrap_or(f64::NAN), 7, 3).replace('+', " ");
+        let (tilt, heading) = (sigma(known.sigma_deg.tilt), sigma(known.sigma_deg.heading));
+        lines.push(format!(
+            "{by}{rest}  sigma of tilt {tilt}  heading {heading}  deg"
+        ));
+    }
+    if let Some((bias, sigma)) = sensor.health.bias() {
+        let [x, y, z] = bias.map(|v| figure(v.to_degrees(), 7, 3));
+        let most = figure(sigma.into_iter().fold(0.0, f64::max).to_degrees(), 7, 3);
+        lines.push(format!(
+            "bias x{x}  y{y}  z{z}  deg/s (1 sigma at most {})",
+            most.trim_start_matches([' ', '+'])
+        ));
+    }
     lines
 }
 
@@ -196,13 +225,14 @@ pub(super) fn plain(board: &Board, now: Instant) -> String {
         let [roll, pitch, yaw] = roll_pitch_yaw(a.q)
             .map(f64::to_degrees)
             .map(|v| figure(v, 9, 3));
+        let known: String = knowledge(sensor).iter().map(|l| format!("{l}  ")).collect();
         let h = &sensor.health;
         let rate = h.rate_hz.map_or("?".to_owned(), |v| format!("{v:.1}"));
         let age = sensor.heard.map_or("?".to_owned(), |heard| {
             lasting(now.saturating_duration_since(heard))
         });
         out.push_str(&format!(
-            "{}  seq {}  roll {roll}  pitch {pitch}  yaw {yaw} deg  {rate} Hz  gaps {}  lost {}  dropped {}  last {age} ago  {}\n",
+            "{}  seq {}  roll {roll}  pitch {pitch}  yaw {yaw} deg  {known}{rate} Hz  gaps {}  lost {}  dropped {}  last {age} ago  {}\n",
             shortened(id), a.seq, h.gaps, h.lost, sensor.dropped, a.status.join(",")
         ));
     }
@@ -318,6 +348,37 @@ mod tests {
         assert!(
             tone == Tone::Heading && text.ends_with("  provisional"),
             "{text}"
+        );
+    }
+
+    #[test]
+    fn an_aided_attitude_is_no_alarm_and_says_what_is_known() {
+        let now = Instant::now();
+        let mut board = Board::new("tcp://127.0.0.1:4550".to_owned(), &[]);
+        let aided = ATT.replace("\"provisional\"", "\"provisional\",\"aided\",\"rest\"");
+        board.take(Said::Attitude(aided.as_bytes()), now);
+        let status = r#"{"class":"STATUS","sources":[{"id":"imu\u001b[31m0","attitude":{"aided":"gra\u001b[31mvity","rest":true,"sigma_deg":{"tilt":0.3125,"tilt_least":null,"heading":1.25},"field":null},"aid":{"learned":{"gyro_bias_rad_s":[0.008726646259971648,-0.01,null]},"sigma":{"gyro_bias_rad_s":[1e-4,2e-4,1e-4]}}}]}"#;
+        board.take(Said::Status(status.as_bytes()), now);
+        let lines = body(&board, now, 100);
+        assert_eq!(lines[0].0, Tone::Heading, "{lines:?}");
+        let text: String = lines.iter().map(|(_, l)| format!("{l}\n")).collect();
+        for text in [text, plain(&board, now)] {
+            for part in [
+                "aided by gra\\u{1b}[31mvity, at rest  sigma of tilt   0.312  heading   1.250  deg",
+                "bias x +0.500  y -0.573  z",
+                "deg/s (1 sigma at most 0.011)",
+                "provisional",
+            ] {
+                assert!(text.contains(part), "no `{part}` in\n{text}");
+            }
+            assert!(!text.contains('\u{1b}'));
+        }
+        let levelled = aided.replace("\"rest\"", "\"levelled\"");
+        board.take(Said::Attitude(levelled.as_bytes()), now);
+        assert_eq!(
+            body(&board, now, 100)[0].0,
+            Tone::Alarm,
+            "that is worth a look"
         );
     }
 

@@ -10,7 +10,7 @@ use strapd::serve::admission::Token;
 const SECRET: &str = "correct horse battery";
 
 /// A page of somebody else, without a policy.
-fn elsewhere() -> SocketAddr {
+pub(super) fn elsewhere() -> SocketAddr {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap();
     std::thread::spawn(move || {
