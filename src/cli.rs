@@ -4,6 +4,7 @@
 
 pub mod admission;
 pub mod allan;
+mod calibration_files;
 pub mod cat;
 pub mod check;
 pub mod compare;

@@ -1,5 +1,7 @@
 //! Arguments as text -> values, parsed once and validated once. Pure.
 
+pub mod calibration;
+
 use crate::error::{Error, Result};
 use nalgebra::Vector3;
 use strapd_attitude::estimate::{Bias, Initial, NOISE_PRESETS, Noise, Truncation};

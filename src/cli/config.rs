@@ -312,14 +312,16 @@ impl Layered {
     pub fn settings(&self) -> Result<Settings> {
         let mut settings = self.serve.settings()?;
         for (id, estimation, _) in &self.sensors {
-            let plan = estimation.selection().and_then(|_| estimation.live_plan());
-            let plan = plan.map_err(|why| {
+            let plan = estimation.selection().and_then(|_| estimation.live_plans());
+            let (plan, mut each) = plan.map_err(|why| {
                 Error::Usage(format!(
                     "sensor {}: {why}",
                     strapd_recording::text::printable(id)
                 ))
             })?;
-            settings.plans.insert(id.clone(), plan);
+            settings
+                .plans
+                .insert(id.clone(), each.remove(id).unwrap_or(plan));
         }
         Ok(settings)
     }

@@ -1,13 +1,17 @@
 //! The estimation flags shared by `replay` (and, later, `serve` and `simulate`): text -> settings,
 //! checked once. Pure.
 
+use super::calibration_files::Calibrations;
 use crate::config::{
     Selection, parse_bias, parse_initial, parse_noise, parse_truncation, selection, unit_quaternion,
 };
 use crate::error::{Error, Result};
 use clap::{Args, ValueEnum};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
 use strapd_attitude::condition::{Clock, GyroUnit, OnGap};
-use strapd_attitude::estimate::{Aid, Plan, Truncation};
+use strapd_attitude::estimate::{Aid, Plan, SensorCalibration, Truncation};
 use strapd_attitude::propagate::{Method, Order, Placement};
 use strapd_attitude::record::SampleKind;
 
@@ -119,6 +123,11 @@ pub struct Estimation {
         allow_hyphen_values = true
     )]
     pub bias: String,
+    /// What is known of the sensor beforehand: a TOML file, as --save-calibration of replay writes it. It is taken
+    /// out first, and its sigmas are where the filter begins. serve: or a folder of such files, each for the
+    /// sensor it names
+    #[arg(long, value_name = "FILE")]
+    pub calibration: Option<PathBuf>,
     /// Longest gap that is bridged, in seconds
     #[arg(
         long,
@@ -274,8 +283,22 @@ impl Estimation {
     /// The flags as one checked plan.
     ///
     /// # Errors
-    /// [`Error::Usage`] naming the flag, for anything that can be judged without the data.
+    /// [`Error::Usage`] naming the flag, for anything that can be judged without the data; the calibration can not
+    /// be read.
     pub fn plan(&self) -> Result<Plan> {
+        let known = match &self.calibration {
+            None => None,
+            Some(path) => Some(Calibrations::read(path)?.of_all().ok_or_else(|| {
+                Error::Usage(format!(
+                    "--calibration {}: is a folder\n  help: name the file in it that is of this sensor",
+                    path.display()
+                ))
+            })?),
+        };
+        self.plan_with(known)
+    }
+
+    fn plan_with(&self, calibration: Option<Arc<SensorCalibration>>) -> Result<Plan> {
         for (flag, topic, is_used, help) in [
             (
                 "--accel-topic",
@@ -352,6 +375,7 @@ impl Estimation {
                 .undo_truncation
                 .as_deref()
                 .map_or(Ok(Truncation::Unsaid), parse_truncation)?,
+            calibration,
             start: self.start,
             until: self.until,
         };
@@ -372,11 +396,28 @@ impl Estimation {
         )
     }
 
-    /// The plan of a live stream, which has no topic.
+    /// The plan of live streams, which have no topics, and those of sensors with calibrations of their own.
     ///
     /// # Errors
     /// As [`Estimation::plan`].
-    pub fn live_plan(&self) -> Result<Plan> {
+    pub fn live_plans(&self) -> Result<(Plan, BTreeMap<String, Plan>)> {
+        self.check_live()?;
+        let known = self.calibration.as_deref().map(Calibrations::read);
+        Ok(match known.transpose()? {
+            None => (self.plan_with(None)?, BTreeMap::new()),
+            Some(Calibrations::One(known)) => (self.plan_with(Some(known))?, BTreeMap::new()),
+            Some(Calibrations::Each(each)) => {
+                let plan = |(id, known)| Ok((id, self.plan_with(Some(known))?));
+                (
+                    self.plan_with(None)?,
+                    each.into_iter().map(plan).collect::<Result<_>>()?,
+                )
+            }
+        })
+    }
+
+    /// Flags that are no use to a live stream.
+    fn check_live(&self) -> Result<()> {
         if self.topic.is_some() {
             return Err(Error::Usage(
                 "--topic: a sensor is named by `id` in its samples, and chosen with WATCH"
@@ -393,7 +434,7 @@ impl Estimation {
                 )));
             }
         }
-        self.plan()
+        Ok(())
     }
 
     fn method(&self) -> Result<Method> {

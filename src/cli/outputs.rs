@@ -100,7 +100,7 @@ fn resolve_one(output: &str, log: &str, logs: usize) -> Result<String> {
 }
 
 /// The log's name without directory and extension; `stdin` for `-`.
-fn stem(log: &str) -> String {
+pub(super) fn stem(log: &str) -> String {
     if log == "-" {
         return "stdin".to_owned();
     }

@@ -1,6 +1,7 @@
 //! `strapd replay SOURCE... -o SINK...`: recorded samples -> attitude. I/O.
 
-use super::estimation::Estimation;
+use super::calibration_files;
+use super::estimation::{AidArg, Estimation};
 use super::progress::Reporter;
 use super::serving::{Served, Serving};
 use super::{Global, Outcome, outputs, print};
@@ -12,6 +13,7 @@ use crate::report::summary::RunSummary;
 use crate::sink::{Compression, Encoding, Options, Target};
 use clap::{Args, ValueEnum};
 use std::io::Write;
+use std::path::{Path, PathBuf};
 use strapd_attitude::estimate::Plan;
 use strapd_recording::pool::Pool;
 
@@ -41,6 +43,9 @@ pub struct Replay {
     /// Replace outputs that exist
     #[arg(long, help_heading = "Output")]
     pub force: bool,
+    /// Save what was learned of the sensor in this TOML file, for --calibration; {stem} stands for the log's name
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    pub save_calibration: Option<String>,
     /// Copy every message of the input into MCAP outputs too
     #[arg(long, help_heading = "Output")]
     pub copy_input: bool,
@@ -144,6 +149,7 @@ pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
         ));
     }
     outputs::check_distinct(&args.outputs, &args.sources)?;
+    args.check_calibrations(&logs)?;
     let plan = args.estimation.plan()?;
     let selection = args.estimation.selection()?;
     let pool = Pool::new(global.threads)?;
@@ -170,7 +176,8 @@ pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
             }
             // Whoever read the output has enough: nothing more to say or do.
             Ok((summary, _)) if summary.reader_gone => return Ok(outcome),
-            Ok((summary, ended)) => {
+            Ok((mut summary, ended)) => {
+                args.save_calibration(log, &mut summary)?;
                 if ended == Outcome::Failed {
                     outcome = ended;
                 }
@@ -194,6 +201,52 @@ pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
 }
 
 impl Replay {
+    /// Where the calibration of a log goes.
+    fn calibration_file(&self, log: &str) -> Option<String> {
+        let name = self.save_calibration.as_ref()?;
+        Some(name.replace("{stem}", &outputs::stem(log)))
+    }
+
+    /// Checks that each log has a file for its calibration, and each calibration is of one sensor.
+    fn check_calibrations(&self, logs: &[&String]) -> Result<()> {
+        let Some(name) = &self.save_calibration else {
+            return Ok(());
+        };
+        let wrong = |what: &str| Err(Error::Usage(format!("--save-calibration {name}: {what}")));
+        if self.sources.len() > 1 && !name.contains("{stem}") {
+            return wrong(
+                "each log would be saved there\n  help: a name with {stem}, for example {stem}.calibration.toml",
+            );
+        }
+        if self.estimation.topic.as_deref() == Some("all") {
+            return wrong("a calibration is of one sensor\n  help: --topic NAME");
+        }
+        if self.estimation.aid == AidArg::None && self.estimation.bias != "auto" {
+            return wrong(
+                "the gyro alone learns nothing\n  help: --aid gravity, or --bias auto for the bias of a rest",
+            );
+        }
+        let files = logs.iter().filter_map(|log| self.calibration_file(log));
+        files
+            .map(PathBuf::from)
+            .try_for_each(|file| calibration_files::check_target(&file, self.force))
+    }
+
+    fn save_calibration(&self, log: &str, summary: &mut RunSummary) -> Result<()> {
+        let Some(file) = self.calibration_file(log) else {
+            return Ok(());
+        };
+        let [topic] = summary.topics.as_slice() else {
+            return Err(Error::Usage(format!(
+                "--save-calibration {file}: {} sensors, and a calibration is of one\n  help: --topic NAME",
+                summary.topics.len()
+            )));
+        };
+        calibration_files::write(Path::new(&file), &topic.calibration)?;
+        summary.calibration = Some(file);
+        Ok(())
+    }
+
     /// The run for one log.
     ///
     /// # Errors

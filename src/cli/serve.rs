@@ -1,6 +1,7 @@
 //! `strapd serve`: samples over sockets -> attitudes over sockets. I/O.
 
 use super::admission::Admission;
+use super::calibration_files::{self, file_of};
 use super::config::Layered;
 use super::estimation::Estimation;
 use super::{Global, Outcome};
@@ -17,7 +18,7 @@ use crate::sink::address::{DEFAULTS, Listen};
 use crate::sink::{Format, Target};
 use clap::Args;
 use std::io::IsTerminal;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -89,6 +90,9 @@ pub struct Serve {
     /// loses no heading
     #[arg(long, value_name = "FILE")]
     pub state: Option<PathBuf>,
+    /// Save what was learned of each sensor in this folder at the end, as ID.toml: --calibration takes the folder
+    #[arg(long, value_name = "DIR")]
+    pub save_calibration: Option<PathBuf>,
     /// A sensor that connects again and sends again what it has sent may begin so many seconds back:
     /// those samples count as late. One that begins further back begins a new run
     #[arg(long, value_name = "SECS", value_parser = window, default_value = "60")]
@@ -153,8 +157,15 @@ pub fn run(global: &Global, args: &Serve) -> Result<Outcome> {
         .enable_all()
         .build()
         .map_err(|e| Error::Usage(format!("--threads {}: {e}", global.threads)))?;
+    let calibrations = args.save_calibration.as_deref();
+    if let Some(folder) = calibrations {
+        std::fs::create_dir_all(folder).map_err(|source| Error::Write {
+            path: folder.to_owned(),
+            source,
+        })?;
+    }
     let has_stdin = args.sources.iter().any(|s| s == "-");
-    let outcome = runtime.block_on(serve(settings, has_stdin, state));
+    let outcome = runtime.block_on(serve(settings, has_stdin, (state, calibrations)));
     // A thread that waits for standard input would otherwise be waited for.
     runtime.shutdown_background();
     let Some(status) = recorder.map(Recorder::finish) else {
@@ -179,7 +190,7 @@ pub fn run(global: &Global, args: &Serve) -> Result<Outcome> {
 async fn serve(
     settings: Settings,
     has_stdin: bool,
-    state: Option<Arc<Mutex<StateFile>>>,
+    (state, calibrations): (Option<Arc<Mutex<StateFile>>>, Option<&Path>),
 ) -> Result<Outcome> {
     // Signals first: from the ready line on, one drains.
     let mut signals = Signals::new().map_err(|e| Error::Usage(format!("signals: {e}")))?;
@@ -217,6 +228,13 @@ async fn serve(
         let saving = tokio::task::spawn_blocking(move || state::save(&file, &hub));
         if tokio::time::timeout(limit, saving).await.is_err() {
             tracing::warn!("the attitudes could not be saved in time");
+        }
+    }
+    for (id, known) in calibrations.map(|_| hub.calibrations()).unwrap_or_default() {
+        let folder = calibrations.unwrap_or(Path::new("."));
+        // The others are saved all the same.
+        if let Err(e) = calibration_files::write(&file_of(folder, &id), &known) {
+            tracing::warn!("--save-calibration: {e}");
         }
     }
     let of = |n: &std::sync::atomic::AtomicU64| n.load(Ordering::Relaxed);
@@ -333,9 +351,11 @@ impl Serve {
         } else {
             self.listen.iter().map(String::as_str).collect()
         };
+        let (plan, plans) = self.estimation.live_plans()?;
         self.admission.apply(Settings {
             decode: self.estimation.selection()?.decode,
-            plan: self.estimation.live_plan()?,
+            plan,
+            plans,
             listen: given
                 .into_iter()
                 .map(Listen::parse)

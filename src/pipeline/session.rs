@@ -117,6 +117,9 @@ impl Topic {
             .then(|| AgainstRecorded::new(plan, &found.resolved, &prepared))
             .transpose()
             .map_err(refuse)?;
+        let mut warnings = found.warnings;
+        let known = plan.calibration.as_deref();
+        warnings.extend(known.and_then(|known| known.mismatch(&found.name)));
         Ok(Topic {
             name: found.name,
             output_topic: found.output_topic,
@@ -124,7 +127,7 @@ impl Topic {
             resolved: found.resolved,
             prepared,
             noticed: found.noticed,
-            warnings: found.warnings,
+            warnings,
             estimator,
             output: Output::default(),
             zeros: LoneZeros::default(),

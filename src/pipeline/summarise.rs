@@ -1,9 +1,10 @@
 //! What the stages counted -> the summary of the run. Pure.
 
 use super::delivery::broken;
-use super::request::ReplayRequest;
+use super::request::{ReplayRequest, Source};
 use super::session::{Ended, Topic};
 use crate::report::aid::Aided;
+use crate::report::calibration;
 use crate::report::findings::orientation;
 use crate::report::series::Drawn;
 use crate::report::sigma::SigmaTerms;
@@ -11,6 +12,7 @@ use crate::report::stamps::{Regularised, Segment};
 use crate::report::summary::{Gaps, RunSummary, TopicSummary, significant};
 use std::sync::atomic::Ordering;
 use strapd_attitude::condition::regularise;
+use strapd_attitude::estimate::{SensorCalibration, learned};
 use strapd_attitude::propagate::Method;
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{Nanos, SampleKind, Verdict};
@@ -40,6 +42,7 @@ pub fn run(run: &ReplayRequest, ended: Ended, survey: &Survey) -> RunSummary {
             .into_iter()
             .map(|(name, written)| (name, written.bytes, written.messages))
             .collect(),
+        calibration: None,
         served: run
             .targets
             .iter()
@@ -101,6 +104,7 @@ fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
         bias: topic.prepared.bias.into(),
         bias_origin: topic.prepared.bias_origin.clone(),
         aided: topic.estimator.filter().map(Aided::of),
+        calibration: calibrated(run, topic),
         noise: run.plan.noise.name.clone(),
         sigma_terms: Some(SigmaTerms::of(
             &run.plan,
@@ -142,6 +146,17 @@ fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
     summary.warnings.extend(warnings(topic, &summary));
     summary.warnings.extend(orientation::warnings(&summary));
     summary
+}
+
+/// What is known of the sensor at the end.
+fn calibrated(run: &ReplayRequest, topic: &Topic) -> SensorCalibration {
+    let filter = topic.estimator.filter();
+    let known = learned(&run.plan, &topic.resolved, &topic.prepared, filter);
+    let source = match &run.source {
+        Source::File(path) => path.file_name().unwrap_or_default().to_string_lossy(),
+        Source::Stdin => "standard input".into(),
+    };
+    calibration::described(known, &topic.name, &source, topic.output.last.as_ref())
 }
 
 /// What was kept to be drawn, with the errors against the reference.

@@ -10,6 +10,7 @@ use serde_json::{Value, json};
 use std::fmt::Write as _;
 use strapd_attitude::compare::{BiasFit, BodyAxesFit, Consistency};
 pub use strapd_attitude::digits::significant;
+use strapd_attitude::estimate::SensorCalibration;
 use strapd_attitude::record::{Counts, SampleKind, Verdict};
 use strapd_attitude::worlds::EARTH_RATE;
 
@@ -58,6 +59,8 @@ pub struct TopicSummary {
     pub bias_origin: String,
     /// What corrected the attitude, where something did.
     pub aided: Option<Aided>,
+    /// What is known of the sensor at the end.
+    pub calibration: SensorCalibration,
     /// Noise behind sigma.
     pub noise: String,
     /// What sigma is made of.
@@ -154,6 +157,8 @@ pub struct RunSummary {
     pub topics: Vec<TopicSummary>,
     /// Outputs: name, bytes, messages.
     pub outputs: Vec<(String, u64, u64)>,
+    /// Where the calibration was saved.
+    pub calibration: Option<String>,
     /// Where it was served to whoever connected.
     pub served: Vec<String>,
     /// What was wrong with the file itself.
@@ -202,6 +207,10 @@ impl RunSummary {
             };
             line(&mut out, "wrote", &what);
         }
+        for (name, topic) in self.calibration.iter().zip(&self.topics) {
+            let what = super::calibration::observed(&topic.calibration);
+            line(&mut out, "wrote", &format!("{name}  {what}"));
+        }
         for name in &self.served {
             line(&mut out, "served", name);
         }
@@ -236,6 +245,7 @@ impl RunSummary {
             "outputs": self.outputs.iter().map(|(name, bytes, messages)| json!({
                 "name": name, "bytes": bytes, "messages": messages,
             })).collect::<Vec<_>>(),
+            "calibration": self.calibration,
             "served": self.served,
             "elapsed_s": self.elapsed_secs,
             "samples_per_s": self.samples() as f64 / self.elapsed_secs.max(1e-9),

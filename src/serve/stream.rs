@@ -12,6 +12,7 @@ pub mod stamps;
 
 use crate::pipeline::session_builder::labelled;
 use crate::report::aid::Aided;
+use crate::report::calibration;
 use crate::serve::channel::Channel;
 use crate::serve::hub::SampleRun;
 use crate::serve::recorder::stream_of;
@@ -27,8 +28,8 @@ use std::sync::Arc;
 use std::time::Duration;
 use strapd_attitude::condition::{Clock, Report};
 use strapd_attitude::estimate::Estimator;
-use strapd_attitude::estimate::Plan;
-use strapd_attitude::estimate::{Meaning, Prepared, at_once};
+use strapd_attitude::estimate::{Bias, Plan};
+use strapd_attitude::estimate::{Meaning, Prepared, SensorCalibration, at_once, learned};
 use strapd_attitude::propagate::{Method, Sequential};
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{AttitudeSample, Counts, Nanos, RawSample, Verdict};
@@ -145,6 +146,10 @@ impl SensorStream {
         let resolved = Meaning::new(plan, &declared);
         let mut prepared = at_once(plan, &resolved, first).map_err(fault)?;
         let estimator = Estimator::live(plan, &resolved, &prepared).map_err(fault)?;
+        let known = plan.calibration.as_deref();
+        prepared
+            .warnings
+            .extend(known.and_then(|known| known.mismatch(&id)));
         let labels = labelled(stream_of(&id), plan, &resolved, &prepared);
         let saved = saved.filter(|saved| match saved.attitude(&labels) {
             Ok(_) => true,
@@ -218,6 +223,22 @@ impl SensorStream {
             self.stamps.unit(),
             self.estimator.memory(),
         ))
+    }
+
+    /// What is known of the sensor by now. `plan` is that of [`SensorStream::new`].
+    #[must_use]
+    pub fn calibration(&self, plan: &Plan) -> SensorCalibration {
+        // What a rest would have told was learned on the way.
+        let plan = Plan {
+            bias: match plan.bias {
+                Bias::Auto => Bias::None,
+                other => other,
+            },
+            ..plan.clone()
+        };
+        let filter = self.estimator.filter();
+        let known = learned(&plan, &self.resolved, &self.prepared, filter);
+        calibration::described(known, &self.id, "live", self.last.as_ref())
     }
 
     /// Somebody else sends it from now on, and hears again what is wrong with its samples.

@@ -8,6 +8,7 @@
 
 mod allan;
 mod bad_input;
+mod calibration;
 mod check;
 mod cli;
 mod containers;

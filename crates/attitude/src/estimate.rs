@@ -11,20 +11,24 @@
 
 mod aiding;
 mod anew;
+mod calibrated;
 mod estimator;
 mod first_pass;
 mod intervals;
 mod meaning;
 mod plan;
 mod preparation;
+mod sensor_calibration;
 mod stamps;
 
 pub use aiding::Aiding;
 pub use anew::Anew;
+pub use calibrated::learned;
 pub use estimator::{Estimator, Memory};
 pub use first_pass::{Conditioned, FEW};
 pub use intervals::{LEAST_INTERVALS, Mismatch};
 pub use meaning::{Meaning, orientation_convention};
 pub use plan::{Aid, Bias, Initial, NOISE_PRESETS, Noise, NoisePreset, Plan, Truncation};
 pub use preparation::{Patience, Preparation, Prepared, at_once};
+pub use sensor_calibration::{Known, SensorCalibration};
 pub use stamps::{StampPass, Stamps};

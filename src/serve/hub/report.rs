@@ -7,6 +7,7 @@ use crate::serve::wire;
 use bytes::Bytes;
 use std::collections::BTreeSet;
 use std::time::Instant;
+use strapd_attitude::estimate::SensorCalibration;
 
 /// How the attitudes were saved last.
 #[derive(Debug)]
@@ -79,6 +80,17 @@ impl Hub {
         for (id, saved) in lock(&self.saved).iter() {
             all.entry(id.clone()).or_insert_with(|| saved.clone());
         }
+        all
+    }
+
+    /// What is known by now of every sensor that is there, by name.
+    #[must_use]
+    pub fn calibrations(&self) -> Vec<(String, SensorCalibration)> {
+        let mut all = Vec::new();
+        self.each_sensor(|stream| {
+            let known = stream.calibration(self.plan_of(stream.id()));
+            all.push((stream.id().to_string(), known));
+        });
         all
     }
 

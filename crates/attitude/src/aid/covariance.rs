@@ -90,6 +90,12 @@ impl Covariance {
         self.0[a][b]
     }
 
+    /// What two states have in common, at the start.
+    pub(super) fn set(&mut self, a: usize, b: usize, covariance: f64) {
+        self.0[a][b] = covariance;
+        self.0[b][a] = covariance;
+    }
+
     /// More is unknown of a state.
     #[inline]
     pub(super) fn add(&mut self, state: usize, variance: f64) {

@@ -9,10 +9,11 @@ use super::interval::Interval;
 use super::plausibility::Plausibility;
 use super::rest::Rest;
 use super::settings::Settings;
+use super::update::COLOURED;
 use crate::frames::{Body, In, Nav};
 use crate::quaternion::Quaternion;
 use crate::record::Status;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3};
 
 /// A specific force beyond this (each component, m/s^2) is none.
 const LARGEST_FORCE: f64 = 1000.0;
@@ -164,6 +165,37 @@ impl Filter {
             force_bias: three(FORCE_BIAS),
             lead: self.covariance.variance(LEAD).max(0.0).sqrt(),
         }
+    }
+
+    /// Covariance of the calibration's numbers from state `first` on, as much larger than the filter's own as that
+    /// of the attitude.
+    fn block<const N: usize>(&self, first: usize) -> SMatrix<f64, N, N> {
+        SMatrix::from_fn(|i, j| COLOURED * self.covariance.between(first + i, first + j))
+    }
+
+    /// Of the gyro's bias, (rad/s)^2; of its scale and axes; of the accelerometer's bias, (m/s^2)^2. Body axes.
+    pub(crate) fn calibration_covariance(&self) -> (Matrix3<f64>, Matrix6<f64>, Matrix3<f64>) {
+        (self.block(BIAS), self.block(SCALE), self.block(FORCE_BIAS))
+    }
+
+    /// Of the accelerometer's lead, s.
+    pub(crate) fn lead_sigma(&self) -> f64 {
+        self.block::<1>(LEAD)[(0, 0)].max(0.0).sqrt()
+    }
+
+    /// What it was told.
+    pub(crate) fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// What it took the sigma of the accelerometer's lead for at the start, s.
+    pub(crate) fn lead_prior(&self) -> f64 {
+        let settings = &self.settings;
+        settings.prior.lead_sigma.unwrap_or_else(|| {
+            settings
+                .lead_prior
+                .hypot(settings.lead_share * self.nominal)
+        })
     }
 
     /// What the rates that come now are to be corrected by.

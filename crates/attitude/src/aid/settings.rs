@@ -1,5 +1,7 @@
 //! What the filter is told about sensors and motions. Pure.
 
+use super::prior::Prior;
+
 /// Settings of the [`Filter`](super::Filter), SI. The defaults are one set for every sensor and motion it was
 /// judged on.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -103,6 +105,8 @@ pub struct Settings {
     pub gap_secs: f64,
     /// The gyro's range, rad/s; at it, the turn is unknown. 0: not known.
     pub gyro_range: f64,
+    /// What is known of this very sensor, in place of the priors above.
+    pub prior: Prior,
 }
 
 impl Default for Settings {
@@ -155,6 +159,7 @@ impl Default for Settings {
             gap_factor: 1.5,
             gap_secs: 0.2,
             gyro_range: 0.0,
+            prior: Prior::default(),
         }
     }
 }

@@ -1,9 +1,7 @@
 //! How the filter begins, and begins anew. Pure.
 
-use super::calibration::{Applied, Calibration};
-use super::covariance::{
-    BIAS, CROSS, Covariance, FIELD, FORCE_BIAS, HEADING, LEAD, POSITION, SCALE, TILT, VELOCITY,
-};
+use super::calibration::Applied;
+use super::covariance::{BIAS, FIELD, HEADING, POSITION, TILT, VELOCITY};
 use super::filter::{Filter, Measured, is_field};
 use super::gravity::Residuals;
 use super::heading::Surroundings;
@@ -22,7 +20,7 @@ const HEADING_UNKNOWN: f64 = 3.0;
 /// Sigma of a tilt that nothing has told, rad.
 const TILT_UNKNOWN: f64 = 1.5;
 /// What may be wrong with a bias after a reset, rad/s.
-const BIAS_AFTER_RESET: f64 = 8.7e-4;
+pub(crate) const BIAS_AFTER_RESET: f64 = 8.7e-4;
 
 impl Filter {
     /// Begins at a first sample: level by its specific force and with the heading of the propagator's attitude,
@@ -133,20 +131,7 @@ impl Filter {
     /// The sensor as it was switched on.
     pub(super) fn forget_calibration(&mut self) {
         let settings = self.settings;
-        self.calibration = Calibration::default();
+        (self.calibration, self.covariance) = settings.prior.begin(&settings);
         self.known = Applied::of(&self.calibration);
-        self.covariance = Covariance::zero();
-        for (first, sigma) in [
-            (BIAS, settings.bias_prior),
-            (SCALE, settings.scale_prior),
-            (CROSS, settings.cross_prior),
-            (FORCE_BIAS, settings.force_bias_prior),
-        ] {
-            for axis in 0..3 {
-                self.covariance.add(first + axis, sigma * sigma);
-            }
-        }
-        self.covariance
-            .add(LEAD, settings.lead_prior * settings.lead_prior);
     }
 }

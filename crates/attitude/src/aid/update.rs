@@ -15,7 +15,7 @@ use crate::record::AttitudeCovariance;
 use nalgebra::Vector3;
 
 /// Accelerations are not white, which makes errors larger than they are thought to be.
-const COLOURED: f64 = 2.0;
+pub(super) const COLOURED: f64 = 2.0;
 /// Delay of a sensor's own filters, s.
 const DELAY: f64 = 2e-3;
 /// Between the axes of sensor and case, rad.
@@ -26,7 +26,7 @@ impl Filter {
     pub(super) fn update(&mut self) {
         let settings = self.settings;
         let secs = self.interval.secs;
-        if self.report.updates == 0 {
+        if self.report.updates == 0 && settings.prior.lead_sigma.is_none() {
             self.covariance
                 .add(LEAD, (settings.lead_share * self.nominal).powi(2));
         }

@@ -53,6 +53,7 @@ pub(super) struct Gate {
     /// mount * axes * unit; `None` when that changes nothing, so that values keep their bits.
     gyro: Option<Matrix3<f64>>,
     accel: Option<Matrix3<f64>>,
+    accel_bias: Vector3<f64>,
     to_rad: f64,
     /// Step of truncation in the source's unit.
     cut: Option<f64>,
@@ -66,8 +67,9 @@ impl Gate {
         let unless_identity = |m: Matrix3<f64>| (m != Matrix3::identity()).then_some(m);
         Gate {
             kind: settings.kind,
-            gyro: unless_identity(axes * settings.unit.to_rad()),
-            accel: unless_identity(axes * settings.accel_scale),
+            gyro: unless_identity(axes * settings.gyro_matrix * settings.unit.to_rad()),
+            accel: unless_identity(axes * settings.accel_matrix * settings.accel_scale),
+            accel_bias: axes * settings.accel_bias,
             to_rad: settings.unit.to_rad(),
             cut: settings
                 .truncation_step
@@ -130,7 +132,7 @@ impl Gate {
             accel: match &self.accel {
                 None => accel,
                 Some(m) => m * accel,
-            },
+            } - self.accel_bias,
             interval,
             index,
             epoch: 0,

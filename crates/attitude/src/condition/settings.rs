@@ -69,7 +69,8 @@ impl OnGap {
 /// How a stream is conditioned.
 ///
 /// # Convention
-/// A raw vector v_s in the sensor's own axes and unit becomes `w_b = mount * axes * unit * v_s - bias`.
+/// A raw vector v_s in the sensor's own axes and unit becomes `w_b = mount * axes * gyro_matrix * unit * v_s - bias`, an
+/// acceleration `mount * axes * (accel_matrix * accel_scale * a_s - accel_bias)`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
     /// What a sample means in time.
@@ -78,6 +79,12 @@ pub struct Settings {
     pub unit: GyroUnit,
     /// Multiply the recorded acceleration by this to get m/s^2.
     pub accel_scale: f64,
+    /// Corrects scale and axes of the gyro, sensor axes.
+    pub gyro_matrix: Matrix3<f64>,
+    /// The same for the accelerometer.
+    pub accel_matrix: Matrix3<f64>,
+    /// What is left of its bias after that, m/s^2, sensor axes.
+    pub accel_bias: Vector3<f64>,
     /// Body axes from source axes: a signed permutation. Determinant -1 is allowed: recordings
     /// with columns in z,y,x order exist, and naming the columns right is not a reflection.
     pub axes: Matrix3<f64>,
@@ -112,6 +119,9 @@ impl Default for Settings {
             kind: SampleKind::Rate,
             unit: GyroUnit::Rad,
             accel_scale: 1.0,
+            gyro_matrix: Matrix3::identity(),
+            accel_matrix: Matrix3::identity(),
+            accel_bias: Vector3::zeros(),
             axes: Matrix3::identity(),
             mount: Matrix3::identity(),
             clock: Clock::Header,
@@ -187,6 +197,10 @@ impl Settings {
                 "acceleration scale {} is not usable",
                 self.accel_scale
             ));
+        }
+        let numbers = self.gyro_matrix.iter().chain(self.accel_matrix.iter());
+        if !numbers.chain(self.accel_bias.iter()).all(|n| n.is_finite()) {
+            return fail("--calibration: numbers that are none".to_owned());
         }
         if let Some(range) = self.gyro_range
             && !(range.is_finite() && range > 0.0)

@@ -3,6 +3,7 @@
 //! Apart from the rest of the preparation because a force says nothing of its own unit, and one that is no
 //! specific force (phones export acceleration without gravity) would level to anything.
 
+use super::calibrated::BIAS_LEFT;
 use super::meaning::Meaning;
 use super::plan::{Aid, Bias, Initial, Plan};
 use crate::aid::{self, Settings, Start};
@@ -18,8 +19,6 @@ const IN_G: std::ops::Range<f64> = 0.4..4.0;
 const IN_SI: std::ops::RangeInclusive<f64> = 4.0..=40.0;
 /// How far the mean of the first second may be from gravity, as a share.
 const FAR: f64 = 0.15;
-/// Of a gyro whose bias was removed, rad/s: what the bias may have become since.
-const BIAS_LEFT: f64 = 1e-3;
 /// Of an initial attitude that was given, or found at rest, rad.
 const TILT_GIVEN: f64 = 0.3;
 const TILT_AT_REST: f64 = 0.05;
@@ -79,7 +78,7 @@ impl Aiding {
             Err(Unaided::NoForce) if plan.aid == Aid::Auto => Ok(None),
             Err(Unaided::NoForce) if first.len() <= 1 => {
                 warnings.push(format!("{asked}: the first sample carries no specific force: the attitude is the gyro's until one comes"));
-                Ok(Some(Aiding::with_scale(plan, 1.0)))
+                Ok(Some(Aiding::with_scale((plan, resolved), 1.0)))
             }
             Err(Unaided::NoForce) => Err(format!(
                 "{asked}: none of the first {} samples carries a specific force\n  help: --field accel=PATH or --accel-topic NAME says where it is, --aid none does without",
@@ -103,7 +102,7 @@ impl Aiding {
     ) -> Result<Aiding, Unaided> {
         if plan.has_forces_beside {
             // Its unit shows in its first, its plausibility in the filter.
-            return Ok(Aiding::with_scale(plan, 1.0));
+            return Ok(Aiding::with_scale((plan, resolved), 1.0));
         }
         let mut lengths = first
             .iter()
@@ -139,10 +138,10 @@ impl Aiding {
                 first.len(),
             )));
         }
-        Ok(Aiding::with_scale(plan, scale))
+        Ok(Aiding::with_scale((plan, resolved), scale))
     }
 
-    fn with_scale(plan: &Plan, force_scale: f64) -> Aiding {
+    fn with_scale((plan, resolved): (&Plan, &Meaning), force_scale: f64) -> Aiding {
         let mut settings = Settings {
             gyro_range: plan.gyro_range.unwrap_or(0.0),
             has_field: plan.aid == Aid::GravityAndField,
@@ -170,6 +169,7 @@ impl Aiding {
         if plan.bias != Bias::None {
             settings.bias_prior = settings.bias_prior.min(BIAS_LEFT);
         }
+        settings.prior = resolved.prior(&settings, plan.bias == Bias::None);
         Aiding {
             settings,
             start: start(plan.initial, settings.has_field),

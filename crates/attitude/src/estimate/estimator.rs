@@ -170,6 +170,10 @@ impl Estimator {
             (false, Initial::Gravity) => plan.noise.levelled(),
             (false, _) => plan.noise.clone(),
         };
+        let noise = match (&plan.calibration, &prepared.aiding) {
+            (Some(known), None) => known.narrowed(&noise),
+            _ => noise,
+        };
         let propagation = propagate::Settings {
             method: plan.method,
             kind: resolved.kind,
@@ -191,14 +195,17 @@ impl Estimator {
         .map_err(|e| e.to_string())?;
         Ok(Estimator {
             settings: told_apart(&format!(
-                "{settings:?} {:?} {:?} {noise:?}{}",
+                "{settings:?} {:?} {:?} {noise:?}{}{}",
                 plan.method,
                 prepared.world_rate,
                 // Nothing for a gyro alone: what was saved before there was more goes on.
                 prepared.aiding.map_or_else(String::new, |aiding| format!(
                     " {aiding:?} {} {} {:?}",
                     plan.has_forces_beside, plan.declination, plan.mag_mount
-                ))
+                )),
+                plan.calibration
+                    .as_ref()
+                    .map_or_else(String::new, |known| format!(" {known:?}"))
             )),
             conditioner: Conditioner::new(settings).map_err(|e| e.to_string())?,
             regulariser: prepared.stamps.regulariser(resolved.kind)?,
@@ -347,13 +354,13 @@ impl Estimator {
         let (Some(force), Some(stamp)) = (raw.accel, besides.clock.read(raw)) else {
             return;
         };
-        let force = besides.resolved.force(force);
+        let resolved = &besides.resolved;
         let scale = *besides
             .force_scale
-            .get_or_insert_with(|| aiding::force_scale(&besides.resolved, force.norm()));
+            .get_or_insert_with(|| aiding::force_scale(resolved, resolved.force(force).norm()));
+        let force = resolved.calibrated_force(force, scale);
         let place = self.rates.len();
-        self.beside
-            .push((place, stamp, Beside::Force(force * scale)));
+        self.beside.push((place, stamp, Beside::Force(force)));
     }
 
     fn take_field(&mut self, raw: &RawSample) {
@@ -363,8 +370,10 @@ impl Estimator {
         let Some((field, stamp)) = raw.mag.zip(besides.clock.read(raw)) else {
             return;
         };
-        let field = Beside::Field(besides.resolved.field(field));
-        self.beside.push((self.rates.len(), stamp, field));
+        let (field, lead) = besides.resolved.field(field);
+        let stamp = Nanos(stamp.0.saturating_add((lead * 1e9).round() as i64));
+        let place = self.rates.len();
+        self.beside.push((place, stamp, Beside::Field(field)));
     }
 
     /// A payload that could not be decoded stood here in the stream.

@@ -4,12 +4,14 @@
 
 use super::aiding;
 use super::plan::Plan;
+use super::sensor_calibration::SensorCalibration;
 use crate::condition::{Clock, GyroUnit, Settings};
 use crate::frames::{Body, BodyAxes, Dcm, Nav, Sensor};
 use crate::quaternion::Quaternion;
 use crate::record::{AccelUnit, Declared, RawSample, SampleKind, TimeUnit};
 use crate::worlds::{Convention, World};
 use nalgebra::{Matrix3, Vector3};
+use std::sync::Arc;
 
 /// The flags and what the format states, put together: a flag wins.
 #[derive(Clone, Debug)]
@@ -30,6 +32,8 @@ pub struct Meaning {
     pub interval: Option<(String, TimeUnit)>,
     /// Whether the user stated that unit.
     pub interval_unit_given: bool,
+    /// What is known of the sensor beforehand.
+    pub calibration: Option<Arc<SensorCalibration>>,
     axes: Matrix3<f64>,
     mount: Matrix3<f64>,
     /// Magnetometer to body axes.
@@ -60,19 +64,32 @@ impl Meaning {
             recorded: orientation_convention(declared),
             interval: declared.interval.clone(),
             interval_unit_given: declared.interval_unit_given,
+            calibration: plan.calibration.clone(),
             axes,
             mount,
             body,
         }
     }
 
-    /// The settings of the conditioning stage.
+    /// Sensor to body axes.
+    pub(super) fn to_body(&self) -> Matrix3<f64> {
+        self.mount * self.axes
+    }
+
+    /// The settings of the conditioning stage: `bias` is what is taken out of calibrated rates, body axes.
     #[must_use]
     pub fn conditioning(&self, plan: &Plan, clock: Clock, bias: Vector3<f64>) -> Settings {
+        let known = self.calibration.as_deref();
+        let matrix =
+            |of: fn(&SensorCalibration) -> Matrix3<f64>| known.map_or_else(Matrix3::identity, of);
+        let accel_matrix = matrix(SensorCalibration::force_matrix);
         Settings {
             kind: self.kind,
             unit: self.unit,
             accel_scale: self.accel_scale,
+            gyro_matrix: matrix(SensorCalibration::gyro_matrix),
+            accel_matrix,
+            accel_bias: known.map_or_else(Vector3::zeros, |k| accel_matrix * k.force_bias_vector()),
             axes: self.axes,
             mount: self.mount,
             clock,
@@ -94,12 +111,30 @@ impl Meaning {
     /// A recorded specific force in m/s^2 and body axes, as far as the format states its unit.
     #[must_use]
     pub fn force(&self, recorded: [f64; 3]) -> Vector3<f64> {
-        self.mount * self.axes * Vector3::from(recorded) * self.accel_scale
+        self.to_body() * Vector3::from(recorded) * self.accel_scale
     }
 
-    /// A recorded magnetic field in body axes.
-    pub(super) fn field(&self, recorded: [f64; 3]) -> Vector3<f64> {
-        self.mag_axes * Vector3::from(recorded)
+    /// The same, calibrated, where `scale` makes it m/s^2.
+    pub(super) fn calibrated_force(&self, recorded: [f64; 3], scale: f64) -> Vector3<f64> {
+        match &self.calibration {
+            None => self.force(recorded) * scale,
+            Some(known) => {
+                let force = Vector3::from(recorded) * (self.accel_scale * scale);
+                self.to_body() * (known.force_matrix() * (force - known.force_bias_vector()))
+            }
+        }
+    }
+
+    /// A recorded magnetic field in body axes, calibrated, and for how long after its stamp it is that, s.
+    pub(super) fn field(&self, recorded: [f64; 3]) -> (Vector3<f64>, f64) {
+        let field = Vector3::from(recorded);
+        match &self.calibration {
+            None => (self.mag_axes * field, 0.0),
+            Some(known) => (
+                self.mag_axes * (known.field_matrix() * (field - known.hard_iron_vector())),
+                known.field_lead.map_or(0.0, |lead| lead.value[0]),
+            ),
+        }
     }
 
     /// World and body of the output as labels. NED comes with FRD, everything else with FLU.

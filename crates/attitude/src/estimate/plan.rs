@@ -3,6 +3,7 @@
 //! Apart from the stages because each of them takes its part of it, and because what can not be is refused
 //! here, before the data are looked at.
 
+use super::sensor_calibration::SensorCalibration;
 use crate::condition::{self, Clock, GyroUnit, OnGap};
 use crate::frames::BodyAxes;
 use crate::propagate::{self, Method, Propagator};
@@ -10,6 +11,7 @@ use crate::quaternion::Quaternion;
 use crate::record::SampleKind;
 use crate::worlds::World;
 use nalgebra::Vector3;
+use std::sync::Arc;
 
 /// How the samples of a run are to be understood and integrated: the estimation flags, checked.
 /// `None` = the format decides where it states it, else the default.
@@ -60,6 +62,8 @@ pub struct Plan {
     pub truncation: Truncation,
     /// `--sensor-delay`, s.
     pub sensor_delay_secs: f64,
+    /// `--calibration`: what is known of the sensor beforehand.
+    pub calibration: Option<Arc<SensorCalibration>>,
     /// `--start`, s.
     pub start: Option<f64>,
     /// `--until`, s.
@@ -125,6 +129,7 @@ impl Default for Plan {
             declination: 0.0,
             truncation: Truncation::Unsaid,
             sensor_delay_secs: 0.0,
+            calibration: None,
             start: None,
             until: None,
         }
@@ -165,6 +170,7 @@ impl Plan {
         }
         self.check_earth_rate()?;
         self.check_field()?;
+        self.check_calibration()?;
         if self.regularise_stamps && matches!(self.clock, Clock::Index { .. }) {
             return Err("--regularise-stamps: the stamps of --time index are even already\n  help: leave one of the two out".to_owned());
         }
@@ -202,6 +208,18 @@ impl Plan {
         }
         if has_field && self.world == World::Level {
             return Err("--world level: with a magnetic field the heading is that of north\n  help: --world enu, ned or nwu; --aid gravity for the heading of the start".to_owned());
+        }
+        Ok(())
+    }
+
+    /// A calibration is one of a sensor, and says no other bias than `--bias`.
+    fn check_calibration(&self) -> Result<(), String> {
+        let Some(known) = &self.calibration else {
+            return Ok(());
+        };
+        known.check().map_err(|e| format!("--calibration: {e}"))?;
+        if known.bias.is_some() && matches!(self.bias, Bias::Given(_)) {
+            return Err("--bias x,y,z: the calibration says a bias, too\n  help: leave --bias out, or `bias` out of the file; --bias auto takes that of the rest in this log".to_owned());
         }
         Ok(())
     }

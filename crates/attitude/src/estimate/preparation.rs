@@ -208,8 +208,11 @@ impl Preparation {
             &mut warnings,
         )?;
         let earth = plan.latitude_deg.map(|deg| Earth::at(deg.to_radians()));
-        let (bias, bias_sigma, bias_origin) =
-            decide_bias(&plan, &rests, earth.map(|e| e.felt_by(&initial)))?;
+        let (bias, bias_sigma, bias_origin) = decide_bias(
+            (&plan, &resolved),
+            &rests,
+            earth.map(|e| e.felt_by(&initial)),
+        )?;
         let found = stamps.map(StampPass::finish).transpose()?;
         let stamps = match (known.or(found), patience) {
             (None, _) => Stamps::AsRecorded,
@@ -228,7 +231,7 @@ impl Preparation {
         // What was gathered for an attitude that is aided is of no use to another.
         let is_wanted = aiding.is_some() || plan.truncation != Truncation::Unsaid;
         let rates = rates.as_deref().filter(|_| is_wanted);
-        let truncation_step = decide_truncation(plan.truncation, rates, &mut warnings)?;
+        let truncation_step = decide_truncation(&plan, rates, &mut warnings)?;
         Ok(Prepared {
             aiding,
             truncation_step,
@@ -286,8 +289,8 @@ pub fn at_once(plan: &Plan, resolved: &Meaning, first: &RawSample) -> Result<Pre
     )?;
     let earth = plan.latitude_deg.map(|deg| Earth::at(deg.to_radians()));
     let (bias, bias_sigma, mut bias_origin) =
-        decide_bias(plan, &rests, earth.map(|e| e.felt_by(&initial)))?;
-    if asked.bias == Bias::Auto {
+        decide_bias((plan, resolved), &rests, earth.map(|e| e.felt_by(&initial)))?;
+    if asked.bias == Bias::Auto && resolved.calibrated_bias(&plan.noise).is_none() {
         "none to begin with, learned on the way".clone_into(&mut bias_origin);
     }
     warnings.extend(earth.and_then(|e| e.heading_warning(plan.initial)));
@@ -300,7 +303,7 @@ pub fn at_once(plan: &Plan, resolved: &Meaning, first: &RawSample) -> Result<Pre
     };
     Ok(Prepared {
         aiding,
-        truncation_step: decide_truncation(plan.truncation, None, &mut warnings)?,
+        truncation_step: decide_truncation(plan, None, &mut warnings)?,
         clock: plan.clock,
         bias,
         bias_sigma,
@@ -328,24 +331,23 @@ fn looks_for_truncation(plan: &Plan) -> bool {
     }
 }
 
-/// `rates` are those of a file that can be read twice, where they are looked at.
+/// `rates` are those of a file that can be read twice, where they are looked at. What they do not tell, a calibration
+/// may.
 fn decide_truncation(
-    asked: Truncation,
+    plan: &Plan,
     rates: Option<&[[f64; 3]]>,
     warnings: &mut Vec<String>,
 ) -> Result<Option<f64>, String> {
-    let grid = match (asked, rates) {
-        (Truncation::Steps(step), _) => return Ok(Some(step)),
-        (Truncation::On, None) => {
-            return Err("--undo-truncation on: what can not be read twice does not show its step in time\n  help: on=STEP in rad/s, as `strapd replay` of a file says it".to_owned());
-        }
-        (_, None) => return Ok(None),
-        (_, Some(rates)) => Grid::of(rates),
-    };
-    let is_asked = asked == Truncation::On;
-    match grid {
-        None if is_asked => Err("--undo-truncation on: these rates count in no steps\n  help: on=STEP in rad/s states them, off leaves the rates alone".to_owned()),
-        Some(grid) if is_asked || grid.is_truncated() => {
+    let known = plan.calibration.as_ref().and_then(|known| known.step());
+    let is_asked = plan.truncation == Truncation::On;
+    match plan.truncation {
+        Truncation::Steps(step) => return Ok(Some(step)),
+        Truncation::Off => return Ok(None),
+        Truncation::On | Truncation::Auto | Truncation::Unsaid => {}
+    }
+    let grid = rates.and_then(Grid::of);
+    match (grid, known) {
+        (Some(grid), _) if is_asked || grid.is_truncated() => {
             let degrees = grid.step.to_degrees();
             let why = grid.zero_bin.map_or_else(String::new, |ratio| {
                 format!(" (the one about zero is {ratio:.1} times as wide)")
@@ -356,7 +358,24 @@ fn decide_truncation(
             ));
             Ok(Some(grid.step))
         }
-        _ => Ok(None),
+        (Some(Grid { zero_bin: Some(ratio), .. }), Some(_)) => {
+            warnings.push(format!(
+                "--calibration: its truncation_step was not used: these rates were not cut (the bin about zero is {ratio:.1} times as wide as the others); --undo-truncation on=STEP insists"
+            ));
+            Ok(None)
+        }
+        (_, Some(step)) => {
+            warnings.push(format!(
+                "the driver cuts the rates towards zero in steps of {:.4} deg/s, says the calibration: half a step was put back; --undo-truncation off leaves them",
+                step.to_degrees()
+            ));
+            Ok(Some(step))
+        }
+        (_, None) if !is_asked => Ok(None),
+        (_, None) => Err(match rates {
+            None => "--undo-truncation on: what can not be read twice does not show its step in time\n  help: on=STEP in rad/s, as `strapd replay` of a file says it, or a --calibration with its truncation_step".to_owned(),
+            Some(_) => "--undo-truncation on: these rates count in no steps\n  help: on=STEP in rad/s states them, off leaves the rates alone".to_owned(),
+        }),
     }
 }
 
@@ -364,16 +383,19 @@ fn decide_truncation(
 /// taken out: then it is no bias, and only a rest at the start, where the attitude is known, can tell
 /// the two apart.
 fn decide_bias(
-    plan: &Plan,
+    (plan, resolved): (&Plan, &Meaning),
     rests: &Rests,
     earth: Option<Vector3<f64>>,
 ) -> Result<(Vector3<f64>, Vector3<f64>, String), String> {
     match plan.bias {
-        Bias::None => Ok((
-            Vector3::zeros(),
-            plan.noise.unremoved_bias().into(),
-            "none".to_owned(),
-        )),
+        Bias::None => Ok(match resolved.calibrated_bias(&plan.noise) {
+            Some((bias, sigma)) => (bias, sigma, "as calibrated".to_owned()),
+            None => (
+                Vector3::zeros(),
+                plan.noise.unremoved_bias().into(),
+                "none".to_owned(),
+            ),
+        }),
         Bias::Given(bias) => Ok((
             bias,
             plan.noise.unstable_bias().into(),

@@ -1,0 +1,217 @@
+//! A calibration, and how the sensor is mounted -> what the filter begins with; what it learned -> a calibration. Pure.
+//!
+//! Apart from the filter because a calibration is of the sensor's axes as recorded and of everything that was taken
+//! out of a sample, while the filter knows body axes and what is left.
+
+use super::meaning::Meaning;
+use super::plan::{Bias, Noise, Plan};
+use super::preparation::Prepared;
+use super::sensor_calibration::{Known, SensorCalibration};
+use crate::aid::{BIAS_AFTER_RESET, Filter, Prior, Settings};
+use nalgebra::{Matrix3, Matrix6, Vector3};
+
+/// Of a gyro whose bias was removed, rad/s: what the bias may have become since.
+pub(super) const BIAS_LEFT: f64 = 1e-3;
+
+/// Rows and columns of a symmetric matrix in the order of its states: scale, then axes.
+const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
+
+/// Takes scale and axes about other axes, `by` orthogonal: `by E by^T`.
+fn turned(by: &Matrix3<f64>) -> Matrix6<f64> {
+    Matrix6::from_fn(|row, column| {
+        let (k, l) = PAIRS[column];
+        let mut unit = Matrix3::zeros();
+        unit[(k, l)] = 1.0;
+        unit[(l, k)] = 1.0;
+        let (i, j) = PAIRS[row];
+        (by * unit * by.transpose())[(i, j)]
+    })
+}
+
+fn diagonal(sigma: &Vector3<f64>) -> Matrix3<f64> {
+    Matrix3::from_diagonal(&sigma.component_mul(sigma))
+}
+
+/// Sigmas of three numbers, by `class` where data have not told them.
+fn sigmas(known: &Known<3>, class: f64) -> Vector3<f64> {
+    Vector3::from_fn(|i, _| known.sigma_of(i).unwrap_or(class))
+}
+
+/// Sigmas of scale and axes of a matrix that need not be symmetric, by `settings` where data have not told them.
+fn scale_sigmas(gyro: Option<&Known<9>>, settings: &Settings) -> [f64; 6] {
+    PAIRS.map(|(i, j)| {
+        let class = if i == j {
+            settings.scale_prior
+        } else {
+            settings.cross_prior
+        };
+        let of = |i: usize, j: usize| gyro.and_then(|g| g.sigma_of(3 * i + j));
+        match (of(i, j), of(j, i)) {
+            (Some(a), Some(b)) => a.hypot(b) / std::f64::consts::SQRT_2,
+            _ => class,
+        }
+    })
+}
+
+impl Meaning {
+    /// What a filter of `settings` is told of a sensor whose calibration was taken out of the samples: the bias only
+    /// where that is the calibration's.
+    pub(super) fn prior(&self, settings: &Settings, is_bias_calibrated: bool) -> Prior {
+        let Some(calibration) = &self.calibration else {
+            return Prior::default();
+        };
+        let c = self.to_body();
+        let told = |known: &Option<Known<3>>| known.filter(|k| !k.is_unobserved());
+        let by_gyro = c * calibration.gyro_matrix();
+        let by_force = c * calibration.force_matrix();
+        Prior {
+            bias: told(&calibration.bias)
+                .filter(|_| is_bias_calibrated)
+                .map(|bias| {
+                    by_gyro * diagonal(&sigmas(&bias, settings.bias_prior)) * by_gyro.transpose()
+                }),
+            scale: calibration
+                .gyro
+                .filter(|gyro| !gyro.is_unobserved())
+                .map(|gyro| {
+                    let map = turned(&c);
+                    let sigma = scale_sigmas(Some(&gyro), settings);
+                    map * Matrix6::from_diagonal(&sigma.map(|s| s * s).into()) * map.transpose()
+                }),
+            force_bias: told(&calibration.force_bias).map(|bias| {
+                let sigma = sigmas(&bias, settings.force_bias_prior);
+                by_force * diagonal(&sigma) * by_force.transpose()
+            }),
+            lead: calibration.lead.map_or(0.0, |lead| lead.value[0]),
+            lead_sigma: calibration.lead.and_then(|lead| lead.sigma_of(0)),
+        }
+    }
+
+    /// The bias that a calibration takes out and what is not known of it, rad/s, body axes: by the class of the
+    /// sensor what it does not say.
+    pub(super) fn calibrated_bias(&self, noise: &Noise) -> Option<(Vector3<f64>, Vector3<f64>)> {
+        let calibration = self.calibration.as_ref()?;
+        let known = calibration.bias.as_ref()?;
+        let by_gyro = self.to_body() * calibration.gyro_matrix();
+        let class = noise.unremoved_bias().into_iter().fold(0.0, f64::max);
+        let covariance = by_gyro * diagonal(&sigmas(known, class)) * by_gyro.transpose();
+        let unstable = Vector3::from(noise.unstable_bias());
+        let sigma = covariance.diagonal().map(f64::sqrt);
+        Some((
+            by_gyro * calibration.bias_vector(),
+            sigma.zip_map(&unstable, f64::hypot),
+        ))
+    }
+}
+
+/// What is known of the sensor at the end of a run: what it was known by before, with what the filter has learned.
+/// Numbers that the run has told nothing of stay as they were.
+#[must_use]
+pub fn learned(
+    plan: &Plan,
+    resolved: &Meaning,
+    prepared: &Prepared,
+    filter: Option<&Filter>,
+) -> SensorCalibration {
+    let mut known = plan.calibration.as_deref().cloned().unwrap_or_default();
+    let c = resolved.to_body();
+    let undone = |matrix: Matrix3<f64>| matrix.try_inverse().unwrap_or_else(Matrix3::identity);
+    let from_gyro = undone(c * known.gyro_matrix());
+    let from_force = undone(c * known.force_matrix());
+    if plan.bias != Bias::None {
+        known.bias = Some(Known {
+            value: (from_gyro * prepared.bias).into(),
+            sigma: Some([BIAS_LEFT; 3]),
+            observed: [true; 3],
+        });
+    }
+    if let Some(step) = prepared.truncation_step {
+        known.truncation_step = Some(Known {
+            value: [step],
+            sigma: None,
+            observed: [true],
+        });
+    }
+    let Some(filter) = filter.filter(|f| f.is_started() && !f.is_force_implausible()) else {
+        return known;
+    };
+    let (settings, now) = (filter.settings(), filter.calibration());
+    let (bias, scale, force_bias) = filter.calibration_covariance();
+    let about = |by: &Matrix3<f64>, covariance: Matrix3<f64>| {
+        let sigma = (by * covariance * by.transpose()).diagonal();
+        sigma.map(|variance| variance.max(0.0).sqrt()).into()
+    };
+    let left = c.transpose() * (now.matrix() - Matrix3::identity()) * c;
+    let total = (Matrix3::identity() + left) * known.gyro_matrix() - Matrix3::identity();
+    let map = turned(&c.transpose());
+    let scale = (map * scale * map.transpose()).diagonal();
+    let prior = scale_sigmas(known.gyro.as_ref(), settings);
+    // Of a symmetric matrix: the states in the places of its elements.
+    let everywhere = |of: &dyn Fn(usize) -> f64| {
+        let mut all = [0.0; 9];
+        for (n, (i, j)) in PAIRS.into_iter().enumerate() {
+            all[3 * i + j] = of(n);
+            all[3 * j + i] = of(n);
+        }
+        all
+    };
+    known.bias = Some(now_known(
+        known.bias.as_ref(),
+        [settings.bias_prior; 3],
+        (from_gyro * (prepared.bias + now.bias)).into(),
+        about(&from_gyro, bias),
+        BIAS_AFTER_RESET,
+    ));
+    known.gyro = Some(now_known(
+        known.gyro.as_ref(),
+        everywhere(&|n| prior[n]),
+        total.transpose().as_slice().try_into().unwrap_or([0.0; 9]),
+        everywhere(&|n| scale[n].max(0.0).sqrt()),
+        0.0,
+    ));
+    known.force_bias = Some(now_known(
+        known.force_bias.as_ref(),
+        [settings.force_bias_prior; 3],
+        (Vector3::from(vector_of(known.force_bias.as_ref())) + from_force * now.force_bias).into(),
+        about(&from_force, force_bias),
+        0.0,
+    ));
+    known.lead = Some(now_known(
+        known.lead.as_ref(),
+        [filter.lead_prior()],
+        [now.lead],
+        [filter.lead_sigma()],
+        0.0,
+    ));
+    known
+}
+
+fn vector_of(known: Option<&Known<3>>) -> [f64; 3] {
+    known.map_or([0.0; 3], |known| known.value)
+}
+
+/// Each number as it is known now, where that is better than before, else as it was: by `class` where nothing was
+/// known. `lost` is what switching the sensor off leaves unknown.
+fn now_known<const N: usize>(
+    before: Option<&Known<N>>,
+    class: [f64; N],
+    value: [f64; N],
+    sigma: [f64; N],
+    lost: f64,
+) -> Known<N> {
+    let mut known = before.copied().unwrap_or(Known {
+        value: [0.0; N],
+        sigma: None,
+        observed: [false; N],
+    });
+    let mut sigmas = known.sigma.unwrap_or(class);
+    for i in 0..N {
+        if sigma[i] < known.sigma_of(i).unwrap_or(class[i]) && value[i].is_finite() {
+            known.value[i] = value[i];
+            sigmas[i] = sigma[i].hypot(lost);
+            known.observed[i] = true;
+        }
+    }
+    known.sigma = Some(sigmas);
+    known
+}

@@ -1,0 +1,210 @@
+//! What is known of one sensor beforehand, or was learned of it. Pure.
+//!
+//! Apart from what the filter knows ([`crate::aid::Calibration`]) because it outlives a run and a mounting: sensor
+//! axes as recorded, everything that was taken out before, and how well each number is known.
+
+use crate::estimate::Noise;
+use nalgebra::{Matrix3, Vector3};
+
+/// Largest errors a sensor can have, each element: rad/s, shares, m/s^2, s, the field's unit.
+const BIAS: f64 = 10.0;
+const SHARE: f64 = 0.3;
+const FORCE_BIAS: f64 = 100.0;
+const LEAD: f64 = 0.5;
+const FIELD: f64 = 1e6;
+const STEP: f64 = 1.0;
+
+/// Numbers of a calibration with what is known of each. Matrices row by row.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Known<const N: usize> {
+    /// The numbers.
+    pub value: [f64; N],
+    /// One standard deviation of each.
+    pub sigma: Option<[f64; N]>,
+    /// Whether data have told them; what they have not is known no better than of any sensor.
+    pub observed: [bool; N],
+}
+
+impl<const N: usize> Known<N> {
+    /// One standard deviation of a number that data have told.
+    #[must_use]
+    pub fn sigma_of(&self, i: usize) -> Option<f64> {
+        let sigma = self.sigma.as_ref()?.get(i).copied()?;
+        self.observed.get(i).is_some_and(|o| *o).then_some(sigma)
+    }
+
+    /// Whether nothing of it was told by data.
+    #[must_use]
+    pub fn is_unobserved(&self) -> bool {
+        (0..N).all(|i| self.sigma_of(i).is_none())
+    }
+
+    fn check(&self, key: &str, unit: &str, largest: f64) -> Result<(), String> {
+        for value in self.value {
+            if value.is_nan() || value.abs() > largest {
+                return Err(format!(
+                    "`{key}`: {value} is no error of a sensor; at most {largest} {unit}"
+                ));
+            }
+        }
+        for sigma in self.sigma.iter().flatten() {
+            if !(*sigma > 0.0 && *sigma <= largest) {
+                return Err(format!(
+                    "`{key}`: sigma {sigma} is none; above 0, at most {largest} {unit}"
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Calibration of a sensor.
+///
+/// # Convention
+/// Sensor axes as recorded, before `--body` and `--mount`; rates in rad/s, specific force in m/s^2, the field in the
+/// unit it is recorded in:
+///
+/// ```text
+/// rate  = (I + G) (gyro - bias)
+/// force = (I + A) (accel - ba),  of the attitude `lead` after its stamp
+/// field = (I + S) (mag - h),     of the attitude `mag_lead` after its stamp
+/// ```
+#[derive(Clone, PartialEq, Debug, Default)]
+pub struct SensorCalibration {
+    /// What the sensor is called.
+    pub sensor: Option<String>,
+    /// When the last sample was measured that it comes from.
+    pub date: Option<String>,
+    /// What it comes from, by name.
+    pub sources: Vec<String>,
+    /// Gyro bias, rad/s.
+    pub bias: Option<Known<3>>,
+    /// G: scale and axes of the gyro.
+    pub gyro: Option<Known<9>>,
+    /// ba: accelerometer bias, m/s^2.
+    pub force_bias: Option<Known<3>>,
+    /// A: scale and axes of the accelerometer.
+    pub force: Option<Known<9>>,
+    /// Accelerometer lead, s.
+    pub lead: Option<Known<1>>,
+    /// h: hard iron.
+    pub hard_iron: Option<Known<3>>,
+    /// S: soft iron.
+    pub soft_iron: Option<Known<9>>,
+    /// Lead of the magnetometer, s.
+    pub field_lead: Option<Known<1>>,
+    /// Step in which the driver cuts the rates towards zero, rad/s.
+    pub truncation_step: Option<Known<1>>,
+}
+
+impl SensorCalibration {
+    /// Checks that a sensor can be like this.
+    ///
+    /// # Errors
+    /// In words, naming the key.
+    pub fn check(&self) -> Result<(), String> {
+        fn of<const N: usize>(
+            known: &Option<Known<N>>,
+            key: &str,
+            unit: &str,
+            largest: f64,
+        ) -> Result<(), String> {
+            known
+                .as_ref()
+                .map_or(Ok(()), |k| k.check(key, unit, largest))
+        }
+        of(&self.bias, "bias", "rad/s", BIAS)?;
+        of(&self.gyro, "G", "(of 1, or rad)", SHARE)?;
+        of(&self.force_bias, "ba", "m/s^2", FORCE_BIAS)?;
+        of(&self.force, "A", "(of 1, or rad)", SHARE)?;
+        of(&self.lead, "lead", "s", LEAD)?;
+        of(&self.hard_iron, "h", "in the unit of the field", FIELD)?;
+        of(&self.soft_iron, "S", "(of 1, or rad)", SHARE)?;
+        of(&self.field_lead, "mag_lead", "s", LEAD)?;
+        of(&self.truncation_step, "truncation_step", "rad/s", STEP)?;
+        if self.step().is_some_and(|step| step <= 0.0) {
+            return Err("`truncation_step`: a step is above 0".to_owned());
+        }
+        Ok(())
+    }
+
+    /// What is to be said where it is taken for a sensor of another name.
+    #[must_use]
+    pub fn mismatch(&self, name: &str) -> Option<String> {
+        let own = self.sensor.as_deref().filter(|own| *own != name)?;
+        Some(format!(
+            "--calibration: the file is of the sensor `{own}`, and this is `{name}`: it was taken all the same"
+        ))
+    }
+
+    /// `I + G`.
+    #[must_use]
+    pub fn gyro_matrix(&self) -> Matrix3<f64> {
+        matrix(self.gyro.as_ref())
+    }
+
+    /// `I + A`.
+    #[must_use]
+    pub fn force_matrix(&self) -> Matrix3<f64> {
+        matrix(self.force.as_ref())
+    }
+
+    /// `I + S`.
+    #[must_use]
+    pub fn field_matrix(&self) -> Matrix3<f64> {
+        matrix(self.soft_iron.as_ref())
+    }
+
+    /// Gyro bias, rad/s.
+    #[must_use]
+    pub fn bias_vector(&self) -> Vector3<f64> {
+        vector(self.bias.as_ref())
+    }
+
+    /// Accelerometer bias, m/s^2.
+    #[must_use]
+    pub fn force_bias_vector(&self) -> Vector3<f64> {
+        vector(self.force_bias.as_ref())
+    }
+
+    /// Hard iron, in the field's unit.
+    #[must_use]
+    pub fn hard_iron_vector(&self) -> Vector3<f64> {
+        vector(self.hard_iron.as_ref())
+    }
+
+    /// Step of truncation, rad/s.
+    #[must_use]
+    pub fn step(&self) -> Option<f64> {
+        self.truncation_step.map(|step| step.value[0])
+    }
+
+    /// The noise of a class of sensors with what is known of scale and axes of this one.
+    #[must_use]
+    pub fn narrowed(&self, noise: &Noise) -> Noise {
+        let Some(gyro) = &self.gyro else {
+            return noise.clone();
+        };
+        let largest = |is_diagonal: bool, class: f64| {
+            (0..9)
+                .filter(|i| (i % 4 == 0) == is_diagonal)
+                .map(|i| gyro.sigma_of(i).unwrap_or(class))
+                .fold(0.0, f64::max)
+        };
+        Noise {
+            scale: largest(true, noise.scale),
+            misalignment: largest(false, noise.misalignment),
+            ..noise.clone()
+        }
+    }
+}
+
+fn matrix(known: Option<&Known<9>>) -> Matrix3<f64> {
+    known.map_or_else(Matrix3::identity, |known| {
+        Matrix3::identity() + Matrix3::from_row_slice(&known.value)
+    })
+}
+
+fn vector(known: Option<&Known<3>>) -> Vector3<f64> {
+    known.map_or_else(Vector3::zeros, |known| known.value.into())
+}

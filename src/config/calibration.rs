@@ -1,0 +1,428 @@
+//! TOML <-> the calibration of a sensor (`--calibration`, `--save-calibration`). Pure.
+//!
+//! Written by hand: every key that is not known, every number that is none, is an error with its line.
+
+use std::fmt::Write as _;
+use std::ops::Range;
+use strapd_attitude::estimate::{Known, SensorCalibration};
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// What this release writes.
+const FORMAT: u32 = 1;
+/// A name, a date.
+const LONGEST_TEXT: usize = 4096;
+/// Recordings a calibration comes from.
+const MOST_SOURCES: usize = 64;
+/// The keys there are.
+const KEYS: &str = "strapd_calibration, sensor, date, sources, bias, G, ba, A, lead, h, S, mag_lead, truncation_step, and in each of the last nine value, sigma, observed";
+
+/// What is said of a place in the text.
+struct Wrong {
+    at: Range<usize>,
+    what: String,
+}
+
+type Read<T> = std::result::Result<T, Wrong>;
+
+fn wrong<T>(at: &Range<usize>, what: impl Into<String>) -> Read<T> {
+    Err(Wrong {
+        at: at.clone(),
+        what: what.into(),
+    })
+}
+
+/// The calibration in a text.
+///
+/// # Errors
+/// In words, with the line and the key.
+pub fn parse(text: &str) -> std::result::Result<SensorCalibration, String> {
+    let document = DeTable::parse(text).map_err(|e| e.to_string().trim_end().to_owned())?;
+    let known = table(document.get_ref()).map_err(|e| {
+        let before = text.get(..e.at.start).unwrap_or_default();
+        let line = 1 + before.bytes().filter(|b| *b == b'\n').count();
+        format!("line {line}: {}", e.what)
+    })?;
+    known.check()?;
+    Ok(known)
+}
+
+fn table(document: &DeTable<'_>) -> Read<SensorCalibration> {
+    let mut known = SensorCalibration::default();
+    for (key, value) in document {
+        let name = key.get_ref().as_ref();
+        match name {
+            "strapd_calibration" => {
+                let format = value.get_ref().as_integer().map(|i| i.as_str().parse());
+                if format != Some(Ok(FORMAT)) {
+                    return wrong(
+                        &value.span(),
+                        format!("`{name}`: another format than {FORMAT}, which this release reads"),
+                    );
+                }
+            }
+            "sensor" => known.sensor = Some(text(name, value)?),
+            "date" => known.date = Some(text(name, value)?),
+            "sources" => known.sources = texts(name, value)?,
+            "bias" => known.bias = Some(self::known(name, value)?),
+            "G" => known.gyro = Some(self::known(name, value)?),
+            "ba" => known.force_bias = Some(self::known(name, value)?),
+            "A" => known.force = Some(self::known(name, value)?),
+            "lead" => known.lead = Some(self::known(name, value)?),
+            "h" => known.hard_iron = Some(self::known(name, value)?),
+            "S" => known.soft_iron = Some(self::known(name, value)?),
+            "mag_lead" => known.field_lead = Some(self::known(name, value)?),
+            "truncation_step" => known.truncation_step = Some(self::known(name, value)?),
+            _ => return unknown(&key.span(), name),
+        }
+    }
+    Ok(known)
+}
+
+fn unknown<T>(at: &Range<usize>, name: &str) -> Read<T> {
+    let name = strapd_recording::text::printable(name);
+    wrong(
+        at,
+        format!("unknown key `{name}`\n  help: there are {KEYS}"),
+    )
+}
+
+type Value<'a, 'i> = &'a Spanned<DeValue<'i>>;
+
+fn text(name: &str, value: Value<'_, '_>) -> Read<String> {
+    let text = match value.get_ref() {
+        DeValue::String(text) => text.to_string(),
+        DeValue::Datetime(date) => date.to_string(),
+        other => {
+            return wrong(
+                &value.span(),
+                format!("`{name}`: a text is expected, not a {}", other.type_str()),
+            );
+        }
+    };
+    if text.len() > LONGEST_TEXT {
+        return wrong(
+            &value.span(),
+            format!("`{name}`: longer than {LONGEST_TEXT} bytes"),
+        );
+    }
+    Ok(text)
+}
+
+fn list<'a, 'i>(
+    name: &str,
+    value: Value<'a, 'i>,
+    length: usize,
+) -> Read<&'a [Spanned<DeValue<'i>>]> {
+    match value.get_ref().as_array() {
+        Some(list) if list.len() == length => Ok(list),
+        Some(list) => wrong(
+            &value.span(),
+            format!("`{name}`: {} where {length} are expected", list.len()),
+        ),
+        None => wrong(
+            &value.span(),
+            format!(
+                "`{name}`: a list of {length} is expected, not a {}",
+                value.get_ref().type_str()
+            ),
+        ),
+    }
+}
+
+fn texts(name: &str, value: Value<'_, '_>) -> Read<Vec<String>> {
+    match value.get_ref().as_array() {
+        Some(list) if list.len() <= MOST_SOURCES => list.iter().map(|v| text(name, v)).collect(),
+        _ => wrong(
+            &value.span(),
+            format!("`{name}`: a list of at most {MOST_SOURCES} texts is expected"),
+        ),
+    }
+}
+
+/// The N values of one thing: itself, a list of 3, or 3 lists of 3.
+fn leaves<'a, 'i, const N: usize>(name: &str, value: Value<'a, 'i>) -> Read<[Value<'a, 'i>; N]> {
+    let mut all = [value; N];
+    match N {
+        1 => {}
+        3 => all
+            .iter_mut()
+            .zip(list(name, value, 3)?)
+            .for_each(|(to, from)| *to = from),
+        _ => {
+            for (row, value) in all.chunks_exact_mut(3).zip(list(name, value, 3)?) {
+                row.iter_mut()
+                    .zip(list(name, value, 3)?)
+                    .for_each(|(to, from)| *to = from);
+            }
+        }
+    }
+    Ok(all)
+}
+
+fn numbers<const N: usize>(name: &str, value: Value<'_, '_>) -> Read<[f64; N]> {
+    let mut numbers = [0.0; N];
+    for (to, from) in numbers.iter_mut().zip(leaves::<N>(name, value)?) {
+        *to = number(name, from)?;
+    }
+    Ok(numbers)
+}
+
+fn number(name: &str, value: Value<'_, '_>) -> Read<f64> {
+    let number = match value.get_ref() {
+        DeValue::Float(number) => number.as_str().parse().ok(),
+        DeValue::Integer(number) if number.radix() == 10 => number.as_str().parse().ok(),
+        other => {
+            return wrong(
+                &value.span(),
+                format!("`{name}`: a number is expected, not a {}", other.type_str()),
+            );
+        }
+    };
+    match number.filter(|number: &f64| number.is_finite()) {
+        Some(number) => Ok(number),
+        None => wrong(&value.span(), format!("`{name}`: is no finite number")),
+    }
+}
+
+/// One for all, or each its own.
+fn truths<const N: usize>(name: &str, value: Value<'_, '_>) -> Read<[bool; N]> {
+    if let Some(all) = value.get_ref().as_bool() {
+        return Ok([all; N]);
+    }
+    let mut truths = [false; N];
+    for (to, from) in truths.iter_mut().zip(leaves::<N>(name, value)?) {
+        *to = match from.get_ref().as_bool() {
+            Some(truth) => truth,
+            None => {
+                return wrong(
+                    &from.span(),
+                    format!(
+                        "`{name}`: true or false is expected, not a {}",
+                        from.get_ref().type_str()
+                    ),
+                );
+            }
+        };
+    }
+    Ok(truths)
+}
+
+/// A table of value, sigma, observed; or the value alone.
+fn known<const N: usize>(name: &str, value: Value<'_, '_>) -> Read<Known<N>> {
+    let Some(table) = value.get_ref().as_table() else {
+        return Ok(Known {
+            value: numbers(name, value)?,
+            sigma: None,
+            observed: [false; N],
+        });
+    };
+    let (mut numbers_of, mut sigma, mut observed) = (None, None, None);
+    for (key, value) in table {
+        let inner = key.get_ref().as_ref();
+        let full = format!("{name}.{inner}");
+        match inner {
+            "value" => numbers_of = Some(numbers(&full, value)?),
+            "sigma" => sigma = Some(numbers(&full, value)?),
+            "observed" => observed = Some(truths(&full, value)?),
+            _ => return unknown(&key.span(), &full),
+        }
+    }
+    let Some(numbers) = numbers_of else {
+        return wrong(&value.span(), format!("`{name}`: `value` is missing"));
+    };
+    Ok(Known {
+        value: numbers,
+        sigma,
+        observed: observed.unwrap_or([sigma.is_some(); N]),
+    })
+}
+
+/// The text of a calibration; read, it is that calibration to nine digits.
+#[must_use]
+pub fn text_of(known: &SensorCalibration) -> String {
+    let quoted = |text: &str| toml::Value::from(text).to_string();
+    let mut out =
+        String::from("# Calibration of a sensor: its axes as recorded, SI. docs/calibration.md\n");
+    let _ = writeln!(out, "strapd_calibration = {FORMAT}");
+    for (key, text) in [("sensor", &known.sensor), ("date", &known.date)] {
+        if let Some(text) = text {
+            let _ = writeln!(out, "{key} = {}", quoted(text));
+        }
+    }
+    let sources: Vec<String> = known.sources.iter().map(|s| quoted(s)).collect();
+    let _ = writeln!(out, "sources = [{}]", sources.join(", "));
+    section(&mut out, "bias", "gyro bias, rad/s", &known.bias);
+    section(&mut out, "G", "rate = (I + G) (gyro - bias)", &known.gyro);
+    section(
+        &mut out,
+        "ba",
+        "accelerometer bias, m/s^2",
+        &known.force_bias,
+    );
+    section(&mut out, "A", "force = (I + A) (accel - ba)", &known.force);
+    let lead = "s: a force belongs to the attitude so long after its stamp";
+    section(&mut out, "lead", lead, &known.lead);
+    let iron = "hard iron, in the unit the field is recorded in";
+    section(&mut out, "h", iron, &known.hard_iron);
+    section(&mut out, "S", "field = (I + S) (mag - h)", &known.soft_iron);
+    let lead = "s: a field belongs to the attitude so long after its stamp";
+    section(&mut out, "mag_lead", lead, &known.field_lead);
+    let step = "rad/s: in such steps the driver cuts the rates towards zero";
+    section(&mut out, "truncation_step", step, &known.truncation_step);
+    out
+}
+
+fn section<const N: usize>(out: &mut String, key: &str, what: &str, known: &Option<Known<N>>) {
+    let Some(known) = known else { return };
+    let _ = writeln!(out, "\n[{key}]  # {what}");
+    let _ = writeln!(
+        out,
+        "value = {}",
+        nested(&known.value.map(|n| rounded(n, 8)))
+    );
+    if let Some(sigma) = &known.sigma {
+        let _ = writeln!(out, "sigma = {}", nested(&sigma.map(|n| rounded(n, 2))));
+    }
+    let observed = match known.observed.first() {
+        Some(first) if known.observed.iter().all(|o| o == first) => first.to_string(),
+        _ => nested(&known.observed.map(|o| o.to_string())),
+    };
+    let _ = writeln!(out, "observed = {observed}");
+}
+
+fn nested(all: &[String]) -> String {
+    let list = |part: &[String]| format!("[{}]", part.join(", "));
+    match all {
+        [one] => one.clone(),
+        [_, _, _] => list(all),
+        _ => list(&all.chunks(3).map(list).collect::<Vec<_>>()),
+    }
+}
+
+/// To so many digits behind the first, and then as short as it reads the same.
+fn rounded(number: f64, digits: usize) -> String {
+    let short: f64 = format!("{number:.digits$e}").parse().unwrap_or(number);
+    // What has neither point nor exponent is no float in TOML.
+    format!("{short:?}")
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn full() -> SensorCalibration {
+        let known = |value| Known {
+            value,
+            sigma: Some([1e-3, 2e-3, 3e-3]),
+            observed: [true, false, true],
+        };
+        let matrix = |scale: f64| {
+            let mut value = [0.0; 9];
+            for (i, v) in value.iter_mut().enumerate() {
+                *v = scale * (i as f64 - 4.0);
+            }
+            Known {
+                value,
+                sigma: Some([2.5e-4; 9]),
+                observed: [true; 9],
+            }
+        };
+        let one = |value| Known {
+            value: [value],
+            sigma: None,
+            observed: [true],
+        };
+        SensorCalibration {
+            sensor: Some("/imu \"left\"\n".to_owned()),
+            date: Some("2026-11-22T20:52:07Z".to_owned()),
+            sources: vec!["a.mcap".to_owned(), "b\\c".to_owned()],
+            bias: Some(known([0.01, -0.008, 5e-9])),
+            gyro: Some(matrix(1.234_567_89e-3)),
+            force_bias: Some(known([0.0, 1.0, -2.0])),
+            force: Some(matrix(1e-4)),
+            lead: Some(one(2.3e-3)),
+            hard_iron: Some(known([2e-6, 0.0, -1e-6])),
+            soft_iron: Some(matrix(-1e-5)),
+            field_lead: Some(one(-1e-3)),
+            truncation_step: Some(one(1.065_264e-3)),
+        }
+    }
+
+    #[test]
+    fn what_is_written_is_read_and_written_the_same() {
+        for known in [full(), SensorCalibration::default()] {
+            let text = text_of(&known);
+            let read = parse(&text).unwrap();
+            assert_eq!(read, known, "{text}");
+            assert_eq!(text_of(&read), text);
+        }
+    }
+
+    #[test]
+    fn a_number_alone_is_a_value_without_sigma() {
+        let known = parse(
+            "bias = [0.01, 0, -1e-3]\ntruncation_step = 0.001\n[lead]\nvalue = 0.002\nsigma = 1e-4",
+        )
+        .unwrap();
+        assert_eq!(known.bias.unwrap().value, [0.01, 0.0, -1e-3]);
+        assert!(known.bias.unwrap().is_unobserved());
+        assert_eq!(known.step(), Some(0.001));
+        assert_eq!(known.lead.unwrap().sigma_of(0), Some(1e-4));
+        let unseen = parse("[lead]\nvalue = 0.002\nsigma = 1e-4\nobserved = false").unwrap();
+        assert_eq!(unseen.lead.unwrap().sigma_of(0), None);
+    }
+
+    #[test]
+    fn what_is_no_calibration_is_refused_with_line_and_key() {
+        for (text, line, key) in [
+            ("bias = [1, 2]", "line 1", "bias"),
+            ("\n\n[bias]\nvalue = [1, 2, nan]", "line 4", "bias.value"),
+            ("[bias]\nvalue = [1, 2, inf]", "line 2", "bias.value"),
+            ("[bias]\nvalue = [1, 2, '3']", "line 2", "bias.value"),
+            ("bais = [1, 2, 3]", "line 1", "unknown key `bais`"),
+            (
+                "[bias]\nvalue = [0, 0, 0]\nsgima = 1",
+                "line 3",
+                "bias.sgima",
+            ),
+            ("[bias]\nsigma = [0, 0, 0]", "line 1", "`value` is missing"),
+            ("bias = [1e9, 0, 0]", "", "bias"),
+            (
+                "[bias]\nvalue = [0, 0, 0]\nsigma = [0, 1, 1]",
+                "",
+                "sigma 0",
+            ),
+            (
+                "[bias]\nvalue = [0, 0, 0]\nsigma = [-1, 1, 1]",
+                "",
+                "sigma -1",
+            ),
+            (
+                "[bias]\nvalue = [0, 0, 0]\nobserved = 1",
+                "line 3",
+                "bias.observed",
+            ),
+            ("G = [0, 0, 0]", "line 1", "G"),
+            ("G = [[0, 0, 0], [0, 0], [0, 0, 0]]", "line 1", "G"),
+            ("G = [[1, 0, 0], [0, 0, 0], [0, 0, 0]]", "", "G"),
+            ("lead = 1e3", "", "lead"),
+            ("truncation_step = 0", "", "truncation_step"),
+            ("truncation_step = -1e-3", "", "truncation_step"),
+            ("sources = 'a'", "line 1", "sources"),
+            ("sensor = 3", "line 1", "sensor"),
+            ("strapd_calibration = 2", "line 1", "strapd_calibration"),
+            ("bias = [0, 0, 0]\nbias = [0, 0, 0]", "line 2", "duplicate"),
+            ("bias = [0, 0", "line 1", ""),
+            ("\u{0}", "line 1", ""),
+        ] {
+            let said = parse(text).unwrap_err();
+            assert!(said.contains(line) && said.contains(key), "{text}: {said}");
+        }
+        let long = format!("sensor = '{}'", "x".repeat(5000));
+        assert!(parse(&long).unwrap_err().contains("4096"));
+        let many = format!("sources = [{}]", "'a',".repeat(65));
+        assert!(parse(&many).unwrap_err().contains("64"));
+    }
+}

@@ -1,0 +1,63 @@
+//! What is known of a sensor at the end of a run -> its calibration as it is saved, and words. Pure.
+
+use super::calendar::date;
+use strapd_attitude::estimate::{Known, SensorCalibration};
+use strapd_attitude::record::AttitudeSample;
+
+/// Recordings that are named.
+const MOST_SOURCES: usize = 16;
+
+/// With whose it is, from where, and when: by the clock of the samples, where that knows the day.
+#[must_use]
+pub fn described(
+    known: SensorCalibration,
+    sensor: &str,
+    source: &str,
+    last: Option<&AttitudeSample>,
+) -> SensorCalibration {
+    let day = |nanos: i64| date(u64::try_from(nanos).ok()?);
+    let mut sources = known.sources;
+    sources.retain(|s| s != source);
+    sources.push(source.to_owned());
+    let oldest = sources.len().saturating_sub(MOST_SOURCES);
+    SensorCalibration {
+        sensor: Some(sensor.chars().take(1000).collect()),
+        date: last
+            .and_then(|last| day(last.stamp.0).or_else(|| day(last.log.0)))
+            .or(known.date),
+        sources: sources.split_off(oldest),
+        ..known
+    }
+}
+
+/// Which of its numbers data have told.
+#[must_use]
+pub fn observed(known: &SensorCalibration) -> String {
+    fn of<const N: usize>(key: &'static str, known: &Option<Known<N>>) -> Option<String> {
+        let known = known.as_ref()?;
+        match known.observed.iter().filter(|o| **o).count() {
+            0 => None,
+            n if n == N => Some(key.to_owned()),
+            n => Some(format!("{key} ({n} of {N})")),
+        }
+    }
+    let all: Vec<String> = [
+        of("bias", &known.bias),
+        of("G", &known.gyro),
+        of("ba", &known.force_bias),
+        of("A", &known.force),
+        of("lead", &known.lead),
+        of("h", &known.hard_iron),
+        of("S", &known.soft_iron),
+        of("mag_lead", &known.field_lead),
+        of("truncation_step", &known.truncation_step),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    if all.is_empty() {
+        "calibration, of which NOTHING was observed".to_owned()
+    } else {
+        format!("calibration; observed: {}", all.join(", "))
+    }
+}
