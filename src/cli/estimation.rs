@@ -66,6 +66,15 @@ pub struct Estimation {
     /// Rotation from the magnetometer's to body axes, as --mount [default: as the gyro's]
     #[arg(long, value_name = "q=W,X,Y,Z")]
     pub mag_mount: Option<String>,
+    /// Learn the magnetometer's hard iron, too, known at the start to so large a share of the field (1 sigma: 0.03
+    /// to 0.1): for one that nobody has calibrated, on a body that turns every way [default: it has none]
+    #[arg(
+        long,
+        value_name = "SIGMA",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
+    pub mag_hard_iron: f64,
     /// How far magnetic north lies east of true north, in degrees: the heading by --aid gravity+mag is
     /// true then
     #[arg(
@@ -369,6 +378,7 @@ impl Estimation {
                 .as_deref()
                 .map(|text| unit_quaternion("--mag-mount", text))
                 .transpose()?,
+            mag_hard_iron: self.mag_hard_iron,
             declination: self.declination.to_radians(),
             sensor_delay_secs: self.sensor_delay,
             truncation: self

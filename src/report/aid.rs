@@ -89,7 +89,7 @@ impl Aided {
             }
         }
         let deg = |v: &Vector3<f64>| triple(&v.map(f64::to_degrees));
-        vec![
+        let mut lines = vec![
             did,
             format!(
                 "learned: bias {} +- {} deg/s, scale {} +- {} %, lead {} ms",
@@ -99,7 +99,20 @@ impl Aided {
                 triple(&(self.sigma.scale * 100.0)),
                 significant(self.calibration.lead * 1e3, 2)
             ),
-        ]
+        ];
+        if self.has_iron() {
+            lines.push(format!(
+                "hard iron {} +- {}, in the unit of the field",
+                triple(&self.calibration.hard_iron),
+                triple(&self.sigma.hard_iron)
+            ));
+        }
+        lines
+    }
+
+    /// Whether hard iron was looked for, in fields that came.
+    fn has_iron(&self) -> bool {
+        self.sigma.hard_iron.x > 0.0
     }
 
     /// The gyro's bias that was learned, beside what was removed before, rad/s.
@@ -172,6 +185,7 @@ impl Aided {
                 "gyro_cross_rad": list(&c.cross),
                 "accel_bias_m_s2": list(&c.force_bias),
                 "accel_lead_s": c.lead,
+                "mag_hard_iron": self.has_iron().then(|| list(&c.hard_iron)),
             })
         };
         json!({

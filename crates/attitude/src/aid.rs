@@ -57,4 +57,3 @@ pub use memory::Memory;
 pub(crate) use plausibility::is_gravity;
 pub use prior::Prior;
 pub use settings::Settings;
-pub(crate) use start::BIAS_AFTER_RESET;

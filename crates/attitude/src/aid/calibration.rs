@@ -20,6 +20,8 @@ pub struct Calibration {
     pub force_bias: Vector3<f64>,
     /// Accelerometer lead, s.
     pub lead: f64,
+    /// Hard iron, in the field's unit: a field that turns with the body. Zero unless it is asked for.
+    pub hard_iron: Vector3<f64>,
 }
 
 impl Calibration {

@@ -5,7 +5,7 @@ use nalgebra::Matrix3;
 /// Error states: tilt x, y and heading (rad, earth axes), velocity x, y, position x, y, gyro bias, scale, cross,
 /// accelerometer bias, its lead, disturbance of the field's heading (nothing without a magnetometer).
 pub(super) const STATES: usize = 21;
-/// Length of a row: a multiple of what a vector register holds.
+/// With hard iron, where it is asked for. Rows are as long in any case: a multiple of what a vector register holds.
 pub(super) const WIDTH: usize = 24;
 /// Of the states that change by themselves, the first so many.
 const MOVING: usize = 7;
@@ -20,6 +20,7 @@ pub(super) const CROSS: usize = 13;
 pub(super) const FORCE_BIAS: usize = 16;
 pub(super) const LEAD: usize = 19;
 pub(super) const FIELD: usize = 20;
+pub(super) const IRON: usize = 21;
 
 /// A correction of the error states, and of nothing beyond them.
 pub(super) type Correction = [f64; WIDTH];
@@ -41,12 +42,16 @@ impl Transition {
     derive(serde::Serialize, serde::Deserialize),
     serde(into = "Vec<f64>", try_from = "Vec<f64>")
 )]
-pub(super) struct Covariance([[f64; WIDTH]; STATES]);
+pub(super) struct Covariance {
+    rows: [[f64; WIDTH]; WIDTH],
+    /// So many of them are of states: [`STATES`], or all.
+    states: usize,
+}
 
 /// The rows of its lower half, one after the other.
 impl From<Covariance> for Vec<f64> {
     fn from(covariance: Covariance) -> Vec<f64> {
-        let rows = covariance.0.iter().enumerate();
+        let rows = covariance.rows.iter().take(covariance.states).enumerate();
         rows.flat_map(|(i, row)| row[..=i].to_vec()).collect()
     }
 }
@@ -55,20 +60,18 @@ impl TryFrom<Vec<f64>> for Covariance {
     type Error = String;
 
     fn try_from(half: Vec<f64>) -> Result<Covariance, String> {
-        let need = STATES * (STATES + 1) / 2;
-        if half.len() != need {
-            return Err(format!(
-                "a covariance of {} numbers, not {need}",
-                half.len()
-            ));
-        }
-        let mut covariance = Covariance::zero();
+        let has_iron = match [STATES, WIDTH].map(|n| half.len() == n * (n + 1) / 2) {
+            [true, _] => false,
+            [_, true] => true,
+            _ => return Err(format!("a covariance of {} numbers", half.len())),
+        };
+        let mut covariance = Covariance::zero(has_iron);
         let mut numbers = half.into_iter();
-        for i in 0..STATES {
+        for i in 0..covariance.states {
             for j in 0..=i {
                 let number = numbers.next().unwrap_or(f64::NAN);
-                covariance.0[i][j] = number;
-                covariance.0[j][i] = number;
+                covariance.rows[i][j] = number;
+                covariance.rows[j][i] = number;
             }
         }
         Ok(covariance)
@@ -76,54 +79,63 @@ impl TryFrom<Vec<f64>> for Covariance {
 }
 
 impl Covariance {
-    pub(super) fn zero() -> Covariance {
-        Covariance([[0.0; WIDTH]; STATES])
+    /// Every state known, with or without those of hard iron.
+    pub(super) fn zero(has_iron: bool) -> Covariance {
+        Covariance {
+            rows: [[0.0; WIDTH]; WIDTH],
+            states: if has_iron { WIDTH } else { STATES },
+        }
+    }
+
+    /// Whether it has states of hard iron.
+    pub(super) fn has_iron(&self) -> bool {
+        self.states > STATES
     }
 
     #[inline]
     pub(super) fn variance(&self, state: usize) -> f64 {
-        self.0[state][state]
+        self.rows[state][state]
     }
 
     #[inline]
     pub(super) fn between(&self, a: usize, b: usize) -> f64 {
-        self.0[a][b]
+        self.rows[a][b]
     }
 
     /// What two states have in common, at the start.
     pub(super) fn set(&mut self, a: usize, b: usize, covariance: f64) {
-        self.0[a][b] = covariance;
-        self.0[b][a] = covariance;
+        self.rows[a][b] = covariance;
+        self.rows[b][a] = covariance;
     }
 
     /// More is unknown of a state.
     #[inline]
     pub(super) fn add(&mut self, state: usize, variance: f64) {
-        self.0[state][state] += variance;
+        self.rows[state][state] += variance;
     }
 
     /// More is unknown of tilt and heading.
     #[inline]
     pub(super) fn add_to_attitude(&mut self, variance: f64) {
         for axis in 0..3 {
-            self.0[axis][axis] += variance;
+            self.rows[axis][axis] += variance;
         }
     }
 
     /// A state known to `variance`, and with no other in common.
     pub(super) fn restart(&mut self, state: usize, variance: f64) {
-        for other in 0..STATES {
-            self.0[state][other] = 0.0;
-            self.0[other][state] = 0.0;
+        for other in 0..self.states {
+            self.rows[state][other] = 0.0;
+            self.rows[other][state] = 0.0;
         }
-        self.0[state][state] = variance;
+        self.rows[state][state] = variance;
     }
 
     /// Every row and column of a state, times `factor`.
     pub(super) fn fade(&mut self, state: usize, factor: f64) {
-        for other in 0..STATES {
-            self.0[state][other] *= factor;
-            self.0[other][state] *= factor;
+        for other in 0..self.states {
+            self.rows[state][other] *= factor;
+            self.rows[other][state] *= factor;
         }
     }
 
@@ -131,10 +143,10 @@ impl Covariance {
     pub(super) fn step(&mut self, by: &Transition) {
         let mut moved = [[0.0; WIDTH]; MOVING];
         for (a, row) in moved.iter_mut().enumerate() {
-            *row = self.0[a];
+            *row = self.rows[a];
             for (k, f) in by.0[a].iter().enumerate() {
                 if *f != 0.0 {
-                    for (out, p) in row.iter_mut().zip(&self.0[k]) {
+                    for (out, p) in row.iter_mut().zip(&self.rows[k]) {
                         *out += f * p;
                     }
                 }
@@ -152,12 +164,12 @@ impl Covariance {
             }
         }
         for a in 0..MOVING {
-            for k in MOVING..STATES {
-                self.0[a][k] = moved[a][k];
-                self.0[k][a] = moved[a][k];
+            for k in MOVING..self.states {
+                self.rows[a][k] = moved[a][k];
+                self.rows[k][a] = moved[a][k];
             }
             for b in 0..MOVING {
-                self.0[a][b] = 0.5 * (square[a][b] + square[b][a]);
+                self.rows[a][b] = 0.5 * (square[a][b] + square[b][a]);
             }
         }
     }
@@ -173,7 +185,7 @@ impl Covariance {
     ) {
         let mut ph = [0.0; WIDTH];
         for (state, factor) in h {
-            for (out, p) in ph.iter_mut().zip(&self.0[*state]) {
+            for (out, p) in ph.iter_mut().zip(&self.rows[*state]) {
                 *out += factor * p;
             }
         }
@@ -186,9 +198,9 @@ impl Covariance {
         // A product of two equals that of the two in another order: the matrix stays symmetric to the bit.
         let root = inverse.sqrt();
         let scaled = ph.map(|p| p * root);
-        for state in 0..STATES {
+        for state in 0..self.states {
             correction[state] += ph[state] * inverse * left;
-            for (p, other) in self.0[state].iter_mut().zip(&scaled) {
+            for (p, other) in self.rows[state].iter_mut().zip(&scaled) {
                 *p -= scaled[state] * other;
             }
         }
@@ -198,50 +210,53 @@ impl Covariance {
     pub(super) fn turn(&mut self, cos: f64, sin: f64) {
         for first in [TILT, VELOCITY, POSITION] {
             for k in 0..WIDTH {
-                let (u, v) = (self.0[first][k], self.0[first + 1][k]);
-                self.0[first][k] = cos * u - sin * v;
-                self.0[first + 1][k] = sin * u + cos * v;
+                let (u, v) = (self.rows[first][k], self.rows[first + 1][k]);
+                self.rows[first][k] = cos * u - sin * v;
+                self.rows[first + 1][k] = sin * u + cos * v;
             }
-            for k in 0..STATES {
-                let (u, v) = (self.0[k][first], self.0[k][first + 1]);
-                self.0[k][first] = cos * u - sin * v;
-                self.0[k][first + 1] = sin * u + cos * v;
+            for k in 0..self.states {
+                let (u, v) = (self.rows[k][first], self.rows[k][first + 1]);
+                self.rows[k][first] = cos * u - sin * v;
+                self.rows[k][first + 1] = sin * u + cos * v;
             }
-            let mean = 0.5 * (self.0[first][first + 1] + self.0[first + 1][first]);
-            self.0[first][first + 1] = mean;
-            self.0[first + 1][first] = mean;
+            let mean = 0.5 * (self.rows[first][first + 1] + self.rows[first + 1][first]);
+            self.rows[first][first + 1] = mean;
+            self.rows[first + 1][first] = mean;
         }
     }
 
     /// Of tilt and heading, rad^2, earth axes.
     pub(super) fn attitude(&self) -> Matrix3<f64> {
-        Matrix3::from_fn(|i, j| self.0[i][j])
+        Matrix3::from_fn(|i, j| self.rows[i][j])
     }
 
     /// Whether it can be one: every variance a number above zero, or zero where a state is known.
     pub(super) fn is_sound(&self) -> bool {
-        (0..STATES).all(|i| self.0[i][i].is_finite() && self.0[i][i] >= 0.0)
+        (0..self.states).all(|i| self.rows[i][i].is_finite() && self.rows[i][i] >= 0.0)
     }
 
     /// Whether no correlation is more than one, beside what makes it [sound](Covariance::is_sound): what a file
     /// says may be anything.
     pub(super) fn is_plausible(&self) -> bool {
-        let within =
-            |i: usize, j: usize| self.0[i][j].powi(2) <= self.0[i][i] * self.0[j][j] * (1.0 + 1e-9);
-        self.is_sound() && (0..STATES).all(|i| (0..i).all(|j| within(i, j)))
+        let within = |i: usize, j: usize| {
+            self.rows[i][j].powi(2) <= self.rows[i][i] * self.rows[j][j] * (1.0 + 1e-9)
+        };
+        self.is_sound() && (0..self.states).all(|i| (0..i).all(|j| within(i, j)))
     }
 
     /// Smallest pivot of the factor of the matrix scaled to ones on its diagonal, over the states that are not
     /// known exactly; not above 0 where it is not positive definite.
     #[cfg(test)]
     pub(super) fn smallest_pivot(&self) -> f64 {
-        let open: Vec<usize> = (0..STATES).filter(|i| self.0[*i][*i] != 0.0).collect();
-        let scale = |i: usize| self.0[i][i].sqrt();
+        let open: Vec<usize> = (0..self.states)
+            .filter(|i| self.rows[*i][*i] != 0.0)
+            .collect();
+        let scale = |i: usize| self.rows[i][i].sqrt();
         let mut a: Vec<Vec<f64>> = open
             .iter()
             .map(|i| {
                 open.iter()
-                    .map(|j| self.0[*i][*j] / (scale(*i) * scale(*j)))
+                    .map(|j| self.rows[*i][*j] / (scale(*i) * scale(*j)))
                     .collect()
             })
             .collect();
@@ -262,11 +277,11 @@ impl Covariance {
     #[cfg(test)]
     pub(super) fn asymmetry(&self) -> f64 {
         let mut largest = 0.0_f64;
-        for i in 0..STATES {
-            for j in 0..STATES {
-                let scale = (self.0[i][i] * self.0[j][j]).sqrt();
+        for i in 0..self.states {
+            for j in 0..self.states {
+                let scale = (self.rows[i][i] * self.rows[j][j]).sqrt();
                 if scale > 0.0 {
-                    largest = largest.max((self.0[i][j] - self.0[j][i]).abs() / scale);
+                    largest = largest.max((self.rows[i][j] - self.rows[j][i]).abs() / scale);
                 }
             }
         }

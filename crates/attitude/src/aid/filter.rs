@@ -2,7 +2,7 @@
 
 use super::beside::Beside;
 use super::calibration::{Applied, Calibration};
-use super::covariance::{BIAS, CROSS, Covariance, FORCE_BIAS, LEAD, SCALE, TILT};
+use super::covariance::{BIAS, CROSS, Covariance, FORCE_BIAS, IRON, LEAD, SCALE, TILT};
 use super::gravity::Residuals;
 use super::heading::Surroundings;
 use super::interval::Interval;
@@ -119,7 +119,7 @@ impl Filter {
             is_instant,
             world_rate: *world_rate.as_vector(),
             is_started: false,
-            covariance: Covariance::zero(),
+            covariance: Covariance::zero(false),
             calibration,
             known: Applied::of(&calibration),
             correction: Quaternion::identity(),
@@ -164,6 +164,7 @@ impl Filter {
             cross: three(CROSS),
             force_bias: three(FORCE_BIAS),
             lead: self.covariance.variance(LEAD).max(0.0).sqrt(),
+            hard_iron: three(IRON),
         }
     }
 
@@ -183,6 +184,14 @@ impl Filter {
         self.block::<1>(LEAD)[(0, 0)].max(0.0).sqrt()
     }
 
+    /// Of hard iron, where it is looked for: covariance, and what it was taken for at the start, in the field's unit.
+    pub(crate) fn hard_iron_covariance(&self) -> Option<(Matrix3<f64>, f64)> {
+        let prior = self.settings.hard_iron * self.surroundings.mean_norm();
+        self.covariance
+            .has_iron()
+            .then(|| (self.block(IRON), prior))
+    }
+
     /// What it was told.
     pub(crate) fn settings(&self) -> &Settings {
         &self.settings
@@ -191,11 +200,14 @@ impl Filter {
     /// What it took the sigma of the accelerometer's lead for at the start, s.
     pub(crate) fn lead_prior(&self) -> f64 {
         let settings = &self.settings;
-        settings.prior.lead_sigma.unwrap_or_else(|| {
-            settings
-                .lead_prior
-                .hypot(settings.lead_share * self.nominal)
-        })
+        // The second part is added by the first correction.
+        let share = if self.report.updates > 0 {
+            settings.lead_share * self.nominal
+        } else {
+            0.0
+        };
+        let class = settings.lead_prior.hypot(share);
+        settings.prior.lead_sigma.unwrap_or(class)
     }
 
     /// What the rates that come now are to be corrected by.
@@ -289,7 +301,10 @@ impl Filter {
         let at_instant = if self.is_instant { sample.rate } else { rate };
         let force = self.add_force(sample, &r, known.corrected(at_instant, 1.0), is_gap);
         if let Some(field) = sample.field.filter(is_field) {
+            let field = self.less_iron(field);
             self.interval.field += r * field;
+            self.interval.field_in_body += field;
+            self.interval.by_iron += r.row(0).transpose();
             self.interval.fields += 1.0;
         }
         let sigma = Vector3::from_fn(|i, _| self.covariance.variance(BIAS + i).max(0.0).sqrt());

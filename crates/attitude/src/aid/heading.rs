@@ -4,7 +4,7 @@
 //! state of its own stands for the disturbance. A field whose norm or dip is another than before counts less,
 //! and a heading far from the expected one too, until it has lasted long enough to be the truth.
 
-use super::covariance::{Correction, FIELD, HEADING, TILT};
+use super::covariance::{Correction, FIELD, HEADING, IRON, TILT};
 use super::filter::Filter;
 use super::settings::Settings;
 use nalgebra::Vector3;
@@ -14,6 +14,9 @@ use std::f64::consts::{PI, TAU};
 const OTHER_SECS: f64 = 5.0;
 /// Time constant of the mean deviation, s.
 const DEVIATION_SECS: f64 = 3.0;
+/// Time constant of the mean norm that hard iron is judged by, s, and how far the norm is off by itself, as a share.
+const NORM_SECS: f64 = 30.0;
+const NORM_SIGMA: f64 = 0.03;
 /// A field steeper than this (horizontal share) has no heading.
 const STEEPEST: f64 = 0.1;
 
@@ -56,6 +59,15 @@ pub(super) struct Surroundings {
     deviation: f64,
     /// For how long a good field has said another heading, s.
     contradicted: f64,
+    /// Mean norm of what is left of the field without hard iron; 0 before the first.
+    mean_norm: f64,
+}
+
+impl Surroundings {
+    /// Mean norm of the field, where hard iron is looked for.
+    pub(super) fn mean_norm(&self) -> f64 {
+        self.mean_norm
+    }
 }
 
 /// The magnetic field that headings are taken from.
@@ -80,6 +92,45 @@ impl Filter {
             dip,
             deviation: self.surroundings.deviation.max(0.0).sqrt(),
         })
+    }
+
+    /// A field without what is known of hard iron, whose uncertainty begins with the first.
+    pub(super) fn less_iron(&mut self, field: Vector3<f64>) -> Vector3<f64> {
+        if !self.covariance.has_iron() {
+            return field;
+        }
+        if self.covariance.variance(IRON) == 0.0 {
+            let sigma = self.settings.hard_iron * field.norm();
+            for axis in 0..3 {
+                self.covariance.restart(IRON + axis, sigma * sigma);
+            }
+        }
+        field - self.calibration.hard_iron
+    }
+
+    /// Hard iron makes the norm of the field change with the attitude.
+    fn use_norm(&mut self, correction: &mut Correction) {
+        let secs = self.interval.secs;
+        let field = self.interval.field_in_body / self.interval.fields;
+        let norm = field.norm();
+        let mean = &mut self.surroundings.mean_norm;
+        if *mean == 0.0 {
+            *mean = norm;
+        }
+        *mean += secs / (NORM_SECS + secs) * (norm - *mean);
+        if norm.is_nan() || norm <= 0.0 {
+            return;
+        }
+        let (off, white) = (norm - *mean, NORM_SIGMA * *mean);
+        let sigmas = off.abs() / white;
+        let robust = (0.5 * sigmas).max(1.0).powi(2);
+        let by_iron = |axis: usize| (IRON + axis, -field[axis] / norm);
+        self.covariance.measure(
+            &[by_iron(0), by_iron(1), by_iron(2)],
+            -off,
+            white * white * 2.0 * self.settings.field_secs / secs * robust,
+            correction,
+        );
     }
 
     /// The measurement of heading, where there is one.
@@ -119,6 +170,11 @@ impl Filter {
         } else {
             around.other_secs = (around.other_secs - 2.0 * secs).max(0.0);
         }
+        let has_iron = self.covariance.has_iron();
+        if has_iron {
+            self.use_norm(correction);
+        }
+        let around = &mut self.surroundings;
         let horizontal = level / now.norm;
         if horizontal < STEEPEST {
             self.report.fields_rejected += 1;
@@ -155,12 +211,16 @@ impl Filter {
         } else {
             around.contradicted = (around.contradicted - 2.0 * secs).max(0.0);
         }
-        covariance.measure(
-            &[(HEADING, 1.0), (FIELD, 1.0)],
-            residual,
-            variance,
-            correction,
-        );
+        let seen = self.interval.by_iron / (self.interval.fields * level);
+        let h = [
+            (HEADING, 1.0),
+            (FIELD, 1.0),
+            (IRON, seen.x),
+            (IRON + 1, seen.y),
+            (IRON + 2, seen.z),
+        ];
+        let h = if has_iron { &h[..] } else { &h[..2] };
+        covariance.measure(h, residual, variance, correction);
     }
 }
 

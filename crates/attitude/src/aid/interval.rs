@@ -24,6 +24,9 @@ pub(super) struct Interval {
     /// Sum of the field, and how many there are.
     pub(super) field: Vector3<f64>,
     pub(super) fields: f64,
+    /// The same sum in body axes, and that of the first row of the attitude matrix: what hard iron does to it.
+    pub(super) field_in_body: Vector3<f64>,
+    pub(super) by_iron: Vector3<f64>,
 }
 
 impl Interval {
@@ -38,6 +41,8 @@ impl Interval {
             rate: Vector3::zeros(),
             field: Vector3::zeros(),
             fields: 0.0,
+            field_in_body: Vector3::zeros(),
+            by_iron: Vector3::zeros(),
         }
     }
 

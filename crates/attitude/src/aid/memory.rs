@@ -107,7 +107,8 @@ impl Aided {
     /// known it.
     #[must_use]
     pub fn recall(&mut self, (propagation, memory): (&propagate::Memory, &Memory)) -> bool {
-        let has_forces = self.forces.is_some() == memory.forces.is_some();
+        let has_forces = self.forces.is_some() == memory.forces.is_some()
+            && self.filter.covariance.has_iron() == memory.covariance.has_iron();
         if !memory.is_plausible() || !has_forces || !self.propagator.recall(propagation) {
             return false;
         }
@@ -173,6 +174,7 @@ impl Memory {
             && calibration.scale.amax().max(calibration.cross.amax()) <= SCALE
             && calibration.force_bias.amax() <= FORCE_BIAS
             && calibration.lead.abs() <= LEAD
+            && calibration.hard_iron.iter().all(|h| h.abs() <= LARGEST)
             && self.covariance.is_plausible()
             && is_unit(&self.correction)
             && self.last_out.iter().all(is_unit)
@@ -217,12 +219,17 @@ mod tests {
     }
 
     fn aided(method: Method) -> Aided {
+        aided_with(method, 0.0)
+    }
+
+    fn aided_with(method: Method, hard_iron: f64) -> Aided {
         let propagation = propagate::Settings {
             method,
             ..propagate::Settings::default()
         };
         let settings = Settings {
             has_field: true,
+            hard_iron,
             ..Settings::default()
         };
         Aided::new(propagation, settings, Start::Level).unwrap()
@@ -247,7 +254,8 @@ mod tests {
             order: Order::Exact,
             finals: false,
         };
-        for method in [live, Method::Auto] {
+        for (method, iron) in [(live, 0.0), (Method::Auto, 0.0), (live, 0.05)] {
+            let aided = |method| aided_with(method, iron);
             for cut in [1, 5, 333, 1507] {
                 let mut whole = aided(method);
                 let _ = fed(&mut whole, 0..cut);
@@ -270,7 +278,12 @@ mod tests {
     fn plain(memory: &Memory) -> Memory {
         let text = serde_json::to_string(memory).unwrap();
         // Each sample that waits has what it was corrected by.
-        let most = 8192 + 700 * memory.given.len().saturating_sub(1);
+        let iron = if memory.covariance.has_iron() {
+            1800
+        } else {
+            0
+        };
+        let most = 8192 + iron + 700 * memory.given.len().saturating_sub(1);
         assert!(text.len() < most, "{} {}", text.len(), memory.given.len());
         serde_json::from_str(&text).unwrap()
     }
@@ -285,10 +298,13 @@ mod tests {
         let mut whole = aided(Method::Auto);
         let _ = fed(&mut whole, 0..500);
         let (propagation, good) = whole.memory().unwrap();
-        let spoil: [fn(&mut Memory); 6] = [
+        let spoil: [fn(&mut Memory); 8] = [
             |m| m.correction[0] = 2.0,
             |m| m.calibration.bias.x = 1e3,
             |m| m.covariance = Covariance::try_from(vec![-1.0; 231]).unwrap(),
+            // With hard iron, where none is looked for.
+            |m| m.covariance = Covariance::try_from(vec![1e-9; 300]).unwrap(),
+            |m| m.calibration.hard_iron.y = f64::NAN,
             |m| m.velocity[1] = f64::NAN,
             |m| m.nominal = -1.0,
             |m| m.forces = Some(Beside::default()),

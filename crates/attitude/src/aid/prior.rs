@@ -1,7 +1,7 @@
 //! What is known of a sensor beforehand -> what the filter begins with. Pure.
 
 use super::calibration::Calibration;
-use super::covariance::{BIAS, Covariance, FORCE_BIAS, LEAD, SCALE};
+use super::covariance::{BIAS, Covariance, FORCE_BIAS, IRON, LEAD, SCALE};
 use super::settings::Settings;
 use nalgebra::{Matrix3, Matrix6};
 
@@ -19,12 +19,14 @@ pub struct Prior {
     pub lead: f64,
     /// Its standard deviation.
     pub lead_sigma: Option<f64>,
+    /// Covariance of what is left of hard iron, in squares of the field's unit.
+    pub hard_iron: Option<Matrix3<f64>>,
 }
 
 impl Prior {
     /// Calibration and covariance of a sensor of which this is known, by `settings` what is not.
     pub(super) fn begin(&self, settings: &Settings) -> (Calibration, Covariance) {
-        let mut covariance = Covariance::zero();
+        let mut covariance = Covariance::zero(settings.hard_iron > 0.0);
         let mut put = |first: usize, size: usize, of: &dyn Fn(usize, usize) -> f64| {
             for i in 0..size {
                 for j in 0..size {
@@ -50,6 +52,10 @@ impl Prior {
         }
         let lead = self.lead_sigma.unwrap_or(settings.lead_prior);
         put(LEAD, 1, &even(lead));
+        // Without, it is known to a share of a field that has not come yet.
+        if let Some(known) = self.hard_iron.filter(|_| settings.hard_iron > 0.0) {
+            put(IRON, 3, &|i, j| known[(i, j)]);
+        }
         let calibration = Calibration {
             lead: self.lead,
             ..Calibration::default()

@@ -97,6 +97,9 @@ pub struct Settings {
     pub field_mean_secs: f64,
     /// After so many seconds another field is accepted.
     pub field_new_secs: f64,
+    /// Prior sigma of hard iron, as a share of the first field: for a magnetometer nobody has calibrated. 0: none is
+    /// looked for.
+    pub hard_iron: f64,
     /// Jumps of the rate beyond this add uncertainty, rad/s^2.
     pub jerk: f64,
     /// Steps longer than so many ordinary ones are gaps.
@@ -155,6 +158,7 @@ impl Default for Settings {
             field_same: 0.1,
             field_mean_secs: 10.0,
             field_new_secs: 20.0,
+            hard_iron: 0.0,
             jerk: 1000.0,
             gap_factor: 1.5,
             gap_secs: 0.2,

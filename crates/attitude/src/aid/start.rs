@@ -20,7 +20,7 @@ const HEADING_UNKNOWN: f64 = 3.0;
 /// Sigma of a tilt that nothing has told, rad.
 const TILT_UNKNOWN: f64 = 1.5;
 /// What may be wrong with a bias after a reset, rad/s.
-pub(crate) const BIAS_AFTER_RESET: f64 = 8.7e-4;
+const BIAS_AFTER_RESET: f64 = 8.7e-4;
 
 impl Filter {
     /// Begins at a first sample: level by its specific force and with the heading of the propagator's attitude,
@@ -36,6 +36,7 @@ impl Filter {
             return;
         };
         let field = first.field.filter(is_field);
+        let field = field.map(|field| self.less_iron(field));
         let up = force.normalize();
         let north =
             field.filter(|field| field.cross(&up).norm_squared() > 1e-4 * field.norm_squared());

@@ -1,4 +1,5 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod golden;
+mod iron;
 mod probes;

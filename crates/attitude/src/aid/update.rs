@@ -2,8 +2,8 @@
 
 use super::calibration::Applied;
 use super::covariance::{
-    BIAS, CROSS, Correction, FIELD, FORCE_BIAS, HEADING, LEAD, POSITION, SCALE, TILT, Transition,
-    VELOCITY, WIDTH,
+    BIAS, CROSS, Correction, FIELD, FORCE_BIAS, HEADING, IRON, LEAD, POSITION, SCALE, TILT,
+    Transition, VELOCITY, WIDTH,
 };
 use super::filter::Filter;
 use super::gravity::Force;
@@ -163,6 +163,7 @@ impl Filter {
         calibration.cross += three(CROSS);
         calibration.force_bias += three(FORCE_BIAS);
         calibration.lead += correction[LEAD];
+        calibration.hard_iron += three(IRON);
         self.disturbance += correction[FIELD];
         self.known = Applied::of(calibration);
         // The earth axes of the estimate have turned.

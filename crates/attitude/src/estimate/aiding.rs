@@ -145,6 +145,7 @@ impl Aiding {
         let mut settings = Settings {
             gyro_range: plan.gyro_range.unwrap_or(0.0),
             has_field: plan.aid == Aid::GravityAndField,
+            hard_iron: plan.mag_hard_iron,
             ..Settings::default()
         };
         // The filter's own priors are those of the class that is the default; who names another knows better.

@@ -7,11 +7,15 @@ use super::meaning::Meaning;
 use super::plan::{Bias, Noise, Plan};
 use super::preparation::Prepared;
 use super::sensor_calibration::{Known, SensorCalibration};
-use crate::aid::{BIAS_AFTER_RESET, Filter, Prior, Settings};
+use crate::aid::{Filter, Prior, Settings};
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
 /// Of a gyro whose bias was removed, rad/s: what the bias may have become since.
 pub(super) const BIAS_LEFT: f64 = 1e-3;
+
+/// What the bias of a chip may become while it is switched off, rad/s (0.3 deg/s): ten degrees of temperature do that. A
+/// sensor whose class has less of it after switching on has no more than that.
+const SWITCHED_OFF: f64 = 5e-3;
 
 /// Rows and columns of a symmetric matrix in the order of its states: scale, then axes.
 const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
@@ -64,6 +68,7 @@ impl Meaning {
         let told = |known: &Option<Known<3>>| known.filter(|k| !k.is_unobserved());
         let by_gyro = c * calibration.gyro_matrix();
         let by_force = c * calibration.force_matrix();
+        let by_field = self.field_to_body() * calibration.field_matrix();
         Prior {
             bias: told(&calibration.bias)
                 .filter(|_| is_bias_calibrated)
@@ -84,6 +89,10 @@ impl Meaning {
             }),
             lead: calibration.lead.map_or(0.0, |lead| lead.value[0]),
             lead_sigma: calibration.lead.and_then(|lead| lead.sigma_of(0)),
+            hard_iron: calibration
+                .hard_iron
+                .filter(|iron| (0..3).all(|i| iron.sigma_of(i).is_some()))
+                .map(|iron| by_field * diagonal(&sigmas(&iron, 0.0)) * by_field.transpose()),
         }
     }
 
@@ -118,10 +127,16 @@ pub fn learned(
     let undone = |matrix: Matrix3<f64>| matrix.try_inverse().unwrap_or_else(Matrix3::identity);
     let from_gyro = undone(c * known.gyro_matrix());
     let from_force = undone(c * known.force_matrix());
+    let class = plan.noise.turn_on_bias.into_iter().fold(0.0, f64::max);
+    let switched_off = if class > 0.0 {
+        SWITCHED_OFF.min(class)
+    } else {
+        SWITCHED_OFF
+    };
     if plan.bias != Bias::None {
         known.bias = Some(Known {
             value: (from_gyro * prepared.bias).into(),
-            sigma: Some([BIAS_LEFT; 3]),
+            sigma: Some([BIAS_LEFT.hypot(switched_off); 3]),
             observed: [true; 3],
         });
     }
@@ -160,7 +175,7 @@ pub fn learned(
         [settings.bias_prior; 3],
         (from_gyro * (prepared.bias + now.bias)).into(),
         about(&from_gyro, bias),
-        BIAS_AFTER_RESET,
+        switched_off,
     ));
     known.gyro = Some(now_known(
         known.gyro.as_ref(),
@@ -176,6 +191,17 @@ pub fn learned(
         about(&from_force, force_bias),
         0.0,
     ));
+    if let Some((covariance, class)) = filter.hard_iron_covariance() {
+        let from_field = undone(resolved.field_to_body() * known.field_matrix());
+        let before = Vector3::from(vector_of(known.hard_iron.as_ref()));
+        known.hard_iron = Some(now_known(
+            known.hard_iron.as_ref(),
+            [class; 3],
+            (before + from_field * now.hard_iron).into(),
+            about(&from_field, covariance),
+            0.0,
+        ));
+    }
     known.lead = Some(now_known(
         known.lead.as_ref(),
         [filter.lead_prior()],

@@ -76,6 +76,11 @@ impl Meaning {
         self.mount * self.axes
     }
 
+    /// Magnetometer to body axes.
+    pub(super) fn field_to_body(&self) -> Matrix3<f64> {
+        self.mag_axes
+    }
+
     /// The settings of the conditioning stage: `bias` is what is taken out of calibrated rates, body axes.
     #[must_use]
     pub fn conditioning(&self, plan: &Plan, clock: Clock, bias: Vector3<f64>) -> Settings {

@@ -56,6 +56,8 @@ pub struct Plan {
     pub has_forces_beside: bool,
     /// `--mag-mount`: magnetometer to body, `[w, x, y, z]`; `None` = as the gyro.
     pub mag_mount: Option<[f64; 4]>,
+    /// `--mag-hard-iron`: prior sigma of hard iron that is looked for, as a share of the field; 0: none is.
+    pub mag_hard_iron: f64,
     /// `--declination`, rad: how far magnetic north lies east of true north.
     pub declination: f64,
     /// `--undo-truncation`.
@@ -126,6 +128,7 @@ impl Default for Plan {
             is_accel_kinematic: false,
             has_forces_beside: false,
             mag_mount: None,
+            mag_hard_iron: 0.0,
             declination: 0.0,
             truncation: Truncation::Unsaid,
             sensor_delay_secs: 0.0,
@@ -195,6 +198,17 @@ impl Plan {
         if self.declination.is_nan() || self.declination.abs() > std::f64::consts::PI {
             return Err(
                 "--declination: degrees from -180 to 180, east of true north positive".to_owned(),
+            );
+        }
+        if self.mag_hard_iron != 0.0 && !has_field {
+            return Err(
+                "--mag-hard-iron: no magnetic field is used\n  help: --aid gravity+mag".to_owned(),
+            );
+        }
+        if !(0.0..=1.0).contains(&self.mag_hard_iron) {
+            return Err(
+                "--mag-hard-iron: one standard deviation as a share of the field, from 0 to 1: 0.05"
+                    .to_owned(),
             );
         }
         if self.mag_mount.is_some() && !has_field {

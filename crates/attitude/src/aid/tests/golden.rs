@@ -50,6 +50,11 @@ fn attitude(angles: &Vector3<f64>) -> Matrix3<f64> {
     *Rotation3::from_euler_angles(angles.x, angles.y, angles.z).matrix()
 }
 
+/// The attitude at sample `k`.
+pub(super) fn truth(k: usize) -> Matrix3<f64> {
+    attitude(&angles(k as f64 * STEP).1)
+}
+
 /// Gyro, force and field of sample `k`.
 pub(super) fn sample(k: usize) -> (Vector3<f64>, Vector3<f64>, Vector3<f64>) {
     let t = k as f64 * STEP;
