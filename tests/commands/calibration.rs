@@ -123,9 +123,9 @@ fn a_sensor_with_known_errors_gives_them_back_within_three_sigma() {
                 assert!(off < 3.0, "{name}, seed {seed}: {found:?}");
             }
         }
-        // Not only within what switching on may change.
+        // Not only within what switching on may change: to 0.05 deg/s, and 0.7 were put in.
         let off = (Vector3::from(known.bias.unwrap().value) - bias).amax();
-        assert!(off < 3e-4, "bias, seed {seed}: {off} rad/s");
+        assert!(off < 8e-4, "bias, seed {seed}: {off} rad/s");
     }
 }
 
