@@ -166,7 +166,7 @@ fn another_log_of_the_sensor_begins_better_by_what_the_first_has_told() {
 fn numbers_that_a_run_has_told_nothing_of_are_handed_through() {
     let dir = tempfile::tempdir().unwrap();
     let at = dir.path();
-    log(at, "h.ndjson", 1, 60);
+    log(at, "h.ndjson", 1, 240);
     strapd(
         at,
         "replay h.ndjson --aid gravity --save-calibration a.toml",

@@ -3,6 +3,9 @@
 use strapd::config::calibration::{parse, text_of};
 use strapd_attitude::estimate::{Known, SensorCalibration};
 
+/// Small multiples of it have no more than the nine digits that are written: 2^-12.
+const STEP: f64 = 0.000_244_140_625;
+
 fn full() -> SensorCalibration {
     let known = |value| Known {
         value,
@@ -30,12 +33,12 @@ fn full() -> SensorCalibration {
         date: Some("2026-11-22T20:52:07Z".to_owned()),
         sources: vec!["a.mcap".to_owned(), "b\\c".to_owned()],
         bias: Some(known([0.01, -0.008, 5e-9])),
-        gyro: Some(matrix(1.234_567_89e-3)),
+        gyro: Some(matrix(STEP)),
         force_bias: Some(known([0.0, 1.0, -2.0])),
-        force: Some(matrix(1e-4)),
+        force: Some(matrix(-STEP)),
         lead: Some(one(2.3e-3)),
         hard_iron: Some(known([2e-6, 0.0, -1e-6])),
-        soft_iron: Some(matrix(-1e-5)),
+        soft_iron: Some(matrix(2.0 * STEP)),
         field_lead: Some(one(-1e-3)),
         truncation_step: Some(one(1.065_264e-3)),
     }

@@ -21,6 +21,10 @@ pub struct Calibration {
     /// Accelerometer lead, s.
     pub lead: f64,
     /// Hard iron, in the field's unit: a field that turns with the body. Zero unless it is asked for.
+    #[cfg_attr(
+        feature = "serde",
+        serde(default, skip_serializing_if = "crate::aid::memory::is_nothing")
+    )]
     pub hard_iron: Vector3<f64>,
 }
 

@@ -303,8 +303,10 @@ impl Filter {
         if let Some(field) = sample.field.filter(is_field) {
             let field = self.less_iron(field);
             self.interval.field += r * field;
-            self.interval.field_in_body += field;
-            self.interval.by_iron += r.row(0).transpose();
+            if self.covariance.has_iron() {
+                self.interval.field_in_body += field;
+                self.interval.by_iron += r.row(0).transpose();
+            }
             self.interval.fields += 1.0;
         }
         let sigma = Vector3::from_fn(|i, _| self.covariance.variance(BIAS + i).max(0.0).sqrt());
