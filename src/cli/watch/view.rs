@@ -355,6 +355,7 @@ mod tests {
     fn an_aided_attitude_is_no_alarm_and_says_what_is_known() {
         let now = Instant::now();
         let mut board = Board::new("tcp://127.0.0.1:4550".to_owned(), &[]);
+        board.connected(now);
         let aided = ATT.replace("\"provisional\"", "\"provisional\",\"aided\",\"rest\"");
         board.take(Said::Attitude(aided.as_bytes()), now);
         let status = r#"{"class":"STATUS","sources":[{"id":"imu\u001b[31m0","attitude":{"aided":"gra\u001b[31mvity","rest":true,"sigma_deg":{"tilt":0.3125,"tilt_least":null,"heading":1.25},"field":null},"aid":{"learned":{"gyro_bias_rad_s":[0.008726646259971648,-0.01,null]},"sigma":{"gyro_bias_rad_s":[1e-4,2e-4,1e-4]}}}]}"#;
