@@ -6,7 +6,8 @@ use super::daemon::{Daemon, TCP, WS, eventually, listening};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::Duration;
 use strapd::serve::source::Source;
 
 const WATCH: &str = r#"{"class":"WATCH"}"#;
@@ -199,13 +200,20 @@ fn a_thousand_last_attitudes_are_more_than_may_wait_and_all_come() {
 fn what_comes_while_somebody_starts_to_watch_is_neither_lost_nor_doubled() {
     let daemon = Daemon::start(listening(&[TCP, WS]));
     let stop = Arc::new(AtomicBool::new(false));
+    // The last attitude that a late watcher has read.
+    let seen = Arc::new(AtomicU64::new(0));
     let sending = {
-        let (stop, address) = (stop.clone(), daemon.address(0));
+        let (stop, seen, address) = (stop.clone(), seen.clone(), daemon.address(0));
         std::thread::spawn(move || {
             let mut sender = Client::tcp(address).watching(r#"{"class":"WATCH","id":"a"}"#);
             let mut n = 0;
             while !stop.load(Ordering::Relaxed) {
-                // As it is answered: never more than a watcher can take.
+                // As it is answered, and never more ahead of a watcher that does not get the processor than waits
+                // for it without a gap.
+                if n > seen.load(Ordering::Relaxed) + 100 {
+                    std::thread::sleep(Duration::from_micros(100));
+                    continue;
+                }
                 sender.send(&rate("a", n, 0.5));
                 sender.object("ATT");
                 n += 1;
@@ -230,6 +238,7 @@ fn what_comes_while_somebody_starts_to_watch_is_neither_lost_nor_doubled() {
                 Some(before) => assert_eq!((seq, is_last(&att)), (before + 1, false), "{att}"),
             }
             before = Some(seq);
+            seen.store(seq, Ordering::Relaxed);
         }
     }
     stop.store(true, Ordering::Relaxed);
