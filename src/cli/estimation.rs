@@ -1,5 +1,5 @@
 //! The estimation flags shared by `replay` (and, later, `serve` and `simulate`): text -> settings,
-//! checked once. Pure.
+//! checked once. Pure but for the calibrations that are read.
 
 use super::calibration_files::Calibrations;
 use crate::config::{

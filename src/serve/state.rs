@@ -22,7 +22,7 @@ use strapd_attitude::record::{AttitudeCovariance, AttitudeSample, Nanos, Status}
 
 /// What this release writes. 1 had neither the run nor the memory.
 const FORMAT: u32 = 2;
-/// A larger file is none of ours: a sensor takes no more than 8 KiB.
+/// A larger file is none of ours: a sensor takes no more than 10 KiB.
 const MAX_BYTES: u64 = 64 << 20;
 /// How often it is written.
 const EVERY: Duration = Duration::from_millis(500);
