@@ -187,10 +187,7 @@ impl Told {
             let _ = writeln!(
                 out,
                 "  bias     {}: where this is the gyro alone, add ({:.6}, {:.6}, {:.6}) rad/s to its --bias",
-                against::bias_words(fit).replace(
-                    "the gyro leaves the recorded orientation",
-                    "the estimate leaves the reference"
-                ),
+                against::bias_words(fit, "the estimate", "the reference"),
                 fit.bias.x,
                 fit.bias.y,
                 fit.bias.z

@@ -63,13 +63,13 @@ pub fn beyond_sigma(found: &Consistency) -> Option<String> {
     })
 }
 
-/// What the bias does, in words.
+/// What the bias does, in words: "the gyro" (`who`) leaves "the recorded orientation" (`whom`).
 #[must_use]
-pub fn bias_words(fit: &BiasFit) -> String {
+pub fn bias_words(fit: &BiasFit, who: &str, whom: &str) -> String {
     let per_hour = |v: f64| significant(v.to_degrees() * 3600.0, 3);
     let [before, after] = fit.over_long.map(deg);
     format!(
-        "the gyro leaves the recorded orientation by a constant bias of {} deg/h (+- {}): {before} deg over {} s, {after} without it",
+        "{who} leaves {whom} by a constant bias of {} deg/h (+- {}): {before} deg over {} s, {after} without it",
         per_hour(fit.bias.norm()),
         per_hour(fit.sigma.norm()),
         significant(fit.long_secs, 2)

@@ -4,9 +4,10 @@
 //! that says another.
 
 use super::summary::significant;
+use nalgebra::Matrix3;
 use serde_json::{Value, json};
 use strapd_attitude::aid::Settings;
-use strapd_attitude::estimate::{Bias, Initial, Noise, Plan, Prepared};
+use strapd_attitude::estimate::{Bias, Initial, Plan, Prepared};
 
 /// One thing that is not known.
 #[derive(Clone, PartialEq, Debug)]
@@ -41,7 +42,7 @@ impl SigmaTerms {
         let noise = &plan.noise;
         let mut terms = match &prepared.aiding {
             Some(aiding) => filtered(&aiding.settings),
-            None => alone(plan, noise),
+            None => alone(plan, prepared.bias_sigma.into()),
         };
         terms.push(Term {
             name: "bridged_gaps",
@@ -87,8 +88,13 @@ impl SigmaTerms {
 }
 
 /// Of the gyro alone.
-fn alone(plan: &Plan, noise: &Noise) -> Vec<Term> {
+fn alone(plan: &Plan, bias_sigma: [f64; 3]) -> Vec<Term> {
+    let known = plan.calibration.as_deref();
+    let noise = &known.map_or_else(|| plan.noise.clone(), |known| known.narrowed(&plan.noise));
     let (turn_on, note) = match plan.bias {
+        Bias::None if known.is_some_and(|known| known.bias.is_some()) => {
+            (bias_sigma, " (left by --calibration, flicker in it)")
+        }
         Bias::None => (noise.turn_on_bias, " (--bias removes it)"),
         Bias::Auto | Bias::Given(_) => (noise.left_of_turn_on(), " (left by --bias)"),
     };
@@ -166,6 +172,20 @@ fn filtered(settings: &Settings) -> Vec<Term> {
         note,
     };
     let field = |value: f64| if settings.has_field { value } else { 0.0 };
+    // A calibration's sigmas take the place of the class's: of the worst axis.
+    let worst = |variances: &[f64]| variances.iter().copied().fold(0.0, f64::max).sqrt();
+    let prior = &settings.prior;
+    let three = |known: Option<Matrix3<f64>>, class: f64| {
+        known.map_or(class, |p| worst(p.diagonal().as_slice()))
+    };
+    let bias = three(prior.bias, settings.bias_prior);
+    let force_bias = three(prior.force_bias, settings.force_bias_prior);
+    let [scale, cross] = prior
+        .scale
+        .map_or([settings.scale_prior, settings.cross_prior], |p| {
+            let (scale, axes) = (p.fixed_view::<3, 3>(0, 0), p.fixed_view::<3, 3>(3, 3));
+            [scale.diagonal(), axes.diagonal()].map(|v| worst(v.as_slice()))
+        });
     vec![
         one(
             "white_noise",
@@ -182,37 +202,26 @@ fn filtered(settings: &Settings) -> Vec<Term> {
             "",
         ),
         one(
-            "bias",
-            "bias",
-            settings.bias_prior.to_degrees(),
-            "deg/s",
-            " at first",
+            "bias_by_tilt",
+            "its change with the side that is down",
+            settings.bias_by_tilt.to_degrees(),
+            "deg/s/g",
+            "",
         ),
-        one(
-            "scale",
-            "scale",
-            settings.scale_prior * 100.0,
-            "%",
-            " at first",
-        ),
-        one(
-            "axes",
-            "axes",
-            settings.cross_prior.to_degrees(),
-            "deg",
-            " at first",
-        ),
+        one("bias", "bias", bias.to_degrees(), "deg/s", " at first"),
+        one("scale", "scale", scale * 100.0, "%", " at first"),
+        one("axes", "axes", cross.to_degrees(), "deg", " at first"),
         one(
             "accelerometer_bias",
             "accelerometer bias",
-            settings.force_bias_prior,
+            force_bias,
             "m/s^2",
             " at first",
         ),
         one(
             "accelerometer_lead",
             "its lead",
-            settings.lead_prior * 1e3,
+            settings.prior.lead_sigma.unwrap_or(settings.lead_prior) * 1e3,
             "ms",
             " at first",
         ),
@@ -229,6 +238,13 @@ fn filtered(settings: &Settings) -> Vec<Term> {
             field(settings.heading_start.to_degrees()),
             "deg",
             "",
+        ),
+        one(
+            "hard_iron",
+            "hard iron",
+            field(settings.hard_iron * 100.0),
+            "%",
+            " of the first field",
         ),
     ]
 }
@@ -260,9 +276,10 @@ impl Term {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
+    use strapd_attitude::estimate::Noise;
 
     fn words(plan: &Plan) -> String {
-        let terms = alone(plan, &plan.noise);
+        let terms = alone(plan, [0.0; 3]);
         let terms = SigmaTerms {
             is_filtered: false,
             class: plan.noise.name.clone(),

@@ -88,10 +88,14 @@ fn told_by_it(
         } else {
             flags = bias_flag(&fit, recorded.removed);
             out.push(
-                Finding::new(Severity::Warning, "bias-by-orientation", bias_words(&fit))
-                    .with("fit", bias_json(&fit))
-                    .advise("remove it; of another run of the sensor it may be another")
-                    .flags(flags.clone()),
+                Finding::new(
+                    Severity::Warning,
+                    "bias-by-orientation",
+                    bias_words(&fit, "the gyro", "the recorded orientation"),
+                )
+                .with("fit", bias_json(&fit))
+                .advise("remove it; of another run of the sensor it may be another")
+                .flags(flags.clone()),
             );
         }
     }

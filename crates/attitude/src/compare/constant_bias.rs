@@ -203,8 +203,7 @@ fn windows(estimate: &Track<'_>, reference: &Track<'_>) -> Vec<Window> {
         while is_not_after(behind, *end) {
             behind += 1;
         }
-        let ends = estimate.at(*start, place).zip(estimate.at(*end, behind));
-        let Some((first, last)) = ends else {
+        let (Ok(first), Ok(last)) = (estimate.at(*start, place), estimate.at(*end, behind)) else {
             continue;
         };
         let within = estimate

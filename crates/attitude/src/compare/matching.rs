@@ -41,21 +41,29 @@ impl<'a> Track<'a> {
     }
 }
 
+/// Why there is no attitude at an instant.
+pub(super) enum Missing {
+    Outside,
+    InGap,
+}
+
 impl Track<'_> {
-    /// The attitude at an instant, interpolated, by the place of the first row after it; `None` outside, and in gaps.
-    pub(super) fn at(&self, stamp: Nanos, after: usize) -> Option<Quaternion<Nav, Body>> {
-        let (t0, q0) = self.rows.get(after.checked_sub(1)?)?;
-        if *t0 == stamp {
-            return Some(q0.normalised());
+    /// The attitude at an instant, interpolated, by the place of the first row after it.
+    pub(super) fn at(&self, stamp: Nanos, after: usize) -> Result<Quaternion<Nav, Body>, Missing> {
+        let before = after.checked_sub(1).and_then(|i| self.rows.get(i));
+        match (before, self.rows.get(after)) {
+            (Some((t, q)), _) if *t == stamp => Ok(q.normalised()),
+            (Some((t0, q0)), Some((t1, q1))) => {
+                let gap = t1.since(*t0);
+                if gap > self.spacing.saturating_mul(LONGEST_BRIDGE) {
+                    return Err(Missing::InGap);
+                }
+                // t0 < stamp < t1, so gap > 0.
+                let t = stamp.since(*t0) as f64 / gap as f64;
+                Ok(q0.normalised().slerp(&q1.normalised(), t))
+            }
+            _ => Err(Missing::Outside),
         }
-        let (t1, q1) = self.rows.get(after)?;
-        let gap = t1.since(*t0);
-        if gap > self.spacing.saturating_mul(LONGEST_BRIDGE) {
-            return None;
-        }
-        // t0 < stamp < t1, so gap > 0.
-        let t = stamp.since(*t0) as f64 / gap as f64;
-        Some(q0.normalised().slerp(&q1.normalised(), t))
     }
 }
 
@@ -88,34 +96,25 @@ pub(super) fn for_each_match(
         bad_references: reference.bad,
         ..LeftOut::default()
     };
-    let longest = estimate.spacing.saturating_mul(LONGEST_BRIDGE);
     let mut after = 0; // the first estimate later than the reference sample
     for (stamp, q_ref) in reference.rows.iter() {
         while estimate.rows.get(after).is_some_and(|(t, _)| t <= stamp) {
             after += 1;
         }
-        let before = after.checked_sub(1).and_then(|i| estimate.rows.get(i));
-        let mut place = after;
-        let q_est = match (before, estimate.rows.get(after)) {
-            (Some((t, q)), _) if t == stamp => {
-                place -= 1; // there is one before
-                q.normalised()
+        let q_est = match estimate.at(*stamp, after) {
+            Ok(q_est) => q_est,
+            Err(Missing::InGap) => {
+                left_out.in_gap += 1;
+                continue;
             }
-            (Some((t0, q0)), Some((t1, q1))) => {
-                let gap = t1.since(*t0);
-                if gap > longest {
-                    left_out.in_gap += 1;
-                    continue;
-                }
-                // t0 < stamp < t1, so gap > 0.
-                let t = stamp.since(*t0) as f64 / gap as f64;
-                q0.normalised().slerp(&q1.normalised(), t)
-            }
-            _ => {
+            Err(Missing::Outside) => {
                 left_out.outside += 1;
                 continue;
             }
         };
+        let before = after.saturating_sub(1);
+        let is_at = estimate.rows.get(before).is_some_and(|(t, _)| t == stamp);
+        let place = if is_at { before } else { after };
         if visit(*stamp, q_ref.normalised() * q_est.inverse(), place).is_break() {
             break;
         }

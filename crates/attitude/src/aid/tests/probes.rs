@@ -288,18 +288,21 @@ fn a_clock_that_is_set_back_is_a_gap_of_unknown_length() {
     assert!(sigma.iter().all(|s| *s > 0.0 && *s < 8.7e-3), "{sigma}");
 }
 
-/// A perfect gyro at rest for 10 s, then turned about the vertical, faster by a degree a second each second.
-fn bias_after_a_slow_start(settings: Settings) -> f64 {
-    let propagation = propagate::Settings::default();
-    let mut aided = Aided::new(propagation, settings, Start::Level).unwrap();
+/// A filter that has had samples at 100 Hz for so long, with what a perfect gyro and accelerometer measure at each time.
+fn fed(
+    settings: Settings,
+    secs: i64,
+    measured: impl Fn(f64) -> (Vector3<f64>, Vector3<f64>),
+) -> Aided {
+    let mut aided = Aided::new(propagate::Settings::default(), settings, Start::Level).unwrap();
     let mut out = Vec::new();
-    for i in 0..1300_i64 {
-        let rate = 0.02 * (i as f64 * 0.01 - 10.0).max(0.0);
+    for i in 0..100 * secs {
+        let (rate, force) = measured(i as f64 * 0.01);
         let sample = RateSample {
             stamp: Nanos(i * 10_000_000),
             start: Nanos(i * 10_000_000),
-            value: Vector3::z() * rate,
-            accel: Some(Vector3::z() * 9.81),
+            value: rate,
+            accel: Some(force),
             join: if i == 0 {
                 Join::Start
             } else {
@@ -310,7 +313,18 @@ fn bias_after_a_slow_start(settings: Settings) -> f64 {
         };
         aided.push(&[sample], &mut out);
     }
-    aided.filter().calibration().bias.norm()
+    aided
+}
+
+/// A perfect gyro at rest for 10 s, then turned about the vertical, faster by two hundredths of a rad/s each second.
+fn bias_after_a_slow_start(settings: Settings) -> f64 {
+    let slow = |t: f64| {
+        (
+            Vector3::z() * 0.02 * (t - 10.0).max(0.0),
+            Vector3::z() * 9.81,
+        )
+    };
+    fed(settings, 13, slow).filter().calibration().bias.norm()
 }
 
 #[test]
@@ -326,32 +340,21 @@ fn a_motion_that_sets_in_slowly_is_no_bias() {
 
 /// Largest sigma of the bias of a body that rested for 10 s and was then turned on its side within one.
 fn bias_sigma_on_the_side(settings: Settings) -> f64 {
-    let propagation = propagate::Settings::default();
-    let mut aided = Aided::new(propagation, settings, Start::Level).unwrap();
-    let mut out = Vec::new();
-    for i in 0..1100_i64 {
-        let roll = std::f64::consts::FRAC_PI_2 * (i as f64 * 0.01 - 10.0).max(0.0);
-        let sample = RateSample {
-            stamp: Nanos(i * 10_000_000),
-            start: Nanos(i * 10_000_000),
-            value: Vector3::x()
-                * if i < 1000 {
-                    0.0
-                } else {
-                    std::f64::consts::FRAC_PI_2
-                },
-            accel: Some(Vector3::new(0.0, roll.sin(), roll.cos()) * 9.81),
-            join: if i == 0 {
-                Join::Start
-            } else {
-                Join::Continuous
-            },
-            status: Status::OK,
-            log: Nanos(i * 10_000_000),
+    let turned = |t: f64| {
+        let rate = if t < 10.0 {
+            0.0
+        } else {
+            std::f64::consts::FRAC_PI_2
         };
-        aided.push(&[sample], &mut out);
-    }
-    aided.filter().calibration_sigma().bias.max()
+        let roll = std::f64::consts::FRAC_PI_2 * (t - 10.0).max(0.0);
+        let force = Vector3::new(0.0, roll.sin(), roll.cos()) * 9.81;
+        (Vector3::x() * rate, force)
+    };
+    fed(settings, 11, turned)
+        .filter()
+        .calibration_sigma()
+        .bias
+        .max()
 }
 
 #[test]
