@@ -5,6 +5,7 @@
 use crate::report::series::{Drawn, Elapsed, Mark};
 use crate::report::trace::Traces;
 use std::collections::VecDeque;
+use strapd_attitude::aid::Innovation;
 use strapd_attitude::condition::Clock;
 use strapd_attitude::record::{AttitudeSample, Counts, Nanos, RawSample, Status, Verdict};
 
@@ -31,6 +32,7 @@ impl History {
             drawn: Drawn {
                 stretches,
                 series: Traces::new(stretches),
+                innovations: Traces::new(stretches),
                 marks: Mark::ALL.map(|_| Traces::new(stretches)).to_vec(),
                 elapsed: Elapsed::default(),
                 errors: None,
@@ -75,6 +77,17 @@ impl History {
     pub fn add(&mut self, samples: &[AttitudeSample]) {
         for sample in samples {
             self.add_one(sample);
+        }
+    }
+
+    /// Takes what corrected the attitudes added so far.
+    pub fn corrected(&mut self, innovations: &[(Nanos, Innovation)]) {
+        for (stamp, innovation) in innovations {
+            let [(x, sigma), (y, _)] = innovation.gravity;
+            let (heading, of_heading) = innovation.heading;
+            let at = self.drawn.elapsed.at(*stamp);
+            let values = [x, y, 3.0 * sigma, heading, 3.0 * of_heading];
+            self.drawn.innovations.push(at, values.map(f64::to_degrees));
         }
     }
 

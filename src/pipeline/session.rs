@@ -255,6 +255,9 @@ impl Session {
             if let Some(against) = &mut topic.against {
                 against.advance(pool);
             }
+            if let Some(history) = &mut topic.history {
+                history.corrected(&topic.estimator.innovations());
+            }
         }
         Ok(Flow::Continue)
     }
@@ -309,6 +312,9 @@ impl Session {
             let _ = self.outlet.write(stream, attitudes, pool)?;
             if let Some(against) = &mut topic.against {
                 against.finish(pool);
+            }
+            if let Some(history) = &mut topic.history {
+                history.corrected(&topic.estimator.innovations());
             }
         }
         Ok(Ended {

@@ -13,6 +13,9 @@ pub struct Drawn {
     pub stretches: usize,
     /// Rate about x, y, z (deg/s, body axes, bias removed), roll, pitch, yaw (deg), sigma of tilt and of heading (deg).
     pub series: Traces<8>,
+    /// Innovations, deg: of gravity along x and y with three sigma, of heading with three sigma. Empty where nothing
+    /// corrects.
+    pub innovations: Traces<5>,
     /// One per [`Mark`]: where, with its length in ns.
     pub marks: Vec<Traces<1>>,
     /// Stamps to the axis of time.

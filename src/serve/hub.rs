@@ -175,6 +175,12 @@ impl Client {
     }
 }
 
+/// How many of these are of the gyro.
+#[must_use]
+pub fn rates_in(samples: &[RawSample]) -> usize {
+    samples.iter().filter(|s| !s.is_beside).count()
+}
+
 impl Hub {
     /// With nobody connected.
     ///
@@ -196,7 +202,7 @@ impl Hub {
         // No secret: it only tells a reader that the daemon was restarted.
         let session = RandomState::new().hash_one(std::process::id()) as u32;
         Ok(Hub {
-            decoder: LineDecoder::new(&settings.decode),
+            decoder: LineDecoder::new(&settings.decode).with_besides(),
             decode_options: settings.decode,
             plan,
             plans,
@@ -401,7 +407,7 @@ impl Hub {
                 "`sample_kind` or unit is another than in this sensor's first sample; give it another `id`".to_owned(),
             ));
         }
-        count(&self.counters.samples, run.samples.len());
+        count(&self.counters.samples, rates_in(run.samples));
         let taken = sensor.stream.stamped(run);
         let (lines, samples) = match &taken {
             None => (run.lines, run.samples),
@@ -436,7 +442,8 @@ impl Hub {
         if let Some(recorder) = &self.recorder
             && !samples.is_empty()
         {
-            recorder.input(id, samples.to_vec());
+            let rates = samples.iter().filter(|s| !s.is_beside);
+            recorder.input(id, rates.copied().collect());
         }
         self.deliver(sensor, id, text);
         let faults = sensor.stream.news();

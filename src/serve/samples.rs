@@ -5,7 +5,7 @@
 //! elsewhere without having asked first.
 
 use super::http::{refusal, response, unauthorised};
-use super::hub::{Asker, Client, Flood, GAVE_WAY, Hub, News, SampleRun, Sensor, count};
+use super::hub::{Asker, Client, Flood, GAVE_WAY, Hub, News, SampleRun, Sensor, count, rates_in};
 use super::listen::{Connection, now};
 use super::log_throttle;
 use super::peer::{Origin, Peer};
@@ -428,7 +428,7 @@ impl Poster {
             };
             match self.hand_over(&run, &mut gathered.text) {
                 Ok(News { note, faults }) => {
-                    taken.samples += run.samples.len() as u64;
+                    taken.samples += rates_in(run.samples) as u64;
                     if let Some(note) = note {
                         let id = head.id.as_deref().unwrap_or(NAMELESS);
                         log_throttle::info(

@@ -123,13 +123,18 @@ impl Side {
 }
 
 impl Naming {
-    /// Gives a line's sensor its name here.
-    fn name(&mut self, head: &mut Line) -> Result<(), Fault> {
+    /// Gives a line's sensor its name here. What comes beside the gyro belongs to it (`is_beside`).
+    fn name(&mut self, head: &mut Line, is_beside: bool) -> Result<(), Fault> {
         if self.id.is_none() && head.id.is_some() {
             return Ok(());
         }
-        let origin = (head.id.clone(), head.sensor.clone());
-        let called = self.called.get_or_insert_with(|| origin.clone());
+        let mut origin = (head.id.clone(), head.sensor.clone());
+        let called = if is_beside {
+            origin.1 = self.called.as_ref().and_then(|called| called.1.clone());
+            self.called.as_ref().unwrap_or(&origin)
+        } else {
+            self.called.get_or_insert_with(|| origin.clone())
+        };
         if *called != origin {
             let name = |(id, sensor): &Origin| {
                 id.clone()
@@ -275,7 +280,8 @@ impl Session {
         if let Side::Source(naming) = &mut self.side {
             match &mut read {
                 Ok(Message::Samples(head)) => {
-                    if let Err(fault) = naming.name(head) {
+                    let new = scratch.samples.get(before..).unwrap_or_default();
+                    if let Err(fault) = naming.name(head, wire::are_beside(new)) {
                         count(
                             &self.hub.counters.refused_samples,
                             scratch.samples.len() - before,

@@ -132,7 +132,9 @@ impl Source {
     #[must_use]
     pub fn decoder(&self, options: &Options) -> Option<LineDecoder> {
         match &self.protocol {
-            Protocol::SensorServer(sensor) => Some(LineDecoder::with_sensor(options, sensor)),
+            Protocol::SensorServer(sensor) => {
+                Some(LineDecoder::with_sensor(options, sensor).with_besides())
+            }
             Protocol::Auto | Protocol::Lines | Protocol::Strapd => None,
         }
     }

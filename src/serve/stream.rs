@@ -28,13 +28,16 @@ use std::sync::Arc;
 use std::time::Duration;
 use strapd_attitude::condition::{Clock, Report};
 use strapd_attitude::estimate::Estimator;
-use strapd_attitude::estimate::{Bias, Plan};
+use strapd_attitude::estimate::{Aid, Bias, Forces, Memory, Plan};
 use strapd_attitude::estimate::{Meaning, Prepared, SensorCalibration, at_once, learned};
 use strapd_attitude::propagate::{Method, Sequential};
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{AttitudeSample, Counts, Nanos, RawSample, Verdict};
 use strapd_attitude::record::{Declared, TimeUnit};
 use strapd_recording::decode::{Ambiguous, Bare, Line};
+
+/// That forces are not used was said; the bits below are verdicts.
+const FORCES: u32 = 1 << 31;
 
 /// Numbers a sample may come behind its turn. Further back, the sender counts anew.
 const OVERTAKEN: u64 = 64;
@@ -82,6 +85,8 @@ pub struct SensorStream {
     /// Verdicts that were said to who sends it, as bits, and what was counted when it came.
     told: u32,
     counted: Counts,
+    /// Specific forces came that this attitude can not use.
+    has_unused_forces: bool,
 }
 
 /// How far it is known where a sender stands.
@@ -114,13 +119,13 @@ pub fn live_plan(plan: &Plan) -> Result<Plan, String> {
         ),
         ..RawSample::default()
     };
-    let prepared = at_once(&plan, &resolved, &sample)?;
+    let prepared = at_once(&plan, &resolved, &[sample])?;
     Estimator::live(&plan, &resolved, &prepared)?;
     Ok(plan)
 }
 
 impl SensorStream {
-    /// For the sensor `id`, whose first line says `stated` and brings `first`. `plan` is a
+    /// For the sensor `id`, whose first line says `stated` and brings `together`. `plan` is a
     /// [`live_plan`]. It goes on from `saved`, where there is such and the stamps do; `declare` makes its
     /// labels known to clients.
     ///
@@ -130,7 +135,7 @@ impl SensorStream {
         plan: &Plan,
         id: Arc<str>,
         stated: &Line,
-        first: &RawSample,
+        together: &[RawSample],
         saved: Option<Saved>,
         declare: impl FnOnce(&Stream) -> Arc<Channel>,
     ) -> Result<SensorStream, Fault> {
@@ -144,7 +149,9 @@ impl SensorStream {
             ..Declared::default()
         };
         let resolved = Meaning::new(plan, &declared);
-        let mut prepared = at_once(plan, &resolved, first).map_err(fault)?;
+        let memory = saved.as_ref().and_then(Saved::memory);
+        let plan = &expecting(plan, memory.is_some_and(Memory::has_forces_beside));
+        let mut prepared = at_once(plan, &resolved, together).map_err(fault)?;
         let estimator = Estimator::live(plan, &resolved, &prepared).map_err(fault)?;
         let known = plan.calibration.as_deref();
         prepared
@@ -181,6 +188,7 @@ impl SensorStream {
             jitter_secs: 0.0,
             told: 0,
             counted: Counts::default(),
+            has_unused_forces: false,
         })
     }
 
@@ -327,13 +335,14 @@ impl SensorStream {
         window: Duration,
         placed: Placed,
     ) -> Result<Option<Fault>, Fault> {
-        if self.joining != Joining::Undecided {
+        if self.joining != Joining::Undecided || samples.iter().all(|raw| raw.is_beside) {
             return Ok(None);
         }
         let span = self.span();
         let near = span.map_or(Nanos(0), |span| span.last);
         let first = samples
             .iter()
+            .filter(|raw| !raw.is_beside)
             .find_map(|raw| Some((raw, self.estimator.stamp_of(raw, near)?)));
         let (span, raw, stamp) = match (span, first) {
             (Some(span), Some((raw, stamp))) => (span, raw, stamp),
@@ -395,7 +404,9 @@ impl SensorStream {
             id: Some(self.id.to_string()),
             ..Fault::new("not_ready", what)
         };
-        let prepared = at_once(plan, &self.resolved, raw).map_err(fault)?;
+        let forces = self.prepared.aiding.map(|aiding| aiding.forces);
+        let plan = &expecting(plan, forces == Some(Forces::Beside));
+        let prepared = at_once(plan, &self.resolved, &[*raw]).map_err(fault)?;
         let mut estimator = Estimator::live(plan, &self.resolved, &prepared).map_err(fault)?;
         let labels = labelled(stream_of(&self.id), plan, &self.resolved, &prepared);
         if labels.world_axes != self.channel.stream().world_axes {
@@ -461,13 +472,25 @@ impl SensorStream {
             }
         }
         for raw in samples {
-            if self.joining == Joining::Joined || !self.is_again(plan, raw) {
+            if raw.is_beside {
+                self.take_beside(plan, raw);
+            } else if self.joining == Joining::Joined || !self.is_again(plan, raw) {
                 self.reset_if_asked(plan, raw);
                 self.estimator.take(raw);
                 self.intervals.take(raw, plan.clock, self.resolved.kind);
             }
         }
         self.first = self.first.or(self.conditioning().first);
+    }
+
+    /// A specific force or a field with a stamp of its own; until a rate has told where the run stands, there is
+    /// nothing to correct.
+    fn take_beside(&mut self, plan: &Plan, raw: &RawSample) {
+        if self.joining == Joining::Joined {
+            self.estimator.take(raw);
+        }
+        let is_alone = self.prepared.aiding.is_none() && plan.aid == Aid::Auto;
+        self.has_unused_forces |= is_alone && raw.accel.is_some();
     }
 
     /// A line that could not be decoded stood here.
@@ -504,6 +527,13 @@ impl SensorStream {
         let counts = self.estimator.conditioning().counts;
         let mut news = Vec::from_iter(self.ambiguous.take());
         news.extend(self.intervals.news(&self.id));
+        if std::mem::take(&mut self.has_unused_forces) && self.told & FORCES == 0 {
+            self.told |= FORCES;
+            news.push(Fault {
+                id: Some(self.id.to_string()),
+                ..Fault::new("forces_unused", "specific forces come in messages of their own, and the first came after the attitude had begun with the gyro alone; start the daemon with --aid gravity, or send a force first. Said once".to_owned())
+            });
+        }
         for verdict in Verdict::ALL {
             let bit = 1 << verdict as u32;
             let is_new = counts.get(verdict) > self.counted.get(verdict);
@@ -574,6 +604,14 @@ impl SensorStream {
             "interval_mismatches": self.intervals.found(),
             "warnings": warnings,
         })
+    }
+}
+
+/// The plan of a sensor whose specific forces are known to come in messages of their own.
+fn expecting(plan: &Plan, forces_beside: bool) -> Plan {
+    Plan {
+        has_forces_beside: plan.has_forces_beside || forces_beside,
+        ..plan.clone()
     }
 }
 

@@ -131,6 +131,12 @@ pub fn read(
     read_from(decoder, line, received, false, samples)
 }
 
+/// Whether all there are come from other sensors than the gyro.
+#[must_use]
+pub fn are_beside(samples: &[RawSample]) -> bool {
+    !samples.is_empty() && samples.iter().all(|s| s.is_beside)
+}
+
 /// The same of somebody we connected to: where that is a daemon, the rates of its attitudes are
 /// samples (`is_source`).
 ///
@@ -148,13 +154,19 @@ pub fn read_from(
     let head = decoder
         .decode_object(line, received, samples)
         .map_err(|why| undecodable(&why))?;
-    let has_rate = samples
-        .get(before..)
-        .is_some_and(|new| new.iter().any(|s| s.gyro.is_some()));
+    if head.class == Class::Rate {
+        // What says that it is of the gyro is, with a rate or without.
+        for sample in samples.iter_mut().skip(before) {
+            sample.is_beside = false;
+        }
+    }
+    let new = samples.get(before..).unwrap_or_default();
+    let has_rate = new.iter().any(|s| s.gyro.is_some());
     let class = match &head.class {
         // A sample of our own whose rate is null was one with NaN: it is counted, not passed over.
         Class::Rate if samples.len() > before => return Ok(Message::Samples(head)),
         Class::None | Class::Imu if has_rate => return Ok(Message::Samples(head)),
+        Class::None if are_beside(new) => return Ok(Message::Samples(head)),
         Class::Att if is_source && has_rate => return Ok(Message::Samples(head)),
         Class::Other(class) => Some(class.clone()),
         Class::Att => Some("ATT".to_owned()),

@@ -10,6 +10,7 @@ mod admission;
 pub(crate) mod aiding;
 mod bad_lines;
 mod bare_stamps;
+mod besides;
 mod cat;
 mod config;
 mod connecting;

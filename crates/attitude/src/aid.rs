@@ -51,7 +51,7 @@ mod update;
 
 pub use aided::{Aided, Start};
 pub use calibration::Calibration;
-pub use filter::{Filter, Report};
+pub use filter::{Filter, Innovation, Report};
 pub use heading::FieldQuality;
 pub use memory::Memory;
 pub(crate) use plausibility::is_gravity;

@@ -21,7 +21,7 @@ mod preparation;
 mod sensor_calibration;
 mod stamps;
 
-pub use aiding::Aiding;
+pub use aiding::{Aiding, Forces};
 pub use anew::Anew;
 pub use calibrated::learned;
 pub use estimator::{Estimator, Memory};

@@ -115,6 +115,9 @@ pub struct RawSample {
     pub orientation: Option<[f64; 4]>,
     /// The message's own integration interval in nanoseconds (PX4 `gyro_integral_dt`, `delta_angle_dt`).
     pub interval_nanos: Option<i64>,
+    /// Of another sensor of the body than the gyro, with a stamp and a rate of its own: it corrects attitudes, and is
+    /// no sample that lacks its rate.
+    pub is_beside: bool,
 }
 
 /// How a sample connects to the one before it in the same stream.

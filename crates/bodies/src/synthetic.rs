@@ -395,6 +395,7 @@ impl Synthetic {
                     mag: mag.map(Into::into),
                     orientation: Some(spin.q_nb.wxyz()),
                     interval_nanos: (!rates).then_some((now - self.before) as i64),
+                    is_beside: false,
                 });
                 self.noticed.samples += 1;
                 self.noticed.fields += u64::from(mag.is_some());

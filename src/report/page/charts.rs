@@ -184,6 +184,37 @@ pub(super) fn bounds(trace: &Traces<4>, time: Time, part: Bounded) -> Result<Str
     over_time(time, title, "deg", lines)
 }
 
+/// What corrected the attitude was off by, between three sigma of what was expected: gravity, and heading where a field
+/// told it.
+pub(super) fn innovations(traces: &Traces<5>, time: Time) -> Vec<Result<String, String>> {
+    let parts: [(&str, &[(usize, &str)], usize); 2] = [
+        ("Innovations of gravity, as tilt", &[(0, "x"), (1, "y")], 2),
+        ("Innovations of heading", &[(3, "heading")], 4),
+    ];
+    let mut charts = Vec::new();
+    for (title, named, three) in parts {
+        let of = |index: usize| traces.points(index, time.nanos);
+        let mut lines: Vec<Series> = named
+            .iter()
+            .map(|(index, name)| line(name, index % 3 + 1, of(*index)))
+            .collect();
+        if lines.iter().all(|series| series.points.is_empty()) {
+            continue;
+        }
+        let bound = |sign: f64| of(three).iter().map(|[x, y]| [*x, sign * y]).collect();
+        for (name, points) in [("3 sigma", bound(1.0)), ("", bound(-1.0))] {
+            lines.push(Series {
+                name: name.to_owned(),
+                points,
+                look: Look::Dashed,
+                color: Some(4),
+            });
+        }
+        charts.push(over_time(time, title, "deg", lines));
+    }
+    charts
+}
+
 /// Which part of an error.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Bounded {

@@ -182,6 +182,16 @@ fn plots(s: &TopicSummary, drawn: &Drawn, stretches: usize, out: &mut String) {
         &[(6, "tilt"), (7, "heading")],
     );
     out.push_str(&figure("sigma", sigma));
+    if drawn.innovations.samples > 0 {
+        let innovations = charts::innovations(&drawn.innovations.reduced(stretches), time);
+        for (chart, id) in innovations
+            .into_iter()
+            .zip(["innovations", "innovations-heading"])
+        {
+            out.push_str(&figure(id, chart));
+        }
+        out.push_str("<p class=\"small\">How far what was measured was from what was expected, ten times a second. Accelerations make it large, and sigma with it; long on one side it says that the body moves otherwise than the filter thinks.</p>\n");
+    }
     if drawn.series.samples > stretches as u64 * 4 {
         let _ = writeln!(
             out,

@@ -85,13 +85,12 @@ impl Hub {
             self.make_room(&mut sensors)?;
         }
         let id: Arc<str> = id.into();
-        let first = run.samples.first().copied().unwrap_or_default();
         let last = lock(&self.saved).get(&id).cloned();
         let stream = SensorStream::new(
             self.plan_of(&id),
             id.clone(),
             run.head,
-            &first,
+            run.samples,
             last,
             |labels| self.declare(labels),
         )?;

@@ -285,6 +285,7 @@ fn errors_lie_between_their_three_sigma_and_what_was_learned_is_in_a_table() {
     assert!(figure(&html, "tilt-bounds").is_none() && !html.contains("within-sigma"));
     assert!(!html.contains("Calibration learned"));
     assert!(html.contains("class consumer, --noise"));
+    assert!(figure(&html, "innovations").is_none());
     // Held against an attitude of its own: no error, which lies within.
     strapd(dir.path(), "replay log.mcap -o truth.csv -q").done();
     let (html, _) = page(dir.path(), &samples, "--reference truth.csv");
@@ -305,4 +306,8 @@ fn errors_lie_between_their_three_sigma_and_what_was_learned_is_in_a_table() {
     assert!(html.contains("bias-by-orientation") && html.contains("beyond-sigma"));
     let (html, _) = page(dir.path(), &samples, "--aid gravity");
     assert!(html.contains("Calibration learned") && html.contains("accelerometer lead, ms"));
+    // Gravity alone was measured.
+    let innovations = figure(&html, "innovations").unwrap();
+    assert!(innovations.contains("<polyline") && innovations.contains("3 sigma"));
+    assert!(figure(&html, "innovations-heading").is_none());
 }

@@ -2,7 +2,7 @@
 
 use super::beside::Beside;
 use super::calibration::Applied;
-use super::filter::{Filter, Measured};
+use super::filter::{Filter, Innovation, Measured};
 use super::settings::Settings;
 use crate::frames::{Body, Nav};
 use crate::propagate::{self, Method, Propagator, Sequential, SettingsError};
@@ -79,6 +79,8 @@ pub struct Aided {
     /// What comes out of the propagator for one sample.
     scratch: Vec<AttitudeSample>,
     pub(super) last_out: Option<Quaternion<Nav, Body>>,
+    /// Where somebody looks at them.
+    innovations: Option<Vec<(Nanos, Innovation)>>,
 }
 
 /// A sample and what it was corrected by.
@@ -116,6 +118,7 @@ impl Aided {
             last: None,
             scratch: Vec::new(),
             last_out: None,
+            innovations: None,
         })
     }
 
@@ -126,6 +129,24 @@ impl Aided {
             forces: Some(Beside::default()),
             ..self
         }
+    }
+
+    /// Keeps the innovations of every correction from now on, for [`Aided::innovations`].
+    pub fn keep_innovations(&mut self) {
+        self.innovations.get_or_insert_default();
+    }
+
+    /// Those kept since this was asked last, each with the stamp of the correction.
+    pub fn innovations(&mut self) -> Vec<(Nanos, Innovation)> {
+        self.innovations
+            .as_mut()
+            .map(std::mem::take)
+            .unwrap_or_default()
+    }
+
+    /// From now on, as after [`Aided::with_forces_beside`].
+    pub fn expect_forces_beside(&mut self) {
+        self.forces.get_or_insert_default();
     }
 
     /// Takes a specific force (m/s^2, body axes) measured at `stamp`: it is used at the first gyro sample at or
@@ -300,7 +321,13 @@ impl Aided {
         } else if matches!(given.join, Join::Hold | Join::Start) {
             self.filter.hold(measured);
         } else if measured.secs > 0.0 {
+            let updates = self.filter.report().updates;
             self.filter.take(measured, &given.applied, attitude);
+            if let Some(innovations) = &mut self.innovations
+                && self.filter.report().updates > updates
+            {
+                innovations.push((given.stamp, self.filter.innovation));
+            }
         }
     }
 

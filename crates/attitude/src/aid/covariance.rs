@@ -175,14 +175,14 @@ impl Covariance {
     }
 
     /// One scalar measurement `h . error = innovation` of a variance; what has been corrected so far is in
-    /// `correction`, and what it adds, too.
+    /// `correction`, and what it adds, too. What was left to explain comes back, with one sigma of what was expected.
     pub(super) fn measure(
         &mut self,
         h: &[(usize, f64)],
         innovation: f64,
         variance: f64,
         correction: &mut Correction,
-    ) {
+    ) -> (f64, f64) {
         let mut ph = [0.0; WIDTH];
         for (state, factor) in h {
             for (out, p) in ph.iter_mut().zip(&self.rows[*state]) {
@@ -204,6 +204,7 @@ impl Covariance {
                 *p -= scaled[state] * other;
             }
         }
+        (left, spread.sqrt())
     }
 
     /// The earth axes of the estimate have turned about the vertical: the states in them turn back.

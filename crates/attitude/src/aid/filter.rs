@@ -66,6 +66,23 @@ pub struct Report {
     pub failures: u64,
 }
 
+/// How far what was measured was from what was expected, with one sigma of that, rad; NaN where nothing was measured.
+/// Its sigma follows the accelerations that are seen, so it is the mean that tells a wrong model: it should be nothing.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Innovation {
+    /// Of gravity, as the tilt it would be: the specific force along x and y of the world, over gravity.
+    pub gravity: [(f64, f64); 2],
+    /// Of the heading by the field.
+    pub heading: (f64, f64),
+}
+
+impl Innovation {
+    pub(super) const NONE: Innovation = Innovation {
+        gravity: [(f64::NAN, f64::NAN); 2],
+        heading: (f64::NAN, f64::NAN),
+    };
+}
+
 /// Corrects what a propagator integrates. See the [module](crate::aid).
 #[derive(Clone, Debug)]
 pub struct Filter {
@@ -105,6 +122,8 @@ pub struct Filter {
     pub(super) plausibility: Plausibility,
     /// Since the sample before.
     pub(super) has_levelled: bool,
+    /// Of the last correction.
+    pub(super) innovation: Innovation,
     pub(super) report: Report,
 }
 
@@ -140,6 +159,7 @@ impl Filter {
             since_force: 0.0,
             plausibility: Plausibility::default(),
             has_levelled: false,
+            innovation: Innovation::NONE,
             report: Report::default(),
         };
         filter.forget_calibration();

@@ -137,8 +137,11 @@ impl Filter {
                 (VELOCITY + i, by_velocity),
                 (POSITION + i, by_position),
             ];
-            self.covariance
+            let (left, sigma) = self
+                .covariance
                 .measure(&h, -residual[i], variance, correction);
+            let gravity = settings.gravity;
+            self.innovation.gravity[i] = (left / gravity, sigma / gravity);
         }
     }
 

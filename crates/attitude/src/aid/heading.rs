@@ -220,7 +220,7 @@ impl Filter {
             (IRON + 2, seen.z),
         ];
         let h = if has_iron { &h[..] } else { &h[..2] };
-        covariance.measure(h, residual, variance, correction);
+        self.innovation.heading = covariance.measure(h, residual, variance, correction);
     }
 }
 

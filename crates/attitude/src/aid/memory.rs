@@ -155,6 +155,12 @@ impl Aided {
 }
 
 impl Memory {
+    /// Whether specific forces came in messages of their own.
+    #[must_use]
+    pub fn has_forces_beside(&self) -> bool {
+        self.forces.is_some()
+    }
+
     fn is_plausible(&self) -> bool {
         let calibration = &self.calibration;
         let is_unit = |q: &[f64; 4]| (q.iter().map(|c| c * c).sum::<f64>() - 1.0).abs() < 1e-9;

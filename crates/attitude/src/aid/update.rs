@@ -5,7 +5,7 @@ use super::covariance::{
     BIAS, CROSS, Correction, FIELD, FORCE_BIAS, HEADING, IRON, LEAD, POSITION, SCALE, TILT,
     Transition, VELOCITY, WIDTH,
 };
-use super::filter::Filter;
+use super::filter::{Filter, Innovation};
 use super::gravity::Force;
 use super::interval::Interval;
 use super::start::{POSITION_START, VELOCITY_START};
@@ -31,6 +31,7 @@ impl Filter {
                 .add(LEAD, (settings.lead_share * self.nominal).powi(2));
         }
         self.report.updates += 1;
+        self.innovation = Innovation::NONE;
         let force = self.mean_force();
         let is_levelled = force.is_some_and(|force| self.judge_tilt(&force));
         self.predict(force.as_ref());

@@ -33,6 +33,17 @@ enum Unaided {
     Implausible(String),
 }
 
+/// Where specific forces come from.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Forces {
+    /// With the gyro samples.
+    WithRates,
+    /// In messages of their own.
+    Beside,
+    /// None has come: the first decides.
+    Unseen,
+}
+
 /// What corrects the attitude.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Aiding {
@@ -42,6 +53,8 @@ pub struct Aiding {
     pub start: Start,
     /// Multiplies the recorded force, beside what its format states.
     pub force_scale: f64,
+    /// Where it comes from.
+    pub forces: Forces,
 }
 
 impl Aiding {
@@ -78,7 +91,11 @@ impl Aiding {
             Err(Unaided::NoForce) if plan.aid == Aid::Auto => Ok(None),
             Err(Unaided::NoForce) if first.len() <= 1 => {
                 warnings.push(format!("{asked}: the first sample carries no specific force: the attitude is the gyro's until one comes"));
-                Ok(Some(Aiding::with_scale((plan, resolved), 1.0)))
+                let unscaled = Aiding::with_scale((plan, resolved), 1.0);
+                Ok(Some(Aiding {
+                    forces: Forces::Unseen,
+                    ..unscaled
+                }))
             }
             Err(Unaided::NoForce) => Err(format!(
                 "{asked}: none of the first {} samples carries a specific force\n  help: --field accel=PATH or --accel-topic NAME says where it is, --aid none does without",
@@ -102,7 +119,11 @@ impl Aiding {
     ) -> Result<Aiding, Unaided> {
         if plan.has_forces_beside {
             // Its unit shows in its first, its plausibility in the filter.
-            return Ok(Aiding::with_scale((plan, resolved), 1.0));
+            let unscaled = Aiding::with_scale((plan, resolved), 1.0);
+            return Ok(Aiding {
+                forces: Forces::Beside,
+                ..unscaled
+            });
         }
         let mut lengths = first
             .iter()
@@ -175,6 +196,7 @@ impl Aiding {
             settings,
             start: start(plan.initial, settings.has_field),
             force_scale,
+            forces: Forces::WithRates,
         }
     }
 }

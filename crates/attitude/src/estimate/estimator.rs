@@ -3,7 +3,7 @@
 //! Conditions and propagates; what must be known first ([`Prepared`]) is given. Reads no clock and
 //! does no I/O.
 
-use super::aiding;
+use super::aiding::{self, Forces};
 use super::anew::Anew;
 use super::meaning::Meaning;
 use super::plan::{Initial, Noise, Plan};
@@ -57,7 +57,7 @@ enum Beside {
 struct Besides {
     resolved: Meaning,
     clock: Clock,
-    has_forces: bool,
+    forces: Forces,
     has_field: bool,
     /// Multiplies forces, once the first has come.
     force_scale: Option<f64>,
@@ -84,6 +84,12 @@ impl Integrator {
             (Integrator::Alone(_), _) => {}
             (Integrator::Aided(aided), Beside::Force(force)) => aided.take_force(stamp, force),
             (Integrator::Aided(aided), Beside::Field(field)) => aided.take_field(stamp, field),
+        }
+    }
+
+    fn expect_forces_beside(&mut self) {
+        if let Integrator::Aided(aided) = self {
+            aided.expect_forces_beside();
         }
     }
 
@@ -119,6 +125,14 @@ impl Memory {
     #[must_use]
     pub fn last(&self) -> Option<Nanos> {
         self.conditioning.last()
+    }
+
+    /// Whether specific forces came in messages of their own.
+    #[must_use]
+    pub fn has_forces_beside(&self) -> bool {
+        self.aiding
+            .as_ref()
+            .is_some_and(aid::Memory::has_forces_beside)
     }
 }
 
@@ -185,10 +199,9 @@ impl Estimator {
         let integrator = match &prepared.aiding {
             None => Propagator::new(propagation).map(|p| Integrator::Alone(Box::new(p))),
             Some(aiding) => Aided::new(propagation, aiding.settings, aiding.start).map(|aided| {
-                Integrator::Aided(Box::new(if plan.has_forces_beside {
-                    aided.with_forces_beside()
-                } else {
-                    aided
+                Integrator::Aided(Box::new(match aiding.forces {
+                    Forces::Beside => aided.with_forces_beside(),
+                    Forces::WithRates | Forces::Unseen => aided,
                 }))
             }),
         }
@@ -200,8 +213,12 @@ impl Estimator {
                 prepared.world_rate,
                 // Nothing for a gyro alone: what was saved before there was more goes on.
                 prepared.aiding.map_or_else(String::new, |aiding| format!(
-                    " {aiding:?} {} {} {:?}",
-                    plan.has_forces_beside, plan.declination, plan.mag_mount
+                    " {:?} {:?} {} {} {:?}",
+                    aiding.settings,
+                    aiding.start,
+                    aiding.force_scale,
+                    plan.declination,
+                    plan.mag_mount
                 )),
                 plan.calibration
                     .as_ref()
@@ -218,7 +235,7 @@ impl Estimator {
             besides: prepared.aiding.map(|aiding| Besides {
                 resolved: resolved.clone(),
                 clock: prepared.clock,
-                has_forces: plan.has_forces_beside,
+                forces: aiding.forces,
                 has_field: aiding.settings.has_field,
                 force_scale: None,
             }),
@@ -283,6 +300,13 @@ impl Estimator {
         if self.regulariser.is_some() || self.settings != memory.settings {
             return false;
         }
+        if memory.has_forces_beside()
+            && let Some(besides) = self.besides.as_mut()
+            && besides.forces == Forces::Unseen
+        {
+            besides.forces = Forces::Beside;
+            self.integrator.expect_forces_beside();
+        }
         let mut conditioner = self.conditioner.clone();
         let fits = conditioner.recall(&memory.conditioning)
             && match (&mut self.integrator, &memory.aiding) {
@@ -337,8 +361,17 @@ impl Estimator {
     /// Takes the next sample.
     #[inline]
     pub fn take(&mut self, raw: &RawSample) {
+        if raw.is_beside {
+            return self.take_beside(raw);
+        }
         if raw.mag.is_some() {
             self.take_field(raw);
+        }
+        if let Some(besides) = &mut self.besides
+            && besides.forces == Forces::Unseen
+            && raw.accel.is_some()
+        {
+            besides.forces = Forces::WithRates;
         }
         self.conditioner
             .push(std::slice::from_ref(raw), &mut self.rates);
@@ -348,12 +381,20 @@ impl Estimator {
     /// rates, of their own. What is not asked for ([`Plan::has_forces_beside`], [`Plan::aid`]) is passed over.
     pub fn take_beside(&mut self, raw: &RawSample) {
         self.take_field(raw);
-        let Some(besides) = self.besides.as_mut().filter(|b| b.has_forces) else {
+        let Some(besides) = &mut self.besides else {
             return;
         };
         let (Some(force), Some(stamp)) = (raw.accel, besides.clock.read(raw)) else {
             return;
         };
+        match besides.forces {
+            Forces::WithRates => return,
+            Forces::Beside => {}
+            Forces::Unseen => {
+                besides.forces = Forces::Beside;
+                self.integrator.expect_forces_beside();
+            }
+        }
         let resolved = &besides.resolved;
         let scale = *besides
             .force_scale
@@ -471,6 +512,21 @@ impl Estimator {
         match &self.integrator {
             Integrator::Alone(_) => None,
             Integrator::Aided(aided) => Some(aided.filter()),
+        }
+    }
+
+    /// Keeps the innovations of what corrects the attitude, for [`Estimator::innovations`].
+    pub fn keep_innovations(&mut self) {
+        if let Integrator::Aided(aided) = &mut self.integrator {
+            aided.keep_innovations();
+        }
+    }
+
+    /// Those kept since this was asked last, each with the stamp of the correction.
+    pub fn innovations(&mut self) -> Vec<(Nanos, aid::Innovation)> {
+        match &mut self.integrator {
+            Integrator::Alone(_) => Vec::new(),
+            Integrator::Aided(aided) => aided.innovations(),
         }
     }
 

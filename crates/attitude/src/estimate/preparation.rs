@@ -264,15 +264,26 @@ pub(super) fn learned_on_the_way(plan: &Plan) -> Plan {
     }
 }
 
-/// Decides from the first sample alone, for a live stream: its attitude must not wait. The clock is
-/// the one asked for, and another never takes its place. What only rest tells begins level, without a bias,
-/// where a filter learns the rest.
+/// Decides from the first sample alone, for a live stream: its attitude must not wait. `together` are those that came
+/// with it, which tell whether specific forces come in messages of their own. The clock is the one asked for, and
+/// another never takes its place. What only rest tells begins level, without a bias, where a filter learns the rest.
 ///
 /// # Errors
 /// In words: what only rest can tell was asked for of a gyro alone, or the sample carries no orientation to begin with.
-pub fn at_once(plan: &Plan, resolved: &Meaning, first: &RawSample) -> Result<Prepared, String> {
+pub fn at_once(
+    plan: &Plan,
+    resolved: &Meaning,
+    together: &[RawSample],
+) -> Result<Prepared, String> {
     let asked = plan;
-    let plan = &learned_on_the_way(asked);
+    let is_force = |raw: &RawSample| raw.is_beside && raw.accel.is_some();
+    let first = together.iter().find(|raw| !raw.is_beside);
+    let first = &first.copied().unwrap_or_default();
+    let plan = &Plan {
+        has_forces_beside: asked.has_forces_beside
+            || (first.accel.is_none() && together.iter().any(is_force)),
+        ..learned_on_the_way(asked)
+    };
     let rests = Rests::default();
     let mut warnings = Vec::new();
     let first_alone = std::slice::from_ref(first);

@@ -219,9 +219,8 @@ fn any_sample() -> impl Strategy<Value = RawSample> {
             publish: Nanos(log),
             gyro,
             accel,
-            mag: None,
-            orientation: None,
             interval_nanos,
+            ..RawSample::default()
         })
 }
 

@@ -44,6 +44,8 @@ pub(crate) struct Plan {
     pub(crate) sensor: Option<String>,
     /// Of a message's stamp and a nested one, the nested is read.
     pub(crate) nested_stamp: bool,
+    /// Specific forces and fields that come by themselves are read, too ([`RawSample::is_beside`]).
+    pub(crate) takes_besides: bool,
 }
 
 impl Plan {
@@ -61,6 +63,7 @@ impl Plan {
             settled: None,
             sensor: None,
             nested_stamp: options.nth_stamp > 0,
+            takes_besides: false,
         }
     }
 
@@ -161,9 +164,13 @@ impl Plan {
                 None
             }
         };
+        let is_beside = |found: &Found<'_>| self.takes_besides && found.is_beside();
         if found.has_gyro() || found.batch.is_empty() {
             let header = stamped(0, header);
-            out.push(found.sample(form, header, log, publish, &mut outcome));
+            out.push(RawSample {
+                is_beside: is_beside(found),
+                ..found.sample(form, header, log, publish, &mut outcome)
+            });
             outcome.samples = 1;
             return outcome;
         }
@@ -171,7 +178,10 @@ impl Plan {
             let own = element.instant(settled, &mut outcome);
             let stamp = if element.stamp.is_some() { own } else { header };
             let stamp = stamped(outcome.samples, stamp);
-            out.push(element.sample(form, stamp, log, publish, &mut outcome));
+            out.push(RawSample {
+                is_beside: is_beside(element),
+                ..element.sample(form, stamp, log, publish, &mut outcome)
+            });
             outcome.samples += 1;
         }
         outcome

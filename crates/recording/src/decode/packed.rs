@@ -179,6 +179,7 @@ pub fn read(object: &[u8], received: Nanos) -> Result<Object, Unreadable> {
             mag: floats_at(object, 80).and_then(some_vector),
             orientation: None,
             interval_nanos: u64_at(object, 72).and_then(|n| some_time(n.cast_signed())),
+            is_beside: false,
         };
         let seq = Some(seq).filter(|n| *n != NO_SEQ);
         Some(Object::Rate {
@@ -396,8 +397,8 @@ mod tests {
                         gyro,
                         accel,
                         mag,
-                        orientation: None,
                         interval_nanos,
+                        ..RawSample::default()
                     };
                     let mut bytes = Vec::new();
                     push_sample(&mut bytes, 9, 4, &raw);

@@ -223,6 +223,7 @@ impl Form {
                     let q = [6, 7, 8, 9].map(|n| registers.get(Slot(n)));
                     self.orientation(q, marked(Slot::ORIENTATION_MARK))
                 }),
+            is_beside: false,
             interval_nanos: registers.has(Slot::INTERVAL, 1).then(|| {
                 let unit = match self.interval {
                     // An interval is no instant: without a stated unit it is seconds.

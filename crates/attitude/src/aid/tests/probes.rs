@@ -372,3 +372,30 @@ fn the_bias_of_one_side_is_not_wholly_that_of_another() {
     let more = (with * with - without * without).sqrt();
     assert!((4e-4..6e-4).contains(&more), "{without} {with} {more}");
 }
+
+#[test]
+fn a_push_stands_out_of_the_innovations() {
+    let mut aided = aided(propagate::Method::Auto);
+    aided.keep_innovations();
+    let mut samples = stream();
+    for sample in &mut samples[1500..1510] {
+        sample.accel = sample
+            .accel
+            .map(|force| force + Vector3::new(20.0, 20.0, 0.0));
+    }
+    aided.push(&samples, &mut Vec::new());
+    let kept = aided.innovations();
+    assert_eq!(kept.len() as u64, aided.filter().report().updates);
+    assert!(aided.innovations().is_empty());
+    assert!(kept.is_sorted_by_key(|(stamp, _)| stamp.0));
+    // Without a field there is none of heading.
+    assert!(kept.iter().all(|(_, i)| i.heading.0.is_nan()));
+    let largest = |from: i64, to: i64| {
+        kept.iter()
+            .filter(|(stamp, _)| (from..to).contains(&(stamp.0 / 10_000_000)))
+            .flat_map(|(_, i)| i.gravity.map(|(left, _)| left.to_degrees()))
+            .fold(0.0, |most: f64, i| most.max(i.abs()))
+    };
+    let (before, pushed) = (largest(500, 1500), largest(1500, 1520));
+    assert!(before < 20.0 && pushed > 5.0 * before, "{before} {pushed}");
+}

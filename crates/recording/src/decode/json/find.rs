@@ -141,17 +141,20 @@ impl<'a, 'p> Seeker<'a, 'p> {
     fn named(&mut self, key: &str, depth: u32, twist: bool, found: &mut Found<'a>) -> Scan<()> {
         match self.meaning(key, twist) {
             Some(Meaning::Gyro { rank, unit }) if self.auto_gyro => {
+                found.names_gyro = true;
                 if let Some(v) = self.vector(1, found)? {
                     found.gyro(rank, unit, None, v);
                 }
             }
             Some(Meaning::DeltaAngle) if self.auto_gyro => {
+                found.names_gyro = true;
                 if let Some(v) = self.vector(1, found)? {
                     let unit = Some(crate::decode::GyroUnit::Rad);
                     found.gyro(1, unit, Some(SampleKind::DeltaAngle), v);
                 }
             }
             Some(Meaning::GyroAxis { axis, rank, unit }) if self.auto_gyro => {
+                found.names_gyro = true;
                 if let Some(value) = self.scanner.float()? {
                     found.gyro_axis(axis, rank, unit, value);
                 }
@@ -314,7 +317,7 @@ impl<'a, 'p> Seeker<'a, 'p> {
 
     /// One object of an array: a sample of a batch, or one transform among others.
     fn element(&mut self, element: Found<'a>, found: &mut Found<'a>) -> Scan<()> {
-        if element.has_gyro() {
+        if element.has_gyro() || (self.plan.takes_besides && element.is_beside()) {
             if self.batched >= MAX_BATCH {
                 return Err(Undecodable::TooMany {
                     limit: MAX_BATCH as u64,

@@ -38,6 +38,21 @@ pub(crate) enum StampRule {
     Nested,
 }
 
+/// What a phone's sensor of this name measures. An accelerometer only where gravity is in it, and in the direction of a
+/// specific force: Android's, and Sensor Logger's `totalacceleration` and `accelerometeruncalibrated` (what it calls
+/// `accelerometer` is without gravity).
+fn measured_by(sensor: &str) -> Option<Slot> {
+    let name = sensor.to_ascii_lowercase();
+    match &*name {
+        "android.sensor.accelerometer" | "totalacceleration" | "accelerometeruncalibrated" => {
+            Some(Slot::ACCEL)
+        }
+        "android.sensor.magnetic_field" | "magnetometer" => Some(Slot::MAG),
+        _ if name.contains("gyro") => Some(Slot::GYRO),
+        _ => None,
+    }
+}
+
 /// What one object held.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Found<'a> {
@@ -49,6 +64,8 @@ pub(crate) struct Found<'a> {
     pub(crate) unit: Option<GyroUnit>,
     pub(crate) interval: TimeUnit,
     pub(crate) accel_interval: TimeUnit,
+    /// A body rate is named, if without a value: a sample that lacks it.
+    pub(crate) names_gyro: bool,
     /// Numbers under `values`, whose meaning only a sensor's name tells.
     pub(crate) values: Option<[f64; 3]>,
     pub(crate) sensor: Option<Cow<'a, str>>,
@@ -112,12 +129,22 @@ impl<'a> Found<'a> {
         self.registers.has(Slot::GYRO, 3)
     }
 
+    /// Of an accelerometer or magnetometer that sends by itself.
+    pub(crate) fn is_beside(&self) -> bool {
+        let has = |slot| self.registers.has(slot, 3);
+        !self.has_gyro()
+            && !self.names_gyro
+            && !self.has_orientation()
+            && (has(Slot::ACCEL) || has(Slot::MAG))
+    }
+
     pub(crate) fn has_orientation(&self) -> bool {
         self.registers.has(Slot::ORIENTATION, 4)
     }
 
     /// Keeps what an object inside this one held, until all keys have been seen.
     pub(crate) fn nest(&mut self, inner: Found<'a>, rule: StampRule) {
+        self.names_gyro |= inner.names_gyro;
         if inner.registers.seen == 0 && inner.batch.is_empty() && inner.stamp.is_none() {
             return;
         }
@@ -138,12 +165,15 @@ impl<'a> Found<'a> {
         if self.delta_velocity && !self.registers.has(Slot::ACCEL_INTERVAL, 1) {
             self.registers.seen &= !Slot::ACCEL.bits(3);
         }
-        let is_gyro = |name: &str| name.to_ascii_lowercase().contains("gyro");
         if let (Some(values), Some(sensor)) = (self.values, &self.sensor)
-            && is_gyro(sensor)
+            && let Some(slot) = measured_by(sensor)
         {
             let sensor_is_android = sensor.starts_with("android.");
-            self.gyro(4, Some(GyroUnit::Rad), None, values);
+            if slot == Slot::GYRO {
+                self.gyro(4, Some(GyroUnit::Rad), None, values);
+            } else if !self.registers.has(slot, 3) {
+                self.vector(slot, values);
+            }
             // Android stamps its events in nanoseconds since boot.
             if let (true, Some((_, Written::Number(_, unit @ TimeUnit::ByMagnitude)))) =
                 (sensor_is_android, &mut self.stamp)

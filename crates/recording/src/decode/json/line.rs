@@ -87,6 +87,13 @@ impl LineDecoder {
         decoder
     }
 
+    /// The same that reads specific forces and fields that come by themselves, too ([`RawSample::is_beside`]).
+    #[must_use]
+    pub fn with_besides(mut self) -> Self {
+        self.plan.takes_besides = true;
+        self
+    }
+
     /// Reads one line, without or with its line end; `received` becomes the log and publish time.
     ///
     /// # Errors

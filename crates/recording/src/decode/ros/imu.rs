@@ -136,6 +136,7 @@ fn sample<const BIG: bool>(
             is_mark(double(4)),
         ),
         interval_nanos: None,
+        is_beside: false,
     })
 }
 
