@@ -187,12 +187,14 @@ pub(super) fn bounds(trace: &Traces<4>, time: Time, part: Bounded) -> Result<Str
 /// What corrected the attitude was off by, between three sigma of what was expected: gravity, and heading where a field
 /// told it.
 pub(super) fn innovations(traces: &Traces<5>, time: Time) -> Vec<Result<String, String>> {
-    let parts: [(&str, &[(usize, &str)], usize); 2] = [
-        ("Innovations of gravity, as tilt", &[(0, "x"), (1, "y")], 2),
-        ("Innovations of heading", &[(3, "heading")], 4),
-    ];
+    let of_gravity = (
+        "Innovations of gravity, as tilt",
+        vec![(0, "x"), (1, "y")],
+        2,
+    );
+    let of_heading = ("Innovations of heading", vec![(3, "heading")], 4);
     let mut charts = Vec::new();
-    for (title, named, three) in parts {
+    for (title, named, three) in [of_gravity, of_heading] {
         let of = |index: usize| traces.points(index, time.nanos);
         let mut lines: Vec<Series> = named
             .iter()
