@@ -275,6 +275,8 @@ fn warnings(topic: &Topic, summary: &TopicSummary) -> Vec<String> {
             "{marked} samples mark their gyro as absent (covariance -1), which some drivers do wrongly: --ignore-covariance-flag uses it all the same"
         ));
     }
+    let aided = summary.aided.as_ref();
+    said.extend(aided.and_then(|aided| aided.doubt(&summary.noise)));
     if topic.zeros.count > 0 {
         said.push(format!(
             "{} samples are exactly zero about all axes between others that are not: a driver that has no data says so this way; they are integrated as rest",

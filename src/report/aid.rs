@@ -11,6 +11,7 @@ pub struct Aided {
     started: bool,
     has_field: bool,
     is_implausible: bool,
+    is_beyond_class: bool,
     report: Report,
     calibration: Calibration,
     sigma: Calibration,
@@ -27,6 +28,7 @@ impl Aided {
             started: filter.is_started(),
             has_field: filter.has_field(),
             is_implausible: filter.is_force_implausible(),
+            is_beyond_class: filter.is_beyond_class(),
             report: filter.report(),
             calibration: *filter.calibration(),
             sigma: filter.calibration_sigma(),
@@ -164,6 +166,24 @@ impl Aided {
         })
     }
 
+    /// What is to be said where the sensor is farther off than those of its class, `noise`, are.
+    #[must_use]
+    pub fn doubt(&self, noise: &str) -> Option<String> {
+        let largest = |v: &Vector3<f64>, scale: f64| significant(v.amax() * scale, 2);
+        let advice = match noise {
+            "uncalibrated" => "give its sizes to --noise as a list",
+            _ => "--noise uncalibrated expects that",
+        };
+        (self.started && self.is_beyond_class).then(|| {
+            format!(
+                "the sensor is farther off than those of class {noise} are (scale {} %, axes {} deg, accelerometer {} m/s^2): sigma is too small; {advice}",
+                largest(&self.calibration.scale, 100.0),
+                largest(&self.calibration.cross, 1f64.to_degrees()),
+                largest(&self.calibration.force_bias, 1.0),
+            )
+        })
+    }
+
     /// What the sigma of the attitude is of.
     #[must_use]
     pub fn sigma_text(&self) -> &'static str {
@@ -191,6 +211,7 @@ impl Aided {
         json!({
             "by": if self.has_field { "gravity+mag" } else { "gravity" },
             "force_implausible": self.is_implausible,
+            "beyond_class": self.is_beyond_class,
             "fields": self.report.fields,
             "fields_doubted": self.report.fields_rejected,
             "fields_unpaired": self.report.fields_unpaired,

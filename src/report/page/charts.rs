@@ -203,7 +203,16 @@ pub(super) fn innovations(traces: &Traces<5>, time: Time) -> Vec<Result<String, 
         if lines.iter().all(|series| series.points.is_empty()) {
             continue;
         }
-        let bound = |sign: f64| of(three).iter().map(|[x, y]| [*x, sign * y]).collect();
+        // Bounds far from everything would flatten it.
+        let values = lines.iter().flat_map(|series| &series.points);
+        let largest = values.map(|p| p[1].abs()).fold(0.0, f64::max);
+        let shown = |y: f64| if y > 3.0 * largest { f64::NAN } else { y };
+        let bound = |sign: f64| {
+            of(three)
+                .iter()
+                .map(|[x, y]| [*x, sign * shown(*y)])
+                .collect()
+        };
         for (name, points) in [("3 sigma", bound(1.0)), ("", bound(-1.0))] {
             lines.push(Series {
                 name: name.to_owned(),

@@ -399,3 +399,33 @@ fn a_push_stands_out_of_the_innovations() {
     let (before, pushed) = (largest(500, 1500), largest(1500, 1520));
     assert!(before < 20.0 && pushed > 5.0 * before, "{before} {pushed}");
 }
+
+#[test]
+fn a_scale_that_its_class_has_not_is_noticed() {
+    let rolling = |scale: f64| {
+        move |t: f64| {
+            let (roll, rate) = (3.0 * (0.4 * t).sin(), 1.2 * (0.4 * t).cos());
+            let force = Vector3::new(0.0, roll.sin(), roll.cos()) * 9.81;
+            (Vector3::x() * (rate * scale), force)
+        }
+    };
+    for (scale, is_beyond) in [(1.0, false), (1.002, false), (1.03, true)] {
+        let filter = fed(Settings::default(), 90, rolling(scale));
+        let found = filter.filter().calibration().scale;
+        assert_eq!(
+            filter.filter().is_beyond_class(),
+            is_beyond,
+            "{scale}: {found}"
+        );
+    }
+    let uncalibrated = Settings {
+        scale_prior: 0.02,
+        cross_prior: 0.02,
+        ..Settings::default()
+    };
+    assert!(
+        !fed(uncalibrated, 90, rolling(1.03))
+            .filter()
+            .is_beyond_class()
+    );
+}
