@@ -176,7 +176,7 @@ impl Aided {
         };
         (self.started && self.is_beyond_class).then(|| {
             format!(
-                "the sensor is farther off than those of class {noise} are (scale {} %, axes {} deg, accelerometer {} m/s^2): sigma is too small; {advice}",
+                "the sensor is farther off than those of class {noise} are (scale {} %, axes {} deg, accelerometer {} m/s^2): sigma was too small until that was seen; {advice}",
                 largest(&self.calibration.scale, 100.0),
                 largest(&self.calibration.cross, 1f64.to_degrees()),
                 largest(&self.calibration.force_bias, 1.0),

@@ -21,6 +21,8 @@ const LARGEST_FORCE: f64 = 1000.0;
 const LARGEST_FIELD: f64 = 1e6;
 /// How long a specific force counts for the present, s.
 const FORCE_SECS: f64 = 0.5;
+/// One sigma of the scale, and of the angles between the axes (rad), of a gyro that is none of its class.
+const WIDE: f64 = 0.01;
 /// After so many gaps in a row the sensor has become slower.
 const GAPS_IN_A_ROW: u32 = 20;
 
@@ -122,6 +124,8 @@ pub struct Filter {
     pub(super) plausibility: Plausibility,
     /// Since the sample before.
     pub(super) has_levelled: bool,
+    /// The gyro was found to be none of its class, and its scale and axes are looked for farther off.
+    pub(super) is_widened: bool,
     /// Of the last correction.
     pub(super) innovation: Innovation,
     pub(super) report: Report,
@@ -159,6 +163,7 @@ impl Filter {
             since_force: 0.0,
             plausibility: Plausibility::default(),
             has_levelled: false,
+            is_widened: false,
             innovation: Innovation::NONE,
             report: Report::default(),
         };
@@ -189,16 +194,41 @@ impl Filter {
     }
 
     /// Whether what was learned of the gyro's scale and axes lies two of its prior sigmas off, or the accelerometer's bias
-    /// three: then the sensor is none of that class, and the sigma of the attitude is too small. Not asked of priors that a
-    /// calibration gave. The bounds tell the 14 recordings of BROAD from simulated units that nobody calibrated.
+    /// three: then the sensor is none of that class, and the sigma of the attitude has been too small. Not asked of priors
+    /// that a calibration gave. The bounds tell the 14 recordings of BROAD from simulated units that nobody calibrated.
     #[must_use]
     pub fn is_beyond_class(&self) -> bool {
+        let settings = &self.settings;
+        let is_force = self.calibration.force_bias.amax() > 3.0 * settings.force_bias_prior;
+        self.is_widened
+            || self.is_gyro_beyond_class()
+            || (is_force && settings.prior.force_bias.is_none())
+    }
+
+    fn is_gyro_beyond_class(&self) -> bool {
         let (settings, found) = (&self.settings, &self.calibration);
-        let prior = &settings.prior;
-        let is_gyro = found.scale.amax() > 2.0 * settings.scale_prior
-            || found.cross.amax() > 2.0 * settings.cross_prior;
-        let is_force = found.force_bias.amax() > 3.0 * settings.force_bias_prior;
-        (is_gyro && prior.scale.is_none()) || (is_force && prior.force_bias.is_none())
+        settings.prior.scale.is_none()
+            && (found.scale.amax() > 2.0 * settings.scale_prior
+                || found.cross.amax() > 2.0 * settings.cross_prior)
+    }
+
+    /// Looks for the gyro's scale and axes farther off, once it was found to be none of its class.
+    pub(super) fn widen(&mut self) {
+        if self.is_widened || !self.is_gyro_beyond_class() {
+            return;
+        }
+        self.is_widened = true;
+        let Settings {
+            scale_prior,
+            cross_prior,
+            ..
+        } = self.settings;
+        for (first, prior) in [(SCALE, scale_prior), (CROSS, cross_prior)] {
+            let more = (WIDE * WIDE - prior * prior).max(0.0);
+            for axis in 0..3 {
+                self.covariance.add(first + axis, more);
+            }
+        }
     }
 
     /// Covariance of the calibration's numbers from state `first` on, as much larger than the filter's own as that

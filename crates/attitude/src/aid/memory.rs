@@ -57,6 +57,8 @@ pub struct Memory {
     last_force: Option<Vector3<f64>>,
     since_force: f64,
     plausibility: Plausibility,
+    #[cfg_attr(feature = "serde", serde(default))]
+    is_widened: bool,
     report: Report,
     given: Vec<Given>,
     last: Option<Nanos>,
@@ -99,6 +101,7 @@ impl Aided {
             last_force: filter.last_force,
             since_force: filter.since_force,
             plausibility: filter.plausibility,
+            is_widened: filter.is_widened,
             report: filter.report,
             given: self.given.iter().copied().collect(),
             last: self.last,
@@ -141,6 +144,7 @@ impl Aided {
             last_force: memory.last_force,
             since_force: memory.since_force,
             plausibility: memory.plausibility,
+            is_widened: memory.is_widened,
             report: memory.report,
             ..self.filter.clone()
         };

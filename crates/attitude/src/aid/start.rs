@@ -134,5 +134,6 @@ impl Filter {
         let settings = self.settings;
         (self.calibration, self.covariance) = settings.prior.begin(&settings);
         self.known = Applied::of(&self.calibration);
+        self.is_widened = false;
     }
 }

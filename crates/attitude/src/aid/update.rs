@@ -61,6 +61,7 @@ impl Filter {
             self.use_field(&mut correction);
         }
         self.inject(&correction);
+        self.widen();
         self.interval = Interval::new();
         let attitude = self.correction.wxyz();
         if !self.covariance.is_sound() || !attitude.iter().all(|c| c.is_finite()) {
