@@ -102,6 +102,8 @@ pub struct Settings {
     pub outputs: Vec<Target>,
     /// The replay that is served; no samples are taken then.
     pub playback: Option<Arc<playback::controls::Playback>>,
+    /// What is served brings samples beside attitudes: clients may ask for them before the first stream is there.
+    pub brings_samples: bool,
 }
 
 /// A daemon that listens, and serves when it is [run](Server::run).

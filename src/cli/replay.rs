@@ -269,9 +269,9 @@ impl Replay {
             .collect::<Result<_>>()?;
         let source = Source::parse(log);
         let can_rewind = matches!(&source, Source::File(path) if path.is_file());
-        let served = self
-            .serving
-            .start(targets, self.speed.as_deref(), (log, can_rewind))?;
+        let served =
+            self.serving
+                .start(targets, self.speed.as_deref(), (log, can_rewind, false))?;
         let run = ReplayRequest {
             source,
             targets: served.targets.clone(),

@@ -48,8 +48,8 @@ pub(super) struct Served {
 }
 
 impl Serving {
-    /// Starts the server, if a target listens. `speed` is what was given; `source` what is played, and
-    /// whether it can be played again.
+    /// Starts the server, if a target listens. `speed` is what was given; `source` what is played, whether it can be
+    /// played again, and whether it brings samples beside attitudes.
     ///
     /// # Errors
     /// [`Error::Usage`] naming the flag; [`Error::Bind`].
@@ -57,7 +57,7 @@ impl Serving {
         &self,
         mut targets: Vec<Target>,
         speed: Option<&str>,
-        (source, can_rewind): (&str, bool),
+        (source, can_rewind, brings_samples): (&str, bool, bool),
     ) -> Result<Served> {
         if let Some(page) = &self.page {
             targets.push(Target::Listen(Listen::parse_from(
@@ -106,6 +106,7 @@ impl Serving {
             });
             let settings = self.admission.apply(Settings {
                 listen,
+                brings_samples,
                 ..Settings::default()
             })?;
             let cast = Cast::start(settings, playback, self.page.is_some(), true)?;

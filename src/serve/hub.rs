@@ -67,6 +67,8 @@ pub struct Hub {
     recorder: Option<Handle>,
     /// The replay it serves, which is then its only source.
     playback: Option<Arc<Playback>>,
+    /// Samples can be watched, too.
+    brings_samples: bool,
     outgoing: Vec<Arc<Outgoing>>,
     session: String,
     started: Instant,
@@ -210,6 +212,7 @@ impl Hub {
             token: settings.token,
             recorder: settings.recorder,
             playback: settings.playback,
+            brings_samples: settings.brings_samples,
             outgoing: settings
                 .sources
                 .into_iter()

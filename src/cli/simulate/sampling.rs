@@ -274,7 +274,7 @@ impl Common {
         let played = format!("simulate {name}");
         let served = self
             .serving
-            .start(targets, self.speed.as_deref(), (&played, true))?;
+            .start(targets, self.speed.as_deref(), (&played, true, true))?;
         let simulation = Simulation {
             name: name.to_owned(),
             source,

@@ -23,6 +23,7 @@ impl Hub {
     pub fn classes(&self) -> Vec<Class> {
         let mut classes: Vec<Class> = read(&self.channels).values().map(|c| c.class()).collect();
         classes.push(Class::Att);
+        classes.extend(self.brings_samples.then_some(Class::Rate));
         classes.sort_unstable();
         classes.dedup();
         classes

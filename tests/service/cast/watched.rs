@@ -4,7 +4,14 @@ use super::lines::{LOG, SIMULATION, lines_of, of_class};
 use crate::program::strapd;
 use crate::serve::client::{Client, get};
 use crate::serve::daemon::{Process, TCP, WS, eventually};
+use std::collections::VecDeque;
 use std::path::Path;
+use std::sync::Arc;
+use strapd::serve::Settings;
+use strapd::serve::hub::Hub;
+use strapd::serve::playback::controls::Playback;
+use strapd::serve::session::{Scratch, Session};
+use strapd_attitude::record::Nanos;
 
 /// Started, and waiting for a client to say `play`.
 pub(crate) fn paused(arguments: &str, sinks: &[&str]) -> Process {
@@ -77,6 +84,26 @@ fn whoever_watches_a_simulation_gets_samples_and_truth_or_one_of_them() {
     assert!(of_class(&lines, "RATE") == of("RATE") && of_class(&lines, "ATT").is_empty());
     let lines = truth.lines();
     assert!(of_class(&lines, "RATE").is_empty() && of_class(&lines, "ATT") == of("ATT"));
+}
+
+#[test]
+fn samples_of_a_simulation_can_be_asked_for_before_it_has_begun() {
+    for (brings_samples, answer) in [(true, "WATCH"), (false, "ERROR")] {
+        let playback = Playback::new("simulate top", Some(1.0), true);
+        let hub = Hub::new(Settings {
+            playback: Some(Arc::new(playback)),
+            brings_samples,
+            ..Settings::default()
+        });
+        let mut early = Session::new(&Arc::new(hub.unwrap()), "early".to_owned(), true);
+        let asked = b"{\"class\":\"WATCH\",\"streams\":[\"RATE\"]}\n";
+        early.bytes(asked, Nanos(0), &mut Scratch::default());
+        let mut parts = VecDeque::new();
+        early.client().outbox.take(usize::MAX, &mut parts);
+        let last = parts.back().unwrap();
+        let said: serde_json::Value = serde_json::from_slice(last).unwrap();
+        assert_eq!(said["class"], answer, "{said}");
+    }
 }
 
 #[test]

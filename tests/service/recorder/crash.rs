@@ -5,6 +5,7 @@ use super::{assert_whole, attitude, linear, recovered, sample};
 use std::path::Path;
 use std::process::Command;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use strapd::serve::recorder::{Recorder, Settings};
 
@@ -61,14 +62,38 @@ fn killed(dir: &Path, n: u64, rate_hz: u64, flush_ms: u64, moment: Duration) -> 
     handed.saturating_sub(samples.min(attitudes)) as f64 / rate_hz as f64
 }
 
+/// What `work` gives, and by how much a thread that sleeps for a moment woke too late meanwhile, s: where the machine is
+/// busy, nobody does anything in time.
+fn with_lateness<T>(work: impl FnOnce() -> T) -> (T, f64) {
+    let done = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        let watch = scope.spawn(|| {
+            let (moment, mut latest) = (Duration::from_millis(5), 0.0_f64);
+            while !done.load(Ordering::Relaxed) {
+                let before = Instant::now();
+                std::thread::sleep(moment);
+                let late = before.elapsed().saturating_sub(moment);
+                latest = latest.max(late.as_secs_f64());
+            }
+            latest
+        });
+        let result = work();
+        done.store(true, Ordering::Relaxed);
+        (result, watch.join().unwrap())
+    })
+}
+
 #[test]
 fn kill_9_at_twenty_moments_costs_a_quarter_of_a_second_at_most() {
-    // At twice the default pace of flushing, so that the bound holds on a busy machine too; the
-    // default is measured below.
+    // At twice the default pace of flushing, so that the bound has room; the default is measured below. The thread that
+    // flushes waits for the processor twice: to wake, and to write.
     for rate_hz in [200, 1000] {
-        let lost = seconds_lost(rate_hz, 100, 10, 5);
-        eprintln!("{rate_hz} Hz: lost {lost:.3?} s");
-        assert!(lost.last().unwrap() <= &0.25, "{rate_hz} Hz: {lost:?} s");
+        let (lost, late) = with_lateness(|| seconds_lost(rate_hz, 100, 10, 5));
+        eprintln!("{rate_hz} Hz: lost {lost:.3?} s, the machine {late:.3} s late");
+        assert!(
+            *lost.last().unwrap() <= 0.25 + 2.0 * late,
+            "{rate_hz} Hz: {lost:?} s, the machine {late} s late"
+        );
     }
 }
 
