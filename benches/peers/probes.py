@@ -128,8 +128,14 @@ def estimates(binary, run, flags=""):
     return [found[0], six, found[1], nine]
 
 
+# Rows that are wanted: those whose name has one of these in it.
+ONLY = [""]
+
+
 def row(name, binary, runs, flags=""):
     """One line of a table: the mean over the runs."""
+    if not any(part in name for part in ONLY):
+        return
     scores = []
     for run in runs:
         four = estimates(binary, run, flags)
@@ -358,7 +364,9 @@ def main():
     parser.add_argument("folder", nargs="?", help="of trials with optical truth")
     parser.add_argument("--strapd", default="target/release/strapd")
     parser.add_argument("--trials", help="their numbers, separated by commas")
+    parser.add_argument("--only", help="rows with one of these in their name, separated by commas")
     args = parser.parse_args()
+    ONLY[:] = (args.only or "").split(",")
     binary = os.path.abspath(args.strapd)
     if args.what == "motions":
         return motions(binary)
