@@ -78,6 +78,13 @@ fn line(name: &str, color: usize, points: Vec<[f64; 2]>) -> Series {
     }
 }
 
+fn bound(name: &str, points: Vec<[f64; 2]>, color: usize) -> Series {
+    Series {
+        look: Look::Dashed,
+        ..line(name, color, points)
+    }
+}
+
 /// Some of a run's series in one chart.
 pub(super) fn series(
     traces: &Traces<8>,
@@ -169,18 +176,12 @@ pub(super) fn bounds(trace: &Traces<4>, time: Time, part: Bounded) -> Result<Str
     for point in above.iter_mut().filter(|p| p[1] > ROOM * largest) {
         point[1] = f64::NAN;
     }
-    let bound = |points: Vec<[f64; 2]>, name: &str| Series {
-        name: name.to_owned(),
-        points,
-        look: Look::Dashed,
-        color: Some(2),
-    };
     let mut lines = vec![line("error", 1, errors)];
     if part == Bounded::Heading {
         let below = above.iter().map(|[x, y]| [*x, -*y]).collect();
-        lines.push(bound(below, ""));
+        lines.push(bound("", below, 2));
     }
-    lines.push(bound(above, "3 sigma"));
+    lines.push(bound("3 sigma", above, 2));
     over_time(time, title, "deg", lines)
 }
 
@@ -207,20 +208,14 @@ pub(super) fn innovations(traces: &Traces<5>, time: Time) -> Vec<Result<String, 
         let values = lines.iter().flat_map(|series| &series.points);
         let largest = values.map(|p| p[1].abs()).fold(0.0, f64::max);
         let shown = |y: f64| if y > 3.0 * largest { f64::NAN } else { y };
-        let bound = |sign: f64| {
+        let bounds = |sign: f64| {
             of(three)
                 .iter()
                 .map(|[x, y]| [*x, sign * shown(*y)])
                 .collect()
         };
-        for (name, points) in [("3 sigma", bound(1.0)), ("", bound(-1.0))] {
-            lines.push(Series {
-                name: name.to_owned(),
-                points,
-                look: Look::Dashed,
-                color: Some(4),
-            });
-        }
+        let (above, below) = (bounds(1.0), bounds(-1.0));
+        lines.extend([bound("3 sigma", above, 4), bound("", below, 4)]);
         charts.push(over_time(time, title, "deg", lines));
     }
     charts

@@ -124,11 +124,9 @@ impl Aided {
 
     /// The same where specific forces come by [`Aided::take_force`], and not with the gyro samples.
     #[must_use]
-    pub fn with_forces_beside(self) -> Aided {
-        Aided {
-            forces: Some(Beside::default()),
-            ..self
-        }
+    pub fn with_forces_beside(mut self) -> Aided {
+        self.expect_forces_beside();
+        self
     }
 
     /// Keeps the innovations of every correction from now on, for [`Aided::innovations`].

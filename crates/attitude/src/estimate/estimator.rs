@@ -300,13 +300,6 @@ impl Estimator {
         if self.regulariser.is_some() || self.settings != memory.settings {
             return false;
         }
-        if memory.has_forces_beside()
-            && let Some(besides) = self.besides.as_mut()
-            && besides.forces == Forces::Unseen
-        {
-            besides.forces = Forces::Beside;
-            self.integrator.expect_forces_beside();
-        }
         let mut conditioner = self.conditioner.clone();
         let fits = conditioner.recall(&memory.conditioning)
             && match (&mut self.integrator, &memory.aiding) {
@@ -378,7 +371,8 @@ impl Estimator {
     }
 
     /// Takes the specific force, or the magnetic field, of a message that carries no rate: of topics, and at
-    /// rates, of their own. What is not asked for ([`Plan::has_forces_beside`], [`Plan::aid`]) is passed over.
+    /// rates, of their own. What is not asked for ([`Plan::aid`]), and a force where forces come with the rates
+    /// ([`Forces`]), is passed over.
     pub fn take_beside(&mut self, raw: &RawSample) {
         self.take_field(raw);
         let Some(besides) = &mut self.besides else {

@@ -397,6 +397,7 @@ fn a_push_stands_out_of_the_innovations() {
             .fold(0.0, |most: f64, i| most.max(i.abs()))
     };
     let (before, pushed) = (largest(500, 1500), largest(1500, 1520));
+    // Found 12 degrees in the motion itself, and 180 where it is pushed by three times gravity.
     assert!(before < 20.0 && pushed > 5.0 * before, "{before} {pushed}");
 }
 
