@@ -18,6 +18,7 @@ pub mod progress;
 pub mod recover;
 pub mod replay;
 pub mod report;
+pub mod send;
 pub mod serve;
 pub mod serving;
 pub mod shell;
@@ -44,6 +45,7 @@ use std::process::ExitCode;
   strapd report flight.mcap -o flight.html     all that can be said about it, on one page
   strapd cat flight.mcap --topic /imu | head   decoded samples as NDJSON
   strapd serve                                 samples in over sockets, attitude out
+  strapd send flight.mcap                      a recording into that daemon, in real time
   strapd watch                                 what that daemon makes, live in the terminal
 
 Exit codes: 0 done; 1 failed; 2 bad arguments; 3 done, but samples were lost (check: something was found);
@@ -140,6 +142,8 @@ pub enum Command {
     Compare(compare::Compare),
     /// Decoded samples of a file, or attitudes of a daemon, as NDJSON, CSV or a table
     Cat(cat::Cat),
+    /// A recording's samples to a daemon, as fast as they were measured
+    Send(send::Send),
     /// Every sensor of a daemon, live in the terminal
     Watch(watch::Watch),
     /// Samples of a synthetic gyro whose true attitude is known exactly
@@ -194,6 +198,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Report(command) => report::run(&cli.global, &command),
         Command::Compare(command) => compare::run(&cli.global, &command),
         Command::Cat(command) => cat::run(&cli.global, &command),
+        Command::Send(command) => send::run(&cli.global, &command),
         Command::Watch(command) => watch::run(&cli.global, &command),
         Command::Simulate(command) => simulate::run(&cli.global, &command),
         Command::Model(command) => model::run(&cli.global, &command),

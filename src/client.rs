@@ -5,13 +5,15 @@
 //! | [`remote`] | the word on the command line -> where to connect | pure |
 //! | [`link`] | bytes and messages both ways, over any transport | I/O |
 //! | [`secret`] | a file -> the token in it | reads it |
+//! | [`sender`] | lines -> a daemon, and what it complains of | I/O |
 //! | [`watcher`] | what a daemon says -> attitudes, state, complaints | I/O |
 //!
-//! `serve` connects out to its sources through [`link`] too; `cat` and `watch` do.
+//! `serve` connects out to its sources through [`link`] too; `cat`, `send` and `watch` do.
 
 pub mod link;
 pub mod remote;
 pub mod secret;
+pub mod sender;
 pub mod watcher;
 
 use crate::error::{Error, Result};

@@ -22,6 +22,7 @@ mod stream;
 mod target;
 #[cfg(test)]
 pub(crate) mod tests;
+mod tum;
 
 pub use copy::CopiedChannel;
 pub(crate) use csv::{RAW_HEADER, push_raw_row, roll_pitch_yaw};
@@ -141,11 +142,15 @@ impl Sink {
     ) -> Result<Sink> {
         let mut tables = streams.iter().filter(|s| s.content != Content::Truth);
         let table = tables.next();
-        if target.format() == Some(Format::Csv) && tables.next().is_some() {
-            return Err(Error::Usage(format!(
-                "a CSV has no column for the topic and {} topics are estimated\n  help: choose one with --topic, or write .ndjson or .mcap",
-                streams.len()
-            )));
+        let is_several = tables.next().is_some();
+        match target.format() {
+            Some(Format::Csv | Format::Tum) if is_several => {
+                return Err(Error::Usage(format!(
+                    "a table of one attitude has no column for the topic, and {} topics are estimated\n  help: choose one with --topic, or write .ndjson or .mcap",
+                    streams.len()
+                )));
+            }
+            _ => {}
         }
         let output = Output::open(target, inputs, options.force)?;
         let streams: Vec<Stream> = streams.iter().map(Stream::bounded).collect();
@@ -172,6 +177,10 @@ impl Sink {
                 head.extend_from_slice(header);
                 Form::Csv(last)
             }
+            Some(Format::Tum) => {
+                head.extend_from_slice(tum::HEADER);
+                Form::Tum
+            }
             Some(Format::Mcap) => Form::Mcap {
                 layout: Layout::begin(
                     &mut file,
@@ -183,11 +192,13 @@ impl Sink {
                 compression: options.compression,
             },
         };
-        // A table has no rows for truth.
-        let left_out: Vec<bool> = streams
-            .iter()
-            .map(|s| matches!(form, Form::Csv(_)) && s.content == Content::Truth)
-            .collect();
+        // A CSV has no rows for truth, a trajectory none for what is no attitude.
+        let is_left_out = |stream: &Stream| match form {
+            Form::Csv(_) => stream.content == Content::Truth,
+            Form::Tum => matches!(stream.content, Content::Samples(_)),
+            _ => false,
+        };
+        let left_out: Vec<bool> = streams.iter().map(is_left_out).collect();
         Sink::begin(output, form, file, &head, &left_out)
     }
 

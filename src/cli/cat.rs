@@ -1,5 +1,6 @@
 //! `strapd cat SOURCE`: decoded samples of a file, or attitudes of a daemon, as NDJSON, CSV or a table. I/O.
 
+pub(super) mod line;
 mod url;
 
 use super::{Global, Outcome};
@@ -11,7 +12,6 @@ use crate::pipeline::log::{Log, problems};
 use crate::pipeline::topic_reading::{Taken, TopicReading};
 use crate::sink::{RAW_HEADER, push_raw_row};
 use clap::{Args, ValueEnum};
-use serde_json::json;
 use std::io::{BufWriter, Write};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -215,7 +215,9 @@ impl Printer {
         }
         self.left -= 1;
         match self.format {
-            Format::Ndjson => self.ndjson(raw, kind)?,
+            Format::Ndjson => {
+                writeln!(self.out, "{}", line::rate(&self.topic, self.seq, raw, kind))?;
+            }
             Format::Csv => {
                 self.row.clear();
                 push_raw_row(&mut self.row, raw, kind.map_or("", SampleKind::name));
@@ -225,34 +227,6 @@ impl Printer {
         }
         self.seq += 1;
         Ok(self.left > 0)
-    }
-
-    /// A `RATE` object as the service reads it: what is absent is left out, NaN becomes null.
-    fn ndjson(&mut self, raw: &RawSample, kind: Option<SampleKind>) -> std::io::Result<()> {
-        let (sec, nsec) = raw.header.unwrap_or(raw.log).to_sec_nanosec();
-        let mut object = json!({
-            "class": "RATE", "id": self.topic, "seq": self.seq,
-            "stamp": { "sec": sec, "nsec": nsec },
-        });
-        if let Some(map) = object.as_object_mut() {
-            let mut put = |key: &str, value: serde_json::Value| map.insert(key.to_owned(), value);
-            if let Some(gyro) = raw.gyro {
-                put("gyro", json!(gyro));
-            }
-            if let Some(accel) = raw.accel {
-                put("accel", json!(accel));
-            }
-            if let Some([w, x, y, z]) = raw.orientation {
-                put("q", json!({ "w": w, "x": x, "y": y, "z": z }));
-            }
-            if let Some(interval) = raw.interval_nanos {
-                put("dt_ns", json!(interval));
-            }
-            if let Some(kind) = kind {
-                put("sample_kind", json!(kind.name()));
-            }
-        }
-        writeln!(self.out, "{object}")
     }
 
     fn table(&mut self, raw: &RawSample) -> std::io::Result<()> {

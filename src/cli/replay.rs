@@ -31,7 +31,7 @@ pub struct Replay {
     /// Logs: MCAP, ULog or ROS 1 bag, NDJSON, or - for one of these on standard input
     #[arg(required = true, value_name = "SOURCE")]
     pub sources: Vec<String>,
-    /// Where the attitude goes: a .mcap, .ndjson or .csv file, a directory, - (NDJSON on stdout),
+    /// Where the attitude goes: a .mcap, .ndjson, .csv or .tum (evo) file, a directory, - (NDJSON on stdout),
     /// null: (nowhere); tcp-listen://HOST:PORT, unix-listen:///PATH, ws-listen://HOST:PORT (whoever
     /// connects); tcp://HOST:PORT, udp://HOST:PORT[?profile=plotjuggler] (somebody who listens).
     /// {stem} stands for the log's name. May be given several times

@@ -11,7 +11,7 @@ use crate::pipeline::input::Input;
 use crate::pipeline::provenance::sha256;
 use crate::report::findings::findings;
 use crate::report::page::{DRAWN, Noise, Page, STRETCHES, Told, longest_rest};
-use crate::report::summary::significant;
+use crate::report::summary::{human_bytes, significant};
 use crate::sink::Document;
 use clap::Args;
 use std::path::PathBuf;
@@ -135,7 +135,13 @@ pub fn run(global: &Global, args: &Report) -> Result<Outcome> {
         checked: &checked,
     };
     if let Some(document) = document {
-        document.write(&page.html())?;
+        let html = page.html();
+        document.write(&html)?;
+        let name = output
+            .map(|path| path.display().to_string())
+            .unwrap_or_default();
+        tracing::info!("{}", page.sentence());
+        tracing::info!("wrote {name}  {}", human_bytes(html.len() as u64));
     }
     if global.json {
         print(&format!("{}\n", page.json()))?;

@@ -1,6 +1,7 @@
 //! Bytes and messages to and from a remote end, over any transport. I/O.
 
 use super::remote::{Place, Remote};
+use super::secret::Secret;
 use futures_util::{SinkExt, StreamExt};
 use std::io;
 use std::time::Duration;
@@ -84,6 +85,26 @@ impl Link {
         }
     }
 
+    /// The same, and shows the token where lines are spoken, too.
+    ///
+    /// # Errors
+    /// As [`Link::connect`].
+    pub async fn connect_as(
+        remote: &Remote,
+        token: Option<&Secret>,
+        max_message: usize,
+    ) -> Result<Link, String> {
+        let mut link = Link::connect(remote, token.map(Secret::reveal), max_message).await?;
+        let is_web = matches!(remote, Remote::WebSocket { .. });
+        if let Some(token) = token.filter(|_| !is_web && link.is_two_way()) {
+            let auth = serde_json::json!({"class": "AUTH", "token": token.reveal()});
+            link.send(&auth.to_string())
+                .await
+                .map_err(|e| e.to_string())?;
+        }
+        Ok(link)
+    }
+
     /// Who is at the other end, by number.
     #[must_use]
     pub fn peer(&self) -> &str {
@@ -116,7 +137,7 @@ impl Link {
         }
     }
 
-    /// Sends one line, given without its end.
+    /// Sends lines, given without the end of the last.
     ///
     /// # Errors
     /// The connection broke, or nothing was taken for 10 s.
@@ -133,6 +154,20 @@ impl Link {
         timeout(SEND, sending)
             .await
             .unwrap_or_else(|_| Err(io::ErrorKind::TimedOut.into()))
+    }
+
+    /// Says that nothing more will be sent; what the other end says can still be read.
+    ///
+    /// # Errors
+    /// The connection broke.
+    pub async fn end(&mut self) -> io::Result<()> {
+        match &mut self.wire {
+            Wire::Tcp(stream) => stream.shutdown().await,
+            #[cfg(unix)]
+            Wire::Unix(stream) => stream.shutdown().await,
+            Wire::WebSocket(web) => web.stream.send(Message::Close(None)).await.map_err(broken),
+            Wire::Udp(_) => Ok(()),
+        }
     }
 }
 

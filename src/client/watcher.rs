@@ -9,7 +9,7 @@ use strapd_recording::decode::framing::{Framed, Framer};
 use strapd_recording::text::printable;
 
 /// Longest line that is read: the `STATUS` of a thousand sensors.
-const MAX_LINE: usize = 4 << 20;
+pub(super) const MAX_LINE: usize = 4 << 20;
 
 /// What one line said.
 #[derive(Debug, PartialEq)]
@@ -82,16 +82,9 @@ impl Watcher {
         token: Option<&Secret>,
         request: &str,
     ) -> Result<Watcher, String> {
-        let mut link = Link::connect(remote, token.map(Secret::reveal), MAX_LINE).await?;
-        let mut first = Vec::new();
-        if let (Some(token), false) = (token, matches!(remote, Remote::WebSocket { .. })) {
-            first.push(serde_json::json!({"class": "AUTH", "token": token.reveal()}).to_string());
-        }
-        first.push(request.to_owned());
+        let mut link = Link::connect_as(remote, token, MAX_LINE).await?;
         if link.is_two_way() {
-            for line in first {
-                link.send(&line).await.map_err(|e| e.to_string())?;
-            }
+            link.send(request).await.map_err(|e| e.to_string())?;
         }
         Ok(Watcher {
             link,
@@ -177,7 +170,7 @@ impl Watcher {
 }
 
 /// What a line says; `None` for what is of no use to a watcher.
-fn understood(line: &[u8]) -> Option<Said<'_>> {
+pub(super) fn understood(line: &[u8]) -> Option<Said<'_>> {
     let object: Object<'_> = match serde_json::from_slice(line) {
         Ok(object) => object,
         Err(_) => {

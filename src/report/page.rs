@@ -120,6 +120,13 @@ impl Page<'_> {
         out
     }
 
+    /// The verdict, as the page begins.
+    #[must_use]
+    pub fn sentence(&self) -> String {
+        let verdict = self.verdict();
+        format!("{} {}", verdict.level.word(), verdict.text)
+    }
+
     /// For machines: one object, the one in the page.
     #[must_use]
     pub fn json(&self) -> Value {

@@ -99,12 +99,13 @@ impl fmt::Display for PlotError {
 
 impl std::error::Error for PlotError {}
 
-/// Told apart by people with any colour vision (Okabe and Ito 2008), black first, grey for yellow.
+/// Told apart by people with any colour vision (Okabe and Ito 2008), black first, grey for yellow. The three after black
+/// are those of x, y and z everywhere: red, green, blue.
 const PALETTE: [RGBColor; 8] = [
     RGBColor(0, 0, 0),
-    RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),
+    RGBColor(0, 114, 178),
     RGBColor(204, 121, 167),
     RGBColor(86, 180, 233),
     RGBColor(230, 159, 0),

@@ -7,6 +7,7 @@ use super::csv;
 use super::json::Objects;
 use super::mcap::Layout;
 use super::mcap::chunk::{Chunk, Compression};
+use super::tum;
 use strapd_attitude::record::{AttitudeSample, Nanos, RawSample};
 
 /// A run of samples of one stream, with what of its past their messages depend on.
@@ -42,6 +43,7 @@ pub(super) enum Form {
     Ndjson(Vec<Objects>),
     /// With what is in the last column of every row.
     Csv(String),
+    Tum,
     Null,
 }
 
@@ -81,6 +83,11 @@ impl Slot {
                 }
                 for sample in &self.batch.raw {
                     csv::push_raw_row(&mut self.text, sample, last);
+                }
+            }
+            Form::Tum => {
+                for sample in &self.batch.samples {
+                    tum::push_row(&mut self.text, sample);
                 }
             }
             Form::Null => {}

@@ -13,6 +13,8 @@ pub enum Format {
     Ndjson,
     /// One row per sample under a header row.
     Csv,
+    /// A trajectory as `evo` reads it.
+    Tum,
 }
 
 /// Where the output goes.
@@ -43,7 +45,7 @@ pub enum Target {
 }
 
 /// The list every message about an unknown sink ends with.
-const KNOWN: &str = "known sinks: FILE.mcap, FILE.ndjson (or .jsonl), FILE.csv, - (NDJSON on standard output), null: (discard), tcp-listen://HOST:PORT, unix-listen:///PATH, ws-listen://HOST:PORT (whoever connects), tcp://HOST:PORT, udp://HOST:PORT[?profile=plotjuggler] (somebody who listens)";
+const KNOWN: &str = "known sinks: FILE.mcap, FILE.ndjson (or .jsonl), FILE.csv, FILE.tum (for evo), - (NDJSON on standard output), null: (discard), tcp-listen://HOST:PORT, unix-listen:///PATH, ws-listen://HOST:PORT (whoever connects), tcp://HOST:PORT, udp://HOST:PORT[?profile=plotjuggler] (somebody who listens)";
 
 /// What the objects sent to somebody look like.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -133,6 +135,7 @@ impl Target {
             Some("mcap") => Format::Mcap,
             Some("ndjson" | "jsonl") => Format::Ndjson,
             Some("csv") => Format::Csv,
+            Some("tum") => Format::Tum,
             Some(other) => {
                 return Err(Error::Usage(format!(
                     "-o {}: unknown extension `.{other}`\n  help: {KNOWN}",
@@ -177,6 +180,7 @@ mod tests {
             ("a.ndjson", Format::Ndjson),
             ("a.b.jsonl", Format::Ndjson),
             ("./x/a.CSV", Format::Csv),
+            ("run.tum", Format::Tum),
         ] {
             let target = Target::parse(text).unwrap();
             assert_eq!(target.format(), Some(format), "{text}");

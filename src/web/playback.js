@@ -15,8 +15,10 @@ function later(stamp, by) {
 }
 
 function clock(value) {
-  const minutes = Math.floor(value / 60);
-  const rest = (value - 60 * minutes).toFixed(1).padStart(4, "0");
+  // Rounded first: 59.96 s are a minute.
+  const tenths = Math.round(value * 10);
+  const minutes = Math.floor(tenths / 600);
+  const rest = ((tenths - 600 * minutes) / 10).toFixed(1).padStart(4, "0");
   return `${minutes}:${rest}`;
 }
 

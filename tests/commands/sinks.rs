@@ -407,21 +407,23 @@ fn two_streams_share_an_mcap_and_keep_their_channels_and_frames() {
 }
 
 #[test]
-fn several_topics_do_not_fit_into_a_csv_and_the_message_says_what_does() {
+fn several_topics_do_not_fit_into_a_table_and_the_message_says_what_does() {
     let streams = [Stream::new("/a", "fa"), Stream::new("/b", "fb")];
     let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("two.csv");
-    let error = Sink::create(
-        &target(&path),
-        &[],
-        Options::default(),
-        &streams,
-        &provenance(),
-    )
-    .unwrap_err()
-    .to_string();
-    assert!(error.contains("--topic"), "{error}");
-    assert!(!path.exists());
+    for name in ["two.csv", "two.tum"] {
+        let path = dir.path().join(name);
+        let error = Sink::create(
+            &target(&path),
+            &[],
+            Options::default(),
+            &streams,
+            &provenance(),
+        )
+        .unwrap_err()
+        .to_string();
+        assert!(error.contains("--topic"), "{error}");
+        assert!(!path.exists());
+    }
 }
 
 #[test]

@@ -30,6 +30,7 @@ mod recording;
 mod resetting;
 mod runs;
 mod same_bytes;
+mod sending;
 mod slow_readers;
 mod state;
 mod storms;

@@ -176,12 +176,12 @@ pub(super) fn bounds(trace: &Traces<4>, time: Time, part: Bounded) -> Result<Str
     for point in above.iter_mut().filter(|p| p[1] > ROOM * largest) {
         point[1] = f64::NAN;
     }
-    let mut lines = vec![line("error", 1, errors)];
+    let mut lines = vec![line("error", 3, errors)];
     if part == Bounded::Heading {
         let below = above.iter().map(|[x, y]| [*x, -*y]).collect();
-        lines.push(bound("", below, 2));
+        lines.push(bound("", below, 1));
     }
-    lines.push(bound("3 sigma", above, 2));
+    lines.push(bound("3 sigma", above, 1));
     over_time(time, title, "deg", lines)
 }
 
@@ -199,7 +199,7 @@ pub(super) fn innovations(traces: &Traces<5>, time: Time) -> Vec<Result<String, 
         let of = |index: usize| traces.points(index, time.nanos);
         let mut lines: Vec<Series> = named
             .iter()
-            .map(|(index, name)| line(name, index % 3 + 1, of(*index)))
+            .map(|(index, name)| line(name, (index + 1).min(3), of(*index)))
             .collect();
         if lines.iter().all(|series| series.points.is_empty()) {
             continue;

@@ -1,6 +1,6 @@
 //! Made logs: spikes, silence, hostile names, outputs.
 
-use super::{figure, is_sound};
+use super::{data, figure, is_sound};
 use crate::made_logs::{ImuSample, PACKINGS, START, TOPIC, bytes, logged, motion, written};
 use crate::program::strapd;
 use serde_json::Value;
@@ -310,4 +310,25 @@ fn errors_lie_between_their_three_sigma_and_what_was_learned_is_in_a_table() {
     let innovations = figure(&html, "innovations").unwrap();
     assert!(innovations.contains("<polyline") && innovations.contains("3 sigma"));
     assert!(figure(&html, "innovations-heading").is_none());
+}
+
+#[test]
+fn the_verdict_and_what_was_written_are_said() {
+    let dir = tempfile::tempdir().unwrap();
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures");
+    let log = fixtures.join("xsens_mti.mcap");
+    let ran = strapd(dir.path(), &format!("report {} -o r.html", log.display()));
+    assert_eq!(ran.out, "");
+    let size = std::fs::metadata(dir.path().join("r.html")).unwrap().len();
+    let kilobytes = format!("wrote r.html  {:.1} kB", size as f64 * 1e-3);
+    assert!(ran.err.contains(&kilobytes), "{kilobytes}: {}", ran.err);
+    let html = std::fs::read_to_string(dir.path().join("r.html")).unwrap();
+    let verdict = data(&html)["verdict"]["text"].as_str().unwrap().to_owned();
+    assert!(ran.err.contains(&verdict), "{}", ran.err);
+    // Of a log nothing can be had of, too.
+    let empty = strapd(
+        dir.path(),
+        &format!("report {} -o e.html --topic /nothing", log.display()),
+    );
+    assert!(!empty.err.is_empty() && empty.code != Some(0), "{empty:?}");
 }

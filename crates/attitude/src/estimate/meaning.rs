@@ -163,6 +163,7 @@ impl Meaning {
         RawSample {
             gyro: raw.gyro.map(|v| by(self.axes * self.unit.to_rad(), v)),
             accel: raw.accel.map(|v| by(self.axes * self.accel_scale, v)),
+            mag: raw.mag.map(|v| by(self.axes, v)),
             orientation: raw.orientation.map(|wxyz| {
                 match (self.recorded, Quaternion::<Nav, Body>::try_from_wxyz(wxyz)) {
                     (Convention::EnuFlu, _) | (_, Err(_)) => wxyz,

@@ -1,0 +1,32 @@
+//! A sample -> the `RATE` object that `replay` and the service read. Pure.
+
+use serde_json::{Value, json};
+use strapd_attitude::record::{RawSample, SampleKind};
+
+/// The object of sample number `seq` of the sensor `id`, in the units and axes it has here: what is absent is left
+/// out, NaN becomes null. `kind` is what the format says the sample means.
+pub(in crate::cli) fn rate(id: &str, seq: u64, raw: &RawSample, kind: Option<SampleKind>) -> Value {
+    let (sec, nsec) = raw.header.unwrap_or(raw.log).to_sec_nanosec();
+    let mut object = json!({
+        "class": "RATE", "id": id, "seq": seq,
+        "stamp": { "sec": sec, "nsec": nsec },
+    });
+    if let Some(map) = object.as_object_mut() {
+        let mut put = |key: &str, value: Value| map.insert(key.to_owned(), value);
+        for (key, vector) in [("gyro", raw.gyro), ("accel", raw.accel), ("mag", raw.mag)] {
+            if let Some(vector) = vector {
+                put(key, json!(vector));
+            }
+        }
+        if let Some([w, x, y, z]) = raw.orientation {
+            put("q", json!({ "w": w, "x": x, "y": y, "z": z }));
+        }
+        if let Some(interval) = raw.interval_nanos {
+            put("dt_ns", json!(interval));
+        }
+        if let Some(kind) = kind {
+            put("sample_kind", json!(kind.name()));
+        }
+    }
+    object
+}

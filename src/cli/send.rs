@@ -1,0 +1,262 @@
+//! `strapd send LOG ADDRESS`: a recording's samples to a daemon, as they were measured in time. I/O.
+//!
+//! Apart from `cat` because it has two ends: the log is read ahead by a thread of its own, so that a line leaves when it
+//! is due, and what the daemon answers is heard all the while.
+
+use super::cat::line;
+use super::{Global, Outcome, replay};
+use crate::client;
+use crate::client::remote::Remote;
+use crate::client::secret::Secret;
+use crate::client::sender::Sender;
+use crate::error::{Error, Result};
+use crate::pipeline::decoders::Decoders;
+use crate::pipeline::input::Input;
+use crate::pipeline::log::{Log, problems};
+use crate::pipeline::pace::Pace;
+use crate::pipeline::topic_reading::{Taken, TopicReading};
+use clap::Args;
+use serde_json::json;
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::time::Instant;
+use strapd_attitude::estimate::{Meaning, Plan};
+use strapd_attitude::record::{Nanos, SampleKind};
+use strapd_recording::decode::{FieldPath, Options};
+use strapd_recording::pool::Pool;
+use tokio::sync::mpsc;
+
+/// Lines handed over at once by the thread that reads.
+const BATCH: usize = 256;
+/// Batches read ahead of what was sent.
+const AHEAD_BATCHES: usize = 8;
+/// Bytes sent at once, when nothing waits for its time.
+const CHUNK: usize = 32 << 10;
+
+/// A recording's samples to a daemon (strapd serve), as fast as they were measured.
+#[derive(Args, Debug)]
+#[command(after_help = "Examples:
+  strapd send flight.mcap                                  to the daemon of this machine
+  strapd send flight.mcap tcp://robot:4550 --speed max     all at once
+  strapd send flight.ulg ws://127.0.0.1:8765 --id left     under another name
+  ros2bag_filter | strapd send - unix:///run/strapd.sock   what a pipe brings")]
+pub struct Send {
+    /// A recording (any format that replay reads; - is standard input)
+    #[arg(value_name = "LOG")]
+    pub source: PathBuf,
+    /// To whom: tcp://HOST:PORT, ws://HOST:PORT, unix:///PATH
+    #[arg(value_name = "ADDRESS", default_value = "tcp://127.0.0.1:4550")]
+    pub address: String,
+    /// Topic; the IMU topic by default
+    #[arg(long, value_name = "NAME")]
+    pub topic: Option<String>,
+    /// Where a value lies in the message: ROLE=PATH, as in replay
+    #[arg(long = "field", value_name = "ROLE=PATH")]
+    pub fields: Vec<String>,
+    /// What the daemon is to call the sensor; the topic by default
+    #[arg(long, value_name = "NAME")]
+    pub id: Option<String>,
+    /// How many times as fast as they were measured, or max
+    #[arg(long, value_name = "FACTOR", default_value = "1")]
+    pub speed: String,
+    /// The token the daemon asks for is in this file (first line, mode 0600)
+    #[arg(long, value_name = "FILE", env = "STRAPD_TOKEN_FILE")]
+    pub token_file: Option<PathBuf>,
+}
+
+/// A line, and when it is due.
+type Due = (Nanos, String);
+
+/// What the thread that reads has come to.
+#[derive(Debug, Default)]
+struct Read {
+    topic: String,
+    lost: u64,
+}
+
+/// Runs it.
+///
+/// # Errors
+/// The log can not be read or decoded; nobody answers, or whoever answered has gone.
+pub fn run(global: &Global, args: &Send) -> Result<Outcome> {
+    let remote = Remote::parse(&args.address)?;
+    if matches!(remote, Remote::UdpListen(_)) {
+        return Err(Error::Usage(format!(
+            "send: {}: listens, and sends nothing\n  help: tcp://HOST:PORT, ws://HOST:PORT or unix:///PATH of a strapd serve",
+            args.address
+        )));
+    }
+    let pace = Pace::new(replay::speed(&args.speed)?);
+    let token = args
+        .token_file
+        .as_deref()
+        .map(|file| Secret::read("--token-file", file))
+        .transpose()?;
+    let fields = args.fields.iter().map(|field| {
+        field
+            .parse::<FieldPath>()
+            .map_err(|e| Error::Usage(format!("--field: {e}")))
+    });
+    let options = Options {
+        fields: fields.collect::<Result<_>>()?,
+        ..Options::default()
+    };
+    // Looked at before anybody is called: a log that can not be read is not the daemon's business.
+    let pool = Pool::new(global.threads)?;
+    let log = Log::told_apart(
+        &Input::open(&args.source)?,
+        args.topic.as_deref(),
+        &options,
+        &pool,
+    )?;
+    let (give, mut take) = mpsc::channel::<Vec<Due>>(AHEAD_BATCHES);
+    let begun = Instant::now();
+    let (read, sent) = std::thread::scope(|scope| {
+        let (options, pool) = (&options, &pool);
+        let reader = scope.spawn(move || read(args, &log, options, pool, give));
+        let name = format!("send {}", args.source.display());
+        let sent = client::run(&name, send(&remote, token.as_ref(), pace, &mut take));
+        // Whoever reads on is told that nobody sends.
+        drop(take);
+        let read = reader
+            .join()
+            .unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        (read, sent)
+    });
+    let sent = sent?;
+    let read = read?;
+    let secs = begun.elapsed().as_secs_f64();
+    if global.json {
+        super::print(&format!(
+            "{}\n",
+            json!({
+                "address": remote.to_string(), "topic": read.topic, "sent": sent.lines,
+                "data_secs": sent.data_secs, "elapsed_secs": secs, "lost": read.lost, "errors": sent.complaints,
+            })
+        ))?;
+    } else if !global.quiet {
+        tracing::info!(
+            "sent {} samples of {} to {remote}: {:.3} s of data in {secs:.3} s",
+            sent.lines,
+            read.topic,
+            sent.data_secs
+        );
+    }
+    Ok(match read.lost + sent.complaints {
+        0 => Outcome::Done,
+        _ => Outcome::Lossy,
+    })
+}
+
+/// Reads the log and hands its lines over, until it ends or nobody takes them.
+fn read(
+    args: &Send,
+    log: &Log,
+    options: &Options,
+    pool: &Pool,
+    give: mpsc::Sender<Vec<Due>>,
+) -> Result<Read> {
+    let mut decoders = Decoders::new(options);
+    let reading = TopicReading::new(log, args.topic.as_deref(), &mut decoders)?;
+    let meanings: Vec<(Meaning, Option<SampleKind>)> = reading
+        .channels
+        .iter()
+        .map(|(_, decoder)| {
+            let declared = &decoder.stated().declared;
+            let meaning = Meaning::new(&Plan::default(), declared);
+            (meaning, declared.sample_kind)
+        })
+        .collect();
+    let topic = reading.name().to_owned();
+    let id = args.id.as_deref().unwrap_or(&topic);
+    let (mut batch, mut seq, mut undecodable) = (Vec::with_capacity(BATCH), 0, 0);
+    let mut goes_on = true;
+    let survey = reading.walk(pool, |taken| {
+        match taken {
+            Taken::Sample(place, raw) => {
+                if let Some((meaning, kind)) = meanings.get(place) {
+                    let raw = meaning.in_flu(&raw);
+                    let due = raw.header.unwrap_or(raw.log);
+                    batch.push((due, line::rate(id, seq, &raw, *kind).to_string()));
+                    seq += 1;
+                }
+            }
+            Taken::Undecodable(at, why) => {
+                if undecodable == 0 {
+                    tracing::warn!("first undecodable payload, {}: {why}", log.place_of(at));
+                }
+                undecodable += 1;
+            }
+        }
+        if batch.len() == BATCH {
+            goes_on = give.blocking_send(std::mem::take(&mut batch)).is_ok();
+        }
+        Ok(match goes_on {
+            true => ControlFlow::Continue(()),
+            false => ControlFlow::Break(()),
+        })
+    })?;
+    // Nobody takes it: the other end says why.
+    let _ = give.blocking_send(batch);
+    for problem in problems(&survey) {
+        tracing::warn!("{}: {problem}", log.name().display());
+    }
+    if undecodable > 0 {
+        tracing::warn!("{undecodable} payloads could not be decoded");
+    }
+    Ok(Read {
+        topic,
+        lost: undecodable + survey.problems.losses(),
+    })
+}
+
+/// What was sent.
+#[derive(Debug, Default)]
+struct Sent {
+    lines: u64,
+    /// Between the first stamp and the last, s.
+    data_secs: f64,
+    /// Errors that came back.
+    complaints: u64,
+}
+
+async fn send(
+    remote: &Remote,
+    token: Option<&Secret>,
+    mut pace: Option<Pace>,
+    lines: &mut mpsc::Receiver<Vec<Due>>,
+) -> Result<Sent> {
+    let failed = |what: String| Error::Remote {
+        address: remote.to_string(),
+        what,
+    };
+    let mut sender = Sender::connect(remote, token).await.map_err(failed)?;
+    let (mut sent, mut chunk) = (Sent::default(), String::new());
+    let mut span: Option<(Nanos, Nanos)> = None;
+    while let Some(batch) = lines.recv().await {
+        for (due, line) in batch {
+            let wait = pace.as_mut().map_or(std::time::Duration::ZERO, |pace| {
+                pace.until(due, Instant::now())
+            });
+            if !wait.is_zero() || chunk.len() + line.len() >= CHUNK {
+                sender.send(&mut chunk).await.map_err(failed)?;
+                sender.listen(wait).await.map_err(failed)?;
+            }
+            if !chunk.is_empty() {
+                chunk.push('\n');
+            }
+            chunk.push_str(&line);
+            sent.lines += 1;
+            let first = span.map_or(due, |(first, _)| first);
+            span = Some((first, due));
+        }
+        // The log may be a pipe, whose next sample comes when it comes.
+        if pace.is_some() || lines.is_empty() {
+            sender.send(&mut chunk).await.map_err(failed)?;
+        }
+    }
+    sender.send(&mut chunk).await.map_err(failed)?;
+    sent.complaints = sender.finish().await.map_err(failed)?;
+    sent.data_secs = span.map_or(0.0, |(first, last)| last.secs_since(first));
+    Ok(sent)
+}
