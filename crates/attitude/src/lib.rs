@@ -17,6 +17,7 @@
 //! | [`propagate`] | rates -> attitude: the hot loop |
 //! | [`aid`] | specific force, field -> corrections of attitude and sensor |
 //! | [`estimate`] | all of these in one: what is asked for and the first samples -> an estimator -> attitude |
+//! | [`smooth`] | a whole recording -> the best attitudes it can give, and its sensor |
 //! | [`noise`] | what a sensor adds: measured, and put in on purpose |
 //! | [`compare`] | two attitudes -> how far apart |
 //!
@@ -61,4 +62,5 @@ pub mod noise;
 pub mod propagate;
 pub mod quaternion;
 pub mod record;
+pub mod smooth;
 pub mod worlds;

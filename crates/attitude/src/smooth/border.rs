@@ -1,0 +1,133 @@
+//! The constants of a log: which they are, and what is known of them beforehand. Pure.
+//!
+//! Apart from the nodes because these are the border of the equations: every node sees them.
+
+use nalgebra::{Matrix2, Matrix3, Vector3};
+
+/// Gyro matrix less 1, row by row.
+pub(super) const GYRO: usize = 0;
+/// Accelerometer: bias, matrix less 1, time offset.
+pub(super) const FORCE_BIAS: usize = 9;
+pub(super) const FORCE: usize = 12;
+pub(super) const FORCE_TIME: usize = 21;
+/// Centre of the positions.
+pub(super) const CENTRE: usize = 22;
+/// Magnetometer: hard iron, matrix less 1; the field's north and up; its time offset; the field while moving.
+pub(super) const IRON: usize = 25;
+pub(super) const FIELD: usize = 28;
+pub(super) const NORTH: usize = 37;
+pub(super) const FIELD_TIME: usize = 39;
+pub(super) const MOVING: usize = 40;
+/// How many there are, and without a magnetometer.
+pub(super) const ALL: usize = 43;
+pub(super) const PLAIN: usize = 25;
+/// Width of the border's equations: right sides are one more column.
+pub(super) const WIDE: usize = ALL + 1;
+pub(super) const NARROW: usize = PLAIN + 1;
+
+/// The constants, SI and uT.
+pub(super) type Constants = [f64; ALL];
+
+/// 3x3 from its place among the constants, plus 1.
+pub(super) fn matrix(constants: &Constants, first: usize) -> Matrix3<f64> {
+    Matrix3::from_fn(|i, j| constants[first + 3 * i + j] + if i == j { 1.0 } else { 0.0 })
+}
+
+/// Three of the constants.
+pub(super) fn vector(constants: &Constants, first: usize) -> Vector3<f64> {
+    Vector3::from_fn(|i, _| constants[first + i])
+}
+
+/// Inverse covariance of the constants beforehand: symmetric.
+#[derive(Clone)]
+pub(super) struct Priors {
+    pub(super) information: Vec<[f64; ALL]>,
+    /// One standard deviation of each; infinite where nothing is known.
+    pub(super) sigma: Constants,
+}
+
+/// Hard iron is of this size, uT, or of any (Cauchy's distribution).
+pub(super) const IRON_SCALE: f64 = 1.0;
+
+impl Priors {
+    /// For a log that rests in so many segments; `has_moving_field`: the field may be another while moving.
+    pub(super) fn new(looseness: f64, has_moving_field: bool) -> Priors {
+        let mut sigma = [0.0; ALL];
+        let mut matrix = |first: usize, diagonal: f64, others: f64| {
+            for i in 0..9 {
+                sigma[first + i] = looseness * if i % 4 == 0 { diagonal } else { others };
+            }
+        };
+        matrix(FORCE, 0.0015, 0.001);
+        matrix(FIELD, 0.015, 0.008);
+        let mut put = |range: std::ops::Range<usize>, value: f64| sigma[range].fill(value);
+        put(FORCE_BIAS..FORCE, 0.04 * looseness);
+        put(FORCE_TIME..CENTRE, 0.003 * looseness);
+        put(CENTRE..IRON, 10.0);
+        put(IRON..FIELD, 1e3);
+        put(NORTH..FIELD_TIME, 1e3);
+        put(FIELD_TIME..MOVING, 0.005 * looseness);
+        put(MOVING..ALL, if has_moving_field { 2.5 } else { 1e-3 });
+        let mut information = vec![[0.0; ALL]; ALL];
+        for i in FORCE_BIAS..ALL {
+            information[i][i] = 1.0 / (sigma[i] * sigma[i]);
+        }
+        // Scales share a part: a clock, a reference voltage. A pair across the diagonal is a share of axes that are
+        // not square to each other and of a triad that is turned in its case.
+        let (own, shared): (f64, f64) = (0.0007 * looseness, 0.003 * looseness);
+        let scales = Matrix3::from_diagonal_element(own * own) + Matrix3::repeat(shared * shared);
+        let (skew, turned): (f64, f64) = (0.001 * looseness, 0.002 * looseness);
+        let (s, t) = (skew * skew, turned * turned);
+        let pair = Matrix2::new(s + t, s - t, s - t, s + t);
+        for i in 0..9 {
+            sigma[GYRO + i] = if i % 4 == 0 {
+                scales[(0, 0)].sqrt()
+            } else {
+                pair[(0, 0)].sqrt()
+            };
+        }
+        let scales = scales.try_inverse().unwrap_or_default();
+        for i in 0..3 {
+            for j in 0..3 {
+                information[GYRO + 4 * i][GYRO + 4 * j] = scales[(i, j)];
+            }
+        }
+        let pair = pair.try_inverse().unwrap_or_default();
+        for (a, b) in [(1, 3), (2, 6), (5, 7)] {
+            let places = [GYRO + a, GYRO + b];
+            for i in 0..2 {
+                for j in 0..2 {
+                    information[places[i]][places[j]] = pair[(i, j)];
+                }
+            }
+        }
+        sigma[IRON..FIELD].fill(f64::INFINITY);
+        sigma[NORTH..FIELD_TIME].fill(f64::INFINITY);
+        Priors { information, sigma }
+    }
+
+    /// Adds them to the border's equations; the last column is their right side.
+    pub(super) fn add<const W: usize>(&self, constants: &Constants, border: &mut [[f64; W]; W]) {
+        let last = W - 1;
+        for i in 0..last {
+            for j in i..last {
+                border[i][j] += self.information[i][j];
+            }
+            for j in 0..last {
+                // The field's size is anything: no pull.
+                if !(NORTH..FIELD_TIME).contains(&j) {
+                    border[i][last] -= self.information[i][j] * constants[j];
+                }
+            }
+        }
+        if last >= FIELD {
+            let square: f64 = constants[IRON..FIELD].iter().map(|h| h * h).sum();
+            let scale = IRON_SCALE * IRON_SCALE;
+            let weight = 1.0 / (1.0 + square / scale) / scale;
+            for i in IRON..FIELD {
+                border[i][i] += weight;
+                border[i][last] -= weight * constants[i];
+            }
+        }
+    }
+}

@@ -1,0 +1,314 @@
+//! Nodes and constants -> better ones, iteration by iteration (Gauss and Newton). Pure.
+//!
+//! A stage of its own because it is run without the field, then with it, and what came before is kept in case a phase
+//! ends nowhere.
+
+use super::border::{self, Constants, Priors, WIDE};
+use super::factors::{BIAS, Node, STATES, VELOCITY};
+use super::heading::{FieldTrust, sections};
+use super::motion::Bound;
+use super::pass::{Model, sweep_all};
+use super::sample::Samples;
+use super::segments::Segment;
+use super::settings::Settings;
+use super::solver::{Solution, Solver};
+use super::survey::Survey;
+use super::sweep::GRAVITY;
+use crate::quaternion::exp_minus_one;
+use crate::quaternion::kernel::{normalised, product};
+use nalgebra::Vector3;
+
+/// A heading that nothing tells is held to this, rad.
+const HELD: f64 = 1e-4;
+/// Of the first node, rad, m/s, m: only that there is a solution.
+const ANYWHERE: f64 = 1e6;
+/// Largest turn of a node in one iteration, rad.
+const LARGEST_TURN: f64 = 0.5;
+/// Done below this, rad, after so many iterations.
+const DONE: f64 = 1e-6_f64.to_radians();
+const FEWEST: usize = 4;
+/// Turns above this that grow twice running lead nowhere, rad: smaller ones grow when weights change.
+const DIVERGING: f64 = 0.1;
+/// The last turn of a result is below, rad.
+const RESTLESS: f64 = 0.5_f64.to_radians();
+/// Time over which a mean force points up, s.
+const UPRIGHT_SECS: f64 = 10.0;
+
+/// What does not change between iterations.
+pub(super) struct Problem<'a> {
+    pub(super) survey: &'a Survey,
+    pub(super) settings: &'a Settings,
+    pub(super) segments: &'a [Segment],
+    pub(super) priors: &'a Priors,
+    pub(super) trust: &'a FieldTrust,
+    /// Of the gyro's bias beforehand, rad/s.
+    pub(super) bias: Vector3<f64>,
+    pub(super) bias_sigma: f64,
+}
+
+/// What the iterations improve.
+#[derive(Clone)]
+pub(super) struct State {
+    pub(super) nodes: Vec<Node>,
+    pub(super) constants: Constants,
+    pub(super) bound: Bound,
+    pub(super) field_weights: Vec<f64>,
+    /// Sections whose heading the field tells.
+    pub(super) has_north: Vec<bool>,
+}
+
+/// Why a phase led nowhere.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Failure {
+    /// A number was none, or the equations had no solution.
+    NotFinite,
+    /// The largest turn of a node grew twice running; the last was this, rad.
+    Diverging(f64),
+    /// After the last iteration nodes still turned by this, rad.
+    Unfinished(f64),
+    /// The motion was taken to go this far, m, without a standstill anywhere.
+    Strays(f64),
+    /// The mean force is this far off the vertical, rad.
+    NotUpright(f64),
+}
+
+/// How a phase ended.
+pub(super) struct Phase<const W: usize> {
+    /// The equations of the last iteration.
+    pub(super) solver: Option<Solver<W>>,
+    pub(super) failure: Option<Failure>,
+    pub(super) iterations: usize,
+    /// Mean fields by segment, of the last iteration.
+    pub(super) fields: Vec<Option<[f64; 3]>>,
+    /// Twice the negative logarithm of the likelihood but for a constant.
+    pub(super) cost: f64,
+}
+
+/// Iterates, with the field if the border is wide.
+pub(super) fn run<S: Samples, const W: usize>(
+    samples: &mut S,
+    problem: &Problem<'_>,
+    state: &mut State,
+    most: usize,
+) -> Result<Phase<W>, S::Error> {
+    let mut phase = Phase {
+        solver: None,
+        failure: None,
+        iterations: 0,
+        fields: Vec::new(),
+        cost: f64::NAN,
+    };
+    let (mut largest, mut growing) = (f64::INFINITY, 0);
+    for iteration in 0..most {
+        let before = phase.solver.take();
+        let equations = equations::<S, W>(samples, problem, state, before)?;
+        phase.iterations += 1;
+        phase.fields = equations.fields;
+        phase.cost = equations.cost;
+        let tilt = off_vertical(problem.segments, &equations.pushes);
+        let solution = equations.solver.solve();
+        phase.solver = Some(equations.solver);
+        let Some(solution) = solution else {
+            phase.failure = Some(Failure::NotFinite);
+            return Ok(phase);
+        };
+        let turn = state.correct(&solution);
+        if W == WIDE {
+            state.field_weights =
+                problem
+                    .trust
+                    .after(iteration, &equations.residuals, problem.segments);
+        }
+        let centre = border::vector(&state.constants, border::CENTRE);
+        state.bound.learn(
+            &state.nodes,
+            &centre,
+            problem.segments,
+            problem.settings.colour,
+        );
+        growing = if turn > largest && turn > DIVERGING {
+            growing + 1
+        } else {
+            0
+        };
+        largest = turn;
+        phase.failure = problem.failure(state, turn, tilt);
+        if growing >= 2 {
+            phase.failure = Some(Failure::Diverging(turn));
+            return Ok(phase);
+        }
+        if turn < DONE && iteration + 1 >= FEWEST {
+            break;
+        }
+    }
+    Ok(phase)
+}
+
+impl Problem<'_> {
+    fn failure(&self, state: &State, turn: f64, tilt: f64) -> Option<Failure> {
+        const FARTHEST: f64 = 100.0;
+        const MOST_TILT: f64 = 5.0_f64.to_radians();
+        let strays = state.bound.sigma[1];
+        if !turn.is_finite() {
+            Some(Failure::NotFinite)
+        } else if turn > RESTLESS {
+            Some(Failure::Unfinished(turn))
+        } else if strays > FARTHEST && !self.segments.iter().any(|segment| segment.is_still) {
+            Some(Failure::Strays(strays))
+        } else if tilt > MOST_TILT {
+            Some(Failure::NotUpright(tilt))
+        } else {
+            None
+        }
+    }
+}
+
+impl State {
+    /// Takes the corrections; the largest turn of a node, rad.
+    fn correct(&mut self, solution: &Solution) -> f64 {
+        let turn = |x: &[f64; STATES]| {
+            x[..VELOCITY]
+                .iter()
+                .fold(0.0, |most: f64, t| most.max(t.abs()))
+        };
+        let largest = solution.nodes.iter().map(turn).fold(0.0, f64::max);
+        let share = if largest < LARGEST_TURN {
+            1.0
+        } else {
+            LARGEST_TURN / largest
+        };
+        for (node, x) in self.nodes.iter_mut().zip(&solution.nodes) {
+            let part = |first: usize| Vector3::from_fn(|i, _| share * x[first + i]);
+            let [w, a, b, c] = exp_minus_one(&part(0));
+            node.q = normalised(&product(&[1.0 + w, a, b, c], &node.q));
+            node.velocity += part(VELOCITY);
+            node.position += part(2 * VELOCITY);
+            node.bias += part(BIAS);
+        }
+        for (constant, x) in self.constants.iter_mut().zip(&solution.border) {
+            *constant += share * x;
+        }
+        largest
+    }
+}
+
+struct Equations<const W: usize> {
+    solver: Solver<W>,
+    fields: Vec<Option<[f64; 3]>>,
+    residuals: Vec<f64>,
+    pushes: Vec<[f64; 3]>,
+    cost: f64,
+}
+
+/// Sweeps, assembles and eliminates in one pass.
+fn equations<S: Samples, const W: usize>(
+    samples: &mut S,
+    problem: &Problem<'_>,
+    state: &State,
+    before: Option<Solver<W>>,
+) -> Result<Equations<W>, S::Error> {
+    let segments = problem.segments;
+    let mut solver = Solver::<W>::new(segments.len() + 1, before);
+    problem.priors.add(&state.constants, &mut solver.border);
+    let last = W - 1;
+    let held = held_headings(problem, state, W == WIDE);
+    let mut own = [[0.0; STATES]; STATES];
+    let mut border = [[0.0; W]; STATES];
+    for i in 0..BIAS {
+        own[i][i] = 1.0 / (ANYWHERE * ANYWHERE);
+    }
+    let weight = 1.0 / (problem.bias_sigma * problem.bias_sigma);
+    for i in 0..3 {
+        own[BIAS + i][BIAS + i] = weight;
+        border[BIAS + i][last] = -weight * (state.nodes[0].bias[i] - problem.bias[i]);
+    }
+    let centre = border::vector(&state.constants, border::CENTRE);
+    let count = segments.len();
+    let (mut fields, mut residuals, mut pushes) = (
+        Vec::with_capacity(count),
+        Vec::with_capacity(count),
+        Vec::with_capacity(count),
+    );
+    let mut cost = state.bound.log_norm(segments);
+    let model = Model {
+        segments,
+        nodes: &state.nodes,
+        constants: &state.constants,
+        field_weights: &state.field_weights,
+    };
+    let mut finish = |k: usize,
+                      own: &mut [[f64; STATES]; STATES],
+                      border: &mut [[f64; W]; STATES],
+                      corner: &mut [[f64; W]; W]| {
+        cost += state
+            .bound
+            .add((k, &state.nodes[k]), &centre, segments, own, border, corner);
+        if held[k] {
+            own[2][2] += 1.0 / (HELD * HELD);
+        }
+    };
+    let mut squares = 0.0;
+    sweep_all::<S, W>(samples, (problem.survey, problem.settings), &model, |job| {
+        solver.add_border(&job.border);
+        squares += job.border[last][last];
+        for (i, blocks) in job.blocks.iter().enumerate() {
+            add(&mut own, &blocks.own);
+            add(&mut border, &blocks.own_border);
+            finish(job.first + i, &mut own, &mut border, &mut solver.border);
+            solver.eliminate(&mut own, &blocks.next, &mut border);
+            for (j, next) in blocks.next_own.iter().enumerate() {
+                own[j][j] += next;
+            }
+            add(&mut border, &blocks.next_border);
+            residuals.push(blocks.field_residual);
+        }
+        fields.extend(job.seen.iter().map(|seen| seen.field));
+        pushes.extend(job.seen.iter().map(|seen| seen.velocity));
+    })?;
+    finish(segments.len(), &mut own, &mut border, &mut solver.border);
+    solver.eliminate(&mut own, &[[0.0; STATES]; STATES], &mut border);
+    Ok(Equations {
+        solver,
+        fields,
+        residuals,
+        pushes,
+        cost: cost + squares,
+    })
+}
+
+fn add<const N: usize>(sum: &mut [[f64; N]; STATES], part: &[[f64; N]; STATES]) {
+    for (row, part) in sum.iter_mut().zip(part) {
+        for (sum, x) in row.iter_mut().zip(part) {
+            *sum += x;
+        }
+    }
+}
+
+/// Nodes whose heading nothing tells: the first of each section without a field.
+fn held_headings(problem: &Problem<'_>, state: &State, has_field: bool) -> Vec<bool> {
+    let mut held = vec![false; problem.segments.len() + 1];
+    for (i, (first, _)) in sections(problem.segments).into_iter().enumerate() {
+        held[first] = !has_field || !state.has_north.get(i).copied().unwrap_or(false);
+    }
+    held
+}
+
+/// How far the mean forces of parts of the log are off the vertical: the median, rad; 0 of a short log.
+fn off_vertical(segments: &[Segment], pushes: &[[f64; 3]]) -> f64 {
+    let mut angles = Vec::new();
+    let (mut secs, mut velocity) = (0.0, Vector3::zeros());
+    for (segment, push) in segments.iter().zip(pushes) {
+        if segment.is_break {
+            (secs, velocity) = (0.0, Vector3::zeros());
+            continue;
+        }
+        secs += segment.secs;
+        velocity += Vector3::from(*push);
+        if secs >= UPRIGHT_SECS {
+            let up: Vector3<f64> = velocity / secs + Vector3::z() * GRAVITY;
+            angles.push(up.x.hypot(up.y).atan2(up.z));
+            (secs, velocity) = (0.0, Vector3::zeros());
+        }
+    }
+    super::segments::median(&mut angles)
+}

@@ -1,0 +1,91 @@
+//! Samples -> what the real-time filter makes of them at the nodes. Pure.
+//!
+//! Apart from the forward pass because it learns the gyro's bias as it goes: the start where nothing ever rests, and
+//! what the result falls back to.
+
+use super::pass::by_segment;
+use super::sample::Samples;
+use super::segments::{Segment, median_of};
+use super::settings::Settings;
+use super::survey::Survey;
+use crate::aid::{self, Aided};
+use crate::propagate;
+use crate::record::{AttitudeSample, Join, Nanos, RateSample, SampleKind, Status};
+use nalgebra::{Matrix3, Vector3};
+
+/// The real-time filter's view.
+pub(super) struct Realtime {
+    pub(super) nodes: Vec<[f64; 4]>,
+    /// Of the attitude's error, rad^2, earth axes.
+    pub(super) covariances: Vec<Matrix3<f64>>,
+    /// Median of its bias over the second half of the log, rad/s, and its sigma at the end.
+    pub(super) bias: Vector3<f64>,
+    pub(super) bias_sigma: Vector3<f64>,
+}
+
+/// Runs it over all samples; heading is that of the first.
+pub(super) fn run<S: Samples>(
+    samples: &mut S,
+    with: (&Survey, &Settings),
+    segments: &[Segment],
+) -> Result<Option<Realtime>, S::Error> {
+    let propagation = propagate::Settings {
+        kind: SampleKind::DeltaAngle,
+        ..propagate::Settings::default()
+    };
+    let Ok(mut aided) = Aided::new(propagation, aid::Settings::default(), aid::Start::Level) else {
+        return Ok(None);
+    };
+    let mut out: Vec<AttitudeSample> = Vec::new();
+    let (mut nodes, mut covariances, mut biases) = (Vec::new(), Vec::new(), Vec::new());
+    let mut stamps: Vec<i64> = Vec::new();
+    let mut sort = |out: &mut Vec<AttitudeSample>, stamps: &[i64]| {
+        for sample in out.drain(..) {
+            if stamps
+                .get(nodes.len())
+                .is_some_and(|stamp| *stamp <= sample.stamp.0)
+            {
+                nodes.push(sample.q_nb.wxyz());
+                covariances.push(sample.covariance.in_navigation_axes(&sample.q_nb));
+            }
+        }
+    };
+    let mut last = None;
+    by_segment(samples, with, segments, |k, held| {
+        for sample in held.iter() {
+            let stamp = Nanos(sample.stamp);
+            let (join, start) = match last.replace(sample.stamp) {
+                None => (Join::Start, sample.stamp),
+                Some(_) if sample.is_after_break => (Join::Hold, sample.stamp),
+                Some(before) => (Join::Continuous, before),
+            };
+            let secs = stamp.secs_since(Nanos(start));
+            let rate = RateSample {
+                stamp,
+                start: Nanos(start),
+                value: sample.rate * secs,
+                accel: Some(sample.force),
+                join,
+                status: Status::OK,
+                log: stamp,
+            };
+            aided.push(&[rate], &mut out);
+        }
+        stamps.extend(held.last().map(|sample| sample.stamp));
+        if k.is_none_or(|k| 2 * k >= segments.len()) {
+            biases.push(aided.filter().calibration().bias);
+        }
+        sort(&mut out, &stamps);
+    })?;
+    aided.finish(&mut out);
+    sort(&mut out, &stamps);
+    let wanted = segments.len() + 1;
+    let is_whole = nodes.len() == wanted && nodes.iter().flatten().all(|c| c.is_finite());
+    let bias = median_of(&biases).filter(|bias| bias.iter().all(|b| b.is_finite()));
+    Ok(bias.filter(|_| is_whole).map(|bias| Realtime {
+        nodes,
+        covariances,
+        bias,
+        bias_sigma: aided.filter().calibration_sigma().bias,
+    }))
+}

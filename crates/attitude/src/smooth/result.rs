@@ -1,0 +1,167 @@
+//! What a recording told: the sensor, the sections, how sure. Pure.
+
+use super::border::{self, Constants, IRON_SCALE, Priors};
+use super::phase::Failure;
+use super::survey::Quantisation;
+use crate::record::Nanos;
+use nalgebra::Vector3;
+
+/// A constant whose sigma is above this share of what it was beforehand was not observed.
+const OBSERVED: f64 = 0.7;
+
+/// Some numbers that were learned, each with one standard deviation after and before.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Learned<const N: usize> {
+    /// The numbers; matrices row by row.
+    pub value: [f64; N],
+    /// One standard deviation, by this log.
+    pub sigma: [f64; N],
+    /// Beforehand.
+    pub prior: [f64; N],
+}
+
+impl<const N: usize> Learned<N> {
+    /// Whether this log says more of the number `i` than was known before.
+    #[must_use]
+    pub fn is_observed(&self, i: usize) -> bool {
+        match (self.sigma.get(i), self.prior.get(i)) {
+            (Some(sigma), Some(prior)) => *sigma <= OBSERVED * prior,
+            _ => false,
+        }
+    }
+
+    fn of(first: usize, constants: &Constants, sigma: &Constants, prior: &Constants) -> Learned<N> {
+        Learned {
+            value: std::array::from_fn(|i| constants[first + i]),
+            sigma: std::array::from_fn(|i| sigma[first + i]),
+            prior: std::array::from_fn(|i| prior[first + i]),
+        }
+    }
+}
+
+/// The sensor by this log. Body axes.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Calibration {
+    /// G of `rate = (1 + G)(measured - bias)`.
+    pub gyro: Learned<9>,
+    /// ba of `force = (1 + A)(measured - ba)`, m/s^2.
+    pub force_bias: Learned<3>,
+    /// A.
+    pub force: Learned<9>,
+    /// ta of `force + ta rate x force`, s.
+    pub force_time: Learned<1>,
+    /// With a field.
+    pub magnetometer: Option<Magnetometer>,
+}
+
+/// The magnetometer by this log.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Magnetometer {
+    /// h of `field = (1 + S)(measured - h)`, uT.
+    pub hard_iron: Learned<3>,
+    /// S.
+    pub matrix: Learned<9>,
+    /// tm of `field + tm rate x field`, s.
+    pub time: Learned<1>,
+    /// The field's north and up, uT.
+    pub north_up: Learned<2>,
+    /// What is added to it while the body moves: east, north, up, uT.
+    pub while_moving: Learned<3>,
+    /// uT by the unit of the field that came.
+    pub scale: f64,
+}
+
+impl Calibration {
+    /// `covariance`: of as many constants as there were.
+    pub(super) fn of(
+        constants: &Constants,
+        covariance: &[Vec<f64>],
+        priors: &Priors,
+        scale: f64,
+    ) -> Calibration {
+        let sigma: Constants = std::array::from_fn(|i| {
+            covariance
+                .get(i)
+                .and_then(|row| row.get(i))
+                .map_or(priors.sigma[i], |variance| variance.max(0.0).sqrt())
+        });
+        let mut prior = priors.sigma;
+        // As it counted in the end.
+        let square: f64 = constants[border::IRON..border::FIELD]
+            .iter()
+            .map(|h| h * h)
+            .sum();
+        prior[border::IRON..border::FIELD].fill(IRON_SCALE.hypot(square.sqrt()));
+        let has_field = covariance.len() > border::PLAIN;
+        Calibration {
+            gyro: Learned::of(border::GYRO, constants, &sigma, &prior),
+            force_bias: Learned::of(border::FORCE_BIAS, constants, &sigma, &prior),
+            force: Learned::of(border::FORCE, constants, &sigma, &prior),
+            force_time: Learned::of(border::FORCE_TIME, constants, &sigma, &prior),
+            magnetometer: has_field.then(|| Magnetometer {
+                hard_iron: Learned::of(border::IRON, constants, &sigma, &prior),
+                matrix: Learned::of(border::FIELD, constants, &sigma, &prior),
+                time: Learned::of(border::FIELD_TIME, constants, &sigma, &prior),
+                north_up: Learned::of(border::NORTH, constants, &sigma, &prior),
+                while_moving: Learned::of(border::MOVING, constants, &sigma, &prior),
+                scale,
+            }),
+        }
+    }
+}
+
+/// The gyro's bias at a node.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Bias {
+    /// Of the node.
+    pub stamp: Nanos,
+    /// rad/s, body axes.
+    pub value: Vector3<f64>,
+    /// One standard deviation of each axis.
+    pub sigma: Vector3<f64>,
+}
+
+/// A part of the log without a break.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Section {
+    /// Of its first sample, and of its last.
+    pub start: Nanos,
+    /// The last.
+    pub end: Nanos,
+    /// Heading is that of north; otherwise of the section's beginning, and unknown against the other sections.
+    pub has_north: bool,
+}
+
+/// What the attitudes are.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Outcome {
+    /// The smoother's, field included where there is one.
+    Converged,
+    /// The smoother's without the field, turned north: with it, it led nowhere.
+    WithoutField(Failure),
+    /// The real-time filter's: the smoother led nowhere.
+    Filter(Failure),
+}
+
+/// What was done to the samples, and what became of them.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Counts {
+    /// That came.
+    pub samples: u64,
+    /// That could not be used: not finite, beyond what there is, not later than those before, without a force.
+    pub rejected: u64,
+    /// Of those, without a force.
+    pub forceless: u64,
+    /// Segments between nodes, and those of them at rest.
+    pub segments: u64,
+    /// At rest.
+    pub standstills: u64,
+    /// Gaps that were bridged.
+    pub bridged: u64,
+    /// Gaps over which nothing is known.
+    pub breaks: u64,
+    /// Iterations without the field, and with it.
+    pub iterations: [u64; 2],
+    /// Of the rates.
+    pub quantisation: Option<Quantisation>,
+}

@@ -1,0 +1,252 @@
+//! Prepared samples -> nodes, the segments between them, and which of those are at rest. Pure.
+//!
+//! A stage of its own because the unknowns of the problem are its nodes, and a standstill is decided by segment.
+
+use super::prepare::Prepared;
+use nalgebra::Vector3;
+
+/// Fewer samples than this after the last node do not get one.
+const FEWEST: usize = 5;
+/// Largest deviation at rest: of the rate (rad/s), of the force (m/s^2), and of the mean rate from the median one.
+pub(super) const STILL_RATE: f64 = 0.5_f64.to_radians();
+const STILL_FORCE: f64 = 0.2;
+const STILL_MEAN: f64 = 0.5_f64.to_radians();
+/// A log without noise has thresholds of nothing.
+const SLACK: f64 = 1e-9;
+
+/// Samples from one node to the next.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Segment {
+    pub samples: usize,
+    /// Between its nodes, s.
+    pub secs: f64,
+    /// Of its last sample.
+    pub stamp: i64,
+    /// Nothing is known of the motion.
+    pub is_break: bool,
+    pub is_still: bool,
+    /// Variance left by gaps, of attitude and of velocity.
+    pub doubt: [f64; 2],
+    pub mean_rate: Vector3<f64>,
+    /// Largest standard deviation of an axis: rate, force.
+    pub spread: [f64; 2],
+}
+
+/// Mean and sum of squares about it, of rate and force.
+#[derive(Clone, Copy)]
+struct Sums {
+    samples: usize,
+    secs: f64,
+    stamp: i64,
+    doubt: [f64; 2],
+    mean: [Vector3<f64>; 2],
+    square: [Vector3<f64>; 2],
+}
+
+impl Sums {
+    fn none() -> Sums {
+        Sums {
+            samples: 0,
+            secs: 0.0,
+            stamp: 0,
+            doubt: [0.0; 2],
+            mean: [Vector3::zeros(); 2],
+            square: [Vector3::zeros(); 2],
+        }
+    }
+
+    fn take(&mut self, sample: &Prepared) {
+        self.samples += 1;
+        let share = 1.0 / self.samples as f64;
+        for (what, value) in [&sample.rate, &sample.force].into_iter().enumerate() {
+            let off = value - self.mean[what];
+            self.mean[what] += off * share;
+            self.square[what] += off.component_mul(&(value - self.mean[what]));
+        }
+        self.secs += sample.secs;
+        self.stamp = sample.stamp;
+        self.doubt[0] += sample.doubt[0];
+        self.doubt[1] += sample.doubt[1];
+    }
+
+    /// Of both together (Chan, Golub, LeVeque 1979).
+    fn with(mut self, later: &Sums) -> Sums {
+        let (n, m) = (self.samples as f64, later.samples as f64);
+        for what in 0..2 {
+            let off = later.mean[what] - self.mean[what];
+            self.square[what] += later.square[what] + off.component_mul(&off) * (n * m / (n + m));
+            self.mean[what] += off * (m / (n + m));
+        }
+        self.samples += later.samples;
+        self.secs += later.secs;
+        self.stamp = later.stamp;
+        self.doubt[0] += later.doubt[0];
+        self.doubt[1] += later.doubt[1];
+        self
+    }
+
+    fn segment(&self) -> Segment {
+        let spread = self
+            .square
+            .map(|square| (square.max() / self.samples as f64).max(0.0).sqrt());
+        Segment {
+            samples: self.samples,
+            secs: self.secs,
+            stamp: self.stamp,
+            is_break: false,
+            is_still: false,
+            doubt: self.doubt,
+            mean_rate: self.mean[0],
+            spread,
+        }
+    }
+}
+
+/// Cuts a stream into segments.
+pub(super) struct Cutter {
+    spacing: f64,
+    /// Stamp of the first sample of all.
+    origin: Option<i64>,
+    slot: f64,
+    segments: Vec<Segment>,
+    /// The last that is complete, of this section.
+    complete: Option<Sums>,
+    current: Sums,
+}
+
+impl Cutter {
+    pub(super) fn new(spacing: f64) -> Cutter {
+        Cutter {
+            spacing,
+            origin: None,
+            slot: 0.0,
+            segments: Vec::new(),
+            complete: None,
+            current: Sums::none(),
+        }
+    }
+
+    pub(super) fn take(&mut self, sample: &Prepared) {
+        let Some(origin) = self.origin else {
+            self.origin = Some(sample.stamp);
+            return;
+        };
+        let secs = sample.stamp.saturating_sub(origin) as f64 * 1e-9;
+        let slot = (secs / self.spacing + 1e-9).floor();
+        if sample.is_after_break {
+            self.end_section();
+            let mut gap = Sums::none();
+            gap.take(sample);
+            self.segments.push(Segment {
+                is_break: true,
+                ..gap.segment()
+            });
+        } else {
+            self.current.take(sample);
+            if slot > self.slot {
+                self.segments
+                    .extend(self.complete.take().map(|sums| sums.segment()));
+                self.complete = Some(std::mem::replace(&mut self.current, Sums::none()));
+            }
+        }
+        self.slot = slot;
+    }
+
+    fn end_section(&mut self) {
+        let current = std::mem::replace(&mut self.current, Sums::none());
+        match self.complete.take() {
+            Some(complete) if current.samples > 0 && current.samples < FEWEST => {
+                self.segments.push(complete.with(&current).segment());
+            }
+            complete => {
+                self.segments.extend(complete.map(|sums| sums.segment()));
+                if current.samples > 0 {
+                    self.segments.push(current.segment());
+                }
+            }
+        }
+    }
+
+    /// All segments, and the stamp of the first node.
+    pub(super) fn finish(mut self) -> (Vec<Segment>, i64) {
+        self.end_section();
+        (self.segments, self.origin.unwrap_or(0))
+    }
+}
+
+/// Marks the segments at rest; the gyro's bias by them, rad/s, where there are any.
+pub(super) fn find_standstill(segments: &mut [Segment]) -> Option<Vector3<f64>> {
+    let moving = |what: usize| -> Vec<f64> {
+        segments
+            .iter()
+            .filter(|segment| !segment.is_break)
+            .map(|segment| segment.spread[what])
+            .collect()
+    };
+    let rate = (2.0 * fifth_percentile(moving(0))?).min(STILL_RATE) + SLACK;
+    let force = (1.6 * fifth_percentile(moving(1))?).min(STILL_FORCE) + SLACK;
+    let mut quiet: Vec<bool> = segments
+        .iter()
+        .map(|segment| !segment.is_break && segment.spread[0] < rate && segment.spread[1] < force)
+        .collect();
+    let bias = median_rate(segments, |i| quiet[i])?;
+    for (quiet, segment) in quiet.iter_mut().zip(segments.iter()) {
+        *quiet &= (segment.mean_rate - bias).norm() < STILL_MEAN;
+    }
+    // The log's ends and breaks have no neighbour on one side, and need the other.
+    let beside = |i: Option<usize>| {
+        i.and_then(|i| segments.get(i).filter(|s| !s.is_break).map(|_| quiet[i]))
+    };
+    let still: Vec<bool> = (0..segments.len())
+        .map(|i| {
+            let (before, after) = (beside(i.checked_sub(1)), beside(i.checked_add(1)));
+            quiet[i] && before.or(after).is_some() && before != Some(false) && after != Some(false)
+        })
+        .collect();
+    for (segment, still) in segments.iter_mut().zip(still) {
+        segment.is_still = still;
+    }
+    median_rate(segments, |i| segments[i].is_still)
+}
+
+/// Median of the mean rates of the chosen segments, each axis.
+fn median_rate(segments: &[Segment], is_chosen: impl Fn(usize) -> bool) -> Option<Vector3<f64>> {
+    let chosen: Vec<Vector3<f64>> = segments
+        .iter()
+        .enumerate()
+        .filter(|(i, _)| is_chosen(*i))
+        .map(|(_, segment)| segment.mean_rate)
+        .collect();
+    median_of(&chosen)
+}
+
+/// Median of each axis.
+pub(super) fn median_of(vectors: &[Vector3<f64>]) -> Option<Vector3<f64>> {
+    if vectors.is_empty() {
+        return None;
+    }
+    Some(Vector3::from_fn(|axis, _| {
+        let mut values: Vec<f64> = vectors.iter().map(|vector| vector[axis]).collect();
+        median(&mut values)
+    }))
+}
+
+/// The mean of the two middle ones of an even number; 0 of none.
+pub(super) fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let n = values.len();
+    match (values.get(n.saturating_sub(1) / 2), values.get(n / 2)) {
+        (Some(a), Some(b)) => 0.5 * (a + b),
+        _ => 0.0,
+    }
+}
+
+/// Between the two nearest ranks in proportion.
+fn fifth_percentile(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    let place = 0.05 * (values.len().checked_sub(1)?) as f64;
+    let (low, share) = (place.floor() as usize, place.fract());
+    let a = *values.get(low)?;
+    let b = *values.get(low + 1).unwrap_or(&a);
+    Some(a + share * (b - a))
+}

@@ -1,0 +1,112 @@
+//! What the smoother is told about a recording and how to treat it. Pure.
+
+use std::num::NonZero;
+
+/// What a gyro value is the rate of.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum SampleModel {
+    /// The mean over the interval that ends at its stamp: also a delta angle, divided by that interval.
+    #[default]
+    Interval,
+    /// The rate at its stamp.
+    Instant,
+}
+
+/// What of the field counts as north.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum HeadingReference {
+    /// The field where the body rests; while it moves the field may be another, and only supports.
+    #[default]
+    Standstill,
+    /// The mean of the whole log, for a resting place that is disturbed.
+    All,
+}
+
+/// In what the field is measured.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum FieldUnit {
+    /// uT.
+    #[default]
+    Microtesla,
+    /// Not known: its median is taken for 50 uT.
+    Unknown,
+}
+
+/// Settings of the smoother, SI, beside the noise that `docs/theory/smoother.md` fixes. The defaults are one set for
+/// all sensors and motions it was judged on.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Settings {
+    /// Time between nodes, s. `None`: 0.5, 1 above an hour, 2 above four hours, more beyond a day (as many nodes).
+    pub node_spacing: Option<f64>,
+    /// By how much the sigma of every calibration constant is larger than after a calibration in the factory.
+    pub looseness: f64,
+    /// How late the samples are, s: attitudes are turned on by the rate over this.
+    pub sensor_delay: f64,
+    /// What of the field counts as north.
+    pub heading_reference: HeadingReference,
+    /// The unit of the field.
+    pub field_unit: FieldUnit,
+    /// What a gyro value is the rate of.
+    pub sample_model: SampleModel,
+    /// Whether rates that a driver cut towards zero are put back in the middle of their step.
+    pub undo_truncation: bool,
+    /// Whether the motion bound is widened where velocities of neighbouring nodes resemble each other.
+    pub colour: bool,
+    /// Most iterations without the field.
+    pub iterations: usize,
+    /// Most iterations with it.
+    pub field_iterations: usize,
+    /// Threads that sweep: the bits that come out do not depend on it.
+    pub threads: NonZero<usize>,
+}
+
+impl Default for Settings {
+    fn default() -> Settings {
+        Settings {
+            node_spacing: None,
+            looseness: 1.0,
+            sensor_delay: 0.0,
+            heading_reference: HeadingReference::Standstill,
+            field_unit: FieldUnit::Microtesla,
+            sample_model: SampleModel::Interval,
+            undo_truncation: true,
+            colour: true,
+            iterations: 6,
+            field_iterations: 9,
+            threads: NonZero::<usize>::MIN,
+        }
+    }
+}
+
+impl Settings {
+    /// What can not be: its name and value.
+    pub(super) fn fault(&self) -> Option<(&'static str, f64)> {
+        let spacing = self.node_spacing.unwrap_or(0.5);
+        let in_range =
+            |value: f64, smallest: f64, largest: f64| (smallest..=largest).contains(&value);
+        if !in_range(spacing, 0.05, 60.0) {
+            return Some(("node_spacing", spacing));
+        }
+        if !in_range(self.looseness, 1e-3, 1e3) {
+            return Some(("looseness", self.looseness));
+        }
+        if !in_range(self.sensor_delay, -1.0, 1.0) {
+            return Some(("sensor_delay", self.sensor_delay));
+        }
+        if self.iterations == 0 {
+            return Some(("iterations", 0.0));
+        }
+        None
+    }
+
+    /// Time between nodes of a log so long, s.
+    pub(super) fn spacing(&self, secs: f64) -> f64 {
+        const HOUR: f64 = 3600.0;
+        match self.node_spacing {
+            Some(given) => given,
+            None if secs <= HOUR => 0.5,
+            None if secs <= 4.0 * HOUR => 1.0,
+            None => 2.0 * (secs / (24.0 * HOUR)).max(1.0),
+        }
+    }
+}

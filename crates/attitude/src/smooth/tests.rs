@@ -1,0 +1,7 @@
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests")]
+
+mod golden;
+mod input;
+mod logs;
+mod robustness;
+mod slopes;

@@ -1,0 +1,327 @@
+//! The figures of an independent computation, to their digits.
+
+use super::logs::{BIAS, FORCE_BIAS, Log, Motion, errors, log, smoothed};
+use crate::record::Nanos;
+use crate::smooth::border::{self, ALL};
+use crate::smooth::prepare::{Prepared, Preparer};
+use crate::smooth::segments::{Cutter, find_standstill};
+use crate::smooth::survey::Survey;
+use crate::smooth::sweep::{Sensor, sweep};
+use crate::smooth::{Outcome, Sample, Settings, Smoothed};
+use nalgebra::Vector3;
+
+/// Half of the last digit of six.
+const DIGITS: f64 = 5.1e-7;
+
+/// As the figures were made: before the colour of the motion bound.
+fn settings() -> Settings {
+    Settings {
+        colour: false,
+        iterations: 12,
+        field_iterations: 16,
+        ..Settings::default()
+    }
+}
+
+#[track_caller]
+fn agree(ours: &[f64], theirs: &[f64], tolerance: f64) {
+    assert_eq!(ours.len(), theirs.len());
+    for (a, b) in ours.iter().zip(theirs) {
+        assert!((a - b).abs() <= tolerance, "{ours:?}\n{theirs:?}");
+    }
+}
+
+pub(super) fn prepared(samples: &[Sample], settings: &Settings) -> (Survey, Vec<Prepared>) {
+    let survey = Survey::of(&mut { samples }, settings).unwrap();
+    let mut preparer = Preparer::new(&survey, settings);
+    let mut out = Vec::new();
+    preparer.push(samples, &mut out);
+    preparer.finish(&mut out);
+    (survey, out)
+}
+
+#[test]
+fn the_input_is_that_of_the_figures() {
+    let hand = log(Motion::Hand);
+    let sample = &hand.samples[3000];
+    agree(
+        sample.rate.as_slice(),
+        &[1.507064, -0.019627, 0.362298],
+        DIGITS,
+    );
+    agree(
+        sample.force.unwrap().as_slice(),
+        &[-8.533420, 3.905005, -4.989968],
+        DIGITS,
+    );
+    agree(
+        sample.field.unwrap().as_slice(),
+        &[46.211861, -19.580033, 7.506694],
+        DIGITS,
+    );
+    agree(
+        &hand.truth[6000],
+        &[0.499626, 0.697964, 0.486997, 0.161412],
+        DIGITS,
+    );
+}
+
+#[test]
+fn nodes_and_standstills_are_those_of_the_figures() {
+    let (_, prepared) = prepared(&log(Motion::Hand).samples, &settings());
+    let mut cutter = Cutter::new(0.5);
+    prepared.iter().for_each(|sample| cutter.take(sample));
+    let (mut segments, _) = cutter.finish();
+    let bias = find_standstill(&mut segments).unwrap();
+    assert_eq!(segments.len() + 1, 121);
+    assert_eq!(
+        segments.iter().filter(|segment| segment.is_still).count(),
+        38
+    );
+    assert!(segments[0].is_still && segments[119].is_still);
+    agree(bias.as_slice(), &BIAS, DIGITS);
+}
+
+#[test]
+fn a_segment_is_swept_as_in_the_figures() {
+    let hand = log(Motion::Hand);
+    let (_, prepared) = prepared(&hand.samples, &settings());
+    let mut constants = [0.0; ALL];
+    constants[border::FORCE_BIAS..border::FORCE].copy_from_slice(&FORCE_BIAS);
+    let sensor = Sensor::of(&constants);
+    let swept = sweep::<true>(
+        &prepared[3001..=3050],
+        &hand.truth[3000],
+        &Vector3::from(BIAS),
+        &sensor,
+    );
+    agree(&swept.q, &[0.196393, 0.789901, 0.392953, -0.427872], DIGITS);
+    agree(&swept.velocity, &[0.425868, 0.351780, 0.447799], DIGITS);
+    agree(&swept.position, &[0.065528, 0.048780, 0.117758], DIGITS);
+    let turn = [
+        -0.190510, -0.440226, 0.099669, 0.269949, -0.041745, -0.002951, 0.624089, -0.095572,
+        -0.005201, -0.134316, 0.033633, 0.023156,
+    ];
+    agree(&swept.by_turn[0], &turn, DIGITS);
+    let velocity = [-0.771776, 0.421774, 1.024747, 1.121921, -0.119577, 0.078771];
+    agree(&swept.by_velocity[0][..6], &velocity, DIGITS);
+    agree(&swept.by_velocity[0][24..], &[4.572860], DIGITS);
+    let position = [
+        0.003122, -0.019132, -0.013812, -0.004578, 0.000402, -0.000468,
+    ];
+    agree(&swept.by_position[2][..6], &position, DIGITS);
+    agree(&swept.field.r[0], &[0.380632, 0.879139, -0.205996], DIGITS);
+    agree(
+        &swept.field.rm[0][3..6],
+        &[40.562006, -14.872413, 10.683593],
+        DIGITS,
+    );
+    agree(
+        &swept.field.by_time,
+        &[-15.784133, 18.814924, 7.640488],
+        DIGITS,
+    );
+    agree(
+        &swept.field.by_turn[1][..3],
+        &[-4.687464, -10.808099, 1.036291],
+        DIGITS,
+    );
+}
+
+/// Errors of tilt and heading (root mean square, largest), and one sigma of the node in the middle, deg.
+#[track_caller]
+fn run(log: &Log, is_plain: bool, figures: [f64; 4], sigma: [f64; 3]) -> Smoothed {
+    let log = if is_plain {
+        log.clone().plain()
+    } else {
+        log.clone()
+    };
+    let (smoothed, estimates) = log.smoothed(&settings());
+    assert_eq!(smoothed.outcome(), Outcome::Converged);
+    // What the document grants: the figures come from another order of the same sums.
+    agree(&errors(&estimates, &log.truth, is_plain), &figures, 2e-4);
+    let middle = smoothed.marginals[smoothed.marginals.len() / 2].turn;
+    let ours = [0, 1, 2].map(|i| middle[(i, i)].sqrt().to_degrees());
+    agree(&ours, &sigma, 2e-4);
+    smoothed
+}
+
+#[test]
+fn a_hand_without_a_field() {
+    let hand = log(Motion::Hand);
+    let figures = [0.034825, 0.115268, 0.082618, 0.223507];
+    let smoothed = run(&hand, true, figures, [0.103673, 0.109168, 0.294517]);
+    let gyro = smoothed.calibration().gyro.value.map(|g| 100.0 * g);
+    let theirs = [
+        0.228829, 0.082957, -0.018954, 0.028108, 0.237973, 0.054777, -0.044080, 0.006670, 0.221993,
+    ];
+    agree(&gyro, &theirs, 2e-6);
+    agree(
+        &smoothed.calibration().force_bias.value,
+        &[0.027420, -0.020739, 0.036106],
+        2e-6,
+    );
+    let bias = smoothed
+        .biases()
+        .nth(60)
+        .unwrap()
+        .value
+        .map(f64::to_degrees);
+    agree(bias.as_slice(), &[0.572620, -0.458690, 0.287069], 2e-6);
+    agree(&smoothed.bound(), &[0.7552, 0.3083], 1e-4);
+}
+
+#[test]
+fn a_hand_with_a_field() {
+    let hand = log(Motion::Hand);
+    let figures = [0.035018, 1.463151, 0.083784, 1.577074];
+    let smoothed = run(&hand, false, figures, [0.103670, 0.109056, 3.676582]);
+    let magnetometer = smoothed.calibration().magnetometer.unwrap();
+    agree(
+        &magnetometer.hard_iron.value,
+        &[1.524699, -1.238209, 0.396480],
+        2e-6,
+    );
+    agree(&magnetometer.north_up.value, &[18.269917, -44.967713], 2e-6);
+    let (_, estimates) = hand.smoothed(&settings());
+    agree(
+        &estimates[3000].q_nb.wxyz(),
+        &[0.448998, 0.688387, 0.524518, -0.222271],
+        2e-6,
+    );
+}
+
+#[test]
+fn at_rest() {
+    let still = log(Motion::Still);
+    run(
+        &still,
+        true,
+        [0.209784, 0.0, 0.209784, 0.0],
+        [0.241941, 0.241941, 0.132651],
+    );
+    run(
+        &still,
+        false,
+        [0.209784, 7.198110, 0.209784, 7.198110],
+        [0.241903, 0.241908, 3.657149],
+    );
+}
+
+#[test]
+fn on_a_turntable() {
+    let turn = log(Motion::Turn);
+    run(
+        &turn,
+        true,
+        [0.086925, 2.252738, 0.088084, 3.430607],
+        [0.115839, 0.115839, 3.534140],
+    );
+    run(
+        &turn,
+        false,
+        [0.079416, 1.288169, 0.080272, 1.541745],
+        [0.115739, 0.113207, 0.646267],
+    );
+}
+
+#[test]
+fn in_a_car() {
+    let car = log(Motion::Car);
+    let plain = run(
+        &car,
+        true,
+        [0.213209, 0.036105, 0.257291, 0.093579],
+        [0.232330, 0.231397, 0.538725],
+    );
+    agree(&plain.bound(), &[25.0528, 775.9683], 1e-2);
+    run(
+        &car,
+        false,
+        [0.208152, 5.352680, 0.252381, 5.435828],
+        [0.231319, 0.230907, 3.068778],
+    );
+}
+
+/// Rates on a grid, and what they were before.
+fn gridded(on_grid: fn(f64) -> f64) -> (Vec<Sample>, Vec<Vector3<f64>>) {
+    let step = (2000.0_f64 / 32768.0).to_radians();
+    let rates: Vec<Vector3<f64>> = (0..20000)
+        .map(|i| {
+            let t = f64::from(i) / 200.0;
+            let rate = Vector3::new(
+                2.0 * (0.9 * t).sin(),
+                1.5 * (1.3 * t + 1.0).sin(),
+                (0.5 * t + 2.0).sin(),
+            );
+            rate.add_scalar(0.002)
+        })
+        .collect();
+    let sample = |(i, rate): (i64, &Vector3<f64>)| Sample {
+        stamp: Nanos(i * 5_000_000),
+        rate: rate.map(|w| on_grid(w / step) * step),
+        force: Some(Vector3::z() * 9.81),
+        field: None,
+    };
+    ((0..).zip(&rates).map(sample).collect(), rates)
+}
+
+#[test]
+fn truncation_is_found_and_undone() {
+    let figures: [(fn(f64) -> f64, f64, u64); 3] = [
+        (f64::trunc, 1.820225, 116),
+        (f64::round, 0.866667, 103),
+        (f64::floor, 0.681818, 98),
+    ];
+    for (i, (on_grid, ratio, counted)) in figures.into_iter().enumerate() {
+        let (samples, rates) = gridded(on_grid);
+        let (survey, prepared) = prepared(&samples, &Settings::default());
+        let found = survey.quantisation.unwrap();
+        agree(&[found.step.to_degrees()], &[0.06103516], 5e-9);
+        agree(&[found.zero_bin], &[ratio], DIGITS);
+        assert_eq!(found.counted, counted);
+        assert_eq!(found.is_undone, i == 0);
+        let mean = |of: &dyn Fn(usize) -> Vector3<f64>| {
+            let sum: Vector3<f64> = (0..rates.len()).map(|k| of(k) - rates[k]).sum();
+            (sum / rates.len() as f64).map(f64::to_degrees)
+        };
+        let (before, after) = (mean(&|k| samples[k].rate), mean(&|k| prepared[k].rate));
+        if i == 0 {
+            agree(before.as_slice(), &[-0.000581, -0.000170, 0.000087], DIGITS);
+            agree(after.as_slice(), &[0.000127, -0.000153, -0.000035], DIGITS);
+        } else {
+            assert_eq!(before, after);
+        }
+    }
+}
+
+#[test]
+fn a_hole_is_filled_by_a_cubic() {
+    let stamps = (0..8).chain(12..20);
+    let samples: Vec<Sample> = stamps
+        .map(|i| {
+            let t = f64::from(i) * 0.01;
+            Sample {
+                stamp: Nanos(i64::from(i) * 10_000_000),
+                rate: Vector3::new((9.0 * t).sin(), (7.0 * t).cos(), t * t),
+                force: Some(Vector3::z() * 9.81),
+                field: None,
+            }
+        })
+        .collect();
+    let (_, prepared) = prepared(&samples, &Settings::default());
+    assert_eq!(prepared.len(), 20);
+    agree(
+        prepared[8].rate.as_slice(),
+        &[0.666842, 0.853943, 0.006080],
+        DIGITS,
+    );
+    agree(
+        prepared[11].rate.as_slice(),
+        &[0.846878, 0.723083, 0.011780],
+        DIGITS,
+    );
+    assert_eq!(prepared[8].stamp, 80_000_000);
+    assert!(!prepared[8].is_input && prepared[12].is_input && prepared[12].doubt[0] > 0.0);
+    let _ = smoothed(&samples, &Settings::default());
+}
