@@ -211,24 +211,31 @@ pub fn run(cli: Cli) -> Result<Outcome> {
 
 /// Starts the diagnostics on stderr.
 pub fn start_diagnostics(global: &Global) {
-    use tracing_subscriber::EnvFilter;
+    use tracing_subscriber::filter::{LevelFilter, Targets};
+    use tracing_subscriber::prelude::*;
     let level = match (global.quiet, global.verbose) {
-        (true, _) => "warn",
-        (false, 0) => "info",
-        (false, 1) => "debug",
-        (false, _) => "trace",
+        (true, _) => LevelFilter::WARN,
+        (false, 0) => LevelFilter::INFO,
+        (false, 1) => LevelFilter::DEBUG,
+        (false, _) => LevelFilter::TRACE,
     };
-    let filter = EnvFilter::try_from_env("STRAPD_LOG").unwrap_or_else(|_| EnvFilter::new(level));
-    let builder = tracing_subscriber::fmt()
-        .with_env_filter(filter)
+    let asked = std::env::var("STRAPD_LOG").unwrap_or_default();
+    let targets = match asked.parse::<Targets>() {
+        Ok(targets) if !asked.is_empty() => targets,
+        _ => Targets::new().with_default(level),
+    };
+    let layer = tracing_subscriber::fmt::layer()
         .with_writer(std::io::stderr)
         .with_target(false)
         .with_ansi(use_colour(global.color));
-    // A second start (tests in one process) is harmless.
-    let _ = match global.log_format {
-        LogFormat::Json => builder.json().try_init(),
-        LogFormat::Text => builder.without_time().try_init(),
+    let layer = match global.log_format {
+        LogFormat::Json => layer.json().boxed(),
+        LogFormat::Text => layer.without_time().boxed(),
     };
+    // A second start (tests in one process) is harmless.
+    let _ = tracing_subscriber::registry()
+        .with(layer.with_filter(targets))
+        .try_init();
 }
 
 /// Whether stderr takes colour.

@@ -10,6 +10,7 @@ pub mod plot;
 pub mod series;
 pub mod sigma;
 pub mod simulation;
+pub mod smoothing;
 pub mod stamps;
 pub mod summary;
 pub mod trace;

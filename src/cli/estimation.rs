@@ -371,6 +371,7 @@ impl Estimation {
             gyro_range: self.gyro_range,
             noise: parse_noise(&self.noise)?,
             aid: self.aid.into(),
+            smooth: false,
             is_accel_kinematic: self.accel_sign == SignArg::Kinematic,
             has_forces_beside: self.accel_topic.is_some(),
             mag_mount: self
@@ -388,6 +389,19 @@ impl Estimation {
             calibration,
             start: self.start,
             until: self.until,
+        };
+        plan.check().map_err(Error::Usage)?;
+        Ok(plan)
+    }
+
+    /// The same with `--smooth`, where it was given.
+    ///
+    /// # Errors
+    /// As [`Estimation::plan`]; [`Error::Usage`]: the flags do not go with a smoother.
+    pub fn plan_of_a_recording(&self, smooth: bool) -> Result<Plan> {
+        let plan = Plan {
+            smooth,
+            ..self.plan()?
         };
         plan.check().map_err(Error::Usage)?;
         Ok(plan)

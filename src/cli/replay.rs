@@ -40,6 +40,10 @@ pub struct Replay {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub estimation: Estimation,
+    /// Smooth: the best attitude the whole recording can give, all of it at the end, with the sensor calibrated from
+    /// the recording itself (needs the accelerometer; --aid gravity+mag: heading from north)
+    #[arg(long, help_heading = "Estimation")]
+    pub smooth: bool,
     /// Replace outputs that exist
     #[arg(long, help_heading = "Output")]
     pub force: bool,
@@ -150,7 +154,7 @@ pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
     }
     outputs::check_distinct(&args.outputs, &args.sources)?;
     args.check_calibrations(&logs)?;
-    let plan = args.estimation.plan()?;
+    let plan = args.estimation.plan_of_a_recording(args.smooth)?;
     let selection = args.estimation.selection()?;
     let pool = Pool::new(global.threads)?;
     let mut outcome = Outcome::Done;

@@ -42,6 +42,10 @@ pub struct Report {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub estimation: Estimation,
+    /// Smooth: the best attitude the whole recording can give, all of it at the end, with the sensor calibrated from
+    /// the recording itself (needs the accelerometer; --aid gravity+mag: heading from north)
+    #[arg(long, help_heading = "Estimation")]
+    pub smooth: bool,
     /// Hold the attitude against the one in this file (.mcap, .ndjson, .csv), not the one in the log
     #[arg(long, value_name = "FILE")]
     pub reference: Option<PathBuf>,
@@ -74,7 +78,7 @@ pub fn run(global: &Global, args: &Report) -> Result<Outcome> {
         }
         _ => {}
     }
-    let plan = args.estimation.plan()?;
+    let plan = args.estimation.plan_of_a_recording(args.smooth)?;
     let selection = args.estimation.selection()?;
     let inputs: Vec<PathBuf> = Some(&args.file)
         .into_iter()

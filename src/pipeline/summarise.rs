@@ -8,6 +8,7 @@ use crate::report::calibration;
 use crate::report::findings::orientation;
 use crate::report::series::Drawn;
 use crate::report::sigma::SigmaTerms;
+use crate::report::smoothing::Smoothing;
 use crate::report::stamps::{Regularised, Segment};
 use crate::report::summary::{Gaps, RunSummary, TopicSummary, significant};
 use std::sync::atomic::Ordering;
@@ -104,6 +105,7 @@ fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
         bias: topic.prepared.bias.into(),
         bias_origin: topic.prepared.bias_origin.clone(),
         aided: topic.estimator.filter().map(Aided::of),
+        smoothed: topic.estimator.smoothed().map(Smoothing::of),
         calibration: calibrated(run, topic),
         noise: run.plan.noise.name.clone(),
         sigma_terms: Some(SigmaTerms::of(
@@ -151,7 +153,9 @@ fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
 /// What is known of the sensor at the end.
 fn calibrated(run: &ReplayRequest, topic: &Topic) -> SensorCalibration {
     let filter = topic.estimator.filter();
-    let known = learned(&run.plan, &topic.resolved, &topic.prepared, filter);
+    let smoothed = topic.estimator.smoothed().and_then(Result::ok);
+    let of = (&run.plan, &topic.resolved, &topic.prepared);
+    let known = learned(of, filter, smoothed);
     let source = match &run.source {
         Source::File(path) => path.file_name().unwrap_or_default().to_string_lossy(),
         Source::Stdin => "standard input".into(),
@@ -275,8 +279,11 @@ fn warnings(topic: &Topic, summary: &TopicSummary) -> Vec<String> {
             "{marked} samples mark their gyro as absent (covariance -1), which some drivers do wrongly: --ignore-covariance-flag uses it all the same"
         ));
     }
-    let aided = summary.aided.as_ref();
-    said.extend(aided.and_then(|aided| aided.doubt(&summary.noise)));
+    match (&summary.smoothed, &summary.aided) {
+        (Some(smoothed), _) => said.extend(smoothed.doubt()),
+        (None, Some(aided)) => said.extend(aided.doubt(&summary.noise)),
+        (None, None) => {}
+    }
     if topic.zeros.count > 0 {
         said.push(format!(
             "{} samples are exactly zero about all axes between others that are not: a driver that has no data says so this way; they are integrated as rest",

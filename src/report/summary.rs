@@ -5,6 +5,7 @@
 use super::aid::Aided;
 use super::series::Drawn;
 use super::sigma::SigmaTerms;
+use super::smoothing::Smoothing;
 use super::stamps::Regularised;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
@@ -59,6 +60,8 @@ pub struct TopicSummary {
     pub bias_origin: String,
     /// What corrected the attitude, where something did.
     pub aided: Option<Aided>,
+    /// What a smoother made of it, where one was asked for.
+    pub smoothed: Option<Smoothing>,
     /// What is known of the sensor at the end.
     pub calibration: SensorCalibration,
     /// Noise behind sigma.
@@ -293,15 +296,17 @@ impl TopicSummary {
                 self.input_axes, self.body, self.world, self.initial
             ),
         );
-        match &self.aided {
+        let by_smoother = self.smoothed.as_ref().map(|s| ("smooth", s.lines()));
+        let by_filter = self.aided.as_ref().map(|aided| ("aid", aided.lines()));
+        match by_smoother.or(by_filter) {
             None => line(
                 out,
                 "aid",
                 "none: the gyro alone, which drifts (--aid gravity corrects tilt by the accelerometer)",
             ),
-            Some(aided) => {
-                for (i, words) in aided.lines().iter().enumerate() {
-                    line(out, if i == 0 { "aid" } else { "" }, words);
+            Some((name, lines)) => {
+                for (i, words) in lines.iter().enumerate() {
+                    line(out, if i == 0 { name } else { "" }, words);
                 }
             }
         }
@@ -410,6 +415,9 @@ impl TopicSummary {
     }
 
     fn drift_text(&self) -> String {
+        if let Some(smoothed) = &self.smoothed {
+            return smoothed.sigma_text().to_owned();
+        }
         if let Some(aided) = &self.aided {
             return aided.sigma_text().to_owned();
         }
@@ -488,6 +496,7 @@ impl TopicSummary {
                 "latitude_deg": latitude, "rad_s": EARTH_RATE,
             })),
             "aid": self.aided.as_ref().map(Aided::json),
+            "smooth": self.smoothed.as_ref().map(Smoothing::json),
             "noise": self.noise,
             "sigma_terms": self.sigma_terms.as_ref().map(SigmaTerms::json),
             "drift_deg_per_h": self.drift.to_degrees() * 3600.0,

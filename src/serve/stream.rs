@@ -245,7 +245,7 @@ impl SensorStream {
             ..plan.clone()
         };
         let filter = self.estimator.filter();
-        let known = learned(&plan, &self.resolved, &self.prepared, filter);
+        let known = learned((&plan, &self.resolved, &self.prepared), filter, None);
         calibration::described(known, &self.id, "live", self.last.as_ref())
     }
 

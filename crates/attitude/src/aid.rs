@@ -50,6 +50,7 @@ mod tests;
 mod update;
 
 pub use aided::{Aided, Start};
+pub(crate) use beside::Beside;
 pub use calibration::Calibration;
 pub use filter::{Filter, Innovation, Report};
 pub use heading::FieldQuality;

@@ -19,6 +19,7 @@ mod meaning;
 mod plan;
 mod preparation;
 mod sensor_calibration;
+mod smoothing;
 mod stamps;
 
 pub use aiding::{Aiding, Forces};

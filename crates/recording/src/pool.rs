@@ -49,4 +49,8 @@ impl Executor for Pool {
         self.pool
             .install(|| (0..n).into_par_iter().map(&f).collect())
     }
+
+    fn threads(&self) -> usize {
+        Pool::threads(self)
+    }
 }

@@ -138,8 +138,15 @@ fn integrated(s: &TopicSummary, stretches: Option<usize>, out: &mut String) {
         rows.add("warning", &warning.replace("\n  help: ", "; "));
     }
     out.push_str(&rows.html());
-    if let Some(learned) = s.aided.as_ref().and_then(Aided::learned) {
-        out.push_str("<h3>Calibration learned on the way</h3>\n");
+    let (title, learned) = match &s.smoothed {
+        Some(smoothed) => ("Calibration by the whole recording", smoothed.learned()),
+        None => (
+            "Calibration learned on the way",
+            s.aided.as_ref().and_then(Aided::learned),
+        ),
+    };
+    if let Some(learned) = learned {
+        out.push_str(&format!("<h3>{title}</h3>\n"));
         let head = ["", "x", "y", "z", "+- x", "+- y", "+- z"];
         out.push_str(&table("numbers", &head, &learned));
         out.push_str("<p class=\"small\">One sigma. What the motion does not show stays near nothing, with the sigma it had at first.</p>\n");

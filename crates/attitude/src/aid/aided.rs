@@ -142,6 +142,11 @@ impl Aided {
             .unwrap_or_default()
     }
 
+    /// Whether they do.
+    pub(crate) fn has_forces_beside(&self) -> bool {
+        self.forces.is_some()
+    }
+
     /// From now on, as after [`Aided::with_forces_beside`].
     pub fn expect_forces_beside(&mut self) {
         self.forces.get_or_insert_default();

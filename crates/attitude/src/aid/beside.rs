@@ -17,7 +17,7 @@ const MOST: usize = 4096;
 /// Vectors on their way to gyro samples.
 #[derive(Clone, PartialEq, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(super) struct Beside {
+pub(crate) struct Beside {
     waiting: VecDeque<(Nanos, Vector3<f64>)>,
     last: Option<Vector3<f64>>,
     /// Whether one that equals the one before it is that one again.
@@ -31,7 +31,7 @@ pub(super) struct Beside {
 
 impl Beside {
     /// Of a sensor whose messages may say the same measurement several times.
-    pub(super) fn with_repeats() -> Beside {
+    pub(crate) fn with_repeats() -> Beside {
         Beside {
             has_repeats: true,
             ..Beside::default()
@@ -39,7 +39,7 @@ impl Beside {
     }
 
     /// Takes a vector, body axes.
-    pub(super) fn take(&mut self, stamp: Nanos, vector: Vector3<f64>) {
+    pub(crate) fn take(&mut self, stamp: Nanos, vector: Vector3<f64>) {
         if !vector.iter().all(|v| v.is_finite()) {
             self.not_finite += 1;
             return;
@@ -77,7 +77,7 @@ impl Beside {
 
     /// The mean of those that belong to the gyro sample at `stamp`, each turned on by `rate` (rad/s, body axes)
     /// from its own stamp: as the body would have seen it then.
-    pub(super) fn at(&mut self, stamp: Nanos, rate: &Vector3<f64>) -> Option<Vector3<f64>> {
+    pub(crate) fn at(&mut self, stamp: Nanos, rate: &Vector3<f64>) -> Option<Vector3<f64>> {
         let (mut sum, mut n) = (Vector3::zeros(), 0.0);
         while let Some((own, vector)) = self.waiting.front() {
             let ago = stamp.since(*own);

@@ -8,6 +8,7 @@ use super::plan::{Bias, Noise, Plan};
 use super::preparation::Prepared;
 use super::sensor_calibration::{Known, SensorCalibration};
 use crate::aid::{Filter, Prior, Settings};
+use crate::smooth::{Learned, Outcome, Smoothed};
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
 /// Of a gyro whose bias was removed, rad/s: what the bias may have become since.
@@ -115,12 +116,13 @@ impl Meaning {
 
 /// What is known of the sensor at the end of a run: what it was known by before, with what the filter has learned.
 /// Numbers that the run has told nothing of stay as they were.
+///
+/// Of a recording that was smoothed, `smoothed` says more than the filter that ran along.
 #[must_use]
 pub fn learned(
-    plan: &Plan,
-    resolved: &Meaning,
-    prepared: &Prepared,
+    (plan, resolved, prepared): (&Plan, &Meaning, &Prepared),
     filter: Option<&Filter>,
+    smoothed: Option<&Smoothed>,
 ) -> SensorCalibration {
     let mut known = plan.calibration.as_deref().cloned().unwrap_or_default();
     let c = resolved.to_body();
@@ -146,6 +148,10 @@ pub fn learned(
             sigma: None,
             observed: [true],
         });
+    }
+    if let Some(smoothed) = smoothed {
+        by_smoother(&mut known, (resolved, prepared), smoothed, switched_off);
+        return known;
     }
     let Some(filter) = filter.filter(|f| f.is_started() && !f.is_force_implausible()) else {
         return known;
@@ -210,6 +216,101 @@ pub fn learned(
         0.0,
     ));
     known
+}
+
+/// What a whole recording says of the sensor; nothing where the smoother led nowhere.
+fn by_smoother(
+    known: &mut SensorCalibration,
+    (resolved, prepared): (&Meaning, &Prepared),
+    smoothed: &Smoothed,
+    switched_off: f64,
+) {
+    if matches!(smoothed.outcome(), Outcome::Filter(_)) {
+        return;
+    }
+    let found = smoothed.calibration();
+    let c = resolved.to_body();
+    let undone = |matrix: Matrix3<f64>| matrix.try_inverse().unwrap_or_else(Matrix3::identity);
+    // Of errors that are independent: squares turn with the squares of the axes.
+    let about = |by: &Matrix3<f64>, sigma: [f64; 3]| -> [f64; 3] {
+        let squares = by.component_mul(by) * Vector3::from(sigma).map(|s| s * s);
+        squares.map(f64::sqrt).into()
+    };
+    // (I + E), found of what was left of a matrix that was known, in the sensor's own axes.
+    let whole = |c: &Matrix3<f64>, before: &Matrix3<f64>, found: &Learned<9>| {
+        let left = c.transpose() * Matrix3::from_row_slice(&found.value) * c;
+        let total = (Matrix3::identity() + left) * before - Matrix3::identity();
+        let square = c.component_mul(c);
+        let of = |numbers: &[f64; 9]| -> [f64; 9] {
+            let turned =
+                square.transpose() * Matrix3::from_row_slice(numbers).map(|s| s * s) * square;
+            row_by_row(&turned.map(f64::sqrt))
+        };
+        (row_by_row(&total), of(&found.sigma), of(&found.prior))
+    };
+    let from_gyro = undone(c * known.gyro_matrix());
+    let from_force = undone(c * known.force_matrix());
+    // As it was at the end.
+    if let Some(last) = smoothed.biases().last() {
+        let sigma = about(&from_gyro, last.sigma.into());
+        let value = from_gyro * (prepared.bias + last.value);
+        known.bias = Some(now_known(
+            known.bias.as_ref(),
+            [f64::INFINITY; 3],
+            value.into(),
+            sigma,
+            switched_off,
+        ));
+    }
+    let (value, sigma, prior) = whole(&c, &known.gyro_matrix(), &found.gyro);
+    known.gyro = Some(now_known(known.gyro.as_ref(), prior, value, sigma, 0.0));
+    let before = Vector3::from(vector_of(known.force_bias.as_ref()));
+    let value = before + from_force * Vector3::from(found.force_bias.value);
+    known.force_bias = Some(now_known(
+        known.force_bias.as_ref(),
+        about(&from_force, found.force_bias.prior),
+        value.into(),
+        about(&from_force, found.force_bias.sigma),
+        0.0,
+    ));
+    let (value, sigma, prior) = whole(&c, &known.force_matrix(), &found.force);
+    known.force = Some(now_known(known.force.as_ref(), prior, value, sigma, 0.0));
+    // A lead that was known is told to the filter alone: what is found is all of it.
+    known.lead = Some(now_known(
+        known.lead.as_ref(),
+        found.force_time.prior,
+        found.force_time.value,
+        found.force_time.sigma,
+        0.0,
+    ));
+    let Some(magnetometer) = &found.magnetometer else {
+        return;
+    };
+    let to_body = resolved.field_to_body();
+    let from_field = undone(to_body * known.field_matrix());
+    // Of the field in the unit it is recorded in.
+    let unit = 1.0 / magnetometer.scale;
+    let iron = &magnetometer.hard_iron;
+    let before = Vector3::from(vector_of(known.hard_iron.as_ref()));
+    known.hard_iron = Some(now_known(
+        known.hard_iron.as_ref(),
+        about(&from_field, iron.prior).map(|s| s * unit),
+        (before + from_field * Vector3::from(iron.value) * unit).into(),
+        about(&from_field, iron.sigma).map(|s| s * unit),
+        0.0,
+    ));
+    let (value, sigma, prior) = whole(&to_body, &known.field_matrix(), &magnetometer.matrix);
+    known.soft_iron = Some(now_known(
+        known.soft_iron.as_ref(),
+        prior,
+        value,
+        sigma,
+        0.0,
+    ));
+}
+
+fn row_by_row(matrix: &Matrix3<f64>) -> [f64; 9] {
+    std::array::from_fn(|n| matrix[(n / 3, n % 3)])
 }
 
 fn vector_of(known: Option<&Known<3>>) -> [f64; 3] {

@@ -8,6 +8,7 @@ use super::anew::Anew;
 use super::meaning::Meaning;
 use super::plan::{Initial, Noise, Plan};
 use super::preparation::Prepared;
+use super::smoothing::Smoothing;
 use crate::aid::{self, Aided};
 use crate::condition::regularise::{self, Regulariser};
 use crate::condition::{self, Clock, Conditioner};
@@ -15,8 +16,12 @@ use crate::frames::Nav;
 use crate::propagate::{self, Executor, Method, Propagator};
 use crate::quaternion::{Quaternion, RotationVector};
 use crate::record::{AttitudeSample, Join, Nanos, RateSample, RawSample};
+use crate::smooth::Smoothed;
 use crate::worlds::{Convention, World};
 use nalgebra::Vector3;
+
+/// Why a smoother does not go on from somewhere.
+const OF_A_WHOLE: &str = "a smoothed recording has no attitude to go on from";
 
 /// An estimator of one stream.
 #[derive(Debug)]
@@ -68,6 +73,8 @@ struct Besides {
 enum Integrator {
     Alone(Box<Propagator>),
     Aided(Box<Aided>),
+    /// All at the end.
+    Smoothed(Box<Smoothing>),
 }
 
 impl Integrator {
@@ -76,6 +83,7 @@ impl Integrator {
             Integrator::Alone(propagator) => propagator.push(rates, exec, out),
             // What a sample is corrected by hangs on those before it.
             Integrator::Aided(aided) => aided.push(rates, out),
+            Integrator::Smoothed(smoothing) => smoothing.push(rates),
         }
     }
 
@@ -84,12 +92,20 @@ impl Integrator {
             (Integrator::Alone(_), _) => {}
             (Integrator::Aided(aided), Beside::Force(force)) => aided.take_force(stamp, force),
             (Integrator::Aided(aided), Beside::Field(field)) => aided.take_field(stamp, field),
+            (Integrator::Smoothed(smoothing), Beside::Force(force)) => {
+                smoothing.take_force(stamp, force);
+            }
+            (Integrator::Smoothed(smoothing), Beside::Field(field)) => {
+                smoothing.take_field(stamp, field);
+            }
         }
     }
 
     fn expect_forces_beside(&mut self) {
-        if let Integrator::Aided(aided) = self {
-            aided.expect_forces_beside();
+        match self {
+            Integrator::Alone(_) => {}
+            Integrator::Aided(aided) => aided.expect_forces_beside(),
+            Integrator::Smoothed(smoothing) => smoothing.expect_forces_beside(),
         }
     }
 
@@ -97,6 +113,7 @@ impl Integrator {
         match self {
             Integrator::Alone(propagator) => propagator.finish(exec, out),
             Integrator::Aided(aided) => aided.finish(out),
+            Integrator::Smoothed(smoothing) => smoothing.finish(exec, out),
         }
     }
 }
@@ -199,10 +216,20 @@ impl Estimator {
         let integrator = match &prepared.aiding {
             None => Propagator::new(propagation).map(|p| Integrator::Alone(Box::new(p))),
             Some(aiding) => Aided::new(propagation, aiding.settings, aiding.start).map(|aided| {
-                Integrator::Aided(Box::new(match aiding.forces {
+                let aided = match aiding.forces {
                     Forces::Beside => aided.with_forces_beside(),
                     Forces::WithRates | Forces::Unseen => aided,
-                }))
+                };
+                if plan.smooth {
+                    let heading = match aiding.start {
+                        aid::Start::Level => None,
+                        aid::Start::Known { .. } => Some(prepared.initial.yaw_pitch_roll().yaw),
+                    };
+                    let smoothing = Smoothing::new(aided, resolved.kind, heading);
+                    Integrator::Smoothed(Box::new(smoothing))
+                } else {
+                    Integrator::Aided(Box::new(aided))
+                }
             }),
         }
         .map_err(|e| e.to_string())?;
@@ -266,6 +293,7 @@ impl Estimator {
         match &mut self.integrator {
             Integrator::Alone(propagator) => propagator.resume(&last),
             Integrator::Aided(aided) => aided.resume(&last),
+            Integrator::Smoothed(_) => return Err(OF_A_WHOLE.to_owned()),
         }
         .map_err(|e| e.to_string())
     }
@@ -283,6 +311,7 @@ impl Estimator {
                 let (propagation, aiding) = aided.memory()?;
                 (propagation, Some(aiding))
             }
+            Integrator::Smoothed(_) => return None,
         };
         Some(Memory {
             settings: self.settings,
@@ -325,6 +354,7 @@ impl Estimator {
         match &mut self.integrator {
             Integrator::Alone(propagator) => propagator.succeed(resets),
             Integrator::Aided(aided) => aided.succeed(resets),
+            Integrator::Smoothed(_) => {}
         }
     }
 
@@ -336,6 +366,7 @@ impl Estimator {
         match &mut self.integrator {
             Integrator::Alone(propagator) => propagator.begin_anew(&anew.attitude),
             Integrator::Aided(aided) => aided.begin_anew(&anew.attitude, anew.start),
+            Integrator::Smoothed(_) => {}
         }
         self.begins_anew = true;
     }
@@ -497,6 +528,7 @@ impl Estimator {
         match &self.integrator {
             Integrator::Alone(propagator) => propagator.report(),
             Integrator::Aided(aided) => aided.propagation(),
+            Integrator::Smoothed(smoothing) => smoothing.aided().propagation(),
         }
     }
 
@@ -506,6 +538,23 @@ impl Estimator {
         match &self.integrator {
             Integrator::Alone(_) => None,
             Integrator::Aided(aided) => Some(aided.filter()),
+            Integrator::Smoothed(smoothing) => Some(smoothing.aided().filter()),
+        }
+    }
+
+    /// Of a recording that was smoothed, once it is finished: what was learned of it.
+    ///
+    /// # Errors
+    /// In words: why it was not, and its attitudes are the filter's. `None` where nobody asked.
+    #[must_use]
+    pub fn smoothed(&self) -> Option<Result<&Smoothed, &str>> {
+        let Integrator::Smoothed(smoothing) = &self.integrator else {
+            return None;
+        };
+        match (smoothing.smoothed(), smoothing.failure()) {
+            (Some(smoothed), _) => Some(Ok(smoothed)),
+            (None, Some(why)) => Some(Err(why)),
+            (None, None) => None,
         }
     }
 
@@ -519,7 +568,7 @@ impl Estimator {
     /// Those kept since this was asked last, each with the stamp of the correction.
     pub fn innovations(&mut self) -> Vec<(Nanos, aid::Innovation)> {
         match &mut self.integrator {
-            Integrator::Alone(_) => Vec::new(),
+            Integrator::Alone(_) | Integrator::Smoothed(_) => Vec::new(),
             Integrator::Aided(aided) => aided.innovations(),
         }
     }
@@ -530,6 +579,7 @@ impl Estimator {
         match &self.integrator {
             Integrator::Alone(propagator) => propagator.method(),
             Integrator::Aided(aided) => aided.method(),
+            Integrator::Smoothed(smoothing) => smoothing.aided().method(),
         }
     }
 

@@ -50,6 +50,8 @@ pub struct Plan {
     pub noise: Noise,
     /// `--aid`.
     pub aid: Aid,
+    /// `--smooth`: the whole recording at once, all attitudes at its end.
+    pub smooth: bool,
     /// `--accel-sign`: the accelerometer says down at rest, not up.
     pub is_accel_kinematic: bool,
     /// Specific forces come by [`Estimator::take_beside`](super::Estimator::take_beside), not with the rates.
@@ -125,6 +127,7 @@ impl Default for Plan {
             gyro_range: None,
             noise: Noise::preset(&NOISE_PRESETS[0]),
             aid: Aid::None,
+            smooth: false,
             is_accel_kinematic: false,
             has_forces_beside: false,
             mag_mount: None,
@@ -174,6 +177,7 @@ impl Plan {
         self.check_earth_rate()?;
         self.check_field()?;
         self.check_calibration()?;
+        self.check_smoothing()?;
         if self.regularise_stamps && matches!(self.clock, Clock::Index { .. }) {
             return Err("--regularise-stamps: the stamps of --time index are even already\n  help: leave one of the two out".to_owned());
         }
@@ -236,6 +240,32 @@ impl Plan {
             return Err("--bias x,y,z: the calibration says a bias, too\n  help: leave --bias out, or `bias` out of the file; --bias auto takes that of the rest in this log".to_owned());
         }
         Ok(())
+    }
+
+    /// A smoother needs forces, and integrates by itself.
+    fn check_smoothing(&self) -> Result<(), String> {
+        if !self.smooth {
+            return Ok(());
+        }
+        let what = match self {
+            Plan { aid: Aid::None, .. } => {
+                "--aid none: a smoother needs the accelerometer\n  help: --aid gravity or gravity+mag; without --smooth the gyro alone"
+            }
+            Plan { method, .. } if *method != Method::Auto => {
+                "--method: a smoother integrates between its nodes by itself\n  help: leave one of the two out"
+            }
+            Plan {
+                latitude_deg: Some(_),
+                ..
+            } => {
+                "--earth-rate: the smoother takes the Earth's rotation for bias\n  help: leave one of the two out"
+            }
+            Plan { mag_hard_iron, .. } if *mag_hard_iron != 0.0 => {
+                "--mag-hard-iron: a smoother learns the magnetometer's errors by itself\n  help: leave it out"
+            }
+            _ => return Ok(()),
+        };
+        Err(format!("--smooth with {what}"))
     }
 
     /// `--earth-rate` needs a latitude that is one, and a world in which the Earth's axis has a place.

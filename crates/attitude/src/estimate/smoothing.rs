@@ -1,0 +1,266 @@
+//! Conditioned samples of a whole recording -> its smoothed attitudes, at the end. Pure.
+//!
+//! Apart from the smoother because that reads samples again and again, and here they come once: they are kept, with the
+//! vectors measured beside them, and a filter runs along for what the run says of turns, gaps and sensor.
+
+use crate::aid::{Aided, Beside};
+use crate::frames::{Body, Nav};
+use crate::propagate::Executor;
+use crate::quaternion::{Quaternion, RotationVector};
+use crate::record::{
+    AttitudeCovariance, AttitudeSample, Join, Nanos, RateSample, SampleKind, Status,
+};
+use crate::smooth::{
+    Estimate, FieldUnit, Outcome, Sample, SampleModel, Samples, Settings, SmoothError, Smoothed,
+    smooth,
+};
+use nalgebra::{Matrix3, Vector3};
+use std::convert::Infallible;
+use std::num::NonZero;
+
+/// Between the last sample and the next where the stamps go back: nothing is known of what lies between, ns.
+const APART: i64 = 10_000_000_000;
+
+/// A recording on its way to the smoother.
+#[derive(Debug)]
+pub(super) struct Smoothing {
+    /// Runs along: counts, and attitudes where the smoother has none.
+    aided: Aided,
+    /// Its attitudes, kept only until the end is known to be smoothed.
+    along: Vec<AttitudeSample>,
+    kept: Kept,
+    forces: Option<Beside>,
+    fields: Beside,
+    /// Heading of the first attitude where somebody said it, rad.
+    heading: Option<f64>,
+    smoothed: Option<Smoothed>,
+    /// Why there is none.
+    failure: Option<String>,
+}
+
+/// What was measured, in memory.
+#[derive(Debug)]
+struct Kept {
+    kind: SampleKind,
+    rates: Vec<RateSample>,
+    /// Fields by the place of their sample.
+    fields: Vec<(usize, Vector3<f64>)>,
+    /// Stamps that went back go on from here: places, and what is added to the stamps from there on, ns.
+    shifts: Vec<(usize, i64)>,
+}
+
+impl Kept {
+    fn sample(&self, place: usize, rate: &RateSample, shift: i64) -> Sample {
+        Sample {
+            stamp: Nanos(rate.stamp.0.saturating_add(shift)),
+            rate: mean_rate(self.kind, rate),
+            force: rate.accel,
+            field: self
+                .fields
+                .binary_search_by_key(&place, |(at, _)| *at)
+                .ok()
+                .and_then(|found| self.fields.get(found))
+                .map(|(_, field)| *field),
+        }
+    }
+}
+
+/// The rate of a sample, rad/s: of a mean or a delta angle that over its interval.
+fn mean_rate(kind: SampleKind, sample: &RateSample) -> Vector3<f64> {
+    let own = match kind {
+        SampleKind::Rate => 1.0,
+        SampleKind::Average | SampleKind::DeltaAngle => sample.stamp.secs_since(sample.start),
+    };
+    if own > 0.0 {
+        sample.value / own
+    } else {
+        Vector3::zeros()
+    }
+}
+
+impl Samples for &Kept {
+    type Error = Infallible;
+
+    fn pass(&mut self, take: &mut dyn FnMut(&[Sample])) -> Result<(), Infallible> {
+        const CHUNK: usize = 4096;
+        let mut chunk = Vec::with_capacity(CHUNK);
+        let mut shifts = self.shifts.iter().peekable();
+        let mut shift = 0;
+        for (place, rate) in self.rates.iter().enumerate() {
+            if let Some((_, by)) = shifts.next_if(|(at, _)| *at == place) {
+                shift = *by;
+            }
+            chunk.push(self.sample(place, rate, shift));
+            if chunk.len() == CHUNK {
+                take(&chunk);
+                chunk.clear();
+            }
+        }
+        take(&chunk);
+        Ok(())
+    }
+}
+
+impl Smoothing {
+    /// Of a filter that has taken nothing yet. `heading`: of the first attitude, where it is not that of the smoother.
+    pub(super) fn new(aided: Aided, kind: SampleKind, heading: Option<f64>) -> Smoothing {
+        Smoothing {
+            forces: aided.has_forces_beside().then(Beside::default),
+            fields: Beside::with_repeats(),
+            aided,
+            along: Vec::new(),
+            kept: Kept {
+                kind,
+                rates: Vec::new(),
+                fields: Vec::new(),
+                shifts: Vec::new(),
+            },
+            heading,
+            smoothed: None,
+            failure: None,
+        }
+    }
+
+    /// The filter that runs along.
+    pub(super) fn aided(&self) -> &Aided {
+        &self.aided
+    }
+
+    /// The result, once the end has come.
+    pub(super) fn smoothed(&self) -> Option<&Smoothed> {
+        self.smoothed.as_ref()
+    }
+
+    /// Why there is none.
+    pub(super) fn failure(&self) -> Option<&str> {
+        self.failure.as_deref()
+    }
+
+    pub(super) fn expect_forces_beside(&mut self) {
+        self.forces.get_or_insert_default();
+        self.aided.expect_forces_beside();
+    }
+
+    pub(super) fn take_force(&mut self, stamp: Nanos, force: Vector3<f64>) {
+        if let Some(forces) = &mut self.forces {
+            forces.take(stamp, force);
+        }
+        self.aided.take_force(stamp, force);
+    }
+
+    pub(super) fn take_field(&mut self, stamp: Nanos, field: Vector3<f64>) {
+        self.fields.take(stamp, field);
+        self.aided.take_field(stamp, field);
+    }
+
+    pub(super) fn push(&mut self, rates: &[RateSample]) {
+        for rate in rates {
+            let turning = mean_rate(self.kept.kind, rate);
+            let place = self.kept.rates.len();
+            if let Some(last) = self
+                .kept
+                .rates
+                .last()
+                .filter(|last| last.stamp >= rate.stamp)
+            {
+                let so_far = self.kept.shifts.last().map_or(0, |(_, by)| *by);
+                let by = last.stamp.since(rate.stamp).saturating_add(APART);
+                self.kept.shifts.push((place, so_far.saturating_add(by)));
+            }
+            let accel = match &mut self.forces {
+                None => rate.accel,
+                Some(forces) => forces.at(rate.stamp, &turning),
+            };
+            if let Some(field) = self.fields.at(rate.stamp, &turning) {
+                self.kept.fields.push((place, field));
+            }
+            self.kept.rates.push(RateSample { accel, ..*rate });
+        }
+        self.aided.push(rates, &mut self.along);
+    }
+
+    /// The recording has ended: appends all its attitudes.
+    pub(super) fn finish(&mut self, exec: &impl Executor, out: &mut Vec<AttitudeSample>) {
+        self.aided.finish(&mut self.along);
+        let settings = Settings {
+            sample_model: match self.kept.kind {
+                SampleKind::Rate => SampleModel::Instant,
+                SampleKind::Average | SampleKind::DeltaAngle => SampleModel::Interval,
+            },
+            field_unit: FieldUnit::Unknown,
+            // What a driver cut off is put back before, where it is.
+            undo_truncation: false,
+            threads: NonZero::new(exec.threads()).unwrap_or(NonZero::<usize>::MIN),
+            ..Settings::default()
+        };
+        let smoothed = match smooth(&mut &self.kept, &settings) {
+            Ok(smoothed) => smoothed,
+            Err(why) => {
+                self.failure = Some(match why {
+                    SmoothError::Read(never) => match never {},
+                    other => other.to_string(),
+                });
+                out.append(&mut self.along);
+                return;
+            }
+        };
+        self.along = Vec::new();
+        self.write(&smoothed, out);
+        self.smoothed = Some(smoothed);
+    }
+
+    fn write(&self, smoothed: &Smoothed, out: &mut Vec<AttitudeSample>) {
+        let is_filter = matches!(smoothed.outcome(), Outcome::Filter(_));
+        let mut rates = self.kept.rates.iter();
+        let mut turn: Option<Quaternion<Nav, Nav>> = None;
+        let (mut section, mut last): (usize, Option<Quaternion<Nav, Body>>) = (0, None);
+        let taken = smoothed.attitudes(&mut &self.kept, |estimates| {
+            for (estimate, rate) in estimates.iter().zip(&mut rates) {
+                let turn = *turn.get_or_insert_with(|| self.turn(smoothed, estimate));
+                let q_nb = (turn * estimate.q_nb).normalised();
+                let q_nb = last.map_or(q_nb, |last| q_nb.same_sign_as(&last));
+                last = Some(q_nb);
+                let mut status = rate.status.with(Status::AIDED);
+                if estimate.section > section {
+                    section = estimate.section;
+                    status = status.with(Status::RESET);
+                }
+                if is_filter && rate.join == Join::Hold {
+                    status = status.with(Status::HELD);
+                }
+                out.push(AttitudeSample {
+                    stamp: rate.stamp,
+                    q_nb,
+                    rate: estimate.rate,
+                    accel: rate.accel,
+                    covariance: in_body(&estimate.covariance, &estimate.q_nb),
+                    status,
+                    reset_count: u32::try_from(section).unwrap_or(u32::MAX),
+                    log: rate.log,
+                });
+            }
+        });
+        match taken {
+            Ok(()) => {}
+            Err(never) => match never {},
+        }
+    }
+
+    /// About the vertical, so that the first attitude has the heading that was said, where there is no north.
+    fn turn(&self, smoothed: &Smoothed, first: &Estimate) -> Quaternion<Nav, Nav> {
+        let has_north = smoothed.sections().iter().any(|section| section.has_north);
+        let by = match self.heading.filter(|_| !has_north) {
+            Some(heading) => heading - first.q_nb.yaw_pitch_roll().yaw,
+            None => 0.0,
+        };
+        Quaternion::from_rotation_vector(&RotationVector(Vector3::z() * by))
+    }
+}
+
+/// Of an error in earth axes: the same in those of the body.
+fn in_body(earth: &Matrix3<f64>, q_nb: &Quaternion<Nav, Body>) -> AttitudeCovariance {
+    let r = *q_nb.to_dcm().as_matrix();
+    let body = r.transpose() * earth * r;
+    let upper = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
+    AttitudeCovariance::from_upper(upper.map(|place| body[place]))
+}
