@@ -284,7 +284,8 @@ impl Work {
             &mut state.constants,
         );
         let before = state.clone();
-        let mut outcome = Outcome::Converged;
+        let settled = |turn: Option<f64>| turn.map_or(Outcome::Converged, Outcome::Unsettled);
+        let mut outcome = settled(plain.unsettled());
         if has_north.contains(&true) && self.settings.field_iterations > 0 {
             drop(plain);
             state.has_north = has_north.clone();
@@ -294,6 +295,7 @@ impl Work {
             let known = phase.solver.as_ref().and_then(Solver::covariance);
             match (phase.failure, known) {
                 (None, Some((covariance, marginals))) => {
+                    let outcome = settled(phase.unsettled());
                     return Ok(Ok(Solved {
                         state,
                         covariance,
@@ -526,7 +528,8 @@ impl Smoothed {
             .sections
             .get(section)
             .is_some_and(|section| section.has_north);
-        if self.outcome != Outcome::Converged && has_north {
+        let is_turned = matches!(self.outcome, Outcome::WithoutField(_) | Outcome::Filter(_));
+        if is_turned && has_north {
             covariance[(2, 2)] += TURNED * TURNED;
         }
         if !has_north {
