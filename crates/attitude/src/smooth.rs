@@ -12,8 +12,8 @@
 //! segment -> turn, push, way, and their derivatives                   sweep
 //! -> normal equations                                                 factors, border, motion, heading
 //! -> corrections, covariance                                          solver
-//! again, without the field and with it                                pass, phase, smoothed
-//! -> attitude at every sample                                         output
+//! again, without the field and with it                                pass, phase, work
+//! -> attitude at every sample                                         smoothed, output
 //! ```
 //!
 //! # Frames
@@ -53,6 +53,7 @@
 
 mod border;
 mod bridge;
+mod error;
 mod factors;
 mod heading;
 mod motion;
@@ -72,11 +73,14 @@ mod survey;
 mod sweep;
 #[cfg(test)]
 mod tests;
+mod work;
 
+pub use error::SmoothError;
 pub use output::Estimate;
 pub use phase::Failure;
 pub use result::{Bias, Calibration, Counts, Learned, Magnetometer, Outcome, Section};
 pub use sample::{Sample, Samples};
 pub use settings::{FieldUnit, HeadingReference, SampleModel, Settings};
-pub use smoothed::{SmoothError, Smoothed, smooth};
+pub use smoothed::Smoothed;
 pub use survey::Quantisation;
+pub use work::smooth;

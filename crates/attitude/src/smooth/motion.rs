@@ -22,6 +22,8 @@ const MOST_ALIKE: f64 = 0.98;
 pub(super) struct Bound {
     pub(super) sigma: [f64; 2],
     weights: Vec<[f64; 2]>,
+    /// Of positions, before colour widens it, m.
+    pub(super) reach: f64,
 }
 
 impl Bound {
@@ -29,6 +31,7 @@ impl Bound {
         Bound {
             sigma: [0.5, 1.0],
             weights: vec![[1.0; 2]; nodes],
+            reach: 0.0,
         }
     }
 
@@ -65,13 +68,13 @@ impl Bound {
         v * node.velocity.norm_squared() + p * off.norm_squared()
     }
 
-    /// Learns it anew.
+    /// Learns it anew; velocity and position each wider where neighbours resemble each other, if that is asked for.
     pub(super) fn learn(
         &mut self,
         nodes: &[Node],
         centre: &Vector3<f64>,
         segments: &[Segment],
-        is_coloured: bool,
+        is_coloured: [bool; 2],
     ) {
         let moves = |i: usize| {
             segments
@@ -92,12 +95,16 @@ impl Bound {
                     sum += self.weights[*k][what] * off(*k).norm_squared();
                     weight += self.weights[*k][what];
                 }
-                let colour = if is_coloured {
+                let colour = if is_coloured[what] {
                     colour(&moving, off)
                 } else {
                     1.0
                 };
-                self.sigma[what] = (colour * WIDTH * (sum / weight / 3.0).sqrt()).max(LEAST[what]);
+                let reach = WIDTH * (sum / weight / 3.0).sqrt();
+                if what == 1 {
+                    self.reach = reach;
+                }
+                self.sigma[what] = (colour * reach).max(LEAST[what]);
             }
         }
         for (k, weight) in self.weights.iter_mut().enumerate() {

@@ -29,8 +29,8 @@ const DONE: f64 = 1e-6_f64.to_radians();
 const FEWEST: usize = 4;
 /// Turns above this that grow twice running lead nowhere, rad: smaller ones grow when weights change.
 const DIVERGING: f64 = 0.1;
-/// The last turn of a result is below, rad.
-const RESTLESS: f64 = 0.5_f64.to_radians();
+/// A result's last turn is below this, rad; while it is not, there are up to twice as many iterations.
+const SETTLED: f64 = 0.1_f64.to_radians();
 /// Time over which a mean force points up, s.
 const UPRIGHT_SECS: f64 = 10.0;
 
@@ -72,12 +72,21 @@ pub enum Failure {
     NotUpright(f64),
 }
 
+impl<const W: usize> Phase<W> {
+    /// The last turn, if it was not small.
+    pub(super) fn unsettled(&self) -> Option<f64> {
+        (self.turn > SETTLED).then_some(self.turn)
+    }
+}
+
 /// How a phase ended.
 pub(super) struct Phase<const W: usize> {
     /// The equations of the last iteration.
     pub(super) solver: Option<Solver<W>>,
     pub(super) failure: Option<Failure>,
     pub(super) iterations: usize,
+    /// Largest of a node in the last iteration, rad.
+    pub(super) turn: f64,
     /// Mean fields by segment, of the last iteration.
     pub(super) fields: Vec<Option<[f64; 3]>>,
     /// Twice the negative logarithm of the likelihood but for a constant.
@@ -95,11 +104,14 @@ pub(super) fn run<S: Samples, const W: usize>(
         solver: None,
         failure: None,
         iterations: 0,
+        turn: f64::INFINITY,
         fields: Vec::new(),
         cost: f64::NAN,
     };
     let (mut largest, mut growing) = (f64::INFINITY, 0);
-    for iteration in 0..most {
+    // With the field, weights change to the end: more of it is not better.
+    let longest = if W == WIDE { most } else { 2 * most };
+    for iteration in 0..longest {
         let before = phase.solver.take();
         let equations = equations::<S, W>(samples, problem, state, before)?;
         phase.iterations += 1;
@@ -124,7 +136,7 @@ pub(super) fn run<S: Samples, const W: usize>(
             &state.nodes,
             &centre,
             problem.segments,
-            problem.settings.colour,
+            problem.is_coloured(W == WIDE),
         );
         growing = if turn > largest && turn > DIVERGING {
             growing + 1
@@ -137,7 +149,9 @@ pub(super) fn run<S: Samples, const W: usize>(
             phase.failure = Some(Failure::Diverging(turn));
             return Ok(phase);
         }
-        if turn < DONE && iteration + 1 >= FEWEST {
+        phase.turn = turn;
+        let is_done = turn < DONE && iteration + 1 >= FEWEST;
+        if is_done || (turn < SETTLED && iteration + 1 >= most) {
             break;
         }
     }
@@ -145,13 +159,21 @@ pub(super) fn run<S: Samples, const W: usize>(
 }
 
 impl Problem<'_> {
+    /// Of velocity, of position. Without a field heading hangs on what gravity says of the gyro's scale, by way of the
+    /// places the body comes back to, and a wide bound of those loses it; where nothing rests that is no use either.
+    fn is_coloured(&self, has_field: bool) -> [bool; 2] {
+        let rests = self.segments.iter().any(|segment| segment.is_still);
+        let colour = self.settings.colour;
+        [colour, colour && (has_field || !rests)]
+    }
+
     fn failure(&self, state: &State, turn: f64, tilt: f64) -> Option<Failure> {
         const FARTHEST: f64 = 100.0;
         const MOST_TILT: f64 = 5.0_f64.to_radians();
-        let strays = state.bound.sigma[1];
+        let strays = state.bound.reach;
         if !turn.is_finite() {
             Some(Failure::NotFinite)
-        } else if turn > RESTLESS {
+        } else if turn > DIVERGING {
             Some(Failure::Unfinished(turn))
         } else if strays > FARTHEST && !self.segments.iter().any(|segment| segment.is_still) {
             Some(Failure::Strays(strays))

@@ -23,17 +23,43 @@ pub(super) struct Realtime {
     pub(super) bias_sigma: Vector3<f64>,
 }
 
-/// Runs it over all samples; heading is that of the first.
+/// Prior sigma of the gyro's bias, rad/s: of any gyro, since the recording has time to tell.
+const BIAS_PRIOR: f64 = 0.1;
+
+/// Runs it over all samples, twice: what it learned of the bias is known from the start the second time. Heading is
+/// that of the first sample.
 pub(super) fn run<S: Samples>(
     samples: &mut S,
     with: (&Survey, &Settings),
     segments: &[Segment],
 ) -> Result<Option<Realtime>, S::Error> {
+    let wide = aid::Settings {
+        bias_prior: BIAS_PRIOR,
+        ..aid::Settings::default()
+    };
+    match pass(samples, with, segments, (wide, Vector3::zeros()))? {
+        Some(found) => pass(
+            samples,
+            with,
+            segments,
+            (aid::Settings::default(), found.bias),
+        ),
+        None => Ok(None),
+    }
+}
+
+/// One pass, over rates without the bias that is known.
+fn pass<S: Samples>(
+    samples: &mut S,
+    with: (&Survey, &Settings),
+    segments: &[Segment],
+    (settings, known): (aid::Settings, Vector3<f64>),
+) -> Result<Option<Realtime>, S::Error> {
     let propagation = propagate::Settings {
         kind: SampleKind::DeltaAngle,
         ..propagate::Settings::default()
     };
-    let Ok(mut aided) = Aided::new(propagation, aid::Settings::default(), aid::Start::Level) else {
+    let Ok(mut aided) = Aided::new(propagation, settings, aid::Start::Level) else {
         return Ok(None);
     };
     let mut out: Vec<AttitudeSample> = Vec::new();
@@ -63,7 +89,7 @@ pub(super) fn run<S: Samples>(
             let rate = RateSample {
                 stamp,
                 start: Nanos(start),
-                value: sample.rate * secs,
+                value: (sample.rate - known) * secs,
                 accel: Some(sample.force),
                 join,
                 status: Status::OK,
@@ -85,7 +111,7 @@ pub(super) fn run<S: Samples>(
     Ok(bias.filter(|_| is_whole).map(|bias| Realtime {
         nodes,
         covariances,
-        bias,
+        bias: bias + known,
         bias_sigma: aided.filter().calibration_sigma().bias,
     }))
 }

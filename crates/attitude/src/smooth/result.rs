@@ -137,6 +137,8 @@ pub struct Section {
 pub enum Outcome {
     /// The smoother's, field included where there is one.
     Converged,
+    /// The same, but in the last iteration a node still turned by this, rad.
+    Unsettled(f64),
     /// The smoother's without the field, turned north: with it, it led nowhere.
     WithoutField(Failure),
     /// The real-time filter's: the smoother led nowhere.

@@ -20,6 +20,8 @@ const SMALLEST_STEP: usize = 5;
 const AROUND: usize = 8;
 /// More different intervals than this are counted in coarser bins.
 const MOST_INTERVALS: usize = 1 << 14;
+/// A step longer than this is no time of which anything is known, ns.
+const LONGEST: i64 = 10_000_000_000;
 /// A field of unknown unit has this median, uT.
 const FIELD: f64 = 50.0;
 
@@ -46,7 +48,7 @@ pub(super) struct Survey {
     pub forceless: u64,
     /// Median time between samples, s.
     pub interval: f64,
-    /// From the first to the last, s.
+    /// From the first to the last without the long breaks, s.
     pub secs: f64,
     pub quantisation: Option<Quantisation>,
     /// Fields that came.
@@ -114,7 +116,9 @@ impl First {
         self.accepted += 1;
         if let Some(last) = &self.last {
             let nanos = sample.stamp.since(last.stamp);
-            self.secs += nanos as f64 * 1e-9;
+            if nanos <= LONGEST {
+                self.secs += nanos as f64 * 1e-9;
+            }
             self.intervals.take(nanos);
             let step = sample.rate - last.rate;
             step.iter().for_each(|d| self.differences.take(d.abs()));

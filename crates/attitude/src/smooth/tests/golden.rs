@@ -268,12 +268,9 @@ fn gridded(on_grid: fn(f64) -> f64) -> (Vec<Sample>, Vec<Vector3<f64>>) {
 
 #[test]
 fn truncation_is_found_and_undone() {
-    let figures: [(fn(f64) -> f64, f64, u64); 3] = [
-        (f64::trunc, 1.820225, 116),
-        (f64::round, 0.866667, 103),
-        (f64::floor, 0.681818, 98),
-    ];
-    for (i, (on_grid, ratio, counted)) in figures.into_iter().enumerate() {
+    let cuts: [fn(f64) -> f64; 3] = [f64::trunc, f64::round, f64::floor];
+    let figures = [(1.820225, 116), (0.866667, 103), (0.681818, 98)];
+    for (i, (on_grid, (ratio, counted))) in cuts.into_iter().zip(figures).enumerate() {
         let (samples, rates) = gridded(on_grid);
         let (survey, prepared) = prepared(&samples, &Settings::default());
         let found = survey.quantisation.unwrap();

@@ -1,1 +1,258 @@
+//! Bad input: too little, numbers that are none, an axis that is dead, clocks that jump.
 
+use super::logs::{Motion, errors, log, smoothed};
+use crate::record::Nanos;
+use crate::smooth::{FieldUnit, Outcome, Sample, Settings, SmoothError, smooth};
+use nalgebra::Vector3;
+
+fn sample(i: i64) -> Sample {
+    Sample {
+        stamp: Nanos(i * 10_000_000),
+        rate: Vector3::zeros(),
+        force: Some(Vector3::z() * 9.81),
+        field: None,
+    }
+}
+
+#[test]
+fn too_few_samples_are_refused_and_three_are_smoothed() {
+    for few in [vec![], vec![sample(0)], vec![sample(0), sample(0)]] {
+        let refused = smooth(&mut few.as_slice(), &Settings::default());
+        assert!(matches!(refused, Err(SmoothError::TooFew { .. })));
+    }
+    for count in 2..30 {
+        let samples: Vec<Sample> = (0..count).map(sample).collect();
+        let (_, estimates) = smoothed(&samples, &Settings::default());
+        for estimate in estimates {
+            assert!(
+                estimate
+                    .q_nb
+                    .angle_to(&crate::quaternion::Quaternion::identity())
+                    < 1e-6
+            );
+        }
+    }
+}
+
+#[test]
+fn a_log_without_forces_is_refused_with_the_reason() {
+    let samples: Vec<Sample> = (0..1000)
+        .map(|i| Sample {
+            force: None,
+            ..sample(i)
+        })
+        .collect();
+    let refused = smooth(&mut samples.as_slice(), &Settings::default());
+    assert_eq!(
+        refused.unwrap_err(),
+        SmoothError::TooFew {
+            samples: 1000,
+            forceless: 1000
+        }
+    );
+}
+
+#[test]
+fn nothing_but_nan_is_refused_and_some_of_it_is_counted() {
+    let nothing: Vec<Sample> = (0..1000)
+        .map(|i| Sample {
+            rate: Vector3::repeat(f64::NAN),
+            ..sample(i)
+        })
+        .collect();
+    assert!(smooth(&mut nothing.as_slice(), &Settings::default()).is_err());
+
+    let mut hand = log(Motion::Hand);
+    hand.samples[0].rate.x = f64::INFINITY;
+    hand.samples[2000].rate.y = f64::NAN;
+    hand.samples[2500].force = Some(Vector3::new(0.0, f64::NAN, 9.8));
+    hand.samples[2600].force = Some(Vector3::repeat(1e30));
+    hand.samples[2700].field = Some(Vector3::repeat(f64::NAN));
+    hand.samples[6000].rate.z = 1e9;
+    let (smoothed, estimates) = hand.smoothed(&Settings::default());
+    assert_eq!(smoothed.counts().rejected, 5);
+    assert_eq!(smoothed.outcome(), Outcome::Converged);
+    let filled: Vec<usize> = (0..6001).filter(|i| estimates[*i].is_filled).collect();
+    assert_eq!(filled, [0, 2000, 2500, 2600, 6000]);
+    let [tilt, _, tilt_most, heading_most] = errors(&estimates, &hand.truth, false);
+    assert!(
+        tilt < 0.1 && tilt_most < 0.3 && heading_most < 3.0,
+        "{tilt} {tilt_most} {heading_most}"
+    );
+    for (estimate, sample) in estimates.iter().zip(&hand.samples) {
+        assert_eq!(estimate.stamp, sample.stamp);
+    }
+}
+
+/// What is said must be finite, and what is wrong must be said.
+fn is_sane(samples: &[Sample]) {
+    let (smoothed, estimates) = smoothed(samples, &Settings::default());
+    for estimate in &estimates {
+        let norm: f64 = estimate.q_nb.wxyz().iter().map(|c| c * c).sum();
+        assert!((norm - 1.0).abs() < 1e-9, "{estimate:?}");
+        assert!(
+            (0..3)
+                .all(|i| estimate.covariance[(i, i)] > 0.0
+                    && estimate.covariance[(i, i)].is_finite())
+        );
+    }
+    let calibration = smoothed.calibration();
+    for learned in [calibration.gyro, calibration.force] {
+        assert!(
+            learned
+                .value
+                .iter()
+                .chain(&learned.sigma)
+                .all(|x| x.is_finite())
+        );
+    }
+    if let Some(magnetometer) = calibration.magnetometer {
+        assert!(magnetometer.hard_iron.value.iter().all(|x| x.is_finite()));
+    }
+}
+
+#[test]
+fn a_dead_axis_and_dead_sensors_give_finite_attitudes() {
+    for axis in 0..3 {
+        for dead in 0..3 {
+            let mut hand = log(Motion::Hand);
+            for sample in &mut hand.samples {
+                match dead {
+                    0 => sample.rate[axis] = 0.0,
+                    1 => sample.force.as_mut().unwrap()[axis] = 0.0,
+                    _ => sample.field.as_mut().unwrap()[axis] = 0.0,
+                }
+            }
+            is_sane(&hand.samples);
+        }
+    }
+    let zeros: Vec<Sample> = (0..3000)
+        .map(|i| Sample {
+            force: Some(Vector3::zeros()),
+            field: Some(Vector3::zeros()),
+            ..sample(i)
+        })
+        .collect();
+    is_sane(&zeros);
+}
+
+#[test]
+fn clocks_that_jump_leave_breaks() {
+    const DAY: i64 = 86_400_000_000_000;
+    let hand = log(Motion::Hand);
+    let mut jumped = hand.clone();
+    for sample in &mut jumped.samples[3000..] {
+        sample.stamp.0 += 400 * DAY;
+    }
+    let (smoothed, estimates) = jumped.smoothed(&Settings::default());
+    assert_eq!(
+        (smoothed.counts().breaks, smoothed.counts().rejected),
+        (1, 0)
+    );
+    let [tilt, _, tilt_most, _] = errors(&estimates, &jumped.truth, false);
+    assert!(tilt < 0.2 && tilt_most < 0.5, "{tilt} {tilt_most}");
+
+    // One stamp alone is out of its time.
+    let mut leapt = hand.clone();
+    leapt.samples[3000].stamp.0 += 400 * DAY;
+    leapt.samples[4000].stamp.0 -= 400 * DAY;
+    let (smoothed, _) = leapt.smoothed(&Settings::default());
+    assert_eq!(
+        (smoothed.counts().breaks, smoothed.counts().rejected),
+        (0, 2)
+    );
+    let mut first = hand.clone();
+    first.samples[0].stamp.0 += 400 * DAY;
+    assert_eq!(first.smoothed(&Settings::default()).0.counts().rejected, 1);
+
+    // A log of breaks only.
+    let apart: Vec<Sample> = (0..100)
+        .map(|i| Sample {
+            stamp: Nanos(i * i * 1_000_000_000),
+            ..sample(i)
+        })
+        .collect();
+    is_sane(&apart);
+}
+
+#[test]
+fn minutes_at_rest_drift_by_nothing() {
+    let samples: Vec<Sample> = (0..60_000)
+        .map(|i| {
+            // Noise of a sort: incommensurate waves.
+            let t = i as f64;
+            let noise = Vector3::new((1.1 * t).sin(), (2.3 * t).sin(), (3.7 * t).cos());
+            Sample {
+                rate: Vector3::new(0.02, -0.01, 0.03) + noise * 1e-3,
+                force: Some(Vector3::z() * 9.81 + noise * 0.02),
+                ..sample(i)
+            }
+        })
+        .collect();
+    let (smoothed, estimates) = smoothed(&samples, &Settings::default());
+    assert_eq!(smoothed.outcome(), Outcome::Converged);
+    let largest = estimates
+        .iter()
+        .map(|e| e.q_nb.angle_to(&estimates[0].q_nb))
+        .fold(0.0, f64::max);
+    assert!(largest.to_degrees() < 0.05, "{}", largest.to_degrees());
+    assert!(
+        !smoothed.calibration().gyro.is_observed(0)
+            && !smoothed.calibration().force_bias.is_observed(0)
+    );
+    // Beside what is known of the bias at one node by itself.
+    assert!(
+        smoothed
+            .biases()
+            .all(|bias| (bias.value.x - 0.02).abs() < 3.0 * bias.sigma.x)
+    );
+}
+
+#[test]
+fn a_field_of_unknown_unit_gives_the_same_attitudes() {
+    let hand = log(Motion::Hand);
+    let mut gauss = hand.clone();
+    gauss
+        .samples
+        .iter_mut()
+        .for_each(|sample| sample.field = sample.field.map(|field| field * 0.01));
+    let settings = Settings {
+        field_unit: FieldUnit::Unknown,
+        ..Settings::default()
+    };
+    let (_, ours) = gauss.smoothed(&settings);
+    let (_, theirs) = hand.smoothed(&settings);
+    let apart = ours
+        .iter()
+        .zip(&theirs)
+        .map(|(a, b)| a.q_nb.angle_to(&b.q_nb))
+        .fold(0.0, f64::max);
+    // Medians are to a hundredth of an octave, 0.7 %.
+    assert!(apart.to_degrees() < 0.1, "{}", apart.to_degrees());
+}
+
+#[test]
+fn settings_that_can_not_be_are_refused() {
+    let samples: Vec<Sample> = (0..100).map(sample).collect();
+    for settings in [
+        Settings {
+            node_spacing: Some(f64::NAN),
+            ..Settings::default()
+        },
+        Settings {
+            looseness: 0.0,
+            ..Settings::default()
+        },
+        Settings {
+            sensor_delay: 10.0,
+            ..Settings::default()
+        },
+        Settings {
+            iterations: 0,
+            ..Settings::default()
+        },
+    ] {
+        let refused = smooth(&mut samples.as_slice(), &settings);
+        assert!(matches!(refused, Err(SmoothError::Setting { .. })));
+    }
+}

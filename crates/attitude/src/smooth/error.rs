@@ -1,0 +1,39 @@
+//! Why a recording was not smoothed at all. Pure.
+
+use std::fmt;
+
+/// Why there is no result.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum SmoothError<E> {
+    /// The samples could not be read.
+    Read(E),
+    /// Fewer than two samples could be used, of so many; `forceless` had no specific force.
+    TooFew {
+        /// That came.
+        samples: u64,
+        /// Without a force.
+        forceless: u64,
+    },
+    /// A setting can not be.
+    Setting {
+        /// Which.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+    },
+}
+
+impl<E: fmt::Display> fmt::Display for SmoothError<E> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            SmoothError::Read(error) => error.fmt(f),
+            SmoothError::TooFew { samples, forceless } => write!(
+                f,
+                "{samples} samples, of which fewer than 2 can be used; {forceless} have no specific force\n  help: a smoother needs the accelerometer: without it, integrate the gyro alone"
+            ),
+            SmoothError::Setting { name, value } => write!(f, "{name} = {value} can not be"),
+        }
+    }
+}
+
+impl<E: fmt::Debug + fmt::Display> std::error::Error for SmoothError<E> {}

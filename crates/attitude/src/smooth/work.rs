@@ -1,0 +1,412 @@
+//! Samples -> the best that the whole recording says of them. Pure.
+//!
+//! Apart from its parts because this is their order, and what becomes of a part that leads nowhere.
+
+use super::border::{ALL, NARROW, Priors, WIDE};
+use super::error::SmoothError;
+use super::factors::Node;
+use super::heading::{FieldTrust, sections, turn_north};
+use super::motion::Bound;
+use super::pass::by_segment;
+use super::phase::{Failure, Phase, Problem, State, run};
+use super::prepare::{Prepared, Preparer};
+use super::realtime::{self, Realtime};
+use super::result::{Calibration, Counts, Outcome, Section};
+use super::sample::Samples;
+use super::segments::{Cutter, STILL_RATE, Segment, find_standstill};
+use super::settings::{HeadingReference, Settings};
+use super::smoothed::{ANY_HEADING, Smoothed};
+use super::solver::{Marginal, Solver};
+use super::start::forward;
+use super::survey::Survey;
+use super::sweep::{Sensor, sweep};
+use crate::record::Nanos;
+use nalgebra::{Matrix3, Vector3};
+
+/// Of the gyro's bias beforehand, rad/s.
+const BIAS_SIGMA: f64 = 1.0_f64.to_radians();
+/// The stillest segment is at rest if its mean rate is this near to the filter's bias, rad/s.
+const NEAR: f64 = 2.0_f64.to_radians();
+/// The field may be another while a log moves that rests in more segments than this.
+const RESTS: usize = 10;
+
+/// Smooths a recording.
+///
+/// # Errors
+/// [`SmoothError`]: samples that can not be read, or are too few. A recording that the smoother can not make sense of
+/// is none: see [`Smoothed::outcome`].
+pub fn smooth<S: Samples>(
+    samples: &mut S,
+    settings: &Settings,
+) -> Result<Smoothed, SmoothError<S::Error>> {
+    if let Some((name, value)) = settings.fault() {
+        return Err(SmoothError::Setting { name, value });
+    }
+    let survey = Survey::of(samples, settings).map_err(SmoothError::Read)?;
+    if survey.accepted < 2 {
+        return Err(SmoothError::TooFew {
+            samples: survey.samples,
+            forceless: survey.forceless,
+        });
+    }
+    let spacing = settings.spacing(survey.secs);
+    let (mut segments, first, bridged) =
+        cut(samples, (&survey, settings), spacing).map_err(SmoothError::Read)?;
+    let still = find_standstill(&mut segments);
+    let work = Work {
+        survey,
+        settings: *settings,
+        segments,
+        first,
+        bridged,
+        spacing,
+    };
+    work.smoothed(samples, still).map_err(SmoothError::Read)
+}
+
+fn cut<S: Samples>(
+    samples: &mut S,
+    (survey, settings): (&Survey, &Settings),
+    spacing: f64,
+) -> Result<(Vec<Segment>, i64, u64), S::Error> {
+    let mut cutter = Cutter::new(spacing);
+    let mut preparer = Preparer::new(survey, settings);
+    let (mut ready, mut bridged) = (Vec::new(), 0);
+    let mut take = |ready: &mut Vec<Prepared>| {
+        for sample in ready.drain(..) {
+            bridged += u64::from(sample.doubt[0] > 0.0);
+            cutter.take(&sample);
+        }
+    };
+    samples.pass(&mut |chunk| {
+        preparer.push(chunk, &mut ready);
+        take(&mut ready);
+    })?;
+    preparer.finish(&mut ready);
+    take(&mut ready);
+    let (segments, first) = cutter.finish();
+    Ok((segments, first, bridged))
+}
+
+/// A recording of which nodes and standstills are known.
+struct Work {
+    survey: Survey,
+    settings: Settings,
+    segments: Vec<Segment>,
+    first: i64,
+    bridged: u64,
+    spacing: f64,
+}
+
+/// What a phase left, and what it says of the nodes.
+struct Solved {
+    state: State,
+    covariance: Vec<Vec<f64>>,
+    marginals: Vec<Marginal>,
+    outcome: Outcome,
+    iterations: [u64; 2],
+}
+
+impl Work {
+    fn with(&self) -> (&Survey, &Settings) {
+        (&self.survey, &self.settings)
+    }
+
+    fn smoothed<S: Samples>(
+        self,
+        samples: &mut S,
+        still: Option<Vector3<f64>>,
+    ) -> Result<Smoothed, S::Error> {
+        let rests = self
+            .segments
+            .iter()
+            .filter(|segment| segment.is_still)
+            .count();
+        let is_separate =
+            self.settings.heading_reference == HeadingReference::Standstill && rests > RESTS;
+        let priors = Priors::new(self.settings.looseness, is_separate);
+        let trust = FieldTrust::new(self.settings.heading_reference, self.spacing);
+        let problem = |bias: Vector3<f64>| Problem {
+            survey: &self.survey,
+            settings: &self.settings,
+            segments: &self.segments,
+            priors: &priors,
+            trust: &trust,
+            bias,
+            bias_sigma: BIAS_SIGMA,
+        };
+        let mut filter = None;
+        let mut starts = Vec::new();
+        match still {
+            Some(bias) => {
+                starts.push((bias, forward(samples, self.with(), &self.segments, &bias)?))
+            }
+            None => {
+                filter = realtime::run(samples, self.with(), &self.segments)?;
+                for bias in self.biases(filter.as_ref()) {
+                    let nodes = match &filter {
+                        Some(filter) => filter.nodes.clone(),
+                        None => forward(samples, self.with(), &self.segments, &bias)?,
+                    };
+                    starts.push((bias, nodes));
+                }
+            }
+        }
+        let mut best: Option<(Problem<'_>, State, Phase<NARROW>)> = None;
+        for (bias, nodes) in starts {
+            let problem = problem(bias);
+            let mut state = self.state(nodes, bias, &trust);
+            let phase = run::<S, NARROW>(samples, &problem, &mut state, self.settings.iterations)?;
+            let is_better = best.as_ref().is_none_or(|(_, _, other)| {
+                (phase.failure.is_none(), -phase.cost) > (other.failure.is_none(), -other.cost)
+            });
+            if is_better {
+                best = Some((problem, state, phase));
+            }
+        }
+        let Some((problem, state, phase)) = best else {
+            return self.fallen_back(samples, filter, Failure::NotFinite, &priors);
+        };
+        if let Some(failure) = phase.failure {
+            return self.fallen_back(samples, filter, failure, &priors);
+        }
+        let solved = self.with_field(samples, &problem, state, phase)?;
+        match solved {
+            Ok(solved) => Ok(self.finish(solved, &priors)),
+            Err(failure) => self.fallen_back(samples, filter, failure, &priors),
+        }
+    }
+
+    /// What the gyro's bias may be where nothing rests.
+    fn biases(&self, filter: Option<&Realtime>) -> Vec<Vector3<f64>> {
+        let inner = self.segments.iter().filter(|segment| !segment.is_break);
+        let stillest = inner.min_by(|a, b| a.spread[0].total_cmp(&b.spread[0]));
+        match (stillest, filter) {
+            (None, None) => vec![Vector3::zeros()],
+            (Some(segment), None) => vec![segment.mean_rate],
+            (None, Some(filter)) => vec![filter.bias],
+            (Some(segment), Some(filter)) if segment.spread[0] >= STILL_RATE => vec![filter.bias],
+            (Some(segment), Some(filter)) if (segment.mean_rate - filter.bias).norm() < NEAR => {
+                vec![segment.mean_rate]
+            }
+            (Some(segment), Some(filter)) => vec![filter.bias, segment.mean_rate],
+        }
+    }
+
+    fn state(&self, attitudes: Vec<[f64; 4]>, bias: Vector3<f64>, trust: &FieldTrust) -> State {
+        let node = |q| Node {
+            q,
+            velocity: Vector3::zeros(),
+            position: Vector3::zeros(),
+            bias,
+        };
+        State {
+            bound: Bound::new(attitudes.len()),
+            nodes: attitudes.into_iter().map(node).collect(),
+            constants: [0.0; ALL],
+            field_weights: trust.first(&self.segments),
+            has_north: Vec::new(),
+        }
+    }
+
+    /// The phase with the field, where there is one; that without, where it leads nowhere.
+    fn with_field<S: Samples>(
+        &self,
+        samples: &mut S,
+        problem: &Problem<'_>,
+        mut state: State,
+        plain: Phase<NARROW>,
+    ) -> Result<Result<Solved, Failure>, S::Error> {
+        let mut iterations = [plain.iterations as u64, 0];
+        let has_north = turn_north(
+            &self.segments,
+            &plain.fields,
+            &state.field_weights,
+            &mut state.nodes,
+            &mut state.constants,
+        );
+        let before = state.clone();
+        let settled = |turn: Option<f64>| turn.map_or(Outcome::Converged, Outcome::Unsettled);
+        let mut outcome = settled(plain.unsettled());
+        if has_north.contains(&true) && self.settings.field_iterations > 0 {
+            drop(plain);
+            state.has_north = has_north.clone();
+            let phase =
+                run::<S, WIDE>(samples, problem, &mut state, self.settings.field_iterations)?;
+            iterations[1] = phase.iterations as u64;
+            let known = phase.solver.as_ref().and_then(Solver::covariance);
+            match (phase.failure, known) {
+                (None, Some((covariance, marginals))) => {
+                    let outcome = settled(phase.unsettled());
+                    return Ok(Ok(Solved {
+                        state,
+                        covariance,
+                        marginals,
+                        outcome,
+                        iterations,
+                    }));
+                }
+                (failure, _) => {
+                    outcome = Outcome::WithoutField(failure.unwrap_or(Failure::NotFinite))
+                }
+            }
+            drop(phase);
+            state = before;
+            let plain = run::<S, NARROW>(samples, problem, &mut state, 1)?;
+            state.has_north = has_north;
+            return Ok(self.plain(state, &plain, outcome, iterations));
+        }
+        Ok(self.plain(state, &plain, outcome, iterations))
+    }
+
+    fn plain(
+        &self,
+        state: State,
+        phase: &Phase<NARROW>,
+        outcome: Outcome,
+        iterations: [u64; 2],
+    ) -> Result<Solved, Failure> {
+        match phase.solver.as_ref().and_then(Solver::covariance) {
+            Some((covariance, marginals)) => Ok(Solved {
+                state,
+                covariance,
+                marginals,
+                outcome,
+                iterations,
+            }),
+            None => Err(Failure::NotFinite),
+        }
+    }
+
+    /// The real-time filter's attitudes; the forward pass's where even that has none.
+    fn fallen_back<S: Samples>(
+        self,
+        samples: &mut S,
+        filter: Option<Realtime>,
+        failure: Failure,
+        priors: &Priors,
+    ) -> Result<Smoothed, S::Error> {
+        let filter = match filter {
+            Some(filter) => Some(filter),
+            None => realtime::run(samples, self.with(), &self.segments)?,
+        };
+        let unknown = Matrix3::from_diagonal_element(ANY_HEADING * ANY_HEADING);
+        let filter = match filter {
+            Some(filter) => filter,
+            None => {
+                let nodes = forward(samples, self.with(), &self.segments, &Vector3::zeros())?;
+                Realtime {
+                    covariances: vec![unknown; nodes.len()],
+                    nodes,
+                    bias: Vector3::zeros(),
+                    bias_sigma: Vector3::repeat(BIAS_SIGMA),
+                }
+            }
+        };
+        let bias = filter.bias_sigma.map(|sigma| sigma * sigma).into();
+        let marginals = filter
+            .covariances
+            .iter()
+            .map(|turn| Marginal { turn: *turn, bias })
+            .collect();
+        let trust = FieldTrust::new(self.settings.heading_reference, self.spacing);
+        let mut state = self.state(filter.nodes, filter.bias, &trust);
+        let outcome = Outcome::Filter(failure);
+        if self.survey.fields > 0 {
+            let fields = self.fields(samples, &state.nodes)?;
+            state.has_north = turn_north(
+                &self.segments,
+                &fields,
+                &state.field_weights,
+                &mut state.nodes,
+                &mut state.constants,
+            );
+            state.constants = [0.0; ALL];
+        }
+        let solved = Solved {
+            state,
+            covariance: Vec::new(),
+            marginals,
+            outcome,
+            iterations: [0; 2],
+        };
+        Ok(self.finish(solved, priors))
+    }
+
+    /// Mean field of each segment with these attitudes.
+    fn fields<S: Samples>(
+        &self,
+        samples: &mut S,
+        nodes: &[Node],
+    ) -> Result<Vec<Option<[f64; 3]>>, S::Error> {
+        let sensor = Sensor::of(&[0.0; ALL]);
+        let mut fields = Vec::with_capacity(self.segments.len());
+        by_segment(samples, self.with(), &self.segments, |k, held| {
+            let Some(k) = k else { return };
+            let swept = sweep::<false>(held, &nodes[k].q, &nodes[k].bias, &sensor);
+            let has_field = swept.field.samples > 0.0 && !self.segments[k].is_break;
+            fields.push(has_field.then_some(swept.field.measured));
+        })?;
+        Ok(fields)
+    }
+
+    fn finish(self, solved: Solved, priors: &Priors) -> Smoothed {
+        let Solved {
+            state,
+            covariance,
+            marginals,
+            outcome,
+            iterations,
+        } = solved;
+        let stamp = |node: usize| {
+            Nanos(
+                node.checked_sub(1)
+                    .and_then(|k| self.segments.get(k))
+                    .map_or(self.first, |segment| segment.stamp),
+            )
+        };
+        let sections: Vec<Section> = sections(&self.segments)
+            .into_iter()
+            .enumerate()
+            .map(|(i, (first, last))| Section {
+                start: stamp(first),
+                end: stamp(last),
+                has_north: state.has_north.get(i).copied().unwrap_or(false),
+            })
+            .collect();
+        let counts = Counts {
+            samples: self.survey.samples,
+            rejected: self.survey.samples - self.survey.accepted,
+            forceless: self.survey.forceless,
+            segments: self.segments.len() as u64,
+            standstills: self
+                .segments
+                .iter()
+                .filter(|segment| segment.is_still)
+                .count() as u64,
+            bridged: self.bridged,
+            breaks: sections.len() as u64 - 1,
+            iterations,
+            quantisation: self.survey.quantisation,
+        };
+        Smoothed {
+            calibration: Calibration::of(
+                &state.constants,
+                &covariance,
+                priors,
+                self.survey.field_scale,
+            ),
+            survey: self.survey,
+            settings: self.settings,
+            segments: self.segments,
+            nodes: state.nodes,
+            constants: state.constants,
+            marginals,
+            first: self.first,
+            sections,
+            outcome,
+            bound: state.bound.sigma,
+            counts,
+        }
+    }
+}
