@@ -108,11 +108,13 @@ fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
         smoothed: topic.estimator.smoothed().map(Smoothing::of),
         calibration: calibrated(run, topic),
         noise: run.plan.noise.name.clone(),
-        sigma_terms: Some(SigmaTerms::of(
-            &run.plan,
-            &topic.prepared,
-            gaps.count.saturating_sub(gaps.not_bridged),
-        )),
+        sigma_terms: (!run.plan.smooth).then(|| {
+            SigmaTerms::of(
+                &run.plan,
+                &topic.prepared,
+                gaps.count.saturating_sub(gaps.not_bridged),
+            )
+        }),
         drift: drift(run, topic, propagation.integrated_secs),
         integration_error: propagation.integration_error,
         input_axes: topic.resolved.body.to_string(),
@@ -212,6 +214,13 @@ fn regularised(causal: bool, report: &regularise::Report, first: Nanos) -> Regul
 
 /// The method, `auto` with what it stands for.
 fn method_words(topic: &Topic) -> String {
+    if topic.estimator.smoothed().is_some() {
+        return match topic.estimator.is_taken_as_mean() {
+            true => "smoothed, samples taken as means since the one before (steps of at most 5 ms; --sample-kind rate: at their stamps)",
+            false => "smoothed",
+        }
+        .to_owned();
+    }
     match (topic.estimator.method(), topic.resolved.kind) {
         (Method::Auto, SampleKind::Rate) => "auto: centred window of 16 samples, exact".to_owned(),
         (Method::Auto, _) => "auto: centred window of 15 increments, exact".to_owned(),

@@ -22,6 +22,7 @@ mod replay;
 mod report;
 mod simulate;
 mod sinks;
+mod smoothing;
 mod streams;
 mod trajectory;
 mod youbot;

@@ -225,7 +225,8 @@ impl Estimator {
                         aid::Start::Level => None,
                         aid::Start::Known { .. } => Some(prepared.initial.yaw_pitch_roll().yaw),
                     };
-                    let smoothing = Smoothing::new(aided, resolved.kind, heading);
+                    let smoothing =
+                        Smoothing::new(aided, (resolved.kind, resolved.is_kind_stated), heading);
                     Integrator::Smoothed(Box::new(smoothing))
                 } else {
                     Integrator::Aided(Box::new(aided))
@@ -555,6 +556,16 @@ impl Estimator {
             (Some(smoothed), _) => Some(Ok(smoothed)),
             (None, Some(why)) => Some(Err(why)),
             (None, None) => None,
+        }
+    }
+
+    /// Whether a smoother took samples of which nobody said what they mean as means since the one before, as it does where
+    /// steps are of 5 ms and less.
+    #[must_use]
+    pub fn is_taken_as_mean(&self) -> bool {
+        match &self.integrator {
+            Integrator::Smoothed(smoothing) => smoothing.is_taken_as_mean(),
+            _ => false,
         }
     }
 

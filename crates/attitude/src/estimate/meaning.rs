@@ -18,6 +18,8 @@ use std::sync::Arc;
 pub struct Meaning {
     /// What a sample means.
     pub kind: SampleKind,
+    /// A flag or the format says so.
+    pub(super) is_kind_stated: bool,
     /// Unit of the rates.
     pub unit: GyroUnit,
     /// Axes of the input.
@@ -57,6 +59,7 @@ impl Meaning {
         Meaning {
             mag_axes: mag_mount.map_or(mount * axes, |q| *q.to_dcm().as_matrix()),
             kind: plan.kind.or(declared.sample_kind).unwrap_or_default(),
+            is_kind_stated: plan.kind.or(declared.sample_kind).is_some(),
             unit,
             accel_scale: aiding::scale_of(declared.accel_unit)
                 * if plan.is_accel_kinematic { -1.0 } else { 1.0 },

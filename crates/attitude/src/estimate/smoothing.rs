@@ -21,6 +21,12 @@ use std::num::NonZero;
 /// Between the last sample and the next where the stamps go back: nothing is known of what lies between, ns.
 const APART: i64 = 10_000_000_000;
 
+/// Steps no longer than this, ns, hardly tell a rate at its stamp from a mean since the one before; sensors' own filters
+/// make them late by more than half a step.
+const SHORT: i64 = 5_000_000;
+/// Steps that are looked at.
+const FEW: usize = 4096;
+
 /// A recording on its way to the smoother.
 #[derive(Debug)]
 pub(super) struct Smoothing {
@@ -33,6 +39,9 @@ pub(super) struct Smoothing {
     fields: Beside,
     /// Heading of the first attitude where somebody said it, rad.
     heading: Option<f64>,
+    /// Nobody said what a sample means, and steps are short: taken as means.
+    is_taken_as_mean: bool,
+    is_kind_stated: bool,
     smoothed: Option<Smoothed>,
     /// Why there is none.
     failure: Option<String>,
@@ -50,6 +59,16 @@ struct Kept {
 }
 
 impl Kept {
+    /// The median of the first steps, ns.
+    fn step(&self) -> Option<i64> {
+        let steps = self.rates.windows(2).take(FEW);
+        let mut steps: Vec<i64> = steps
+            .filter_map(|pair| Some(pair.last()?.stamp.since(pair.first()?.stamp)))
+            .collect();
+        steps.sort_unstable();
+        steps.get(steps.len() / 2).copied()
+    }
+
     fn sample(&self, place: usize, rate: &RateSample, shift: i64) -> Sample {
         Sample {
             stamp: Nanos(rate.stamp.0.saturating_add(shift)),
@@ -102,8 +121,9 @@ impl Samples for &Kept {
 }
 
 impl Smoothing {
-    /// Of a filter that has taken nothing yet. `heading`: of the first attitude, where it is not that of the smoother.
-    pub(super) fn new(aided: Aided, kind: SampleKind, heading: Option<f64>) -> Smoothing {
+    /// Of a filter that has taken nothing yet. `kind`: what a sample means, and whether somebody said so. `heading`: of the first attitude, where it is not that of the smoother.
+    pub(super) fn new(aided: Aided, kind: (SampleKind, bool), heading: Option<f64>) -> Smoothing {
+        let (kind, is_kind_stated) = kind;
         Smoothing {
             forces: aided.has_forces_beside().then(Beside::default),
             fields: Beside::with_repeats(),
@@ -116,6 +136,8 @@ impl Smoothing {
                 shifts: Vec::new(),
             },
             heading,
+            is_taken_as_mean: false,
+            is_kind_stated,
             smoothed: None,
             failure: None,
         }
@@ -129,6 +151,11 @@ impl Smoothing {
     /// The result, once the end has come.
     pub(super) fn smoothed(&self) -> Option<&Smoothed> {
         self.smoothed.as_ref()
+    }
+
+    /// Whether samples whose meaning nobody said were taken as means over their steps.
+    pub(super) fn is_taken_as_mean(&self) -> bool {
+        self.is_taken_as_mean
     }
 
     /// Why there is none.
@@ -182,14 +209,21 @@ impl Smoothing {
     /// The recording has ended: appends all its attitudes.
     pub(super) fn finish(&mut self, exec: &impl Executor, out: &mut Vec<AttitudeSample>) {
         self.aided.finish(&mut self.along);
+        self.is_taken_as_mean = self.kept.kind == SampleKind::Rate
+            && !self.is_kind_stated
+            && self.kept.step().is_some_and(|step| step <= SHORT);
         let settings = Settings {
             sample_model: match self.kept.kind {
-                SampleKind::Rate => SampleModel::Instant,
+                SampleKind::Rate if !self.is_taken_as_mean => SampleModel::Instant,
+                SampleKind::Rate => SampleModel::Interval,
                 SampleKind::Average | SampleKind::DeltaAngle => SampleModel::Interval,
             },
             field_unit: FieldUnit::Unknown,
             // What a driver cut off is put back before, where it is.
             undo_truncation: false,
+            // It stops when nothing turns any longer; a sensor far from its class takes more.
+            iterations: 12,
+            field_iterations: 16,
             threads: NonZero::new(exec.threads()).unwrap_or(NonZero::<usize>::MIN),
             ..Settings::default()
         };
