@@ -220,15 +220,18 @@ fn a_field_of_unknown_unit_gives_the_same_attitudes() {
         field_unit: FieldUnit::Unknown,
         ..Settings::default()
     };
-    let (_, ours) = gauss.smoothed(&settings);
-    let (_, theirs) = hand.smoothed(&settings);
+    let (smoothed, ours) = gauss.smoothed(&settings);
+    let scale = smoothed.calibration().magnetometer.unwrap().scale;
+    // The field is of 48.5 uT and hard iron, and is taken for 50.
+    assert!((scale / 100.0 - 1.0).abs() < 0.1, "{scale}");
+    let (_, theirs) = hand.smoothed(&Settings::default());
     let apart = ours
         .iter()
         .zip(&theirs)
         .map(|(a, b)| a.q_nb.angle_to(&b.q_nb))
         .fold(0.0, f64::max);
-    // Medians are to a hundredth of an octave, 0.7 %.
-    assert!(apart.to_degrees() < 0.1, "{}", apart.to_degrees());
+    // Sigmas of the field are of 3 % other sizes, and hard iron is hardly observed: that is degrees of heading.
+    assert!(apart.to_degrees() < 0.3, "{}", apart.to_degrees());
 }
 
 #[test]
