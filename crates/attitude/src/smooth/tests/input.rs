@@ -259,3 +259,29 @@ fn settings_that_can_not_be_are_refused() {
         assert!(matches!(refused, Err(SmoothError::Setting { .. })));
     }
 }
+
+#[test]
+fn an_accelerometer_may_be_slower_than_the_gyro() {
+    let mut hand = log(Motion::Hand).plain();
+    for (i, sample) in hand.samples.iter_mut().enumerate() {
+        if i % 4 != 1 {
+            sample.force = None;
+        }
+    }
+    let (smoothed, estimates) = hand.smoothed(&Settings::default());
+    assert_eq!(smoothed.outcome(), Outcome::Converged);
+    // All before the first force; those after the last are within a quarter of a second of it.
+    assert_eq!(
+        (smoothed.counts().forceless, smoothed.counts().rejected),
+        (4501, 1)
+    );
+    let [tilt, heading, ..] = errors(&estimates, &hand.truth, true);
+    assert!(tilt < 0.1 && heading < 0.3, "{tilt} {heading}");
+
+    // Half a second without any is a break.
+    hand.samples[3000..3050]
+        .iter_mut()
+        .for_each(|sample| sample.force = None);
+    let (smoothed, _) = hand.smoothed(&Settings::default());
+    assert_eq!(smoothed.counts().breaks, 1);
+}
