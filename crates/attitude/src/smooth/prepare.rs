@@ -7,6 +7,7 @@ use super::bridge::{self, Catmull};
 use super::sample::Sample;
 use super::settings::{SampleModel, Settings};
 use super::survey::Survey;
+use crate::record::Nanos;
 use nalgebra::Vector3;
 
 /// A rate beyond this (each component, rad/s), and a force (m/s^2), are none.
@@ -43,17 +44,22 @@ pub(super) struct Prepared {
     pub doubt: [f64; 2],
 }
 
-/// Leaves out samples that are none: not finite, beyond what there is, or not later than the ones before.
+/// Leaves out samples that are none: not finite, beyond what there is, or not later than the ones before. One without
+/// a force gets that between its neighbours', for an accelerometer slower than the gyro.
 #[derive(Default)]
 pub(super) struct Gate {
     offered: u64,
     last: Option<i64>,
     /// Accepted unless its stamp turns out to have leapt.
     waiting: Option<(Sample, u64)>,
+    /// The last force that was measured.
+    force: Option<(Nanos, Vector3<f64>)>,
+    /// Samples since then, without one.
+    lacking: Vec<(Sample, u64)>,
 }
 
 impl Gate {
-    /// Gives those that are accepted to `take`, one late, with their place in the input.
+    /// Gives those that are accepted to `take`, some of them late, with their place in the input.
     pub(super) fn offer(&mut self, sample: &Sample, take: &mut dyn FnMut(&Sample, u64)) {
         let place = self.offered;
         self.offered += 1;
@@ -61,10 +67,10 @@ impl Gate {
             return;
         }
         let stamp = sample.stamp.0;
-        if let Some((waiting, its_place)) = &self.waiting {
+        if let Some((waiting, its_place)) = self.waiting {
             let ahead = waiting.stamp.0;
             if stamp > ahead {
-                take(waiting, *its_place);
+                self.accept(&waiting, its_place, take);
                 self.last = Some(ahead);
             } else {
                 let has_leapt = match self.last {
@@ -79,21 +85,48 @@ impl Gate {
         self.waiting = Some((*sample, place));
     }
 
-    /// The last one.
+    fn accept(&mut self, sample: &Sample, place: u64, take: &mut dyn FnMut(&Sample, u64)) {
+        let Some(force) = sample.force else {
+            let since = |(stamp, _): &(Nanos, _)| sample.stamp.secs_since(*stamp);
+            if self
+                .force
+                .as_ref()
+                .is_some_and(|force| since(force) <= LONGEST_BRIDGE)
+            {
+                self.lacking.push((*sample, place));
+            }
+            return;
+        };
+        if let Some((stamp, before)) = self.force {
+            let secs = sample.stamp.secs_since(stamp);
+            for (lacking, its_place) in self.lacking.drain(..) {
+                if secs <= LONGEST_BRIDGE {
+                    let share = lacking.stamp.secs_since(stamp) / secs;
+                    let force = Some(before + (force - before) * share);
+                    take(&Sample { force, ..lacking }, its_place);
+                }
+            }
+        }
+        self.force = Some((sample.stamp, force));
+        take(sample, place);
+    }
+
+    /// The last ones.
     pub(super) fn finish(&mut self, take: &mut dyn FnMut(&Sample, u64)) {
         if let Some((sample, place)) = self.waiting.take() {
-            take(&sample, place);
+            self.accept(&sample, place, take);
+        }
+        let force = self.force.map(|(_, force)| force);
+        for (lacking, place) in self.lacking.drain(..) {
+            take(&Sample { force, ..lacking }, place);
         }
     }
 }
 
 fn is_usable(sample: &Sample) -> bool {
-    let Some(force) = &sample.force else {
-        return false;
-    };
     // NaN is not below anything.
-    sample.rate.iter().all(|w| w.abs() < LARGEST_RATE)
-        && force.iter().all(|f| f.abs() < LARGEST_FORCE)
+    let is_force = |force: &Vector3<f64>| force.iter().all(|f| f.abs() < LARGEST_FORCE);
+    sample.rate.iter().all(|w| w.abs() < LARGEST_RATE) && sample.force.as_ref().is_none_or(is_force)
 }
 
 /// A stream of samples on its way to the sweep.

@@ -150,9 +150,9 @@ pub enum Outcome {
 pub struct Counts {
     /// That came.
     pub samples: u64,
-    /// That could not be used: not finite, beyond what there is, not later than those before, without a force.
+    /// That could not be used: not finite, beyond what there is, not later than those before, without a force near.
     pub rejected: u64,
-    /// Of those, without a force.
+    /// That came without a force: an accelerometer may be slower than the gyro.
     pub forceless: u64,
     /// Segments between nodes, and those of them at rest.
     pub segments: u64,

@@ -15,7 +15,8 @@ pub struct Sample {
     /// Rate, rad/s; of a delta angle: divided by its interval. Its meaning is
     /// [`SampleModel`](super::SampleModel)'s.
     pub rate: Vector3<f64>,
-    /// Specific force, m/s^2: +9.81 along the axis that points up at rest. Without one, the sample is left out.
+    /// Specific force, m/s^2: +9.81 along the axis that points up at rest. Without one, that
+    /// between its neighbours' is taken, a quarter of a second apart at most; otherwise the sample is left out.
     pub force: Option<Vector3<f64>>,
     /// Magnetic field, uT. One that was measured only once comes once.
     pub field: Option<Vector3<f64>>,

@@ -105,7 +105,6 @@ impl<const W: usize> Solver<W> {
         self.nodes.push(node);
     }
 
-    /// Half the weighted sum of squares is not reduced below this: of the last column with itself.
     /// Corrections of all unknowns; `None` where the equations do not determine them.
     pub(super) fn solve(&self) -> Option<Solution> {
         let last = W - 1;

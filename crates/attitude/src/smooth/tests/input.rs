@@ -220,15 +220,18 @@ fn a_field_of_unknown_unit_gives_the_same_attitudes() {
         field_unit: FieldUnit::Unknown,
         ..Settings::default()
     };
-    let (_, ours) = gauss.smoothed(&settings);
-    let (_, theirs) = hand.smoothed(&settings);
+    let (smoothed, ours) = gauss.smoothed(&settings);
+    let scale = smoothed.calibration().magnetometer.unwrap().scale;
+    // The field is of 48.5 uT and hard iron, and is taken for 50.
+    assert!((scale / 100.0 - 1.0).abs() < 0.1, "{scale}");
+    let (_, theirs) = hand.smoothed(&Settings::default());
     let apart = ours
         .iter()
         .zip(&theirs)
         .map(|(a, b)| a.q_nb.angle_to(&b.q_nb))
         .fold(0.0, f64::max);
-    // Medians are to a hundredth of an octave, 0.7 %.
-    assert!(apart.to_degrees() < 0.1, "{}", apart.to_degrees());
+    // Sigmas of the field are of 3 % other sizes, and hard iron is hardly observed: that is degrees of heading.
+    assert!(apart.to_degrees() < 0.3, "{}", apart.to_degrees());
 }
 
 #[test]
@@ -255,4 +258,30 @@ fn settings_that_can_not_be_are_refused() {
         let refused = smooth(&mut samples.as_slice(), &settings);
         assert!(matches!(refused, Err(SmoothError::Setting { .. })));
     }
+}
+
+#[test]
+fn an_accelerometer_may_be_slower_than_the_gyro() {
+    let mut hand = log(Motion::Hand).plain();
+    for (i, sample) in hand.samples.iter_mut().enumerate() {
+        if i % 4 != 1 {
+            sample.force = None;
+        }
+    }
+    let (smoothed, estimates) = hand.smoothed(&Settings::default());
+    assert_eq!(smoothed.outcome(), Outcome::Converged);
+    // All before the first force; those after the last are within a quarter of a second of it.
+    assert_eq!(
+        (smoothed.counts().forceless, smoothed.counts().rejected),
+        (4501, 1)
+    );
+    let [tilt, heading, ..] = errors(&estimates, &hand.truth, true);
+    assert!(tilt < 0.1 && heading < 0.3, "{tilt} {heading}");
+
+    // Half a second without any is a break.
+    hand.samples[3000..3050]
+        .iter_mut()
+        .for_each(|sample| sample.force = None);
+    let (smoothed, _) = hand.smoothed(&Settings::default());
+    assert_eq!(smoothed.counts().breaks, 1);
 }

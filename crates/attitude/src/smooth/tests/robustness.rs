@@ -1,6 +1,6 @@
 //! Threads, chunks, breaks, no standstill, large biases: what the result must not depend on or break at.
 
-use super::logs::{Log, Motion, conjugate, errors, log, product, smoothed};
+use super::logs::{Log, Motion, conjugate, errors, log, product};
 use crate::smooth::{Estimate, Outcome, Sample, SampleModel, Samples, Settings, Smoothed, smooth};
 use nalgebra::Vector3;
 use std::convert::Infallible;
@@ -89,20 +89,23 @@ fn restless(bias: Vector3<f64>) -> Log {
 
 #[test]
 fn without_a_standstill_a_bias_of_5_deg_per_s_is_found() {
-    let bias = Vector3::new(5.0, -5.0, 5.0).map(f64::to_radians);
-    for is_plain in [true, false] {
-        let hand = restless(bias);
-        let hand = if is_plain { hand.plain() } else { hand };
-        let (smoothed, estimates) = hand.smoothed(&Settings::default());
-        assert_eq!(smoothed.counts().standstills, 0);
-        let [tilt, heading, tilt_most, _] = errors(&estimates, &hand.truth, is_plain);
-        // Half a minute of motion, beside 150 degrees that the bias alone would turn.
-        assert!(
-            tilt < 1.0 && tilt_most < 3.0,
-            "tilt {tilt} {tilt_most} {:?}",
-            smoothed.outcome()
-        );
-        assert!(heading < 8.0, "heading {heading} {:?}", smoothed.outcome());
+    for corner in 0..8 {
+        let sign = |axis: i32| if corner >> axis & 1 == 0 { 5.0 } else { -5.0 };
+        let bias = Vector3::new(sign(0), sign(1), sign(2)).map(f64::to_radians);
+        for is_plain in [true, false] {
+            let hand = restless(bias);
+            let hand = if is_plain { hand.plain() } else { hand };
+            let (smoothed, estimates) = hand.smoothed(&Settings::default());
+            assert_eq!(smoothed.counts().standstills, 0);
+            let [tilt, heading, tilt_most, _] = errors(&estimates, &hand.truth, is_plain);
+            // Half a minute of motion, in which the bias alone would turn by 200 degrees.
+            assert!(
+                tilt < 1.0 && tilt_most < 3.0,
+                "tilt {tilt} {tilt_most} {:?}",
+                smoothed.outcome()
+            );
+            assert!(heading < 8.0, "heading {heading} {:?}", smoothed.outcome());
+        }
     }
 }
 
@@ -210,11 +213,19 @@ fn a_delay_turns_attitudes_on() {
 }
 
 #[test]
-fn one_standard_deviation_covers_the_hand() {
-    for is_plain in [true, false] {
+fn variances_are_those_of_the_equations_of_the_case_and_of_the_clock() {
+    for (is_plain, heading) in [(true, 4.0), (false, 1.0)] {
         let hand = log(Motion::Hand);
         let hand = if is_plain { hand.plain() } else { hand };
-        let (_, estimates) = smoothed(&hand.samples, &Settings::default());
+        let (smoothed, estimates) = hand.smoothed(&Settings::default());
+        for node in [10, 60, 110] {
+            let (estimate, known) = (&estimates[50 * node], smoothed.marginals[node].turn);
+            let rest = 0.2_f64.to_radians().powi(2) + (0.0025 * estimate.rate.norm()).powi(2);
+            for (axis, times) in [(0, 1.0), (1, 1.0), (2, heading)] {
+                let expected = times * known[(axis, axis)] + rest;
+                assert!((estimate.covariance[(axis, axis)] / expected - 1.0).abs() < 1e-9);
+            }
+        }
         for (estimate, truth) in estimates.iter().zip(&hand.truth) {
             let error = product(&estimate.q_nb.wxyz(), &conjugate(truth));
             for axis in 0..2 {
