@@ -289,7 +289,15 @@ fn warnings(topic: &Topic, summary: &TopicSummary) -> Vec<String> {
         ));
     }
     match (&summary.smoothed, &summary.aided) {
-        (Some(smoothed), _) => said.extend(smoothed.doubt()),
+        (Some(smoothed), _) => {
+            said.extend(smoothed.doubt());
+            if topic.estimator.is_smoothed_beyond_class() {
+                said.push(format!(
+                    "the sensor is farther off than those of class {} are: smoothed again with priors 2.5 times as wide; --noise uncalibrated says so beforehand",
+                    summary.noise
+                ));
+            }
+        }
         (None, Some(aided)) => said.extend(aided.doubt(&summary.noise)),
         (None, None) => {}
     }

@@ -135,7 +135,12 @@ fn flags_that_do_not_go_with_it_and_logs_that_can_not_be_smoothed_are_said() {
         ran.refused(2, &["--smooth", word]);
     }
     let gyro: String = (0..300)
-        .map(|i| format!("{{\"stamp_ns\":{},\"gyro\":[0,0,0.1]}}\n", i64::from(i) * 10_000_000))
+        .map(|i| {
+            format!(
+                "{{\"stamp_ns\":{},\"gyro\":[0,0,0.1]}}\n",
+                i64::from(i) * 10_000_000
+            )
+        })
         .collect();
     let ran = strapd_fed(dir, "replay - --aid gravity --smooth -o null:", gyro);
     ran.refused(1, &["specific force"]);

@@ -8,7 +8,7 @@ use super::anew::Anew;
 use super::meaning::Meaning;
 use super::plan::{Initial, Noise, Plan};
 use super::preparation::Prepared;
-use super::smoothing::Smoothing;
+use super::smoothing::{Smoothing, Told};
 use crate::aid::{self, Aided};
 use crate::condition::regularise::{self, Regulariser};
 use crate::condition::{self, Clock, Conditioner};
@@ -225,8 +225,14 @@ impl Estimator {
                         aid::Start::Level => None,
                         aid::Start::Known { .. } => Some(prepared.initial.yaw_pitch_roll().yaw),
                     };
-                    let smoothing =
-                        Smoothing::new(aided, (resolved.kind, resolved.is_kind_stated), heading);
+                    let class = aid::Settings::default().scale_prior;
+                    let told = Told {
+                        kind: resolved.kind,
+                        is_kind_stated: resolved.is_kind_stated,
+                        heading,
+                        looseness: aiding.settings.scale_prior / class,
+                    };
+                    let smoothing = Smoothing::new(aided, told);
                     Integrator::Smoothed(Box::new(smoothing))
                 } else {
                     Integrator::Aided(Box::new(aided))
@@ -565,6 +571,15 @@ impl Estimator {
     pub fn is_taken_as_mean(&self) -> bool {
         match &self.integrator {
             Integrator::Smoothed(smoothing) => smoothing.is_taken_as_mean(),
+            _ => false,
+        }
+    }
+
+    /// Whether a smoother found the sensor farther off than those of its class, and smoothed it again with wider priors.
+    #[must_use]
+    pub fn is_smoothed_beyond_class(&self) -> bool {
+        match &self.integrator {
+            Integrator::Smoothed(smoothing) => smoothing.is_beyond_class(),
             _ => false,
         }
     }

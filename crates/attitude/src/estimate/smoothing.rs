@@ -27,6 +27,19 @@ const SHORT: i64 = 5_000_000;
 /// Steps that are looked at.
 const FEW: usize = 4096;
 
+/// What was said of a recording beforehand.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) struct Told {
+    /// What a sample means.
+    pub(super) kind: SampleKind,
+    /// Somebody said so.
+    pub(super) is_kind_stated: bool,
+    /// Heading of the first attitude, rad; `None`: that of the smoother.
+    pub(super) heading: Option<f64>,
+    /// How many times as far off as sensors of the default class this one may be.
+    pub(super) looseness: f64,
+}
+
 /// A recording on its way to the smoother.
 #[derive(Debug)]
 pub(super) struct Smoothing {
@@ -37,14 +50,26 @@ pub(super) struct Smoothing {
     kept: Kept,
     forces: Option<Beside>,
     fields: Beside,
-    /// Heading of the first attitude where somebody said it, rad.
-    heading: Option<f64>,
+    told: Told,
     /// Nobody said what a sample means, and steps are short: taken as means.
     is_taken_as_mean: bool,
-    is_kind_stated: bool,
+    /// The sensor is none of its class.
+    is_beyond_class: bool,
     smoothed: Option<Smoothed>,
     /// Why there is none.
     failure: Option<String>,
+}
+
+/// A gyro whose scale or axes are found so many prior sigmas off is none of its class, and is smoothed again with
+/// priors that are so many times as wide: those of one that nobody has calibrated.
+const BEYOND: f64 = 2.0;
+const LOOSER: f64 = 2.5;
+
+fn is_beyond(smoothed: &Smoothed) -> bool {
+    let gyro = &smoothed.calibration().gyro;
+    let mut all = gyro.value.iter().zip(&gyro.prior);
+    !matches!(smoothed.outcome(), Outcome::Filter(_))
+        && all.any(|(value, prior)| value.abs() > BEYOND * prior)
 }
 
 /// What was measured, in memory.
@@ -121,23 +146,22 @@ impl Samples for &Kept {
 }
 
 impl Smoothing {
-    /// Of a filter that has taken nothing yet. `kind`: what a sample means, and whether somebody said so. `heading`: of the first attitude, where it is not that of the smoother.
-    pub(super) fn new(aided: Aided, kind: (SampleKind, bool), heading: Option<f64>) -> Smoothing {
-        let (kind, is_kind_stated) = kind;
+    /// Of a filter that has taken nothing yet.
+    pub(super) fn new(aided: Aided, told: Told) -> Smoothing {
         Smoothing {
             forces: aided.has_forces_beside().then(Beside::default),
             fields: Beside::with_repeats(),
             aided,
             along: Vec::new(),
             kept: Kept {
-                kind,
+                kind: told.kind,
                 rates: Vec::new(),
                 fields: Vec::new(),
                 shifts: Vec::new(),
             },
-            heading,
+            told,
             is_taken_as_mean: false,
-            is_kind_stated,
+            is_beyond_class: false,
             smoothed: None,
             failure: None,
         }
@@ -156,6 +180,11 @@ impl Smoothing {
     /// Whether samples whose meaning nobody said were taken as means over their steps.
     pub(super) fn is_taken_as_mean(&self) -> bool {
         self.is_taken_as_mean
+    }
+
+    /// Whether the sensor was farther off than those of its class, and smoothed as one that nobody calibrated.
+    pub(super) fn is_beyond_class(&self) -> bool {
+        self.is_beyond_class
     }
 
     /// Why there is none.
@@ -210,7 +239,7 @@ impl Smoothing {
     pub(super) fn finish(&mut self, exec: &impl Executor, out: &mut Vec<AttitudeSample>) {
         self.aided.finish(&mut self.along);
         self.is_taken_as_mean = self.kept.kind == SampleKind::Rate
-            && !self.is_kind_stated
+            && !self.told.is_kind_stated
             && self.kept.step().is_some_and(|step| step <= SHORT);
         let settings = Settings {
             sample_model: match self.kept.kind {
@@ -219,15 +248,21 @@ impl Smoothing {
                 SampleKind::Average | SampleKind::DeltaAngle => SampleModel::Interval,
             },
             field_unit: FieldUnit::Unknown,
+            looseness: self.told.looseness,
             // What a driver cut off is put back before, where it is.
             undo_truncation: false,
-            // It stops when nothing turns any longer; a sensor far from its class takes more.
-            iterations: 12,
-            field_iterations: 16,
             threads: NonZero::new(exec.threads()).unwrap_or(NonZero::<usize>::MIN),
             ..Settings::default()
         };
         let smoothed = match smooth(&mut &self.kept, &settings) {
+            Ok(smoothed) if is_beyond(&smoothed) => {
+                let looser = Settings {
+                    looseness: LOOSER * settings.looseness,
+                    ..settings
+                };
+                self.is_beyond_class = true;
+                smooth(&mut &self.kept, &looser).unwrap_or(smoothed)
+            }
             Ok(smoothed) => smoothed,
             Err(why) => {
                 self.failure = Some(match why {
@@ -283,7 +318,7 @@ impl Smoothing {
     /// About the vertical, so that the first attitude has the heading that was said, where there is no north.
     fn turn(&self, smoothed: &Smoothed, first: &Estimate) -> Quaternion<Nav, Nav> {
         let has_north = smoothed.sections().iter().any(|section| section.has_north);
-        let by = match self.heading.filter(|_| !has_north) {
+        let by = match self.told.heading.filter(|_| !has_north) {
             Some(heading) => heading - first.q_nb.yaw_pitch_roll().yaw,
             None => 0.0,
         };
