@@ -5,6 +5,7 @@ use super::estimation::{AidArg, Estimation};
 use super::progress::Reporter;
 use super::serving::{Served, Serving};
 use super::{Global, Outcome, outputs, print};
+use super::tables::Tables;
 use crate::config::{Selection, Shard};
 use crate::error::{Error, Result};
 use crate::pipeline::replay;
@@ -40,6 +41,9 @@ pub struct Replay {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub estimation: Estimation,
+    /// How a table is to be read.
+    #[command(flatten)]
+    pub tables: Tables,
     /// Replace outputs that exist
     #[arg(long, help_heading = "Output")]
     pub force: bool,
@@ -151,7 +155,8 @@ pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
     outputs::check_distinct(&args.outputs, &args.sources)?;
     args.check_calibrations(&logs)?;
     let plan = args.estimation.plan()?;
-    let selection = args.estimation.selection()?;
+    let mut selection = args.estimation.selection()?;
+    args.tables.put(&mut selection.decode)?;
     let pool = Pool::new(global.threads)?;
     let mut outcome = Outcome::Done;
     let mut summaries = Vec::new();

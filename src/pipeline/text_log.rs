@@ -7,7 +7,7 @@
 use super::bare_stamps::BareStamps;
 use super::channel_route::{Item, Route};
 use super::input::Input;
-use super::lines::{no_samples, unclear};
+use super::lines::{described, no_samples, unclear};
 use super::log::LogChannel;
 use super::simulate::TRUTH_ID;
 use crate::error::{Error, Result};
@@ -18,6 +18,7 @@ use std::path::Path;
 use std::sync::Arc;
 use strapd_attitude::record::{Declared, Nanos, RawSample};
 use strapd_recording::decode::{Class, Line, Options, Rank, Role, Stated, Undecodable};
+use strapd_recording::delimited::Table;
 use strapd_recording::format::Format;
 use strapd_recording::lines::Lines;
 use strapd_recording::mcap::{Channel, ChannelSurvey, Schema, Survey};
@@ -71,10 +72,19 @@ impl TextLog {
     pub(super) fn survey(input: &Input, options: &Options) -> Result<(TextLog, Vec<LogChannel>)> {
         let mut met: Vec<(Key, Met)> = Vec::new();
         let mut lines = input.lines(options)?;
+        let declared = lines.declared();
+        let table = lines.table().cloned();
+        let description = match &table {
+            Some(table) if !table.is_own() => described(&lines),
+            _ => "fields by name, in each line".to_owned(),
+        };
+        for note in table.iter().flat_map(Table::notes) {
+            tracing::warn!("{}: {note}", input.name().display());
+        }
         let sensors = read(&mut lines, input.name(), |read| {
             if let Read::Samples(place, key, line, samples) = read {
                 if place == met.len() {
-                    met.push((key.clone(), Met::new(line, options)));
+                    met.push((key.clone(), Met::new(line, options, &declared, &description)));
                 }
                 if let Some((_, met)) = met.get_mut(place) {
                     met.take(samples);
@@ -240,17 +250,17 @@ fn read(
 }
 
 impl Met {
-    fn new(line: &Line, options: &Options) -> Met {
+    fn new(line: &Line, options: &Options, declared: &Declared, description: &str) -> Met {
         Met {
             stated: Stated {
                 declared: Declared {
                     interval_unit_given: options.states_interval_unit(),
                     sample_kind: line.sample_kind,
                     gyro_unit: line.gyro_unit,
-                    ..Declared::default()
+                    ..declared.clone()
                 },
                 has_stamp: true,
-                description: "fields by name, in each line".to_owned(),
+                description: description.to_owned(),
                 ..Stated::default()
             },
             class: match &line.class {
