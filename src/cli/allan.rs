@@ -5,8 +5,8 @@ mod outputs;
 mod words;
 
 use super::estimation::{KindArg, TimeArg, UnitArg};
-use super::{Global, Outcome, print};
 use super::tables::Tables;
+use super::{Global, Outcome, print};
 use crate::config::{Selection, selection};
 use crate::error::{Error, Result};
 use crate::pipeline::input::Input;

@@ -2,8 +2,8 @@
 
 mod url;
 
-use super::{Global, Outcome};
 use super::tables::Tables;
+use super::{Global, Outcome};
 use crate::client::remote::Remote;
 use crate::error::{Error, Result};
 use crate::pipeline::decoders::Decoders;

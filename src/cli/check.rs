@@ -1,7 +1,7 @@
 //! `strapd check FILE`: every finding about a log, with the flag that helps. I/O.
 
-use super::{Global, Outcome, print};
 use super::tables::Tables;
+use super::{Global, Outcome, print};
 use crate::error::{Error, Result};
 use crate::pipeline::check::{Checked, check};
 use crate::pipeline::input::Input;

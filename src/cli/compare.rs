@@ -1,7 +1,7 @@
 //! `strapd compare EST REF`: time-aligned angle error between two attitudes. I/O.
 
-use super::{Global, Outcome, print};
 use super::tables::Tables;
+use super::{Global, Outcome, print};
 use crate::error::{Error, Result};
 use crate::pipeline::attitude_track::{self, Side};
 use crate::pipeline::input::Input;

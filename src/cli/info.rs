@@ -3,8 +3,8 @@
 mod aids;
 mod words;
 
-use super::{Global, Outcome, print};
 use super::tables::Tables;
+use super::{Global, Outcome, print};
 use crate::error::{Error, Result};
 use crate::pipeline::input::Input;
 use crate::pipeline::inspection::look;

@@ -2,8 +2,8 @@
 
 use super::estimation::Estimation;
 use super::progress::Reporter;
-use super::{Global, Outcome, allan, print};
 use super::tables::Tables;
+use super::{Global, Outcome, allan, print};
 use crate::config::Selection;
 use crate::error::{Error, Result};
 use crate::pipeline::attitude_track::{self, Side, Track};

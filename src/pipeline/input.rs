@@ -151,7 +151,9 @@ impl Input {
     /// # Errors
     /// It can not be read, or is no table.
     pub(super) fn is_own_table(&self, options: &Options) -> Result<bool> {
-        let lines = self.lines(&Options::default()).or_else(|_| self.lines(options))?;
+        let lines = self
+            .lines(&Options::default())
+            .or_else(|_| self.lines(options))?;
         Ok(lines.table().is_some_and(Table::is_own))
     }
 

@@ -84,7 +84,10 @@ impl TextLog {
         let sensors = read(&mut lines, input.name(), |read| {
             if let Read::Samples(place, key, line, samples) = read {
                 if place == met.len() {
-                    met.push((key.clone(), Met::new(line, options, &declared, &description)));
+                    met.push((
+                        key.clone(),
+                        Met::new(line, options, &declared, &description),
+                    ));
                 }
                 if let Some((_, met)) = met.get_mut(place) {
                     met.take(samples);

@@ -3,8 +3,8 @@
 //! Apart from the readers because it comes before all of them: files are called whatever somebody called them, and a
 //! pipe has no name. What the bytes say wins over what the name says.
 
-use crate::error::{Error, Result};
 use crate::delimited;
+use crate::error::{Error, Result};
 use crate::mcap::MAGIC;
 use crate::recognise;
 use crate::{bag, ulog};
@@ -91,9 +91,10 @@ impl Format {
         if is_cut {
             lines.next_back();
         }
-        let is_table = delimited::may_be_table(text) && lines
-            .take(delimited::MOST_HEAD_LINES)
-            .any(|line| delimited::is_header(line, None));
+        let is_table = delimited::may_be_table(text)
+            && lines
+                .take(delimited::MOST_HEAD_LINES)
+                .any(|line| delimited::is_header(line, None));
         is_table.then_some(Format::Table)
     }
 
@@ -188,7 +189,9 @@ fn tells_enough(head: &[u8]) -> bool {
         .any(|(magic, _)| magic.starts_with(head) && head.len() < magic.len());
     // What stands before the header of a table is text, too; lines of objects begin with one soon.
     let whole = text.iter().rposition(|b| *b == b'\n');
-    let lines = text.get(..whole.map_or(0, |end| end + 1)).unwrap_or_default();
+    let lines = text
+        .get(..whole.map_or(0, |end| end + 1))
+        .unwrap_or_default();
     !begins_magic
         && (Format::of_bytes(head).is_some()
             || (!lines.is_empty() && !delimited::may_be_table(lines)))

@@ -3,9 +3,9 @@
 //! Apart from the decoders because it counts lines and bounds them: what a line holds is theirs to say.
 
 use crate::decode::{Line, LineDecoder, MAX_LINE, Options, Undecodable};
+use crate::delimited::{Opening, Table};
 use crate::error::{Error, Result};
 use crate::format::Format;
-use crate::delimited::{Opening, Table};
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -117,7 +117,10 @@ impl<R: Read> Lines<R> {
     /// What is said of all samples before the first: the names of a table may say units.
     #[must_use]
     pub fn declared(&self) -> Declared {
-        self.table().map(Table::declared).cloned().unwrap_or_default()
+        self.table()
+            .map(Table::declared)
+            .cloned()
+            .unwrap_or_default()
     }
 
     /// The number of the line that was given last, from 1.

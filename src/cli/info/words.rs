@@ -299,7 +299,7 @@ fn write_topic(looked: &Inspection, out: &mut String) {
         out,
         "; largest rate {} {}/s",
         significant(peak, 4),
-        looked.resolved.unit.name()
+        looked.quality_unit.name()
     );
     if let Some(offset) = &q.offset {
         let _ = writeln!(

@@ -64,9 +64,7 @@ impl Clock {
                 });
                 let is_whole = nanos.fract() == 0.0;
                 match count {
-                    Some(count) if is_whole => {
-                        Ok(Nanos(count.saturating_mul(*nanos as i64)))
-                    }
+                    Some(count) if is_whole => Ok(Nanos(count.saturating_mul(*nanos as i64))),
                     Some(count) => Ok(scaled(count as f64, *nanos)),
                     None if is_whole => {
                         decimal_in_steps(number, *nanos as i64).ok_or("is no number")
@@ -120,19 +118,27 @@ mod tests {
             wraps: Wraps::at(65_536),
         };
         let mut read = |text: &str| clock.read(text).unwrap().0 / 20_000_000;
-        assert_eq!(["65534", "65535", "0", "2"].map(&mut read), [65_534, 65_535, 65_536, 65_538]);
+        assert_eq!(
+            ["65534", "65535", "0", "2"].map(&mut read),
+            [65_534, 65_535, 65_536, 65_538]
+        );
         assert_eq!(read("1"), 65_537, "a row out of order");
         assert!(clock.read("1.5").is_err() && clock.read("").is_err());
     }
 
     #[test]
     fn decimal_stamps_are_exact_to_the_nanosecond_in_every_unit() {
-        let read = |nanos: f64, text: &str| {
-            Clock::Counts { nanos, wraps: None }.read(text).map(|n| n.0)
-        };
-        assert_eq!(read(1e9, "1700000000.123456789"), Ok(1_700_000_000_123_456_789));
+        let read =
+            |nanos: f64, text: &str| Clock::Counts { nanos, wraps: None }.read(text).map(|n| n.0);
+        assert_eq!(
+            read(1e9, "1700000000.123456789"),
+            Ok(1_700_000_000_123_456_789)
+        );
         assert_eq!(read(1e9, "1.50E-1"), Ok(150_000_000));
-        assert_eq!(read(1e6, "1700000000123.456789"), Ok(1_700_000_000_123_456_789));
+        assert_eq!(
+            read(1e6, "1700000000123.456789"),
+            Ok(1_700_000_000_123_456_789)
+        );
         assert_eq!(read(1e5, "12"), Ok(1_200_000));
         assert_eq!(read(976_562.5, "3"), Ok(2_929_688));
         assert!(read(1e9, "x").is_err() && read(0.5, "inf").is_err());

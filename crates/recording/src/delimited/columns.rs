@@ -83,7 +83,9 @@ impl FromStr for Columns {
             })?;
             let role = ROLES.iter().find(|(known, _)| *known == name.trim());
             let (name, role) = role.copied().ok_or_else(|| {
-                format!("`{name}` is no role; they are gyro, accel, mag, orientation, stamp, counter")
+                format!(
+                    "`{name}` is no role; they are gyro, accel, mag, orientation, stamp, counter"
+                )
             })?;
             if given.iter().any(|before| before.role == role) {
                 return Err(format!("{name} is given twice"));
@@ -108,7 +110,9 @@ impl FromStr for Columns {
                 ));
             }
             if columns.iter().any(String::is_empty) {
-                return Err(format!("{name}: a column without a name; its number, from 1, will do"));
+                return Err(format!(
+                    "{name}: a column without a name; its number, from 1, will do"
+                ));
             }
             given.push(Given {
                 role,
@@ -140,6 +144,10 @@ mod tests {
             let why = text.parse::<Columns>().map(|_| ()).unwrap_err();
             assert!(why.contains(words), "{text}: {why}");
         }
-        assert!("gyro=a:b:c:deg/s,stamp=1:us,accel=none".parse::<Columns>().is_ok());
+        assert!(
+            "gyro=a:b:c:deg/s,stamp=1:us,accel=none"
+                .parse::<Columns>()
+                .is_ok()
+        );
     }
 }

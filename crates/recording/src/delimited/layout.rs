@@ -47,9 +47,7 @@ pub(crate) fn may_be_table(first: &[u8]) -> bool {
     let text = without_mark(first);
     let binary = |b: &u8| *b < b' ' && !b"\t\r\n".contains(b);
     let is_object = |line: &[u8]| matches!(line.trim_ascii_start().first(), Some(b'{' | b'['));
-    !text.is_empty()
-        && !text.iter().any(binary)
-        && !text.split(|b| *b == b'\n').any(is_object)
+    !text.is_empty() && !text.iter().any(binary) && !text.split(|b| *b == b'\n').any(is_object)
 }
 
 /// The names of a line, cut by this delimiter; none of what can be no header.
@@ -196,9 +194,8 @@ impl Opening {
         let numbers = numbers.filter(|numbers| !numbers.is_empty())?;
         let tried = Delimiter::TRIED.iter().copied();
         let mut tried = self.delimiter.into_iter().chain(tried);
-        let cells = |line: &[u8], delimiter: Delimiter| -> Vec<String> {
-            text_cells(line, delimiter)
-        };
+        let cells =
+            |line: &[u8], delimiter: Delimiter| -> Vec<String> { text_cells(line, delimiter) };
         let delimiter = tried.find(|delimiter| {
             let cells = cells(line, *delimiter);
             numbers
@@ -207,7 +204,8 @@ impl Opening {
         })?;
         let before = self.lines.last().map(|before| cells(before, delimiter));
         let is_under_header = before.is_some_and(|before| {
-            before.len() == cells(line, delimiter).len() && !before.iter().any(|cell| is_number(cell))
+            before.len() == cells(line, delimiter).len()
+                && !before.iter().any(|cell| is_number(cell))
         });
         Some(match is_under_header {
             true => found(at - 1, delimiter, true, false),
@@ -245,8 +243,9 @@ impl Opening {
                     .collect()
             }
         };
-        let is_row =
-            |line: &[u8]| !line.iter().all(u8::is_ascii_whitespace) && !is_comment(line.trim_ascii());
+        let is_row = |line: &[u8]| {
+            !line.iter().all(u8::is_ascii_whitespace) && !is_comment(line.trim_ascii())
+        };
         let mut rows: Vec<Vec<String>> = self
             .lines
             .iter()
@@ -304,7 +303,10 @@ impl Opening {
             );
         };
         let all: Vec<&str> = names.iter().map(|name| name.text.as_str()).collect();
-        let said = all.get(..all.len().min(MOST_SAID)).unwrap_or(&all).join("`, `");
+        let said = all
+            .get(..all.len().min(MOST_SAID))
+            .unwrap_or(&all)
+            .join("`, `");
         if let Some(given) = self.given.as_ref().map(Columns::all) {
             let wrong = given.iter().flat_map(|given| &given.columns);
             let wrong: Vec<String> = wrong
@@ -315,13 +317,19 @@ impl Opening {
             }
         }
         let axes = ["x", "y", "z"];
-        if axes.iter().all(|axis| all.iter().any(|name| name.eq_ignore_ascii_case(axis))) {
+        if axes
+            .iter()
+            .all(|axis| all.iter().any(|name| name.eq_ignore_ascii_case(axis)))
+        {
             return format!(
                 "its columns x, y, z do not say of which sensor they are (they are rates where the file is called Gyroscope...)\n  help: --columns gyro=x:y:z if they are rates"
             );
         }
         let aside = names.iter().find_map(|name| match name.meant {
-            Meant::Aside { kind: Kind::Gyro, why } => Some(format!("; `{}` {why}", name.text)),
+            Meant::Aside {
+                kind: Kind::Gyro,
+                why,
+            } => Some(format!("; `{}` {why}", name.text)),
             _ => None,
         });
         format!(

@@ -115,26 +115,93 @@ const ORIENTATION: &[&str] = &[
 ];
 /// Stems that an axis may be written to without anything between.
 const FUSED: &[&str] = &[
-    "gyro", "gyr", "gyroscope", "w", "g", "omega", "acc", "accel", "a", "mag", "m", "b", "q",
-    "quat", "gf",
+    "gyro",
+    "gyr",
+    "gyroscope",
+    "w",
+    "g",
+    "omega",
+    "acc",
+    "accel",
+    "a",
+    "mag",
+    "m",
+    "b",
+    "q",
+    "quat",
+    "gf",
+    "f",
 ];
 
 /// Words of what is derived from a measurement, or is about it: such a column is none of the roles.
 const DERIVED: &[&str] = &[
-    "gravity", "grav", "bias", "biases", "offset", "std", "stddev", "var", "variance", "cov",
-    "covariance", "sigma", "temp", "temperature", "setpoint", "command", "cmd", "desired", "target",
-    "error", "err", "scale", "delta", "dv", "dq", "jerk", "noise", "angle", "euler", "status",
+    "gravity",
+    "grav",
+    "bias",
+    "biases",
+    "offset",
+    "std",
+    "stddev",
+    "var",
+    "variance",
+    "cov",
+    "covariance",
+    "sigma",
+    "temp",
+    "temperature",
+    "setpoint",
+    "command",
+    "cmd",
+    "desired",
+    "target",
+    "error",
+    "err",
+    "scale",
+    "delta",
+    "dv",
+    "dq",
+    "jerk",
+    "noise",
+    "angle",
+    "euler",
+    "status",
 ];
 const WITHOUT_GRAVITY: &[&str] = &["linear", "lin", "user", "free"];
 const AS_COUNTED: &[&str] = &["raw", "uncal", "uncalibrated", "lsb"];
 
 /// All words of a stamp's name are among these, and one of them is strong.
 const STAMP_STRONG: &[&str] = &[
-    "timestamp", "time", "t", "stamp", "ts", "elapsed", "millis", "micros",
+    "timestamp",
+    "time",
+    "t",
+    "stamp",
+    "ts",
+    "elapsed",
+    "millis",
+    "micros",
 ];
 const STAMP_WEAK: &[&str] = &[
-    "sample", "fine", "since", "start", "epoch", "unix", "utc", "system", "sys", "device", "imu",
-    "gyro", "gyroscope", "header", "sensor", "boot", "reboot", "realtime", "cal", "in", "the",
+    "sample",
+    "fine",
+    "since",
+    "start",
+    "epoch",
+    "unix",
+    "utc",
+    "system",
+    "sys",
+    "device",
+    "imu",
+    "gyro",
+    "gyroscope",
+    "header",
+    "sensor",
+    "boot",
+    "reboot",
+    "realtime",
+    "cal",
+    "in",
+    "the",
 ];
 
 /// Words of a name: cut at what is neither letter nor digit, and where capitals begin.
@@ -145,8 +212,8 @@ fn words(text: &str) -> Vec<String> {
     let mut chars = text.chars().peekable();
     while let Some(c) = chars.next() {
         let next_is_small = chars.peek().is_some_and(|next| next.is_lowercase());
-        let begins = c.is_uppercase()
-            && (before.is_lowercase() || (before.is_uppercase() && next_is_small));
+        let begins =
+            c.is_uppercase() && (before.is_lowercase() || (before.is_uppercase() && next_is_small));
         if (begins || !c.is_alphanumeric()) && !word.is_empty() {
             words.push(std::mem::take(&mut word));
         }
@@ -190,8 +257,8 @@ fn part_of(word: &str) -> Option<usize> {
     ["x", "y", "z", "w"].iter().position(|axis| *axis == word)
 }
 
-/// Takes the part out of a name's words: which it is, where it stood, and the words without it.
-fn cut_part(words: &[String], is_indexed: bool) -> Option<(usize, usize, Vec<String>)> {
+/// Takes the part out of a name's words: which it is, and the words without it.
+fn cut_part(words: &[String], is_indexed: bool) -> Option<(usize, Vec<String>)> {
     let without = |at: usize, stem: Option<&str>| {
         let mut rest = words.to_vec();
         match stem {
@@ -208,11 +275,11 @@ fn cut_part(words: &[String], is_indexed: bool) -> Option<(usize, usize, Vec<Str
         .find_map(|(at, word)| Some((at, part_of(word)?)))
         .filter(|_| words.len() > 1)
     {
-        return Some((part, at, without(at, None)));
+        return Some((part, without(at, None)));
     }
     if let (true, Some(last)) = (is_indexed, words.last()) {
         let part = ["0", "1", "2"].iter().position(|index| index == last)?;
-        return Some((part, words.len() - 1, without(words.len() - 1, None)));
+        return Some((part, without(words.len() - 1, None)));
     }
     words.iter().enumerate().rev().find_map(|(at, word)| {
         let (end, last) = word.char_indices().next_back()?;
@@ -220,7 +287,7 @@ fn cut_part(words: &[String], is_indexed: bool) -> Option<(usize, usize, Vec<Str
         let part = part_of(last.encode_utf8(&mut [0; 4]))?;
         FUSED
             .contains(&stem)
-            .then(|| (part, at, without(at, Some(stem))))
+            .then(|| (part, without(at, Some(stem))))
     })
 }
 
@@ -321,12 +388,11 @@ impl Name {
             return (meant, None, None);
         }
         let indexed = base.ends_with(']');
-        let Some((part, at, mut rest)) = cut_part(all, indexed) else {
+        let Some((part, mut rest)) = cut_part(all, indexed) else {
             return (Meant::Nothing, None, None);
         };
         let is_fused = !base.contains(|c: char| !c.is_alphanumeric()) || rest.len() == all.len();
         // Units behind the axis, or behind the sensor: `acc_x_m_s2`, `gyro_dps_x`.
-        let behind = rest.get(at..).unwrap_or_default().to_vec();
         let (mut said, mut quantity) = (None, None);
         for of in [Quantity::Rate, Quantity::Force, Quantity::Field] {
             let mut short = rest.clone();
@@ -349,7 +415,6 @@ impl Name {
         let Some(kind) = kind_of(&rest, is_fused).filter(|_| part < 3) else {
             return (Meant::Nothing, None, None);
         };
-        let _ = behind;
         let has = |known: &[&str]| rest.iter().any(|word| is_word(known, word));
         let meant = if has(DERIVED) {
             Meant::Nothing
@@ -376,8 +441,9 @@ impl Name {
         // `s` and the like are words of a stamp beside a strong one, `t` is no unit.
         let fits =
             |word: &String| is(STAMP_STRONG, word) || is(STAMP_WEAK, word) || time(word).is_some();
-        let is_stamp =
-            all.iter().all(fits) && all.iter().any(|word| is(STAMP_STRONG, word)) && !all.is_empty();
+        let is_stamp = all.iter().all(fits)
+            && all.iter().any(|word| is(STAMP_STRONG, word))
+            && !all.is_empty();
         is_stamp.then(|| {
             let unit = all.iter().rev().find_map(time);
             (Meant::Stamp, Some(Quantity::Time), unit)
@@ -418,7 +484,9 @@ impl Name {
             }
         }
         let last = all.last()?;
-        let stem = last.strip_prefix("quat").or_else(|| last.strip_prefix('q'))?;
+        let stem = last
+            .strip_prefix("quat")
+            .or_else(|| last.strip_prefix('q'))?;
         let mut others = rest(all.len() - 1);
         others.push("q");
         Some(of_part(part(stem)?, others))
@@ -500,9 +568,17 @@ mod tests {
         ] {
             assert_eq!(meant(text).0, None, "{text}");
         }
-        for text in ["Linear Acceleration x (m/s^2)", "userAcceleration_x", "FreeAcc_X", "gyro_raw_x"] {
+        for text in [
+            "Linear Acceleration x (m/s^2)",
+            "userAcceleration_x",
+            "FreeAcc_X",
+            "gyro_raw_x",
+        ] {
             let name = Name::of(text.as_bytes());
-            assert!(matches!(name.meant, Meant::Aside { .. }), "{text}: {name:?}");
+            assert!(
+                matches!(name.meant, Meant::Aside { .. }),
+                "{text}: {name:?}"
+            );
         }
     }
 
@@ -526,7 +602,13 @@ mod tests {
             let said = name.unit.and_then(Result::ok).and_then(Unit::name);
             assert_eq!(said, unit, "{text}");
         }
-        for text in ["second", "UTC_Second", "loggingTime(txt)", "datetime", "accelerometerTimestamp(s)"] {
+        for text in [
+            "second",
+            "UTC_Second",
+            "loggingTime(txt)",
+            "datetime",
+            "accelerometerTimestamp(s)",
+        ] {
             assert_ne!(Name::of(text.as_bytes()).meant, Meant::Stamp, "{text}");
         }
     }

@@ -95,7 +95,10 @@ impl Preamble {
                 && let Some((name, value)) = text.split_once(',')
             {
                 let value = value.trim();
-                let number = value.parse().ok().filter(|n: &f64| n.is_finite() && *n > 0.0);
+                let number = value
+                    .parse()
+                    .ok()
+                    .filter(|n: &f64| n.is_finite() && *n > 0.0);
                 match name.trim() {
                     "tscale" => found.tscale = number,
                     "gscale" => found.gscale = number,

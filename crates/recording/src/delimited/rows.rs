@@ -230,7 +230,10 @@ impl Table {
         }
         if self.whose == Whose::Others && is_comment(row) {
             // What says another rate is the head of another table.
-            let other = |hz: f64| self.declared_period().is_some_and(|p| (1e9 / hz - p).abs() > 1.0);
+            let other = |hz: f64| {
+                self.declared_period()
+                    .is_some_and(|p| (1e9 / hz - p).abs() > 1.0)
+            };
             if layout::is_header(row, self.given.as_ref())
                 || preamble::rate(row).is_some_and(|rate| other(rate.hz))
             {

@@ -76,10 +76,10 @@ const FIELDS: [(&str, f64); 12] = [
     ("ut", 1e-6),
     ("microtesla", 1e-6),
     ("nt", 1e-9),
-    ("g", 1e-4),
     ("gauss", 1e-4),
-    ("mg", 1e-7),
+    ("g", 1e-4),
     ("mgauss", 1e-7),
+    ("mg", 1e-7),
     ("milligauss", 1e-7),
     ("localflux", 1e-4),
 ];

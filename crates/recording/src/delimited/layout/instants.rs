@@ -51,7 +51,8 @@ impl Roles<'_> {
             return Ok(self.of_stamp(stamp));
         }
         let each = self.names.iter().enumerate();
-        let is_stamp = |at: usize, meant: &Meant| *meant == Meant::Stamp && !is_refused && !self.is_empty(at);
+        let is_stamp =
+            |at: usize, meant: &Meant| *meant == Meant::Stamp && !is_refused && !self.is_empty(at);
         let columns: Vec<usize> = each
             .filter(|(at, name)| is_stamp(*at, &name.meant))
             .map(|(at, _)| at)
@@ -69,7 +70,9 @@ impl Roles<'_> {
                     _ => Err(format!(
                         "its stamp may be {}: which is meant can not be told\n  help: --columns stamp={}",
                         self.listed(several),
-                        several.first().map_or_else(String::new, |at| self.reference(*at))
+                        several
+                            .first()
+                            .map_or_else(String::new, |at| self.reference(*at))
                     )),
                 }
             }
@@ -123,7 +126,10 @@ impl Roles<'_> {
         Ok(Instants {
             clock,
             column: column.map(|at| (at, format!("counter={}", self.reference(at)))),
-            notes: vec![format!("stamps are {by} at {} Hz, as its head says: `{}`", rate.hz, rate.said)],
+            notes: vec![format!(
+                "stamps are {by} at {} Hz, as its head says: `{}`",
+                rate.hz, rate.said
+            )],
         })
     }
 
@@ -249,10 +255,15 @@ impl Roles<'_> {
         const TICK: f64 = 1e5;
         const MICRO: f64 = 1e3;
         let step = units_that_fit(stamps.iter().copied()).map(|(step, _)| step);
-        let of_rate = self.preamble.rate.as_ref().zip(step).and_then(|(rate, step)| {
-            let is_it = |nanos: &f64| (step * nanos * rate.hz / 1e9 - 1.0).abs() < 0.5;
-            [TICK, MICRO].into_iter().find(is_it)
-        });
+        let of_rate = self
+            .preamble
+            .rate
+            .as_ref()
+            .zip(step)
+            .and_then(|(rate, step)| {
+                let is_it = |nanos: &f64| (step * nanos * rate.hz / 1e9 - 1.0).abs() < 0.5;
+                [TICK, MICRO].into_iter().find(is_it)
+            });
         match (of_rate, step) {
             (Some(nanos), _) => Ok(nanos),
             (None, Some(step)) if step <= FINE_TICKS => Ok(TICK),

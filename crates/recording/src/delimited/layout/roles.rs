@@ -67,7 +67,11 @@ pub(super) fn place(names: &[Name], column: &str) -> Result<usize, String> {
 pub(super) fn candidates(names: &[Name], kind: Kind) -> Vec<Group> {
     let mut groups: BTreeMap<&str, Vec<Vec<usize>>> = BTreeMap::new();
     for (at, name) in names.iter().enumerate() {
-        if let Meant::Part { kind: of_kind, part, of } = &name.meant
+        if let Meant::Part {
+            kind: of_kind,
+            part,
+            of,
+        } = &name.meant
             && *of_kind == kind
         {
             let parts = groups
@@ -141,8 +145,11 @@ impl Roles<'_> {
             let places = chosen.columns.iter().enumerate();
             of.extend(places.map(|(part, at)| (*at, column(part))));
             if kind != Kind::Matrix {
-                let mut said: Vec<String> =
-                    chosen.columns.iter().map(|at| self.reference(*at)).collect();
+                let mut said: Vec<String> = chosen
+                    .columns
+                    .iter()
+                    .map(|at| self.reference(*at))
+                    .collect();
                 said.extend(chosen.unit.and_then(Unit::name).map(str::to_owned));
                 assumed.push(format!("{}={}", kind.name(), said.join(":")));
             }
@@ -263,7 +270,10 @@ impl Roles<'_> {
         columns: &[usize],
         notes: &mut Vec<String>,
     ) -> Result<Option<Option<Unit>>, String> {
-        let names: Vec<&Name> = columns.iter().filter_map(|at| self.names.get(*at)).collect();
+        let names: Vec<&Name> = columns
+            .iter()
+            .filter_map(|at| self.names.get(*at))
+            .collect();
         let Some(first) = names.first() else {
             return Ok(Some(None));
         };
@@ -313,7 +323,7 @@ impl Roles<'_> {
             (Maker::Xsens, Kind::Gyro) if is_named("gyr_") => Some(rad),
             (Maker::Dot, Kind::Gyro) if is_named("gyr_") => Some(Unit::Rate(GyroUnit::Deg, 1.0)),
             (Maker::Xsens | Maker::Dot, Kind::Accel) if is_named("acc_") => Some(si),
-            (_, Kind::Gyro) if self.is_physics_toolbox() || is_named("x") => Some(rad),
+            (_, Kind::Gyro) if self.is_physics_toolbox() || name.text.len() == 1 => Some(rad),
             (_, Kind::Accel) if self.is_physics_toolbox() => Some(gravities(1.0)),
             (_, Kind::Mag) if self.is_physics_toolbox() => Some(Unit::Field(1e-6)),
             _ => None,
@@ -322,7 +332,9 @@ impl Roles<'_> {
 
     /// Physics Toolbox has the force in g beside what is left of it without gravity.
     fn is_physics_toolbox(&self) -> bool {
-        self.names.iter().any(|name| name.text.eq_ignore_ascii_case("gfx"))
+        self.names
+            .iter()
+            .any(|name| name.text.eq_ignore_ascii_case("gfx"))
     }
 
     /// Whether a column has nothing in the first rows.
