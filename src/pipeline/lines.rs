@@ -182,6 +182,8 @@ fn read(
     let format = lines.format();
     let mut sensor: Option<String> = None;
     let mut bare = BareStamps::default();
+    // Rows under a header that is known are of a table, though the first be none.
+    let (mut early, mut first_bad) = (Vec::new(), None);
     let is_beside = run.plan.aid == Aid::GravityAndField || run.plan.has_forces_beside;
     let mut has_rates = false;
     let mut samples = Vec::new();
@@ -189,11 +191,15 @@ fn read(
     let mut closed = false;
     while !closed && let Some(line) = lines.next(&mut samples)? {
         match line {
-            Err(why) if sensor.is_none() => return Err(no_samples(path, &lines, &why)),
-            Err(why) => {
-                let number = Nanos(i64::try_from(lines.number()).unwrap_or(i64::MAX));
-                items.push(Item::Undecodable(0, Box::new((number, why))));
+            Err(why) if sensor.is_none() => {
+                first_bad.get_or_insert_with(|| no_samples(path, &lines, &why));
+                let is_sure = lines.table().is_some_and(|table| !table.is_own());
+                if !is_sure || early.len() as u64 > PATIENCE {
+                    break;
+                }
+                early.push(undecodable(lines.number(), why));
             }
+            Err(why) => items.push(undecodable(lines.number(), why)),
             Ok(mut line) => {
                 // A sample of our own whose rate is null was one with NaN: it is counted, not
                 // passed over.
@@ -245,6 +251,7 @@ fn read(
                         }
                         let (found, stream) = met(run, &id, &lines, &declared);
                         taker.meet(found, stream)?;
+                        items.append(&mut early);
                         sensor = Some(id);
                     }
                     Some(first) if *first != id => {
@@ -267,20 +274,25 @@ fn read(
         // With nothing left in the buffer the next line may be long in coming: what is known goes
         // out first.
         let may_wait = lines.may_wait();
-        if items.len() >= BATCH || may_wait {
+        if sensor.is_some() && (items.len() >= BATCH || may_wait) {
             closed = taker.take(&mut items)? == Flow::Closed;
         }
-        if may_wait {
+        if sensor.is_some() && may_wait {
             taker.pause()?;
         }
     }
     if sensor.is_none() {
-        return Err(nothing(path, format));
+        return Err(first_bad.unwrap_or_else(|| nothing(path, format)));
     }
     let last = bare.settle().map_err(|what| unclear(path, &what))?;
     items.extend(last.map(|raw| Item::Sample(0, raw)));
     let _ = taker.take(&mut items)?;
     Ok(())
+}
+
+fn undecodable(number: u64, why: Undecodable) -> Item {
+    let number = Nanos(i64::try_from(number).unwrap_or(i64::MAX));
+    Item::Undecodable(0, Box::new((number, why)))
 }
 
 pub(super) fn unclear(path: &Path, what: &Ambiguous) -> Error {

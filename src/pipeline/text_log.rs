@@ -27,6 +27,8 @@ use strapd_recording::mcap::{Channel, ChannelSurvey, Schema, Survey};
 const MOST_SENSORS: usize = 1024;
 /// Items that go through the pipeline together.
 const BATCH: usize = 1024;
+/// Rows that are none before the first that is one: beyond, none follows.
+const MOST_EARLY: usize = 1000;
 /// What samples that name no sensor are called.
 const UNNAMED: &str = "imu";
 
@@ -188,10 +190,20 @@ fn read(
     let mut sensors = Sensors::default();
     let mut samples = Vec::new();
     let mut before = None;
+    // Rows under a header that is known are of a table, though the first be none.
+    let (mut early, mut first_bad) = (Vec::new(), None);
     while let Some(line) = lines.next(&mut samples)? {
         let line = match (line, before) {
             (Ok(line), _) => line,
-            (Err(why), None) => return Err(no_samples(path, lines, &why)),
+            (Err(why), None) => {
+                first_bad.get_or_insert_with(|| no_samples(path, lines, &why));
+                let is_sure = lines.table().is_some_and(|table| !table.is_own());
+                if !is_sure || early.len() > MOST_EARLY {
+                    break;
+                }
+                early.push((lines.number(), why));
+                continue;
+            }
             (Err(why), Some(place)) => {
                 if take(Read::Undecodable(place, lines.number(), why))?.is_break() {
                     return Ok(sensors);
@@ -224,6 +236,11 @@ fn read(
             }
         };
         before = Some(place);
+        for (number, why) in early.drain(..) {
+            if take(Read::Undecodable(place, number, why))?.is_break() {
+                return Ok(sensors);
+            }
+        }
         let Some(bare) = sensors.bare.get_mut(place) else {
             continue;
         };
@@ -234,6 +251,9 @@ fn read(
         if take(Read::Samples(place, &key, &line, &known))?.is_break() {
             return Ok(sensors);
         }
+    }
+    if let Some(why) = first_bad.filter(|_| before.is_none()) {
+        return Err(why);
     }
     let places: Vec<(Key, usize)> = std::mem::take(&mut sensors.places).into_iter().collect();
     for (key, place) in places {

@@ -175,6 +175,7 @@ impl<R: Read> Lines<R> {
     }
 
     fn is_blank(&self) -> bool {
-        self.line.iter().all(u8::is_ascii_whitespace)
+        // Of a longer one, what comes behind may be anything.
+        self.line.len() <= MAX_LINE && self.line.iter().all(u8::is_ascii_whitespace)
     }
 }

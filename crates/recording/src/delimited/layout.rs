@@ -58,6 +58,13 @@ fn names_in(line: &[u8], delimiter: Delimiter) -> Vec<Name> {
     if is_object || row.iter().any(binary) {
         return Vec::new();
     }
+    // Between blanks a mark of comments would be a cell.
+    let row = match (delimiter, row) {
+        (Delimiter::Blanks, [b'#' | b'%', rest @ ..] | [b'/', b'/', rest @ ..]) => {
+            rest.trim_ascii_start()
+        }
+        _ => row,
+    };
     let mut names: Vec<Name> = Vec::new();
     for cell in delimiter.cells(row) {
         if names.len() == MOST_COLUMNS {
@@ -287,15 +294,18 @@ impl Opening {
             return "it holds bytes of zero: it is binary, or UTF-16 without its mark\n  help: iconv -f UTF-16LE -t UTF-8 FILE > log.csv, if it is text".to_owned();
         }
         // The line with the most names.
+        let texts = |names: &[Name]| names.iter().filter(|name| !is_number(&name.text)).count();
         let best = self
             .lines
             .iter()
-            .flat_map(|line| {
-                let tried = self.delimiter.into_iter().chain(Delimiter::TRIED);
-                tried.map(|delimiter| names_in(line, delimiter))
+            .filter_map(|line| {
+                let mut tried = self.delimiter.into_iter().chain(Delimiter::TRIED);
+                tried.find_map(|delimiter| {
+                    Some(names_in(line, delimiter)).filter(|names| names.len() >= 3)
+                })
             })
-            .filter(|names| names.len() >= 3 && names.iter().any(|name| !is_number(&name.text)))
-            .max_by_key(|names| names.iter().filter(|name| !is_number(&name.text)).count());
+            .filter(|names| texts(names) > 0)
+            .max_by_key(|names| texts(names));
         let Some(names) = best else {
             return format!(
                 "none of its first lines has three cells that could name columns; it begins with `{}`\n  help: a first row with names such as time_s, gyro_x, gyro_y, gyro_z; or --columns gyro=2:3:4,stamp=1:s by numbers, and --delimiter",
