@@ -362,13 +362,15 @@ fn met(
 ) -> (Found, Stream) {
     let name = if id.is_empty() { "imu" } else { id };
     let notes = lines.table().map(Table::notes).unwrap_or_default();
+    let doubt = lines.table().and_then(Table::doubt_of_unit);
+    let doubt = doubt.filter(|_| run.plan.unit.is_none());
     let found = Found {
         name: name.to_owned(),
         output_topic: output_topic(name, &BTreeSet::new()),
         described: described(lines),
         resolved: Meaning::new(&run.plan, declared),
         noticed: Arc::default(),
-        warnings: notes.to_vec(),
+        warnings: notes.iter().cloned().chain(doubt).collect(),
     };
     (found, Stream::new(name, ""))
 }

@@ -80,7 +80,8 @@ impl TextLog {
             Some(table) if !table.is_own() => described(&lines),
             _ => "fields by name, in each line".to_owned(),
         };
-        for note in table.iter().flat_map(Table::notes) {
+        let doubt = table.as_ref().and_then(Table::doubt_of_unit);
+        for note in table.iter().flat_map(Table::notes).chain(&doubt) {
             tracing::warn!("{}: {note}", input.name().display());
         }
         let sensors = read(&mut lines, input.name(), |read| {

@@ -23,6 +23,7 @@ mod report;
 mod simulate;
 mod sinks;
 mod streams;
+mod tables;
 mod youbot;
 
 #[path = "../made_logs/mod.rs"]

@@ -147,6 +147,11 @@ fn lines() {
 }
 
 #[test]
+fn tables() {
+    survives("delimited", CASES, crate::parsers::delimited);
+}
+
+#[test]
 fn conversations() {
     survives("session", CASES, crate::parsers::session);
 }

@@ -187,6 +187,16 @@ impl Table {
         &self.notes
     }
 
+    /// What to say where nobody says the unit of its rates.
+    #[must_use]
+    pub fn doubt_of_unit(&self) -> Option<String> {
+        let is_open = !self.is_own() && self.has(GYRO[0]) && self.declared.gyro_unit.is_none();
+        is_open.then(|| {
+            "the unit of the rates is not stated, and taken for rad/s: --gyro-unit deg, if it is deg/s"
+                .to_owned()
+        })
+    }
+
     /// What its names say of its numbers.
     #[must_use]
     pub fn declared(&self) -> &Declared {
@@ -260,7 +270,15 @@ impl Table {
     /// What is no row because another table begins with it.
     fn explained(&mut self, row: &[u8], why: Undecodable) -> Undecodable {
         if self.whose != Whose::Others || !layout::is_header(row, self.given.as_ref()) {
-            return why;
+            let (have, need) = (self.delimiter.cells(row).count(), self.columns.len());
+            // What stands in the wrong place is not the point then.
+            return match why {
+                Undecodable::Cell { .. } if have != need => Undecodable::Row {
+                    have: have as u64,
+                    need: need as u64,
+                },
+                why => why,
+            };
         }
         self.is_elsewhere = true;
         Undecodable::OtherTable

@@ -480,3 +480,43 @@ fn acceleration_without_gravity_is_named_and_not_used() {
     let given = read("-", text.as_bytes(), &options(columns)).unwrap();
     assert_eq!(given.samples[0].accel, Some([4.0, 5.0, 6.0]));
 }
+
+/// Rows a second on one thread, of seven columns as EuRoC has them.
+#[test]
+#[ignore = "a figure: --release -- --ignored --nocapture rows_a_second"]
+fn rows_a_second() {
+    let head = all()[0].text.lines().next().unwrap().to_owned() + "\n";
+    let mut text = head;
+    for k in 0..1_000_000 {
+        let [w, a, _] = motion(k);
+        let numbers: Vec<String> = w.iter().chain(&a).map(|v| format!("{v:.9}")).collect();
+        writeln!(
+            text,
+            "{},{}",
+            START + k as i64 * 5_000_000,
+            numbers.join(",")
+        )
+        .unwrap();
+    }
+    let mut best = f64::INFINITY;
+    for _ in 0..5 {
+        let name = Path::new("data.csv");
+        let mut lines = Lines::new(name, Format::Table, text.as_bytes(), &options("")).unwrap();
+        let mut samples = Vec::new();
+        let start = std::time::Instant::now();
+        let mut n = 0;
+        while let Some(line) = lines.next(&mut samples).unwrap() {
+            n += usize::from(line.is_ok());
+            if samples.len() > 1000 {
+                samples.clear();
+            }
+        }
+        assert_eq!(n, 1_000_000);
+        best = best.min(start.elapsed().as_secs_f64());
+    }
+    println!(
+        "{:.2} M rows/s, {:.0} MB/s",
+        1.0 / best,
+        text.len() as f64 / best * 1e-6
+    );
+}

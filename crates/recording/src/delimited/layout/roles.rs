@@ -178,10 +178,7 @@ impl Roles<'_> {
                 table.declared.gyro_unit = Some(unit);
                 scales.gyro = scale;
             }
-            Some(_) => notes.push(
-                "the unit of the rates is not stated, and taken for rad/s: --gyro-unit deg, if it is deg/s".to_owned(),
-            ),
-            None => {}
+            _ => {}
         }
         if let Some(Unit::Force(unit, scale)) = accel.and_then(|accel| accel.unit) {
             table.declared.accel_unit = Some(unit);
