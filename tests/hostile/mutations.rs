@@ -148,7 +148,8 @@ fn lines() {
 
 #[test]
 fn tables() {
-    survives("delimited", CASES, crate::parsers::delimited);
+    // Each is read twice.
+    survives("delimited", CASES / 3, crate::parsers::delimited);
 }
 
 #[test]

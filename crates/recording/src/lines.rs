@@ -18,8 +18,8 @@ pub struct Lines<R> {
     input: BufReader<R>,
     form: Form,
     /// The line that was read last, and that was given last, from 1.
-    number: u64,
-    given: u64,
+    last_read: u64,
+    current: u64,
     offset: u64,
     line: Vec<u8>,
     /// Rows of a table that were looked at before, with their numbers.
@@ -43,8 +43,8 @@ impl<R: Read> Lines<R> {
             name: name.to_owned(),
             input: BufReader::with_capacity(1 << 16, input),
             form: Form::Objects(LineDecoder::new(options)),
-            number: 0,
-            given: 0,
+            last_read: 0,
+            current: 0,
             offset: 0,
             line: Vec::new(),
             held: VecDeque::new(),
@@ -126,7 +126,7 @@ impl<R: Read> Lines<R> {
     /// The number of the line that was given last, from 1.
     #[must_use]
     pub fn number(&self) -> u64 {
-        self.given
+        self.current
     }
 
     /// Bytes read so far.
@@ -144,11 +144,11 @@ impl<R: Read> Lines<R> {
     /// The next line: one that was looked at before, or from the input.
     fn next_line(&mut self) -> Result<bool> {
         if let Some((number, line)) = self.held.pop_front() {
-            (self.given, self.line) = (number, line);
+            (self.current, self.line) = (number, line);
             return Ok(true);
         }
         let is_there = self.read()?;
-        self.given = self.number;
+        self.current = self.last_read;
         Ok(is_there)
     }
 
@@ -166,7 +166,7 @@ impl<R: Read> Lines<R> {
         let read = Read::take(&mut self.input, limit)
             .read_until(b'\n', &mut self.line)
             .map_err(fail)? as u64;
-        self.number += 1;
+        self.last_read += 1;
         self.offset += read;
         if read == limit && self.line.last() != Some(&b'\n') {
             self.offset += self.input.skip_until(b'\n').map_err(fail)? as u64;

@@ -136,6 +136,9 @@ pub(crate) struct Opening {
     rows: usize,
 }
 
+/// Rows, each with the number of its line, from 1.
+type Rows = Vec<(u64, Vec<u8>)>;
+
 /// Where the header is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 struct Found {
@@ -224,7 +227,7 @@ impl Opening {
     ///
     /// # Errors
     /// What is missing or can not be told, in words with their help.
-    pub(crate) fn finish(self) -> Result<(Table, Vec<(u64, Vec<u8>)>), String> {
+    pub(crate) fn finish(self) -> Result<(Table, Rows), String> {
         let Some(found) = self.found else {
             return Err(self.nothing());
         };
@@ -331,9 +334,7 @@ impl Opening {
             .iter()
             .all(|axis| all.iter().any(|name| name.eq_ignore_ascii_case(axis)))
         {
-            return format!(
-                "its columns x, y, z do not say of which sensor they are (they are rates where the file is called Gyroscope...)\n  help: --columns gyro=x:y:z if they are rates"
-            );
+            return "its columns x, y, z do not say of which sensor they are (they are rates where the file is called Gyroscope...)\n  help: --columns gyro=x:y:z if they are rates".to_owned();
         }
         let aside = names.iter().find_map(|name| match name.meant {
             Meant::Aside {
@@ -349,7 +350,7 @@ impl Opening {
     }
 }
 
-fn numbered<'l>(lines: impl Iterator<Item = (usize, &'l Vec<u8>)>) -> Vec<(u64, Vec<u8>)> {
+fn numbered<'l>(lines: impl Iterator<Item = (usize, &'l Vec<u8>)>) -> Rows {
     lines
         .map(|(at, line)| (at as u64 + 1, line.clone()))
         .collect()

@@ -83,6 +83,9 @@ fn motion(k: usize) -> [[f64; 3]; 3] {
     ]
 }
 
+/// A vector of a row.
+type OfRow = fn(usize) -> [f64; 3];
+
 /// A maker's table: its name, its text, and what is in it.
 pub struct Made {
     pub name: &'static str,
@@ -91,7 +94,7 @@ pub struct Made {
     stamp: fn(usize) -> i64,
     gyro: fn(usize) -> [f64; 3],
     gyro_unit: Option<GyroUnit>,
-    accel: Option<(fn(usize) -> [f64; 3], Option<AccelUnit>)>,
+    accel: Option<(OfRow, Option<AccelUnit>)>,
     mag: Option<fn(usize) -> [f64; 3]>,
     orientation: Option<[f64; 4]>,
 }

@@ -34,6 +34,9 @@ struct Chosen {
     unit: Option<Unit>,
 }
 
+/// A role, the columns that fill it, and what each of them is.
+type Filled<'c> = (&'c Option<Chosen>, Kind, fn(usize) -> Column);
+
 /// Where a column is that the user names, or gives by its number from 1.
 pub(super) fn place(names: &[Name], column: &str) -> Result<usize, String> {
     let all = |is: &dyn Fn(&str) -> bool| -> Vec<usize> {
@@ -127,7 +130,7 @@ impl Roles<'_> {
         }
         let instants = self.instants()?;
         let mut of: Vec<(usize, Column)> = Vec::new();
-        let roles: [(&Option<Chosen>, Kind, fn(usize) -> Column); 5] = [
+        let roles: [Filled<'_>; 5] = [
             (&gyro, Kind::Gyro, Column::Gyro),
             (&accel, Kind::Accel, Column::Accel),
             (&mag, Kind::Mag, Column::Mag),
@@ -173,12 +176,9 @@ impl Roles<'_> {
         notes.extend(instants.notes);
         table.has_decimal_comma = self.has_decimal_comma(&of);
         let mut scales = Scales::default();
-        match gyro.map(|gyro| gyro.unit) {
-            Some(Some(Unit::Rate(unit, scale))) => {
-                table.declared.gyro_unit = Some(unit);
-                scales.gyro = scale;
-            }
-            _ => {}
+        if let Some(Unit::Rate(unit, scale)) = gyro.and_then(|gyro| gyro.unit) {
+            table.declared.gyro_unit = Some(unit);
+            scales.gyro = scale;
         }
         if let Some(Unit::Force(unit, scale)) = accel.and_then(|accel| accel.unit) {
             table.declared.accel_unit = Some(unit);
