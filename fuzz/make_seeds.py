@@ -182,3 +182,41 @@ for name, options in {
     writer.add_attachment(0, 0, "att", "text/plain", b"hello")
     writer.finish()
     seed("mcap", name, file.getvalue())
+
+# Tables of text, after their makers' documentation.
+
+
+def rows(n, cells, separator=",", end="\n"):
+    return "".join(separator.join(str(cell) for cell in cells(k)) + end for k in range(n))
+
+
+def moving(k):
+    t = 0.01 * k
+    return [round(v, 6) for v in (math.sin(t), 1.3 * math.cos(t), 0.4, 0.1, 0.2, 9.8)]
+
+
+NS = 1_700_000_000_000_000_000
+tables = {
+    "euroc": "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]\n"
+    + rows(30, lambda k: [NS + k * 5_000_000, *moving(k)]),
+    "sensor_logger": "time,seconds_elapsed,z,y,x\n" + rows(30, lambda k: [NS + k * 10_000_000, k / 100, *moving(k)[:3]]),
+    "phyphox": '"Time (s)";"Gyroscope x (rad/s)";"Gyroscope y (rad/s)";"Gyroscope z (rad/s)"\n'
+    + rows(30, lambda k: [f"{v:.3E}".replace(".", ",") for v in (k / 100, *moving(k)[:3])], ";"),
+    "physics": "time,gFx,gFy,gFz,ax,ay,az,wx,wy,wz\n" + rows(20, lambda k: [k / 100, *moving(k)[3:], 0, 0, 0, *moving(k)[:3]]),
+    "xsens": "// Update Rate: 100.0Hz\nPacketCounter\tSampleTimeFine\tAcc_X\tAcc_Y\tAcc_Z\tGyr_X\tGyr_Y\tGyr_Z\tMat[1][1]\tMat[2][1]\tMat[3][1]\tMat[1][2]\tMat[2][2]\tMat[3][2]\tMat[1][3]\tMat[2][3]\tMat[3][3]\n"
+    + rows(20, lambda k: [(65_530 + k) % 65_536, "", *moving(k)[3:], *moving(k)[:3], 0, 1, 0, -1, 0, 0, 0, 0, 1], "\t", "\t\r\n"),
+    "dot": "sep=,\nDeviceTag:,DOT\nOutputRate:,60Hz\nPacketCounter,SampleTimeFine,Quat_W,Quat_X,Quat_Y,Quat_Z,Acc_X,Acc_Y,Acc_Z,Gyr_X,Gyr_Y,Gyr_Z\n"
+    + rows(20, lambda k: [k, (4_294_900_000 + k * 16_667) % 2**32, 1, 0, 0, 0, *moving(k)[3:], *moving(k)[:3]]),
+    "gcsv": "GYROFLOW IMU LOG\nversion,1.3\norientation,YxZ\ntscale,0.001\ngscale,0.00122\nascale,0.000488\nt,gx,gy,gz,ax,ay,az\n"
+    + rows(20, lambda k: [k * 10, *(round(500 * v) for v in moving(k))]),
+    "shimmer": "Timestamp_Unix_CAL\tGyro_X_CAL\tGyro_Y_CAL\tGyro_Z_CAL\nms\tdeg/s\tdeg/s\tdeg/s\n"
+    + rows(20, lambda k: [NS // 10**6 + k * 10, *moving(k)[:3]], "\t"),
+    "blanks": "# t_us  wx_dps wy_dps wz_dps\n" + rows(20, lambda k: [k * 10_000, *moving(k)[:3]], "  "),
+    "dated": "timestamp | wx | wy | wz\n" + rows(20, lambda k: [f"2023-11-14T22:13:20.{k:02}Z", *moving(k)[:3]], " | "),
+    "by_number": "gyro=2:3:4:deg/s,stamp=1:ms,accel=5:6:7:g\n" + rows(20, lambda k: [k * 10, *moving(k)]),
+    "two": ("time_s,gyro_x,gyro_y,gyro_z\n" + rows(10, lambda k: [k / 100, *moving(k)[:3]])) * 2
+    + "time_s,gyro_z,gyro_y,gyro_x\n"
+    + rows(5, lambda k: [k / 100, *moving(k)[:3]]),
+}
+for name, text in tables.items():
+    seed("delimited", name, text.encode())

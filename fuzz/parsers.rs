@@ -12,8 +12,10 @@ use strapd_attitude::record::{Nanos, RawSample};
 use strapd_recording::decode::framing::{Framed, Framer};
 use strapd_recording::decode::packed::{self, Object};
 use strapd_recording::decode::{Channel, Decoder, Options, decode_line, role};
+use strapd_recording::delimited::Table;
+use strapd_recording::format::Format;
+use strapd_recording::lines::Lines;
 use strapd_recording::mcap::{Reader, WalkOptions, walk};
-use strapd_recording::table::Table;
 
 const NOW: Nanos = Nanos(1_700_000_000_000_000_000);
 
@@ -181,7 +183,7 @@ pub fn lines(data: &[u8]) {
 /// A table, where the first line names its columns: each row is a sample, the first line again, or an error.
 fn rows(data: &[u8]) {
     let mut lines = data.split(|b| *b == b'\n');
-    let Some(Ok(table)) = lines.next().map(Table::new) else {
+    let Some(Ok(mut table)) = lines.next().map(Table::own) else {
         return;
     };
     let mut out: Vec<RawSample> = Vec::new();
@@ -192,6 +194,68 @@ fn rows(data: &[u8]) {
             Err(why) => assert!(out.is_empty() && !why.to_string().is_empty()),
         }
     }
+}
+
+/// As many bytes at a time.
+struct Dribble<'b>(&'b [u8], usize);
+
+impl std::io::Read for Dribble<'_> {
+    fn read(&mut self, into: &mut [u8]) -> std::io::Result<usize> {
+        let n = self.1.min(into.len()).min(self.0.len());
+        let (now, later) = self.0.split_at(n);
+        into[..n].copy_from_slice(now);
+        self.0 = later;
+        Ok(n)
+    }
+}
+
+/// What a table gives: samples, and why rows are none.
+fn table(data: &[u8], at_once: usize, options: &Options) -> (Vec<String>, Vec<RawSample>) {
+    let mut said = Vec::new();
+    let mut samples = Vec::new();
+    let name = std::path::Path::new("Gyroscope.csv");
+    match Lines::new(name, Format::Table, Dribble(data, at_once), options) {
+        Err(why) => said.push(why.to_string()),
+        Ok(mut lines) => {
+            said.extend(lines.table().map(|table| table.assumed().to_owned()));
+            while let Some(line) = lines.next(&mut samples).unwrap() {
+                match line {
+                    Ok(line) => assert!(line.decoded.samples <= 1),
+                    Err(why) => said.push(format!("{}: {why}", lines.number())),
+                }
+            }
+            assert_eq!(lines.offset(), data.len() as u64);
+        }
+    }
+    (said, samples)
+}
+
+/// A table of somebody's, in one piece.
+pub fn whole_table(data: &[u8]) {
+    let _ = table(data, usize::MAX, &Options::default());
+}
+
+/// A table of somebody's, what is said of its columns before it (`gyro=2:3:4`, a line end): however it is cut, the same
+/// comes of it.
+pub fn delimited(data: &[u8]) {
+    let _ = Format::of_bytes(data);
+    let (first, rest) = data.split_at(data.iter().position(|b| *b == b'\n').unwrap_or(0));
+    let columns = std::str::from_utf8(first)
+        .ok()
+        .and_then(|text| text.parse().ok());
+    let (rest, options) = match columns {
+        None => (data, Options::default()),
+        columns => {
+            let options = Options {
+                columns,
+                ..Options::default()
+            };
+            (rest.get(1..).unwrap_or_default(), options)
+        }
+    };
+    let whole = table(rest, usize::MAX, &options);
+    let cut = table(rest, 1 + data.len() % 7, &options);
+    assert_eq!(format!("{whole:?}"), format!("{cut:?}"));
 }
 
 #[derive(Debug, PartialEq, Eq)]

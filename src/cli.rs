@@ -23,6 +23,7 @@ pub mod serve;
 pub mod serving;
 pub mod shell;
 pub mod simulate;
+pub mod tables;
 pub mod watch;
 
 use crate::error::{Error, Result};

@@ -5,6 +5,7 @@ mod outputs;
 mod words;
 
 use super::estimation::{KindArg, TimeArg, UnitArg};
+use super::tables::Tables;
 use super::{Global, Outcome, print};
 use crate::config::{Selection, selection};
 use crate::error::{Error, Result};
@@ -40,6 +41,9 @@ pub struct Allan {
     /// Where a value lies in the message: ROLE=PATH, as in replay
     #[arg(long = "field", value_name = "ROLE=PATH")]
     pub fields: Vec<String>,
+    /// How a table is to be read.
+    #[command(flatten)]
+    pub tables: Tables,
     /// Use a gyro whose covariance is marked -1 (absent) all the same
     #[arg(long)]
     pub ignore_covariance_flag: bool,
@@ -98,12 +102,13 @@ struct Axis {
 /// The log can not be read, holds no rate, or too few samples; an output exists.
 pub fn run(global: &Global, args: &Allan) -> Result<Outcome> {
     let plan = args.plan()?;
-    let selection = selection(
+    let mut selection = selection(
         args.topic.as_ref(),
         &args.fields,
         args.ignore_covariance_flag,
         [None, None],
     )?;
+    args.tables.put(&mut selection.decode)?;
     args.plot
         .iter()
         .try_for_each(|p| super::outputs::check_chart(p))?;

@@ -3,6 +3,7 @@
 pub(super) mod line;
 mod url;
 
+use super::tables::Tables;
 use super::{Global, Outcome};
 use crate::client::remote::Remote;
 use crate::error::{Error, Result};
@@ -40,6 +41,9 @@ pub struct Cat {
     /// Where a value lies in the message: ROLE=PATH, as in replay
     #[arg(long = "field", value_name = "ROLE=PATH")]
     pub fields: Vec<String>,
+    /// How a table is to be read.
+    #[command(flatten)]
+    pub tables: Tables,
     /// Form of the output
     #[arg(long, value_enum, default_value = "ndjson")]
     pub format: Format,
@@ -97,7 +101,7 @@ pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
             )));
         }
     }
-    let options = Options {
+    let mut options = Options {
         fields: args
             .fields
             .iter()
@@ -109,6 +113,7 @@ pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
         ignore_covariance_flag: false,
         ..Options::default()
     };
+    args.tables.put(&mut options)?;
     let pool = Pool::new(global.threads)?;
     let log = Log::told_apart(
         &Input::open(&args.source)?,

@@ -1,5 +1,6 @@
 //! `strapd check FILE`: every finding about a log, with the flag that helps. I/O.
 
+use super::tables::Tables;
 use super::{Global, Outcome, print};
 use crate::error::{Error, Result};
 use crate::pipeline::check::{Checked, check};
@@ -30,6 +31,9 @@ pub struct Check {
     /// Where a value lies in the message: ROLE=PATH, as in replay
     #[arg(long = "field", value_name = "ROLE=PATH")]
     pub fields: Vec<String>,
+    /// How a table is to be read.
+    #[command(flatten)]
+    pub tables: Tables,
 }
 
 /// Runs it.
@@ -38,7 +42,7 @@ pub struct Check {
 /// The log can not be read, or the topic named is not in it.
 pub fn run(global: &Global, args: &Check) -> Result<Outcome> {
     let pool = Pool::new(global.threads)?;
-    let options = Options {
+    let mut options = Options {
         fields: args
             .fields
             .iter()
@@ -46,6 +50,7 @@ pub fn run(global: &Global, args: &Check) -> Result<Outcome> {
             .collect::<Result<_>>()?,
         ..Options::default()
     };
+    args.tables.put(&mut options)?;
     let input = Input::open(&args.file)?;
     let checked = check(&input, args.topic.as_deref(), &options, &pool)?;
     let found = findings(&checked);

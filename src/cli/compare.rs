@@ -1,5 +1,6 @@
 //! `strapd compare EST REF`: time-aligned angle error between two attitudes. I/O.
 
+use super::tables::Tables;
 use super::{Global, Outcome, print};
 use crate::error::{Error, Result};
 use crate::pipeline::attitude_track::{self, Side};
@@ -18,6 +19,7 @@ use strapd_attitude::compare::{
     Align, BiasFit, Comparison, Consistency, ErrorStats, Errors, Known, Stamped, compare,
     consistency, fit_body_axes, fit_constant_bias, for_each_error,
 };
+use strapd_recording::decode::Options;
 use strapd_recording::pool::Pool;
 
 /// Time-aligned angle error between two attitudes.
@@ -43,6 +45,9 @@ pub struct Compare {
     /// Topic or id of the reference
     #[arg(long, value_name = "NAME")]
     pub ref_topic: Option<String>,
+    /// How a table is to be read.
+    #[command(flatten)]
+    pub tables: Tables,
     /// Constant rotation of the world to remove first: none, first (equal at the first common
     /// instant), first-heading (the same, about the vertical only), heading (about the vertical, least
     /// squares), best (least squares)
@@ -91,8 +96,10 @@ pub fn run(global: &Global, args: &Compare) -> Result<Outcome> {
             "compare - -: standard input comes once\n  help: give one of the two a file".to_owned(),
         ));
     }
+    let mut options = Options::default();
+    args.tables.put(&mut options)?;
     let read = |path: &Path, side, topic: &Option<String>| {
-        attitude_track::read(&Input::open(path)?, side, topic.as_deref(), &pool)
+        attitude_track::read(&Input::open(path)?, side, topic.as_deref(), &options, &pool)
     };
     let estimate = read(&args.estimate, Side::Estimate, &args.topic)?;
     let reference = read(&args.reference, Side::Reference, &args.ref_topic)?;

@@ -3,6 +3,7 @@
 mod aids;
 mod words;
 
+use super::tables::Tables;
 use super::{Global, Outcome, print};
 use crate::error::{Error, Result};
 use crate::pipeline::input::Input;
@@ -29,6 +30,9 @@ pub struct Info {
     /// Where a value lies in the message: ROLE=PATH, as in replay
     #[arg(long = "field", value_name = "ROLE=PATH")]
     pub fields: Vec<String>,
+    /// How a table is to be read.
+    #[command(flatten)]
+    pub tables: Tables,
 }
 
 /// Runs it.
@@ -37,7 +41,7 @@ pub struct Info {
 /// The log can not be read, or the topic named is not in it.
 pub fn run(global: &Global, args: &Info) -> Result<Outcome> {
     let pool = Pool::new(global.threads)?;
-    let options = Options {
+    let mut options = Options {
         fields: args
             .fields
             .iter()
@@ -45,6 +49,7 @@ pub fn run(global: &Global, args: &Info) -> Result<Outcome> {
             .collect::<Result<_>>()?,
         ..Options::default()
     };
+    args.tables.put(&mut options)?;
     let input = Input::open(&args.file)?;
     let log = Log::told_apart(&input, args.topic.as_deref(), &options, &pool)?;
     if let Some(topic) = &args.topic

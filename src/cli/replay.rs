@@ -4,6 +4,7 @@ use super::calibration_files;
 use super::estimation::{AidArg, Estimation};
 use super::progress::Reporter;
 use super::serving::{Served, Serving};
+use super::tables::Tables;
 use super::{Global, Outcome, outputs, print};
 use crate::config::{Selection, Shard};
 use crate::error::{Error, Result};
@@ -44,6 +45,9 @@ pub struct Replay {
     /// the recording itself (needs the accelerometer; --aid gravity+mag: heading from north)
     #[arg(long, help_heading = "Estimation")]
     pub smooth: bool,
+    /// How a table is to be read.
+    #[command(flatten)]
+    pub tables: Tables,
     /// Replace outputs that exist
     #[arg(long, help_heading = "Output")]
     pub force: bool,
@@ -155,7 +159,8 @@ pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
     outputs::check_distinct(&args.outputs, &args.sources)?;
     args.check_calibrations(&logs)?;
     let plan = args.estimation.plan_of_a_recording(args.smooth)?;
-    let selection = args.estimation.selection()?;
+    let mut selection = args.estimation.selection()?;
+    args.tables.put(&mut selection.decode)?;
     let pool = Pool::new(global.threads)?;
     let mut outcome = Outcome::Done;
     let mut summaries = Vec::new();

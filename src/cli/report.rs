@@ -2,6 +2,7 @@
 
 use super::estimation::Estimation;
 use super::progress::Reporter;
+use super::tables::Tables;
 use super::{Global, Outcome, allan, print};
 use crate::config::Selection;
 use crate::error::{Error, Result};
@@ -16,6 +17,7 @@ use crate::sink::Document;
 use clap::Args;
 use std::path::PathBuf;
 use strapd_attitude::estimate::{Bias, Plan};
+use strapd_recording::decode::Options;
 use strapd_recording::pool::Pool;
 
 /// Rest from which an Allan deviation is worth having, s.
@@ -46,6 +48,9 @@ pub struct Report {
     /// the recording itself (needs the accelerometer; --aid gravity+mag: heading from north)
     #[arg(long, help_heading = "Estimation")]
     pub smooth: bool,
+    /// How a table is to be read.
+    #[command(flatten)]
+    pub tables: Tables,
     /// Hold the attitude against the one in this file (.mcap, .ndjson, .csv), not the one in the log
     #[arg(long, value_name = "FILE")]
     pub reference: Option<PathBuf>,
@@ -79,7 +84,8 @@ pub fn run(global: &Global, args: &Report) -> Result<Outcome> {
         _ => {}
     }
     let plan = args.estimation.plan_of_a_recording(args.smooth)?;
-    let selection = args.estimation.selection()?;
+    let mut selection = args.estimation.selection()?;
+    args.tables.put(&mut selection.decode)?;
     let inputs: Vec<PathBuf> = Some(&args.file)
         .into_iter()
         .chain(&args.reference)
@@ -166,6 +172,7 @@ impl Report {
             &Input::open(path)?,
             Side::Reference,
             self.ref_topic.as_deref(),
+            &Options::default(),
             pool,
         )?;
         for problem in &track.problems {

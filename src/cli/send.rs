@@ -4,6 +4,7 @@
 //! is due, and what the daemon answers is heard all the while.
 
 use super::cat::line;
+use super::tables::Tables;
 use super::{Global, Outcome, replay};
 use crate::client;
 use crate::client::remote::Remote;
@@ -53,6 +54,9 @@ pub struct Send {
     /// Where a value lies in the message: ROLE=PATH, as in replay
     #[arg(long = "field", value_name = "ROLE=PATH")]
     pub fields: Vec<String>,
+    /// How a table is to be read.
+    #[command(flatten)]
+    pub tables: Tables,
     /// What the daemon is to call the sensor; the topic by default
     #[arg(long, value_name = "NAME")]
     pub id: Option<String>,
@@ -97,10 +101,11 @@ pub fn run(global: &Global, args: &Send) -> Result<Outcome> {
             .parse::<FieldPath>()
             .map_err(|e| Error::Usage(format!("--field: {e}")))
     });
-    let options = Options {
+    let mut options = Options {
         fields: fields.collect::<Result<_>>()?,
         ..Options::default()
     };
+    args.tables.put(&mut options)?;
     // Looked at before anybody is called: a log that can not be read is not the daemon's business.
     let pool = Pool::new(global.threads)?;
     let log = Log::told_apart(

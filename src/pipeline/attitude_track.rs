@@ -54,7 +54,15 @@ pub enum Side {
 ///
 /// # Errors
 /// The file can not be read, or holds no attitude, or several and none named.
-pub fn read(input: &Input, side: Side, topic: Option<&str>, pool: &Pool) -> Result<Track> {
+pub fn read(
+    input: &Input,
+    side: Side,
+    topic: Option<&str>,
+    options: &Options,
+    pool: &Pool,
+) -> Result<Track> {
+    // They are for the one of the two that is another maker's table.
+    let plainly = Options::default();
     let plain = |read: Vec<(Entry, [f64; 3])>| {
         let sigmas = || read.iter().map(|(_, sigma)| Vector3::from(*sigma));
         Track {
@@ -70,19 +78,26 @@ pub fn read(input: &Input, side: Side, topic: Option<&str>, pool: &Pool) -> Resu
         }
     };
     match input.format() {
-        Format::Table => from_csv(input).map(plain),
+        Format::Table if input.is_own_table(options)? => from_csv(input).map(plain),
+        Format::Table => from_log(input, side, topic, options, pool),
         Format::Lines => match from_ndjson(input, side, topic)? {
             // Samples may have orientations beside them.
-            none if none.is_empty() => from_log(input, side, topic, pool),
+            none if none.is_empty() => from_log(input, side, topic, &plainly, pool),
             some => Ok(plain(some)),
         },
-        Format::Mcap | Format::Ulog | Format::Bag => from_log(input, side, topic, pool),
+        Format::Mcap | Format::Ulog | Format::Bag => from_log(input, side, topic, &plainly, pool),
     }
 }
 
-fn from_log(input: &Input, side: Side, topic: Option<&str>, pool: &Pool) -> Result<Track> {
+fn from_log(
+    input: &Input,
+    side: Side,
+    topic: Option<&str>,
+    options: &Options,
+    pool: &Pool,
+) -> Result<Track> {
     let path = input.name();
-    let log = Log::told_apart(input, topic, &Options::default(), pool)?;
+    let log = Log::told_apart(input, topic, options, pool)?;
     let known = attitude_channel(path, &log, side, topic)?;
     let decoder = known
         .decoder(&mut Decoders::default())

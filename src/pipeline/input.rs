@@ -12,6 +12,7 @@ use std::io::{Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use strapd_recording::decode::Options;
+use strapd_recording::delimited::Table;
 use strapd_recording::format::{Format, open};
 use strapd_recording::lines::Lines;
 use strapd_recording::mcap::Reader;
@@ -69,9 +70,8 @@ impl Input {
             };
             let room = usize::try_from(MOST - have).unwrap_or(usize::MAX);
             let taken = block.get(..read.min(room)).unwrap_or_default();
-            if head.len() < strapd_recording::format::HEAD {
-                head.extend_from_slice(taken);
-            }
+            let wanted = strapd_recording::format::HEAD.saturating_sub(head.len());
+            head.extend_from_slice(taken.get(..wanted.min(taken.len())).unwrap_or_default());
             file.write_all(taken).map_err(|e| no_room(&name, &e))?;
             have += taken.len() as u64;
             if taken.len() < read {
@@ -90,6 +90,7 @@ impl Input {
         Ok(Input {
             format: Format::of_bytes(&head)
                 .or_else(named)
+                .or_else(|| Format::of_shape(&head))
                 .unwrap_or(Format::Mcap),
             kept: Some(Arc::new(file)),
             source,
@@ -143,6 +144,17 @@ impl Input {
             None => Reader::open(&self.name)?,
             Some(_) => Reader::of_file(&self.name, self.bytes()?)?,
         })
+    }
+
+    /// Whether it is a table that strapd wrote.
+    ///
+    /// # Errors
+    /// It can not be read, or is no table.
+    pub(super) fn is_own_table(&self, options: &Options) -> Result<bool> {
+        let lines = self
+            .lines(&Options::default())
+            .or_else(|_| self.lines(options))?;
+        Ok(lines.table().is_some_and(Table::is_own))
     }
 
     /// Its bytes as lines or rows.

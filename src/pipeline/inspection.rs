@@ -16,9 +16,9 @@ use std::sync::Arc;
 use strapd_attitude::condition::quality::{Quality, QualitySummary};
 use strapd_attitude::condition::regularise;
 use strapd_attitude::condition::stillness::{self, Limits, Rests, Stillness};
-use strapd_attitude::condition::{Clock, choose_clock};
+use strapd_attitude::condition::{Clock, GyroUnit, choose_clock};
 use strapd_attitude::estimate::{Aid, Aiding, Conditioned, FEW, Meaning, Plan};
-use strapd_attitude::record::RawSample;
+use strapd_attitude::record::{Declared, RawSample};
 use strapd_recording::decode::{self, Options};
 use strapd_recording::mcap::{self, Survey};
 use strapd_recording::pool::Pool;
@@ -40,6 +40,8 @@ pub struct Inspection {
     pub kind_stated: bool,
     /// Statistics.
     pub quality: QualitySummary,
+    /// The unit of its rates: rad/s where the format states any, else that which was taken for granted.
+    pub quality_unit: GyroUnit,
     /// Rests, rad/s.
     pub rests: Rests,
     /// The bias they give.
@@ -130,12 +132,42 @@ struct Look {
     clock: Option<(Clock, Option<String>)>,
     asked: Clock,
     quality: Quality,
+    si: Si,
     conditioned: Conditioned,
     stillness: Stillness,
     stamps: regularise::Survey,
     undecodable: u64,
     plan: Plan,
     aid: Aids,
+}
+
+/// From the units that a format states to those that numbers are judged in. What it does not state stays as it is: then
+/// the numbers tell.
+struct Si {
+    rate: f64,
+    force: f64,
+    unit: GyroUnit,
+}
+
+impl Si {
+    fn new(plan: &Plan, declared: &Declared, resolved: &Meaning) -> Si {
+        let stated = declared.gyro_unit.filter(|_| plan.unit.is_none());
+        Si {
+            rate: stated.map_or(1.0, GyroUnit::to_rad),
+            // 1 where none is stated.
+            force: resolved.accel_scale.abs(),
+            unit: plan.unit.unwrap_or_default(),
+        }
+    }
+
+    fn of(&self, raw: &RawSample) -> RawSample {
+        let by = |vector: Option<[f64; 3]>, by: f64| vector.map(|v| v.map(|value| value * by));
+        RawSample {
+            gyro: by(raw.gyro, self.rate),
+            accel: by(raw.accel, self.force),
+            ..*raw
+        }
+    }
 }
 
 impl Look {
@@ -145,7 +177,7 @@ impl Look {
             self.stamps.push(sample);
         })?;
         if self.clock.is_some() {
-            self.quality.push(raw);
+            self.quality.push(&self.si.of(raw));
             return Ok(());
         }
         self.first.push(*raw);
@@ -159,7 +191,9 @@ impl Look {
         let (clock, warning) = choose_clock(&self.first, self.asked);
         self.quality = Quality::new(clock);
         self.aid = Aids::of(&self.plan, &self.resolved, &self.first);
-        self.first.drain(..).for_each(|raw| self.quality.push(&raw));
+        for raw in self.first.drain(..) {
+            self.quality.push(&self.si.of(&raw));
+        }
         self.clock = Some((clock, warning.map(|w| w.to_string())));
     }
 
@@ -183,6 +217,7 @@ impl Look {
             resolved: self.resolved,
             kind_stated: self.kind_stated,
             quality,
+            quality_unit: self.si.unit,
             bias: stillness::estimate_bias(&rests, &Limits::default()).ok(),
             rests,
             undecodable: self.undecodable,
@@ -344,6 +379,7 @@ fn begin(source: &Source, known: &LogChannel, decoder: &decode::Decoder, plan: &
         first: Vec::new(),
         clock: None,
         quality: Quality::new(plan.clock),
+        si: Si::new(plan, &decoder.stated().declared, &resolved),
         conditioned: Conditioned::new(plan, &resolved),
         asked: plan.clock,
         stillness: Stillness::new(resolved.kind, Limits::default()),

@@ -15,11 +15,13 @@ use std::collections::BTreeSet;
 use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
+use strapd_attitude::condition::Clock;
 use strapd_attitude::estimate::{Aid, Meaning};
 use strapd_attitude::estimate::{StampPass, Stamps};
 use strapd_attitude::record::{Declared, Nanos};
 use strapd_recording::decode::Options;
 use strapd_recording::decode::{Ambiguous, Class, Undecodable};
+use strapd_recording::delimited::Table;
 use strapd_recording::format::Format;
 use strapd_recording::lines::Lines;
 use strapd_recording::mcap::Survey;
@@ -38,10 +40,30 @@ pub fn open<R: Read>(path: &Path, format: Format, input: R, options: &Options) -
     if format == Format::Table && !options.fields.is_empty() {
         return Err(Error::Unsupported {
             path: path.to_owned(),
-            what: "--field is for messages, and this is a CSV\n  help: its first row names its columns: stamp_ns, gyro_x, gyro_y, gyro_z".to_owned(),
+            what: "--field is for messages, and this is a CSV\n  help: --columns gyro=NAME:NAME:NAME,stamp=NAME:UNIT says what its columns are".to_owned(),
         });
     }
+    if format != Format::Table {
+        only_for_tables(path, format, options)?;
+    }
     Ok(Lines::new(path, format, input, options)?)
+}
+
+/// `--columns` and `--delimiter` say nothing of anything but a table.
+///
+/// # Errors
+/// One of them is given.
+pub(super) fn only_for_tables(path: &Path, format: Format, options: &Options) -> Result<()> {
+    if options.columns.is_none() && options.delimiter.is_none() {
+        return Ok(());
+    }
+    Err(Error::Unsupported {
+        path: path.to_owned(),
+        what: format!(
+            "--columns and --delimiter are for tables of text, and this is {}\n  help: --field says where values lie in messages",
+            format.name()
+        ),
+    })
 }
 
 /// Replays lines; `stamps` is what [`stamps`] found.
@@ -160,6 +182,8 @@ fn read(
     let format = lines.format();
     let mut sensor: Option<String> = None;
     let mut bare = BareStamps::default();
+    // Rows under a header that is known are of a table, though the first be none.
+    let (mut early, mut first_bad) = (Vec::new(), None);
     let is_beside = run.plan.aid == Aid::GravityAndField || run.plan.has_forces_beside;
     let mut has_rates = false;
     let mut samples = Vec::new();
@@ -167,11 +191,15 @@ fn read(
     let mut closed = false;
     while !closed && let Some(line) = lines.next(&mut samples)? {
         match line {
-            Err(why) if sensor.is_none() => return Err(no_samples(path, &lines, &why)),
-            Err(why) => {
-                let number = Nanos(i64::try_from(lines.number()).unwrap_or(i64::MAX));
-                items.push(Item::Undecodable(0, Box::new((number, why))));
+            Err(why) if sensor.is_none() => {
+                first_bad.get_or_insert_with(|| no_samples(path, &lines, &why));
+                let is_sure = lines.table().is_some_and(|table| !table.is_own());
+                if !is_sure || early.len() as u64 > PATIENCE {
+                    break;
+                }
+                early.push(undecodable(lines.number(), why));
             }
+            Err(why) => items.push(undecodable(lines.number(), why)),
             Ok(mut line) => {
                 // A sample of our own whose rate is null was one with NaN: it is counted, not
                 // passed over.
@@ -214,10 +242,16 @@ fn read(
                             sample_kind: line.sample_kind,
                             gyro_unit: line.gyro_unit,
                             interval_unit_given: run.selection.decode.states_interval_unit(),
-                            ..Declared::default()
+                            ..lines.declared()
                         };
-                        let (found, stream) = met(run, &id, format, &declared);
+                        let is_placed = matches!(run.plan.clock, Clock::Index { .. })
+                            || lines.table().is_none_or(Table::has_stamps);
+                        if !is_placed {
+                            return Err(unplaced(path, &lines));
+                        }
+                        let (found, stream) = met(run, &id, &lines, &declared);
                         taker.meet(found, stream)?;
+                        items.append(&mut early);
                         sensor = Some(id);
                     }
                     Some(first) if *first != id => {
@@ -240,20 +274,25 @@ fn read(
         // With nothing left in the buffer the next line may be long in coming: what is known goes
         // out first.
         let may_wait = lines.may_wait();
-        if items.len() >= BATCH || may_wait {
+        if sensor.is_some() && (items.len() >= BATCH || may_wait) {
             closed = taker.take(&mut items)? == Flow::Closed;
         }
-        if may_wait {
+        if sensor.is_some() && may_wait {
             taker.pause()?;
         }
     }
     if sensor.is_none() {
-        return Err(nothing(path, format));
+        return Err(first_bad.unwrap_or_else(|| nothing(path, format)));
     }
     let last = bare.settle().map_err(|what| unclear(path, &what))?;
     items.extend(last.map(|raw| Item::Sample(0, raw)));
     let _ = taker.take(&mut items)?;
     Ok(())
+}
+
+fn undecodable(number: u64, why: Undecodable) -> Item {
+    let number = Nanos(i64::try_from(number).unwrap_or(i64::MAX));
+    Item::Undecodable(0, Box::new((number, why)))
 }
 
 pub(super) fn unclear(path: &Path, what: &Ambiguous) -> Error {
@@ -269,7 +308,7 @@ pub(super) fn unclear(path: &Path, what: &Ambiguous) -> Error {
 pub(super) fn no_samples(path: &Path, lines: &Lines<impl Read>, why: &Undecodable) -> Error {
     let help = match lines.format() {
         Format::Table => {
-            "one row per sample under a row of names, as strapd cat --format csv writes them"
+            "one row per sample under a row of names, as strapd cat --format csv writes them; --columns says what they are"
         }
         _ => "one JSON object per line, with gyro and stamp; or an MCAP",
     };
@@ -282,7 +321,7 @@ pub(super) fn no_samples(path: &Path, lines: &Lines<impl Read>, why: &Undecodabl
 fn nothing(path: &Path, format: Format) -> Error {
     let what = match format {
         Format::Table => {
-            "no row carries a body rate\n  help: columns gyro_x, gyro_y, gyro_z, in rad/s"
+            "no row carries a body rate\n  help: columns gyro_x, gyro_y, gyro_z, in rad/s, or --columns gyro=NAME:NAME:NAME"
         }
         _ => {
             "no line carries a body rate\n  help: {\"class\":\"RATE\",\"stamp\":{\"sec\":1,\"nsec\":0},\"gyro\":[0.1,0,0]}, or --field gyro=PATH"
@@ -294,15 +333,44 @@ fn nothing(path: &Path, format: Format) -> Error {
     }
 }
 
-fn met(run: &ReplayRequest, id: &str, format: Format, declared: &Declared) -> (Found, Stream) {
+/// Rows without stamps, and nothing said of it.
+fn unplaced(path: &Path, lines: &Lines<impl Read>) -> Error {
+    let notes = lines.table().map(Table::notes).unwrap_or_default();
+    Error::Unsupported {
+        path: path.to_owned(),
+        what: format!(
+            "no row says when it was measured\n  help: --time index --rate-hz HZ, or --columns stamp=NAME:UNIT\n  note: {}",
+            notes.join("; ")
+        ),
+    }
+}
+
+/// How a table is read, so that it can be pasted and changed, with the format's name; of anything else that alone.
+pub(super) fn described(lines: &Lines<impl Read>) -> String {
+    let name = lines.format().name();
+    match lines.table().map(Table::assumed).unwrap_or_default() {
+        "" => name.to_owned(),
+        assumed => format!("--columns '{assumed}' [{name}]"),
+    }
+}
+
+fn met(
+    run: &ReplayRequest,
+    id: &str,
+    lines: &Lines<impl Read>,
+    declared: &Declared,
+) -> (Found, Stream) {
     let name = if id.is_empty() { "imu" } else { id };
+    let notes = lines.table().map(Table::notes).unwrap_or_default();
+    let doubt = lines.table().and_then(Table::doubt_of_unit);
+    let doubt = doubt.filter(|_| run.plan.unit.is_none());
     let found = Found {
         name: name.to_owned(),
         output_topic: output_topic(name, &BTreeSet::new()),
-        described: format.name().to_owned(),
+        described: described(lines),
         resolved: Meaning::new(&run.plan, declared),
         noticed: Arc::default(),
-        warnings: Vec::new(),
+        warnings: notes.iter().cloned().chain(doubt).collect(),
     };
     (found, Stream::new(name, ""))
 }

@@ -6,6 +6,7 @@
 use super::channel_route::{Item, Route};
 use super::decoders::Decoders;
 use super::input::Input;
+use super::lines::only_for_tables;
 use super::sources::{self, Source};
 use super::text_log::TextLog;
 use super::topics::{self, Candidate, Choice, PICKED_UNNAMED};
@@ -68,7 +69,10 @@ impl Log {
     /// It can not be read, or is none.
     pub fn of(input: &Input, options: &Options, pool: &Pool) -> Result<Log> {
         match input.format() {
-            Format::Mcap | Format::Ulog | Format::Bag => Log::of_mcap(input, pool),
+            format @ (Format::Mcap | Format::Ulog | Format::Bag) => {
+                only_for_tables(input.name(), format, options)?;
+                Log::of_mcap(input, pool)
+            }
             Format::Lines | Format::Table => {
                 let (text, channels) = TextLog::survey(input, options)?;
                 Ok(Log {

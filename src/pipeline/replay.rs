@@ -81,10 +81,12 @@ fn piped(
         return Err(strapd_recording::Error::NotRead { path, format }.into());
     }
     // What has no name and tells nothing may still be lines, of which the first is damaged.
-    let format = known.unwrap_or(Format::Lines);
+    let shape = || Format::of_shape(&head);
+    let format = known.or_else(shape).unwrap_or(Format::Lines);
     let whole = std::io::Cursor::new(head).chain(input);
     match format {
         Format::Mcap | Format::Ulog | Format::Bag => {
+            lines::only_for_tables(&run.source.name(), format, &run.selection.decode)?;
             let reader = Reader::from_stream(run.source.name(), Box::new(whole))?;
             replay_stream::replay(run, reader, pool, watch)
         }

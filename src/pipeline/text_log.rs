@@ -7,7 +7,7 @@
 use super::bare_stamps::BareStamps;
 use super::channel_route::{Item, Route};
 use super::input::Input;
-use super::lines::{no_samples, unclear};
+use super::lines::{described, no_samples, unclear};
 use super::log::LogChannel;
 use super::simulate::TRUTH_ID;
 use crate::error::{Error, Result};
@@ -18,6 +18,7 @@ use std::path::Path;
 use std::sync::Arc;
 use strapd_attitude::record::{Declared, Nanos, RawSample};
 use strapd_recording::decode::{Class, Line, Options, Rank, Role, Stated, Undecodable};
+use strapd_recording::delimited::Table;
 use strapd_recording::format::Format;
 use strapd_recording::lines::Lines;
 use strapd_recording::mcap::{Channel, ChannelSurvey, Schema, Survey};
@@ -26,6 +27,8 @@ use strapd_recording::mcap::{Channel, ChannelSurvey, Schema, Survey};
 const MOST_SENSORS: usize = 1024;
 /// Items that go through the pipeline together.
 const BATCH: usize = 1024;
+/// Rows that are none before the first that is one: beyond, none follows.
+const MOST_EARLY: usize = 1000;
 /// What samples that name no sensor are called.
 const UNNAMED: &str = "imu";
 
@@ -71,10 +74,23 @@ impl TextLog {
     pub(super) fn survey(input: &Input, options: &Options) -> Result<(TextLog, Vec<LogChannel>)> {
         let mut met: Vec<(Key, Met)> = Vec::new();
         let mut lines = input.lines(options)?;
+        let declared = lines.declared();
+        let table = lines.table().cloned();
+        let description = match &table {
+            Some(table) if !table.is_own() => described(&lines),
+            _ => "fields by name, in each line".to_owned(),
+        };
+        let doubt = table.as_ref().and_then(Table::doubt_of_unit);
+        for note in table.iter().flat_map(Table::notes).chain(&doubt) {
+            tracing::warn!("{}: {note}", input.name().display());
+        }
         let sensors = read(&mut lines, input.name(), |read| {
             if let Read::Samples(place, key, line, samples) = read {
                 if place == met.len() {
-                    met.push((key.clone(), Met::new(line, options)));
+                    met.push((
+                        key.clone(),
+                        Met::new(line, options, &declared, &description),
+                    ));
                 }
                 if let Some((_, met)) = met.get_mut(place) {
                     met.take(samples);
@@ -175,10 +191,20 @@ fn read(
     let mut sensors = Sensors::default();
     let mut samples = Vec::new();
     let mut before = None;
+    // Rows under a header that is known are of a table, though the first be none.
+    let (mut early, mut first_bad) = (Vec::new(), None);
     while let Some(line) = lines.next(&mut samples)? {
         let line = match (line, before) {
             (Ok(line), _) => line,
-            (Err(why), None) => return Err(no_samples(path, lines, &why)),
+            (Err(why), None) => {
+                first_bad.get_or_insert_with(|| no_samples(path, lines, &why));
+                let is_sure = lines.table().is_some_and(|table| !table.is_own());
+                if !is_sure || early.len() > MOST_EARLY {
+                    break;
+                }
+                early.push((lines.number(), why));
+                continue;
+            }
             (Err(why), Some(place)) => {
                 if take(Read::Undecodable(place, lines.number(), why))?.is_break() {
                     return Ok(sensors);
@@ -211,6 +237,11 @@ fn read(
             }
         };
         before = Some(place);
+        for (number, why) in early.drain(..) {
+            if take(Read::Undecodable(place, number, why))?.is_break() {
+                return Ok(sensors);
+            }
+        }
         let Some(bare) = sensors.bare.get_mut(place) else {
             continue;
         };
@@ -221,6 +252,9 @@ fn read(
         if take(Read::Samples(place, &key, &line, &known))?.is_break() {
             return Ok(sensors);
         }
+    }
+    if let Some(why) = first_bad.filter(|_| before.is_none()) {
+        return Err(why);
     }
     let places: Vec<(Key, usize)> = std::mem::take(&mut sensors.places).into_iter().collect();
     for (key, place) in places {
@@ -240,17 +274,17 @@ fn read(
 }
 
 impl Met {
-    fn new(line: &Line, options: &Options) -> Met {
+    fn new(line: &Line, options: &Options, declared: &Declared, description: &str) -> Met {
         Met {
             stated: Stated {
                 declared: Declared {
                     interval_unit_given: options.states_interval_unit(),
                     sample_kind: line.sample_kind,
                     gyro_unit: line.gyro_unit,
-                    ..Declared::default()
+                    ..declared.clone()
                 },
                 has_stamp: true,
-                description: "fields by name, in each line".to_owned(),
+                description: description.to_owned(),
                 ..Stated::default()
             },
             class: match &line.class {

@@ -24,6 +24,7 @@ mod simulate;
 mod sinks;
 mod smoothing;
 mod streams;
+mod tables;
 mod trajectory;
 mod youbot;
 

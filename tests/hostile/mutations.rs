@@ -147,6 +147,12 @@ fn lines() {
 }
 
 #[test]
+fn tables() {
+    // Each is read twice.
+    survives("delimited", CASES / 3, crate::parsers::delimited);
+}
+
+#[test]
 fn conversations() {
     survives("session", CASES, crate::parsers::session);
 }

@@ -11,6 +11,8 @@ use strapd::pipeline::recover::{Recover, run};
 use strapd::pipeline::request::Source;
 use strapd::sink::{Options, Target};
 use strapd_attitude::record::RawSample;
+use strapd_recording::format::Format;
+use strapd_recording::lines::Lines;
 use strapd_recording::mcap::{MAGIC, Message, ProblemKind, Reader, WalkOptions, op, walk};
 use strapd_recording::pool::Pool;
 
@@ -156,6 +158,50 @@ fn memory_is_bounded_by_what_is_in_flight_whatever_the_file() {
         eprintln!("bomb declaring {declared}: peak grew by {grown} MiB");
     }
     recovering_holds_little_of_a_long_record(dir.path());
+    a_table_is_read_row_by_row();
+}
+
+/// 100 MB of a table from nowhere: a line of 60 MB, and rows behind it.
+fn a_table_is_read_row_by_row() {
+    let head = &b"time_s,gyro_x,gyro_y,gyro_z\n0,1,2,3\n"[..];
+    let row = b"0.01,1.25,2.25,3.25\n";
+    let rows = row.repeat(1000);
+    let mut counted = (0, 0);
+    let grown = added(|| {
+        let rows = std::iter::repeat_n(&rows[..], 2000);
+        let rows = Pieces(rows.chain(std::iter::once(&b"\n"[..])), &[]);
+        let long = std::io::Read::take(std::io::repeat(b'7'), 60 << 20);
+        let input = std::io::Read::chain(std::io::Read::chain(head, long), &b"\n"[..]);
+        let input = std::io::Read::chain(input, rows);
+        let mut lines = Lines::new(
+            Path::new("-"),
+            Format::Table,
+            input,
+            &strapd_recording::decode::Options::default(),
+        )
+        .unwrap();
+        let mut samples = Vec::new();
+        while let Some(line) = lines.next(&mut samples).unwrap() {
+            counted.0 += samples.len();
+            counted.1 += usize::from(line.is_err());
+            samples.clear();
+        }
+    });
+    assert_eq!(counted, (2_000_001, 1));
+    eprintln!("a table: peak grew by {grown} MiB");
+    assert!(grown <= 8, "{grown} MiB");
+}
+
+/// Reads pieces, one after the other.
+struct Pieces<'b, I>(I, &'b [u8]);
+
+impl<'b, I: Iterator<Item = &'b [u8]>> std::io::Read for Pieces<'b, I> {
+    fn read(&mut self, into: &mut [u8]) -> std::io::Result<usize> {
+        if self.1.is_empty() {
+            self.1 = self.0.next().unwrap_or_default();
+        }
+        std::io::Read::read(&mut self.1, into)
+    }
 }
 
 /// Peak resident memory that `work` adds to what is there now, MiB.

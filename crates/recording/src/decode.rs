@@ -39,9 +39,13 @@ pub use json::objects::{Object, Objects};
 pub use refusal::{Undecodable, Unsupported, exact_name};
 pub use role::{Rank, Role, role, role_of};
 pub use stamp::{Ambiguous, Bare, MOST_WAITING, unit_of};
+pub(crate) use stamp::{
+    bare as bare_of_text, decimal_in_steps, from_rfc3339 as instant_of_date, units_that_fit,
+};
 pub use stated::Stated;
 pub use strapd_attitude::condition::GyroUnit;
 
+use crate::delimited::{Columns, Delimiter};
 use crate::text::printable;
 use registers::{Form, Slot, StampForm};
 use ros::fifo::Fifo;
@@ -100,6 +104,10 @@ pub struct Options {
     pub wanted: Wanted,
     /// `--field` paths.
     pub fields: Vec<FieldPath>,
+    /// `--columns`: which columns of a table fill which role.
+    pub columns: Option<Columns>,
+    /// `--delimiter`: what stands between the cells of a table.
+    pub delimiter: Option<Delimiter>,
     /// Use data that its covariance (-1) marks as absent.
     pub ignore_covariance_flag: bool,
     /// Of several transforms in a message, take the one to this child frame; else the first.

@@ -47,11 +47,11 @@ pub enum Error {
         found: String,
     },
     /// A table without the columns that are needed.
-    #[error("{}: no table that can be read: {why}\n  help: columns stamp_ns and gyro_x, gyro_y, gyro_z (rad/s), as strapd cat --format csv writes them; of other tables mlr --icsv --ojsonl cat FILE > log.ndjson makes lines (docs/formats.md)", path.display())]
+    #[error("{}: no table that can be read: {why}", path.display())]
     NotTable {
         /// Which file.
         path: PathBuf,
-        /// What is missing.
+        /// What is missing, and what helps.
         why: String,
     },
     /// The input is of a known format that is not read.

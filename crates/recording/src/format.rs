@@ -3,10 +3,10 @@
 //! Apart from the readers because it comes before all of them: files are called whatever somebody called them, and a
 //! pipe has no name. What the bytes say wins over what the name says.
 
+use crate::delimited;
 use crate::error::{Error, Result};
 use crate::mcap::MAGIC;
 use crate::recognise;
-use crate::table::Table;
 use crate::{bag, ulog};
 use std::fs::File;
 use std::io::{BufRead, Read, Seek, SeekFrom};
@@ -24,7 +24,7 @@ pub enum Format {
     Bag,
     /// One JSON object per line.
     Lines,
-    /// The CSV that strapd writes itself. A reader of other people's tables has its place beside it.
+    /// Rows of cells: the CSV that strapd writes itself, and other makers' tables.
     Table,
 }
 
@@ -39,7 +39,7 @@ const MAGICS: [(&[u8], Format); 3] = [
 pub(crate) const LONGEST_MAGIC: usize = bag::MAGIC.len();
 
 /// Endings of names, for what the bytes do not tell.
-const ENDINGS: [(&str, Format); 7] = [
+const ENDINGS: [(&str, Format); 9] = [
     ("mcap", Format::Mcap),
     ("ulg", Format::Ulog),
     ("ulog", Format::Ulog),
@@ -47,6 +47,8 @@ const ENDINGS: [(&str, Format); 7] = [
     ("ndjson", Format::Lines),
     ("jsonl", Format::Lines),
     ("csv", Format::Table),
+    ("tsv", Format::Table),
+    ("gcsv", Format::Table),
 ];
 
 /// Bytes that are looked at: the first line of a table is shorter.
@@ -84,8 +86,23 @@ impl Format {
         if matches!(text.first(), Some(b'{' | b'[')) {
             return Some(Format::Lines);
         }
-        let first = text.split(|b| *b == b'\n').next().unwrap_or_default();
-        Table::is_header(first).then_some(Format::Table)
+        let is_cut = head.len() >= HEAD && !text.ends_with(b"\n");
+        let mut lines = text.split(|b| *b == b'\n');
+        if is_cut {
+            lines.next_back();
+        }
+        let is_table = delimited::may_be_table(text)
+            && lines
+                .take(delimited::MOST_HEAD_LINES)
+                .any(|line| delimited::is_header(line, None));
+        is_table.then_some(Format::Table)
+    }
+
+    /// The format that bytes look like, where neither they nor the name say more: text in cells, whose columns the user
+    /// may name.
+    #[must_use]
+    pub fn of_shape(head: &[u8]) -> Option<Format> {
+        delimited::is_text_of_cells(head).then_some(Format::Table)
     }
 
     /// The format that a name's ending stands for.
@@ -126,7 +143,7 @@ impl Format {
             let path = path.to_owned();
             return Err(Error::NotRead { path, format });
         }
-        Ok(Format::of_name(path))
+        Ok(Format::of_name(path).or_else(|| Format::of_shape(&head)))
     }
 
     /// What to say of a file whose name stands for another format than its bytes.
@@ -170,7 +187,14 @@ fn tells_enough(head: &[u8]) -> bool {
     let begins_magic = MAGICS
         .iter()
         .any(|(magic, _)| magic.starts_with(head) && head.len() < magic.len());
-    !begins_magic && (Format::of_bytes(head).is_some() || text.contains(&b'\n'))
+    // What stands before the header of a table is text, too; lines of objects begin with one soon.
+    let whole = text.iter().rposition(|b| *b == b'\n');
+    let lines = text
+        .get(..whole.map_or(0, |end| end + 1))
+        .unwrap_or_default();
+    !begins_magic
+        && (Format::of_bytes(head).is_some()
+            || (!lines.is_empty() && !delimited::may_be_table(lines)))
 }
 
 /// A text without the byte order mark that spreadsheets put before it.

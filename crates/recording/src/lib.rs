@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! file, stream -> format -> mcap  -> decode -> RawSample
-//!                        -> lines -> decode, table
+//!                        -> lines -> decode, delimited
 //!                                   text, error: beside it
 //! ```
 //!
@@ -12,7 +12,7 @@
 //! | [`mod@format`] | first bytes and name -> which format | pure |
 //! | [`lines`] | lines of JSON, rows of a table -> what each holds | I/O |
 //! | [`attitude_line`] | a line that says an attitude -> numbers | pure |
-//! | [`table`] | rows of strapd's own CSV -> raw samples | pure |
+//! | [`delimited`] | rows of a table, strapd's own or another maker's -> raw samples | pure |
 //! | `bag` | ROS 1 bags -> the records MCAP has for them | pure |
 //! | `ulog` | ULog, the log of PX4 -> the records MCAP has for it | pure |
 //! | [`decode`] | bytes of one message, one line, one packed object -> raw samples | pure |
@@ -24,13 +24,13 @@
 pub mod attitude_line;
 mod bag;
 pub mod decode;
+pub mod delimited;
 pub mod error;
 pub mod format;
 pub mod lines;
 pub mod mcap;
 pub mod pool;
 pub mod recognise;
-pub mod table;
 pub mod text;
 mod ulog;
 

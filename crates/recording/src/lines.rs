@@ -3,12 +3,13 @@
 //! Apart from the decoders because it counts lines and bounds them: what a line holds is theirs to say.
 
 use crate::decode::{Line, LineDecoder, MAX_LINE, Options, Undecodable};
+use crate::delimited::{Opening, Table};
 use crate::error::{Error, Result};
 use crate::format::Format;
-use crate::table::Table;
+use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
-use strapd_attitude::record::{Nanos, RawSample};
+use strapd_attitude::record::{Declared, Nanos, RawSample};
 
 /// A text of samples, being read.
 #[derive(Debug)]
@@ -16,16 +17,20 @@ pub struct Lines<R> {
     name: PathBuf,
     input: BufReader<R>,
     form: Form,
-    number: u64,
+    /// The line that was read last, and that was given last, from 1.
+    last_read: u64,
+    current: u64,
     offset: u64,
     line: Vec<u8>,
+    /// Rows of a table that were looked at before, with their numbers.
+    held: VecDeque<(u64, Vec<u8>)>,
 }
 
 /// How a line is read.
 #[derive(Debug)]
 enum Form {
     Objects(LineDecoder),
-    Rows(Table),
+    Rows(Box<Table>),
 }
 
 impl<R: Read> Lines<R> {
@@ -38,17 +43,22 @@ impl<R: Read> Lines<R> {
             name: name.to_owned(),
             input: BufReader::with_capacity(1 << 16, input),
             form: Form::Objects(LineDecoder::new(options)),
-            number: 0,
+            last_read: 0,
+            current: 0,
             offset: 0,
             line: Vec::new(),
+            held: VecDeque::new(),
         };
         if format == Format::Table {
-            while lines.read()? && lines.is_blank() {}
-            let table = Table::new(&lines.line).map_err(|why| Error::NotTable {
+            let stem = name.file_stem().unwrap_or_default().to_string_lossy();
+            let mut opening = Opening::new(options, &stem);
+            while lines.read()? && opening.take(&lines.line) {}
+            let (table, rows) = opening.finish().map_err(|why| Error::NotTable {
                 path: name.to_owned(),
                 why,
             })?;
-            lines.form = Form::Rows(table);
+            lines.form = Form::Rows(Box::new(table));
+            lines.held = rows.into();
         }
         Ok(lines)
     }
@@ -63,14 +73,14 @@ impl<R: Read> Lines<R> {
         samples: &mut Vec<RawSample>,
     ) -> Result<Option<std::result::Result<Line, Undecodable>>> {
         loop {
-            if !self.read()? {
+            if !self.next_line()? {
                 return Ok(None);
             }
             if !self.is_blank() {
                 break;
             }
         }
-        Ok(Some(match &self.form {
+        Ok(Some(match &mut self.form {
             // A line has no time but the one in it.
             Form::Objects(decoder) => decoder.decode(&self.line, Nanos(0), samples),
             Form::Rows(table) => table.decode(&self.line, samples),
@@ -95,10 +105,28 @@ impl<R: Read> Lines<R> {
         }
     }
 
-    /// The number of the line that was read last, from 1.
+    /// The table that the lines are rows of.
+    #[must_use]
+    pub fn table(&self) -> Option<&Table> {
+        match &self.form {
+            Form::Objects(_) => None,
+            Form::Rows(table) => Some(table),
+        }
+    }
+
+    /// What is said of all samples before the first: the names of a table may say units.
+    #[must_use]
+    pub fn declared(&self) -> Declared {
+        self.table()
+            .map(Table::declared)
+            .cloned()
+            .unwrap_or_default()
+    }
+
+    /// The number of the line that was given last, from 1.
     #[must_use]
     pub fn number(&self) -> u64 {
-        self.number
+        self.current
     }
 
     /// Bytes read so far.
@@ -110,7 +138,18 @@ impl<R: Read> Lines<R> {
     /// Whether the next line may be long in coming: nothing of it is here.
     #[must_use]
     pub fn may_wait(&self) -> bool {
-        self.input.buffer().is_empty()
+        self.held.is_empty() && self.input.buffer().is_empty()
+    }
+
+    /// The next line: one that was looked at before, or from the input.
+    fn next_line(&mut self) -> Result<bool> {
+        if let Some((number, line)) = self.held.pop_front() {
+            (self.current, self.line) = (number, line);
+            return Ok(true);
+        }
+        let is_there = self.read()?;
+        self.current = self.last_read;
+        Ok(is_there)
     }
 
     /// Reads the next line, at most [`MAX_LINE`] and one byte of it; the rest of a longer one is
@@ -127,7 +166,7 @@ impl<R: Read> Lines<R> {
         let read = Read::take(&mut self.input, limit)
             .read_until(b'\n', &mut self.line)
             .map_err(fail)? as u64;
-        self.number += 1;
+        self.last_read += 1;
         self.offset += read;
         if read == limit && self.line.last() != Some(&b'\n') {
             self.offset += self.input.skip_until(b'\n').map_err(fail)? as u64;
@@ -136,6 +175,7 @@ impl<R: Read> Lines<R> {
     }
 
     fn is_blank(&self) -> bool {
-        self.line.iter().all(u8::is_ascii_whitespace)
+        // Of a longer one, what comes behind may be anything.
+        self.line.len() <= MAX_LINE && self.line.iter().all(u8::is_ascii_whitespace)
     }
 }

@@ -238,8 +238,7 @@ fn text(first: &[u8]) -> Option<Foreign> {
     is_table(first).then_some(())?;
     of(
         "a table of text",
-        "mlr --icsv --ojsonl cat FILE > log.ndjson makes a line of each row (Miller; --fs tab, --fs semicolon for \
-         other separators); columns are known by names such as time, gyro_x, gyro_y, gyro_z",
+        "call it .csv, and say what its columns are: --columns gyro=NAME:NAME:NAME,stamp=NAME:UNIT (docs/inputs.md)",
     )
 }
 

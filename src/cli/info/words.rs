@@ -51,6 +51,17 @@ impl Report<'_> {
         out
     }
 
+    /// How a table was read: the `--columns` that say the same.
+    fn tables(&self) -> Vec<&str> {
+        let stated = self.channels.iter().filter_map(|k| k.stated.as_ref());
+        let mut said: Vec<&str> = stated
+            .map(|stated| stated.description.as_str())
+            .filter(|said| said.starts_with("--columns"))
+            .collect();
+        said.dedup();
+        said
+    }
+
     fn write_file(&self, out: &mut String) {
         let survey = self.survey;
         let size = survey.file_size.map_or_else(String::new, human_bytes);
@@ -80,6 +91,9 @@ impl Report<'_> {
                 survey.channels.len(),
                 format.name()
             );
+            for said in self.tables() {
+                let _ = writeln!(out, "          read as {said}");
+            }
             return;
         }
         let chunks: Vec<String> = survey
@@ -225,6 +239,7 @@ impl Report<'_> {
             "metadata_records": survey.facts.metadata,
             "attachments": survey.facts.attachments,
             "problems": self.problems,
+            "read_as": self.tables(),
             "topics": self.channels.iter().map(|k| json!({
                 "topic": k.channel.topic,
                 "type": k.channel.schema.as_deref().map(|s| s.name.as_str()),
@@ -284,7 +299,7 @@ fn write_topic(looked: &Inspection, out: &mut String) {
         out,
         "; largest rate {} {}/s",
         significant(peak, 4),
-        looked.resolved.unit.name()
+        looked.quality_unit.name()
     );
     if let Some(offset) = &q.offset {
         let _ = writeln!(

@@ -21,7 +21,10 @@ fn what_is_not_there_a_directory_empty_or_no_mcap_is_called_so_by_every_command(
             &["folder", "is a directory", "help: name the .mcap file"],
         );
         on("empty.mcap").refused(1, &["empty.mcap", "is empty"]);
-        on("text.mcap").refused(1, &["text.mcap", "is a table of text", "help: mlr"]);
+        on("text.mcap").refused(
+            1,
+            &["text.mcap", "is a table of text", "help: call it .csv"],
+        );
         on("short.mcap").refused(1, &["short.mcap", "not an MCAP"]);
     }
     assert!(!at.join("out.csv").exists());

@@ -123,6 +123,14 @@ fn mcap_file(data: &[u8]) {
     assert!(report.is_ok());
 }
 
+/// Cells of a header, and rows under it.
+fn wide(length: usize) -> Vec<u8> {
+    let names: String = (0..200).map(|n| format!("a{n},")).collect();
+    let row = "1.25,".repeat(204);
+    let head = format!("time_s,gyro_x,gyro_y,gyro_z,{names}\n");
+    again(&head, &format!("{row}\n"), "", length)
+}
+
 /// Everything a command line takes as text.
 fn arguments(data: &[u8]) {
     let text = std::str::from_utf8(data).unwrap();
@@ -213,6 +221,8 @@ fn repeated(length: usize, piece: impl Fn(usize) -> Vec<u8>) -> Vec<u8> {
     }
     out
 }
+
+const TABLE: &str = "time_s,gyro_x,gyro_y,gyro_z\n0,1,2,3\n";
 
 const IMU_JSON: &str = r#""gyro":[0.1,2,3],"#;
 
@@ -357,6 +367,16 @@ pub(crate) const CASES: &[Case] = cases! {
         "lines: one in small pieces": |n| again("{", IMU_JSON, "\"stamp\":1}\n", n);
         "lines: blank": |n| again("", "\n", "", n);
         "lines: none ends": |n| again("", "x", "", n);
+    }
+    parsers::whole_table => {
+        "tables: rows": |n| again(TABLE, "0.01,1,2,3\n", "", n);
+        "tables: rows of many cells": wide;
+        "tables: rows that are none": |n| again(TABLE, "0.01,x,2,3\n", "", n);
+        "tables: rows in quotes": |n| again(TABLE, "\"0.01\",\"1\",\"2\",3\n", "", n);
+        "tables: one quote": |n| again(&format!("{TABLE}\""), "a\"\"", "", n);
+        "tables: other tables": |n| again(TABLE, "time_s,gyro_z,gyro_y,gyro_x\n1,2\n", "", n);
+        "tables: a header of many names": |n| again("", "gyro_x,", "\n1,2,3\n", n);
+        "tables: no header": |n| again("", "a,b,c\n", "", n);
     }
     parsers::lines => {
         "packed: objects": |n| b"\xf8\x01\x08\0\0\0\0\0".repeat(n / 8);

@@ -62,7 +62,7 @@ pub(super) struct Smoothing {
 
 /// A gyro whose scale or axes are found so many prior sigmas off is none of its class, and is smoothed again with
 /// priors that are so many times as wide: those of one that nobody has calibrated.
-const BEYOND: f64 = 2.0;
+const BEYOND: f64 = 2.5;
 const LOOSER: f64 = 2.5;
 
 fn is_beyond(smoothed: &Smoothed) -> bool {

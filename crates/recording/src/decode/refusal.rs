@@ -107,6 +107,9 @@ pub enum Undecodable {
         /// Columns of the table.
         need: u64,
     },
+    /// A row under the header of another table.
+    #[error("another table begins here, with other columns: put it into a file of its own")]
+    OtherTable,
     /// A cell that is not what its column holds.
     #[error("column `{column}`: `{near}` {why}")]
     Cell {

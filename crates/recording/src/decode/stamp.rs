@@ -7,7 +7,7 @@
 mod unit;
 
 pub use unit::{Ambiguous, Bare, MOST_WAITING, unit_of};
-pub(crate) use unit::{Told, unit_in_log};
+pub(crate) use unit::{Told, unit_in_log, units_that_fit};
 
 use strapd_attitude::record::{Nanos, TimeUnit};
 
@@ -35,9 +35,17 @@ pub(crate) fn from_float(count: f64, unit: TimeUnit) -> Option<Nanos> {
 /// Decimal text (`1700000000.123456789`, `-3`, `1.7e9`), exact to the nanosecond and rounded half
 /// away from zero below it. `None` when it is not a number.
 pub(crate) fn from_decimal(text: &str, unit: TimeUnit) -> Option<Nanos> {
-    let nanos = scaled(text, |magnitude| unit.nanos(magnitude))?;
+    saturated(scaled(text, |magnitude| unit.nanos(magnitude))?)
+}
+
+fn saturated(nanos: i128) -> Option<Nanos> {
     let beyond = if nanos < 0 { -i64::MAX } else { i64::MAX };
     Some(Nanos(i64::try_from(nanos).unwrap_or(beyond)))
+}
+
+/// Decimal text times whole nanoseconds: exact, rounded half away from zero. `None` when it is not a number.
+pub(crate) fn decimal_in_steps(text: &str, nanos: i64) -> Option<Nanos> {
+    saturated(scaled(text, |_| nanos)?)
 }
 
 /// Decimal text whose unit nobody says. `None` when it is not a number.

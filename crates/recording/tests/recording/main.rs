@@ -5,6 +5,7 @@
 mod conformance;
 mod containers;
 mod decode;
+mod delimited;
 mod mcap_damage;
 #[path = "../../../../tests/mcap_logs/mod.rs"]
 mod mcap_logs;

@@ -191,6 +191,16 @@ pub fn unit_of(stamps: impl IntoIterator<Item = Bare>) -> Result<TimeUnit, Ambig
     }
 }
 
+/// The ordinary step of these stamps, in what they count, and the units in which it is that of a gyro's samples; `None`
+/// where they are all the same.
+pub(crate) fn units_that_fit(
+    stamps: impl IntoIterator<Item = Bare>,
+) -> Option<(f64, Vec<TimeUnit>)> {
+    let opening = Opening::of(stamps);
+    let step = Bare(opening.step?).count();
+    Some((step, opening.fits.iter().map(|(unit, _)| *unit).collect()))
+}
+
 /// What the first messages of a log tell.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Told {

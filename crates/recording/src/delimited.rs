@@ -1,0 +1,26 @@
+//! Delimited text -> samples, whoever wrote it. Pure.
+//!
+//! ```text
+//! first lines -> preamble, header -> names, units -> layout -> table
+//! row         -> cells            -> table        -> RawSample
+//! ```
+//!
+//! A stage of its own because a table has no names but those of its first rows, and everybody calls them otherwise:
+//! what each column holds, in which unit, is decided once, from the names and the first rows, and said; what can not be
+//! told is refused with the flag that says it ([`Columns`]).
+
+mod cells;
+mod clock;
+mod columns;
+mod layout;
+mod names;
+mod own;
+mod preamble;
+mod rows;
+mod units;
+
+pub use cells::Delimiter;
+pub use columns::Columns;
+pub use rows::Table;
+
+pub(crate) use layout::{MOST_HEAD_LINES, Opening, is_header, is_text_of_cells, may_be_table};

@@ -1,0 +1,146 @@
+//! What a row says of its time -> its instant. Pure.
+//!
+//! Apart from the rows because makers agree on nothing here: whole nanoseconds, decimal seconds, ticks that wrap, dates,
+//! a running number beside a rate, nothing.
+
+use crate::decode::{decimal_in_steps, instant_of_date};
+use strapd_attitude::record::Nanos;
+
+/// How the rows of a table are placed in time.
+#[derive(Clone, PartialEq, Debug)]
+pub(super) enum Clock {
+    /// A column of whole nanoseconds.
+    Nanos,
+    /// A column of numbers, so many nanoseconds each.
+    Counts { nanos: f64, wraps: Option<Wraps> },
+    /// A column of dates (RFC 3339).
+    Dates,
+    /// A column of running numbers, so far apart.
+    Counter { period: f64, wraps: Wraps },
+    /// Nothing but the rows themselves, so far apart.
+    Rows { period: f64 },
+    /// Nothing at all.
+    Nothing,
+}
+
+/// A counter of finite width: a step back of more than half of it is one on.
+#[derive(Clone, PartialEq, Debug)]
+pub(super) struct Wraps {
+    width: i64,
+    last: i64,
+    turns: i64,
+}
+
+impl Wraps {
+    pub(super) fn at(width: i64) -> Wraps {
+        Wraps {
+            width,
+            last: 0,
+            turns: 0,
+        }
+    }
+
+    fn unwrapped(&mut self, count: i64) -> i64 {
+        if (0..self.width).contains(&count) {
+            if self.last.saturating_sub(count) > self.width / 2 {
+                self.turns = self.turns.saturating_add(self.width);
+            }
+            self.last = count;
+        }
+        count.saturating_add(self.turns)
+    }
+}
+
+impl Clock {
+    /// The instant that a cell says; `number` has its point where it belongs.
+    pub(super) fn read(&mut self, number: &str) -> Result<Nanos, &'static str> {
+        let whole = || number.parse::<i64>().ok();
+        match self {
+            Clock::Nanos => whole().map(Nanos).ok_or("is no whole number"),
+            Clock::Counts { nanos, wraps } => {
+                let count = whole().map(|count| match wraps {
+                    Some(wraps) => wraps.unwrapped(count),
+                    None => count,
+                });
+                let is_whole = nanos.fract() == 0.0;
+                match count {
+                    Some(count) if is_whole => Ok(Nanos(count.saturating_mul(*nanos as i64))),
+                    Some(count) => Ok(scaled(count as f64, *nanos)),
+                    None if is_whole => {
+                        decimal_in_steps(number, *nanos as i64).ok_or("is no number")
+                    }
+                    None => number
+                        .parse::<f64>()
+                        .ok()
+                        .filter(|count| count.is_finite())
+                        .map(|count| scaled(count, *nanos))
+                        .ok_or("is no number"),
+                }
+            }
+            Clock::Dates => instant_of_date(number).ok_or("is no date (RFC 3339)"),
+            Clock::Counter { period, wraps } => {
+                let count = whole().ok_or("is no whole number")?;
+                Ok(at(wraps.unwrapped(count), *period))
+            }
+            Clock::Rows { .. } | Clock::Nothing => Ok(Nanos(0)),
+        }
+    }
+
+    /// The instant of the row of this number, from 0, where nothing else says it.
+    pub(super) fn of_row(&self, row: u64) -> Option<Nanos> {
+        match self {
+            Clock::Rows { period } => Some(at(i64::try_from(row).unwrap_or(i64::MAX), *period)),
+            _ => None,
+        }
+    }
+}
+
+fn at(count: i64, period: f64) -> Nanos {
+    match period.fract() == 0.0 {
+        true => Nanos(count.saturating_mul(period as i64)),
+        false => scaled(count as f64, period),
+    }
+}
+
+fn scaled(count: f64, nanos: f64) -> Nanos {
+    Nanos((count * nanos).round() as i64)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counters_go_on_where_they_wrap_and_back_where_they_go_back() {
+        let mut clock = Clock::Counter {
+            period: 2e7,
+            wraps: Wraps::at(65_536),
+        };
+        let mut read = |text: &str| clock.read(text).unwrap().0 / 20_000_000;
+        assert_eq!(
+            ["65534", "65535", "0", "2"].map(&mut read),
+            [65_534, 65_535, 65_536, 65_538]
+        );
+        assert_eq!(read("1"), 65_537, "a row out of order");
+        assert!(clock.read("1.5").is_err() && clock.read("").is_err());
+    }
+
+    #[test]
+    fn decimal_stamps_are_exact_to_the_nanosecond_in_every_unit() {
+        let read =
+            |nanos: f64, text: &str| Clock::Counts { nanos, wraps: None }.read(text).map(|n| n.0);
+        assert_eq!(
+            read(1e9, "1700000000.123456789"),
+            Ok(1_700_000_000_123_456_789)
+        );
+        assert_eq!(read(1e9, "1.50E-1"), Ok(150_000_000));
+        assert_eq!(
+            read(1e6, "1700000000123.456789"),
+            Ok(1_700_000_000_123_456_789)
+        );
+        assert_eq!(read(1e5, "12"), Ok(1_200_000));
+        assert_eq!(read(976_562.5, "3"), Ok(2_929_688));
+        assert!(read(1e9, "x").is_err() && read(0.5, "inf").is_err());
+    }
+}

@@ -1,0 +1,154 @@
+//! `--columns gyro=gx:gy:gz,stamp=t:ms` -> which columns fill which role. Pure.
+
+use super::names::Kind;
+use super::units::{Quantity, Unit};
+use std::str::FromStr;
+
+/// What a column, or several, are to us.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Role {
+    Of(Kind),
+    Stamp,
+    Counter,
+}
+
+const ROLES: [(&str, Role); 6] = [
+    ("gyro", Role::Of(Kind::Gyro)),
+    ("accel", Role::Of(Kind::Accel)),
+    ("mag", Role::Of(Kind::Mag)),
+    ("orientation", Role::Of(Kind::Orientation)),
+    ("stamp", Role::Stamp),
+    ("counter", Role::Counter),
+];
+
+impl Role {
+    fn parts(self) -> usize {
+        match self {
+            Role::Of(kind) => kind.parts(),
+            Role::Stamp | Role::Counter => 1,
+        }
+    }
+
+    fn quantity(self) -> Option<Quantity> {
+        match self {
+            Role::Of(kind) => kind.quantity(),
+            Role::Stamp => Some(Quantity::Time),
+            Role::Counter => None,
+        }
+    }
+}
+
+/// What the user says of a role: columns by name, or by number from 1; none of no columns.
+#[derive(Clone, PartialEq, Debug)]
+pub(super) struct Given {
+    pub(super) role: Role,
+    pub(super) columns: Vec<String>,
+    pub(super) unit: Option<Unit>,
+}
+
+/// The roles that the user gives to columns.
+///
+/// ```text
+/// gyro=gx:gy:gz                 three columns by their names
+/// gyro=gx:gy:gz:deg/s           and their unit
+/// stamp=1:us                    one by its number, from 1, and its unit
+/// orientation=qw:qx:qy:qz       w first
+/// counter=PacketCounter         a running number, beside a rate in the file's head
+/// accel=none                    not to be used
+/// ```
+#[derive(Clone, PartialEq, Debug)]
+pub struct Columns {
+    given: Vec<Given>,
+}
+
+impl Columns {
+    /// What is said of this role.
+    pub(super) fn of(&self, role: Role) -> Option<&Given> {
+        self.given.iter().find(|given| given.role == role)
+    }
+
+    pub(super) fn all(&self) -> &[Given] {
+        &self.given
+    }
+}
+
+impl FromStr for Columns {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Columns, String> {
+        let mut given: Vec<Given> = Vec::new();
+        for part in text.split(',') {
+            let (name, right) = part.split_once('=').ok_or_else(|| {
+                format!("`{part}` is no ROLE=NAME; for example gyro=gx:gy:gz,stamp=t:ms")
+            })?;
+            let role = ROLES.iter().find(|(known, _)| *known == name.trim());
+            let (name, role) = role.copied().ok_or_else(|| {
+                format!(
+                    "`{name}` is no role; they are gyro, accel, mag, orientation, stamp, counter"
+                )
+            })?;
+            if given.iter().any(|before| before.role == role) {
+                return Err(format!("{name} is given twice"));
+            }
+            let mut columns: Vec<String> = Vec::new();
+            if right.trim() != "none" {
+                columns.extend(right.split(':').map(|column| column.trim().to_owned()));
+            }
+            let parts = role.parts();
+            let mut unit = None;
+            if columns.len() == parts + 1
+                && let (Some(quantity), Some(text)) = (role.quantity(), columns.pop())
+            {
+                unit = Some(Unit::of(quantity, &text).ok_or_else(|| {
+                    format!("{name}: the unit `{text}` is not known (deg/s, rad/s, m/s^2, g, uT, ns, us, ms, s, ...)")
+                })?);
+            }
+            if !columns.is_empty() && columns.len() != parts {
+                return Err(format!(
+                    "{name} is made of {parts} columns with : between them, and may be followed by a unit; here are {}",
+                    columns.len()
+                ));
+            }
+            if columns.iter().any(String::is_empty) {
+                return Err(format!(
+                    "{name}: a column without a name; its number, from 1, will do"
+                ));
+            }
+            given.push(Given {
+                role,
+                columns,
+                unit,
+            });
+        }
+        Ok(Columns { given })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_that_can_not_be_meant_are_refused_with_words() {
+        for (text, words) in [
+            ("gyro", "no ROLE=NAME"),
+            ("gyros=a:b:c", "no role"),
+            ("gyro=a:b", "made of 3 columns"),
+            ("gyro=a:b:c:furlong", "unit `furlong`"),
+            ("gyro=a:b:c,gyro=a:b:c", "given twice"),
+            ("gyro=a::c", "without a name"),
+            ("stamp=t:ms:s", "made of 1"),
+            ("orientation=w:x:y", "made of 4"),
+            ("", "no ROLE=NAME"),
+        ] {
+            let read = text.parse::<Columns>();
+            let is_refused = read.as_ref().is_err_and(|why| why.contains(words));
+            assert!(is_refused, "{text}: {read:?}");
+        }
+        assert!(
+            "gyro=a:b:c:deg/s,stamp=1:us,accel=none"
+                .parse::<Columns>()
+                .is_ok()
+        );
+    }
+}

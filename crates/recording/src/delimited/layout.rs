@@ -1,0 +1,448 @@
+//! The first lines of a table -> what its columns hold. Pure.
+//!
+//! Apart from the rows because here, once, it is decided and said what numbers mean: nothing of it is guessed in silence,
+//! and what can not be told ends with the flag that tells it.
+
+mod instants;
+mod roles;
+
+use super::cells::Delimiter;
+use super::columns::{Columns, Role};
+use super::names::{Kind, Meant, Name};
+use super::preamble::Preamble;
+use super::rows::{Column, Table, is_comment};
+use super::units::{Quantity, Unit};
+use crate::decode::Options;
+use crate::format::without_mark;
+use crate::text::printable;
+use roles::Roles;
+
+/// Lines, and bytes of them, in which the header is looked for.
+pub(crate) const MOST_HEAD_LINES: usize = 200;
+const MOST_HEAD: usize = 64 << 10;
+/// Rows that are looked at before the first one is read.
+const OPENING: usize = 24;
+/// A line of more cells is no header.
+const MOST_COLUMNS: usize = 1024;
+/// Names that an error repeats.
+const MOST_SAID: usize = 16;
+
+/// Whether a line names the columns of a table of rates or orientations.
+pub(crate) fn is_header(line: &[u8], given: Option<&Columns>) -> bool {
+    header_in(line, None, given, "").is_some()
+}
+
+/// Whether it is text of which some line has three cells or more, and no lines of objects.
+pub(crate) fn is_text_of_cells(first: &[u8]) -> bool {
+    let cells = |line: &[u8]| {
+        let of = |separator: u8| line.iter().filter(|b| **b == separator).count();
+        b"\t,;|".iter().map(|separator| of(*separator)).max()
+    };
+    let mut lines = without_mark(first).split(|b| *b == b'\n');
+    may_be_table(first) && lines.any(|line| cells(line) >= Some(2))
+}
+
+/// Whether it is text without lines of objects: the header of a table may yet come.
+pub(crate) fn may_be_table(first: &[u8]) -> bool {
+    let text = without_mark(first);
+    let binary = |b: &u8| *b < b' ' && !b"\t\r\n".contains(b);
+    let is_object = |line: &[u8]| matches!(line.trim_ascii_start().first(), Some(b'{' | b'['));
+    !text.is_empty() && !text.iter().any(binary) && !text.split(|b| *b == b'\n').any(is_object)
+}
+
+/// The names of a line, cut by this delimiter; none of what can be no header.
+fn names_in(line: &[u8], delimiter: Delimiter) -> Vec<Name> {
+    let row = delimiter.row(without_mark(line));
+    let binary = |b: &u8| *b < b' ' && *b != b'\t';
+    let is_object = row.windows(2).any(|pair| pair == b"\":");
+    if is_object || row.iter().any(binary) {
+        return Vec::new();
+    }
+    // Between blanks a mark of comments would be a cell.
+    let row = match (delimiter, row) {
+        (Delimiter::Blanks, [b'#' | b'%', rest @ ..] | [b'/', b'/', rest @ ..]) => {
+            rest.trim_ascii_start()
+        }
+        _ => row,
+    };
+    let mut names: Vec<Name> = Vec::new();
+    for cell in delimiter.cells(row) {
+        if names.len() == MOST_COLUMNS {
+            return Vec::new();
+        }
+        names.push(Name::of(&cell));
+    }
+    while names.last().is_some_and(|name| name.text.is_empty()) {
+        names.pop();
+    }
+    names
+}
+
+/// By which delimiter a line is a header.
+fn header_in(
+    line: &[u8],
+    delimiter: Option<Delimiter>,
+    given: Option<&Columns>,
+    stem: &str,
+) -> Option<Delimiter> {
+    let tried = delimiter.as_slice();
+    let tried = if tried.is_empty() {
+        &Delimiter::TRIED
+    } else {
+        tried
+    };
+    tried.iter().copied().find(|delimiter| {
+        let names = names_in(line, *delimiter);
+        names.len() >= 3 && names_something(&names, given, stem)
+    })
+}
+
+/// Whether these names are those of a table of rates or orientations.
+fn names_something(names: &[Name], given: Option<&Columns>, stem: &str) -> bool {
+    let given = given.map(Columns::all).unwrap_or_default();
+    let columns = || given.iter().flat_map(|given| &given.columns);
+    // Numbers alone tell no header.
+    if columns().next().is_some() && columns().all(|column| number(column).is_some()) {
+        return false;
+    }
+    let are_there = columns().all(|column| roles::place(names, column).is_ok());
+    let is_given = given.iter().any(|given| {
+        matches!(given.role, Role::Of(Kind::Gyro | Kind::Orientation)) && !given.columns.is_empty()
+    });
+    are_there
+        && (is_given
+            || [Kind::Gyro, Kind::Orientation, Kind::Matrix]
+                .into_iter()
+                .any(|kind| !roles::candidates(names, kind).is_empty())
+            || roles::bare_axes(names, stem).is_some())
+}
+
+/// A column's number, from 1.
+fn number(column: &str) -> Option<usize> {
+    let is_number = column.bytes().all(|b| b.is_ascii_digit());
+    column.parse().ok().filter(|n| is_number && *n > 0)
+}
+
+/// The first lines of a table, as they come.
+#[derive(Debug)]
+pub(crate) struct Opening {
+    given: Option<Columns>,
+    delimiter: Option<Delimiter>,
+    /// What the file is called, without its ending.
+    stem: String,
+    lines: Vec<Vec<u8>>,
+    bytes: usize,
+    found: Option<Found>,
+    rows: usize,
+}
+
+/// Rows, each with the number of its line, from 1.
+type Rows = Vec<(u64, Vec<u8>)>;
+
+/// Where the header is.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+struct Found {
+    /// Its line; of a table without one, its first row.
+    at: usize,
+    delimiter: Delimiter,
+    is_header: bool,
+    is_own: bool,
+}
+
+impl Opening {
+    pub(crate) fn new(options: &Options, stem: &str) -> Opening {
+        Opening {
+            given: options.columns.clone(),
+            delimiter: options.delimiter,
+            stem: stem.to_owned(),
+            lines: Vec::new(),
+            bytes: 0,
+            found: None,
+            rows: 0,
+        }
+    }
+
+    /// Takes the next line, blank ones too. Whether there must be more.
+    pub(crate) fn take(&mut self, line: &[u8]) -> bool {
+        let is_blank = line.iter().all(u8::is_ascii_whitespace);
+        self.bytes += line.len();
+        if self.found.is_none() && !is_blank {
+            self.found = self.header(line);
+        } else if !is_blank {
+            self.rows += 1;
+        }
+        self.lines.push(line.to_owned());
+        match self.found {
+            Some(found) => !found.is_own && self.rows < OPENING,
+            None => self.lines.len() < MOST_HEAD_LINES && self.bytes < MOST_HEAD,
+        }
+    }
+
+    fn header(&self, line: &[u8]) -> Option<Found> {
+        let at = self.lines.len();
+        let found = |at, delimiter, is_header, is_own| Found {
+            at,
+            delimiter,
+            is_header,
+            is_own,
+        };
+        if self.given.is_none() && self.delimiter.is_none() && Table::is_own_header(line) {
+            return Some(found(at, Delimiter::Byte(b','), true, true));
+        }
+        let named = header_in(line, self.delimiter, self.given.as_ref(), &self.stem);
+        if let Some(delimiter) = named {
+            return Some(found(at, delimiter, true, false));
+        }
+        // Columns by number: the first line in which they are numbers, under a header or not.
+        let numbers: Option<Vec<usize>> = self
+            .given
+            .iter()
+            .flat_map(Columns::all)
+            .flat_map(|given| &given.columns)
+            .map(|column| number(column))
+            .collect();
+        let numbers = numbers.filter(|numbers| !numbers.is_empty())?;
+        let tried = Delimiter::TRIED.iter().copied();
+        let mut tried = self.delimiter.into_iter().chain(tried);
+        let cells =
+            |line: &[u8], delimiter: Delimiter| -> Vec<String> { text_cells(line, delimiter) };
+        let delimiter = tried.find(|delimiter| {
+            let cells = cells(line, *delimiter);
+            numbers
+                .iter()
+                .all(|n| cells.get(n - 1).is_some_and(|cell| is_number(cell)))
+        })?;
+        let before = self.lines.last().map(|before| cells(before, delimiter));
+        let is_under_header = before.is_some_and(|before| {
+            before.len() == cells(line, delimiter).len()
+                && !before.iter().any(|cell| is_number(cell))
+        });
+        Some(match is_under_header {
+            true => found(at - 1, delimiter, true, false),
+            false => found(at, delimiter, false, false),
+        })
+    }
+
+    /// The table, and its rows so far with the numbers of their lines, from 1.
+    ///
+    /// # Errors
+    /// What is missing or can not be told, in words with their help.
+    pub(crate) fn finish(self) -> Result<(Table, Rows), String> {
+        let Some(found) = self.found else {
+            return Err(self.nothing());
+        };
+        let line = self.lines.get(found.at).map_or(&[][..], Vec::as_slice);
+        let first_row = found.at + usize::from(found.is_header);
+        let mut behind = self.lines.iter().enumerate().skip(first_row);
+        if found.is_own {
+            return Ok((Table::own(line)?, numbered(behind)));
+        }
+        let preamble = self.lines.iter().take(found.at).map(Vec::as_slice);
+        let preamble = Preamble::of(preamble);
+        let row = found.delimiter.row(without_mark(line));
+        let mut names = match found.is_header {
+            true => names_in(line, found.delimiter),
+            false => {
+                let cells = found.delimiter.cells(row).enumerate();
+                cells
+                    .map(|(n, _)| Name {
+                        text: (n + 1).to_string(),
+                        meant: Meant::Nothing,
+                        unit: None,
+                    })
+                    .collect()
+            }
+        };
+        let is_row = |line: &[u8]| {
+            !line.iter().all(u8::is_ascii_whitespace) && !is_comment(line.trim_ascii())
+        };
+        let mut rows: Vec<Vec<String>> = self
+            .lines
+            .iter()
+            .skip(first_row)
+            .filter(|line| is_row(line))
+            .map(|line| text_cells(line, found.delimiter))
+            .collect();
+        // Rows of units, and of what else is said of columns (Shimmer), before the first numbers.
+        let mut above = 0;
+        while let Some(row) = rows.first().filter(|row| says_units(row, &names)) {
+            for (name, cell) in names.iter_mut().zip(row) {
+                name.add_unit(cell);
+            }
+            rows.remove(0);
+            above += 1;
+        }
+        while above > 0 && behind.len() > 0 {
+            let line = behind.next();
+            above -= usize::from(line.is_some_and(|(_, line)| is_row(line)));
+        }
+        check_lengths(&rows, &names, found.delimiter)?;
+        let header = if found.is_header { row } else { &[] };
+        let roles = Roles {
+            names: &names,
+            rows: &rows,
+            preamble: &preamble,
+            given: self.given.as_ref(),
+            stem: &self.stem,
+        };
+        let mut table = roles.table(header, found.delimiter)?;
+        table.given = self.given;
+        Ok((table, numbered(behind)))
+    }
+
+    /// No header: what there is, and what would help.
+    fn nothing(&self) -> String {
+        let start = self.lines.first().map_or(&[][..], Vec::as_slice);
+        if self.lines.iter().flatten().any(|b| *b == 0) {
+            return "it holds bytes of zero: it is binary, or UTF-16 without its mark\n  help: iconv -f UTF-16LE -t UTF-8 FILE > log.csv, if it is text".to_owned();
+        }
+        // The line with the most names.
+        let texts = |names: &[Name]| names.iter().filter(|name| !is_number(&name.text)).count();
+        let best = self
+            .lines
+            .iter()
+            .filter_map(|line| {
+                let mut tried = self.delimiter.into_iter().chain(Delimiter::TRIED);
+                tried.find_map(|delimiter| {
+                    Some(names_in(line, delimiter)).filter(|names| names.len() >= 3)
+                })
+            })
+            .filter(|names| texts(names) > 0)
+            .max_by_key(|names| texts(names));
+        let Some(names) = best else {
+            return format!(
+                "none of its first lines has three cells that could name columns; it begins with `{}`\n  help: a first row with names such as time_s, gyro_x, gyro_y, gyro_z; or --columns gyro=2:3:4,stamp=1:s by numbers, and --delimiter",
+                crate::text::snippet(start)
+            );
+        };
+        let all: Vec<&str> = names.iter().map(|name| name.text.as_str()).collect();
+        let said = all
+            .get(..all.len().min(MOST_SAID))
+            .unwrap_or(&all)
+            .join("`, `");
+        if let Some(given) = self.given.as_ref().map(Columns::all) {
+            let wrong = given.iter().flat_map(|given| &given.columns);
+            let wrong: Vec<String> = wrong
+                .filter_map(|column| roles::place(&names, column).err())
+                .collect();
+            if let Some(first) = wrong.first() {
+                return format!("--columns: {first}; its columns are `{said}`");
+            }
+        }
+        let axes = ["x", "y", "z"];
+        if axes
+            .iter()
+            .all(|axis| all.iter().any(|name| name.eq_ignore_ascii_case(axis)))
+        {
+            return "its columns x, y, z do not say of which sensor they are (they are rates where the file is called Gyroscope...)\n  help: --columns gyro=x:y:z if they are rates".to_owned();
+        }
+        let aside = names.iter().find_map(|name| match name.meant {
+            Meant::Aside {
+                kind: Kind::Gyro,
+                why,
+            } => Some(format!("; `{}` {why}", name.text)),
+            _ => None,
+        });
+        format!(
+            "none of its columns names a rate about x, y and z: `{said}`{}\n  help: --columns gyro=NAME:NAME:NAME,stamp=NAME:UNIT says which they are (or numbers, from 1)",
+            aside.unwrap_or_default()
+        )
+    }
+}
+
+fn numbered<'l>(lines: impl Iterator<Item = (usize, &'l Vec<u8>)>) -> Rows {
+    lines
+        .map(|(at, line)| (at as u64 + 1, line.clone()))
+        .collect()
+}
+
+/// The cells of a row as text, for what is looked at only once.
+fn text_cells(line: &[u8], delimiter: Delimiter) -> Vec<String> {
+    let row = delimiter.row(without_mark(line));
+    let cells = delimiter.cells(row).take(MOST_COLUMNS + 1);
+    cells
+        .map(|cell| String::from_utf8_lossy(cell.trim_ascii()).into_owned())
+        .collect()
+}
+
+/// Whether a cell is a number, with a decimal point or comma.
+fn is_number(cell: &str) -> bool {
+    let is_part = |b: u8| b.is_ascii_digit() || b"+-.,eE".contains(&b);
+    cell.bytes().any(|b| b.is_ascii_digit()) && cell.bytes().all(is_part)
+}
+
+/// Whether a row says what the columns above are measured in, or how they came to be.
+fn says_units(row: &[String], names: &[Name]) -> bool {
+    let of_roles = || {
+        let cells = row.iter().zip(names);
+        cells.filter(|(_, name)| name.quantity().is_some())
+    };
+    let is_word = |cell: &str| ["cal", "raw", "uncal"].contains(&cell.to_lowercase().as_str());
+    let is_unit = |(cell, name): (&String, &Name)| {
+        let quantity = name.quantity();
+        is_word(cell) || quantity.is_some_and(|quantity| Unit::of(quantity, cell).is_some())
+    };
+    of_roles().any(is_unit) && !of_roles().any(|(cell, _)| is_number(cell))
+}
+
+/// All of the first rows are longer or shorter than the header: the one or the other is cut wrongly.
+fn check_lengths(rows: &[Vec<String>], names: &[Name], delimiter: Delimiter) -> Result<(), String> {
+    let need = names.len();
+    let fits = |row: &Vec<String>| {
+        row.len() >= need && row.iter().skip(need).all(|cell| cell.trim().is_empty())
+    };
+    let Some(first) = rows.first() else {
+        return Ok(());
+    };
+    if rows.iter().any(fits) {
+        return Ok(());
+    }
+    let why = match delimiter {
+        Delimiter::Byte(b',') if first.len() + 2 > need * 2 => {
+            ": decimal commas, and commas between the cells? What belongs together can not be told\n  help: export it with semicolons or tabs between the cells, or with decimal points"
+        }
+        _ => "\n  help: --delimiter says what stands between the cells",
+    };
+    Err(format!(
+        "its rows have {} cells under {need} names{why}",
+        first.len()
+    ))
+}
+
+impl Name {
+    /// What its unit is one of.
+    fn quantity(&self) -> Option<Quantity> {
+        match &self.meant {
+            Meant::Part { kind, .. } => kind.quantity(),
+            Meant::Stamp => Some(Quantity::Time),
+            Meant::Aside { .. } | Meant::Counter | Meant::Nothing => None,
+        }
+    }
+
+    /// A row below the header says its unit.
+    fn add_unit(&mut self, cell: &str) {
+        if ["raw", "uncal"].contains(&cell.to_lowercase().as_str()) {
+            if let Meant::Part { kind, .. } = self.meant {
+                self.meant = Meant::Aside {
+                    kind,
+                    why: "is not calibrated",
+                };
+            }
+            return;
+        }
+        if let Some(quantity) = self.quantity()
+            && !cell.is_empty()
+            && !cell.eq_ignore_ascii_case("cal")
+        {
+            self.unit = Some(Unit::of(quantity, cell).ok_or_else(|| printable(cell)));
+        }
+    }
+}
+
+/// The columns of a table with these roles.
+fn columns(names: &[Name], of: &[(usize, Column)]) -> Vec<(Option<Column>, String)> {
+    let column = |at: usize| of.iter().find(|(place, _)| *place == at);
+    let each = names.iter().enumerate();
+    each.map(|(at, name)| (column(at).map(|(_, column)| *column), name.text.clone()))
+        .collect()
+}

@@ -1,0 +1,287 @@
+//! Columns of stamps, counters and rates -> how rows are placed in time. Pure.
+//!
+//! The unit of a stamp is that of its name; else that in which the steps are those of a gyro; else, and that is said,
+//! that which its size suggests. Where name and steps contradict each other, neither is believed.
+
+use super::super::clock::{Clock, Wraps};
+use super::super::columns::Role;
+use super::super::names::Meant;
+use super::super::units::Unit;
+use super::is_number;
+use super::roles::{Roles, place};
+use crate::decode::{Bare, bare_of_text, instant_of_date, unit_of, units_that_fit};
+use strapd_attitude::record::TimeUnit;
+
+/// Where rows lie in time.
+pub(super) struct Instants {
+    pub(super) clock: Clock,
+    /// The column that says it, and what `--columns` calls it.
+    pub(super) column: Option<(usize, String)>,
+    pub(super) notes: Vec<String>,
+}
+
+/// One column of stamps.
+struct Stamp {
+    at: usize,
+    clock: Clock,
+    unit: Option<Unit>,
+    /// Whole nanoseconds.
+    is_exact: bool,
+    note: Option<String>,
+}
+
+/// Steps by which the two kinds of `SampleTimeFine` are told apart: of 10 Hz and more in 0.1 ms, of 200 Hz and less in us.
+const FINE_TICKS: f64 = 1e3;
+const FINE_MICROS: f64 = 5e3;
+/// A counter of packets has 16 bits, a fine time 32.
+const COUNTER_WIDTH: i64 = 1 << 16;
+const FINE_WIDTH: i64 = 1 << 32;
+/// As few steps tell nothing of a unit that the name states.
+const FEW: usize = 4;
+
+impl Roles<'_> {
+    /// How rows are placed in time.
+    pub(super) fn instants(&self) -> Result<Instants, String> {
+        let given = self.given_of(Role::Stamp);
+        let is_refused = given.is_some_and(|given| given.columns.is_empty());
+        if let Some(given) = given.filter(|given| !given.columns.is_empty()) {
+            let column = given.columns.first().map_or("", String::as_str);
+            let at = place(self.names, column).map_err(|why| format!("--columns stamp: {why}"))?;
+            let stamp = self.stamp(at, given.unit)?;
+            return Ok(self.of_stamp(stamp));
+        }
+        let each = self.names.iter().enumerate();
+        let is_stamp =
+            |at: usize, meant: &Meant| *meant == Meant::Stamp && !is_refused && !self.is_empty(at);
+        let columns: Vec<usize> = each
+            .filter(|(at, name)| is_stamp(*at, &name.meant))
+            .map(|(at, _)| at)
+            .collect();
+        let is_counted = self.given_of(Role::Counter).is_some();
+        match columns.as_slice() {
+            _ if is_counted => self.counted(),
+            [] => self.counted(),
+            [one] => Ok(self.of_stamp(self.stamp(*one, None)?)),
+            several => {
+                let stamps = several.iter().filter_map(|at| self.stamp(*at, None).ok());
+                let mut exact = stamps.filter(|stamp| stamp.is_exact);
+                match (exact.next(), exact.next()) {
+                    (Some(one), None) => Ok(self.of_stamp(one)),
+                    _ => Err(format!(
+                        "its stamp may be {}: which is meant can not be told\n  help: --columns stamp={}",
+                        self.listed(several),
+                        several
+                            .first()
+                            .map_or_else(String::new, |at| self.reference(*at))
+                    )),
+                }
+            }
+        }
+    }
+
+    fn of_stamp(&self, stamp: Stamp) -> Instants {
+        let mut said = format!("stamp={}", self.reference(stamp.at));
+        if let Some(unit) = stamp.unit.and_then(Unit::name) {
+            said.push_str(&format!(":{unit}"));
+        }
+        Instants {
+            clock: stamp.clock,
+            column: Some((stamp.at, said)),
+            notes: stamp.note.into_iter().collect(),
+        }
+    }
+
+    /// By a running number, or none, and the rate of the file's head.
+    fn counted(&self) -> Result<Instants, String> {
+        let given = self.given_of(Role::Counter);
+        let column = match given.and_then(|given| given.columns.first()) {
+            Some(column) => {
+                Some(place(self.names, column).map_err(|why| format!("--columns counter: {why}"))?)
+            }
+            None if given.is_some() => None,
+            None => {
+                let mut each = self.names.iter().enumerate();
+                let found = each.find(|(_, name)| name.meant == Meant::Counter);
+                found.map(|(at, _)| at).filter(|at| !self.is_empty(*at))
+            }
+        };
+        let Some(rate) = &self.preamble.rate else {
+            return Ok(Instants {
+                clock: Clock::Nothing,
+                column: None,
+                notes: vec![
+                    "no column says when it was measured, and its head no rate: --time index --rate-hz HZ, or --columns stamp=NAME:UNIT"
+                        .to_owned(),
+                ],
+            });
+        };
+        let period = nearly_whole(1e9 / rate.hz);
+        let (clock, by) = match column {
+            Some(at) => {
+                let wraps = Wraps::at(COUNTER_WIDTH);
+                (Clock::Counter { period, wraps }, self.listed(&[at]))
+            }
+            None => (Clock::Rows { period }, "the number of a row".to_owned()),
+        };
+        Ok(Instants {
+            clock,
+            column: column.map(|at| (at, format!("counter={}", self.reference(at)))),
+            notes: vec![format!(
+                "stamps are {by} at {} Hz, as its head says: `{}`",
+                rate.hz, rate.said
+            )],
+        })
+    }
+
+    /// The numbers of a column in the first rows.
+    fn numbers(&self, at: usize) -> Vec<String> {
+        let cells = self.rows.iter().filter_map(|row| row.get(at));
+        let cells = cells.filter(|cell| !cell.is_empty() && *cell != "-");
+        cells.map(|cell| cell.replace(',', ".")).collect()
+    }
+
+    /// A column of stamps, with the unit that the user gives, or else with its own.
+    fn stamp(&self, at: usize, given: Option<Unit>) -> Result<Stamp, String> {
+        let numbers = self.numbers(at);
+        let stated = self.names.get(at).and_then(|name| name.unit.clone());
+        let text = self.names.get(at).map_or("", |name| name.text.as_str());
+        let of = |nanos: f64| Stamp {
+            at,
+            clock: Clock::Counts { nanos, wraps: None },
+            unit: Some(Unit::Time(nanos)),
+            is_exact: nanos == 1.0 && numbers.iter().all(|n| n.parse::<i64>().is_ok()),
+            note: None,
+        };
+        let is_fine = text.eq_ignore_ascii_case("sampletimefine");
+        let wrapping = |nanos: f64| Stamp {
+            clock: Clock::Counts {
+                nanos,
+                wraps: Some(Wraps::at(FINE_WIDTH)),
+            },
+            ..of(nanos)
+        };
+        if let Some(Unit::Time(nanos)) = given {
+            return Ok(if is_fine { wrapping(nanos) } else { of(nanos) });
+        }
+        if let Some(odd) = numbers.iter().find(|n| !is_number(n)) {
+            if numbers.iter().all(|n| instant_of_date(n).is_some()) {
+                return Ok(Stamp {
+                    clock: Clock::Dates,
+                    unit: None,
+                    ..of(1.0)
+                });
+            }
+            // One that is none among others is counted with its row.
+            if numbers.iter().all(|n| !is_number(n)) {
+                return Err(format!(
+                    "`{}` of column `{text}` is no stamp that is known (numbers, RFC 3339)\n  help: --columns stamp=NAME:UNIT names another; --columns stamp=none with --time index --rate-hz HZ does without",
+                    crate::text::snippet(odd.as_bytes())
+                ));
+            }
+        }
+        let stamps: Vec<Bare> = numbers.iter().filter_map(|n| bare_of_text(n)).collect();
+        if let (Some(tscale), "t") = (self.preamble.tscale, text) {
+            let mut stamp = of(nearly_whole(tscale * 1e9));
+            stamp.unit = stamp.unit.filter(|unit| unit.name().is_some());
+            return Ok(stamp);
+        }
+        if is_fine {
+            return self.fine(at, &stamps).map(wrapping);
+        }
+        match stated {
+            Some(Ok(Unit::Time(nanos))) => {
+                self.check_unit(at, nanos, &stamps)?;
+                Ok(of(nanos))
+            }
+            Some(Err(unit)) => Err(format!(
+                "the unit `{unit}` of its stamps is not known\n  help: --columns stamp={}:UNIT, with ns, us, ms or s",
+                self.reference(at)
+            )),
+            _ => match unit_of(stamps.iter().copied()) {
+                Ok(unit) => Ok(of(unit.nanos(0.0) as f64)),
+                Err(_) if stamps.is_empty() => Ok(of(1.0)),
+                Err(why) => {
+                    let first = stamps.first().map_or(0.0, |bare| bare.count());
+                    let by_size = TimeUnit::of_magnitude(first);
+                    let fits = units_that_fit(stamps.iter().copied());
+                    if fits.is_some_and(|(_, fits)| !fits.contains(&by_size)) {
+                        return Err(format!(
+                            "`{text}`: {}\n  help: --columns stamp={}:UNIT, with ns, us, ms or s",
+                            why.what(),
+                            self.reference(at)
+                        ));
+                    }
+                    let mut stamp = of(by_size.nanos(first) as f64);
+                    stamp.note = Some(format!(
+                        "the unit of the stamps in `{text}` is not stated; by their size they are taken for {}: --columns stamp={}:ms says otherwise",
+                        by_size.name(),
+                        self.reference(at)
+                    ));
+                    Ok(stamp)
+                }
+            },
+        }
+    }
+
+    /// A unit that the name states, and the steps deny.
+    fn check_unit(&self, at: usize, nanos: f64, stamps: &[Bare]) -> Result<(), String> {
+        if stamps.len() < FEW {
+            return Ok(());
+        }
+        let Some((step, fits)) = units_that_fit(stamps.iter().copied()) else {
+            return Ok(());
+        };
+        let is_it = |unit: &&TimeUnit| unit.nanos(0.0) as f64 == nanos;
+        let stated = TimeUnit::NAMED.iter().map(|(_, unit)| unit).find(is_it);
+        let Some(stated) = stated.filter(|unit| !fits.contains(unit)) else {
+            return Ok(());
+        };
+        let Some(other) = fits.first() else {
+            return Ok(());
+        };
+        Err(format!(
+            "{} is in {} by its name, but its steps of {step} are those of a gyro only in {}\n  help: --columns stamp={}:{} takes it so, and :{} as its name says",
+            self.listed(&[at]),
+            stated.name(),
+            other.name(),
+            self.reference(at),
+            other.name(),
+            stated.name()
+        ))
+    }
+
+    /// Xsens counts in 0.1 ms (MT) or in us (DOT), and does not say which.
+    fn fine(&self, at: usize, stamps: &[Bare]) -> Result<f64, String> {
+        const TICK: f64 = 1e5;
+        const MICRO: f64 = 1e3;
+        let step = units_that_fit(stamps.iter().copied()).map(|(step, _)| step);
+        let of_rate = self
+            .preamble
+            .rate
+            .as_ref()
+            .zip(step)
+            .and_then(|(rate, step)| {
+                let is_it = |nanos: &f64| (step * nanos * rate.hz / 1e9 - 1.0).abs() < 0.5;
+                [TICK, MICRO].into_iter().find(is_it)
+            });
+        match (of_rate, step) {
+            (Some(nanos), _) => Ok(nanos),
+            (None, Some(step)) if step <= FINE_TICKS => Ok(TICK),
+            (None, Some(step)) if step >= FINE_MICROS => Ok(MICRO),
+            _ => Err(format!(
+                "{} counts in 0.1 ms or in us, and which can not be told\n  help: --columns stamp={}:100us, or :us",
+                self.listed(&[at]),
+                self.reference(at)
+            )),
+        }
+    }
+}
+
+/// What is whole but for its rounding is whole: stamps are exact then.
+fn nearly_whole(nanos: f64) -> f64 {
+    let whole = nanos.round();
+    match (nanos - whole).abs() <= nanos * 1e-12 {
+        true => whole,
+        false => nanos,
+    }
+}

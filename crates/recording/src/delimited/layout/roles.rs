@@ -1,0 +1,420 @@
+//! Names, units and first rows -> which column is what, or why that can not be told. Pure.
+
+use super::super::cells::Delimiter;
+use super::super::columns::{Columns, Given, Role};
+use super::super::names::{Kind, Meant, Name};
+use super::super::preamble::{Maker, Preamble};
+use super::super::rows::{Column, Scales, Table};
+use super::super::units::Unit;
+use super::{columns, is_number, number};
+use std::collections::BTreeMap;
+use strapd_attitude::condition::GyroUnit;
+use strapd_attitude::record::AccelUnit;
+
+/// What is known of a table before its roles.
+pub(super) struct Roles<'l> {
+    pub(super) names: &'l [Name],
+    /// The first rows.
+    pub(super) rows: &'l [Vec<String>],
+    pub(super) preamble: &'l Preamble,
+    pub(super) given: Option<&'l Columns>,
+    pub(super) stem: &'l str,
+}
+
+/// Columns that may be a vector.
+pub(super) struct Group {
+    pub(super) columns: Vec<usize>,
+    /// A column of which there is another of the same meaning.
+    twice: Option<[usize; 2]>,
+}
+
+/// Columns that are one.
+struct Chosen {
+    columns: Vec<usize>,
+    unit: Option<Unit>,
+}
+
+/// A role, the columns that fill it, and what each of them is.
+type Filled<'c> = (&'c Option<Chosen>, Kind, fn(usize) -> Column);
+
+/// Where a column is that the user names, or gives by its number from 1.
+pub(super) fn place(names: &[Name], column: &str) -> Result<usize, String> {
+    let all = |is: &dyn Fn(&str) -> bool| -> Vec<usize> {
+        let each = names.iter().enumerate();
+        each.filter(|(_, name)| is(&name.text))
+            .map(|(at, _)| at)
+            .collect()
+    };
+    let mut found = all(&|name| name == column);
+    if found.is_empty() {
+        found = all(&|name| name.eq_ignore_ascii_case(column));
+    }
+    match (found.as_slice(), number(column)) {
+        ([one], _) => Ok(*one),
+        ([], Some(n)) if n <= names.len() => Ok(n - 1),
+        ([], Some(n)) => Err(format!("there is no column {n} of {}", names.len())),
+        ([], None) => {
+            let column = crate::text::printable(column);
+            Err(format!("there is no column `{column}`"))
+        }
+        ([first, second, ..], _) => Err(format!(
+            "`{}` is there more than once, as columns {} and {}: give its number",
+            crate::text::printable(column),
+            first + 1,
+            second + 1
+        )),
+    }
+}
+
+/// Every vector of this kind of which all parts are there.
+pub(super) fn candidates(names: &[Name], kind: Kind) -> Vec<Group> {
+    let mut groups: BTreeMap<&str, Vec<Vec<usize>>> = BTreeMap::new();
+    for (at, name) in names.iter().enumerate() {
+        if let Meant::Part {
+            kind: of_kind,
+            part,
+            of,
+        } = &name.meant
+            && *of_kind == kind
+        {
+            let parts = groups
+                .entry(of)
+                .or_insert_with(|| vec![Vec::new(); kind.parts()]);
+            if let Some(part) = parts.get_mut(*part) {
+                part.push(at);
+            }
+        }
+    }
+    let group = |parts: Vec<Vec<usize>>| {
+        let columns: Option<Vec<usize>> = parts.iter().map(|part| part.first().copied()).collect();
+        let twice = parts.iter().find_map(|part| match part.as_slice() {
+            [first, second, ..] => Some([*first, *second]),
+            _ => None,
+        });
+        Some(Group {
+            columns: columns?,
+            twice,
+        })
+    };
+    groups.into_values().filter_map(group).collect()
+}
+
+/// Sensor Logger and its like: bare axes beside a stamp are rates in a file of that name.
+pub(super) fn bare_axes(names: &[Name], stem: &str) -> Option<Vec<usize>> {
+    stem.to_lowercase().starts_with("gyroscope").then_some(())?;
+    names.iter().find(|name| name.meant == Meant::Stamp)?;
+    let axis = |axis: &str| place(names, axis).ok();
+    ["x", "y", "z"].into_iter().map(axis).collect()
+}
+
+impl Roles<'_> {
+    /// The table.
+    ///
+    /// # Errors
+    /// What can not be told, with the flag that tells it.
+    pub(super) fn table(&self, header: &[u8], delimiter: Delimiter) -> Result<Table, String> {
+        let mut notes = Vec::new();
+        let gyro = self.chosen(Kind::Gyro, &mut notes)?;
+        let accel = self.chosen(Kind::Accel, &mut notes)?;
+        let mag = self.chosen(Kind::Mag, &mut notes)?;
+        let orientation = self.chosen(Kind::Orientation, &mut notes)?;
+        let matrix = match orientation {
+            None => self.chosen(Kind::Matrix, &mut notes)?,
+            Some(_) => None,
+        };
+        if gyro.is_none() && orientation.is_none() && matrix.is_none() {
+            return Err(format!(
+                "none of its columns is a rate or an orientation\n  help: --columns gyro=NAME:NAME:NAME; they are {}",
+                self.listed(&(0..self.names.len().min(16)).collect::<Vec<_>>())
+            ));
+        }
+        let instants = self.instants()?;
+        let mut of: Vec<(usize, Column)> = Vec::new();
+        let roles: [Filled<'_>; 5] = [
+            (&gyro, Kind::Gyro, Column::Gyro),
+            (&accel, Kind::Accel, Column::Accel),
+            (&mag, Kind::Mag, Column::Mag),
+            (&orientation, Kind::Orientation, Column::Orientation),
+            (&matrix, Kind::Matrix, Column::Matrix),
+        ];
+        let mut assumed = Vec::new();
+        for (chosen, kind, column) in roles {
+            let Some(chosen) = chosen else {
+                if self.given_of(Role::Of(kind)).is_some() {
+                    assumed.push(format!("{}=none", kind.name()));
+                }
+                continue;
+            };
+            let places = chosen.columns.iter().enumerate();
+            of.extend(places.map(|(part, at)| (*at, column(part))));
+            if kind != Kind::Matrix {
+                let mut said: Vec<String> = chosen
+                    .columns
+                    .iter()
+                    .map(|at| self.reference(*at))
+                    .collect();
+                said.extend(chosen.unit.and_then(Unit::name).map(str::to_owned));
+                assumed.push(format!("{}={}", kind.name(), said.join(":")));
+            }
+        }
+        if let Some((at, said)) = &instants.column {
+            of.push((*at, Column::Stamp));
+            assumed.push(said.clone());
+        }
+        let twice = |(n, (at, _)): (usize, &(usize, Column))| {
+            let mut before = of.iter().take(n);
+            before.any(|(other, _)| other == at).then_some(*at)
+        };
+        if let Some(at) = of.iter().enumerate().find_map(twice) {
+            return Err(format!(
+                "column {} has two roles\n  help: --columns gives each its own",
+                self.listed(&[at])
+            ));
+        }
+        let mut table = Table::of_columns(header, columns(self.names, &of), delimiter);
+        table.clock = instants.clock;
+        notes.extend(instants.notes);
+        table.has_decimal_comma = self.has_decimal_comma(&of);
+        let mut scales = Scales::default();
+        if let Some(Unit::Rate(unit, scale)) = gyro.and_then(|gyro| gyro.unit) {
+            table.declared.gyro_unit = Some(unit);
+            scales.gyro = scale;
+        }
+        if let Some(Unit::Force(unit, scale)) = accel.and_then(|accel| accel.unit) {
+            table.declared.accel_unit = Some(unit);
+            scales.accel = scale;
+        }
+        if let Some(Unit::Field(scale)) = mag.and_then(|mag| mag.unit) {
+            scales.mag = scale;
+        }
+        if let Some(axes) = &self.preamble.orientation {
+            notes.push(format!(
+                "its head says orientation,{axes}: axes are as recorded unless --body {axes} is given"
+            ));
+        }
+        table.scales = scales;
+        table.assumed = assumed.join(",");
+        table.notes = notes;
+        Ok(table)
+    }
+
+    pub(super) fn given_of(&self, role: Role) -> Option<&Given> {
+        self.given.and_then(|given| given.of(role))
+    }
+
+    /// The columns of a kind, where there are any.
+    fn chosen(&self, kind: Kind, notes: &mut Vec<String>) -> Result<Option<Chosen>, String> {
+        if let Some(given) = self.given_of(Role::Of(kind)) {
+            if given.columns.is_empty() {
+                return Ok(None);
+            }
+            let places = given.columns.iter().map(|column| place(self.names, column));
+            let places: Result<Vec<usize>, String> = places.collect();
+            let columns = places.map_err(|why| format!("--columns {}: {why}", kind.name()))?;
+            let unit = match given.unit {
+                Some(unit) => Some(unit),
+                None => self.unit(kind, &columns, notes)?.flatten(),
+            };
+            return Ok(Some(Chosen { columns, unit }));
+        }
+        let mut groups = candidates(self.names, kind);
+        if kind == Kind::Accel && self.is_physics_toolbox() {
+            // Beside the force stands what is left of it without gravity.
+            groups.retain(|group| {
+                let first = group.columns.first().and_then(|at| self.names.get(*at));
+                first.is_some_and(|name| name.text.to_lowercase().starts_with("gf"))
+            });
+        }
+        if groups.is_empty() && kind == Kind::Gyro {
+            groups.extend(bare_axes(self.names, self.stem).map(|columns| Group {
+                columns,
+                twice: None,
+            }));
+        }
+        if groups.len() > 1 {
+            groups.retain(|group| group.columns.iter().all(|at| !self.is_empty(*at)));
+        }
+        let [group] = groups.as_slice() else {
+            if groups.is_empty() {
+                self.say_aside(kind, notes);
+                return Ok(None);
+            }
+            return Err(self.several(kind, &groups));
+        };
+        if let Some([first, second]) = group.twice {
+            return Err(format!(
+                "{} is there twice, as columns {} and {}: which of them is meant can not be told\n  help: --columns {}={} takes the first, by its number; {}=none neither",
+                self.listed(&[first]),
+                first + 1,
+                second + 1,
+                kind.name(),
+                self.references(&group.columns),
+                kind.name()
+            ));
+        }
+        let columns = group.columns.clone();
+        let Some(unit) = self.unit(kind, &columns, notes)? else {
+            return Ok(None);
+        };
+        Ok(Some(Chosen { columns, unit }))
+    }
+
+    /// The unit of these columns, by their names, or by what the maker's documents say; `None` where a role that can be
+    /// done without has an unknown one.
+    fn unit(
+        &self,
+        kind: Kind,
+        columns: &[usize],
+        notes: &mut Vec<String>,
+    ) -> Result<Option<Option<Unit>>, String> {
+        let names: Vec<&Name> = columns
+            .iter()
+            .filter_map(|at| self.names.get(*at))
+            .collect();
+        let Some(first) = names.first() else {
+            return Ok(Some(None));
+        };
+        if let Some(other) = names.iter().find(|name| name.unit != first.unit) {
+            return Err(format!(
+                "its {} has several units: `{}` and `{}`\n  help: --columns {}={}:UNIT, where all of them are of one",
+                kind.name(),
+                first.text,
+                other.text,
+                kind.name(),
+                self.references(columns)
+            ));
+        }
+        Ok(match (&first.unit, kind) {
+            (Some(Ok(unit)), _) => Some(Some(*unit)),
+            (Some(Err(unit)), Kind::Gyro) => {
+                return Err(format!(
+                    "the unit `{unit}` of its rates is not known\n  help: --columns gyro={}:deg/s (or rad/s, mrad/s, mdps)",
+                    self.references(columns)
+                ));
+            }
+            (Some(Err(unit)), Kind::Accel) => {
+                notes.push(format!(
+                    "{} are not used: their unit `{unit}` is not known (--columns accel={}:g)",
+                    self.listed(columns),
+                    self.references(columns)
+                ));
+                None
+            }
+            _ => Some(self.unit_of_maker(kind, first)),
+        })
+    }
+
+    /// What the maker's documents say of a column that states no unit.
+    fn unit_of_maker(&self, kind: Kind, name: &Name) -> Option<Unit> {
+        let head = self.preamble;
+        let si = Unit::Force(AccelUnit::MetresPerSecondSquared, 1.0);
+        let gravities = |scale: f64| Unit::Force(AccelUnit::StandardGravity, scale);
+        let rad = Unit::Rate(GyroUnit::Rad, 1.0);
+        let is_named = |stem: &str| name.text.to_lowercase().starts_with(stem);
+        match (head.maker, kind) {
+            (Maker::Gyroflow, Kind::Gyro) => {
+                head.gscale.map(|scale| Unit::Rate(GyroUnit::Rad, scale))
+            }
+            (Maker::Gyroflow, Kind::Accel) => head.ascale.map(gravities),
+            (Maker::Gyroflow, Kind::Mag) => head.mscale.map(|scale| Unit::Field(scale * 1e-4)),
+            (Maker::Xsens, Kind::Gyro) if is_named("gyr_") => Some(rad),
+            (Maker::Dot, Kind::Gyro) if is_named("gyr_") => Some(Unit::Rate(GyroUnit::Deg, 1.0)),
+            (Maker::Xsens | Maker::Dot, Kind::Accel) if is_named("acc_") => Some(si),
+            (_, Kind::Gyro) if self.is_physics_toolbox() || name.text.len() == 1 => Some(rad),
+            (_, Kind::Accel) if self.is_physics_toolbox() => Some(gravities(1.0)),
+            (_, Kind::Mag) if self.is_physics_toolbox() => Some(Unit::Field(1e-6)),
+            _ => None,
+        }
+    }
+
+    /// Physics Toolbox has the force in g beside what is left of it without gravity.
+    fn is_physics_toolbox(&self) -> bool {
+        self.names
+            .iter()
+            .any(|name| name.text.eq_ignore_ascii_case("gfx"))
+    }
+
+    /// Whether a column has nothing in the first rows.
+    pub(super) fn is_empty(&self, at: usize) -> bool {
+        let cell = |row: &Vec<String>| row.get(at).is_none_or(String::is_empty);
+        !self.rows.is_empty() && self.rows.iter().all(cell)
+    }
+
+    fn say_aside(&self, kind: Kind, notes: &mut Vec<String>) {
+        let each = self.names.iter().enumerate();
+        let aside: Vec<(usize, &str)> = each
+            .filter_map(|(at, name)| match name.meant {
+                Meant::Aside { kind: of, why } if of == kind => Some((at, why)),
+                _ => None,
+            })
+            .collect();
+        if let Some((_, why)) = aside.first() {
+            let columns: Vec<usize> = aside.iter().map(|(at, _)| *at).take(3).collect();
+            notes.push(format!(
+                "{} is not used, since it {why}: --columns {}={} uses it",
+                self.listed(&columns),
+                kind.name(),
+                self.references(&columns)
+            ));
+        }
+    }
+
+    fn several(&self, kind: Kind, groups: &[Group]) -> String {
+        let each: Vec<String> = groups.iter().map(|g| self.listed(&g.columns)).collect();
+        let flags: Vec<String> = groups
+            .iter()
+            .map(|g| format!("--columns {}={}", kind.name(), self.references(&g.columns)))
+            .collect();
+        let none = match kind {
+            Kind::Gyro => String::new(),
+            _ => format!(", or --columns {}=none", kind.name()),
+        };
+        format!(
+            "its {} may be {}: which is meant can not be told\n  help: {}{none}",
+            kind.name(),
+            each.join(" or "),
+            flags.join(", or ")
+        )
+    }
+
+    /// Columns by name, for people.
+    pub(super) fn listed(&self, columns: &[usize]) -> String {
+        let names = columns.iter().filter_map(|at| self.names.get(*at));
+        let names: Vec<String> = names.map(|name| format!("`{}`", name.text)).collect();
+        names.join(", ")
+    }
+
+    /// What `--columns` calls a column: its name, or its number where that can not be written there.
+    pub(super) fn reference(&self, at: usize) -> String {
+        let name = self.names.get(at).map_or("", |name| name.text.as_str());
+        let is_plain = !name.is_empty()
+            && number(name).is_none()
+            && !name.contains([',', ':', '=', '\'', '\\'])
+            && place(self.names, name) == Ok(at);
+        match is_plain {
+            true => name.to_owned(),
+            false => (at + 1).to_string(),
+        }
+    }
+
+    fn references(&self, columns: &[usize]) -> String {
+        let all: Vec<String> = columns.iter().map(|at| self.reference(*at)).collect();
+        all.join(":")
+    }
+
+    /// Whether most numbers of the first rows have a comma for their point.
+    fn has_decimal_comma(&self, of: &[(usize, Column)]) -> bool {
+        let cells = self
+            .rows
+            .iter()
+            .flat_map(|row| of.iter().filter_map(|(at, _)| row.get(*at)));
+        let numbers = cells.filter(|cell| is_number(cell));
+        let (commas, points) = numbers.fold((0, 0), |(commas, points), cell| {
+            (
+                commas + usize::from(cell.contains(',')),
+                points + usize::from(cell.contains('.')),
+            )
+        });
+        commas > points
+    }
+}

@@ -1,0 +1,516 @@
+//! Rows of a table -> samples and what each row says of itself. Pure.
+//!
+//! Apart from the layout because that is decided once, and this is done for every row.
+
+use super::cells::Delimiter;
+use super::clock::Clock;
+use super::columns::Columns;
+use super::layout;
+use super::own;
+use super::preamble;
+use crate::decode::{Class, Line, MAX_LINE, Undecodable, exact_name};
+use crate::format::without_mark;
+use crate::text::{printable, snippet};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
+use std::borrow::Cow;
+use strapd_attitude::record::{Declared, Nanos, RawSample, SampleKind};
+
+/// What a column holds.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Column {
+    Stamp,
+    Log,
+    Interval,
+    Kind,
+    Id,
+    Gyro(usize),
+    Accel(usize),
+    Mag(usize),
+    Orientation(usize),
+    /// Of a rotation matrix, by rows.
+    Matrix(usize),
+}
+
+/// Columns that make a table one of samples or of attitudes.
+const GYRO: [Column; 3] = [Column::Gyro(0), Column::Gyro(1), Column::Gyro(2)];
+const ORIENTATION: [Column; 4] = [
+    Column::Orientation(0),
+    Column::Orientation(1),
+    Column::Orientation(2),
+    Column::Orientation(3),
+];
+
+/// What the numbers of a role are multiplied by before anything is made of them.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) struct Scales {
+    pub(super) gyro: f64,
+    pub(super) accel: f64,
+    pub(super) mag: f64,
+}
+
+impl Default for Scales {
+    fn default() -> Scales {
+        Scales {
+            gyro: 1.0,
+            accel: 1.0,
+            mag: 1.0,
+        }
+    }
+}
+
+/// Whose table it is.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Whose {
+    /// Of samples, written by strapd.
+    Own,
+    /// Of attitudes, written by strapd.
+    OwnAttitudes,
+    Others,
+}
+
+/// A table, by its first rows.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Table {
+    header: Vec<u8>,
+    /// What each cell of a row is, and what its column is called.
+    columns: Vec<(Option<Column>, String)>,
+    whose: Whose,
+    pub(super) delimiter: Delimiter,
+    pub(super) has_decimal_comma: bool,
+    pub(super) clock: Clock,
+    pub(super) scales: Scales,
+    /// What its names say of its numbers.
+    pub(super) declared: Declared,
+    /// The `--columns` that say the same.
+    pub(super) assumed: String,
+    /// What its reader should know.
+    pub(super) notes: Vec<String>,
+    /// Rows so far.
+    row: u64,
+    /// What the user said, to know another table's header by.
+    pub(super) given: Option<Columns>,
+    /// Another table has begun, whose rows are none of this.
+    is_elsewhere: bool,
+}
+
+impl Table {
+    /// Whether a line names the columns of a table of strapd's own.
+    #[must_use]
+    pub fn is_own_header(line: &[u8]) -> bool {
+        Table::own(line).is_ok()
+    }
+
+    /// A table of strapd's own under this first row.
+    ///
+    /// # Errors
+    /// What is missing, in words.
+    pub fn own(header: &[u8]) -> Result<Table, String> {
+        let header = without_mark(header).trim_ascii();
+        let mut columns: Vec<(Option<Column>, String)> = Vec::new();
+        for cell in Delimiter::Byte(b',').cells(header) {
+            let name = printable(&String::from_utf8_lossy(cell.trim_ascii()));
+            let known = own::COLUMNS.iter().find(|(known, _)| *known == name);
+            // Of two that say the same, the first.
+            let column = known
+                .map(|(_, column)| *column)
+                .filter(|column| columns.iter().all(|(before, _)| *before != Some(*column)));
+            columns.push((column, name));
+        }
+        let has = |column: &Column| {
+            columns
+                .iter()
+                .any(|(known, _)| known.as_ref() == Some(column))
+        };
+        if !has(&Column::Stamp) {
+            return Err("it has no column stamp_ns".to_owned());
+        }
+        for (all, names) in [
+            (GYRO.as_slice(), "gyro_x, gyro_y, gyro_z (or wx, wy, wz)"),
+            (ORIENTATION.as_slice(), "qw, qx, qy, qz"),
+        ] {
+            if all.iter().any(has) && !all.iter().all(has) {
+                return Err(format!("of the columns {names} not all are there"));
+            }
+        }
+        if !has(&Column::Gyro(0)) && !has(&Column::Orientation(0)) {
+            return Err(
+                "it has neither columns gyro_x, gyro_y, gyro_z nor qw, qx, qy, qz".to_owned(),
+            );
+        }
+        let is_of_attitudes = columns.iter().all(|(_, name)| name != "gyro_x");
+        let mut table = Table::of_columns(header, columns, Delimiter::Byte(b','));
+        table.whose = match is_of_attitudes {
+            true => Whose::OwnAttitudes,
+            false => Whose::Own,
+        };
+        table.clock = Clock::Nanos;
+        Ok(table)
+    }
+
+    /// A table of somebody else's; what its numbers mean is set by the layout.
+    pub(super) fn of_columns(
+        header: &[u8],
+        columns: Vec<(Option<Column>, String)>,
+        delimiter: Delimiter,
+    ) -> Table {
+        Table {
+            header: header.to_owned(),
+            columns,
+            whose: Whose::Others,
+            delimiter,
+            has_decimal_comma: false,
+            clock: Clock::Nothing,
+            scales: Scales::default(),
+            declared: Declared::default(),
+            assumed: String::new(),
+            notes: Vec::new(),
+            row: 0,
+            given: None,
+            is_elsewhere: false,
+        }
+    }
+
+    /// Whether strapd wrote it.
+    #[must_use]
+    pub fn is_own(&self) -> bool {
+        self.whose != Whose::Others
+    }
+
+    /// The `--columns` that say how it is read; empty of strapd's own.
+    #[must_use]
+    pub fn assumed(&self) -> &str {
+        &self.assumed
+    }
+
+    /// What its reader should know: what was taken for granted, what is not used.
+    #[must_use]
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    /// What to say where nobody says the unit of its rates.
+    #[must_use]
+    pub fn doubt_of_unit(&self) -> Option<String> {
+        let is_open = !self.is_own() && self.has(GYRO[0]) && self.declared.gyro_unit.is_none();
+        is_open.then(|| {
+            "the unit of the rates is not stated, and taken for rad/s: --gyro-unit deg, if it is deg/s"
+                .to_owned()
+        })
+    }
+
+    /// What its names say of its numbers.
+    #[must_use]
+    pub fn declared(&self) -> &Declared {
+        &self.declared
+    }
+
+    /// Whether anything says when its rows were measured.
+    #[must_use]
+    pub fn has_stamps(&self) -> bool {
+        self.clock != Clock::Nothing
+    }
+
+    /// Whether rows have a place for an orientation.
+    #[must_use]
+    pub fn has_orientation(&self) -> bool {
+        self.has(ORIENTATION[0]) || self.has(Column::Matrix(0))
+    }
+
+    pub(super) fn has(&self, column: Column) -> bool {
+        self.columns.iter().any(|(known, _)| *known == Some(column))
+    }
+
+    /// Reads one row, without or with its line end, and pushes its sample. The first row once more, as where tables were
+    /// put one behind the other, is no row, and neither is a comment; what stands under another first row is not of this
+    /// table. A row without `log_ns` was received at its stamp.
+    ///
+    /// # Errors
+    /// A row with more or fewer cells than columns, or a cell that is no number where there must be one.
+    pub fn decode(&mut self, line: &[u8], out: &mut Vec<RawSample>) -> Result<Line, Undecodable> {
+        if line.len() > MAX_LINE {
+            self.row += 1;
+            return Err(Undecodable::LongLine {
+                have: line.len() as u64,
+                limit: MAX_LINE as u64,
+            });
+        }
+        let row = self.delimiter.row(without_mark(line));
+        if row.first() == self.header.first() && row == self.header {
+            self.is_elsewhere = false;
+            return Ok(no_row("header"));
+        }
+        if self.whose == Whose::Others && is_comment(row) {
+            // What says another rate is the head of another table.
+            let other = |hz: f64| {
+                self.declared_period()
+                    .is_some_and(|p| (1e9 / hz - p).abs() > 1.0)
+            };
+            if layout::is_header(row, self.given.as_ref())
+                || preamble::rate(row).is_some_and(|rate| other(rate.hz))
+            {
+                self.is_elsewhere = true;
+            }
+            return Ok(no_row("comment"));
+        }
+        let read = if self.is_elsewhere {
+            Err(Undecodable::OtherTable)
+        } else {
+            self.cells(row).and_then(|read| self.line(read, out))
+        };
+        self.row += 1;
+        read.map_err(|why| self.explained(row, why))
+    }
+
+    fn declared_period(&self) -> Option<f64> {
+        match self.clock {
+            Clock::Counter { period, .. } | Clock::Rows { period } => Some(period),
+            _ => None,
+        }
+    }
+
+    /// What is no row because another table begins with it.
+    fn explained(&mut self, row: &[u8], why: Undecodable) -> Undecodable {
+        // In a header nothing is a number, which tells most rows at once.
+        let is_data = |cell: Cow<'_, [u8]>| {
+            let text = std::str::from_utf8(cell.trim_ascii()).unwrap_or_default();
+            text.parse::<f64>().is_ok()
+        };
+        let is_header = self.whose == Whose::Others
+            && !self.delimiter.cells(row).any(is_data)
+            && layout::is_header(row, self.given.as_ref());
+        if !is_header {
+            let (have, need) = (self.delimiter.cells(row).count(), self.columns.len());
+            // What stands in the wrong place is not the point then.
+            return match why {
+                Undecodable::Cell { .. } if have != need => Undecodable::Row {
+                    have: have as u64,
+                    need: need as u64,
+                },
+                why => why,
+            };
+        }
+        self.is_elsewhere = true;
+        Undecodable::OtherTable
+    }
+
+    fn cells(&mut self, row: &[u8]) -> Result<Read, Undecodable> {
+        let mut read = Read::default();
+        let mut have = 0;
+        let mut is_longer = false;
+        let commas = self.has_decimal_comma;
+        for (n, cell) in self.delimiter.cells(row).enumerate() {
+            let cell = cell.trim_ascii();
+            match self.columns.get(n) {
+                Some((Some(column), name)) => {
+                    read.take(*column, cell, commas, &mut self.clock)
+                        .map_err(|why| Undecodable::Cell {
+                            column: name.clone(),
+                            near: snippet(cell),
+                            why,
+                        })?;
+                }
+                Some((None, _)) => {}
+                // A delimiter at the end of every row.
+                None => is_longer |= !cell.is_empty() || self.is_own(),
+            }
+            have = n + 1;
+        }
+        let need = self.columns.len();
+        if have < need || is_longer {
+            return Err(Undecodable::Row {
+                have: have as u64,
+                need: need as u64,
+            });
+        }
+        Ok(read)
+    }
+
+    fn line(&self, read: Read, out: &mut Vec<RawSample>) -> Result<Line, Undecodable> {
+        // Before the sample: a row that is refused leaves none.
+        let id = read.id.as_deref().map(exact_name).transpose()?;
+        let scaled = |vector: Option<[f64; 3]>, by: f64| match by {
+            1.0 => vector,
+            _ => vector.map(|v| v.map(|value| value * by)),
+        };
+        let gyro = scaled(self.whole(read.gyro, Column::Gyro)?, self.scales.gyro);
+        let accel = scaled(self.whole(read.accel, Column::Accel)?, self.scales.accel);
+        let mag = scaled(self.whole(read.mag, Column::Mag)?, self.scales.mag);
+        let matrix = self.whole(read.matrix, Column::Matrix)?;
+        let orientation = self
+            .whole(read.orientation, Column::Orientation)?
+            .or_else(|| matrix.map(|rows| quaternion(&rows)));
+        let stamp = read.stamp.or_else(|| self.clock.of_row(self.row));
+        let log = read.log.or(stamp).unwrap_or_default();
+        // In tables of several sensors each has rows of its own.
+        let is_others = self.whose == Whose::Others
+            && gyro.is_none()
+            && (accel.is_some() || mag.is_some() || orientation.is_some());
+        out.push(RawSample {
+            header: stamp,
+            log,
+            publish: log,
+            gyro,
+            accel,
+            mag,
+            orientation,
+            interval_nanos: read.interval,
+            is_beside: is_others && orientation.is_none(),
+        });
+        let mut line = Line {
+            class: match self.whose {
+                Whose::OwnAttitudes => Class::Att,
+                Whose::Others if is_others => Class::None,
+                Whose::Own | Whose::Others => Class::Rate,
+            },
+            id,
+            sample_kind: read.kind.or(self.declared.sample_kind),
+            gyro_unit: match self.whose {
+                Whose::Others => self.declared.gyro_unit,
+                _ => gyro.map(|_| crate::decode::GyroUnit::Rad),
+            },
+            ..Line::default()
+        };
+        line.decoded.samples = 1;
+        Ok(line)
+    }
+
+    /// A vector of which all cells are filled, or none.
+    #[inline]
+    fn whole<const N: usize>(
+        &self,
+        found: [Option<f64>; N],
+        column: fn(usize) -> Column,
+    ) -> Result<Option<[f64; N]>, Undecodable> {
+        if found.iter().all(Option::is_none) {
+            return Ok(None);
+        }
+        let mut all = [0.0; N];
+        for (place, value) in all.iter_mut().zip(found) {
+            *place = value.unwrap_or(f64::NAN);
+        }
+        let Some(empty) = found.iter().position(Option::is_none) else {
+            return Ok(Some(all));
+        };
+        let is_it = |(known, _): &&(Option<Column>, String)| *known == Some(column(empty));
+        let name = self.columns.iter().find(is_it);
+        Err(Undecodable::Cell {
+            column: name.map(|(_, name)| name.clone()).unwrap_or_default(),
+            near: String::new(),
+            why: "is empty, but those beside it are not",
+        })
+    }
+}
+
+/// A line that holds no sample, and is none that was lost.
+fn no_row(what: &str) -> Line {
+    Line {
+        class: Class::Other(what.to_owned()),
+        ..Line::default()
+    }
+}
+
+pub(super) fn is_comment(row: &[u8]) -> bool {
+    row.starts_with(b"#") || row.starts_with(b"//") || row.starts_with(b"%")
+}
+
+/// A rotation matrix by rows as `[w, x, y, z]`; what is none stays not finite.
+fn quaternion(rows: &[f64; 9]) -> [f64; 4] {
+    let matrix = Matrix3::from_row_slice(rows);
+    let is_rotation = (matrix * matrix.transpose() - Matrix3::identity()).norm() < 0.01
+        && matrix.determinant() > 0.0;
+    if !is_rotation {
+        return [f64::NAN; 4];
+    }
+    let q = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix));
+    [q.w, q.i, q.j, q.k]
+}
+
+/// What a row holds.
+#[derive(Default)]
+struct Read {
+    stamp: Option<Nanos>,
+    log: Option<Nanos>,
+    interval: Option<i64>,
+    kind: Option<SampleKind>,
+    id: Option<String>,
+    gyro: [Option<f64>; 3],
+    accel: [Option<f64>; 3],
+    mag: [Option<f64>; 3],
+    orientation: [Option<f64>; 4],
+    matrix: [Option<f64>; 9],
+}
+
+impl Read {
+    #[inline]
+    fn take(
+        &mut self,
+        column: Column,
+        cell: &[u8],
+        commas: bool,
+        clock: &mut Clock,
+    ) -> Result<(), &'static str> {
+        if cell.is_empty() {
+            return Ok(());
+        }
+        let mut pointed = [0; MOST_DIGITS];
+        let cell = match commas && cell.contains(&b',') {
+            true => with_point(cell, &mut pointed).ok_or("is no number")?,
+            false => cell,
+        };
+        let text = std::str::from_utf8(cell).map_err(|_| "is not UTF-8")?;
+        let whole = || text.parse::<i64>().map_err(|_| "is no whole number");
+        let put = |place: Option<&mut Option<f64>>| {
+            let value = number(text)?;
+            if let Some(place) = place {
+                *place = Some(value);
+            }
+            Ok::<(), &'static str>(())
+        };
+        match column {
+            Column::Stamp if is_absent(text) => {}
+            Column::Stamp => self.stamp = Some(clock.read(text)?),
+            Column::Log => self.log = Some(Nanos(whole()?)),
+            Column::Interval => self.interval = Some(whole()?),
+            Column::Kind => {
+                let kind = SampleKind::named(text);
+                self.kind = Some(kind.ok_or("is none of rate, average, delta-angle")?);
+            }
+            Column::Id => self.id = Some(text.to_owned()),
+            Column::Gyro(axis) => put(self.gyro.get_mut(axis))?,
+            Column::Accel(axis) => put(self.accel.get_mut(axis))?,
+            Column::Mag(axis) => put(self.mag.get_mut(axis))?,
+            Column::Orientation(part) => put(self.orientation.get_mut(part))?,
+            Column::Matrix(part) => put(self.matrix.get_mut(part))?,
+        }
+        Ok(())
+    }
+}
+
+/// Digits of a number with a decimal comma.
+const MOST_DIGITS: usize = 64;
+
+/// The number with a point where it has its comma.
+fn with_point<'b>(cell: &[u8], buffer: &'b mut [u8; MOST_DIGITS]) -> Option<&'b [u8]> {
+    let out = buffer.get_mut(..cell.len())?;
+    for (to, from) in out.iter_mut().zip(cell) {
+        *to = if *from == b',' { b'.' } else { *from };
+    }
+    Some(out)
+}
+
+/// Words for a number that is not there. Of a vector it is one that is not finite: it is counted, not passed over.
+fn is_absent(text: &str) -> bool {
+    ["null", "-", "NA", "N/A", "n/a", "None"].contains(&text) || text.eq_ignore_ascii_case("nan")
+}
+
+#[inline]
+fn number(text: &str) -> Result<f64, &'static str> {
+    text.parse::<f64>().or_else(|_| match is_absent(text) {
+        true => Ok(f64::NAN),
+        false => Err("is no number"),
+    })
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests;
