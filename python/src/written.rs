@@ -166,11 +166,8 @@ fn record<'a>(bytes: &mut Bytes<'a>) -> Option<(u8, &'a [u8])> {
     Some((kind, body))
 }
 
-/// A covariance about the world's axes, as messages have it, about the body's; zeros there mean unknown.
+/// A covariance about the world's axes, as messages have it, about the body's.
 fn in_body(about_world: &[f64; 9], wxyz: [f64; 4]) -> [f64; 6] {
-    if about_world.iter().all(|v| *v == 0.0) {
-        return [f64::NAN; 6];
-    }
     let q: Quaternion<Nav, Body> = Quaternion::assume_unit(wxyz);
     let c_nb = *q.to_dcm().as_matrix();
     let p = c_nb.transpose() * Matrix3::from_row_slice(about_world) * c_nb;

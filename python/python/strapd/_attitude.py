@@ -71,8 +71,7 @@ class Attitude:
     @property
     def t_s(self) -> npt.NDArray[np.float64]:
         """Seconds since the first."""
-        secs: npt.NDArray[np.float64] = (self.t - self.t[:1]) * 1e-9
-        return secs
+        return (self.t - self.t[:1]).astype(np.float64) * np.float64(1e-9)
 
     @property
     def quat_xyzw(self) -> npt.NDArray[np.float64]:

@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 from typing import IO, TYPE_CHECKING, Any, Optional, Union
 
 import numpy as np
+import numpy.typing as npt
 
 from . import _strapd
 from ._attitude import Attitude
@@ -190,15 +191,23 @@ def replay(path: Path, *, strict: bool = False, **flags: Any) -> Union[Attitude,
         summary = json.loads(_text(out))
         if code == 3:
             told = re.findall(r"^ *WARN (.*)$", said, re.MULTILINE)
-            tell("\n".join(told) or f"{path}: samples were lost", strict)
+            tell("\n".join(told) or f"{path}: samples were lost", strict, depth=3)
         columns = reader.finish()
     found = {}
     for topic in summary["topics"]:
         facts = {**topic, "calibration": None, "file_problems": summary["file_problems"]}
-        found[topic["topic"]] = Attitude(columns[topic["output_topic"]], facts, has_status=False)
+        rows = columns[topic["output_topic"]]
+        unknown(rows["cov"], topic["final"]["sigma_deg"])
+        found[topic["topic"]] = Attitude(rows, facts, has_status=False)
     if flags.get("topic") == "all":
         return found
     return next(iter(found.values()))
+
+
+def unknown(covariance: npt.NDArray[np.float64], at_last: list[Optional[float]]) -> None:
+    """A message says zeros of a covariance that is not known. Where that came about, the last one is not known either."""
+    if None in at_last:
+        covariance[(covariance == 0.0).all(axis=1)] = np.nan
 
 
 def _widen(pipe: int) -> None:

@@ -79,13 +79,13 @@ def loss(summary: dict[str, Any]) -> Optional[str]:
     return "; ".join(said) or None
 
 
-def tell(what: Optional[str], strict: bool) -> None:
-    """Shouts what was lost, or raises it."""
+def tell(what: Optional[str], strict: bool, depth: int) -> None:
+    """Shouts what was lost, or raises it; who is told called so many functions ago."""
     if what is None:
         return
     if strict:
         raise Error(what, "loss")
-    warnings.warn(what, LossWarning, stacklevel=4)
+    warnings.warn(what, LossWarning, stacklevel=depth)
 
 
 def _run(
@@ -109,7 +109,7 @@ def _run(
         None if dt is None else _inputs.intervals(dt, n),
         _ready(settings),
     )
-    tell(loss(summary), strict)
+    tell(loss(summary), strict, depth=4)
     return Attitude(columns, summary)
 
 

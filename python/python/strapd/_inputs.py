@@ -62,7 +62,8 @@ def counted(rate_hz: float, first: int, n: int) -> Nanos:
     if (first + n) * (whole + 1) >= 2**63:
         raise ValueError(f"rate_hz: {n} samples at {rate_hz} Hz last longer than 292 years")
     i = np.arange(first, first + n, dtype=np.int64)
-    return i * whole + np.floor(i * (period - whole) + 0.5).astype(np.int64)
+    nanos: Nanos = i * whole + np.floor(i * (period - whole) + 0.5).astype(np.int64)
+    return nanos
 
 
 def stamps(t: Optional[npt.ArrayLike], rate_hz: Optional[float], n: int, first: int = 0) -> Nanos:
@@ -160,6 +161,7 @@ def calibration(known: Union[str, os.PathLike[str], dict[str, Any]]) -> dict[str
         raise ValueError("calibration: Python 3.11 reads such files\n  help: give a dict") from None
     try:
         with open(known, "rb") as file:
-            return tomllib.load(file)
+            found: dict[str, Any] = tomllib.load(file)
+            return found
     except (OSError, TypeError, tomllib.TOMLDecodeError) as why:
         raise ValueError(f"calibration: {known}: {why}") from None

@@ -1,11 +1,13 @@
-from typing import Any, Optional
+from typing import Any, Optional, final
 
 import numpy as np
 import numpy.typing as npt
-from typing_extensions import Self
+from typing_extensions import Self, disjoint_base
 
 _Floats = npt.NDArray[np.float64]
 _Nanos = npt.NDArray[np.int64]
+
+__all__ = ["Live", "Written", "__version__", "check_settings", "compare", "estimate"]
 
 __version__: str
 
@@ -32,6 +34,7 @@ def compare(
 ) -> dict[str, Any]: ...
 def check_settings(settings: dict[str, Any]) -> None: ...
 
+@disjoint_base
 class Live:
     def __new__(cls, settings: dict[str, Any], rate_hz: Optional[float] = None, /) -> Self: ...
     def push_one(
@@ -46,6 +49,8 @@ class Live:
     @property
     def taken(self) -> int: ...
 
+@final
+@disjoint_base
 class Written:
     def __new__(cls) -> Self: ...
     def push(self, piece: bytes) -> None: ...
