@@ -63,6 +63,8 @@ def test_a_bad_sample_has_no_attitude_and_is_counted() -> None:
     assert est.push_one([0, 0, float("nan")], t=1.01) is None
     assert est.push_one([0, 0, 0.1], t=1.02) is not None
     assert est.push_one([0, 0, 0.1], t=1.005) is None, "late"
+    # Whether the clock has jumped back shows the next.
+    assert est.push_one([0, 0, 0.1], t=1.03) is not None
     assert est.summary["samples"]["by_verdict"]["not_finite"] == 1 and est.summary["samples"]["lost"] == 2
 
 
