@@ -9,6 +9,7 @@ processor time of this process and its children (kernel included), a sample, the
 
 import argparse
 import os
+import resource
 import statistics
 import subprocess
 import sys
@@ -19,8 +20,8 @@ import strapd
 
 
 def cpu():
-    spent = os.times()
-    return spent.user + spent.system + spent.children_user + spent.children_system
+    spent = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    return sum(one.ru_utime + one.ru_stime for one in spent)
 
 
 def samples(n, rate_hz=1000.0):
@@ -90,9 +91,9 @@ def jobs(n):
 
         def fused():
             fusion = imufusion.Ahrs()
-            update = fusion.update_no_magnetometer
+            fusion.set_sample_period(0.001)
             for rate, force in zip(degrees, g):
-                update(rate, force, 0.001)
+                fusion.update_no_magnetometer(rate, force)
 
         all_jobs.append(("imufusion loop, 6D", n // 10, fused))
     except ImportError:
