@@ -42,17 +42,3 @@ pub fn in_python(what: &str) -> String {
     }
     out + rest
 }
-
-#[cfg(test)]
-mod tests {
-    use super::in_python;
-
-    #[test]
-    fn flags_become_arguments_and_nothing_else_changes() {
-        assert_eq!(
-            in_python("--max-gap: too long\n  help: --sample-kind average -- or --bias x,y,z"),
-            "max_gap: too long\n  help: kind average -- or bias x,y,z"
-        );
-        assert_eq!(in_python("a minus -1 -- b --"), "a minus -1 -- b --");
-    }
-}

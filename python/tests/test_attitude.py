@@ -93,6 +93,20 @@ def test_zeros_of_the_command_are_unknown_where_the_end_is() -> None:
     assert np.isnan(cov[[0, 2]]).all() and (cov[1] == 1.0).all()
 
 
+def test_sigma_is_judged_alike_in_every_world() -> None:
+    found = []
+    for world in ("enu", "ned"):
+        est = strapd.estimate(GYR, ACC, t=T, world=world)
+        # x and y hang together: to the FRD body of NED the sign changes, as that of the error about y does.
+        est._cov[:] = [4e-4, 1.9e-4, 0, 1e-4, 0, 1e-4]
+        if world == "ned":
+            est._cov[:] *= [1, -1, -1, 1, 1, 1]
+        truth = (est.rotation() * Rotation.from_rotvec([0.01, 0.02 if world == "enu" else -0.02, 0.0])).as_quat()[:, [3, 0, 1, 2]]
+        found.append(strapd.compare(est, (est.t, truth), align="none", world=world)["sigma"]["tilt"])
+    assert found[0] == pytest.approx(found[1], rel=1e-6)
+    assert found[0]["sigma_rms_deg"] > 0
+
+
 def test_comparisons_take_pairs_and_say_what_is_missing() -> None:
     found = strapd.compare(ATT, (ATT.t, ATT.q), align="none")
     assert found["samples"] == 500 and found["total"]["max_deg"] < 1e-13

@@ -77,14 +77,24 @@ def test_values_become_flags() -> None:
     words = _command.arguments(
         {
             "kind": "average", "bias": (0.1, -2, 1e-20), "init": np.array([1.0, 0, 0, 0]), "regularise_stamps": True,
-            "ignore_covariance_flag": False, "topic": None, "max_gap": np.float64(0.1), "window": 4,
+            "ignore_covariance_flag": False, "topic": None, "max_gap": np.float64(0.1), "window": 4, "declination": 1 / 3,
             "noise": {"arw": 1e-4, "turn_on_bias": (1, 2, 3)}, "field": ["gyro=a.b", "stamp=c"],
         }
     )  # fmt: skip
     assert words == [
         "--sample-kind=average", "--bias=0.1,-2.0,1e-20", "--init=q=1.0,0.0,0.0,0.0", "--regularise-stamps", "--max-gap=0.1",
-        "--window=4", "--noise=arw=0.0001,turn-on-bias=1.0/2.0/3.0", "--field=gyro=a.b", "--field=stamp=c",
+        "--window=4", "--declination=0.3333333333333333", "--noise=arw=0.0001,turn-on-bias=1.0/2.0/3.0", "--field=gyro=a.b", "--field=stamp=c",
     ]  # fmt: skip
+
+
+def test_the_librarys_words_name_arguments_too() -> None:
+    """Both halves turn flags into arguments, and leave dashes that are none."""
+    gyr = np.zeros((600, 3))
+    with pytest.raises(strapd.Error) as error:
+        strapd.integrate(gyr, rate_hz=100, init="first-orientation")
+    said = str(error.value)
+    assert said.startswith("init first-orientation: the first samples carry no orientation") and "help: init gravity" in said
+    assert _command._in_python("--max-gap: a -- b, --sample-kind average, -1") == "max_gap: a -- b, sample_kind average, -1"
 
 
 def test_several_topics_come_by_name() -> None:

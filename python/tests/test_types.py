@@ -24,6 +24,7 @@ if told is not None:
     stamp: int = told[0]
 strapd.estimate(np.zeros((2, 3)), t=[0, 1], world="moon")  # type: ignore[arg-type]
 strapd.estimate(np.zeros((2, 3)), t=[0, 1], colour=1)  # type: ignore[call-arg]
+log: strapd.Log = strapd.open("a.mcap")
 reveal_type(att.q)
 """
 

@@ -9,7 +9,10 @@ Quaternions are w, x, y, z and take **body to world**; the documentation is ``do
 """
 
 from ._attitude import STATUS_BITS, Attitude
-from ._command import Finding, Log, check, open, replay
+from ._command import Finding, Log, check, replay
+
+# Not in __all__: `from strapd import *` is to leave Python's own alone.
+from ._command import open as open  # noqa: A004
 from ._compare import compare
 from ._errors import Error, LossWarning, ResolutionWarning
 from ._estimation import Estimator, Settings, estimate, integrate
@@ -30,6 +33,5 @@ __all__ = [
     "compare",
     "estimate",
     "integrate",
-    "open",
     "replay",
 ]

@@ -12,12 +12,8 @@ class Error(RuntimeError):
     """
 
     def __init__(self, message: str, kind: str = "failed") -> None:
-        # Both are arguments, so that it can be pickled.
-        super().__init__(message, kind)
+        super().__init__(message)
         self.kind = kind
-
-    def __str__(self) -> str:
-        return str(self.args[0])
 
 
 class LossWarning(UserWarning):
