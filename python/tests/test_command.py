@@ -6,6 +6,8 @@ import os
 import pathlib
 import shutil
 import stat
+import sysconfig
+import tempfile
 
 import numpy as np
 import pytest
@@ -112,7 +114,7 @@ def test_without_the_command_it_says_what_is_missing(monkeypatch: pytest.MonkeyP
     assert error.value.kind == "command"
     monkeypatch.delenv("STRAPD_BIN")
     monkeypatch.setenv("PATH", str(tmp_path))
-    monkeypatch.setattr(_command.sysconfig, "get_path", lambda *_: str(tmp_path))
+    monkeypatch.setattr(sysconfig, "get_path", lambda *_: str(tmp_path))
     monkeypatch.setattr(_command.sys, "executable", str(tmp_path / "python"))
     with pytest.raises(strapd.Error, match="not in STRAPD_BIN, beside this Python or on PATH") as error:
         strapd.check(FIXTURES / "coning.mcap")
@@ -138,7 +140,7 @@ def test_a_command_that_fails_is_an_error_and_leaves_nothing(
     program.chmod(program.stat().st_mode | stat.S_IXUSR)
     monkeypatch.setenv("STRAPD_BIN", str(program))
     monkeypatch.setenv("TMPDIR", str(tmp_path))
-    monkeypatch.setattr(_command.tempfile, "tempdir", None)
+    monkeypatch.setattr(tempfile, "tempdir", None)
     descriptors = set(os.listdir("/proc/self/fd"))
     with pytest.raises(strapd.Error, match=said) as error:
         strapd.replay(FIXTURES / "coning.mcap")

@@ -120,5 +120,5 @@ def test_importing_costs_little_beyond_numpy() -> None:
 
 
 def test_scipy_and_pandas_are_not_imported() -> None:
-    code = "import strapd, sys; print([m for m in ('scipy', 'pandas', 'polars', 'typing_extensions') if m in sys.modules])"
+    code = "import strapd, sys; print([m for m in ('scipy', 'pandas', 'polars', 'typing_extensions', 'subprocess') if m in sys.modules])"
     assert subprocess.check_output([sys.executable, "-c", code], text=True) == "[]\n"

@@ -10,13 +10,8 @@ import contextlib
 import json
 import os
 import re
-import shutil
-import subprocess
 import sys
-import sysconfig
-import tempfile
-from dataclasses import dataclass, field
-from typing import IO, TYPE_CHECKING, Any, Optional, Union
+from typing import IO, TYPE_CHECKING, Any, NamedTuple, Optional, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -27,6 +22,7 @@ from ._errors import Error
 from ._estimation import tell
 
 if TYPE_CHECKING:
+    import subprocess
     from collections.abc import Iterator
 
 Path = Union[str, "os.PathLike[str]"]
@@ -44,6 +40,10 @@ FLAGS = frozenset(
 
 def command() -> str:
     """Where the command is: ``STRAPD_BIN``, else beside this Python, else on ``PATH``."""
+    # Here and below: who has arrays alone does not wait for what starts programs.
+    import shutil
+    import sysconfig
+
     named = os.environ.get("STRAPD_BIN")
     if named:
         if os.path.isfile(named) and os.access(named, os.X_OK):
@@ -131,6 +131,8 @@ def _failure(code: int, said: str) -> Exception:
 @contextlib.contextmanager
 def _running(words: list[str], out: IO[bytes], err: IO[bytes], keep: tuple[int, ...] = ()) -> Iterator[subprocess.Popen[bytes]]:
     """The command, which is gone at the end whatever happens."""
+    import subprocess
+
     program = subprocess.Popen(
         [command(), *words], stdin=subprocess.DEVNULL, stdout=out, stderr=err, pass_fds=keep, close_fds=True
     )
@@ -149,6 +151,8 @@ def _text(file: IO[bytes]) -> str:
 
 def _asked(words: list[str], fine: tuple[int, ...] = (0, 3)) -> tuple[Any, str]:
     """What the command answers in JSON, and what it says beside."""
+    import tempfile
+
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
         with _running([*words, "--json", "--quiet"], out, err) as program:
             code = program.wait()
@@ -166,6 +170,8 @@ def replay(path: Path, *, strict: bool = False, **flags: Any) -> Union[Attitude,
     :raises ValueError: an argument that can not be.
     :raises Error: the log can not be read; the message is the command's.
     """
+    import tempfile
+
     words = ["replay", _path(path), *arguments(flags), "--compression=none", "--json", "--quiet"]
     with contextlib.ExitStack() as stack:
         out, err = (stack.enter_context(tempfile.TemporaryFile()) for _ in range(2))
@@ -218,8 +224,7 @@ def _widen(pipe: int) -> None:
         fcntl.fcntl(pipe, fcntl.F_SETPIPE_SZ, PIECE)
 
 
-@dataclass(frozen=True)
-class Finding:
+class Finding(NamedTuple):
     """Something that may spoil the attitude."""
 
     #: Its name, for programs.
@@ -235,7 +240,7 @@ class Finding:
     #: Arguments of the command that help.
     flags: str
     #: The numbers behind it.
-    evidence: dict[str, Any] = field(default_factory=dict)
+    evidence: dict[str, Any]
 
     def __str__(self) -> str:
         flags = f" ({self.flags})" if self.flags else ""
