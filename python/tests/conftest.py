@@ -15,7 +15,8 @@ FIXTURES = REPOSITORY / "fixtures"
 SHARED = REPOSITORY.parent / "shared"
 
 #: What the environment would add to the command line.
-for name in [name for name in os.environ if name.startswith("STRAPD_") and name != "STRAPD_BIN"]:
+OURS = ("STRAPD_BIN", "STRAPD_EXAMPLES", "STRAPD_ALL_TRIALS")
+for name in [name for name in os.environ if name.startswith("STRAPD_") and name not in OURS]:
     del os.environ[name]
 
 
