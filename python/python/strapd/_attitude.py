@@ -1,0 +1,208 @@
+"""An attitude over time, as numpy arrays."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Optional, Union
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    import pandas
+    import polars
+    from scipy.spatial.transform import Rotation
+
+#: Names of the bits of ``status``.
+STATUS_BITS = {
+    "bridged": 1 << 0,
+    "held": 1 << 1,
+    "reset": 1 << 2,
+    "rejected-before": 1 << 3,
+    "reordered": 1 << 4,
+    "saturated": 1 << 5,
+    "undersampled": 1 << 6,
+    "provisional": 1 << 7,
+    "restamped": 1 << 8,
+    "restarted": 1 << 9,
+    "last": 1 << 10,
+    "aided": 1 << 11,
+    "rest": 1 << 12,
+    "levelled": 1 << 13,
+}
+
+
+class Attitude:
+    """Attitudes at n instants: arrays over memory of the compiled half, none copied on the way.
+
+    ``t``, ``t_ns``
+        int64 (n,), nanoseconds of the clock that the stamps were of.
+    ``q``
+        float64 (n, 4): **w, x, y, z**, body to world, unit norm, sign continuous.
+    ``rate``
+        float64 (n, 3): rad/s about the body axes, what was known of the bias removed.
+    ``status``, ``reset``
+        uint16 and uint32 (n,): what was noticed (``flags``), and how often the attitude was held or reset so far. ``None`` where it came
+        through the command, which does not hand them over.
+    ``summary``
+        dict: counts, gaps, method, what was learned; the names are those of ``strapd replay --json``.
+    """
+
+    t: npt.NDArray[np.int64]
+    q: npt.NDArray[np.float64]
+    rate: npt.NDArray[np.float64]
+    status: Optional[npt.NDArray[np.uint16]]
+    reset: Optional[npt.NDArray[np.uint32]]
+    summary: dict[str, Any]
+
+    def __init__(self, columns: dict[str, Any], summary: dict[str, Any], has_status: bool = True) -> None:
+        self.t = columns["t"]
+        self.q = columns["q"]
+        self.rate = columns["rate"]
+        self._cov: npt.NDArray[np.float64] = columns["cov"]
+        self.status = columns["status"] if has_status else None
+        self.reset = columns["reset"] if has_status else None
+        self.summary = summary
+
+    @property
+    def t_ns(self) -> npt.NDArray[np.int64]:
+        """The same as ``t``."""
+        return self.t
+
+    @property
+    def t_s(self) -> npt.NDArray[np.float64]:
+        """Seconds since the first."""
+        return (self.t - self.t[:1]).astype(np.float64) * np.float64(1e-9)
+
+    @property
+    def quat_xyzw(self) -> npt.NDArray[np.float64]:
+        """x, y, z, w, as SciPy before 1.14 and ROS have it (a copy)."""
+        return self.q[:, [1, 2, 3, 0]]
+
+    @property
+    def sigma(self) -> npt.NDArray[np.float64]:
+        """(n, 3): one standard deviation about each body axis, rad; NaN where it is not known."""
+        return np.sqrt(self._cov[:, [0, 3, 5]])
+
+    @property
+    def covariance(self) -> npt.NDArray[np.float64]:
+        """(n, 3, 3): of the error as a rotation vector in body axes, rad^2."""
+        return self._cov[:, [0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(-1, 3, 3)
+
+    @property
+    def world(self) -> str:
+        """Axes of the world: start, level, enu, ned, nwu."""
+        return str(self.summary["world"])
+
+    @property
+    def body(self) -> str:
+        """Axes of the body: flu, or frd where the world is ned."""
+        return str(self.summary["body"])
+
+    @property
+    def lost(self) -> int:
+        """Samples that were lost; ``summary["samples"]["by_verdict"]`` says why."""
+        return int(self.summary["samples"]["lost"])
+
+    @property
+    def gaps(self) -> dict[str, Any]:
+        """Gaps: bridged, held, resets, total_s, not_integrated_s, longest_s."""
+        gaps: dict[str, Any] = self.summary["gaps"]
+        return gaps
+
+    @property
+    def warnings(self) -> list[str]:
+        """Things to know."""
+        return list(self.summary["warnings"])
+
+    @property
+    def bias(self) -> npt.NDArray[np.float64]:
+        """(3,): the gyro's bias at the end, rad/s about the body axes: what was removed beforehand and what was learned."""
+        before = self.summary["bias_rad_s"]
+        bias = np.array([before["x"], before["y"], before["z"]])
+        aid = self.summary["aid"]
+        return bias if aid is None else bias + aid["learned"]["gyro_bias_rad_s"]
+
+    @property
+    def bias_sigma(self) -> Optional[npt.NDArray[np.float64]]:
+        """(3,): one standard deviation of it; ``None`` where nothing was learned and the command does not say."""
+        aid = self.summary["aid"]
+        if aid is not None:
+            return np.array(aid["sigma"]["gyro_bias_rad_s"])
+        sigma = self.summary.get("bias_sigma_rad_s")
+        return None if sigma is None else np.array(sigma)
+
+    @property
+    def calibration(self) -> Optional[dict[str, Any]]:
+        """What is known of the sensor after the run, for ``calibration=`` of the next (``docs/calibration.md``)."""
+        known: Optional[dict[str, Any]] = self.summary.get("calibration")
+        return known
+
+    def flags(self, name: str) -> npt.NDArray[np.bool_]:
+        """(n,): where the status has this bit (``STATUS_BITS``)."""
+        if self.status is None:
+            raise ValueError("flags: the command hands over no status\n  help: summary has the counts")
+        if name not in STATUS_BITS:
+            raise ValueError(f"name: there is no status {name!r}\n  help: one of {', '.join(STATUS_BITS)}")
+        found: npt.NDArray[np.bool_] = (self.status & STATUS_BITS[name]) != 0
+        return found
+
+    def rotation(self) -> Rotation:
+        """As SciPy's ``Rotation``: ``rotation().apply(v_body)`` is v in world axes."""
+        from scipy.spatial.transform import Rotation
+
+        rotation: Rotation = Rotation.from_quat(self.quat_xyzw)
+        return rotation
+
+    def euler(self, seq: str = "ZYX", degrees: bool = False) -> npt.NDArray[np.float64]:
+        """Angles by SciPy; ``ZYX`` is yaw, pitch, roll."""
+        angles: npt.NDArray[np.float64] = self.rotation().as_euler(seq, degrees=degrees)
+        return angles
+
+    def to_dict(self) -> dict[str, npt.NDArray[Any]]:
+        """Columns of one dimension by name, for pandas, polars and the like."""
+        sigma = self.sigma
+        columns: dict[str, npt.NDArray[Any]] = {"t_ns": self.t}
+        columns.update({f"q{axis}": self.q[:, i] for i, axis in enumerate("wxyz")})
+        columns.update({f"w{axis}": self.rate[:, i] for i, axis in enumerate("xyz")})
+        columns.update({f"sigma_{axis}": sigma[:, i] for i, axis in enumerate("xyz")})
+        if self.status is not None and self.reset is not None:
+            columns.update(status=self.status, reset=self.reset)
+        return columns
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A table of :meth:`to_dict`."""
+        import pandas
+
+        return pandas.DataFrame(self.to_dict())
+
+    def to_polars(self) -> polars.DataFrame:
+        """A table of :meth:`to_dict`."""
+        import polars
+
+        return polars.DataFrame(self.to_dict())
+
+    def __len__(self) -> int:
+        return int(self.t.shape[0])
+
+    def __getitem__(self, part: Union[slice, npt.NDArray[Any]]) -> Attitude:
+        """Some of the attitudes, by a slice (no copy), a mask or indices; the summary stays that of the run."""
+        if isinstance(part, (int, np.integer)):
+            raise TypeError("a slice, a mask or indices; att.q[i] is one quaternion")
+        columns: dict[str, Any] = {"t": self.t[part], "q": self.q[part], "rate": self.rate[part], "cov": self._cov[part]}
+        if self.status is not None and self.reset is not None:
+            columns.update(status=self.status[part], reset=self.reset[part])
+        return Attitude(columns, self.summary, has_status=self.status is not None)
+
+    def __repr__(self) -> str:
+        n = len(self)
+        if n == 0:
+            return "<strapd.Attitude: none>"
+        secs = (int(self.t[-1]) - int(self.t[0])) * 1e-9
+        w, x, y, z = self.q[-1]
+        aid = self.summary["aid"]
+        by = "gyro alone" if aid is None else aid["by"]
+        lost = f", lost {self.lost} of {self.summary['samples']['total']} samples" if self.lost else ""
+        return (
+            f"<strapd.Attitude: {n} over {secs:.3f} s, {by}, world {self.world}, body {self.body}{lost}; "
+            f"at last q w {w:.6f} x {x:.6f} y {y:.6f} z {z:.6f}>"
+        )

@@ -1,0 +1,24 @@
+"""What can go wrong, beside ``ValueError`` for an argument that can not be."""
+
+from __future__ import annotations
+
+
+class Error(RuntimeError):
+    """A run that could not be carried out.
+
+    ``kind`` says which, for programs: ``refused`` (these samples do not allow it), ``loss`` (samples were lost, and
+    ``strict`` was asked for), ``no_match``, ``closed``, ``command`` (the command ``strapd`` is not here), ``failed``
+    (the command said why), ``killed``, ``protocol``.
+    """
+
+    def __init__(self, message: str, kind: str = "failed") -> None:
+        super().__init__(message)
+        self.kind = kind
+
+
+class LossWarning(UserWarning):
+    """Done, but samples were lost: the attitude was carried across them."""
+
+
+class ResolutionWarning(UserWarning):
+    """Float seconds that are too large to tell samples apart well."""

@@ -1,0 +1,70 @@
+//! Attitudes -> columns -> numpy arrays over their memory. Pure but for Python's objects.
+//!
+//! Columns, because numpy wants one array a quantity; each number is written once, and its memory handed to numpy.
+
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use strapd_attitude::record::AttitudeSample;
+
+/// Attitudes, a column a quantity.
+#[derive(Debug, Default)]
+pub struct Columns {
+    /// Stamps, ns.
+    pub t: Vec<i64>,
+    /// w, x, y, z of each.
+    pub q: Vec<f64>,
+    /// Rate about body axes, rad/s.
+    pub rate: Vec<f64>,
+    /// Upper triangle of the covariance, body axes, rad^2: xx, xy, xz, yy, yz, zz.
+    pub cov: Vec<f64>,
+    /// Bits of the status.
+    pub status: Vec<u16>,
+    /// Resets and holds so far.
+    pub reset: Vec<u32>,
+}
+
+impl Columns {
+    /// With room for so many.
+    pub fn with_room(n: usize) -> Columns {
+        Columns {
+            t: Vec::with_capacity(n),
+            q: Vec::with_capacity(4 * n),
+            rate: Vec::with_capacity(3 * n),
+            cov: Vec::with_capacity(6 * n),
+            status: Vec::with_capacity(n),
+            reset: Vec::with_capacity(n),
+        }
+    }
+
+    /// Appends attitudes.
+    pub fn extend(&mut self, samples: &[AttitudeSample]) {
+        for sample in samples {
+            self.t.push(sample.stamp.0);
+            self.q.extend_from_slice(&sample.q_nb.wxyz());
+            self.rate.extend_from_slice(sample.rate.as_slice());
+            self.cov.extend_from_slice(&sample.covariance.upper());
+            self.status.push(sample.status.0);
+            self.reset.push(sample.reset_count);
+        }
+    }
+
+    /// As numpy arrays; the memory is theirs from here on.
+    pub fn into_dict(self, py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
+        let dict = PyDict::new(py);
+        dict.set_item("t", self.t.into_pyarray(py))?;
+        dict.set_item("q", rows(py, self.q, 4)?)?;
+        dict.set_item("rate", rows(py, self.rate, 3)?)?;
+        dict.set_item("cov", rows(py, self.cov, 6)?)?;
+        dict.set_item("status", self.status.into_pyarray(py))?;
+        dict.set_item("reset", self.reset.into_pyarray(py))?;
+        Ok(dict)
+    }
+}
+
+/// A flat vector as rows of `width`.
+fn rows(py: Python<'_>, flat: Vec<f64>, width: usize) -> PyResult<Bound<'_, PyArray2<f64>>> {
+    let n = flat.len() / width;
+    let array: Bound<'_, PyArray1<f64>> = flat.into_pyarray(py);
+    array.reshape([n, width])
+}

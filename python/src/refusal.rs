@@ -1,0 +1,44 @@
+//! What can not be done -> the exception that says so. Pure but for the classes, which are Python's.
+
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+/// An argument that can not be: `ValueError`, which names it.
+pub fn argument(what: impl Into<String>) -> PyErr {
+    PyValueError::new_err(in_python(&what.into()))
+}
+
+/// A run that can not be carried out: `strapd.Error` of this kind.
+pub fn run(py: Python<'_>, kind: &str, what: &str) -> PyErr {
+    let error = py
+        .import("strapd._errors")
+        .and_then(|errors| errors.getattr("Error"))
+        .and_then(|class| class.call1((in_python(what), kind)));
+    error.map_or_else(|failure| failure, PyErr::from_value)
+}
+
+/// The library names the flags of the command; in Python they are arguments: `--max-gap` is `max_gap`.
+pub fn in_python(what: &str) -> String {
+    let mut out = String::with_capacity(what.len());
+    let mut rest = what;
+    while let Some(at) = rest.find("--") {
+        let (before, flag) = (&rest[..at], &rest[at + 2..]);
+        out.push_str(before);
+        let end = flag
+            .find(|c: char| !c.is_ascii_lowercase() && c != '-')
+            .unwrap_or(flag.len());
+        let name = flag[..end].trim_end_matches('-');
+        if name.is_empty() {
+            out.push_str("--");
+            rest = flag;
+            continue;
+        }
+        match name {
+            "sample-kind" => out.push_str("kind"),
+            "time" => out.push('t'),
+            other => out.push_str(&other.replace('-', "_")),
+        }
+        rest = &flag[name.len()..];
+    }
+    out + rest
+}

@@ -1,0 +1,85 @@
+"""Samples as they come."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import strapd
+from conftest import turning
+
+T, GYR, ACC = turning(300)
+T += 10**9
+
+
+def test_every_sample_has_its_attitude_at_once() -> None:
+    est = strapd.Estimator()
+    assert est.last is None and est.summary == {} and est.taken == 0
+    told = [est.push_one(gyr, acc, t=t) for t, gyr, acc in zip(T.tolist(), GYR.tolist(), ACC.tolist())]
+    assert [t for t, _ in told] == T.tolist() and est.taken == 300
+    assert est.last is not None and tuple(est.last.q[0]) == told[-1][1]
+    assert est.summary["samples"]["used"] == 300 and est.summary["aid"]["by"] == "gravity"
+
+
+def test_samples_are_counted_where_a_rate_is_given() -> None:
+    one, rows = strapd.Estimator(rate_hz=300.0), strapd.Estimator(rate_hz=300.0)
+    # Loggers write 0 for no stamp: a first one is believed when the second has come.
+    assert one.push_one(GYR[0]) is None
+    told = [one.push_one(gyr) for gyr in GYR[1:].tolist()]
+    found = [rows.push(GYR[:100]), rows.push(GYR[100:])]
+    assert found[0].t[0] == 0 and len(found[0]) == 100
+    assert [0] + [t for t, _ in told] == np.concatenate([part.t for part in found]).tolist()
+    assert told[-1][1] == tuple(found[-1].q[-1])
+    with pytest.raises(ValueError, match="t: the estimator was made with rate_hz"):
+        one.push_one(GYR[0], t=0)
+
+
+def test_what_is_no_sample_is_refused_by_name() -> None:
+    est = strapd.Estimator()
+    for said, arguments in [
+        ("gyr: three numbers", ([1, 2],)),
+        ("gyr: three numbers", ("abc",)),
+        ("acc: three numbers", ([1, 2, 3], 5)),
+        ("mag: three numbers", ([1, 2, 3], None, [None] * 3)),
+        ("t: integer nanoseconds or float seconds", ([1, 2, 3], None, None, "now")),
+        ("t: inf s is no time", ([1, 2, 3], None, None, float("inf"))),
+        ("t: 1700000000000000000 s is no time", ([1, 2, 3], None, None, 1.7e18)),
+        ("t: needed, unless", ([1, 2, 3],)),
+    ]:
+        with pytest.raises(ValueError, match=said):
+            est.push_one(*arguments)
+    with pytest.raises(ValueError, match="gyr: of shape"):
+        est.push(GYR.T, t=T)
+    with pytest.raises(ValueError, match="t: needed"):
+        est.push(GYR)
+    with pytest.raises(ValueError, match="rate_hz: -1 is no sample rate"):
+        strapd.Estimator(rate_hz=-1)
+    with pytest.raises(TypeError, match="there is no setting"):
+        strapd.Estimator(colour=1)
+
+
+def test_a_bad_sample_has_no_attitude_and_is_counted() -> None:
+    est = strapd.Estimator()
+    assert est.push_one([0, 0, 0.1], t=1.0) is not None
+    assert est.push_one([0, 0, float("nan")], t=1.01) is None
+    assert est.push_one([0, 0, 0.1], t=1.02) is not None
+    assert est.push_one([0, 0, 0.1], t=1.005) is None, "late"
+    # Whether the clock has jumped back shows the next.
+    assert est.push_one([0, 0, 0.1], t=1.03) is not None
+    assert est.summary["samples"]["by_verdict"]["not_finite"] == 1 and est.summary["samples"]["lost"] == 2
+
+
+def test_a_gyro_alone_can_not_find_its_bias_live() -> None:
+    with pytest.raises(strapd.Error, match="bias auto") as error:
+        strapd.Estimator(bias="auto").push_one(GYR[0], t=0)
+    assert error.value.kind == "refused"
+
+
+def test_a_finished_estimator_is_closed() -> None:
+    est = strapd.Estimator()
+    est.push(GYR, ACC, t=T)
+    est.finish()
+    for use in (est.finish, lambda: est.push_one(GYR[0], t=0), lambda: est.push(GYR, t=T)):
+        with pytest.raises(strapd.Error, match="finished") as error:
+            use()
+        assert error.value.kind == "closed"
+    assert len(strapd.Estimator().finish()) == 0
