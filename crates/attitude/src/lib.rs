@@ -3,7 +3,7 @@
 //! The modules are the flow, each on those before it:
 //!
 //! ```text
-//! frames -> quaternion -> worlds -> record -> condition -> propagate -> aid
+//! frames -> quaternion -> worlds -> record -> condition -> propagate -> aid -> smooth
 //!                                   noise, compare: beside it
 //! ```
 //!
@@ -16,8 +16,8 @@
 //! | [`condition`] | raw samples -> SI, body axes, in order, finite |
 //! | [`propagate`] | rates -> attitude: the hot loop |
 //! | [`aid`] | specific force, field -> corrections of attitude and sensor |
-//! | [`estimate`] | all of these in one: what is asked for and the first samples -> an estimator -> attitude |
 //! | [`smooth`] | a whole recording -> the best attitudes it can give, and its sensor |
+//! | [`estimate`] | all of these in one: what is asked for and the first samples -> an estimator -> attitude |
 //! | [`noise`] | what a sensor adds: measured, and put in on purpose |
 //! | [`compare`] | two attitudes -> how far apart |
 //!
