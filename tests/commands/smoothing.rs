@@ -44,6 +44,22 @@ fn it_is_nearer_to_the_truth_than_the_filter_and_says_what_it_learned() {
 }
 
 #[test]
+fn where_it_leads_nowhere_the_attitude_is_the_filters_to_the_bit() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    // It never rests, and goes farther than the smoother believes of what never rests.
+    strapd(
+        dir,
+        "simulate car --noise consumer --rate-hz 100 --duration 120 --seed 1 -o car.mcap -q",
+    )
+    .done();
+    let filter = strapd(dir, "replay car.mcap --aid gravity -o - -q");
+    let smooth = strapd(dir, "replay car.mcap --aid gravity --smooth -o -");
+    assert!(smooth.err.contains("NOT CONVERGED"), "{}", smooth.err);
+    assert!(filter.done().out == smooth.done().out);
+}
+
+#[test]
 fn neither_threads_nor_a_pipe_change_a_byte() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();

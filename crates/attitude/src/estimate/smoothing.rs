@@ -7,9 +7,7 @@ use crate::aid::{Aided, Beside};
 use crate::frames::{Body, Nav};
 use crate::propagate::Executor;
 use crate::quaternion::{Quaternion, RotationVector};
-use crate::record::{
-    AttitudeCovariance, AttitudeSample, Join, Nanos, RateSample, SampleKind, Status,
-};
+use crate::record::{AttitudeCovariance, AttitudeSample, Nanos, RateSample, SampleKind, Status};
 use crate::smooth::{
     Estimate, FieldUnit, Outcome, Sample, SampleModel, Samples, Settings, SmoothError, Smoothed,
     smooth,
@@ -273,13 +271,17 @@ impl Smoothing {
                 return;
             }
         };
-        self.along = Vec::new();
-        self.write(&smoothed, out);
+        if matches!(smoothed.outcome(), Outcome::Filter(_)) {
+            // As it is without a smoother, to the bit: nothing that runs along for the smoother's sake is better.
+            out.append(&mut self.along);
+        } else {
+            self.along = Vec::new();
+            self.write(&smoothed, out);
+        }
         self.smoothed = Some(smoothed);
     }
 
     fn write(&self, smoothed: &Smoothed, out: &mut Vec<AttitudeSample>) {
-        let is_filter = matches!(smoothed.outcome(), Outcome::Filter(_));
         let mut rates = self.kept.rates.iter();
         let mut turn: Option<Quaternion<Nav, Nav>> = None;
         let (mut section, mut last): (usize, Option<Quaternion<Nav, Body>>) = (0, None);
@@ -293,9 +295,6 @@ impl Smoothing {
                 if estimate.section > section {
                     section = estimate.section;
                     status = status.with(Status::RESET);
-                }
-                if is_filter && rate.join == Join::Hold {
-                    status = status.with(Status::HELD);
                 }
                 out.push(AttitudeSample {
                     stamp: rate.stamp,
