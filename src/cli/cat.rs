@@ -9,15 +9,13 @@ use crate::client::remote::Remote;
 use crate::error::{Error, Result};
 use crate::pipeline::decoders::Decoders;
 use crate::pipeline::input::Input;
-use crate::pipeline::log::{Log, problems};
-use crate::pipeline::topic_reading::{Taken, TopicReading};
+use crate::pipeline::log::Log;
+use crate::pipeline::topic_reading::TopicReading;
 use crate::sink::{RAW_HEADER, push_raw_row};
 use clap::{Args, ValueEnum};
 use std::io::{BufWriter, Write};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
-use strapd_attitude::estimate::Meaning;
-use strapd_attitude::estimate::Plan;
 use strapd_attitude::record::{RawSample, SampleKind};
 use strapd_recording::decode::{FieldPath, Options};
 use strapd_recording::pool::Pool;
@@ -123,50 +121,21 @@ pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
     )?;
     let mut decoders = Decoders::new(&options);
     let reading = TopicReading::new(&log, args.topic.as_deref(), &mut decoders)?;
-    let meanings: Vec<(Meaning, Option<SampleKind>)> = reading
-        .channels
-        .iter()
-        .map(|(_, decoder)| {
-            let declared = &decoder.stated().declared;
-            (
-                Meaning::new(&Plan::default(), declared),
-                declared.sample_kind,
-            )
-        })
-        .collect();
     let mut printer = Printer::new(args.format, reading.name(), args.count)?;
-    let mut undecodable = 0u64;
-    let survey = reading.walk(&pool, |taken| {
-        let wants_more = match taken {
-            Taken::Sample(place, raw) => meanings
-                .get(place)
-                .map_or(Ok(true), |(m, kind)| printer.print(&m.in_flu(&raw), *kind))
-                .map_err(|e| Error::writing("stdout", e))?,
-            Taken::Undecodable(at, why) => {
-                if undecodable == 0 {
-                    tracing::warn!("first undecodable payload, {}: {why}", log.place_of(at));
-                }
-                undecodable += 1;
-                true
-            }
-        };
-        Ok(if wants_more {
-            ControlFlow::Continue(())
-        } else {
-            ControlFlow::Break(())
+    let lost = reading.walk_in_flu(&pool, |raw, kind| {
+        let wants_more = printer
+            .print(raw, kind)
+            .map_err(|e| Error::writing("stdout", e))?;
+        Ok(match wants_more {
+            true => ControlFlow::Continue(()),
+            false => ControlFlow::Break(()),
         })
     })?;
     printer
         .out
         .flush()
         .map_err(|e| Error::writing("stdout", e))?;
-    for problem in problems(&survey) {
-        tracing::warn!("{}: {problem}", log.name().display());
-    }
-    if undecodable > 0 {
-        tracing::warn!("{undecodable} payloads could not be decoded");
-    }
-    if undecodable > 0 || survey.problems.losses() > 0 {
+    if lost > 0 {
         return Ok(Outcome::Lossy);
     }
     Ok(Outcome::Done)

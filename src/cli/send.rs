@@ -13,16 +13,15 @@ use crate::client::sender::Sender;
 use crate::error::{Error, Result};
 use crate::pipeline::decoders::Decoders;
 use crate::pipeline::input::Input;
-use crate::pipeline::log::{Log, problems};
+use crate::pipeline::log::Log;
 use crate::pipeline::pace::Pace;
-use crate::pipeline::topic_reading::{Taken, TopicReading};
+use crate::pipeline::topic_reading::TopicReading;
 use clap::Args;
 use serde_json::json;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::Instant;
-use strapd_attitude::estimate::{Meaning, Plan};
-use strapd_attitude::record::{Nanos, SampleKind};
+use strapd_attitude::record::Nanos;
 use strapd_recording::decode::{FieldPath, Options};
 use strapd_recording::pool::Pool;
 use tokio::sync::mpsc;
@@ -163,39 +162,14 @@ fn read(
 ) -> Result<Read> {
     let mut decoders = Decoders::new(options);
     let reading = TopicReading::new(log, args.topic.as_deref(), &mut decoders)?;
-    let meanings: Vec<(Meaning, Option<SampleKind>)> = reading
-        .channels
-        .iter()
-        .map(|(_, decoder)| {
-            let declared = &decoder.stated().declared;
-            let meaning = Meaning::new(&Plan::default(), declared);
-            (meaning, declared.sample_kind)
-        })
-        .collect();
     let topic = reading.name().to_owned();
     let id = args.id.as_deref().unwrap_or(&topic);
-    let (mut batch, mut seq, mut undecodable) = (Vec::with_capacity(BATCH), 0, 0);
-    let mut goes_on = true;
-    let survey = reading.walk(pool, |taken| {
-        match taken {
-            Taken::Sample(place, raw) => {
-                if let Some((meaning, kind)) = meanings.get(place) {
-                    let raw = meaning.in_flu(&raw);
-                    let due = raw.header.unwrap_or(raw.log);
-                    batch.push((due, line::rate(id, seq, &raw, *kind).to_string()));
-                    seq += 1;
-                }
-            }
-            Taken::Undecodable(at, why) => {
-                if undecodable == 0 {
-                    tracing::warn!("first undecodable payload, {}: {why}", log.place_of(at));
-                }
-                undecodable += 1;
-            }
-        }
-        if batch.len() == BATCH {
-            goes_on = give.blocking_send(std::mem::take(&mut batch)).is_ok();
-        }
+    let (mut batch, mut seq) = (Vec::with_capacity(BATCH), 0);
+    let lost = reading.walk_in_flu(pool, |raw, kind| {
+        let due = raw.header.unwrap_or(raw.log);
+        batch.push((due, line::rate(id, seq, raw, kind).to_string()));
+        seq += 1;
+        let goes_on = batch.len() < BATCH || give.blocking_send(std::mem::take(&mut batch)).is_ok();
         Ok(match goes_on {
             true => ControlFlow::Continue(()),
             false => ControlFlow::Break(()),
@@ -203,16 +177,7 @@ fn read(
     })?;
     // Nobody takes it: the other end says why.
     let _ = give.blocking_send(batch);
-    for problem in problems(&survey) {
-        tracing::warn!("{}: {problem}", log.name().display());
-    }
-    if undecodable > 0 {
-        tracing::warn!("{undecodable} payloads could not be decoded");
-    }
-    Ok(Read {
-        topic,
-        lost: undecodable + survey.problems.losses(),
-    })
+    Ok(Read { topic, lost })
 }
 
 /// What was sent.

@@ -4,14 +4,15 @@
 
 use super::channel_route::{Item, Noticed, Route, Taker};
 use super::decoders::Decoders;
-use super::log::{AHEAD, Log, LogChannel};
+use super::log::{AHEAD, Log, LogChannel, problems};
 use super::sources::Source;
 use super::topics;
 use crate::error::{Error, Result};
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::Arc;
-use strapd_attitude::record::{Nanos, RawSample};
+use strapd_attitude::estimate::{Meaning, Plan};
+use strapd_attitude::record::{Nanos, RawSample, SampleKind};
 use strapd_recording::decode::{Decoder, Undecodable};
 use strapd_recording::mcap::Survey;
 use strapd_recording::pool::Pool;
@@ -80,6 +81,52 @@ impl<'l> TopicReading<'l> {
     #[must_use]
     pub fn name(&self) -> &str {
         &self.source.name
+    }
+
+    /// Reads all of it, in order, until `take` has enough or fails: samples in rad/s, m/s^2 and FLU, each with what the
+    /// format says it means. What is lost is said, and how many that are comes back.
+    ///
+    /// # Errors
+    /// As [`Log::walk`].
+    pub fn walk_in_flu(
+        &self,
+        pool: &Pool,
+        mut take: impl FnMut(&RawSample, Option<SampleKind>) -> Result<ControlFlow<()>>,
+    ) -> Result<u64> {
+        let meanings: Vec<(Meaning, Option<SampleKind>)> = self
+            .channels
+            .iter()
+            .map(|(_, decoder)| {
+                let declared = &decoder.stated().declared;
+                let meaning = Meaning::new(&Plan::default(), declared);
+                (meaning, declared.sample_kind)
+            })
+            .collect();
+        let mut undecodable = 0u64;
+        let survey = self.walk(pool, |taken| match taken {
+            Taken::Sample(place, raw) => meanings
+                .get(place)
+                .map_or(Ok(ControlFlow::Continue(())), |(meaning, kind)| {
+                    take(&meaning.in_flu(&raw), *kind)
+                }),
+            Taken::Undecodable(at, why) => {
+                if undecodable == 0 {
+                    tracing::warn!(
+                        "first undecodable payload, {}: {why}",
+                        self.log.place_of(at)
+                    );
+                }
+                undecodable += 1;
+                Ok(ControlFlow::Continue(()))
+            }
+        })?;
+        for problem in problems(&survey) {
+            tracing::warn!("{}: {problem}", self.log.name().display());
+        }
+        if undecodable > 0 {
+            tracing::warn!("{undecodable} payloads could not be decoded");
+        }
+        Ok(undecodable + survey.problems.losses())
     }
 
     /// Reads all of it, in order, until `take` has enough or fails.
