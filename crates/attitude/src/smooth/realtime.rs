@@ -38,12 +38,14 @@ pub(super) fn run<S: Samples>(
         ..aid::Settings::default()
     };
     match pass(samples, with, segments, (wide, Vector3::zeros()))? {
-        Some(found) => pass(
-            samples,
-            with,
-            segments,
-            (aid::Settings::default(), found.bias),
-        ),
+        Some(found) => {
+            // What the motion does not show (about the vertical, often) stays near nothing, where biases are.
+            let class = aid::Settings::default().bias_prior;
+            let sure = found.bias.zip_map(&found.bias_sigma, |bias, sigma| {
+                bias * class * class / (class * class + sigma * sigma)
+            });
+            pass(samples, with, segments, (aid::Settings::default(), sure))
+        }
         None => Ok(None),
     }
 }
