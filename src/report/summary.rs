@@ -414,7 +414,9 @@ impl TopicSummary {
         }
     }
 
-    fn drift_text(&self) -> String {
+    /// What the sigma is of, where something corrects the attitude; else what it drifts by.
+    #[must_use]
+    pub fn drift_text(&self) -> String {
         if let Some(smoothed) = &self.smoothed {
             return smoothed.sigma_text().to_owned();
         }

@@ -125,10 +125,9 @@ fn integrated(s: &TopicSummary, stretches: Option<usize>, out: &mut String) {
     rows.add(
         "at the end",
         &format!(
-            "roll {roll:.3}, pitch {pitch:.3}, yaw {yaw:.3} deg, one sigma of {} deg at most; about {} deg/h of drift to be expected ({} noise)",
+            "roll {roll:.3}, pitch {pitch:.3}, yaw {yaw:.3} deg, one sigma of {} deg at most; {}",
             significant(sigma, 2),
-            significant(s.drift.to_degrees() * 3600.0, 2),
-            s.noise
+            s.drift_text()
         ),
     );
     if let Some(terms) = &s.sigma_terms {
