@@ -6,6 +6,7 @@ mod url;
 use super::tables::Tables;
 use super::{Global, Outcome};
 use crate::client::remote::Remote;
+use crate::config::selection;
 use crate::error::{Error, Result};
 use crate::pipeline::decoders::Decoders;
 use crate::pipeline::input::Input;
@@ -17,7 +18,6 @@ use std::io::{BufWriter, Write};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use strapd_attitude::record::{RawSample, SampleKind};
-use strapd_recording::decode::{FieldPath, Options};
 use strapd_recording::pool::Pool;
 
 /// Decoded samples of a file, or attitudes of a daemon, as NDJSON, CSV or a table: rad/s, m/s^2, axes FLU.
@@ -99,18 +99,7 @@ pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
             )));
         }
     }
-    let mut options = Options {
-        fields: args
-            .fields
-            .iter()
-            .map(|f| {
-                f.parse::<FieldPath>()
-                    .map_err(|e| Error::Usage(format!("--field: {e}")))
-            })
-            .collect::<Result<_>>()?,
-        ignore_covariance_flag: false,
-        ..Options::default()
-    };
+    let mut options = selection(None, &args.fields, false, [None; 2])?.decode;
     args.tables.put(&mut options)?;
     let pool = Pool::new(global.threads)?;
     let log = Log::told_apart(

@@ -10,6 +10,7 @@ use crate::client;
 use crate::client::remote::Remote;
 use crate::client::secret::Secret;
 use crate::client::sender::Sender;
+use crate::config::selection;
 use crate::error::{Error, Result};
 use crate::pipeline::decoders::Decoders;
 use crate::pipeline::input::Input;
@@ -20,9 +21,9 @@ use clap::Args;
 use serde_json::json;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 use strapd_attitude::record::Nanos;
-use strapd_recording::decode::{FieldPath, Options};
+use strapd_recording::decode::Options;
 use strapd_recording::pool::Pool;
 use tokio::sync::mpsc;
 
@@ -39,7 +40,7 @@ const CHUNK: usize = 32 << 10;
   strapd send flight.mcap                                  to the daemon of this machine
   strapd send flight.mcap tcp://robot:4550 --speed max     all at once
   strapd send flight.ulg ws://127.0.0.1:8765 --id left     under another name
-  ros2bag_filter | strapd send - unix:///run/strapd.sock   what a pipe brings")]
+  zstd -dc log.mcap.zst | strapd send - unix:///run/strapd.sock   a pipe, which is read to its end first")]
 pub struct Send {
     /// A recording (any format that replay reads; - is standard input)
     #[arg(value_name = "LOG")]
@@ -95,15 +96,7 @@ pub fn run(global: &Global, args: &Send) -> Result<Outcome> {
         .as_deref()
         .map(|file| Secret::read("--token-file", file))
         .transpose()?;
-    let fields = args.fields.iter().map(|field| {
-        field
-            .parse::<FieldPath>()
-            .map_err(|e| Error::Usage(format!("--field: {e}")))
-    });
-    let mut options = Options {
-        fields: fields.collect::<Result<_>>()?,
-        ..Options::default()
-    };
+    let mut options = selection(None, &args.fields, false, [None; 2])?.decode;
     args.tables.put(&mut options)?;
     // Looked at before anybody is called: a log that can not be read is not the daemon's business.
     let pool = Pool::new(global.threads)?;
@@ -205,9 +198,9 @@ async fn send(
     let mut span: Option<(Nanos, Nanos)> = None;
     while let Some(batch) = lines.recv().await {
         for (due, line) in batch {
-            let wait = pace.as_mut().map_or(std::time::Duration::ZERO, |pace| {
-                pace.until(due, Instant::now())
-            });
+            let wait = pace
+                .as_mut()
+                .map_or(Duration::ZERO, |pace| pace.until(due, Instant::now()));
             if !wait.is_zero() || chunk.len() + line.len() >= CHUNK {
                 sender.send(&mut chunk).await.map_err(failed)?;
                 sender.listen(wait).await.map_err(failed)?;
@@ -220,7 +213,7 @@ async fn send(
             let first = span.map_or(due, |(first, _)| first);
             span = Some((first, due));
         }
-        // The log may be a pipe, whose next sample comes when it comes.
+        // What is due leaves, though the reader be behind.
         if pace.is_some() || lines.is_empty() {
             sender.send(&mut chunk).await.map_err(failed)?;
         }

@@ -1,7 +1,6 @@
 //! Bytes and messages to and from a remote end, over any transport. I/O.
 
 use super::remote::{Place, Remote};
-use super::secret::Secret;
 use futures_util::{SinkExt, StreamExt};
 use std::io;
 use std::time::Duration;
@@ -83,26 +82,6 @@ impl Link {
             Ok(opened) => opened,
             Err(_) => Err(format!("no answer within {} s", CONNECT.as_secs())),
         }
-    }
-
-    /// The same, and shows the token where lines are spoken, too.
-    ///
-    /// # Errors
-    /// As [`Link::connect`].
-    pub async fn connect_as(
-        remote: &Remote,
-        token: Option<&Secret>,
-        max_message: usize,
-    ) -> Result<Link, String> {
-        let mut link = Link::connect(remote, token.map(Secret::reveal), max_message).await?;
-        let is_web = matches!(remote, Remote::WebSocket { .. });
-        if let Some(token) = token.filter(|_| !is_web && link.is_two_way()) {
-            let auth = serde_json::json!({"class": "AUTH", "token": token.reveal()});
-            link.send(&auth.to_string())
-                .await
-                .map_err(|e| e.to_string())?;
-        }
-        Ok(link)
     }
 
     /// Who is at the other end, by number.

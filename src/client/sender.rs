@@ -1,26 +1,25 @@
 //! Lines -> a daemon, and what it complains of meanwhile. I/O.
+//!
+//! A watcher that asks for nothing: what comes back is read as a watcher reads it.
 
-use super::link::{Heard, Link};
 use super::remote::Remote;
 use super::secret::Secret;
-use super::watcher::{MAX_LINE, Said, understood};
+use super::watcher::{Said, Watcher};
 use std::time::Duration;
-use strapd_recording::decode::framing::{Framed, Framer};
 use tokio::time::{Instant, timeout_at};
 
-/// How long the other end may take to read the rest and close.
-const CLOSE: Duration = Duration::from_secs(2);
+/// How long the other end may take to say why it has gone.
+const REASON: Duration = Duration::from_secs(2);
+/// How long it may take to read the rest and close.
+const CLOSE: Duration = Duration::from_secs(10);
 /// Complaints that are said.
 const MOST_SAID: u64 = 8;
 
 /// Somebody who sends samples.
 #[derive(Debug)]
 pub struct Sender {
-    link: Link,
-    framer: Framer,
-    buffer: Vec<u8>,
+    watcher: Watcher,
     complaints: u64,
-    last: Option<String>,
 }
 
 impl Sender {
@@ -30,11 +29,8 @@ impl Sender {
     /// In words.
     pub async fn connect(remote: &Remote, token: Option<&Secret>) -> Result<Sender, String> {
         Ok(Sender {
-            link: Link::connect_as(remote, token, MAX_LINE).await?,
-            framer: Framer::with_limit(MAX_LINE),
-            buffer: Vec::new(),
+            watcher: Watcher::open(remote, token).await?,
             complaints: 0,
-            last: None,
         })
     }
 
@@ -46,14 +42,14 @@ impl Sender {
         if lines.is_empty() {
             return Ok(());
         }
-        let sent = self.link.send(lines).await;
+        let sent = self.watcher.link().send(lines).await;
         lines.clear();
         match sent {
             Ok(()) => self.listen(Duration::ZERO).await,
             Err(why) => {
                 // Why it has gone may still be on its way.
-                let _ = self.listen(CLOSE).await;
-                Err(self.ended(&why.to_string()))
+                let _ = self.listen(REASON).await;
+                Err(self.watcher.ended(&why.to_string()))
             }
         }
     }
@@ -64,71 +60,46 @@ impl Sender {
     /// As [`Sender::send`].
     pub async fn listen(&mut self, wait: Duration) -> Result<(), String> {
         let until = Instant::now() + wait;
-        while let Ok(heard) = timeout_at(until, self.link.read(&mut self.buffer)).await {
-            match heard {
-                Ok(heard) => {
-                    if let Some(how) = self.hear(&heard) {
-                        return Err(self.ended(&how));
-                    }
-                }
-                Err(why) => return Err(self.ended(&why.to_string())),
-            }
+        while let Ok(heard) = timeout_at(until, self.hear()).await {
+            heard?;
         }
         Ok(())
     }
 
-    /// Everything was sent: waits until the other end has read it, and says how often it complained.
+    /// Everything was sent: waits until the other end has read it and closed, and says how often it complained.
     ///
     /// # Errors
-    /// As [`Sender::send`].
+    /// It has not closed in time: what it has read nobody knows.
     pub async fn finish(mut self) -> Result<u64, String> {
         // It may have gone already, which is what we wait for.
-        let _ = self.link.end().await;
+        let _ = self.watcher.link().end().await;
         let until = Instant::now() + CLOSE;
-        while let Ok(Ok(heard)) = timeout_at(until, self.link.read(&mut self.buffer)).await {
-            if self.hear(&heard).is_some() {
-                break;
+        loop {
+            match timeout_at(until, self.hear()).await {
+                Ok(Ok(())) => {}
+                Ok(Err(_)) => return Ok(self.complaints),
+                Err(_) => {
+                    return Err(self.watcher.ended(&format!(
+                        "everything was sent, but it has not closed within {} s",
+                        CLOSE.as_secs()
+                    )));
+                }
             }
         }
-        Ok(self.complaints)
     }
 
-    /// What was read; how the other end has closed, if it has.
-    fn hear(&mut self, heard: &Heard) -> Option<String> {
-        let (complaints, last, peer) = (&mut self.complaints, &mut self.last, self.link.peer());
-        let mut framed = |framed: Framed<'_>| {
-            if let Framed::Line(_, line) = framed
-                && let Some(Said::Complaint(what)) = understood(line)
-            {
+    /// Waits for what comes next. May be dropped and called again: nothing is lost.
+    async fn hear(&mut self) -> Result<(), String> {
+        let (complaints, peer) = (&mut self.complaints, self.watcher.peer().to_owned());
+        let mut take = |said: Said<'_>| {
+            if let Said::Complaint(what) = said {
                 *complaints += 1;
                 if *complaints <= MOST_SAID {
                     tracing::warn!("{peer}: {what}");
                 }
-                *last = Some(what);
             }
             true
         };
-        self.framer.feed(&self.buffer, &mut framed);
-        match heard {
-            Heard::Bytes => None,
-            Heard::Message => {
-                self.framer.finish(&mut framed);
-                None
-            }
-            Heard::Closed(words) => {
-                self.framer.finish(&mut framed);
-                Some(words.as_ref().map_or_else(
-                    || "it has closed the connection".to_owned(),
-                    |words| format!("it has closed the connection: {words}"),
-                ))
-            }
-        }
-    }
-
-    fn ended(&self, how: &str) -> String {
-        match &self.last {
-            Some(complaint) => format!("{how}; it said {complaint}"),
-            None => how.to_owned(),
-        }
+        self.watcher.next(&mut take).await.map(|_| ())
     }
 }

@@ -9,7 +9,7 @@ use strapd_recording::decode::framing::{Framed, Framer};
 use strapd_recording::text::printable;
 
 /// Longest line that is read: the `STATUS` of a thousand sensors.
-pub(super) const MAX_LINE: usize = 4 << 20;
+const MAX_LINE: usize = 4 << 20;
 
 /// What one line said.
 #[derive(Debug, PartialEq)]
@@ -82,16 +82,38 @@ impl Watcher {
         token: Option<&Secret>,
         request: &str,
     ) -> Result<Watcher, String> {
-        let mut link = Link::connect_as(remote, token, MAX_LINE).await?;
-        if link.is_two_way() {
-            link.send(request).await.map_err(|e| e.to_string())?;
+        let mut watcher = Watcher::open(remote, token).await?;
+        if watcher.link.is_two_way() {
+            let asked = watcher.link.send(request).await;
+            asked.map_err(|e| e.to_string())?;
         }
-        Ok(Watcher {
+        Ok(watcher)
+    }
+
+    /// Connects, shows the token where one is given, and asks for nothing.
+    ///
+    /// # Errors
+    /// In words.
+    pub(super) async fn open(remote: &Remote, token: Option<&Secret>) -> Result<Watcher, String> {
+        let link = Link::connect(remote, token.map(Secret::reveal), MAX_LINE).await?;
+        let mut watcher = Watcher {
             link,
             framer: Framer::with_limit(MAX_LINE),
             buffer: Vec::new(),
             complaint: None,
-        })
+        };
+        let is_web = matches!(remote, Remote::WebSocket { .. });
+        if let Some(token) = token.filter(|_| !is_web && watcher.link.is_two_way()) {
+            let auth = serde_json::json!({"class": "AUTH", "token": token.reveal()});
+            let shown = watcher.link.send(&auth.to_string()).await;
+            shown.map_err(|e| e.to_string())?;
+        }
+        Ok(watcher)
+    }
+
+    /// The other end, for who says more than a request.
+    pub(super) fn link(&mut self) -> &mut Link {
+        &mut self.link
     }
 
     /// Who is at the other end.
@@ -161,7 +183,8 @@ impl Watcher {
         Ok(goes_on)
     }
 
-    fn ended(&self, how: &str) -> String {
+    /// How it ended, with what the daemon complained of last.
+    pub(super) fn ended(&self, how: &str) -> String {
         match &self.complaint {
             Some(complaint) => format!("{how}; it said {complaint}"),
             None => how.to_owned(),
@@ -170,7 +193,7 @@ impl Watcher {
 }
 
 /// What a line says; `None` for what is of no use to a watcher.
-pub(super) fn understood(line: &[u8]) -> Option<Said<'_>> {
+fn understood(line: &[u8]) -> Option<Said<'_>> {
     let object: Object<'_> = match serde_json::from_slice(line) {
         Ok(object) => object,
         Err(_) => {

@@ -78,6 +78,11 @@ fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
         .iter()
         .find(|g| g.length_nanos == gaps.longest_nanos);
     let first = conditioning.first.unwrap_or_default();
+    let recording = topic.estimator.smoothed().and_then(Result::ok);
+    let smoothed = topic.estimator.smoothed().map(|result| {
+        let result = result.map(Smoothing::of);
+        result.map_err(str::to_owned)
+    });
     let mut summary = TopicSummary {
         topic: topic.name.clone(),
         output_topic: topic.output_topic.clone(),
@@ -96,8 +101,14 @@ fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
             .estimator
             .regularising()
             .map(|(causal, report)| regularised(causal, &report, first)),
-        kind: topic.resolved.kind,
-        method: method_words(topic),
+        kind: match recording {
+            Some(recording) if recording.is_taken_as_mean => SampleKind::Average,
+            _ => topic.resolved.kind,
+        },
+        method: match &smoothed {
+            Some(Ok(smoothing)) => smoothing.method().to_owned(),
+            _ => method_words(topic),
+        },
         body,
         world,
         initial: topic.prepared.initial_origin.clone(),
@@ -105,10 +116,10 @@ fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
         bias: topic.prepared.bias.into(),
         bias_origin: topic.prepared.bias_origin.clone(),
         aided: topic.estimator.filter().map(Aided::of),
-        smoothed: topic.estimator.smoothed().map(Smoothing::of),
+        smoothed,
         calibration: calibrated(run, topic),
         noise: run.plan.noise.name.clone(),
-        sigma_terms: (!run.plan.smooth).then(|| {
+        sigma_terms: recording.is_none().then(|| {
             SigmaTerms::of(
                 &run.plan,
                 &topic.prepared,
@@ -116,7 +127,10 @@ fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
             )
         }),
         drift: drift(run, topic, propagation.integrated_secs),
-        integration_error: propagation.integration_error,
+        // Of what runs along with a smoother it would be another attitude's.
+        integration_error: propagation
+            .integration_error
+            .filter(|_| recording.is_none()),
         input_axes: topic.resolved.body.to_string(),
         gaps: Gaps {
             bridged: gaps.count.saturating_sub(gaps.not_bridged),
@@ -155,9 +169,9 @@ fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
 /// What is known of the sensor at the end.
 fn calibrated(run: &ReplayRequest, topic: &Topic) -> SensorCalibration {
     let filter = topic.estimator.filter();
-    let smoothed = topic.estimator.smoothed().and_then(Result::ok);
+    let recording = topic.estimator.smoothed().and_then(Result::ok);
     let of = (&run.plan, &topic.resolved, &topic.prepared);
-    let known = learned(of, filter, smoothed);
+    let known = learned(of, filter, recording);
     let source = match &run.source {
         Source::File(path) => path.file_name().unwrap_or_default().to_string_lossy(),
         Source::Stdin => "standard input".into(),
@@ -214,13 +228,6 @@ fn regularised(causal: bool, report: &regularise::Report, first: Nanos) -> Regul
 
 /// The method, `auto` with what it stands for.
 fn method_words(topic: &Topic) -> String {
-    if topic.estimator.smoothed().is_some() {
-        return match topic.estimator.is_taken_as_mean() {
-            true => "smoothed, samples taken as means since the one before (steps of at most 5 ms; --sample-kind rate: at their stamps)",
-            false => "smoothed",
-        }
-        .to_owned();
-    }
     match (topic.estimator.method(), topic.resolved.kind) {
         (Method::Auto, SampleKind::Rate) => "auto: centred window of 16 samples, exact".to_owned(),
         (Method::Auto, _) => "auto: centred window of 15 increments, exact".to_owned(),
@@ -288,17 +295,12 @@ fn warnings(topic: &Topic, summary: &TopicSummary) -> Vec<String> {
             "{marked} samples mark their gyro as absent (covariance -1), which some drivers do wrongly: --ignore-covariance-flag uses it all the same"
         ));
     }
-    match (&summary.smoothed, &summary.aided) {
-        (Some(smoothed), _) => {
-            said.extend(smoothed.doubt());
-            if topic.estimator.is_smoothed_beyond_class() {
-                said.push(format!(
-                    "the sensor is farther off than those of class {} are: smoothed again with priors 2.5 times as wide; --noise uncalibrated says so beforehand",
-                    summary.noise
-                ));
-            }
+    match (summary.smoothing(), &summary.aided) {
+        (Some(smoothing), _) => said.extend(smoothing.doubts(&summary.noise)),
+        (None, Some(aided)) => {
+            said.extend(summary.not_smoothed().map(|why| format!("--smooth: {why}")));
+            said.extend(aided.doubt(&summary.noise));
         }
-        (None, Some(aided)) => said.extend(aided.doubt(&summary.noise)),
         (None, None) => {}
     }
     if topic.zeros.count > 0 {

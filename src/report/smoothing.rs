@@ -2,16 +2,12 @@
 
 use super::summary::significant;
 use serde_json::{Value, json};
-use strapd_attitude::smooth::{Calibration, Counts, Failure, Learned, Outcome, Smoothed};
+use strapd_attitude::estimate::Recording;
+use strapd_attitude::smooth::{Calibration, Counts, Learned, Outcome};
 
-/// A recording that was smoothed, or was to be.
+/// A recording that was smoothed.
 #[derive(Clone, Debug)]
 pub struct Smoothing {
-    found: Result<Found, String>,
-}
-
-#[derive(Clone, Debug)]
-struct Found {
     outcome: Outcome,
     counts: Counts,
     calibration: Calibration,
@@ -22,74 +18,65 @@ struct Found {
     sections: usize,
     has_north: bool,
     bound: [f64; 2],
+    is_taken_as_mean: bool,
+    is_beyond_class: bool,
 }
 
 impl Smoothing {
-    /// As it is at the end of a run; in words where there is no result.
+    /// As it is at the end of a run.
     #[must_use]
-    pub fn of(smoothed: Result<&Smoothed, &str>) -> Smoothing {
-        let found = smoothed.map_err(str::to_owned).map(|smoothed| {
-            let biases: Vec<_> = smoothed.biases().collect();
-            let middle = biases.get(biases.len() / 2);
-            let deg = |v: &nalgebra::Vector3<f64>| v.map(f64::to_degrees).into();
-            let span = |axis: usize| {
-                let of = biases.iter().filter_map(|b| b.value.get(axis).copied());
-                let (low, high) = of.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), b| {
-                    (low.min(b), high.max(b))
-                });
-                high - low
-            };
-            let wander = (0..3).map(span).fold(0.0, f64::max);
-            Found {
-                outcome: smoothed.outcome(),
-                counts: *smoothed.counts(),
-                calibration: *smoothed.calibration(),
-                bias: middle.map_or(([0.0; 3], [0.0; 3]), |b| (deg(&b.value), deg(&b.sigma))),
-                wander: wander.to_degrees(),
-                sections: smoothed.sections().len(),
-                has_north: smoothed.sections().iter().any(|section| section.has_north),
-                bound: smoothed.bound(),
-            }
-        });
-        Smoothing { found }
+    pub fn of(recording: &Recording) -> Smoothing {
+        let smoothed = &recording.smoothed;
+        let biases: Vec<_> = smoothed.biases().collect();
+        let middle = biases.get(biases.len() / 2);
+        let deg = |v: &nalgebra::Vector3<f64>| v.map(f64::to_degrees).into();
+        let span = |axis: usize| {
+            let of = biases.iter().filter_map(|b| b.value.get(axis).copied());
+            let (low, high) = of.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), b| {
+                (low.min(b), high.max(b))
+            });
+            high - low
+        };
+        let wander = (0..3).map(span).fold(0.0, f64::max);
+        Smoothing {
+            outcome: smoothed.outcome(),
+            counts: *smoothed.counts(),
+            calibration: *smoothed.calibration(),
+            bias: middle.map_or(([0.0; 3], [0.0; 3]), |b| (deg(&b.value), deg(&b.sigma))),
+            wander: wander.to_degrees(),
+            sections: smoothed.sections().len(),
+            has_north: smoothed.sections().iter().any(|section| section.has_north),
+            bound: smoothed.bound(),
+            is_taken_as_mean: recording.is_taken_as_mean,
+            is_beyond_class: recording.is_beyond_class,
+        }
+    }
+
+    /// What integrated, and what it took a sample for where nobody said that.
+    #[must_use]
+    pub fn method(&self) -> &'static str {
+        match self.is_taken_as_mean {
+            true => "smoothed; in steps of at most 5 ms (--sample-kind rate: at their stamps)",
+            false => "smoothed",
+        }
     }
 
     /// For people: what was done, then what was learned.
     #[must_use]
     pub fn lines(&self) -> Vec<String> {
-        let found = match &self.found {
-            Ok(found) => found,
-            Err(why) => {
-                return vec![format!(
-                    "NOT SMOOTHED: {}; the attitude is the real-time filter's",
-                    why.replace("\n  help: ", "; ")
-                )];
-            }
-        };
-        let counts = &found.counts;
-        let mut did = match found.outcome {
-            Outcome::Filter(why) => {
-                format!(
-                    "NOT CONVERGED ({}): the attitude is the real-time filter's",
-                    words(&why)
-                )
-            }
+        let counts = &self.counts;
+        let mut did = match self.outcome {
             Outcome::WithoutField(why) => format!(
-                "gravity, north by the mean field: with all of the field it did not converge ({})",
-                words(&why)
+                "gravity, north by the mean field: with all of the field it did not converge ({why})"
             ),
-            Outcome::Converged | Outcome::Unsettled(_) if found.has_north => {
-                "gravity and field, the whole recording at once".to_owned()
-            }
-            Outcome::Converged | Outcome::Unsettled(_) => {
-                "gravity, the whole recording at once; heading of the first sample".to_owned()
-            }
+            _ if self.has_north => "gravity and field, the whole recording at once".to_owned(),
+            _ => "gravity, the whole recording at once; heading of the first sample".to_owned(),
         };
         did += &format!(
             ": at rest in {} of {} segments",
             counts.standstills, counts.segments
         );
-        if let Outcome::Unsettled(left) = found.outcome {
+        if let Outcome::Unsettled(left) = self.outcome {
             did += &format!(
                 "; NOT SETTLED: it still turned by {} deg",
                 significant(left.to_degrees(), 2)
@@ -107,23 +94,21 @@ impl Smoothing {
                 did += &format!(", {n} {what}");
             }
         }
-        let gyro = &found.calibration.gyro;
-        let scale = [0, 4, 8].map(|i| gyro.value.get(i).map_or(0.0, |g| g * 100.0));
-        let sigma = [0, 4, 8].map(|i| gyro.sigma.get(i).map_or(0.0, |g| g * 100.0));
-        let (bias, of_bias) = &found.bias;
+        let (scale, of_scale) = scales(&self.calibration.gyro);
+        let (bias, of_bias) = &self.bias;
         let mut lines = vec![
             did,
             format!(
                 "learned: bias {} +- {} deg/s, wandering {}; scale {} +- {} %; not observed: {}",
                 triple(bias),
                 triple(of_bias),
-                significant(found.wander, 2),
+                significant(self.wander, 2),
                 triple(&scale),
-                triple(&sigma),
+                triple(&of_scale),
                 self.unobserved(),
             ),
         ];
-        if let Some(magnetometer) = &found.calibration.magnetometer {
+        if let Some(magnetometer) = &self.calibration.magnetometer {
             lines.push(format!(
                 "hard iron {} +- {} uT, of a field taken for {} uT north and {} up",
                 triple(&magnetometer.hard_iron.value),
@@ -137,10 +122,7 @@ impl Smoothing {
 
     /// What the recording told nothing of.
     fn unobserved(&self) -> String {
-        let Ok(found) = &self.found else {
-            return String::new();
-        };
-        let c = &found.calibration;
+        let c = &self.calibration;
         let m = c.magnetometer.as_ref();
         let all = [
             part("gyro scale and axes", Some(&c.gyro)),
@@ -162,32 +144,26 @@ impl Smoothing {
     /// What the sigma of the attitude is of.
     #[must_use]
     pub fn sigma_text(&self) -> &'static str {
-        match &self.found {
-            Ok(found) if found.has_north => "of tilt and of heading from north, by the smoother",
-            _ => "of tilt and of heading relative to the start, by the smoother",
+        if self.has_north {
+            "of tilt and of heading from north, by the smoother"
+        } else {
+            "of tilt and of heading relative to the start, by the smoother"
         }
     }
 
     /// What was learned, a row each: what and in which unit, about x, y, z, and one sigma of each.
     #[must_use]
-    pub fn learned(&self) -> Option<Vec<Vec<String>>> {
-        let found = self.found.as_ref().ok()?;
+    pub fn learned(&self) -> Vec<Vec<String>> {
         let row = |name: &str, value: [f64; 3], sigma: [f64; 3]| {
             let numbers = value.into_iter().chain(sigma);
             let said = numbers.map(|v| significant(v, 3));
             std::iter::once(name.to_owned()).chain(said).collect()
         };
-        let diagonal = |learned: &Learned<9>| {
-            (
-                [0, 4, 8].map(|i| learned.value.get(i).map_or(0.0, |v| v * 100.0)),
-                [0, 4, 8].map(|i| learned.sigma.get(i).map_or(0.0, |v| v * 100.0)),
-            )
-        };
-        let c = &found.calibration;
-        let (gyro, of_gyro) = diagonal(&c.gyro);
-        let (force, of_force) = diagonal(&c.force);
+        let c = &self.calibration;
+        let (gyro, of_gyro) = scales(&c.gyro);
+        let (force, of_force) = scales(&c.force);
         let mut rows = vec![
-            row("gyro bias in the middle, deg/s", found.bias.0, found.bias.1),
+            row("gyro bias in the middle, deg/s", self.bias.0, self.bias.1),
             row("gyro scale, %", gyro, of_gyro),
             row(
                 "accelerometer bias, m/s^2",
@@ -197,33 +173,31 @@ impl Smoothing {
             row("accelerometer scale, %", force, of_force),
         ];
         if let Some(m) = &c.magnetometer {
-            let (soft, of_soft) = diagonal(&m.matrix);
+            let (soft, of_soft) = scales(&m.matrix);
             rows.push(row("hard iron, uT", m.hard_iron.value, m.hard_iron.sigma));
             rows.push(row("soft iron, %", soft, of_soft));
         }
-        Some(rows)
+        rows
     }
 
-    /// What is to be said aloud: that there is no result, or another than was asked for.
+    /// What is to be said aloud, each with the flag that helps; `noise` is the class the sensor was taken for.
     #[must_use]
-    pub fn doubt(&self) -> Option<String> {
-        let is_well = self
-            .found
-            .as_ref()
-            .is_ok_and(|found| found.outcome == Outcome::Converged);
-        (!is_well).then(|| {
-            let said = self.lines().into_iter().next().unwrap_or_default();
-            format!("--smooth: {said}")
-        })
+    pub fn doubts(&self, noise: &str) -> Vec<String> {
+        let mut said = Vec::new();
+        if self.outcome != Outcome::Converged {
+            said.extend(self.lines().first().map(|did| format!("--smooth: {did}")));
+        }
+        if self.is_beyond_class {
+            said.push(format!(
+                "the sensor is farther off than those of class {noise} are: smoothed again with priors 2.5 times as wide; --noise uncalibrated says so beforehand"
+            ));
+        }
+        said
     }
 
     /// For machines.
     #[must_use]
     pub fn json(&self) -> Value {
-        let found = match &self.found {
-            Ok(found) => found,
-            Err(why) => return json!({ "outcome": "failed", "why": why }),
-        };
         fn numbers<const N: usize>(learned: &Learned<N>) -> Value {
             let observed: Vec<bool> = (0..N).map(|i| learned.is_observed(i)).collect();
             json!({
@@ -231,26 +205,25 @@ impl Smoothing {
                 "prior": learned.prior.as_slice(), "observed": observed,
             })
         }
-        let (outcome, why) = match &found.outcome {
-            Outcome::Converged => ("converged", None),
+        let (outcome, why) = match &self.outcome {
+            Outcome::WithoutField(why) => ("without_field", Some(why.to_string())),
             Outcome::Unsettled(_) => ("unsettled", None),
-            Outcome::WithoutField(why) => ("without_field", Some(words(why))),
-            Outcome::Filter(why) => ("filter", Some(words(why))),
+            _ => ("converged", None),
         };
-        let c = &found.calibration;
+        let c = &self.calibration;
         json!({
             "outcome": outcome,
             "why": why,
-            "segments": found.counts.segments,
-            "standstills": found.counts.standstills,
-            "rejected": found.counts.rejected,
-            "bridged": found.counts.bridged,
-            "sections": found.sections,
-            "iterations": found.counts.iterations,
-            "has_north": found.has_north,
-            "velocity_bound_m_s": found.bound[0],
-            "position_bound_m": found.bound[1],
-            "gyro_bias_deg_s": { "value": found.bias.0, "sigma": found.bias.1, "wander": found.wander },
+            "segments": self.counts.segments,
+            "standstills": self.counts.standstills,
+            "rejected": self.counts.rejected,
+            "bridged": self.counts.bridged,
+            "sections": self.sections,
+            "iterations": self.counts.iterations,
+            "has_north": self.has_north,
+            "velocity_bound_m_s": self.bound[0],
+            "position_bound_m": self.bound[1],
+            "gyro_bias_deg_s": { "value": self.bias.0, "sigma": self.bias.1, "wander": self.wander },
             "G": numbers(&c.gyro),
             "ba": numbers(&c.force_bias),
             "A": numbers(&c.force),
@@ -271,17 +244,10 @@ fn part<const N: usize>(name: &str, learned: Option<&Learned<N>>) -> Option<Stri
     }
 }
 
-fn words(why: &Failure) -> String {
-    let deg = |rad: &f64| significant(rad.to_degrees(), 2);
-    match why {
-        Failure::NotFinite => "the equations had no solution".to_owned(),
-        Failure::Diverging(turn) => format!("it diverged, by {} deg in the end", deg(turn)),
-        Failure::Unfinished(turn) => format!("it still turned by {} deg at the end", deg(turn)),
-        Failure::Strays(far) => {
-            format!("the motion went {} m without a rest", significant(*far, 2))
-        }
-        Failure::NotUpright(off) => format!("the mean force was {} deg off the vertical", deg(off)),
-    }
+/// The diagonal of a matrix, %, and its sigma.
+fn scales(learned: &Learned<9>) -> ([f64; 3], [f64; 3]) {
+    let of = |numbers: &[f64; 9]| [0, 4, 8].map(|i| numbers.get(i).map_or(0.0, |v| v * 100.0));
+    (of(&learned.value), of(&learned.sigma))
 }
 
 fn triple(v: &[f64; 3]) -> String {

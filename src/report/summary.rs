@@ -60,8 +60,8 @@ pub struct TopicSummary {
     pub bias_origin: String,
     /// What corrected the attitude, where something did.
     pub aided: Option<Aided>,
-    /// What a smoother made of it, where one was asked for.
-    pub smoothed: Option<Smoothing>,
+    /// What a smoother made of it, where one was asked for, or why nothing: then the attitude is that of `aided`.
+    pub smoothed: Option<Result<Smoothing, String>>,
     /// What is known of the sensor at the end.
     pub calibration: SensorCalibration,
     /// Noise behind sigma.
@@ -296,19 +296,19 @@ impl TopicSummary {
                 self.input_axes, self.body, self.world, self.initial
             ),
         );
-        let by_smoother = self.smoothed.as_ref().map(|s| ("smooth", s.lines()));
-        let by_filter = self.aided.as_ref().map(|aided| ("aid", aided.lines()));
-        match by_smoother.or(by_filter) {
-            None => line(
-                out,
+        if let Some(why) = self.not_smoothed() {
+            line(out, "smooth", &why);
+        }
+        let (name, lines) = match (self.smoothing(), &self.aided) {
+            (Some(smoothing), _) => ("smooth", smoothing.lines()),
+            (None, Some(aided)) => ("aid", aided.lines()),
+            (None, None) => (
                 "aid",
-                "none: the gyro alone, which drifts (--aid gravity corrects tilt by the accelerometer)",
+                vec!["none: the gyro alone, which drifts (--aid gravity corrects tilt by the accelerometer)".to_owned()],
             ),
-            Some((name, lines)) => {
-                for (i, words) in lines.iter().enumerate() {
-                    line(out, if i == 0 { name } else { "" }, words);
-                }
-            }
+        };
+        for (i, words) in lines.iter().enumerate() {
+            line(out, if i == 0 { name } else { "" }, words);
         }
         line(out, "bias", &self.bias_text());
         if let Some(latitude) = self.latitude_deg {
@@ -414,11 +414,27 @@ impl TopicSummary {
         }
     }
 
+    /// What a smoother made of it, where it made something of it.
+    #[must_use]
+    pub fn smoothing(&self) -> Option<&Smoothing> {
+        self.smoothed.as_ref()?.as_ref().ok()
+    }
+
+    /// That a smoother was asked for and made nothing of it.
+    #[must_use]
+    pub fn not_smoothed(&self) -> Option<String> {
+        let why = self.smoothed.as_ref()?.as_ref().err()?;
+        Some(format!(
+            "NOT SMOOTHED: {}; the attitude is the real-time filter's",
+            why.replace("\n  help: ", "; ")
+        ))
+    }
+
     /// What the sigma is of, where something corrects the attitude; else what it drifts by.
     #[must_use]
     pub fn drift_text(&self) -> String {
-        if let Some(smoothed) = &self.smoothed {
-            return smoothed.sigma_text().to_owned();
+        if let Some(smoothing) = self.smoothing() {
+            return smoothing.sigma_text().to_owned();
         }
         if let Some(aided) = &self.aided {
             return aided.sigma_text().to_owned();
@@ -498,7 +514,10 @@ impl TopicSummary {
                 "latitude_deg": latitude, "rad_s": EARTH_RATE,
             })),
             "aid": self.aided.as_ref().map(Aided::json),
-            "smooth": self.smoothed.as_ref().map(Smoothing::json),
+            "smooth": self.smoothed.as_ref().map(|smoothed| match smoothed {
+                Ok(smoothing) => smoothing.json(),
+                Err(why) => json!({ "outcome": "filter", "why": why }),
+            }),
             "noise": self.noise,
             "sigma_terms": self.sigma_terms.as_ref().map(SigmaTerms::json),
             "drift_deg_per_h": self.drift.to_degrees() * 3600.0,

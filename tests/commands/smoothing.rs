@@ -55,8 +55,19 @@ fn where_it_leads_nowhere_the_attitude_is_the_filters_to_the_bit() {
     .done();
     let filter = strapd(dir, "replay car.mcap --aid gravity -o - -q");
     let smooth = strapd(dir, "replay car.mcap --aid gravity --smooth -o -");
-    assert!(smooth.err.contains("NOT CONVERGED"), "{}", smooth.err);
+    assert!(smooth.err.contains("NOT SMOOTHED"), "{}", smooth.err);
     assert!(filter.done().out == smooth.done().out);
+    // And so is all that is said of it and saved.
+    let learned = |flags: &str| {
+        let saved = format!("replay car.mcap --aid gravity {flags} -o null: --json --force");
+        let ran = strapd(dir, &format!("{saved} --save-calibration car.toml"));
+        let file = std::fs::read_to_string(dir.join("car.toml")).unwrap();
+        let topic = ran.json()["topics"][0].clone();
+        (file, topic["sigma_terms"].clone(), topic["method"].clone())
+    };
+    let (filter, smooth) = (learned(""), learned("--smooth"));
+    assert!(filter.0.contains("bias"), "{}", filter.0);
+    assert_eq!(filter, smooth);
 }
 
 #[test]
@@ -158,8 +169,11 @@ fn flags_that_do_not_go_with_it_and_logs_that_can_not_be_smoothed_are_said() {
             )
         })
         .collect();
-    let ran = strapd_fed(dir, "replay - --aid gravity --smooth -o null:", gyro);
-    ran.refused(1, &["specific force"]);
+    for aid in ["auto", "gravity"] {
+        let flags = format!("replay - --aid {aid} --smooth -o null:");
+        let ran = strapd_fed(dir, &flags, gyro.clone());
+        ran.refused(1, &["specific force", "leave --smooth out"]);
+    }
     // Three samples are too few for anything, and no reason to end without a word.
     let three: String = (0..3)
         .map(|i| format!("{{\"stamp_s\":{i},\"gyro\":[0,0,0.1],\"accel\":[0,0,9.81]}}\n"))

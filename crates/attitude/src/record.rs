@@ -161,6 +161,24 @@ pub struct RateSample {
     pub log: Nanos,
 }
 
+impl RateSample {
+    /// What [`RateSample::value`] is over to be a rate: the sample's own interval, s; 1 of a rate.
+    pub(crate) fn own_secs(&self, kind: SampleKind) -> f64 {
+        match kind {
+            SampleKind::Rate => 1.0,
+            SampleKind::Average | SampleKind::DeltaAngle => self.stamp.secs_since(self.start),
+        }
+    }
+
+    /// The rate at its instant, or its mean over the sample's interval, rad/s; nothing of an interval without length.
+    pub(crate) fn mean_rate(&self, kind: SampleKind) -> Vector3<f64> {
+        match self.own_secs(kind) {
+            own if own > 0.0 => self.value / own,
+            _ => Vector3::zeros(),
+        }
+    }
+}
+
 /// Bits that travel with a sample to the output's `status`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Hash)]
 pub struct Status(pub u16);

@@ -137,8 +137,11 @@ fn integrated(s: &TopicSummary, stretches: Option<usize>, out: &mut String) {
         rows.add("warning", &warning.replace("\n  help: ", "; "));
     }
     out.push_str(&rows.html());
-    let (title, learned) = match &s.smoothed {
-        Some(smoothed) => ("Calibration by the whole recording", smoothed.learned()),
+    let (title, learned) = match s.smoothing() {
+        Some(smoothing) => (
+            "Calibration by the whole recording",
+            Some(smoothing.learned()),
+        ),
         None => (
             "Calibration learned on the way",
             s.aided.as_ref().and_then(Aided::learned),

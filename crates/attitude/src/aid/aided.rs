@@ -231,15 +231,7 @@ impl Aided {
         let applied = self.filter.applied();
         let secs = self.last.map_or(0.0, |last| sample.stamp.secs_since(last));
         self.last = Some(sample.stamp);
-        let own = match self.kind {
-            SampleKind::Rate => 1.0,
-            SampleKind::Average | SampleKind::DeltaAngle => sample.stamp.secs_since(sample.start),
-        };
-        let rate = if own > 0.0 {
-            sample.value / own
-        } else {
-            Vector3::zeros()
-        };
+        let rate = sample.mean_rate(self.kind);
         let turning = applied.corrected(rate, 1.0);
         let force = match &mut self.forces {
             None => sample.accel,
@@ -259,7 +251,7 @@ impl Aided {
             join: sample.join,
         });
         RateSample {
-            value: applied.corrected(sample.value, own),
+            value: applied.corrected(sample.value, sample.own_secs(self.kind)),
             ..*sample
         }
     }

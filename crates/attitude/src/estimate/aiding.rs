@@ -81,14 +81,22 @@ impl Aiding {
     ) -> Result<Option<Aiding>, String> {
         let asked = match plan.aid {
             Aid::None => return Ok(None),
+            Aid::Auto if plan.smooth => "--smooth",
             Aid::Auto => "--aid auto",
             Aid::Gravity => "--aid gravity",
             Aid::GravityAndField => "--aid gravity+mag",
         };
+        // Who asks for a smoother asks for forces.
+        let may_do_without = plan.aid == Aid::Auto && !plan.smooth;
+        let without = if plan.smooth {
+            "or leave --smooth out"
+        } else {
+            "--aid none does without"
+        };
         let found = Aiding::by_force(plan, resolved, first, warnings);
         match found {
             Ok(found) => Ok(Some(found)),
-            Err(Unaided::NoForce) if plan.aid == Aid::Auto => Ok(None),
+            Err(Unaided::NoForce) if may_do_without => Ok(None),
             Err(Unaided::NoForce) if first.len() <= 1 => {
                 warnings.push(format!("{asked}: the first sample carries no specific force: the attitude is the gyro's until one comes"));
                 let unscaled = Aiding::with_scale((plan, resolved), 1.0);
@@ -98,15 +106,15 @@ impl Aiding {
                 }))
             }
             Err(Unaided::NoForce) => Err(format!(
-                "{asked}: none of the first {} samples carries a specific force\n  help: --field accel=PATH or --accel-topic NAME says where it is, --aid none does without",
+                "{asked}: none of the first {} samples carries a specific force\n  help: --field accel=PATH or --accel-topic NAME says where it is, {without}",
                 first.len()
             )),
-            Err(Unaided::Implausible(why)) if plan.aid == Aid::Auto => {
+            Err(Unaided::Implausible(why)) if may_do_without => {
                 warnings.push(format!("{why}: the attitude is the gyro's alone"));
                 Ok(None)
             }
             Err(Unaided::Implausible(why)) => Err(format!(
-                "{asked}: {why}\n  help: --field accel=PATH or --accel-topic NAME names another, --aid none does without"
+                "{asked}: {why}\n  help: --field accel=PATH or --accel-topic NAME names another, {without}"
             )),
         }
     }

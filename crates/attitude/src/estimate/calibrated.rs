@@ -7,8 +7,9 @@ use super::meaning::Meaning;
 use super::plan::{Bias, Noise, Plan};
 use super::preparation::Prepared;
 use super::sensor_calibration::{Known, SensorCalibration};
+use super::smoothing::Recording;
 use crate::aid::{Filter, Prior, Settings};
-use crate::smooth::{Learned, Outcome, Smoothed};
+use crate::smooth::{Learned, Smoothed};
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
 /// Of a gyro whose bias was removed, rad/s: what the bias may have become since.
@@ -117,12 +118,12 @@ impl Meaning {
 /// What is known of the sensor at the end of a run: what it was known by before, with what the filter has learned.
 /// Numbers that the run has told nothing of stay as they were.
 ///
-/// Of a recording that was smoothed, `smoothed` says more than the filter that ran along.
+/// Of a `recording` that was smoothed, that says more than the filter that ran along.
 #[must_use]
 pub fn learned(
     (plan, resolved, prepared): (&Plan, &Meaning, &Prepared),
     filter: Option<&Filter>,
-    smoothed: Option<&Smoothed>,
+    recording: Option<&Recording>,
 ) -> SensorCalibration {
     let mut known = plan.calibration.as_deref().cloned().unwrap_or_default();
     let c = resolved.to_body();
@@ -149,7 +150,7 @@ pub fn learned(
             observed: [true],
         });
     }
-    if let Some(smoothed) = smoothed {
+    if let Some(Recording { smoothed, .. }) = recording {
         by_smoother(&mut known, (resolved, prepared), smoothed, switched_off);
         return known;
     }
@@ -218,16 +219,13 @@ pub fn learned(
     known
 }
 
-/// What a whole recording says of the sensor; nothing where the smoother led nowhere.
+/// What a whole recording says of the sensor.
 fn by_smoother(
     known: &mut SensorCalibration,
     (resolved, prepared): (&Meaning, &Prepared),
     smoothed: &Smoothed,
     switched_off: f64,
 ) {
-    if matches!(smoothed.outcome(), Outcome::Filter(_)) {
-        return;
-    }
     let found = smoothed.calibration();
     let c = resolved.to_body();
     let undone = |matrix: Matrix3<f64>| matrix.try_inverse().unwrap_or_else(Matrix3::identity);

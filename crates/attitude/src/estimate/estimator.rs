@@ -5,10 +5,11 @@
 
 use super::aiding::{self, Forces};
 use super::anew::Anew;
+use super::integrator::{Beside, Integrator};
 use super::meaning::Meaning;
 use super::plan::{Initial, Noise, Plan};
 use super::preparation::Prepared;
-use super::smoothing::{Smoothing, Told};
+use super::smoothing::{Recording, Smoothing, Told};
 use crate::aid::{self, Aided};
 use crate::condition::regularise::{self, Regulariser};
 use crate::condition::{self, Clock, Conditioner};
@@ -16,12 +17,8 @@ use crate::frames::Nav;
 use crate::propagate::{self, Executor, Method, Propagator};
 use crate::quaternion::{Quaternion, RotationVector};
 use crate::record::{AttitudeSample, Join, Nanos, RateSample, RawSample};
-use crate::smooth::Smoothed;
 use crate::worlds::{Convention, World};
 use nalgebra::Vector3;
-
-/// Why a smoother does not go on from somewhere.
-const OF_A_WHOLE: &str = "a smoothed recording has no attitude to go on from";
 
 /// An estimator of one stream.
 #[derive(Debug)]
@@ -48,15 +45,6 @@ pub struct Estimator {
     out: Vec<AttitudeSample>,
 }
 
-/// A vector measured beside the gyro, body axes.
-#[derive(Clone, Copy, Debug)]
-enum Beside {
-    /// Specific force, m/s^2.
-    Force(Vector3<f64>),
-    /// Magnetic field.
-    Field(Vector3<f64>),
-}
-
 /// What is taken beside the rates.
 #[derive(Debug)]
 struct Besides {
@@ -66,56 +54,6 @@ struct Besides {
     has_field: bool,
     /// Multiplies forces, once the first has come.
     force_scale: Option<f64>,
-}
-
-/// Rates -> attitudes.
-#[derive(Debug)]
-enum Integrator {
-    Alone(Box<Propagator>),
-    Aided(Box<Aided>),
-    /// All at the end.
-    Smoothed(Box<Smoothing>),
-}
-
-impl Integrator {
-    fn push(&mut self, rates: &[RateSample], exec: &impl Executor, out: &mut Vec<AttitudeSample>) {
-        match self {
-            Integrator::Alone(propagator) => propagator.push(rates, exec, out),
-            // What a sample is corrected by hangs on those before it.
-            Integrator::Aided(aided) => aided.push(rates, out),
-            Integrator::Smoothed(smoothing) => smoothing.push(rates),
-        }
-    }
-
-    fn take_beside(&mut self, stamp: Nanos, beside: Beside) {
-        match (self, beside) {
-            (Integrator::Alone(_), _) => {}
-            (Integrator::Aided(aided), Beside::Force(force)) => aided.take_force(stamp, force),
-            (Integrator::Aided(aided), Beside::Field(field)) => aided.take_field(stamp, field),
-            (Integrator::Smoothed(smoothing), Beside::Force(force)) => {
-                smoothing.take_force(stamp, force);
-            }
-            (Integrator::Smoothed(smoothing), Beside::Field(field)) => {
-                smoothing.take_field(stamp, field);
-            }
-        }
-    }
-
-    fn expect_forces_beside(&mut self) {
-        match self {
-            Integrator::Alone(_) => {}
-            Integrator::Aided(aided) => aided.expect_forces_beside(),
-            Integrator::Smoothed(smoothing) => smoothing.expect_forces_beside(),
-        }
-    }
-
-    fn finish(&mut self, exec: &impl Executor, out: &mut Vec<AttitudeSample>) {
-        match self {
-            Integrator::Alone(propagator) => propagator.finish(exec, out),
-            Integrator::Aided(aided) => aided.finish(out),
-            Integrator::Smoothed(smoothing) => smoothing.finish(exec, out),
-        }
-    }
 }
 
 /// What an estimator knows at one moment: a few kilobytes of text.
@@ -297,12 +235,7 @@ impl Estimator {
             let back = RotationVector(last.rate * -self.delay);
             last.q_nb = last.q_nb.advanced(&back).normalised();
         }
-        match &mut self.integrator {
-            Integrator::Alone(propagator) => propagator.resume(&last),
-            Integrator::Aided(aided) => aided.resume(&last),
-            Integrator::Smoothed(_) => return Err(OF_A_WHOLE.to_owned()),
-        }
-        .map_err(|e| e.to_string())
+        self.integrator.resume(&last)
     }
 
     /// What it knows, for another estimator to go on exactly; `None` where there is nothing yet, and
@@ -312,14 +245,7 @@ impl Estimator {
         if self.regulariser.is_some() || !self.beside.is_empty() {
             return None;
         }
-        let (propagation, aiding) = match &self.integrator {
-            Integrator::Alone(propagator) => (propagator.memory()?, None),
-            Integrator::Aided(aided) => {
-                let (propagation, aiding) = aided.memory()?;
-                (propagation, Some(aiding))
-            }
-            Integrator::Smoothed(_) => return None,
-        };
+        let (propagation, aiding) = self.integrator.memory()?;
         Some(Memory {
             settings: self.settings,
             conditioning: self.conditioner.memory()?,
@@ -338,13 +264,9 @@ impl Estimator {
         }
         let mut conditioner = self.conditioner.clone();
         let fits = conditioner.recall(&memory.conditioning)
-            && match (&mut self.integrator, &memory.aiding) {
-                (Integrator::Alone(propagator), None) => propagator.recall(&memory.propagation),
-                (Integrator::Aided(aided), Some(aiding)) => {
-                    aided.recall((&memory.propagation, aiding))
-                }
-                _ => false,
-            };
+            && self
+                .integrator
+                .recall(&memory.propagation, memory.aiding.as_ref());
         if fits {
             self.conditioner = conditioner;
             if let Some(besides) = &mut self.besides {
@@ -358,11 +280,7 @@ impl Estimator {
     /// that it was reset.
     pub fn succeed(&mut self, before: &condition::Report, resets: u32) {
         self.conditioner.succeed(before);
-        match &mut self.integrator {
-            Integrator::Alone(propagator) => propagator.succeed(resets),
-            Integrator::Aided(aided) => aided.succeed(resets),
-            Integrator::Smoothed(_) => {}
-        }
+        self.integrator.succeed(resets);
     }
 
     /// The next sample begins the attitude anew, and says so ([`Status::RESET`]); the run and what was learned of
@@ -370,11 +288,7 @@ impl Estimator {
     ///
     /// [`Status::RESET`]: crate::record::Status::RESET
     pub fn begin_anew(&mut self, anew: &Anew) {
-        match &mut self.integrator {
-            Integrator::Alone(propagator) => propagator.begin_anew(&anew.attitude),
-            Integrator::Aided(aided) => aided.begin_anew(&anew.attitude, anew.start),
-            Integrator::Smoothed(_) => {}
-        }
+        self.integrator.begin_anew(anew);
         self.begins_anew = true;
     }
 
@@ -532,81 +446,38 @@ impl Estimator {
     /// What propagation did.
     #[must_use]
     pub fn propagation(&self) -> propagate::Report {
-        match &self.integrator {
-            Integrator::Alone(propagator) => propagator.report(),
-            Integrator::Aided(aided) => aided.propagation(),
-            Integrator::Smoothed(smoothing) => smoothing.aided().propagation(),
-        }
+        self.integrator.propagation()
     }
 
-    /// What corrects the attitude, where something does.
+    /// What corrects the attitude, where something does; beside a smoother, what runs along with it.
     #[must_use]
     pub fn filter(&self) -> Option<&aid::Filter> {
-        match &self.integrator {
-            Integrator::Alone(_) => None,
-            Integrator::Aided(aided) => Some(aided.filter()),
-            Integrator::Smoothed(smoothing) => Some(smoothing.aided().filter()),
-        }
+        self.integrator.filter()
     }
 
-    /// Of a recording that was smoothed, once it is finished: what was learned of it.
+    /// What a smoother made of the recording, once it is finished; `None` where nobody asked for one.
     ///
     /// # Errors
-    /// In words: why it was not, and its attitudes are the filter's. `None` where nobody asked.
+    /// In words: why it made nothing of it. The attitudes are the filter's then, to the bit.
     #[must_use]
-    pub fn smoothed(&self) -> Option<Result<&Smoothed, &str>> {
-        let Integrator::Smoothed(smoothing) = &self.integrator else {
-            return None;
-        };
-        match (smoothing.smoothed(), smoothing.failure()) {
-            (Some(smoothed), _) => Some(Ok(smoothed)),
-            (None, Some(why)) => Some(Err(why)),
-            (None, None) => None,
-        }
-    }
-
-    /// Whether a smoother took samples of which nobody said what they mean as means since the one before, as it does where
-    /// steps are of 5 ms and less.
-    #[must_use]
-    pub fn is_taken_as_mean(&self) -> bool {
-        match &self.integrator {
-            Integrator::Smoothed(smoothing) => smoothing.is_taken_as_mean(),
-            _ => false,
-        }
-    }
-
-    /// Whether a smoother found the sensor farther off than those of its class, and smoothed it again with wider priors.
-    #[must_use]
-    pub fn is_smoothed_beyond_class(&self) -> bool {
-        match &self.integrator {
-            Integrator::Smoothed(smoothing) => smoothing.is_beyond_class(),
-            _ => false,
-        }
+    pub fn smoothed(&self) -> Option<Result<&Recording, &str>> {
+        self.integrator.smoothed()
     }
 
     /// Keeps the innovations of what corrects the attitude, for [`Estimator::innovations`].
     pub fn keep_innovations(&mut self) {
-        if let Integrator::Aided(aided) = &mut self.integrator {
-            aided.keep_innovations();
-        }
+        self.integrator.keep_innovations();
     }
 
     /// Those kept since this was asked last, each with the stamp of the correction.
     pub fn innovations(&mut self) -> Vec<(Nanos, aid::Innovation)> {
-        match &mut self.integrator {
-            Integrator::Alone(_) | Integrator::Smoothed(_) => Vec::new(),
-            Integrator::Aided(aided) => aided.innovations(),
-        }
+        self.integrator.innovations()
     }
 
     /// The method, with its window and order.
     #[must_use]
     pub fn method(&self) -> Method {
-        match &self.integrator {
-            Integrator::Alone(propagator) => propagator.method(),
-            Integrator::Aided(aided) => aided.method(),
-            Integrator::Smoothed(smoothing) => smoothing.aided().method(),
-        }
+        self.integrator.method()
     }
 
     /// What a sensor measured late has happened at the stamp already.

@@ -12,7 +12,7 @@ use crate::smooth::{
     Estimate, FieldUnit, Outcome, Sample, SampleModel, Samples, Settings, SmoothError, Smoothed,
     smooth,
 };
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use std::convert::Infallible;
 use std::num::NonZero;
 
@@ -49,13 +49,19 @@ pub(super) struct Smoothing {
     forces: Option<Beside>,
     fields: Beside,
     told: Told,
-    /// Nobody said what a sample means, and steps are short: taken as means.
-    is_taken_as_mean: bool,
-    /// The sensor is none of its class.
-    is_beyond_class: bool,
-    smoothed: Option<Smoothed>,
-    /// Why there is none.
-    failure: Option<String>,
+    /// Once the end has come; in words why there is none.
+    result: Option<Result<Recording, String>>,
+}
+
+/// A recording that was smoothed.
+#[derive(Debug)]
+pub struct Recording {
+    /// What was made of it; never [`Outcome::Filter`].
+    pub smoothed: Smoothed,
+    /// Nobody said what a sample means, and in steps of 5 ms and less they were taken as means since the one before.
+    pub is_taken_as_mean: bool,
+    /// The sensor is farther off than those of its class, and was smoothed again with priors 2.5 times as wide.
+    pub is_beyond_class: bool,
 }
 
 /// A gyro whose scale or axes are found so many prior sigmas off is none of its class, and is smoothed again with
@@ -66,8 +72,7 @@ const LOOSER: f64 = 2.5;
 fn is_beyond(smoothed: &Smoothed) -> bool {
     let gyro = &smoothed.calibration().gyro;
     let mut all = gyro.value.iter().zip(&gyro.prior);
-    !matches!(smoothed.outcome(), Outcome::Filter(_))
-        && all.any(|(value, prior)| value.abs() > BEYOND * prior)
+    all.any(|(value, prior)| value.abs() > BEYOND * prior)
 }
 
 /// What was measured, in memory.
@@ -91,33 +96,6 @@ impl Kept {
         steps.sort_unstable();
         steps.get(steps.len() / 2).copied()
     }
-
-    fn sample(&self, place: usize, rate: &RateSample, shift: i64) -> Sample {
-        Sample {
-            stamp: Nanos(rate.stamp.0.saturating_add(shift)),
-            rate: mean_rate(self.kind, rate),
-            force: rate.accel,
-            field: self
-                .fields
-                .binary_search_by_key(&place, |(at, _)| *at)
-                .ok()
-                .and_then(|found| self.fields.get(found))
-                .map(|(_, field)| *field),
-        }
-    }
-}
-
-/// The rate of a sample, rad/s: of a mean or a delta angle that over its interval.
-fn mean_rate(kind: SampleKind, sample: &RateSample) -> Vector3<f64> {
-    let own = match kind {
-        SampleKind::Rate => 1.0,
-        SampleKind::Average | SampleKind::DeltaAngle => sample.stamp.secs_since(sample.start),
-    };
-    if own > 0.0 {
-        sample.value / own
-    } else {
-        Vector3::zeros()
-    }
 }
 
 impl Samples for &Kept {
@@ -126,13 +104,20 @@ impl Samples for &Kept {
     fn pass(&mut self, take: &mut dyn FnMut(&[Sample])) -> Result<(), Infallible> {
         const CHUNK: usize = 4096;
         let mut chunk = Vec::with_capacity(CHUNK);
+        let mut fields = self.fields.iter().peekable();
         let mut shifts = self.shifts.iter().peekable();
         let mut shift = 0;
         for (place, rate) in self.rates.iter().enumerate() {
             if let Some((_, by)) = shifts.next_if(|(at, _)| *at == place) {
                 shift = *by;
             }
-            chunk.push(self.sample(place, rate, shift));
+            let field = fields.next_if(|(at, _)| *at == place);
+            chunk.push(Sample {
+                stamp: Nanos(rate.stamp.0.saturating_add(shift)),
+                rate: rate.mean_rate(self.kind),
+                force: rate.accel,
+                field: field.map(|(_, field)| *field),
+            });
             if chunk.len() == CHUNK {
                 take(&chunk);
                 chunk.clear();
@@ -158,10 +143,7 @@ impl Smoothing {
                 shifts: Vec::new(),
             },
             told,
-            is_taken_as_mean: false,
-            is_beyond_class: false,
-            smoothed: None,
-            failure: None,
+            result: None,
         }
     }
 
@@ -170,24 +152,10 @@ impl Smoothing {
         &self.aided
     }
 
-    /// The result, once the end has come.
-    pub(super) fn smoothed(&self) -> Option<&Smoothed> {
-        self.smoothed.as_ref()
-    }
-
-    /// Whether samples whose meaning nobody said were taken as means over their steps.
-    pub(super) fn is_taken_as_mean(&self) -> bool {
-        self.is_taken_as_mean
-    }
-
-    /// Whether the sensor was farther off than those of its class, and smoothed as one that nobody calibrated.
-    pub(super) fn is_beyond_class(&self) -> bool {
-        self.is_beyond_class
-    }
-
-    /// Why there is none.
-    pub(super) fn failure(&self) -> Option<&str> {
-        self.failure.as_deref()
+    /// What was made of it, once the end has come.
+    pub(super) fn result(&self) -> Option<Result<&Recording, &str>> {
+        let result = self.result.as_ref()?;
+        Some(result.as_ref().map_err(String::as_str))
     }
 
     pub(super) fn expect_forces_beside(&mut self) {
@@ -209,7 +177,7 @@ impl Smoothing {
 
     pub(super) fn push(&mut self, rates: &[RateSample]) {
         for rate in rates {
-            let turning = mean_rate(self.kept.kind, rate);
+            let turning = rate.mean_rate(self.kept.kind);
             let place = self.kept.rates.len();
             if let Some(last) = self
                 .kept
@@ -236,49 +204,63 @@ impl Smoothing {
     /// The recording has ended: appends all its attitudes.
     pub(super) fn finish(&mut self, exec: &impl Executor, out: &mut Vec<AttitudeSample>) {
         self.aided.finish(&mut self.along);
-        self.is_taken_as_mean = self.kept.kind == SampleKind::Rate
+        let result = self.smooth(exec.threads());
+        match &result {
+            Ok(recording) => {
+                self.along = Vec::new();
+                self.write(&recording.smoothed, out);
+            }
+            Err(_) => out.append(&mut self.along),
+        }
+        self.result = Some(result);
+    }
+
+    fn smooth(&self, threads: usize) -> Result<Recording, String> {
+        let is_taken_as_mean = self.kept.kind == SampleKind::Rate
             && !self.told.is_kind_stated
             && self.kept.step().is_some_and(|step| step <= SHORT);
+        let sample_model = match self.kept.kind {
+            SampleKind::Rate if !is_taken_as_mean => SampleModel::Instant,
+            _ => SampleModel::Interval,
+        };
         let settings = Settings {
-            sample_model: match self.kept.kind {
-                SampleKind::Rate if !self.is_taken_as_mean => SampleModel::Instant,
-                SampleKind::Rate => SampleModel::Interval,
-                SampleKind::Average | SampleKind::DeltaAngle => SampleModel::Interval,
-            },
+            sample_model,
             field_unit: FieldUnit::Unknown,
             looseness: self.told.looseness,
             // What a driver cut off is put back before, where it is.
             undo_truncation: false,
-            threads: NonZero::new(exec.threads()).unwrap_or(NonZero::<usize>::MIN),
+            threads: NonZero::new(threads).unwrap_or(NonZero::<usize>::MIN),
             ..Settings::default()
         };
-        let smoothed = match smooth(&mut &self.kept, &settings) {
-            Ok(smoothed) if is_beyond(&smoothed) => {
-                let looser = Settings {
-                    looseness: LOOSER * settings.looseness,
-                    ..settings
-                };
-                self.is_beyond_class = true;
-                smooth(&mut &self.kept, &looser).unwrap_or(smoothed)
-            }
-            Ok(smoothed) => smoothed,
-            Err(why) => {
-                self.failure = Some(match why {
-                    SmoothError::Read(never) => match never {},
-                    other => other.to_string(),
-                });
-                out.append(&mut self.along);
-                return;
-            }
+        let smoothed = self.smooth_by(&settings)?;
+        let again = is_beyond(&smoothed).then(|| {
+            self.smooth_by(&Settings {
+                looseness: LOOSER * settings.looseness,
+                ..settings
+            })
+        });
+        // Priors that lead nowhere are none to prefer.
+        let (smoothed, is_beyond_class) = match again {
+            Some(Ok(again)) => (again, true),
+            Some(Err(_)) | None => (smoothed, false),
         };
-        if matches!(smoothed.outcome(), Outcome::Filter(_)) {
-            // As it is without a smoother, to the bit: nothing that runs along for the smoother's sake is better.
-            out.append(&mut self.along);
-        } else {
-            self.along = Vec::new();
-            self.write(&smoothed, out);
+        Ok(Recording {
+            smoothed,
+            is_taken_as_mean,
+            is_beyond_class,
+        })
+    }
+
+    fn smooth_by(&self, settings: &Settings) -> Result<Smoothed, String> {
+        let smoothed = smooth(&mut &self.kept, settings).map_err(|why| match why {
+            SmoothError::Read(never) => match never {},
+            other => other.to_string(),
+        })?;
+        match smoothed.outcome() {
+            // As it is without a smoother: nothing that runs along for its sake is better.
+            Outcome::Filter(why) => Err(format!("it did not converge ({why})")),
+            _ => Ok(smoothed),
         }
-        self.smoothed = Some(smoothed);
     }
 
     fn write(&self, smoothed: &Smoothed, out: &mut Vec<AttitudeSample>) {
@@ -301,7 +283,10 @@ impl Smoothing {
                     q_nb,
                     rate: estimate.rate,
                     accel: rate.accel,
-                    covariance: in_body(&estimate.covariance, &estimate.q_nb),
+                    covariance: AttitudeCovariance::of_navigation_axes(
+                        &estimate.covariance,
+                        &estimate.q_nb,
+                    ),
                     status,
                     reset_count: u32::try_from(section).unwrap_or(u32::MAX),
                     log: rate.log,
@@ -323,12 +308,4 @@ impl Smoothing {
         };
         Quaternion::from_rotation_vector(&RotationVector(Vector3::z() * by))
     }
-}
-
-/// Of an error in earth axes: the same in those of the body.
-fn in_body(earth: &Matrix3<f64>, q_nb: &Quaternion<Nav, Body>) -> AttitudeCovariance {
-    let r = *q_nb.to_dcm().as_matrix();
-    let body = r.transpose() * earth * r;
-    let upper = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
-    AttitudeCovariance::from_upper(upper.map(|place| body[place]))
 }

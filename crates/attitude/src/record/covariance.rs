@@ -93,6 +93,15 @@ impl AttitudeCovariance {
         AttitudeCovariance::of(&p).matrix()
     }
 
+    /// Of an error resolved in navigation axes, the inverse of [`AttitudeCovariance::in_navigation_axes`].
+    pub(crate) fn of_navigation_axes(
+        p: &Matrix3<f64>,
+        q_nb: &Quaternion<Nav, Body>,
+    ) -> AttitudeCovariance {
+        let c_nb = *q_nb.to_dcm().as_matrix();
+        AttitudeCovariance::of(&(c_nb.transpose() * p * c_nb))
+    }
+
     /// The same error about other body axes: `change` gives the new components of a body vector.
     #[must_use]
     pub fn relabelled(&self, change: impl Fn(Vector3<f64>) -> Vector3<f64>) -> AttitudeCovariance {

@@ -17,6 +17,7 @@ use super::sweep::GRAVITY;
 use crate::quaternion::exp_minus_one;
 use crate::quaternion::kernel::{normalised, product};
 use nalgebra::Vector3;
+use std::fmt;
 
 /// A heading that nothing tells is held to this, rad.
 const HELD: f64 = 1e-4;
@@ -70,6 +71,29 @@ pub enum Failure {
     Strays(f64),
     /// The mean force is this far off the vertical, rad.
     NotUpright(f64),
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Failure::NotFinite => write!(f, "the equations had no solution"),
+            Failure::Diverging(turn) => {
+                write!(f, "it diverged, by {:.1} deg in the end", turn.to_degrees())
+            }
+            Failure::Unfinished(turn) => {
+                write!(
+                    f,
+                    "it still turned by {:.1} deg at the end",
+                    turn.to_degrees()
+                )
+            }
+            Failure::Strays(far) => write!(f, "the motion went {far:.0} m without a rest"),
+            Failure::NotUpright(off) => {
+                let off = off.to_degrees();
+                write!(f, "the mean force was {off:.1} deg off the vertical")
+            }
+        }
+    }
 }
 
 impl<const W: usize> Phase<W> {

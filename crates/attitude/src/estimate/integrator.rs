@@ -1,0 +1,177 @@
+//! Conditioned rates, and vectors beside them -> attitudes, whatever corrects them. Pure.
+//!
+//! Apart from the estimator because what integrates is chosen once, and everything around it is the same.
+
+use super::anew::Anew;
+use super::smoothing::{Recording, Smoothing};
+use crate::aid::{self, Aided};
+use crate::propagate::{self, Executor, Method, Propagator};
+use crate::record::{AttitudeSample, Nanos, RateSample};
+use nalgebra::Vector3;
+
+/// A vector measured beside the gyro, body axes.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Beside {
+    /// Specific force, m/s^2.
+    Force(Vector3<f64>),
+    /// Magnetic field.
+    Field(Vector3<f64>),
+}
+
+/// Rates -> attitudes.
+#[derive(Debug)]
+pub(super) enum Integrator {
+    Alone(Box<Propagator>),
+    Aided(Box<Aided>),
+    /// All at the end; of nothing else than a whole recording.
+    Smoothed(Box<Smoothing>),
+}
+
+impl Integrator {
+    pub(super) fn push(
+        &mut self,
+        rates: &[RateSample],
+        exec: &impl Executor,
+        out: &mut Vec<AttitudeSample>,
+    ) {
+        match self {
+            Integrator::Alone(propagator) => propagator.push(rates, exec, out),
+            // What a sample is corrected by hangs on those before it.
+            Integrator::Aided(aided) => aided.push(rates, out),
+            Integrator::Smoothed(smoothing) => smoothing.push(rates),
+        }
+    }
+
+    pub(super) fn take_beside(&mut self, stamp: Nanos, beside: Beside) {
+        match (self, beside) {
+            (Integrator::Alone(_), _) => {}
+            (Integrator::Aided(aided), Beside::Force(force)) => aided.take_force(stamp, force),
+            (Integrator::Aided(aided), Beside::Field(field)) => aided.take_field(stamp, field),
+            (Integrator::Smoothed(smoothing), Beside::Force(force)) => {
+                smoothing.take_force(stamp, force);
+            }
+            (Integrator::Smoothed(smoothing), Beside::Field(field)) => {
+                smoothing.take_field(stamp, field);
+            }
+        }
+    }
+
+    pub(super) fn expect_forces_beside(&mut self) {
+        match self {
+            Integrator::Alone(_) => {}
+            Integrator::Aided(aided) => aided.expect_forces_beside(),
+            Integrator::Smoothed(smoothing) => smoothing.expect_forces_beside(),
+        }
+    }
+
+    pub(super) fn finish(&mut self, exec: &impl Executor, out: &mut Vec<AttitudeSample>) {
+        match self {
+            Integrator::Alone(propagator) => propagator.finish(exec, out),
+            Integrator::Aided(aided) => aided.finish(out),
+            Integrator::Smoothed(smoothing) => smoothing.finish(exec, out),
+        }
+    }
+
+    /// Goes on from an attitude that was saved.
+    ///
+    /// # Errors
+    /// In words.
+    pub(super) fn resume(&mut self, last: &AttitudeSample) -> Result<(), String> {
+        match self {
+            Integrator::Alone(propagator) => propagator.resume(last),
+            Integrator::Aided(aided) => aided.resume(last),
+            Integrator::Smoothed(_) => {
+                return Err("a smoothed recording has no attitude to go on from".to_owned());
+            }
+        }
+        .map_err(|e| e.to_string())
+    }
+
+    pub(super) fn memory(&self) -> Option<(propagate::Memory, Option<aid::Memory>)> {
+        match self {
+            Integrator::Alone(propagator) => Some((propagator.memory()?, None)),
+            Integrator::Aided(aided) => {
+                let (propagation, aiding) = aided.memory()?;
+                Some((propagation, Some(aiding)))
+            }
+            Integrator::Smoothed(_) => None,
+        }
+    }
+
+    /// Whether it goes on as the one that knew this; if not, it is as before.
+    pub(super) fn recall(
+        &mut self,
+        propagation: &propagate::Memory,
+        aiding: Option<&aid::Memory>,
+    ) -> bool {
+        match (self, aiding) {
+            (Integrator::Alone(propagator), None) => propagator.recall(propagation),
+            (Integrator::Aided(aided), Some(aiding)) => aided.recall((propagation, aiding)),
+            _ => false,
+        }
+    }
+
+    pub(super) fn succeed(&mut self, resets: u32) {
+        match self {
+            Integrator::Alone(propagator) => propagator.succeed(resets),
+            Integrator::Aided(aided) => aided.succeed(resets),
+            Integrator::Smoothed(_) => {}
+        }
+    }
+
+    pub(super) fn begin_anew(&mut self, anew: &Anew) {
+        match self {
+            Integrator::Alone(propagator) => propagator.begin_anew(&anew.attitude),
+            Integrator::Aided(aided) => aided.begin_anew(&anew.attitude, anew.start),
+            Integrator::Smoothed(_) => {}
+        }
+    }
+
+    pub(super) fn keep_innovations(&mut self) {
+        if let Integrator::Aided(aided) = self {
+            aided.keep_innovations();
+        }
+    }
+
+    pub(super) fn innovations(&mut self) -> Vec<(Nanos, aid::Innovation)> {
+        match self {
+            Integrator::Alone(_) | Integrator::Smoothed(_) => Vec::new(),
+            Integrator::Aided(aided) => aided.innovations(),
+        }
+    }
+
+    /// What corrects, or runs along with the smoother.
+    fn aided(&self) -> Option<&Aided> {
+        match self {
+            Integrator::Alone(_) => None,
+            Integrator::Aided(aided) => Some(aided),
+            Integrator::Smoothed(smoothing) => Some(smoothing.aided()),
+        }
+    }
+
+    pub(super) fn filter(&self) -> Option<&aid::Filter> {
+        self.aided().map(Aided::filter)
+    }
+
+    /// `None` where nobody asked for a smoother, or the end has not come.
+    pub(super) fn smoothed(&self) -> Option<Result<&Recording, &str>> {
+        match self {
+            Integrator::Smoothed(smoothing) => smoothing.result(),
+            Integrator::Alone(_) | Integrator::Aided(_) => None,
+        }
+    }
+
+    pub(super) fn propagation(&self) -> propagate::Report {
+        match (self, self.aided()) {
+            (Integrator::Alone(propagator), _) => propagator.report(),
+            (_, aided) => aided.map(Aided::propagation).unwrap_or_default(),
+        }
+    }
+
+    pub(super) fn method(&self) -> Method {
+        match (self, self.aided()) {
+            (Integrator::Alone(propagator), _) => propagator.method(),
+            (_, aided) => aided.map_or(Method::Auto, Aided::method),
+        }
+    }
+}
