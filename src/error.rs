@@ -18,6 +18,11 @@ pub enum Error {
         /// Why.
         source: std::io::Error,
     },
+    /// There is no room for the samples of a recording that is smoothed.
+    #[error(
+        "{0}\n  help: make room in the folder of the output, or in that of temporary files (TMPDIR)"
+    )]
+    Spool(#[from] strapd_attitude::estimate::SpoolError),
     /// The output is already there.
     #[error("{}: already exists\n  help: --force replaces it", path.display())]
     OutputExists {

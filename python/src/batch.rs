@@ -118,6 +118,6 @@ fn compute(
         columns.extend(estimator.attitudes(&Sequential));
         look()?;
     }
-    columns.extend(estimator.finish(&Sequential));
+    columns.extend(&estimator.finish(&Sequential));
     Ok((columns, prepared, estimator))
 }

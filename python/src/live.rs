@@ -201,7 +201,7 @@ impl Live {
         if let Some((estimator, _)) = &mut self.running {
             let rest = estimator.finish(&Sequential);
             self.last = rest.last().copied().or(self.last);
-            columns.extend(rest);
+            columns.extend(&rest);
         }
         columns.into_dict(py)
     }

@@ -72,7 +72,10 @@ pub(super) fn each(
         let begun = prepared.and_then(|prepared| {
             let (plan, found) = (&run.plan, chosen.found.clone());
             let stream = labelled(chosen.stream.clone(), plan, &found.resolved, &prepared);
-            let topic = Topic::new(path, plan, found, prepared, run.against.is_some())?;
+            let mut topic = Topic::new(path, plan, found, prepared, run.against.is_some())?;
+            if plan.smooth {
+                topic.spool_beside(&run.targets);
+            }
             Ok((topic, stream))
         });
         let slot = open.next();

@@ -7,7 +7,7 @@ use super::history::History;
 use super::position::Position;
 use super::sample_kinds::AgainstRecorded;
 use crate::error::{Error, Result};
-use crate::sink::{Flow, Written};
+use crate::sink::{Flow, Target, Written};
 use std::path::Path;
 use std::sync::Arc;
 use strapd_attitude::estimate::Estimator;
@@ -135,6 +135,28 @@ impl Topic {
             against,
             history: None,
         })
+    }
+
+    /// What does not fit in memory of a recording that is smoothed goes to a file without a name in the folder of the
+    /// output, or in that of temporary files.
+    pub fn spool_beside(&mut self, targets: &[Target]) {
+        let folder = targets.iter().find_map(|target| match target {
+            Target::File { path, .. } => path.parent(),
+            _ => None,
+        });
+        let here = folder.map(|folder| match folder.as_os_str().is_empty() {
+            true => Path::new("."),
+            false => folder,
+        });
+        let beside = here.and_then(|here| tempfile::tempfile_in(here).ok());
+        match beside.map_or_else(tempfile::tempfile, Ok) {
+            Ok(file) => self.estimator.spool_to(Box::new(file)),
+            Err(why) => tracing::warn!(
+                "{}: all samples are held in memory: no temporary file in {}: {why}",
+                self.name,
+                std::env::temp_dir().display()
+            ),
+        }
     }
 }
 
@@ -301,20 +323,32 @@ impl Session {
     /// As [`Outlet::write`] and [`Outlet::finish`].
     pub fn finish(mut self, pool: &Pool) -> Result<Ended> {
         for (stream, topic) in self.topics.iter_mut().enumerate() {
-            let attitudes = topic.estimator.finish(pool);
-            topic.output.add(attitudes);
-            if let Some(history) = &mut topic.history {
-                history.add(attitudes);
-            }
-            if let Some(against) = &mut topic.against {
-                against.take_estimates(attitudes);
-            }
-            let _ = self.outlet.write(stream, attitudes, pool)?;
-            if let Some(against) = &mut topic.against {
+            let Topic {
+                estimator,
+                output,
+                history,
+                against,
+                ..
+            } = topic;
+            let mut flow = Flow::Continue;
+            estimator.finish_into(pool, |attitudes| {
+                output.add(attitudes);
+                if let Some(history) = history {
+                    history.add(attitudes);
+                }
+                if let Some(against) = against {
+                    against.take_estimates(attitudes);
+                }
+                if flow == Flow::Continue {
+                    flow = self.outlet.write(stream, attitudes, pool)?;
+                }
+                Ok::<(), Error>(())
+            })?;
+            if let Some(against) = against {
                 against.finish(pool);
             }
-            if let Some(history) = &mut topic.history {
-                history.corrected(&topic.estimator.innovations());
+            if let Some(history) = history {
+                history.corrected(&estimator.innovations());
             }
         }
         Ok(Ended {

@@ -45,7 +45,11 @@ pub(super) fn begin(
         .into_iter()
         .zip(prepared)
         .map(|(found, prepared)| {
-            Topic::new(path, &run.plan, found, prepared, run.against.is_some())
+            let mut topic = Topic::new(path, &run.plan, found, prepared, run.against.is_some())?;
+            if run.plan.smooth {
+                topic.spool_beside(&run.targets);
+            }
+            Ok(topic)
         })
         .collect::<Result<Vec<_>>>()?;
     let inputs: Vec<PathBuf> = match &run.source {

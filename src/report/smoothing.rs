@@ -20,6 +20,7 @@ pub struct Smoothing {
     bound: [f64; 2],
     is_taken_as_mean: bool,
     is_beyond_class: bool,
+    spooled_bytes: u64,
 }
 
 impl Smoothing {
@@ -49,6 +50,7 @@ impl Smoothing {
             bound: smoothed.bound(),
             is_taken_as_mean: recording.is_taken_as_mean,
             is_beyond_class: recording.is_beyond_class,
+            spooled_bytes: recording.spooled_bytes,
         }
     }
 
@@ -93,6 +95,10 @@ impl Smoothing {
             if n > 0 {
                 did += &format!(", {n} {what}");
             }
+        }
+        if self.spooled_bytes > 0 {
+            let size = super::summary::human_bytes(self.spooled_bytes);
+            did += &format!("; {size} of it kept in a temporary file");
         }
         let (scale, of_scale) = scales(&self.calibration.gyro);
         let (bias, of_bias) = &self.bias;
@@ -218,6 +224,7 @@ impl Smoothing {
             "standstills": self.counts.standstills,
             "rejected": self.counts.rejected,
             "bridged": self.counts.bridged,
+            "spooled_bytes": self.spooled_bytes,
             "sections": self.sections,
             "iterations": self.counts.iterations,
             "has_north": self.has_north,

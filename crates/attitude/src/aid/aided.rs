@@ -59,7 +59,7 @@ pub enum Start {
 /// assert!((aided.filter().calibration().bias.x - 0.01).abs() < 1e-4);
 /// # Ok::<(), strapd_attitude::propagate::SettingsError>(())
 /// ```
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Aided {
     pub(super) propagator: Propagator,
     pub(super) filter: Filter,

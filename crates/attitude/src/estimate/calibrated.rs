@@ -9,7 +9,7 @@ use super::preparation::Prepared;
 use super::sensor_calibration::{Known, SensorCalibration};
 use super::smoothing::Recording;
 use crate::aid::{Filter, Prior, Settings};
-use crate::smooth::{Learned, Smoothed};
+use crate::smooth::{Beforehand, Learned, OBSERVED, Smoothed};
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
 /// Of a gyro whose bias was removed, rad/s: what the bias may have become since.
@@ -31,6 +31,23 @@ fn turned(by: &Matrix3<f64>) -> Matrix6<f64> {
         unit[(l, k)] = 1.0;
         let (i, j) = PAIRS[row];
         (by * unit * by.transpose())[(i, j)]
+    })
+}
+
+/// Sigma of a sum of independent numbers, by their factors and sigmas; `None` where one is not known.
+fn about(terms: impl Iterator<Item = (f64, Option<f64>)>) -> Option<f64> {
+    let mut square = 0.0;
+    for (factor, sigma) in terms.filter(|(factor, _)| factor.abs() > 1e-6) {
+        square += (factor * sigma?).powi(2);
+    }
+    Some(square.sqrt())
+}
+
+/// Of sigmas those that say more than was known before: the others are of numbers that were not observed.
+fn observed<const N: usize>(sigma: [f64; N], prior: [f64; N]) -> [f64; N] {
+    std::array::from_fn(|i| match sigma[i] <= OBSERVED * prior[i] {
+        true => sigma[i],
+        false => f64::INFINITY,
     })
 }
 
@@ -95,6 +112,37 @@ impl Meaning {
                 .hard_iron
                 .filter(|iron| (0..3).all(|i| iron.sigma_of(i).is_some()))
                 .map(|iron| by_field * diagonal(&sigmas(&iron, 0.0)) * by_field.transpose()),
+        }
+    }
+
+    /// What a smoother is told of it: one standard deviation of each number in body axes, where all are known that it
+    /// is made of there. Hard iron is not among them: a smoother knows it to a microtesla, whatever was taken out.
+    pub(super) fn beforehand(&self) -> Beforehand {
+        let Some(calibration) = &self.calibration else {
+            return Beforehand::default();
+        };
+        let c = self.to_body();
+        let matrix = |c: &Matrix3<f64>, known: &Option<Known<9>>| {
+            std::array::from_fn(|n| {
+                let known = known.as_ref()?;
+                about((0..9).map(|m| (c[(n / 3, m / 3)] * c[(n % 3, m % 3)], known.sigma_of(m))))
+            })
+        };
+        let time = |known: &Option<Known<1>>| {
+            let known = known.as_ref()?;
+            Some((known.value[0], known.sigma_of(0)?))
+        };
+        Beforehand {
+            gyro: matrix(&c, &calibration.gyro),
+            force_bias: std::array::from_fn(|n| {
+                let known = calibration.force_bias.as_ref()?;
+                about((0..3).map(|m| (c[(n, m)], known.sigma_of(m))))
+            }),
+            force: matrix(&c, &calibration.force),
+            force_time: time(&calibration.lead),
+            field: matrix(&self.field_to_body(), &calibration.soft_iron),
+            // A field's stamps are set right before.
+            field_time: time(&calibration.field_lead).map(|(_, sigma)| (0.0, sigma)),
         }
     }
 
@@ -230,7 +278,7 @@ fn by_smoother(
     let c = resolved.to_body();
     let undone = |matrix: Matrix3<f64>| matrix.try_inverse().unwrap_or_else(Matrix3::identity);
     // Of errors that are independent: squares turn with the squares of the axes.
-    let about = |by: &Matrix3<f64>, sigma: [f64; 3]| -> [f64; 3] {
+    let turned = |by: &Matrix3<f64>, sigma: [f64; 3]| -> [f64; 3] {
         let squares = by.component_mul(by) * Vector3::from(sigma).map(|s| s * s);
         squares.map(f64::sqrt).into()
     };
@@ -244,13 +292,14 @@ fn by_smoother(
                 square.transpose() * Matrix3::from_row_slice(numbers).map(|s| s * s) * square;
             row_by_row(&turned.map(f64::sqrt))
         };
-        (row_by_row(&total), of(&found.sigma), of(&found.prior))
+        let prior = of(&found.prior);
+        (row_by_row(&total), observed(of(&found.sigma), prior), prior)
     };
     let from_gyro = undone(c * known.gyro_matrix());
     let from_force = undone(c * known.force_matrix());
     // As it was at the end.
     if let Some(last) = smoothed.biases().last() {
-        let sigma = about(&from_gyro, last.sigma.into());
+        let sigma = turned(&from_gyro, last.sigma.into());
         let value = from_gyro * (prepared.bias + last.value);
         known.bias = Some(now_known(
             known.bias.as_ref(),
@@ -264,11 +313,12 @@ fn by_smoother(
     known.gyro = Some(now_known(known.gyro.as_ref(), prior, value, sigma, 0.0));
     let before = Vector3::from(vector_of(known.force_bias.as_ref()));
     let value = before + from_force * Vector3::from(found.force_bias.value);
+    let prior = turned(&from_force, found.force_bias.prior);
     known.force_bias = Some(now_known(
         known.force_bias.as_ref(),
-        about(&from_force, found.force_bias.prior),
+        prior,
         value.into(),
-        about(&from_force, found.force_bias.sigma),
+        observed(turned(&from_force, found.force_bias.sigma), prior),
         0.0,
     ));
     let (value, sigma, prior) = whole(&c, &known.force_matrix(), &found.force);
@@ -278,7 +328,7 @@ fn by_smoother(
         known.lead.as_ref(),
         found.force_time.prior,
         found.force_time.value,
-        found.force_time.sigma,
+        observed(found.force_time.sigma, found.force_time.prior),
         0.0,
     ));
     let Some(magnetometer) = &found.magnetometer else {
@@ -290,11 +340,12 @@ fn by_smoother(
     let unit = 1.0 / magnetometer.scale;
     let iron = &magnetometer.hard_iron;
     let before = Vector3::from(vector_of(known.hard_iron.as_ref()));
+    let prior = turned(&from_field, iron.prior).map(|s| s * unit);
     known.hard_iron = Some(now_known(
         known.hard_iron.as_ref(),
-        about(&from_field, iron.prior).map(|s| s * unit),
+        prior,
         (before + from_field * Vector3::from(iron.value) * unit).into(),
-        about(&from_field, iron.sigma).map(|s| s * unit),
+        observed(turned(&from_field, iron.sigma).map(|s| s * unit), prior),
         0.0,
     ));
     let (value, sigma, prior) = whole(&to_body, &known.field_matrix(), &magnetometer.matrix);
@@ -303,6 +354,16 @@ fn by_smoother(
         prior,
         value,
         sigma,
+        0.0,
+    ));
+    // Of what the stamps were set right by already.
+    let before = known.field_lead.map_or(0.0, |lead| lead.value[0]);
+    let time = &magnetometer.time;
+    known.field_lead = Some(now_known(
+        known.field_lead.as_ref(),
+        time.prior,
+        time.value.map(|time| before + time),
+        observed(time.sigma, time.prior),
         0.0,
     ));
 }

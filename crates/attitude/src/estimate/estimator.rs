@@ -6,6 +6,7 @@
 use super::aiding::{self, Forces};
 use super::anew::Anew;
 use super::integrator::{Beside, Integrator};
+use super::kept::{Spool, SpoolError};
 use super::meaning::Meaning;
 use super::plan::{Initial, Noise, Plan};
 use super::preparation::Prepared;
@@ -26,11 +27,7 @@ pub struct Estimator {
     conditioner: Conditioner,
     regulariser: Option<Regulariser>,
     integrator: Integrator,
-    /// Of the sensor's own filters, s.
-    delay: f64,
-    world: World,
-    /// True north to the axes of the filter, whose north is magnetic; `None` = the same.
-    north: Option<Quaternion<Nav, Nav>>,
+    asked: Asked,
     /// Vectors that came between the rates, each before the rate of this number.
     beside: Vec<(usize, Nanos, Beside)>,
     /// How what comes beside the rates is understood; `None` where nothing of it is used.
@@ -169,6 +166,7 @@ impl Estimator {
                         is_kind_stated: resolved.is_kind_stated,
                         heading,
                         looseness: aiding.settings.scale_prior / class,
+                        known: resolved.beforehand(),
                     };
                     let smoothing = Smoothing::new(aided, told);
                     Integrator::Smoothed(Box::new(smoothing))
@@ -199,10 +197,12 @@ impl Estimator {
             conditioner: Conditioner::new(settings).map_err(|e| e.to_string())?,
             regulariser: prepared.stamps.regulariser(resolved.kind)?,
             integrator,
-            delay: plan.sensor_delay_secs,
-            world: prepared.world,
-            north: (plan.declination != 0.0 && prepared.aiding.is_some())
-                .then(|| turned_north(plan.declination)),
+            asked: Asked {
+                delay: plan.sensor_delay_secs,
+                world: prepared.world,
+                north: (plan.declination != 0.0 && prepared.aiding.is_some())
+                    .then(|| turned_north(plan.declination)),
+            },
             beside: Vec::new(),
             besides: prepared.aiding.map(|aiding| Besides {
                 resolved: resolved.clone(),
@@ -224,17 +224,7 @@ impl Estimator {
     /// # Errors
     /// In words: it is no rotation.
     pub fn resume(&mut self, last: &AttitudeSample) -> Result<(), String> {
-        let mut last = *last;
-        if let Some(from) = self.world.convention() {
-            last = relabelled(&last, from, Convention::EnuFlu);
-        }
-        if let Some(north) = &self.north {
-            last.q_nb = (north.inverse() * last.q_nb).normalised();
-        }
-        if self.delay != 0.0 {
-            let back = RotationVector(last.rate * -self.delay);
-            last.q_nb = last.q_nb.advanced(&back).normalised();
-        }
+        let last = self.asked.undone(last);
         self.integrator.resume(&last)
     }
 
@@ -372,13 +362,37 @@ impl Estimator {
     pub fn attitudes(&mut self, exec: &impl Executor) -> &[AttitudeSample] {
         self.out.clear();
         self.propagate(exec);
-        self.catch_up();
-        self.relabel();
+        self.asked.apply(&mut self.out);
         &self.out
     }
 
-    /// No more samples: the rest of the attitudes.
-    pub fn finish(&mut self, exec: &impl Executor) -> &[AttitudeSample] {
+    /// What a recording that is smoothed needs beyond some hundred megabytes is kept in `spool`: for
+    /// [`Estimator::finish_into`], before the first sample.
+    pub fn spool_to(&mut self, spool: Box<dyn Spool>) {
+        self.integrator.spool_to(spool);
+    }
+
+    /// No more samples: the rest of the attitudes, at once.
+    pub fn finish(&mut self, exec: &impl Executor) -> Vec<AttitudeSample> {
+        let mut all = Vec::new();
+        let done = self.finish_into(exec, |attitudes| {
+            all.extend_from_slice(attitudes);
+            Ok::<(), SpoolError>(())
+        });
+        debug_assert!(done.is_ok(), "nothing fails in memory: {done:?}");
+        all
+    }
+
+    /// No more samples: gives the rest of the attitudes to `take`, in pieces; of a recording that is smoothed these are
+    /// all.
+    ///
+    /// # Errors
+    /// Those of `take`, which is not called again then; of the spool.
+    pub fn finish_into<E: From<SpoolError>>(
+        &mut self,
+        exec: &impl Executor,
+        mut take: impl FnMut(&[AttitudeSample]) -> Result<(), E>,
+    ) -> Result<(), E> {
         self.out.clear();
         self.conditioner.finish(&mut self.rates);
         self.propagate(exec);
@@ -387,10 +401,16 @@ impl Estimator {
             self.integrator.push(&self.even, exec, &mut self.out);
             self.even.clear();
         }
-        self.integrator.finish(exec, &mut self.out);
-        self.catch_up();
-        self.relabel();
-        &self.out
+        let asked = self.asked;
+        let mut taken = Ok(());
+        self.integrator
+            .finish(exec, &mut self.out, &mut |attitudes| {
+                if taken.is_ok() {
+                    asked.apply(attitudes);
+                    taken = take(attitudes);
+                }
+            })?;
+        taken
     }
 
     fn propagate(&mut self, exec: &impl Executor) {
@@ -479,33 +499,55 @@ impl Estimator {
     pub fn method(&self) -> Method {
         self.integrator.method()
     }
+}
 
-    /// What a sensor measured late has happened at the stamp already.
-    fn catch_up(&mut self) {
-        if self.delay == 0.0 {
-            return;
-        }
-        for sample in &mut self.out {
-            let turn = RotationVector(sample.rate * self.delay);
-            sample.q_nb = sample.q_nb.advanced(&turn).normalised();
+/// How attitudes are asked for: in which world, of which instant.
+#[derive(Clone, Copy, Debug)]
+struct Asked {
+    /// Of the sensor's own filters, s.
+    delay: f64,
+    world: World,
+    /// True north to the axes of the filter, whose north is magnetic; `None` = the same.
+    north: Option<Quaternion<Nav, Nav>>,
+}
+
+impl Asked {
+    /// From the convention everything is computed in (ENU or start, FLU) to the one asked for: world and body change
+    /// together.
+    fn apply(&self, out: &mut [AttitudeSample]) {
+        let to = self
+            .world
+            .convention()
+            .filter(|to| *to != Convention::EnuFlu);
+        for sample in out {
+            // What a sensor measured late has happened at the stamp already.
+            if self.delay != 0.0 {
+                let turn = RotationVector(sample.rate * self.delay);
+                sample.q_nb = sample.q_nb.advanced(&turn).normalised();
+            }
+            if let Some(north) = &self.north {
+                sample.q_nb = (*north * sample.q_nb).normalised();
+            }
+            if let Some(to) = to {
+                *sample = relabelled(sample, Convention::EnuFlu, to);
+            }
         }
     }
 
-    /// From the convention everything is computed in (ENU or start, FLU) to the one asked for. World
-    /// and body change together.
-    fn relabel(&mut self) {
+    /// An attitude that was asked for, as it was computed.
+    fn undone(&self, given: &AttitudeSample) -> AttitudeSample {
+        let mut sample = *given;
+        if let Some(from) = self.world.convention() {
+            sample = relabelled(&sample, from, Convention::EnuFlu);
+        }
         if let Some(north) = &self.north {
-            for sample in &mut self.out {
-                sample.q_nb = (*north * sample.q_nb).normalised();
-            }
+            sample.q_nb = (north.inverse() * sample.q_nb).normalised();
         }
-        let to = match self.world.convention() {
-            None | Some(Convention::EnuFlu) => return,
-            Some(to) => to,
-        };
-        for sample in &mut self.out {
-            *sample = relabelled(sample, Convention::EnuFlu, to);
+        if self.delay != 0.0 {
+            let back = RotationVector(sample.rate * -self.delay);
+            sample.q_nb = sample.q_nb.advanced(&back).normalised();
         }
+        sample
     }
 }
 

@@ -3,6 +3,7 @@
 //! Apart from the estimator because what integrates is chosen once, and everything around it is the same.
 
 use super::anew::Anew;
+use super::kept::{Spool, SpoolError};
 use super::smoothing::{Recording, Smoothing};
 use crate::aid::{self, Aided};
 use crate::propagate::{self, Executor, Method, Propagator};
@@ -38,7 +39,7 @@ impl Integrator {
             Integrator::Alone(propagator) => propagator.push(rates, exec, out),
             // What a sample is corrected by hangs on those before it.
             Integrator::Aided(aided) => aided.push(rates, out),
-            Integrator::Smoothed(smoothing) => smoothing.push(rates),
+            Integrator::Smoothed(smoothing) => smoothing.push(rates, out),
         }
     }
 
@@ -64,12 +65,30 @@ impl Integrator {
         }
     }
 
-    pub(super) fn finish(&mut self, exec: &impl Executor, out: &mut Vec<AttitudeSample>) {
+    /// Where what does not fit in memory goes, of a whole recording.
+    pub(super) fn spool_to(&mut self, spool: Box<dyn Spool>) {
+        if let Integrator::Smoothed(smoothing) = self {
+            smoothing.spool_to(spool);
+        }
+    }
+
+    /// Gives what is in `out`, and the rest after it, in pieces.
+    ///
+    /// # Errors
+    /// Of the spool.
+    pub(super) fn finish(
+        &mut self,
+        exec: &impl Executor,
+        out: &mut Vec<AttitudeSample>,
+        give: &mut dyn FnMut(&mut [AttitudeSample]),
+    ) -> Result<(), SpoolError> {
         match self {
             Integrator::Alone(propagator) => propagator.finish(exec, out),
             Integrator::Aided(aided) => aided.finish(out),
-            Integrator::Smoothed(smoothing) => smoothing.finish(exec, out),
+            Integrator::Smoothed(smoothing) => return smoothing.finish(exec, out, give),
         }
+        give(out);
+        Ok(())
     }
 
     /// Goes on from an attitude that was saved.

@@ -1,19 +1,21 @@
 //! Conditioned samples of a whole recording -> its smoothed attitudes, at the end. Pure.
 //!
 //! Apart from the smoother because that reads samples again and again, and here they come once: they are kept, with the
-//! vectors measured beside them, and a filter runs along for what the run says of turns, gaps and sensor.
+//! vectors measured beside them ([`Kept`]), and a filter runs along for what the run says of turns, gaps and sensor.
 
+use super::kept::{Event, Kept, Spool, SpoolError};
 use crate::aid::{Aided, Beside};
 use crate::frames::{Body, Nav};
 use crate::propagate::Executor;
 use crate::quaternion::{Quaternion, RotationVector};
 use crate::record::{AttitudeCovariance, AttitudeSample, Nanos, RateSample, SampleKind, Status};
 use crate::smooth::{
-    Estimate, FieldUnit, Outcome, Sample, SampleModel, Samples, Settings, SmoothError, Smoothed,
-    smooth,
+    Beforehand, Estimate, FieldUnit, Outcome, Sample, SampleModel, Samples, Settings, SmoothError,
+    Smoothed, smooth,
 };
 use nalgebra::Vector3;
-use std::convert::Infallible;
+use std::cell::RefCell;
+use std::collections::VecDeque;
 use std::num::NonZero;
 
 /// Between the last sample and the next where the stamps go back: nothing is known of what lies between, ns.
@@ -24,6 +26,8 @@ const APART: i64 = 10_000_000_000;
 const SHORT: i64 = 5_000_000;
 /// Steps that are looked at.
 const FEW: usize = 4096;
+/// Samples that are handed on at once.
+const CHUNK: usize = 4096;
 
 /// What was said of a recording beforehand.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -36,18 +40,21 @@ pub(super) struct Told {
     pub(super) heading: Option<f64>,
     /// How many times as far off as sensors of the default class this one may be.
     pub(super) looseness: f64,
+    /// What is known of this one.
+    pub(super) known: Beforehand,
 }
 
 /// A recording on its way to the smoother.
 #[derive(Debug)]
 pub(super) struct Smoothing {
-    /// Runs along: counts, and attitudes where the smoother has none.
+    /// Runs along for its counts: nobody gets its attitudes.
     aided: Aided,
-    /// Its attitudes, kept only until the end is known to be smoothed.
-    along: Vec<AttitudeSample>,
+    /// The same before the first sample.
+    fresh: Aided,
     kept: Kept,
-    forces: Option<Beside>,
-    fields: Beside,
+    /// The first steps, ns, and the last stamp.
+    steps: Vec<i64>,
+    last: Option<Nanos>,
     told: Told,
     /// Once the end has come; in words why there is none.
     result: Option<Result<Recording, String>>,
@@ -62,6 +69,8 @@ pub struct Recording {
     pub is_taken_as_mean: bool,
     /// The sensor is farther off than those of its class, and was smoothed again with priors 2.5 times as wide.
     pub is_beyond_class: bool,
+    /// Bytes of it that were kept in a temporary file.
+    pub spooled_bytes: u64,
 }
 
 /// A gyro whose scale or axes are found so many prior sigmas off is none of its class, and is smoothed again with
@@ -75,54 +84,62 @@ fn is_beyond(smoothed: &Smoothed) -> bool {
     all.any(|(value, prior)| value.abs() > BEYOND * prior)
 }
 
-/// What was measured, in memory.
-#[derive(Debug)]
-struct Kept {
+/// What was kept, as the smoother reads it.
+struct Reading<'a> {
+    kept: &'a mut Kept,
     kind: SampleKind,
-    rates: Vec<RateSample>,
-    /// Fields by the place of their sample.
-    fields: Vec<(usize, Vector3<f64>)>,
-    /// Stamps that went back go on from here: places, and what is added to the stamps from there on, ns.
-    shifts: Vec<(usize, i64)>,
+    has_forces_beside: bool,
+    /// Rates whose attitudes have not come yet, where they are wanted.
+    waiting: Option<&'a RefCell<VecDeque<RateSample>>>,
 }
 
-impl Kept {
-    /// The median of the first steps, ns.
-    fn step(&self) -> Option<i64> {
-        let steps = self.rates.windows(2).take(FEW);
-        let mut steps: Vec<i64> = steps
-            .filter_map(|pair| Some(pair.last()?.stamp.since(pair.first()?.stamp)))
-            .collect();
-        steps.sort_unstable();
-        steps.get(steps.len() / 2).copied()
-    }
-}
+impl Samples for Reading<'_> {
+    type Error = SpoolError;
 
-impl Samples for &Kept {
-    type Error = Infallible;
-
-    fn pass(&mut self, take: &mut dyn FnMut(&[Sample])) -> Result<(), Infallible> {
-        const CHUNK: usize = 4096;
+    fn pass(&mut self, take: &mut dyn FnMut(&[Sample])) -> Result<(), SpoolError> {
+        let mut forces = self.has_forces_beside.then(Beside::default);
+        let mut fields = Beside::with_repeats();
+        let (mut last, mut shift): (Option<Nanos>, i64) = (None, 0);
         let mut chunk = Vec::with_capacity(CHUNK);
-        let mut fields = self.fields.iter().peekable();
-        let mut shifts = self.shifts.iter().peekable();
-        let mut shift = 0;
-        for (place, rate) in self.rates.iter().enumerate() {
-            if let Some((_, by)) = shifts.next_if(|(at, _)| *at == place) {
-                shift = *by;
+        self.kept.give(|event| match event {
+            Event::ForcesBeside => {
+                forces.get_or_insert_default();
             }
-            let field = fields.next_if(|(at, _)| *at == place);
-            chunk.push(Sample {
-                stamp: Nanos(rate.stamp.0.saturating_add(shift)),
-                rate: rate.mean_rate(self.kind),
-                force: rate.accel,
-                field: field.map(|(_, field)| *field),
-            });
-            if chunk.len() == CHUNK {
-                take(&chunk);
-                chunk.clear();
+            Event::Force(stamp, force) => {
+                if let Some(forces) = &mut forces {
+                    forces.take(stamp, force);
+                }
             }
-        }
+            Event::Field(stamp, field) => fields.take(stamp, field),
+            Event::Rate(rate) => {
+                let turning = rate.mean_rate(self.kind);
+                if let Some(last) = last.filter(|last| *last >= rate.stamp) {
+                    shift = shift.saturating_add(last.since(rate.stamp).saturating_add(APART));
+                }
+                last = Some(rate.stamp);
+                let force = match &mut forces {
+                    None => rate.accel,
+                    Some(forces) => forces.at(rate.stamp, &turning),
+                };
+                chunk.push(Sample {
+                    stamp: Nanos(rate.stamp.0.saturating_add(shift)),
+                    rate: turning,
+                    force,
+                    field: fields.at(rate.stamp, &turning),
+                });
+                if let Some(waiting) = self.waiting {
+                    let rate = RateSample {
+                        accel: force,
+                        ..rate
+                    };
+                    waiting.borrow_mut().push_back(rate);
+                }
+                if chunk.len() == CHUNK {
+                    take(&chunk);
+                    chunk.clear();
+                }
+            }
+        })?;
         take(&chunk);
         Ok(())
     }
@@ -132,19 +149,19 @@ impl Smoothing {
     /// Of a filter that has taken nothing yet.
     pub(super) fn new(aided: Aided, told: Told) -> Smoothing {
         Smoothing {
-            forces: aided.has_forces_beside().then(Beside::default),
-            fields: Beside::with_repeats(),
+            fresh: aided.clone(),
             aided,
-            along: Vec::new(),
-            kept: Kept {
-                kind: told.kind,
-                rates: Vec::new(),
-                fields: Vec::new(),
-                shifts: Vec::new(),
-            },
+            kept: Kept::default(),
+            steps: Vec::new(),
+            last: None,
             told,
             result: None,
         }
+    }
+
+    /// What does not fit in memory goes there.
+    pub(super) fn spool_to(&mut self, spool: Box<dyn Spool>) {
+        self.kept.spool_to(spool);
     }
 
     /// The filter that runs along.
@@ -159,67 +176,112 @@ impl Smoothing {
     }
 
     pub(super) fn expect_forces_beside(&mut self) {
-        self.forces.get_or_insert_default();
+        self.kept.push(&Event::ForcesBeside);
         self.aided.expect_forces_beside();
     }
 
     pub(super) fn take_force(&mut self, stamp: Nanos, force: Vector3<f64>) {
-        if let Some(forces) = &mut self.forces {
-            forces.take(stamp, force);
-        }
+        self.kept.push(&Event::Force(stamp, force));
         self.aided.take_force(stamp, force);
     }
 
     pub(super) fn take_field(&mut self, stamp: Nanos, field: Vector3<f64>) {
-        self.fields.take(stamp, field);
+        self.kept.push(&Event::Field(stamp, field));
         self.aided.take_field(stamp, field);
     }
 
-    pub(super) fn push(&mut self, rates: &[RateSample]) {
+    /// `scratch` is empty, and is left so.
+    pub(super) fn push(&mut self, rates: &[RateSample], scratch: &mut Vec<AttitudeSample>) {
         for rate in rates {
-            let turning = rate.mean_rate(self.kept.kind);
-            let place = self.kept.rates.len();
-            if let Some(last) = self
-                .kept
-                .rates
-                .last()
-                .filter(|last| last.stamp >= rate.stamp)
+            self.kept.push(&Event::Rate(*rate));
+            if let Some(last) = self.last.replace(rate.stamp)
+                && self.steps.len() < FEW
             {
-                let so_far = self.kept.shifts.last().map_or(0, |(_, by)| *by);
-                let by = last.stamp.since(rate.stamp).saturating_add(APART);
-                self.kept.shifts.push((place, so_far.saturating_add(by)));
+                self.steps.push(rate.stamp.since(last));
             }
-            let accel = match &mut self.forces {
-                None => rate.accel,
-                Some(forces) => forces.at(rate.stamp, &turning),
-            };
-            if let Some(field) = self.fields.at(rate.stamp, &turning) {
-                self.kept.fields.push((place, field));
-            }
-            self.kept.rates.push(RateSample { accel, ..*rate });
         }
-        self.aided.push(rates, &mut self.along);
+        self.aided.push(rates, scratch);
+        scratch.clear();
     }
 
-    /// The recording has ended: appends all its attitudes.
-    pub(super) fn finish(&mut self, exec: &impl Executor, out: &mut Vec<AttitudeSample>) {
-        self.aided.finish(&mut self.along);
-        let result = self.smooth(exec.threads());
+    /// The recording has ended: gives all its attitudes, in pieces.
+    ///
+    /// # Errors
+    /// Of the file that it was kept in.
+    pub(super) fn finish(
+        &mut self,
+        exec: &impl Executor,
+        out: &mut Vec<AttitudeSample>,
+        give: &mut dyn FnMut(&mut [AttitudeSample]),
+    ) -> Result<(), SpoolError> {
+        self.aided.finish(out);
+        out.clear();
+        let result = match self.smooth(exec.threads()) {
+            Err(SmoothError::Read(error)) => return Err(error),
+            Err(other) => Err(other.to_string()),
+            Ok(result) => result,
+        };
         match &result {
-            Ok(recording) => {
-                self.along = Vec::new();
-                self.write(&recording.smoothed, out);
-            }
-            Err(_) => out.append(&mut self.along),
+            Ok(recording) => self.write(&recording.smoothed, out, give)?,
+            Err(_) => self.filter_again(out, give)?,
         }
         self.result = Some(result);
+        Ok(())
     }
 
-    fn smooth(&self, threads: usize) -> Result<Recording, String> {
-        let is_taken_as_mean = self.kept.kind == SampleKind::Rate
+    /// As it is without a smoother.
+    fn filter_again(
+        &mut self,
+        out: &mut Vec<AttitudeSample>,
+        give: &mut dyn FnMut(&mut [AttitudeSample]),
+    ) -> Result<(), SpoolError> {
+        let filter = &mut self.fresh;
+        self.kept.give(|event| match event {
+            Event::ForcesBeside => filter.expect_forces_beside(),
+            Event::Force(stamp, force) => filter.take_force(stamp, force),
+            Event::Field(stamp, field) => filter.take_field(stamp, field),
+            Event::Rate(rate) => {
+                filter.push(&[rate], out);
+                if out.len() >= CHUNK {
+                    give(out);
+                    out.clear();
+                }
+            }
+        })?;
+        filter.finish(out);
+        give(out);
+        out.clear();
+        Ok(())
+    }
+
+    fn reading(&mut self) -> Reading<'_> {
+        Reading {
+            has_forces_beside: self.fresh.has_forces_beside(),
+            kept: &mut self.kept,
+            kind: self.told.kind,
+            waiting: None,
+        }
+    }
+
+    /// The median of the first steps, ns.
+    fn step(&self) -> Option<i64> {
+        let mut steps = self.steps.clone();
+        steps.sort_unstable();
+        steps.get(steps.len() / 2).copied()
+    }
+
+    /// What was made of it, or in words why nothing.
+    ///
+    /// # Errors
+    /// It can not be smoothed at all.
+    fn smooth(
+        &mut self,
+        threads: usize,
+    ) -> Result<Result<Recording, String>, SmoothError<SpoolError>> {
+        let is_taken_as_mean = self.told.kind == SampleKind::Rate
             && !self.told.is_kind_stated
-            && self.kept.step().is_some_and(|step| step <= SHORT);
-        let sample_model = match self.kept.kind {
+            && self.step().is_some_and(|step| step <= SHORT);
+        let sample_model = match self.told.kind {
             SampleKind::Rate if !is_taken_as_mean => SampleModel::Instant,
             _ => SampleModel::Interval,
         };
@@ -227,49 +289,67 @@ impl Smoothing {
             sample_model,
             field_unit: FieldUnit::Unknown,
             looseness: self.told.looseness,
+            known: self.told.known,
             // What a driver cut off is put back before, where it is.
             undo_truncation: false,
             threads: NonZero::new(threads).unwrap_or(NonZero::<usize>::MIN),
             ..Settings::default()
         };
-        let smoothed = self.smooth_by(&settings)?;
-        let again = is_beyond(&smoothed).then(|| {
-            self.smooth_by(&Settings {
-                looseness: LOOSER * settings.looseness,
-                ..settings
-            })
-        });
-        // Priors that lead nowhere are none to prefer.
-        let (smoothed, is_beyond_class) = match again {
-            Some(Ok(again)) => (again, true),
-            Some(Err(_)) | None => (smoothed, false),
+        let smoothed = match self.smooth_by(&settings)? {
+            Ok(smoothed) => smoothed,
+            Err(why) => return Ok(Err(why)),
         };
-        Ok(Recording {
-            smoothed,
+        let looser = Settings {
+            looseness: LOOSER * settings.looseness,
+            known: settings.known.widened(LOOSER),
+            ..settings
+        };
+        let again = if is_beyond(&smoothed) {
+            // Priors that lead nowhere are none to prefer.
+            self.smooth_by(&looser)?.ok()
+        } else {
+            None
+        };
+        Ok(Ok(Recording {
+            is_beyond_class: again.is_some(),
+            smoothed: again.unwrap_or(smoothed),
             is_taken_as_mean,
-            is_beyond_class,
-        })
+            spooled_bytes: self.kept.spooled_bytes(),
+        }))
     }
 
-    fn smooth_by(&self, settings: &Settings) -> Result<Smoothed, String> {
-        let smoothed = smooth(&mut &self.kept, settings).map_err(|why| match why {
-            SmoothError::Read(never) => match never {},
-            other => other.to_string(),
-        })?;
-        match smoothed.outcome() {
+    fn smooth_by(
+        &mut self,
+        settings: &Settings,
+    ) -> Result<Result<Smoothed, String>, SmoothError<SpoolError>> {
+        let smoothed = smooth(&mut self.reading(), settings)?;
+        Ok(match smoothed.outcome() {
             // As it is without a smoother: nothing that runs along for its sake is better.
             Outcome::Filter(why) => Err(format!("it did not converge ({why})")),
             _ => Ok(smoothed),
-        }
+        })
     }
 
-    fn write(&self, smoothed: &Smoothed, out: &mut Vec<AttitudeSample>) {
-        let mut rates = self.kept.rates.iter();
+    fn write(
+        &mut self,
+        smoothed: &Smoothed,
+        out: &mut Vec<AttitudeSample>,
+        give: &mut dyn FnMut(&mut [AttitudeSample]),
+    ) -> Result<(), SpoolError> {
+        let heading = self.told.heading;
+        let waiting = RefCell::new(VecDeque::new());
+        let mut reading = Reading {
+            waiting: Some(&waiting),
+            ..self.reading()
+        };
         let mut turn: Option<Quaternion<Nav, Nav>> = None;
         let (mut section, mut last): (usize, Option<Quaternion<Nav, Body>>) = (0, None);
-        let taken = smoothed.attitudes(&mut &self.kept, |estimates| {
-            for (estimate, rate) in estimates.iter().zip(&mut rates) {
-                let turn = *turn.get_or_insert_with(|| self.turn(smoothed, estimate));
+        smoothed.attitudes(&mut reading, |estimates| {
+            for estimate in estimates {
+                let Some(rate) = waiting.borrow_mut().pop_front() else {
+                    return;
+                };
+                let turn = *turn.get_or_insert_with(|| turned(smoothed, heading, estimate));
                 let q_nb = (turn * estimate.q_nb).normalised();
                 let q_nb = last.map_or(q_nb, |last| q_nb.same_sign_as(&last));
                 last = Some(q_nb);
@@ -292,20 +372,145 @@ impl Smoothing {
                     log: rate.log,
                 });
             }
-        });
-        match taken {
-            Ok(()) => {}
-            Err(never) => match never {},
+            give(out);
+            out.clear();
+        })
+    }
+}
+
+/// About the vertical, so that the first attitude has the heading that was said, where there is no north.
+fn turned(smoothed: &Smoothed, heading: Option<f64>, first: &Estimate) -> Quaternion<Nav, Nav> {
+    let has_north = smoothed.sections().iter().any(|section| section.has_north);
+    let by = match heading.filter(|_| !has_north) {
+        Some(heading) => heading - first.q_nb.yaw_pitch_roll().yaw,
+        None => 0.0,
+    };
+    Quaternion::from_rotation_vector(&RotationVector(Vector3::z() * by))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::aid::{self, Start};
+    use crate::propagate::{self, Sequential};
+    use crate::record::Join;
+    use std::io::Cursor;
+
+    const SAMPLES: i64 = 24_000;
+
+    /// A hand that rests, turns and rests: rates, and forces and fields at rates and stamps of their own.
+    fn taken(smoothing: &mut Smoothing, is_smooth: bool) {
+        let mut q = Quaternion::<Nav, Body>::identity();
+        for i in 0..SAMPLES {
+            let stamp = Nanos(i * 2_500_000);
+            let t = i as f64 * 0.0025;
+            let share = if (20.0..40.0).contains(&t) { 1.0 } else { 0.0 };
+            let rate = Vector3::new((1.1 * t).sin(), (0.7 * t).cos(), (1.7 * t).sin()) * share;
+            q = q.advanced(&RotationVector(rate * 0.0025));
+            let to_body = q.to_dcm().as_matrix().transpose();
+            // What never rests and goes far is not smoothed.
+            let push = if is_smooth {
+                0.0
+            } else {
+                9.0 * (0.2 * t).sin()
+            };
+            if i % 8 == 0 {
+                let force = to_body * Vector3::new(push, 0.0, 9.81);
+                smoothing.take_force(Nanos(stamp.0 - 1_000_000), force);
+            }
+            if i % 40 == 0 {
+                smoothing.take_field(
+                    Nanos(stamp.0 - 3_000_000),
+                    to_body * Vector3::new(0.0, 20.0, -40.0),
+                );
+            }
+            let wobble = Vector3::new(1.0, -2.0, 1.5) * (1e-3 * (31.0 * t).sin());
+            let shaken = if is_smooth { wobble } else { wobble * 200.0 };
+            let sample = RateSample {
+                stamp,
+                start: stamp,
+                value: rate + Vector3::repeat(0.01) + shaken,
+                accel: None,
+                join: if i == 0 {
+                    Join::Start
+                } else {
+                    Join::Continuous
+                },
+                status: Status::OK,
+                log: Nanos(stamp.0 + 5),
+            };
+            smoothing.push(&[sample], &mut Vec::new());
         }
     }
 
-    /// About the vertical, so that the first attitude has the heading that was said, where there is no north.
-    fn turn(&self, smoothed: &Smoothed, first: &Estimate) -> Quaternion<Nav, Nav> {
-        let has_north = smoothed.sections().iter().any(|section| section.has_north);
-        let by = match self.told.heading.filter(|_| !has_north) {
-            Some(heading) => heading - first.q_nb.yaw_pitch_roll().yaw,
-            None => 0.0,
+    fn aided() -> Aided {
+        let settings = aid::Settings {
+            has_field: true,
+            ..aid::Settings::default()
         };
-        Quaternion::from_rotation_vector(&RotationVector(Vector3::z() * by))
+        let aided = Aided::new(propagate::Settings::default(), settings, Start::Level);
+        aided.unwrap().with_forces_beside()
+    }
+
+    fn attitudes(mut smoothing: Smoothing) -> (Vec<AttitudeSample>, Option<String>) {
+        let mut all = Vec::new();
+        let given = smoothing.finish(&Sequential, &mut Vec::new(), &mut |some| {
+            all.extend_from_slice(some)
+        });
+        given.unwrap();
+        (
+            all,
+            smoothing.result().and_then(Result::err).map(str::to_owned),
+        )
+    }
+
+    fn new() -> Smoothing {
+        Smoothing::new(
+            aided(),
+            Told {
+                kind: SampleKind::Rate,
+                is_kind_stated: true,
+                heading: None,
+                looseness: 1.0,
+                known: Beforehand::default(),
+            },
+        )
+    }
+
+    #[test]
+    fn a_recording_kept_in_a_file_gives_the_bits_of_one_in_memory() {
+        for is_smooth in [true, false] {
+            let (mut held, mut spooled) = (new(), new());
+            spooled.kept = Kept::of_at_most(0);
+            spooled.spool_to(Box::new(Cursor::new(Vec::new())));
+            taken(&mut held, is_smooth);
+            taken(&mut spooled, is_smooth);
+            let (held, why) = attitudes(held);
+            assert_eq!(why.is_none(), is_smooth, "{why:?}");
+            assert_eq!(held.len() as i64, SAMPLES);
+            assert!(spooled.kept.spooled_bytes() > 0);
+            assert_eq!(attitudes(spooled), (held, why));
+        }
+    }
+
+    #[test]
+    fn where_nothing_is_smoothed_the_attitudes_are_the_filters_with_what_came_beside() {
+        let mut smoothing = new();
+        taken(&mut smoothing, false);
+        // The same events to a filter alone.
+        let (mut alone, mut filtered) = (aided(), Vec::new());
+        let events = smoothing.kept.give(|event| match event {
+            Event::Rate(rate) => alone.push(&[rate], &mut filtered),
+            Event::Force(stamp, force) => alone.take_force(stamp, force),
+            Event::Field(stamp, field) => alone.take_field(stamp, field),
+            Event::ForcesBeside => alone.expect_forces_beside(),
+        });
+        events.unwrap();
+        alone.finish(&mut filtered);
+        let running = format!("{:?}", smoothing.aided().filter().report());
+        let (given, why) = attitudes(smoothing);
+        assert!(why.is_some());
+        assert_eq!(given, filtered);
+        assert_eq!(running, format!("{:?}", alone.filter().report()));
     }
 }

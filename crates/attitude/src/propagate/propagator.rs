@@ -65,7 +65,7 @@ const LARGEST: f64 = 1e3;
 /// assert!((w - half).abs() < 1e-15 && (z - half).abs() < 1e-15 && x == 0.0 && y == 0.0);
 /// # Ok::<(), strapd_attitude::propagate::SettingsError>(())
 /// ```
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Propagator {
     method: Method,
     engine: Engine,
@@ -88,7 +88,7 @@ pub struct Propagator {
 }
 
 /// How steps are computed.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 enum Engine {
     Sliding(Box<Plan>),
     Commit {

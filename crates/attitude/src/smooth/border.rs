@@ -2,6 +2,7 @@
 //!
 //! Apart from the nodes because these are the border of the equations: every node sees them.
 
+use super::settings::{Beforehand, Settings};
 use nalgebra::{Matrix2, Matrix3, Vector3};
 
 /// Gyro matrix less 1, row by row.
@@ -44,6 +45,8 @@ pub(super) struct Priors {
     pub(super) information: Vec<[f64; ALL]>,
     /// One standard deviation of each; infinite where nothing is known.
     pub(super) sigma: Constants,
+    /// About what they scatter.
+    mean: Constants,
 }
 
 /// Hard iron is of this size, uT, or of any (Cauchy's distribution).
@@ -51,7 +54,8 @@ pub(super) const IRON_SCALE: f64 = 1.0;
 
 impl Priors {
     /// For a log that rests in so many segments; `has_moving_field`: the field may be another while moving.
-    pub(super) fn new(looseness: f64, has_moving_field: bool) -> Priors {
+    pub(super) fn new(settings: &Settings, has_moving_field: bool) -> Priors {
+        let looseness = settings.looseness;
         let mut sigma = [0.0; ALL];
         let mut matrix = |first: usize, diagonal: f64, others: f64| {
             for i in 0..9 {
@@ -103,7 +107,37 @@ impl Priors {
         }
         sigma[IRON..FIELD].fill(f64::INFINITY);
         sigma[NORTH..FIELD_TIME].fill(f64::INFINITY);
-        Priors { information, sigma }
+        let mut priors = Priors {
+            information,
+            sigma,
+            mean: [0.0; ALL],
+        };
+        priors.narrow(&settings.known);
+        priors
+    }
+
+    /// Takes up what is known of this sensor.
+    fn narrow(&mut self, known: &Beforehand) {
+        let mut put = |first: usize, sigmas: &[Option<f64>]| {
+            if sigmas.iter().all(Option::is_none) {
+                return;
+            }
+            // What is left of numbers that data have told shares nothing any more.
+            for (i, sigma) in sigmas.iter().enumerate() {
+                let own = &mut self.sigma[first + i];
+                *own = sigma.map_or(*own, |sigma| sigma.min(*own));
+                self.information[first + i] = [0.0; ALL];
+                self.information[first + i][first + i] = 1.0 / (*own * *own);
+            }
+        };
+        put(GYRO, &known.gyro);
+        put(FORCE_BIAS, &known.force_bias);
+        put(FORCE, &known.force);
+        put(FIELD, &known.field);
+        put(FORCE_TIME, &[known.force_time.map(|(_, sigma)| sigma)]);
+        put(FIELD_TIME, &[known.field_time.map(|(_, sigma)| sigma)]);
+        self.mean[FORCE_TIME] = known.force_time.map_or(0.0, |(mean, _)| mean);
+        self.mean[FIELD_TIME] = known.field_time.map_or(0.0, |(mean, _)| mean);
     }
 
     /// Adds them to the border's equations; the last column is their right side.
@@ -116,7 +150,7 @@ impl Priors {
             for j in 0..last {
                 // The field's size is anything: no pull.
                 if !(NORTH..FIELD_TIME).contains(&j) {
-                    border[i][last] -= self.information[i][j] * constants[j];
+                    border[i][last] -= self.information[i][j] * (constants[j] - self.mean[j]);
                 }
             }
         }

@@ -7,7 +7,7 @@ use crate::record::Nanos;
 use nalgebra::Vector3;
 
 /// A constant whose sigma is above this share of what it was beforehand was not observed.
-const OBSERVED: f64 = 0.7;
+pub(crate) const OBSERVED: f64 = 0.7;
 
 /// Some numbers that were learned, each with one standard deviation after and before.
 #[derive(Clone, Copy, PartialEq, Debug)]

@@ -32,6 +32,39 @@ pub enum FieldUnit {
     Unknown,
 }
 
+/// What is known of a sensor of which a calibration was taken out of the samples already: one standard deviation of
+/// what is left, body axes, matrices row by row. `None`: as of any sensor.
+#[derive(Clone, Copy, PartialEq, Debug, Default)]
+pub struct Beforehand {
+    /// Of the gyro's scale and axes.
+    pub gyro: [Option<f64>; 9],
+    /// Of the accelerometer's bias, m/s^2.
+    pub force_bias: [Option<f64>; 3],
+    /// Of its scale and axes.
+    pub force: [Option<f64>; 9],
+    /// How long after its stamp a force was measured, s, which is not taken out; and one standard deviation.
+    pub force_time: Option<(f64, f64)>,
+    /// Of the magnetometer's scale and axes.
+    pub field: [Option<f64>; 9],
+    /// As `force_time`, of the field.
+    pub field_time: Option<(f64, f64)>,
+}
+
+impl Beforehand {
+    /// The same, known so many times worse.
+    #[must_use]
+    pub fn widened(mut self, by: f64) -> Beforehand {
+        let sigmas = self.gyro.iter_mut().chain(&mut self.force_bias);
+        for sigma in sigmas.chain(&mut self.force).chain(&mut self.field) {
+            *sigma = sigma.map(|sigma| sigma * by);
+        }
+        for time in [&mut self.force_time, &mut self.field_time] {
+            *time = time.map(|(mean, sigma)| (mean, sigma * by));
+        }
+        self
+    }
+}
+
 /// Settings of the smoother, SI, beside the noise that `docs/theory/smoother.md` fixes. The defaults are one set for
 /// all sensors and motions it was judged on.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -40,6 +73,8 @@ pub struct Settings {
     pub node_spacing: Option<f64>,
     /// By how much the sigma of every calibration constant is larger than after a calibration in the factory.
     pub looseness: f64,
+    /// What is known of this one.
+    pub known: Beforehand,
     /// How late the samples are, s: attitudes are turned on by the rate over this.
     pub sensor_delay: f64,
     /// What of the field counts as north.
@@ -65,6 +100,7 @@ impl Default for Settings {
         Settings {
             node_spacing: None,
             looseness: 1.0,
+            known: Beforehand::default(),
             sensor_delay: 0.0,
             heading_reference: HeadingReference::Standstill,
             field_unit: FieldUnit::Microtesla,

@@ -124,7 +124,7 @@ impl Work {
             .count();
         let is_separate =
             self.settings.heading_reference == HeadingReference::Standstill && rests > RESTS;
-        let priors = Priors::new(self.settings.looseness, is_separate);
+        let priors = Priors::new(&self.settings, is_separate);
         let trust = FieldTrust::new(self.settings.heading_reference, self.spacing);
         let problem = |bias: Vector3<f64>| Problem {
             survey: &self.survey,

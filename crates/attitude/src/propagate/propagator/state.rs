@@ -25,7 +25,7 @@ pub(super) struct Waiting {
 }
 
 /// What the outputs are made of.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct State {
     pub(super) attitude: Accumulator,
     /// Sum of rotation vectors, for the method that wants it.
