@@ -4,6 +4,7 @@
 
 pub mod admission;
 pub mod allan;
+pub mod calibrate;
 mod calibration_files;
 pub mod cat;
 pub mod check;
@@ -45,6 +46,7 @@ use std::process::ExitCode;
   strapd simulate top -o top.mcap              a gyro whose truth is known, to try it all on
   strapd report flight.mcap -o flight.html     all that can be said about it, on one page
   strapd cat flight.mcap --topic /imu | head   decoded samples as NDJSON
+  strapd calibrate a.mcap b.mcap -o imu.toml   what recordings tell of their sensor
   strapd serve                                 samples in over sockets, attitude out
   strapd send flight.mcap                      a recording into that daemon, in real time
   strapd watch                                 what that daemon makes, live in the terminal
@@ -133,6 +135,8 @@ pub enum Command {
     Serve(Box<serve::Serve>),
     /// Look at a configuration file of `serve`
     Config(config::Config),
+    /// Calibrate a sensor from recordings of it: bias, scale, axes, as a file
+    Calibrate(Box<calibrate::Calibrate>),
     /// What a log holds: topics, rates, clocks, frames, and what to do next
     Info(info::Info),
     /// Everything that may spoil the attitude from a log, with the flag that helps
@@ -194,6 +198,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         Command::Replay(command) => replay::run(&cli.global, &command),
         Command::Serve(command) => serve::run(&cli.global, &command),
         Command::Config(command) => config::run(&command),
+        Command::Calibrate(command) => calibrate::run(&cli.global, &command),
         Command::Info(command) => info::run(&cli.global, &command),
         Command::Check(command) => check::run(&cli.global, &command),
         Command::Report(command) => report::run(&cli.global, &command),

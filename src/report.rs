@@ -3,6 +3,7 @@
 pub mod against;
 pub mod aid;
 pub mod calendar;
+pub mod calibrating;
 pub mod calibration;
 pub mod findings;
 pub mod page;

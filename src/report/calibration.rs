@@ -17,22 +17,42 @@ pub fn described(
 ) -> SensorCalibration {
     let day = |nanos: i64| date(u64::try_from(nanos).ok()?);
     let mut sources = known.sources;
-    sources.retain(|s| s != source);
     sources.push(source.to_owned());
-    let oldest = sources.len().saturating_sub(MOST_SOURCES);
     SensorCalibration {
         sensor: Some(sensor.chars().take(1000).collect()),
         date: last
             .and_then(|last| day(last.stamp.0).or_else(|| day(last.log.0)))
             .or(known.date),
-        sources: sources.split_off(oldest),
+        sources: latest(sources),
         ..known
     }
+}
+
+/// Recordings it comes from: each once, where it was last, and no more than are kept.
+#[must_use]
+pub fn latest(sources: Vec<String>) -> Vec<String> {
+    let mut kept: Vec<String> = Vec::new();
+    for source in sources.into_iter().rev() {
+        if kept.len() < MOST_SOURCES && !kept.contains(&source) {
+            kept.push(source);
+        }
+    }
+    kept.reverse();
+    kept
 }
 
 /// Which of its numbers data have told.
 #[must_use]
 pub fn observed(known: &SensorCalibration) -> String {
+    match names(known).as_slice() {
+        [] => "calibration, of which NOTHING was observed".to_owned(),
+        all => format!("calibration; observed: {}", all.join(", ")),
+    }
+}
+
+/// The keys of those numbers.
+#[must_use]
+pub fn names(known: &SensorCalibration) -> Vec<String> {
     fn of<const N: usize>(key: &'static str, known: &Option<Known<N>>) -> Option<String> {
         let known = known.as_ref()?;
         match known.observed.iter().filter(|o| **o).count() {
@@ -41,7 +61,7 @@ pub fn observed(known: &SensorCalibration) -> String {
             n => Some(format!("{key} ({n} of {N})")),
         }
     }
-    let all: Vec<String> = [
+    [
         of("bias", &known.bias),
         of("G", &known.gyro),
         of("ba", &known.force_bias),
@@ -54,10 +74,5 @@ pub fn observed(known: &SensorCalibration) -> String {
     ]
     .into_iter()
     .flatten()
-    .collect();
-    if all.is_empty() {
-        "calibration, of which NOTHING was observed".to_owned()
-    } else {
-        format!("calibration; observed: {}", all.join(", "))
-    }
+    .collect()
 }
