@@ -278,6 +278,7 @@ fn decode(from: &mut Bytes<'_>) -> Option<Event> {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
     use std::io::Cursor;

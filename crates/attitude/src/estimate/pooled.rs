@@ -135,6 +135,7 @@ fn widen<const N: usize>(known: &mut Option<Known<N>>, by: f64) {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 

@@ -389,6 +389,7 @@ fn turned(smoothed: &Smoothed, heading: Option<f64>, first: &Estimate) -> Quater
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
     use crate::aid::{self, Start};
