@@ -11,7 +11,7 @@ use super::pass::{Model, sweep_all};
 use super::sample::Samples;
 use super::segments::Segment;
 use super::settings::Settings;
-use super::solver::{Solution, Solver};
+use super::solver::{Marginal, Solution, Solver};
 use super::survey::Survey;
 use super::sweep::GRAVITY;
 use crate::quaternion::exp_minus_one;
@@ -32,6 +32,8 @@ const FEWEST: usize = 4;
 const DIVERGING: f64 = 0.1;
 /// A result's last turn is below this, rad; while it is not, there are up to twice as many iterations.
 const SETTLED: f64 = 0.1_f64.to_radians();
+/// And beside the sigma of its node.
+const SETTLED_SHARE: f64 = 0.3;
 /// Time over which a mean force points up, s.
 const UPRIGHT_SECS: f64 = 10.0;
 
@@ -97,9 +99,17 @@ impl fmt::Display for Failure {
 }
 
 impl<const W: usize> Phase<W> {
-    /// The last turn, if it was not small.
-    pub(super) fn unsettled(&self) -> Option<f64> {
-        (self.turn > SETTLED).then_some(self.turn)
+    /// The largest turn of the last iteration that was small neither by itself nor beside what is known of its node,
+    /// rad: a heading that has wandered for an hour may turn by more than one that is held.
+    pub(super) fn unsettled(&self, marginals: &[Marginal]) -> Option<f64> {
+        let nodes = self.turns.iter().zip(marginals);
+        let turns = nodes.flat_map(|(turns, marginal)| {
+            turns.iter().enumerate().filter_map(|(axis, turn)| {
+                let sigma = marginal.turn[(axis, axis)].max(0.0).sqrt();
+                (*turn > SETTLED.max(SETTLED_SHARE * sigma)).then_some(*turn)
+            })
+        });
+        turns.max_by(f64::total_cmp)
     }
 }
 
@@ -109,8 +119,8 @@ pub(super) struct Phase<const W: usize> {
     pub(super) solver: Option<Solver<W>>,
     pub(super) failure: Option<Failure>,
     pub(super) iterations: usize,
-    /// Largest of a node in the last iteration, rad.
-    pub(super) turn: f64,
+    /// By how much each node turned in the last iteration, earth axes, rad.
+    turns: Vec<[f64; 3]>,
     /// Mean fields by segment, of the last iteration.
     pub(super) fields: Vec<Option<[f64; 3]>>,
     /// Twice the negative logarithm of the likelihood but for a constant.
@@ -128,7 +138,7 @@ pub(super) fn run<S: Samples, const W: usize>(
         solver: None,
         failure: None,
         iterations: 0,
-        turn: f64::INFINITY,
+        turns: Vec::new(),
         fields: Vec::new(),
         cost: f64::NAN,
     };
@@ -148,7 +158,8 @@ pub(super) fn run<S: Samples, const W: usize>(
             phase.failure = Some(Failure::NotFinite);
             return Ok(phase);
         };
-        let turn = state.correct(&solution);
+        let turns = state.correct(&solution);
+        let turn = turns.iter().flatten().copied().fold(0.0, f64::max);
         if W == WIDE {
             state.field_weights =
                 problem
@@ -173,7 +184,7 @@ pub(super) fn run<S: Samples, const W: usize>(
             phase.failure = Some(Failure::Diverging(turn));
             return Ok(phase);
         }
-        phase.turn = turn;
+        phase.turns = turns;
         let is_done = turn < DONE && iteration + 1 >= FEWEST;
         if is_done || (turn < SETTLED && iteration + 1 >= most) {
             break;
@@ -210,14 +221,11 @@ impl Problem<'_> {
 }
 
 impl State {
-    /// Takes the corrections; the largest turn of a node, rad.
-    fn correct(&mut self, solution: &Solution) -> f64 {
-        let turn = |x: &[f64; STATES]| {
-            x[..VELOCITY]
-                .iter()
-                .fold(0.0, |most: f64, t| most.max(t.abs()))
-        };
-        let largest = solution.nodes.iter().map(turn).fold(0.0, f64::max);
+    /// Takes the corrections; by how much each node was to turn, rad.
+    fn correct(&mut self, solution: &Solution) -> Vec<[f64; 3]> {
+        let turn = |x: &[f64; STATES]| std::array::from_fn(|axis| x[axis].abs());
+        let turns: Vec<[f64; 3]> = solution.nodes.iter().map(turn).collect();
+        let largest = turns.iter().flatten().copied().fold(0.0, f64::max);
         let share = if largest < LARGEST_TURN {
             1.0
         } else {
@@ -234,7 +242,7 @@ impl State {
         for (constant, x) in self.constants.iter_mut().zip(&solution.border) {
             *constant += share * x;
         }
-        largest
+        turns
     }
 }
 
@@ -357,4 +365,36 @@ fn off_vertical(segments: &[Segment], pushes: &[[f64; 3]]) -> f64 {
         }
     }
     super::segments::median(&mut angles)
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Matrix3;
+
+    use super::{Marginal, Phase};
+    use crate::smooth::pass::NARROW;
+
+    fn unsettled(turn: f64, sigma: f64) -> Option<f64> {
+        let phase = Phase::<NARROW> {
+            solver: None,
+            failure: None,
+            iterations: 1,
+            turns: vec![[0.0; 3], [0.0, 0.0, turn.to_radians()]],
+            fields: Vec::new(),
+            cost: 0.0,
+        };
+        let known = |sigma: f64| Marginal {
+            turn: Matrix3::identity() * sigma.to_radians().powi(2),
+            bias: [0.0; 3],
+        };
+        phase.unsettled(&[known(1e-3), known(sigma)])
+    }
+
+    #[test]
+    fn a_turn_is_small_by_itself_or_beside_what_is_known_of_its_own_node() {
+        assert_eq!(unsettled(0.09, 0.01), None);
+        assert_eq!(unsettled(2.3, 0.4), Some(2.3_f64.to_radians()));
+        assert_eq!(unsettled(2.3, 9.0), None);
+        assert_eq!(unsettled(2.8, 9.0), Some(2.8_f64.to_radians()));
+    }
 }

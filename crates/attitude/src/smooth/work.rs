@@ -107,6 +107,10 @@ struct Solved {
     iterations: [u64; 2],
 }
 
+fn settled(unsettled: Option<f64>) -> Outcome {
+    unsettled.map_or(Outcome::Converged, Outcome::Unsettled)
+}
+
 impl Work {
     fn with(&self) -> (&Survey, &Settings) {
         (&self.survey, &self.settings)
@@ -226,8 +230,7 @@ impl Work {
             &mut state.constants,
         );
         let before = state.clone();
-        let settled = |turn: Option<f64>| turn.map_or(Outcome::Converged, Outcome::Unsettled);
-        let mut outcome = settled(plain.unsettled());
+        let mut without_field = None;
         if has_north.contains(&true) && self.settings.field_iterations > 0 {
             drop(plain);
             state.has_north = has_north.clone();
@@ -237,7 +240,7 @@ impl Work {
             let known = phase.solver.as_ref().and_then(Solver::covariance);
             match (phase.failure, known) {
                 (None, Some((covariance, marginals))) => {
-                    let outcome = settled(phase.unsettled());
+                    let outcome = settled(phase.unsettled(&marginals));
                     return Ok(Ok(Solved {
                         state,
                         covariance,
@@ -247,31 +250,32 @@ impl Work {
                     }));
                 }
                 (failure, _) => {
-                    outcome = Outcome::WithoutField(failure.unwrap_or(Failure::NotFinite))
+                    let failure = failure.unwrap_or(Failure::NotFinite);
+                    without_field = Some(Outcome::WithoutField(failure));
                 }
             }
             drop(phase);
             state = before;
             let plain = run::<S, NARROW>(samples, problem, &mut state, 1)?;
             state.has_north = has_north;
-            return Ok(self.plain(state, &plain, outcome, iterations));
+            return Ok(self.plain(state, &plain, without_field, iterations));
         }
-        Ok(self.plain(state, &plain, outcome, iterations))
+        Ok(self.plain(state, &plain, without_field, iterations))
     }
 
     fn plain(
         &self,
         state: State,
         phase: &Phase<NARROW>,
-        outcome: Outcome,
+        outcome: Option<Outcome>,
         iterations: [u64; 2],
     ) -> Result<Solved, Failure> {
         match phase.solver.as_ref().and_then(Solver::covariance) {
             Some((covariance, marginals)) => Ok(Solved {
                 state,
                 covariance,
+                outcome: outcome.unwrap_or_else(|| settled(phase.unsettled(&marginals))),
                 marginals,
-                outcome,
                 iterations,
             }),
             None => Err(Failure::NotFinite),
