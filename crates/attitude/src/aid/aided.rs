@@ -8,7 +8,7 @@ use crate::frames::{Body, Nav};
 use crate::propagate::{self, Method, Propagator, Sequential, SettingsError};
 use crate::quaternion::Quaternion;
 use crate::record::{AttitudeSample, Join, Nanos, RateSample, SampleKind};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use std::collections::VecDeque;
 
 /// Of an attitude that was saved, rad: it is never known better.
@@ -76,7 +76,8 @@ pub struct Aided {
     /// Given to the propagator, whose attitudes have not come out yet.
     pub(super) given: VecDeque<Given>,
     pub(super) last: Option<Nanos>,
-    /// What comes out of the propagator for one sample.
+    /// What goes into the propagator at once, and what comes out of it.
+    corrected: Vec<RateSample>,
     scratch: Vec<AttitudeSample>,
     pub(super) last_out: Option<Quaternion<Nav, Body>>,
     /// Where somebody looks at them.
@@ -104,9 +105,15 @@ impl Aided {
         start: Start,
     ) -> Result<Aided, SettingsError> {
         let is_instant = propagation.kind == SampleKind::Rate;
+        let _ = propagation.checked()?;
+        // The filter says how well the attitude is known.
+        let propagator = Propagator::new(propagate::Settings {
+            noise: propagate::Noise::default(),
+            ..propagation
+        })?;
         Ok(Aided {
             filter: Filter::new(settings, is_instant, propagation.world_rate),
-            propagator: Propagator::new(propagation)?,
+            propagator,
             kind: propagation.kind,
             start,
             begins: start,
@@ -116,6 +123,7 @@ impl Aided {
             fields: Beside::with_repeats(),
             given: VecDeque::new(),
             last: None,
+            corrected: Vec::new(),
             scratch: Vec::new(),
             last_out: None,
             innovations: None,
@@ -207,12 +215,45 @@ impl Aided {
 
     /// Takes samples in and appends the attitudes that are ready.
     pub fn push(&mut self, samples: &[RateSample], out: &mut Vec<AttitudeSample>) {
-        for sample in samples {
-            let corrected = self.give(sample);
+        let mut left = samples;
+        while !left.is_empty() {
+            let (now, later) = left.split_at(self.alike(left));
+            let mut corrected = std::mem::take(&mut self.corrected);
+            corrected.extend(now.iter().map(|sample| self.give(sample)));
             self.propagator
-                .push(&[corrected], &Sequential, &mut self.scratch);
+                .push(&corrected, &Sequential, &mut self.scratch);
+            corrected.clear();
+            self.corrected = corrected;
             self.correct(out);
+            left = later;
         }
+    }
+
+    /// How many of these samples, one at least, are corrected by what is known now: those that come before the attitude
+    /// at which the filter will know more is out. Several at once cost the propagator less than one by one.
+    fn alike(&self, samples: &[RateSample]) -> usize {
+        let latency = self.propagator.latency();
+        // The first of a run comes out at once.
+        if !self.filter.is_started() || (latency > 0 && self.given.is_empty()) {
+            return 1;
+        }
+        let mut last = self.last;
+        let new = samples.iter().map(|sample| {
+            let before = last.replace(sample.stamp).unwrap_or(sample.stamp);
+            sample.stamp.secs_since(before)
+        });
+        let given = self.given.iter().map(|given| given.measured.secs);
+        let mut due = self.filter.due();
+        // The attitude of each comes out no earlier than when so many samples more have been given.
+        let waits = self.given.len();
+        let known = given
+            .chain(new)
+            .position(|secs| due.comes(secs))
+            .map_or(usize::MAX, |at| (at + 1 + latency).saturating_sub(waits));
+        let breaks = |sample: &RateSample| !matches!(sample.join, Join::Continuous | Join::Bridge);
+        let most = known.clamp(1, samples.len());
+        let run = samples.iter().take(most).position(breaks);
+        run.unwrap_or(most).max(1)
     }
 
     /// The stream has ended: appends the attitudes still waiting.
@@ -269,18 +310,21 @@ impl Aided {
                 .given
                 .front()
                 .is_some_and(|given| given.stamp == sample.stamp);
-            if is_first && let Some(given) = self.given.pop_front() {
-                self.take(&given, sample);
+            let (mut q_nb, mut r) = self.filter.corrected(&sample.q_nb);
+            if is_first
+                && let Some(given) = self.given.pop_front()
+                && self.take(&given, sample, &r)
+            {
+                (q_nb, r) = self.filter.corrected(&sample.q_nb);
             }
             let status = sample.status.with(self.filter.status());
-            let mut q_nb = self.filter.corrected(&sample.q_nb);
             if let Some(last) = &self.last_out {
                 q_nb = q_nb.same_sign_as(last);
             }
             let corrected = AttitudeSample {
                 q_nb,
                 status,
-                covariance: self.filter.attitude_covariance(&q_nb, &sample.rate),
+                covariance: self.filter.attitude_covariance(&r, &sample.rate),
                 ..*sample
             };
             self.last_out = Some(q_nb);
@@ -290,7 +334,9 @@ impl Aided {
         self.scratch = scratch;
     }
 
-    fn take(&mut self, given: &Given, propagated: &AttitudeSample) {
+    /// Takes what was measured at an attitude, which with the correction so far has the matrix `r`. Whether that is
+    /// another now.
+    fn take(&mut self, given: &Given, propagated: &AttitudeSample, r: &Matrix3<f64>) -> bool {
         let (measured, attitude) = (&given.measured, &propagated.q_nb);
         if given.join == Join::Reset {
             match self.anew.take() {
@@ -313,17 +359,19 @@ impl Aided {
                     self.filter.begin_known(measured, tilt, heading);
                 }
             }
-        } else if matches!(given.join, Join::Hold | Join::Start) {
-            self.filter.hold(measured);
-        } else if measured.secs > 0.0 {
-            let updates = self.filter.report().updates;
-            self.filter.take(measured, &given.applied, attitude);
-            if let Some(innovations) = &mut self.innovations
-                && self.filter.report().updates > updates
-            {
-                innovations.push((given.stamp, self.filter.innovation));
-            }
+            return true;
         }
+        if matches!(given.join, Join::Hold | Join::Start) {
+            self.filter.hold(measured);
+            return false;
+        }
+        let has_corrected = measured.secs > 0.0 && self.filter.take(measured, &given.applied, r);
+        if let Some(innovations) = &mut self.innovations
+            && has_corrected
+        {
+            innovations.push((given.stamp, self.filter.innovation));
+        }
+        has_corrected
     }
 
     /// What is known at a first sample: of an attitude that was saved, what the propagator says of it by now.

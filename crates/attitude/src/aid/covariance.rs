@@ -25,7 +25,22 @@ pub(super) const IRON: usize = 21;
 /// A correction of the error states, and of nothing beyond them.
 pub(super) type Correction = [f64; WIDTH];
 
-/// Rows of the transition from one update to the next that are not those of the identity, less those of it.
+/// Columns of the rows of a [`Transition`] that are not zero, in order: what tilt and heading, velocity and position hang on.
+const COLUMNS: [&[usize]; MOVING] = [
+    &BY_GYRO,
+    &BY_GYRO,
+    &BY_GYRO,
+    &[TILT + 1, 16, 17, 18, LEAD],
+    &[TILT, 16, 17, 18, LEAD],
+    &[TILT + 1, VELOCITY, 16, 17, 18, LEAD],
+    &[TILT, VELOCITY + 1, 16, 17, 18, LEAD],
+];
+const BY_GYRO: [usize; 9] = [7, 8, 9, 10, 11, 12, 13, 14, 15];
+/// So many numbers of a row are summed up at once.
+const LANES: usize = 8;
+
+/// Rows of the transition from one update to the next that are not those of the identity, less those of it. Only the
+/// [`COLUMNS`] count.
 #[derive(Clone, Debug)]
 pub(super) struct Transition(pub(super) [[f64; STATES]; MOVING]);
 
@@ -143,23 +158,23 @@ impl Covariance {
     pub(super) fn step(&mut self, by: &Transition) {
         let mut moved = [[0.0; WIDTH]; MOVING];
         for (a, row) in moved.iter_mut().enumerate() {
-            *row = self.rows[a];
-            for (k, f) in by.0[a].iter().enumerate() {
-                if *f != 0.0 {
-                    for (out, p) in row.iter_mut().zip(&self.rows[k]) {
-                        *out += f * p;
+            for first in (0..WIDTH).step_by(LANES) {
+                let mut sum: [f64; LANES] = std::array::from_fn(|i| self.rows[a][first + i]);
+                for &k in COLUMNS[a] {
+                    let (f, from) = (by.0[a][k], &self.rows[k]);
+                    for (i, sum) in sum.iter_mut().enumerate() {
+                        *sum += f * from[first + i];
                     }
                 }
+                row[first..first + LANES].copy_from_slice(&sum);
             }
         }
         let mut square = [[0.0; MOVING]; MOVING];
         for (out, row) in square.iter_mut().zip(&moved) {
             for (b, sum) in out.iter_mut().enumerate() {
                 *sum = row[b];
-                for (k, f) in by.0[b].iter().enumerate() {
-                    if *f != 0.0 {
-                        *sum += f * row[k];
-                    }
+                for &k in COLUMNS[b] {
+                    *sum += by.0[b][k] * row[k];
                 }
             }
         }

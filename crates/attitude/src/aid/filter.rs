@@ -336,20 +336,28 @@ impl Filter {
         self.is_started
     }
 
-    /// The attitude that the propagator's is.
+    /// The attitude that the propagator's is, and its matrix.
     #[must_use]
-    pub(crate) fn corrected(&self, propagated: &Quaternion<Nav, Body>) -> Quaternion<Nav, Body> {
-        (self.correction * *propagated).normalised()
+    #[inline]
+    pub(crate) fn corrected(
+        &self,
+        propagated: &Quaternion<Nav, Body>,
+    ) -> (Quaternion<Nav, Body>, Matrix3<f64>) {
+        let attitude = self.correction * *propagated;
+        (attitude.normalised(), *attitude.to_dcm().as_matrix())
     }
 
-    /// Takes the next sample after it has begun, whose rate the propagator was given corrected by `known`. `propagated` is its
-    /// attitude at the sample's instant.
-    pub(crate) fn take(
-        &mut self,
-        sample: &Measured,
-        known: &Applied,
-        propagated: &Quaternion<Nav, Body>,
-    ) {
+    /// When it will correct next.
+    pub(crate) fn due(&self) -> Due {
+        Due {
+            secs: self.interval.secs,
+            update_secs: self.settings.update_secs,
+        }
+    }
+
+    /// Takes the next sample after it has begun, whose rate the propagator was given corrected by `known`. `r` is the matrix
+    /// of its attitude, corrected, at the sample's instant. Whether that has been corrected further.
+    pub(crate) fn take(&mut self, sample: &Measured, known: &Applied, r: &Matrix3<f64>) -> bool {
         let secs = sample.secs;
         self.has_levelled = false;
         let is_gap = self.nominal > 0.0 && secs > self.settings.gap_factor * self.nominal;
@@ -358,11 +366,9 @@ impl Filter {
         } else {
             sample.rate
         };
-        let attitude = self.correction * *propagated;
-        let r = *attitude.to_dcm().as_matrix();
-        self.interval.turn(secs, &r, &rate, known);
+        self.interval.turn(secs, r, &rate, known);
         let at_instant = if self.is_instant { sample.rate } else { rate };
-        let force = self.add_force(sample, &r, known.corrected(at_instant, 1.0), is_gap);
+        let force = self.add_force(sample, r, known.corrected(at_instant, 1.0), is_gap);
         if let Some(field) = sample.field.filter(is_field) {
             let field = self.less_iron(field);
             self.interval.field += r * field;
@@ -372,10 +378,10 @@ impl Filter {
             }
             self.interval.fields += 1.0;
         }
-        let sigma = Vector3::from_fn(|i, _| self.covariance.variance(BIAS + i).max(0.0).sqrt());
-        let bias = self.calibration.bias;
+        let sigma = |axis: usize| self.covariance.variance(BIAS + axis).max(0.0).sqrt();
+        let bias = (&self.calibration.bias, sigma);
         self.rest
-            .take(secs, &rate, force.as_ref(), (&bias, &sigma), &self.settings);
+            .take(secs, &rate, force.as_ref(), bias, &self.settings);
         self.doubt_turn(sample, is_gap);
         self.last_rate = sample.rate;
         if !is_gap {
@@ -392,9 +398,11 @@ impl Filter {
                 self.gaps_in_a_row = 0;
             }
         }
-        if self.interval.secs >= self.settings.update_secs - 0.25 * secs {
+        let is_due = is_due(self.interval.secs, secs, self.settings.update_secs);
+        if is_due {
             self.update();
         }
+        is_due
     }
 
     /// The propagator held the attitude over `secs` of which nothing is known.
@@ -457,8 +465,9 @@ impl Filter {
     /// What a gap, a jump or the end of the gyro's range leaves unknown of a turn.
     fn doubt_turn(&mut self, sample: &Measured, is_gap: bool) {
         let secs = sample.secs;
-        let jump = (sample.rate - self.last_rate).norm();
+        let jump = sample.rate - self.last_rate;
         if is_gap {
+            let jump = jump.norm();
             self.report.gaps += 1;
             self.covariance
                 .add_to_attitude(jump * jump * secs * secs / 36.0);
@@ -471,8 +480,9 @@ impl Filter {
         } else {
             self.nominal
         };
-        let excess = jump - self.settings.jerk * ordinary;
-        if excess > 0.0 {
+        let most = self.settings.jerk * ordinary;
+        if jump.norm_squared() > most * most {
+            let excess = jump.norm() - most;
             self.covariance.add_to_attitude((excess * secs).powi(2));
         }
         let range = self.settings.gyro_range;
@@ -497,6 +507,26 @@ impl Filter {
 
     pub(super) fn is_force(&self, force: &Vector3<f64>) -> bool {
         force.iter().all(|f| f.abs() <= LARGEST_FORCE)
+    }
+}
+
+/// Whether `secs` of an interval, the last step of which took `step`, are enough for a correction.
+fn is_due(secs: f64, step: f64, update_secs: f64) -> bool {
+    secs >= update_secs - 0.25 * step
+}
+
+/// How long it is until the next correction.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Due {
+    secs: f64,
+    update_secs: f64,
+}
+
+impl Due {
+    /// Whether it comes with the next sample, `step` s after the one before.
+    pub(crate) fn comes(&mut self, step: f64) -> bool {
+        self.secs += step.max(0.0);
+        is_due(self.secs, step.max(0.0), self.update_secs)
     }
 }
 

@@ -31,14 +31,14 @@ impl Rest {
         }
     }
 
-    /// A sample `secs` after the one before. `bias`: as far as known, with its sigmas.
+    /// A sample `secs` after the one before. `bias`: as far as known, with the sigma of each axis.
     #[inline]
     pub(super) fn take(
         &mut self,
         secs: f64,
         rate: &Vector3<f64>,
         force: Option<&Vector3<f64>>,
-        (bias, sigma): (&Vector3<f64>, &Vector3<f64>),
+        (bias, sigma): (&Vector3<f64>, impl Fn(usize) -> f64),
         settings: &Settings,
     ) {
         let share = secs / (MEAN_SECS + secs);
@@ -49,13 +49,14 @@ impl Rest {
             self.force += (force - self.force) * share;
             is_quiet &= (force - self.force).norm_squared() <= settings.rest_force.powi(2);
         }
-        is_quiet &= (0..3).all(|i| {
-            if settings.rest_beside_bias {
-                (self.rate[i] - bias[i]).abs() <= settings.rest_rate + 3.0 * sigma[i]
-            } else {
-                self.rate[i].abs() <= settings.rest_rate
-            }
-        });
+        is_quiet = is_quiet
+            && (0..3).all(|i| {
+                if settings.rest_beside_bias {
+                    (self.rate[i] - bias[i]).abs() <= settings.rest_rate + 3.0 * sigma(i)
+                } else {
+                    self.rate[i].abs() <= settings.rest_rate
+                }
+            });
         self.quiet = if is_quiet { self.quiet + secs } else { 0.0 };
     }
 

@@ -108,6 +108,10 @@ pub struct Settings {
     pub gap_secs: f64,
     /// The gyro's range, rad/s; at it, the turn is unknown. 0: not known.
     pub gyro_range: f64,
+    /// Delay of the sensor's own filters that nobody has taken out, s.
+    pub delay: f64,
+    /// Between the axes of the sensor and of its case, rad.
+    pub case: f64,
     /// What is known of this very sensor, in place of the priors above.
     pub prior: Prior,
 }
@@ -163,6 +167,8 @@ impl Default for Settings {
             gap_factor: 1.5,
             gap_secs: 0.2,
             gyro_range: 0.0,
+            delay: 2e-3,
+            case: 3.5e-3,
             prior: Prior::default(),
         }
     }

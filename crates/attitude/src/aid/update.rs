@@ -9,17 +9,13 @@ use super::filter::{Filter, Innovation};
 use super::gravity::Force;
 use super::interval::Interval;
 use super::start::{POSITION_START, VELOCITY_START};
-use crate::frames::{Body, Nav};
+use crate::frames::Nav;
 use crate::quaternion::{Quaternion, RotationVector};
 use crate::record::AttitudeCovariance;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Accelerations are not white, which makes errors larger than they are thought to be.
 pub(super) const COLOURED: f64 = 2.0;
-/// Delay of a sensor's own filters, s.
-const DELAY: f64 = 2e-3;
-/// Between the axes of sensor and case, rad.
-const CASE: f64 = 3.5e-3;
 
 impl Filter {
     /// Corrects by what has been added up.
@@ -205,26 +201,29 @@ impl Filter {
         true
     }
 
-    /// Covariance of the error of the attitude `q_nb` at the corrected `rate`, rad^2, body axes. More than the
-    /// filter's own: accelerations are not white, sensors are late, and their axes are not those of their case.
+    /// Covariance of the error of the attitude with the matrix `r` at the corrected `rate`, rad^2, body axes. More than
+    /// the filter's own: accelerations are not white, sensors are late, and their axes are not those of their case.
     #[must_use]
     pub(crate) fn attitude_covariance(
         &self,
-        q_nb: &Quaternion<Nav, Body>,
+        r: &Matrix3<f64>,
         rate: &Vector3<f64>,
     ) -> AttitudeCovariance {
         if !self.is_started {
             return AttitudeCovariance::from_sigma(Vector3::repeat(std::f64::consts::PI));
         }
-        let r = *q_nb.to_dcm().as_matrix();
-        let white = self.settings.gyro_noise.powi(2) * self.interval.secs;
+        let settings = &self.settings;
+        let white = settings.gyro_noise.powi(2) * self.interval.secs;
         let mut earth = self.covariance.attitude();
         for axis in 0..3 {
             earth[(axis, axis)] += white;
         }
-        let body = r.transpose() * earth * r * COLOURED + rate * rate.transpose() * (DELAY * DELAY);
-        let upper = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]
-            .map(|(i, j)| body[(i, j)] + if i == j { CASE * CASE } else { 0.0 });
+        let carried = r.transpose() * earth;
+        let (late, case) = (settings.delay.powi(2), settings.case.powi(2));
+        let upper = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|(i, j)| {
+            let of_filter: f64 = (0..3).map(|k| carried[(i, k)] * r[(k, j)]).sum();
+            of_filter * COLOURED + rate[i] * rate[j] * late + if i == j { case } else { 0.0 }
+        });
         AttitudeCovariance::from_upper(upper)
     }
 

@@ -138,11 +138,12 @@ impl Run {
             force,
             field,
         };
-        self.filter.take(&measured, &known, &self.propagated);
+        let (_, r) = self.filter.corrected(&self.propagated);
+        let _ = self.filter.take(&measured, &known, &r);
     }
 
     pub(super) fn attitude(&self) -> Quaternion<Nav, Body> {
-        self.filter.corrected(&self.propagated)
+        self.filter.corrected(&self.propagated).0
     }
 }
 

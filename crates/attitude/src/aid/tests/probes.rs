@@ -190,9 +190,14 @@ fn through_our_own_propagator_the_golden_case_is_as_good() {
 
 #[test]
 fn how_a_stream_is_cut_changes_no_bit() {
-    let samples = stream();
-    let run = |lengths: &[usize]| {
-        let mut aided = aided(propagate::Method::Auto);
+    let mut samples = stream();
+    // Whatever ends a run, and a stamp said twice.
+    samples[703].join = Join::Hold;
+    samples[1402].join = Join::Reset;
+    samples[1000].join = Join::Bridge;
+    samples[1101].stamp = samples[1100].stamp;
+    let run = |method, lengths: &[usize]| {
+        let mut aided = aided(method);
         let mut out: Vec<AttitudeSample> = Vec::new();
         let mut rest = samples.as_slice();
         for length in lengths.iter().cycle() {
@@ -206,9 +211,11 @@ fn how_a_stream_is_cut_changes_no_bit() {
         aided.finish(&mut out);
         out
     };
-    let whole = run(&[2001]);
-    assert_eq!(run(&[1]), whole);
-    assert_eq!(run(&[7, 250, 1, 33]), whole);
+    for method in [propagate::Method::Auto, "commit".parse().unwrap()] {
+        let whole = run(method, &[2001]);
+        assert_eq!(run(method, &[1]), whole, "{method:?}");
+        assert_eq!(run(method, &[7, 250, 1, 33]), whole, "{method:?}");
+    }
 }
 
 #[test]
