@@ -124,6 +124,7 @@ pub fn parse_noise(text: &str) -> Result<Noise> {
         scale: one(scale),
         misalignment: one(misalignment),
         tilt: one(tilt),
+        delay: 0.0,
     })
 }
 

@@ -164,7 +164,8 @@ def one(args, motion, seed):
                 absolute = "mag" in flags
                 found[f"strapd {flags}"] = score(q[scored], truth[scored], absolute, p[scored])
         try:
-            found["VQF"] = score(vqf(secs, gyr, acc, mag)[scored], truth[scored], mag is not None)
+            if args.peer:
+                found["VQF"] = score(vqf(secs, gyr, acc, mag)[scored], truth[scored], mag is not None)
         except ImportError as absent:
             complaints.append(str(absent))
     return motion, seed, found, complaints
@@ -205,6 +206,7 @@ def main():
     parser.add_argument("--simulate", default="", help="more flags of `strapd simulate`")
     parser.add_argument("--each", action="store_true", help="a row for each run too")
     parser.add_argument("--jobs", type=int, default=2)
+    parser.set_defaults(peer=True)
     args = parser.parse_args()
     args.strapd = os.path.abspath(args.strapd)
     args.flags = args.flags or (FIELD if args.mag else GRAVITY)

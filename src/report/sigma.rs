@@ -42,7 +42,7 @@ impl SigmaTerms {
         let noise = &plan.noise;
         let mut terms = match &prepared.aiding {
             Some(aiding) => filtered(&aiding.settings),
-            None => alone(plan, prepared.bias_sigma.into()),
+            None => alone(plan, prepared.bias_sigma.into(), prepared.tilt_sigma),
         };
         terms.push(Term {
             name: "bridged_gaps",
@@ -88,7 +88,7 @@ impl SigmaTerms {
 }
 
 /// Of the gyro alone.
-fn alone(plan: &Plan, bias_sigma: [f64; 3]) -> Vec<Term> {
+fn alone(plan: &Plan, bias_sigma: [f64; 3], tilt_sigma: f64) -> Vec<Term> {
     let known = plan.calibration.as_deref();
     let noise = &known.map_or_else(|| plan.noise.clone(), |known| known.narrowed(&plan.noise));
     let (turn_on, note) = match plan.bias {
@@ -99,7 +99,7 @@ fn alone(plan: &Plan, bias_sigma: [f64; 3]) -> Vec<Term> {
         Bias::Auto | Bias::Given(_) => (noise.left_of_turn_on(), " (left by --bias)"),
     };
     let (initial, note_of_start) = match plan.initial {
-        Initial::Gravity => (noise.levelled().initial, " (--init gravity)"),
+        Initial::Gravity => (noise.levelled(tilt_sigma).initial, " (--init gravity)"),
         _ => (noise.initial, ""),
     };
     let term = |name, words, value, unit, note| Term {
@@ -279,7 +279,7 @@ mod tests {
     use strapd_attitude::estimate::Noise;
 
     fn words(plan: &Plan) -> String {
-        let terms = alone(plan, [0.0; 3]);
+        let terms = alone(plan, [0.0; 3], 0.0);
         let terms = SigmaTerms {
             is_filtered: false,
             class: plan.noise.name.clone(),

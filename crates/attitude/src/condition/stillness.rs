@@ -73,6 +73,9 @@ pub struct Rest {
     /// Mean specific force, body axes, in the recording's unit; `None` where there is no
     /// accelerometer.
     pub mean_accel: Option<Vector3<f64>>,
+    /// One standard deviation of its direction, rad, by the scatter between windows: a body that is held, or begins to
+    /// move, is not quite still. 0 without an accelerometer.
+    pub tilt_sigma: f64,
     /// Samples in it.
     pub samples: u64,
 }
@@ -135,6 +138,12 @@ impl Moments {
 
     fn deviation(&self) -> f64 {
         self.variance().max().max(0.0).sqrt()
+    }
+
+    /// Of the mean's direction, rad; 0 of no mean.
+    fn direction_sigma(&self) -> f64 {
+        let sigma = self.deviation() / f64::from(self.n).sqrt() / self.mean.norm();
+        if sigma.is_finite() { sigma } else { 0.0 }
     }
 }
 
@@ -306,6 +315,7 @@ impl Stillness {
                 mean_rate: growing.windows.mean,
                 sigma,
                 mean_accel: (growing.accel.n > 0).then_some(growing.accel.mean),
+                tilt_sigma: growing.accel.direction_sigma(),
                 samples: growing.samples,
             });
         }

@@ -5,7 +5,7 @@
 
 use super::calibrated::BIAS_LEFT;
 use super::meaning::Meaning;
-use super::plan::{Aid, Bias, Initial, Plan};
+use super::plan::{Aid, Bias, Initial, Noise, Plan};
 use crate::aid::{self, Settings, Start};
 use crate::frames::{Body, Nav};
 use crate::quaternion::{Quaternion, RotationVector};
@@ -24,6 +24,10 @@ const TILT_GIVEN: f64 = 0.3;
 const TILT_AT_REST: f64 = 0.05;
 /// Of a heading that was given where a field tells it too, rad.
 const HEADING_GIVEN: f64 = 0.5;
+
+/// What a bias changes by when gravity changes by 1 g along an axis, as a share of what it is after switching on: 0.1 deg/s
+/// of 1 (BMI088), 0.009 of 0.14 (ADIS16465), 1 deg/h of 10 (STIM300), by their data sheets.
+const BY_TILT: f64 = 0.1;
 
 /// Why gravity can not be used.
 enum Unaided {
@@ -177,24 +181,9 @@ impl Aiding {
             hard_iron: plan.mag_hard_iron,
             ..Settings::default()
         };
-        // The filter's own priors are those of the class that is the default; who names another knows better.
+        // The filter's own numbers are those of the class that is the default; who names another knows better.
         if plan.noise != Plan::default().noise {
-            for (prior, known) in [
-                (
-                    &mut settings.bias_prior,
-                    plan.noise.unremoved_bias().into_iter().fold(0.0, f64::max),
-                ),
-                (&mut settings.scale_prior, plan.noise.scale),
-                (&mut settings.cross_prior, plan.noise.misalignment),
-                (
-                    &mut settings.force_bias_prior,
-                    plan.noise.tilt * STANDARD_GRAVITY,
-                ),
-            ] {
-                if known > 0.0 {
-                    *prior = known;
-                }
-            }
+            of_class(&mut settings, &plan.noise);
         }
         if plan.bias != Bias::None {
             settings.bias_prior = settings.bias_prior.min(BIAS_LEFT);
@@ -206,6 +195,38 @@ impl Aiding {
             force_scale,
             forces: Forces::WithRates,
         }
+    }
+}
+
+/// Puts in what a class of sensors says, and leaves what it says nothing of.
+fn of_class(settings: &mut Settings, class: &Noise) {
+    let largest = |axes: [f64; 3]| axes.into_iter().fold(0.0, f64::max);
+    for (number, known) in [
+        (&mut settings.bias_prior, largest(class.unremoved_bias())),
+        (&mut settings.scale_prior, class.scale),
+        (&mut settings.cross_prior, class.misalignment),
+        (
+            &mut settings.force_bias_prior,
+            class.tilt * STANDARD_GRAVITY,
+        ),
+        (&mut settings.gyro_noise, largest(class.arw)),
+        (&mut settings.case, class.misalignment),
+        (&mut settings.delay, class.delay),
+    ] {
+        if known > 0.0 {
+            *number = known;
+        }
+    }
+    // What changes on the way is smaller where the constant is. It is not larger: the filter's own was chosen where
+    // accelerations say more that is wrong than a chip wanders.
+    let default = Settings::default();
+    let share = |of: f64, whole: f64| if of > 0.0 { (of / whole).min(1.0) } else { 1.0 };
+    settings.bias_walk *= share(settings.bias_prior, default.bias_prior);
+    settings.rate_noise *= share(class.scale, default.scale_prior);
+    settings.force_bias_walk *= share(settings.force_bias_prior, default.force_bias_prior);
+    let by_tilt = BY_TILT * largest(class.turn_on_bias);
+    if by_tilt > 0.0 {
+        settings.bias_by_tilt = settings.bias_by_tilt.min(by_tilt);
     }
 }
 
@@ -269,5 +290,69 @@ pub(super) fn scale_of(unit: Option<AccelUnit>) -> f64 {
     match unit {
         Some(AccelUnit::StandardGravity) => STANDARD_GRAVITY,
         Some(AccelUnit::MetresPerSecondSquared) | None => 1.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::estimate::NOISE_PRESETS;
+
+    fn told(name: &str) -> Settings {
+        let class = NOISE_PRESETS.iter().find(|class| class.name == name);
+        let mut settings = Settings::default();
+        of_class(&mut settings, &Noise::preset(class.unwrap()));
+        settings
+    }
+
+    #[test]
+    fn a_better_class_has_less_of_everything_that_sigma_is_made_of() {
+        let classes = ["uncalibrated", "industrial", "tactical", "navigation"].map(told);
+        for pair in classes.windows(2) {
+            let [worse, better] = pair else { continue };
+            for (name, number) in [
+                ("white noise", (|s| s.gyro_noise) as fn(&Settings) -> f64),
+                ("bias", |s| s.bias_prior),
+                ("walk", |s| s.bias_walk),
+                ("by tilt", |s| s.bias_by_tilt),
+                ("rate", |s| s.rate_noise),
+                ("force walk", |s| s.force_bias_walk),
+                ("case", |s| s.case),
+                ("delay", |s| s.delay),
+            ] {
+                let (worse, better) = (number(worse), number(better));
+                // Industrial and tactical have the same white noise.
+                assert!(
+                    better <= worse && better > 0.0,
+                    "{name}: {better} of {worse}"
+                );
+            }
+        }
+        let industrial = &classes[1];
+        // 0.15 deg/sqrt(h), 0.05 to 0.1 deg between the axes, by the data sheet.
+        assert!((industrial.gyro_noise - 4.36e-5).abs() < 1e-7);
+        assert!((industrial.case - 1.5e-3).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_list_says_what_it_says_and_leaves_the_rest() {
+        let silent = Noise {
+            turn_on_bias: [0.0; 3],
+            bias_instability: [0.0; 3],
+            arw: [1e-3; 3],
+            scale: 0.0,
+            misalignment: 0.0,
+            tilt: 0.0,
+            delay: 0.0,
+            ..Plan::default().noise
+        };
+        let mut settings = Settings::default();
+        of_class(&mut settings, &silent);
+        let expected = Settings {
+            gyro_noise: 1e-3,
+            ..Settings::default()
+        };
+        assert_eq!(settings, expected);
     }
 }

@@ -133,7 +133,7 @@ impl Estimator {
                 misalignment: 0.0,
                 ..plan.noise.clone()
             },
-            (false, Initial::Gravity) => plan.noise.levelled(),
+            (false, Initial::Gravity) => plan.noise.levelled(prepared.tilt_sigma),
             (false, _) => plan.noise.clone(),
         };
         let noise = match (&plan.calibration, &prepared.aiding) {

@@ -330,6 +330,8 @@ pub struct Noise {
     pub misalignment: f64,
     /// What an attitude levelled by the accelerometer is off by, rad.
     pub tilt: f64,
+    /// Delay of its filters that nobody has taken out, s.
+    pub delay: f64,
 }
 
 const DEG: f64 = std::f64::consts::PI / 180.0;
@@ -351,6 +353,8 @@ pub struct NoisePreset {
     pub misalignment: f64,
     /// Bias of the accelerometer beside it, as a share of gravity: what levelling by it is off by.
     pub tilt: f64,
+    /// Delay of its filters that nobody has taken out, s.
+    pub delay: f64,
 }
 
 /// The named classes. One standard deviation is a third of a data sheet's limit, or its typical value.
@@ -358,7 +362,8 @@ pub struct NoisePreset {
 /// Sources: `docs/theory/attitude.md` 9 (Bosch BMI088: offset 1 deg/s, sensitivity 1 %, cross-axis 1 %, accelerometer
 /// offset 20 mg; `uncalibrated`, a cheap chip on a board that nobody has measured: InvenSense MPU-6050, scale 3 %,
 /// cross-axis 2 %, offset 50 mg, and 1 degree to its case; ADIS16465: repeatability 0.14 deg/s, sensitivity 0.25 %, misalignment 0.25 deg, 1.4 mg; STIM300: 10 deg/h,
-/// 500 ppm, 1 mrad, 0.75 mg; HG9900 class: 0.003 deg/h, 5 ppm, 10 urad, 25 ug).
+/// 500 ppm, 1 mrad, 0.75 mg; HG9900 class: 0.003 deg/h, 5 ppm,
+/// 10 arc seconds, 25 ug). Delays: of a chip's default filters; the better the class, the better it is stated and taken out.
 pub const NOISE_PRESETS: [NoisePreset; 5] = [
     NoisePreset {
         name: "consumer",
@@ -368,6 +373,7 @@ pub const NOISE_PRESETS: [NoisePreset; 5] = [
         scale: 5e-3,
         misalignment: 5e-3,
         tilt: 0.02,
+        delay: 2e-3,
     },
     NoisePreset {
         name: "uncalibrated",
@@ -377,6 +383,7 @@ pub const NOISE_PRESETS: [NoisePreset; 5] = [
         scale: 0.01,
         misalignment: 0.012,
         tilt: 0.02,
+        delay: 2e-3,
     },
     NoisePreset {
         name: "industrial",
@@ -386,15 +393,17 @@ pub const NOISE_PRESETS: [NoisePreset; 5] = [
         scale: 1e-3,
         misalignment: 1.5e-3,
         tilt: 1.4e-3,
+        delay: 1e-3,
     },
     NoisePreset {
         name: "tactical",
         arw: 0.15,
         bias_instability: 0.5,
         turn_on_bias: 2.8e-3,
-        scale: 3e-4,
-        misalignment: 5e-4,
+        scale: 5e-4,
+        misalignment: 1e-3,
         tilt: 7.5e-4,
+        delay: 5e-4,
     },
     NoisePreset {
         name: "navigation",
@@ -402,8 +411,9 @@ pub const NOISE_PRESETS: [NoisePreset; 5] = [
         bias_instability: 0.01,
         turn_on_bias: 8e-7,
         scale: 5e-6,
-        misalignment: 1e-5,
+        misalignment: 5e-5,
         tilt: 2.5e-5,
+        delay: 1e-4,
     },
 ];
 
@@ -429,6 +439,7 @@ impl Noise {
             scale: class.scale,
             misalignment: class.misalignment,
             tilt: class.tilt,
+            delay: class.delay,
         }
     }
 
@@ -460,11 +471,12 @@ impl Noise {
         [x.hypot(u), y.hypot(v), z.hypot(w)]
     }
 
-    /// The same for an attitude that begins level by the accelerometer at rest.
+    /// The same for an attitude that begins level by the accelerometer at a rest that tells the vertical to `scatter`, rad.
     #[must_use]
-    pub fn levelled(&self) -> Noise {
+    pub fn levelled(&self, scatter: f64) -> Noise {
+        let tilt = self.tilt.hypot(scatter);
         Noise {
-            initial: self.initial.map(|sigma| sigma.hypot(self.tilt)),
+            initial: self.initial.map(|sigma| sigma.hypot(tilt)),
             ..self.clone()
         }
     }

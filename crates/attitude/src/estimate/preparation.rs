@@ -38,6 +38,8 @@ pub struct Prepared {
     pub initial: Quaternion<Nav, Body>,
     /// Where it came from.
     pub initial_origin: String,
+    /// Of `--init gravity`: how well the rest at the start tells the vertical, rad.
+    pub tilt_sigma: f64,
     /// w_ie in ENU, rad/s; zero where the Earth is not taken out.
     pub world_rate: In<Nav>,
     /// The world of the output.
@@ -241,6 +243,7 @@ impl Preparation {
             bias_origin,
             initial,
             initial_origin,
+            tilt_sigma: rests.kept.first().map_or(0.0, |rest| rest.tilt_sigma),
             world_rate: earth.map_or_else(|| In::assume(Vector3::zeros()), |e| e.w_ie),
             world,
             stamps,
@@ -321,6 +324,7 @@ pub fn at_once(
         bias_origin,
         initial,
         initial_origin,
+        tilt_sigma: 0.0,
         world_rate: earth.map_or_else(|| In::assume(Vector3::zeros()), |e| e.w_ie),
         world,
         stamps,
