@@ -240,6 +240,20 @@ fn filtered(settings: &Settings) -> Vec<Term> {
             "",
         ),
         one(
+            "delay",
+            "delay of the sensor's filters",
+            settings.delay * 1e3,
+            "ms",
+            "",
+        ),
+        one(
+            "case",
+            "axes of its case",
+            settings.case.to_degrees(),
+            "deg",
+            "",
+        ),
+        one(
             "hard_iron",
             "hard iron",
             field(settings.hard_iron * 100.0),

@@ -173,8 +173,8 @@ fn a_summary_says_what_its_sigma_is_made_of() {
         ("white_noise", 0.15),
         ("flicker", 0.85),
         ("turn_on_bias", 0.03 * 2.8e-3),
-        ("scale", 0.03),
-        ("axes", 5e-4f64.to_degrees()),
+        ("scale", 0.05),
+        ("axes", 1e-3f64.to_degrees()),
         ("initial_tilt", 0.0),
         ("bridged_gaps", 0.0),
         ("rate_random_walk", 0.0),
@@ -195,6 +195,10 @@ fn a_summary_says_what_its_sigma_is_made_of() {
             > 0.0,
         "{aided}"
     );
+    assert_eq!(aided["terms"]["delay"]["value"], 2.0, "{aided}");
+    let industrial = terms("--aid gravity --noise industrial");
+    assert_eq!(industrial["terms"]["delay"]["value"], 1.0, "{industrial}");
+    assert_eq!(industrial["terms"]["case"]["value"], 1.5e-3f64.to_degrees());
     let text = strapd(dir.path(), "replay log.mcap -o null:").out;
     assert!(
         text.contains("of (class consumer, --noise): white noise 0.84 deg/sqrt(h)"),
