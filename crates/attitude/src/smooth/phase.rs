@@ -372,7 +372,7 @@ mod tests {
     use nalgebra::Matrix3;
 
     use super::{Marginal, Phase};
-    use crate::smooth::pass::NARROW;
+    use crate::smooth::border::NARROW;
 
     fn unsettled(turn: f64, sigma: f64) -> Option<f64> {
         let phase = Phase::<NARROW> {
