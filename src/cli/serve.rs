@@ -133,11 +133,20 @@ pub fn run(global: &Global, args: &Serve) -> Result<Outcome> {
         Some(file) => Some(super::config::layered(file, std::env::args_os().collect())?),
         None => None,
     };
+    let asked = args;
+    let args = layered.as_ref().map_or(args, Layered::serve);
+    let calibrations = args.save_calibration.as_deref();
+    // A folder that is kept up to date begins empty: it is read, too.
+    if let Some(folder) = calibrations {
+        std::fs::create_dir_all(folder).map_err(|source| Error::Write {
+            path: folder.to_owned(),
+            source,
+        })?;
+    }
     let mut settings = match &layered {
         Some(layered) => layered.settings()?,
-        None => args.settings()?,
+        None => asked.settings()?,
     };
-    let args = layered.as_ref().map_or(args, Layered::serve);
     let recorder = args.recording()?.map(Recorder::start).transpose()?;
     settings.recorder = recorder.as_ref().map(Recorder::handle);
     let state = match &args.state {
@@ -157,13 +166,6 @@ pub fn run(global: &Global, args: &Serve) -> Result<Outcome> {
         .enable_all()
         .build()
         .map_err(|e| Error::Usage(format!("--threads {}: {e}", global.threads)))?;
-    let calibrations = args.save_calibration.as_deref();
-    if let Some(folder) = calibrations {
-        std::fs::create_dir_all(folder).map_err(|source| Error::Write {
-            path: folder.to_owned(),
-            source,
-        })?;
-    }
     let has_stdin = args.sources.iter().any(|s| s == "-");
     let outcome = runtime.block_on(serve(settings, has_stdin, (state, calibrations)));
     // A thread that waits for standard input would otherwise be waited for.
