@@ -16,6 +16,8 @@ mod earth_rate;
 mod fixtures;
 mod formats;
 mod model;
+#[cfg(unix)]
+mod pages;
 mod recover;
 mod regularise;
 mod replay;
