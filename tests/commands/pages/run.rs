@@ -107,7 +107,15 @@ impl Place {
         let place = Place::with_fixtures();
         let simulated = "simulate hand --duration 12 --rate-hz 100 --noise consumer_imu --mag -o flight.mcap -o truth.csv";
         strapd(place.path(), simulated).done();
-        for name in ["log.mcap", "calibrating.mcap"] {
+        for name in [
+            "log.mcap",
+            "calibrating.mcap",
+            "monday.mcap",
+            "tuesday.mcap",
+            "new.mcap",
+            "short.mcap",
+            "turns.mcap",
+        ] {
             std::fs::copy(place.path().join("flight.mcap"), place.path().join(name)).unwrap();
         }
         place
@@ -178,7 +186,17 @@ pub(super) fn run(place: &Place, commands: &[&Command], anew: bool) -> Vec<Ran> 
             ""
         };
         let (out, err, code) = (log(n, "out"), log(n, "err"), log(n, "code"));
-        let written: Vec<String> = command.outputs();
+        // What a command reads as well stays.
+        let is_read = |name: &String| {
+            command
+                .text
+                .split_whitespace()
+                .filter(|w| w == name)
+                .count()
+                > 1
+        };
+        let mut written: Vec<String> = command.outputs();
+        written.retain(|name| !is_read(name));
         if anew && !written.is_empty() {
             let _ = writeln!(script, "rm -rf -- {}", written.join(" "));
         }
