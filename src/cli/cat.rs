@@ -124,6 +124,12 @@ pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
         .out
         .flush()
         .map_err(|e| Error::writing("stdout", e))?;
+    if printer.left_out > 0 {
+        tracing::warn!(
+            "{} forces or fields with stamps of their own have no row: --format ndjson has them",
+            printer.left_out
+        );
+    }
     if lost > 0 {
         return Ok(Outcome::Lossy);
     }
@@ -145,6 +151,8 @@ struct Printer {
     format: Format,
     topic: String,
     left: u64,
+    /// Forces and fields of other sensors, which no row has a place for.
+    left_out: u64,
     seq: u64,
     row: Vec<u8>,
 }
@@ -166,6 +174,7 @@ impl Printer {
             format,
             topic: topic.to_owned(),
             left: count.unwrap_or(u64::MAX),
+            left_out: 0,
             seq: 0,
             row: Vec::new(),
         })
@@ -173,6 +182,13 @@ impl Printer {
 
     /// Prints one, with what the format says it means; says whether more are wanted.
     fn print(&mut self, raw: &RawSample, kind: Option<SampleKind>) -> std::io::Result<bool> {
+        if raw.is_beside {
+            match self.format {
+                Format::Ndjson => writeln!(self.out, "{}", line::rate(&self.topic, 0, raw, kind))?,
+                Format::Csv | Format::Table => self.left_out += 1,
+            }
+            return Ok(true);
+        }
         if self.left == 0 {
             return Ok(false);
         }

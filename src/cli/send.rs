@@ -161,7 +161,7 @@ fn read(
     let lost = reading.walk_in_flu(pool, |raw, kind| {
         let due = raw.header.unwrap_or(raw.log);
         batch.push((due, line::rate(id, seq, raw, kind).to_string()));
-        seq += 1;
+        seq += u64::from(!raw.is_beside);
         let goes_on = batch.len() < BATCH || give.blocking_send(std::mem::take(&mut batch)).is_ok();
         Ok(match goes_on {
             true => ControlFlow::Continue(()),

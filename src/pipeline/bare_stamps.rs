@@ -27,9 +27,11 @@ impl BareStamps {
     ) -> Result<impl Iterator<Item = RawSample>, Ambiguous> {
         let bare = line.bare.iter().copied().chain(std::iter::repeat(None));
         self.waiting.extend(samples.drain(..).zip(bare));
-        let mut numbers = self.waiting.iter().filter_map(|(_, bare)| *bare);
+        let mut numbers = self.numbers();
         let (first, ninth) = (numbers.next(), numbers.nth(MOST_WAITING - 1));
-        self.unit = self.unit.or(first.and_then(Bare::certain_unit));
+        let certain = first.and_then(Bare::certain_unit);
+        drop(numbers);
+        self.unit = self.unit.or(certain);
         let are_open = matches!((self.unit, first, ninth), (None, Some(_), None));
         self.release(!are_open || self.waiting.len() >= MOST_HELD)
     }
@@ -42,10 +44,15 @@ impl BareStamps {
         self.release(true)
     }
 
+    /// Those of the samples that wait: what is of other sensors than the gyro comes at other steps.
+    fn numbers(&self) -> impl Iterator<Item = Bare> {
+        let own = self.waiting.iter().filter(|(raw, _)| !raw.is_beside);
+        own.filter_map(|(_, bare)| *bare)
+    }
+
     fn release(&mut self, are_known: bool) -> Result<impl Iterator<Item = RawSample>, Ambiguous> {
-        let mut numbers = self.waiting.iter().filter_map(|(_, bare)| *bare);
-        if are_known && self.unit.is_none() && numbers.clone().next().is_some() {
-            self.unit = Some(unit_of(numbers.by_ref().take(MOST_WAITING + 1))?);
+        if are_known && self.unit.is_none() && self.numbers().next().is_some() {
+            self.unit = Some(unit_of(self.numbers().take(MOST_WAITING + 1))?);
         }
         let unit = self.unit.unwrap_or_default();
         let known = if are_known { self.waiting.len() } else { 0 };
@@ -57,7 +64,7 @@ impl BareStamps {
 }
 
 /// The sample with the times it has not: a line has none but the one in it; a row may.
-pub(super) fn at_its_stamp(raw: RawSample) -> RawSample {
+fn at_its_stamp(raw: RawSample) -> RawSample {
     let stamp = raw.header.unwrap_or(Nanos(0));
     let log = Some(raw.log).filter(|log| log.0 != 0).unwrap_or(stamp);
     RawSample {

@@ -264,7 +264,8 @@ impl Route {
             out.extend(samples.iter().map(|raw| Item::Sample(taker.stream, *raw)));
         }
         if self.reference.is_some() {
-            out.extend(samples.iter().map(|raw| Item::Reference(*raw)));
+            let own = samples.iter().filter(|raw| !raw.is_beside);
+            out.extend(own.map(|raw| Item::Reference(*raw)));
         }
     }
 

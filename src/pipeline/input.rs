@@ -4,6 +4,7 @@
 //! only once is put into a file of its own that has no name and goes with this process: who looks twice sees the same bytes,
 //! and what is said of a log does not depend on how it came.
 
+use super::folder::{self, Folder};
 use super::lines;
 use super::request::Source;
 use crate::error::{Error, Result};
@@ -11,7 +12,7 @@ use std::fs::File;
 use std::io::{Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use strapd_recording::decode::Options;
+use strapd_recording::decode::{Options, Wanted};
 use strapd_recording::delimited::Table;
 use strapd_recording::format::{Format, open};
 use strapd_recording::lines::Lines;
@@ -28,22 +29,39 @@ pub struct Input {
     /// What came only once.
     kept: Option<Arc<File>>,
     format: Format,
+    /// Tables of the same recording.
+    beside: Vec<PathBuf>,
 }
 
 impl Input {
-    /// Opens what a command line names: a file, a pipe, or `-`. A stream is read to its end.
+    /// Opens what a command line names: a file, a folder of one recording, a pipe, or `-`. A stream is read to its end.
     ///
     /// # Errors
-    /// It can not be opened or read, is a directory or empty; there is no room for a stream.
+    /// It can not be opened or read, or is empty; a folder of no recording or of several; there is no room for a stream.
     pub fn open(path: &Path) -> Result<Input> {
         match Source::parse(&path.to_string_lossy()) {
             source @ Source::Stdin => Input::keep(source, std::io::stdin()),
             _ if is_pipe(path) => Input::keep(Source::File(path.to_owned()), open(path)?),
-            _ => Ok(Input {
-                source: Source::File(path.to_owned()),
+            source if path.is_dir() => {
+                let Folder {
+                    main,
+                    format,
+                    beside,
+                } = folder::of(path)?;
+                Ok(Input {
+                    source,
+                    name: main,
+                    kept: None,
+                    format,
+                    beside,
+                })
+            }
+            source => Ok(Input {
+                source,
                 name: path.to_owned(),
                 kept: None,
                 format: recognised(path)?,
+                beside: Vec::new(),
             }),
         }
     }
@@ -95,6 +113,7 @@ impl Input {
             kept: Some(Arc::new(file)),
             source,
             name,
+            beside: Vec::new(),
         })
     }
 
@@ -162,7 +181,15 @@ impl Input {
     /// # Errors
     /// As [`lines::open`].
     pub fn lines(&self, options: &Options) -> Result<Lines<File>> {
-        lines::open(&self.name, self.format, self.bytes()?, options)
+        let lines = lines::open(&self.name, self.format, self.bytes()?, options)?;
+        let of_forces = Options {
+            wanted: Wanted::Forces,
+            ..Options::default()
+        };
+        self.beside.iter().try_fold(lines, |lines, beside| {
+            let other = lines::open(beside, Format::Table, open(beside)?, &of_forces)?;
+            Ok(lines.with(other)?)
+        })
     }
 }
 

@@ -79,16 +79,22 @@ pub struct Aids {
 
 impl Aids {
     /// From the first samples of a topic.
-    fn of(plan: &Plan, resolved: &Meaning, first: &[RawSample]) -> Aids {
+    fn of(plan: &Plan, resolved: &Meaning, first: &[RawSample], beside: &[RawSample]) -> Aids {
         let plan = Plan {
             aid: Aid::Auto,
             ..plan.clone()
         };
+        let has_force = |samples: &[RawSample]| samples.iter().any(|raw| raw.accel.is_some());
+        // Forces in messages of their own stand in where the rates come alone.
+        let of_forces = match !has_force(first) && has_force(beside) {
+            true => beside,
+            false => first,
+        };
         let mut notes = Vec::new();
         // With `auto` what can not be is a warning.
-        let aiding = Aiding::decide(&plan, resolved, first, &mut notes).unwrap_or_default();
+        let aiding = Aiding::decide(&plan, resolved, of_forces, &mut notes).unwrap_or_default();
         let forces = || {
-            first
+            of_forces
                 .iter()
                 .filter_map(|raw| raw.accel)
                 .map(|f| resolved.force(f).norm())
@@ -103,7 +109,11 @@ impl Aids {
             force_scale: aiding.map_or(1.0, |aiding| aiding.force_scale),
             gravity: aiding.is_some(),
             notes,
-            own_field: first.iter().find_map(|raw| raw.mag).map(length),
+            own_field: first
+                .iter()
+                .chain(beside)
+                .find_map(|raw| raw.mag)
+                .map(length),
             ..Aids::default()
         }
     }
@@ -129,6 +139,8 @@ struct Look {
     kind_stated: bool,
     resolved: Meaning,
     first: Vec<RawSample>,
+    /// The first of other sensors than the gyro.
+    beside: Vec<RawSample>,
     clock: Option<(Clock, Option<String>)>,
     asked: Clock,
     quality: Quality,
@@ -172,6 +184,12 @@ impl Si {
 
 impl Look {
     fn take(&mut self, raw: &RawSample) -> std::result::Result<(), String> {
+        if raw.is_beside {
+            if self.beside.len() < FEW {
+                self.beside.push(*raw);
+            }
+            return Ok(());
+        }
         self.conditioned.push(std::slice::from_ref(raw), |sample| {
             self.stillness.push(sample);
             self.stamps.push(sample);
@@ -190,7 +208,7 @@ impl Look {
     fn settle(&mut self) {
         let (clock, warning) = choose_clock(&self.first, self.asked);
         self.quality = Quality::new(clock);
-        self.aid = Aids::of(&self.plan, &self.resolved, &self.first);
+        self.aid = Aids::of(&self.plan, &self.resolved, &self.first, &self.beside);
         for raw in self.first.drain(..) {
             self.quality.push(&self.si.of(&raw));
         }
@@ -377,6 +395,7 @@ fn begin(source: &Source, known: &LogChannel, decoder: &decode::Decoder, plan: &
             .unwrap_or_default(),
         kind_stated: decoder.stated().declared.sample_kind.is_some(),
         first: Vec::new(),
+        beside: Vec::new(),
         clock: None,
         quality: Quality::new(plan.clock),
         si: Si::new(plan, &decoder.stated().declared, &resolved),

@@ -1,7 +1,8 @@
 //! Samples from lines of JSON, or rows of a table -> the same run as from a log. I/O.
 
-use super::bare_stamps::{BareStamps, at_its_stamp};
+use super::bare_stamps::BareStamps;
 use super::channel_route::Item;
+use super::early_besides::{EarlyBesides, are_beside};
 use super::position::Position;
 use super::replay_start::Waiting;
 use super::request::{ReplayRequest, refused};
@@ -16,7 +17,7 @@ use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
 use strapd_attitude::condition::Clock;
-use strapd_attitude::estimate::{Aid, Meaning};
+use strapd_attitude::estimate::Meaning;
 use strapd_attitude::estimate::{StampPass, Stamps};
 use strapd_attitude::record::{Declared, Nanos};
 use strapd_recording::decode::Options;
@@ -159,7 +160,9 @@ impl Taker for Looking<'_> {
 
     fn take(&mut self, items: &mut Vec<Item>) -> Result<Flow> {
         for item in items.drain(..) {
-            if let (Item::Sample(_, raw), Some((name, pass))) = (item, &mut self.pass) {
+            if let (Item::Sample(_, raw), Some((name, pass))) = (item, &mut self.pass)
+                && !raw.is_beside
+            {
                 pass.push(&raw)
                     .map_err(|what| refused(self.path, name, what))?;
             }
@@ -184,7 +187,7 @@ fn read(
     let mut bare = BareStamps::default();
     // Rows under a header that is known are of a table, though the first be none.
     let (mut early, mut first_bad) = (Vec::new(), None);
-    let is_beside = run.plan.aid == Aid::GravityAndField || run.plan.has_forces_beside;
+    let mut early_besides = EarlyBesides::default();
     let mut has_rates = false;
     let mut samples = Vec::new();
     let mut items = Vec::with_capacity(BATCH);
@@ -200,17 +203,23 @@ fn read(
                 early.push(undecodable(lines.number(), why));
             }
             Err(why) => items.push(undecodable(lines.number(), why)),
+            // Of another sensor of the device than the gyro.
+            Ok(line) if are_beside(&line, &mut samples) => match &sensor {
+                None if lines.number() > PATIENCE => return Err(nothing(path, format)),
+                None => early_besides.hold(line, &mut samples),
+                Some(own) if line.id.as_ref().is_none_or(|id| id == own) => {
+                    let known = bare.take(&mut samples, &line);
+                    let known = known.map_err(|what| unclear(path, &what))?;
+                    items.extend(known.map(|raw| Item::Sample(0, raw)));
+                }
+                Some(_) => samples.clear(),
+            },
             Ok(mut line) => {
                 // A sample of our own whose rate is null was one with NaN: it is counted, not
                 // passed over.
                 let is_sample = line.class == Class::Rate && !samples.is_empty();
                 let has_rate = samples.iter().any(|s| s.gyro.is_some());
                 if !is_sample && !has_rate {
-                    // Of the same device between its samples, with a stamp that says its unit.
-                    let id = line.id.as_deref().unwrap_or_default();
-                    if is_beside && sensor.as_deref() == Some(id) && line.bare.is_empty() {
-                        items.extend(samples.drain(..).map(|raw| Item::Beside(at_its_stamp(raw))));
-                    }
                     // Attitudes, status and the like between the samples.
                     samples.clear();
                     if sensor.is_none() && lines.number() > PATIENCE {
@@ -252,6 +261,11 @@ fn read(
                         let (found, stream) = met(run, &id, &lines, &declared);
                         taker.meet(found, stream)?;
                         items.append(&mut early);
+                        for (line, mut samples) in early_besides.release(&id) {
+                            let known = bare.take(&mut samples, &line);
+                            let known = known.map_err(|what| unclear(path, &what))?;
+                            items.extend(known.map(|raw| Item::Sample(0, raw)));
+                        }
                         sensor = Some(id);
                     }
                     Some(first) if *first != id => {
@@ -361,7 +375,7 @@ fn met(
     declared: &Declared,
 ) -> (Found, Stream) {
     let name = if id.is_empty() { "imu" } else { id };
-    let notes = lines.table().map(Table::notes).unwrap_or_default();
+    let notes = lines.notes();
     let doubt = lines.table().and_then(Table::doubt_of_unit);
     let doubt = doubt.filter(|_| run.plan.unit.is_none());
     let found = Found {
@@ -370,7 +384,7 @@ fn met(
         described: described(lines),
         resolved: Meaning::new(&run.plan, declared),
         noticed: Arc::default(),
-        warnings: notes.iter().cloned().chain(doubt).collect(),
+        warnings: notes.into_iter().chain(doubt).collect(),
     };
     (found, Stream::new(name, ""))
 }

@@ -219,10 +219,14 @@ impl Session {
     fn take(&mut self, item: Item, pool: &Pool) -> Result<()> {
         match item {
             Item::Sample(stream, raw) => {
-                self.samples += 1;
                 let Some(topic) = self.topics.get_mut(stream) else {
                     return Ok(());
                 };
+                if raw.is_beside {
+                    topic.estimator.take(&raw);
+                    return Ok(());
+                }
+                self.samples += 1;
                 topic.estimator.take(&raw);
                 topic.zeros.take(raw.gyro);
                 if let Some(history) = &mut topic.history {

@@ -6,6 +6,7 @@
 
 use super::bare_stamps::BareStamps;
 use super::channel_route::{Item, Route};
+use super::early_besides::{EarlyBesides, are_beside};
 use super::input::Input;
 use super::lines::{described, no_samples, unclear};
 use super::log::LogChannel;
@@ -81,7 +82,7 @@ impl TextLog {
             _ => "fields by name, in each line".to_owned(),
         };
         let doubt = table.as_ref().and_then(Table::doubt_of_unit);
-        for note in table.iter().flat_map(Table::notes).chain(&doubt) {
+        for note in lines.notes().iter().chain(&doubt) {
             tracing::warn!("{}: {note}", input.name().display());
         }
         let sensors = read(&mut lines, input.name(), |read| {
@@ -193,6 +194,7 @@ fn read(
     let mut before = None;
     // Rows under a header that is known are of a table, though the first be none.
     let (mut early, mut first_bad) = (Vec::new(), None);
+    let mut early_besides = EarlyBesides::default();
     while let Some(line) = lines.next(&mut samples)? {
         let line = match (line, before) {
             (Ok(line), _) => line,
@@ -212,6 +214,26 @@ fn read(
                 continue;
             }
         };
+        if are_beside(&line, &mut samples) {
+            let place = match &line.id {
+                Some(id) => sensors.places.get(&(id.clone(), false)).copied(),
+                None => before,
+            };
+            let Some(bare) = place.and_then(|place| sensors.bare.get_mut(place)) else {
+                early_besides.hold(line, &mut samples);
+                continue;
+            };
+            let known: Vec<RawSample> = bare
+                .take(&mut samples, &line)
+                .map_err(|what| unclear(path, &what))?
+                .collect();
+            let id = line.id.clone().unwrap_or_default();
+            let of = Read::Samples(place.unwrap_or_default(), &(id, false), &line, &known);
+            if !known.is_empty() && take(of)?.is_break() {
+                return Ok(sensors);
+            }
+            continue;
+        }
         let says_something = |s: &RawSample| s.gyro.is_some() || s.orientation.is_some();
         if line.class != Class::Rate && !samples.iter().any(says_something) {
             // Status and the like between the samples.
@@ -223,6 +245,7 @@ fn read(
             line.class == Class::Att,
         );
         let next = sensors.places.len();
+        let mut of_before = Vec::new();
         let place = match sensors.places.get(&key) {
             Some(place) => *place,
             None if next >= MOST_SENSORS => {
@@ -233,6 +256,7 @@ fn read(
             None => {
                 sensors.places.insert(key.clone(), next);
                 sensors.bare.push(BareStamps::default());
+                of_before = early_besides.release(&key.0);
                 next
             }
         };
@@ -245,10 +269,18 @@ fn read(
         let Some(bare) = sensors.bare.get_mut(place) else {
             continue;
         };
-        let known: Vec<RawSample> = bare
-            .take(&mut samples, &line)
-            .map_err(|what| unclear(path, &what))?
-            .collect();
+        let mut known: Vec<RawSample> = Vec::new();
+        for (line, samples) in of_before
+            .iter_mut()
+            .map(|(line, samples)| (&*line, samples))
+        {
+            let first = bare.take(samples, line);
+            known.extend(first.map_err(|what| unclear(path, &what))?);
+        }
+        known.extend(
+            bare.take(&mut samples, &line)
+                .map_err(|what| unclear(path, &what))?,
+        );
         if take(Read::Samples(place, &key, &line, &known))?.is_break() {
             return Ok(sensors);
         }
@@ -300,11 +332,13 @@ impl Met {
     }
 
     fn take(&mut self, samples: &[RawSample]) {
-        self.messages += samples.len() as u64;
         for sample in samples {
-            self.stated.has_gyro |= sample.gyro.is_some();
             self.stated.has_accel |= sample.accel.is_some();
             self.stated.has_mag |= sample.mag.is_some();
+        }
+        for sample in samples.iter().filter(|raw| !raw.is_beside) {
+            self.messages += 1;
+            self.stated.has_gyro |= sample.gyro.is_some();
             self.stated.has_orientation |= sample.orientation.is_some();
             self.stated.has_interval |= sample.interval_nanos.is_some();
             if let Ok(log) = u64::try_from(sample.log.0) {

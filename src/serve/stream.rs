@@ -10,6 +10,7 @@ mod resetting;
 pub mod run;
 pub mod stamps;
 
+use crate::pipeline::early_besides;
 use crate::pipeline::session_builder::labelled;
 use crate::report::aid::Aided;
 use crate::report::calibration;
@@ -24,6 +25,7 @@ use intervals::Intervals;
 use resetting::Resetting;
 use run::{Placed, Span, Standing};
 use stamps::{Stamps, Taken};
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 use strapd_attitude::condition::{Clock, Report};
@@ -87,6 +89,8 @@ pub struct SensorStream {
     counted: Counts,
     /// Specific forces came that this attitude can not use.
     has_unused_forces: bool,
+    /// Forces and fields that came before the first rate, the last few.
+    early: VecDeque<RawSample>,
 }
 
 /// How far it is known where a sender stands.
@@ -189,6 +193,7 @@ impl SensorStream {
             told: 0,
             counted: Counts::default(),
             has_unused_forces: false,
+            early: VecDeque::new(),
         })
     }
 
@@ -471,6 +476,11 @@ impl SensorStream {
                 self.expected = Some(seq.saturating_add(1));
             }
         }
+        if self.joining == Joining::Joined {
+            for raw in self.early.drain(..) {
+                self.estimator.take(&raw);
+            }
+        }
         for raw in samples {
             if raw.is_beside {
                 self.take_beside(plan, raw);
@@ -483,11 +493,15 @@ impl SensorStream {
         self.first = self.first.or(self.conditioning().first);
     }
 
-    /// A specific force or a field with a stamp of its own; until a rate has told where the run stands, there is
-    /// nothing to correct.
+    /// A specific force or a field with a stamp of its own; until a rate has told where the run stands, it waits.
     fn take_beside(&mut self, plan: &Plan, raw: &RawSample) {
         if self.joining == Joining::Joined {
             self.estimator.take(raw);
+        } else {
+            if self.early.len() == early_besides::MOST {
+                self.early.pop_front();
+            }
+            self.early.push_back(*raw);
         }
         let is_alone = self.prepared.aiding.is_none() && plan.aid == Aid::Auto;
         self.has_unused_forces |= is_alone && raw.accel.is_some();

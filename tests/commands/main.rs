@@ -14,6 +14,7 @@ mod cli;
 mod containers;
 mod earth_rate;
 mod fixtures;
+mod folders;
 mod formats;
 mod model;
 #[cfg(unix)]

@@ -2,10 +2,13 @@
 //!
 //! Apart from the decoders because it counts lines and bounds them: what a line holds is theirs to say.
 
+mod beside;
+
 use crate::decode::{Line, LineDecoder, MAX_LINE, Options, Undecodable};
 use crate::delimited::{Opening, Table};
 use crate::error::{Error, Result};
 use crate::format::Format;
+use beside::Beside;
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -24,7 +27,16 @@ pub struct Lines<R> {
     line: Vec<u8>,
     /// Rows of a table that were looked at before, with their numbers.
     held: VecDeque<(u64, Vec<u8>)>,
+    /// Files of the same recording with forces or fields, and what is next in this one.
+    beside: Vec<Beside<R>>,
+    next: Option<Next>,
 }
+
+/// What a line held, and its samples; `None` at the end.
+type Next = (
+    Option<std::result::Result<Line, Undecodable>>,
+    Vec<RawSample>,
+);
 
 /// How a line is read.
 #[derive(Debug)]
@@ -42,12 +54,14 @@ impl<R: Read> Lines<R> {
         let mut lines = Lines {
             name: name.to_owned(),
             input: BufReader::with_capacity(1 << 16, input),
-            form: Form::Objects(LineDecoder::new(options)),
+            form: Form::Objects(LineDecoder::new(options).with_besides()),
             last_read: 0,
             current: 0,
             offset: 0,
             line: Vec::new(),
             held: VecDeque::new(),
+            beside: Vec::new(),
+            next: None,
         };
         if format == Format::Table {
             let stem = name.file_stem().unwrap_or_default().to_string_lossy();
@@ -63,12 +77,26 @@ impl<R: Read> Lines<R> {
         Ok(lines)
     }
 
-    /// What the next line holds; its samples are pushed. `None` at the end. Blank lines are passed over.
+    /// What the next line holds, of this file or of those beside it, in the order of their stamps; its samples are pushed.
+    /// What a line holds that is of no gyro is marked so ([`RawSample::is_beside`]). `None` at the end. Blank lines are
+    /// passed over.
     ///
     /// # Errors
     /// [`Error::Read`].
     #[allow(clippy::should_implement_trait)]
     pub fn next(
+        &mut self,
+        samples: &mut Vec<RawSample>,
+    ) -> Result<Option<std::result::Result<Line, Undecodable>>> {
+        if self.beside.is_empty() {
+            return self.next_own(samples);
+        }
+        let (line, found) = self.next_of_all()?;
+        samples.extend(found);
+        Ok(line)
+    }
+
+    fn next_own(
         &mut self,
         samples: &mut Vec<RawSample>,
     ) -> Result<Option<std::result::Result<Line, Undecodable>>> {
@@ -114,13 +142,27 @@ impl<R: Read> Lines<R> {
         }
     }
 
+    /// What the reader of its tables should know.
+    #[must_use]
+    pub fn notes(&self) -> Vec<String> {
+        let own = self.table().map(Table::notes).unwrap_or_default();
+        let others = self.beside.iter().flat_map(Beside::notes);
+        own.iter().cloned().chain(others).collect()
+    }
+
     /// What is said of all samples before the first: the names of a table may say units.
     #[must_use]
     pub fn declared(&self) -> Declared {
-        self.table()
+        let mut declared = self
+            .table()
             .map(Table::declared)
             .cloned()
-            .unwrap_or_default()
+            .unwrap_or_default();
+        let mut of_others = self.beside.iter().map(Beside::declared);
+        declared.accel_unit = declared
+            .accel_unit
+            .or_else(|| of_others.find_map(|d| d.accel_unit));
+        declared
     }
 
     /// The number of the line that was given last, from 1.
@@ -138,7 +180,7 @@ impl<R: Read> Lines<R> {
     /// Whether the next line may be long in coming: nothing of it is here.
     #[must_use]
     pub fn may_wait(&self) -> bool {
-        self.held.is_empty() && self.input.buffer().is_empty()
+        self.held.is_empty() && self.beside.is_empty() && self.input.buffer().is_empty()
     }
 
     /// The next line: one that was looked at before, or from the input.

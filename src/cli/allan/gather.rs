@@ -103,6 +103,7 @@ pub(super) fn gather(
     };
     let survey = reading.walk(pool, |taken| {
         match taken {
+            Taken::Sample(_, raw) if raw.is_beside => {}
             Taken::Sample(_, raw) => gathering.take(raw).map_err(fails)?,
             Taken::Undecodable(..) => gathering.undecodable(),
         }

@@ -4,13 +4,15 @@ use serde_json::{Value, json};
 use strapd_attitude::record::{RawSample, SampleKind};
 
 /// The object of sample number `seq` of the sensor `id`, in the units and axes it has here: what is absent is left
-/// out, NaN becomes null. `kind` is what the format says the sample means.
+/// out, NaN becomes null. `kind` is what the format says the sample means. What is of another sensor than the gyro is no
+/// `RATE`, and has no number.
 pub(in crate::cli) fn rate(id: &str, seq: u64, raw: &RawSample, kind: Option<SampleKind>) -> Value {
     let (sec, nsec) = raw.header.unwrap_or(raw.log).to_sec_nanosec();
-    let mut object = json!({
-        "class": "RATE", "id": id, "seq": seq,
-        "stamp": { "sec": sec, "nsec": nsec },
-    });
+    let stamp = json!({ "sec": sec, "nsec": nsec });
+    let mut object = match raw.is_beside {
+        true => json!({ "id": id, "stamp": stamp }),
+        false => json!({ "class": "RATE", "id": id, "seq": seq, "stamp": stamp }),
+    };
     if let Some(map) = object.as_object_mut() {
         let mut put = |key: &str, value: Value| map.insert(key.to_owned(), value);
         for (key, vector) in [("gyro", raw.gyro), ("accel", raw.accel), ("mag", raw.mag)] {

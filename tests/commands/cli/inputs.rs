@@ -18,7 +18,11 @@ fn what_is_not_there_a_directory_empty_or_no_mcap_is_called_so_by_every_command(
         on("nowhere.mcap").refused(1, &["nowhere.mcap", "cannot open", "No such file"]);
         on("folder").refused(
             1,
-            &["folder", "is a directory", "help: name the .mcap file"],
+            &[
+                "folder",
+                "a folder without a recording",
+                "help: name a file",
+            ],
         );
         on("empty.mcap").refused(1, &["empty.mcap", "is empty"]);
         on("text.mcap").refused(

@@ -40,7 +40,7 @@ fn force(n: u64) -> String {
 }
 
 /// Both, where the force of an instant comes before its rate, or behind it.
-fn phone(numbers: std::ops::Range<u64>, forces_first: bool) -> Vec<String> {
+pub(super) fn phone(numbers: std::ops::Range<u64>, forces_first: bool) -> Vec<String> {
     let both = |n: u64| match (n % 4, forces_first) {
         (0, true) => vec![force(n), gyro(n)],
         (0, false) => vec![gyro(n), force(n)],

@@ -237,3 +237,28 @@ fn file_tcp_udp_websocket_unix_and_stdin_give_the_same_attitudes_to_the_byte() {
     // Means over intervals: they need their predecessor.
     check(&fixtures.join("coning_average.mcap"));
 }
+
+#[test]
+fn forces_in_lines_of_their_own_give_the_bytes_of_a_replay_whichever_comes_first() {
+    for forces_first in [true, false] {
+        let lines: Vec<String> = super::besides::phone(0..MANY as u64, forces_first)
+            .into_iter()
+            .map(|line| line + "\n")
+            .collect();
+        let lines: Vec<&[u8]> = lines.iter().map(|line| line.as_bytes()).collect();
+        let args = [
+            "replay",
+            "-",
+            "--method",
+            "commit",
+            "--sample-kind",
+            "rate",
+            "-o",
+            "-",
+        ];
+        let expected = printed(&args, &lines.concat()).unwrap();
+        let got = served(SampleKind::Rate, &lines);
+        assert!(got == expected, "forces first: {forces_first}");
+        assert_eq!(got.iter().filter(|b| **b == b'\n').count(), MANY);
+    }
+}

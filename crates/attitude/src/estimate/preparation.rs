@@ -78,6 +78,8 @@ pub struct Preparation {
     rates: Option<Vec<[f64; 3]>>,
     /// What a pass before this one found.
     known: Option<Stamps>,
+    /// Specific forces came in messages of their own; before the first sample.
+    forces_beside: [bool; 2],
 }
 
 impl Preparation {
@@ -98,6 +100,7 @@ impl Preparation {
                 && resolved.kind != SampleKind::DeltaAngle)
                 .then(Vec::new),
             known: None,
+            forces_beside: [false; 2],
         }
     }
 
@@ -118,6 +121,12 @@ impl Preparation {
     /// # Errors
     /// In words, when the settings do not fit.
     pub fn take(&mut self, raw: &RawSample) -> Result<(), String> {
+        if raw.is_beside {
+            let is_force = raw.accel.is_some();
+            self.forces_beside[0] |= is_force;
+            self.forces_beside[1] |= is_force && self.taken == 0;
+            return Ok(());
+        }
         if self.first.len() < FEW {
             self.first.push(*raw);
         }
@@ -179,6 +188,7 @@ impl Preparation {
             stamps,
             rates,
             known,
+            forces_beside,
             ..
         } = self;
         let is_known = known.is_some();
@@ -195,11 +205,16 @@ impl Preparation {
         }
         let rests = rest.map_or_else(|| Ok(Rests::default()), RestPass::finish)?;
         // The method of a daemon decides as a daemon: by the first sample.
-        let looked_at = match plan.method {
+        let (looked_at, is_beside) = match plan.method {
             Method::Live { .. } | Method::CommitProvisional { .. } if plan.aid == Aid::Auto => {
-                first.get(..1).unwrap_or(&first)
+                (first.get(..1).unwrap_or(&first), forces_beside[1])
             }
-            _ => &first,
+            _ => (first.as_slice(), forces_beside[0]),
+        };
+        let plan = Plan {
+            has_forces_beside: plan.has_forces_beside
+                || (is_beside && looked_at.iter().all(|raw| raw.accel.is_none())),
+            ..plan
         };
         let aiding = Aiding::decide(&plan, &resolved, looked_at, &mut warnings)?;
         let (initial, initial_origin, world) = decide_initial(

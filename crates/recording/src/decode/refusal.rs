@@ -99,6 +99,16 @@ pub enum Undecodable {
         /// How it begins, fit for a terminal.
         near: String,
     },
+    /// Of a file that is read beside the samples' own.
+    #[error("{file}, line {line}: {why}")]
+    Beside {
+        /// What the file is called, fit for a terminal.
+        file: String,
+        /// Number of the line, from 1.
+        line: u64,
+        /// What is wrong with it.
+        why: Box<Undecodable>,
+    },
     /// A row that has not the cells of its table.
     #[error("{have} cells, but {need} columns")]
     Row {

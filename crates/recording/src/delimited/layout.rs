@@ -12,7 +12,7 @@ use super::names::{Kind, Meant, Name};
 use super::preamble::Preamble;
 use super::rows::{Column, Table, is_comment};
 use super::units::{Quantity, Unit};
-use crate::decode::Options;
+use crate::decode::{Options, Wanted};
 use crate::format::without_mark;
 use crate::text::printable;
 use roles::Roles;
@@ -29,7 +29,7 @@ const MOST_SAID: usize = 16;
 
 /// Whether a line names the columns of a table of rates or orientations.
 pub(crate) fn is_header(line: &[u8], given: Option<&Columns>) -> bool {
-    header_in(line, None, given, "").is_some()
+    header_in(line, None, given, ("", Wanted::Rates)).is_some()
 }
 
 /// Whether it is text of which some line has three cells or more, and no lines of objects.
@@ -78,12 +78,12 @@ fn names_in(line: &[u8], delimiter: Delimiter) -> Vec<Name> {
     names
 }
 
-/// By which delimiter a line is a header.
+/// By which delimiter a line is a header. `file` is what it is called, and what is looked for in it.
 fn header_in(
     line: &[u8],
     delimiter: Option<Delimiter>,
     given: Option<&Columns>,
-    stem: &str,
+    file: (&str, Wanted),
 ) -> Option<Delimiter> {
     let tried = delimiter.as_slice();
     let tried = if tried.is_empty() {
@@ -93,12 +93,16 @@ fn header_in(
     };
     tried.iter().copied().find(|delimiter| {
         let names = names_in(line, *delimiter);
-        names.len() >= 3 && names_something(&names, given, stem)
+        names.len() >= 3 && names_something(&names, given, file)
     })
 }
 
-/// Whether these names are those of a table of rates or orientations.
-fn names_something(names: &[Name], given: Option<&Columns>, stem: &str) -> bool {
+/// Whether these names are those of a table of rates or orientations; of one beside such a table, of forces or fields.
+fn names_something(
+    names: &[Name],
+    given: Option<&Columns>,
+    (stem, wanted): (&str, Wanted),
+) -> bool {
     let given = given.map(Columns::all).unwrap_or_default();
     let columns = || given.iter().flat_map(|given| &given.columns);
     // Numbers alone tell no header.
@@ -109,12 +113,16 @@ fn names_something(names: &[Name], given: Option<&Columns>, stem: &str) -> bool 
     let is_given = given.iter().any(|given| {
         matches!(given.role, Role::Of(Kind::Gyro | Kind::Orientation)) && !given.columns.is_empty()
     });
+    let kinds: &[Kind] = match wanted {
+        Wanted::Rates => &[Kind::Gyro, Kind::Orientation, Kind::Matrix],
+        Wanted::Forces | Wanted::Fields => &[Kind::Accel, Kind::Mag],
+    };
     are_there
         && (is_given
-            || [Kind::Gyro, Kind::Orientation, Kind::Matrix]
-                .into_iter()
-                .any(|kind| !roles::candidates(names, kind).is_empty())
-            || roles::bare_axes(names, stem).is_some())
+            || kinds.iter().any(|kind| {
+                !roles::candidates(names, *kind).is_empty()
+                    || roles::bare_axes(names, stem, *kind).is_some()
+            }))
 }
 
 /// A column's number, from 1.
@@ -130,6 +138,7 @@ pub(crate) struct Opening {
     delimiter: Option<Delimiter>,
     /// What the file is called, without its ending.
     stem: String,
+    wanted: Wanted,
     lines: Vec<Vec<u8>>,
     bytes: usize,
     found: Option<Found>,
@@ -155,6 +164,7 @@ impl Opening {
             given: options.columns.clone(),
             delimiter: options.delimiter,
             stem: stem.to_owned(),
+            wanted: options.wanted,
             lines: Vec::new(),
             bytes: 0,
             found: None,
@@ -189,7 +199,8 @@ impl Opening {
         if self.given.is_none() && self.delimiter.is_none() && Table::is_own_header(line) {
             return Some(found(at, Delimiter::Byte(b','), true, true));
         }
-        let named = header_in(line, self.delimiter, self.given.as_ref(), &self.stem);
+        let file = (self.stem.as_str(), self.wanted);
+        let named = header_in(line, self.delimiter, self.given.as_ref(), file);
         if let Some(delimiter) = named {
             return Some(found(at, delimiter, true, false));
         }
@@ -284,6 +295,7 @@ impl Opening {
             preamble: &preamble,
             given: self.given.as_ref(),
             stem: &self.stem,
+            wanted: self.wanted,
         };
         let mut table = roles.table(header, found.delimiter)?;
         table.given = self.given;

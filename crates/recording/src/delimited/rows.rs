@@ -216,6 +216,24 @@ impl Table {
         self.has(ORIENTATION[0]) || self.has(Column::Matrix(0))
     }
 
+    /// Whether rows have a place for a rate.
+    #[must_use]
+    pub fn has_rate(&self) -> bool {
+        self.has(GYRO[0])
+    }
+
+    /// Whether rows have a place for a specific force.
+    #[must_use]
+    pub fn has_force(&self) -> bool {
+        self.has(Column::Accel(0))
+    }
+
+    /// Whether rows have a place for a magnetic field.
+    #[must_use]
+    pub fn has_field(&self) -> bool {
+        self.has(Column::Mag(0))
+    }
+
     pub(super) fn has(&self, column: Column) -> bool {
         self.columns.iter().any(|(known, _)| *known == Some(column))
     }

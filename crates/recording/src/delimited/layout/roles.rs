@@ -7,6 +7,7 @@ use super::super::preamble::{Maker, Preamble};
 use super::super::rows::{Column, Scales, Table};
 use super::super::units::Unit;
 use super::{columns, is_number, number};
+use crate::decode::Wanted;
 use std::collections::BTreeMap;
 use strapd_attitude::condition::GyroUnit;
 use strapd_attitude::record::AccelUnit;
@@ -19,6 +20,7 @@ pub(super) struct Roles<'l> {
     pub(super) preamble: &'l Preamble,
     pub(super) given: Option<&'l Columns>,
     pub(super) stem: &'l str,
+    pub(super) wanted: Wanted,
 }
 
 /// Columns that may be a vector.
@@ -99,9 +101,16 @@ pub(super) fn candidates(names: &[Name], kind: Kind) -> Vec<Group> {
     groups.into_values().filter_map(group).collect()
 }
 
-/// Sensor Logger and its like: bare axes beside a stamp are rates in a file of that name.
-pub(super) fn bare_axes(names: &[Name], stem: &str) -> Option<Vec<usize>> {
-    stem.to_lowercase().starts_with("gyroscope").then_some(())?;
+/// Sensor Logger and its like: bare axes beside a stamp are what a file of that name holds.
+pub(super) fn bare_axes(names: &[Name], stem: &str, kind: Kind) -> Option<Vec<usize>> {
+    let stems: &[&str] = match kind {
+        Kind::Gyro => &["gyroscope"],
+        Kind::Accel => &["totalacceleration", "accelerometer"],
+        Kind::Mag => &["magnetometer"],
+        Kind::Orientation | Kind::Matrix => &[],
+    };
+    let stem = stem.to_lowercase();
+    stems.iter().find(|of_kind| stem.starts_with(*of_kind))?;
     names.iter().find(|name| name.meant == Meant::Stamp)?;
     let axis = |axis: &str| place(names, axis).ok();
     ["x", "y", "z"].into_iter().map(axis).collect()
@@ -122,7 +131,8 @@ impl Roles<'_> {
             None => self.chosen(Kind::Matrix, &mut notes)?,
             Some(_) => None,
         };
-        if gyro.is_none() && orientation.is_none() && matrix.is_none() {
+        let is_beside = self.wanted != Wanted::Rates && (accel.is_some() || mag.is_some());
+        if gyro.is_none() && orientation.is_none() && matrix.is_none() && !is_beside {
             return Err(format!(
                 "none of its columns is a rate or an orientation\n  help: --columns gyro=NAME:NAME:NAME; they are {}",
                 self.listed(&(0..self.names.len().min(16)).collect::<Vec<_>>())
@@ -225,8 +235,8 @@ impl Roles<'_> {
                 first.is_some_and(|name| name.text.to_lowercase().starts_with("gf"))
             });
         }
-        if groups.is_empty() && kind == Kind::Gyro {
-            groups.extend(bare_axes(self.names, self.stem).map(|columns| Group {
+        if groups.is_empty() && (kind == Kind::Gyro || self.wanted != Wanted::Rates) {
+            groups.extend(bare_axes(self.names, self.stem, kind).map(|columns| Group {
                 columns,
                 twice: None,
             }));

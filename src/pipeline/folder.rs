@@ -1,0 +1,193 @@
+//! A folder -> the recording in it. I/O.
+//!
+//! Apart from the input because phones and recorders write a folder for a recording: one file has the rates, and those
+//! beside it have what corrects them, or nothing of use here.
+
+use super::lines;
+use crate::error::{Error, Result};
+use std::path::{Path, PathBuf};
+use strapd_recording::decode::{Options, Wanted};
+use strapd_recording::delimited::Table;
+use strapd_recording::format::{Format, open};
+
+/// Files that are looked at: who has more has no recording there, but an archive.
+const MOST: usize = 1000;
+/// Names that an error repeats.
+const MOST_SAID: usize = 8;
+
+/// What a folder holds.
+#[derive(Debug)]
+pub(super) struct Folder {
+    /// The file with the rates.
+    pub(super) main: PathBuf,
+    pub(super) format: Format,
+    /// Tables with forces or fields of the same recording.
+    pub(super) beside: Vec<PathBuf>,
+}
+
+/// The tables of a folder, by what they hold.
+#[derive(Default)]
+struct Tables {
+    rates: Vec<PathBuf>,
+    orientations: Vec<PathBuf>,
+    forces: Vec<PathBuf>,
+    fields: Vec<PathBuf>,
+}
+
+/// Looks at the files of a folder, not at those of folders in it.
+///
+/// # Errors
+/// It can not be read; there is no recording in it, or more than one.
+pub(super) fn of(path: &Path) -> Result<Folder> {
+    let unsupported = |what: String| Error::Unsupported {
+        path: path.to_owned(),
+        what,
+    };
+    let files = files(path)?;
+    if files.len() > MOST {
+        return Err(unsupported(format!(
+            "a folder of {} files\n  help: name one of them, or the folder of one recording",
+            files.len()
+        )));
+    }
+    let mut whole: Vec<(PathBuf, Format)> = Vec::new();
+    let mut tables = Tables::default();
+    let mut known = None;
+    for file in &files {
+        match Format::of_file(file) {
+            Ok(Some(Format::Table)) => tables.add(file),
+            Ok(Some(format)) => whole.push((file.clone(), format)),
+            Err(why @ strapd_recording::Error::NotRead { .. }) => known = known.or(Some(why)),
+            Ok(None) | Err(_) => {}
+        }
+    }
+    for found in [&mut tables.rates, &mut tables.fields] {
+        let is_raw = |file: &PathBuf| stem(file).contains("uncalibrated");
+        if found.iter().any(|file| !is_raw(file)) {
+            found.retain(|file| !is_raw(file));
+        }
+    }
+    let mut mains = whole;
+    let best = match tables.rates.is_empty() {
+        true => &tables.orientations,
+        false => &tables.rates,
+    };
+    mains.extend(best.iter().map(|file| (file.clone(), Format::Table)));
+    match mains.as_slice() {
+        [(main, format)] => Ok(Folder {
+            beside: match format {
+                Format::Table => tables.beside(main),
+                _ => Vec::new(),
+            },
+            main: main.clone(),
+            format: *format,
+        }),
+        [] => Err(match known {
+            Some(why) => why.into(),
+            None => unsupported(format!(
+                "a folder without a recording that is read: {}\n  help: name a file",
+                named(&files)
+            )),
+        }),
+        several => {
+            let names: Vec<PathBuf> = several.iter().map(|(file, _)| file.clone()).collect();
+            Err(unsupported(format!(
+                "a folder of {} recordings: {}\n  help: name one of them; parts of one recording are not joined",
+                names.len(),
+                named(&names)
+            )))
+        }
+    }
+}
+
+impl Tables {
+    fn add(&mut self, file: &Path) {
+        let table = |wanted| {
+            let options = Options {
+                wanted,
+                ..Options::default()
+            };
+            let lines = lines::open(file, Format::Table, open(file).ok()?, &options).ok()?;
+            lines.table().cloned()
+        };
+        if let Some(found) = table(Wanted::Rates) {
+            match found.has_rate() {
+                true => self.rates.push(file.to_owned()),
+                false => self.orientations.push(file.to_owned()),
+            }
+        } else if let Some(found) = table(Wanted::Forces).filter(Table::has_stamps) {
+            if found.has_force() {
+                self.forces.push(file.to_owned());
+            }
+            if found.has_field() {
+                self.fields.push(file.to_owned());
+            }
+        }
+    }
+
+    /// Those that correct the rates of `main`; of several that may be meant none, which is said.
+    fn beside(mut self, main: &Path) -> Vec<PathBuf> {
+        // Sensor Logger's, of which `Accelerometer` is without gravity.
+        for best in ["totalacceleration", "accelerometeruncalibrated"] {
+            if let Some(at) = self.forces.iter().position(|file| stem(file) == best) {
+                self.forces = vec![self.forces.swap_remove(at)];
+            }
+        }
+        let mut beside = Vec::new();
+        for (what, found) in [
+            ("specific force", self.forces),
+            ("magnetic field", self.fields),
+        ] {
+            match found.as_slice() {
+                [one] if !beside.contains(one) => beside.push(one.clone()),
+                [] | [_] => {}
+                several => tracing::warn!(
+                    "{}: the {what} is not used, since it may be in {}: take all but one out of the folder",
+                    main.display(),
+                    named(several)
+                ),
+            }
+        }
+        beside
+    }
+}
+
+/// The regular files that are not hidden, by name.
+fn files(path: &Path) -> Result<Vec<PathBuf>> {
+    let fail = |source| strapd_recording::Error::Open {
+        path: path.to_owned(),
+        source,
+    };
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(path).map_err(fail)? {
+        let file = entry.map_err(fail)?.path();
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
+        if !name.starts_with('.') && file.is_file() {
+            files.push(file);
+        }
+    }
+    files.sort();
+    Ok(files)
+}
+
+fn stem(file: &Path) -> String {
+    let stem = file.file_stem().unwrap_or_default();
+    stem.to_string_lossy().to_lowercase()
+}
+
+/// File names for people, of many the first few.
+fn named(files: &[PathBuf]) -> String {
+    let name = |file: &PathBuf| {
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
+        strapd_recording::text::printable(&name)
+    };
+    let mut names: Vec<String> = files.iter().take(MOST_SAID).map(name).collect();
+    if files.is_empty() {
+        names.push("no files".to_owned());
+    }
+    let more = files.len().saturating_sub(MOST_SAID);
+    if more > 0 {
+        names.push(format!("and {more} more"));
+    }
+    names.join(", ")
+}

@@ -1,0 +1,347 @@
+//! Promise: a folder that a phone or a recorder wrote is a recording: one file has the rates, those beside it what corrects
+//! them, paired by their stamps. What is used is said; what can not be told is not guessed.
+
+use crate::program::{Ran, strapd, strapd_fed};
+use crate::replays::fixture;
+use serde_json::Value;
+use std::fmt::Write;
+use std::path::Path;
+
+/// Standard gravity, m/s^2.
+const G: f64 = 9.806_65;
+
+/// A sample of a sensor: when, and what it says.
+type Row = (i64, [f64; 3]);
+
+/// A hand's ten seconds, by sensor: the force every 20 ms and 3 ms behind the rate, the field every 50 ms.
+struct Phone {
+    rates: Vec<Row>,
+    forces: Vec<Row>,
+    fields: Vec<Row>,
+}
+
+fn phone(at: &Path) -> Phone {
+    let made = "simulate hand --duration 20 --rate-hz 100 --mag --seed 3 --noise consumer_imu,turn-on-bias=1800,scale-ppm=0,misalignment=0,accel-bias=0,accel-scale-ppm=0,accel-misalignment=0 -o hand.ndjson -o truth.csv";
+    strapd(at, made).done();
+    let text = std::fs::read_to_string(at.join("hand.ndjson")).unwrap();
+    let lines: Vec<Value> = text
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    let lines: Vec<Value> = lines
+        .into_iter()
+        .filter(|line| line["class"] == "RATE" && line["id"] != "truth")
+        .collect();
+    let rows = |name: &str, every: usize, behind: i64| -> Vec<Row> {
+        let row = |line: &Value| {
+            let stamp = &line["stamp"];
+            let nanos =
+                stamp["sec"].as_i64().unwrap() * 1_000_000_000 + stamp["nsec"].as_i64().unwrap();
+            let v: Vec<f64> = line[name]
+                .as_array()
+                .unwrap()
+                .iter()
+                .map(|x| x.as_f64().unwrap())
+                .collect();
+            (nanos + behind, [v[0], v[1], v[2]])
+        };
+        lines.iter().step_by(every).map(row).collect()
+    };
+    Phone {
+        rates: rows("gyro", 1, 0),
+        forces: rows("accel", 2, 3_000_000),
+        fields: rows("mag", 5, 0),
+    }
+}
+
+/// As Sensor Logger writes it: columns z, y, x.
+fn sensor_logger(rows: &[Row], by: f64) -> String {
+    let mut text = "time,seconds_elapsed,z,y,x\n".to_owned();
+    for (stamp, v) in rows {
+        let [x, y, z] = v.map(|value| value * by);
+        let secs = (stamp - rows[0].0) as f64 * 1e-9;
+        writeln!(text, "{stamp},{secs},{z},{y},{x}").unwrap();
+    }
+    text
+}
+
+impl Phone {
+    fn write(&self, folder: &Path) {
+        std::fs::create_dir(folder).unwrap();
+        let put = |name: &str, text: String| std::fs::write(folder.join(name), text).unwrap();
+        put("Gyroscope.csv", sensor_logger(&self.rates, 1.0));
+        put("GyroscopeUncalibrated.csv", sensor_logger(&self.rates, 1.5));
+        put("TotalAcceleration.csv", sensor_logger(&self.forces, 1.0));
+        put("Accelerometer.csv", sensor_logger(&self.forces, 0.01));
+        put("Gravity.csv", sensor_logger(&self.forces, 1.0));
+        // In microtesla.
+        put("Magnetometer.csv", sensor_logger(&self.fields, 1e6));
+        put(
+            "Location.csv",
+            "time,seconds_elapsed,latitude,longitude\n1,2,3,4\n".to_owned(),
+        );
+        put(".hidden.csv", sensor_logger(&self.rates, 2.0));
+    }
+
+    /// The same as lines, each with what one sensor says, in the order of their stamps.
+    fn lines(&self) -> String {
+        let all = [
+            ("mag", &self.fields, 1e6),
+            ("accel", &self.forces, 1.0),
+            ("gyro", &self.rates, 1.0),
+        ];
+        let mut lines: Vec<(i64, String)> = Vec::new();
+        for (name, rows, by) in all {
+            for (stamp, v) in rows {
+                let v = v.map(|value| value * by);
+                lines.push((
+                    *stamp,
+                    format!("{{\"stamp_ns\":{stamp},\"{name}\":{v:?}}}\n"),
+                ));
+            }
+        }
+        lines.sort_by_key(|(stamp, _)| *stamp);
+        lines.into_iter().map(|(_, line)| line).collect()
+    }
+}
+
+fn replayed(at: &Path, of: &str, flags: &str) -> (String, Ran) {
+    let ran = strapd(at, &format!("replay {of} -o out.csv --force {flags}"));
+    (
+        std::fs::read_to_string(at.join("out.csv")).unwrap_or_default(),
+        ran,
+    )
+}
+
+/// The last attitude: w, x, y, z.
+fn last(at: &Path) -> Vec<f64> {
+    let text = std::fs::read_to_string(at.join("out.csv")).unwrap();
+    let mut lines = text.lines();
+    let names: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let cells: Vec<&str> = lines.last().unwrap().split(',').collect();
+    let cell = |name: &str| {
+        cells[names.iter().position(|n| *n == name).unwrap()]
+            .parse()
+            .unwrap()
+    };
+    ["qw", "qx", "qy", "qz"].map(cell).to_vec()
+}
+
+fn rms(at: &Path) -> f64 {
+    let compared = strapd(at, "compare out.csv truth.csv --json --align heading").json();
+    compared["total"]["rms_deg"].as_f64().unwrap()
+}
+
+#[test]
+fn the_files_of_a_phone_are_one_recording_with_the_bits_of_its_lines() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    let phone = phone(at);
+    phone.write(&at.join("phone"));
+    std::fs::write(at.join("phone.ndjson"), phone.lines()).unwrap();
+    for flags in ["--aid auto", "--aid gravity+mag", "--smooth --aid gravity"] {
+        let (rows, ran) = replayed(at, "phone", flags);
+        ran.done();
+        assert!(
+            ran.out
+                .contains("the specific force is from TotalAcceleration.csv"),
+            "{}",
+            ran.out
+        );
+        assert!(
+            ran.out
+                .contains("the magnetic field is from Magnetometer.csv"),
+            "{}",
+            ran.out
+        );
+        let off = rms(at);
+        assert!(off < 1.5, "{flags}: {off}");
+        let lines = replayed(at, "phone.ndjson", flags).0;
+        assert!(rows.lines().count() == 2002 && rows == lines, "{flags}");
+        let piped = strapd_fed(
+            at,
+            &format!("replay - -o out.csv --force {flags}"),
+            phone.lines(),
+        );
+        piped.done();
+        assert!(
+            std::fs::read_to_string(at.join("out.csv")).unwrap() == rows,
+            "{flags}: a pipe"
+        );
+    }
+    // What `cat` prints is the recording, too.
+    let (rows, _) = replayed(at, "phone", "--aid auto");
+    let cat = strapd(at, "cat phone").out;
+    strapd_fed(at, "replay - -o out.csv --force --aid auto", cat).done();
+    assert!(std::fs::read_to_string(at.join("out.csv")).unwrap() == rows);
+    // Without the force the same rates drift.
+    replayed(at, "phone/Gyroscope.csv", "").1.done();
+    assert!(rms(at) > 3.0);
+}
+
+#[test]
+fn every_command_takes_the_folder() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    phone(at).write(&at.join("phone"));
+    let info = strapd(at, "info phone").done().out.clone();
+    assert!(
+        info.contains("2001 samples") && info.contains("--aid auto takes gravity"),
+        "{info}"
+    );
+    let check = strapd(at, "check phone").out;
+    assert!(check.contains("2001 samples"), "{check}");
+    strapd(at, "report phone -o r.html --aid gravity+mag").done();
+    strapd(at, "calibrate phone -o imu.toml --aid gravity").done();
+    strapd(at, "allan phone").done();
+    assert_eq!(
+        strapd(at, "cat phone --format csv -n 5")
+            .done()
+            .out
+            .lines()
+            .count(),
+        6
+    );
+}
+
+#[test]
+fn files_that_name_their_columns_are_told_by_them() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    let phone = phone(at);
+    let folder = at.join("phyphox");
+    std::fs::create_dir(&folder).unwrap();
+    let written = |head: [&str; 3], rows: &[Row], by: f64| {
+        let mut text = format!(
+            "\"Time (s)\",\"{}\",\"{}\",\"{}\"\n",
+            head[0], head[1], head[2]
+        );
+        for (stamp, v) in rows {
+            let [x, y, z] = v.map(|value| value * by);
+            let secs = (stamp - phone.rates[0].0) as f64 * 1e-9;
+            writeln!(text, "{secs:.9E},{x:.15E},{y:.15E},{z:.15E}").unwrap();
+        }
+        text
+    };
+    let put = |name: &str, text: String| std::fs::write(folder.join(name), text).unwrap();
+    put(
+        "Gyroscope.csv",
+        written(
+            [
+                "Gyroscope x (rad/s)",
+                "Gyroscope y (rad/s)",
+                "Gyroscope z (rad/s)",
+            ],
+            &phone.rates,
+            1.0,
+        ),
+    );
+    put(
+        "Accelerometer.csv",
+        written(
+            [
+                "Acceleration x (g)",
+                "Acceleration y (g)",
+                "Acceleration z (g)",
+            ],
+            &phone.forces,
+            1.0 / G,
+        ),
+    );
+    put(
+        "Linear Acceleration.csv",
+        written(
+            [
+                "Linear Acceleration x (m/s^2)",
+                "Linear Acceleration y (m/s^2)",
+                "Linear Acceleration z (m/s^2)",
+            ],
+            &phone.forces,
+            0.1,
+        ),
+    );
+    let (_, ran) = replayed(at, "phyphox", "--aid auto");
+    ran.done();
+    assert!(
+        ran.out
+            .contains("the specific force is from Accelerometer.csv"),
+        "{}",
+        ran.out
+    );
+    // As the same phone's other app has it, but for the last digits.
+    let by_phyphox = last(at);
+    phone.write(&at.join("phone"));
+    replayed(at, "phone", "--aid auto").1.done();
+    let product: f64 = by_phyphox.iter().zip(last(at)).map(|(a, b)| a * b).sum();
+    assert!(product.abs() > 1.0 - 1e-9, "{product}");
+    // Which of two forces is meant can not be told: said, and none is used.
+    put(
+        "Acceleration B.csv",
+        written(
+            [
+                "Acceleration x (g)",
+                "Acceleration y (g)",
+                "Acceleration z (g)",
+            ],
+            &phone.forces,
+            1.0 / G,
+        ),
+    );
+    let (_, ran) = replayed(at, "phyphox", "--aid auto");
+    assert!(
+        ran.err
+            .contains("it may be in Acceleration B.csv, Accelerometer.csv"),
+        "{}",
+        ran.err
+    );
+    assert!(ran.out.contains("aid      none"), "{}", ran.out);
+}
+
+#[test]
+fn a_bad_row_beside_is_counted_and_named_with_its_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    let phone = phone(at);
+    phone.write(&at.join("phone"));
+    let file = at.join("phone/TotalAcceleration.csv");
+    let text = std::fs::read_to_string(&file).unwrap();
+    let mut rows: Vec<&str> = text.lines().collect();
+    rows.insert(100, "1700000000000000000,0.5,9.8,here,0");
+    std::fs::write(&file, rows.join("\n")).unwrap();
+    let (_, ran) = replayed(at, "phone", "--aid auto");
+    assert_eq!(ran.code, Some(3), "{}", ran.out);
+    assert!(
+        ran.out.contains("TotalAcceleration.csv, line 101"),
+        "{}{}",
+        ran.out,
+        ran.err
+    );
+}
+
+#[test]
+fn a_folder_of_one_log_is_that_log_and_of_none_or_several_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    let folder = at.join("rosbag2");
+    std::fs::create_dir(&folder).unwrap();
+    strapd(at, "info rosbag2").refused(1, &["a folder without a recording that is read: no files"]);
+    std::fs::write(
+        folder.join("metadata.yaml"),
+        "rosbag2_bagfile_information:\n  version: 5\n",
+    )
+    .unwrap();
+    strapd(at, "info rosbag2").refused(1, &["metadata.yaml", "help: name a file"]);
+    std::fs::copy(fixture("xsens_mti.mcap"), folder.join("rosbag2_0.mcap")).unwrap();
+    std::fs::copy(fixture("xsens_mti.mcap"), at.join("alone.mcap")).unwrap();
+    let (rows, ran) = replayed(at, "rosbag2", "");
+    ran.done();
+    assert_eq!(rows, replayed(at, "alone.mcap", "").0);
+    std::fs::copy(fixture("xsens_mti.mcap"), folder.join("rosbag2_1.mcap")).unwrap();
+    strapd(at, "replay rosbag2 -o out.csv --force").refused(
+        1,
+        &[
+            "a folder of 2 recordings: rosbag2_0.mcap, rosbag2_1.mcap",
+            "name one of them",
+        ],
+    );
+}
