@@ -71,15 +71,14 @@ impl Place {
     /// With `fixtures/`, and nothing else.
     pub(super) fn with_fixtures() -> Place {
         let dir = tempfile::tempdir().unwrap();
-        std::fs::create_dir(dir.path().join("fixtures")).unwrap();
-        for entry in std::fs::read_dir(root().join("fixtures")).unwrap() {
-            let path = entry.unwrap().path();
-            if path.is_file() {
-                std::fs::copy(
-                    &path,
-                    dir.path().join("fixtures").join(path.file_name().unwrap()),
-                )
-                .unwrap();
+        for folder in ["fixtures", "fixtures/source"] {
+            std::fs::create_dir(dir.path().join(folder)).unwrap();
+            for entry in std::fs::read_dir(root().join(folder)).unwrap() {
+                let path = entry.unwrap().path();
+                if path.is_file() {
+                    let name = path.file_name().unwrap();
+                    std::fs::copy(&path, dir.path().join(folder).join(name)).unwrap();
+                }
             }
         }
         // Held all at once, so that no two are the same.
