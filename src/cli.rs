@@ -178,6 +178,36 @@ pub enum Outcome {
     LimitExceeded,
 }
 
+impl Outcome {
+    /// That of several: one that failed comes before what was lost.
+    fn and(self, other: Outcome) -> Outcome {
+        match (self, other) {
+            (Outcome::Failed, _) | (_, Outcome::Failed) => Outcome::Failed,
+            (Outcome::Done, other) => other,
+            (own, _) => own,
+        }
+    }
+}
+
+/// Does it with each of several inputs; what is wrong with one is said, and the others are done.
+pub(crate) fn with_each<T>(
+    inputs: &[T],
+    mut act: impl FnMut(&T) -> Result<Outcome>,
+) -> Result<Outcome> {
+    let mut all = Outcome::Done;
+    for input in inputs {
+        match act(input) {
+            Ok(outcome) => all = all.and(outcome),
+            Err(error) if inputs.len() > 1 && !error.is_broken_pipe() && error.exit_code() != 2 => {
+                say_error(&error);
+                all = Outcome::Failed;
+            }
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(all)
+}
+
 impl From<Outcome> for ExitCode {
     fn from(outcome: Outcome) -> ExitCode {
         ExitCode::from(match outcome {

@@ -109,7 +109,7 @@ pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
         &pool,
     )?;
     let mut decoders = Decoders::new(&options);
-    let reading = TopicReading::new(&log, args.topic.as_deref(), &mut decoders)?;
+    let reading = TopicReading::new(&log, args.topic.as_deref(), &mut decoders)?.with_fields();
     let mut printer = Printer::new(args.format, reading.name(), args.count)?;
     let lost = reading.walk_in_flu(&pool, |raw, kind| {
         let wants_more = printer

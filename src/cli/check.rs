@@ -1,7 +1,7 @@
-//! `strapd check FILE`: every finding about a log, with the flag that helps. I/O.
+//! `strapd check FILE...`: every finding about a log, with the flag that helps. I/O.
 
 use super::tables::Tables;
-use super::{Global, Outcome, print};
+use super::{Global, Outcome, print, with_each};
 use crate::error::{Error, Result};
 use crate::pipeline::check::{Checked, check};
 use crate::pipeline::input::Input;
@@ -18,13 +18,14 @@ use strapd_recording::text::printable;
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:
   strapd check flight.mcap
+  strapd check *.mcap                               (one behind the other)
   strapd check flight.mcap --json | jq '.findings[] | select(.severity != \"note\")'
 
 Exit codes: 0 nothing found; 3 errors or warnings found. Notes alone are no finding.")]
 pub struct Check {
-    /// A recording: MCAP, NDJSON or CSV; - is standard input
-    #[arg(value_name = "FILE")]
-    pub file: PathBuf,
+    /// Recordings: MCAP, ULog, ROS 1 bags, NDJSON, tables, or folders of one; - is standard input
+    #[arg(value_name = "FILE", required = true)]
+    pub files: Vec<PathBuf>,
     /// Only this topic, though it be not obviously an IMU's
     #[arg(long, value_name = "NAME")]
     pub topic: Option<String>,
@@ -51,25 +52,40 @@ pub fn run(global: &Global, args: &Check) -> Result<Outcome> {
         ..Options::default()
     };
     args.tables.put(&mut options)?;
-    let input = Input::open(&args.file)?;
-    let checked = check(&input, args.topic.as_deref(), &options, &pool)?;
+    let mut between = "";
+    with_each(&args.files, |file| {
+        let (text, outcome) = one(global, args, file, (&options, &pool))?;
+        print(&format!("{between}{text}"))?;
+        between = if global.json { "" } else { "\n" };
+        Ok(outcome)
+    })
+}
+
+fn one(
+    global: &Global,
+    args: &Check,
+    file: &Path,
+    (options, pool): (&Options, &Pool),
+) -> Result<(String, Outcome)> {
+    let input = Input::open(file)?;
+    let checked = check(&input, args.topic.as_deref(), options, pool)?;
     let found = findings(&checked);
     let worst = found.iter().map(|f| f.severity).max();
-    if global.json {
+    let text = if global.json {
         let value = json!({
             "file": input.name().display().to_string(),
             "findings": found.iter().map(Finding::json).collect::<Vec<_>>(),
             "worst": worst.map(Severity::name),
         });
-        print(&format!("{value}\n"))?;
+        format!("{value}\n")
     } else {
-        print(&text(input.name(), &checked, &found))?;
-    }
-    Ok(if worst > Some(Severity::Note) {
-        Outcome::Lossy
-    } else {
-        Outcome::Done
-    })
+        text(input.name(), &checked, &found)
+    };
+    let outcome = match worst > Some(Severity::Note) {
+        true => Outcome::Lossy,
+        false => Outcome::Done,
+    };
+    Ok((text, outcome))
 }
 
 fn text(file: &Path, checked: &Checked, found: &[Finding]) -> String {

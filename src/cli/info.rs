@@ -1,17 +1,17 @@
-//! `strapd info FILE`: what a log holds, how good it is, and what to do next. I/O.
+//! `strapd info FILE...`: what a log holds, how good it is, and what to do next. I/O.
 
 mod aids;
 mod words;
 
 use super::tables::Tables;
-use super::{Global, Outcome, print};
+use super::{Global, Outcome, print, with_each};
 use crate::error::{Error, Result};
 use crate::pipeline::input::Input;
 use crate::pipeline::inspection::look;
 use crate::pipeline::log::{Log, problems};
 use crate::pipeline::topics;
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use strapd_recording::decode::Options;
 use strapd_recording::pool::Pool;
 
@@ -19,11 +19,12 @@ use strapd_recording::pool::Pool;
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:
   strapd info flight.mcap
+  strapd info *.mcap                               (one behind the other)
   strapd info flight.mcap --json | jq '.imu[0].rate_hz'")]
 pub struct Info {
-    /// A recording: MCAP, ULog, ROS 1 bag, NDJSON or CSV; - is standard input
-    #[arg(value_name = "FILE")]
-    pub file: PathBuf,
+    /// Recordings: MCAP, ULog, ROS 1 bags, NDJSON, tables, or folders of one; - is standard input
+    #[arg(value_name = "FILE", required = true)]
+    pub files: Vec<PathBuf>,
     /// Look at this topic too, though it is not obviously an IMU's
     #[arg(long, value_name = "NAME")]
     pub topic: Option<String>,
@@ -50,8 +51,23 @@ pub fn run(global: &Global, args: &Info) -> Result<Outcome> {
         ..Options::default()
     };
     args.tables.put(&mut options)?;
-    let input = Input::open(&args.file)?;
-    let log = Log::told_apart(&input, args.topic.as_deref(), &options, &pool)?;
+    let mut between = "";
+    with_each(&args.files, |file| {
+        let (text, outcome) = one(global, args, file, (&options, &pool))?;
+        print(&format!("{between}{text}"))?;
+        between = if global.json { "" } else { "\n" };
+        Ok(outcome)
+    })
+}
+
+fn one(
+    global: &Global,
+    args: &Info,
+    file: &Path,
+    (options, pool): (&Options, &Pool),
+) -> Result<(String, Outcome)> {
+    let input = Input::open(file)?;
+    let log = Log::told_apart(&input, args.topic.as_deref(), options, pool)?;
     if let Some(topic) = &args.topic
         && !log.has(topic)
     {
@@ -61,7 +77,7 @@ pub fn run(global: &Global, args: &Info) -> Result<Outcome> {
             topics: topics::listing(&log.candidates()),
         });
     }
-    let looks = look(&log, args.topic.as_deref(), &options, &pool)?;
+    let looks = look(&log, args.topic.as_deref(), options, pool)?;
     let survey = &looks.survey;
     let lossy = survey.problems.losses() > 0;
     let report = words::Report {
@@ -72,10 +88,13 @@ pub fn run(global: &Global, args: &Info) -> Result<Outcome> {
         looked: &looks.topics,
         left_out: &looks.left_out,
     };
-    if global.json {
-        print(&format!("{}\n", report.json()))?;
-    } else {
-        print(&report.text())?;
-    }
-    Ok(if lossy { Outcome::Lossy } else { Outcome::Done })
+    let text = match global.json {
+        true => format!("{}\n", report.json()),
+        false => report.text(),
+    };
+    let outcome = match lossy {
+        true => Outcome::Lossy,
+        false => Outcome::Done,
+    };
+    Ok((text, outcome))
 }

@@ -77,6 +77,16 @@ pub(super) fn choose(
     Ok(besides)
 }
 
+/// Whose fields belong to the samples of `own`, where that can be told without being said; else why not.
+///
+/// # Errors
+/// Several that may be meant, or none.
+pub(super) fn of_fields(plan: &Plan, log: &Log, own: &str) -> Result<Besides> {
+    let mut besides = Besides::default();
+    besides.add(unnamed(plan, log.name(), log, own)?);
+    Ok(besides)
+}
+
 /// A topic of vectors that could correct the samples of another.
 #[derive(Clone, Debug)]
 pub struct TopicOfVectors {

@@ -2,6 +2,7 @@
 //!
 //! Apart from the replay for who looks at samples and integrates none: which topic, by which decoders, and the walk.
 
+use super::beside::{self, Besides};
 use super::channel_route::{Item, Noticed, Route, Taker};
 use super::decoders::Decoders;
 use super::log::{AHEAD, Log, LogChannel, problems};
@@ -28,6 +29,8 @@ pub struct TopicReading<'l> {
     pub channels: Vec<(&'l LogChannel, Decoder)>,
     /// By id and schema id: the place among the channels.
     places: BTreeMap<(u16, u16), usize>,
+    /// What has a topic of its own and belongs to these samples.
+    besides: Besides,
 }
 
 /// What is read.
@@ -74,7 +77,19 @@ impl<'l> TopicReading<'l> {
             note: choice.note,
             channels,
             places,
+            besides: Besides::default(),
         })
+    }
+
+    /// The same with the magnetic fields that a topic of their own has for these samples, where there is one.
+    #[must_use]
+    pub fn with_fields(mut self) -> TopicReading<'l> {
+        let has_field = |(_, decoder): &(&LogChannel, Decoder)| decoder.stated().has_mag;
+        if !self.channels.iter().any(has_field) {
+            let found = beside::of_fields(&Plan::default(), self.log, &self.source.topic);
+            self.besides = found.unwrap_or_default();
+        }
+        self
     }
 
     /// What `--topic` takes.
@@ -145,7 +160,9 @@ impl<'l> TopicReading<'l> {
             |met| {
                 let id = (met.id, met.schema_id);
                 let is_own = met.topic == self.source.topic;
-                let stream = *self.places.get(&id).filter(|_| is_own)?;
+                let Some(stream) = self.places.get(&id).filter(|_| is_own).copied() else {
+                    return Route::other(self.besides.decoder(met).cloned(), None);
+                };
                 let (_, decoder) = self.channels.get(stream)?;
                 let noticed = noticed.clone();
                 Some(Route::to(decoder.clone(), vec![Taker { stream, noticed }]))
@@ -155,7 +172,15 @@ impl<'l> TopicReading<'l> {
                     let taken = match item {
                         Item::Sample(place, raw) => Taken::Sample(place, raw),
                         Item::Undecodable(_, why) => Taken::Undecodable(why.0, why.1),
-                        Item::Reference(_) | Item::Beside(_) | Item::Copy(_) => continue,
+                        // In the axes of the samples, as a replay takes it.
+                        Item::Beside(raw) => Taken::Sample(
+                            0,
+                            RawSample {
+                                is_beside: true,
+                                ..raw
+                            },
+                        ),
+                        Item::Reference(_) | Item::Copy(_) => continue,
                     };
                     if take(taken)?.is_break() {
                         return Ok(ControlFlow::Break(()));

@@ -180,6 +180,57 @@ fn the_files_of_a_phone_are_one_recording_with_the_bits_of_its_lines() {
 }
 
 #[test]
+fn a_field_of_a_topic_of_its_own_goes_through_lines_with_the_bits_of_the_log() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    strapd(at, "simulate hand --duration 20 --rate-hz 100 --mag --seed 5 --noise consumer_imu -o hand.mcap").done();
+    let flags = "--aid gravity+mag --sample-kind average";
+    let (rows, ran) = replayed(at, "hand.mcap", flags);
+    ran.done();
+    let lines = strapd(at, "cat hand.mcap").done().out.clone();
+    assert_eq!(
+        lines
+            .lines()
+            .filter(|line| line.contains("\"mag\""))
+            .count(),
+        2001
+    );
+    strapd_fed(at, &format!("replay - -o out.csv --force {flags}"), lines).done();
+    assert!(std::fs::read_to_string(at.join("out.csv")).unwrap() == rows);
+    // A row has no place for it, which is said.
+    let csv = strapd(at, "cat hand.mcap --format csv");
+    assert!(csv.err.contains("2001 forces or fields"), "{}", csv.err);
+}
+
+#[test]
+fn info_and_check_take_several_logs_and_one_that_is_bad_keeps_none_from_being_looked_at() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    for name in ["xsens_mti.mcap", "ximu3.mcap"] {
+        std::fs::copy(fixture(name), at.join(name)).unwrap();
+    }
+    for command in ["info", "check"] {
+        let both = strapd(at, &format!("{command} xsens_mti.mcap ximu3.mcap"));
+        let each =
+            ["xsens_mti.mcap", "ximu3.mcap"].map(|name| strapd(at, &format!("{command} {name}")));
+        assert_eq!(both.out, format!("{}\n{}", each[0].out, each[1].out));
+        assert_eq!(both.code, each.iter().map(|ran| ran.code).max().unwrap());
+        let json = strapd(at, &format!("{command} --json xsens_mti.mcap ximu3.mcap")).lines();
+        assert_eq!(json.len(), 2);
+        let one_bad = strapd(
+            at,
+            &format!("{command} xsens_mti.mcap nowhere.mcap ximu3.mcap"),
+        );
+        assert_eq!((one_bad.code, &one_bad.out), (Some(1), &both.out));
+        assert!(
+            one_bad.err.contains("nowhere.mcap: cannot open"),
+            "{}",
+            one_bad.err
+        );
+    }
+}
+
+#[test]
 fn every_command_takes_the_folder() {
     let dir = tempfile::tempdir().unwrap();
     let at = dir.path();
