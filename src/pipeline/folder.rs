@@ -102,20 +102,12 @@ pub(super) fn of(path: &Path) -> Result<Folder> {
 
 impl Tables {
     fn add(&mut self, file: &Path) {
-        let table = |wanted| {
-            let options = Options {
-                wanted,
-                ..Options::default()
-            };
-            let lines = lines::open(file, Format::Table, open(file).ok()?, &options).ok()?;
-            lines.table().cloned()
-        };
-        if let Some(found) = table(Wanted::Rates) {
+        if let Some(found) = table(file, Wanted::Rates) {
             match found.has_rate() {
                 true => self.rates.push(file.to_owned()),
                 false => self.orientations.push(file.to_owned()),
             }
-        } else if let Some(found) = table(Wanted::Forces).filter(Table::has_stamps) {
+        } else if let Some(found) = table(file, Wanted::Forces).filter(Table::has_stamps) {
             if found.has_force() {
                 self.forces.push(file.to_owned());
             }
@@ -132,6 +124,14 @@ impl Tables {
             if let Some(at) = self.forces.iter().position(|file| stem(file) == best) {
                 self.forces = vec![self.forces.swap_remove(at)];
             }
+        }
+        // What the rates have in their own rows is not looked for elsewhere.
+        let own = table(main, Wanted::Rates);
+        if own.as_ref().is_some_and(Table::has_force) {
+            self.forces.clear();
+        }
+        if own.as_ref().is_some_and(Table::has_field) {
+            self.fields.clear();
         }
         let mut beside = Vec::new();
         for (what, found) in [
@@ -150,6 +150,16 @@ impl Tables {
         }
         beside
     }
+}
+
+/// How a file is read as a table with what is wanted in it.
+fn table(file: &Path, wanted: Wanted) -> Option<Table> {
+    let options = Options {
+        wanted,
+        ..Options::default()
+    };
+    let lines = lines::open(file, Format::Table, open(file).ok()?, &options).ok()?;
+    lines.table().cloned()
 }
 
 /// The regular files that are not hidden, by name.

@@ -348,6 +348,34 @@ fn files_that_name_their_columns_are_told_by_them() {
     assert!(ran.out.contains("aid      none"), "{}", ran.out);
 }
 
+/// As an x-IMU3 leaves it: the force stands beside the rate, and another accelerometer has a file of its own.
+#[test]
+fn a_force_in_the_rows_of_the_rates_is_not_looked_for_elsewhere() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    let folder = at.join("ximu3");
+    std::fs::create_dir(&folder).unwrap();
+    let inertial = fixture("source").join("ximu3_inertial.csv");
+    std::fs::copy(&inertial, folder.join("Inertial.csv")).unwrap();
+    std::fs::copy(&inertial, at.join("alone.csv")).unwrap();
+    let quaternions = fixture("source").join("ximu3_quaternion.csv");
+    std::fs::copy(quaternions, folder.join("Quaternion.csv")).unwrap();
+    let text = std::fs::read_to_string(&inertial).unwrap();
+    let other: Vec<String> = text
+        .lines()
+        .map(|row| {
+            let cells: Vec<&str> = row.split(',').collect();
+            format!("{},{}", cells[0], cells[4..7].join(","))
+        })
+        .collect();
+    std::fs::write(folder.join("HighGAccelerometer.csv"), other.join("\n")).unwrap();
+    let (rows, ran) = replayed(at, "ximu3", "--aid gravity");
+    ran.done();
+    assert!(!ran.out.contains("beside it"), "{}", ran.out);
+    assert!(rows.lines().count() > 400);
+    assert!(replayed(at, "alone.csv", "--aid gravity").0 == rows);
+}
+
 #[test]
 fn a_bad_row_beside_is_counted_and_named_with_its_file() {
     let dir = tempfile::tempdir().unwrap();
