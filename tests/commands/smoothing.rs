@@ -81,7 +81,8 @@ fn neither_threads_nor_a_pipe_change_a_byte() {
         dir,
         "replay hand.ndjson --aid gravity --smooth --threads 1 -o - -q",
     );
-    assert_eq!(one.done().lines().len(), lines.lines().count());
+    let rates = lines.lines().filter(|line| line.contains("\"gyro\""));
+    assert_eq!(one.done().lines().len(), rates.count());
     for threads in [2, 4] {
         let other = strapd(
             dir,
