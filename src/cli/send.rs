@@ -68,8 +68,13 @@ pub struct Send {
     pub token_file: Option<PathBuf>,
 }
 
-/// A line, and when it is due.
-type Due = (Nanos, String);
+/// A sample as it is sent.
+struct Line {
+    due: Nanos,
+    text: String,
+    /// It has no rate: a force or a field that corrects those that have one.
+    is_beside: bool,
+}
 
 /// What the thread that reads has come to.
 #[derive(Debug, Default)]
@@ -106,7 +111,7 @@ pub fn run(global: &Global, args: &Send) -> Result<Outcome> {
         &options,
         &pool,
     )?;
-    let (give, mut take) = mpsc::channel::<Vec<Due>>(AHEAD_BATCHES);
+    let (give, mut take) = mpsc::channel::<Vec<Line>>(AHEAD_BATCHES);
     let begun = Instant::now();
     let (read, sent) = std::thread::scope(|scope| {
         let (options, pool) = (&options, &pool);
@@ -127,14 +132,18 @@ pub fn run(global: &Global, args: &Send) -> Result<Outcome> {
         super::print(&format!(
             "{}\n",
             json!({
-                "address": remote.to_string(), "topic": read.topic, "sent": sent.lines,
+                "address": remote.to_string(), "topic": read.topic, "sent": sent.samples, "sent_beside": sent.besides,
                 "data_secs": sent.data_secs, "elapsed_secs": secs, "lost": read.lost, "errors": sent.complaints,
             })
         ))?;
     } else if !global.quiet {
+        let besides = match sent.besides {
+            0 => String::new(),
+            n => format!(" and {n} lines of forces or fields"),
+        };
         tracing::info!(
-            "sent {} samples of {} to {remote}: {:.3} s of data in {secs:.3} s",
-            sent.lines,
+            "sent {} samples of {}{besides} to {remote}: {:.3} s of data in {secs:.3} s",
+            sent.samples,
             read.topic,
             sent.data_secs
         );
@@ -151,7 +160,7 @@ fn read(
     log: &Log,
     options: &Options,
     pool: &Pool,
-    give: mpsc::Sender<Vec<Due>>,
+    give: mpsc::Sender<Vec<Line>>,
 ) -> Result<Read> {
     let mut decoders = Decoders::new(options);
     let reading = TopicReading::new(log, args.topic.as_deref(), &mut decoders)?.with_fields();
@@ -159,8 +168,11 @@ fn read(
     let id = args.id.as_deref().unwrap_or(&topic);
     let (mut batch, mut seq) = (Vec::with_capacity(BATCH), 0);
     let lost = reading.walk_in_flu(pool, |raw, kind| {
-        let due = raw.header.unwrap_or(raw.log);
-        batch.push((due, line::rate(id, seq, raw, kind).to_string()));
+        batch.push(Line {
+            due: raw.header.unwrap_or(raw.log),
+            text: line::rate(id, seq, raw, kind).to_string(),
+            is_beside: raw.is_beside,
+        });
         seq += u64::from(!raw.is_beside);
         let goes_on = batch.len() < BATCH || give.blocking_send(std::mem::take(&mut batch)).is_ok();
         Ok(match goes_on {
@@ -176,7 +188,9 @@ fn read(
 /// What was sent.
 #[derive(Debug, Default)]
 struct Sent {
-    lines: u64,
+    samples: u64,
+    /// Lines of forces and fields beside them.
+    besides: u64,
     /// Between the first stamp and the last, s.
     data_secs: f64,
     /// Errors that came back.
@@ -187,7 +201,7 @@ async fn send(
     remote: &Remote,
     token: Option<&Secret>,
     mut pace: Option<Pace>,
-    lines: &mut mpsc::Receiver<Vec<Due>>,
+    lines: &mut mpsc::Receiver<Vec<Line>>,
 ) -> Result<Sent> {
     let failed = |what: String| Error::Remote {
         address: remote.to_string(),
@@ -197,19 +211,24 @@ async fn send(
     let (mut sent, mut chunk) = (Sent::default(), String::new());
     let mut span: Option<(Nanos, Nanos)> = None;
     while let Some(batch) = lines.recv().await {
-        for (due, line) in batch {
+        for line in batch {
+            let due = line.due;
             let wait = pace
                 .as_mut()
                 .map_or(Duration::ZERO, |pace| pace.until(due, Instant::now()));
-            if !wait.is_zero() || chunk.len() + line.len() >= CHUNK {
+            if !wait.is_zero() || chunk.len() + line.text.len() >= CHUNK {
                 sender.send(&mut chunk).await.map_err(failed)?;
                 sender.listen(wait).await.map_err(failed)?;
             }
             if !chunk.is_empty() {
                 chunk.push('\n');
             }
-            chunk.push_str(&line);
-            sent.lines += 1;
+            chunk.push_str(&line.text);
+            if line.is_beside {
+                sent.besides += 1;
+            } else {
+                sent.samples += 1;
+            }
             let first = span.map_or(due, |(first, _)| first);
             span = Some((first, due));
         }

@@ -195,7 +195,7 @@ impl Smoothing {
         }
         if self.is_beyond_class {
             said.push(format!(
-                "the sensor is farther off than those of class {noise} are: smoothed again with priors 2.5 times as wide; --noise uncalibrated says so beforehand"
+                "the sensor is farther off than those of class {noise} are: smoothed again as one that nobody calibrated; --noise uncalibrated says so beforehand"
             ));
         }
         said

@@ -81,7 +81,7 @@ pub use phase::Failure;
 pub(crate) use result::OBSERVED;
 pub use result::{Bias, Calibration, Counts, Learned, Magnetometer, Outcome, Section};
 pub use sample::{Sample, Samples};
-pub use settings::{Beforehand, FieldUnit, HeadingReference, SampleModel, Settings};
+pub use settings::{Beforehand, FieldUnit, HeadingReference, Looseness, SampleModel, Settings};
 pub use smoothed::Smoothed;
 pub use survey::Quantisation;
 pub use work::smooth;

@@ -35,6 +35,10 @@ fn output(args: &[&str], input: &[u8]) -> Vec<u8> {
 /// either side, and the two sides seldom wait for each other.
 const ROUND: usize = 400;
 
+fn is_rate(line: &[u8]) -> bool {
+    line.windows(7).any(|part| part == b"\"gyro\":")
+}
+
 /// Sends lines, `piece` of them at once, and reads as many attitudes.
 fn through(
     sender: &mut dyn FnMut(&[u8]),
@@ -47,7 +51,8 @@ fn through(
         for some in round.chunks(piece) {
             sender(&some.concat());
         }
-        for _ in round {
+        // A field in a line of its own is no attitude.
+        for _ in round.iter().filter(|line| is_rate(line)) {
             out.extend_from_slice(watcher.line().unwrap().as_bytes());
             out.push(b'\n');
         }
@@ -63,7 +68,7 @@ fn check(log: &Path) {
     assert!(lines.len() > 200, "{name}");
     assert_eq!(
         expected.iter().filter(|b| **b == b'\n').count(),
-        lines.len(),
+        lines.iter().filter(|line| is_rate(line)).count(),
         "{name}"
     );
 

@@ -63,6 +63,8 @@ fn what_is_sent_becomes_the_attitude_of_a_replay_over_every_transport() {
         assert!(sent.status.success(), "{way}: {}", said(&sent));
         let summary: Value = serde_json::from_slice(&sent.stdout).unwrap();
         assert_eq!(summary["sent"], SAMPLES);
+        // The field has a topic of its own.
+        assert_eq!(summary["sent_beside"], SAMPLES);
         assert_eq!(summary["errors"], 0);
         // 19 s of data, twenty times as fast.
         let secs = summary["elapsed_secs"].as_f64().unwrap();
@@ -77,7 +79,9 @@ fn all_of_it_has_been_read_when_a_hurried_send_ends() {
     let sent = run(&["send", LOG, &address, "--speed", "max"]);
     assert!(sent.status.success(), "{}", said(&sent));
     assert!(
-        said(&sent).contains(&format!("sent {SAMPLES} samples of /imu/data to tcp://")),
+        said(&sent).contains(&format!(
+            "sent {SAMPLES} samples of /imu/data and {SAMPLES} lines of forces or fields to tcp://"
+        )),
         "{}",
         said(&sent)
     );

@@ -18,6 +18,7 @@ use crate::frames::Nav;
 use crate::propagate::{self, Executor, Method, Propagator};
 use crate::quaternion::{Quaternion, RotationVector};
 use crate::record::{AttitudeSample, Join, Nanos, RateSample, RawSample};
+use crate::smooth::Looseness;
 use crate::worlds::{Convention, World};
 use nalgebra::Vector3;
 
@@ -160,12 +161,16 @@ impl Estimator {
                         aid::Start::Level => None,
                         aid::Start::Known { .. } => Some(prepared.initial.yaw_pitch_roll().yaw),
                     };
-                    let class = aid::Settings::default().scale_prior;
+                    let usual = aid::Settings::default();
                     let told = Told {
                         kind: resolved.kind,
                         is_kind_stated: resolved.is_kind_stated,
                         heading,
-                        looseness: aiding.settings.scale_prior / class,
+                        looseness: Looseness {
+                            scale: aiding.settings.scale_prior / usual.scale_prior,
+                            axes: aiding.settings.cross_prior / usual.cross_prior,
+                            force: aiding.settings.force_bias_prior / usual.force_bias_prior,
+                        },
                         known: resolved.beforehand(),
                     };
                     let smoothing = Smoothing::new(aided, told);

@@ -10,8 +10,8 @@ use crate::propagate::Executor;
 use crate::quaternion::{Quaternion, RotationVector};
 use crate::record::{AttitudeCovariance, AttitudeSample, Nanos, RateSample, SampleKind, Status};
 use crate::smooth::{
-    Beforehand, Estimate, FieldUnit, Outcome, Sample, SampleModel, Samples, Settings, SmoothError,
-    Smoothed, smooth,
+    Beforehand, Estimate, FieldUnit, Learned, Looseness, Outcome, Sample, SampleModel, Samples,
+    Settings, SmoothError, Smoothed, smooth,
 };
 use nalgebra::Vector3;
 use std::cell::RefCell;
@@ -39,7 +39,7 @@ pub(super) struct Told {
     /// Heading of the first attitude, rad; `None`: that of the smoother.
     pub(super) heading: Option<f64>,
     /// How many times as far off as sensors of the default class this one may be.
-    pub(super) looseness: f64,
+    pub(super) looseness: Looseness,
     /// What is known of this one.
     pub(super) known: Beforehand,
 }
@@ -67,21 +67,37 @@ pub struct Recording {
     pub smoothed: Smoothed,
     /// Nobody said what a sample means, and in steps of 5 ms and less they were taken as means since the one before.
     pub is_taken_as_mean: bool,
-    /// The sensor is farther off than those of its class, and was smoothed again with priors 2.5 times as wide.
+    /// The sensor is farther off than those of its class, and was smoothed again with the priors of one that nobody calibrated.
     pub is_beyond_class: bool,
     /// Bytes of it that were kept in a temporary file.
     pub spooled_bytes: u64,
 }
 
-/// A gyro whose scale or axes are found so many prior sigmas off is none of its class, and is smoothed again with
-/// priors that are so many times as wide: those of one that nobody has calibrated.
+/// A gyro whose scale or axes are found so many prior sigmas off is none of its class.
 const BEYOND: f64 = 2.5;
-const LOOSER: f64 = 2.5;
+/// And an accelerometer so many: it has more numbers, and motions that are no noise in them.
+const BEYOND_FORCE: f64 = 3.5;
+/// And is smoothed again with priors that are so many times as wide: those of one that nobody has calibrated
+/// (`uncalibrated` beside what is expected where nobody says anything).
+const LOOSER: Looseness = Looseness {
+    scale: 2.5,
+    axes: 6.0,
+    force: 9.8,
+};
+/// So many times as wide is what a calibration file says.
+const LOOSER_KNOWN: f64 = 2.5;
 
 fn is_beyond(smoothed: &Smoothed) -> bool {
-    let gyro = &smoothed.calibration().gyro;
-    let mut all = gyro.value.iter().zip(&gyro.prior);
-    all.any(|(value, prior)| value.abs() > BEYOND * prior)
+    let calibration = smoothed.calibration();
+    is_off(&calibration.gyro, BEYOND)
+        || is_off(&calibration.force_bias, BEYOND_FORCE)
+        || is_off(&calibration.force, BEYOND_FORCE)
+}
+
+/// Whether a constant is so many prior sigmas from nothing.
+fn is_off<const N: usize>(learned: &Learned<N>, sigmas: f64) -> bool {
+    let mut all = learned.value.iter().zip(&learned.prior);
+    all.any(|(value, prior)| value.abs() > sigmas * prior)
 }
 
 /// What was kept, as the smoother reads it.
@@ -300,8 +316,8 @@ impl Smoothing {
             Err(why) => return Ok(Err(why)),
         };
         let looser = Settings {
-            looseness: LOOSER * settings.looseness,
-            known: settings.known.widened(LOOSER),
+            looseness: settings.looseness.times(LOOSER),
+            known: settings.known.widened(LOOSER_KNOWN),
             ..settings
         };
         let again = if is_beyond(&smoothed) {
@@ -401,6 +417,11 @@ mod tests {
 
     /// A hand that rests, turns and rests: rates, and forces and fields at rates and stamps of their own.
     fn taken(smoothing: &mut Smoothing, is_smooth: bool) {
+        taken_by(smoothing, is_smooth, Vector3::zeros());
+    }
+
+    /// By an accelerometer that is off by `bias`.
+    fn taken_by(smoothing: &mut Smoothing, is_smooth: bool, bias: Vector3<f64>) {
         let mut q = Quaternion::<Nav, Body>::identity();
         for i in 0..SAMPLES {
             let stamp = Nanos(i * 2_500_000);
@@ -417,7 +438,7 @@ mod tests {
             };
             if i % 8 == 0 {
                 let force = to_body * Vector3::new(push, 0.0, 9.81);
-                smoothing.take_force(Nanos(stamp.0 - 1_000_000), force);
+                smoothing.take_force(Nanos(stamp.0 - 1_000_000), force + bias);
             }
             if i % 40 == 0 {
                 smoothing.take_field(
@@ -472,7 +493,7 @@ mod tests {
                 kind: SampleKind::Rate,
                 is_kind_stated: true,
                 heading: None,
-                looseness: 1.0,
+                looseness: Looseness::default(),
                 known: Beforehand::default(),
             },
         )
@@ -491,6 +512,24 @@ mod tests {
             assert_eq!(held.len() as i64, SAMPLES);
             assert!(spooled.kept.spooled_bytes() > 0);
             assert_eq!(attitudes(spooled), (held, why));
+        }
+    }
+
+    #[test]
+    fn an_accelerometer_far_off_its_class_is_smoothed_as_one_nobody_calibrated() {
+        for (off, is_beyond) in [(0.05, false), (0.4, true)] {
+            let bias = Vector3::new(off, -off, 0.5 * off);
+            let mut smoothing = new();
+            taken_by(&mut smoothing, true, bias);
+            let given = smoothing.finish(&Sequential, &mut Vec::new(), &mut |_| {});
+            given.unwrap();
+            let recording = smoothing.result().unwrap().unwrap();
+            assert_eq!(recording.is_beyond_class, is_beyond, "{off}");
+            let found = recording.smoothed.calibration().force_bias;
+            for axis in 0..3 {
+                let error = (found.value[axis] - bias[axis]).abs();
+                assert!(error < 3.0 * found.sigma[axis], "{off}: {found:?}");
+            }
         }
     }
 

@@ -2,7 +2,7 @@
 //!
 //! Apart from the nodes because these are the border of the equations: every node sees them.
 
-use super::settings::{Beforehand, Settings};
+use super::settings::{Beforehand, Looseness, Settings};
 use nalgebra::{Matrix2, Matrix3, Vector3};
 
 /// Gyro matrix less 1, row by row.
@@ -55,22 +55,26 @@ pub(super) const IRON_SCALE: f64 = 1.0;
 impl Priors {
     /// For a log that rests in so many segments; `has_moving_field`: the field may be another while moving.
     pub(super) fn new(settings: &Settings, has_moving_field: bool) -> Priors {
-        let looseness = settings.looseness;
+        let Looseness { scale, axes, force } = settings.looseness;
         let mut sigma = [0.0; ALL];
         let mut matrix = |first: usize, diagonal: f64, others: f64| {
             for i in 0..9 {
-                sigma[first + i] = looseness * if i % 4 == 0 { diagonal } else { others };
+                sigma[first + i] = if i % 4 == 0 {
+                    scale * diagonal
+                } else {
+                    axes * others
+                };
             }
         };
         matrix(FORCE, 0.0015, 0.001);
         matrix(FIELD, 0.015, 0.008);
         let mut put = |range: std::ops::Range<usize>, value: f64| sigma[range].fill(value);
-        put(FORCE_BIAS..FORCE, 0.04 * looseness);
-        put(FORCE_TIME..CENTRE, 0.003 * looseness);
+        put(FORCE_BIAS..FORCE, 0.04 * force);
+        put(FORCE_TIME..CENTRE, 0.003 * scale);
         put(CENTRE..IRON, 10.0);
         put(IRON..FIELD, 1e3);
         put(NORTH..FIELD_TIME, 1e3);
-        put(FIELD_TIME..MOVING, 0.005 * looseness);
+        put(FIELD_TIME..MOVING, 0.005 * scale);
         put(MOVING..ALL, if has_moving_field { 2.5 } else { 1e-3 });
         let mut information = vec![[0.0; ALL]; ALL];
         for i in FORCE_BIAS..ALL {
@@ -78,9 +82,9 @@ impl Priors {
         }
         // Scales share a part: a clock, a reference voltage. A pair across the diagonal is a share of axes that are
         // not square to each other and of a triad that is turned in its case.
-        let (own, shared): (f64, f64) = (0.0007 * looseness, 0.003 * looseness);
+        let (own, shared): (f64, f64) = (0.0007 * scale, 0.003 * scale);
         let scales = Matrix3::from_diagonal_element(own * own) + Matrix3::repeat(shared * shared);
-        let (skew, turned): (f64, f64) = (0.001 * looseness, 0.002 * looseness);
+        let (skew, turned): (f64, f64) = (0.001 * axes, 0.002 * axes);
         let (s, t) = (skew * skew, turned * turned);
         let pair = Matrix2::new(s + t, s - t, s - t, s + t);
         for i in 0..9 {

@@ -65,14 +65,45 @@ impl Beforehand {
     }
 }
 
+/// How many times as wide as after a calibration in the factory the priors are.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Looseness {
+    /// Of scales, and of when forces and fields are measured.
+    pub scale: f64,
+    /// Of axes, to each other and in the case.
+    pub axes: f64,
+    /// Of the accelerometer's bias.
+    pub force: f64,
+}
+
+impl Default for Looseness {
+    fn default() -> Looseness {
+        Looseness {
+            scale: 1.0,
+            axes: 1.0,
+            force: 1.0,
+        }
+    }
+}
+
+impl Looseness {
+    pub(crate) fn times(self, by: Looseness) -> Looseness {
+        Looseness {
+            scale: self.scale * by.scale,
+            axes: self.axes * by.axes,
+            force: self.force * by.force,
+        }
+    }
+}
+
 /// Settings of the smoother, SI, beside the noise that `docs/theory/smoother.md` fixes. The defaults are one set for
 /// all sensors and motions it was judged on.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Settings {
     /// Time between nodes, s. `None`: 0.5, 1 above an hour, 2 above four hours, more beyond a day (as many nodes).
     pub node_spacing: Option<f64>,
-    /// By how much the sigma of every calibration constant is larger than after a calibration in the factory.
-    pub looseness: f64,
+    /// By how much the sigmas of calibration constants are larger than after a calibration in the factory.
+    pub looseness: Looseness,
     /// What is known of this one.
     pub known: Beforehand,
     /// How late the samples are, s: attitudes are turned on by the rate over this.
@@ -99,7 +130,7 @@ impl Default for Settings {
     fn default() -> Settings {
         Settings {
             node_spacing: None,
-            looseness: 1.0,
+            looseness: Looseness::default(),
             known: Beforehand::default(),
             sensor_delay: 0.0,
             heading_reference: HeadingReference::Standstill,
@@ -123,8 +154,11 @@ impl Settings {
         if !in_range(spacing, 0.05, 60.0) {
             return Some(("node_spacing", spacing));
         }
-        if !in_range(self.looseness, 1e-3, 1e3) {
-            return Some(("looseness", self.looseness));
+        let Looseness { scale, axes, force } = self.looseness;
+        for looseness in [scale, axes, force] {
+            if !in_range(looseness, 1e-3, 1e3) {
+                return Some(("looseness", looseness));
+            }
         }
         if !in_range(self.sensor_delay, -1.0, 1.0) {
             return Some(("sensor_delay", self.sensor_delay));

@@ -18,16 +18,29 @@ pub(super) fn way_in(last: &[u8]) -> String {
     let best = names.iter().filter_map(|name| Some((likely(name)?, name)));
     // The first of the best.
     let best = best.reduce(|best, next| if next.0 > best.0 { next } else { best });
-    let Some((_, best)) = best else {
+    let Some((rank, best)) = best else {
         return "unzip FILE unpacks it; name the log inside".to_owned();
     };
+    let (folder, own) = best.rsplit_once('/').unwrap_or(("", best));
+    // A table of rates among others: they may have what corrects them.
+    let tables = names.iter().filter_map(|name| likely(name)).count();
+    if rank < LOG && tables > 1 && is_plain(best) {
+        let of = |folder: &str| {
+            format!(
+                "unzip FILE -d unpacked, then name the folder {folder}: its tables are one recording"
+            )
+        };
+        return match folder {
+            "" => of("unpacked"),
+            folder => of(&format!("unpacked/{folder}")),
+        };
+    }
     if !is_plain(best) {
         return format!(
             "unzip FILE unpacks it; name the log inside, which may be {:?}",
             printable(best)
         );
     }
-    let own = best.rsplit('/').next().unwrap_or(best);
     format!("unzip -p FILE {best} > {own} takes out the log inside; name that")
 }
 
@@ -51,13 +64,16 @@ fn members(last: &[u8]) -> Vec<String> {
     names
 }
 
+/// The least of a member that is a log whole.
+const LOG: u8 = 3;
+
 /// How likely a member is the one that is meant; `None` for what can be none.
 fn likely(name: &str) -> Option<u8> {
     let name = name.to_ascii_lowercase();
     let own = name.rsplit('/').next().unwrap_or(&name);
     let (_, extension) = own.rsplit_once('.')?;
     let is_log = match extension {
-        "mcap" | "bag" | "ulg" | "ulog" | "ndjson" | "jsonl" => 3,
+        "mcap" | "bag" | "ulg" | "ulog" | "ndjson" | "jsonl" => LOG,
         "csv" | "tsv" | "txt" | "gcsv" => 0,
         _ => return None,
     };
@@ -87,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn the_table_of_the_gyroscope_is_taken_out_of_a_phones_archive() {
+    fn the_tables_of_a_phones_archive_are_unpacked_together_and_a_log_is_taken_out() {
         let phone = [
             "Metadata.csv",
             "GyroscopeUncalibrated.csv",
@@ -96,7 +112,14 @@ mod tests {
         ];
         assert_eq!(
             way_in(&archive(&phone)),
-            "unzip -p FILE run/Gyroscope.csv > Gyroscope.csv takes out the log inside; name that"
+            "unzip FILE -d unpacked, then name the folder unpacked/run: its tables are one recording"
+        );
+        assert!(
+            way_in(&archive(&["Gyroscope.csv", "Accelerometer.csv"])).contains("folder unpacked:")
+        );
+        assert_eq!(
+            way_in(&archive(&["a/gyro.csv"])),
+            "unzip -p FILE a/gyro.csv > gyro.csv takes out the log inside; name that"
         );
         assert!(way_in(&archive(&["a.txt", "flight.ulg"])).contains("flight.ulg"));
         let odd = way_in(&archive(&["meta/device.csv", "Raw Data $(x) gyro.csv"]));

@@ -2,7 +2,7 @@
 
 use super::logs::{Motion, errors, log, smoothed};
 use crate::record::Nanos;
-use crate::smooth::{FieldUnit, Outcome, Sample, Settings, SmoothError, smooth};
+use crate::smooth::{FieldUnit, Looseness, Outcome, Sample, Settings, SmoothError, smooth};
 use nalgebra::Vector3;
 
 fn sample(i: i64) -> Sample {
@@ -243,7 +243,10 @@ fn settings_that_can_not_be_are_refused() {
             ..Settings::default()
         },
         Settings {
-            looseness: 0.0,
+            looseness: Looseness {
+                axes: 0.0,
+                ..Looseness::default()
+            },
             ..Settings::default()
         },
         Settings {
