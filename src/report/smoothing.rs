@@ -3,7 +3,7 @@
 use super::summary::significant;
 use serde_json::{Value, json};
 use strapd_attitude::estimate::Recording;
-use strapd_attitude::smooth::{Calibration, Counts, Learned, Outcome};
+use strapd_attitude::smooth::{Calibration, Counts, Learned, Outcome, Sizes};
 
 /// A recording that was smoothed.
 #[derive(Clone, Debug)]
@@ -21,7 +21,60 @@ pub struct Smoothing {
     is_taken_as_mean: bool,
     is_beyond_class: bool,
     spooled_bytes: u64,
+    sizes: Vec<Sizes>,
 }
+
+/// Sizes over a recording, as measured and as calibrated.
+#[derive(Clone, Copy, Debug)]
+struct Spread {
+    mean: [f64; 2],
+    /// Root mean square about it.
+    deviation: [f64; 2],
+}
+
+impl Spread {
+    /// `None` where there are too few to tell.
+    fn of(sizes: impl Iterator<Item = [f64; 2]> + Clone) -> Option<Spread> {
+        let count = sizes.clone().count();
+        if count < FEWEST {
+            return None;
+        }
+        let mean =
+            |value: &dyn Fn([f64; 2]) -> f64| sizes.clone().map(value).sum::<f64>() / count as f64;
+        let means = [
+            mean(&|[measured, _]| measured),
+            mean(&|[_, calibrated]| calibrated),
+        ];
+        Some(Spread {
+            mean: means,
+            deviation: [
+                mean(&|[measured, _]| (measured - means[0]).powi(2)).sqrt(),
+                mean(&|[_, calibrated]| (calibrated - means[1]).powi(2)).sqrt(),
+            ],
+        })
+    }
+
+    fn text(&self, unit: &str) -> String {
+        let [before, after] = [0, 1].map(|i| {
+            let mean = significant(self.mean[i], 4);
+            format!(
+                "{mean} {unit} (spread {})",
+                significant(self.deviation[i], 2)
+            )
+        });
+        format!("{before} as measured, {after} as calibrated")
+    }
+
+    fn json(&self) -> Value {
+        json!({
+            "measured": {"mean": self.mean[0], "deviation": self.deviation[0]},
+            "calibrated": {"mean": self.mean[1], "deviation": self.deviation[1]},
+        })
+    }
+}
+
+/// Segments that tell a spread.
+const FEWEST: usize = 4;
 
 impl Smoothing {
     /// As it is at the end of a run.
@@ -51,7 +104,22 @@ impl Smoothing {
             is_taken_as_mean: recording.is_taken_as_mean,
             is_beyond_class: recording.is_beyond_class,
             spooled_bytes: recording.spooled_bytes,
+            sizes: recording.sizes.clone(),
         }
+    }
+
+    /// How large forces at rest and fields were, over time.
+    #[must_use]
+    pub fn sizes(&self) -> &[Sizes] {
+        &self.sizes
+    }
+
+    /// Of the force at rest, m/s^2, and of the field, uT.
+    fn spreads(&self) -> [Option<Spread>; 2] {
+        [
+            Spread::of(self.sizes.iter().filter_map(|sizes| sizes.force)),
+            Spread::of(self.sizes.iter().filter_map(|sizes| sizes.field)),
+        ]
     }
 
     /// What integrated, and what it took a sample for where nobody said that.
@@ -123,6 +191,9 @@ impl Smoothing {
                 significant(magnetometer.north_up.value[1], 3),
             ));
         }
+        let [force, field] = self.spreads();
+        lines.extend(force.map(|force| format!("force at rest {}", force.text("m/s^2"))));
+        lines.extend(field.map(|field| format!("field {}", field.text("uT"))));
         lines
     }
 
@@ -157,34 +228,54 @@ impl Smoothing {
         }
     }
 
-    /// What was learned, a row each: what and in which unit, about x, y, z, and one sigma of each.
+    /// What was learned, a row each, under [`Smoothing::HEAD`].
     #[must_use]
     pub fn learned(&self) -> Vec<Vec<String>> {
-        let row = |name: &str, value: [f64; 3], sigma: [f64; 3]| {
-            let numbers = value.into_iter().chain(sigma);
-            let said = numbers.map(|v| significant(v, 3));
-            std::iter::once(name.to_owned()).chain(said).collect()
-        };
         let c = &self.calibration;
-        let (gyro, of_gyro) = scales(&c.gyro);
-        let (force, of_force) = scales(&c.force);
-        let mut rows = vec![
-            row("gyro bias in the middle, deg/s", self.bias.0, self.bias.1),
-            row("gyro scale, %", gyro, of_gyro),
-            row(
-                "accelerometer bias, m/s^2",
-                c.force_bias.value,
-                c.force_bias.sigma,
-            ),
-            row("accelerometer scale, %", force, of_force),
-        ];
+        let [x, y, z] = self.bias.0.map(|v| significant(v, 3));
+        let [of_x, of_y, of_z] = self.bias.1.map(|v| significant(v, 3));
+        let name = "gyro bias in the middle, deg/s".to_owned();
+        let mut rows = vec![vec![
+            name,
+            x,
+            y,
+            z,
+            of_x,
+            of_y,
+            of_z,
+            String::new(),
+            String::new(),
+        ]];
+        matrix("gyro", &c.gyro, &mut rows);
+        rows.push(row(
+            "accelerometer bias, m/s^2",
+            &c.force_bias,
+            [0, 1, 2],
+            1.0,
+        ));
+        matrix("accelerometer", &c.force, &mut rows);
+        rows.push(row("accelerometer lead, ms", &c.force_time, [0], 1e3));
         if let Some(m) = &c.magnetometer {
-            let (soft, of_soft) = scales(&m.matrix);
-            rows.push(row("hard iron, uT", m.hard_iron.value, m.hard_iron.sigma));
-            rows.push(row("soft iron, %", soft, of_soft));
+            rows.push(row("hard iron, uT", &m.hard_iron, [0, 1, 2], 1.0));
+            matrix("magnetometer", &m.matrix, &mut rows);
+            rows.push(row("magnetometer lead, ms", &m.time, [0], 1e3));
         }
         rows
     }
+
+    /// What the columns of [`Smoothing::learned`] are: numbers, one sigma of each, one sigma beforehand, and whether the
+    /// recording showed them.
+    pub const HEAD: [&str; 9] = [
+        "",
+        "x",
+        "y",
+        "z",
+        "+- x",
+        "+- y",
+        "+- z",
+        "known to +-",
+        "observed",
+    ];
 
     /// What is to be said aloud, each with the flag that helps; `noise` is the class the sensor was taken for.
     #[must_use]
@@ -217,6 +308,7 @@ impl Smoothing {
             _ => ("converged", None),
         };
         let c = &self.calibration;
+        let [force, field] = self.spreads();
         json!({
             "outcome": outcome,
             "why": why,
@@ -238,8 +330,58 @@ impl Smoothing {
             "h": c.magnetometer.as_ref().map(|m| numbers(&m.hard_iron)),
             "S": c.magnetometer.as_ref().map(|m| numbers(&m.matrix)),
             "mag_lead": c.magnetometer.as_ref().map(|m| numbers(&m.time)),
+            "force_at_rest_m_s2": force.map(|spread| spread.json()),
+            "field_ut": field.map(|spread| spread.json()),
         })
     }
+}
+
+/// Some numbers of what was learned, and what was known of them, times `factor`.
+fn row<const N: usize, const M: usize>(
+    name: &str,
+    learned: &Learned<N>,
+    of: [usize; M],
+    factor: f64,
+) -> Vec<String> {
+    let cells = |numbers: &[f64; N]| {
+        let mut cells = [const { String::new() }; 3];
+        for (cell, i) in cells.iter_mut().zip(of) {
+            *cell = numbers
+                .get(i)
+                .map_or_else(String::new, |v| significant(v * factor, 3));
+        }
+        cells
+    };
+    let known = of.iter().filter_map(|i| learned.prior.get(*i)).copied();
+    let observed = of.iter().filter(|i| learned.is_observed(**i)).count();
+    let mut row = vec![name.to_owned()];
+    row.extend(cells(&learned.value));
+    row.extend(cells(&learned.sigma));
+    row.push(significant(known.fold(0.0, f64::max) * factor, 2));
+    row.push(match observed {
+        0 => "no".to_owned(),
+        n if n == M => "yes".to_owned(),
+        n => format!("{n} of {M}"),
+    });
+    row
+}
+
+/// A matrix: its diagonal, and the turns of axes above and below it.
+fn matrix(name: &str, learned: &Learned<9>, rows: &mut Vec<Vec<String>>) {
+    let degrees = 1f64.to_degrees();
+    rows.push(row(&format!("{name} scale, %"), learned, [0, 4, 8], 100.0));
+    rows.push(row(
+        &format!("{name} axes xy, xz, yz, deg"),
+        learned,
+        [1, 2, 5],
+        degrees,
+    ));
+    rows.push(row(
+        &format!("{name} axes yx, zx, zy, deg"),
+        learned,
+        [3, 6, 7],
+        degrees,
+    ));
 }
 
 fn part<const N: usize>(name: &str, learned: Option<&Learned<N>>) -> Option<String> {

@@ -196,4 +196,34 @@ fn the_report_has_its_calibration() {
     let html = std::fs::read_to_string(dir.join("r.html")).unwrap();
     assert!(html.contains("Calibration by the whole recording"));
     assert!(html.contains("gyro bias in the middle, deg/s"));
+    assert!(html.contains("id=\"force-size\"") && !html.contains("id=\"field-size\""));
+
+    strapd(
+        dir,
+        "report hand.mcap --aid gravity+mag --smooth -o mag.html",
+    )
+    .done();
+    let html = std::fs::read_to_string(dir.join("mag.html")).unwrap();
+    for part in [
+        "known to +-",
+        "hard iron, uT",
+        "id=\"force-size\"",
+        "id=\"field-size\"",
+    ] {
+        assert!(html.contains(part), "{part}");
+    }
+    assert!(html.contains("<p>Field ") && html.contains("uT (spread "));
+    let json = strapd(
+        dir,
+        "replay hand.mcap --aid gravity+mag --smooth -o null: --json",
+    )
+    .json();
+    let smooth = &json["topics"][0]["smooth"];
+    // The unit has hard iron of some uT.
+    let spread = |what: &str, when: &str| smooth[what][when]["deviation"].as_f64().unwrap();
+    let fields = ["measured", "calibrated"].map(|when| spread("field_ut", when));
+    assert!(fields[1] < 0.5 * fields[0], "{smooth}");
+    let gravity = |when: &str| smooth["force_at_rest_m_s2"][when]["mean"].as_f64().unwrap();
+    assert!((gravity("measured") - 9.81).abs() > 0.1, "{smooth}");
+    assert!((gravity("calibrated") - 9.81).abs() < 0.02, "{smooth}");
 }

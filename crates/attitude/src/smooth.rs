@@ -79,7 +79,7 @@ pub use error::SmoothError;
 pub use output::Estimate;
 pub use phase::Failure;
 pub(crate) use result::OBSERVED;
-pub use result::{Bias, Calibration, Counts, Learned, Magnetometer, Outcome, Section};
+pub use result::{Bias, Calibration, Counts, Learned, Magnetometer, Outcome, Section, Sizes};
 pub use sample::{Sample, Samples};
 pub use settings::{Beforehand, FieldUnit, HeadingReference, Looseness, SampleModel, Settings};
 pub use smoothed::Smoothed;

@@ -4,6 +4,7 @@ use crate::report::plot::{Axis, Chart, Look, Series};
 use crate::report::series::{Drawn, ErrorTrace};
 use crate::report::trace::Traces;
 use strapd_attitude::condition::quality::QualitySummary;
+use strapd_attitude::smooth::Sizes;
 
 /// Size of a chart over time, pixels.
 const SIZE: (u32, u32) = (960, 300);
@@ -11,6 +12,8 @@ const SIZE: (u32, u32) = (960, 300);
 const BESIDE: u32 = 128;
 /// Up to this many points each is marked.
 const FEW: usize = 60;
+/// Stretches of time in which sizes are drawn.
+const SIZES: usize = 240;
 /// Errors this many times the smallest would flatten the others.
 const FLATTENING: f64 = 6.0;
 
@@ -83,6 +86,30 @@ fn bound(name: &str, points: Vec<[f64; 2]>, color: usize) -> Series {
         look: Look::Dashed,
         ..line(name, color, points)
     }
+}
+
+/// Sizes of the force at rest and of the field, as measured and as calibrated, where there are some.
+pub(super) fn sizes(sizes: &[Sizes], drawn: &Drawn) -> Vec<(&'static str, Result<String, String>)> {
+    let time = Time::of(drawn);
+    let chart = |of: &dyn Fn(&Sizes) -> Option<[f64; 2]>, title: &str, unit: &str| {
+        let mut traces = Traces::<2>::new(SIZES);
+        for found in sizes {
+            match of(found) {
+                Some(values) => traces.push(drawn.elapsed.at(found.stamp), values),
+                None => traces.interrupt(),
+            }
+        }
+        let named = [(1, "calibrated"), (0, "measured")];
+        let lines = named.map(|(i, name)| line(name, 2 - i, traces.points(i, time.nanos)));
+        (traces.samples > 1).then(|| over_time(time, title, unit, lines.into()))
+    };
+    let force = chart(&|found| found.force, "Size of the force at rest", "m/s^2");
+    let field = chart(&|found| found.field, "Size of the field", "uT");
+    let named = [("force-size", force), ("field-size", field)];
+    named
+        .into_iter()
+        .filter_map(|(id, chart)| Some((id, chart?)))
+        .collect()
 }
 
 /// Some of a run's series in one chart.

@@ -1,11 +1,12 @@
 //! One topic -> its part of the page. Pure.
 
 use super::charts::{self, Time};
-use super::markup::{Rows, escaped, figure, table};
+use super::markup::{Rows, escaped, figure, sentence, table};
 use super::{Noise, Page, numbers, reference, timeline};
 use crate::pipeline::check::CheckedTopic;
 use crate::report::aid::Aided;
 use crate::report::series::Drawn;
+use crate::report::smoothing::Smoothing;
 use crate::report::summary::{TopicSummary, meaning, significant};
 use std::fmt::Write as _;
 use strapd_attitude::record::Verdict;
@@ -137,18 +138,10 @@ fn integrated(s: &TopicSummary, stretches: Option<usize>, out: &mut String) {
         rows.add("warning", &warning.replace("\n  help: ", "; "));
     }
     out.push_str(&rows.html());
-    let (title, learned) = match s.smoothing() {
-        Some(smoothing) => (
-            "Calibration by the whole recording",
-            Some(smoothing.learned()),
-        ),
-        None => (
-            "Calibration learned on the way",
-            s.aided.as_ref().and_then(Aided::learned),
-        ),
-    };
-    if let Some(learned) = learned {
-        out.push_str(&format!("<h3>{title}</h3>\n"));
+    if let Some(smoothing) = s.smoothing() {
+        smoothed(smoothing, s.drawn.as_deref(), out);
+    } else if let Some(learned) = s.aided.as_ref().and_then(Aided::learned) {
+        out.push_str("<h3>Calibration learned on the way</h3>\n");
         let head = ["", "x", "y", "z", "+- x", "+- y", "+- z"];
         out.push_str(&table("numbers", &head, &learned));
         out.push_str("<p class=\"small\">One sigma. What the motion does not show stays near nothing, with the sigma it had at first.</p>\n");
@@ -158,6 +151,20 @@ fn integrated(s: &TopicSummary, stretches: Option<usize>, out: &mut String) {
         (Some(drawn), Some(stretches)) => plots(s, drawn, stretches, out),
         (Some(_), None) => out.push_str("<p>Not drawn, to keep this page small: <code>strapd report --topic NAME</code> draws it.</p>\n"),
         (None, _) => out.push_str("<p>No sample was used, so there is nothing to draw.</p>\n"),
+    }
+}
+
+/// What the whole recording told of the sensor, and what that is worth.
+fn smoothed(smoothing: &Smoothing, drawn: Option<&Drawn>, out: &mut String) {
+    out.push_str("<h3>Calibration by the whole recording</h3>\n");
+    out.push_str(&table("numbers", &Smoothing::HEAD, &smoothing.learned()));
+    out.push_str("<p class=\"small\">One sigma, after and before. What the motion does not show stays near nothing, with the sigma it had: it is not observed. Axes are small turns: xy is how far x reads y.</p>\n");
+    for line in smoothing.lines().iter().skip(1) {
+        let _ = writeln!(out, "<p>{}.</p>", sentence(&escaped(line)));
+    }
+    let Some(drawn) = drawn else { return };
+    for (id, chart) in charts::sizes(smoothing.sizes(), drawn) {
+        out.push_str(&figure(id, chart));
     }
 }
 

@@ -11,7 +11,7 @@ use crate::quaternion::{Quaternion, RotationVector};
 use crate::record::{AttitudeCovariance, AttitudeSample, Nanos, RateSample, SampleKind, Status};
 use crate::smooth::{
     Beforehand, Estimate, FieldUnit, Learned, Looseness, Outcome, Sample, SampleModel, Samples,
-    Settings, SmoothError, Smoothed, smooth,
+    Settings, Sizes, SmoothError, Smoothed, smooth,
 };
 use nalgebra::Vector3;
 use std::cell::RefCell;
@@ -71,6 +71,8 @@ pub struct Recording {
     pub is_beyond_class: bool,
     /// Bytes of it that were kept in a temporary file.
     pub spooled_bytes: u64,
+    /// How large forces at rest and fields were, as measured and as calibrated.
+    pub sizes: Vec<Sizes>,
 }
 
 /// A gyro whose scale or axes are found so many prior sigmas off is none of its class.
@@ -232,13 +234,13 @@ impl Smoothing {
     ) -> Result<(), SpoolError> {
         self.aided.finish(out);
         out.clear();
-        let result = match self.smooth(exec.threads()) {
+        let mut result = match self.smooth(exec.threads()) {
             Err(SmoothError::Read(error)) => return Err(error),
             Err(other) => Err(other.to_string()),
             Ok(result) => result,
         };
-        match &result {
-            Ok(recording) => self.write(&recording.smoothed, out, give)?,
+        match &mut result {
+            Ok(recording) => recording.sizes = self.write(&recording.smoothed, out, give)?,
             Err(_) => self.filter_again(out, give)?,
         }
         self.result = Some(result);
@@ -331,6 +333,7 @@ impl Smoothing {
             smoothed: again.unwrap_or(smoothed),
             is_taken_as_mean,
             spooled_bytes: self.kept.spooled_bytes(),
+            sizes: Vec::new(),
         }))
     }
 
@@ -351,7 +354,7 @@ impl Smoothing {
         smoothed: &Smoothed,
         out: &mut Vec<AttitudeSample>,
         give: &mut dyn FnMut(&mut [AttitudeSample]),
-    ) -> Result<(), SpoolError> {
+    ) -> Result<Vec<Sizes>, SpoolError> {
         let heading = self.told.heading;
         let waiting = RefCell::new(VecDeque::new());
         let mut reading = Reading {

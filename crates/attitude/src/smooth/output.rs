@@ -5,7 +5,9 @@
 use super::factors::{Node, difference};
 use super::pass::by_segment;
 use super::prepare::Prepared;
+use super::result::Sizes;
 use super::sample::{Sample, Samples};
+use super::segments::Segment;
 use super::smoothed::Smoothed;
 use super::sweep::{Sensor, turned};
 use crate::frames::{Body, Nav};
@@ -53,7 +55,8 @@ impl Waiting {
 }
 
 impl Smoothed {
-    /// Gives the attitude at every sample that came, in order, in chunks.
+    /// Gives the attitude at every sample that came, in order, in chunks. How large forces and fields were, for each
+    /// segment between two nodes that has some.
     ///
     /// # Errors
     /// Those of `samples`, which are to be the ones that were smoothed.
@@ -61,7 +64,7 @@ impl Smoothed {
         &self,
         samples: &mut S,
         mut take: impl FnMut(&[Estimate]),
-    ) -> Result<(), S::Error> {
+    ) -> Result<Vec<Sizes>, S::Error> {
         let waiting = RefCell::new(Waiting {
             stamps: VecDeque::new(),
             first: 0,
@@ -75,6 +78,7 @@ impl Smoothed {
         let mut swept: Vec<[f64; 4]> = Vec::new();
         let mut last = None;
         let mut section = 0;
+        let mut all_sizes = Vec::new();
         by_segment(
             &mut watched,
             (&self.survey, &self.settings),
@@ -84,6 +88,7 @@ impl Smoothed {
                 let (a, b) = (&self.nodes[from], &self.nodes[to]);
                 let is_break = k.is_some_and(|k| self.segments[k].is_break);
                 section += usize::from(is_break);
+                all_sizes.extend(k.and_then(|k| self.sizes(&self.segments[k], held, &sensor)));
                 swept.clear();
                 let residual = if k.is_none() || is_break {
                     swept.resize(held.len(), b.q);
@@ -132,7 +137,36 @@ impl Smoothed {
             }));
         }
         take(&out);
-        Ok(())
+        Ok(all_sizes)
+    }
+
+    /// How large forces and fields of a segment are; `None` of one in motion without a field.
+    fn sizes(&self, segment: &Segment, held: &[Prepared], sensor: &Sensor) -> Option<Sizes> {
+        let mean = |sizes: &mut dyn Iterator<Item = [f64; 2]>| {
+            let (mut sum, mut count) = ([0.0; 2], 0.0);
+            for [measured, calibrated] in sizes {
+                sum = [sum[0] + measured, sum[1] + calibrated];
+                count += 1.0;
+            }
+            (count > 0.0).then(|| sum.map(|sum| sum / count))
+        };
+        let forces = held.iter().filter(|_| segment.is_still).map(|sample| {
+            let calibrated: Vector3<f64> = sensor.force * (sample.force - sensor.force_bias);
+            [sample.force.norm(), calibrated.norm()]
+        });
+        let has_field = |sample: &&Prepared| {
+            self.calibration.magnetometer.is_some() && sample.field.iter().all(|m| m.is_finite())
+        };
+        let fields = held.iter().filter(has_field).map(|sample| {
+            let calibrated: Vector3<f64> = sensor.field * (sample.field - sensor.iron);
+            [sample.field.norm(), calibrated.norm()]
+        });
+        let sizes = Sizes {
+            stamp: Nanos(segment.stamp),
+            force: mean(&mut { forces }),
+            field: mean(&mut { fields }),
+        };
+        (sizes.force.is_some() || sizes.field.is_some()).then_some(sizes)
     }
 
     /// Attitudes of a segment's samples from its node on, and by what they miss the next one.

@@ -110,6 +110,18 @@ impl Calibration {
     }
 }
 
+/// How large what was measured between two nodes is, by the sensor and by its calibration. Whatever way is up, a force at
+/// rest and the field should be of one size; how far they are from it is what a calibration is worth.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Sizes {
+    /// Of the later node.
+    pub stamp: Nanos,
+    /// Mean size of the specific force, m/s^2, as measured and as calibrated; where the body rests.
+    pub force: Option<[f64; 2]>,
+    /// The same of the field, uT (as [`Magnetometer::scale`] makes them); where its calibration was looked for.
+    pub field: Option<[f64; 2]>,
+}
+
 /// The gyro's bias at a node.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Bias {

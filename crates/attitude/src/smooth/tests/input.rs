@@ -288,3 +288,38 @@ fn an_accelerometer_may_be_slower_than_the_gyro() {
     let (smoothed, _) = hand.smoothed(&Settings::default());
     assert_eq!(smoothed.counts().breaks, 1);
 }
+
+#[test]
+fn calibrated_a_field_is_as_large_at_every_attitude_and_a_force_at_rest_is_gravity() {
+    let log = log(Motion::Hand);
+    let mut samples = log.samples.as_slice();
+    let smoothed = smooth(&mut samples, &Settings::default()).unwrap();
+    let sizes = smoothed.attitudes(&mut samples, |_| {}).unwrap();
+    let spread = |values: Vec<f64>| {
+        let of = |pick: fn(f64, f64) -> f64| values.iter().copied().reduce(pick).unwrap();
+        of(f64::max) - of(f64::min)
+    };
+    let fields = |i: usize| sizes.iter().filter_map(move |found| Some(found.field?[i]));
+    // Hard iron of 2.3 uT, of which a minute shows most.
+    let spreads = [0, 1].map(|i| spread(fields(i).collect()));
+    assert!(
+        spreads[0] > 3.0 && spreads[1] < 0.4 * spreads[0],
+        "{spreads:?}"
+    );
+    assert_eq!(fields(0).count(), sizes.len());
+    // At rest for ten seconds at both ends, and calm at first; a bias of 0.04 m/s^2 about the vertical.
+    let forces: Vec<[f64; 2]> = sizes.iter().filter_map(|found| found.force).collect();
+    assert!(
+        forces.len() >= 38 && forces.len() < sizes.len(),
+        "{}",
+        forces.len()
+    );
+    for [measured, calibrated] in forces {
+        assert!((measured - 9.81).abs() > 0.01, "{measured}");
+        assert!((calibrated - 9.81).abs() < 0.01, "{calibrated}");
+    }
+    let plain = log.plain();
+    let smoothed = smooth(&mut plain.samples.as_slice(), &Settings::default()).unwrap();
+    let sizes = smoothed.attitudes(&mut plain.samples.as_slice(), |_| {});
+    assert!(sizes.unwrap().iter().all(|found| found.field.is_none()));
+}
