@@ -383,6 +383,7 @@ fn noise(given: &Given<'_, '_>) -> PyResult<Noise> {
         scale: 0.0,
         misalignment: 0.0,
         tilt: 0.0,
+        delay: 0.0,
     };
     if !dict.contains("arw")? {
         return Err(argument(
