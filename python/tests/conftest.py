@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import os
 import pathlib
+import signal
 import subprocess
 
 import numpy as np
@@ -18,6 +19,9 @@ SHARED = REPOSITORY.parent / "shared"
 OURS = ("STRAPD_BIN", "STRAPD_EXAMPLES", "STRAPD_ALL_TRIALS")
 for name in [name for name in os.environ if name.startswith("STRAPD_") and name not in OURS]:
     del os.environ[name]
+
+# Who runs the tests in the background of a shell has SIGINT ignored, and so would all that they start.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_configure(config: pytest.Config) -> None:

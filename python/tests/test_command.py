@@ -30,7 +30,7 @@ def test_what_is_lost_is_shouted_in_the_commands_words() -> None:
 
 def test_the_commands_errors_are_ours(tmp_path: pathlib.Path) -> None:
     for path, said in [
-        (tmp_path, "is a directory"),
+        (tmp_path, "a folder without a recording"),
         (tmp_path / "none.mcap", "No such file"),
         (FIXTURES / "README.md", "."),
     ]:
