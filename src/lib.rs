@@ -5,20 +5,19 @@
 //! ```text
 //! strapd-recording -> strapd-attitude <- strapd-bodies
 //!            \               |               /
-//!             pipeline -> sink -> serve, client, report -> cli      here
+//!                      strapd-replay
+//!                            |
+//!               serve, client, report -> cli      here
 //! ```
 //!
 //! | module | arrow | |
 //! |---|---|---|
-//! | `config` | how samples are to be understood and integrated, checked | pure |
-//! | `pipeline` | a recording -> attitudes: replay, tracks, what a log holds | I/O |
-//! | `sink` | attitude -> MCAP, NDJSON, CSV, sockets | I/O |
 //! | `serve` | the daemon: samples in over sockets, attitude out | I/O |
 //! | `client` | the other end: a daemon, or whatever sends samples -> lines | I/O |
-//! | `report` | a run -> its summary, its findings, its page | pure |
+//! | `report` | a run -> its page | pure |
 //! | `cli` | arguments -> a run -> what is printed | I/O |
 //!
-//! Reading order: `strapd_attitude::estimate`, `pipeline::replay`, then one module. Tests, benches, examples and fuzzers see
+//! Reading order: `strapd_attitude::estimate`, `strapd_replay::pipeline::replay`, then one module. Tests, benches, examples and fuzzers see
 //! inside by the feature `inside`; nobody else is to.
 
 #![allow(
@@ -38,21 +37,6 @@ mod client;
 #[doc(hidden)]
 pub mod client;
 #[cfg(not(feature = "inside"))]
-mod config;
-#[cfg(feature = "inside")]
-#[doc(hidden)]
-pub mod config;
-#[cfg(not(feature = "inside"))]
-mod error;
-#[cfg(feature = "inside")]
-#[doc(hidden)]
-pub mod error;
-#[cfg(not(feature = "inside"))]
-mod pipeline;
-#[cfg(feature = "inside")]
-#[doc(hidden)]
-pub mod pipeline;
-#[cfg(not(feature = "inside"))]
 mod report;
 #[cfg(feature = "inside")]
 #[doc(hidden)]
@@ -62,11 +46,18 @@ mod serve;
 #[cfg(feature = "inside")]
 #[doc(hidden)]
 pub mod serve;
-#[cfg(not(feature = "inside"))]
-mod sink;
+
 #[cfg(feature = "inside")]
 #[doc(hidden)]
-pub mod sink;
+pub use strapd_replay::{config, error, pipeline, sink};
+#[cfg(not(feature = "inside"))]
+use strapd_replay::{config, error, pipeline, sink};
+
+#[cfg(not(feature = "inside"))]
+mod size_limit;
+#[cfg(feature = "inside")]
+#[doc(hidden)]
+pub mod size_limit;
 
 use clap::Parser;
 use std::process::ExitCode;
@@ -76,7 +67,7 @@ use std::process::ExitCode;
 pub fn main() -> ExitCode {
     let cli = cli::Cli::parse();
     cli::start_diagnostics(&cli.global);
-    sink::make_size_limit_an_error();
+    size_limit::make_size_limit_an_error();
     match cli::run(cli) {
         Ok(outcome) => outcome.into(),
         Err(error) if error.is_broken_pipe() => ExitCode::SUCCESS,

@@ -1,17 +1,9 @@
-//! What a run says about itself, for people and for machines. Pure.
+//! What a run says about itself, drawn. Pure.
 
-pub mod against;
-pub mod aid;
-pub mod calendar;
-pub mod calibrating;
-pub mod calibration;
-pub mod findings;
 pub mod page;
 pub mod plot;
-pub mod series;
-pub mod sigma;
-pub mod simulation;
-pub mod smoothing;
-pub mod stamps;
-pub mod summary;
-pub mod trace;
+
+pub use strapd_replay::findings;
+pub use strapd_replay::summary::{
+    self, against, aid, calendar, calibrating, calibration, series, smoothing, trace,
+};

@@ -12,7 +12,7 @@ use crate::pipeline::request::{ReplayRequest, Source};
 use crate::report::calibrating::{Calibrating, Recorded};
 use crate::report::calibration;
 use crate::report::summary::TopicSummary;
-use crate::sink::{Options, Target};
+use crate::sink::Target;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use strapd_attitude::estimate::{Aid, Plan, Pooled, SensorCalibration};
@@ -165,17 +165,11 @@ fn learned(
     pool: &Pool,
 ) -> Result<(TopicSummary, bool)> {
     let run = ReplayRequest {
-        source: Source::parse(log),
         targets: vec![Target::Null],
-        audience: None,
         selection,
         plan,
-        options: Options::default(),
-        copy_input: false,
-        out_rate: None,
-        speed: None,
-        against: None,
         command: super::shell::own_command(),
+        ..ReplayRequest::new(Source::parse(log))
     };
     let mut reporter = Reporter::new(global, log);
     let summary = replay::run(&run, pool, &mut |position| reporter.update(position));

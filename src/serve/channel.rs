@@ -153,7 +153,7 @@ impl Channel {
 
     /// Whether one of its channels for viewers has this number.
     pub(super) fn has(&self, channel: u32) -> bool {
-        let second = matches!(self.payloads, Payloads::Truth { .. });
+        let second = self.stream.content == Content::Truth;
         channel == self.number || (second && channel == self.number + 1)
     }
 
@@ -168,10 +168,10 @@ impl Channel {
         mut previous: Option<Nanos>,
     ) -> Vec<Chunk> {
         let own = of(self.number);
-        let (beside, is_transform) = match self.payloads {
-            Payloads::Attitude { .. } => (of(foxglove::TRANSFORMS), true),
-            Payloads::Truth { .. } => (of(self.number + 1), false),
-            Payloads::Samples { .. } => (None, false),
+        let (beside, is_transform) = match self.stream.content {
+            Content::Attitude => (of(foxglove::TRANSFORMS), true),
+            Content::Truth => (of(self.number + 1), false),
+            Content::Samples(_) => (None, false),
         };
         if own.is_none() && beside.is_none() {
             return Vec::new();

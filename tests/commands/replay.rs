@@ -7,6 +7,7 @@ mod bad_values;
 mod clocks;
 mod cuts;
 mod hostile;
+mod in_memory;
 mod outputs;
 mod publishers;
 mod recordings;

@@ -2,29 +2,20 @@
 #![allow(dead_code, unreachable_pub, clippy::unwrap_used, clippy::expect_used)]
 
 use std::path::{Path, PathBuf};
-use strapd::config::Selection;
 use strapd::error::Result;
 use strapd::pipeline::replay::run;
 use strapd::pipeline::request::{ReplayRequest, Source};
 use strapd::report::summary::{RunSummary, TopicSummary};
-use strapd::sink::{Options, Target};
+use strapd::sink::Target;
 use strapd_attitude::estimate::Plan;
 use strapd_recording::pool::Pool;
 
 /// A replay of a file into nothing, every setting at its default.
 pub fn replay_of(path: &Path) -> ReplayRequest {
     ReplayRequest {
-        source: Source::File(path.to_owned()),
         targets: vec![Target::Null],
-        selection: Selection::default(),
-        plan: Plan::default(),
-        options: Options::default(),
-        copy_input: false,
-        out_rate: None,
-        speed: None,
-        audience: None,
-        against: None,
         command: "test".to_owned(),
+        ..ReplayRequest::new(Source::File(path.to_owned()))
     }
 }
 

@@ -4,7 +4,23 @@ use super::*;
 use crate::serve::channel::Channel;
 use crate::serve::last::Wanted;
 use crate::sink::Stream;
-use crate::sink::tests::sample;
+use nalgebra::Vector3;
+use strapd_attitude::quaternion::Quaternion;
+use strapd_attitude::record::{AttitudeCovariance, AttitudeSample, Nanos, Status};
+
+/// A sample with nothing special about it.
+fn sample(stamp: Nanos) -> AttitudeSample {
+    AttitudeSample {
+        stamp,
+        q_nb: Quaternion::assume_unit([0.5, -0.5, 0.5, 0.5]),
+        rate: Vector3::new(0.1, -0.2, 0.3),
+        accel: None,
+        covariance: AttitudeCovariance::from_sigma(Vector3::new(1e-3, 2e-3, 3e-3)),
+        status: Status::OK,
+        reset_count: 0,
+        log: stamp,
+    }
+}
 
 fn chunk(id: &str, first_seq: u64, size: usize) -> Chunk {
     Chunk {

@@ -83,7 +83,7 @@ fn this_binary_as_the_recording_process() {
         .with_writer(std::io::stderr)
         .with_ansi(false)
         .init();
-    strapd::sink::make_size_limit_an_error();
+    strapd::size_limit::make_size_limit_an_error();
     let counter = std::fs::File::create(counter).unwrap();
     let code = match kind {
         "paced" => paced(first, second, PathBuf::from(path), &counter),

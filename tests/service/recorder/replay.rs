@@ -14,7 +14,6 @@ use strapd::pipeline::request::{ReplayRequest, Source};
 use strapd::serve::recorder::{Recorder, Settings};
 use strapd::sink::Compression;
 use strapd::sink::{Options, Target};
-use strapd_attitude::estimate::Plan;
 use strapd_attitude::record::RawSample;
 use strapd_recording::decode;
 use strapd_recording::mcap::{WalkOptions, walk};
@@ -57,23 +56,17 @@ fn samples(path: &Path) -> Vec<RawSample> {
 /// The lines of the NDJSON a replay of `path` gives, without what names the stream.
 fn attitudes(path: &Path, topic: Option<&str>, out: &Path) -> Vec<serde_json::Value> {
     let replay = ReplayRequest {
-        source: Source::File(path.to_owned()),
         targets: vec![Target::parse(out.to_str().unwrap()).unwrap()],
         selection: Selection {
             topic: topic.map(str::to_owned),
             ..Selection::default()
         },
-        plan: Plan::default(),
         options: Options {
             force: true,
             ..Options::default()
         },
-        copy_input: false,
-        out_rate: None,
-        speed: None,
-        audience: None,
-        against: None,
         command: "test".to_owned(),
+        ..ReplayRequest::new(Source::File(path.to_owned()))
     };
     run(&replay, &Pool::new(1).unwrap(), &mut |_| {}).unwrap();
     std::fs::read_to_string(out)

@@ -1,0 +1,385 @@
+//! Arguments as text -> values, parsed once and validated once. Pure.
+
+pub mod calibration;
+
+use crate::error::{Error, Result};
+use nalgebra::Vector3;
+use strapd_attitude::estimate::{Bias, Initial, NOISE_PRESETS, Noise, Truncation};
+use strapd_attitude::frames::{Body, Nav};
+use strapd_attitude::quaternion::{Quaternion, YawPitchRoll};
+use strapd_recording::decode::{self, FieldPath, FieldRole};
+
+/// Which samples of a recording, and how its messages are read.
+#[derive(Clone, Debug, Default)]
+pub struct Selection {
+    /// `--topic`.
+    pub topic: Option<String>,
+    /// `--field`, `--ignore-covariance-flag`.
+    pub decode: decode::Options,
+    /// `--accel-topic`.
+    pub accel: Option<TopicBeside>,
+    /// `--mag-topic`.
+    pub mag: Option<TopicBeside>,
+}
+
+/// A topic whose specific forces, or magnetic fields, belong to the samples of another.
+#[derive(Clone, Debug)]
+pub struct TopicBeside {
+    /// Its name.
+    pub topic: String,
+    /// Where the vector lies: the `--field` of its role.
+    pub fields: Vec<FieldPath>,
+}
+
+/// `--undo-truncation`: `auto`, `on`, `on=STEP` (rad/s), `off`.
+///
+/// # Errors
+/// [`Error::Usage`] for anything but `auto`, `on`, `on=STEP`, `off`.
+pub fn parse_truncation(text: &str) -> Result<Truncation> {
+    Ok(match text {
+        "auto" => Truncation::Auto,
+        "on" => Truncation::On,
+        "off" => Truncation::Off,
+        _ => text
+            .strip_prefix("on=")
+            .and_then(|step| step.parse().ok())
+            .filter(|step: &f64| *step > 0.0 && *step < 1.0)
+            .map(Truncation::Steps)
+            .ok_or_else(|| {
+                Error::Usage(format!(
+                    "--undo-truncation: `{text}` is none\n  help: auto, on, on=STEP in rad/s (below 1), or off"
+                ))
+            })?,
+    })
+}
+
+/// `consumer`, ..., or `arw=..` and any of `bias-instability`, `rrw`, `turn-on-bias`, `initial`,
+/// in SI; each one number, or three joined by `/` for the body axes x, y, z. And `scale`, `misalignment`, `tilt`.
+///
+/// # Errors
+/// [`Error::Usage`] naming the part that is wrong.
+pub fn parse_noise(text: &str) -> Result<Noise> {
+    if let Some(preset) = NOISE_PRESETS.iter().find(|preset| preset.name == text) {
+        return Ok(Noise::preset(preset));
+    }
+    let wrong = |what: String| {
+        let names: Vec<&str> = NOISE_PRESETS.iter().map(|p| p.name).collect();
+        Error::Usage(format!(
+            "--noise {text}: {what}\n  help: a preset ({}), or arw=RAD_PER_SQRT_S[,bias-instability=RAD_S][,rrw=RAD_S_PER_SQRT_S][,turn-on-bias=RAD_S][,initial=RAD][,scale=SHARE][,misalignment=RAD][,tilt=RAD], each one number or, but for the last three, three x/y/z",
+            names.join(", ")
+        ))
+    };
+    let mut given: [Option<[f64; 3]>; NOISE_KEYS.len()] = [None; NOISE_KEYS.len()];
+    for part in text.split(',') {
+        let (key, value) = part.split_once('=').unwrap_or((part, ""));
+        let key = key.trim();
+        let Some((slot, _)) = given
+            .iter_mut()
+            .zip(NOISE_KEYS)
+            .find(|(_, name)| *name == key)
+        else {
+            return Err(wrong(format!(
+                "`{key}` is no preset and no figure of noise"
+            )));
+        };
+        if slot.is_some() {
+            return Err(wrong(format!("{key} is given twice")));
+        }
+        *slot = Some(by_axis(value).ok_or_else(|| {
+            wrong(format!(
+                "{key}={value} is neither one number nor three x/y/z, from 0 up"
+            ))
+        })?);
+    }
+    let [
+        arw,
+        bias_instability,
+        rrw,
+        turn_on_bias,
+        initial,
+        scale,
+        misalignment,
+        tilt,
+    ] = given;
+    for (key, axes) in [
+        ("scale", scale),
+        ("misalignment", misalignment),
+        ("tilt", tilt),
+    ] {
+        if axes.is_some_and(|[x, y, z]| x != y || y != z) {
+            return Err(wrong(format!("{key} is one number")));
+        }
+    }
+    let one = |axes: Option<[f64; 3]>| axes.map_or(0.0, |[x, ..]| x);
+    let Some(arw) = arw else {
+        return Err(wrong("arw is missing".to_owned()));
+    };
+    Ok(Noise {
+        name: text.to_owned(),
+        arw,
+        bias_instability: bias_instability.unwrap_or_default(),
+        rrw: rrw.unwrap_or_default(),
+        turn_on_bias: turn_on_bias.unwrap_or_default(),
+        initial: initial.unwrap_or_default(),
+        scale: one(scale),
+        misalignment: one(misalignment),
+        tilt: one(tilt),
+        delay: 0.0,
+    })
+}
+
+/// What `--noise` takes, in the order of the fields.
+const NOISE_KEYS: [&str; 8] = [
+    "arw",
+    "bias-instability",
+    "rrw",
+    "turn-on-bias",
+    "initial",
+    "scale",
+    "misalignment",
+    "tilt",
+];
+
+/// One number for all axes, or three joined by `/`; finite and not negative.
+fn by_axis(text: &str) -> Option<[f64; 3]> {
+    let numbers: Option<Vec<f64>> = text
+        .split('/')
+        .map(|part| part.trim().parse::<f64>().ok())
+        .map(|v| v.filter(|v| v.is_finite() && *v >= 0.0))
+        .collect();
+    match numbers?.as_slice() {
+        [all] => Some([*all; 3]),
+        [x, y, z] => Some([*x, *y, *z]),
+        _ => None,
+    }
+}
+
+/// `identity`, `gravity`, `first-orientation`, `q=w,x,y,z`, `rpy=roll,pitch,yaw` (degrees).
+///
+/// # Errors
+/// [`Error::Usage`] for anything else, a quaternion that is not near unit norm included.
+pub fn parse_initial(text: &str) -> Result<Initial> {
+    match text {
+        "identity" => return Ok(Initial::Identity),
+        "gravity" => return Ok(Initial::Gravity),
+        "first-orientation" => return Ok(Initial::FirstOrientation),
+        _ => {}
+    }
+    if let Some(list) = text.strip_prefix("q=") {
+        return Ok(Initial::Given(unit_quaternion("--init", list)?));
+    }
+    if let Some(list) = text.strip_prefix("rpy=") {
+        let [roll, pitch, yaw] = numbers::<3>("--init rpy", list)?.map(f64::to_radians);
+        let q: Quaternion<Nav, Body> =
+            Quaternion::from_yaw_pitch_roll(&YawPitchRoll { yaw, pitch, roll });
+        return Ok(Initial::Given(q.wxyz()));
+    }
+    Err(Error::Usage(format!(
+        "--init {text}: expected identity, gravity, first-orientation, q=w,x,y,z or rpy=roll,pitch,yaw (degrees)"
+    )))
+}
+
+/// `none`, `auto`, or `x,y,z` in rad/s.
+///
+/// # Errors
+/// [`Error::Usage`] for anything else.
+pub fn parse_bias(text: &str) -> Result<Bias> {
+    match text {
+        "none" => Ok(Bias::None),
+        "auto" => Ok(Bias::Auto),
+        list => numbers::<3>("--bias", list)
+            .map(|b| Bias::Given(Vector3::from(b)))
+            .map_err(|_| {
+                Error::Usage(format!(
+                    "--bias {text}: expected none, auto, or three numbers x,y,z in rad/s"
+                ))
+            }),
+    }
+}
+
+/// `--topic`, `--field` and `--ignore-covariance-flag`, as given; `--accel-topic` and `--mag-topic` (`beside`),
+/// to which the fields of their roles belong.
+///
+/// # Errors
+/// [`Error::Usage`] for a field that is none.
+pub fn selection(
+    topic: Option<&String>,
+    fields: &[String],
+    ignore_covariance_flag: bool,
+    beside: [Option<&String>; 2],
+) -> Result<Selection> {
+    let mut fields: Vec<FieldPath> = fields
+        .iter()
+        .map(|f| f.parse().map_err(|e| Error::Usage(format!("--field: {e}"))))
+        .collect::<Result<_>>()?;
+    let mut of = |role: FieldRole, topic: Option<&String>| {
+        let topic = topic?.clone();
+        let fields = fields.extract_if(.., |field| field.role == role).collect();
+        Some(TopicBeside { topic, fields })
+    };
+    let [accel, mag] = beside;
+    let (accel, mag) = (of(FieldRole::Accel, accel), of(FieldRole::Mag, mag));
+    Ok(Selection {
+        accel,
+        mag,
+        topic: topic.cloned(),
+        decode: decode::Options {
+            fields,
+            ignore_covariance_flag,
+            ..decode::Options::default()
+        },
+    })
+}
+
+/// `--shard i/n`: this process takes inputs i, i + n, i + 2n, ... of the list, i from 0.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Shard {
+    /// Which share, from 0.
+    pub index: usize,
+    /// Of how many.
+    pub of: usize,
+}
+
+impl Shard {
+    /// `i/n` with `0 <= i < n`.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] otherwise.
+    pub fn parse(text: &str) -> Result<Shard> {
+        text.split_once('/')
+            .and_then(|(i, n)| Some((i.trim().parse().ok()?, n.trim().parse().ok()?)))
+            .filter(|(i, n)| i < n)
+            .map(|(index, of)| Shard { index, of })
+            .ok_or_else(|| {
+                Error::Usage(format!(
+                    "--shard {text}: expected i/n with 0 <= i < n, for example --shard 0/4"
+                ))
+            })
+    }
+
+    /// Whether the input at `position` of the list is this share's.
+    #[must_use]
+    pub fn takes(self, position: usize) -> bool {
+        position % self.of == self.index
+    }
+}
+
+/// `N` finite numbers separated by commas.
+pub fn numbers<const N: usize>(flag: &str, list: &str) -> Result<[f64; N]> {
+    let parsed: Option<Vec<f64>> = list
+        .split(',')
+        .map(|part| part.trim().parse::<f64>().ok().filter(|v| v.is_finite()))
+        .collect();
+    parsed
+        .and_then(|v| <[f64; N]>::try_from(v).ok())
+        .ok_or_else(|| {
+            Error::Usage(format!(
+                "{flag} {list}: expected {N} finite numbers separated by commas"
+            ))
+        })
+}
+
+/// Four numbers of about unit norm, normalised, the value of `flag`; an initial `q=` may be left out. A norm
+/// off by more than 1 % is a mistake, not rounding.
+///
+/// # Errors
+/// [`Error::Usage`] when it is not four finite numbers of about unit norm.
+pub fn unit_quaternion(flag: &str, list: &str) -> Result<[f64; 4]> {
+    let list = list.strip_prefix("q=").unwrap_or(list);
+    let q = numbers::<4>(flag, list)?;
+    let norm = q.iter().map(|v| v * v).sum::<f64>().sqrt();
+    if (norm - 1.0).abs() > 0.01 {
+        return Err(Error::Usage(format!(
+            "{flag} q={list}: a unit quaternion w,x,y,z is needed, this one has norm {norm}"
+        )));
+    }
+    Ok(q.map(|v| v / norm))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use strapd_attitude::propagate;
+
+    const DEG: f64 = std::f64::consts::PI / 180.0;
+
+    #[test]
+    fn a_preset_is_in_radians_and_seconds() {
+        // 0.84 deg/sqrt(h) = 0.014 deg/sqrt(s); 5 deg/h.
+        let noise = parse_noise("consumer").unwrap();
+        assert!((noise.arw[0] - 0.014 * DEG).abs() < 1e-15);
+        assert!((noise.bias_instability[2] - 5.0 * DEG / 3600.0).abs() < 1e-18);
+    }
+
+    #[test]
+    fn given_noise_needs_its_angle_random_walk() {
+        let noise = parse_noise("arw=1e-4/2e-4/3e-4,bias-instability=2e-5").unwrap();
+        assert_eq!(noise.arw, [1e-4, 2e-4, 3e-4]);
+        assert_eq!(noise.bias_instability, [2e-5; 3]);
+        for bad in [
+            "arw=1/2",
+            "arw=1/2/3/4",
+            "arw=1//2",
+            "arw=1e-4,arw=1e-4",
+            "arw=1e-4,",
+            "consumer,arw=1",
+            "",
+            "bias-instability=1e-5",
+            "arw=-1",
+            "arw=NaN",
+            "arw=1e-4,x=2",
+            "arw=1e-4,scale=1/2/3",
+        ] {
+            assert!(parse_noise(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn every_figure_of_noise_reaches_the_propagator() {
+        let noise = parse_noise(
+            "arw=1,rrw=2,turn-on-bias=3/0/0,bias-instability=4,initial=5/6/7,scale=0.25,misalignment=0.5,tilt=1",
+        );
+        let noise = noise.unwrap();
+        // Independent of each other: 1.7 B of flicker, and what an estimate leaves of the turn-on bias.
+        let left = 6.8_f64.hypot(0.09);
+        assert_eq!(noise.unstable_bias(), [left, 6.8, 6.8]);
+        assert_eq!(noise.unremoved_bias(), [3.0_f64.hypot(left), 6.8, 6.8]);
+        assert_eq!(
+            noise.with_bias([8.0; 3]),
+            propagate::Noise {
+                initial: [5.0, 6.0, 7.0],
+                arw: [1.0; 3],
+                bias: [8.0; 3],
+                rrw: [2.0; 3],
+                scale: 0.25,
+                misalignment: 0.5,
+                bias_tau: None,
+            }
+        );
+    }
+
+    #[test]
+    fn a_quaternion_that_is_no_rotation_is_refused() {
+        assert!(matches!(
+            parse_initial("q=1,0,0,0"),
+            Ok(Initial::Given([1.0, 0.0, 0.0, 0.0]))
+        ));
+        for bad in ["q=1,1,1,1", "q=0,0,0,0", "q=1,0,0", "q=NaN,0,0,1", "qq", ""] {
+            assert!(parse_initial(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn shards_share_the_list_without_overlap() {
+        let shards: Vec<Shard> = (0..3)
+            .map(|i| Shard::parse(&format!("{i}/3")).unwrap())
+            .collect();
+        for position in 0..20 {
+            assert_eq!(shards.iter().filter(|s| s.takes(position)).count(), 1);
+        }
+        for bad in ["3/3", "0/0", "1", "-1/2", "a/b"] {
+            assert!(Shard::parse(bad).is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,297 @@
+//! A recorded orientation, and what it says about the samples -> findings. Pure.
+
+use super::{Finding, Severity};
+use crate::pipeline::check::CheckedTopic;
+use crate::summary::against::{beyond_sigma, bias_flag, bias_json, bias_words, consistency_json};
+use crate::summary::{Against, Recorded, TopicSummary, significant};
+use nalgebra::Vector3;
+use serde_json::json;
+use strapd_attitude::compare::{BiasFit, BodyAxesFit};
+
+/// A meaning is better when its median error is below this share of the other's.
+const CLEARLY: f64 = 0.95;
+/// Other axes explain an error when they leave less than this share of it.
+const EXPLAINED: f64 = 0.4;
+/// Errors over 1 s below this need no explanation, rad (2 degrees).
+const SMALL: f64 = 0.035;
+/// Where gaps take more than this share of the time, what was turned is not known.
+const MOSTLY_THERE: f64 = 0.5;
+/// An orientation that misses the motion by this share of it does not follow the gyro.
+const ANOTHER_MOTION: f64 = 0.5;
+/// Of a motion about one axis other axes look like a bias; one below this share of the motion is believed.
+const SMALL_SHARE: f64 = 0.3;
+/// Two biases that differ by less than this share are the same.
+const SAME: f64 = 0.3;
+
+pub(super) fn find(topic: &CheckedTopic, out: &mut Vec<Finding>) {
+    let Ok(summary) = &topic.replayed else {
+        return;
+    };
+    let Some(recorded) = &summary.recorded else {
+        if !topic.looked.kind_stated {
+            out.push(meaning_unknown());
+        }
+        return;
+    };
+    let is_seen = summary.gaps.total_secs <= MOSTLY_THERE * summary.duration_secs;
+    let trusted = is_truth(recorded, is_seen, out);
+    let used = summary.kind.name();
+    match best_meaning(&summary.against) {
+        Some(best) if trusted => meaning(&summary.against, best, used, out),
+        _ if !topic.looked.kind_stated => out.push(meaning_unknown()),
+        _ => {}
+    }
+    if trusted {
+        let at_rest = topic.looked.bias.as_ref().map(|found| found.bias);
+        told_by_it(summary, recorded, at_rest, out);
+    }
+}
+
+/// What a replay says of the orientation it was held against, in lines; nothing where that is no truth.
+pub(crate) fn warnings(summary: &TopicSummary) -> Vec<String> {
+    let Some(recorded) = &summary.recorded else {
+        return Vec::new();
+    };
+    let is_seen = summary.gaps.total_secs <= MOSTLY_THERE * summary.duration_secs;
+    let (mut wrong, mut found) = (Vec::new(), Vec::new());
+    if is_truth(recorded, is_seen, &mut wrong) {
+        told_by_it(summary, recorded, None, &mut found);
+    }
+    let words = |f: &Finding| match f.flags.as_str() {
+        "" => format!("{}; {}", f.what, f.advice),
+        flags => format!("{}: {flags}", f.what),
+    };
+    found.iter().map(words).collect()
+}
+
+/// A bias by which the gyro leaves it, and a sigma that does not hold. `at_rest` is the bias that a rest shows.
+fn told_by_it(
+    summary: &TopicSummary,
+    recorded: &Recorded,
+    at_rest: Option<Vector3<f64>>,
+    out: &mut Vec<Finding>,
+) {
+    let mut flags = String::new();
+    // What the filter has learned needs no flag.
+    let is_learned = |fit: &BiasFit| {
+        let aided = summary.aided.as_ref();
+        aided.is_some_and(|aided| (aided.bias() - fit.bias).norm() < SAME * fit.bias.norm())
+    };
+    let bias = recorded
+        .bias
+        .filter(|fit| is_bias(recorded, fit) && !is_learned(fit));
+    if let Some(fit) = bias {
+        let left = |rest: Vector3<f64>| rest - Vector3::from(recorded.removed) - fit.bias;
+        if at_rest.is_some_and(|rest| left(rest).norm() < SAME * fit.bias.norm()) {
+            // Said already.
+            "--bias auto".clone_into(&mut flags);
+        } else {
+            flags = bias_flag(&fit, recorded.removed);
+            out.push(
+                Finding::new(
+                    Severity::Warning,
+                    "bias-by-orientation",
+                    bias_words(&fit, "the gyro", "the recorded orientation"),
+                )
+                .with("fit", bias_json(&fit))
+                .advise("remove it; of another run of the sensor it may be another")
+                .flags(flags.clone()),
+            );
+        }
+    }
+    let Some(found) = &recorded.consistency else {
+        return;
+    };
+    let Some(what) = beyond_sigma(found) else {
+        return;
+    };
+    let advice = if !flags.is_empty() {
+        "without that bias it may hold"
+    } else if summary.aided.is_some() {
+        "this motion is not as the filter takes it, or the orientation is no truth"
+    } else {
+        "the sensor is worse than its class, or the orientation is no truth"
+    };
+    // The next worse class; there is none behind the last, and a list is the user's own.
+    let worse = match summary.noise.as_str() {
+        "consumer" => "--noise uncalibrated",
+        "industrial" | "tactical" | "navigation" => "--noise consumer",
+        _ => "",
+    };
+    if flags.is_empty() && summary.aided.is_none() {
+        worse.clone_into(&mut flags);
+    }
+    out.push(
+        Finding::new(Severity::Warning, "beyond-sigma", what)
+            .with("sigma", consistency_json(found))
+            .with("noise", summary.noise.clone())
+            .advise(advice)
+            .flags(flags),
+    );
+}
+
+/// Whether what was fitted is a bias: worth removing, and no other axes that look like one.
+fn is_bias(recorded: &Recorded, fit: &BiasFit) -> bool {
+    let one_axis = recorded.axes.is_none() && fit.turn > SMALL;
+    fit.is_worth_removing() && !(one_axis && fit.bias.norm() > SMALL_SHARE * fit.turn)
+}
+
+/// Whether a bias explains what other axes might.
+fn bias_explains(recorded: &Recorded) -> bool {
+    recorded.bias.is_some_and(|fit| {
+        let [before, after] = fit.over_1s;
+        is_bias(recorded, &fit) && after < EXPLAINED * before
+    })
+}
+
+fn meaning_unknown() -> Finding {
+    Finding::new(
+        Severity::Note,
+        "sample-kind-unknown",
+        "nothing says whether a sample is the rate at its stamp or the mean over its interval; it is taken as the rate",
+    )
+    .advise("the sensor's manual says it; it matters more than the integrator")
+    .flags("--sample-kind rate|average|delta-angle")
+}
+
+fn best_meaning(rows: &[Against]) -> Option<&Against> {
+    rows.iter()
+        .min_by(|a, b| a.median_deg.total_cmp(&b.median_deg))
+}
+
+/// Which meaning of a sample fits, when it is clearly not the one used.
+fn meaning(rows: &[Against], best: &Against, used: &str, out: &mut Vec<Finding>) {
+    let Some(current) = rows.iter().find(|r| r.kind == used) else {
+        return;
+    };
+    if best.median_deg >= CLEARLY * current.median_deg {
+        return;
+    }
+    let flags = match best.kind {
+        "held" => "--method dcm-left".to_owned(),
+        kind => format!("--sample-kind {kind}"),
+    };
+    out.push(
+        Finding::new(
+            Severity::Warning,
+            "sample-kind",
+            format!(
+                "taken as {used}, the samples miss the recorded orientation by {} deg over 1 s (median); as {}, by {} deg",
+                significant(current.median_deg, 3),
+                best.meaning,
+                significant(best.median_deg, 3)
+            ),
+        )
+        .with(
+            "median_deg",
+            json!(
+                rows.iter()
+                    .map(|r| (r.kind.to_owned(), json!(r.median_deg)))
+                    .collect::<serde_json::Map<_, _>>()
+            ),
+        )
+        .with("pairs", best.pairs)
+        .advise("take them so")
+        .flags(flags),
+    );
+}
+
+/// Whether the recorded orientation can be a reference; what is wrong with it is said. Of its axes nothing can be
+/// where the motion was not seen.
+fn is_truth(recorded: &Recorded, is_seen: bool, out: &mut Vec<Finding>) -> bool {
+    if recorded.unusable > 0 {
+        out.push(
+            Finding::new(
+                Severity::Warning,
+                "orientation-invalid",
+                format!(
+                    "{} recorded orientations are no rotation (zero, NaN, or far from norm 1)",
+                    recorded.unusable
+                ),
+            )
+            .with("count", recorded.unusable)
+            .with("usable", recorded.usable)
+            .advise("they are left out of comparisons; do not start from one"),
+        );
+    }
+    if recorded.constant {
+        out.push(
+            Finding::new(
+                Severity::Warning,
+                "orientation-constant",
+                format!(
+                    "all {} recorded orientations are the same: the field is not filled",
+                    recorded.usable
+                ),
+            )
+            .with("count", recorded.usable)
+            .advise("it is no reference"),
+        );
+        return false;
+    }
+    is_seen && (bias_explains(recorded) || recorded.axes.is_none_or(|fit| axes_agree(&fit, out)))
+}
+
+fn axes_agree(fit: &BodyAxesFit, out: &mut Vec<Finding>) -> bool {
+    if fit.as_recorded < SMALL {
+        return true;
+    }
+    let [w, x, y, z] = fit.turn.wxyz();
+    let deg = f64::to_degrees;
+    let evidence = |finding: Finding| {
+        finding
+            .with("pairs", fit.pairs)
+            .with("median_turn_deg", deg(fit.median_turn))
+            .with("as_recorded_deg", deg(fit.as_recorded))
+            .with("turned_deg", deg(fit.turned))
+            .with("turn_wxyz", json!([w, x, y, z]))
+    };
+    if fit.inverse {
+        out.push(evidence(
+            Finding::new(
+                Severity::Warning,
+                "orientation-inverse",
+                format!(
+                    "the recorded orientation follows the gyro only as its inverse ({} deg over 1 s instead of {}): it takes world to body, or its numbers are in another order",
+                    significant(deg(fit.turned), 3),
+                    significant(deg(fit.as_recorded), 3)
+                ),
+            )
+            .advise("invert it where it was written; docs/conventions.md lists who means what"),
+        ));
+        return false;
+    }
+    if fit.turned < EXPLAINED * fit.as_recorded {
+        out.push(evidence(
+            Finding::new(
+                Severity::Warning,
+                "orientation-other-axes",
+                format!(
+                    "the recorded orientation is that of other body axes, turned by {:.1} deg (q w {w:.4} x {x:.4} y {y:.4} z {z:.4}) from the gyro's: {} deg over 1 s as recorded, {} deg with the turn",
+                    deg(2.0 * w.abs().min(1.0).acos()),
+                    significant(deg(fit.as_recorded), 3),
+                    significant(deg(fit.turned), 3)
+                ),
+            )
+            .advise("state the gyro's axes, or its mounting")
+            .flags(format!("--mount q={w:.6},{x:.6},{y:.6},{z:.6}")),
+        ));
+        return false;
+    }
+    if fit.as_recorded > ANOTHER_MOTION * fit.median_turn {
+        out.push(evidence(
+            Finding::new(
+                Severity::Warning,
+                "orientation-unrelated",
+                format!(
+                    "the recorded orientation does not follow the gyro: {} deg of error over 1 s, of {} deg turned",
+                    significant(deg(fit.as_recorded), 3),
+                    significant(deg(fit.median_turn), 3)
+                ),
+            )
+            .advise("it is no truth for these samples, or their clocks differ"),
+        ));
+        return false;
+    }
+    true
+}

@@ -1,0 +1,24 @@
+//! A recording -> attitudes, and what is said of the run. I/O.
+//!
+//! ```text
+//! request -> log (what is in it) -> choice of channels -> preparation -> estimators -> attitudes -> outputs
+//!                                                                                  \-> summary, findings
+//! ```
+//!
+//! | module | arrow | |
+//! |---|---|---|
+//! | [`config`] | how samples are to be understood and integrated, checked | pure |
+//! | [`pipeline`] | a recording -> attitudes: replay, tracks, what a log holds | I/O |
+//! | [`sink`] | attitude -> MCAP, NDJSON, CSV, sockets | I/O |
+//! | [`summary`] | a run -> its numbers, for people and for machines | pure |
+//! | [`findings`] | what is known about a log -> what is wrong with it, and what helps | pure |
+//! | [`error`] | everything that can end a run | pure |
+//!
+//! What the command, the daemon and the Python wheel share: no async runtime, no arguments, no terminal.
+
+pub mod config;
+pub mod error;
+pub mod findings;
+pub mod pipeline;
+pub mod sink;
+pub mod summary;

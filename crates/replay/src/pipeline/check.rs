@@ -1,0 +1,187 @@
+//! A log -> everything that is known about its quality: looked at, then integrated once. I/O.
+//!
+//! The second pass is a replay of all topics at once without outputs, so that what `check` says about verdicts,
+//! gaps and turns per step is what a replay would do, and not another program's opinion.
+
+use super::attitude_track::Track;
+use super::each::{Told, each};
+use super::input::Input;
+use super::inspection::{Inspection, look_as};
+use super::log::{Log, problems};
+use super::position::Position;
+use super::request::ReplayRequest;
+use crate::config::Selection;
+use crate::error::{Error, Result};
+use crate::summary::TopicSummary;
+use strapd_attitude::estimate::Plan;
+use strapd_recording::decode;
+use strapd_recording::pool::Pool;
+
+/// A log, examined.
+#[derive(Debug)]
+pub struct Checked {
+    /// What is wrong with the file itself, the first few in words.
+    pub problems: Vec<String>,
+    /// How many of those lost data.
+    pub file_losses: u64,
+    /// Its size in bytes, where that can be known.
+    pub file_size: Option<u64>,
+    /// The profile it names.
+    pub profile: String,
+    /// Topics that sound like an IMU's and can not be decoded: why.
+    pub refused: Vec<String>,
+    /// Its topics of samples.
+    pub topics: Vec<CheckedTopic>,
+    /// Topics of samples beyond those, which were not examined.
+    pub left_out: Vec<String>,
+}
+
+/// A topic of samples, looked at and replayed.
+#[derive(Debug)]
+pub struct CheckedTopic {
+    /// Statistics of the samples as recorded.
+    pub looked: Inspection,
+    /// What a replay with default flags makes of them, or why it refuses.
+    pub replayed: std::result::Result<Box<TopicSummary>, String>,
+}
+
+/// What a report wants of the replays beside their summaries.
+#[derive(Clone, Copy, Debug)]
+pub struct Drawing<'a> {
+    /// Stretches of time each series is drawn in.
+    pub stretches: usize,
+    /// A reference from another file; `None` = as the run says.
+    pub reference: Option<&'a Track>,
+}
+
+/// How a log is examined.
+#[derive(Clone, Debug)]
+pub struct Examination<'a> {
+    /// Its topic is the only one looked at.
+    pub selection: Selection,
+    /// How samples are understood and integrated.
+    pub plan: Plan,
+    /// The topic of the reference in the log, empty = found.
+    pub reference_topic: String,
+    /// What is drawn of the replays.
+    pub drawing: Option<Drawing<'a>>,
+    /// The command as typed.
+    pub command: String,
+}
+
+/// Examines a log, or one topic of it, with default flags.
+///
+/// # Errors
+/// It can not be read, or holds no such topic.
+pub fn check(
+    input: &Input,
+    named: Option<&str>,
+    options: &decode::Options,
+    pool: &Pool,
+) -> Result<Checked> {
+    let examination = Examination {
+        selection: Selection {
+            topic: named.map(str::to_owned),
+            decode: options.clone(),
+            ..Selection::default()
+        },
+        plan: Plan::default(),
+        reference_topic: String::new(),
+        drawing: None,
+        command: "strapd check".to_owned(),
+    };
+    examine(input, &examination, pool, &mut |_| {})
+}
+
+/// Examines a log, or one topic of it.
+///
+/// # Errors
+/// It can not be read, or holds no such topic.
+pub fn examine(
+    input: &Input,
+    asked: &Examination<'_>,
+    pool: &Pool,
+    watch: &mut dyn FnMut(&Position),
+) -> Result<Checked> {
+    let named = asked
+        .selection
+        .topic
+        .as_deref()
+        .filter(|name| *name != "all");
+    let path = input.name();
+    let log = Log::told_apart(input, named, &asked.selection.decode, pool)?;
+    for topic in named
+        .into_iter()
+        .chain(Some(asked.reference_topic.as_str()).filter(|name| !name.is_empty()))
+    {
+        if !log.has(topic) {
+            return Err(Error::NoSuchTopic {
+                path: path.to_owned(),
+                topic: topic.to_owned(),
+                topics: super::topics::listing(&log.candidates()),
+            });
+        }
+    }
+    let looks = look_as(&log, named, (&asked.selection.decode, &asked.plan), pool)?;
+    let has_reference = asked.drawing.is_some_and(|d| d.reference.is_some())
+        || log
+            .channels
+            .iter()
+            .any(|k| k.role.has_orientation && k.messages > 0);
+    let refused = if looks.topics.is_empty() {
+        // With what it says about channels that only sound like one.
+        log.choose(path, None)
+            .err()
+            .map(|e| e.to_string())
+            .into_iter()
+            .collect()
+    } else {
+        Vec::new()
+    };
+    let looked: Vec<Inspection> = looks
+        .topics
+        .into_iter()
+        .filter(|l| named.is_none_or(|name| l.topic == name || l.of == name))
+        .collect();
+    let names: Vec<String> = looked.iter().map(|l| l.topic.clone()).collect();
+    let replayed = integrate(&log, &names, asked, has_reference, pool, watch)?;
+    let topics = looked
+        .into_iter()
+        .zip(replayed)
+        .map(|(looked, replayed)| CheckedTopic { looked, replayed })
+        .collect();
+    let survey = &looks.survey;
+    Ok(Checked {
+        problems: problems(survey),
+        file_losses: survey.problems.losses(),
+        file_size: survey.file_size,
+        profile: survey.facts.profile.clone(),
+        refused,
+        topics,
+        left_out: match named {
+            Some(_) => Vec::new(),
+            None => looks.left_out,
+        },
+    })
+}
+
+fn integrate(
+    log: &Log,
+    topics: &[String],
+    asked: &Examination<'_>,
+    has_reference: bool,
+    pool: &Pool,
+    watch: &mut dyn FnMut(&Position),
+) -> Result<Vec<Told>> {
+    if topics.is_empty() {
+        return Ok(Vec::new());
+    }
+    let run = ReplayRequest {
+        selection: asked.selection.clone(),
+        plan: asked.plan.clone(),
+        against: has_reference.then(|| asked.reference_topic.clone()),
+        command: asked.command.clone(),
+        ..ReplayRequest::new(log.input().source().clone())
+    };
+    each(&run, log, topics, asked.drawing.as_ref(), pool, watch)
+}

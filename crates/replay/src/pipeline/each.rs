@@ -1,0 +1,148 @@
+//! A log -> what a replay makes of each of several topics, all in one pass. I/O.
+//!
+//! Apart from the replay because nothing is written, every topic is by itself (one that is refused does not
+//! keep the others from being told about), and a log may have hundreds: a pass for each would cost the
+//! square of its size.
+
+use super::channel_choice::{Chosen, besides, choose_each, reference, route};
+use super::check::Drawing;
+use super::decoders::Decoders;
+use super::delivery::{Delivery, Outlet};
+use super::history::History;
+use super::log::{AHEAD, Log};
+use super::position::Position;
+use super::replay::{done, prepare};
+use super::request::ReplayRequest;
+use super::session::{Session, Topic};
+use super::session_builder::labelled;
+use super::summarise;
+use crate::error::Result;
+use crate::sink::{Provenance, Stream};
+use crate::summary::TopicSummary;
+use std::ops::ControlFlow;
+use strapd_recording::pool::Pool;
+
+/// What became of a topic, or why nothing did.
+pub(super) type Told = std::result::Result<Box<TopicSummary>, String>;
+
+/// Integrates the topics called `names`, without outputs; by name, in their order.
+///
+/// # Errors
+/// The log can not be read.
+pub(super) fn each(
+    run: &ReplayRequest,
+    log: &Log,
+    names: &[String],
+    drawing: Option<&Drawing<'_>>,
+    pool: &Pool,
+    watch: &mut dyn FnMut(&Position),
+) -> Result<Vec<Told>> {
+    let path = log.name();
+    let mut decoders = Decoders::of_run(&run.plan, &run.selection.decode);
+    let mut told: Vec<Option<Told>> = Vec::new();
+    let mut chosen: Vec<Chosen> = Vec::new();
+    for found in choose_each(run, path, log, names, &mut decoders) {
+        told.push(found.map_or_else(
+            |refused| Some(Err(refused.to_string())),
+            |found| {
+                chosen.push(found);
+                None
+            },
+        ));
+    }
+    let elsewhere = drawing.and_then(|d| d.reference).is_some();
+    let reference = match reference(run, path, log, &chosen, true) {
+        _ if elsewhere => None,
+        Ok(reference) => reference,
+        Err(refused) => {
+            let refused = refused.to_string();
+            let all = told
+                .into_iter()
+                .map(|told| told.unwrap_or_else(|| Err(refused.clone())));
+            return Ok(all.collect());
+        }
+    };
+
+    let prepared = prepare(run, log, &chosen, pool)?;
+    let mut topics = Vec::new();
+    let mut streams: Vec<Stream> = Vec::new();
+    let mut kept = Vec::new();
+    let mut open = told.iter_mut().filter(|told| told.is_none());
+    for (chosen, prepared) in chosen.into_iter().zip(prepared) {
+        let begun = prepared.and_then(|prepared| {
+            let (plan, found) = (&run.plan, chosen.found.clone());
+            let stream = labelled(chosen.stream.clone(), plan, &found.resolved, &prepared);
+            let mut topic = Topic::new(path, plan, found, prepared, run.against.is_some())?;
+            if plan.smooth {
+                topic.spool_beside(&run.targets);
+            }
+            Ok((topic, stream))
+        });
+        let slot = open.next();
+        match begun {
+            Ok((topic, stream)) => {
+                topics.push(topic);
+                streams.push(stream);
+                kept.push(chosen);
+            }
+            Err(refused) => {
+                if let Some(slot) = slot {
+                    *slot = Some(Err(refused.to_string()));
+                }
+            }
+        }
+    }
+    let besides = besides(run, path, log, &mut kept)?;
+    let together = topics.len();
+    for (topic, chosen) in topics.iter_mut().zip(&kept) {
+        if let Some(against) = &mut topic.against {
+            against.share_room(together);
+            let own = reference.as_ref().is_some_and(|r| r.is_of(chosen));
+            if let Some(reference) = reference.as_ref().filter(|_| !own) {
+                against.take_reference_from(&reference.resolved);
+            }
+        }
+        if let Some(drawing) = drawing {
+            draw(topic, drawing);
+        }
+    }
+    let provenance = Provenance::default();
+    let outlet = Outlet::open(
+        &[],
+        &[],
+        run.options,
+        &streams,
+        &provenance,
+        Delivery::default(),
+    )?;
+    let mut session = Session::new(topics, outlet);
+    let span = log.survey.times;
+    log.walk(
+        AHEAD,
+        pool,
+        |channel| route(&kept, reference.as_ref(), &besides, false, channel),
+        |items| {
+            let done = done(items, span);
+            let _ = session.consume(items.drain(..), pool)?;
+            watch(&session.position(done));
+            Ok(ControlFlow::Continue(()))
+        },
+    )?;
+    let mut summaries = summarise::topics(run, session.finish(pool)?).into_iter();
+    let mut next = || {
+        let summary = summaries.next().map(Box::new);
+        summary.ok_or_else(|| "the replay gave nothing".to_owned())
+    };
+    Ok(told
+        .into_iter()
+        .map(|told| told.unwrap_or_else(&mut next))
+        .collect())
+}
+
+fn draw(topic: &mut Topic, drawing: &Drawing<'_>) {
+    topic.history = Some(History::new(topic.prepared.clock, drawing.stretches));
+    topic.estimator.keep_innovations();
+    if let (Some(against), Some(track)) = (&mut topic.against, drawing.reference) {
+        against.take_reference_track(&track.entries);
+    }
+}

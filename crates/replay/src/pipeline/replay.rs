@@ -1,0 +1,232 @@
+//! A recorded log -> attitude, end to end. I/O.
+//!
+//! A file is read twice: once as far as is needed to know clock, bias, initial attitude and lines
+//! through stamps, then to integrate. A stream is read once; its first samples wait until these are known.
+
+use super::channel_choice::{Chosen, besides, choose, looked_at, reference, route};
+use super::channel_route::Item;
+use super::input::{Input, is_pipe};
+use super::log::{A_LITTLE_AHEAD, AHEAD, Log};
+use super::position::Position;
+use super::request::{ReplayRequest, Source, refused};
+use super::session::Found;
+use super::session_builder::{begin, labelled};
+use super::summarise;
+use super::{lines, replay_stream};
+use crate::error::Result;
+use crate::sink::{Flow, Stream};
+use crate::summary::RunSummary;
+use std::io::{BufReader, Read};
+use std::ops::ControlFlow;
+use std::time::Instant;
+use strapd_attitude::estimate::StampPass;
+use strapd_attitude::estimate::{Patience, Preparation, Prepared};
+use strapd_recording::format::{Format, head_of, open};
+use strapd_recording::mcap::Reader;
+use strapd_recording::pool::Pool;
+use strapd_recording::recognise;
+
+/// Does it. `watch` is told where it is, often.
+///
+/// # Errors
+/// Whatever kept it from being carried out. Bad samples and damaged files are no error: they are
+/// counted in the summary.
+pub fn run(
+    run: &ReplayRequest,
+    pool: &Pool,
+    watch: &mut dyn FnMut(&Position),
+) -> Result<RunSummary> {
+    let begun = Instant::now();
+    let mut summary = match &run.source {
+        Source::File(path) if is_pipe(path) => piped(run, open(path)?, pool, watch)?,
+        Source::File(path) => {
+            let input = Input::open(path)?;
+            // Of lines and rows who speaks is known when all are read, which only several sensors are worth.
+            let is_of_all = run.selection.topic.as_deref() == Some("all");
+            match input.format() {
+                Format::Lines | Format::Table if !is_of_all => {
+                    let text = || input.lines(&run.selection.decode);
+                    let stamps = lines::stamps(run, text()?)?;
+                    lines::replay(run, text()?, stamps, pool, watch)?
+                }
+                _ => file(run, &input, pool, watch)?,
+            }
+        }
+        Source::Stdin => piped(run, std::io::stdin(), pool, watch)?,
+    };
+    summary.elapsed_secs = begun.elapsed().as_secs_f64();
+    Ok(summary)
+}
+
+/// Standard input or a named pipe, told by the first bytes.
+fn piped(
+    run: &ReplayRequest,
+    input: impl Read + Send + 'static,
+    pool: &Pool,
+    watch: &mut dyn FnMut(&Position),
+) -> Result<RunSummary> {
+    let mut input = BufReader::with_capacity(1 << 16, input);
+    let head = head_of(&mut input).map_err(|source| strapd_recording::Error::Read {
+        path: run.source.name(),
+        offset: 0,
+        source,
+    })?;
+    if head.is_empty() {
+        return Err(strapd_recording::Error::Empty {
+            path: run.source.name(),
+        }
+        .into());
+    }
+    let known = Format::of_bytes(&head);
+    if let Some(format) = recognise::marked(&head, &[]).filter(|_| known.is_none()) {
+        let path = run.source.name();
+        return Err(strapd_recording::Error::NotRead { path, format }.into());
+    }
+    // What has no name and tells nothing may still be lines, of which the first is damaged.
+    let shape = || Format::of_shape(&head);
+    let format = known.or_else(shape).unwrap_or(Format::Lines);
+    let whole = std::io::Cursor::new(head).chain(input);
+    match format {
+        Format::Mcap | Format::Ulog | Format::Bag => {
+            lines::only_for_tables(&run.source.name(), format, &run.selection.decode)?;
+            let reader = Reader::from_stream(run.source.name(), Box::new(whole))?;
+            replay_stream::replay(run, reader, pool, watch)
+        }
+        Format::Lines | Format::Table => {
+            let text = lines::open(&run.source.name(), format, whole, &run.selection.decode)?;
+            lines::replay(run, text, None, pool, watch)
+        }
+    }
+}
+
+fn file(
+    run: &ReplayRequest,
+    input: &Input,
+    pool: &Pool,
+    watch: &mut dyn FnMut(&Position),
+) -> Result<RunSummary> {
+    let path = input.name();
+    let log = Log::told_apart(
+        input,
+        run.selection.topic.as_deref(),
+        &run.selection.decode,
+        pool,
+    )?;
+    let choice = log.choose(path, run.selection.topic.as_deref())?;
+    let mut chosen = choose(run, path, &log, &choice.topics)?;
+    if let (Some(note), Some(first)) = (choice.note, chosen.first_mut()) {
+        first.found.warnings.push(note);
+    }
+    let reference = reference(run, path, &log, &chosen, false)?;
+    let besides = besides(run, path, &log, &mut chosen)?;
+    let prepared = prepare(run, &log, &chosen, pool)?
+        .into_iter()
+        .collect::<Result<Vec<Prepared>>>()?;
+
+    let streams: Vec<Stream> = chosen
+        .iter()
+        .zip(&prepared)
+        .map(|(c, p)| labelled(c.stream.clone(), &run.plan, &c.found.resolved, p))
+        .collect();
+    let founds: Vec<Found> = chosen.iter().map(|c| c.found.clone()).collect();
+    let mut session = begin(run, path, founds, prepared, &streams)?;
+    if let (Some(reference), Some(topic)) = (&reference, session.topics.first_mut())
+        && let Some(against) = &mut topic.against
+    {
+        against.take_reference_from(&reference.resolved);
+    }
+    let span = log.survey.times;
+    if let Some((first, last)) = span {
+        session.length(last.saturating_sub(first) as f64 * 1e-9);
+    }
+    let total: u64 = log.survey.channels.iter().map(|c| c.messages).sum();
+    let survey = log.walk(
+        AHEAD,
+        pool,
+        |channel| {
+            let copied = run.copy_input;
+            route(&chosen, reference.as_ref(), &besides, copied, channel)
+        },
+        |items| {
+            let done = done(items, span);
+            let flow = session.consume(items.drain(..), pool)?;
+            if flow == Flow::Closed {
+                return Ok(ControlFlow::Break(()));
+            }
+            watch(&session.position(done.filter(|_| total > 0)));
+            Ok(ControlFlow::Continue(()))
+        },
+    )?;
+    Ok(summarise::run(run, session.finish(pool)?, &survey))
+}
+
+/// How much of a log of this span lies before the last of `items`.
+pub(super) fn done(items: &[Item], span: Option<(u64, u64)>) -> Option<f64> {
+    let (now, (first, last)) = items.last().and_then(log_time).zip(span)?;
+    Some(now.saturating_sub(first) as f64 / last.saturating_sub(first).max(1) as f64)
+}
+
+/// Reads as far as needed to know clock, bias and initial attitude of every topic, or why one is refused.
+pub(super) fn prepare(
+    run: &ReplayRequest,
+    log: &Log,
+    chosen: &[Chosen],
+    pool: &Pool,
+) -> Result<Vec<Result<Prepared>>> {
+    let mut preparations: Vec<Preparation> = chosen
+        .iter()
+        .map(|c| {
+            Preparation::new(&run.plan, &c.found.resolved, Patience::WholeLog).with_stamps(
+                StampPass::new(&run.plan, &c.found.resolved, run.other_kinds()),
+            )
+        })
+        .collect();
+    let mut failures: Vec<Option<String>> = chosen.iter().map(|_| None).collect();
+    log.walk(
+        A_LITTLE_AHEAD,
+        pool,
+        |channel| looked_at(chosen, channel),
+        |items| {
+            for item in items.drain(..) {
+                let Item::Sample(stream, raw) = item else {
+                    continue;
+                };
+                if let (Some(preparation), Some(failure @ None)) =
+                    (preparations.get_mut(stream), failures.get_mut(stream))
+                {
+                    *failure = preparation.take(&raw).err();
+                }
+            }
+            let mut open = preparations.iter().zip(&failures);
+            Ok(
+                if open.any(|(preparation, failure)| failure.is_none() && preparation.wants_more())
+                {
+                    ControlFlow::Continue(())
+                } else {
+                    ControlFlow::Break(())
+                },
+            )
+        },
+    )?;
+    let name = |stream: usize| chosen.get(stream).map_or("", |c| c.found.name.as_str());
+    Ok(preparations
+        .into_iter()
+        .zip(failures)
+        .enumerate()
+        .map(|(stream, (preparation, failure))| {
+            failure
+                .map_or_else(|| preparation.decide(), Err)
+                .map_err(|what| refused(log.name(), name(stream), what))
+        })
+        .collect())
+}
+
+fn log_time(item: &Item) -> Option<u64> {
+    match item {
+        Item::Sample(_, raw) | Item::Reference(raw) | Item::Beside(raw) => {
+            u64::try_from(raw.log.0).ok()
+        }
+        Item::Undecodable(_, why) => u64::try_from(why.0.0).ok(),
+        Item::Copy(message) => Some(message.log_time),
+    }
+}

@@ -1,0 +1,332 @@
+//! An MCAP that can be read only once -> attitude. I/O.
+//!
+//! Nothing is known before it comes: the first IMU topic is taken, and its first samples wait until
+//! clock, bias and initial attitude are known.
+
+use super::beside;
+use super::channel_choice::which_stamp;
+use super::channel_route::{Item, Noticed, Route, Taker};
+use super::decoders::Decoders;
+use super::held::Held;
+use super::log::{LogChannel, described, explained, known, problems, rank};
+use super::position::Position;
+use super::replay_start::Waiting;
+use super::request::ReplayRequest;
+use super::session::Found;
+use super::sources::publisher;
+use super::summarise;
+use super::topics::{self, PICKED_UNNAMED};
+use crate::config::TopicBeside;
+use crate::error::{Error, Result};
+use crate::sink::{Flow, Stream, output_topic};
+use crate::summary::RunSummary;
+use std::collections::BTreeSet;
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::sync::Arc;
+use strapd_attitude::estimate::{Aid, Meaning};
+use strapd_recording::decode::{Decoder, Unsupported, Wanted};
+use strapd_recording::mcap::{self, Channel, Reader, Survey, WalkOptions};
+use strapd_recording::pool::Pool;
+
+/// An MCAP that can be read only once.
+pub(super) fn replay(
+    run: &ReplayRequest,
+    reader: Reader,
+    pool: &Pool,
+    watch: &mut dyn FnMut(&Position),
+) -> Result<RunSummary> {
+    let path = run.source.name();
+    let mut waiting = Waiting::new(run, &path, None);
+    let mut failure = None;
+    let picked = std::cell::RefCell::new(Picked {
+        decoders: Decoders::of_run(&run.plan, &run.selection.decode),
+        ..Picked::default()
+    });
+    let report = mcap::walk(
+        reader,
+        // On this thread: what is learnt from a first message must not depend on who was faster.
+        // And nothing waits for a batch: the stream may pause.
+        &WalkOptions {
+            batch: 1,
+            ..WalkOptions::default()
+        },
+        |channel| picked.borrow_mut().route(run, channel),
+        Route::map,
+        |items| {
+            let fed = picked.borrow_mut().feed(run, &path, items);
+            let step = fed
+                .and_then(|()| waiting.meet(&mut picked.borrow_mut().found))
+                .and_then(|()| picked.borrow().is_one_body(&path))
+                .and_then(|()| waiting.consume(items.drain(..), pool));
+            match step {
+                Ok(Flow::Continue) => {
+                    watch(&waiting.position());
+                    ControlFlow::Continue(())
+                }
+                Ok(Flow::Closed) => ControlFlow::Break(()),
+                Err(e) => {
+                    failure = Some(e);
+                    ControlFlow::Break(())
+                }
+            }
+        },
+    )?;
+    if let Some(e) = failure {
+        return Err(e);
+    }
+    let mut picked = picked.into_inner();
+    let mut last = Vec::new();
+    picked.release(run, &path, &mut last)?;
+    waiting.meet(&mut picked.found)?;
+    if !last.is_empty() {
+        let _ = waiting.consume(last.drain(..), pool)?;
+    }
+    if waiting.is_idle() {
+        return Err(picked.nothing(run, &path, &report.survey));
+    }
+    let session = waiting.into_session(pool)?;
+    let mut summary = summarise::run(run, session.finish(pool)?, &report.survey);
+    if let Some(topic) = summary.topics.first_mut() {
+        topic.warnings.extend(picked.passed_over());
+    }
+    Ok(summary)
+}
+
+/// The first IMU of a stream.
+#[derive(Default)]
+struct Picked {
+    topic: Option<String>,
+    publisher: String,
+    noticed: Arc<Noticed>,
+    /// Channels of the topic so far.
+    channels: usize,
+    found: Option<(Found, Stream)>,
+    /// Whether there is or was such a find.
+    is_met: bool,
+    /// Channels of the topic whose first messages tell how to read them.
+    held: Vec<Held>,
+    others: BTreeSet<String>,
+    /// Where the magnetic field comes from, where no flag says it.
+    field_topic: Option<String>,
+    refusals: Vec<String>,
+    /// Decoders with the run's options, and with none.
+    decoders: Decoders,
+    plain: Decoders,
+}
+
+impl Picked {
+    fn route(&mut self, run: &ReplayRequest, channel: &Arc<Channel>) -> Option<Route> {
+        let copied = run.copy_input.then(|| channel.clone());
+        let beside = self.beside(run, channel);
+        let found = known(channel, 0, None, &mut self.plain);
+        let named = run.selection.topic.as_deref().filter(|t| *t != "all");
+        let wanted = match (&self.topic, named) {
+            (Some(topic), _) => {
+                let is_same = *topic == channel.topic;
+                if is_same && publisher(channel) != self.publisher {
+                    let other = format!("{topic} published by `{}`", publisher(channel));
+                    self.others.insert(other);
+                    return Route::other(beside, copied);
+                }
+                is_same
+            }
+            (None, Some(name)) => name == channel.topic,
+            // A twist that may be a body rate is taken only when nothing better is there, and what
+            // is still to come nobody knows.
+            (None, None) => rank(&found.role) > PICKED_UNNAMED,
+        };
+        if !wanted {
+            if rank(&found.role) >= PICKED_UNNAMED {
+                self.others.insert(channel.topic.clone());
+            }
+            return Route::other(beside, copied);
+        }
+        match self.decoders.of(channel) {
+            Ok(decoder) => {
+                if self.topic.is_none() {
+                    self.topic = Some(channel.topic.clone());
+                    self.publisher = publisher(channel);
+                }
+                let taker = Taker {
+                    stream: 0,
+                    noticed: self.noticed.clone(),
+                };
+                self.channels += 1;
+                if decoder.has_bare_stamps() {
+                    let held = Held::new(channel, decoder, taker, self.channels, copied);
+                    let route = held.route();
+                    self.held.push(held);
+                    return Some(route);
+                }
+                self.meet(run, channel, &decoder);
+                Some(
+                    Route::to(decoder, vec![taker])
+                        .taking_turns(self.channels)
+                        .beside(beside)
+                        .copying(copied),
+                )
+            }
+            Err(why) => {
+                self.refusals.push(why.to_string());
+                Route::other(beside, copied)
+            }
+        }
+    }
+
+    /// What is read of a channel beside the samples: of the topics named, or of the first with a field.
+    fn beside(&mut self, run: &ReplayRequest, channel: &Arc<Channel>) -> Option<Decoder> {
+        let of = |wanted, beside: Option<&TopicBeside>| {
+            let options = beside::options(wanted, beside);
+            Decoders::of_run(&run.plan, &options).of(channel)
+        };
+        let named = [
+            (Wanted::Forces, &run.selection.accel),
+            (Wanted::Fields, &run.selection.mag),
+        ];
+        for (wanted, beside) in named {
+            if let Some(beside) = beside.as_ref().filter(|b| b.topic == channel.topic) {
+                return of(wanted, Some(beside))
+                    .map_err(|why| self.refusals.push(why.to_string()))
+                    .ok();
+            }
+        }
+        let is_open = run.plan.aid == Aid::GravityAndField && run.selection.mag.is_none();
+        // JSON says what it holds only in its messages, which are still to come.
+        if !is_open || channel.message_encoding == "json" || !beside::may_be_field(channel) {
+            return None;
+        }
+        let topic = self.field_topic.as_ref();
+        if topic.is_some_and(|topic| *topic != channel.topic) {
+            return None;
+        }
+        let decoder = of(Wanted::Fields, None).ok()?;
+        let has_rate = self.decoders.of(channel).is_ok_and(|d| d.stated().has_gyro);
+        self.field_topic = Some(channel.topic.clone());
+        // Of the samples' own messages it comes with them.
+        (!has_rate).then_some(decoder)
+    }
+
+    /// How the topic is read is known: by the decoder of its first channel.
+    fn meet(&mut self, run: &ReplayRequest, channel: &Channel, decoder: &Decoder) {
+        if std::mem::replace(&mut self.is_met, true) {
+            return;
+        }
+        self.found = Some((
+            Found {
+                name: channel.topic.clone(),
+                output_topic: output_topic(&channel.topic, &BTreeSet::new()),
+                described: described(channel),
+                resolved: Meaning::new(&run.plan, &decoder.stated().declared),
+                noticed: self.noticed.clone(),
+                warnings: which_stamp(decoder).into_iter().collect(),
+            },
+            Stream::new(&channel.topic, ""),
+        ));
+    }
+
+    /// Hands messages of channels whose first ones wait to these, and takes what comes of it.
+    fn feed(&mut self, run: &ReplayRequest, path: &Path, items: &mut Vec<Item>) -> Result<()> {
+        if self.held.is_empty() {
+            return Ok(());
+        }
+        for item in std::mem::take(items) {
+            let place = match &item {
+                Item::Copy(copied) => self.held.iter().position(|held| held.is_of(copied)),
+                _ => None,
+            };
+            match (item, place.and_then(|place| self.held.get_mut(place))) {
+                (Item::Copy(copied), Some(held)) => {
+                    let was_waiting = held.is_waiting();
+                    held.take(*copied, &self.decoders, items)
+                        .map_err(|why| unsupported(path, &why))?;
+                    if was_waiting && !held.is_waiting() {
+                        let (channel, decoder) = held.known();
+                        self.meet(run, &channel, &decoder);
+                    }
+                }
+                (item, _) => items.push(item),
+            }
+        }
+        Ok(())
+    }
+
+    /// The stream has ended: nothing waits any longer.
+    fn release(&mut self, run: &ReplayRequest, path: &Path, items: &mut Vec<Item>) -> Result<()> {
+        for mut held in std::mem::take(&mut self.held) {
+            if held.is_waiting() {
+                held.release(&self.decoders, items)
+                    .map_err(|why| unsupported(path, &why))?;
+                let (channel, decoder) = held.known();
+                self.meet(run, &channel, &decoder);
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether the topic's channels so far are one publisher's.
+    fn is_one_body(&self, path: &Path) -> Result<()> {
+        if self.channels > 1 && self.noticed.are_several() {
+            return Err(Error::Topic {
+                path: path.to_owned(),
+                topic: self.topic.clone().unwrap_or_default(),
+                what: format!(
+                    "{} channels of this topic take turns: two publishers, and they must not be mixed
+  help: save it to a file, where --topic tells them apart",
+                    self.channels
+                ),
+            });
+        }
+        Ok(())
+    }
+
+    /// Why nothing was picked.
+    fn nothing(self, run: &ReplayRequest, path: &Path, survey: &Survey) -> Error {
+        if let Some(what) = self.refusals.into_iter().next() {
+            return Error::Unsupported {
+                path: path.to_owned(),
+                what,
+            };
+        }
+        let mut decoders = Decoders::default();
+        let channels: Vec<LogChannel> = survey
+            .channels
+            .iter()
+            .map(|c| known(&c.channel, c.messages, None, &mut decoders))
+            .collect();
+        let candidates: Vec<_> = channels.iter().map(LogChannel::candidate).collect();
+        let error = match topics::choose(path, &candidates, run.selection.topic.as_deref()) {
+            Err(e) => e,
+            Ok(choice) => Error::Unsupported {
+                path: path.to_owned(),
+                what: format!(
+                    "no IMU topic; {} may carry a body rate, but is not taken unnamed from a stream, where a better one could still come\n  help: --topic NAME",
+                    choice.topics.join(", ")
+                ),
+            },
+        };
+        explained(error, &channels, &problems(survey))
+    }
+
+    fn passed_over(&self) -> Option<String> {
+        let names: Vec<&str> = self
+            .others
+            .iter()
+            .filter(|t| Some(*t) != self.topic.as_ref())
+            .map(String::as_str)
+            .collect();
+        (!names.is_empty()).then(|| {
+            format!(
+                "the first IMU topic was taken; also there: {} (--topic)",
+                names.join(", ")
+            )
+        })
+    }
+}
+
+fn unsupported(path: &Path, why: &Unsupported) -> Error {
+    Error::Unsupported {
+        path: path.to_owned(),
+        what: why.to_string(),
+    }
+}

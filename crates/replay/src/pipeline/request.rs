@@ -1,0 +1,102 @@
+//! What a replay is: from where, to where, how. Pure.
+
+use super::audience::Audience;
+use crate::config::Selection;
+use crate::error::Error;
+use crate::sink::{self, Target};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use strapd_attitude::estimate::Plan;
+
+/// A replay to be done.
+#[derive(Clone, Debug)]
+pub struct ReplayRequest {
+    /// From where.
+    pub source: Source,
+    /// To where.
+    pub targets: Vec<Target>,
+    /// Which of them.
+    pub selection: Selection,
+    /// How samples are understood and integrated.
+    pub plan: Plan,
+    /// How outputs are made.
+    pub options: sink::Options,
+    /// Whether every message of the input is copied to MCAP outputs.
+    pub copy_input: bool,
+    /// `--out-rate`, Hz.
+    pub out_rate: Option<f64>,
+    /// `--speed`; `None` = as fast as possible.
+    pub speed: Option<f64>,
+    /// Who serves it to whoever connects, where a target listens.
+    pub audience: Option<Arc<dyn Audience>>,
+    /// `--against-recorded`: the reference's topic, empty = found.
+    pub against: Option<String>,
+    /// The command as typed, for the output's metadata.
+    pub command: String,
+}
+
+impl ReplayRequest {
+    /// A replay of `source` into nothing, every setting at its default.
+    #[must_use]
+    pub fn new(source: Source) -> ReplayRequest {
+        ReplayRequest {
+            source,
+            targets: Vec::new(),
+            selection: Selection::default(),
+            plan: Plan::default(),
+            options: sink::Options::default(),
+            copy_input: false,
+            out_rate: None,
+            speed: None,
+            audience: None,
+            against: None,
+            command: String::new(),
+        }
+    }
+
+    /// What else samples are taken for, to compare.
+    pub(super) fn other_kinds(&self) -> impl Iterator<Item = strapd_attitude::record::SampleKind> {
+        self.against
+            .iter()
+            .flat_map(|_| super::sample_kinds::kinds())
+    }
+}
+
+/// Where a run's data comes from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// A file: an MCAP, or NDJSON by its extension.
+    File(PathBuf),
+    /// Standard input: MCAP or NDJSON, told apart by the first bytes.
+    Stdin,
+}
+
+impl Source {
+    /// `-` or a path.
+    #[must_use]
+    pub fn parse(text: &str) -> Source {
+        if text == "-" {
+            Source::Stdin
+        } else {
+            Source::File(PathBuf::from(text))
+        }
+    }
+
+    /// For messages.
+    #[must_use]
+    pub fn name(&self) -> PathBuf {
+        match self {
+            Source::File(path) => path.clone(),
+            Source::Stdin => PathBuf::from("standard input"),
+        }
+    }
+}
+
+/// A topic that can not be run, in the words of the stage that refused it.
+pub(super) fn refused(path: &Path, topic: &str, what: String) -> Error {
+    Error::Topic {
+        path: path.to_owned(),
+        topic: topic.to_owned(),
+        what,
+    }
+}

@@ -1,0 +1,386 @@
+//! What the stages counted -> the summary of the run. Pure.
+
+use super::delivery::broken;
+use super::request::{ReplayRequest, Source};
+use super::session::{Ended, Topic};
+use crate::findings::orientation;
+use crate::summary::aid::Aided;
+use crate::summary::calibration;
+use crate::summary::series::Drawn;
+use crate::summary::sigma::SigmaTerms;
+use crate::summary::smoothing::Smoothing;
+use crate::summary::stamps::{Regularised, Segment};
+use crate::summary::{Gaps, RunSummary, TopicSummary, significant};
+use std::sync::atomic::Ordering;
+use strapd_attitude::condition::regularise;
+use strapd_attitude::estimate::{SensorCalibration, learned};
+use strapd_attitude::propagate::Method;
+use strapd_attitude::quaternion::Quaternion;
+use strapd_attitude::record::{Nanos, SampleKind, Verdict};
+use strapd_recording::format::Format;
+use strapd_recording::mcap::Survey;
+
+/// Above this a rate is probably not in rad/s: 200 rad/s is 11,500 deg/s, five times what most gyros
+/// can measure.
+const UNLIKELY_RATE: f64 = 200.0;
+
+/// The summary of a run.
+#[must_use]
+pub fn run(run: &ReplayRequest, ended: Ended, survey: &Survey) -> RunSummary {
+    let Ended {
+        mut topics,
+        outputs,
+    } = ended;
+    RunSummary {
+        source: run.source.name().display().to_string(),
+        topics: topics
+            .iter_mut()
+            .map(|topic| of_topic(run, topic))
+            .collect(),
+        broken: broken(&outputs),
+        reader_gone: !outputs.is_empty() && outputs.iter().all(|(_, written)| written.closed),
+        outputs: outputs
+            .into_iter()
+            .map(|(name, written)| (name, written.bytes, written.messages))
+            .collect(),
+        calibration: None,
+        served: run
+            .targets
+            .iter()
+            .filter_map(|target| Some(target.listens()?.to_string()))
+            .collect(),
+        file_problems: super::log::problems(survey),
+        file_losses: survey.problems.losses(),
+        elapsed_secs: 0.0,
+    }
+}
+
+/// What became of each topic of a run without outputs.
+pub(super) fn topics(run: &ReplayRequest, ended: Ended) -> Vec<TopicSummary> {
+    let mut topics = ended.topics;
+    topics
+        .iter_mut()
+        .map(|topic| of_topic(run, topic))
+        .collect()
+}
+
+fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
+    let drawn = drawn(topic);
+    let conditioning = topic.estimator.conditioning();
+    let propagation = topic.estimator.propagation();
+    let (world, body) = topic.resolved.labels(topic.prepared.world);
+    let last = topic.output.last;
+    let q = last.map_or_else(Quaternion::identity, |s| s.q_nb);
+    let angles = q.yaw_pitch_roll();
+    let gaps = &conditioning.gaps;
+    let longest = gaps
+        .kept
+        .iter()
+        .find(|g| g.length_nanos == gaps.longest_nanos);
+    let first = conditioning.first.unwrap_or_default();
+    let recording = topic.estimator.smoothed().and_then(Result::ok);
+    let smoothed = topic.estimator.smoothed().map(|result| {
+        let result = result.map(Smoothing::of);
+        result.map_err(str::to_owned)
+    });
+    let mut summary = TopicSummary {
+        topic: topic.name.clone(),
+        output_topic: topic.output_topic.clone(),
+        decoded_as: topic.described.clone(),
+        counts: conditioning.counts,
+        left_out: topic.noticed.left_out().iter().map(|(_, n)| n).sum(),
+        first_losses: first_losses(topic, first),
+        written: topic.output.count,
+        duration_secs: conditioning.last.map_or(0.0, |last| last.secs_since(first)),
+        rate_hz: conditioning
+            .spacing_nanos
+            .filter(|n| *n > 0)
+            .map(|n| 1e9 / n as f64),
+        clock: topic.prepared.clock.name().to_owned(),
+        stamps: topic
+            .estimator
+            .regularising()
+            .map(|(causal, report)| regularised(causal, &report, first)),
+        kind: match recording {
+            Some(recording) if recording.is_taken_as_mean => SampleKind::Average,
+            _ => topic.resolved.kind,
+        },
+        method: match &smoothed {
+            Some(Ok(smoothing)) => smoothing.method().to_owned(),
+            _ => method_words(topic),
+        },
+        body,
+        world,
+        initial: topic.prepared.initial_origin.clone(),
+        latitude_deg: run.plan.latitude_deg,
+        bias: topic.prepared.bias.into(),
+        bias_origin: topic.prepared.bias_origin.clone(),
+        aided: topic.estimator.filter().map(Aided::of),
+        smoothed,
+        calibration: calibrated(run, topic),
+        noise: run.plan.noise.name.clone(),
+        sigma_terms: recording.is_none().then(|| {
+            SigmaTerms::of(
+                &run.plan,
+                &topic.prepared,
+                gaps.count.saturating_sub(gaps.not_bridged),
+            )
+        }),
+        drift: drift(run, topic, propagation.integrated_secs),
+        // Of what runs along with a smoother it would be another attitude's.
+        integration_error: propagation
+            .integration_error
+            .filter(|_| recording.is_none()),
+        input_axes: topic.resolved.body.to_string(),
+        gaps: Gaps {
+            bridged: gaps.count.saturating_sub(gaps.not_bridged),
+            held: propagation.holds,
+            resets: propagation.resets,
+            total_secs: gaps.total_nanos as f64 * 1e-9,
+            held_secs: gaps.not_bridged_nanos.0 as f64 * 1e-9,
+            longest_held_secs: gaps.not_bridged_nanos.1 as f64 * 1e-9,
+            longest_secs: gaps.longest_nanos as f64 * 1e-9,
+            longest_at_secs: longest.map_or(0.0, |g| g.start.secs_since(first)),
+        },
+        turned: propagation.angle_turned,
+        largest_step: propagation.largest_step,
+        undersampled: propagation.undersampled,
+        final_wxyz: q.wxyz(),
+        final_ypr: [angles.yaw, angles.pitch, angles.roll],
+        final_sigma: last.map_or([0.0; 3], |s| s.covariance.sigma().into()),
+        against: topic
+            .against
+            .as_ref()
+            .map(super::sample_kinds::AgainstRecorded::rows)
+            .unwrap_or_default(),
+        recorded: topic
+            .against
+            .as_ref()
+            .and_then(super::sample_kinds::AgainstRecorded::recorded),
+        warnings: topic.prepared.warnings.clone(),
+        drawn,
+    };
+    summary.warnings.extend(topic.warnings.iter().cloned());
+    summary.warnings.extend(warnings(topic, &summary));
+    summary.warnings.extend(orientation::warnings(&summary));
+    summary
+}
+
+/// What is known of the sensor at the end.
+fn calibrated(run: &ReplayRequest, topic: &Topic) -> SensorCalibration {
+    let filter = topic.estimator.filter();
+    let recording = topic.estimator.smoothed().and_then(Result::ok);
+    let of = (&run.plan, &topic.resolved, &topic.prepared);
+    let known = learned(of, filter, recording);
+    let source = match &run.source {
+        Source::File(path) => path.file_name().unwrap_or_default().to_string_lossy(),
+        Source::Stdin => "standard input".into(),
+    };
+    calibration::described(known, &topic.name, &source, topic.output.last.as_ref())
+}
+
+/// What was kept to be drawn, with the errors against the reference.
+fn drawn(topic: &mut Topic) -> Option<Box<Drawn>> {
+    let mut drawn = topic.history.take()?.finish();
+    if let Some(against) = &topic.against {
+        let elapsed = &drawn.elapsed;
+        let errors = against.errors(drawn.stretches, topic.resolved.kind, |stamp| {
+            elapsed.at(stamp)
+        });
+        drawn.errors = Some(errors);
+    }
+    Some(Box::new(drawn))
+}
+
+/// What is not known of the bias at the end, about the worst axis, rad/s: what was not known at the start,
+/// and what it has wandered since.
+fn drift(run: &ReplayRequest, topic: &Topic, secs: f64) -> f64 {
+    topic
+        .prepared
+        .bias_sigma
+        .iter()
+        .zip(run.plan.noise.rrw)
+        .map(|(bias, rrw)| bias.hypot(rrw * secs.sqrt()))
+        .fold(0.0, f64::max)
+}
+
+fn regularised(causal: bool, report: &regularise::Report, first: Nanos) -> Regularised {
+    Regularised {
+        causal,
+        segments: report.segments,
+        kept: report
+            .kept
+            .iter()
+            .map(|s| Segment {
+                from_secs: s.start.secs_since(first),
+                samples: s.samples,
+                rate_hz: s.rate_hz,
+            })
+            .collect(),
+        rms_nanos: report.rms_nanos,
+        p99_nanos: report.p99_nanos,
+        max_nanos: report.max_nanos,
+        jitter: report.jitter,
+        ambiguous: report.ambiguous,
+        uneven: report.is_uneven(),
+    }
+}
+
+/// The method, `auto` with what it stands for.
+fn method_words(topic: &Topic) -> String {
+    match (topic.estimator.method(), topic.resolved.kind) {
+        (Method::Auto, SampleKind::Rate) => "auto: centred window of 16 samples, exact".to_owned(),
+        (Method::Auto, _) => "auto: centred window of 15 increments, exact".to_owned(),
+        (other, _) => other.to_string(),
+    }
+}
+
+fn first_losses(topic: &Topic, start: Nanos) -> Vec<String> {
+    let report = topic.estimator.conditioning();
+    let mut said: Vec<String> = Verdict::ALL
+        .iter()
+        .filter(|v| v.is_loss() && **v != Verdict::Undecodable)
+        .filter_map(|v| report.first_bad(*v).map(|bad| (v, bad)))
+        .map(|(verdict, bad)| {
+            let at = bad
+                .stamp
+                // A stamp that is none says nothing about when.
+                .filter(|_| *verdict != Verdict::NoStamp)
+                .map_or_else(String::new, |s| format!(" at {:.6} s", s.secs_since(start)));
+            format!(
+                "first {}: sample {}{at}",
+                verdict.name().replace('_', " "),
+                bad.index
+            )
+        })
+        .collect();
+    if let Some((log, why)) = &topic.first_undecodable {
+        said.push(if is_text(&topic.described) {
+            format!("first undecodable, line {}: {why}", log.0)
+        } else {
+            format!("first undecodable, logged at {} ns: {why}", log.0)
+        });
+    }
+    said
+}
+
+/// Whether it was read from lines or rows: their undecodable payloads carry the line's number where others carry a time.
+fn is_text(described: &str) -> bool {
+    [Format::Lines, Format::Table]
+        .iter()
+        .map(|format| format.name())
+        .any(|name| described == name || described.ends_with(&format!("[{name}]")))
+}
+
+fn warnings(topic: &Topic, summary: &TopicSummary) -> Vec<String> {
+    let mut said = Vec::new();
+    if summary.counts.used() == 0 {
+        said.push(nothing_used(summary));
+    }
+    if topic.output.largest_rate > UNLIKELY_RATE {
+        said.push(format!(
+            "the largest rate is {} rad/s, more than gyros measure: is it in deg/s? --gyro-unit deg",
+            significant(topic.output.largest_rate, 4)
+        ));
+    }
+    if summary.undersampled > 0 {
+        said.push(format!(
+            "{} steps turn more than half a turn: the samples are too few for the motion, or the unit is wrong (--gyro-unit)",
+            summary.undersampled
+        ));
+    }
+    let marked = topic.noticed.gyro_marked_absent.load(Ordering::Relaxed);
+    if marked > 0 {
+        said.push(format!(
+            "{marked} samples mark their gyro as absent (covariance -1), which some drivers do wrongly: --ignore-covariance-flag uses it all the same"
+        ));
+    }
+    match (summary.smoothing(), &summary.aided) {
+        (Some(smoothing), _) => said.extend(smoothing.doubts(&summary.noise)),
+        (None, Some(aided)) => {
+            said.extend(summary.not_smoothed().map(|why| format!("--smooth: {why}")));
+            said.extend(aided.doubt(&summary.noise));
+        }
+        (None, None) => {}
+    }
+    if topic.zeros.count > 0 {
+        said.push(format!(
+            "{} samples are exactly zero about all axes between others that are not: a driver that has no data says so this way; they are integrated as rest",
+            topic.zeros.count
+        ));
+    }
+    let carried = topic.noticed.stamps_carried.load(Ordering::Relaxed);
+    if carried > 0 {
+        said.push(format!(
+            "{carried} stamps had a second or more of nanoseconds, carried over"
+        ));
+    }
+    for (frame, n) in topic.noticed.left_out() {
+        let (name, _) = topic.name.split_once('@').unwrap_or((&topic.name, ""));
+        said.push(format!(
+            "{n} messages name the frame `{frame}`, another body's, and were left out: --topic {name}@{frame} takes them"
+        ));
+    }
+    let restamped = summary.counts.get(Verdict::Restamped);
+    if let Some(step) = topic.estimator.conditioning().coarse_nanos {
+        let clock = &summary.clock;
+        let other = if clock == "log" { "header" } else { "log" };
+        said.push(format!(
+            "the {clock} stamps count in steps of {} s, {:.1} samples in each: these were spread over it evenly ({restamped} of them), so a stamp is good to a part of that step; --time {other} may be finer",
+            significant(step as f64 * 1e-9, 3),
+            summary.rate_hz.unwrap_or(0.0) * step as f64 * 1e-9
+        ));
+    } else if restamped > 0 {
+        said.push(format!(
+            "{restamped} samples shared their stamp with another and were given one of their own between their neighbours"
+        ));
+    }
+    if summary.stamps.as_ref().is_some_and(|stamps| stamps.uneven) {
+        said.push("--regularise-stamps: there was no constant rate in this stream: leave it out, or --time index --rate-hz HZ".to_owned());
+    }
+    if topic.estimator.conditioning().saturated > 0 {
+        said.push(format!(
+            "{} samples reach the gyro's range (--gyro-range): the true rate was higher",
+            topic.estimator.conditioning().saturated
+        ));
+    }
+    if let Some(against) = &topic.against
+        && summary.against.is_empty()
+    {
+        said.push(match against.references() {
+            0 => "--against-recorded: the log holds no orientation to compare with (name its topic: --against-recorded=TOPIC)".to_owned(),
+            n => format!("--against-recorded: no two of the {n} recorded orientations are 1 s apart"),
+        });
+    }
+    if let Some(advice) = kind_advice(topic, &summary.against) {
+        said.push(advice);
+    }
+    said
+}
+
+/// Why a run gave no attitude at all.
+fn nothing_used(summary: &TopicSummary) -> String {
+    let total = summary.counts.total();
+    let trimmed = summary.counts.get(Verdict::Trimmed);
+    if total == 0 {
+        "no sample was used: the topic has no messages".to_owned()
+    } else if trimmed == total {
+        format!("no sample was used: all {total} lie outside --start, --until")
+    } else {
+        format!("no sample was used: all {total} were turned away (see lost)")
+    }
+}
+
+/// Which meaning of a sample fits this log, when it is not the one used and clearly better.
+fn kind_advice(topic: &Topic, rows: &[crate::summary::Against]) -> Option<String> {
+    const CLEARLY: f64 = 0.95;
+    let used = rows.iter().find(|r| r.kind == topic.resolved.kind.name())?;
+    let best = rows
+        .iter()
+        .min_by(|a, b| a.median_deg.total_cmp(&b.median_deg))?;
+    (best.median_deg < CLEARLY * used.median_deg).then(|| match best.kind {
+        "held" => "samples fit best as held over the interval after their stamp: --method dcm-left"
+            .to_owned(),
+        kind => format!("samples fit best as {kind}: --sample-kind {kind}"),
+    })
+}

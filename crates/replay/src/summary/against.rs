@@ -1,0 +1,149 @@
+//! What a recorded orientation says of sigma and of the gyro's bias -> words, JSON. Pure.
+//!
+//! Apart from the summary because `compare`, `check` and the page say the same.
+
+use super::{Recorded, significant};
+use serde_json::{Value, json};
+use strapd_attitude::compare::{Align, BiasFit, Consistency, WithinSigma};
+
+/// A share in percent: never 100 where one is outside.
+fn percent(share: f64) -> String {
+    let floor = (share * 1000.0).floor() / 10.0;
+    format!("{floor}")
+}
+
+fn deg(radians: f64) -> String {
+    significant(radians.to_degrees(), 2)
+}
+
+/// Which share lies within three sigma, in one line.
+#[must_use]
+pub fn within_sigma(found: &Consistency) -> String {
+    let part = |name: &str, part: &WithinSigma| {
+        format!(
+            "{name} {} % (rms {} deg, sigma {})",
+            percent(part.inside),
+            deg(part.rms),
+            deg(part.sigma)
+        )
+    };
+    let leaning = found.leaning.map_or_else(String::new, |lean| {
+        format!(
+            "; its vertical leans by {} deg, which was taken out",
+            deg(lean)
+        )
+    });
+    format!(
+        "within 3 sigma: {}, {}; world aligned: {}{leaning}; {} deg noise of the reference counted",
+        part("tilt", &found.tilt),
+        part("heading", &found.heading),
+        found.align,
+        deg(found.reference_noise)
+    )
+}
+
+/// The same where less lies there than sigma promises; `None` where it holds.
+#[must_use]
+pub fn beyond_sigma(found: &Consistency) -> Option<String> {
+    found.is_beyond().then(|| {
+        let part = |name: &str, part: &WithinSigma| {
+            format!(
+                "{} % of the errors of {name} (rms {} deg under a sigma of {}, at worst {} sigma)",
+                percent(part.inside),
+                deg(part.rms),
+                deg(part.sigma),
+                significant(part.worst, 2)
+            )
+        };
+        format!(
+            "the error is beyond 3 sigma: within are {} and {}",
+            part("tilt", &found.tilt),
+            part("heading", &found.heading)
+        )
+    })
+}
+
+/// What the bias does, in words: "the gyro" (`who`) leaves "the recorded orientation" (`whom`).
+#[must_use]
+pub fn bias_words(fit: &BiasFit, who: &str, whom: &str) -> String {
+    let per_hour = |v: f64| significant(v.to_degrees() * 3600.0, 3);
+    let [before, after] = fit.over_long.map(deg);
+    format!(
+        "{who} leaves {whom} by a constant bias of {} deg/h (+- {}): {before} deg over {} s, {after} without it",
+        per_hour(fit.bias.norm()),
+        per_hour(fit.sigma.norm()),
+        significant(fit.long_secs, 2)
+    )
+}
+
+/// The flag that removes it, beside what was removed already.
+#[must_use]
+pub fn bias_flag(fit: &BiasFit, removed: [f64; 3]) -> String {
+    let all = nalgebra::Vector3::from(removed) + fit.bias;
+    // A millionth of a rad/s is 0.2 deg/h; none is minus nothing.
+    let [x, y, z]: [f64; 3] = all.map(|v| (v * 1e6).round() / 1e6 + 0.0).into();
+    format!("--bias {x:.6},{y:.6},{z:.6}")
+}
+
+/// For machines.
+#[must_use]
+pub fn consistency_json(found: &Consistency) -> Value {
+    let part = |part: &WithinSigma| {
+        json!({
+            "within_3_sigma": part.inside,
+            "rms_deg": part.rms.to_degrees(),
+            "sigma_rms_deg": part.sigma.to_degrees(),
+            "worst_in_sigma": part.worst,
+        })
+    };
+    json!({
+        "samples": found.samples,
+        "tilt": part(&found.tilt),
+        "heading": part(&found.heading),
+        "beyond_3_sigma": found.is_beyond(),
+        "align": found.align.name(),
+        "leaning_deg": found.leaning.map(f64::to_degrees),
+        "reference_noise_deg": found.reference_noise.to_degrees(),
+    })
+}
+
+/// For machines.
+#[must_use]
+pub fn bias_json(fit: &BiasFit) -> Value {
+    let vector = |v: &nalgebra::Vector3<f64>| json!({ "x": v.x, "y": v.y, "z": v.z });
+    json!({
+        "bias_rad_s": vector(&fit.bias),
+        "sigma_rad_s": vector(&fit.sigma),
+        "windows": fit.windows,
+        "over_1s_deg": fit.over_1s.map(f64::to_degrees),
+        "long_s": fit.long_secs,
+        "over_long_deg": fit.over_long.map(f64::to_degrees),
+        "worth_removing": fit.is_worth_removing(),
+    })
+}
+
+impl Recorded {
+    /// For machines.
+    #[must_use]
+    pub fn json(&self) -> Value {
+        json!({
+            "usable": self.usable,
+            "unusable": self.unusable,
+            "constant": self.constant,
+            "sigma": self.consistency.as_ref().map(consistency_json),
+            "bias_left": self.bias.as_ref().map(bias_json),
+        })
+    }
+}
+
+/// How the worlds are laid on each other, in words.
+#[must_use]
+pub fn alignment(align: Align) -> &'static str {
+    match align {
+        Align::None => "both worlds taken as they are",
+        Align::First => "made equal at the first common instant",
+        Align::FirstHeading => "the heading made equal at the first common instant",
+        Align::Heading => "the heading made equal on the whole",
+        Align::Best => "the worlds made equal on the whole",
+    }
+}

@@ -1,0 +1,240 @@
+//! What corrected the attitude and what it learned -> words, JSON. Pure.
+
+use super::significant;
+use nalgebra::Vector3;
+use serde_json::{Value, json};
+use strapd_attitude::aid::{Calibration, Filter, Report};
+
+/// The filter at the end of a run.
+#[derive(Clone, Copy, Debug)]
+pub struct Aided {
+    started: bool,
+    has_field: bool,
+    is_implausible: bool,
+    is_beyond_class: bool,
+    report: Report,
+    calibration: Calibration,
+    sigma: Calibration,
+}
+
+/// Parts in a million.
+const PPM: f64 = 1e6;
+
+impl Aided {
+    /// As `filter` is now.
+    #[must_use]
+    pub fn of(filter: &Filter) -> Aided {
+        Aided {
+            started: filter.is_started(),
+            has_field: filter.has_field(),
+            is_implausible: filter.is_force_implausible(),
+            is_beyond_class: filter.is_beyond_class(),
+            report: filter.report(),
+            calibration: *filter.calibration(),
+            sigma: filter.calibration_sigma(),
+        }
+    }
+
+    /// For people: what it did, then what it learned.
+    #[must_use]
+    pub fn lines(&self) -> Vec<String> {
+        if !self.started {
+            return vec!["gravity, but no specific force came: the gyro alone".to_owned()];
+        }
+        let Report {
+            updates,
+            fields,
+            fields_rejected,
+            fields_unpaired,
+            forces_unpaired,
+            levelled,
+            restarts,
+            forces_rejected,
+            saturated,
+            failures,
+            ..
+        } = self.report;
+        let mut did = if self.has_field {
+            format!(
+                "gravity and field: corrected {updates} times, heading by {fields} fields of the magnetometer (--aid gravity: without)"
+            )
+        } else {
+            format!(
+                "gravity: tilt corrected {updates} times, heading the gyro's (--aid none: the gyro alone)"
+            )
+        };
+        if self.is_implausible {
+            did +=
+                "; GIVEN UP: what the accelerometer says has no gravity in it (force_implausible)";
+        }
+        if self.has_field && fields == 0 {
+            did += "; NO FIELD belonged to a sample";
+        }
+        for (n, what) in [
+            (
+                fields_unpaired,
+                "fields half a second off every sample, or no numbers",
+            ),
+            (
+                forces_unpaired,
+                "forces half a second off every sample, or no numbers",
+            ),
+            (fields_rejected, "corrections by the field doubted"),
+            (levelled, "times levelled anew"),
+            (restarts, "times taken to travel"),
+            (forces_rejected, "forces rejected"),
+            (saturated, "samples at the gyro's range"),
+            (failures, "FULL RESTARTS"),
+        ] {
+            if n > 0 {
+                did += &format!(", {n} {what}");
+            }
+        }
+        let deg = |v: &Vector3<f64>| triple(&v.map(f64::to_degrees));
+        let mut lines = vec![
+            did,
+            format!(
+                "learned: bias {} +- {} deg/s, scale {} +- {} %, lead {} ms",
+                deg(&self.calibration.bias),
+                deg(&self.sigma.bias),
+                triple(&(self.calibration.scale * 100.0)),
+                triple(&(self.sigma.scale * 100.0)),
+                significant(self.calibration.lead * 1e3, 2)
+            ),
+        ];
+        if self.has_iron() {
+            lines.push(format!(
+                "hard iron {} +- {}, in the unit of the field",
+                triple(&self.calibration.hard_iron),
+                triple(&self.sigma.hard_iron)
+            ));
+        }
+        lines
+    }
+
+    /// Whether hard iron was looked for, in fields that came.
+    fn has_iron(&self) -> bool {
+        self.sigma.hard_iron.x > 0.0
+    }
+
+    /// The gyro's bias that was learned, beside what was removed before, rad/s.
+    #[must_use]
+    pub fn bias(&self) -> Vector3<f64> {
+        self.calibration.bias
+    }
+
+    /// What was learned, a row each: what and in which unit, about x, y, z, and one sigma of each; `None` where no
+    /// force came.
+    #[must_use]
+    pub fn learned(&self) -> Option<Vec<Vec<String>>> {
+        let (found, sigma) = (&self.calibration, &self.sigma);
+        let three = |name: &str, value: Vector3<f64>, sigma: Vector3<f64>| {
+            let numbers = value.iter().chain(sigma.iter());
+            let said = numbers.map(|v| significant(*v, 3));
+            std::iter::once(name.to_owned()).chain(said).collect()
+        };
+        let one = |name: &str, value: f64, sigma: f64| {
+            let mut row = vec![String::new(); 7];
+            for (cell, said) in row.iter_mut().step_by(3).zip([
+                name.to_owned(),
+                significant(value, 3),
+                significant(sigma, 3),
+            ]) {
+                *cell = said;
+            }
+            row.swap(3, 1);
+            row.swap(6, 4);
+            row
+        };
+        let deg = f64::to_degrees;
+        self.started.then(|| {
+            vec![
+                three("gyro bias, deg/s", found.bias.map(deg), sigma.bias.map(deg)),
+                three("gyro scale, %", found.scale * 100.0, sigma.scale * 100.0),
+                three(
+                    "between its axes, deg",
+                    found.cross.map(deg),
+                    sigma.cross.map(deg),
+                ),
+                three(
+                    "accelerometer bias, m/s^2",
+                    found.force_bias,
+                    sigma.force_bias,
+                ),
+                one("accelerometer lead, ms", found.lead * 1e3, sigma.lead * 1e3),
+            ]
+        })
+    }
+
+    /// What is to be said where the sensor is farther off than those of its class, `noise`, are.
+    #[must_use]
+    pub fn doubt(&self, noise: &str) -> Option<String> {
+        let largest = |v: &Vector3<f64>, scale: f64| significant(v.amax() * scale, 2);
+        let advice = match noise {
+            "uncalibrated" => "give its sizes to --noise as a list",
+            _ => "--noise uncalibrated expects that",
+        };
+        (self.started && self.is_beyond_class).then(|| {
+            format!(
+                "the sensor is farther off than those of class {noise} are (scale {} %, axes {} deg, accelerometer {} m/s^2): sigma was too small until that was seen; {advice}",
+                largest(&self.calibration.scale, 100.0),
+                largest(&self.calibration.cross, 1f64.to_degrees()),
+                largest(&self.calibration.force_bias, 1.0),
+            )
+        })
+    }
+
+    /// What the sigma of the attitude is of.
+    #[must_use]
+    pub fn sigma_text(&self) -> &'static str {
+        if self.has_field {
+            "of tilt and of heading from north, as the filter knows them"
+        } else {
+            "of tilt and of heading relative to the start, as the filter knows them"
+        }
+    }
+
+    /// For machines.
+    #[must_use]
+    pub fn json(&self) -> Value {
+        let list = |v: &Vector3<f64>| json!([v.x, v.y, v.z]);
+        let numbers = |c: &Calibration| {
+            json!({
+                "gyro_bias_rad_s": list(&c.bias),
+                "gyro_scale_ppm": list(&(c.scale * PPM)),
+                "gyro_cross_rad": list(&c.cross),
+                "accel_bias_m_s2": list(&c.force_bias),
+                "accel_lead_s": c.lead,
+                "mag_hard_iron": self.has_iron().then(|| list(&c.hard_iron)),
+            })
+        };
+        json!({
+            "by": if self.has_field { "gravity+mag" } else { "gravity" },
+            "force_implausible": self.is_implausible,
+            "beyond_class": self.is_beyond_class,
+            "fields": self.report.fields,
+            "fields_doubted": self.report.fields_rejected,
+            "fields_unpaired": self.report.fields_unpaired,
+            "forces_unpaired": self.report.forces_unpaired,
+            "started": self.started,
+            "corrections": self.report.updates,
+            "levelled": self.report.levelled,
+            "reference_restarts": self.report.restarts,
+            "gaps": self.report.gaps,
+            "forces_rejected": self.report.forces_rejected,
+            "saturated": self.report.saturated,
+            "full_restarts": self.report.failures,
+            "learned": numbers(&self.calibration),
+            "sigma": numbers(&self.sigma),
+        })
+    }
+}
+
+fn triple(v: &Vector3<f64>) -> String {
+    format!(
+        "({}, {}, {})",
+        significant(v.x, 2),
+        significant(v.y, 2),
+        significant(v.z, 2)
+    )
+}
