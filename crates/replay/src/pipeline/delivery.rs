@@ -51,7 +51,7 @@ fn name(target: &Target) -> String {
 
 /// The sinks of a run.
 #[derive(Debug)]
-pub struct Outlet {
+pub(super) struct Outlet {
     sinks: Vec<(String, Sink)>,
     copied: Vec<BTreeMap<usize, CopiedChannel>>,
     decimators: Vec<Option<Decimator>>,
@@ -63,7 +63,7 @@ pub struct Outlet {
 
 /// When items are handed over, and how many of them.
 #[derive(Clone, Debug, Default)]
-pub struct Delivery {
+pub(super) struct Delivery {
     /// `--out-rate`, Hz.
     pub out_rate: Option<f64>,
     /// `--speed`; `None` = as fast as possible.
@@ -86,7 +86,7 @@ impl Outlet {
     ///
     /// # Errors
     /// As [`Sink::create`]; nothing is left behind.
-    pub fn open(
+    pub(super) fn open(
         targets: &[Target],
         inputs: &[PathBuf],
         options: Options,
@@ -128,7 +128,7 @@ impl Outlet {
     ///
     /// # Errors
     /// As [`Sink::write`].
-    pub fn write(
+    pub(super) fn write(
         &mut self,
         stream: usize,
         samples: &[AttitudeSample],
@@ -149,7 +149,12 @@ impl Outlet {
     ///
     /// # Errors
     /// As [`Sink::write_raw`].
-    pub fn write_raw(&mut self, stream: usize, samples: &[RawSample], pool: &Pool) -> Result<Flow> {
+    pub(super) fn write_raw(
+        &mut self,
+        stream: usize,
+        samples: &[RawSample],
+        pool: &Pool,
+    ) -> Result<Flow> {
         self.hand_over(stream, samples, SAMPLES, pool)
     }
 
@@ -212,12 +217,12 @@ impl Outlet {
 
     /// Whether what is handed over waits for its time.
     #[must_use]
-    pub fn is_paced(&self) -> bool {
+    pub(super) fn is_paced(&self) -> bool {
         self.pace.is_some()
     }
 
     /// How long the input is, about, for whoever is shown where the run is.
-    pub fn length(&self, secs: f64) {
+    pub(super) fn length(&self, secs: f64) {
         if let Some(audience) = &self.audience {
             audience.length(secs);
         }
@@ -228,7 +233,7 @@ impl Outlet {
     ///
     /// # Errors
     /// As [`Sink::flush`].
-    pub fn flush_to_readers(&mut self, pool: &Pool) -> Result<()> {
+    pub(super) fn flush_to_readers(&mut self, pool: &Pool) -> Result<()> {
         for (name, sink) in &mut self.sinks {
             if name == STDOUT || name.contains("://") {
                 // That it has hung up is noticed at the next write.
@@ -242,7 +247,7 @@ impl Outlet {
     ///
     /// # Errors
     /// As [`Sink::copy`].
-    pub fn copy(&mut self, message: &Copied, pool: &Pool) -> Result<()> {
+    pub(super) fn copy(&mut self, message: &Copied, pool: &Pool) -> Result<()> {
         for ((_, sink), channels) in self.sinks.iter_mut().zip(&mut self.copied) {
             let channel = match channels.get(&message.channel.index) {
                 Some(channel) => *channel,
@@ -277,7 +282,7 @@ impl Outlet {
     ///
     /// # Errors
     /// As [`Sink::finish`].
-    pub fn finish(self) -> Result<Vec<(String, Written)>> {
+    pub(super) fn finish(self) -> Result<Vec<(String, Written)>> {
         if self.audience.as_ref().is_some_and(|a| a.is_cut()) {
             return Ok(Vec::new());
         }

@@ -14,7 +14,7 @@ const WAITING: usize = 1 << 16;
 
 /// What is kept of a run to be drawn.
 #[derive(Debug)]
-pub struct History {
+pub(super) struct History {
     clock: Clock,
     drawn: Drawn,
     lost: u64,
@@ -26,7 +26,7 @@ pub struct History {
 impl History {
     /// For stamps of `clock`, in at most `stretches` stretches of time.
     #[must_use]
-    pub fn new(clock: Clock, stretches: usize) -> History {
+    pub(super) fn new(clock: Clock, stretches: usize) -> History {
         History {
             clock,
             drawn: Drawn {
@@ -45,7 +45,7 @@ impl History {
     }
 
     /// A sample (`None` = one that could not be decoded) was taken; `counts` are those after it.
-    pub fn took(&mut self, raw: Option<&RawSample>, counts: &Counts) {
+    pub(super) fn took(&mut self, raw: Option<&RawSample>, counts: &Counts) {
         let stamp = raw.and_then(|raw| match self.clock {
             Clock::Header => raw.header,
             Clock::Log => Some(raw.log),
@@ -74,14 +74,14 @@ impl History {
     }
 
     /// Takes attitudes, in order.
-    pub fn add(&mut self, samples: &[AttitudeSample]) {
+    pub(super) fn add(&mut self, samples: &[AttitudeSample]) {
         for sample in samples {
             self.add_one(sample);
         }
     }
 
     /// Takes what corrected the attitudes added so far.
-    pub fn corrected(&mut self, innovations: &[(Nanos, Innovation)]) {
+    pub(super) fn corrected(&mut self, innovations: &[(Nanos, Innovation)]) {
         for (stamp, innovation) in innovations {
             let [(x, sigma), (y, _)] = innovation.gravity;
             let (heading, of_heading) = innovation.heading;
@@ -148,7 +148,7 @@ impl History {
 
     /// No more.
     #[must_use]
-    pub fn finish(mut self) -> Drawn {
+    pub(super) fn finish(mut self) -> Drawn {
         let end = self.drawn.elapsed.x();
         while let Some((_, mark)) = self.rejected.pop_front() {
             self.mark(mark, end, 0);

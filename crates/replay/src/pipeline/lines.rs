@@ -37,7 +37,12 @@ const PATIENCE: u64 = 1000;
 ///
 /// # Errors
 /// They can not be read; `--field` for a table, whose columns have names.
-pub fn open<R: Read>(path: &Path, format: Format, input: R, options: &Options) -> Result<Lines<R>> {
+pub(super) fn open<R: Read>(
+    path: &Path,
+    format: Format,
+    input: R,
+    options: &Options,
+) -> Result<Lines<R>> {
     if format == Format::Table && !options.fields.is_empty() {
         return Err(Error::Unsupported {
             path: path.to_owned(),
@@ -71,7 +76,7 @@ pub(super) fn only_for_tables(path: &Path, format: Format, options: &Options) ->
 ///
 /// # Errors
 /// As [`super::replay::run`]; several sensors in one stream and none named.
-pub fn replay(
+pub(super) fn replay(
     run: &ReplayRequest,
     input: Lines<impl Read>,
     stamps: Option<Stamps>,
@@ -93,7 +98,7 @@ pub fn replay(
 ///
 /// # Errors
 /// As [`replay`]; there is no constant rate.
-pub fn stamps(run: &ReplayRequest, input: Lines<impl Read>) -> Result<Option<Stamps>> {
+pub(super) fn stamps(run: &ReplayRequest, input: Lines<impl Read>) -> Result<Option<Stamps>> {
     if !run.plan.regularise_stamps {
         return Ok(None);
     }

@@ -53,7 +53,7 @@ const MEANINGS: [(&str, &str, SampleKind, Option<Method>); 4] = [
 
 /// A comparison under way.
 #[derive(Debug)]
-pub struct AgainstRecorded {
+pub(super) struct AgainstRecorded {
     resolved: Meaning,
     clock: strapd_attitude::condition::Clock,
     own_reference: bool,
@@ -121,7 +121,11 @@ impl AgainstRecorded {
     ///
     /// # Errors
     /// In words: settings that can not be.
-    pub fn new(plan: &Plan, resolved: &Meaning, prepared: &Prepared) -> Result<Self, String> {
+    pub(super) fn new(
+        plan: &Plan,
+        resolved: &Meaning,
+        prepared: &Prepared,
+    ) -> Result<Self, String> {
         let mut prepared = prepared.clone();
         let world = prepared.world;
         let align = match &prepared.aiding {
@@ -165,7 +169,7 @@ impl AgainstRecorded {
     }
 
     /// It is one of so many comparisons at once: together they hold no more than a few would.
-    pub fn share_room(&mut self, comparisons: usize) {
+    pub(super) fn share_room(&mut self, comparisons: usize) {
         let most = MOST.min(ROOMY * MOST / comparisons.max(1));
         let tracks = self.tracks.iter_mut();
         tracks
@@ -175,7 +179,7 @@ impl AgainstRecorded {
     }
 
     /// Takes what the run put out.
-    pub fn take_estimates(&mut self, samples: &[AttitudeSample]) {
+    pub(super) fn take_estimates(&mut self, samples: &[AttitudeSample]) {
         let from = self.world.convention().unwrap_or(Convention::EnuFlu);
         for sample in samples {
             let turned = |v| from.convert_body(Convention::EnuFlu, v);
@@ -197,18 +201,18 @@ impl AgainstRecorded {
 
     /// Whether the reference is not the samples' own.
     #[must_use]
-    pub fn is_held_against_another(&self) -> bool {
+    pub(super) fn is_held_against_another(&self) -> bool {
         !self.own_reference
     }
 
     /// The reference comes from a topic of its own, whose orientations are in `recorded`'s convention.
-    pub fn take_reference_from(&mut self, recorded: &Meaning) {
+    pub(super) fn take_reference_from(&mut self, recorded: &Meaning) {
         self.own_reference = false;
         self.resolved.recorded = recorded.recorded;
     }
 
     /// The reference is this track, of the body whose attitude is estimated, and not in the log.
-    pub fn take_reference_track(&mut self, entries: &[(Nanos, [f64; 4])]) {
+    pub(super) fn take_reference_track(&mut self, entries: &[(Nanos, [f64; 4])]) {
         self.own_reference = false;
         for (stamp, wxyz) in entries {
             match Quaternion::try_from_wxyz(*wxyz) {
@@ -219,7 +223,7 @@ impl AgainstRecorded {
     }
 
     /// Takes a sample, and the orientation in it unless the reference has a topic of its own.
-    pub fn take(&mut self, raw: &RawSample) {
+    pub(super) fn take(&mut self, raw: &RawSample) {
         for estimator in &mut self.estimators {
             estimator.take(raw);
         }
@@ -229,7 +233,7 @@ impl AgainstRecorded {
     }
 
     /// Takes a recorded orientation.
-    pub fn take_reference(&mut self, raw: &RawSample) {
+    pub(super) fn take_reference(&mut self, raw: &RawSample) {
         use strapd_attitude::condition::Clock;
         let stamp = match self.clock {
             Clock::Header => raw.header,
@@ -265,7 +269,7 @@ impl AgainstRecorded {
     }
 
     /// Propagates what was taken.
-    pub fn advance(&mut self, exec: &impl Executor) {
+    pub(super) fn advance(&mut self, exec: &impl Executor) {
         for (estimator, track) in self.estimators.iter_mut().zip(&mut self.tracks) {
             for sample in estimator.attitudes(exec) {
                 track.push((sample.stamp, sample.q_nb));
@@ -286,7 +290,7 @@ impl AgainstRecorded {
     }
 
     /// No more samples.
-    pub fn finish(&mut self, exec: &impl Executor) {
+    pub(super) fn finish(&mut self, exec: &impl Executor) {
         for (estimator, track) in self.estimators.iter_mut().zip(&mut self.tracks) {
             for sample in estimator.finish(exec) {
                 track.push((sample.stamp, sample.q_nb));
@@ -300,13 +304,13 @@ impl AgainstRecorded {
 
     /// Recorded orientations that could be used.
     #[must_use]
-    pub fn references(&self) -> usize {
+    pub(super) fn references(&self) -> usize {
         self.reference.entries.len()
     }
 
     /// What the recorded orientation itself is like; `None` when there is none at all.
     #[must_use]
-    pub fn recorded(&self) -> Option<Recorded> {
+    pub(super) fn recorded(&self) -> Option<Recorded> {
         let entries = &self.reference.entries;
         let first = entries.first().map(|(_, q)| *q);
         if entries.is_empty() && self.unusable == 0 {
@@ -370,7 +374,12 @@ impl AgainstRecorded {
     /// The errors over time after [`Align::First`], for each meaning that finds a reference: `x` places
     /// a stamp on the axis, `used` is the meaning the run took.
     #[must_use]
-    pub fn errors(&self, stretches: usize, used: SampleKind, x: impl Fn(Nanos) -> i64) -> Errors {
+    pub(super) fn errors(
+        &self,
+        stretches: usize,
+        used: SampleKind,
+        x: impl Fn(Nanos) -> i64,
+    ) -> Errors {
         let of = |((kind, meaning, sample_kind, method), track): (
             &(&'static str, &'static str, SampleKind, Option<Method>),
             &Thinned<Stamped>,
@@ -406,7 +415,7 @@ impl AgainstRecorded {
 
     /// The errors; empty when no two recorded orientations are 1 s apart.
     #[must_use]
-    pub fn rows(&self) -> Vec<Against> {
+    pub(super) fn rows(&self) -> Vec<Against> {
         MEANINGS
             .iter()
             .zip(&self.tracks)

@@ -19,7 +19,7 @@ use strapd_recording::pool::Pool;
 
 /// One estimated topic of a run.
 #[derive(Debug)]
-pub struct Topic {
+pub(super) struct Topic {
     /// Where its samples come from.
     pub name: String,
     /// Where its attitude goes.
@@ -51,7 +51,7 @@ pub struct Topic {
 /// Samples that are exactly zero about all axes between two that are not: what a driver without data says. A
 /// rest is longer.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct LoneZeros {
+pub(super) struct LoneZeros {
     /// How many.
     pub count: u64,
     previous: Option<[f64; 3]>,
@@ -70,7 +70,7 @@ impl LoneZeros {
 
 /// What came out of an estimator.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Output {
+pub(super) struct Output {
     /// First attitude.
     pub first: Option<AttitudeSample>,
     /// Last attitude.
@@ -100,7 +100,7 @@ impl Topic {
     ///
     /// # Errors
     /// [`Error::Topic`] when the settings do not fit it.
-    pub fn new(
+    pub(super) fn new(
         path: &Path,
         plan: &Plan,
         found: Found,
@@ -139,7 +139,7 @@ impl Topic {
 
     /// What does not fit in memory of a recording that is smoothed goes to a file without a name in the folder of the
     /// output, or in that of temporary files.
-    pub fn spool_beside(&mut self, targets: &[Target]) {
+    pub(super) fn spool_beside(&mut self, targets: &[Target]) {
         let folder = targets.iter().find_map(|target| match target {
             Target::File { path, .. } => path.parent(),
             _ => None,
@@ -179,7 +179,7 @@ pub struct Found {
 
 /// A run from the first integrated sample on.
 #[derive(Debug)]
-pub struct Session {
+pub(super) struct Session {
     /// The topics.
     pub topics: Vec<Topic>,
     outlet: Outlet,
@@ -191,7 +191,7 @@ pub struct Session {
 impl Session {
     /// A session over `topics` into `outlet`.
     #[must_use]
-    pub fn new(topics: Vec<Topic>, outlet: Outlet) -> Session {
+    pub(super) fn new(topics: Vec<Topic>, outlet: Outlet) -> Session {
         Session {
             topics,
             outlet,
@@ -204,7 +204,11 @@ impl Session {
     ///
     /// # Errors
     /// As [`Outlet::write`].
-    pub fn consume(&mut self, items: impl Iterator<Item = Item>, pool: &Pool) -> Result<Flow> {
+    pub(super) fn consume(
+        &mut self,
+        items: impl Iterator<Item = Item>,
+        pool: &Pool,
+    ) -> Result<Flow> {
         // Handed on in time topics must take turns: a batch of one would go by before the other's.
         let take_turns = self.topics.len() > 1 && self.outlet.is_paced();
         for item in items {
@@ -292,18 +296,18 @@ impl Session {
     ///
     /// # Errors
     /// As [`Outlet::write`].
-    pub fn flush_to_readers(&mut self, pool: &Pool) -> Result<()> {
+    pub(super) fn flush_to_readers(&mut self, pool: &Pool) -> Result<()> {
         self.outlet.flush_to_readers(pool)
     }
 
     /// How long the input is, about.
-    pub fn length(&self, secs: f64) {
+    pub(super) fn length(&self, secs: f64) {
         self.outlet.length(secs);
     }
 
     /// Where the run is.
     #[must_use]
-    pub fn position(&self, fraction: Option<f64>) -> Position {
+    pub(super) fn position(&self, fraction: Option<f64>) -> Position {
         let mut position = Position {
             fraction,
             samples: self.samples,
@@ -325,7 +329,7 @@ impl Session {
     ///
     /// # Errors
     /// As [`Outlet::write`] and [`Outlet::finish`].
-    pub fn finish(mut self, pool: &Pool) -> Result<Ended> {
+    pub(super) fn finish(mut self, pool: &Pool) -> Result<Ended> {
         for (stream, topic) in self.topics.iter_mut().enumerate() {
             let Topic {
                 estimator,
@@ -364,7 +368,7 @@ impl Session {
 
 /// A run that is over.
 #[derive(Debug)]
-pub struct Ended {
+pub(super) struct Ended {
     /// Its topics.
     pub topics: Vec<Topic>,
     /// Its outputs by name.

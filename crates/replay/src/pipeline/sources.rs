@@ -453,7 +453,7 @@ const MOST_RETURNS: u64 = 2;
 
 /// Whether channels of one topic follow each other, as when a recorder was started again, or take turns.
 #[derive(Debug, Default)]
-pub struct Turns {
+pub(super) struct Turns {
     current: Option<usize>,
     left: BTreeSet<usize>,
     returns: u64,
@@ -464,7 +464,7 @@ pub struct Turns {
 
 impl Turns {
     /// The next message came on `channel`.
-    pub fn take(&mut self, channel: usize, digest: u64) {
+    pub(super) fn take(&mut self, channel: usize, digest: u64) {
         if self.recent.get(&digest).is_some_and(|of| *of != channel) {
             // Two recorders wrote what one publisher sent.
             self.echoes += 1;
@@ -486,7 +486,7 @@ impl Turns {
 
     /// Whether they are several publishers' channels.
     #[must_use]
-    pub fn are_several(&self) -> bool {
+    pub(super) fn are_several(&self) -> bool {
         // Each message that is there twice may bring two returns.
         self.returns > MOST_RETURNS + 2 * self.echoes
     }

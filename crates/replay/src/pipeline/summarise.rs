@@ -26,7 +26,7 @@ const UNLIKELY_RATE: f64 = 200.0;
 
 /// The summary of a run.
 #[must_use]
-pub fn run(run: &ReplayRequest, ended: Ended, survey: &Survey) -> RunSummary {
+pub(super) fn run(run: &ReplayRequest, ended: Ended, survey: &Survey) -> RunSummary {
     let Ended {
         mut topics,
         outputs,
