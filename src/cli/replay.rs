@@ -336,7 +336,7 @@ fn say_warnings(summary: &RunSummary) {
                 topic.gaps.held_secs
             );
         }
-        for warning in &topic.warnings {
+        for warning in topic.warnings() {
             tracing::warn!("{source}: {}: {warning}", topic.topic);
         }
     }

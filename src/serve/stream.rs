@@ -14,6 +14,7 @@ use crate::pipeline::early_besides;
 use crate::pipeline::session_builder::labelled;
 use crate::report::aid::Aided;
 use crate::report::calibration;
+use crate::report::findings::{Finding, of_sensor};
 use crate::serve::channel::Channel;
 use crate::serve::hub::SampleRun;
 use crate::serve::recorder::stream_of;
@@ -586,6 +587,8 @@ impl SensorStream {
             .cloned()
             .chain(self.intervals.warning())
             .collect();
+        let clock = self.prepared.clock.name();
+        let found = of_sensor(report, &self.estimator.propagation(), clock);
         let stamp = |s: Nanos| {
             let (sec, nsec) = s.to_sec_nanosec();
             serde_json::json!({"sec": sec, "nsec": nsec})
@@ -617,6 +620,7 @@ impl SensorStream {
             "bias": self.prepared.bias_origin,
             "interval_mismatches": self.intervals.found(),
             "warnings": warnings,
+            "findings": found.iter().map(Finding::json).collect::<Vec<_>>(),
         })
     }
 }

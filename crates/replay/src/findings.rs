@@ -1,11 +1,17 @@
-//! What is known about a log -> findings: how bad, on what evidence, what to do. Pure.
+//! What is known about a log, a run or a live sensor -> findings: how bad, on what evidence, what to do. Pure.
 //!
+//! The one vocabulary: `info`, `check`, `report`, a replay's warnings and the daemon's `STATUS` take their words from here.
 //! Thresholds are opinions; those about the samples themselves lie in [`strapd_attitude::condition::quality`],
 //! those about the replay and the recorded orientation here. A finding's `code` is stable: scripts
 //! match on it.
 
-pub(crate) mod orientation;
+mod orientation;
+mod run;
 mod samples;
+
+pub use run::of_sensor;
+pub(crate) use run::{Noted, of_run};
+pub use samples::of_samples;
 
 use crate::pipeline::check::{Checked, CheckedTopic};
 use crate::pipeline::topics::named_few;
@@ -54,7 +60,7 @@ pub struct Finding {
 }
 
 impl Finding {
-    fn new(severity: Severity, code: &'static str, what: impl Into<String>) -> Finding {
+    pub(crate) fn new(severity: Severity, code: &'static str, what: impl Into<String>) -> Finding {
         Finding {
             severity,
             code,
@@ -66,19 +72,32 @@ impl Finding {
         }
     }
 
-    fn with(mut self, name: &str, value: impl Into<Value>) -> Finding {
+    pub(crate) fn with(mut self, name: &str, value: impl Into<Value>) -> Finding {
         self.evidence.insert(name.to_owned(), value.into());
         self
     }
 
-    fn advise(mut self, advice: impl Into<String>) -> Finding {
+    pub(crate) fn advise(mut self, advice: impl Into<String>) -> Finding {
         self.advice = advice.into();
         self
     }
 
-    fn flags(mut self, flags: impl Into<String>) -> Finding {
+    pub(crate) fn flags(mut self, flags: impl Into<String>) -> Finding {
         self.flags = flags.into();
         self
+    }
+
+    /// What was seen and what helps, in one line.
+    #[must_use]
+    pub fn line(&self) -> String {
+        let mut line = self.what.clone();
+        for (separator, part) in [("; ", &self.advice), (": ", &self.flags)] {
+            if !part.is_empty() {
+                line.push_str(separator);
+                line.push_str(part);
+            }
+        }
+        line
     }
 
     /// For machines.
@@ -162,7 +181,7 @@ pub fn findings(checked: &Checked) -> Vec<Finding> {
     }
     for topic in &checked.topics {
         let mut of_topic = Vec::new();
-        samples::find(topic, &mut of_topic);
+        of_topic.extend(of_samples(&topic.looked));
         replayed(topic, &mut of_topic);
         orientation::find(topic, &mut of_topic);
         for finding in &mut of_topic {
@@ -174,77 +193,18 @@ pub fn findings(checked: &Checked) -> Vec<Finding> {
     found
 }
 
-/// Largest turn per step that integrates well whatever the motion: beyond, aliasing is near.
-const LARGE_STEP_DEG: f64 = 30.0;
-
-/// Longest gap that anybody would bridge.
-const LONGEST_BRIDGE_SECS: f64 = 3600.0;
-
 /// What only integrating shows.
 fn replayed(topic: &CheckedTopic, out: &mut Vec<Finding>) {
-    let summary = match &topic.replayed {
-        Ok(summary) => summary,
+    match &topic.replayed {
+        Ok(summary) => {
+            out.extend(run::gaps(&summary.gaps));
+            out.extend(run::steps(summary.undersampled, summary.largest_step));
+        }
         Err(why) => {
             let (what, help) = why.split_once('\n').unwrap_or((why, ""));
             let help = help.trim().trim_start_matches("help: ");
             out.push(Finding::new(Severity::Error, "refused", what).advise(help));
-            return;
         }
-    };
-    let breaks = summary.gaps.held + summary.gaps.resets;
-    if breaks > 0 {
-        let longest = summary.gaps.longest_held_secs;
-        let held = Finding::new(
-            Severity::Error,
-            "gap-held",
-            format!(
-                "{breaks} gaps or clock jumps are too long to integrate over, the longest {longest:.3} s, {:.1} s after the start",
-                summary.gaps.longest_at_secs
-            ),
-        )
-        .with("count", breaks)
-        .with("longest_s", longest)
-        .with("longest_at_s", summary.gaps.longest_at_secs)
-        .with("total_s", summary.gaps.held_secs);
-        // Nobody bridges an hour, or a clock that was set back: such a stamp is wrong, or another clock's.
-        out.push(if (f64::MIN_POSITIVE..=LONGEST_BRIDGE_SECS).contains(&longest) {
-            held.advise("the attitude is held there; bridge them where the motion was slow")
-                .flags(format!(
-                    "--on-gap bridge --max-gap {:.1}",
-                    (longest * 10.0).ceil() / 10.0
-                ))
-        } else {
-            held.advise("the attitude is held there; a clock was set, or is not always the same one: another may be steadier")
-                .flags("--time log, or --time header")
-        });
-    }
-    let step_deg = summary.largest_step.to_degrees();
-    if summary.undersampled > 0 {
-        out.push(
-            Finding::new(
-                Severity::Error,
-                "under-sampled",
-                format!(
-                    "{} steps turn more than half a turn (up to {step_deg:.0} deg): the samples are too few for the motion, or the unit is wrong",
-                    summary.undersampled
-                ),
-            )
-            .with("steps", summary.undersampled)
-            .with("largest_step_deg", step_deg)
-            .advise("check the unit first; otherwise sample faster"),
-        );
-    } else if step_deg > LARGE_STEP_DEG {
-        out.push(
-            Finding::new(
-                Severity::Warning,
-                "large-turn-per-step",
-                format!(
-                    "up to {step_deg:.0} deg are turned in one step: few samples for this motion"
-                ),
-            )
-            .with("largest_step_deg", step_deg)
-            .advise("sample faster; delta angles suffer less than rates"),
-        );
     }
 }
 

@@ -19,6 +19,7 @@ use self::series::Drawn;
 use self::sigma::SigmaTerms;
 use self::smoothing::Smoothing;
 use self::stamps::Regularised;
+use crate::findings::Finding;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use strapd_attitude::compare::{BiasFit, BodyAxesFit, Consistency};
@@ -103,7 +104,7 @@ pub struct TopicSummary {
     /// What the recorded orientation itself is like, where one was compared with.
     pub recorded: Option<Recorded>,
     /// Things to know, each with the flag that helps.
-    pub warnings: Vec<String>,
+    pub findings: Vec<Finding>,
     /// What is drawn of it, where a report asked for that.
     pub drawn: Option<Box<Drawn>>,
 }
@@ -387,8 +388,8 @@ impl TopicSummary {
             line(out, "", first);
         }
         self.write_against(out);
-        for warning in &self.warnings {
-            line(out, "warning", warning);
+        for warning in self.warnings() {
+            line(out, "warning", &warning);
         }
     }
 
@@ -440,6 +441,12 @@ impl TopicSummary {
             "NOT SMOOTHED: {}; the attitude is the real-time filter's",
             why.replace("\n  help: ", "; ")
         ))
+    }
+
+    /// What was found, a line each.
+    #[must_use]
+    pub fn warnings(&self) -> Vec<String> {
+        self.findings.iter().map(Finding::line).collect()
     }
 
     /// What the sigma is of, where something corrects the attitude; else what it drifts by.
@@ -555,7 +562,8 @@ impl TopicSummary {
                 "kind": a.kind, "median_deg": a.median_deg, "p95_deg": a.p95_deg, "pairs": a.pairs,
             })).collect::<Vec<_>>(),
             "recorded": self.recorded.as_ref().map(Recorded::json),
-            "warnings": self.warnings,
+            "warnings": self.warnings(),
+            "findings": self.findings.iter().map(Finding::json).collect::<Vec<_>>(),
         })
     }
 }

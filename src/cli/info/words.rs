@@ -7,6 +7,7 @@ use crate::pipeline::log::{LogChannel, described, rank};
 use crate::pipeline::request::Source;
 use crate::pipeline::topics::named_few;
 use crate::report::calendar::{date, duration};
+use crate::report::findings::{Finding, of_samples};
 use crate::report::summary::{human_bytes, significant};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
@@ -349,42 +350,14 @@ fn write_topic(looked: &Inspection, out: &mut String) {
             let _ = writeln!(out, "   rest: none found");
         }
     }
-    for bad in bad_counts(looked) {
-        let _ = writeln!(out, "   {bad}");
+    for finding in of_samples(looked) {
+        let _ = writeln!(out, "   {}: {}", finding.severity.name(), finding.line());
     }
-    for advice in &q.advice {
-        let _ = writeln!(out, "   note: {advice}");
-    }
-    if let Some(warning) = &looked.clock_warning {
-        let _ = writeln!(out, "   note: {warning}");
-    }
-}
-
-fn bad_counts(looked: &Inspection) -> Vec<String> {
-    let q = &looked.quality;
-    [
-        (looked.undecodable, "payloads can not be decoded"),
-        (q.not_finite, "samples have NaN or infinity in the gyro"),
-        (q.no_gyro, "samples mark their gyro as absent"),
-        (q.no_stamp, "samples have no stamp"),
-        (
-            q.collisions,
-            "samples share their stamp with another, with other data",
-        ),
-        (q.zero_rows, "samples are exactly zero"),
-        (
-            q.accel_not_finite,
-            "samples have NaN or infinity in the acceleration",
-        ),
-    ]
-    .into_iter()
-    .filter(|(n, _)| *n > 0)
-    .map(|(n, what)| format!("{n} {what}"))
-    .collect()
 }
 
 fn topic_json(looked: &Inspection) -> Value {
     let q = &looked.quality;
+    let found = of_samples(looked);
     json!({
         "topic": looked.topic,
         "decoded_as": looked.described,
@@ -426,7 +399,7 @@ fn topic_json(looked: &Inspection) -> Value {
         })).collect::<Vec<_>>(),
         "bias": looked.bias.map(|b| json!({
             "x": b.bias.x, "y": b.bias.y, "z": b.bias.z, "sigma": b.sigma.max(), "rest_s": b.secs })),
-        "notes": q.advice.iter().map(ToString::to_string)
-            .chain(looked.clock_warning.clone()).collect::<Vec<_>>(),
+        "notes": found.iter().map(Finding::line).collect::<Vec<_>>(),
+        "findings": found.iter().map(Finding::json).collect::<Vec<_>>(),
     })
 }

@@ -134,7 +134,7 @@ fn integrated(s: &TopicSummary, stretches: Option<usize>, out: &mut String) {
     if let Some(terms) = &s.sigma_terms {
         rows.add("sigma", &terms.text());
     }
-    for warning in &s.warnings {
+    for warning in s.warnings() {
         rows.add("warning", &warning.replace("\n  help: ", "; "));
     }
     out.push_str(&rows.html());

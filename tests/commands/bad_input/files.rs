@@ -91,7 +91,7 @@ fn a_motion_too_fast_for_its_samples_is_warned_of() {
     for name in Method::names() {
         let plan = plan(name.parse().unwrap(), SampleKind::Rate);
         let summary = done(&replay_with(&path, plan)).unwrap();
-        let said = only(&summary).warnings.join("; ");
+        let said = only(&summary).warnings().join("; ");
         assert!(
             said.contains("99 steps turn more than half a turn"),
             "{name}: {said}"

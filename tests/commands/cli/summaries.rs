@@ -314,7 +314,7 @@ fn a_message_of_zeros_amid_motion_is_said() {
     crate::made_logs::written(dir.path(), "log.mcap", &samples);
     let ran = strapd(dir.path(), "replay log.mcap -o null:");
     assert!(
-        ran.done().out.contains("2 samples are exactly zero"),
+        ran.done().out.contains("2 of 300 samples are exactly zero"),
         "{ran:?}"
     );
     // A body that rests, without noise, is another thing.
@@ -334,4 +334,47 @@ fn a_line_that_can_not_be_read_is_named_by_its_line_and_a_failed_read_by_its_byt
     .unwrap();
     strapd(dir.path(), "replay log.mcap -o a.csv").done();
     strapd(dir.path(), "compare a.csv t.ndjson").refused(1, &["t.ndjson: line 3:"]);
+}
+
+#[test]
+fn every_command_says_a_finding_in_the_same_words() {
+    let dir = bench();
+    std::fs::copy(fixture("faults.mcap"), dir.path().join("faults.mcap")).unwrap();
+    let said = |line: &str| {
+        let ran = strapd(dir.path(), line);
+        assert!(matches!(ran.code, Some(0 | 3)), "{ran:?}");
+        serde_json::from_str::<serde_json::Value>(&ran.out).unwrap()
+    };
+    let found = |list: &serde_json::Value, code: &str| {
+        let list = list.as_array().unwrap();
+        let of = |f: &&serde_json::Value| f["code"] == code;
+        let one = list
+            .iter()
+            .find(of)
+            .unwrap_or_else(|| panic!("{code} in {list:?}"));
+        ["severity", "topic", "what", "advice", "flags"].map(|k| one[k].clone())
+    };
+    let check = said("check faults.mcap --json");
+    let info = said("info faults.mcap --json");
+    let replay = said("replay faults.mcap -o null: --json");
+    let report = said("report faults.mcap -o r.html --json");
+    for code in ["undecodable", "gyro-absent", "missing"] {
+        let mut in_check = found(&check["findings"], code);
+        assert_eq!(found(&report["findings"], code), in_check);
+        // What is about one topic alone needs no name of it.
+        in_check[1] = "".into();
+        let mut in_info = found(&info["imu"][0]["findings"], code);
+        in_info[1] = "".into();
+        assert_eq!(in_info, in_check);
+    }
+    assert_eq!(
+        found(&replay["topics"][0]["findings"], "gyro-absent"),
+        found(&check["findings"], "gyro-absent")
+    );
+    let line = "1 of 602 samples mark their gyro as absent (covariance -1); some drivers set the mark wrongly; \
+                if the rates are good, use them: --ignore-covariance-flag";
+    for command in ["info faults.mcap", "replay faults.mcap -o null:"] {
+        let ran = strapd(dir.path(), command);
+        assert!(ran.out.contains(line), "{ran:?}");
+    }
 }

@@ -81,7 +81,7 @@ fn a_bias_from_rest_does_not_swallow_the_earth() {
             let off = quaternion(a.numbers()).angle_to(&expected);
             assert!(off < 1e-12, "{world}: {off:.2e} rad");
         }
-        assert!(topic.warnings.iter().all(|w| !w.contains("--earth-rate")));
+        assert!(topic.warnings().iter().all(|w| !w.contains("--earth-rate")));
     }
     // Without the flag the Earth is taken for bias, as it always was.
     let without = Plan {
@@ -130,7 +130,7 @@ fn an_unknown_heading_is_warned_of_with_its_size() {
         ..plan(World::Enu)
     };
     let (summary, found) = attitudes(&replay_with(&path, plan), dir.path());
-    let said = only(&summary).warnings.join("; ");
+    let said = only(&summary).warnings().join("; ");
     // 15.041 cos 48 = 10.064 deg/h: 1.75 of it for 10 degrees, 20.1 at most.
     assert!(said.contains("10 degrees leaves 1.8 deg/h"), "{said}");
     assert!(said.contains("at most 20.1"), "{said}");

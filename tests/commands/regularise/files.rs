@@ -214,6 +214,6 @@ fn every_meaning_is_compared_on_its_own_lines() {
         only(&summary).against.len(),
         4,
         "{:?}",
-        only(&summary).warnings
+        only(&summary).warnings()
     );
 }

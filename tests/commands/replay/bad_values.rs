@@ -141,7 +141,7 @@ fn a_log_of_nothing_but_nan_ends_with_a_count_and_without_an_attitude() {
     assert!(attitudes.is_empty());
     assert_eq!(only(&summary).counts.get(Verdict::NotFinite), 50);
     assert!(summary.is_lossy());
-    let said = only(&summary).warnings.join("; ");
+    let said = only(&summary).warnings().join("; ");
     assert!(said.contains("no sample was used"), "{said}");
 }
 
@@ -155,12 +155,12 @@ fn rates_in_degrees_are_integrated_and_the_flag_is_named() {
     }
     let path = written(dir.path(), "deg.mcap", &samples);
     let (summary, _) = attitudes(&replay_with(&path, Plan::default()), dir.path());
-    let said = only(&summary).warnings.join("; ");
+    let said = only(&summary).warnings().join("; ");
     assert!(said.contains("--gyro-unit deg"), "{said}");
     let plan = Plan {
         unit: Some(strapd_attitude::condition::GyroUnit::Deg),
         ..Plan::default()
     };
     let (summary, _) = attitudes(&replay_with(&path, plan), dir.path());
-    assert!(only(&summary).warnings.is_empty(), "{summary:?}");
+    assert!(only(&summary).warnings().is_empty(), "{summary:?}");
 }

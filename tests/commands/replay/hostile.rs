@@ -89,7 +89,7 @@ fn zero_header_stamps_fall_back_to_log_time_and_that_is_said() {
     let topic = only(&summary);
     assert_verdicts(topic, &[(Verdict::Accepted, 953)]);
     assert_eq!(topic.clock, "log");
-    let said = topic.warnings.join("; ");
+    let said = topic.warnings().join("; ");
     assert!(said.contains("header stamps are 0"), "{said}");
     assert!(said.contains("--time log"), "{said}");
 }
@@ -108,11 +108,11 @@ fn pairs_with_the_same_stamp_are_counted_and_none_is_divided_by() {
     );
     assert!(
         topic
-            .warnings
+            .warnings()
             .iter()
             .any(|w| w.starts_with("136 samples shared their stamp")),
         "{:?}",
-        topic.warnings
+        topic.warnings()
     );
     assert!(!summary.is_lossy());
 }
@@ -242,7 +242,7 @@ fn the_only_imu_of_ninety_four_topics_is_found_and_the_other_rates_are_mentioned
     let topic = only(&summary);
     assert_eq!(topic.topic, "/test/sensor_msgs/imu");
     assert_verdicts(topic, &[(Verdict::Accepted, 2)]);
-    let said = topic.warnings.join("; ");
+    let said = topic.warnings().join("; ");
     assert!(said.contains("/test/geometry_msgs/twist_stamped"), "{said}");
 }
 

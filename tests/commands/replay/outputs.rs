@@ -424,7 +424,7 @@ fn an_imu_topic_without_a_message_leaves_nothing_and_that_is_said() {
     let result = done(&replay_of(&path));
     match result {
         Ok(summary) => {
-            let said = only(&summary).warnings.join("; ");
+            let said = only(&summary).warnings().join("; ");
             assert!(said.contains("no sample was used"), "{said}");
         }
         Err(error) => {

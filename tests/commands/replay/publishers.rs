@@ -254,7 +254,7 @@ fn a_second_publisher_that_comes_late_is_left_out_counted_and_named() {
     let topic = only(&summary);
     assert_eq!(topic.left_out, 300);
     assert!(summary.is_lossy(), "nobody asked to leave them out");
-    let said = topic.warnings.join("; ");
+    let said = topic.warnings().join("; ");
     let name = format!("{TOPIC}@right");
     assert!(
         said.contains("300 messages") && said.contains(&name),
@@ -303,7 +303,7 @@ fn two_publishers_in_a_pipe_are_not_mixed_either() {
         let (summary, found) = piped(&path);
         let summary = summary.unwrap();
         assert_eq!(found, expected, "the first publisher's alone");
-        let said = only(&summary).warnings.join("; ");
+        let said = only(&summary).warnings().join("; ");
         assert!(said.contains(word), "{said}");
     }
     let (summary, found) = piped(&turns.0);

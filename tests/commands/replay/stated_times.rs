@@ -165,7 +165,7 @@ fn the_messages_own_stamp_is_taken_unless_it_is_none_and_a_nested_one_is() {
     let dir = tempfile::tempdir().unwrap();
     let stamps = |path: &Path| -> (Vec<i64>, String) {
         let (summary, found) = attitudes(&replay_of(path), dir.path());
-        let said = only(&summary).warnings.join("; ");
+        let said = only(&summary).warnings().join("; ");
         (found.iter().map(|a| a.stamp).collect(), said)
     };
     let at = |offset: i64| -> Vec<i64> { (0..600).map(|k| START + k * STEP + offset).collect() };
@@ -238,7 +238,7 @@ fn stamps_in_whole_seconds_give_every_sample_within_the_logs_span_wherever_it_be
             assert!(!summary.is_lossy(), "{kind:?} from {from}: {topic:?}");
             assert!(topic.counts.get(Verdict::Restamped) > 1200, "{topic:?}");
             assert_eq!(found, expected, "{kind:?} from {from}");
-            let said = topic.warnings.join("; ");
+            let said = topic.warnings().join("; ");
             assert!(
                 said.contains("steps of 1") && said.contains("--time log"),
                 "{said}"
@@ -324,7 +324,7 @@ fn what_is_bridged_is_excluded_from_the_integration_error_in_words() {
     let summary = done(&replay_by(&wrong, "dt=gyro_integral_dt:us")).unwrap();
     let topic = only(&summary);
     assert_eq!(topic.gaps.bridged, 599);
-    let said = topic.warnings.join("; ");
+    let said = topic.warnings().join("; ");
     assert!(said.contains("a sample lasts 1.00e-5 s"), "{said}");
     let text = summary.text();
     assert!(

@@ -207,6 +207,16 @@ fn bad_samples_follow_the_rules_of_conditioning_and_are_said_once_each() {
     assert_eq!(source["lost"], 6);
     assert_eq!(source["not_bridged"], 1);
     assert_eq!(source["reset"], 1);
+    let [held] = source["findings"].as_array().unwrap().as_slice() else {
+        panic!("{source}");
+    };
+    assert_eq!(held["code"], "gap-held");
+    assert_eq!(held["severity"], "error");
+    for (name, secs) in [("longest_s", 0.993), ("longest_at_s", 0.006)] {
+        let said = held["evidence"][name].as_f64().unwrap();
+        assert!((said - secs).abs() < 1e-9, "{held}");
+    }
+    assert!(held["flags"].as_str().unwrap().contains("--on-gap bridge"));
     let stamps: Vec<u64> = attitudes
         .iter()
         .map(|a| a["stamp"]["nsec"].as_u64().unwrap() / 1_000_000)

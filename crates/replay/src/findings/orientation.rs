@@ -47,21 +47,20 @@ pub(super) fn find(topic: &CheckedTopic, out: &mut Vec<Finding>) {
     }
 }
 
-/// What a replay says of the orientation it was held against, in lines; nothing where that is no truth.
-pub(crate) fn warnings(summary: &TopicSummary) -> Vec<String> {
+/// What a replay says of the orientation it was held against: nothing of its bias where that is no truth.
+pub(super) fn of_run(summary: &TopicSummary) -> Vec<Finding> {
+    let mut found = Vec::new();
+    if let Some(best) = best_meaning(&summary.against) {
+        meaning(&summary.against, best, summary.kind.name(), &mut found);
+    }
     let Some(recorded) = &summary.recorded else {
-        return Vec::new();
+        return found;
     };
     let is_seen = summary.gaps.total_secs <= MOSTLY_THERE * summary.duration_secs;
-    let (mut wrong, mut found) = (Vec::new(), Vec::new());
-    if is_truth(recorded, is_seen, &mut wrong) {
+    if is_truth(recorded, is_seen, &mut Vec::new()) {
         told_by_it(summary, recorded, None, &mut found);
     }
-    let words = |f: &Finding| match f.flags.as_str() {
-        "" => format!("{}; {}", f.what, f.advice),
-        flags => format!("{}: {flags}", f.what),
-    };
-    found.iter().map(words).collect()
+    found
 }
 
 /// A bias by which the gyro leaves it, and a sigma that does not hold. `at_rest` is the bias that a rest shows.

@@ -1,7 +1,7 @@
 //! Statistics of the samples as recorded -> findings. Pure.
 
 use super::{Finding, Severity};
-use crate::pipeline::check::CheckedTopic;
+use crate::pipeline::inspection::Inspection;
 use crate::summary::significant;
 use serde_json::json;
 use strapd_attitude::condition::quality::{Advice, AxisStats};
@@ -17,28 +17,32 @@ const REPEATED_SHARE: f64 = 0.003;
 /// Longer runs of one value are no repeats of a sensor with noise.
 const LONG_RUN: u64 = 20;
 
-pub(super) fn find(topic: &CheckedTopic, out: &mut Vec<Finding>) {
-    counted(topic, out);
-    if let Some(warning) = &topic.looked.clock_warning {
+/// What the samples of a topic show as they were recorded.
+#[must_use]
+pub fn of_samples(looked: &Inspection) -> Vec<Finding> {
+    let mut out = Vec::new();
+    counted(looked, &mut out);
+    if let Some(warning) = &looked.clock_warning {
         // What was seen on the first line, the flags on those after it.
         let (what, help) = warning.split_once('\n').unwrap_or((warning, ""));
         out.push(
             Finding::new(Severity::Warning, "clock", what)
-                .with("clock", topic.looked.clock.name())
+                .with("clock", looked.clock.name())
                 .advise(help.trim().trim_start_matches("help: ").to_owned()),
         );
     }
-    for advice in &topic.looked.quality.advice {
-        out.extend(advised(topic, advice));
+    for advice in &looked.quality.advice {
+        out.extend(advised(looked, advice));
     }
-    silent(topic, out);
-    clocks(topic, out);
-    bias(topic, out);
+    silent(looked, &mut out);
+    clocks(looked, &mut out);
+    bias(looked, &mut out);
+    out
 }
 
 /// Axes that never read but one value, while another moves.
-fn silent(topic: &CheckedTopic, out: &mut Vec<Finding>) {
-    let q = &topic.looked.quality;
+fn silent(looked: &Inspection, out: &mut Vec<Finding>) {
+    let q = &looked.quality;
     let varies = |a: &AxisStats| a.max > a.min;
     if !q.axes.iter().any(varies) || q.count < LONG_RUN {
         return;
@@ -62,204 +66,276 @@ fn silent(topic: &CheckedTopic, out: &mut Vec<Finding>) {
 }
 
 /// Rows that are bad in themselves.
-fn counted(topic: &CheckedTopic, out: &mut Vec<Finding>) {
-    let q = &topic.looked.quality;
-    let total = q.count + topic.looked.undecodable;
-    let of_total = |n: u64, what: &str| format!("{n} of {total} {what}");
-    let mut add = |n: u64, severity, code, what: &str, advice: &str, flags: &str| {
-        if n > 0 {
-            out.push(
-                Finding::new(severity, code, of_total(n, what))
-                    .with("count", n)
-                    .with("samples", total)
-                    .advise(advice)
-                    .flags(flags),
-            );
-        }
-    };
+fn counted(looked: &Inspection, out: &mut Vec<Finding>) {
     use Severity::{Error, Warning};
-    add(
-        topic.looked.undecodable,
-        Error,
-        "undecodable",
-        "payloads can not be decoded",
-        "they are left out and counted",
-        "",
-    );
-    add(
-        q.not_finite,
-        Error,
-        "not-finite",
-        "samples have NaN or infinity in the gyro",
-        "they are left out; the attitude is carried across them",
-        "",
-    );
-    add(
-        q.no_gyro,
-        Error,
-        "gyro-absent",
-        "samples mark their gyro as absent (covariance -1)",
-        "some drivers set the mark wrongly; if the rates are good, use them",
-        "--ignore-covariance-flag",
-    );
-    add(
-        q.no_stamp,
-        Error,
-        "no-stamp",
-        "samples have no stamp",
-        "take the recorder's time",
-        "--time log",
-    );
-    add(
-        q.collisions,
-        Warning,
-        "shared-stamps",
-        "samples share their stamp with another that has other data",
-        "each is given a stamp of its own between its neighbours, where there is room",
-        "",
-    );
-    add(
-        q.duplicates.saturating_sub(q.collisions),
-        Warning,
-        "repeats",
-        "samples repeat their predecessor, stamp and data",
-        "they are left out",
-        "",
-    );
-    add(
-        q.disorder,
-        Warning,
-        "disorder",
-        "samples are older than one before them",
-        "those within the reorder window are put back in place, later ones are left out",
-        "",
-    );
+    let q = &looked.quality;
+    let total = q.count + looked.undecodable;
     let repeated = q.repeated_rows.saturating_sub(q.duplicates);
     // A rest, or a steady turn, without noise repeats itself for long; a sensor read too often does not.
     let longest = q.axes.iter().map(|a| a.longest_run).max().unwrap_or(0);
-    if repeated as f64 > REPEATED_SHARE * total as f64 && longest < LONG_RUN && total >= LONG_RUN {
-        add(
-            repeated,
-            Warning,
-            "repeated-rows",
+    let is_read_too_often =
+        repeated as f64 > REPEATED_SHARE * total as f64 && longest < LONG_RUN && total >= LONG_RUN;
+    let found = [
+        some(
+            (looked.undecodable, total),
+            (Error, "undecodable"),
+            "payloads can not be decoded",
+            "they are left out and counted",
+        ),
+        some(
+            (q.not_finite, total),
+            (Error, "not-finite"),
+            "samples have NaN or infinity in the gyro",
+            "they are left out; the attitude is carried across them",
+        ),
+        gyro_absent(q.no_gyro, total),
+        some(
+            (q.no_stamp, total),
+            (Error, "no-stamp"),
+            "samples have no stamp",
+            "take the recorder's time",
+        )
+        .map(|found| found.flags("--time log")),
+        some(
+            (q.collisions, total),
+            (Warning, "shared-stamps"),
+            "samples share their stamp with another that has other data",
+            "each is given a stamp of its own between its neighbours, where there is room",
+        ),
+        some(
+            (q.duplicates.saturating_sub(q.collisions), total),
+            (Warning, "repeats"),
+            "samples repeat their predecessor, stamp and data",
+            "they are left out",
+        ),
+        some(
+            (q.disorder, total),
+            (Warning, "disorder"),
+            "samples are older than one before them",
+            "those within the reorder window are put back in place, later ones are left out",
+        ),
+        some(
+            (repeated, total),
+            (Warning, "repeated-rows"),
             "samples repeat the values before them under a new stamp",
             "the sensor is read faster than it measures: record at its own rate",
-            "",
-        );
-    }
-    if q.lone_zero_rows > 0 {
-        add(
-            q.lone_zero_rows,
-            Warning,
-            "zero-rows",
-            "samples are exactly zero about all axes",
-            "a driver that has no data yet says so this way; they are integrated as rest",
-            "",
-        );
-    }
-    add(
-        q.accel_not_finite,
-        Warning,
-        "accel-not-finite",
-        "samples have NaN or infinity in the acceleration",
-        "only levelling is affected",
-        "",
-    );
+        )
+        .filter(|_| is_read_too_often),
+        zero_rows(q.lone_zero_rows, total),
+        some(
+            (q.accel_not_finite, total),
+            (Warning, "accel-not-finite"),
+            "samples have NaN or infinity in the acceleration",
+            "only levelling is affected",
+        ),
+    ];
+    out.extend(found.into_iter().flatten());
 }
 
-fn advised(topic: &CheckedTopic, advice: &Advice) -> Option<Finding> {
+fn advised(looked: &Inspection, advice: &Advice) -> Option<Finding> {
     use Severity::{Error, Note, Warning};
-    let text = advice.to_string();
-    // The flag is said apart from what was seen.
-    let what = text
-        .split_once(": --")
-        .or_else(|| text.split_once(": if "))
-        .map_or(text.as_str(), |(what, _)| what)
-        .to_owned();
-    let stated_frd = topic.looked.resolved.body == BodyAxes::Frd;
-    let finding = |severity, code| Finding::new(severity, code, what.clone());
+    let stated_frd = looked.resolved.body == BodyAxes::Frd;
     Some(match *advice {
-        Advice::RatesLookLikeDegrees { peak } => finding(Error, "unit-degrees")
-            .with("largest_rate", peak)
-            .advise("the rates are in deg/s")
-            .flags("--gyro-unit deg"),
+        Advice::RatesLookLikeDegrees { peak } => rates_like_degrees(peak),
         Advice::GravityTurnsOtherwise { found, unit } => {
-            let found = finding(Error, "unit-against-gravity")
+            let share = match unit {
+                Some(_) => format!("{:.4}", found.factor),
+                None => format!("{:.2}", found.factor),
+            };
+            let seen = format!(
+                "gravity turns by {share} of what the gyro says (correlation {:.2})",
+                found.correlation
+            );
+            let what = match unit {
+                Some(unit) => format!("{seen}: the rates look like {unit}/s"),
+                None => format!("{seen}: gyro and accelerometer disagree about axes, signs or unit"),
+            };
+            let finding = Finding::new(Error, "unit-against-gravity", what)
                 .with("factor", found.factor)
                 .with("correlation", found.correlation);
             match unit {
-                Some(unit) => found
+                Some(unit) => finding
                     .advise("the accelerometer shows the unit of the rates")
                     .flags(format!("--gyro-unit {unit}")),
-                None => found
+                None => finding
                     .advise("give the gyro's axes or unit as they are")
                     .flags("--body MAP or --gyro-unit"),
             }
         }
-        Advice::AccelNotInMetres { magnitude, unit } => finding(Warning, "accel-unit")
-            .with("magnitude_at_rest", magnitude)
-            .with("plausible_unit", unit)
-            .advise("only levelling uses the acceleration, and its direction alone"),
+        Advice::AccelNotInMetres { magnitude, unit } => Finding::new(
+            Warning,
+            "accel-unit",
+            format!("acceleration at rest is {magnitude:.3}: plausible in {unit}, not in m/s^2"),
+        )
+        .with("magnitude_at_rest", magnitude)
+        .with("plausible_unit", unit)
+        .advise("only levelling uses the acceleration, and its direction alone"),
         Advice::LooksLikeFrd if stated_frd => return None,
-        Advice::LooksLikeFrd => finding(Warning, "looks-frd")
-            .with("stated", topic.looked.resolved.body.to_string())
-            .advise("the body's z points down")
-            .flags("--body frd"),
-        Advice::MountedOnSide { gravity } => finding(Note, "mounted-on-side")
-            .with("gravity", gravity.to_string())
-            .advise("the attitude is the sensor's; state its mounting to get the body's")
-            .flags("--mount q=w,x,y,z"),
-        Advice::Saturated { axis, at, samples } => finding(Error, "saturated")
-            .with("axis", axis_name(axis))
-            .with("reading", at)
-            .with("samples", samples)
-            .advise("the true rate was higher: the attitude is wrong after it; have them flagged")
-            .flags(format!("--gyro-range {:.4}", at.abs())),
-        Advice::Stuck { axis, samples } => finding(Error, "stuck")
-            .with("axis", axis_name(axis))
-            .with("samples", samples)
-            .advise("one axis repeats itself while the others move: the sensor or its driver is broken"),
-        Advice::StampsStandStill => finding(Error, "stamps-stand-still")
-            .advise("take another clock")
-            .flags("--time log"),
-        Advice::StampsJitter { share } => finding(Warning, "jitter")
-            .with("p99_share_of_step", share)
-            .with(
-                "p99_s",
-                topic.looked.quality.spacing.map_or(0.0, |s| s.jitter_p99_secs),
-            )
-            .advise("if the sensor samples evenly and only its stamps jitter, straighten them; if it samples unevenly, keep them")
-            .flags("--regularise-stamps"),
-        Advice::StampsJitterEvenly { jitter, segments } => finding(Warning, "jitter")
-            .with("rms_share_of_step", jitter)
-            .with("segments_of_constant_rate", segments)
-            .advise("if a clock of its own triggers the sensor, straighten its stamps; if it samples when it is asked, keep them: they can not tell, --against-recorded may")
-            .flags("--regularise-stamps"),
-        Advice::StampsUneven { share } => finding(Warning, "jitter")
-            .with("p99_share_of_step", share)
-            .advise("the stamps keep no constant rate: another clock may be steadier; if no sample is missing, number them")
-            .flags("--time log, or --time index --rate-hz HZ"),
-        Advice::ClocksDrift { ppm } => finding(Warning, "clock-drift")
-            .with("ppm", ppm)
-            .advise("one of the clocks is wrong by as much, and so is every angle")
-            .flags("--time header|log"),
+        Advice::LooksLikeFrd => Finding::new(
+            Warning,
+            "looks-frd",
+            "gravity reads negative on z at rest: z points down",
+        )
+        .with("stated", looked.resolved.body.to_string())
+        .advise("the body looks like front, right, down")
+        .flags("--body frd"),
+        Advice::MountedOnSide { gravity } => Finding::new(
+            Note,
+            "mounted-on-side",
+            format!("gravity is on {gravity} at rest: the sensor is mounted on its side"),
+        )
+        .with("gravity", gravity.to_string())
+        .advise("the attitude is the sensor's; state its mounting to get the body's")
+        .flags("--mount q=w,x,y,z, or an axis map in --body"),
+        Advice::Saturated { axis, at, samples } => Finding::new(
+            Error,
+            "saturated",
+            format!(
+                "gyro {} reads exactly {at} in {samples} samples: looks saturated",
+                axis_name(axis)
+            ),
+        )
+        .with("axis", axis_name(axis))
+        .with("reading", at)
+        .with("samples", samples)
+        .advise("the true rate was higher: the attitude is wrong after it; have them flagged")
+        .flags(format!("--gyro-range {:.4}", at.abs())),
+        Advice::Stuck { axis, samples } => Finding::new(
+            Error,
+            "stuck",
+            format!(
+                "gyro {} repeats one value {samples} times in a row while the others move: stuck?",
+                axis_name(axis)
+            ),
+        )
+        .with("axis", axis_name(axis))
+        .with("samples", samples)
+        .advise("one axis repeats itself while the others move: the sensor or its driver is broken"),
+        Advice::StampsStandStill => {
+            Finding::new(Error, "stamps-stand-still", "the stamps do not advance")
+                .advise("take another clock")
+                .flags("--time log, or --time index --rate-hz HZ")
+        }
+        Advice::StampsJitter { share } => Finding::new(
+            Warning,
+            "jitter",
+            format!("stamps jitter by {:.0} % of the step (p99)", share * 100.0),
+        )
+        .with("p99_share_of_step", share)
+        .with(
+            "p99_s",
+            looked.quality.spacing.map_or(0.0, |s| s.jitter_p99_secs),
+        )
+        .advise("if the sensor samples evenly and only its stamps jitter, straighten them; if it samples unevenly, keep them")
+        .flags("--regularise-stamps"),
+        Advice::StampsJitterEvenly { jitter, segments } => Finding::new(
+            Warning,
+            "jitter",
+            format!(
+                "stamps jitter by {:.1} % of the step (rms) about {}",
+                jitter * 100.0,
+                match segments {
+                    1 => "one constant rate".to_owned(),
+                    n => format!("{n} stretches of constant rate"),
+                }
+            ),
+        )
+        .with("rms_share_of_step", jitter)
+        .with("segments_of_constant_rate", segments)
+        .advise("if a clock of its own triggers the sensor, straighten its stamps; if it samples when it is asked, keep them: they can not tell, --against-recorded may")
+        .flags("--regularise-stamps"),
+        Advice::StampsUneven { share } => Finding::new(
+            Warning,
+            "jitter",
+            format!(
+                "stamps jitter by {:.0} % of the step (p99) and keep no constant rate",
+                share * 100.0
+            ),
+        )
+        .with("p99_share_of_step", share)
+        .advise("another clock may be steadier; if no sample is missing, number them")
+        .flags("--time log, or --time index --rate-hz HZ"),
+        Advice::ClocksDrift { ppm } => Finding::new(
+            Warning,
+            "clock-drift",
+            format!("header and log time drift apart by {ppm:.0} ppm"),
+        )
+        .with("ppm", ppm)
+        .advise("one of the clocks is wrong by as much, and so is every angle")
+        .flags("--time header|log"),
         Advice::SamplesMissing {
             missing,
             longest_secs,
-        } => finding(Warning, "missing")
-            .with("missing", missing)
-            .with("longest_s", longest_secs)
-            .with("gaps", topic.looked.quality.gaps)
-            .advise("bridged by interpolation where short")
-            .flags("--max-gap SECS --on-gap hold|bridge|reset"),
-        Advice::NeverStill => finding(Note, "never-still")
-            .advise("no bias can be had from this log: give one, if it is known")
-            .flags("--bias x,y,z"),
+        } => Finding::new(
+            Warning,
+            "missing",
+            format!("{missing} samples are missing, at most {longest_secs:.3} s at a time"),
+        )
+        .with("missing", missing)
+        .with("longest_s", longest_secs)
+        .with("gaps", looked.quality.gaps)
+        .advise("bridged by interpolation where short")
+        .flags("--max-gap SECS --on-gap hold|bridge|reset"),
+        Advice::NeverStill => Finding::new(
+            Note,
+            "never-still",
+            "the body is never still for half a second",
+        )
+        .advise("no bias can be had from this log: give one, if it is known")
+        .flags("--bias x,y,z"),
     })
 }
 
-fn clocks(topic: &CheckedTopic, out: &mut Vec<Finding>) {
-    if let Some(offset) = &topic.looked.quality.offset
+/// No gyro turns that fast in rad/s.
+pub(super) fn rates_like_degrees(peak: f64) -> Finding {
+    Finding::new(
+        Severity::Error,
+        "unit-degrees",
+        format!("rates reach {peak:.1}: no gyro measures that in rad/s; deg/s would be plausible"),
+    )
+    .with("largest_rate", peak)
+    .advise("the rates are in deg/s")
+    .flags("--gyro-unit deg")
+}
+
+/// Samples without a gyro by the mark of their format.
+pub(super) fn gyro_absent(n: u64, total: u64) -> Option<Finding> {
+    let found = some(
+        (n, total),
+        (Severity::Error, "gyro-absent"),
+        "samples mark their gyro as absent (covariance -1)",
+        "some drivers set the mark wrongly; if the rates are good, use them",
+    )?;
+    Some(found.flags("--ignore-covariance-flag"))
+}
+
+/// Samples without any rate amid others.
+pub(super) fn zero_rows(n: u64, total: u64) -> Option<Finding> {
+    some(
+        (n, total),
+        (Severity::Warning, "zero-rows"),
+        "samples are exactly zero about all axes",
+        "a driver that has no data yet says so this way; they are integrated as rest",
+    )
+}
+
+/// So many of all, where there are any.
+fn some(
+    (n, total): (u64, u64),
+    (severity, code): (Severity, &'static str),
+    what: &str,
+    advice: &str,
+) -> Option<Finding> {
+    (n > 0).then(|| {
+        Finding::new(severity, code, format!("{n} of {total} {what}"))
+            .with("count", n)
+            .with("samples", total)
+            .advise(advice)
+    })
+}
+
+fn clocks(looked: &Inspection, out: &mut Vec<Finding>) {
+    if let Some(offset) = &looked.quality.offset
         && offset.mean_secs.abs() > OTHER_CLOCK_SECS
     {
         out.push(
@@ -284,8 +360,8 @@ fn clocks(topic: &CheckedTopic, out: &mut Vec<Finding>) {
     }
 }
 
-fn bias(topic: &CheckedTopic, out: &mut Vec<Finding>) {
-    let Some(found) = &topic.looked.bias else {
+fn bias(looked: &Inspection, out: &mut Vec<Finding>) {
+    let Some(found) = &looked.bias else {
         return;
     };
     let to_deg_per_h = |v: f64| v.to_degrees() * 3600.0;

@@ -18,6 +18,7 @@ use super::summarise;
 use super::topics::{self, PICKED_UNNAMED};
 use crate::config::TopicBeside;
 use crate::error::{Error, Result};
+use crate::findings::{Finding, Severity};
 use crate::sink::{Flow, Stream, output_topic};
 use crate::summary::RunSummary;
 use std::collections::BTreeSet;
@@ -88,7 +89,7 @@ pub(super) fn replay(
     let session = waiting.into_session(pool)?;
     let mut summary = summarise::run(run, session.finish(pool)?, &report.survey);
     if let Some(topic) = summary.topics.first_mut() {
-        topic.warnings.extend(picked.passed_over());
+        topic.findings.extend(picked.passed_over());
     }
     Ok(summary)
 }
@@ -308,7 +309,7 @@ impl Picked {
         explained(error, &channels, &problems(survey))
     }
 
-    fn passed_over(&self) -> Option<String> {
+    fn passed_over(&self) -> Option<Finding> {
         let names: Vec<&str> = self
             .others
             .iter()
@@ -316,10 +317,13 @@ impl Picked {
             .map(String::as_str)
             .collect();
         (!names.is_empty()).then(|| {
-            format!(
-                "the first IMU topic was taken; also there: {} (--topic)",
+            let what = format!(
+                "the first IMU topic was taken; also there: {}",
                 names.join(", ")
-            )
+            );
+            Finding::new(Severity::Warning, "several-topics", what)
+                .with("topics", names)
+                .flags("--topic NAME")
         })
     }
 }

@@ -2,15 +2,16 @@
 
 use super::delivery::broken;
 use super::request::{ReplayRequest, Source};
+use super::sample_kinds::AgainstRecorded;
 use super::session::{Ended, Topic};
-use crate::findings::orientation;
+use crate::findings::{self, Finding, Severity};
 use crate::summary::aid::Aided;
 use crate::summary::calibration;
 use crate::summary::series::Drawn;
 use crate::summary::sigma::SigmaTerms;
 use crate::summary::smoothing::Smoothing;
 use crate::summary::stamps::{Regularised, Segment};
-use crate::summary::{Gaps, RunSummary, TopicSummary, significant};
+use crate::summary::{Gaps, RunSummary, TopicSummary};
 use std::sync::atomic::Ordering;
 use strapd_attitude::condition::regularise;
 use strapd_attitude::estimate::{SensorCalibration, learned};
@@ -19,10 +20,6 @@ use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{Nanos, SampleKind, Verdict};
 use strapd_recording::format::Format;
 use strapd_recording::mcap::Survey;
-
-/// Above this a rate is probably not in rad/s: 200 rad/s is 11,500 deg/s, five times what most gyros
-/// can measure.
-const UNLIKELY_RATE: f64 = 200.0;
 
 /// The summary of a run.
 #[must_use]
@@ -151,18 +148,32 @@ fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
         against: topic
             .against
             .as_ref()
-            .map(super::sample_kinds::AgainstRecorded::rows)
+            .map(AgainstRecorded::rows)
             .unwrap_or_default(),
-        recorded: topic
-            .against
-            .as_ref()
-            .and_then(super::sample_kinds::AgainstRecorded::recorded),
-        warnings: topic.prepared.warnings.clone(),
+        recorded: topic.against.as_ref().and_then(AgainstRecorded::recorded),
+        findings: Vec::new(),
         drawn,
     };
-    summary.warnings.extend(topic.warnings.iter().cloned());
-    summary.warnings.extend(warnings(topic, &summary));
-    summary.warnings.extend(orientation::warnings(&summary));
+    let said = topic.prepared.warnings.iter().chain(&topic.warnings);
+    summary.findings = said
+        .map(|said| Finding::new(Severity::Warning, "preparation", said.clone()))
+        .collect();
+    let found = findings::of_run(
+        &summary,
+        &findings::Noted {
+            conditioning: topic.estimator.conditioning(),
+            largest_rate: topic.output.largest_rate,
+            marked_absent: topic.noticed.gyro_marked_absent.load(Ordering::Relaxed),
+            zeros: topic.zeros.count,
+            stamps_carried: topic.noticed.stamps_carried.load(Ordering::Relaxed),
+            left_out: &topic.noticed.left_out(),
+            references: topic.against.as_ref().map(|a| a.references() as u64),
+        },
+    );
+    summary.findings.extend(found);
+    for finding in &mut summary.findings {
+        finding.topic.clone_from(&summary.topic);
+    }
     summary
 }
 
@@ -270,117 +281,4 @@ fn is_text(described: &str) -> bool {
         .iter()
         .map(|format| format.name())
         .any(|name| described == name || described.ends_with(&format!("[{name}]")))
-}
-
-fn warnings(topic: &Topic, summary: &TopicSummary) -> Vec<String> {
-    let mut said = Vec::new();
-    if summary.counts.used() == 0 {
-        said.push(nothing_used(summary));
-    }
-    if topic.output.largest_rate > UNLIKELY_RATE {
-        said.push(format!(
-            "the largest rate is {} rad/s, more than gyros measure: is it in deg/s? --gyro-unit deg",
-            significant(topic.output.largest_rate, 4)
-        ));
-    }
-    if summary.undersampled > 0 {
-        said.push(format!(
-            "{} steps turn more than half a turn: the samples are too few for the motion, or the unit is wrong (--gyro-unit)",
-            summary.undersampled
-        ));
-    }
-    let marked = topic.noticed.gyro_marked_absent.load(Ordering::Relaxed);
-    if marked > 0 {
-        said.push(format!(
-            "{marked} samples mark their gyro as absent (covariance -1), which some drivers do wrongly: --ignore-covariance-flag uses it all the same"
-        ));
-    }
-    match (summary.smoothing(), &summary.aided) {
-        (Some(smoothing), _) => said.extend(smoothing.doubts(&summary.noise)),
-        (None, Some(aided)) => {
-            said.extend(summary.not_smoothed().map(|why| format!("--smooth: {why}")));
-            said.extend(aided.doubt(&summary.noise));
-        }
-        (None, None) => {}
-    }
-    if topic.zeros.count > 0 {
-        said.push(format!(
-            "{} samples are exactly zero about all axes between others that are not: a driver that has no data says so this way; they are integrated as rest",
-            topic.zeros.count
-        ));
-    }
-    let carried = topic.noticed.stamps_carried.load(Ordering::Relaxed);
-    if carried > 0 {
-        said.push(format!(
-            "{carried} stamps had a second or more of nanoseconds, carried over"
-        ));
-    }
-    for (frame, n) in topic.noticed.left_out() {
-        let (name, _) = topic.name.split_once('@').unwrap_or((&topic.name, ""));
-        said.push(format!(
-            "{n} messages name the frame `{frame}`, another body's, and were left out: --topic {name}@{frame} takes them"
-        ));
-    }
-    let restamped = summary.counts.get(Verdict::Restamped);
-    if let Some(step) = topic.estimator.conditioning().coarse_nanos {
-        let clock = &summary.clock;
-        let other = if clock == "log" { "header" } else { "log" };
-        said.push(format!(
-            "the {clock} stamps count in steps of {} s, {:.1} samples in each: these were spread over it evenly ({restamped} of them), so a stamp is good to a part of that step; --time {other} may be finer",
-            significant(step as f64 * 1e-9, 3),
-            summary.rate_hz.unwrap_or(0.0) * step as f64 * 1e-9
-        ));
-    } else if restamped > 0 {
-        said.push(format!(
-            "{restamped} samples shared their stamp with another and were given one of their own between their neighbours"
-        ));
-    }
-    if summary.stamps.as_ref().is_some_and(|stamps| stamps.uneven) {
-        said.push("--regularise-stamps: there was no constant rate in this stream: leave it out, or --time index --rate-hz HZ".to_owned());
-    }
-    if topic.estimator.conditioning().saturated > 0 {
-        said.push(format!(
-            "{} samples reach the gyro's range (--gyro-range): the true rate was higher",
-            topic.estimator.conditioning().saturated
-        ));
-    }
-    if let Some(against) = &topic.against
-        && summary.against.is_empty()
-    {
-        said.push(match against.references() {
-            0 => "--against-recorded: the log holds no orientation to compare with (name its topic: --against-recorded=TOPIC)".to_owned(),
-            n => format!("--against-recorded: no two of the {n} recorded orientations are 1 s apart"),
-        });
-    }
-    if let Some(advice) = kind_advice(topic, &summary.against) {
-        said.push(advice);
-    }
-    said
-}
-
-/// Why a run gave no attitude at all.
-fn nothing_used(summary: &TopicSummary) -> String {
-    let total = summary.counts.total();
-    let trimmed = summary.counts.get(Verdict::Trimmed);
-    if total == 0 {
-        "no sample was used: the topic has no messages".to_owned()
-    } else if trimmed == total {
-        format!("no sample was used: all {total} lie outside --start, --until")
-    } else {
-        format!("no sample was used: all {total} were turned away (see lost)")
-    }
-}
-
-/// Which meaning of a sample fits this log, when it is not the one used and clearly better.
-fn kind_advice(topic: &Topic, rows: &[crate::summary::Against]) -> Option<String> {
-    const CLEARLY: f64 = 0.95;
-    let used = rows.iter().find(|r| r.kind == topic.resolved.kind.name())?;
-    let best = rows
-        .iter()
-        .min_by(|a, b| a.median_deg.total_cmp(&b.median_deg))?;
-    (best.median_deg < CLEARLY * used.median_deg).then(|| match best.kind {
-        "held" => "samples fit best as held over the interval after their stamp: --method dcm-left"
-            .to_owned(),
-        kind => format!("samples fit best as {kind}: --sample-kind {kind}"),
-    })
 }

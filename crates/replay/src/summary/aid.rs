@@ -1,6 +1,7 @@
 //! What corrected the attitude and what it learned -> words, JSON. Pure.
 
 use super::significant;
+use crate::findings::{Finding, Severity};
 use nalgebra::Vector3;
 use serde_json::{Value, json};
 use strapd_attitude::aid::{Calibration, Filter, Report};
@@ -168,19 +169,26 @@ impl Aided {
 
     /// What is to be said where the sensor is farther off than those of its class, `noise`, are.
     #[must_use]
-    pub fn doubt(&self, noise: &str) -> Option<String> {
+    pub fn doubt(&self, noise: &str) -> Option<Finding> {
         let largest = |v: &Vector3<f64>, scale: f64| significant(v.amax() * scale, 2);
-        let advice = match noise {
-            "uncalibrated" => "give its sizes to --noise as a list",
-            _ => "--noise uncalibrated expects that",
-        };
-        (self.started && self.is_beyond_class).then(|| {
-            format!(
-                "the sensor is farther off than those of class {noise} are (scale {} %, axes {} deg, accelerometer {} m/s^2): sigma was too small until that was seen; {advice}",
-                largest(&self.calibration.scale, 100.0),
-                largest(&self.calibration.cross, 1f64.to_degrees()),
-                largest(&self.calibration.force_bias, 1.0),
+        let found = || {
+            Finding::new(
+                Severity::Warning,
+                "beyond-class",
+                format!(
+                    "the sensor is farther off than those of class {noise} are (scale {} %, axes {} deg, accelerometer {} m/s^2): sigma was too small until that was seen",
+                    largest(&self.calibration.scale, 100.0),
+                    largest(&self.calibration.cross, 1f64.to_degrees()),
+                    largest(&self.calibration.force_bias, 1.0),
+                ),
             )
+            .with("noise", noise)
+        };
+        (self.started && self.is_beyond_class).then(|| match noise {
+            "uncalibrated" => found().advise("give its sizes to --noise as a list"),
+            _ => found()
+                .advise("a class expects that")
+                .flags("--noise uncalibrated"),
         })
     }
 

@@ -2,6 +2,7 @@
 
 use super::calibration;
 use super::{TopicSummary, significant};
+use crate::findings::Finding;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use strapd_attitude::estimate::{Known, Pooled, SensorCalibration};
@@ -32,7 +33,10 @@ impl Recorded {
             samples: topic.counts.used(),
             secs: topic.duration_secs,
             not_smoothed: topic.not_smoothed(),
-            doubts: smoothing.map_or_else(Vec::new, |s| s.doubts(&topic.noise)),
+            doubts: smoothing.map_or_else(Vec::new, |s| {
+                let doubts = s.doubts(&topic.noise);
+                doubts.iter().map(Finding::line).collect()
+            }),
             told: calibration::names(&topic.calibration),
         }
     }

@@ -1,6 +1,7 @@
 //! What a smoother learned of a recording -> words, rows, JSON. Pure.
 
 use super::significant;
+use crate::findings::{Finding, Severity};
 use serde_json::{Value, json};
 use strapd_attitude::estimate::Recording;
 use strapd_attitude::smooth::{Calibration, Counts, Learned, Outcome, Sizes};
@@ -279,17 +280,29 @@ impl Smoothing {
 
     /// What is to be said aloud, each with the flag that helps; `noise` is the class the sensor was taken for.
     #[must_use]
-    pub fn doubts(&self, noise: &str) -> Vec<String> {
-        let mut said = Vec::new();
+    pub fn doubts(&self, noise: &str) -> Vec<Finding> {
+        let mut found = Vec::new();
         if self.outcome != Outcome::Converged {
-            said.extend(self.lines().first().map(|did| format!("--smooth: {did}")));
+            let did = self.lines().into_iter().next();
+            found.extend(did.map(|did| {
+                Finding::new(Severity::Warning, "smoothing", format!("--smooth: {did}"))
+            }));
         }
         if self.is_beyond_class {
-            said.push(format!(
-                "the sensor is farther off than those of class {noise} are: smoothed again as one that nobody calibrated; --noise uncalibrated says so beforehand"
-            ));
+            found.push(
+                Finding::new(
+                    Severity::Warning,
+                    "beyond-class",
+                    format!(
+                        "the sensor is farther off than those of class {noise} are: smoothed again as one that nobody calibrated"
+                    ),
+                )
+                .with("noise", noise)
+                .advise("a class says so beforehand")
+                .flags("--noise uncalibrated"),
+            );
         }
-        said
+        found
     }
 
     /// For machines.

@@ -1,4 +1,4 @@
-//! Numbers about a recording -> what to do about it, with the flag that helps. Pure.
+//! Numbers about a recording -> what they give away, as data. Pure.
 //!
 //! A stage of its own because thresholds of advice are opinions, and opinions should lie in
 //! one place, apart from the counting.
@@ -7,7 +7,7 @@ use super::summary::{GravityAxis, QualitySummary};
 use super::{GyroAgainstGravity, Quiet};
 use crate::condition::regularise::{Lines, Uneven};
 
-/// Something to do about a recording; the text names the flag.
+/// Something to do about a recording: what was seen, with its numbers. Its words belong to whoever says it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Advice {
     /// No gyro turns that fast in rad/s.
@@ -85,95 +85,6 @@ pub enum Advice {
     },
     /// The body is never still: no bias can be had from this recording.
     NeverStill,
-}
-
-impl std::fmt::Display for Advice {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let axis_name = |axis: &usize| ["x", "y", "z"].get(*axis).copied().unwrap_or("?");
-        match self {
-            Advice::RatesLookLikeDegrees { peak } => write!(
-                f,
-                "rates reach {peak:.1}: no gyro measures that in rad/s; deg/s would be plausible: --gyro-unit deg"
-            ),
-            Advice::GravityTurnsOtherwise {
-                found,
-                unit: Some(unit),
-            } => write!(
-                f,
-                "gravity turns by {:.4} of what the gyro says (correlation {:.2}): the rates look like {unit}/s: --gyro-unit {unit}",
-                found.factor, found.correlation
-            ),
-            Advice::GravityTurnsOtherwise { found, unit: None } => write!(
-                f,
-                "gravity turns by {:.2} of what the gyro says (correlation {:.2}): gyro and accelerometer disagree about axes, signs or unit",
-                found.factor, found.correlation
-            ),
-            Advice::AccelNotInMetres { magnitude, unit } => write!(
-                f,
-                "acceleration at rest is {magnitude:.3}: plausible in {unit}, not in m/s^2"
-            ),
-            Advice::LooksLikeFrd => write!(
-                f,
-                "gravity reads negative on z at rest: z points down, looks like --body frd"
-            ),
-            Advice::MountedOnSide { gravity } => write!(
-                f,
-                "gravity is on {gravity} at rest: the sensor is mounted on its side: --mount q=w,x,y,z or an axis map in --body"
-            ),
-            Advice::Saturated { axis, at, samples } => write!(
-                f,
-                "gyro {} reads exactly {at} in {samples} samples: looks saturated; --gyro-range {:.4} flags them",
-                axis_name(axis),
-                at.abs()
-            ),
-            Advice::Stuck { axis, samples } => write!(
-                f,
-                "gyro {} repeats one value {samples} times in a row while the others move: stuck?",
-                axis_name(axis)
-            ),
-            Advice::StampsStandStill => write!(
-                f,
-                "the stamps do not advance: --time log, or --time index --rate-hz HZ"
-            ),
-            Advice::StampsJitter { share } => write!(
-                f,
-                "stamps jitter by {:.0} % of the step (p99): if the sensor samples evenly, --regularise-stamps",
-                share * 100.0
-            ),
-            Advice::StampsJitterEvenly { jitter, segments } => {
-                write!(
-                    f,
-                    "stamps jitter by {:.1} % of the step (rms) about ",
-                    jitter * 100.0
-                )?;
-                match segments {
-                    1 => f.write_str("one constant rate")?,
-                    n => write!(f, "{n} stretches of constant rate")?,
-                }
-                f.write_str(": if a clock of its own triggers the sensor, --regularise-stamps; if it samples when it is asked, the stamps are right as they are. They can not tell which; --against-recorded may")
-            }
-            Advice::StampsUneven { share } => write!(
-                f,
-                "stamps jitter by {:.0} % of the step (p99) and keep no constant rate: if the recorder's clock is steadier, --time log; if no sample is missing, --time index --rate-hz HZ",
-                share * 100.0
-            ),
-            Advice::ClocksDrift { ppm } => write!(
-                f,
-                "header and log time drift apart by {ppm:.0} ppm: one of the clocks is wrong; --time chooses"
-            ),
-            Advice::SamplesMissing {
-                missing,
-                longest_secs,
-            } => write!(
-                f,
-                "{missing} samples are missing, at most {longest_secs:.3} s at a time: --max-gap, --on-gap decide what happens there"
-            ),
-            Advice::NeverStill => write!(
-                f,
-                "the body is never still for half a second: --bias auto will refuse; --bias x,y,z gives one"
-            ),
-        }
-    }
 }
 
 /// Above this no gyro is in rad/s (11,500 deg/s; the widest range sold is 4000 to 20,000 deg/s on

@@ -1,0 +1,287 @@
+//! What a run has counted -> findings, the same of a log and of a live sensor. Pure.
+
+use super::{Finding, Severity, orientation, samples};
+use crate::summary::{Gaps, TopicSummary, significant};
+use strapd_attitude::condition::Report;
+use strapd_attitude::propagate;
+use strapd_attitude::record::Verdict;
+
+/// Largest turn per step that integrates well whatever the motion: beyond, aliasing is near.
+const LARGE_STEP_DEG: f64 = 30.0;
+/// Longest gap that anybody would bridge.
+const LONGEST_BRIDGE_SECS: f64 = 3600.0;
+/// Above this a rate is probably not in rad/s: 200 rad/s is 11,500 deg/s, five times what most gyros
+/// can measure.
+const UNLIKELY_RATE: f64 = 200.0;
+
+/// What a run knows of its samples that its summary does not say.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Noted<'a> {
+    /// What was counted while conditioning.
+    pub(crate) conditioning: &'a Report,
+    /// Largest component of any rate, rad/s.
+    pub(crate) largest_rate: f64,
+    /// Samples whose format marks their gyro as absent.
+    pub(crate) marked_absent: u64,
+    /// Samples without any rate amid others.
+    pub(crate) zeros: u64,
+    /// Stamps with a second or more of nanoseconds.
+    pub(crate) stamps_carried: u64,
+    /// Frames of other bodies on the topic, and how many messages named them.
+    pub(crate) left_out: &'a [(String, u64)],
+    /// Orientations that were compared with; `None` where none were to be.
+    pub(crate) references: Option<u64>,
+}
+
+/// Everything a replay says of a topic beside its numbers. The gaps have a line of their own there.
+pub(crate) fn of_run(summary: &TopicSummary, noted: &Noted<'_>) -> Vec<Finding> {
+    let mut out = Vec::new();
+    if summary.counts.used() == 0 {
+        out.push(nothing_used(summary));
+    }
+    if noted.largest_rate > UNLIKELY_RATE {
+        out.push(samples::rates_like_degrees(noted.largest_rate));
+    }
+    out.extend(steps(summary.undersampled, summary.largest_step).filter(is_no_opinion));
+    let total = summary.counts.total();
+    out.extend(samples::gyro_absent(noted.marked_absent, total));
+    match (summary.smoothing(), &summary.aided) {
+        (Some(smoothing), _) => out.extend(smoothing.doubts(&summary.noise)),
+        (None, Some(aided)) => {
+            let refused = summary.not_smoothed();
+            out.extend(refused.map(|why| {
+                Finding::new(
+                    Severity::Warning,
+                    "not-smoothed",
+                    format!("not smoothed: {why}"),
+                )
+            }));
+            out.extend(aided.doubt(&summary.noise));
+        }
+        (None, None) => {}
+    }
+    out.extend(samples::zero_rows(noted.zeros, total));
+    if noted.stamps_carried > 0 {
+        let n = noted.stamps_carried;
+        out.push(
+            Finding::new(
+                Severity::Warning,
+                "stamps-carried",
+                format!("{n} stamps had a second or more of nanoseconds, carried over"),
+            )
+            .with("count", n),
+        );
+    }
+    for (frame, n) in noted.left_out {
+        let (name, _) = summary
+            .topic
+            .split_once('@')
+            .unwrap_or((&summary.topic, ""));
+        out.push(
+            Finding::new(
+                Severity::Warning,
+                "other-frame",
+                format!("{n} messages name the frame `{frame}`, another body's, and were left out"),
+            )
+            .with("frame", frame.as_str())
+            .with("count", *n)
+            .flags(format!("--topic {name}@{frame}")),
+        );
+    }
+    out.extend(stamps(noted.conditioning, &summary.clock));
+    if summary.stamps.as_ref().is_some_and(|stamps| stamps.uneven) {
+        out.push(
+            Finding::new(
+                Severity::Warning,
+                "no-constant-rate",
+                "--regularise-stamps: there was no constant rate in this stream",
+            )
+            .advise("leave it out, or number the samples")
+            .flags("--time index --rate-hz HZ"),
+        );
+    }
+    out.extend(saturated(noted.conditioning));
+    if let Some(references) = noted.references.filter(|_| summary.against.is_empty()) {
+        out.push(no_reference(references));
+    }
+    out.extend(orientation::of_run(summary));
+    out
+}
+
+/// What a live sensor's counts show, for `STATUS`. `clock`: of its stamps.
+#[must_use]
+pub fn of_sensor(report: &Report, propagation: &propagate::Report, clock: &str) -> Vec<Finding> {
+    let seconds = |nanos: i64| nanos as f64 * 1e-9;
+    let held = Gaps {
+        held: propagation.holds,
+        resets: propagation.resets,
+        held_secs: report.gaps.not_bridged_nanos.0 as f64 * 1e-9,
+        longest_held_secs: report.gaps.not_bridged_nanos.1 as f64 * 1e-9,
+        longest_at_secs: longest_at(report).map_or(0.0, seconds),
+        ..Gaps::default()
+    };
+    let mut out: Vec<Finding> = gaps(&held).into_iter().collect();
+    out.extend(steps(propagation.undersampled, propagation.largest_step));
+    out.extend(stamps(report, clock));
+    out.extend(saturated(report));
+    out.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
+    out
+}
+
+/// When the longest gap was, ns after the first sample.
+fn longest_at(report: &Report) -> Option<i64> {
+    let gaps = &report.gaps;
+    let longest = gaps
+        .kept
+        .iter()
+        .find(|g| g.length_nanos == gaps.longest_nanos)?;
+    Some(longest.start.0.saturating_sub(report.first?.0))
+}
+
+/// Whether it is more than an opinion about the motion, of which a replay's own numbers tell.
+fn is_no_opinion(finding: &Finding) -> bool {
+    finding.severity == Severity::Error
+}
+
+/// Why a run gave no attitude at all.
+fn nothing_used(summary: &TopicSummary) -> Finding {
+    let total = summary.counts.total();
+    let trimmed = summary.counts.get(Verdict::Trimmed);
+    let what = if total == 0 {
+        "no sample was used: the topic has no messages".to_owned()
+    } else if trimmed == total {
+        format!("no sample was used: all {total} lie outside --start, --until")
+    } else {
+        format!("no sample was used: all {total} were turned away (see lost)")
+    };
+    Finding::new(Severity::Error, "nothing-used", what).with("samples", total)
+}
+
+/// Gaps and clock jumps that were not integrated over.
+pub(super) fn gaps(gaps: &Gaps) -> Option<Finding> {
+    let breaks = gaps.held + gaps.resets;
+    if breaks == 0 {
+        return None;
+    }
+    let longest = gaps.longest_held_secs;
+    let held = Finding::new(
+        Severity::Error,
+        "gap-held",
+        format!(
+            "{breaks} gaps or clock jumps are too long to integrate over, the longest {longest:.3} s, {:.1} s after the start",
+            gaps.longest_at_secs
+        ),
+    )
+    .with("count", breaks)
+    .with("longest_s", longest)
+    .with("longest_at_s", gaps.longest_at_secs)
+    .with("total_s", gaps.held_secs);
+    // Nobody bridges an hour, or a clock that was set back: such a stamp is wrong, or another clock's.
+    Some(
+        if (f64::MIN_POSITIVE..=LONGEST_BRIDGE_SECS).contains(&longest) {
+            held.advise("the attitude is held there; bridge them where the motion was slow")
+                .flags(format!(
+                    "--on-gap bridge --max-gap {:.1}",
+                    (longest * 10.0).ceil() / 10.0
+                ))
+        } else {
+            held.advise("the attitude is held there; a clock was set, or is not always the same one: another may be steadier")
+            .flags("--time log, or --time header")
+        },
+    )
+}
+
+/// Steps that turn far.
+pub(super) fn steps(undersampled: u64, largest_step: f64) -> Option<Finding> {
+    let step_deg = largest_step.to_degrees();
+    if undersampled > 0 {
+        return Some(
+            Finding::new(
+                Severity::Error,
+                "under-sampled",
+                format!(
+                    "{undersampled} steps turn more than half a turn (up to {step_deg:.0} deg): the samples are too few for the motion, or the unit is wrong"
+                ),
+            )
+            .with("steps", undersampled)
+            .with("largest_step_deg", step_deg)
+            .advise("check the unit first; otherwise sample faster")
+            .flags("--gyro-unit deg"),
+        );
+    }
+    (step_deg > LARGE_STEP_DEG).then(|| {
+        Finding::new(
+            Severity::Warning,
+            "large-turn-per-step",
+            format!("up to {step_deg:.0} deg are turned in one step: few samples for this motion"),
+        )
+        .with("largest_step_deg", step_deg)
+        .advise("sample faster; delta angles suffer less than rates")
+    })
+}
+
+/// Stamps that several samples share.
+fn stamps(report: &Report, clock: &str) -> Option<Finding> {
+    let restamped = report.counts.get(Verdict::Restamped);
+    if let Some(step) = report.coarse_nanos {
+        let other = if clock == "log" { "header" } else { "log" };
+        let in_each = report
+            .spacing_nanos
+            .filter(|n| *n > 0)
+            .map_or(0.0, |n| step as f64 / n as f64);
+        return Some(
+            Finding::new(
+                Severity::Warning,
+                "coarse-stamps",
+                format!(
+                    "the {clock} stamps count in steps of {} s, {in_each:.1} samples in each: these were spread over it evenly ({restamped} of them), so a stamp is good to a part of that step",
+                    significant(step as f64 * 1e-9, 3)
+                ),
+            )
+            .with("step_s", step as f64 * 1e-9)
+            .with("count", restamped)
+            .advise("another clock may be finer")
+            .flags(format!("--time {other}")),
+        );
+    }
+    (restamped > 0).then(|| {
+        Finding::new(
+            Severity::Warning,
+            "shared-stamps",
+            format!(
+                "{restamped} samples shared their stamp with another and were given one of their own between their neighbours"
+            ),
+        )
+        .with("count", restamped)
+    })
+}
+
+/// Samples at the end of the gyro's range, where that was said.
+fn saturated(report: &Report) -> Option<Finding> {
+    let n = report.saturated;
+    (n > 0).then(|| {
+        Finding::new(
+            Severity::Warning,
+            "at-range",
+            format!("{n} samples reach the gyro's range (--gyro-range): the true rate was higher"),
+        )
+        .with("count", n)
+    })
+}
+
+fn no_reference(found: u64) -> Finding {
+    match found {
+        0 => Finding::new(
+            Severity::Warning,
+            "no-reference",
+            "--against-recorded: the log holds no orientation to compare with",
+        )
+        .advise("name its topic")
+        .flags("--against-recorded=TOPIC"),
+        n => Finding::new(
+            Severity::Warning,
+            "no-reference",
+            format!("--against-recorded: no two of the {n} recorded orientations are 1 s apart"),
+        ),
+    }
+}
