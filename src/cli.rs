@@ -260,6 +260,9 @@ pub fn start_diagnostics(global: &Global) {
         Ok(targets) if !asked.is_empty() => targets,
         _ => Targets::new().with_default(level),
     };
+    // Below that it says each request as it goes out, with tokens and keys.
+    let most = targets.default_level().unwrap_or(LevelFilter::OFF);
+    let targets = targets.with_target("tungstenite", most.min(LevelFilter::DEBUG));
     let layer = tracing_subscriber::fmt::layer()
         .with_writer(std::io::stderr)
         .with_target(false)

@@ -168,7 +168,7 @@ fn learned(
         targets: vec![Target::Null],
         selection,
         plan,
-        command: super::shell::own_command(),
+        command: super::shell::recorded_command(false),
         ..ReplayRequest::new(Source::parse(log))
     };
     let mut reporter = Reporter::new(global, log);

@@ -51,6 +51,9 @@ pub struct Replay {
     /// Replace outputs that exist
     #[arg(long, help_heading = "Output")]
     pub force: bool,
+    /// Keep in outputs where the input and the files of this command lie, not their names alone
+    #[arg(long, help_heading = "Output")]
+    pub record_paths: bool,
     /// Save what was learned of the sensor in this TOML file, for --calibration; {stem} stands for the log's name
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub save_calibration: Option<String>,
@@ -299,7 +302,8 @@ impl Replay {
             out_rate: self.out_rate,
             speed: served.speed,
             against: self.against_recorded.clone(),
-            command: super::shell::own_command(),
+            command: super::shell::recorded_command(self.record_paths),
+            record_paths: self.record_paths,
         };
         Ok((run, served))
     }

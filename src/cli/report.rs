@@ -60,6 +60,9 @@ pub struct Report {
     /// Replace a page that exists
     #[arg(long)]
     pub force: bool,
+    /// Keep in the page where the log and the files of this command lie, not their names alone
+    #[arg(long)]
+    pub record_paths: bool,
 }
 
 /// Runs it.
@@ -108,24 +111,42 @@ pub fn run(global: &Global, args: &Report) -> Result<Outcome> {
             stretches: STRETCHES,
             reference: reference.as_ref(),
         }),
-        command: super::shell::own_command(),
+        command: super::shell::recorded_command(args.record_paths),
     };
     let mut reporter = Reporter::new(global, &input.name().display().to_string());
     let checked = examine(&input, &asked, &pool, &mut |position| {
         reporter.update(position);
     });
     reporter.finish();
-    let checked = checked?;
+    let mut checked = checked?;
+    // A page is shown to others.
+    let file = match (args.record_paths, input.name().file_name()) {
+        (false, Some(name)) => {
+            let name = name.to_string_lossy().into_owned();
+            checked.rename(&input.name().display().to_string(), &name);
+            name
+        }
+        _ => input.name().display().to_string(),
+    };
     let told = findings(&checked).into_iter().map(|finding| Told {
         answered: answered(finding.code, &asked.plan),
         finding,
     });
     let page = Page {
-        file: input.name().display().to_string(),
+        file,
         sha256: sha256(input.name(), input.bytes()?)?,
         command: asked.command.clone(),
         reference: match (&reference, asked.reference_topic.as_str()) {
-            (Some(track), _) => track.name.clone(),
+            (Some(track), _) => match args
+                .reference
+                .as_deref()
+                .and_then(|p| Some((p, p.file_name()?)))
+            {
+                Some((path, name)) if !args.record_paths => track
+                    .name
+                    .replace(&path.display().to_string(), &name.to_string_lossy()),
+                _ => track.name.clone(),
+            },
             (None, "") => String::new(),
             (None, topic) => format!("the orientation on {topic}"),
         },

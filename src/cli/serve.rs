@@ -14,7 +14,7 @@ use crate::serve::shutdown::Signals;
 use crate::serve::source::Source;
 use crate::serve::state::{self, StateFile};
 use crate::serve::{Server, Settings, listen};
-use crate::sink::address::{DEFAULTS, Listen};
+use crate::sink::address::{DEFAULTS, Listen, printable_address};
 use crate::sink::{Format, Target};
 use clap::Args;
 use std::io::IsTerminal;
@@ -86,6 +86,9 @@ pub struct Serve {
     /// Replace the recording if it exists
     #[arg(long, requires = "record", help_heading = "Recording")]
     pub force: bool,
+    /// Keep this command in the recording with the folders of its files
+    #[arg(long, requires = "record", help_heading = "Recording")]
+    pub record_paths: bool,
     /// Go on from the attitudes in this file, and keep it no more than a second behind: a restart
     /// loses no heading
     #[arg(long, value_name = "FILE")]
@@ -309,7 +312,7 @@ impl Serve {
         };
         settings.provenance.metadata = [
             ("version", env!("CARGO_PKG_VERSION").to_owned()),
-            ("command", super::shell::own_command()),
+            ("command", super::shell::recorded_command(self.record_paths)),
         ]
         .map(|(key, value)| (key.to_owned(), value))
         .into();
@@ -325,12 +328,24 @@ impl Serve {
         for text in self.sources.iter().filter(|s| *s != "-") {
             if !Remote::is_meant(text) {
                 return Err(Error::Usage(format!(
-                    "serve {text}: is no source of a daemon; known: tcp://HOST:PORT, ws://HOST:PORT/PATH, unix:///PATH, -\n  help: --listen waits for senders; strapd replay reads a log"
+                    "serve {}: is no source of a daemon; known: tcp://HOST:PORT, ws://HOST:PORT/PATH, unix:///PATH, -\n  help: --listen waits for senders; strapd replay reads a log",
+                    printable_address(text)
                 )));
             }
-            let source = Source::parse(text)?;
+            let mut source = Source::parse(text)?;
             if sources.iter().any(|s| s.remote == source.remote) {
-                return Err(Error::Usage(format!("serve {text}: is given twice")));
+                return Err(Error::Usage(format!(
+                    "serve {}: is given twice",
+                    source.name
+                )));
+            }
+            // What tells two apart may be what is not printed.
+            let alike = |s: &Source| {
+                s.name == source.name || s.name.starts_with(&format!("{} (", source.name))
+            };
+            match sources.iter().filter(|s| alike(s)).count() {
+                0 => {}
+                others => source.name.push_str(&format!(" ({})", others + 1)),
             }
             sources.push(source);
         }

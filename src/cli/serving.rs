@@ -10,6 +10,7 @@ use crate::serve::playback::server::{Cast, Next};
 use crate::sink::Target;
 use crate::sink::address::Listen;
 use clap::Args;
+use std::path::Path;
 use std::sync::Arc;
 
 /// Where the page is when nothing else is said: beside the daemon's.
@@ -96,7 +97,12 @@ impl Serving {
             None
         } else {
             let others = targets.len() - listen.len();
-            let playback = Playback::new(source, speed, self.paused);
+            // Who connects has no need of the folder.
+            let name = Path::new(source)
+                .file_name()
+                .map(|name| name.to_string_lossy());
+            let name = name.as_deref().unwrap_or(source);
+            let playback = Playback::new(name, speed, self.paused);
             playback.forward_only(if !can_rewind {
                 Some("the input can be read only once, so there is no way back")
             } else if others > 0 {

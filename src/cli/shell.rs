@@ -3,8 +3,10 @@
 //! Commands are printed to be pasted, and files and logs are called whatever somebody chose: no name may end
 //! a word, start another command, or reach the terminal as anything but text.
 
-use std::ffi::OsStr;
+use crate::sink::address::printable_address;
+use std::ffi::{OsStr, OsString};
 use std::fmt::Write as _;
+use std::path::Path;
 
 /// `word` as one word of a POSIX shell, fit for a terminal: as it is where that is safe, else in single quotes,
 /// and where it has what no terminal should be sent, as what `printf` makes of it.
@@ -55,9 +57,9 @@ fn made_by_printf(bytes: &[u8]) -> String {
 
 /// A file's name where a command takes it: one that begins with a dash is no flag, and not standard input.
 #[must_use]
-pub fn quoted_file(path: &std::path::Path) -> String {
+pub fn quoted_file(path: &Path) -> String {
     if path.as_os_str().as_encoded_bytes().starts_with(b"-") {
-        quoted(std::path::Path::new(".").join(path))
+        quoted(Path::new(".").join(path))
     } else {
         quoted(path)
     }
@@ -70,9 +72,92 @@ pub fn flag(name: &str, value: &str) -> String {
     format!("{name}{joint}{}", quoted(value))
 }
 
-/// This process's own command, to be pasted.
+/// This process's own command as outputs keep it: files by their names, without folders, unless `with_paths`; addresses as they
+/// are printed, without passwords and keys.
 #[must_use]
-pub fn own_command() -> String {
-    let words: Vec<String> = std::env::args_os().map(quoted).collect();
+pub fn recorded_command(with_paths: bool) -> String {
+    let mut words: Vec<String> = Vec::new();
+    let mut before = std::ffi::OsString::new();
+    for word in std::env::args_os() {
+        words.push(quoted(kept(&word, &before, with_paths)));
+        before = word;
+    }
     words.join(" ")
+}
+
+/// Flags whose values have slashes and are no files.
+const TOPICS: [&str; 5] = [
+    "--topic",
+    "--accel-topic",
+    "--mag-topic",
+    "--ref-topic",
+    "--against-recorded",
+];
+
+/// A word of a command as it is kept; `before` is the word before it.
+fn kept(word: &OsStr, before: &OsStr, with_paths: bool) -> OsString {
+    let Some(text) = word.to_str() else {
+        let name = Path::new(word).file_name();
+        return name.filter(|_| !with_paths).unwrap_or(word).to_owned();
+    };
+    let (flag, value) = match text.split_once('=') {
+        Some((flag, _)) if flag.starts_with("--") => (flag, text.get(flag.len() + 1..)),
+        _ if text.starts_with("-o") => ("-o", text.get(2..)),
+        _ => ("", Some(text)),
+    };
+    let value = value.unwrap_or_default();
+    let head = text.strip_suffix(value).unwrap_or_default();
+    if value.contains("://") {
+        return format!("{head}{}", printable_address(value)).into();
+    }
+    let of = |flags: &[&str]| flags.iter().any(|f| *f == flag || OsStr::new(f) == before);
+    if with_paths || of(&TOPICS) || !is_path(value, of(&["-o"])) {
+        return word.to_owned();
+    }
+    let mut out = OsString::from(head);
+    out.push(Path::new(value).file_name().unwrap_or_default());
+    out
+}
+
+/// Whether a word is a path with folders: it says so, or there is such a folder.
+fn is_path(value: &str, is_output: bool) -> bool {
+    let path = Path::new(value);
+    let has_folder = path.parent().is_some_and(|p| !p.as_os_str().is_empty());
+    let says_so = path.is_absolute() || ["./", "../", "~/"].iter().any(|p| value.starts_with(p));
+    has_folder && (is_output || says_so || path.exists() || path.parent().is_some_and(Path::exists))
+}
+
+#[cfg(test)]
+mod kept_words {
+    use super::*;
+
+    #[test]
+    fn folders_are_left_out_and_topics_are_not_folders() {
+        for (before, word, without) in [
+            ("", "/usr/bin/strapd", "strapd"),
+            ("replay", "/home/ada/secret/a.mcap", "a.mcap"),
+            ("replay", "../secret/a.mcap", "a.mcap"),
+            ("replay", "src/lib.rs", "lib.rs"),
+            ("-o", "no/such/folder/x.csv", "x.csv"),
+            ("a", "-o/home/ada/x.csv", "-ox.csv"),
+            ("a", "--state=/home/ada/s.json", "--state=s.json"),
+            ("--topic", "/imu/data", "/imu/data"),
+            ("a", "--topic=/imu/data", "--topic=/imu/data"),
+            ("--noise", "arw=0.1/0.2/0.3", "arw=0.1/0.2/0.3"),
+            ("--shard", "0/4", "0/4"),
+            ("--init", "q=1,0,0,0", "q=1,0,0,0"),
+            ("a", "-", "-"),
+            (
+                "serve",
+                "ws://u:p@h:1/x?k=v&id=l",
+                "ws://...@h:1/x?k=...&id=...",
+            ),
+            ("a", "--listen=tcp-listen://:1", "--listen=tcp-listen://:1"),
+        ] {
+            let kept = |with| kept(OsStr::new(word), OsStr::new(before), with);
+            assert_eq!(kept(false).to_str(), Some(without), "{word}");
+            let is_address = word.contains("://");
+            assert_eq!(kept(true) == word, !is_address || without == word, "{word}");
+        }
+    }
 }

@@ -157,10 +157,10 @@ async fn open(remote: &Remote, token: Option<&str>, max_message: usize) -> Resul
             let peer = address(&stream);
             (Wire::Tcp(stream), format!("tcp://{peer}"))
         }
-        Remote::WebSocket { place, path } => {
+        Remote::WebSocket { place, resource } => {
             let stream = dial(place).await?;
             let peer = address(&stream);
-            let web = upgrade(stream, place, path, token, max_message).await?;
+            let web = upgrade(stream, place, resource.asked(), token, max_message).await?;
             (Wire::WebSocket(Box::new(web)), format!("ws://{peer}"))
         }
         #[cfg(unix)]

@@ -3,6 +3,7 @@
 //! known tomorrow.
 
 use crate::error::{Error, Result};
+use crate::sink::address::printable_address;
 use std::fmt;
 use std::path::PathBuf;
 
@@ -15,8 +16,8 @@ pub enum Remote {
     WebSocket {
         /// The machine.
         place: Place,
-        /// Path and query as they are asked for, beginning with `/`.
-        path: String,
+        /// What is asked for there.
+        resource: Resource,
     },
     /// Lines over a Unix socket.
     Unix(PathBuf),
@@ -31,6 +32,30 @@ pub struct Place {
     pub host: String,
     /// From 1, but for what is listened on.
     pub port: u16,
+}
+
+/// Path and query of a WebSocket, beginning with `/`. Printed it has no values of the query: they may be keys.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Resource(String);
+
+impl Resource {
+    /// As it is asked for, with everything; for who connects alone.
+    #[must_use]
+    pub fn asked(&self) -> &str {
+        &self.0
+    }
+}
+
+impl fmt::Display for Resource {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&printable_address(&self.0))
+    }
+}
+
+impl fmt::Debug for Resource {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{self}")
+    }
 }
 
 /// A parameter of a query: name and value, decoded.
@@ -58,7 +83,8 @@ impl Remote {
         match parameters.first() {
             None => Ok(remote),
             Some((name, _)) => Err(Error::Usage(format!(
-                "{text}: `?{name}=` means nothing here\n  help: {KNOWN}"
+                "{}: `?{name}=` means nothing here\n  help: {KNOWN}",
+                printable_address(text)
             ))),
         }
     }
@@ -72,11 +98,14 @@ impl Remote {
         text: &str,
         ours: impl Fn(&str) -> bool,
     ) -> Result<(Remote, Vec<Parameter>)> {
-        let refuse = |what: &str| Error::Usage(format!("{text}: {what}\n  help: {KNOWN}"));
+        let refuse = |what: &str| {
+            let shown = printable_address(text);
+            Error::Usage(format!("{shown}: {what}\n  help: {KNOWN}"))
+        };
         if text.len() > MAX_BYTES || text.chars().any(char::is_control) {
             return Err(Error::Usage(format!(
                 "{}: is no address\n  help: {KNOWN}",
-                strapd_recording::text::printable(text)
+                printable_address(text)
             )));
         }
         let (scheme, rest) = text.split_once("://").ok_or_else(|| refuse("no scheme"))?;
@@ -108,7 +137,10 @@ impl Remote {
                     path.push_str(&encoded(value, b""));
                 }
                 let place = place(authority)?.connectable().map_err(refuse)?;
-                Remote::WebSocket { place, path }
+                Remote::WebSocket {
+                    place,
+                    resource: Resource(path),
+                }
             }
             "wss" | "https" => {
                 return Err(refuse(
@@ -171,7 +203,7 @@ impl fmt::Display for Remote {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Remote::Tcp(place) => write!(f, "tcp://{place}"),
-            Remote::WebSocket { place, path } => write!(f, "ws://{place}{path}"),
+            Remote::WebSocket { place, resource } => write!(f, "ws://{place}{resource}"),
             Remote::Unix(path) => write!(f, "unix://{}", path.display()),
             Remote::UdpListen(place) => write!(f, "udp-listen://{place}"),
         }
@@ -275,13 +307,20 @@ mod tests {
         let phone =
             r#"ws://phone:8080/sensors/connect?types=["android.sensor.gyroscope","b"]&id=left"#;
         let (remote, parameters) = Remote::with_parameters(phone, |p| p == "id").unwrap();
+        let asked = |remote: &Remote| match remote {
+            Remote::WebSocket { resource, .. } => resource.asked().to_owned(),
+            _ => String::new(),
+        };
         assert_eq!(
-            remote.to_string(),
-            "ws://phone:8080/sensors/connect?types=%5B%22android.sensor.gyroscope%22%2C%22b%22%5D"
+            asked(&remote),
+            "/sensors/connect?types=%5B%22android.sensor.gyroscope%22%2C%22b%22%5D"
         );
+        let printed = "ws://phone:8080/sensors/connect?types=...";
+        assert_eq!(remote.to_string(), printed);
+        assert!(!format!("{remote:?}").contains("gyroscope"));
         assert_eq!(parameters[1], ("id".to_owned(), "left".to_owned()));
         // What was escaped already is not escaped twice.
         let (remote, _) = Remote::with_parameters("ws://h:1/a%20b?c=%5B", |_| false).unwrap();
-        assert_eq!(remote.to_string(), "ws://h:1/a%20b?c=%5B");
+        assert_eq!(asked(&remote), "/a%20b?c=%5B");
     }
 }

@@ -13,9 +13,10 @@
 //! Stamps: Android's `SensorEvent.timestamp`, the time base of `SystemClock.elapsedRealtimeNanos()`.
 //! Units and the six values of the uncalibrated gyroscope: Android's `SensorEvent.values`.
 
-use crate::client::remote::Remote;
+use crate::client::remote::{Parameter, Remote};
 use crate::client::secret::Secret;
 use crate::error::{Error, Result};
+use crate::sink::address::printable_address;
 use std::path::Path;
 use strapd_recording::decode::{LineDecoder, Options, exact_name};
 use strapd_recording::text::printable;
@@ -36,7 +37,7 @@ pub struct Source {
     pub protocol: Protocol,
     /// What it wants to see first.
     pub token: Option<Secret>,
-    /// What the user wrote, for people.
+    /// Its address, for people: of the query the names, and the values that are ours and no secret.
     pub name: String,
 }
 
@@ -62,13 +63,14 @@ impl Source {
     pub fn parse(text: &str) -> Result<Source> {
         let (remote, parameters) = Remote::with_parameters(text, |p| OURS.contains(&p))?;
         let refuse = |what: String| {
+            let shown = printable_address(text);
             Error::Usage(format!(
-                "serve {text}: {what}\n  help: ?id=NAME names the sensor; ?proto=auto|ndjson|strapd|sensorserver; ?token-file=FILE"
+                "serve {shown}: {what}\n  help: ?id=NAME names the sensor; ?proto=auto|ndjson|strapd|sensorserver; ?token-file=FILE"
             ))
         };
         if matches!(remote, Remote::UdpListen(_)) {
             return Err(Error::Usage(format!(
-                "serve {text}: datagrams are listened for, not fetched\n  help: --listen {text}"
+                "serve {remote}: datagrams are listened for, not fetched\n  help: --listen {remote}"
             )));
         }
         let is_web = matches!(remote, Remote::WebSocket { .. });
@@ -94,8 +96,9 @@ impl Source {
             Some(id) => Some(exact_name(id).map_err(|why| refuse(format!("?id=: {why}")))?),
         };
         let phone = match &remote {
-            Remote::WebSocket { path, .. } => {
-                path.starts_with("/sensor/connect") || path.starts_with("/sensors/connect")
+            Remote::WebSocket { resource, .. } => {
+                let asked = resource.asked();
+                asked.starts_with("/sensor/connect") || asked.starts_with("/sensors/connect")
             }
             _ => false,
         };
@@ -120,11 +123,11 @@ impl Source {
             .map(|file| Secret::read("token-file", Path::new(file)))
             .transpose()?;
         Ok(Source {
-            remote,
             id,
             protocol,
             token,
-            name: printable(text),
+            name: named(&remote, &parameters),
+            remote,
         })
     }
 
@@ -138,6 +141,18 @@ impl Source {
             Protocol::Auto | Protocol::Lines | Protocol::Strapd => None,
         }
     }
+}
+
+/// The address as it is printed, with the sensor's name and the way to speak where they were given.
+fn named(remote: &Remote, parameters: &[Parameter]) -> String {
+    let mut name = remote.to_string();
+    for (parameter, value) in parameters {
+        if ["id", "proto"].contains(&parameter.as_str()) {
+            name.push(if name.contains('?') { '&' } else { '?' });
+            name.push_str(&format!("{parameter}={}", printable(value)));
+        }
+    }
+    name
 }
 
 #[cfg(test)]

@@ -30,6 +30,7 @@ mod recording;
 mod resetting;
 mod runs;
 mod same_bytes;
+mod secrets;
 mod sending;
 mod slow_readers;
 mod state;

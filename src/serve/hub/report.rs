@@ -57,7 +57,7 @@ impl Hub {
                 "saved_s_ago": s.saved.map(|t| t.elapsed().as_secs_f64()), "failed": s.failed,
             })),
             "recording": recording.map(|r| serde_json::json!({
-                "file": r.files.last().map(|f| f.display().to_string()), "files": r.files.len(),
+                "file": r.files.last().and_then(|f| f.file_name()).map(|f| f.to_string_lossy()), "files": r.files.len(),
                 "bytes": r.bytes, "samples": r.samples, "attitudes": r.attitudes, "stopped": r.stopped,
             })),
         }))

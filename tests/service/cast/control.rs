@@ -54,7 +54,11 @@ fn attitudes_after_a_seek_forward_or_backward_are_those_of_an_undisturbed_run() 
         place = client.next_of("PLAYBACK");
     }
     let (start, session) = (place["start"].clone(), place["session"].clone());
-    assert_eq!(place["file"], LOG);
+    assert!(
+        LOG.ends_with(&format!("/{}", place["file"].as_str().unwrap())),
+        "{place}"
+    );
+    assert!(!place["file"].as_str().unwrap().contains('/'));
     // 12 of 19 s ahead, while it waits: one attitude shows where it is.
     let at = later(&start, 12);
     assert_eq!(client.play(&format!("\"seek\",\"at\":{at}"))["at"], at);

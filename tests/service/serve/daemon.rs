@@ -113,6 +113,8 @@ pub(crate) fn eventually(what: &str, mut done: impl FnMut() -> bool) {
 pub(crate) struct Process {
     pub(crate) child: Child,
     pub(crate) addresses: Vec<String>,
+    /// What was logged up to the ready line.
+    pub(crate) early: String,
     pub(crate) log: BufReader<ChildStderr>,
 }
 
@@ -169,16 +171,28 @@ impl Process {
             .spawn()
             .unwrap();
         let mut log = BufReader::new(child.stderr.take().unwrap());
-        let mut line = String::new();
-        log.read_line(&mut line).unwrap();
-        let said: serde_json::Value = serde_json::from_str(&line).unwrap_or_else(|_| {
-            unreachable!("no ready line: {line}");
-        });
-        let message = said["fields"]["message"].as_str().unwrap();
-        let addresses = message.strip_prefix("ready ").expect(message);
+        let mut early = String::new();
+        let addresses = loop {
+            let mut line = String::new();
+            assert!(
+                log.read_line(&mut line).unwrap() > 0,
+                "no ready line: {early}"
+            );
+            let said: serde_json::Value = serde_json::from_str(&line).unwrap_or_else(|_| {
+                unreachable!("no line of a log: {line}");
+            });
+            early.push_str(&line);
+            let message = said["fields"]["message"].as_str().unwrap_or_default();
+            if let Some(addresses) = message.strip_prefix("ready ") {
+                break addresses.to_owned();
+            }
+            // More is said only where more was asked for.
+            assert_ne!(said["level"], "INFO", "{line}");
+        };
         Process {
             addresses: addresses.split(' ').map(str::to_owned).collect(),
             child,
+            early,
             log,
         }
     }

@@ -36,6 +36,28 @@ pub struct Checked {
     pub left_out: Vec<String>,
 }
 
+impl Checked {
+    /// Calls the file `name` in all words in which it was called `path`.
+    pub fn rename(&mut self, path: &str, name: &str) {
+        let summaries = self.topics.iter_mut().map(|topic| &mut topic.replayed);
+        let mut words: Vec<&mut String> = Vec::new();
+        for summary in summaries {
+            match summary {
+                Ok(summary) => {
+                    words.extend(summary.findings.iter_mut().map(|found| &mut found.what))
+                }
+                Err(why) => words.push(why),
+            }
+        }
+        words.extend(self.problems.iter_mut().chain(&mut self.refused));
+        for word in words {
+            if word.contains(path) {
+                *word = word.replace(path, name);
+            }
+        }
+    }
+}
+
 /// A topic of samples, looked at and replayed.
 #[derive(Debug)]
 pub struct CheckedTopic {

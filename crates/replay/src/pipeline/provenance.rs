@@ -31,7 +31,12 @@ pub fn of(
     };
     put("version".to_owned(), env!("CARGO_PKG_VERSION").to_owned());
     put("command".to_owned(), run.command.clone());
-    put("input".to_owned(), run.source.name().display().to_string());
+    let input = run.source.name();
+    let input = match input.file_name() {
+        Some(name) if !run.record_paths => name.to_string_lossy().into_owned(),
+        _ => input.display().to_string(),
+    };
+    put("input".to_owned(), input);
     put("method".to_owned(), run.plan.method.to_string());
     put("noise".to_owned(), run.plan.noise.name.clone());
     // The ends are read only where there is something to write the result into, and never of a

@@ -31,8 +31,10 @@ pub struct ReplayRequest {
     pub audience: Option<Arc<dyn Audience>>,
     /// `--against-recorded`: the reference's topic, empty = found.
     pub against: Option<String>,
-    /// The command as typed, for the output's metadata.
+    /// The command, for the output's metadata.
     pub command: String,
+    /// Whether the output's metadata say in which folder the input lies.
+    pub record_paths: bool,
 }
 
 impl ReplayRequest {
@@ -51,6 +53,7 @@ impl ReplayRequest {
             audience: None,
             against: None,
             command: String::new(),
+            record_paths: false,
         }
     }
 

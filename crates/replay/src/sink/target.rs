@@ -1,7 +1,7 @@
 //! The word after `-o` -> where the attitude goes, in which format. Pure.
 
 use crate::error::{Error, Result};
-use crate::sink::address::Listen;
+use crate::sink::address::{Listen, printable_address};
 use std::path::{Path, PathBuf};
 
 /// What a file or pipe is filled with.
@@ -80,7 +80,10 @@ impl Target {
     }
 
     fn socket(text: &str, scheme: &str, rest: &str) -> Result<Target> {
-        let refuse = |what: &str| Err(Error::Usage(format!("-o {text}: {what}\n  help: {KNOWN}")));
+        let refuse = |what: &str| {
+            let shown = printable_address(text);
+            Err(Error::Usage(format!("-o {shown}: {what}\n  help: {KNOWN}")))
+        };
         let (address, query) = match rest.split_once('?') {
             Some((address, query)) => (address, Some(query)),
             None => (rest, None),
@@ -99,6 +102,9 @@ impl Target {
             ("udp-listen", _) => {
                 refuse("takes samples in (strapd serve --listen); udp://HOST:PORT sends")
             }
+            ("tcp" | "udp", _) if address.contains('@') => refuse(
+                "no user or password goes into an address; strapd serve --token-file shows a token",
+            ),
             ("tcp" | "udp", _) if !is_complete => refuse("HOST:PORT is needed"),
             ("tcp", None) => Ok(Target::Tcp(address.to_owned())),
             ("udp", query) => {
@@ -239,8 +245,9 @@ mod tests {
             "s3://b/x.mcap",
         ] {
             let said = Target::parse(text).unwrap_err().to_string();
+            let shown = printable_address(text);
             assert!(
-                said.contains(text) && said.contains("help: known"),
+                said.contains(&shown) && said.contains("help: known"),
                 "{said}"
             );
         }
