@@ -11,7 +11,7 @@ use pyo3::types::{PyDict, PyString};
 use std::str::FromStr;
 use std::sync::Arc;
 use strapd_attitude::condition::{GyroUnit, OnGap};
-use strapd_attitude::estimate::{Aid, Bias, Initial, NOISE_PRESETS, Noise, Plan, Truncation};
+use strapd_attitude::estimate::{Aid, Bias, Initial, NOISE_FIGURES, NOISE_PRESETS, Noise, Plan, Truncation};
 use strapd_attitude::propagate::{Method, Order, Placement};
 use strapd_attitude::record::SampleKind;
 
@@ -346,7 +346,7 @@ fn truncation(given: &Given<'_, '_>) -> PyResult<Truncation> {
     }
 }
 
-/// A class by name, or a dict of figures in SI, each one number or three about the body axes.
+/// A class by name, or a dict of figures in the units of data sheets, each one number or three about the body axes.
 fn noise(given: &Given<'_, '_>) -> PyResult<Noise> {
     let Some(value) = given.get("noise")? else {
         return Ok(Plan::default().noise);
@@ -373,64 +373,27 @@ fn noise(given: &Given<'_, '_>) -> PyResult<Noise> {
             shown(&value)
         ))
     })?;
-    let mut noise = Noise {
-        name: "given".to_owned(),
-        arw: [0.0; 3],
-        bias_instability: [0.0; 3],
-        rrw: [0.0; 3],
-        turn_on_bias: [0.0; 3],
-        initial: [0.0; 3],
-        scale: 0.0,
-        misalignment: 0.0,
-        tilt: 0.0,
-        delay: 0.0,
-    };
-    if !dict.contains("arw")? {
-        return Err(argument(
-            "noise: 'arw' is missing, the angle random walk in rad/sqrt(s)",
-        ));
-    }
+    let mut given = Vec::new();
     for (key, figure) in dict.iter() {
         let key = key
             .extract::<String>()
             .map_err(|_| argument("noise: the figures have names"))?;
-        let wrong = || {
-            argument(format!(
-                "noise: '{key}' is one number or three about the body axes, from 0 up, not {}",
-                shown(&figure)
-            ))
-        };
         let axes: [f64; 3] = match figure.extract::<f64>() {
             Ok(all) => [all; 3],
-            Err(_) => figure.extract().map_err(|_| wrong())?,
+            Err(_) => figure.extract().map_err(|_| {
+                argument(format!(
+                    "noise: '{key}' is one number or three about the body axes, from 0 up, not {}",
+                    shown(&figure)
+                ))
+            })?,
         };
-        if axes.iter().any(|v| !v.is_finite() || *v < 0.0) {
-            return Err(wrong());
-        }
-        let one = || {
-            if axes[0] == axes[1] && axes[1] == axes[2] {
-                Ok(axes[0])
-            } else {
-                Err(wrong())
-            }
-        };
-        match key.as_str() {
-            "arw" => noise.arw = axes,
-            "bias_instability" => noise.bias_instability = axes,
-            "rrw" => noise.rrw = axes,
-            "turn_on_bias" => noise.turn_on_bias = axes,
-            "initial" => noise.initial = axes,
-            "scale" => noise.scale = one()?,
-            "misalignment" => noise.misalignment = one()?,
-            "tilt" => noise.tilt = one()?,
-            _ => {
-                return Err(argument(format!(
-                    "noise: there is no '{key}'\n  help: arw, bias_instability, rrw, turn_on_bias, initial, scale, misalignment, tilt"
-                )));
-            }
-        }
+        given.push((key, axes));
     }
-    Ok(noise)
+    let figures = given.iter().map(|(key, axes)| (key.as_str(), *axes));
+    Noise::of_figures("given", figures).map_err(|why| {
+        let known = NOISE_FIGURES.map(|f| format!("{} ({})", f.key.replace('-', "_"), f.unit));
+        argument(format!("noise: {why}\n  help: {}", known.join(", ")))
+    })
 }
 
 /// Checks settings without data.

@@ -164,10 +164,10 @@ pub struct Estimation {
     pub ignore_covariance_flag: bool,
     /// Class of the sensor: consumer, uncalibrated, industrial, tactical, navigation, or a list
     ///
-    /// arw=RAD_PER_SQRT_S and any of bias-instability=RAD_S, rrw=RAD_S_PER_SQRT_S, turn-on-bias=RAD_S and
-    /// initial=RAD, with commas between; each one number, or three x/y/z for the body axes. The turn-on bias counts unless a bias is removed
-    /// (--bias); initial is the uncertainty of the initial attitude. And one number each: scale=SHARE and misalignment=RAD,
-    /// which grow with the angle turned, tilt=RAD of --init gravity.
+    /// In the units of data sheets, as in simulate: arw (deg/sqrt(h)) and any of bias-instability (deg/h), rrw (deg/h/sqrt(h)),
+    /// turn-on-bias (deg/h) and initial (deg), with commas between: arw=0.15,bias-instability=2; each one number, or three x/y/z for
+    /// the body axes. The turn-on bias counts unless a bias is removed (--bias); initial is the uncertainty of the initial attitude.
+    /// And one number each: scale-ppm and misalignment (deg), which grow with the angle turned, tilt (deg) of --init gravity.
     #[arg(long, value_name = "NOISE", default_value = "consumer")]
     pub noise: String,
     /// Skip the first seconds of the data

@@ -4,7 +4,7 @@ pub mod calibration;
 
 use crate::error::{Error, Result};
 use nalgebra::Vector3;
-use strapd_attitude::estimate::{Bias, Initial, NOISE_PRESETS, Noise, Truncation};
+use strapd_attitude::estimate::{Bias, Initial, NOISE_FIGURES, NOISE_PRESETS, Noise, Truncation};
 use strapd_attitude::frames::{Body, Nav};
 use strapd_attitude::quaternion::{Quaternion, YawPitchRoll};
 use strapd_recording::decode::{self, FieldPath, FieldRole};
@@ -53,8 +53,8 @@ pub fn parse_truncation(text: &str) -> Result<Truncation> {
     })
 }
 
-/// `consumer`, ..., or `arw=..` and any of `bias-instability`, `rrw`, `turn-on-bias`, `initial`,
-/// in SI; each one number, or three joined by `/` for the body axes x, y, z. And `scale`, `misalignment`, `tilt`.
+/// A class, or `arw=..` and any other of [`NOISE_FIGURES`], in the units of data sheets; each one number, or three joined by `/`
+/// for the body axes x, y, z.
 ///
 /// # Errors
 /// [`Error::Usage`] naming the part that is wrong.
@@ -64,81 +64,32 @@ pub fn parse_noise(text: &str) -> Result<Noise> {
     }
     let wrong = |what: String| {
         let names: Vec<&str> = NOISE_PRESETS.iter().map(|p| p.name).collect();
+        let figures = NOISE_FIGURES.map(|figure| format!("{} in {}", figure.key, figure.unit));
         Error::Usage(format!(
-            "--noise {text}: {what}\n  help: a preset ({}), or arw=RAD_PER_SQRT_S[,bias-instability=RAD_S][,rrw=RAD_S_PER_SQRT_S][,turn-on-bias=RAD_S][,initial=RAD][,scale=SHARE][,misalignment=RAD][,tilt=RAD], each one number or, but for the last three, three x/y/z",
-            names.join(", ")
+            "--noise {text}: {what}\n  help: a class ({}), or figures joined by commas ({}), each one number or three x/y/z",
+            names.join(", "),
+            figures.join(", ")
         ))
     };
-    let mut given: [Option<[f64; 3]>; NOISE_KEYS.len()] = [None; NOISE_KEYS.len()];
+    let mut given = Vec::new();
     for part in text.split(',') {
         let (key, value) = part.split_once('=').unwrap_or((part, ""));
         let key = key.trim();
-        let Some((slot, _)) = given
-            .iter_mut()
-            .zip(NOISE_KEYS)
-            .find(|(_, name)| *name == key)
-        else {
-            return Err(wrong(format!(
-                "`{key}` is no preset and no figure of noise"
-            )));
-        };
-        if slot.is_some() {
-            return Err(wrong(format!("{key} is given twice")));
+        if NOISE_FIGURES
+            .iter()
+            .all(|figure| figure.key != key.replace('_', "-"))
+        {
+            return Err(wrong(format!("`{key}` is no class and no figure of noise")));
         }
-        *slot = Some(by_axis(value).ok_or_else(|| {
+        let axes = by_axis(value).ok_or_else(|| {
             wrong(format!(
                 "{key}={value} is neither one number nor three x/y/z, from 0 up"
             ))
-        })?);
+        })?;
+        given.push((key, axes));
     }
-    let [
-        arw,
-        bias_instability,
-        rrw,
-        turn_on_bias,
-        initial,
-        scale,
-        misalignment,
-        tilt,
-    ] = given;
-    for (key, axes) in [
-        ("scale", scale),
-        ("misalignment", misalignment),
-        ("tilt", tilt),
-    ] {
-        if axes.is_some_and(|[x, y, z]| x != y || y != z) {
-            return Err(wrong(format!("{key} is one number")));
-        }
-    }
-    let one = |axes: Option<[f64; 3]>| axes.map_or(0.0, |[x, ..]| x);
-    let Some(arw) = arw else {
-        return Err(wrong("arw is missing".to_owned()));
-    };
-    Ok(Noise {
-        name: text.to_owned(),
-        arw,
-        bias_instability: bias_instability.unwrap_or_default(),
-        rrw: rrw.unwrap_or_default(),
-        turn_on_bias: turn_on_bias.unwrap_or_default(),
-        initial: initial.unwrap_or_default(),
-        scale: one(scale),
-        misalignment: one(misalignment),
-        tilt: one(tilt),
-        delay: 0.0,
-    })
+    Noise::of_figures(text, given).map_err(wrong)
 }
-
-/// What `--noise` takes, in the order of the fields.
-const NOISE_KEYS: [&str; 8] = [
-    "arw",
-    "bias-instability",
-    "rrw",
-    "turn-on-bias",
-    "initial",
-    "scale",
-    "misalignment",
-    "tilt",
-];
 
 /// One number for all axes, or three joined by `/`; finite and not negative.
 fn by_axis(text: &str) -> Option<[f64; 3]> {

@@ -68,7 +68,7 @@ fn together(gathered: &Gathered, axes: &[Axis]) -> ImuError {
     }
 }
 
-/// What `replay --noise` takes, axis by axis: rad/sqrt(s), rad/s, rad/s/sqrt(s). `None` without an
+/// What `replay --noise` takes, axis by axis, in the units of data sheets. `None` without an
 /// angle random walk on every axis, or from a sensor that moved.
 fn for_replay(gathered: &Gathered, axes: &[Axis]) -> Option<String> {
     let errors: Option<Vec<ImuError>> = axes
@@ -83,7 +83,7 @@ fn for_replay(gathered: &Gathered, axes: &[Axis]) -> Option<String> {
         .map(|t| {
             let values: Vec<String> = errors
                 .iter()
-                .map(|e| format!("{:.3e}", (t.read)(e)))
+                .map(|e| significant((t.read)(e) / t.si, 4))
                 .collect();
             format!("{}={}", t.key.replace('_', "-"), values.join("/"))
         })
@@ -156,10 +156,7 @@ pub(super) fn text(path: &Path, gathered: &Gathered, axes: &[Axis]) -> String {
         let _ = writeln!(out, "  to use   simulate --noise {}", error.text());
     }
     if let Some(flag) = for_replay(gathered, axes) {
-        let _ = writeln!(
-            out,
-            "           replay --noise {flag}   (rad, s; axis by axis)"
-        );
+        let _ = writeln!(out, "           replay --noise {flag}   (axis by axis)");
     }
     // The last column is padded.
     out.lines()

@@ -266,32 +266,24 @@ fn every_figure_of_noise_is_in_the_sigma_of_the_summary() {
         (squared, topic["drift_deg_per_h"].as_f64().unwrap())
     };
     // However the body turned, the sum of the variances is that of the start.
-    let (squared, drift) = ran("arw=0,initial=0.01/0.02/0.02");
-    assert!(
-        (squared.sqrt() - 0.03f64.to_degrees()).abs() < 1e-9,
-        "{squared}"
-    );
+    let (squared, drift) = ran("arw=0,initial=0.1/0.2/0.2");
+    assert!((squared.sqrt() - 0.3).abs() < 1e-9, "{squared}");
     assert_eq!(drift, 0.0);
     // A bias that walks from nothing: K sqrt(t) of it after the 2.99 s of the log.
-    let (squared, drift) = ran("arw=0,rrw=1e-3");
-    let walked = 1e-3 * 2.99f64.sqrt();
-    assert!(
-        (drift / (walked.to_degrees() * 3600.0) - 1.0).abs() < 1e-9,
-        "{drift}"
-    );
+    let rrw = 12_000.0;
+    let (squared, drift) = ran("arw=0,rrw=12000");
+    let walked = rrw * (2.99f64 / 3600.0).sqrt();
+    assert!((drift / walked - 1.0).abs() < 1e-9, "{drift}");
     // At most K^2 t^3 / 3 about each axis, as if it had not turned; it turned by less than one.
-    let still = 1e-6f64 * 2.99f64.powi(3) * (180.0 / std::f64::consts::PI).powi(2);
+    let still = rrw * rrw * (2.99f64 / 3600.0).powi(3);
     assert!(
         squared <= still * (1.0 + 1e-9) && squared > 0.2 * still,
         "{squared} {still}"
     );
-    let (_, drift) = ran("arw=0,turn-on-bias=3e-4/0/0,bias-instability=4e-4/0/0");
+    let (_, drift) = ran("arw=0,turn-on-bias=60/0/0,bias-instability=80/0/0");
     // The flicker of an instability B is 1.7 B, and 3 % of a turn-on bias outlive its removal.
-    let expected = 3e-4f64.hypot(1.7 * 4e-4).hypot(0.03 * 3e-4);
-    assert!(
-        (drift / (expected.to_degrees() * 3600.0) - 1.0).abs() < 1e-9,
-        "{drift}"
-    );
+    let expected = 60f64.hypot(1.7 * 80.0).hypot(0.03 * 60.0);
+    assert!((drift / expected - 1.0).abs() < 1e-9, "{drift}");
     let json = strapd(dir.path(), "replay log.mcap -o null: --json")
         .done()
         .json();
