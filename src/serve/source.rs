@@ -169,10 +169,12 @@ mod tests {
             Protocol::SensorServer("android.sensor.gyroscope".to_owned())
         );
         assert_eq!(phone.id.as_deref(), Some("phone"));
-        assert_eq!(
-            phone.remote.to_string(),
-            "ws://p:8080/sensor/connect?type=android.sensor.gyroscope"
-        );
+        let Remote::WebSocket { resource, .. } = &phone.remote else {
+            panic!("{}", phone.remote);
+        };
+        let asked = "/sensor/connect?type=android.sensor.gyroscope";
+        assert_eq!(resource.asked(), asked);
+        assert_eq!(phone.name, "ws://p:8080/sensor/connect?type=...&id=phone");
         assert_eq!(of("ws://p:8765/ws").protocol, Protocol::Auto);
         assert_eq!(of("tcp://p:1?proto=ndjson").protocol, Protocol::Lines);
         assert_eq!(of("tcp://p:1?proto=strapd").protocol, Protocol::Strapd);
@@ -189,7 +191,7 @@ mod tests {
             ("tcp://p:1?id=", "1 to 255 bytes"),
             ("tcp://p:1?id=a&id=b", "twice"),
             ("tcp://p:1?proto=mqtt", "no ?proto=mqtt"),
-            ("udp-listen://:1", "--listen udp-listen://:1"),
+            ("udp-listen://:1", "--listen udp-listen://127.0.0.1:1"),
             ("flight.mcap", "no scheme"),
         ] {
             let said = Source::parse(text).unwrap_err().to_string();
