@@ -265,9 +265,14 @@ mod tests {
 
     #[test]
     fn given_noise_needs_its_angle_random_walk() {
-        let noise = parse_noise("arw=1e-4/2e-4/3e-4,bias-instability=2e-5").unwrap();
-        assert_eq!(noise.arw, [1e-4, 2e-4, 3e-4]);
-        assert_eq!(noise.bias_instability, [2e-5; 3]);
+        let noise = parse_noise("arw=0.6/1.2/1.8,bias-instability=7200").unwrap();
+        // 0.6 deg/sqrt(h) is 0.01 deg/sqrt(s); 7200 deg/h is 2 deg/s.
+        for (arw, deg) in noise.arw.into_iter().zip([0.01_f64, 0.02, 0.03]) {
+            assert!((arw - deg.to_radians()).abs() < 1e-15, "{arw}");
+        }
+        for bias in noise.bias_instability {
+            assert!((bias - 2.0_f64.to_radians()).abs() < 1e-14, "{bias}");
+        }
         for bad in [
             "arw=1/2",
             "arw=1/2/3/4",
@@ -289,25 +294,42 @@ mod tests {
     #[test]
     fn every_figure_of_noise_reaches_the_propagator() {
         let noise = parse_noise(
-            "arw=1,rrw=2,turn-on-bias=3/0/0,bias-instability=4,initial=5/6/7,scale=0.25,misalignment=0.5,tilt=1",
+            "arw=1,rrw=2,turn-on-bias=3/0/0,bias-instability=4,initial=5/6/7,scale-ppm=250,misalignment=0.5,tilt=1",
         );
         let noise = noise.unwrap();
+        let of_deg_per_h = |axes: [f64; 3]| axes.map(|v: f64| (v / 3600.0).to_radians());
         // Independent of each other: 1.7 B of flicker, and what an estimate leaves of the turn-on bias.
         let left = 6.8_f64.hypot(0.09);
-        assert_eq!(noise.unstable_bias(), [left, 6.8, 6.8]);
-        assert_eq!(noise.unremoved_bias(), [3.0_f64.hypot(left), 6.8, 6.8]);
-        assert_eq!(
-            noise.with_bias([8.0; 3]),
-            propagate::Noise {
-                initial: [5.0, 6.0, 7.0],
-                arw: [1.0; 3],
-                bias: [8.0; 3],
-                rrw: [2.0; 3],
-                scale: 0.25,
-                misalignment: 0.5,
-                bias_tau: None,
-            }
+        assert_near(noise.unstable_bias(), of_deg_per_h([left, 6.8, 6.8]));
+        let both = 3.0_f64.hypot(left);
+        assert_near(noise.unremoved_bias(), of_deg_per_h([both, 6.8, 6.8]));
+        let propagate::Noise {
+            initial,
+            arw,
+            bias,
+            rrw,
+            scale,
+            misalignment,
+            bias_tau,
+        } = noise.with_bias([8.0; 3]);
+        assert_near(initial, [5.0, 6.0, 7.0].map(f64::to_radians));
+        assert_near(arw, [(1.0_f64 / 60.0).to_radians(); 3]);
+        assert_eq!(bias, [8.0; 3]);
+        assert_near(rrw, of_deg_per_h([2.0 / 60.0; 3]));
+        assert_near(
+            [scale, misalignment, noise.tilt],
+            [250e-6, 0.5_f64.to_radians(), 1.0_f64.to_radians()],
         );
+        assert_eq!(bias_tau, None);
+    }
+
+    fn assert_near(is: [f64; 3], should: [f64; 3]) {
+        for (a, b) in is.into_iter().zip(should) {
+            assert!(
+                (a - b).abs() <= 1e-14 * b.abs(),
+                "{is:?} and not {should:?}"
+            );
+        }
     }
 
     #[test]
