@@ -179,7 +179,7 @@ impl Input {
     /// Its bytes as lines or rows.
     ///
     /// # Errors
-    /// As [`lines::open`].
+    /// As `lines::open`.
     pub fn lines(&self, options: &Options) -> Result<Lines<File>> {
         let lines = lines::open(&self.name, self.format, self.bytes()?, options)?;
         let of_forces = Options {
