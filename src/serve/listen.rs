@@ -3,6 +3,7 @@
 //! One file per transport; the conversation is the same over all ([`super::session`]).
 
 mod duplex;
+mod http;
 mod stalling;
 mod stdin;
 pub(crate) mod tcp;
@@ -35,7 +36,6 @@ use strapd_attitude::record::Nanos;
 #[cfg(unix)]
 pub use passed::Passed;
 pub use stdin::read as read_stdin;
-pub(crate) use websocket::Connection;
 
 /// Most bytes taken from a socket at once.
 const READ: usize = 16 << 10;
@@ -151,7 +151,7 @@ impl Listener {
         match self {
             Listener::Tcp(listener) => tcp::serve(listener, context).await,
             Listener::Udp(socket) => udp::serve(socket, context).await,
-            Listener::WebSocket(listener) => websocket::serve(listener, context).await,
+            Listener::WebSocket(listener) => http::serve(listener, context).await,
             #[cfg(unix)]
             Listener::Unix(bound) => unix::serve(bound, context).await,
         }

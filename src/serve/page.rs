@@ -4,7 +4,7 @@
 //! elsewhere, no inline script or style, so that `default-src 'self'` can stand. They hold no secret
 //! and are given without a token; what they ask for is not.
 
-use super::http::{refusal, response};
+use super::http::answer::{refusal, response};
 use axum::Router;
 use axum::body::Body;
 use axum::extract::Path;

@@ -4,8 +4,8 @@
 //! The numbers are those of `strapd model top`. Every one that is asked for is bounded, and so is how
 //! many requests are worked on at once: whoever asks too much hears why.
 
-use super::http::{refusal, response};
-use super::listen::Connection;
+use super::http::answer::{refusal, response};
+use super::http::connection::Connection;
 use axum::body::Body as Answer;
 use axum::extract::rejection::QueryRejection;
 use axum::extract::{Extension, Query};

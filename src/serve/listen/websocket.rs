@@ -1,39 +1,28 @@
-//! WebSocket -> sessions, HTTP -> `/healthz`, `/metrics`. I/O.
+//! A WebSocket -> a session, or a viewer. I/O.
 //!
 //! One message is one line or several; every answer and attitude is a message of its own, so that a
 //! page can hand it to `JSON.parse` as it is. Packed objects go in binary messages, one or more in each.
 
-use super::stalling::Stalling;
-use super::{Context, accept, in_room, now, prepare};
-use crate::serve::admission::{Denied, Web};
+use super::{in_room, now};
 use crate::serve::foxglove::{self, Framed};
-use crate::serve::http;
+use crate::serve::http::connection::Connection;
 use crate::serve::hub::{Client, Flood, Hub, count};
-use crate::serve::peer::Peer;
-use crate::serve::places::{Kind, Place};
-use crate::serve::samples::Posters;
+use crate::serve::places::Kind;
 use crate::serve::session::Session;
-use crate::serve::shutdown::Running;
 use crate::serve::viewer::Viewer;
 use crate::serve::wire;
-use axum::body::Body;
 use axum::extract::ws::{Message, Utf8Bytes, WebSocket};
-use axum::http::{Request, Response, StatusCode, header};
 use bytes::Bytes;
 use futures_util::{SinkExt, Stream, StreamExt};
-use hyper::body::Incoming;
-use hyper_util::rt::{TokioIo, TokioTimer};
 use memchr::memchr_iter;
 use std::collections::VecDeque;
 use std::future::poll_fn;
-use std::net::IpAddr;
-use std::pin::{Pin, pin};
+use std::pin::Pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::task::Poll;
 use std::time::Duration;
 use strapd_recording::decode::packed;
-use tokio::net::TcpListener;
 use tokio::task::yield_now;
 use tokio::time::{Instant, MissedTickBehavior, interval_at, sleep, timeout};
 
@@ -49,150 +38,6 @@ pub(crate) const MAX_WRITE_BUFFER: usize = 512 << 10;
 const LAST_WORDS: Duration = Duration::from_millis(250);
 /// Attitudes taken from the outbox at once.
 const TAKE: usize = 64 << 10;
-
-/// One HTTP connection, handed to what answers its requests.
-#[derive(Clone, Debug)]
-pub(crate) struct Connection {
-    pub(crate) hub: Arc<Hub>,
-    pub(crate) peer: Peer,
-    /// Its address, without the port.
-    pub(crate) from: IpAddr,
-    pub(crate) posters: Arc<Posters>,
-    /// The client has shown the token with the request.
-    pub(crate) trusted: bool,
-    /// A browser says that the request is of a page it has from here.
-    pub(crate) is_own_page: bool,
-    pub(crate) running: Running,
-    /// Held as long as the connection, or the WebSocket it becomes, lives.
-    pub(crate) place: Arc<Place>,
-}
-
-pub(super) async fn serve(listener: TcpListener, context: Context) {
-    let router = http::router();
-    let posters = Arc::new(Posters::default());
-    let bound = listener
-        .local_addr()
-        .map_or(IpAddr::from([127, 0, 0, 1]), |a| a.ip());
-    accept(
-        context,
-        Kind::Http,
-        || listener.accept(),
-        |(stream, peer), context, place| {
-            prepare(&stream);
-            let place = Arc::new(place);
-            let limits = *context.hub.limits();
-            let stream = Stalling::new(stream, limits.no_progress, place.clone());
-            let connection = Connection {
-                hub: context.hub.clone(),
-                peer: Peer::at("ws", peer),
-                from: peer.ip().to_canonical(),
-                posters: posters.clone(),
-                trusted: false,
-                is_own_page: false,
-                running: context.running.clone(),
-                place: place.clone(),
-            };
-            let (router, web) = (router.clone(), context.web.clone());
-            let service = hyper::service::service_fn(move |request: Request<Incoming>| {
-                answer(request, router.clone(), web.clone(), bound, connection.clone())
-            });
-            let mut running = context.running.clone();
-            tokio::spawn(async move {
-                let mut serving = pin!(
-                    hyper::server::conn::http1::Builder::new()
-                        .timer(TokioTimer::new())
-                        .header_read_timeout(limits.first_line)
-                        .max_buf_size(MAX_MESSAGE)
-                        .serve_connection(TokioIo::new(stream), service)
-                        .with_upgrades()
-                );
-                // What the peer does wrong is its own loss.
-                tokio::select! {
-                    _ = serving.as_mut() => {}
-                    // Nobody waits for an answer any more, or takes it.
-                    () = place.lost() => {}
-                    () = running.asked() => {
-                        serving.as_mut().graceful_shutdown();
-                        let _ = serving.await;
-                    }
-                }
-            });
-        },
-        |(stream, _), context, words| {
-            let running = context.running.clone();
-            tokio::spawn(async move {
-                let head = format!(
-                    "HTTP/1.1 503 Service Unavailable\r\nContent-Type: application/json\r\nContent-Length: {}\r\nConnection: close\r\n\r\n",
-                    words.len()
-                );
-                let whole = [head.as_bytes(), &words].concat();
-                super::duplex::dismiss(stream, whole.into()).await;
-                drop(running);
-            });
-        },
-    )
-    .await;
-}
-
-/// Checks who asks, then lets the router answer.
-async fn answer(
-    mut request: Request<Incoming>,
-    router: axum::Router,
-    web: Arc<Web>,
-    bound: IpAddr,
-    mut connection: Connection,
-) -> Result<Response<Body>, std::convert::Infallible> {
-    use hyper::service::Service;
-    let text = |name: header::HeaderName| {
-        // Two of them, or one that is no text, is nobody we know.
-        let mut values = request.headers().get_all(name).iter();
-        match (values.next(), values.next()) {
-            (None, _) => None,
-            (Some(one), None) => Some(one.to_str().unwrap_or("?").to_owned()),
-            _ => Some("?".to_owned()),
-        }
-    };
-    let (host, origin) = (text(header::HOST), text(header::ORIGIN));
-    // A target may name whom it is for by itself, and that then counts as Host does.
-    let target = request.uri().authority().map(|name| name.as_str());
-    let admitted = target
-        .map_or(Ok(()), |name| web.admit(bound, Some(name), None))
-        .and_then(|()| web.admit(bound, host.as_deref(), origin.as_deref()));
-    if let Err(why) = admitted {
-        count(&connection.hub.counters.refused, 1);
-        http::warn_of(why, target.or(host.as_deref()), origin.as_deref());
-        return Ok(http::refusal(
-            StatusCode::FORBIDDEN,
-            "forbidden",
-            why.reason(),
-        ));
-    }
-    connection.is_own_page = Web::is_own(host.as_deref(), origin.as_deref());
-    if let (Some(token), Some(shown)) = (connection.hub.token(), text(header::AUTHORIZATION)) {
-        let shown = shown.strip_prefix("Bearer ").unwrap_or_default();
-        match token.judge(shown, connection.peer.address(), std::time::Instant::now()) {
-            Ok(()) => {
-                connection.trusted = true;
-                connection.place.has_shown_token();
-            }
-            Err(Denied { fault, delay }) => {
-                count(&connection.hub.counters.refused, 1);
-                tokio::select! {
-                    () = sleep(delay) => {}
-                    () = connection.running.asked() => {}
-                }
-                return Ok(http::refusal(
-                    StatusCode::UNAUTHORIZED,
-                    fault.code,
-                    &fault.message,
-                ));
-            }
-        }
-    }
-    request.extensions_mut().insert(connection);
-    let service = hyper_util::service::TowerToHyperService::new(router);
-    service.call(request).await
-}
 
 /// Serves one WebSocket to the end of its conversation.
 ///
