@@ -27,7 +27,10 @@
 
 pub mod admission;
 pub mod channel;
+pub mod chunk;
 pub mod connect;
+mod fault;
+pub mod filter;
 mod forward;
 pub mod foxglove;
 mod http;
@@ -37,6 +40,7 @@ pub mod limits;
 pub mod listen;
 mod log_throttle;
 pub mod outbox;
+mod outgoing;
 mod page;
 pub mod peer;
 pub mod places;
@@ -62,6 +66,7 @@ use hub::Hub;
 use limits::Limits;
 use listen::{Context, Listener};
 use places::Places;
+use playback::position::Timeline;
 use shutdown::Shutdown;
 use source::Source;
 use std::collections::BTreeMap;
@@ -101,7 +106,7 @@ pub struct Settings {
     /// Whom to call and send every attitude to ([`Target::Tcp`], [`Target::Udp`]).
     pub outputs: Vec<Target>,
     /// The replay that is served; no samples are taken then.
-    pub playback: Option<Arc<playback::controls::Playback>>,
+    pub timeline: Option<Arc<dyn Timeline>>,
     /// What is served brings samples beside attitudes: clients may ask for them before the first stream is there.
     pub brings_samples: bool,
 }
@@ -239,7 +244,7 @@ impl Reach {
         Reach {
             has_token: settings.token.is_some(),
             allow_insecure_remote: settings.allow_insecure_remote,
-            flag: match settings.playback {
+            flag: match settings.timeline {
                 Some(_) => "-o",
                 None => "--listen",
             },

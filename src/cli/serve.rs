@@ -12,7 +12,7 @@ use crate::serve::limits::Limits;
 use crate::serve::recorder::{self, Recorder, Split};
 use crate::serve::shutdown::Signals;
 use crate::serve::source::Source;
-use crate::serve::state::{self, StateFile};
+use crate::serve::state::StateFile;
 use crate::serve::{Server, Settings, listen};
 use crate::sink::address::{DEFAULTS, Listen, printable_address};
 use crate::sink::{Format, Target};
@@ -208,7 +208,7 @@ async fn serve(
     tokio::spawn(pat_the_watchdog());
     let keeping = state
         .clone()
-        .map(|file| tokio::spawn(state::keep(file, hub.clone())));
+        .map(|file| tokio::spawn(hub.clone().keep_saving(file)));
     if has_stdin {
         let hub = hub.clone();
         std::thread::spawn(move || listen::read_stdin(&hub, std::io::stdin().lock()));
@@ -230,7 +230,7 @@ async fn serve(
         let hub = hub.clone();
         let limit = hub.limits().drain;
         // Behind whatever save is still under way; a disk that hangs is not waited for.
-        let saving = tokio::task::spawn_blocking(move || state::save(&file, &hub));
+        let saving = tokio::task::spawn_blocking(move || hub.save(&file));
         if tokio::time::timeout(limit, saving).await.is_err() {
             tracing::warn!("the attitudes could not be saved in time");
         }

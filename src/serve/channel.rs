@@ -3,8 +3,10 @@
 //! Apart from where its samples come from: a sensor of the daemon and a stream of a replay reach
 //! whoever watches in the same way.
 
-use super::outbox::{Chunk, Class};
-use super::{foxglove, wire};
+use super::chunk::Chunk;
+use super::filter::Class;
+use super::foxglove::frames;
+use super::wire;
 use crate::sink::json::Objects;
 use crate::sink::payload::{Payloads, Topic};
 use crate::sink::{Content, Profile, Stream};
@@ -88,7 +90,7 @@ impl Channel {
             lines: Objects::new(stream, Profile::Lines),
             plot: Objects::new(stream, Profile::PlotJuggler),
             label: (number, wire::packed_stream(number, stream)),
-            number: foxglove::channel_of(number),
+            number: frames::channel_of(number),
             payloads: Payloads::new(stream, streams),
             last: Mutex::new(None),
             sent: AtomicU64::new(0),
@@ -169,7 +171,7 @@ impl Channel {
     ) -> Vec<Chunk> {
         let own = of(self.number);
         let (beside, is_transform) = match self.stream.content {
-            Content::Attitude => (of(foxglove::TRANSFORMS), true),
+            Content::Attitude => (of(frames::TRANSFORMS), true),
             Content::Truth => (of(self.number + 1), false),
             Content::Samples(_) => (None, false),
         };
@@ -179,9 +181,9 @@ impl Channel {
         let mut out = Vec::new();
         let push = |out: &mut Vec<u8>, subscription, time, payload: &dyn Fn(&mut Vec<u8>)| {
             if let Some(subscription) = subscription {
-                let from = foxglove::open(out, subscription, time);
+                let from = frames::open(out, subscription, time);
                 payload(out);
-                foxglove::close(out, from);
+                frames::close(out, from);
             }
         };
         let mut chunks = Vec::new();

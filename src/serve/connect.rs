@@ -8,19 +8,19 @@
 use super::hub::{Flood, Hub};
 use super::listen::{in_room, now};
 use super::log_throttle;
+use super::outgoing::Outgoing;
 use super::session::{End, Session, Side};
 use super::shutdown::Running;
-use super::source::{Protocol, Source};
+use super::source::Protocol;
 use super::upstream::Event;
 use crate::client::link::{Heard, Link};
 use crate::client::remote::Remote;
 use bytes::Bytes;
 use futures_util::FutureExt;
 use std::collections::VecDeque;
-use std::fmt::Write;
 use std::hash::{BuildHasher, RandomState};
 use std::io;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tokio::task::yield_now;
 use tokio::time::timeout;
@@ -38,82 +38,6 @@ const RATES: &str = r#"{"class":"WATCH","streams":["RATE"]}"#;
 /// Asks a daemon that has none for its attitudes.
 /// The last one of each is no sample.
 const ATTITUDES: &str = r#"{"class":"WATCH","streams":["ATT"],"last":false}"#;
-
-/// A source and how it stands.
-#[derive(Debug)]
-pub struct Outgoing {
-    source: Source,
-    state: Mutex<State>,
-}
-
-#[derive(Debug)]
-struct State {
-    /// Who answered, while connected.
-    peer: Option<String>,
-    /// When it was connected or lost.
-    since: Instant,
-    attempts: u64,
-    connections: u64,
-    last_error: Option<String>,
-}
-
-impl Outgoing {
-    /// Not yet connected.
-    #[must_use]
-    pub fn new(source: Source) -> Outgoing {
-        Outgoing {
-            source,
-            state: Mutex::new(State {
-                peer: None,
-                since: Instant::now(),
-                attempts: 0,
-                connections: 0,
-                last_error: None,
-            }),
-        }
-    }
-
-    fn state(&self) -> MutexGuard<'_, State> {
-        // A State is whole after every statement.
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// How it stands, for `STATUS`.
-    #[must_use]
-    pub fn status(&self) -> serde_json::Value {
-        let state = self.state();
-        serde_json::json!({
-            "uri": self.source.name, "id": self.source.id,
-            "connected": state.peer.is_some(), "peer": state.peer,
-            "since_s": state.since.elapsed().as_secs_f64(),
-            "attempts": state.attempts, "connections": state.connections,
-            "last_error": state.last_error,
-        })
-    }
-
-    fn connected(&self, peer: &str) {
-        let mut state = self.state();
-        state.peer = Some(peer.to_owned());
-        state.since = Instant::now();
-        state.connections += 1;
-    }
-
-    /// Not connected, for this reason.
-    fn lost(&self, why: &str) {
-        let mut state = self.state();
-        if state.peer.take().is_some() {
-            state.since = Instant::now();
-        }
-        state.last_error = Some(why.to_owned());
-    }
-
-    /// Something is wrong with what comes; the connection lives.
-    fn complain(&self, what: &str) {
-        self.state().last_error = Some(what.to_owned());
-        let name = &self.source.name;
-        log_throttle::warn(&format!("{name} says"), &format!("{name}: {what}"));
-    }
-}
 
 /// How long to wait before another attempt: ever longer, and never in step with others who lost the
 /// same peer at the same time.
@@ -136,13 +60,13 @@ impl Redial {
 
 /// Stays connected until the daemon ends.
 pub(super) async fn keep(outgoing: Arc<Outgoing>, hub: Arc<Hub>, mut running: Running) {
-    let source = &outgoing.source;
+    let source = outgoing.source();
     let name = &source.name;
     // The token of a stream goes in its first line instead.
     let token = source.token.as_ref().map(|t| t.reveal());
     let mut redial = Redial::default();
     loop {
-        outgoing.state().attempts += 1;
+        outgoing.attempt();
         let connecting = Link::connect(&source.remote, token, MAX_MESSAGE);
         let connected = tokio::select! {
             connected = connecting => connected,
@@ -182,7 +106,7 @@ async fn converse(
     hub: &Arc<Hub>,
     running: &mut Running,
 ) -> Option<String> {
-    let source = &outgoing.source;
+    let source = outgoing.source();
     let side = Side::source(source.id.clone(), source.decoder(hub.decode_options()));
     let mut session = Session::with(hub, source.name.clone(), side);
     let mut bytes = Vec::new();
@@ -299,54 +223,6 @@ async fn take(session: &mut Session, heard: &Heard, bytes: &[u8], said: &mut Vec
         }
         yield_now().await;
         in_room(|_, scratch| session.go_on(scratch));
-    }
-}
-
-/// The metrics of the sources, as Prometheus text.
-pub(super) fn exposition(out: &mut String, hub: &Hub) {
-    /// Name, kind, help, and the value of one source.
-    type Family = (&'static str, &'static str, &'static str, fn(&State) -> u64);
-    let families: [Family; 3] = [
-        (
-            "outgoing_connected",
-            "gauge",
-            "Whether a source is connected.",
-            |s| u64::from(s.peer.is_some()),
-        ),
-        (
-            "outgoing_attempts_total",
-            "counter",
-            "Attempts to connect to a source.",
-            |s| s.attempts,
-        ),
-        (
-            "outgoing_connections_total",
-            "counter",
-            "Connections made to a source.",
-            |s| s.connections,
-        ),
-    ];
-    if hub.outgoing().is_empty() {
-        return;
-    }
-    for (name, kind, help, value) in families {
-        // A String takes every write.
-        let _ = write!(
-            out,
-            "# HELP strapd_{name} {help}\n# TYPE strapd_{name} {kind}\n"
-        );
-        for outgoing in hub.outgoing() {
-            let uri = outgoing
-                .source
-                .name
-                .replace('\\', "\\\\")
-                .replace('"', "\\\"");
-            let _ = writeln!(
-                out,
-                "strapd_{name}{{uri=\"{uri}\"}} {}",
-                value(&outgoing.state())
-            );
-        }
     }
 }
 

@@ -3,10 +3,10 @@
 //! A client like any other, but that we call: its outbox is bounded, the oldest give way, and it slows
 //! nobody down. One that can not be reached, or goes, is called again.
 
+use super::filter::Filter;
 use super::hub::{Client, ClientProtocol, Hub, count};
 use super::listen::Context;
 use super::log_throttle;
-use super::outbox::Filter;
 use super::shutdown::Running;
 use crate::sink::Target;
 use bytes::Bytes;

@@ -3,15 +3,15 @@
 //! Written here, on our own WebSocket: Foxglove's SDK brings 156 crates, checks no `Origin`, and has a
 //! queue of its own; our limits are to hold for viewers too. The wire is that of
 //! `foxglove/ws-protocol` (docs/spec.md) and, for playback, of the SDK (`protocol/common`).
-//!
-//! One stretch of bytes in an outbox holds whole messages, each behind its kind and length
-//! ([`messages`]).
+
+pub mod frames;
 
 use super::channel::Channel;
-use super::outbox::Dropped;
-use super::playback::controls::{Action, Mode, Place};
+use super::chunk::Dropped;
+use super::playback::position::{Action, Mode, Position};
 use crate::sink::payload::Topic;
 use bytes::{BufMut, Bytes};
+use frames::{BINARY, TEXT, TRANSFORMS, framed, unsigned};
 use serde::Deserialize;
 use serde_json::{Value, json};
 use strapd_attitude::record::Nanos;
@@ -23,24 +23,6 @@ pub const SUBPROTOCOLS: [&str; 2] = ["foxglove.sdk.v1", "foxglove.websocket.v1"]
 pub const MAX_SUBSCRIPTIONS: usize = 4096;
 /// Longest name of a request that is repeated.
 const MAX_REQUEST_ID: usize = 256;
-/// The channel of the transforms; those of streams come behind it.
-pub const TRANSFORMS: u32 = 1;
-
-const TEXT: u8 = 1;
-const BINARY: u8 = 2;
-
-/// Number of the first channel of stream `number`, from 1; the second has the next one.
-#[must_use]
-pub fn channel_of(number: u32) -> u32 {
-    number.saturating_mul(2)
-}
-
-/// The stream a channel is of.
-#[must_use]
-pub fn stream_of(channel: u32) -> u32 {
-    channel / 2
-}
-
 /// What a viewer asks for.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Request {
@@ -148,18 +130,10 @@ fn text(value: &Value) -> Bytes {
     framed(TEXT, text.as_bytes())
 }
 
-fn framed(kind: u8, message: &[u8]) -> Bytes {
-    let mut out = Vec::with_capacity(message.len() + 5);
-    out.put_u8(kind);
-    out.put_u32_le(message.len() as u32);
-    out.extend_from_slice(message);
-    out.into()
-}
-
 /// Who we are and what can be done. `place`: where the replay is; `controls`: whether the viewer is one
 /// that can move it.
 #[must_use]
-pub fn server_info(session: &str, place: Option<&Place>, controls: bool) -> Bytes {
+pub fn server_info(session: &str, place: Option<&Position>, controls: bool) -> Bytes {
     let mut info = json!({
         "op": "serverInfo", "name": concat!("strapd ", env!("CARGO_PKG_VERSION")),
         "capabilities": [], "supportedEncodings": [], "metadata": {}, "sessionId": session,
@@ -231,40 +205,9 @@ pub fn gap(id: &str, dropped: &Dropped) -> Bytes {
     }))
 }
 
-fn unsigned(at: Nanos) -> u64 {
-    at.0.max(0) as u64
-}
-
-/// Appends the head of a message with data; the payload follows. [`close`] it.
-pub(crate) fn open(out: &mut Vec<u8>, subscription: u32, time: Nanos) -> usize {
-    let from = out.len();
-    out.put_u8(BINARY);
-    out.put_u32_le(0);
-    out.put_u8(1);
-    out.put_u32_le(subscription);
-    out.put_u64_le(unsigned(time));
-    from
-}
-
-/// Ends what [`open`] began.
-pub(crate) fn close(out: &mut [u8], from: usize) {
-    let length = (out.len() - from - 5) as u32;
-    if let Some(place) = out.get_mut(from + 1..from + 5) {
-        place.copy_from_slice(&length.to_le_bytes());
-    }
-}
-
-/// What time it is in the data.
-#[must_use]
-pub fn time(at: Nanos) -> Bytes {
-    let mut message = vec![2];
-    message.put_u64_le(unsigned(at));
-    framed(BINARY, &message)
-}
-
 /// Where a replay is; `request`: the one that is answered.
 #[must_use]
-pub fn playback_state(place: &Place, did_seek: bool, request: &str) -> Bytes {
+pub fn playback_state(place: &Position, did_seek: bool, request: &str) -> Bytes {
     let mut message = vec![
         5,
         match place.mode {
@@ -279,32 +222,6 @@ pub fn playback_state(place: &Place, did_seek: bool, request: &str) -> Bytes {
     message.put_u32_le(request.len() as u32);
     message.extend_from_slice(request.as_bytes());
     framed(BINARY, &message)
-}
-
-/// A message, as it goes into a WebSocket.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Framed {
-    /// UTF-8.
-    Text(Bytes),
-    /// Anything.
-    Binary(Bytes),
-}
-
-/// The messages in a stretch of bytes; they share its memory.
-pub fn messages(stretch: &Bytes) -> impl Iterator<Item = Framed> {
-    let mut rest = stretch.clone();
-    std::iter::from_fn(move || {
-        let (kind, length) = (*rest.first()?, rest.get(1..5)?);
-        let length = u32::from_le_bytes(length.try_into().ok()?) as usize;
-        let end = length.checked_add(5).filter(|end| *end <= rest.len())?;
-        let message = rest.slice(5..end);
-        rest = rest.slice(end..);
-        Some(if kind == TEXT {
-            Framed::Text(message)
-        } else {
-            Framed::Binary(message)
-        })
-    })
 }
 
 #[cfg(test)]

@@ -13,6 +13,7 @@ mod places;
 mod polling;
 mod report;
 mod resetting;
+mod saving;
 
 pub use back_pressure::Flood;
 pub use counters::{Counters, count};
@@ -24,18 +25,20 @@ pub use resetting::Asker;
 use super::Settings;
 use super::admission::Token;
 use super::channel::{Channel, Items};
-use super::connect::Outgoing;
+use super::chunk::Chunk;
+use super::fault::Fault;
 use super::foxglove;
 use super::limits::Limits;
 use super::log_throttle;
-use super::outbox::{Chunk, Outbox};
+use super::outbox::Outbox;
+use super::outgoing::Outgoing;
 use super::peer::Peer;
-use super::playback::controls::Playback;
+use super::playback::position::Timeline;
 use super::recorder::Handle;
-use super::stream::run::Placed;
+use super::stream::run::{Placed, SampleRun};
 use super::stream::stamps::Taken;
 use super::stream::{SensorStream, live_plan};
-use super::wire::{self, Fault};
+use super::wire;
 use crate::error::{Error, Result};
 use crate::sink::Profile;
 use bytes::Bytes;
@@ -47,7 +50,7 @@ use std::time::Instant;
 use strapd_attitude::estimate::Plan;
 use strapd_attitude::record::{Nanos, RawSample};
 use strapd_recording::decode::packed::Form;
-use strapd_recording::decode::{self, Bare, Line, LineDecoder, exact_name};
+use strapd_recording::decode::{self, LineDecoder, exact_name};
 use strapd_recording::text::printable;
 use tokio::sync::Notify;
 
@@ -65,8 +68,8 @@ pub struct Hub {
     limits: Limits,
     token: Option<Token>,
     recorder: Option<Handle>,
-    /// The replay it serves, which is then its only source.
-    playback: Option<Arc<Playback>>,
+    /// That of the replay it serves, which is then its only source.
+    timeline: Option<Arc<dyn Timeline>>,
     /// Samples can be watched, too.
     brings_samples: bool,
     outgoing: Vec<Arc<Outgoing>>,
@@ -137,28 +140,9 @@ pub struct Client {
     sensors: AtomicUsize,
 }
 
-/// Samples of one sensor from one client that came together.
-#[derive(Debug)]
-pub struct SampleRun<'a> {
-    /// From whom.
-    pub client: u64,
-    /// What the first of their lines said.
-    pub head: &'a Line,
-    /// When they were received.
-    pub received: Nanos,
-    /// What tells where they stand in their stream.
-    pub placed: Placed,
-    /// The sender's number of each line, and where its samples end.
-    pub lines: &'a [(Option<u64>, usize)],
-    /// The samples.
-    pub samples: &'a [RawSample],
-    /// Their stamps that are numbers without a unit, at their places; shorter where no more follow.
-    pub bare: &'a [Option<Bare>],
-}
-
 /// What a sender should hear of its samples.
 #[derive(Clone, Debug, Default)]
-pub struct News {
+pub struct Feedback {
     /// No fault: a new run has begun.
     pub note: Option<Fault>,
     /// What was not used, the first time.
@@ -211,7 +195,7 @@ impl Hub {
             limits: settings.limits,
             token: settings.token,
             recorder: settings.recorder,
-            playback: settings.playback,
+            timeline: settings.timeline,
             brings_samples: settings.brings_samples,
             outgoing: settings
                 .sources
@@ -275,7 +259,7 @@ impl Hub {
     /// Names this run of the daemon; a replay that begins anew gets another name.
     #[must_use]
     pub fn session(&self) -> String {
-        match self.playback.as_ref().map_or(0, |p| p.run()) {
+        match self.timeline.as_ref().map_or(0, |t| t.run()) {
             0 => self.session.clone(),
             run => format!("{}.{run}", self.session),
         }
@@ -376,7 +360,7 @@ impl Hub {
         sensor: &Mutex<Sensor>,
         run: &SampleRun<'_>,
         text: &mut Vec<u8>,
-    ) -> std::result::Result<News, Fault> {
+    ) -> std::result::Result<Feedback, Fault> {
         let mut sensor = lock(sensor);
         let id = sensor.stream.id().clone();
         let refuse = |code, what: String| Fault {
@@ -431,7 +415,7 @@ impl Hub {
         samples: &[RawSample],
         placed: Placed,
         text: &mut Vec<u8>,
-    ) -> std::result::Result<News, Fault> {
+    ) -> std::result::Result<Feedback, Fault> {
         let plan = self.plan_of(id);
         let window = self.limits.state_window;
         let note = sensor.stream.join(plan, samples, window, placed)?;
@@ -450,7 +434,7 @@ impl Hub {
         }
         self.deliver(sensor, id, text);
         let faults = sensor.stream.news();
-        Ok(News { note, faults })
+        Ok(Feedback { note, faults })
     }
 
     /// Samples that wait for the unit of their stamps are taken by what is known.
@@ -461,9 +445,9 @@ impl Hub {
         let id = sensor.stream.id().clone();
         let Taken { lines, samples } = sensor.stream.overdue();
         let placed = Placed::ByStamp;
-        let news = self.integrate(sensor, &id, &lines, &samples, placed, &mut Vec::new());
-        let (note, faults) = match news {
-            Ok(news) => (news.note, news.faults),
+        let feedback = self.integrate(sensor, &id, &lines, &samples, placed, &mut Vec::new());
+        let (note, faults) = match feedback {
+            Ok(feedback) => (feedback.note, feedback.faults),
             Err(fault) => (None, vec![fault]),
         };
         let clients = read(&self.clients);

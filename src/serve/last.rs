@@ -4,7 +4,7 @@
 //! the attitudes that wait.
 
 use super::channel::{Channel, Clock, Items};
-use super::outbox::Chunk;
+use super::chunk::Chunk;
 use crate::sink::Profile;
 use std::sync::Arc;
 use strapd_attitude::record::{AttitudeSample, Status};

@@ -4,8 +4,11 @@
 //! queue has a cap, the oldest attitudes give way, what gave way is counted and said (`GAP`), and
 //! replies (`STATUS`, `ERROR`, ...) are never dropped: when too many wait, the client is closed.
 
+use super::chunk::{Chunk, Dropped, Encode, MAX_QUEUED, NOTE};
+use super::filter::{Class, Filter};
+use super::foxglove::frames;
 use super::last::Last;
-use super::{foxglove, wire};
+use super::wire;
 use crate::sink::Decimator;
 use bytes::Bytes;
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
@@ -14,8 +17,6 @@ use strapd_attitude::record::{AttitudeSample, Nanos};
 use strapd_recording::decode::packed::Form;
 use tokio::sync::Notify;
 
-/// Most bytes of attitudes waiting for one client, what is being written included.
-pub const MAX_QUEUED: usize = 256 << 10;
 /// With more than this waiting, senders that can wait do.
 const CROWDED: usize = MAX_QUEUED / 2;
 /// Most replies waiting for one client.
@@ -29,90 +30,8 @@ const MAX_ANNOUNCED: usize = 8 << 20;
 const CROWDED_REPLIES: usize = MAX_CONTROL / 4;
 const CROWDED_BYTES: usize = MAX_CONTROL_BYTES / 4;
 
-/// Attitudes of one stream, encoded once and shared by every client that takes them all.
-#[derive(Clone, Debug)]
-pub struct Chunk {
-    /// Whose.
-    pub id: Arc<str>,
-    /// Number of the first in its stream.
-    pub first_seq: u64,
-    /// How many.
-    pub count: u64,
-    /// Whole lines, or whole packed objects.
-    pub bytes: Bytes,
-    /// Number of the stream and the line that says what it is, where it is packed.
-    pub label: Option<(u32, Bytes)>,
-}
-
-/// Encodes some attitudes of a stream, at least one, with their numbers.
-pub type Encode<'a> = dyn Fn(Form, &[(u64, AttitudeSample)]) -> Chunk + 'a;
-
 /// Between two notices of the time in the data, ns of it.
 const BETWEEN_TIMES: i64 = 20_000_000;
-
-/// The stream of notes, which are no attitudes.
-const NOTE: &str = "";
-
-impl Chunk {
-    fn is_note(&self) -> bool {
-        self.count == 0
-    }
-}
-
-/// What the objects of a stream are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Class {
-    /// Attitudes.
-    Att,
-    /// What a sensor put out.
-    Rate,
-}
-
-impl Class {
-    /// Its name on the wire.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Class::Att => "ATT",
-            Class::Rate => "RATE",
-        }
-    }
-}
-
-/// What a client asked for with `WATCH`.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Filter {
-    /// Classes; `None` = all there are.
-    pub classes: Option<BTreeSet<Class>>,
-    /// Sensors; `None` = all.
-    pub ids: Option<BTreeSet<String>>,
-    /// At most this many attitudes a second of each.
-    pub rate_hz: Option<f64>,
-    /// How they are written.
-    pub form: Form,
-    /// Whether the last attitude of each stream that was not watched before is wanted first.
-    pub last: bool,
-}
-
-impl Filter {
-    /// Whether it wants objects of this class of stream `id`.
-    #[must_use]
-    pub fn takes(&self, id: &str, class: Class) -> bool {
-        self.ids.as_ref().is_none_or(|ids| ids.contains(id))
-            && self.classes.as_ref().is_none_or(|c| c.contains(&class))
-    }
-}
-
-/// Attitudes that were dropped, to be said.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Dropped {
-    /// How many.
-    pub count: u64,
-    /// Number of the first.
-    pub first_seq: u64,
-    /// Number of the last.
-    pub last_seq: u64,
-}
 
 /// Why a client was told nothing more.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -466,7 +385,7 @@ impl Outbox {
                 .is_none_or(|told| now.since(told).abs() >= BETWEEN_TIMES)
         {
             state.told = Some(now);
-            last.bytes = [&last.bytes[..], &foxglove::time(now)].concat().into();
+            last.bytes = [&last.bytes[..], &frames::time(now)].concat().into();
         }
         for chunk in chunks {
             state.push(chunk);

@@ -4,9 +4,9 @@
 //! places of their own: however many come, they take none from those who converse. Where places are
 //! short, somebody who does nothing with his gives way to whoever comes.
 
+use super::fault::Fault;
 use super::hub::Client;
 use super::limits::Limits;
-use super::wire::Fault;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -251,8 +251,8 @@ impl Drop for Place {
 mod tests {
     use super::*;
     use crate::serve::Settings;
+    use crate::serve::filter::Filter;
     use crate::serve::hub::Hub;
-    use crate::serve::outbox::Filter;
     use futures_util::FutureExt;
 
     fn places(idle: Duration) -> Arc<Places> {

@@ -1,4 +1,5 @@
 //! A replay or a simulation that is served: its server, and who may stop and move it.
 
 pub mod controls;
+pub mod position;
 pub mod server;

@@ -9,14 +9,15 @@ mod resetting;
 mod turn;
 mod unpacking;
 
-use super::hub::{Client, GAVE_WAY, Hub, News, SampleRun, Sensor, count};
+use super::fault::Fault;
+use super::hub::{Client, Feedback, GAVE_WAY, Hub, Sensor, count};
 use super::limits::Allowance;
 use super::log_throttle;
 use super::peer::Peer;
 use super::stream::NAMELESS;
-use super::stream::run::Placed;
+use super::stream::run::{Placed, SampleRun};
 use super::upstream::{self, Event};
-use super::wire::{self, Fault, Message};
+use super::wire::{self, Message};
 use bytes::Bytes;
 use opening::Opening;
 use std::collections::{BTreeMap, BTreeSet};
@@ -516,7 +517,7 @@ impl Session {
             news
         });
         match news {
-            Ok(News { note, faults }) => {
+            Ok(Feedback { note, faults }) => {
                 if let Some(note) = note {
                     log_throttle::info(&format!("run {id}"), &format!("{id}: {}", note.message));
                     self.client.outbox.reply(wire::note(&note));

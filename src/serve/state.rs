@@ -3,8 +3,6 @@
 //! One JSON object, written under another name, synced and renamed: whatever happens, there is a whole
 //! one, at most a second old.
 
-use super::hub::Hub;
-use super::log_throttle;
 use super::stream::run::Span;
 use crate::error::{Error, Result};
 use crate::sink::{self, sync_directory};
@@ -13,8 +11,6 @@ use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::time::Duration;
 use strapd_attitude::estimate::Memory;
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::TimeUnit;
@@ -24,9 +20,6 @@ use strapd_attitude::record::{AttitudeCovariance, AttitudeSample, Nanos, Status}
 const FORMAT: u32 = 2;
 /// A larger file is none of ours: a sensor takes no more than 10 KiB.
 const MAX_BYTES: u64 = 64 << 20;
-/// How often it is written.
-const EVERY: Duration = Duration::from_millis(500);
-
 /// The last attitude of a sensor, and between which axes it is.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Saved {
@@ -269,36 +262,6 @@ fn read(path: &Path, file: File) -> Result<Sensors> {
         )));
     }
     Ok(document.sensors)
-}
-
-/// Saves the hub's attitudes again and again, until it is dropped.
-pub async fn keep(file: Arc<std::sync::Mutex<StateFile>>, hub: Arc<Hub>) {
-    let mut tick = tokio::time::interval(EVERY);
-    tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
-    loop {
-        tick.tick().await;
-        let (file, hub) = (file.clone(), hub.clone());
-        // A thread of its own for each: the disk may be slow. It can only panic on a bug, which
-        // would be printed; the next one tries again.
-        let _ = tokio::task::spawn_blocking(move || save(&file, &hub)).await;
-    }
-}
-
-/// Saves them once; a failure is said, and is no reason to stop.
-pub fn save(file: &std::sync::Mutex<StateFile>, hub: &Hub) {
-    let sensors = hub.saved();
-    let mut file = file
-        .lock()
-        .unwrap_or_else(std::sync::PoisonError::into_inner);
-    let outcome = file.write(&sensors);
-    drop(file);
-    if let Err(e) = &outcome {
-        log_throttle::warn(
-            "state",
-            &format!("{e}; a restart would go on from an older attitude"),
-        );
-    }
-    hub.state_saved(outcome.err().map(|e| e.to_string()));
 }
 
 #[cfg(test)]

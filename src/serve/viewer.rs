@@ -6,7 +6,7 @@ use super::foxglove::{self, Level, MAX_SUBSCRIPTIONS, Request};
 use super::hub::{Client, ClientProtocol, Hub, count};
 use super::limits::Allowance;
 use super::peer::Peer;
-use super::playback::controls::Action;
+use super::playback::position::Action;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Instant;

@@ -10,8 +10,10 @@ mod resetting;
 pub use packing::{broken_packed, packed_stream, unreadable};
 pub use resetting::{Reset, reset_answer};
 
-use super::outbox::{Class as Stream, Dropped, Filter, MAX_QUEUED};
-use super::playback::controls::{Action, Place};
+use super::chunk::{Dropped, MAX_QUEUED};
+use super::fault::Fault;
+use super::filter::{Class as Stream, Filter};
+use super::playback::position::{Action, Position};
 use bytes::Bytes;
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -45,31 +47,6 @@ pub enum Message {
     Reset(Result<Reset, Fault>),
     /// Here is the token.
     Auth(String),
-}
-
-/// What is wrong with a line.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Fault {
-    /// A name for programs.
-    pub code: &'static str,
-    /// A sentence for people.
-    pub message: String,
-    /// Byte of the line, from 1.
-    pub column: Option<u64>,
-    /// Which sensor, where one is concerned.
-    pub id: Option<String>,
-}
-
-impl Fault {
-    /// Without a place.
-    #[must_use]
-    pub fn new(code: &'static str, message: impl Into<String>) -> Fault {
-        Fault {
-            code,
-            message: message.into(),
-            ..Fault::default()
-        }
-    }
 }
 
 #[derive(Deserialize)]
@@ -423,7 +400,7 @@ pub fn gap(id: &str, dropped: &Dropped) -> Bytes {
 
 /// Where a replay is.
 #[must_use]
-pub fn playback(place: &Place, session: &str) -> Bytes {
+pub fn playback(place: &Position, session: &str) -> Bytes {
     let stamp = |at: Option<Nanos>| {
         at.map(|at| {
             let (sec, nsec) = at.to_sec_nanosec();

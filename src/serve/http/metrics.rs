@@ -2,8 +2,8 @@
 
 use super::answer::{response, unauthorised};
 use super::connection::Connection;
-use crate::serve::connect;
 use crate::serve::hub::Hub;
+use crate::serve::outgoing;
 use axum::body::Body;
 use axum::extract::Extension;
 use axum::http::{Response, StatusCode};
@@ -105,7 +105,7 @@ fn exposition(hub: &Hub) -> String {
             label(sensor.id())
         );
     });
-    connect::exposition(&mut out, hub);
+    outgoing::exposition(&mut out, hub.outgoing());
     out
 }
 

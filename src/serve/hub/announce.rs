@@ -2,10 +2,12 @@
 
 use super::{ClientProtocol, Hub, read, write};
 use crate::serve::channel::Channel;
+use crate::serve::fault::Fault;
+use crate::serve::filter::Class;
 use crate::serve::foxglove;
-use crate::serve::outbox::Class;
-use crate::serve::playback::controls::{Action, Place};
-use crate::serve::wire::{self, Fault};
+use crate::serve::foxglove::frames::{TRANSFORMS, stream_of};
+use crate::serve::playback::position::{Action, Position};
+use crate::serve::wire;
 use crate::sink::{Profile, Stream};
 use bytes::Bytes;
 use std::sync::Arc;
@@ -15,7 +17,7 @@ impl Hub {
     /// Whether clients may send samples: a replay has its own.
     #[must_use]
     pub fn takes_samples(&self) -> bool {
-        self.playback.is_none()
+        self.timeline.is_none()
     }
 
     /// What can be watched.
@@ -50,16 +52,16 @@ impl Hub {
     /// Whether a viewer can subscribe to it.
     #[must_use]
     pub fn has_channel(&self, number: u32) -> bool {
-        number == foxglove::TRANSFORMS
+        number == TRANSFORMS
             || read(&self.channels)
-                .get(&foxglove::stream_of(number))
+                .get(&stream_of(number))
                 .is_some_and(|c| c.has(number))
     }
 
     /// Where the replay is; `None` where there is none to be controlled.
     #[must_use]
-    pub fn where_it_is(&self) -> Option<Place> {
-        self.playback.as_ref()?.place()
+    pub fn where_it_is(&self) -> Option<Position> {
+        self.timeline.as_ref()?.position()
     }
 
     /// The same as a line.
@@ -89,13 +91,13 @@ impl Hub {
     /// # Errors
     /// The fault to answer with.
     pub fn control(&self, client: u64, action: Action) -> std::result::Result<(), Fault> {
-        let playback = self.playback.as_ref().ok_or_else(|| {
+        let timeline = self.timeline.as_ref().ok_or_else(|| {
             Fault::new(
                 "nothing_to_play",
                 "samples come as they come here; strapd replay LOG -o ws-listen://... can be controlled",
             )
         })?;
-        playback.ask(action, || {
+        timeline.ask(action, &mut || {
             for client in read(&self.clients).values() {
                 client.outbox.forget();
             }
@@ -127,7 +129,7 @@ impl Hub {
 
     /// The streams of a replay, for `STATUS`; those of sensors say more themselves.
     pub(super) fn own_streams(&self) -> Vec<serde_json::Value> {
-        match &self.playback {
+        match &self.timeline {
             None => Vec::new(),
             Some(_) => read(&self.channels).values().map(|c| c.status()).collect(),
         }

@@ -173,8 +173,9 @@ impl Hub {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::super::super::Settings;
-    use super::super::super::outbox::{Chunk, Filter, MAX_QUEUED};
     use super::*;
+    use crate::serve::chunk::{Chunk, MAX_QUEUED};
+    use crate::serve::filter::Filter;
     use std::collections::VecDeque;
 
     fn watched() -> (Arc<Hub>, Arc<Client>) {

@@ -2,9 +2,9 @@
 
 use super::{Client, ClientProtocol, Hub, read};
 use crate::serve::channel::{Channel, Clock};
-use crate::serve::foxglove;
+use crate::serve::filter::Filter;
+use crate::serve::foxglove::frames::{TRANSFORMS, stream_of};
 use crate::serve::last::{Last, Wanted};
-use crate::serve::outbox::Filter;
 use crate::sink::Profile;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -41,11 +41,11 @@ impl Hub {
                 subscription,
                 clock,
             };
-            if channel == foxglove::TRANSFORMS {
+            if channel == TRANSFORMS {
                 for each in channels.values() {
                     bring(client, each, since, wanted);
                 }
-            } else if let Some(stream) = channels.get(&foxglove::stream_of(channel)) {
+            } else if let Some(stream) = channels.get(&stream_of(channel)) {
                 bring(client, stream, since, wanted);
             }
         }
@@ -53,7 +53,7 @@ impl Hub {
 
     /// Which time the messages for viewers have.
     pub(super) fn clock(&self) -> Clock {
-        match &self.playback {
+        match &self.timeline {
             None => Clock::Log,
             Some(_) => Clock::Stamp,
         }

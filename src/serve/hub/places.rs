@@ -1,12 +1,13 @@
 //! Places for sensors: who takes one, and who gives way. Pure but for locks.
 
-use super::{Client, Hub, SampleRun, Sensor, count, lock, read, write};
+use super::{Client, Hub, Sensor, count, lock, read, write};
 use crate::serve::channel::Channel;
+use crate::serve::fault::Fault;
 use crate::serve::foxglove;
 use crate::serve::peer::Origin;
 use crate::serve::state::{Saved, Sensors};
 use crate::serve::stream::SensorStream;
-use crate::serve::wire::Fault;
+use crate::serve::stream::run::SampleRun;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
@@ -287,7 +288,7 @@ mod tests {
             drop(session);
             viewer
                 .outbox
-                .subscribe(foxglove::channel_of(n as u32 + 1), n as u32, 4096);
+                .subscribe(foxglove::frames::channel_of(n as u32 + 1), n as u32, 4096);
             viewer.outbox.discard(&mut said);
         }
         assert_eq!(read(&hub.sensors).len(), places);

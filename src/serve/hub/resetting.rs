@@ -1,8 +1,9 @@
 //! `RESET` -> the sensor it is for, where who asks may ask. Locks.
 
 use super::{Hub, count, lock, read};
+use crate::serve::fault::Fault;
 use crate::serve::log_throttle;
-use crate::serve::wire::{Fault, Reset};
+use crate::serve::wire::Reset;
 use strapd_recording::text::printable;
 
 /// Who asks for something of a sensor.

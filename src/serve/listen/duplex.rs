@@ -4,13 +4,14 @@
 //! a client that is worked for is not read from, which is how TCP slows a sender down.
 
 use super::{Context, in_room, now};
+use crate::serve::fault::Fault;
 use crate::serve::hub::{Flood, count};
 use crate::serve::outbox::Outbox;
 use crate::serve::peer::Peer;
 use crate::serve::places::{Kind, Place};
 use crate::serve::session::Session;
 use crate::serve::shutdown::Running;
-use crate::serve::wire::{self, Fault};
+use crate::serve::wire;
 use bytes::{Buf, Bytes};
 use std::collections::VecDeque;
 use std::future::{Future, ready};

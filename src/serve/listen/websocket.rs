@@ -4,7 +4,7 @@
 //! page can hand it to `JSON.parse` as it is. Packed objects go in binary messages, one or more in each.
 
 use super::{in_room, now};
-use crate::serve::foxglove::{self, Framed};
+use crate::serve::foxglove::frames::{self, Framed};
 use crate::serve::http::connection::Connection;
 use crate::serve::hub::{Client, Flood, Hub, count};
 use crate::serve::places::Kind;
@@ -167,7 +167,7 @@ pub(crate) async fn converse(socket: WebSocket, connection: Connection, foxglove
                             }
                         }
                         Some(_) => {
-                            for message in foxglove::messages(&part) {
+                            for message in frames::messages(&part) {
                                 sink.feed(match message {
                                     Framed::Text(line) => text(line),
                                     Framed::Binary(bytes) => Message::Binary(bytes),

@@ -1,11 +1,12 @@
 //! Where a replay is, and who tells it to stop, go on, or be elsewhere. Pure but for locks and the clock.
 //!
-//! One thread runs the replay and asks before it hands anything on ([`Playback::turn`]); clients ask
+//! One thread runs the replay and asks before it hands anything on ([`Playback::grant`]); clients ask
 //! for changes from the tasks that serve them. A seek changes no bit of any attitude: forward, the run
 //! integrates on without showing; backward, it is begun again and does not show until it is there.
 
+use super::position::{Action, Mode, Position, Timeline};
 use crate::pipeline::pace::Pace;
-use crate::serve::wire::Fault;
+use crate::serve::fault::Fault;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use strapd_attitude::record::Nanos;
@@ -18,7 +19,7 @@ const SPEEDS: std::ops::RangeInclusive<f64> = 1e-3..=1e4;
 
 /// What may go on now.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Turn {
+pub enum Grant {
     /// So many items, to everybody.
     Show(usize),
     /// So many items, to nobody who watches: a seek is under way.
@@ -29,68 +30,13 @@ pub enum Turn {
 
 /// What watchers should be told.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum News {
+pub enum Notice {
     /// Nothing.
     Nothing,
     /// It goes on.
     Tick,
     /// It is in another state.
     Changed,
-}
-
-/// Whether it moves.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mode {
-    /// It does.
-    Playing,
-    /// It waits for a client.
-    Paused,
-    /// There is nothing more.
-    Ended,
-}
-
-impl Mode {
-    /// Its name on the wire.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Mode::Playing => "playing",
-            Mode::Paused => "paused",
-            Mode::Ended => "ended",
-        }
-    }
-}
-
-/// What a client asks for.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Action {
-    /// Go on; after the end, from the start.
-    Play,
-    /// Wait.
-    Pause,
-    /// Be there.
-    Seek(Nanos),
-    /// Be so many times as fast as the data.
-    Speed(f64),
-}
-
-/// Where it is.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Place {
-    /// Whether it moves.
-    pub mode: Mode,
-    /// Stamp of what was shown last, or of where it is going.
-    pub at: Option<Nanos>,
-    /// First stamp.
-    pub start: Option<Nanos>,
-    /// Last stamp, as far as it is known.
-    pub end: Option<Nanos>,
-    /// How many times as fast as the data.
-    pub speed: f64,
-    /// What is played.
-    pub file: String,
-    /// How often it was begun anew: attitudes before and after a change do not belong together.
-    pub run: u64,
 }
 
 /// A replay that is served.
@@ -176,49 +122,27 @@ impl Playback {
         self.state().length = Some(Nanos((secs * 1e9) as i64));
     }
 
-    /// Where it is; `None` where nobody may control it.
-    #[must_use]
-    pub fn place(&self) -> Option<Place> {
-        let state = self.state();
-        state.pace.as_ref()?;
-        Some(Place {
-            mode: state.mode,
-            at: state.until.or(state.at).or(state.start),
-            start: state.start,
-            end: state.end,
-            speed: state.speed,
-            file: self.file.clone(),
-            run: state.run,
-        })
-    }
-
-    /// How often it was begun anew.
-    #[must_use]
-    pub fn run(&self) -> u64 {
-        self.state().run
-    }
-
     /// Waits until items with these stamps are due, and says how many of them are.
-    pub fn turn(&self, mut stamps: impl Iterator<Item = Nanos> + Clone) -> (Turn, News) {
+    pub fn grant(&self, mut stamps: impl Iterator<Item = Nanos> + Clone) -> (Grant, Notice) {
         let mut state = self.state();
         let Some(first) = stamps.clone().next() else {
-            return (Turn::Show(0), News::Nothing);
+            return (Grant::Show(0), Notice::Nothing);
         };
-        let mut news = News::Nothing;
+        let mut notice = Notice::Nothing;
         if state.start.is_none() {
             state.start = Some(first);
             state.end = state.length.map(|l| Nanos(first.0.saturating_add(l.0)));
-            news = News::Changed;
+            notice = Notice::Changed;
         }
         loop {
             if state.stopped || state.restart {
-                return (Turn::End, news);
+                return (Grant::End, notice);
             }
             match state.until {
                 Some(until) if first < until => {
                     return (
-                        Turn::Mute(stamps.take_while(|stamp| *stamp < until).count()),
-                        news,
+                        Grant::Mute(stamps.take_while(|stamp| *stamp < until).count()),
+                        notice,
                     );
                 }
                 Some(_) => {
@@ -228,14 +152,14 @@ impl Playback {
                     if let Some(pace) = &mut state.pace {
                         pace.restart();
                     }
-                    news = News::Changed;
+                    notice = Notice::Changed;
                 }
                 None => {}
             }
             if state.mode != Mode::Playing && !std::mem::take(&mut state.glimpse) {
-                if news == News::Changed {
+                if notice == Notice::Changed {
                     // Said before it waits; the same items are asked for again.
-                    return (Turn::Show(0), news);
+                    return (Grant::Show(0), notice);
                 }
                 state = self
                     .changed
@@ -245,11 +169,11 @@ impl Playback {
             }
             let paused = state.mode != Mode::Playing;
             let Some(pace) = &mut state.pace else {
-                return (Turn::Show(stamps.count()), news);
+                return (Grant::Show(stamps.count()), notice);
             };
             if paused {
                 state.at = Some(first);
-                return (Turn::Show(1), News::Changed);
+                return (Grant::Show(1), Notice::Changed);
             }
             let wait = pace.until(first, Instant::now());
             if wait > Duration::ZERO {
@@ -261,81 +185,14 @@ impl Playback {
             }
             let n = pace.take(stamps.clone());
             state.at = stamps.nth(n.saturating_sub(1)).or(Some(first));
-            if news == News::Nothing && state.told.is_none_or(|told| told.elapsed() >= TICK) {
-                news = News::Tick;
+            if notice == Notice::Nothing && state.told.is_none_or(|told| told.elapsed() >= TICK) {
+                notice = Notice::Tick;
             }
-            if news != News::Nothing {
+            if notice != Notice::Nothing {
                 state.told = Some(Instant::now());
             }
-            return (Turn::Show(n), news);
+            return (Grant::Show(n), notice);
         }
-    }
-
-    /// A client asks for something. `stale` is called where what waits for the watchers is out of date by that,
-    /// before the run goes on: what it shows next is not.
-    ///
-    /// # Errors
-    /// The fault to answer with.
-    pub fn ask(&self, action: Action, stale: impl FnOnce()) -> Result<(), Fault> {
-        let refuse = |what: &str| Err(Fault::new("bad_playback", what.to_owned()));
-        let mut state = self.state();
-        if state.pace.is_none() {
-            return Err(Fault::new(
-                "not_paced",
-                "this run goes as fast as it can; --speed 1 makes it one that can be controlled",
-            ));
-        }
-        let mut leaps = false;
-        match action {
-            Action::Pause if state.mode == Mode::Playing => state.mode = Mode::Paused,
-            Action::Pause => {}
-            Action::Play if state.mode == Mode::Ended => {
-                state.rewind(None)?;
-                leaps = true;
-                state.mode = Mode::Playing;
-            }
-            Action::Play => {
-                if state.mode == Mode::Paused
-                    && let Some(pace) = &mut state.pace
-                {
-                    pace.restart();
-                }
-                state.mode = Mode::Playing;
-            }
-            Action::Speed(speed) => {
-                if !SPEEDS.contains(&speed) {
-                    return refuse("speed: a factor from 0.001 to 10000 is needed");
-                }
-                state.speed = speed;
-                if let Some(pace) = &mut state.pace {
-                    pace.set_speed(speed, Instant::now());
-                }
-            }
-            Action::Seek(to) => {
-                let Some(start) = state.start else {
-                    return refuse("nothing has been read yet, so there is no place to go to");
-                };
-                let to = to.max(start);
-                let is_ahead = state.mode != Mode::Ended
-                    && !state.restart
-                    && state.at.is_none_or(|at| to > at);
-                if is_ahead {
-                    state.until = Some(to);
-                } else {
-                    state.rewind(Some(to))?;
-                }
-                if state.mode == Mode::Ended {
-                    state.mode = Mode::Paused;
-                }
-                leaps = true;
-            }
-        }
-        if leaps {
-            stale();
-        }
-        drop(state);
-        self.changed.notify_all();
-        Ok(())
     }
 
     /// From now on nothing is handed on.
@@ -419,6 +276,88 @@ impl Playback {
     }
 }
 
+impl Timeline for Playback {
+    fn position(&self) -> Option<Position> {
+        let state = self.state();
+        state.pace.as_ref()?;
+        Some(Position {
+            mode: state.mode,
+            at: state.until.or(state.at).or(state.start),
+            start: state.start,
+            end: state.end,
+            speed: state.speed,
+            file: self.file.clone(),
+            run: state.run,
+        })
+    }
+
+    fn run(&self) -> u64 {
+        self.state().run
+    }
+
+    fn ask(&self, action: Action, stale: &mut dyn FnMut()) -> Result<(), Fault> {
+        let refuse = |what: &str| Err(Fault::new("bad_playback", what.to_owned()));
+        let mut state = self.state();
+        if state.pace.is_none() {
+            return Err(Fault::new(
+                "not_paced",
+                "this run goes as fast as it can; --speed 1 makes it one that can be controlled",
+            ));
+        }
+        let mut leaps = false;
+        match action {
+            Action::Pause if state.mode == Mode::Playing => state.mode = Mode::Paused,
+            Action::Pause => {}
+            Action::Play if state.mode == Mode::Ended => {
+                state.rewind(None)?;
+                leaps = true;
+                state.mode = Mode::Playing;
+            }
+            Action::Play => {
+                if state.mode == Mode::Paused
+                    && let Some(pace) = &mut state.pace
+                {
+                    pace.restart();
+                }
+                state.mode = Mode::Playing;
+            }
+            Action::Speed(speed) => {
+                if !SPEEDS.contains(&speed) {
+                    return refuse("speed: a factor from 0.001 to 10000 is needed");
+                }
+                state.speed = speed;
+                if let Some(pace) = &mut state.pace {
+                    pace.set_speed(speed, Instant::now());
+                }
+            }
+            Action::Seek(to) => {
+                let Some(start) = state.start else {
+                    return refuse("nothing has been read yet, so there is no place to go to");
+                };
+                let to = to.max(start);
+                let is_ahead = state.mode != Mode::Ended
+                    && !state.restart
+                    && state.at.is_none_or(|at| to > at);
+                if is_ahead {
+                    state.until = Some(to);
+                } else {
+                    state.rewind(Some(to))?;
+                }
+                if state.mode == Mode::Ended {
+                    state.mode = Mode::Paused;
+                }
+                leaps = true;
+            }
+        }
+        if leaps {
+            stale();
+        }
+        drop(state);
+        self.changed.notify_all();
+        Ok(())
+    }
+}
+
 impl State {
     /// To run again from the start, unseen up to `to`.
     fn rewind(&mut self, to: Option<Nanos>) -> Result<(), Fault> {
@@ -443,34 +382,36 @@ mod tests {
     #[test]
     fn a_seek_forward_is_mute_up_to_its_stamp_and_then_shows() {
         let playback = Playback::new("f", Some(1000.0), false);
-        assert!(matches!(playback.turn(stamps(0, 1)), (Turn::Show(1), _)));
+        assert!(matches!(playback.grant(stamps(0, 1)), (Grant::Show(1), _)));
         let mut stale = false;
         playback
-            .ask(Action::Seek(Nanos(50_000_000)), || stale = true)
+            .ask(Action::Seek(Nanos(50_000_000)), &mut || stale = true)
             .unwrap();
         assert!(stale);
-        assert_eq!(playback.turn(stamps(1, 100)).0, Turn::Mute(49));
-        let (turn, news) = playback.turn(stamps(50, 1));
-        assert_eq!((turn, news), (Turn::Show(1), News::Changed));
+        assert_eq!(playback.grant(stamps(1, 100)).0, Grant::Mute(49));
+        let (grant, notice) = playback.grant(stamps(50, 1));
+        assert_eq!((grant, notice), (Grant::Show(1), Notice::Changed));
     }
 
     #[test]
     fn a_seek_backward_ends_the_run_and_the_next_one_is_mute_up_to_its_stamp() {
         let playback = Playback::new("f", Some(1000.0), false);
-        assert!(matches!(playback.turn(stamps(5, 5)), (Turn::Show(5), _)));
+        assert!(matches!(playback.grant(stamps(5, 5)), (Grant::Show(5), _)));
         let mut stale = false;
         playback
-            .ask(Action::Seek(Nanos(7_000_000)), || stale = true)
+            .ask(Action::Seek(Nanos(7_000_000)), &mut || stale = true)
             .unwrap();
         assert!(stale);
-        assert_eq!(playback.turn(stamps(10, 5)).0, Turn::End);
+        assert_eq!(playback.grant(stamps(10, 5)).0, Grant::End);
         assert!(!playback.ended(), "it is not the end");
         assert!(playback.wait_for_restart() && playback.begin_anew());
-        assert_eq!(playback.turn(stamps(5, 5)).0, Turn::Mute(2));
-        assert!(matches!(playback.turn(stamps(7, 1)), (Turn::Show(1), _)));
+        assert_eq!(playback.grant(stamps(5, 5)).0, Grant::Mute(2));
+        assert!(matches!(playback.grant(stamps(7, 1)), (Grant::Show(1), _)));
         assert_eq!(playback.run(), 1);
         playback.forward_only(Some("because"));
-        let refused = playback.ask(Action::Seek(Nanos(0)), || {}).unwrap_err();
+        let refused = playback
+            .ask(Action::Seek(Nanos(0)), &mut || {})
+            .unwrap_err();
         assert_eq!(refused.code, "forward_only");
     }
 
@@ -478,50 +419,58 @@ mod tests {
     fn while_paused_nothing_goes_on_but_one_item_where_a_seek_has_led() {
         let playback = Playback::new("f", Some(1000.0), true);
         // That it waits, and where, is said first.
-        assert_eq!(playback.turn(stamps(0, 9)), (Turn::Show(0), News::Changed));
-        assert_eq!(playback.place().unwrap().at, Some(Nanos(0)));
-        playback.ask(Action::Seek(Nanos(3_000_000)), || {}).unwrap();
-        assert_eq!(playback.turn(stamps(0, 9)).0, Turn::Mute(3));
-        assert_eq!(playback.turn(stamps(3, 6)), (Turn::Show(1), News::Changed));
-        playback.ask(Action::Play, || {}).unwrap();
-        assert!(matches!(playback.turn(stamps(4, 5)), (Turn::Show(5), _)));
+        assert_eq!(
+            playback.grant(stamps(0, 9)),
+            (Grant::Show(0), Notice::Changed)
+        );
+        assert_eq!(playback.position().unwrap().at, Some(Nanos(0)));
+        playback
+            .ask(Action::Seek(Nanos(3_000_000)), &mut || {})
+            .unwrap();
+        assert_eq!(playback.grant(stamps(0, 9)).0, Grant::Mute(3));
+        assert_eq!(
+            playback.grant(stamps(3, 6)),
+            (Grant::Show(1), Notice::Changed)
+        );
+        playback.ask(Action::Play, &mut || {}).unwrap();
+        assert!(matches!(playback.grant(stamps(4, 5)), (Grant::Show(5), _)));
     }
 
     #[test]
     fn what_can_not_be_is_refused() {
         let unpaced = Playback::new("f", None, true);
         assert_eq!(
-            unpaced.ask(Action::Pause, || {}).unwrap_err().code,
+            unpaced.ask(Action::Pause, &mut || {}).unwrap_err().code,
             "not_paced"
         );
-        assert_eq!(unpaced.place(), None);
-        assert_eq!(unpaced.turn(stamps(0, 9)).0, Turn::Show(9));
+        assert_eq!(unpaced.position(), None);
+        assert_eq!(unpaced.grant(stamps(0, 9)).0, Grant::Show(9));
         let playback = Playback::new("f", Some(1.0), false);
         for speed in [0.0, -1.0, f64::NAN, f64::INFINITY] {
             assert!(
-                playback.ask(Action::Speed(speed), || {}).is_err(),
+                playback.ask(Action::Speed(speed), &mut || {}).is_err(),
                 "{speed}"
             );
         }
         assert!(
-            playback.ask(Action::Seek(Nanos(0)), || {}).is_err(),
+            playback.ask(Action::Seek(Nanos(0)), &mut || {}).is_err(),
             "no start yet"
         );
         playback.stop();
-        assert_eq!(playback.turn(stamps(0, 9)).0, Turn::End);
+        assert_eq!(playback.grant(stamps(0, 9)).0, Grant::End);
         assert!(!playback.wait_for_restart());
     }
 
     #[test]
     fn what_is_shown_after_a_seek_is_not_forgotten_with_what_came_before() {
         let playback = std::sync::Arc::new(Playback::new("f", Some(1.0), true));
-        let (turn, _) = playback.turn(stamps(0, 10));
-        assert_eq!(turn, Turn::Show(0));
+        let (turn, _) = playback.grant(stamps(0, 10));
+        assert_eq!(turn, Grant::Show(0));
         let run = playback.clone();
         let forgotten = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(false));
         let seen = forgotten.clone();
         let shown = std::thread::spawn(move || {
-            while run.turn(stamps(0, 10)).0 != Turn::Show(1) {}
+            while run.grant(stamps(0, 10)).0 != Grant::Show(1) {}
             seen.load(std::sync::atomic::Ordering::SeqCst)
         });
         std::thread::sleep(Duration::from_millis(20));
@@ -529,7 +478,9 @@ mod tests {
             std::thread::sleep(Duration::from_millis(50));
             forgotten.store(true, std::sync::atomic::Ordering::SeqCst);
         };
-        playback.ask(Action::Seek(Nanos(0)), forget).unwrap();
+        playback
+            .ask(Action::Seek(Nanos(0)), &mut || forget())
+            .unwrap();
         assert!(shown.join().unwrap());
     }
 }

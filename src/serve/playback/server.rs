@@ -4,7 +4,7 @@
 //! are the run's own, and that the run can be stopped, moved and begun anew ([`crate::serve::playback`]).
 //! To the run it is an [`Audience`].
 
-use super::controls::{News, Playback, Turn};
+use super::controls::{Grant, Notice, Playback};
 use crate::error::{Error, Result};
 use crate::pipeline::audience::{self, Audience};
 use crate::serve::channel::{Channel, Items};
@@ -75,7 +75,7 @@ impl Cast {
         signals: bool,
     ) -> Result<Cast> {
         let playback = Arc::new(playback);
-        settings.playback = Some(playback.clone());
+        settings.timeline = Some(playback.clone());
         let failed = |e: std::io::Error| Error::Usage(format!("cannot serve: {e}"));
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(1)
@@ -217,15 +217,15 @@ impl Audience for Cast {
     fn turn(&self, count: usize, due: &dyn Fn(usize) -> Nanos) -> Option<audience::Turn> {
         let of = |count, is_shown| Some(audience::Turn { count, is_shown });
         loop {
-            let (turn, news) = self.playback.turn((0..count).map(due));
-            if news != News::Nothing {
-                self.hub.announce(news == News::Tick, None);
+            let (grant, notice) = self.playback.grant((0..count).map(due));
+            if notice != Notice::Nothing {
+                self.hub.announce(notice == Notice::Tick, None);
             }
-            match turn {
-                Turn::Show(0) if count > 0 => {}
-                Turn::Show(n) => return of(n, true),
-                Turn::Mute(n) => return of(n, false),
-                Turn::End => return None,
+            match grant {
+                Grant::Show(0) if count > 0 => {}
+                Grant::Show(n) => return of(n, true),
+                Grant::Mute(n) => return of(n, false),
+                Grant::End => return None,
             }
         }
     }

@@ -2,15 +2,14 @@
 //!
 //! Apart from the requests, since a poster outlives each of them.
 
+use crate::serve::fault::Fault;
 use crate::serve::http::answer::response;
-use crate::serve::hub::{
-    Asker, Client, Flood, GAVE_WAY, Hub, News, SampleRun, Sensor, count, rates_in,
-};
+use crate::serve::hub::{Asker, Client, Feedback, Flood, GAVE_WAY, Hub, Sensor, count, rates_in};
 use crate::serve::log_throttle;
 use crate::serve::peer::{Origin, Peer};
 use crate::serve::stream::NAMELESS;
-use crate::serve::stream::run::Placed;
-use crate::serve::wire::{self, Fault, Message};
+use crate::serve::stream::run::{Placed, SampleRun};
+use crate::serve::wire::{self, Message};
 use axum::body::Body;
 use axum::http::{Response, StatusCode};
 use serde_json::{Value, json};
@@ -261,7 +260,7 @@ impl Poster {
                 bare: bare.get(from..to.min(bare.len())).unwrap_or_default(),
             };
             match self.hand_over(&run, &mut gathered.text) {
-                Ok(News { note, faults }) => {
+                Ok(Feedback { note, faults }) => {
                     taken.samples += rates_in(run.samples) as u64;
                     if let Some(note) = note {
                         let id = head.id.as_deref().unwrap_or(NAMELESS);
@@ -293,7 +292,7 @@ impl Poster {
         gathered.samples.drain(..until);
     }
 
-    fn hand_over(&mut self, run: &SampleRun<'_>, text: &mut Vec<u8>) -> Result<News, Fault> {
+    fn hand_over(&mut self, run: &SampleRun<'_>, text: &mut Vec<u8>) -> Result<Feedback, Fault> {
         let id = run.head.id.as_deref().filter(|id| !id.is_empty());
         let id = id.unwrap_or(NAMELESS);
         self.last = None;

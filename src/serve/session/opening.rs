@@ -4,7 +4,8 @@
 //! request to any port, and what follows in its body would otherwise be lines like any others.
 
 use super::{End, Session, first_line_must_be_auth};
-use crate::serve::wire::{self, Fault};
+use crate::serve::fault::Fault;
+use crate::serve::wire;
 use strapd_recording::decode::packed::MARK;
 
 /// How far a conversation has come. Until its first object was seen nothing else is read: what a

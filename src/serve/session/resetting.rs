@@ -1,8 +1,9 @@
 //! `RESET` of a client -> the sensor, or why not. Pure but for locks.
 
 use super::{Session, Side};
+use crate::serve::fault::Fault;
 use crate::serve::hub::Asker;
-use crate::serve::wire::{self, Fault, Reset};
+use crate::serve::wire::{self, Reset};
 
 impl Session {
     /// It is the WebSocket of a page of the daemon itself, and may begin any sensor's attitude anew.

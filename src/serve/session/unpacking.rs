@@ -1,7 +1,8 @@
 //! Packed objects of a client -> samples, as its lines. Pure.
 
 use super::{Scratch, Session, first_line_must_be_auth, goes_on};
-use crate::serve::wire::{self, Fault};
+use crate::serve::fault::Fault;
+use crate::serve::wire;
 use strapd_attitude::record::Nanos;
 use strapd_recording::decode::Line;
 use strapd_recording::decode::packed::{self, Object};

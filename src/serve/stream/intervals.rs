@@ -3,7 +3,7 @@
 //! Apart from the stream because a replay refuses a log whose intervals disagree ([`Mismatch`]), while a
 //! daemon goes on: all it can do is say so.
 
-use crate::serve::wire::Fault;
+use crate::serve::fault::Fault;
 use strapd_attitude::condition::Clock;
 use strapd_attitude::estimate::{LEAST_INTERVALS, Mismatch};
 use strapd_attitude::record::{RawSample, SampleKind};

@@ -5,7 +5,8 @@
 //! stamps tell, and to integrate the same samples twice would be an attitude nobody has.
 
 use std::time::Duration;
-use strapd_attitude::record::Nanos;
+use strapd_attitude::record::{Nanos, RawSample};
+use strapd_recording::decode::{Bare, Line};
 
 /// Whether a sender's samples have a place of their own beside their stamps.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -16,6 +17,25 @@ pub enum Placed {
     /// Yes, as of a stream that a broker keeps: what was taken is not taken again, and a stamp
     /// never begins a run.
     ByPosition,
+}
+
+/// Samples of one sensor from one client that came together.
+#[derive(Debug)]
+pub struct SampleRun<'a> {
+    /// From whom.
+    pub client: u64,
+    /// What the first of their lines said.
+    pub head: &'a Line,
+    /// When they were received.
+    pub received: Nanos,
+    /// What tells where they stand in their stream.
+    pub placed: Placed,
+    /// The sender's number of each line, and where its samples end.
+    pub lines: &'a [(Option<u64>, usize)],
+    /// The samples.
+    pub samples: &'a [RawSample],
+    /// Their stamps that are numbers without a unit, at their places; shorter where no more follow.
+    pub bare: &'a [Option<Bare>],
 }
 
 /// Where a connection's first sample stands.

@@ -1,0 +1,26 @@
+//! What is wrong with a line, as its sender is answered. Pure: below all that reads or answers.
+
+/// What is wrong with a line.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Fault {
+    /// A name for programs.
+    pub code: &'static str,
+    /// A sentence for people.
+    pub message: String,
+    /// Byte of the line, from 1.
+    pub column: Option<u64>,
+    /// Which sensor, where one is concerned.
+    pub id: Option<String>,
+}
+
+impl Fault {
+    /// Without a place.
+    #[must_use]
+    pub fn new(code: &'static str, message: impl Into<String>) -> Fault {
+        Fault {
+            code,
+            message: message.into(),
+            ..Fault::default()
+        }
+    }
+}

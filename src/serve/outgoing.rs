@@ -1,0 +1,142 @@
+//! A source that is connected to, and how the connection stands. Locks.
+
+use super::log_throttle;
+use super::source::Source;
+use std::fmt::Write;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+/// A source and how it stands.
+#[derive(Debug)]
+pub struct Outgoing {
+    source: Source,
+    state: Mutex<State>,
+}
+
+#[derive(Debug)]
+struct State {
+    /// Who answered, while connected.
+    peer: Option<String>,
+    /// When it was connected or lost.
+    since: Instant,
+    attempts: u64,
+    connections: u64,
+    last_error: Option<String>,
+}
+
+impl Outgoing {
+    /// Not yet connected.
+    #[must_use]
+    pub fn new(source: Source) -> Outgoing {
+        Outgoing {
+            source,
+            state: Mutex::new(State {
+                peer: None,
+                since: Instant::now(),
+                attempts: 0,
+                connections: 0,
+                last_error: None,
+            }),
+        }
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        // A State is whole after every statement.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// How it stands, for `STATUS`.
+    #[must_use]
+    pub fn status(&self) -> serde_json::Value {
+        let state = self.state();
+        serde_json::json!({
+            "uri": self.source.name, "id": self.source.id,
+            "connected": state.peer.is_some(), "peer": state.peer,
+            "since_s": state.since.elapsed().as_secs_f64(),
+            "attempts": state.attempts, "connections": state.connections,
+            "last_error": state.last_error,
+        })
+    }
+
+    /// Where it is.
+    pub(super) fn source(&self) -> &Source {
+        &self.source
+    }
+
+    /// Another attempt begins.
+    pub(super) fn attempt(&self) {
+        self.state().attempts += 1;
+    }
+
+    /// This peer has answered.
+    pub(super) fn connected(&self, peer: &str) {
+        let mut state = self.state();
+        state.peer = Some(peer.to_owned());
+        state.since = Instant::now();
+        state.connections += 1;
+    }
+
+    /// Not connected, for this reason.
+    pub(super) fn lost(&self, why: &str) {
+        let mut state = self.state();
+        if state.peer.take().is_some() {
+            state.since = Instant::now();
+        }
+        state.last_error = Some(why.to_owned());
+    }
+
+    /// Something is wrong with what comes; the connection lives.
+    pub(super) fn complain(&self, what: &str) {
+        self.state().last_error = Some(what.to_owned());
+        let name = &self.source.name;
+        log_throttle::warn(&format!("{name} says"), &format!("{name}: {what}"));
+    }
+}
+
+/// The metrics of the sources, as Prometheus text.
+pub(super) fn exposition(out: &mut String, all: &[Arc<Outgoing>]) {
+    /// Name, kind, help, and the value of one source.
+    type Family = (&'static str, &'static str, &'static str, fn(&State) -> u64);
+    let families: [Family; 3] = [
+        (
+            "outgoing_connected",
+            "gauge",
+            "Whether a source is connected.",
+            |s| u64::from(s.peer.is_some()),
+        ),
+        (
+            "outgoing_attempts_total",
+            "counter",
+            "Attempts to connect to a source.",
+            |s| s.attempts,
+        ),
+        (
+            "outgoing_connections_total",
+            "counter",
+            "Connections made to a source.",
+            |s| s.connections,
+        ),
+    ];
+    if all.is_empty() {
+        return;
+    }
+    for (name, kind, help, value) in families {
+        // A String takes every write.
+        let _ = write!(
+            out,
+            "# HELP strapd_{name} {help}\n# TYPE strapd_{name} {kind}\n"
+        );
+        for outgoing in all {
+            let uri = outgoing
+                .source
+                .name
+                .replace('\\', "\\\\")
+                .replace('"', "\\\"");
+            let _ = writeln!(
+                out,
+                "strapd_{name}{{uri=\"{uri}\"}} {}",
+                value(&outgoing.state())
+            );
+        }
+    }
+}

@@ -1,0 +1,75 @@
+//! Where a replay is, and what a client may ask of it. Pure: what the protocols and the hub know of a playback.
+
+use crate::serve::fault::Fault;
+use strapd_attitude::record::Nanos;
+
+/// Whether it moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mode {
+    /// It does.
+    Playing,
+    /// It waits for a client.
+    Paused,
+    /// There is nothing more.
+    Ended,
+}
+
+impl Mode {
+    /// Its name on the wire.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Mode::Playing => "playing",
+            Mode::Paused => "paused",
+            Mode::Ended => "ended",
+        }
+    }
+}
+
+/// What a client asks for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Action {
+    /// Go on; after the end, from the start.
+    Play,
+    /// Wait.
+    Pause,
+    /// Be there.
+    Seek(Nanos),
+    /// Be so many times as fast as the data.
+    Speed(f64),
+}
+
+/// Where it is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Position {
+    /// Whether it moves.
+    pub mode: Mode,
+    /// Stamp of what was shown last, or of where it is going.
+    pub at: Option<Nanos>,
+    /// First stamp.
+    pub start: Option<Nanos>,
+    /// Last stamp, as far as it is known.
+    pub end: Option<Nanos>,
+    /// How many times as fast as the data.
+    pub speed: f64,
+    /// What is played.
+    pub file: String,
+    /// How often it was begun anew: attitudes before and after a change do not belong together.
+    pub run: u64,
+}
+
+/// A replay that is served, as the hub sees it.
+pub trait Timeline: std::fmt::Debug + Send + Sync {
+    /// Where it is; `None`: it can not be controlled.
+    fn position(&self) -> Option<Position>;
+
+    /// How often it was begun anew.
+    fn run(&self) -> u64;
+
+    /// A client asks for something. `stale` is called where what waits for the watchers is out of date
+    /// by that, before the run goes on.
+    ///
+    /// # Errors
+    /// The fault to answer with.
+    fn ask(&self, action: Action, stale: &mut dyn FnMut()) -> Result<(), Fault>;
+}
