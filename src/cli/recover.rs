@@ -131,7 +131,7 @@ fn text(source: &str, recovered: &Recovered) -> String {
     );
     for found in &survey.channels {
         let topic = printable(&found.channel.topic);
-        let described = crate::pipeline::log::described(&found.channel);
+        let described = crate::pipeline::log_channel::described(&found.channel);
         let _ = writeln!(out, "  {topic}  {described}  {} messages", found.messages);
     }
     for (count, what) in [

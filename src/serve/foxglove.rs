@@ -227,6 +227,7 @@ pub fn playback_state(place: &Position, did_seek: bool, request: &str) -> Bytes 
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
+    use super::frames::{Framed, close, messages, open, time};
     use super::*;
     use rand::{RngExt, SeedableRng};
 

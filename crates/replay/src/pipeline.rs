@@ -8,8 +8,8 @@
 //! | file | |
 //! |---|---|
 //! | `replay`, `replay_stream`, `lines` | the same run over a file, a stream that comes once, and lines |
-//! | `input`, `folder`, `text_log`, `bare_stamps`, `early_besides`, `topic_reading` | what can be read again, the recording in a folder, the log in a text, one topic of a log |
-//! | `log`, `sources`, `topics`, `channel_choice`, `decoders`, `channel_route` | which channels are read, as what, by which decoder |
+//! | `input`, `line_input`, `folder`, `text_log`, `bare_stamps`, `early_besides`, `topic_reading` | what can be read again, the recording in a folder, the log in a text, one topic of a log |
+//! | `log`, `log_channel`, `sources`, `topics`, `channel_choice`, `decoders`, `channel_route` | which channels are read, as what, by which decoder |
 //! | `replay_start`, `session_builder`, `session`, `delivery`, `pace`, `position`, `audience` | a run under way: what waits, what goes out, when, and who may stop it |
 //! | `inspection`, `check`, `each`, `history`, `sample_kinds`, `attitude_track` | looking at a log, and holding it against others |
 //! | `in_memory` | the attitudes of a replay for a program that asks for them |
@@ -32,8 +32,10 @@ mod history;
 pub mod in_memory;
 pub mod input;
 pub mod inspection;
+mod line_input;
 mod lines;
 pub mod log;
+pub mod log_channel;
 pub mod pace;
 pub mod position;
 pub mod provenance;

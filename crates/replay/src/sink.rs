@@ -12,6 +12,7 @@ mod copy;
 mod csv;
 mod decimate;
 mod document;
+mod form;
 pub mod json;
 mod mcap;
 mod output;
@@ -21,6 +22,7 @@ mod stream;
 mod target;
 #[cfg(test)]
 mod tests;
+mod text;
 mod tum;
 
 pub use copy::CopiedChannel;
@@ -38,7 +40,8 @@ pub use stream::{Content, Provenance, Stream, output_topic};
 pub use target::{Format, Profile, Target};
 
 use crate::error::{Error, Result};
-use batch::{Batch, Form, Slot};
+use batch::Batch;
+use form::{Form, Slot};
 use mcap::Layout;
 use mcap::chunk::Chunk;
 use mcap::file::McapFile;

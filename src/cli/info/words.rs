@@ -3,7 +3,7 @@
 use crate::cli::shell::{flag, quoted_file};
 use crate::pipeline::input::Input;
 use crate::pipeline::inspection::Inspection;
-use crate::pipeline::log::{LogChannel, described, rank};
+use crate::pipeline::log_channel::{LogChannel, described, rank};
 use crate::pipeline::request::Source;
 use crate::pipeline::topics::named_few;
 use crate::report::calendar::{date, duration};

@@ -91,7 +91,7 @@ fn samples_of_a_simulation_can_be_asked_for_before_it_has_begun() {
     for (brings_samples, answer) in [(true, "WATCH"), (false, "ERROR")] {
         let playback = Playback::new("simulate top", Some(1.0), true);
         let hub = Hub::new(Settings {
-            playback: Some(Arc::new(playback)),
+            timeline: Some(Arc::new(playback)),
             brings_samples,
             ..Settings::default()
         });

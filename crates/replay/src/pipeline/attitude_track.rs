@@ -5,7 +5,8 @@
 use super::channel_route::{Item, Route};
 use super::decoders::Decoders;
 use super::input::Input;
-use super::log::{AHEAD, Log, LogChannel, problems, rank};
+use super::log::{AHEAD, Log, problems};
+use super::log_channel::{LogChannel, rank};
 use super::simulate::{TRUTH_ID, TRUTH_TOPIC};
 use super::topics;
 use crate::error::{Error, Result};

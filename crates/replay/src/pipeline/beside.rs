@@ -5,7 +5,8 @@
 //! correct what is integrated.
 
 use super::decoders::Decoders;
-use super::log::{Log, LogChannel, described};
+use super::log::Log;
+use super::log_channel::{LogChannel, described};
 use super::sources::is_same;
 use super::topics;
 use crate::config::{Selection, TopicBeside};

@@ -6,7 +6,8 @@
 use super::beside::{self, Besides};
 use super::channel_route::{Noticed, Route, Taker};
 use super::decoders::Decoders;
-use super::log::{Log, LogChannel, described, rank};
+use super::log::Log;
+use super::log_channel::{LogChannel, described, rank};
 use super::request::ReplayRequest;
 use super::session::Found;
 use super::sources::{Source, is_same};

@@ -1,6 +1,6 @@
 //! What becomes of the messages of one channel, on the workers. Pure.
 
-use super::log::nanos;
+use super::log_channel::nanos;
 use super::sources::{Source, Turns, digest};
 use std::cell::RefCell;
 use std::collections::BTreeMap;

@@ -3,13 +3,12 @@
 //! Apart from the log because how its messages are understood is asked again for each run, and a log may
 //! have tens of thousands of channels of one schema, or as many schemas.
 
-use super::log::plain;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use strapd_attitude::condition::Clock;
 use strapd_attitude::estimate::Plan;
 use strapd_attitude::record::Nanos;
-use strapd_recording::decode::{Decoder, Effort, Options, Unsupported};
+use strapd_recording::decode::{self, Decoder, Effort, Options, Unsupported};
 use strapd_recording::mcap::{Channel, Schema};
 
 /// Decoders under the same options. All of a log together cost no more than one [`Effort`].
@@ -122,5 +121,18 @@ impl Decoders {
                 ..why.clone()
             }),
         }
+    }
+}
+
+/// The channel as the decoders see it.
+#[must_use]
+pub fn plain(channel: &Channel) -> decode::Channel<'_> {
+    let schema = channel.schema.as_deref();
+    decode::Channel {
+        topic: &channel.topic,
+        message_encoding: &channel.message_encoding,
+        schema_name: schema.map_or("", |s| &s.name),
+        schema_encoding: schema.map_or("", |s| &s.encoding),
+        schema_data: schema.map_or(&[], |s| &s.data),
     }
 }

@@ -3,7 +3,7 @@
 //! Apart from the input because phones and recorders write a folder for a recording: one file has the rates, and those
 //! beside it have what corrects them, or nothing of use here.
 
-use super::lines;
+use super::line_input;
 use crate::error::{Error, Result};
 use std::path::{Path, PathBuf};
 use strapd_recording::decode::{Options, Wanted};
@@ -158,7 +158,7 @@ fn table(file: &Path, wanted: Wanted) -> Option<Table> {
         wanted,
         ..Options::default()
     };
-    let lines = lines::open(file, Format::Table, open(file).ok()?, &options).ok()?;
+    let lines = line_input::open(file, Format::Table, open(file).ok()?, &options).ok()?;
     lines.table().cloned()
 }
 

@@ -5,7 +5,7 @@
 
 use super::channel_route::{Copied, Item, Route, Taker};
 use super::decoders::Decoders;
-use super::log::nanos;
+use super::log_channel::nanos;
 use super::sources::{OPENINGS, OPENINGS_LIMIT, keep};
 use std::sync::Arc;
 use strapd_recording::decode::{Decoder, Unsupported};

@@ -5,7 +5,7 @@
 //! and what is said of a log does not depend on how it came.
 
 use super::folder::{self, Folder};
-use super::lines;
+use super::line_input;
 use super::request::Source;
 use crate::error::{Error, Result};
 use std::fs::File;
@@ -179,15 +179,15 @@ impl Input {
     /// Its bytes as lines or rows.
     ///
     /// # Errors
-    /// As `lines::open`.
+    /// As `line_input::open`.
     pub fn lines(&self, options: &Options) -> Result<Lines<File>> {
-        let lines = lines::open(&self.name, self.format, self.bytes()?, options)?;
+        let lines = line_input::open(&self.name, self.format, self.bytes()?, options)?;
         let of_forces = Options {
             wanted: Wanted::Forces,
             ..Options::default()
         };
         self.beside.iter().try_fold(lines, |lines, beside| {
-            let other = lines::open(beside, Format::Table, open(beside)?, &of_forces)?;
+            let other = line_input::open(beside, Format::Table, open(beside)?, &of_forces)?;
             Ok(lines.with(other)?)
         })
     }

@@ -6,7 +6,8 @@
 use super::beside::{TopicOfVectors, vectors};
 use super::channel_route::{Item, Noticed, Route, Taker};
 use super::decoders::Decoders;
-use super::log::{AHEAD, Log, LogChannel, described, rank};
+use super::log::{AHEAD, Log};
+use super::log_channel::{LogChannel, described, rank};
 use super::sources::Source;
 use super::topics::{MOST_TOPICS, PICKED_UNNAMED};
 use crate::error::{Error, Result};

@@ -3,6 +3,7 @@
 use super::bare_stamps::BareStamps;
 use super::channel_route::Item;
 use super::early_besides::{EarlyBesides, are_beside};
+use super::line_input::{described, no_samples, unclear};
 use super::position::Position;
 use super::replay_start::Waiting;
 use super::request::{ReplayRequest, refused};
@@ -20,8 +21,7 @@ use strapd_attitude::condition::Clock;
 use strapd_attitude::estimate::Meaning;
 use strapd_attitude::estimate::{StampPass, Stamps};
 use strapd_attitude::record::{Declared, Nanos};
-use strapd_recording::decode::Options;
-use strapd_recording::decode::{Ambiguous, Class, Undecodable};
+use strapd_recording::decode::{Class, Undecodable};
 use strapd_recording::delimited::Table;
 use strapd_recording::format::Format;
 use strapd_recording::lines::Lines;
@@ -32,45 +32,6 @@ use strapd_recording::pool::Pool;
 const BATCH: usize = 2048;
 /// Lines without any sample before the first, after which this is no log of samples.
 const PATIENCE: u64 = 1000;
-
-/// Begins to read lines or rows.
-///
-/// # Errors
-/// They can not be read; `--field` for a table, whose columns have names.
-pub(super) fn open<R: Read>(
-    path: &Path,
-    format: Format,
-    input: R,
-    options: &Options,
-) -> Result<Lines<R>> {
-    if format == Format::Table && !options.fields.is_empty() {
-        return Err(Error::Unsupported {
-            path: path.to_owned(),
-            what: "--field is for messages, and this is a CSV\n  help: --columns gyro=NAME:NAME:NAME,stamp=NAME:UNIT says what its columns are".to_owned(),
-        });
-    }
-    if format != Format::Table {
-        only_for_tables(path, format, options)?;
-    }
-    Ok(Lines::new(path, format, input, options)?)
-}
-
-/// `--columns` and `--delimiter` say nothing of anything but a table.
-///
-/// # Errors
-/// One of them is given.
-pub(super) fn only_for_tables(path: &Path, format: Format, options: &Options) -> Result<()> {
-    if options.columns.is_none() && options.delimiter.is_none() {
-        return Ok(());
-    }
-    Err(Error::Unsupported {
-        path: path.to_owned(),
-        what: format!(
-            "--columns and --delimiter are for tables of text, and this is {}\n  help: --field says where values lie in messages",
-            format.name()
-        ),
-    })
-}
 
 /// Replays lines; `stamps` is what [`stamps`] found.
 ///
@@ -314,29 +275,6 @@ fn undecodable(number: u64, why: Undecodable) -> Item {
     Item::Undecodable(0, Box::new((number, why)))
 }
 
-pub(super) fn unclear(path: &Path, what: &Ambiguous) -> Error {
-    Error::Unsupported {
-        path: path.to_owned(),
-        what: format!(
-            "{what}\n  help: --field stamp=NAME:ns (or us, ms, s) says it for a name as it is"
-        ),
-    }
-}
-
-/// What begins with no line of samples.
-pub(super) fn no_samples(path: &Path, lines: &Lines<impl Read>, why: &Undecodable) -> Error {
-    let help = match lines.format() {
-        Format::Table => {
-            "one row per sample under a row of names, as strapd cat --format csv writes them; --columns says what they are"
-        }
-        _ => "one JSON object per line, with gyro and stamp; or an MCAP",
-    };
-    Error::Unsupported {
-        path: path.to_owned(),
-        what: format!("line {}: {why}\n  help: {help}", lines.number()),
-    }
-}
-
 fn nothing(path: &Path, format: Format) -> Error {
     let what = match format {
         Format::Table => {
@@ -361,15 +299,6 @@ fn unplaced(path: &Path, lines: &Lines<impl Read>) -> Error {
             "no row says when it was measured\n  help: --time index --rate-hz HZ, or --columns stamp=NAME:UNIT\n  note: {}",
             notes.join("; ")
         ),
-    }
-}
-
-/// How a table is read, so that it can be pasted and changed, with the format's name; of anything else that alone.
-pub(super) fn described(lines: &Lines<impl Read>) -> String {
-    let name = lines.format().name();
-    match lines.table().map(Table::assumed).unwrap_or_default() {
-        "" => name.to_owned(),
-        assumed => format!("--columns '{assumed}' [{name}]"),
     }
 }
 

@@ -6,7 +6,8 @@
 use super::channel_route::{Item, Route};
 use super::decoders::Decoders;
 use super::input::Input;
-use super::lines::only_for_tables;
+use super::line_input::only_for_tables;
+use super::log_channel::{LogChannel, described, known, nanos, rank};
 use super::sources::{self, Source};
 use super::text_log::TextLog;
 use super::topics::{self, Candidate, Choice, PICKED_UNNAMED};
@@ -17,7 +18,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use strapd_attitude::record::Nanos;
-use strapd_recording::decode::{self, Decoder, Options, Rank, Role, Stated, Unsupported, role_of};
+use strapd_recording::decode::Options;
 use strapd_recording::format::Format;
 use strapd_recording::mcap::{self, Channel, Reader, Survey, WalkOptions};
 use strapd_recording::pool::Pool;
@@ -43,23 +44,6 @@ pub struct Log {
 enum Body {
     Mcap(Reader),
     Text(Box<TextLog>),
-}
-
-/// A channel and its first message.
-#[derive(Clone, Debug)]
-pub struct LogChannel {
-    /// The channel.
-    pub channel: Arc<Channel>,
-    /// Messages on it.
-    pub messages: u64,
-    /// Log time and payload of its first message, where there is one.
-    pub first: Option<(Nanos, Vec<u8>)>,
-    /// Log times and payloads of its first messages, where one does not tell enough.
-    pub openings: Vec<(Nanos, Vec<u8>)>,
-    /// What it can serve as.
-    pub role: Role,
-    /// What its samples are, where they come as such.
-    pub stated: Option<Stated>,
 }
 
 impl Log {
@@ -349,98 +333,6 @@ impl Log {
     }
 }
 
-impl LogChannel {
-    /// For the choice of topics.
-    #[must_use]
-    pub fn candidate(&self) -> Candidate {
-        Candidate {
-            topic: self.channel.topic.clone(),
-            of: self.channel.topic.clone(),
-            described: described(&self.channel),
-            messages: Some(self.messages),
-            rank: rank(&self.role),
-        }
-    }
-
-    /// A decoder for it that has seen its first message.
-    ///
-    /// # Errors
-    /// The channel can not be decoded: which, why, and the flag that helps.
-    pub fn decoder(&self, decoders: &mut Decoders) -> std::result::Result<Decoder, Unsupported> {
-        if let Some(stated) = &self.stated {
-            return Ok(Decoder::of_samples(&plain(&self.channel), stated.clone()));
-        }
-        let own = decoders.of(&self.channel)?;
-        let own = self.settled(own, decoders)?;
-        // The message's own stamp, unless it is none and a nested one is.
-        for nth in 0..own.stamps().len() {
-            let decoder = decoders.with_stamp(&self.channel, nth)?;
-            let Ok(decoder) = self.settled(decoder, decoders) else {
-                continue;
-            };
-            if !self.openings.is_empty() && decoder.has_good_stamps(&self.openings) {
-                return Ok(decoder);
-            }
-        }
-        Ok(own)
-    }
-
-    fn settled(
-        &self,
-        mut decoder: Decoder,
-        decoders: &Decoders,
-    ) -> std::result::Result<Decoder, Unsupported> {
-        if let Some((log, payload)) = &self.first {
-            decoder.settle(payload, *log)?;
-        }
-        let first = match self.openings.as_slice() {
-            // A batch tells as much by itself.
-            [] => self.first.as_slice(),
-            openings => openings,
-        };
-        decoders.settle_unit(&mut decoder, first)?;
-        Ok(decoder)
-    }
-}
-
-/// The channel as the decoders see it.
-#[must_use]
-pub fn plain(channel: &Channel) -> decode::Channel<'_> {
-    let schema = channel.schema.as_deref();
-    decode::Channel {
-        topic: &channel.topic,
-        message_encoding: &channel.message_encoding,
-        schema_name: schema.map_or("", |s| &s.name),
-        schema_encoding: schema.map_or("", |s| &s.encoding),
-        schema_data: schema.map_or(&[], |s| &s.data),
-    }
-}
-
-/// `sensor_msgs/msg/Imu [cdr]`, fit for a terminal.
-#[must_use]
-pub fn described(channel: &Channel) -> String {
-    let name = channel
-        .schema
-        .as_deref()
-        .map_or("(no type)", |s| s.name.as_str());
-    strapd_recording::text::printable(&format!("{name} [{}]", channel.message_encoding))
-}
-
-/// A role as a number: higher is more likely "the IMU" (see [`Candidate::rank`]).
-#[must_use]
-pub fn rank(role: &Role) -> u8 {
-    if !role.has_rate {
-        return 0;
-    }
-    match role.rank {
-        Rank::Imu => 5,
-        Rank::Processed => 4,
-        Rank::RateByTopic => 3,
-        Rank::Weak => 2,
-        Rank::ByNameOnly => 1,
-    }
-}
-
 /// "No IMU topic" with what is wrong with those that sound like one, and with the file.
 #[must_use]
 pub fn explained(error: Error, channels: &[LogChannel], problems: &[String]) -> Error {
@@ -466,35 +358,6 @@ pub fn explained(error: Error, channels: &[LogChannel], problems: &[String]) -> 
         topics.push_str(&format!("\n  the file is damaged: {problem}"));
     }
     Error::NoImuTopic { path, topics }
-}
-
-/// A channel with what it can serve as; `decoders` are those of default options.
-#[must_use]
-pub fn known(
-    channel: &Arc<Channel>,
-    messages: u64,
-    first: Option<(Nanos, Vec<u8>)>,
-    decoders: &mut Decoders,
-) -> LogChannel {
-    let role = role_of(
-        &plain(channel),
-        decoders.of(channel),
-        first.as_ref().map(|(log, data)| (data.as_slice(), *log)),
-    );
-    LogChannel {
-        channel: channel.clone(),
-        messages,
-        first,
-        openings: Vec::new(),
-        role,
-        stated: None,
-    }
-}
-
-/// A log time as a stamp; beyond 2262 it saturates.
-#[must_use]
-pub fn nanos(time: u64) -> Nanos {
-    Nanos(i64::try_from(time).unwrap_or(i64::MAX))
 }
 
 /// Bytes on their way at once through a walk to the end.

@@ -12,7 +12,7 @@ use super::request::{ReplayRequest, Source, refused};
 use super::session::Found;
 use super::session_builder::{begin, labelled};
 use super::summarise;
-use super::{lines, replay_stream};
+use super::{line_input, lines, replay_stream};
 use crate::error::Result;
 use crate::sink::{Flow, Stream};
 use crate::summary::RunSummary;
@@ -88,12 +88,12 @@ fn piped(
     let whole = std::io::Cursor::new(head).chain(input);
     match format {
         Format::Mcap | Format::Ulog | Format::Bag => {
-            lines::only_for_tables(&run.source.name(), format, &run.selection.decode)?;
+            line_input::only_for_tables(&run.source.name(), format, &run.selection.decode)?;
             let reader = Reader::from_stream(run.source.name(), Box::new(whole))?;
             replay_stream::replay(run, reader, pool, watch)
         }
         Format::Lines | Format::Table => {
-            let text = lines::open(&run.source.name(), format, whole, &run.selection.decode)?;
+            let text = line_input::open(&run.source.name(), format, whole, &run.selection.decode)?;
             lines::replay(run, text, None, pool, watch)
         }
     }

@@ -6,7 +6,7 @@
 //! another frame, are several, and each gets a name: `TOPIC@FRAME`, `TOPIC@PUBLISHER`.
 
 use super::decoders::Decoders;
-use super::log::{LogChannel, nanos};
+use super::log_channel::{LogChannel, nanos, rank};
 use super::topics::PICKED_UNNAMED;
 use crate::error::Result;
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
@@ -227,7 +227,7 @@ enum Standing {
 
 impl Standing {
     fn is_of(self, known: &LogChannel) -> bool {
-        let may_be_integrated = super::log::rank(&known.role) >= PICKED_UNNAMED;
+        let may_be_integrated = rank(&known.role) >= PICKED_UNNAMED;
         match self {
             Standing::Named => true,
             Standing::Rate => may_be_integrated,

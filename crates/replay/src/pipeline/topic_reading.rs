@@ -5,7 +5,8 @@
 use super::beside::{self, Besides};
 use super::channel_route::{Item, Noticed, Route, Taker};
 use super::decoders::Decoders;
-use super::log::{AHEAD, Log, LogChannel, problems};
+use super::log::{AHEAD, Log, problems};
+use super::log_channel::LogChannel;
 use super::sources::Source;
 use super::topics;
 use crate::error::{Error, Result};

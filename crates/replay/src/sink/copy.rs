@@ -4,7 +4,7 @@
 //! messages, attachments and metadata over as they were found. Messages keep their order; a chunk of
 //! them is closed at a fixed size, so the bytes depend on the calls alone.
 
-use super::batch::Form;
+use super::form::Form;
 use super::mcap::file::McapFile;
 use super::mcap::{self, Attachment, InputChannel, InputMessage, Layout};
 use super::output::{Flow, Output};

@@ -2,7 +2,7 @@
 //!
 //! The names of the columns are those that [`strapd_recording::table`] reads.
 
-use super::json::{push_f64, push_i64, push_status};
+use super::text::{push_f64, push_i64, push_status};
 use strapd_attitude::record::{AttitudeSample, RawSample};
 
 /// The first row. Angles in degrees, rates in rad/s, stamps in nanoseconds; roll, pitch and yaw are

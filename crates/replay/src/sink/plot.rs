@@ -7,8 +7,8 @@
 //! JSON stops it. So: seconds as a float, then one object named like the sensor, with nothing but
 //! finite numbers in it.
 
-use super::json::{push_f64, push_i64, push_string};
 use super::stream::Stream;
+use super::text::{push_f64, push_i64, push_string};
 use strapd_attitude::record::{AttitudeSample, Nanos, RawSample};
 
 const AXES: [&str; 3] = ["x", "y", "z"];

@@ -7,7 +7,7 @@
 //! Sturm, Engelhard, Endres, Burgard, Cremers, A Benchmark for the Evaluation of RGB-D SLAM Systems (IROS 2012): the
 //! format of its ground truth.
 
-use super::json::push_f64;
+use super::text::push_f64;
 use strapd_attitude::record::AttitudeSample;
 
 /// The first row, a comment to who reads it.
