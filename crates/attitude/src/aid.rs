@@ -42,9 +42,11 @@ mod interval;
 mod memory;
 mod plausibility;
 mod prior;
+mod residuals;
 mod rest;
 mod settings;
 mod start;
+mod surroundings;
 #[cfg(test)]
 mod tests;
 mod update;

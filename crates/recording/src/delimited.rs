@@ -11,6 +11,7 @@
 
 mod cells;
 mod clock;
+mod column;
 mod columns;
 mod layout;
 mod names;

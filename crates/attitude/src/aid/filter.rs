@@ -3,18 +3,19 @@
 use super::beside::Beside;
 use super::calibration::{Applied, Calibration};
 use super::covariance::{BIAS, CROSS, Covariance, FORCE_BIAS, IRON, LEAD, SCALE, TILT};
-use super::gravity::Residuals;
-use super::heading::Surroundings;
 use super::interval::Interval;
 use super::plausibility::Plausibility;
+use super::residuals::Residuals;
 use super::rest::Rest;
 use super::settings::Settings;
-use super::update::COLOURED;
+use super::surroundings::Surroundings;
 use crate::frames::{Body, In, Nav};
 use crate::quaternion::Quaternion;
 use crate::record::Status;
 use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3};
 
+/// Accelerations are not white, which makes errors larger than they are thought to be.
+pub(super) const COLOURED: f64 = 2.0;
 /// A specific force beyond this (each component, m/s^2) is none.
 const LARGEST_FORCE: f64 = 1000.0;
 /// A field beyond this (each component, whatever its unit) is none.

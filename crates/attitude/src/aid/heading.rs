@@ -6,7 +6,7 @@
 
 use super::covariance::{Correction, FIELD, HEADING, IRON, TILT};
 use super::filter::Filter;
-use super::settings::Settings;
+use super::surroundings::Field;
 use nalgebra::Vector3;
 use std::f64::consts::{PI, TAU};
 
@@ -19,56 +19,6 @@ const NORM_SECS: f64 = 30.0;
 const NORM_SIGMA: f64 = 0.03;
 /// A field steeper than this (horizontal share) has no heading.
 const STEEPEST: f64 = 0.1;
-
-/// Norm and dip of a field.
-#[derive(Clone, Copy, PartialEq, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-struct Field {
-    norm: f64,
-    /// Downwards from horizontal, rad.
-    dip: f64,
-}
-
-impl Field {
-    /// Share of the norm, and angle, by which another differs.
-    fn off(&self, other: &Field) -> (f64, f64) {
-        (other.norm / self.norm - 1.0, other.dip - self.dip)
-    }
-
-    fn is_like(&self, other: &Field, settings: &Settings) -> bool {
-        let (norm, dip) = self.off(other);
-        norm.abs() < settings.field_same && dip.abs() < settings.field_same
-    }
-
-    fn approach(&mut self, other: &Field, share: f64) {
-        self.norm += share * (other.norm - self.norm);
-        self.dip += share * (other.dip - self.dip);
-    }
-}
-
-/// What the field has been like.
-#[derive(Clone, PartialEq, Debug, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(super) struct Surroundings {
-    /// The field that headings are believed in.
-    reference: Option<Field>,
-    /// Another that may be accepted, and for how long it has been the same, s.
-    other: Option<Field>,
-    other_secs: f64,
-    /// Mean square deviation from the reference.
-    deviation: f64,
-    /// For how long a good field has said another heading, s.
-    contradicted: f64,
-    /// Mean norm of what is left of the field without hard iron; 0 before the first.
-    mean_norm: f64,
-}
-
-impl Surroundings {
-    /// Mean norm of the field, where hard iron is looked for.
-    pub(super) fn mean_norm(&self) -> f64 {
-        self.mean_norm
-    }
-}
 
 /// The magnetic field that headings are taken from.
 #[derive(Clone, Copy, PartialEq, Debug)]

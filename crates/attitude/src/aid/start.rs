@@ -3,10 +3,10 @@
 use super::calibration::Applied;
 use super::covariance::{BIAS, FIELD, HEADING, POSITION, TILT, VELOCITY};
 use super::filter::{Filter, Measured, is_field};
-use super::gravity::Residuals;
-use super::heading::Surroundings;
 use super::interval::Interval;
+use super::residuals::Residuals;
 use super::rest::Rest;
+use super::surroundings::Surroundings;
 use crate::condition::stillness::level;
 use crate::frames::{Body, Dcm, Nav};
 use crate::quaternion::{Quaternion, RotationVector};

@@ -5,7 +5,7 @@ use super::covariance::{
     BIAS, CROSS, Correction, FIELD, FORCE_BIAS, HEADING, IRON, LEAD, POSITION, SCALE, TILT,
     Transition, VELOCITY, WIDTH,
 };
-use super::filter::{Filter, Innovation};
+use super::filter::{COLOURED, Filter, Innovation};
 use super::gravity::Force;
 use super::interval::Interval;
 use super::start::{POSITION_START, VELOCITY_START};
@@ -13,9 +13,6 @@ use crate::frames::Nav;
 use crate::quaternion::{Quaternion, RotationVector};
 use crate::record::AttitudeCovariance;
 use nalgebra::{Matrix3, Vector3};
-
-/// Accelerations are not white, which makes errors larger than they are thought to be.
-pub(super) const COLOURED: f64 = 2.0;
 
 impl Filter {
     /// Corrects by what has been added up.

@@ -3,17 +3,14 @@
 //! Apart from the rest of the preparation because a force says nothing of its own unit, and one that is no
 //! specific force (phones export acceleration without gravity) would level to anything.
 
-use super::calibrated::BIAS_LEFT;
-use super::meaning::Meaning;
-use super::plan::{Aid, Bias, Initial, Noise, Plan};
+use super::meaning::{Meaning, STANDARD_GRAVITY};
+use super::plan::{Aid, BIAS_LEFT, Bias, Initial, Noise, Plan};
 use crate::aid::{self, Settings, Start};
 use crate::frames::{Body, Nav};
 use crate::quaternion::{Quaternion, RotationVector};
-use crate::record::{AccelUnit, Nanos, RawSample, SampleKind};
+use crate::record::{Nanos, RawSample, SampleKind};
 use nalgebra::Vector3;
 
-/// Standard gravity, m/s^2.
-pub(super) const STANDARD_GRAVITY: f64 = 9.806_65;
 /// Lengths of a force in g and in m/s^2.
 const IN_G: std::ops::Range<f64> = 0.4..4.0;
 const IN_SI: std::ops::RangeInclusive<f64> = 4.0..=40.0;
@@ -283,14 +280,6 @@ fn not_turning(resolved: &Meaning, first: &[RawSample]) -> Option<(f64, f64)> {
         secs += step;
     }
     (secs > 0.2).then(|| (sum.norm() / secs, secs))
-}
-
-/// Multiplies a recorded force into m/s^2, as far as its format states the unit.
-pub(super) fn scale_of(unit: Option<AccelUnit>) -> f64 {
-    match unit {
-        Some(AccelUnit::StandardGravity) => STANDARD_GRAVITY,
-        Some(AccelUnit::MetresPerSecondSquared) | None => 1.0,
-    }
 }
 
 #[cfg(test)]

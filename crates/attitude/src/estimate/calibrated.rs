@@ -4,16 +4,13 @@
 //! out of a sample, while the filter knows body axes and what is left.
 
 use super::meaning::Meaning;
-use super::plan::{Bias, Noise, Plan};
+use super::plan::{BIAS_LEFT, Bias, Noise, Plan};
 use super::preparation::Prepared;
 use super::sensor_calibration::{Known, SensorCalibration};
 use super::smoothing::Recording;
 use crate::aid::{Filter, Prior, Settings};
 use crate::smooth::{Beforehand, Learned, OBSERVED, Smoothed};
 use nalgebra::{Matrix3, Matrix6, Vector3};
-
-/// Of a gyro whose bias was removed, rad/s: what the bias may have become since.
-pub(super) const BIAS_LEFT: f64 = 1e-3;
 
 /// What the bias of a chip may become while it is switched off, rad/s (0.3 deg/s): ten degrees of temperature do that. A
 /// sensor whose class has less of it after switching on has no more than that.

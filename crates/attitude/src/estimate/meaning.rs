@@ -2,7 +2,6 @@
 //!
 //! Apart from the preparation because it needs no sample: what is asked for wins over what is declared.
 
-use super::aiding;
 use super::plan::Plan;
 use super::sensor_calibration::SensorCalibration;
 use crate::condition::{Clock, GyroUnit, Settings};
@@ -12,6 +11,9 @@ use crate::record::{AccelUnit, Declared, RawSample, SampleKind, TimeUnit};
 use crate::worlds::{Convention, World};
 use nalgebra::{Matrix3, Vector3};
 use std::sync::Arc;
+
+/// Standard gravity, m/s^2.
+pub(super) const STANDARD_GRAVITY: f64 = 9.806_65;
 
 /// The flags and what the format states, put together: a flag wins.
 #[derive(Clone, Debug)]
@@ -61,7 +63,7 @@ impl Meaning {
             kind: plan.kind.or(declared.sample_kind).unwrap_or_default(),
             is_kind_stated: plan.kind.or(declared.sample_kind).is_some(),
             unit,
-            accel_scale: aiding::scale_of(declared.accel_unit)
+            accel_scale: scale_of(declared.accel_unit)
                 * if plan.is_accel_kinematic { -1.0 } else { 1.0 },
             accel_unit_stated: declared.accel_unit,
             recorded: orientation_convention(declared),
@@ -203,4 +205,12 @@ impl Meaning {
 #[must_use]
 pub fn orientation_convention(declared: &Declared) -> Convention {
     declared.world.unwrap_or(Convention::EnuFlu)
+}
+
+/// Multiplies a recorded force into m/s^2, as far as its format states the unit.
+fn scale_of(unit: Option<AccelUnit>) -> f64 {
+    match unit {
+        Some(AccelUnit::StandardGravity) => STANDARD_GRAVITY,
+        Some(AccelUnit::MetresPerSecondSquared) | None => 1.0,
+    }
 }

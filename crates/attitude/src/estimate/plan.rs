@@ -13,6 +13,9 @@ use crate::worlds::World;
 use nalgebra::Vector3;
 use std::sync::Arc;
 
+/// Of a gyro whose bias was removed, rad/s: what the bias may have become since.
+pub(super) const BIAS_LEFT: f64 = 1e-3;
+
 /// How the samples of a run are to be understood and integrated: the estimation flags, checked.
 /// `None` = the format decides where it states it, else the default.
 #[derive(Clone, Debug)]

@@ -2,7 +2,7 @@
 //!
 //! Apart from the stream because these are two curves and a figure for their error.
 
-use super::prepare::{BESIDE, Prepared};
+use super::prepared::{BESIDE, Prepared};
 use super::sample::Sample;
 use nalgebra::Vector3;
 

@@ -4,7 +4,7 @@
 
 use super::factors::{Node, difference};
 use super::pass::by_segment;
-use super::prepare::Prepared;
+use super::prepared::Prepared;
 use super::result::Sizes;
 use super::sample::{Sample, Samples};
 use super::segments::Segment;

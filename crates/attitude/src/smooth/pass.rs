@@ -6,7 +6,8 @@
 
 use super::border::Constants;
 use super::factors::{Blocks, Node, assemble};
-use super::prepare::{Prepared, Preparer};
+use super::prepare::Preparer;
+use super::prepared::Prepared;
 use super::sample::Samples;
 use super::segments::Segment;
 use super::settings::Settings;

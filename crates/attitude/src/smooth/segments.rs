@@ -2,7 +2,7 @@
 //!
 //! A stage of its own because the unknowns of the problem are its nodes, and a standstill is decided by segment.
 
-use super::prepare::Prepared;
+use super::prepared::Prepared;
 use nalgebra::Vector3;
 
 /// Fewer samples than this after the last node do not get one.

@@ -4,7 +4,7 @@
 //! seconds of each section, then a complementary filter. Heading begins where the section before ended.
 
 use super::pass::by_segment;
-use super::prepare::Prepared;
+use super::prepared::Prepared;
 use super::sample::Samples;
 use super::segments::Segment;
 use super::settings::Settings;

@@ -3,7 +3,7 @@
 //! A stage of its own because everything after it is a stream: the time between samples, the step their rates count
 //! in, and the size of the field are those of the whole log.
 
-use super::prepare::Gate;
+use super::gate::Gate;
 use super::sample::{Sample, Samples};
 use super::settings::{FieldUnit, Settings};
 use crate::condition::truncation::undone;

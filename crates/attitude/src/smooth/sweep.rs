@@ -5,7 +5,7 @@
 //! which are the same for all samples. First order in the time step, as the sums themselves are.
 
 use super::border::{self, Constants};
-use super::prepare::Prepared;
+use super::prepared::Prepared;
 use crate::quaternion::exp_minus_one;
 use crate::quaternion::kernel::product;
 use nalgebra::{Matrix3, Vector3};

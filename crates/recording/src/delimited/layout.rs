@@ -7,10 +7,11 @@ mod instants;
 mod roles;
 
 use super::cells::Delimiter;
+use super::column::{Column, is_comment};
 use super::columns::{Columns, Role};
 use super::names::{Kind, Meant, Name};
 use super::preamble::Preamble;
-use super::rows::{Column, Table, is_comment};
+use super::rows::Table;
 use super::units::{Quantity, Unit};
 use crate::decode::{Options, Wanted};
 use crate::format::without_mark;

@@ -1,6 +1,6 @@
 //! The columns that strapd writes itself. Pure.
 
-use super::rows::Column;
+use super::column::Column;
 
 /// Those that are read, by name. Those of a rate behind an attitude, and a quaternion's without their `q`, are in
 /// tables of attitudes. Units and axes are those of `strapd cat`: rad/s (delta angles in rad), m/s^2, x forward, y left,

@@ -4,6 +4,7 @@
 
 use super::cells::Delimiter;
 use super::clock::Clock;
+use super::column::{Column, is_comment};
 use super::columns::Columns;
 use super::layout;
 use super::own;
@@ -14,22 +15,6 @@ use crate::text::{printable, snippet};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 use std::borrow::Cow;
 use strapd_attitude::record::{Declared, Nanos, RawSample, SampleKind};
-
-/// What a column holds.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Column {
-    Stamp,
-    Log,
-    Interval,
-    Kind,
-    Id,
-    Gyro(usize),
-    Accel(usize),
-    Mag(usize),
-    Orientation(usize),
-    /// Of a rotation matrix, by rows.
-    Matrix(usize),
-}
 
 /// Columns that make a table one of samples or of attitudes.
 const GYRO: [Column; 3] = [Column::Gyro(0), Column::Gyro(1), Column::Gyro(2)];
@@ -425,10 +410,6 @@ fn no_row(what: &str) -> Line {
         class: Class::Other(what.to_owned()),
         ..Line::default()
     }
-}
-
-pub(super) fn is_comment(row: &[u8]) -> bool {
-    row.starts_with(b"#") || row.starts_with(b"//") || row.starts_with(b"%")
 }
 
 /// A rotation matrix by rows as `[w, x, y, z]`; what is none stays not finite.

@@ -202,6 +202,7 @@ impl FrameTransform {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
+    use strapd_attitude::record::Nanos;
     use crate::sink::tests::sample;
     use nalgebra::Vector3;
     use strapd_attitude::quaternion::Quaternion;

@@ -3,7 +3,8 @@
 use super::logs::{BIAS, FORCE_BIAS, Log, Motion, errors, log, smoothed};
 use crate::record::Nanos;
 use crate::smooth::border::{self, ALL};
-use crate::smooth::prepare::{Prepared, Preparer};
+use crate::smooth::prepare::Preparer;
+use crate::smooth::prepared::Prepared;
 use crate::smooth::segments::{Cutter, find_standstill};
 use crate::smooth::survey::Survey;
 use crate::smooth::sweep::{Sensor, sweep};

@@ -9,7 +9,7 @@ use crate::smooth::border::{self, ALL, Constants, WIDE};
 use crate::smooth::factors::{
     BIAS as BIAS_STATE, Node, Row, STATES, difference, field, inertial, standstill,
 };
-use crate::smooth::prepare::Prepared;
+use crate::smooth::prepared::Prepared;
 use crate::smooth::segments::Segment;
 use crate::smooth::sweep::{Sensor, Swept, sweep};
 use nalgebra::Vector3;

@@ -1,10 +1,11 @@
 //! Names, units and first rows -> which column is what, or why that can not be told. Pure.
 
 use super::super::cells::Delimiter;
+use super::super::column::Column;
 use super::super::columns::{Columns, Given, Role};
 use super::super::names::{Kind, Meant, Name};
 use super::super::preamble::{Maker, Preamble};
-use super::super::rows::{Column, Scales, Table};
+use super::super::rows::{Scales, Table};
 use super::super::units::Unit;
 use super::{columns, is_number, number};
 use crate::decode::Wanted;

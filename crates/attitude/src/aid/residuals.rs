@@ -1,0 +1,62 @@
+//! Residuals of the specific force, one after another -> the variance of the next. Pure.
+
+use super::settings::Settings;
+
+/// What residuals have been like.
+#[derive(Clone, PartialEq, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct Residuals {
+    /// Power density, m^2/s^3.
+    density: f64,
+    /// Mean square of a residual, and mean product with the one before.
+    square: f64,
+    product: f64,
+    last: [f64; 2],
+}
+
+impl Residuals {
+    pub(super) fn new(settings: &Settings) -> Residuals {
+        Residuals {
+            density: settings.force_start,
+            square: 0.0,
+            product: 0.0,
+            last: [0.0; 2],
+        }
+    }
+
+    /// The reference was left: what comes has nothing to do with what was.
+    pub(super) fn restart(&mut self) {
+        (self.square, self.product, self.last) = (0.0, 0.0, [0.0; 2]);
+    }
+
+    /// Variance of the residual of an interval of `secs`, with the vertical acceleration.
+    pub(super) fn variance(
+        &mut self,
+        secs: f64,
+        residual: [f64; 2],
+        up: f64,
+        settings: &Settings,
+    ) -> f64 {
+        let share = secs / (settings.force_secs + secs);
+        let [x, y] = residual;
+        let square = x * x + y * y;
+        let now = secs * (0.5 * square).max(settings.force_vertical * up * up);
+        self.density += share * (now - self.density);
+        let density = settings
+            .force_floor
+            .max(self.density)
+            .max(settings.force_instant * now);
+        self.square += share * (square - self.square);
+        let product = x * self.last[0] + y * self.last[1];
+        self.product += share * (product - self.product);
+        self.last = residual;
+        // What resembles the one before it says less than its number.
+        let likeness = if self.square > 0.0 {
+            (self.product / self.square).clamp(0.0, 0.98)
+        } else {
+            0.0
+        };
+        let colour = ((1.0 + likeness) / (1.0 - likeness)).powf(settings.colour);
+        density / secs * colour
+    }
+}

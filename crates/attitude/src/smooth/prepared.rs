@@ -1,0 +1,25 @@
+//! A sample as the sweep wants it.
+
+use nalgebra::Vector3;
+
+/// So many samples on both sides of a gap say how the rate goes on.
+pub(super) const BESIDE: usize = 5;
+/// A sample as the sweep wants it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Prepared {
+    pub stamp: i64,
+    /// Since the one before, s.
+    pub secs: f64,
+    /// Mean since the one before, rad/s.
+    pub rate: Vector3<f64>,
+    pub force: Vector3<f64>,
+    /// NaN where none was measured.
+    pub field: Vector3<f64>,
+    /// Which one of the input it is, or which one it comes before.
+    pub input: u64,
+    pub is_input: bool,
+    /// Nothing is known of the time before it.
+    pub is_after_break: bool,
+    /// Variance that a gap before it leaves of attitude and velocity: rad^2, (m/s)^2.
+    pub doubt: [f64; 2],
+}
