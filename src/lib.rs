@@ -49,7 +49,7 @@ pub mod serve;
 
 #[cfg(feature = "inside")]
 #[doc(hidden)]
-pub use strapd_replay::{config, error, pipeline, sink};
+pub use strapd_replay::{config, error, inspection, pipeline, sink};
 #[cfg(not(feature = "inside"))]
 use strapd_replay::{config, error, pipeline, sink};
 

@@ -3,7 +3,7 @@
 use super::tables::Tables;
 use super::{Global, Outcome, print, with_each};
 use crate::error::{Error, Result};
-use crate::pipeline::check::{Checked, check};
+use crate::pipeline::check::check;
 use crate::pipeline::input::Input;
 use crate::report::findings::{Finding, Severity, findings};
 use clap::Args;
@@ -13,6 +13,7 @@ use std::path::{Path, PathBuf};
 use strapd_recording::decode::Options;
 use strapd_recording::pool::Pool;
 use strapd_recording::text::printable;
+use strapd_replay::inspection::Checked;
 
 /// Everything that may spoil the attitude from a log: stamps, gaps, units, axes, bias, bad samples.
 #[derive(Args, Debug)]

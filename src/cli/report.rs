@@ -7,7 +7,7 @@ use super::{Global, Outcome, allan, print};
 use crate::config::Selection;
 use crate::error::{Error, Result};
 use crate::pipeline::attitude_track::{self, Side, Track};
-use crate::pipeline::check::{CheckedTopic, Drawing, Examination, examine};
+use crate::pipeline::check::{Drawing, Examination, examine};
 use crate::pipeline::input::Input;
 use crate::pipeline::provenance::sha256;
 use crate::report::findings::findings;
@@ -19,6 +19,7 @@ use std::path::PathBuf;
 use strapd_attitude::estimate::{Bias, Plan};
 use strapd_recording::decode::Options;
 use strapd_recording::pool::Pool;
+use strapd_replay::inspection::CheckedTopic;
 
 /// Rest from which an Allan deviation is worth having, s.
 const ENOUGH: f64 = 600.0;

@@ -15,13 +15,13 @@ mod verdict;
 pub use findings::Told;
 pub use numbers::{comparison_json, longest_rest};
 
-use crate::pipeline::check::{Checked, CheckedTopic};
 use crate::report::calendar::date;
 use crate::report::summary::human_bytes;
 use markup::{Rows, escaped};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::Path;
+use strapd_replay::inspection::{Checked, CheckedTopic};
 use verdict::Verdict;
 
 /// Largest page, bytes.

@@ -47,10 +47,11 @@ pub mod regularise;
 pub mod stillness;
 pub mod truncation;
 
+pub use crate::record::GyroUnit;
 pub use clock::{Clock, ClockWarning, choose_clock};
 pub use memory::Memory;
 pub use report::{FirstBad, GAPS_KEPT, Gap, Gaps, Report};
-pub use settings::{GyroUnit, OnGap, Settings, SettingsError};
+pub use settings::{OnGap, Settings, SettingsError};
 
 use crate::record::{Nanos, RateSample, RawSample, SampleKind, Status, Verdict};
 use clock::IndexClock;

@@ -11,7 +11,7 @@ mod covariance;
 mod declared;
 
 pub use covariance::AttitudeCovariance;
-pub use declared::{AccelUnit, Declared, TimeUnit};
+pub use declared::{AccelUnit, Declared, GyroUnit, TimeUnit};
 
 use crate::frames::{Body, Nav};
 use crate::quaternion::Quaternion;

@@ -17,7 +17,10 @@ mod elliptic;
 pub mod field;
 mod gauss;
 pub mod inertia;
+mod kinematics;
 pub mod motion;
+mod motion_error;
+mod rest_to_rest;
 pub mod rigid_body;
 #[cfg(feature = "random")]
 pub mod synthetic;

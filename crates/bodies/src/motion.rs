@@ -33,39 +33,13 @@ pub use coning::{Coning, ConstantRate};
 pub use free_body::FreeBody;
 pub use specific_force::Accelerometer;
 
+pub use crate::kinematics::Kinematics;
+pub use crate::motion_error::MotionError;
+pub(crate) use crate::motion_error::{FASTEST, within};
+
 use super::rigid_body::{HeavyBody, Spin};
 use super::youbot::Gripper;
 use nalgebra::Vector3;
-use std::fmt;
-
-/// A motion can not have this parameter.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct MotionError {
-    /// Which parameter.
-    pub what: &'static str,
-    /// As given.
-    pub value: f64,
-}
-
-impl fmt::Display for MotionError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} can not be {}", self.what, self.value)
-    }
-}
-
-impl std::error::Error for MotionError {}
-
-/// The value, when it is a number of size at most `most`.
-pub(crate) fn within(what: &'static str, value: f64, most: f64) -> Result<f64, MotionError> {
-    if value.abs() <= most {
-        Ok(value)
-    } else {
-        Err(MotionError { what, value })
-    }
-}
-
-/// The largest rate or angular frequency taken, rad/s: ten times what any gyro reads.
-pub(crate) const FASTEST: f64 = 1e5;
 
 /// Any of the motions.
 #[derive(Clone, Debug)]
@@ -84,17 +58,6 @@ pub enum Motion {
     Gripper(Box<Gripper>),
     /// Carried by somebody or something that accelerates.
     Carried(Box<Carried>),
-}
-
-/// What a sensor at the origin of the body axes feels at an instant.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Kinematics {
-    /// Attitude and body rate.
-    pub spin: Spin,
-    /// Rate of change of the body rate, rad/s^2, body axes.
-    pub rate_change: Vector3<f64>,
-    /// Acceleration of the origin, m/s^2, navigation axes.
-    pub acceleration_n: Vector3<f64>,
 }
 
 impl Motion {

@@ -74,7 +74,6 @@ pub use joints::{
 };
 pub use limits::Limits;
 pub use masses::{gripper, published_links};
-pub(crate) use path::rest_to_rest;
 pub use path::{JointPath, Leg, Sinusoid};
 pub use policy::Policy;
 pub use recursion::LinkMotion;

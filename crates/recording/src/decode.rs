@@ -45,7 +45,7 @@ pub(crate) use stamp::{
 pub use stated::Stated;
 pub use strapd_attitude::condition::GyroUnit;
 
-use crate::delimited::{Columns, Delimiter};
+use crate::columns::{Columns, Delimiter};
 use crate::text::printable;
 use registers::{Form, Slot, StampForm};
 use ros::fifo::Fifo;

@@ -9,19 +9,14 @@
 //! what each column holds, in which unit, is decided once, from the names and the first rows, and said; what can not be
 //! told is refused with the flag that says it ([`Columns`]).
 
-mod cells;
 mod clock;
 mod column;
-mod columns;
 mod layout;
-mod names;
 mod own;
 mod preamble;
 mod rows;
-mod units;
 
-pub use cells::Delimiter;
-pub use columns::Columns;
+pub use crate::columns::{Columns, Delimiter};
 pub use rows::Table;
 
 pub(crate) use layout::{MOST_HEAD_LINES, Opening, is_header, is_text_of_cells, may_be_table};

@@ -5,9 +5,8 @@
 
 use crate::delimited;
 use crate::error::{Error, Result};
-use crate::mcap::MAGIC;
 use crate::recognise;
-use crate::{bag, ulog};
+use crate::text::without_mark;
 use std::fs::File;
 use std::io::{BufRead, Read, Seek, SeekFrom};
 use std::path::Path;
@@ -28,15 +27,22 @@ pub enum Format {
     Table,
 }
 
+/// The eight bytes at both ends of an MCAP.
+pub const MCAP_MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
+/// The first bytes of a ULog.
+pub(crate) const ULOG_MAGIC: [u8; 7] = *b"ULog\x01\x12\x35";
+/// The first bytes of a bag of ROS 1.
+pub(crate) const BAG_MAGIC: [u8; 13] = *b"#ROSBAG V2.0\n";
+
 /// Bytes that tell a format by themselves, at the beginning.
 const MAGICS: [(&[u8], Format); 3] = [
-    (&MAGIC, Format::Mcap),
-    (&ulog::MAGIC, Format::Ulog),
-    (&bag::MAGIC, Format::Bag),
+    (&MCAP_MAGIC, Format::Mcap),
+    (&ULOG_MAGIC, Format::Ulog),
+    (&BAG_MAGIC, Format::Bag),
 ];
 
 /// The longest of them.
-pub(crate) const LONGEST_MAGIC: usize = bag::MAGIC.len();
+pub(crate) const LONGEST_MAGIC: usize = BAG_MAGIC.len();
 
 /// Endings of names, for what the bytes do not tell.
 const ENDINGS: [(&str, Format); 9] = [
@@ -195,11 +201,6 @@ fn tells_enough(head: &[u8]) -> bool {
     !begins_magic
         && (Format::of_bytes(head).is_some()
             || (!lines.is_empty() && !delimited::may_be_table(lines)))
-}
-
-/// A text without the byte order mark that spreadsheets put before it.
-pub(crate) fn without_mark(text: &[u8]) -> &[u8] {
-    text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text)
 }
 
 /// Opens a file to be read from its beginning.

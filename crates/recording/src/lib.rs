@@ -13,6 +13,8 @@
 //! | [`lines`] | lines of JSON, rows of a table -> what each holds | I/O |
 //! | [`attitude_line`] | a line that says an attitude -> numbers | pure |
 //! | [`delimited`] | rows of a table, strapd's own or another maker's -> raw samples | pure |
+//! | `columns` | what columns of tables are called, and what a user says of them | pure |
+//! | `records` | records as MCAP has them, which other containers are transcribed to | pure |
 //! | `bag` | ROS 1 bags -> the records MCAP has for them | pure |
 //! | `ulog` | ULog, the log of PX4 -> the records MCAP has for it | pure |
 //! | [`decode`] | bytes of one message, one line, one packed object -> raw samples | pure |
@@ -23,6 +25,7 @@
 
 pub mod attitude_line;
 mod bag;
+mod columns;
 pub mod decode;
 pub mod delimited;
 pub mod error;
@@ -31,6 +34,7 @@ pub mod lines;
 pub mod mcap;
 pub mod pool;
 pub mod recognise;
+mod records;
 pub mod text;
 mod ulog;
 

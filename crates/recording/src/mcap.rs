@@ -18,7 +18,6 @@
 
 mod attached;
 mod block;
-mod bytes;
 mod channels;
 mod container;
 mod input;
@@ -32,13 +31,11 @@ mod resync;
 mod scan;
 mod summary;
 mod survey;
-pub(crate) mod transcript;
 mod walk;
 mod workers;
 
 pub use block::Compression;
 use block::Payload;
-pub(crate) use bytes::Bytes;
 pub use channels::{Channel, Schema};
 pub use list::{Listed, list};
 pub use messages::{Message, Tally};
@@ -138,7 +135,7 @@ impl Reader {
         let mut magic = Vec::with_capacity(MAGIC.len());
         // Eight tell every format but a bag, of which they tell that five more follow.
         for most in [MAGIC.len(), LONGEST_MAGIC] {
-            if most == MAGIC.len() || magic == crate::bag::MAGIC[..MAGIC.len()] {
+            if most == MAGIC.len() || magic == crate::format::BAG_MAGIC[..MAGIC.len()] {
                 let more = (most - magic.len()) as u64;
                 let read = from.by_ref().take(more).read_to_end(&mut magic);
                 read.map_err(|e| read_error(&name, 0, e))?;

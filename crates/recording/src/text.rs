@@ -50,3 +50,24 @@ pub fn snippet(bytes: &[u8]) -> String {
     }
     out
 }
+
+/// A text without the byte order mark that spreadsheets put before it.
+pub(crate) fn without_mark(text: &[u8]) -> &[u8] {
+    text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text)
+}
+
+/// Names, fit for a terminal: the first ten, and how many more there are.
+#[must_use]
+pub fn named_few<T: AsRef<str>>(topics: &[T]) -> String {
+    const FEW: usize = 10;
+    let names: Vec<String> = topics
+        .iter()
+        .take(FEW)
+        .map(|topic| printable(topic.as_ref()))
+        .collect();
+    let mut out = names.join(", ");
+    if topics.len() > FEW {
+        out.push_str(&format!(" and {} more", topics.len() - FEW));
+    }
+    out
+}

@@ -20,7 +20,7 @@ mod transcriber;
 pub(crate) use transcriber::{Fault, FaultKind, Step, Transcriber};
 
 /// The first seven bytes of a file. A byte of version and the start's time follow.
-pub(crate) const MAGIC: [u8; 7] = *b"ULog\x01\x12\x35";
+pub(crate) use crate::format::ULOG_MAGIC as MAGIC;
 
 /// Bytes before the first record.
 pub(crate) const HEADER: usize = 16;

@@ -11,6 +11,7 @@
 //! | [`pipeline`] | a recording -> attitudes: replay, tracks, what a log holds | I/O |
 //! | [`sink`] | attitude -> MCAP, NDJSON, CSV, sockets | I/O |
 //! | [`summary`] | a run -> its numbers, for people and for machines | pure |
+//! | [`inspection`] | what looking at a log tells of its topics | pure |
 //! | [`findings`] | what is known about a log -> what is wrong with it, and what helps | pure |
 //! | [`error`] | everything that can end a run | pure |
 //!
@@ -18,7 +19,9 @@
 
 pub mod config;
 pub mod error;
+mod finding;
 pub mod findings;
+pub mod inspection;
 pub mod pipeline;
 pub mod sink;
 pub mod summary;

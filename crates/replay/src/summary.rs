@@ -19,7 +19,7 @@ use self::series::Drawn;
 use self::sigma::SigmaTerms;
 use self::smoothing::Smoothing;
 use self::stamps::Regularised;
-use crate::findings::Finding;
+use crate::finding::Finding;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use strapd_attitude::compare::{BiasFit, BodyAxesFit, Consistency};

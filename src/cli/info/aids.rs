@@ -1,11 +1,10 @@
 //! What may correct an attitude -> words, JSON. Pure.
 
 use crate::cli::shell::flag;
-use crate::pipeline::beside::TopicOfVectors;
-use crate::pipeline::inspection::Aids;
 use crate::report::summary::significant;
 use serde_json::{Value, json};
 use strapd_recording::text::printable;
+use strapd_replay::inspection::{Aids, TopicOfVectors};
 
 /// Units of a field by the length of the Earth's, 22 to 67 uT, with room for what iron does to it.
 const FIELD_UNITS: [(&str, f64); 5] = [

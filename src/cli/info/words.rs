@@ -2,10 +2,8 @@
 
 use crate::cli::shell::{flag, quoted_file};
 use crate::pipeline::input::Input;
-use crate::pipeline::inspection::Inspection;
 use crate::pipeline::log_channel::{LogChannel, described, rank};
 use crate::pipeline::request::Source;
-use crate::pipeline::topics::named_few;
 use crate::report::calendar::{date, duration};
 use crate::report::findings::{Finding, of_samples};
 use crate::report::summary::{human_bytes, significant};
@@ -14,6 +12,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use strapd_recording::format::Format;
 use strapd_recording::mcap::Survey;
+use strapd_recording::text::named_few;
+use strapd_replay::inspection::Inspection;
 
 /// Most other topics that are listed.
 const OTHERS: usize = 40;

@@ -1,10 +1,10 @@
 //! What was found out about a topic -> JSON. Pure.
 
 use super::Noise;
-use crate::pipeline::check::CheckedTopic;
 use crate::report::series::{Drawn, Errors, Mark};
 use serde_json::{Value, json};
 use strapd_attitude::compare::{Comparison, ErrorStats};
+use strapd_replay::inspection::CheckedTopic;
 
 /// Rests told one by one.
 const RESTS: usize = 1000;

@@ -3,13 +3,13 @@
 use super::charts::{self, Time};
 use super::markup::{Rows, escaped, figure, sentence, table};
 use super::{Noise, Page, numbers, reference, timeline};
-use crate::pipeline::check::CheckedTopic;
 use crate::report::aid::Aided;
 use crate::report::series::Drawn;
 use crate::report::smoothing::Smoothing;
 use crate::report::summary::{TopicSummary, meaning, significant};
 use std::fmt::Write as _;
 use strapd_attitude::record::Verdict;
+use strapd_replay::inspection::CheckedTopic;
 
 /// Rests and cuts told one by one.
 const TOLD: usize = 12;

@@ -2,10 +2,10 @@
 
 use super::findings::Told;
 use super::markup::sentence;
-use crate::pipeline::check::Checked;
 use crate::report::calendar::duration;
 use crate::report::findings::Severity;
 use crate::report::summary::{TopicSummary, significant};
+use strapd_replay::inspection::Checked;
 
 /// How good it is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

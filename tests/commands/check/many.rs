@@ -4,7 +4,8 @@ use crate::made_logs::{Logged, logged, motion};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-use strapd::pipeline::check::{Checked, Examination, check, examine};
+use strapd::inspection::{Checked, CheckedTopic};
+use strapd::pipeline::check::{Examination, check, examine};
 use strapd::pipeline::input::Input;
 use strapd::pipeline::inspection::look;
 use strapd::pipeline::log::Log;
@@ -69,9 +70,7 @@ fn a_topic_among_others_is_told_as_it_is_alone() {
         let [alone] = &alone.topics[..] else {
             panic!("{name}");
         };
-        let summary = |topic: &strapd::pipeline::check::CheckedTopic| {
-            format!("{:?}", topic.replayed.as_ref().unwrap())
-        };
+        let summary = |topic: &CheckedTopic| format!("{:?}", topic.replayed.as_ref().unwrap());
         assert_eq!(summary(topic), summary(alone));
         assert_eq!(topic.replayed.as_ref().unwrap().counts.used(), 400);
     }

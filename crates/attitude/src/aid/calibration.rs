@@ -23,7 +23,7 @@ pub struct Calibration {
     /// Hard iron, in the field's unit: a field that turns with the body. Zero unless it is asked for.
     #[cfg_attr(
         feature = "serde",
-        serde(default, skip_serializing_if = "crate::aid::memory::is_nothing")
+        serde(default, skip_serializing_if = "crate::aid::calibration::is_nothing")
     )]
     pub hard_iron: Vector3<f64>,
 }
@@ -68,4 +68,10 @@ impl Applied {
     pub(crate) fn corrected(self, measured: Vector3<f64>, secs: f64) -> Vector3<f64> {
         self.matrix * (measured - self.bias * secs)
     }
+}
+
+/// What is zero to the bit takes no place in a text.
+#[cfg(feature = "serde")]
+pub(super) fn is_nothing(v: &Vector3<f64>) -> bool {
+    v.iter().all(|c| c.to_bits() == 0)
 }

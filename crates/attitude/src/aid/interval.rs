@@ -27,12 +27,12 @@ pub(super) struct Interval {
     /// The same sum in body axes, and that of the first row of the attitude matrix: what hard iron does to it.
     #[cfg_attr(
         feature = "serde",
-        serde(default, skip_serializing_if = "crate::aid::memory::is_nothing")
+        serde(default, skip_serializing_if = "crate::aid::calibration::is_nothing")
     )]
     pub(super) field_in_body: Vector3<f64>,
     #[cfg_attr(
         feature = "serde",
-        serde(default, skip_serializing_if = "crate::aid::memory::is_nothing")
+        serde(default, skip_serializing_if = "crate::aid::calibration::is_nothing")
     )]
     pub(super) by_iron: Vector3<f64>,
 }

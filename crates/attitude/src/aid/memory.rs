@@ -68,12 +68,6 @@ pub struct Memory {
     fields: Beside,
 }
 
-/// What is zero to the bit takes no place in a text.
-#[cfg(feature = "serde")]
-pub(super) fn is_nothing(v: &Vector3<f64>) -> bool {
-    v.iter().all(|c| c.to_bits() == 0)
-}
-
 impl Aided {
     /// What it and its propagator know; `None` before the first sample of a run.
     #[must_use]

@@ -4,9 +4,42 @@
 //! setting given by hand wins over anything declared here.
 
 use super::{Nanos, SampleKind};
-use crate::condition::GyroUnit;
 use crate::frames::BodyAxes;
 use crate::worlds::Convention;
+
+/// Unit of the recorded rates (or of the recorded angles, for delta angles).
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Hash)]
+pub enum GyroUnit {
+    /// rad/s (or rad).
+    #[default]
+    Rad,
+    /// degrees per second (or degrees).
+    Deg,
+    /// mrad/s (or mrad).
+    Mrad,
+}
+
+impl GyroUnit {
+    /// Multiply by this to get rad/s (or rad).
+    #[must_use]
+    pub fn to_rad(self) -> f64 {
+        match self {
+            GyroUnit::Rad => 1.0,
+            GyroUnit::Deg => std::f64::consts::PI / 180.0,
+            GyroUnit::Mrad => 1e-3,
+        }
+    }
+
+    /// The name used by `--gyro-unit`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            GyroUnit::Rad => "rad",
+            GyroUnit::Deg => "deg",
+            GyroUnit::Mrad => "mrad",
+        }
+    }
+}
 
 /// Unit of a specific force.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Hash)]

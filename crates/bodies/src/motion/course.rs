@@ -2,7 +2,7 @@
 
 use super::jet::Jet;
 use crate::double_double::DoubleDouble;
-use crate::youbot::rest_to_rest;
+use crate::rest_to_rest::rest_to_rest;
 use std::f64::consts::TAU;
 
 /// Whole nanoseconds since the start, and a part beyond them.

@@ -3,7 +3,7 @@
 use super::taylor::{Heavy, Rates, Trajectory};
 use super::{Rotor, Spin};
 use crate::double_double::DoubleDouble;
-use crate::motion::{FASTEST, MotionError, within};
+use crate::motion_error::{FASTEST, MotionError, within};
 use nalgebra::Vector3;
 use strapd_attitude::frames::{Body, Nav};
 use strapd_attitude::quaternion::Quaternion;

@@ -1,7 +1,7 @@
 //! Everything a top, a case or a method refuses, with its numbers. Pure.
 
 use crate::inertia::InertiaError;
-use crate::motion::MotionError;
+use crate::motion_error::MotionError;
 use crate::rigid_body::NotConverged;
 use std::fmt;
 

@@ -7,7 +7,7 @@ use super::path::JointPath;
 use super::{Arm, ArmError, Base, Tool};
 use crate::dh::Transform;
 use crate::gauss::NODES;
-use crate::motion::Kinematics;
+use crate::kinematics::Kinematics;
 use crate::rigid_body::Spin;
 use nalgebra::Vector3;
 use strapd_attitude::frames::{Dcm, In, NotARotation, Sensor};

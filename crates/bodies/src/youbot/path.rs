@@ -4,6 +4,7 @@ use super::error::bounded;
 use super::joints::{JOINTS, SeedJoints, SeedMotion};
 use super::limits::Limits;
 use super::{Arm, ArmError};
+use crate::rest_to_rest::{PEAK, rest_to_rest};
 
 mod knots;
 
@@ -51,21 +52,6 @@ impl Sinusoid {
         Ok(self)
     }
 }
-
-/// The way from one rest to the next: `s(x) = 10 x^3 - 15 x^4 + 6 x^5`, least jerk, rate and
-/// acceleration zero at both ends. Fraction of the way and its two derivatives over `duration` s.
-pub(crate) fn rest_to_rest(secs: f64, duration: f64) -> [f64; 3] {
-    let x = (secs / duration).clamp(0.0, 1.0);
-    let y = 1.0 - x;
-    [
-        x * x * x * (10.0 - x * (15.0 - 6.0 * x)),
-        30.0 * x * x * y * y / duration,
-        60.0 * x * y * (1.0 - 2.0 * x) / (duration * duration),
-    ]
-}
-
-/// Peak of the derivative of [`rest_to_rest`] over one second.
-pub(super) const PEAK: f64 = 15.0 / 8.0;
 
 /// Instants looked at between two knots.
 const BETWEEN: usize = 16;

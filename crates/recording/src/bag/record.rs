@@ -2,7 +2,7 @@
 //!
 //! Apart because fields are named text in any order: what is asked of a head is found once, here.
 
-use crate::mcap::Bytes;
+use crate::records::Bytes;
 
 /// Record types.
 pub(crate) mod op {

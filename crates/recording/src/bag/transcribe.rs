@@ -4,8 +4,8 @@
 //! channel's.
 
 use super::record::{Head, head, op};
-use crate::mcap::Bytes;
-use crate::mcap::transcript::Transcript;
+use crate::records::Bytes;
+use crate::records::transcript::Transcript;
 
 /// The end of the record at `at`; `Err(true)` where none can begin, `Err(false)` where it goes on behind `data`.
 pub(crate) fn next_record(data: &[u8], at: usize) -> Result<usize, bool> {

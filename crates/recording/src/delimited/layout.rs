@@ -6,16 +6,16 @@
 mod instants;
 mod roles;
 
-use super::cells::Delimiter;
 use super::column::{Column, is_comment};
-use super::columns::{Columns, Role};
-use super::names::{Kind, Meant, Name};
 use super::preamble::Preamble;
 use super::rows::Table;
-use super::units::{Quantity, Unit};
+use crate::columns::Delimiter;
+use crate::columns::{Columns, Role};
+use crate::columns::{Kind, Meant, Name};
+use crate::columns::{Quantity, Unit};
 use crate::decode::{Options, Wanted};
-use crate::format::without_mark;
 use crate::text::printable;
+use crate::text::without_mark;
 use roles::Roles;
 
 /// Lines, and bytes of them, in which the header is looked for.

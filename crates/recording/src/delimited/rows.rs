@@ -2,15 +2,15 @@
 //!
 //! Apart from the layout because that is decided once, and this is done for every row.
 
-use super::cells::Delimiter;
 use super::clock::Clock;
 use super::column::{Column, is_comment};
-use super::columns::Columns;
 use super::layout;
 use super::own;
 use super::preamble;
+use crate::columns::Columns;
+use crate::columns::Delimiter;
 use crate::decode::{Class, Line, MAX_LINE, Undecodable, exact_name};
-use crate::format::without_mark;
+use crate::text::without_mark;
 use crate::text::{printable, snippet};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 use std::borrow::Cow;

@@ -5,8 +5,8 @@
 
 use super::input::{Held, LogFile};
 use super::problem::ProblemKind;
-use super::transcript::Transcript;
 use crate::bag;
+use crate::records::transcript::Transcript;
 use std::io;
 use std::sync::Arc;
 

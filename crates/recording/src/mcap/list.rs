@@ -4,7 +4,6 @@
 //! metadata, indexes and the summary. One thread, no order made, chunks opened in place.
 
 use super::block::Buffers;
-use super::bytes::{HEAD, head_at};
 use super::container::Container;
 use super::problem::{ProblemKind, Problems};
 use super::record::Record;
@@ -12,6 +11,7 @@ use super::scan::{Besides, Item};
 use super::workers::place;
 use super::{Facts, Reader, read_error};
 use crate::error::Result;
+use crate::records::{HEAD, head_at};
 use std::ops::ControlFlow;
 
 /// One record and where it is.

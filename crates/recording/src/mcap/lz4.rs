@@ -15,7 +15,7 @@ const STORED: u32 = 1 << 31;
 /// checked afterwards. `None` where the frame is of a kind this does not read (dictionaries, skippable
 /// and legacy frames, reserved bits) or is damaged; the general reader then has its say.
 pub(super) fn unpack(packed: &[u8], out: &mut [u8]) -> Option<usize> {
-    let mut b = super::bytes::Bytes::new(packed);
+    let mut b = crate::records::Bytes::new(packed);
     if b.take(4)? != MAGIC {
         return None;
     }

@@ -3,11 +3,11 @@
 //! A stage of its own because it is the inner loop of every read: one pass over record heads,
 //! one table look-up per message, no allocation but the items.
 
-use super::bytes::{HEAD, head_at};
 use super::channels::{Channel, NONE, Table};
 use super::order::Batch;
 use super::problem::ProblemKind;
 use super::record::{MessageRecord, op};
+use crate::records::{HEAD, head_at};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 

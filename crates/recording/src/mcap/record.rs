@@ -4,30 +4,11 @@
 //! (<https://mcap.dev/spec>): what a field is worth is judged by the callers. Bytes after the
 //! last known field are ignored, as the specification asks.
 
-use super::bytes::Bytes;
+use crate::records::Bytes;
 
 /// The eight bytes at both ends of a file.
-pub const MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
-
-/// Record opcodes.
-#[allow(missing_docs)]
-pub mod op {
-    pub const HEADER: u8 = 0x01;
-    pub const FOOTER: u8 = 0x02;
-    pub const SCHEMA: u8 = 0x03;
-    pub const CHANNEL: u8 = 0x04;
-    pub const MESSAGE: u8 = 0x05;
-    pub const CHUNK: u8 = 0x06;
-    pub const MESSAGE_INDEX: u8 = 0x07;
-    pub const CHUNK_INDEX: u8 = 0x08;
-    pub const ATTACHMENT: u8 = 0x09;
-    pub const ATTACHMENT_INDEX: u8 = 0x0A;
-    pub const STATISTICS: u8 = 0x0B;
-    pub const METADATA: u8 = 0x0C;
-    pub const METADATA_INDEX: u8 = 0x0D;
-    pub const SUMMARY_OFFSET: u8 = 0x0E;
-    pub const DATA_END: u8 = 0x0F;
-}
+pub use crate::format::MCAP_MAGIC as MAGIC;
+pub use crate::records::op;
 
 /// One record, borrowed from the bytes it was read from. Times are nanoseconds, offsets and
 /// lengths bytes; field names are the specification's.

@@ -5,9 +5,9 @@
 //! Its CRC is checked afterwards like any other's.
 
 use super::block::Compression;
-use super::bytes::{HEAD, head_at};
 use super::input::Tape;
 use super::record::{ChunkHead, op};
+use crate::records::{HEAD, head_at};
 use std::io;
 
 /// Bytes searched at a time.

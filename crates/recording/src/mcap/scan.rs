@@ -8,12 +8,12 @@ mod chunk;
 
 use super::Limits;
 use super::block::{Block, Compression, Kind, Payload};
-use super::bytes::{HEAD, head_at};
 use super::input::{Held, Input, Tape};
 use super::problem::{ProblemKind, Problems};
 use super::record::{MAGIC, Record, op};
 use super::resync;
 use crate::format::Format;
+use crate::records::{HEAD, head_at};
 use std::collections::BTreeMap;
 use std::io;
 

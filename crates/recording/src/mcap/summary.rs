@@ -4,10 +4,10 @@
 //! holds, every record parses and every chunk it names lies before it.
 
 use super::Limits;
-use super::bytes::{HEAD, head_at};
 use super::channels::Fallback;
 use super::input::{Input, LogFile, Tape};
 use super::record::{Footer, MAGIC, Record, Statistics, op};
+use crate::records::{HEAD, head_at};
 use std::collections::BTreeMap;
 use std::io;
 use std::sync::Arc;

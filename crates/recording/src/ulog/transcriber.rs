@@ -7,7 +7,7 @@
 use super::format::{Format, Formats, Layout};
 use super::record::{HEAD, LONGEST, Look, head, id, look, pair};
 use super::{HEADER, MAGIC};
-use crate::mcap::transcript::Transcript;
+use crate::records::transcript::Transcript;
 use std::collections::BTreeMap;
 
 /// Most formats.

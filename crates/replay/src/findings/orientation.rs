@@ -1,7 +1,7 @@
 //! A recorded orientation, and what it says about the samples -> findings. Pure.
 
 use super::{Finding, Severity};
-use crate::pipeline::check::CheckedTopic;
+use crate::inspection::CheckedTopic;
 use crate::summary::against::{beyond_sigma, bias_flag, bias_json, bias_words, consistency_json};
 use crate::summary::{Against, Recorded, TopicSummary, significant};
 use nalgebra::Vector3;

@@ -1,7 +1,7 @@
 //! Statistics of the samples as recorded -> findings. Pure.
 
 use super::{Finding, Severity};
-use crate::pipeline::inspection::Inspection;
+use crate::inspection::Inspection;
 use crate::summary::significant;
 use serde_json::json;
 use strapd_attitude::condition::quality::{Advice, AxisStats};

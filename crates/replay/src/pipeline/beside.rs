@@ -11,12 +11,14 @@ use super::sources::is_same;
 use super::topics;
 use crate::config::{Selection, TopicBeside};
 use crate::error::{Error, Result};
+use crate::inspection::TopicOfVectors;
 use std::path::Path;
 use std::sync::Arc;
 use strapd_attitude::condition::Clock;
 use strapd_attitude::estimate::{Aid, Plan};
 use strapd_recording::decode::{Decoder, Options, Wanted};
 use strapd_recording::mcap::Channel;
+use strapd_recording::text::named_few;
 use strapd_recording::text::printable;
 
 /// Channels that are read beside those of the samples.
@@ -86,19 +88,6 @@ pub(super) fn of_fields(plan: &Plan, log: &Log, own: &str) -> Result<Besides> {
     let mut besides = Besides::default();
     besides.add(unnamed(plan, log.name(), log, own)?);
     Ok(besides)
-}
-
-/// A topic of vectors that could correct the samples of another.
-#[derive(Clone, Debug)]
-pub struct TopicOfVectors {
-    /// Its name.
-    pub topic: String,
-    /// Type and encoding.
-    pub described: String,
-    /// Messages a second of the log; `None` where its length is not known.
-    pub rate_hz: Option<f64>,
-    /// Length of the first vector, in the unit of the file.
-    pub first: Option<f64>,
 }
 
 /// The topics beside `own` with magnetic fields, and with specific forces; and of the fields the one that
@@ -218,7 +207,7 @@ fn unnamed<'l>(
         [_] => String::new(),
         several => format!(
             "--aid gravity+mag: several topics carry a magnetic field: {}\n  help: --mag-topic NAME",
-            topics::named_few(several)
+            named_few(several)
         ),
     };
     match (found.pop(), what) {

@@ -6,66 +6,16 @@
 use super::attitude_track::Track;
 use super::each::{Told, each};
 use super::input::Input;
-use super::inspection::{Inspection, look_as};
+use super::inspection::look_as;
 use super::log::{Log, problems};
 use super::position::Position;
 use super::request::ReplayRequest;
 use crate::config::Selection;
 use crate::error::{Error, Result};
-use crate::summary::TopicSummary;
+use crate::inspection::{Checked, CheckedTopic, Inspection};
 use strapd_attitude::estimate::Plan;
 use strapd_recording::decode;
 use strapd_recording::pool::Pool;
-
-/// A log, examined.
-#[derive(Debug)]
-pub struct Checked {
-    /// What is wrong with the file itself, the first few in words.
-    pub problems: Vec<String>,
-    /// How many of those lost data.
-    pub file_losses: u64,
-    /// Its size in bytes, where that can be known.
-    pub file_size: Option<u64>,
-    /// The profile it names.
-    pub profile: String,
-    /// Topics that sound like an IMU's and can not be decoded: why.
-    pub refused: Vec<String>,
-    /// Its topics of samples.
-    pub topics: Vec<CheckedTopic>,
-    /// Topics of samples beyond those, which were not examined.
-    pub left_out: Vec<String>,
-}
-
-impl Checked {
-    /// Calls the file `name` in all words in which it was called `path`.
-    pub fn rename(&mut self, path: &str, name: &str) {
-        let summaries = self.topics.iter_mut().map(|topic| &mut topic.replayed);
-        let mut words: Vec<&mut String> = Vec::new();
-        for summary in summaries {
-            match summary {
-                Ok(summary) => {
-                    words.extend(summary.findings.iter_mut().map(|found| &mut found.what))
-                }
-                Err(why) => words.push(why),
-            }
-        }
-        words.extend(self.problems.iter_mut().chain(&mut self.refused));
-        for word in words {
-            if word.contains(path) {
-                *word = word.replace(path, name);
-            }
-        }
-    }
-}
-
-/// A topic of samples, looked at and replayed.
-#[derive(Debug)]
-pub struct CheckedTopic {
-    /// Statistics of the samples as recorded.
-    pub looked: Inspection,
-    /// What a replay with default flags makes of them, or why it refuses.
-    pub replayed: std::result::Result<Box<TopicSummary>, String>,
-}
 
 /// What a report wants of the replays beside their summaries.
 #[derive(Clone, Copy, Debug)]

@@ -3,7 +3,7 @@
 //! Apart from the replay because it integrates nothing: `info` (and later `check`) look before
 //! anyone leaps.
 
-use super::beside::{TopicOfVectors, vectors};
+use super::beside::vectors;
 use super::channel_route::{Item, Noticed, Route, Taker};
 use super::decoders::Decoders;
 use super::log::{AHEAD, Log};
@@ -11,114 +11,19 @@ use super::log_channel::{LogChannel, described, rank};
 use super::sources::Source;
 use super::topics::{MOST_TOPICS, PICKED_UNNAMED};
 use crate::error::{Error, Result};
+use crate::inspection::{Aids, Inspection};
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::Arc;
-use strapd_attitude::condition::quality::{Quality, QualitySummary};
+use strapd_attitude::condition::quality::Quality;
 use strapd_attitude::condition::regularise;
-use strapd_attitude::condition::stillness::{self, Limits, Rests, Stillness};
+use strapd_attitude::condition::stillness::{self, Limits, Stillness};
 use strapd_attitude::condition::{Clock, GyroUnit, choose_clock};
-use strapd_attitude::estimate::{Aid, Aiding, Conditioned, FEW, Meaning, Plan};
+use strapd_attitude::estimate::{Conditioned, FEW, Meaning, Plan};
 use strapd_attitude::record::{Declared, RawSample};
 use strapd_recording::decode::{self, Options};
 use strapd_recording::mcap::{self, Survey};
 use strapd_recording::pool::Pool;
-
-/// One topic of samples, looked at.
-#[derive(Debug)]
-pub struct Inspection {
-    /// Its name: the topic, or one of several sources on it.
-    pub topic: String,
-    /// The topic.
-    pub of: String,
-    /// Type and encoding.
-    pub described: String,
-    /// The frame its first message names.
-    pub frame: String,
-    /// How its samples are understood by default.
-    pub resolved: Meaning,
-    /// Whether the format states the meaning of a sample.
-    pub kind_stated: bool,
-    /// Statistics.
-    pub quality: QualitySummary,
-    /// The unit of its rates: rad/s where the format states any, else that which was taken for granted.
-    pub quality_unit: GyroUnit,
-    /// Rests, rad/s.
-    pub rests: Rests,
-    /// The bias they give.
-    pub bias: Option<stillness::BiasEstimate>,
-    /// Payloads that could not be decoded.
-    pub undecodable: u64,
-    /// The clock the statistics are on.
-    pub clock: Clock,
-    /// What was noticed about the clock.
-    pub clock_warning: Option<String>,
-    /// What may correct its attitude.
-    pub aid: Aids,
-}
-
-/// What of the samples themselves, or beside them, may correct an attitude.
-#[derive(Clone, Debug, Default)]
-pub struct Aids {
-    /// Whether the samples carry specific forces.
-    pub has_force: bool,
-    /// Mean length of the forces in the first samples, as recorded in the unit the format states (else its own).
-    pub mean_force: Option<f64>,
-    /// What they are multiplied by to be m/s^2: 9.80665 of forces in g.
-    pub force_scale: f64,
-    /// Whether `--aid auto` takes gravity.
-    pub gravity: bool,
-    /// What there is to say of the forces.
-    pub notes: Vec<String>,
-    /// Length of the first field in the samples themselves.
-    pub own_field: Option<f64>,
-    /// Topics with fields, and the one that is taken unnamed.
-    pub fields: (Vec<TopicOfVectors>, Option<String>),
-    /// Topics with forces.
-    pub forces: Vec<TopicOfVectors>,
-}
-
-impl Aids {
-    /// From the first samples of a topic.
-    fn of(plan: &Plan, resolved: &Meaning, first: &[RawSample], beside: &[RawSample]) -> Aids {
-        let plan = Plan {
-            aid: Aid::Auto,
-            ..plan.clone()
-        };
-        let has_force = |samples: &[RawSample]| samples.iter().any(|raw| raw.accel.is_some());
-        // Forces in messages of their own stand in where the rates come alone.
-        let of_forces = match !has_force(first) && has_force(beside) {
-            true => beside,
-            false => first,
-        };
-        let mut notes = Vec::new();
-        // With `auto` what can not be is a warning.
-        let aiding = Aiding::decide(&plan, resolved, of_forces, &mut notes).unwrap_or_default();
-        let forces = || {
-            of_forces
-                .iter()
-                .filter_map(|raw| raw.accel)
-                .map(|f| resolved.force(f).norm())
-        };
-        let (sum, n) = forces()
-            .filter(|length| length.is_finite())
-            .fold((0.0, 0.0), |(sum, n), length| (sum + length, n + 1.0));
-        let length = |[x, y, z]: [f64; 3]| x.hypot(y).hypot(z);
-        Aids {
-            has_force: forces().next().is_some(),
-            mean_force: (n > 0.0).then(|| sum / n),
-            force_scale: aiding.map_or(1.0, |aiding| aiding.force_scale),
-            gravity: aiding.is_some(),
-            notes,
-            own_field: first
-                .iter()
-                .chain(beside)
-                .find_map(|raw| raw.mag)
-                .map(length),
-            ..Aids::default()
-        }
-    }
-}
 
 /// What was looked at.
 #[derive(Debug)]

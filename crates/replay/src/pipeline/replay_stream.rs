@@ -19,7 +19,7 @@ use super::summarise;
 use super::topics::{self, PICKED_UNNAMED};
 use crate::config::TopicBeside;
 use crate::error::{Error, Result};
-use crate::findings::{Finding, Severity};
+use crate::finding::{Finding, Severity};
 use crate::sink::{Flow, Stream, output_topic};
 use crate::summary::RunSummary;
 use std::collections::BTreeSet;

@@ -6,6 +6,7 @@
 use crate::error::{Error, Result};
 use std::collections::BTreeSet;
 use std::path::Path;
+use strapd_recording::text::named_few;
 
 /// What the choice needs to know of one channel.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -111,22 +112,6 @@ pub fn choose(path: &Path, candidates: &[Candidate], named: Option<&str>) -> Res
             Ok(Choice { topics, note })
         }
     }
-}
-
-/// The names of topics, fit for a terminal: the first ten, and how many more there are.
-#[must_use]
-pub fn named_few<T: AsRef<str>>(topics: &[T]) -> String {
-    const FEW: usize = 10;
-    let names: Vec<String> = topics
-        .iter()
-        .take(FEW)
-        .map(|topic| strapd_recording::text::printable(topic.as_ref()))
-        .collect();
-    let mut out = names.join(", ");
-    if topics.len() > FEW {
-        out.push_str(&format!(" and {} more", topics.len() - FEW));
-    }
-    out
 }
 
 /// One indented line per channel, at most 40.

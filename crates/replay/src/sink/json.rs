@@ -202,10 +202,10 @@ impl FrameTransform {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use strapd_attitude::record::Nanos;
     use crate::sink::tests::sample;
     use nalgebra::Vector3;
     use strapd_attitude::quaternion::Quaternion;
+    use strapd_attitude::record::Nanos;
     use strapd_attitude::record::{AttitudeCovariance, Status};
 
     fn att(stream: &Stream, seq: u64, s: &AttitudeSample) -> String {

@@ -1,7 +1,7 @@
 //! What corrected the attitude and what it learned -> words, JSON. Pure.
 
 use super::significant;
-use crate::findings::{Finding, Severity};
+use crate::finding::{Finding, Severity};
 use nalgebra::Vector3;
 use serde_json::{Value, json};
 use strapd_attitude::aid::{Calibration, Filter, Report};

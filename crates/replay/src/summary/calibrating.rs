@@ -2,7 +2,7 @@
 
 use super::calibration;
 use super::{TopicSummary, significant};
-use crate::findings::Finding;
+use crate::finding::Finding;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use strapd_attitude::estimate::{Known, Pooled, SensorCalibration};

@@ -1,7 +1,7 @@
 //! What a smoother learned of a recording -> words, rows, JSON. Pure.
 
 use super::significant;
-use crate::findings::{Finding, Severity};
+use crate::finding::{Finding, Severity};
 use serde_json::{Value, json};
 use strapd_attitude::estimate::Recording;
 use strapd_attitude::smooth::{Calibration, Counts, Learned, Outcome, Sizes};

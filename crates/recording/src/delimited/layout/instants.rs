@@ -4,11 +4,11 @@
 //! that which its size suggests. Where name and steps contradict each other, neither is believed.
 
 use super::super::clock::{Clock, Wraps};
-use super::super::columns::Role;
-use super::super::names::Meant;
-use super::super::units::Unit;
 use super::is_number;
 use super::roles::{Roles, place};
+use crate::columns::Meant;
+use crate::columns::Role;
+use crate::columns::Unit;
 use crate::decode::{Bare, bare_of_text, instant_of_date, unit_of, units_that_fit};
 use strapd_attitude::record::TimeUnit;
 

@@ -1,13 +1,13 @@
 //! Names, units and first rows -> which column is what, or why that can not be told. Pure.
 
-use super::super::cells::Delimiter;
 use super::super::column::Column;
-use super::super::columns::{Columns, Given, Role};
-use super::super::names::{Kind, Meant, Name};
 use super::super::preamble::{Maker, Preamble};
 use super::super::rows::{Scales, Table};
-use super::super::units::Unit;
 use super::{columns, is_number, number};
+use crate::columns::Delimiter;
+use crate::columns::Unit;
+use crate::columns::{Columns, Given, Role};
+use crate::columns::{Kind, Meant, Name};
 use crate::decode::Wanted;
 use std::collections::BTreeMap;
 use strapd_attitude::condition::GyroUnit;

@@ -5,15 +5,15 @@
 
 use super::super::Limits;
 use super::super::block::{Block, Compression, Kind, Payload};
-use super::super::bytes::{HEAD, head_at};
 use super::super::channels::Fallback;
 use super::super::input::{Input, LogFile, Tape};
 use super::super::problem::{ProblemKind, Problems};
 use super::super::record::op as record_op;
 use super::super::scan::{Facts, Item};
-use super::super::transcript::Transcript;
 use crate::bag::{self, Head, op};
 use crate::format::Format;
+use crate::records::transcript::Transcript;
+use crate::records::{HEAD, head_at};
 use std::io;
 use std::sync::Arc;
 

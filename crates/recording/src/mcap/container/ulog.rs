@@ -7,8 +7,8 @@ use super::super::input::{Held, Input, Tape};
 use super::super::problem::{ProblemKind, Problems};
 use super::super::record::op;
 use super::super::scan::{Facts, Item};
-use super::super::transcript::Transcript;
 use crate::format::Format;
+use crate::records::transcript::Transcript;
 use crate::ulog::{Fault, FaultKind, Step, Transcriber};
 use std::io;
 

@@ -4,12 +4,12 @@
 //! believed only where they are consistent, since everything after it hangs on them.
 
 use super::super::block::{Block, Compression, Kind, Payload};
-use super::super::bytes::{HEAD, head_at};
 use super::super::input::Input;
 use super::super::problem::ProblemKind;
 use super::super::record::{ChunkHead, op};
 use super::super::resync;
 use super::{Besides, Item, PEEK, SLACK, Scanner, Section};
+use crate::records::{HEAD, head_at};
 use std::io;
 use std::sync::Arc;
 

@@ -5,7 +5,6 @@
 
 use super::super::attached::intact;
 use super::super::block::{Block, Kind};
-use super::super::bytes::{HEAD, head_at};
 use super::super::channels::{Channel, Table};
 use super::super::container::Container;
 use super::super::messages::{Message, Stop, Tally, pass};
@@ -18,6 +17,7 @@ use super::super::survey::Survey;
 use super::super::workers::{Done, Findings, Outcome, Shared, Ticket, place};
 use super::WalkReport;
 use crate::error::{Error, Result};
+use crate::records::{HEAD, head_at};
 use std::collections::{BTreeMap, VecDeque};
 use std::io;
 use std::ops::ControlFlow;

@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 /// What a column, or several, are to us.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Role {
+pub(crate) enum Role {
     Of(Kind),
     Stamp,
     Counter,
@@ -40,10 +40,10 @@ impl Role {
 
 /// What the user says of a role: columns by name, or by number from 1; none of no columns.
 #[derive(Clone, PartialEq, Debug)]
-pub(super) struct Given {
-    pub(super) role: Role,
-    pub(super) columns: Vec<String>,
-    pub(super) unit: Option<Unit>,
+pub(crate) struct Given {
+    pub(crate) role: Role,
+    pub(crate) columns: Vec<String>,
+    pub(crate) unit: Option<Unit>,
 }
 
 /// The roles that the user gives to columns.
@@ -63,11 +63,11 @@ pub struct Columns {
 
 impl Columns {
     /// What is said of this role.
-    pub(super) fn of(&self, role: Role) -> Option<&Given> {
+    pub(crate) fn of(&self, role: Role) -> Option<&Given> {
         self.given.iter().find(|given| given.role == role)
     }
 
-    pub(super) fn all(&self) -> &[Given] {
+    pub(crate) fn all(&self) -> &[Given] {
         &self.given
     }
 }

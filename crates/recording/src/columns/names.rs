@@ -8,7 +8,7 @@ use crate::text::printable;
 
 /// A vector or quaternion that columns may be parts of.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-pub(super) enum Kind {
+pub(crate) enum Kind {
     Gyro,
     Accel,
     Mag,
@@ -20,7 +20,7 @@ pub(super) enum Kind {
 
 impl Kind {
     /// How many columns it is made of.
-    pub(super) fn parts(self) -> usize {
+    pub(crate) fn parts(self) -> usize {
         match self {
             Kind::Gyro | Kind::Accel | Kind::Mag => 3,
             Kind::Orientation => 4,
@@ -29,7 +29,7 @@ impl Kind {
     }
 
     /// Its name for people and for `--columns`.
-    pub(super) fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Kind::Gyro => "gyro",
             Kind::Accel => "accel",
@@ -40,7 +40,7 @@ impl Kind {
     }
 
     /// What its unit is one of.
-    pub(super) fn quantity(self) -> Option<Quantity> {
+    pub(crate) fn quantity(self) -> Option<Quantity> {
         match self {
             Kind::Gyro => Some(Quantity::Rate),
             Kind::Accel => Some(Quantity::Force),
@@ -52,7 +52,7 @@ impl Kind {
 
 /// What a column may be.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub(super) enum Meant {
+pub(crate) enum Meant {
     /// Part of a vector; those of one vector have the same `of`.
     Part { kind: Kind, part: usize, of: String },
     /// Part of a vector that is not taken by itself: why.
@@ -67,13 +67,13 @@ pub(super) enum Meant {
 
 /// A column's name.
 #[derive(Clone, PartialEq, Debug)]
-pub(super) struct Name {
+pub(crate) struct Name {
     /// As it is, without the unit's brackets cut off; fit for a terminal.
-    pub(super) text: String,
+    pub(crate) text: String,
     /// What it may be.
-    pub(super) meant: Meant,
+    pub(crate) meant: Meant,
     /// Its unit, as it is written; `Err` of one in brackets that is not known.
-    pub(super) unit: Option<Result<Unit, String>>,
+    pub(crate) unit: Option<Result<Unit, String>>,
 }
 
 const GYRO: &[&str] = &[
@@ -327,7 +327,7 @@ fn unit_at_end(words: &[String], quantity: Quantity) -> Option<(Unit, usize)> {
 
 impl Name {
     /// What a cell of a header says.
-    pub(super) fn of(cell: &[u8]) -> Name {
+    pub(crate) fn of(cell: &[u8]) -> Name {
         let text = String::from_utf8_lossy(cell);
         let text = text
             .trim_matches(|c: char| c.is_whitespace() || c == '"' || c == '\u{feff}')

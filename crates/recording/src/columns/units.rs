@@ -8,7 +8,7 @@ use strapd_attitude::record::AccelUnit;
 
 /// A unit of one role, and what a number in it must be multiplied by first.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(super) enum Unit {
+pub(crate) enum Unit {
     /// Of a rate.
     Rate(GyroUnit, f64),
     /// Of a specific force.
@@ -21,7 +21,7 @@ pub(super) enum Unit {
 
 /// What is measured.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(super) enum Quantity {
+pub(crate) enum Quantity {
     Rate,
     Force,
     Field,
@@ -114,7 +114,7 @@ const TIMES: [(&str, f64); 25] = [
 ];
 
 /// A unit's text without what writers differ in: case, blanks, brackets, signs of powers and products.
-pub(super) fn plain(text: &str) -> String {
+pub(crate) fn plain(text: &str) -> String {
     let mut out = String::new();
     for c in text.chars() {
         match c {
@@ -132,7 +132,7 @@ pub(super) fn plain(text: &str) -> String {
 
 impl Unit {
     /// The unit that a text names, as makers write it.
-    pub(super) fn of(quantity: Quantity, text: &str) -> Option<Unit> {
+    pub(crate) fn of(quantity: Quantity, text: &str) -> Option<Unit> {
         let text = plain(text);
         let named = |name: &&str| **name == *text;
         match quantity {
@@ -156,7 +156,7 @@ impl Unit {
     }
 
     /// What `--columns` calls it; `None` of one that has no name.
-    pub(super) fn name(self) -> Option<&'static str> {
+    pub(crate) fn name(self) -> Option<&'static str> {
         match self {
             Unit::Rate(unit, scale) => {
                 let mut known = RATES.iter();

@@ -80,11 +80,11 @@ impl<'a> Bytes<'a> {
 }
 
 /// The nine bytes before every record: opcode and length of the body.
-pub(super) const HEAD: usize = 9;
+pub(crate) const HEAD: usize = 9;
 
 /// Opcode and body length of the record at `at`, or `None` where fewer than nine bytes are left.
 #[inline]
-pub(super) fn head_at(data: &[u8], at: usize) -> Option<(u8, u64)> {
+pub(crate) fn head_at(data: &[u8], at: usize) -> Option<(u8, u64)> {
     let head = data.get(at..)?.first_chunk::<HEAD>()?;
     let [opcode, length @ ..] = *head;
     Some((opcode, u64::from_le_bytes(length)))

@@ -3,7 +3,7 @@
 //! A stage of its own so that ULog and bags need no second way through the house: their readers write schemas,
 //! channels and messages here, and what follows (definitions, workers, order, counting) can not tell.
 
-use super::record::op;
+use super::op;
 
 /// Records one after another, as they would lie in a chunk.
 #[derive(Debug, Default)]

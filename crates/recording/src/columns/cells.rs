@@ -24,7 +24,7 @@ const NAMED: [(&str, Delimiter); 6] = [
 
 impl Delimiter {
     /// Those that are looked for, in this order: what comes first may hold what comes later.
-    pub(super) const TRIED: [Delimiter; 5] = [
+    pub(crate) const TRIED: [Delimiter; 5] = [
         Delimiter::Byte(b'\t'),
         Delimiter::Byte(b';'),
         Delimiter::Byte(b','),
@@ -44,7 +44,7 @@ impl Delimiter {
     }
 
     /// A line without its end, and without what is beside its cells.
-    pub(super) fn row(self, line: &[u8]) -> &[u8] {
+    pub(crate) fn row(self, line: &[u8]) -> &[u8] {
         match self {
             Delimiter::Blanks => line.trim_ascii(),
             Delimiter::Byte(byte) => {
@@ -56,7 +56,7 @@ impl Delimiter {
     }
 
     /// The cells of a row: a cell in quotes with all that is in it.
-    pub(super) fn cells(self, row: &[u8]) -> Cells<'_> {
+    pub(crate) fn cells(self, row: &[u8]) -> Cells<'_> {
         Cells {
             delimiter: self,
             rest: Some(row),
@@ -87,7 +87,7 @@ impl FromStr for Delimiter {
 }
 
 /// See [`Delimiter::cells`].
-pub(super) struct Cells<'a> {
+pub(crate) struct Cells<'a> {
     delimiter: Delimiter,
     rest: Option<&'a [u8]>,
 }

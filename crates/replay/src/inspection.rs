@@ -1,0 +1,174 @@
+//! What looking at a log tells of its topics of samples, and what replaying them tells more.
+//!
+//! Below the pipeline, which finds it out, and the findings, which judge it.
+
+use crate::summary::TopicSummary;
+use strapd_attitude::condition::quality::QualitySummary;
+use strapd_attitude::condition::stillness::{self, Rests};
+use strapd_attitude::condition::{Clock, GyroUnit};
+use strapd_attitude::estimate::{Aid, Aiding, Meaning, Plan};
+use strapd_attitude::record::RawSample;
+
+/// One topic of samples, looked at.
+#[derive(Debug)]
+pub struct Inspection {
+    /// Its name: the topic, or one of several sources on it.
+    pub topic: String,
+    /// The topic.
+    pub of: String,
+    /// Type and encoding.
+    pub described: String,
+    /// The frame its first message names.
+    pub frame: String,
+    /// How its samples are understood by default.
+    pub resolved: Meaning,
+    /// Whether the format states the meaning of a sample.
+    pub kind_stated: bool,
+    /// Statistics.
+    pub quality: QualitySummary,
+    /// The unit of its rates: rad/s where the format states any, else that which was taken for granted.
+    pub quality_unit: GyroUnit,
+    /// Rests, rad/s.
+    pub rests: Rests,
+    /// The bias they give.
+    pub bias: Option<stillness::BiasEstimate>,
+    /// Payloads that could not be decoded.
+    pub undecodable: u64,
+    /// The clock the statistics are on.
+    pub clock: Clock,
+    /// What was noticed about the clock.
+    pub clock_warning: Option<String>,
+    /// What may correct its attitude.
+    pub aid: Aids,
+}
+
+/// What of the samples themselves, or beside them, may correct an attitude.
+#[derive(Clone, Debug, Default)]
+pub struct Aids {
+    /// Whether the samples carry specific forces.
+    pub has_force: bool,
+    /// Mean length of the forces in the first samples, as recorded in the unit the format states (else its own).
+    pub mean_force: Option<f64>,
+    /// What they are multiplied by to be m/s^2: 9.80665 of forces in g.
+    pub force_scale: f64,
+    /// Whether `--aid auto` takes gravity.
+    pub gravity: bool,
+    /// What there is to say of the forces.
+    pub notes: Vec<String>,
+    /// Length of the first field in the samples themselves.
+    pub own_field: Option<f64>,
+    /// Topics with fields, and the one that is taken unnamed.
+    pub fields: (Vec<TopicOfVectors>, Option<String>),
+    /// Topics with forces.
+    pub forces: Vec<TopicOfVectors>,
+}
+
+impl Aids {
+    /// From the first samples of a topic.
+    pub(crate) fn of(
+        plan: &Plan,
+        resolved: &Meaning,
+        first: &[RawSample],
+        beside: &[RawSample],
+    ) -> Aids {
+        let plan = Plan {
+            aid: Aid::Auto,
+            ..plan.clone()
+        };
+        let has_force = |samples: &[RawSample]| samples.iter().any(|raw| raw.accel.is_some());
+        // Forces in messages of their own stand in where the rates come alone.
+        let of_forces = match !has_force(first) && has_force(beside) {
+            true => beside,
+            false => first,
+        };
+        let mut notes = Vec::new();
+        // With `auto` what can not be is a warning.
+        let aiding = Aiding::decide(&plan, resolved, of_forces, &mut notes).unwrap_or_default();
+        let forces = || {
+            of_forces
+                .iter()
+                .filter_map(|raw| raw.accel)
+                .map(|f| resolved.force(f).norm())
+        };
+        let (sum, n) = forces()
+            .filter(|length| length.is_finite())
+            .fold((0.0, 0.0), |(sum, n), length| (sum + length, n + 1.0));
+        let length = |[x, y, z]: [f64; 3]| x.hypot(y).hypot(z);
+        Aids {
+            has_force: forces().next().is_some(),
+            mean_force: (n > 0.0).then(|| sum / n),
+            force_scale: aiding.map_or(1.0, |aiding| aiding.force_scale),
+            gravity: aiding.is_some(),
+            notes,
+            own_field: first
+                .iter()
+                .chain(beside)
+                .find_map(|raw| raw.mag)
+                .map(length),
+            ..Aids::default()
+        }
+    }
+}
+
+/// A topic of vectors that could correct the samples of another.
+#[derive(Clone, Debug)]
+pub struct TopicOfVectors {
+    /// Its name.
+    pub topic: String,
+    /// Type and encoding.
+    pub described: String,
+    /// Messages a second of the log; `None` where its length is not known.
+    pub rate_hz: Option<f64>,
+    /// Length of the first vector, in the unit of the file.
+    pub first: Option<f64>,
+}
+
+/// A log, examined.
+#[derive(Debug)]
+pub struct Checked {
+    /// What is wrong with the file itself, the first few in words.
+    pub problems: Vec<String>,
+    /// How many of those lost data.
+    pub file_losses: u64,
+    /// Its size in bytes, where that can be known.
+    pub file_size: Option<u64>,
+    /// The profile it names.
+    pub profile: String,
+    /// Topics that sound like an IMU's and can not be decoded: why.
+    pub refused: Vec<String>,
+    /// Its topics of samples.
+    pub topics: Vec<CheckedTopic>,
+    /// Topics of samples beyond those, which were not examined.
+    pub left_out: Vec<String>,
+}
+
+impl Checked {
+    /// Calls the file `name` in all words in which it was called `path`.
+    pub fn rename(&mut self, path: &str, name: &str) {
+        let summaries = self.topics.iter_mut().map(|topic| &mut topic.replayed);
+        let mut words: Vec<&mut String> = Vec::new();
+        for summary in summaries {
+            match summary {
+                Ok(summary) => {
+                    words.extend(summary.findings.iter_mut().map(|found| &mut found.what))
+                }
+                Err(why) => words.push(why),
+            }
+        }
+        words.extend(self.problems.iter_mut().chain(&mut self.refused));
+        for word in words {
+            if word.contains(path) {
+                *word = word.replace(path, name);
+            }
+        }
+    }
+}
+
+/// A topic of samples, looked at and replayed.
+#[derive(Debug)]
+pub struct CheckedTopic {
+    /// Statistics of the samples as recorded.
+    pub looked: Inspection,
+    /// What a replay with default flags makes of them, or why it refuses.
+    pub replayed: std::result::Result<Box<TopicSummary>, String>,
+}
