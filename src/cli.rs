@@ -300,3 +300,29 @@ pub(crate) fn print(text: &str) -> Result<()> {
         .and_then(|()| out.flush())
         .map_err(|e| Error::writing("stdout", e))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Cli;
+    use clap::CommandFactory;
+    use std::collections::BTreeSet;
+    use strapd_attitude::setting;
+
+    #[test]
+    fn every_setting_that_a_library_names_is_a_flag_of_a_command() {
+        let mut flags = BTreeSet::new();
+        let mut left = vec![Cli::command()];
+        while let Some(command) = left.pop() {
+            flags.extend(
+                command
+                    .get_arguments()
+                    .filter_map(|a| a.get_long().map(str::to_owned)),
+            );
+            left.extend(command.get_subcommands().cloned());
+        }
+        for setting in setting::ALL {
+            let flag = setting.name().replace('_', "-");
+            assert!(flags.contains(&flag), "no command has --{flag}");
+        }
+    }
+}

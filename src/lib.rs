@@ -65,6 +65,10 @@ use std::process::ExitCode;
 /// Parses the arguments, starts the diagnostics, runs, and says the outcome as an exit code.
 #[must_use]
 pub fn main() -> ExitCode {
+    // What a library says helps is a flag here.
+    let as_flag =
+        |name: &str, f: &mut std::fmt::Formatter<'_>| write!(f, "--{}", name.replace('_', "-"));
+    let _ = strapd_attitude::setting::name_settings(as_flag);
     let cli = cli::Cli::parse();
     cli::start_diagnostics(&cli.global);
     size_limit::make_size_limit_an_error();

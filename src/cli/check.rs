@@ -116,7 +116,7 @@ fn text(file: &Path, checked: &Checked, found: &[Finding]) -> String {
             finding.code,
             finding.what
         );
-        let advice = match (finding.advice.as_str(), finding.flags.as_str()) {
+        let advice = match (finding.advice.as_str(), finding.flags().as_str()) {
             ("", "") => continue,
             (advice, "") => advice.to_owned(),
             ("", flags) => flags.to_owned(),

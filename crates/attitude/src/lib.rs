@@ -62,5 +62,6 @@ pub mod noise;
 pub mod propagate;
 pub mod quaternion;
 pub mod record;
+pub mod setting;
 pub mod smooth;
 pub mod worlds;

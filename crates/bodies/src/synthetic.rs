@@ -28,6 +28,7 @@ use strapd_attitude::noise::sensor_error::{
 };
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{Nanos, RawSample, SampleKind};
+use strapd_attitude::setting::{RATE_HZ, START_STAMP};
 
 /// What a reading of the accelerometer is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -119,12 +120,12 @@ impl fmt::Display for SamplingError {
             } => write!(f, "{what} can not be {value}: {allowed}"),
             SamplingError::UnderSampled { rate_hz, needed_hz } => write!(
                 f,
-                "at {rate_hz} Hz the motion turns half a turn or more from sample to sample\n  help: --rate-hz above {needed_hz:.1}, several times that for a good attitude"
+                "at {rate_hz} Hz the motion turns half a turn or more from sample to sample\n  help: {RATE_HZ} above {needed_hz:.1}, several times that for a good attitude"
             ),
             SamplingError::Errors(fault) => write!(f, "{fault}"),
             SamplingError::StampOverflow { start } => write!(
                 f,
-                "the stamps, from {} ns on, run over the end of 64-bit nanoseconds\n  help: an earlier --start-stamp",
+                "the stamps, from {} ns on, run over the end of 64-bit nanoseconds\n  help: an earlier {START_STAMP}",
                 start.0
             ),
         }

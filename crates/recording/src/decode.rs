@@ -44,6 +44,7 @@ pub(crate) use stamp::{
 };
 pub use stated::Stated;
 pub use strapd_attitude::condition::GyroUnit;
+use strapd_attitude::setting::{FIELD, TOPIC};
 
 use crate::columns::{Columns, Delimiter};
 use crate::text::printable;
@@ -184,7 +185,7 @@ impl Effort {
     /// Most fields one schema counts for: beyond, none is compiled.
     const ONE: usize = 50_000;
 
-    fn spend(&mut self, schema: Schema, encoding: &str) -> Result<Schema, (String, &'static str)> {
+    fn spend(&mut self, schema: Schema, encoding: &str) -> Result<Schema, (String, String)> {
         // Protobuf's types may hold themselves, and are not written out; elsewhere that is no schema, and is
         // found out only by going round.
         let circle = if encoding == "protobuf" {
@@ -201,7 +202,7 @@ impl Effort {
             None => Err((
                 "the schemas of this log spell out to more fields than are gone over for one log"
                     .to_owned(),
-                "",
+                String::new(),
             )),
         }
     }
@@ -228,7 +229,7 @@ impl Decoder {
         effort: &mut Effort,
     ) -> Result<Decoder, Unsupported> {
         let label = label(channel);
-        let refuse = |(why, help): (String, &str)| unsupported(&label, why, help);
+        let refuse = |(why, help): (String, String)| unsupported(&label, why, help);
         if channel.message_encoding == "json" {
             return Ok(Decoder::json(channel, options, label));
         }
@@ -241,8 +242,8 @@ impl Decoder {
         let (schema, selection) = understand(channel, read, options)
             .or_else(|why| understand(channel, well_known(channel), options).map_err(|_| why))
             .map_err(refuse)?;
-        let plan =
-            compile_plan(channel, &schema, &selection, options).map_err(|why| refuse((why, "")))?;
+        let plan = compile_plan(channel, &schema, &selection, options)
+            .map_err(|why| refuse((why, String::new())))?;
         let frame = selection
             .frame
             .as_deref()
@@ -489,13 +490,17 @@ fn label(channel: &Channel<'_>) -> [String; 3] {
     ]
 }
 
-fn unsupported([topic, type_name, encoding]: &[String; 3], why: String, help: &str) -> Unsupported {
+fn unsupported(
+    [topic, type_name, encoding]: &[String; 3],
+    why: String,
+    help: String,
+) -> Unsupported {
     Unsupported {
         topic: topic.clone(),
         type_name: type_name.clone(),
         encoding: encoding.clone(),
         why,
-        help: help.to_owned(),
+        help,
     }
 }
 
@@ -513,27 +518,27 @@ fn fifo(channel: &Channel<'_>, options: &Options) -> Option<Fifo> {
 }
 
 /// What the type of this name is everywhere.
-fn well_known(channel: &Channel<'_>) -> Result<Schema, (String, &'static str)> {
+fn well_known(channel: &Channel<'_>) -> Result<Schema, (String, String)> {
     let dialect = match channel.message_encoding {
         "cdr" => Dialect::Ros2,
         _ => Dialect::Ros1,
     };
     builtin::schema(&ros_name(channel.schema_name), dialect)
         .filter(|_| matches!(channel.message_encoding, "cdr" | "ros1"))
-        .ok_or((String::new(), ""))
+        .ok_or_else(|| (String::new(), String::new()))
 }
 
 /// The schema with the fields that are wanted of it.
 fn understand(
     channel: &Channel<'_>,
-    schema: Result<Schema, (String, &'static str)>,
+    schema: Result<Schema, (String, String)>,
     options: &Options,
-) -> Result<(Schema, Selection), (String, &'static str)> {
+) -> Result<(Schema, Selection), (String, String)> {
     let schema = schema?;
     let selection = select(&schema, channel.schema_name, options).map_err(|why| {
         (
             why,
-            "paths are names between dots: --field gyro=imu.angular_velocity",
+            format!("paths are names between dots: {FIELD} gyro=imu.angular_velocity"),
         )
     })?;
     let (_, slot) = options.wanted.vector();
@@ -545,39 +550,42 @@ fn understand(
 }
 
 /// Why a type or message is of no use, and what helps.
-fn nothing_wanted(what: &str, wanted: Wanted) -> (String, &'static str) {
+fn nothing_wanted(what: &str, wanted: Wanted) -> (String, String) {
     let (lacks, help) = match wanted {
-        Wanted::Rates => ("body rate and no orientation", "name it: --field gyro=PATH"),
-        Wanted::Forces => ("specific force", "name it: --field accel=PATH"),
-        Wanted::Fields => ("magnetic field", "name it: --field mag=PATH"),
+        Wanted::Rates => (
+            "body rate and no orientation",
+            format!("name it: {FIELD} gyro=PATH"),
+        ),
+        Wanted::Forces => ("specific force", format!("name it: {FIELD} accel=PATH")),
+        Wanted::Fields => ("magnetic field", format!("name it: {FIELD} mag=PATH")),
     };
     let why = format!("the {what} has no {lacks} under a name this program knows");
     (why, help)
 }
 
-fn read_schema(channel: &Channel<'_>) -> Result<Schema, (String, &'static str)> {
+fn read_schema(channel: &Channel<'_>) -> Result<Schema, (String, String)> {
     let dialect = match channel.message_encoding {
         "cdr" => Dialect::Ros2,
         "ros1" => Dialect::Ros1,
         "protobuf" => {
             return descriptor::parse(channel.schema_data, channel.schema_name)
-                .map_err(|why| (why, ""));
+                .map_err(|why| (why, String::new()));
         }
         _ => {
             return Err((
                 "its message encoding is not one this program reads (cdr, ros1, json, protobuf)"
                     .to_owned(),
-                "choose another topic with --topic",
+                format!("choose another topic with {TOPIC}"),
             ));
         }
     };
     let text = std::str::from_utf8(channel.schema_data)
-        .map_err(|_| ("its schema is not UTF-8 text".to_owned(), ""))?;
+        .map_err(|_| ("its schema is not UTF-8 text".to_owned(), String::new()))?;
     if text.trim().is_empty() {
         // std_msgs/Empty has an empty definition, too, but nothing in it is wanted.
         return builtin::schema(&ros_name(channel.schema_name), dialect).ok_or((
             "its schema text is empty, and the type is none of the well-known ones".to_owned(),
-            "",
+            String::new(),
         ));
     }
     match channel.schema_encoding {
@@ -588,7 +596,7 @@ fn read_schema(channel: &Channel<'_>) -> Result<Schema, (String, &'static str)> 
                 .to_owned(),
         ),
     }
-    .map_err(|why| (why, ""))
+    .map_err(|why| (why, String::new()))
 }
 
 fn compile_plan(

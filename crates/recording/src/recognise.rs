@@ -3,6 +3,8 @@
 //! A stage of its own because the name of a file says little: logs come as `.log`, `.bin`, `.dat`, or packed.
 //! What is known but not read is told with the command that makes something of it that is.
 
+use strapd_attitude::setting::COLUMNS;
+
 mod zip;
 
 /// How many of a file's first bytes are looked at. Of a stream eight are enough for most.
@@ -238,7 +240,9 @@ fn text(first: &[u8]) -> Option<Foreign> {
     is_table(first).then_some(())?;
     of(
         "a table of text",
-        "call it .csv, and say what its columns are: --columns gyro=NAME:NAME:NAME,stamp=NAME:UNIT (docs/inputs.md)",
+        &format!(
+            "call it .csv, and say what its columns are: {COLUMNS} gyro=NAME:NAME:NAME,stamp=NAME:UNIT (docs/inputs.md)"
+        ),
     )
 }
 

@@ -4,9 +4,11 @@ pub mod calibration;
 
 use crate::error::{Error, Result};
 use nalgebra::Vector3;
+use std::fmt::Display;
 use strapd_attitude::estimate::{Bias, Initial, NOISE_FIGURES, NOISE_PRESETS, Noise, Truncation};
 use strapd_attitude::frames::{Body, Nav};
 use strapd_attitude::quaternion::{Quaternion, YawPitchRoll};
+use strapd_attitude::setting::{BIAS, FIELD, INIT, NOISE, SHARD, UNDO_TRUNCATION};
 use strapd_recording::decode::{self, FieldPath, FieldRole};
 
 /// Which samples of a recording, and how its messages are read.
@@ -47,7 +49,7 @@ pub fn parse_truncation(text: &str) -> Result<Truncation> {
             .map(Truncation::Steps)
             .ok_or_else(|| {
                 Error::Usage(format!(
-                    "--undo-truncation: `{text}` is none\n  help: auto, on, on=STEP in rad/s (below 1), or off"
+                    "{UNDO_TRUNCATION}: `{text}` is none\n  help: auto, on, on=STEP in rad/s (below 1), or off"
                 ))
             })?,
     })
@@ -66,7 +68,7 @@ pub fn parse_noise(text: &str) -> Result<Noise> {
         let names: Vec<&str> = NOISE_PRESETS.iter().map(|p| p.name).collect();
         let figures = NOISE_FIGURES.map(|figure| format!("{} in {}", figure.key, figure.unit));
         Error::Usage(format!(
-            "--noise {text}: {what}\n  help: a class ({}), or figures joined by commas ({}), each one number or three x/y/z",
+            "{NOISE} {text}: {what}\n  help: a class ({}), or figures joined by commas ({}), each one number or three x/y/z",
             names.join(", "),
             figures.join(", ")
         ))
@@ -117,16 +119,16 @@ pub fn parse_initial(text: &str) -> Result<Initial> {
         _ => {}
     }
     if let Some(list) = text.strip_prefix("q=") {
-        return Ok(Initial::Given(unit_quaternion("--init", list)?));
+        return Ok(Initial::Given(unit_quaternion(INIT, list)?));
     }
     if let Some(list) = text.strip_prefix("rpy=") {
-        let [roll, pitch, yaw] = numbers::<3>("--init rpy", list)?.map(f64::to_radians);
+        let [roll, pitch, yaw] = numbers::<3>(INIT.to("rpy"), list)?.map(f64::to_radians);
         let q: Quaternion<Nav, Body> =
             Quaternion::from_yaw_pitch_roll(&YawPitchRoll { yaw, pitch, roll });
         return Ok(Initial::Given(q.wxyz()));
     }
     Err(Error::Usage(format!(
-        "--init {text}: expected identity, gravity, first-orientation, q=w,x,y,z or rpy=roll,pitch,yaw (degrees)"
+        "{INIT} {text}: expected identity, gravity, first-orientation, q=w,x,y,z or rpy=roll,pitch,yaw (degrees)"
     )))
 }
 
@@ -138,11 +140,11 @@ pub fn parse_bias(text: &str) -> Result<Bias> {
     match text {
         "none" => Ok(Bias::None),
         "auto" => Ok(Bias::Auto),
-        list => numbers::<3>("--bias", list)
+        list => numbers::<3>(BIAS, list)
             .map(|b| Bias::Given(Vector3::from(b)))
             .map_err(|_| {
                 Error::Usage(format!(
-                    "--bias {text}: expected none, auto, or three numbers x,y,z in rad/s"
+                    "{BIAS} {text}: expected none, auto, or three numbers x,y,z in rad/s"
                 ))
             }),
     }
@@ -161,7 +163,7 @@ pub fn selection(
 ) -> Result<Selection> {
     let mut fields: Vec<FieldPath> = fields
         .iter()
-        .map(|f| f.parse().map_err(|e| Error::Usage(format!("--field: {e}"))))
+        .map(|f| f.parse().map_err(|e| Error::Usage(format!("{FIELD}: {e}"))))
         .collect::<Result<_>>()?;
     let mut of = |role: FieldRole, topic: Option<&String>| {
         let topic = topic?.clone();
@@ -203,7 +205,7 @@ impl Shard {
             .map(|(index, of)| Shard { index, of })
             .ok_or_else(|| {
                 Error::Usage(format!(
-                    "--shard {text}: expected i/n with 0 <= i < n, for example --shard 0/4"
+                    "{SHARD} {text}: expected i/n with 0 <= i < n, for example {SHARD} 0/4"
                 ))
             })
     }
@@ -216,7 +218,7 @@ impl Shard {
 }
 
 /// `N` finite numbers separated by commas.
-pub fn numbers<const N: usize>(flag: &str, list: &str) -> Result<[f64; N]> {
+pub fn numbers<const N: usize>(what: impl Display, list: &str) -> Result<[f64; N]> {
     let parsed: Option<Vec<f64>> = list
         .split(',')
         .map(|part| part.trim().parse::<f64>().ok().filter(|v| v.is_finite()))
@@ -225,7 +227,7 @@ pub fn numbers<const N: usize>(flag: &str, list: &str) -> Result<[f64; N]> {
         .and_then(|v| <[f64; N]>::try_from(v).ok())
         .ok_or_else(|| {
             Error::Usage(format!(
-                "{flag} {list}: expected {N} finite numbers separated by commas"
+                "{what} {list}: expected {N} finite numbers separated by commas"
             ))
         })
 }
@@ -235,13 +237,13 @@ pub fn numbers<const N: usize>(flag: &str, list: &str) -> Result<[f64; N]> {
 ///
 /// # Errors
 /// [`Error::Usage`] when it is not four finite numbers of about unit norm.
-pub fn unit_quaternion(flag: &str, list: &str) -> Result<[f64; 4]> {
+pub fn unit_quaternion(what: impl Display, list: &str) -> Result<[f64; 4]> {
     let list = list.strip_prefix("q=").unwrap_or(list);
-    let q = numbers::<4>(flag, list)?;
+    let q = numbers::<4>(&what, list)?;
     let norm = q.iter().map(|v| v * v).sum::<f64>().sqrt();
     if (norm - 1.0).abs() > 0.01 {
         return Err(Error::Usage(format!(
-            "{flag} q={list}: a unit quaternion w,x,y,z is needed, this one has norm {norm}"
+            "{what} q={list}: a unit quaternion w,x,y,z is needed, this one has norm {norm}"
         )));
     }
     Ok(q.map(|v| v / norm))

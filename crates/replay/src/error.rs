@@ -2,6 +2,7 @@
 //! flag that helps. Bad samples are not here: they are counted verdicts ([`strapd_attitude::record::Verdict`]).
 
 use std::path::PathBuf;
+use strapd_attitude::setting::{FIELD, FORCE, LISTEN, TOPIC};
 
 /// A run that could not be carried out.
 #[derive(Debug, thiserror::Error)]
@@ -24,13 +25,13 @@ pub enum Error {
     )]
     Spool(#[from] strapd_attitude::estimate::SpoolError),
     /// The output is already there.
-    #[error("{}: already exists\n  help: --force replaces it", path.display())]
+    #[error("{}: already exists\n  help: {} replaces it", path.display(), FORCE)]
     OutputExists {
         /// Which file.
         path: PathBuf,
     },
     /// Output and input are the same file.
-    #[error("{}: is the input; it will not be overwritten, not even with --force\n  help: give another name to -o", path.display())]
+    #[error("{}: is the input; it will not be overwritten, not even with {}\n  help: give another name to -o", path.display(), FORCE)]
     OutputIsInput {
         /// Which file.
         path: PathBuf,
@@ -39,7 +40,7 @@ pub enum Error {
     #[error("the reader of standard output has gone")]
     BrokenPipe,
     /// The log holds nothing a rate can be read from.
-    #[error("{}: no IMU topic: nothing in it carries a body rate with a stamp\n  it holds:{topics}\n  help: --topic NAME with --field gyro=PATH names a rate in any message", path.display())]
+    #[error("{}: no IMU topic: nothing in it carries a body rate with a stamp\n  it holds:{topics}\n  help: {} NAME with {} gyro=PATH names a rate in any message", path.display(), TOPIC, FIELD)]
     NoImuTopic {
         /// Which file.
         path: PathBuf,
@@ -47,7 +48,7 @@ pub enum Error {
         topics: String,
     },
     /// The log holds several IMU topics, or several publishers on one, and none was named.
-    #[error("{}: several IMU topics or publishers, and they must not be mixed:{topics}\n  help: --topic NAME takes one of them, --topic all each of them", path.display())]
+    #[error("{}: several IMU topics or publishers, and they must not be mixed:{topics}\n  help: {} NAME takes one of them, {} all each of them", path.display(), TOPIC, TOPIC)]
     SeveralImuTopics {
         /// Which file.
         path: PathBuf,
@@ -113,15 +114,17 @@ pub enum Error {
     Usage(String),
 }
 
-fn bind_help(source: &std::io::Error) -> &'static str {
+fn bind_help(source: &std::io::Error) -> String {
     match source.kind() {
         std::io::ErrorKind::AddrInUse => {
-            "\n  help: is another strapd running there? --listen takes another address; port 0 takes a free port and shows it"
+            format!(
+                "\n  help: is another strapd running there? {LISTEN} takes another address; port 0 takes a free port and shows it"
+            )
         }
         std::io::ErrorKind::PermissionDenied => {
-            "\n  help: ports below 1024 need a privilege; take a higher one"
+            "\n  help: ports below 1024 need a privilege; take a higher one".to_owned()
         }
-        _ => "",
+        _ => String::new(),
     }
 }
 

@@ -3,6 +3,7 @@
 //! The type alone: the rules are in [`crate::findings`], which know a run; a run's summary holds what they found.
 
 use serde_json::{Map, Value, json};
+use strapd_attitude::setting::Choice;
 
 /// How bad a finding is.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
@@ -42,8 +43,8 @@ pub struct Finding {
     pub evidence: Map<String, Value>,
     /// What to do about it.
     pub advice: String,
-    /// The exact flags that do it, where flags do.
-    pub flags: String,
+    /// The settings that do it, where settings do: one of these, each of some that are set together.
+    pub help: Vec<Vec<Choice>>,
 }
 
 impl Finding {
@@ -55,7 +56,7 @@ impl Finding {
             what: what.into(),
             evidence: Map::new(),
             advice: String::new(),
-            flags: String::new(),
+            help: Vec::new(),
         }
     }
 
@@ -69,16 +70,44 @@ impl Finding {
         self
     }
 
-    pub(crate) fn flags(mut self, flags: impl Into<String>) -> Finding {
-        self.flags = flags.into();
+    /// Settings that help; called again, others that do as well.
+    pub(crate) fn help<C: Into<Choice>>(mut self, set: impl IntoIterator<Item = C>) -> Finding {
+        let set: Vec<Choice> = set.into_iter().map(Into::into).collect();
+        if !set.is_empty() {
+            self.help.push(set);
+        }
         self
+    }
+
+    /// The settings that help, as this program names them: `--time log, or --time index --rate-hz HZ`.
+    #[must_use]
+    pub fn flags(&self) -> String {
+        let said = |set: &Vec<Choice>| {
+            let each: Vec<String> = set.iter().map(ToString::to_string).collect();
+            each.join(" ")
+        };
+        let sets: Vec<String> = self.help.iter().map(said).collect();
+        sets.join(", or ")
+    }
+
+    /// The same for a program that sets them: `[{"time": "log"}, {"time": "index", "rate_hz": "HZ"}]`.
+    fn settings(&self) -> Value {
+        let object = |set: &Vec<Choice>| {
+            let value = |choice: &Choice| match choice.value.as_str() {
+                "" => Value::Bool(true),
+                value => value.into(),
+            };
+            let each = set.iter().map(|c| (c.setting.name().to_owned(), value(c)));
+            Value::Object(each.collect())
+        };
+        self.help.iter().map(object).collect()
     }
 
     /// What was seen and what helps, in one line.
     #[must_use]
     pub fn line(&self) -> String {
         let mut line = self.what.clone();
-        for (separator, part) in [("; ", &self.advice), (": ", &self.flags)] {
+        for (separator, part) in [("; ", &self.advice), (": ", &self.flags())] {
             if !part.is_empty() {
                 line.push_str(separator);
                 line.push_str(part);
@@ -97,7 +126,8 @@ impl Finding {
             "what": self.what,
             "evidence": self.evidence,
             "advice": self.advice,
-            "flags": self.flags,
+            "flags": self.flags(),
+            "settings": self.settings(),
         })
     }
 }

@@ -12,6 +12,7 @@ mod samples;
 pub use run::of_sensor;
 pub(crate) use run::{Noted, of_run};
 pub use samples::of_samples;
+use strapd_attitude::setting::{FIELD, TOPIC};
 
 pub use crate::finding::{Finding, Severity};
 
@@ -46,7 +47,7 @@ pub fn findings(checked: &Checked) -> Vec<Finding> {
         found.push(
             Finding::new(Severity::Error, "no-imu-topic", what)
                 .advise("name the topic and where the rate lies in it")
-                .flags("--topic NAME --field gyro=PATH"),
+                .help([TOPIC.to("NAME"), FIELD.to("gyro=PATH")]),
         );
     }
     if checked.topics.len() > 1 {
@@ -63,7 +64,7 @@ pub fn findings(checked: &Checked) -> Vec<Finding> {
             )
             .with("topics", names.clone())
             .advise("choose one, or `all`")
-            .flags("--topic NAME"),
+            .help([TOPIC.to("NAME")]),
         );
     }
     if !checked.left_out.is_empty() {
@@ -79,7 +80,7 @@ pub fn findings(checked: &Checked) -> Vec<Finding> {
             )
             .with("topics", checked.left_out.clone())
             .advise("examine one by its name")
-            .flags("--topic NAME"),
+            .help([TOPIC.to("NAME")]),
         );
     }
     for topic in &checked.topics {

@@ -35,6 +35,7 @@ pub use mcap::payload;
 pub use mcap::{Attachment, Encoding, InputChannel, InputMessage};
 pub use output::Flow;
 pub use output::sync_directory;
+use strapd_attitude::setting::TOPIC;
 pub use stream::{Content, Provenance, Stream, output_topic};
 
 pub use target::{Format, Profile, Target};
@@ -147,7 +148,7 @@ impl Sink {
         match target.format() {
             Some(Format::Csv | Format::Tum) if is_several => {
                 return Err(Error::Usage(format!(
-                    "a table of one attitude has no column for the topic, and {} topics are estimated\n  help: choose one with --topic, or write .ndjson or .mcap",
+                    "a table of one attitude has no column for the topic, and {} topics are estimated\n  help: choose one with {TOPIC}, or write .ndjson or .mcap",
                     streams.len()
                 )));
             }

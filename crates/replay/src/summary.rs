@@ -26,6 +26,7 @@ use strapd_attitude::compare::{BiasFit, BodyAxesFit, Consistency};
 pub use strapd_attitude::digits::significant;
 use strapd_attitude::estimate::SensorCalibration;
 use strapd_attitude::record::{Counts, SampleKind, Verdict};
+use strapd_attitude::setting::AID;
 use strapd_attitude::worlds::EARTH_RATE;
 
 /// What one topic of one log became.
@@ -317,7 +318,9 @@ impl TopicSummary {
             (None, Some(aided)) => ("aid", aided.lines()),
             (None, None) => (
                 "aid",
-                vec!["none: the gyro alone, which drifts (--aid gravity corrects tilt by the accelerometer)".to_owned()],
+                vec![format!(
+                    "none: the gyro alone, which drifts ({AID} gravity corrects tilt by the accelerometer)"
+                )],
             ),
         };
         for (i, words) in lines.iter().enumerate() {

@@ -64,7 +64,7 @@ pub(super) fn section(told: &[Told], out: &mut String) {
             "</p><p>{}.</p>",
             escaped(&sentence(finding.what.trim_end_matches('.')))
         );
-        let advice = match (finding.advice.as_str(), finding.flags.as_str()) {
+        let advice = match (finding.advice.as_str(), finding.flags().as_str()) {
             ("", "") => String::new(),
             (advice, "") => escaped(&sentence(advice)),
             ("", flags) => format!("<code>{}</code>", escaped(flags)),

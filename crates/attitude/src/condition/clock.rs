@@ -4,6 +4,7 @@
 //! zero or standing still, and the choice decides every interval after it.
 
 use crate::record::{Nanos, RawSample};
+use crate::setting::{RATE_HZ, TIME};
 
 /// Which of a sample's clocks is believed (`--time`).
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
@@ -79,11 +80,11 @@ impl std::fmt::Display for ClockWarning {
         match self {
             ClockWarning::Absent { clock } => write!(
                 f,
-                "the messages carry no {clock} stamp: using the log time\n  help: --time log makes this explicit; --time index --rate-hz HZ for a fixed rate"
+                "the messages carry no {clock} stamp: using the log time\n  help: {TIME} log makes this explicit; {TIME} index {RATE_HZ} HZ for a fixed rate"
             ),
             ClockWarning::Zero { clock, looked_at } => write!(
                 f,
-                "{looked_at} of {looked_at} {clock} stamps are 0: using the log time\n  help: --time log makes this explicit; --time index --rate-hz HZ for a fixed rate"
+                "{looked_at} of {looked_at} {clock} stamps are 0: using the log time\n  help: {TIME} log makes this explicit; {TIME} index {RATE_HZ} HZ for a fixed rate"
             ),
             ClockWarning::StandsStill {
                 clock,
@@ -91,12 +92,12 @@ impl std::fmt::Display for ClockWarning {
                 looked_at,
             } => write!(
                 f,
-                "{looked_at} of {looked_at} {clock} stamps are {} ns: that clock stands still, using the log time\n  help: --time log makes this explicit; --time index --rate-hz HZ for a fixed rate",
+                "{looked_at} of {looked_at} {clock} stamps are {} ns: that clock stands still, using the log time\n  help: {TIME} log makes this explicit; {TIME} index {RATE_HZ} HZ for a fixed rate",
                 at.0
             ),
             ClockWarning::NoneMoves => write!(
                 f,
-                "neither the message stamps nor the log time advance: integration needs time\n  help: --time index --rate-hz HZ"
+                "neither the message stamps nor the log time advance: integration needs time\n  help: {TIME} index {RATE_HZ} HZ"
             ),
         }
     }

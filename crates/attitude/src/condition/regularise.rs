@@ -24,6 +24,7 @@ mod tracker;
 
 use super::histogram::Histogram;
 use crate::record::{Join, Nanos, RateSample, SampleKind};
+use crate::setting::{RATE_HZ, REGULARISE_STAMPS, TIME};
 use count::{Counted, Counter};
 use line::{Fitter, Line};
 use std::sync::Arc;
@@ -215,7 +216,7 @@ pub enum Uneven {
 
 impl std::fmt::Display for Uneven {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("--regularise-stamps: there is no constant rate: ")?;
+        write!(f, "{REGULARISE_STAMPS}: there is no constant rate: ")?;
         match self {
             Uneven::Jitter { jitter, doubts } => write!(
                 f,
@@ -232,7 +233,10 @@ impl std::fmt::Display for Uneven {
                 "it changes, or samples can not be counted, {segments} times in {samples} samples"
             )?,
         }
-        f.write_str("\n  help: --time index --rate-hz HZ if no sample is missing; --time log if that clock is steadier; else the stamps as they are")
+        write!(
+            f,
+            "\n  help: {TIME} index {RATE_HZ} HZ if no sample is missing; {TIME} log if that clock is steadier; else the stamps as they are"
+        )
     }
 }
 

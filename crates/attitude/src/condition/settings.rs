@@ -5,6 +5,9 @@
 
 use super::clock::Clock;
 use crate::record::{GyroUnit, SampleKind};
+use crate::setting::{
+    BIAS, BODY, CALIBRATION, GYRO_RANGE, MAX_GAP, MOUNT, RATE_HZ, START, UNDO_TRUNCATION, UNTIL,
+};
 use nalgebra::{Matrix3, Vector3};
 
 /// What happens at a gap longer than [`Settings::max_gap_secs`], and at a clock that jumped back.
@@ -125,7 +128,7 @@ impl Settings {
         let fail = |text: String| Err(SettingsError(text));
         if !is_signed_permutation(&self.axes) {
             return fail(format!(
-                "--body: {:?} is not a signed permutation of the axes",
+                "{BODY}: {:?} is not a signed permutation of the axes",
                 rows(&self.axes)
             ));
         }
@@ -133,7 +136,7 @@ impl Settings {
         // `!(a <= b)` and not `a > b`, so that NaN fails too.
         if !(excess <= ROTATION_TOLERANCE && self.mount.determinant() > 0.0) {
             return fail(format!(
-                "--mount: {:?} is not a rotation (C C^T is off the identity by {excess:.1e}, determinant {:.3})",
+                "{MOUNT}: {:?} is not a rotation (C C^T is off the identity by {excess:.1e}, determinant {:.3})",
                 rows(&self.mount),
                 self.mount.determinant()
             ));
@@ -142,19 +145,19 @@ impl Settings {
             && !(rate_hz.is_finite() && (1e-3..=1e9).contains(&rate_hz))
         {
             return fail(format!(
-                "--rate-hz: {rate_hz} is not a sample rate (0.001 to 1e9 Hz)"
+                "{RATE_HZ}: {rate_hz} is not a sample rate (0.001 to 1e9 Hz)"
             ));
         }
         if !(self.max_gap_secs >= 0.0 && self.max_gap_secs <= MAX_GAP_SECS) {
             return fail(format!(
-                "--max-gap: {} s is not between 0 and {MAX_GAP_SECS} s",
+                "{MAX_GAP}: {} s is not between 0 and {MAX_GAP_SECS} s",
                 self.max_gap_secs
             ));
         }
         let bias = self.bias.amax();
         if !(self.bias.iter().all(|b| b.is_finite()) && bias <= super::gate::HUGE_RATE) {
             return fail(format!(
-                "--bias: {:?} rad/s can not be a gyro bias",
+                "{BIAS}: {:?} rad/s can not be a gyro bias",
                 self.bias.as_slice()
             ));
         }
@@ -166,21 +169,21 @@ impl Settings {
         }
         let numbers = self.gyro_matrix.iter().chain(self.accel_matrix.iter());
         if !numbers.chain(self.accel_bias.iter()).all(|n| n.is_finite()) {
-            return fail("--calibration: numbers that are none".to_owned());
+            return fail(format!("{CALIBRATION}: numbers that are none"));
         }
         if let Some(range) = self.gyro_range
             && !(range.is_finite() && range > 0.0)
         {
-            return fail(format!("--gyro-range: {range} rad/s is not a range"));
+            return fail(format!("{GYRO_RANGE}: {range} rad/s is not a range"));
         }
         if let Some(step) = self.truncation_step
             && !(step.is_finite() && (0.0..1.0).contains(&step))
         {
             return fail(format!(
-                "--undo-truncation: {step} rad/s is not the step of a gyro"
+                "{UNDO_TRUNCATION}: {step} rad/s is not the step of a gyro"
             ));
         }
-        for (flag, value) in [("--start", self.start), ("--until", self.until)] {
+        for (flag, value) in [(START, self.start), (UNTIL, self.until)] {
             if let Some(secs) = value
                 && !(secs.is_finite() && secs.abs() <= 1e9)
             {
@@ -190,7 +193,7 @@ impl Settings {
         if let (Some(start), Some(until)) = (self.start, self.until)
             && start > until
         {
-            return fail(format!("--start {start} is later than --until {until}"));
+            return fail(format!("{START} {start} is later than {UNTIL} {until}"));
         }
         if self.reorder_window > MAX_WINDOW {
             return fail(format!(

@@ -9,6 +9,7 @@ use crate::aid::{self, Settings, Start};
 use crate::frames::{Body, Nav};
 use crate::quaternion::{Quaternion, RotationVector};
 use crate::record::{Nanos, RawSample, SampleKind};
+use crate::setting::{ACCEL_TOPIC, AID, FIELD, SMOOTH};
 use nalgebra::Vector3;
 
 /// Lengths of a force in g and in m/s^2.
@@ -82,17 +83,17 @@ impl Aiding {
     ) -> Result<Option<Aiding>, String> {
         let asked = match plan.aid {
             Aid::None => return Ok(None),
-            Aid::Auto if plan.smooth => "--smooth",
-            Aid::Auto => "--aid auto",
-            Aid::Gravity => "--aid gravity",
-            Aid::GravityAndField => "--aid gravity+mag",
+            Aid::Auto if plan.smooth => format!("{SMOOTH}"),
+            Aid::Auto => format!("{AID} auto"),
+            Aid::Gravity => format!("{AID} gravity"),
+            Aid::GravityAndField => format!("{AID} gravity+mag"),
         };
         // Who asks for a smoother asks for forces.
         let may_do_without = plan.aid == Aid::Auto && !plan.smooth;
         let without = if plan.smooth {
-            "or leave --smooth out"
+            format!("or leave {SMOOTH} out")
         } else {
-            "--aid none does without"
+            format!("{AID} none does without")
         };
         let found = Aiding::by_force(plan, resolved, first, warnings);
         match found {
@@ -107,7 +108,7 @@ impl Aiding {
                 }))
             }
             Err(Unaided::NoForce) => Err(format!(
-                "{asked}: none of the first {} samples carries a specific force\n  help: --field accel=PATH or --accel-topic NAME says where it is, {without}",
+                "{asked}: none of the first {} samples carries a specific force\n  help: {FIELD} accel=PATH or {ACCEL_TOPIC} NAME says where it is, {without}",
                 first.len()
             )),
             Err(Unaided::Implausible(why)) if may_do_without => {
@@ -115,7 +116,7 @@ impl Aiding {
                 Ok(None)
             }
             Err(Unaided::Implausible(why)) => Err(format!(
-                "{asked}: {why}\n  help: --field accel=PATH or --accel-topic NAME names another, {without}"
+                "{asked}: {why}\n  help: {FIELD} accel=PATH or {ACCEL_TOPIC} NAME names another, {without}"
             )),
         }
     }

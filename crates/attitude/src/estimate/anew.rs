@@ -12,6 +12,7 @@ use crate::condition::stillness::Rests;
 use crate::frames::{Body, Nav};
 use crate::quaternion::Quaternion;
 use crate::record::RawSample;
+use crate::setting::AID;
 
 /// What a stream that goes on begins anew with.
 #[derive(Clone, Debug)]
@@ -39,7 +40,9 @@ impl Anew {
     ) -> Result<Anew, String> {
         let aiding = prepared.aiding.as_ref();
         if initial == Initial::Gravity && aiding.is_none() {
-            return Err("gravity: nothing levels this sensor's attitude (--aid none, or it carries no specific force)\n  help: identity, q=w,x,y,z or rpy=roll,pitch,yaw".to_owned());
+            return Err(format!(
+                "gravity: nothing levels this sensor's attitude ({AID} none, or it carries no specific force)\n  help: identity, q=w,x,y,z or rpy=roll,pitch,yaw"
+            ));
         }
         let plan = learned_on_the_way(&Plan {
             initial,

@@ -7,6 +7,7 @@ use crate::condition::Clock;
 use crate::digits::significant;
 use crate::record::TimeUnit;
 use crate::record::{RawSample, SampleKind};
+use crate::setting::{FIELD, SAMPLE_KIND, TIME};
 
 /// How far an interval and a step may be apart: samples are lost and stamps jitter, but not by this.
 const MOST: f64 = 3.0;
@@ -77,10 +78,10 @@ impl Mismatch {
             .map_or("s", |(name, _)| name);
         let other = TimeUnit::NAMED.iter().find(fits).map_or_else(
             || "no unit makes them agree".to_owned(),
-            |(name, _)| format!("--field dt={path}:{name} reads it in {name}, which fits"),
+            |(name, _)| format!("{FIELD} dt={path}:{name} reads it in {name}, which fits"),
         );
         format!(
-            "{self}: one of the two is wrong, or most samples were left out\n  help: {other}; --field dt={path}:{own} takes it as it is and bridges the rest; --sample-kind rate leaves it aside; --time log takes other stamps"
+            "{self}: one of the two is wrong, or most samples were left out\n  help: {other}; {FIELD} dt={path}:{own} takes it as it is and bridges the rest; {SAMPLE_KIND} rate leaves it aside; {TIME} log takes other stamps"
         )
     }
 }

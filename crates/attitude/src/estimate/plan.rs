@@ -9,6 +9,10 @@ use crate::frames::BodyAxes;
 use crate::propagate::{self, Method, Propagator};
 use crate::quaternion::Quaternion;
 use crate::record::SampleKind;
+use crate::setting::{
+    AID, BIAS, CALIBRATION, DECLINATION, EARTH_RATE, INIT, MAG_HARD_IRON, MAG_MOUNT, METHOD,
+    REGULARISE_STAMPS, SENSOR_DELAY, SMOOTH, TIME, WORLD,
+};
 use crate::worlds::World;
 use nalgebra::Vector3;
 use std::sync::Arc;
@@ -173,7 +177,7 @@ impl Plan {
         conditioning.validate().map_err(|e| e.to_string())?;
         if self.sensor_delay_secs.is_nan() || self.sensor_delay_secs.abs() > LONGEST_DELAY {
             return Err(format!(
-                "--sensor-delay: {} s is no delay of a sensor\n  help: seconds, at most {LONGEST_DELAY}: 0.0023 for 2.3 ms",
+                "{SENSOR_DELAY}: {} s is no delay of a sensor\n  help: seconds, at most {LONGEST_DELAY}: 0.0023 for 2.3 ms",
                 self.sensor_delay_secs
             ));
         }
@@ -182,7 +186,9 @@ impl Plan {
         self.check_calibration()?;
         self.check_smoothing()?;
         if self.regularise_stamps && matches!(self.clock, Clock::Index { .. }) {
-            return Err("--regularise-stamps: the stamps of --time index are even already\n  help: leave one of the two out".to_owned());
+            return Err(format!(
+                "{REGULARISE_STAMPS}: the stamps of {TIME} index are even already\n  help: leave one of the two out"
+            ));
         }
         Propagator::new(propagate::Settings {
             method: self.method,
@@ -200,35 +206,40 @@ impl Plan {
     fn check_field(&self) -> Result<(), String> {
         let has_field = self.aid == Aid::GravityAndField;
         if self.declination != 0.0 && !has_field {
-            return Err("--declination: only a heading by the magnetic field has one\n  help: --aid gravity+mag".to_owned());
+            return Err(format!(
+                "{DECLINATION}: only a heading by the magnetic field has one\n  help: {AID} gravity+mag"
+            ));
         }
         if self.declination.is_nan() || self.declination.abs() > std::f64::consts::PI {
-            return Err(
-                "--declination: degrees from -180 to 180, east of true north positive".to_owned(),
-            );
+            return Err(format!(
+                "{DECLINATION}: degrees from -180 to 180, east of true north positive"
+            ));
         }
         if self.mag_hard_iron != 0.0 && !has_field {
-            return Err(
-                "--mag-hard-iron: no magnetic field is used\n  help: --aid gravity+mag".to_owned(),
-            );
+            return Err(format!(
+                "{MAG_HARD_IRON}: no magnetic field is used\n  help: {AID} gravity+mag"
+            ));
         }
         if !(0.0..=1.0).contains(&self.mag_hard_iron) {
-            return Err(
-                "--mag-hard-iron: one standard deviation as a share of the field, from 0 to 1: 0.05"
-                    .to_owned(),
-            );
+            return Err(format!(
+                "{MAG_HARD_IRON}: one standard deviation as a share of the field, from 0 to 1: 0.05"
+            ));
         }
         if self.mag_mount.is_some() && !has_field {
-            return Err(
-                "--mag-mount: no magnetic field is used\n  help: --aid gravity+mag".to_owned(),
-            );
+            return Err(format!(
+                "{MAG_MOUNT}: no magnetic field is used\n  help: {AID} gravity+mag"
+            ));
         }
         let is_beside = has_field || self.has_forces_beside;
         if is_beside && matches!(self.clock, Clock::Index { .. }) {
-            return Err("--time index: samples without stamps can not be paired with a field, or a specific force of its own\n  help: --time header, log or publish".to_owned());
+            return Err(format!(
+                "{TIME} index: samples without stamps can not be paired with a field, or a specific force of its own\n  help: {TIME} header, log or publish"
+            ));
         }
         if has_field && self.world == World::Level {
-            return Err("--world level: with a magnetic field the heading is that of north\n  help: --world enu, ned or nwu; --aid gravity for the heading of the start".to_owned());
+            return Err(format!(
+                "{WORLD} level: with a magnetic field the heading is that of north\n  help: {WORLD} enu, ned or nwu; {AID} gravity for the heading of the start"
+            ));
         }
         Ok(())
     }
@@ -238,9 +249,11 @@ impl Plan {
         let Some(known) = &self.calibration else {
             return Ok(());
         };
-        known.check().map_err(|e| format!("--calibration: {e}"))?;
+        known.check().map_err(|e| format!("{CALIBRATION}: {e}"))?;
         if known.bias.is_some() && matches!(self.bias, Bias::Given(_)) {
-            return Err("--bias x,y,z: the calibration says a bias, too\n  help: leave --bias out, or `bias` out of the file; --bias auto takes that of the rest in this log".to_owned());
+            return Err(format!(
+                "{BIAS} x,y,z: the calibration says a bias, too\n  help: leave {BIAS} out, or `bias` out of the file; {BIAS} auto takes that of the rest in this log"
+            ));
         }
         Ok(())
     }
@@ -252,23 +265,31 @@ impl Plan {
         }
         let what = match self {
             Plan { aid: Aid::None, .. } => {
-                "--aid none: a smoother needs the accelerometer\n  help: --aid gravity or gravity+mag; without --smooth the gyro alone"
+                format!(
+                    "{AID} none: a smoother needs the accelerometer\n  help: {AID} gravity or gravity+mag; without {SMOOTH} the gyro alone"
+                )
             }
             Plan { method, .. } if *method != Method::Auto => {
-                "--method: a smoother integrates between its nodes by itself\n  help: leave one of the two out"
+                format!(
+                    "{METHOD}: a smoother integrates between its nodes by itself\n  help: leave one of the two out"
+                )
             }
             Plan {
                 latitude_deg: Some(_),
                 ..
             } => {
-                "--earth-rate: the smoother takes the Earth's rotation for bias\n  help: leave one of the two out"
+                format!(
+                    "{EARTH_RATE}: the smoother takes the Earth's rotation for bias\n  help: leave one of the two out"
+                )
             }
             Plan { mag_hard_iron, .. } if *mag_hard_iron != 0.0 => {
-                "--mag-hard-iron: a smoother learns the magnetometer's errors by itself\n  help: leave it out"
+                format!(
+                    "{MAG_HARD_IRON}: a smoother learns the magnetometer's errors by itself\n  help: leave it out"
+                )
             }
             _ => return Ok(()),
         };
-        Err(format!("--smooth with {what}"))
+        Err(format!("{SMOOTH} with {what}"))
     }
 
     /// `--earth-rate` needs a latitude that is one, and a world in which the Earth's axis has a place.
@@ -278,11 +299,13 @@ impl Plan {
         };
         if !(-90.0..=90.0).contains(&latitude) {
             return Err(format!(
-                "--earth-rate {latitude}: a latitude lies between -90 and 90 degrees, north positive"
+                "{EARTH_RATE} {latitude}: a latitude lies between -90 and 90 degrees, north positive"
             ));
         }
         if self.world == World::Start {
-            return Err("--earth-rate: in --world start nobody knows where north and up are, and so not how the Earth turns\n  help: --world enu (or ned, nwu) with --init first-orientation, q=w,x,y,z, rpy=roll,pitch,yaw, or gravity where the heading is 0".to_owned());
+            return Err(format!(
+                "{EARTH_RATE}: in {WORLD} start nobody knows where north and up are, and so not how the Earth turns\n  help: {WORLD} enu (or ned, nwu) with {INIT} first-orientation, q=w,x,y,z, rpy=roll,pitch,yaw, or gravity where the heading is 0"
+            ));
         }
         Ok(())
     }

@@ -16,7 +16,11 @@ use crate::frames::{Body, In, Nav};
 use crate::propagate::Method;
 use crate::quaternion::{Quaternion, YawPitchRoll};
 use crate::record::{Nanos, RawSample, SampleKind};
-use crate::worlds::{Convention, EARTH_RATE, World};
+use crate::setting::{
+    AID, BIAS, CALIBRATION, DECLINATION, EARTH_RATE, GYRO_UNIT, INIT, REGULARISE_STAMPS, START,
+    UNDO_TRUNCATION,
+};
+use crate::worlds::{self, Convention, World};
 use nalgebra::Vector3;
 
 /// Samples, and seconds of data, in which rest is sought when the log can not be read twice.
@@ -239,7 +243,7 @@ impl Preparation {
                 }),
                 Patience::FirstMinute,
             ) if !is_known => {
-                warnings.push("--regularise-stamps: this stream can be read only once, so each stamp was filtered by those before it; a file is fitted as a whole, which is more accurate and gives other numbers".to_owned());
+                warnings.push(format!("{REGULARISE_STAMPS}: this stream can be read only once, so each stamp was filtered by those before it; a file is fitted as a whole, which is more accurate and gives other numbers"));
                 Stamps::Causal { states_interval }
             }
             (Some(stamps), _) => stamps,
@@ -307,7 +311,9 @@ pub fn at_once(
     let first_alone = std::slice::from_ref(first);
     let aiding = Aiding::decide(plan, resolved, first_alone, &mut warnings)?;
     if aiding.is_none() && needs_rest(asked) {
-        return Err("--bias auto and --init gravity: without a specific force that corrects it the attitude needs to be found at rest beforehand, and a live stream waits for nothing\n  help: --aid gravity with a sensor that carries `accel` learns both on the way; else measure once (`strapd info LOG` shows the bias) and give --bias x,y,z; --init rpy=roll,pitch,yaw or identity".to_owned());
+        return Err(format!(
+            "{BIAS} auto and {INIT} gravity: without a specific force that corrects it the attitude needs to be found at rest beforehand, and a live stream waits for nothing\n  help: {AID} gravity with a sensor that carries `accel` learns both on the way; else measure once (`strapd info LOG` shows the bias) and give {BIAS} x,y,z; {INIT} rpy=roll,pitch,yaw or identity"
+        ));
     }
     let (initial, initial_origin, world) = decide_initial(
         (plan, aiding.as_ref()),
@@ -383,28 +389,38 @@ fn decide_truncation(
                 format!(" (the one about zero is {ratio:.1} times as wide)")
             });
             warnings.push(format!(
-                "the driver cut the rates towards zero in steps of {degrees:.4} deg/s{why}: half a step was put back; --undo-truncation off leaves them, on={:.6e} does it to a stream",
+                "the driver cut the rates towards zero in steps of {degrees:.4} deg/s{why}: half a step was put back; {UNDO_TRUNCATION} off leaves them, on={:.6e} does it to a stream",
                 grid.step
             ));
             Ok(Some(grid.step))
         }
-        (Some(Grid { zero_bin: Some(ratio), .. }), Some(_)) => {
+        (
+            Some(Grid {
+                zero_bin: Some(ratio),
+                ..
+            }),
+            Some(_),
+        ) => {
             warnings.push(format!(
-                "--calibration: its truncation_step was not used: these rates were not cut (the bin about zero is {ratio:.1} times as wide as the others); --undo-truncation on=STEP insists"
+                "{CALIBRATION}: its truncation_step was not used: these rates were not cut (the bin about zero is {ratio:.1} times as wide as the others); {UNDO_TRUNCATION} on=STEP insists"
             ));
             Ok(None)
         }
         (_, Some(step)) => {
             warnings.push(format!(
-                "the driver cuts the rates towards zero in steps of {:.4} deg/s, says the calibration: half a step was put back; --undo-truncation off leaves them",
+                "the driver cuts the rates towards zero in steps of {:.4} deg/s, says the calibration: half a step was put back; {UNDO_TRUNCATION} off leaves them",
                 step.to_degrees()
             ));
             Ok(Some(step))
         }
         (_, None) if !is_asked => Ok(None),
         (_, None) => Err(match rates {
-            None => "--undo-truncation on: what can not be read twice does not show its step in time\n  help: on=STEP in rad/s, as `strapd replay` of a file says it, or a --calibration with its truncation_step".to_owned(),
-            Some(_) => "--undo-truncation on: these rates count in no steps\n  help: on=STEP in rad/s states them, off leaves the rates alone".to_owned(),
+            None => format!(
+                "{UNDO_TRUNCATION} on: what can not be read twice does not show its step in time\n  help: on=STEP in rad/s, as `strapd replay` of a file says it, or a {CALIBRATION} with its truncation_step"
+            ),
+            Some(_) => format!(
+                "{UNDO_TRUNCATION} on: these rates count in no steps\n  help: on=STEP in rad/s states them, off leaves the rates alone"
+            ),
         }),
     }
 }
@@ -433,7 +449,7 @@ fn decide_bias(
         )),
         Bias::Auto => {
             let limits = Limits::default();
-            let refuse = |e: NoRest| format!("--bias auto: {e}");
+            let refuse = |e: NoRest| format!("{BIAS} auto: {e}");
             let mut estimate = stillness::estimate_bias(rests, &limits).map_err(refuse)?;
             let mut earths = "";
             if let Some(earth) = earth {
@@ -481,7 +497,7 @@ pub(super) fn decide_initial(
         Initial::Identity | Initial::Gravity if has_field => {
             if plan.declination == 0.0 {
                 warnings.push(format!(
-                    "{world}: north is magnetic north; --declination DEG makes it true north"
+                    "{world}: north is magnetic north; {DECLINATION} DEG makes it true north"
                 ));
             }
             Ok((
@@ -493,7 +509,7 @@ pub(super) fn decide_initial(
         Initial::Identity if aiding.is_some() => {
             if world != World::Level {
                 warnings.push(format!(
-                    "the heading at the first sample was taken as 0 in {world}: gravity does not tell it; --init first-orientation, q=.. or rpy=.. gives a real one"
+                    "the heading at the first sample was taken as 0 in {world}: gravity does not tell it; {INIT} first-orientation, q=.. or rpy=.. gives a real one"
                 ));
             }
             Ok((
@@ -505,7 +521,7 @@ pub(super) fn decide_initial(
         Initial::Identity => {
             if plan.world != World::Start {
                 warnings.push(format!(
-                    "the initial attitude was taken as identity in {}: --init gravity, first-orientation, q=.. or rpy=.. gives a real one",
+                    "the initial attitude was taken as identity in {}: {INIT} gravity, first-orientation, q=.. or rpy=.. gives a real one",
                     plan.world
                 ));
             }
@@ -523,8 +539,9 @@ pub(super) fn decide_initial(
         Initial::Gravity => {
             let level =
                 stillness::accel_at_start(rests, &Limits::default()).map_err(|e| not_level(&e))?;
-            let level = stillness::level(&level)
-                .ok_or("--init gravity: the accelerometer reads zero at rest")?;
+            let level = stillness::level(&level).ok_or(format!(
+                "{INIT} gravity: the accelerometer reads zero at rest"
+            ))?;
             // Heading is unknown: zero in the convention that is shown.
             let shown = Convention::EnuFlu.convert(asked, level);
             let angles = shown.yaw_pitch_roll();
@@ -537,7 +554,7 @@ pub(super) fn decide_initial(
                 .filter_map(|s| s.orientation)
                 .find_map(|wxyz| resolved.recorded_attitude(wxyz));
             let q = found.ok_or_else(|| {
-                "--init first-orientation: the first samples carry no orientation\n  help: --init gravity, identity, q=w,x,y,z or rpy=roll,pitch,yaw".to_owned()
+                format!("{INIT} first-orientation: the first samples carry no orientation\n  help: {INIT} gravity, identity, q=w,x,y,z or rpy=roll,pitch,yaw")
             })?;
             let world = match (plan.world, resolved.recorded) {
                 (World::Start | World::Level, Convention::NedFrd) => World::Ned,
@@ -573,17 +590,17 @@ impl Earth {
     /// What it means that nobody said where the body heads.
     fn heading_warning(self, initial: Initial) -> Option<String> {
         let why = match initial {
-            Initial::Gravity => "--init gravity knows no heading, 0 was taken",
-            Initial::Identity => "--init identity has heading 0",
+            Initial::Gravity => format!("{INIT} gravity knows no heading, 0 was taken"),
+            Initial::Identity => format!("{INIT} identity has heading 0"),
             Initial::FirstOrientation | Initial::Given(_) => return None,
         };
         let deg_per_h = |w: f64| w.to_degrees() * 3600.0;
-        let level = deg_per_h(EARTH_RATE * self.latitude.cos().abs());
+        let level = deg_per_h(worlds::EARTH_RATE * self.latitude.cos().abs());
         Some(format!(
-            "--earth-rate: {why}: a heading off by 10 degrees leaves {:.1} deg/h of the Earth's rotation, any other at most {:.1} (where nothing taken out leaves {:.1})\n  help: --init first-orientation, q=w,x,y,z or rpy=roll,pitch,yaw states it",
+            "{EARTH_RATE}: {why}: a heading off by 10 degrees leaves {:.1} deg/h of the Earth's rotation, any other at most {:.1} (where nothing taken out leaves {:.1})\n  help: {INIT} first-orientation, q=w,x,y,z or rpy=roll,pitch,yaw states it",
             2.0 * level * 5_f64.to_radians().sin(),
             2.0 * level,
-            deg_per_h(EARTH_RATE),
+            deg_per_h(worlds::EARTH_RATE),
         ))
     }
 }
@@ -593,18 +610,18 @@ fn not_at_start(why: &NoRest) -> String {
     let said = why.to_string();
     let why = said.lines().next().unwrap_or_default();
     format!(
-        "--bias auto with --earth-rate: {why}; only at the start is the attitude known, and without it a bias and the Earth's rotation are the same\n  help: --start SECS begins at a rest, --bias x,y,z (rad/s) gives the bias"
+        "{BIAS} auto with {EARTH_RATE}: {why}; only at the start is the attitude known, and without it a bias and the Earth's rotation are the same\n  help: {START} SECS begins at a rest, {BIAS} x,y,z (rad/s) gives the bias"
     )
 }
 
 /// Why `--init gravity` can not be. The reasons are those of a bias, the ways out are not.
 fn not_level(why: &NoRest) -> String {
-    let said = format!("--init gravity: {why}");
+    let said = format!("{INIT} gravity: {why}");
     match why {
         NoRest::Moving { .. } | NoRest::Disagree { .. } => {
             let why = said.lines().next().unwrap_or_default();
             format!(
-                "{why}\n  help: --init identity starts unlevelled, --init rpy=roll,pitch,yaw (degrees) as you say; if the rates look too large, --gyro-unit deg"
+                "{why}\n  help: {INIT} identity starts unlevelled, {INIT} rpy=roll,pitch,yaw (degrees) as you say; if the rates look too large, {GYRO_UNIT} deg"
             )
         }
         NoRest::NotAtStart { .. } | NoRest::NoAccel => said,

@@ -4,6 +4,7 @@
 //! axes as recorded, everything that was taken out before, and how well each number is known.
 
 use crate::estimate::Noise;
+use crate::setting::CALIBRATION;
 use nalgebra::{Matrix3, Vector3};
 
 /// Largest errors a sensor can have, each element: rad/s, shares, m/s^2, s, the field's unit.
@@ -133,7 +134,7 @@ impl SensorCalibration {
     pub fn mismatch(&self, name: &str) -> Option<String> {
         let own = self.sensor.as_deref().filter(|own| *own != name)?;
         Some(format!(
-            "--calibration: the file is of the sensor `{own}`, and this is `{name}`: it was taken all the same"
+            "{CALIBRATION}: the file is of the sensor `{own}`, and this is `{name}`: it was taken all the same"
         ))
     }
 

@@ -8,6 +8,7 @@ use super::meaning::Meaning;
 use super::plan::Plan;
 use crate::condition::regularise::{Lines, Regulariser, Survey, Value};
 use crate::record::{RawSample, SampleKind};
+use crate::setting::REGULARISE_STAMPS;
 use std::sync::Arc;
 
 /// What becomes of the stamps.
@@ -45,7 +46,7 @@ impl Stamps {
             } => {
                 let (_, lines) = lines.iter().find(|(of, _)| *of == kind).ok_or_else(|| {
                     format!(
-                        "--regularise-stamps: no pass was made for {} samples",
+                        "{REGULARISE_STAMPS}: no pass was made for {} samples",
                         kind.name()
                     )
                 })?;

@@ -5,6 +5,7 @@ use super::method::Method;
 use crate::frames::{Body, In, Nav};
 use crate::quaternion::Quaternion;
 use crate::record::SampleKind;
+use crate::setting::{EARTH_RATE, INIT, NOISE, WINDOW};
 use nalgebra::Vector3;
 use std::fmt;
 
@@ -66,19 +67,19 @@ impl fmt::Display for SettingsError {
                 largest,
             } => write!(
                 f,
-                "a window of {given} samples can not be used\n  help: --window takes {smallest} to {largest}"
+                "a window of {given} samples can not be used\n  help: {WINDOW} takes {smallest} to {largest}"
             ),
             SettingsError::Initial { wxyz } => write!(
                 f,
-                "the initial attitude {wxyz:?} (w, x, y, z) is not a unit quaternion\n  help: --init q=w,x,y,z with norm 1"
+                "the initial attitude {wxyz:?} (w, x, y, z) is not a unit quaternion\n  help: {INIT} q=w,x,y,z with norm 1"
             ),
             SettingsError::WorldRate { rate } => write!(
                 f,
-                "the world can not turn at {rate:?} rad/s\n  help: --earth-rate takes a latitude in degrees, -90 to 90"
+                "the world can not turn at {rate:?} rad/s\n  help: {EARTH_RATE} takes a latitude in degrees, -90 to 90"
             ),
             SettingsError::Noise { name, value } => write!(
                 f,
-                "noise {name} = {value} can not be\n  help: --noise takes numbers from 0 up, in SI units"
+                "noise {name} = {value} can not be\n  help: {NOISE} takes numbers from 0 up, in SI units"
             ),
         }
     }

@@ -3,6 +3,7 @@
 //! Apart from the decoders because every encoding takes the same paths.
 
 use strapd_attitude::record::TimeUnit;
+use strapd_attitude::setting::{FIELD, GYRO_UNIT};
 
 /// What a field is to us.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Hash)]
@@ -92,7 +93,7 @@ pub struct FieldPath {
 
 /// A `--field` that can not be read.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("--field {text}: {why}")]
+#[error("{} {text}: {why}", FIELD)]
 pub struct BadFieldPath {
     /// What was given.
     pub text: String,
@@ -104,25 +105,26 @@ impl std::str::FromStr for FieldPath {
     type Err = BadFieldPath;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let bad = |why: &str| BadFieldPath {
+        let bad = |why: String| BadFieldPath {
             text: crate::text::printable(text),
-            why: why.to_owned(),
+            why,
         };
-        let (role, right) = text
-            .split_once('=')
-            .ok_or_else(|| bad("write it as role=path, for example gyro=imu.angular_velocity"))?;
-        let role = FieldRole::named(role.trim())
-            .ok_or_else(|| bad("the roles are gyro, accel, mag, orientation, stamp, dt"))?;
+        let (role, right) = text.split_once('=').ok_or_else(|| {
+            bad("write it as role=path, for example gyro=imu.angular_velocity".to_owned())
+        })?;
+        let role = FieldRole::named(role.trim()).ok_or_else(|| {
+            bad("the roles are gyro, accel, mag, orientation, stamp, dt".to_owned())
+        })?;
         let (list, unit) = match right.rsplit_once(':') {
             None => (right, None),
             Some(_) if !matches!(role, FieldRole::Stamp | FieldRole::Interval) => {
-                return Err(bad(
-                    "only stamp and dt take a unit after a colon; see --gyro-unit",
-                ));
+                return Err(bad(format!(
+                    "only stamp and dt take a unit after a colon; see {GYRO_UNIT}"
+                )));
             }
             Some((list, unit)) => match TimeUnit::named(unit) {
                 Some(unit) => (list, Some(unit)),
-                None => return Err(bad("the units are ns, us, ms, s")),
+                None => return Err(bad("the units are ns, us, ms, s".to_owned())),
             },
         };
         let paths = list
@@ -130,11 +132,11 @@ impl std::str::FromStr for FieldPath {
             .map(|path| path_of(path.trim()))
             .collect::<Option<Vec<_>>>()
             .ok_or_else(|| {
-                bad("a path is names between dots; an index goes in brackets: a.b[0].c")
+                bad("a path is names between dots; an index goes in brackets: a.b[0].c".to_owned())
             })?;
         if paths.len() != 1 && paths.len() != role.scalars() {
             let why = format!("{} paths; give one, or {}", paths.len(), role.scalars());
-            return Err(bad(&why));
+            return Err(bad(why));
         }
         Ok(FieldPath {
             role,

@@ -12,6 +12,7 @@ use super::{Decoder, FieldRole, Plan, Unsupported, Wanted, nothing_wanted, unsup
 use crate::text::printable;
 use strapd_attitude::record::Nanos;
 use strapd_attitude::record::TimeUnit;
+use strapd_attitude::setting::FIELD;
 
 impl Decoder {
     /// Learns from one message (the first of the topic) what no schema says: the unit of a stamp
@@ -82,8 +83,8 @@ impl Decoder {
                 read.map_or_else(|| "PATH".to_owned(), String::clone)
             }
         };
-        let help = format!("--field stamp={path}:ns (or us, ms, s) states it");
-        unsupported(&self.label, what, &help)
+        let help = format!("{FIELD} stamp={path}:ns (or us, ms, s) states it");
+        unsupported(&self.label, what, help)
     }
 
     /// The stamps of one payload that are bare numbers.

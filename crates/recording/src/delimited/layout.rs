@@ -17,6 +17,7 @@ use crate::decode::{Options, Wanted};
 use crate::text::printable;
 use crate::text::without_mark;
 use roles::Roles;
+use strapd_attitude::setting::{COLUMNS, DELIMITER};
 
 /// Lines, and bytes of them, in which the header is looked for.
 pub(crate) const MOST_HEAD_LINES: usize = 200;
@@ -324,7 +325,7 @@ impl Opening {
             .max_by_key(|names| texts(names));
         let Some(names) = best else {
             return format!(
-                "none of its first lines has three cells that could name columns; it begins with `{}`\n  help: a first row with names such as time_s, gyro_x, gyro_y, gyro_z; or --columns gyro=2:3:4,stamp=1:s by numbers, and --delimiter",
+                "none of its first lines has three cells that could name columns; it begins with `{}`\n  help: a first row with names such as time_s, gyro_x, gyro_y, gyro_z; or {COLUMNS} gyro=2:3:4,stamp=1:s by numbers, and {DELIMITER}",
                 crate::text::snippet(start)
             );
         };
@@ -339,7 +340,7 @@ impl Opening {
                 .filter_map(|column| roles::place(&names, column).err())
                 .collect();
             if let Some(first) = wrong.first() {
-                return format!("--columns: {first}; its columns are `{said}`");
+                return format!("{COLUMNS}: {first}; its columns are `{said}`");
             }
         }
         let axes = ["x", "y", "z"];
@@ -347,7 +348,9 @@ impl Opening {
             .iter()
             .all(|axis| all.iter().any(|name| name.eq_ignore_ascii_case(axis)))
         {
-            return "its columns x, y, z do not say of which sensor they are (they are rates where the file is called Gyroscope...)\n  help: --columns gyro=x:y:z if they are rates".to_owned();
+            return format!(
+                "its columns x, y, z do not say of which sensor they are (they are rates where the file is called Gyroscope...)\n  help: {COLUMNS} gyro=x:y:z if they are rates"
+            );
         }
         let aside = names.iter().find_map(|name| match name.meant {
             Meant::Aside {
@@ -357,7 +360,7 @@ impl Opening {
             _ => None,
         });
         format!(
-            "none of its columns names a rate about x, y and z: `{said}`{}\n  help: --columns gyro=NAME:NAME:NAME,stamp=NAME:UNIT says which they are (or numbers, from 1)",
+            "none of its columns names a rate about x, y and z: `{said}`{}\n  help: {COLUMNS} gyro=NAME:NAME:NAME,stamp=NAME:UNIT says which they are (or numbers, from 1)",
             aside.unwrap_or_default()
         )
     }
@@ -412,9 +415,9 @@ fn check_lengths(rows: &[Vec<String>], names: &[Name], delimiter: Delimiter) -> 
     }
     let why = match delimiter {
         Delimiter::Byte(b',') if first.len() + 2 > need * 2 => {
-            ": decimal commas, and commas between the cells? What belongs together can not be told\n  help: export it with semicolons or tabs between the cells, or with decimal points"
+            ": decimal commas, and commas between the cells? What belongs together can not be told\n  help: export it with semicolons or tabs between the cells, or with decimal points".to_owned()
         }
-        _ => "\n  help: --delimiter says what stands between the cells",
+        _ => format!("\n  help: {DELIMITER} says what stands between the cells"),
     };
     Err(format!(
         "its rows have {} cells under {need} names{why}",

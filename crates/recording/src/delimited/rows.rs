@@ -15,6 +15,7 @@ use crate::text::{printable, snippet};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 use std::borrow::Cow;
 use strapd_attitude::record::{Declared, Nanos, RawSample, SampleKind};
+use strapd_attitude::setting::GYRO_UNIT;
 
 /// Columns that make a table one of samples or of attitudes.
 const GYRO: [Column; 3] = [Column::Gyro(0), Column::Gyro(1), Column::Gyro(2)];
@@ -178,8 +179,7 @@ impl Table {
     pub fn doubt_of_unit(&self) -> Option<String> {
         let is_open = !self.is_own() && self.has(GYRO[0]) && self.declared.gyro_unit.is_none();
         is_open.then(|| {
-            "the unit of the rates is not stated, and taken for rad/s: --gyro-unit deg, if it is deg/s"
-                .to_owned()
+            format!("the unit of the rates is not stated, and taken for rad/s: {GYRO_UNIT} deg, if it is deg/s")
         })
     }
 

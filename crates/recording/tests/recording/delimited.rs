@@ -469,12 +469,12 @@ fn acceleration_without_gravity_is_named_and_not_used() {
         "`Linear Acceleration x (m/s^2)`",
         "is not used",
         "without gravity",
-        "--columns accel=",
+        "columns accel=",
     ] {
         assert!(note.contains(word), "`{word}` is missing: {note}");
     }
     let columns = note
-        .split("--columns ")
+        .split("columns ")
         .nth(1)
         .unwrap()
         .split(" uses")

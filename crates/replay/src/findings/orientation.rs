@@ -2,11 +2,12 @@
 
 use super::{Finding, Severity};
 use crate::inspection::CheckedTopic;
-use crate::summary::against::{beyond_sigma, bias_flag, bias_json, bias_words, consistency_json};
+use crate::summary::against::{beyond_sigma, bias_json, bias_words, consistency_json, removing};
 use crate::summary::{Against, Recorded, TopicSummary, significant};
 use nalgebra::Vector3;
 use serde_json::json;
 use strapd_attitude::compare::{BiasFit, BodyAxesFit};
+use strapd_attitude::setting::{BIAS, Choice, METHOD, MOUNT, NOISE, SAMPLE_KIND};
 
 /// A meaning is better when its median error is below this share of the other's.
 const CLEARLY: f64 = 0.95;
@@ -70,7 +71,7 @@ fn told_by_it(
     at_rest: Option<Vector3<f64>>,
     out: &mut Vec<Finding>,
 ) {
-    let mut flags = String::new();
+    let mut help: Option<Choice> = None;
     // What the filter has learned needs no flag.
     let is_learned = |fit: &BiasFit| {
         let aided = summary.aided.as_ref();
@@ -83,9 +84,9 @@ fn told_by_it(
         let left = |rest: Vector3<f64>| rest - Vector3::from(recorded.removed) - fit.bias;
         if at_rest.is_some_and(|rest| left(rest).norm() < SAME * fit.bias.norm()) {
             // Said already.
-            "--bias auto".clone_into(&mut flags);
+            help = Some(BIAS.to("auto"));
         } else {
-            flags = bias_flag(&fit, recorded.removed);
+            help = Some(removing(&fit, recorded.removed));
             out.push(
                 Finding::new(
                     Severity::Warning,
@@ -94,7 +95,7 @@ fn told_by_it(
                 )
                 .with("fit", bias_json(&fit))
                 .advise("remove it; of another run of the sensor it may be another")
-                .flags(flags.clone()),
+                .help(help.clone()),
             );
         }
     }
@@ -104,7 +105,7 @@ fn told_by_it(
     let Some(what) = beyond_sigma(found) else {
         return;
     };
-    let advice = if !flags.is_empty() {
+    let advice = if help.is_some() {
         "without that bias it may hold"
     } else if summary.aided.is_some() {
         "this motion is not as the filter takes it, or the orientation is no truth"
@@ -113,19 +114,19 @@ fn told_by_it(
     };
     // The next worse class; there is none behind the last, and a list is the user's own.
     let worse = match summary.noise.as_str() {
-        "consumer" => "--noise uncalibrated",
-        "industrial" | "tactical" | "navigation" => "--noise consumer",
-        _ => "",
+        "consumer" => Some(NOISE.to("uncalibrated")),
+        "industrial" | "tactical" | "navigation" => Some(NOISE.to("consumer")),
+        _ => None,
     };
-    if flags.is_empty() && summary.aided.is_none() {
-        worse.clone_into(&mut flags);
+    if summary.aided.is_none() {
+        help = help.or(worse);
     }
     out.push(
         Finding::new(Severity::Warning, "beyond-sigma", what)
             .with("sigma", consistency_json(found))
             .with("noise", summary.noise.clone())
             .advise(advice)
-            .flags(flags),
+            .help(help),
     );
 }
 
@@ -150,7 +151,7 @@ fn meaning_unknown() -> Finding {
         "nothing says whether a sample is the rate at its stamp or the mean over its interval; it is taken as the rate",
     )
     .advise("the sensor's manual says it; it matters more than the integrator")
-    .flags("--sample-kind rate|average|delta-angle")
+    .help([SAMPLE_KIND.to("rate|average|delta-angle")])
 }
 
 fn best_meaning(rows: &[Against]) -> Option<&Against> {
@@ -166,9 +167,9 @@ fn meaning(rows: &[Against], best: &Against, used: &str, out: &mut Vec<Finding>)
     if best.median_deg >= CLEARLY * current.median_deg {
         return;
     }
-    let flags = match best.kind {
-        "held" => "--method dcm-left".to_owned(),
-        kind => format!("--sample-kind {kind}"),
+    let help = match best.kind {
+        "held" => METHOD.to("dcm-left"),
+        kind => SAMPLE_KIND.to(kind),
     };
     out.push(
         Finding::new(
@@ -191,7 +192,7 @@ fn meaning(rows: &[Against], best: &Against, used: &str, out: &mut Vec<Finding>)
         )
         .with("pairs", best.pairs)
         .advise("take them so")
-        .flags(flags),
+        .help([help]),
     );
 }
 
@@ -273,7 +274,7 @@ fn axes_agree(fit: &BodyAxesFit, out: &mut Vec<Finding>) -> bool {
                 ),
             )
             .advise("state the gyro's axes, or its mounting")
-            .flags(format!("--mount q={w:.6},{x:.6},{y:.6},{z:.6}")),
+            .help([MOUNT.to(format!("q={w:.6},{x:.6},{y:.6},{z:.6}"))]),
         ));
         return false;
     }

@@ -5,6 +5,10 @@ use crate::summary::{Gaps, TopicSummary, significant};
 use strapd_attitude::condition::Report;
 use strapd_attitude::propagate;
 use strapd_attitude::record::Verdict;
+use strapd_attitude::setting::{
+    AGAINST_RECORDED, GYRO_RANGE, GYRO_UNIT, MAX_GAP, ON_GAP, RATE_HZ, REGULARISE_STAMPS, START,
+    TIME, TOPIC, UNTIL,
+};
 
 /// Largest turn per step that integrates well whatever the motion: beyond, aliasing is near.
 const LARGE_STEP_DEG: f64 = 30.0;
@@ -85,7 +89,7 @@ pub(crate) fn of_run(summary: &TopicSummary, noted: &Noted<'_>) -> Vec<Finding> 
             )
             .with("frame", frame.as_str())
             .with("count", *n)
-            .flags(format!("--topic {name}@{frame}")),
+            .help([TOPIC.to(format!("{name}@{frame}"))]),
         );
     }
     out.extend(stamps(noted.conditioning, &summary.clock));
@@ -94,10 +98,10 @@ pub(crate) fn of_run(summary: &TopicSummary, noted: &Noted<'_>) -> Vec<Finding> 
             Finding::new(
                 Severity::Warning,
                 "no-constant-rate",
-                "--regularise-stamps: there was no constant rate in this stream",
+                format!("{REGULARISE_STAMPS}: there was no constant rate in this stream"),
             )
             .advise("leave it out, or number the samples")
-            .flags("--time index --rate-hz HZ"),
+            .help([TIME.to("index"), RATE_HZ.to("HZ")]),
         );
     }
     out.extend(saturated(noted.conditioning));
@@ -150,7 +154,7 @@ fn nothing_used(summary: &TopicSummary) -> Finding {
     let what = if total == 0 {
         "no sample was used: the topic has no messages".to_owned()
     } else if trimmed == total {
-        format!("no sample was used: all {total} lie outside --start, --until")
+        format!("no sample was used: all {total} lie outside {START}, {UNTIL}")
     } else {
         format!("no sample was used: all {total} were turned away (see lost)")
     };
@@ -180,13 +184,13 @@ pub(super) fn gaps(gaps: &Gaps) -> Option<Finding> {
     Some(
         if (f64::MIN_POSITIVE..=LONGEST_BRIDGE_SECS).contains(&longest) {
             held.advise("the attitude is held there; bridge them where the motion was slow")
-                .flags(format!(
-                    "--on-gap bridge --max-gap {:.1}",
-                    (longest * 10.0).ceil() / 10.0
-                ))
+                .help([
+                    ON_GAP.to("bridge"),
+                    MAX_GAP.to(format!("{:.1}", (longest * 10.0).ceil() / 10.0)),
+                ])
         } else {
             held.advise("the attitude is held there; a clock was set, or is not always the same one: another may be steadier")
-            .flags("--time log, or --time header")
+            .help([TIME.to("log")]).help([TIME.to("header")])
         },
     )
 }
@@ -206,7 +210,7 @@ pub(super) fn steps(undersampled: u64, largest_step: f64) -> Option<Finding> {
             .with("steps", undersampled)
             .with("largest_step_deg", step_deg)
             .advise("check the unit first; otherwise sample faster")
-            .flags("--gyro-unit deg"),
+            .help([GYRO_UNIT.to("deg")]),
         );
     }
     (step_deg > LARGE_STEP_DEG).then(|| {
@@ -241,7 +245,7 @@ fn stamps(report: &Report, clock: &str) -> Option<Finding> {
             .with("step_s", step as f64 * 1e-9)
             .with("count", restamped)
             .advise("another clock may be finer")
-            .flags(format!("--time {other}")),
+            .help([TIME.to(other)]),
         );
     }
     (restamped > 0).then(|| {
@@ -263,7 +267,7 @@ fn saturated(report: &Report) -> Option<Finding> {
         Finding::new(
             Severity::Warning,
             "at-range",
-            format!("{n} samples reach the gyro's range (--gyro-range): the true rate was higher"),
+            format!("{n} samples reach the gyro's range ({GYRO_RANGE}): the true rate was higher"),
         )
         .with("count", n)
     })
@@ -274,14 +278,14 @@ fn no_reference(found: u64) -> Finding {
         0 => Finding::new(
             Severity::Warning,
             "no-reference",
-            "--against-recorded: the log holds no orientation to compare with",
+            format!("{AGAINST_RECORDED}: the log holds no orientation to compare with"),
         )
         .advise("name its topic")
-        .flags("--against-recorded=TOPIC"),
+        .help([AGAINST_RECORDED.to("TOPIC")]),
         n => Finding::new(
             Severity::Warning,
             "no-reference",
-            format!("--against-recorded: no two of the {n} recorded orientations are 1 s apart"),
+            format!("{AGAINST_RECORDED}: no two of the {n} recorded orientations are 1 s apart"),
         ),
     }
 }

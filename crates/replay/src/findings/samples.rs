@@ -6,6 +6,10 @@ use crate::summary::significant;
 use serde_json::json;
 use strapd_attitude::condition::quality::{Advice, AxisStats};
 use strapd_attitude::frames::BodyAxes;
+use strapd_attitude::setting::{
+    AGAINST_RECORDED, BIAS, BODY, GYRO_RANGE, GYRO_UNIT, IGNORE_COVARIANCE_FLAG, MAX_GAP, MOUNT,
+    ON_GAP, RATE_HZ, REGULARISE_STAMPS, TIME,
+};
 
 /// Header and recorder's clock further apart than this are different clocks, s.
 const OTHER_CLOCK_SECS: f64 = 1.0;
@@ -95,7 +99,7 @@ fn counted(looked: &Inspection, out: &mut Vec<Finding>) {
             "samples have no stamp",
             "take the recorder's time",
         )
-        .map(|found| found.flags("--time log")),
+        .map(|found| found.help([TIME.to("log")])),
         some(
             (q.collisions, total),
             (Warning, "shared-stamps"),
@@ -156,10 +160,10 @@ fn advised(looked: &Inspection, advice: &Advice) -> Option<Finding> {
             match unit {
                 Some(unit) => finding
                     .advise("the accelerometer shows the unit of the rates")
-                    .flags(format!("--gyro-unit {unit}")),
+                    .help([GYRO_UNIT.to(unit)]),
                 None => finding
                     .advise("give the gyro's axes or unit as they are")
-                    .flags("--body MAP or --gyro-unit"),
+                    .help([BODY.to("MAP")]).help([GYRO_UNIT.to("deg")]),
             }
         }
         Advice::AccelNotInMetres { magnitude, unit } => Finding::new(
@@ -178,7 +182,7 @@ fn advised(looked: &Inspection, advice: &Advice) -> Option<Finding> {
         )
         .with("stated", looked.resolved.body.to_string())
         .advise("the body looks like front, right, down")
-        .flags("--body frd"),
+        .help([BODY.to("frd")]),
         Advice::MountedOnSide { gravity } => Finding::new(
             Note,
             "mounted-on-side",
@@ -186,7 +190,7 @@ fn advised(looked: &Inspection, advice: &Advice) -> Option<Finding> {
         )
         .with("gravity", gravity.to_string())
         .advise("the attitude is the sensor's; state its mounting to get the body's")
-        .flags("--mount q=w,x,y,z, or an axis map in --body"),
+        .help([MOUNT.to("q=w,x,y,z")]).help([BODY.to("MAP")]),
         Advice::Saturated { axis, at, samples } => Finding::new(
             Error,
             "saturated",
@@ -199,7 +203,7 @@ fn advised(looked: &Inspection, advice: &Advice) -> Option<Finding> {
         .with("reading", at)
         .with("samples", samples)
         .advise("the true rate was higher: the attitude is wrong after it; have them flagged")
-        .flags(format!("--gyro-range {:.4}", at.abs())),
+        .help([GYRO_RANGE.to(format!("{:.4}", at.abs()))]),
         Advice::Stuck { axis, samples } => Finding::new(
             Error,
             "stuck",
@@ -214,7 +218,7 @@ fn advised(looked: &Inspection, advice: &Advice) -> Option<Finding> {
         Advice::StampsStandStill => {
             Finding::new(Error, "stamps-stand-still", "the stamps do not advance")
                 .advise("take another clock")
-                .flags("--time log, or --time index --rate-hz HZ")
+                .help([TIME.to("log")]).help([TIME.to("index"), RATE_HZ.to("HZ")])
         }
         Advice::StampsJitter { share } => Finding::new(
             Warning,
@@ -227,7 +231,7 @@ fn advised(looked: &Inspection, advice: &Advice) -> Option<Finding> {
             looked.quality.spacing.map_or(0.0, |s| s.jitter_p99_secs),
         )
         .advise("if the sensor samples evenly and only its stamps jitter, straighten them; if it samples unevenly, keep them")
-        .flags("--regularise-stamps"),
+        .help([REGULARISE_STAMPS]),
         Advice::StampsJitterEvenly { jitter, segments } => Finding::new(
             Warning,
             "jitter",
@@ -242,8 +246,8 @@ fn advised(looked: &Inspection, advice: &Advice) -> Option<Finding> {
         )
         .with("rms_share_of_step", jitter)
         .with("segments_of_constant_rate", segments)
-        .advise("if a clock of its own triggers the sensor, straighten its stamps; if it samples when it is asked, keep them: they can not tell, --against-recorded may")
-        .flags("--regularise-stamps"),
+        .advise(format!("if a clock of its own triggers the sensor, straighten its stamps; if it samples when it is asked, keep them: they can not tell, {AGAINST_RECORDED} may"))
+        .help([REGULARISE_STAMPS]),
         Advice::StampsUneven { share } => Finding::new(
             Warning,
             "jitter",
@@ -254,7 +258,7 @@ fn advised(looked: &Inspection, advice: &Advice) -> Option<Finding> {
         )
         .with("p99_share_of_step", share)
         .advise("another clock may be steadier; if no sample is missing, number them")
-        .flags("--time log, or --time index --rate-hz HZ"),
+        .help([TIME.to("log")]).help([TIME.to("index"), RATE_HZ.to("HZ")]),
         Advice::ClocksDrift { ppm } => Finding::new(
             Warning,
             "clock-drift",
@@ -262,7 +266,7 @@ fn advised(looked: &Inspection, advice: &Advice) -> Option<Finding> {
         )
         .with("ppm", ppm)
         .advise("one of the clocks is wrong by as much, and so is every angle")
-        .flags("--time header|log"),
+        .help([TIME.to("header|log")]),
         Advice::SamplesMissing {
             missing,
             longest_secs,
@@ -275,14 +279,14 @@ fn advised(looked: &Inspection, advice: &Advice) -> Option<Finding> {
         .with("longest_s", longest_secs)
         .with("gaps", looked.quality.gaps)
         .advise("bridged by interpolation where short")
-        .flags("--max-gap SECS --on-gap hold|bridge|reset"),
+        .help([MAX_GAP.to("SECS"), ON_GAP.to("hold|bridge|reset")]),
         Advice::NeverStill => Finding::new(
             Note,
             "never-still",
             "the body is never still for half a second",
         )
         .advise("no bias can be had from this log: give one, if it is known")
-        .flags("--bias x,y,z"),
+        .help([BIAS.to("x,y,z")]),
     })
 }
 
@@ -295,7 +299,7 @@ pub(super) fn rates_like_degrees(peak: f64) -> Finding {
     )
     .with("largest_rate", peak)
     .advise("the rates are in deg/s")
-    .flags("--gyro-unit deg")
+    .help([GYRO_UNIT.to("deg")])
 }
 
 /// Samples without a gyro by the mark of their format.
@@ -306,7 +310,7 @@ pub(super) fn gyro_absent(n: u64, total: u64) -> Option<Finding> {
         "samples mark their gyro as absent (covariance -1)",
         "some drivers set the mark wrongly; if the rates are good, use them",
     )?;
-    Some(found.flags("--ignore-covariance-flag"))
+    Some(found.help([IGNORE_COVARIANCE_FLAG]))
 }
 
 /// Samples without any rate amid others.
@@ -355,7 +359,7 @@ fn clocks(looked: &Inspection, out: &mut Vec<Finding>) {
             .with("mean_s", offset.mean_secs)
             .with("drift_ppm", offset.drift_ppm)
             .advise("different clocks, or a log played again; compare only on one of them")
-            .flags("--time header|log"),
+            .help([TIME.to("header|log")]),
         );
     }
 }
@@ -383,7 +387,7 @@ fn bias(looked: &Inspection, out: &mut Vec<Finding>) {
             .with("sigma_rad_s", sigma)
             .with("rest_s", found.secs)
             .advise("remove it")
-            .flags("--bias auto"),
+            .help([BIAS.to("auto")]),
         );
     }
 }

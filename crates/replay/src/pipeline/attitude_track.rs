@@ -18,6 +18,7 @@ use strapd_attitude::estimate::orientation_convention;
 use strapd_attitude::frames::{Body, Nav};
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{AttitudeCovariance, Nanos};
+use strapd_attitude::setting::{REF_TOPIC, TOPIC};
 use strapd_attitude::worlds::{Convention, World};
 use strapd_recording::attitude_line::Attitude;
 use strapd_recording::decode::{Options, Role};
@@ -262,7 +263,7 @@ fn attitude_channel<'l>(
             Err(Error::Unsupported {
                 path: path.to_owned(),
                 what: format!(
-                    "several topics carry an attitude:{}\n  help: --topic NAME (or --ref-topic NAME) takes one",
+                    "several topics carry an attitude:{}\n  help: {TOPIC} NAME (or {REF_TOPIC} NAME) takes one",
                     topics::listing(&list)
                 ),
             })
@@ -355,7 +356,7 @@ fn from_ndjson(input: &Input, side: Side, id: Option<&str>) -> Result<Vec<(Entry
                         path,
                         number,
                         &format!(
-                            "attitudes of both `{}` and `{}`; --topic ID takes one",
+                            "attitudes of both `{}` and `{}`; {TOPIC} ID takes one",
                             printable(first),
                             printable(&att.id)
                         ),

@@ -16,6 +16,7 @@ use std::path::Path;
 use std::sync::Arc;
 use strapd_attitude::condition::Clock;
 use strapd_attitude::estimate::{Aid, Plan};
+use strapd_attitude::setting::{AID, FIELD, MAG_TOPIC, TIME};
 use strapd_recording::decode::{Decoder, Options, Wanted};
 use strapd_recording::mcap::Channel;
 use strapd_recording::text::named_few;
@@ -72,7 +73,7 @@ pub(super) fn choose(
     } else if plan.aid == Aid::GravityAndField && !has_field {
         let found = unnamed(plan, path, log, own)?;
         besides.notes.push(format!(
-            "the magnetic field was taken from {} (--mag-topic NAME takes another)",
+            "the magnetic field was taken from {} ({MAG_TOPIC} NAME takes another)",
             printable(&found.0.channel.topic)
         ));
         besides.add(found);
@@ -166,7 +167,7 @@ fn named<'l>(
         .map_err(|why| refuse(why.to_string()))?;
     if plan.clock == Clock::Header && !decoder.stated().has_stamp {
         return Err(refuse(format!(
-            "{} ({}): its messages carry no stamp to find their gyro sample by\n  help: --time log",
+            "{} ({}): its messages carry no stamp to find their gyro sample by\n  help: {TIME} log",
             printable(&beside.topic),
             described(&known.channel)
         )));
@@ -203,10 +204,12 @@ fn unnamed<'l>(
         .map(|(k, _)| k.channel.topic.as_str())
         .collect();
     let what = match names.as_slice() {
-        [] => "--aid gravity+mag: no topic carries a magnetic field\n  help: --mag-topic NAME, with --field mag=PATH where it has another name; --aid gravity does without".to_owned(),
+        [] => format!(
+            "{AID} gravity+mag: no topic carries a magnetic field\n  help: {MAG_TOPIC} NAME, with {FIELD} mag=PATH where it has another name; {AID} gravity does without"
+        ),
         [_] => String::new(),
         several => format!(
-            "--aid gravity+mag: several topics carry a magnetic field: {}\n  help: --mag-topic NAME",
+            "{AID} gravity+mag: several topics carry a magnetic field: {}\n  help: {MAG_TOPIC} NAME",
             named_few(several)
         ),
     };

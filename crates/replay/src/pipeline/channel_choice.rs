@@ -18,6 +18,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::Arc;
 use strapd_attitude::estimate::Meaning;
+use strapd_attitude::setting::{FIELD, TOPIC};
 use strapd_recording::decode::Decoder;
 use strapd_recording::mcap::Channel;
 
@@ -100,7 +101,7 @@ fn choose_one(
         return Err(Error::Unsupported {
             path: path.to_owned(),
             what: format!(
-                "{} ({}): carries no body rate\n  help: --field gyro=PATH names one",
+                "{} ({}): carries no body rate\n  help: {FIELD} gyro=PATH names one",
                 strapd_recording::text::printable(name),
                 described(&first.channel)
             ),
@@ -149,7 +150,7 @@ pub(super) fn besides(
     let [one] = chosen else {
         if let Some(asked) = asked.filter(|_| !chosen.is_empty()) {
             return Err(Error::Usage(format!(
-                "{} could belong to any of {} topics\n  help: --topic NAME takes one of them",
+                "{} could belong to any of {} topics\n  help: {TOPIC} NAME takes one of them",
                 strapd_recording::text::printable(&asked.topic),
                 chosen.len()
             )));
@@ -174,7 +175,7 @@ pub(super) fn which_stamp(decoder: &Decoder) -> Option<String> {
         .collect();
     (!others.is_empty()).then(|| {
         format!(
-            "messages carry several stamps: {read} was taken, not {}; --field stamp=PATH takes another",
+            "messages carry several stamps: {read} was taken, not {}; {FIELD} stamp=PATH takes another",
             others.join(", ")
         )
     })

@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use std::io::Read;
 use std::path::Path;
+use strapd_attitude::setting::{COLUMNS, DELIMITER, FIELD};
 use strapd_recording::decode::{Ambiguous, Options, Undecodable};
 use strapd_recording::delimited::Table;
 use strapd_recording::format::Format;
@@ -21,7 +22,9 @@ pub(super) fn open<R: Read>(
     if format == Format::Table && !options.fields.is_empty() {
         return Err(Error::Unsupported {
             path: path.to_owned(),
-            what: "--field is for messages, and this is a CSV\n  help: --columns gyro=NAME:NAME:NAME,stamp=NAME:UNIT says what its columns are".to_owned(),
+            what: format!(
+                "{FIELD} is for messages, and this is a CSV\n  help: {COLUMNS} gyro=NAME:NAME:NAME,stamp=NAME:UNIT says what its columns are"
+            ),
         });
     }
     if format != Format::Table {
@@ -41,7 +44,7 @@ pub(super) fn only_for_tables(path: &Path, format: Format, options: &Options) ->
     Err(Error::Unsupported {
         path: path.to_owned(),
         what: format!(
-            "--columns and --delimiter are for tables of text, and this is {}\n  help: --field says where values lie in messages",
+            "{COLUMNS} and {DELIMITER} are for tables of text, and this is {}\n  help: {FIELD} says where values lie in messages",
             format.name()
         ),
     })
@@ -52,7 +55,7 @@ pub(super) fn unclear(path: &Path, what: &Ambiguous) -> Error {
     Error::Unsupported {
         path: path.to_owned(),
         what: format!(
-            "{what}\n  help: --field stamp=NAME:ns (or us, ms, s) says it for a name as it is"
+            "{what}\n  help: {FIELD} stamp=NAME:ns (or us, ms, s) says it for a name as it is"
         ),
     }
 }
@@ -61,9 +64,11 @@ pub(super) fn unclear(path: &Path, what: &Ambiguous) -> Error {
 pub(super) fn no_samples(path: &Path, lines: &Lines<impl Read>, why: &Undecodable) -> Error {
     let help = match lines.format() {
         Format::Table => {
-            "one row per sample under a row of names, as strapd cat --format csv writes them; --columns says what they are"
+            format!(
+                "one row per sample under a row of names, as strapd writes a CSV; {COLUMNS} says what they are"
+            )
         }
-        _ => "one JSON object per line, with gyro and stamp; or an MCAP",
+        _ => "one JSON object per line, with gyro and stamp; or an MCAP".to_owned(),
     };
     Error::Unsupported {
         path: path.to_owned(),
@@ -76,6 +81,6 @@ pub(super) fn described(lines: &Lines<impl Read>) -> String {
     let name = lines.format().name();
     match lines.table().map(Table::assumed).unwrap_or_default() {
         "" => name.to_owned(),
-        assumed => format!("--columns '{assumed}' [{name}]"),
+        assumed => format!("{COLUMNS} '{assumed}' [{name}]"),
     }
 }

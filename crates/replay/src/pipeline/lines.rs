@@ -21,6 +21,7 @@ use strapd_attitude::condition::Clock;
 use strapd_attitude::estimate::Meaning;
 use strapd_attitude::estimate::{StampPass, Stamps};
 use strapd_attitude::record::{Declared, Nanos};
+use strapd_attitude::setting::{COLUMNS, FIELD, RATE_HZ, TIME, TOPIC};
 use strapd_recording::decode::{Class, Undecodable};
 use strapd_recording::delimited::Table;
 use strapd_recording::format::Format;
@@ -239,7 +240,7 @@ fn read(
                             path,
                             first,
                             format!(
-                                "line {}: samples of another sensor, `{id}`\n  help: --topic ID takes one of them, and of a file --topic all each",
+                                "line {}: samples of another sensor, `{id}`\n  help: {TOPIC} ID takes one of them, and of a file {TOPIC} all each",
                                 lines.number()
                             ),
                         ));
@@ -278,15 +279,19 @@ fn undecodable(number: u64, why: Undecodable) -> Item {
 fn nothing(path: &Path, format: Format) -> Error {
     let what = match format {
         Format::Table => {
-            "no row carries a body rate\n  help: columns gyro_x, gyro_y, gyro_z, in rad/s, or --columns gyro=NAME:NAME:NAME"
+            format!(
+                "no row carries a body rate\n  help: columns gyro_x, gyro_y, gyro_z, in rad/s, or {COLUMNS} gyro=NAME:NAME:NAME"
+            )
         }
         _ => {
-            "no line carries a body rate\n  help: {\"class\":\"RATE\",\"stamp\":{\"sec\":1,\"nsec\":0},\"gyro\":[0.1,0,0]}, or --field gyro=PATH"
+            format!(
+                "no line carries a body rate\n  help: {{\"class\":\"RATE\",\"stamp\":{{\"sec\":1,\"nsec\":0}},\"gyro\":[0.1,0,0]}}, or {FIELD} gyro=PATH"
+            )
         }
     };
     Error::Unsupported {
         path: path.to_owned(),
-        what: what.to_owned(),
+        what,
     }
 }
 
@@ -296,7 +301,7 @@ fn unplaced(path: &Path, lines: &Lines<impl Read>) -> Error {
     Error::Unsupported {
         path: path.to_owned(),
         what: format!(
-            "no row says when it was measured\n  help: --time index --rate-hz HZ, or --columns stamp=NAME:UNIT\n  note: {}",
+            "no row says when it was measured\n  help: {TIME} index {RATE_HZ} HZ, or {COLUMNS} stamp=NAME:UNIT\n  note: {}",
             notes.join("; ")
         ),
     }

@@ -27,6 +27,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
 use strapd_attitude::estimate::{Aid, Meaning};
+use strapd_attitude::setting::TOPIC;
 use strapd_recording::decode::{Decoder, Unsupported, Wanted};
 use strapd_recording::mcap::{self, Channel, Reader, Survey, WalkOptions};
 use strapd_recording::pool::Pool;
@@ -274,7 +275,7 @@ impl Picked {
                 topic: self.topic.clone().unwrap_or_default(),
                 what: format!(
                     "{} channels of this topic take turns: two publishers, and they must not be mixed
-  help: save it to a file, where --topic tells them apart",
+  help: save it to a file, where {TOPIC} tells them apart",
                     self.channels
                 ),
             });
@@ -302,7 +303,7 @@ impl Picked {
             Ok(choice) => Error::Unsupported {
                 path: path.to_owned(),
                 what: format!(
-                    "no IMU topic; {} may carry a body rate, but is not taken unnamed from a stream, where a better one could still come\n  help: --topic NAME",
+                    "no IMU topic; {} may carry a body rate, but is not taken unnamed from a stream, where a better one could still come\n  help: {TOPIC} NAME",
                     choice.topics.join(", ")
                 ),
             },
@@ -324,7 +325,7 @@ impl Picked {
             );
             Finding::new(Severity::Warning, "several-topics", what)
                 .with("topics", names)
-                .flags("--topic NAME")
+                .help([TOPIC.to("NAME")])
         })
     }
 }

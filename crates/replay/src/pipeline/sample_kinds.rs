@@ -39,7 +39,7 @@ const MEANINGS: [(&str, &str, SampleKind, Option<Method>); 4] = [
     ),
     (
         "held",
-        "held over the interval after its stamp (--method dcm-left)",
+        "held over the interval after its stamp (method dcm-left)",
         SampleKind::Rate,
         Some(Method::DcmLeft),
     ),

@@ -104,7 +104,7 @@ fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
             _ => topic.resolved.kind,
         },
         method: match &smoothed {
-            Some(Ok(smoothing)) => smoothing.method().to_owned(),
+            Some(Ok(smoothing)) => smoothing.method(),
             _ => method_words(topic),
         },
         body,

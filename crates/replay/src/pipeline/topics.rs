@@ -6,6 +6,7 @@
 use crate::error::{Error, Result};
 use std::collections::BTreeSet;
 use std::path::Path;
+use strapd_attitude::setting::TOPIC;
 use strapd_recording::text::named_few;
 
 /// What the choice needs to know of one channel.
@@ -60,7 +61,7 @@ pub fn choose(path: &Path, candidates: &[Candidate], named: Option<&str>) -> Res
                 return Err(Error::Unsupported {
                     path: path.to_owned(),
                     what: format!(
-                        "{} topics carry a rate, and at most {MOST_TOPICS} are taken at once: {}\n  help: --topic NAME takes one of them",
+                        "{} topics carry a rate, and at most {MOST_TOPICS} are taken at once: {}\n  help: {TOPIC} NAME takes one of them",
                         topics.len(),
                         named_few(&topics)
                     ),
@@ -104,7 +105,7 @@ pub fn choose(path: &Path, candidates: &[Candidate], named: Option<&str>) -> Res
                 .collect();
             let note = (!others.is_empty()).then(|| {
                 format!(
-                    "took {}; {} could be taken too with --topic",
+                    "took {}; {} could be taken too with {TOPIC}",
                     named_few(&topics),
                     named_few(&others)
                 )
@@ -177,7 +178,7 @@ mod tests {
         let all = [candidate("/a", 5), candidate("/b", 5)];
         let error = chosen(&all, None).unwrap_err().to_string();
         assert!(
-            error.contains("/a") && error.contains("/b") && error.contains("--topic"),
+            error.contains("/a") && error.contains("/b") && error.contains("topic"),
             "{error}"
         );
         assert_eq!(chosen(&all, Some("all")).unwrap().topics, ["/a", "/b"]);

@@ -1,8 +1,10 @@
 //! The word after `--listen` -> what to listen on. Pure but for looking up a host's name.
 
 use crate::error::{Error, Result};
+use std::fmt::Display;
 use std::net::{IpAddr, SocketAddr, ToSocketAddrs};
 use std::path::PathBuf;
+use strapd_attitude::setting::LISTEN;
 
 /// Something to listen on.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -109,17 +111,17 @@ impl Listen {
     /// # Errors
     /// [`Error::Usage`] with what is known.
     pub fn parse(text: &str) -> Result<Listen> {
-        Listen::parse_from("--listen", text)
+        Listen::parse_from(LISTEN, text)
     }
 
     /// The same, written behind another flag.
     ///
     /// # Errors
     /// As [`Listen::parse`].
-    pub fn parse_from(flag: &str, text: &str) -> Result<Listen> {
-        let refuse = |what: &str| {
+    pub fn parse_from(what: impl Display, text: &str) -> Result<Listen> {
+        let refuse = |why: &str| {
             let shown = printable_address(text);
-            Error::Usage(format!("{flag} {shown}: {what}\n  help: {KNOWN}"))
+            Error::Usage(format!("{what} {shown}: {why}\n  help: {KNOWN}"))
         };
         let (scheme, rest) = text.split_once("://").ok_or_else(|| refuse("no scheme"))?;
         let address = || -> Result<SocketAddr> {

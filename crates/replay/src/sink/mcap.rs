@@ -20,6 +20,7 @@ use chunk::Chunk;
 use file::McapFile;
 use std::collections::BTreeMap;
 use strapd_attitude::record::Nanos;
+use strapd_attitude::setting::{COPY_INPUT, ENCODING};
 
 /// What messages are made of.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -420,12 +421,13 @@ fn log_time(log: Nanos) -> u64 {
 }
 
 fn only_attitudes_are_json() -> Error {
-    Error::Usage(
-        "only attitudes are written to MCAP as JSON\n  help: --encoding cdr, or write .ndjson"
-            .to_owned(),
-    )
+    Error::Usage(format!(
+        "only attitudes are written to MCAP as JSON\n  help: {ENCODING} cdr, or write .ndjson"
+    ))
 }
 
 fn too_many_channels() -> Error {
-    Error::Usage("an MCAP file holds at most 65535 channels and schemas\n  help: a copy of this log (--copy-input, recover) does not fit into one".to_owned())
+    Error::Usage(format!(
+        "an MCAP file holds at most 65535 channels and schemas\n  help: a copy of this log ({COPY_INPUT}, recover) does not fit into one"
+    ))
 }

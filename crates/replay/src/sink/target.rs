@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::sink::address::{Listen, printable_address};
 use std::path::{Path, PathBuf};
+use strapd_attitude::setting::{LISTEN, TOKEN_FILE};
 
 /// What a file or pipe is filled with.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -99,12 +100,12 @@ impl Target {
             ("tcp-listen" | "unix-listen" | "ws-listen" | "tcp", Some(_)) => {
                 refuse("nothing follows the address; a profile is for udp://")
             }
-            ("udp-listen", _) => {
-                refuse("takes samples in (strapd serve --listen); udp://HOST:PORT sends")
-            }
-            ("tcp" | "udp", _) if address.contains('@') => refuse(
-                "no user or password goes into an address; strapd serve --token-file shows a token",
-            ),
+            ("udp-listen", _) => refuse(&format!(
+                "takes samples in (strapd serve {LISTEN}); udp://HOST:PORT sends"
+            )),
+            ("tcp" | "udp", _) if address.contains('@') => refuse(&format!(
+                "no user or password goes into an address; strapd serve {TOKEN_FILE} shows a token"
+            )),
             ("tcp" | "udp", _) if !is_complete => refuse("HOST:PORT is needed"),
             ("tcp", None) => Ok(Target::Tcp(address.to_owned())),
             ("udp", query) => {

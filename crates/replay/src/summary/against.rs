@@ -5,6 +5,7 @@
 use super::{Recorded, significant};
 use serde_json::{Value, json};
 use strapd_attitude::compare::{Align, BiasFit, Consistency, WithinSigma};
+use strapd_attitude::setting::{BIAS, Choice};
 
 /// A share in percent: never 100 where one is outside.
 fn percent(share: f64) -> String {
@@ -76,13 +77,13 @@ pub fn bias_words(fit: &BiasFit, who: &str, whom: &str) -> String {
     )
 }
 
-/// The flag that removes it, beside what was removed already.
+/// What removes it, beside what was removed already.
 #[must_use]
-pub fn bias_flag(fit: &BiasFit, removed: [f64; 3]) -> String {
+pub fn removing(fit: &BiasFit, removed: [f64; 3]) -> Choice {
     let all = nalgebra::Vector3::from(removed) + fit.bias;
     // A millionth of a rad/s is 0.2 deg/h; none is minus nothing.
     let [x, y, z]: [f64; 3] = all.map(|v| (v * 1e6).round() / 1e6 + 0.0).into();
-    format!("--bias {x:.6},{y:.6},{z:.6}")
+    BIAS.to(format!("{x:.6},{y:.6},{z:.6}"))
 }
 
 /// For machines.

@@ -5,6 +5,7 @@ use crate::finding::{Finding, Severity};
 use nalgebra::Vector3;
 use serde_json::{Value, json};
 use strapd_attitude::aid::{Calibration, Filter, Report};
+use strapd_attitude::setting::{AID, NOISE};
 
 /// The filter at the end of a run.
 #[derive(Clone, Copy, Debug)]
@@ -57,11 +58,11 @@ impl Aided {
         } = self.report;
         let mut did = if self.has_field {
             format!(
-                "gravity and field: corrected {updates} times, heading by {fields} fields of the magnetometer (--aid gravity: without)"
+                "gravity and field: corrected {updates} times, heading by {fields} fields of the magnetometer ({AID} gravity: without)"
             )
         } else {
             format!(
-                "gravity: tilt corrected {updates} times, heading the gyro's (--aid none: the gyro alone)"
+                "gravity: tilt corrected {updates} times, heading the gyro's ({AID} none: the gyro alone)"
             )
         };
         if self.is_implausible {
@@ -185,10 +186,10 @@ impl Aided {
             .with("noise", noise)
         };
         (self.started && self.is_beyond_class).then(|| match noise {
-            "uncalibrated" => found().advise("give its sizes to --noise as a list"),
+            "uncalibrated" => found().advise(format!("give its sizes to {NOISE} as a list")),
             _ => found()
                 .advise("a class expects that")
-                .flags("--noise uncalibrated"),
+                .help([NOISE.to("uncalibrated")]),
         })
     }
 

@@ -8,6 +8,7 @@ use nalgebra::Matrix3;
 use serde_json::{Value, json};
 use strapd_attitude::aid::Settings;
 use strapd_attitude::estimate::{Bias, Initial, Plan, Prepared};
+use strapd_attitude::setting::{BIAS, CALIBRATION, INIT, NOISE};
 
 /// One thing that is not known.
 #[derive(Clone, PartialEq, Debug)]
@@ -19,7 +20,7 @@ struct Term {
     value: [f64; 3],
     unit: &'static str,
     /// Said behind it.
-    note: &'static str,
+    note: String,
 }
 
 /// What sigma holds.
@@ -49,7 +50,7 @@ impl SigmaTerms {
             words: "gaps bridged:",
             value: [bridged as f64; 3],
             unit: "",
-            note: "",
+            note: String::new(),
         });
         SigmaTerms {
             is_filtered: prepared.aiding.is_some(),
@@ -64,14 +65,14 @@ impl SigmaTerms {
         let said = self.terms.iter().filter(|t| t.value != [0.0; 3]);
         let said: Vec<String> = said.map(Term::text).collect();
         if said.is_empty() {
-            return "of nothing: --noise CLASS says what the sensor is".to_owned();
+            return format!("of nothing: {NOISE} CLASS says what the sensor is");
         }
         let by = if self.is_filtered {
             format!("the filter's, priors of class {}", self.class)
         } else {
             format!("class {}", self.class)
         };
-        format!("of ({by}, --noise): {}", said.join(", "))
+        format!("of ({by}, {NOISE}): {}", said.join(", "))
     }
 
     /// For machines: every term by its name, those that are nothing with 0.
@@ -80,7 +81,7 @@ impl SigmaTerms {
         json!({
             "by": if self.is_filtered { "filter" } else { "noise" },
             "class": self.class,
-            "flag": "--noise",
+            "flag": NOISE.to_string(),
             "terms": self.terms.iter().map(|t| (t.name.to_owned(), t.json()))
                 .collect::<serde_json::Map<_, _>>(),
         })
@@ -92,22 +93,26 @@ fn alone(plan: &Plan, bias_sigma: [f64; 3], tilt_sigma: f64) -> Vec<Term> {
     let known = plan.calibration.as_deref();
     let noise = &known.map_or_else(|| plan.noise.clone(), |known| known.narrowed(&plan.noise));
     let (turn_on, note) = match plan.bias {
-        Bias::None if known.is_some_and(|known| known.bias.is_some()) => {
-            (bias_sigma, " (left by --calibration, flicker in it)")
-        }
-        Bias::None => (noise.turn_on_bias, " (--bias removes it)"),
-        Bias::Auto | Bias::Given(_) => (noise.left_of_turn_on(), " (left by --bias)"),
+        Bias::None if known.is_some_and(|known| known.bias.is_some()) => (
+            bias_sigma,
+            format!(" (left by {CALIBRATION}, flicker in it)"),
+        ),
+        Bias::None => (noise.turn_on_bias, format!(" ({BIAS} removes it)")),
+        Bias::Auto | Bias::Given(_) => (noise.left_of_turn_on(), format!(" (left by {BIAS})")),
     };
     let (initial, note_of_start) = match plan.initial {
-        Initial::Gravity => (noise.levelled(tilt_sigma).initial, " (--init gravity)"),
-        _ => (noise.initial, ""),
+        Initial::Gravity => (
+            noise.levelled(tilt_sigma).initial,
+            format!(" ({INIT} gravity)"),
+        ),
+        _ => (noise.initial, String::new()),
     };
-    let term = |name, words, value, unit, note| Term {
+    let term = |name, words, value, unit, note: &str| Term {
         name,
         words,
         value,
         unit,
-        note,
+        note: note.to_owned(),
     };
     vec![
         term(
@@ -136,7 +141,7 @@ fn alone(plan: &Plan, bias_sigma: [f64; 3], tilt_sigma: f64) -> Vec<Term> {
             "turn-on bias",
             turn_on.map(f64::to_degrees),
             "deg/s",
-            note,
+            &note,
         ),
         term(
             "scale",
@@ -157,19 +162,19 @@ fn alone(plan: &Plan, bias_sigma: [f64; 3], tilt_sigma: f64) -> Vec<Term> {
             "initial attitude",
             initial.map(f64::to_degrees),
             "deg",
-            note_of_start,
+            &note_of_start,
         ),
     ]
 }
 
 /// Of the filter: what it began with, and learned since.
 fn filtered(settings: &Settings) -> Vec<Term> {
-    let one = |name, words, value: f64, unit, note| Term {
+    let one = |name, words, value: f64, unit, note: &str| Term {
         name,
         words,
         value: [value; 3],
         unit,
-        note,
+        note: note.to_owned(),
     };
     let field = |value: f64| if settings.has_field { value } else { 0.0 };
     // A calibration's sigmas take the place of the class's: of the worst axis.
@@ -306,9 +311,9 @@ mod tests {
     fn what_bias_and_init_leave_is_said_and_what_is_nothing_is_not() {
         let plan = Plan::default();
         let said = words(&plan);
-        assert!(said.contains("class consumer, --noise"), "{said}");
+        assert!(said.contains("class consumer, noise"), "{said}");
         assert!(
-            said.contains("turn-on bias 1.0 deg/s (--bias removes it)"),
+            said.contains("turn-on bias 1.0 deg/s (bias removes it)"),
             "{said}"
         );
         assert!(
@@ -322,11 +327,11 @@ mod tests {
         };
         let said = words(&removed);
         assert!(
-            said.contains("turn-on bias 0.030 deg/s (left by --bias)"),
+            said.contains("turn-on bias 0.030 deg/s (left by bias)"),
             "{said}"
         );
         assert!(
-            said.contains("initial attitude 1.1 deg (--init gravity)"),
+            said.contains("initial attitude 1.1 deg (init gravity)"),
             "{said}"
         );
         let mut given = plan.clone();

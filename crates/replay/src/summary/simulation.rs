@@ -4,6 +4,7 @@ use super::{human_bytes, human_count, line, meaning};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use strapd_attitude::record::SampleKind;
+use strapd_attitude::setting::{NOISE, RATE_HZ, START_STAMP};
 use strapd_bodies::synthetic::Noticed;
 
 /// What a simulation did.
@@ -41,7 +42,7 @@ impl SimulationSummary {
         let n = self.noticed;
         if n.undersampled > 0 {
             warnings.push(format!(
-                "{} of {} steps turn half a turn or more: no one can tell which way; --rate-hz above {:.0}",
+                "{} of {} steps turn half a turn or more: no one can tell which way; {RATE_HZ} above {:.0}",
                 n.undersampled,
                 n.instants,
                 n.fastest / std::f64::consts::PI
@@ -49,19 +50,19 @@ impl SimulationSummary {
         }
         if n.saturated > 0 {
             warnings.push(format!(
-                "{} of {} samples are at the end of the sensor's range; --noise PRESET,range=DEG_S widens it",
+                "{} of {} samples are at the end of the sensor's range; {NOISE} PRESET,range=DEG_S widens it",
                 n.saturated, n.samples
             ));
         }
         if n.force_saturated > 0 {
             warnings.push(format!(
-                "{} of {} specific forces are at the end of the accelerometer's range; --noise PRESET,accel-range=G widens it",
+                "{} of {} specific forces are at the end of the accelerometer's range; {NOISE} PRESET,accel-range=G widens it",
                 n.force_saturated, n.samples
             ));
         }
         if self.stamps_out_of_range > 0 {
             warnings.push(format!(
-                "{} stamps do not fit into the 32-bit seconds of ROS messages (1901 to 2038); --start-stamp",
+                "{} stamps do not fit into the 32-bit seconds of ROS messages (1901 to 2038); {START_STAMP}",
                 self.stamps_out_of_range
             ));
         }

@@ -4,6 +4,7 @@ use super::significant;
 use crate::finding::{Finding, Severity};
 use serde_json::{Value, json};
 use strapd_attitude::estimate::Recording;
+use strapd_attitude::setting::{NOISE, SAMPLE_KIND, SMOOTH};
 use strapd_attitude::smooth::{Calibration, Counts, Learned, Outcome, Sizes};
 
 /// A recording that was smoothed.
@@ -125,10 +126,12 @@ impl Smoothing {
 
     /// What integrated, and what it took a sample for where nobody said that.
     #[must_use]
-    pub fn method(&self) -> &'static str {
+    pub fn method(&self) -> String {
         match self.is_taken_as_mean {
-            true => "smoothed; in steps of at most 5 ms (--sample-kind rate: at their stamps)",
-            false => "smoothed",
+            true => {
+                format!("smoothed; in steps of at most 5 ms ({SAMPLE_KIND} rate: at their stamps)")
+            }
+            false => "smoothed".to_owned(),
         }
     }
 
@@ -285,7 +288,7 @@ impl Smoothing {
         if self.outcome != Outcome::Converged {
             let did = self.lines().into_iter().next();
             found.extend(did.map(|did| {
-                Finding::new(Severity::Warning, "smoothing", format!("--smooth: {did}"))
+                Finding::new(Severity::Warning, "smoothing", format!("{SMOOTH}: {did}"))
             }));
         }
         if self.is_beyond_class {
@@ -299,7 +302,7 @@ impl Smoothing {
                 )
                 .with("noise", noise)
                 .advise("a class says so beforehand")
-                .flags("--noise uncalibrated"),
+                .help([NOISE.to("uncalibrated")]),
             );
         }
         found

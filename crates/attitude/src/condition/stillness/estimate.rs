@@ -6,6 +6,7 @@
 use super::{Limits, Rest, Rests};
 use crate::frames::{Body, Nav};
 use crate::quaternion::Quaternion;
+use crate::setting::{BIAS, GYRO_UNIT, INIT, START, UNTIL};
 use nalgebra::Vector3;
 
 /// A gyro bias from rests.
@@ -56,21 +57,22 @@ impl std::fmt::Display for NoRest {
                         ": the quietest half second has a gyro deviation of {stillest:.4} rad/s, still is below {limit:.4}"
                     )?;
                 }
-                f.write_str(
-                    "\n  help: --bias x,y,z (rad/s) from a recording at rest, or --bias none; if the rates look too large, --gyro-unit deg",
+                write!(
+                    f,
+                    "\n  help: {BIAS} x,y,z (rad/s) from a recording at rest, or {BIAS} none; if the rates look too large, {GYRO_UNIT} deg"
                 )
             }
             NoRest::Disagree { scatter } => write!(
                 f,
-                "the rests contradict each other by {scatter:.4} rad/s: some are slow turns, not rests\n  help: --bias x,y,z (rad/s), or --start/--until around one true rest"
+                "the rests contradict each other by {scatter:.4} rad/s: some are slow turns, not rests\n  help: {BIAS} x,y,z (rad/s), or {START}/{UNTIL} around one true rest"
             ),
             NoRest::NotAtStart { first_rest_secs } => write!(
                 f,
-                "the body moves at the start; it first rests {first_rest_secs:.1} s later\n  help: --start {first_rest_secs:.1} begins there; --init identity starts unlevelled"
+                "the body moves at the start; it first rests {first_rest_secs:.1} s later\n  help: {START} {first_rest_secs:.1} begins there; {INIT} identity starts unlevelled"
             ),
             NoRest::NoAccel => write!(
                 f,
-                "there is no acceleration to level from\n  help: --init identity, or --init rpy=r,p,y"
+                "there is no acceleration to level from\n  help: {INIT} identity, or {INIT} rpy=r,p,y"
             ),
         }
     }

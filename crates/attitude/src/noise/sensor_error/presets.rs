@@ -1,7 +1,6 @@
 //! Classes of gyros by name. Pure.
 
 use super::{ImuError, ImuErrorFault};
-
 /// A class of gyro.
 #[derive(Debug)]
 pub struct Preset {
@@ -95,11 +94,11 @@ pub static PRESETS: [Preset; 15] = [
     Preset {
         name: "consumer",
         terms: "arw=0.84,bias_instability=5",
-        source: "the noise of consumer_mems alone, as replay --noise consumer",
+        source: "the noise of consumer_mems alone, as an estimator expects it of that class",
     },
     Preset {
         name: "industrial",
         terms: "arw=0.15,bias_instability=2",
-        source: "the noise of industrial_mems alone, as replay --noise industrial",
+        source: "the noise of industrial_mems alone, as an estimator expects it of that class",
     },
 ];

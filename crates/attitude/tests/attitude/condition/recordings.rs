@@ -364,7 +364,7 @@ fn the_recordings_rest_where_they_rest_and_nowhere_else() {
             // Moving from the first sample to the last.
             "broad07" | "xsens" | "px4" => {
                 assert!(matches!(bias, Err(NoRest::Moving { .. })), "{name}");
-                assert!(bias.unwrap_err().to_string().contains("--bias"));
+                assert!(bias.unwrap_err().to_string().contains("bias"));
                 assert!(matches!(level_force, Err(NoRest::Moving { .. })), "{name}");
             }
             // Still for the first second alone.

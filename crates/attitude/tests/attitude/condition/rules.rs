@@ -554,7 +554,7 @@ fn the_clock_falls_back_to_log_time_and_says_why() {
         warning,
         Some(ClockWarning::Zero { looked_at: 50, .. })
     ));
-    assert!(warning.unwrap().to_string().contains("--rate-hz"));
+    assert!(warning.unwrap().to_string().contains("rate_hz"));
     let (clock, warning) = choose_clock(&with(|_| None), Clock::Header);
     assert_eq!(clock, Clock::Log);
     assert!(matches!(warning, Some(ClockWarning::Absent { .. })));
@@ -685,63 +685,63 @@ fn settings_that_can_not_be_name_their_flag() {
     let nan = f64::NAN;
     let cases: [(&str, Settings); 9] = [
         (
-            "--body",
+            "body",
             Settings {
                 axes: Matrix3::identity() * 2.0,
                 ..Settings::default()
             },
         ),
         (
-            "--body",
+            "body",
             Settings {
                 axes: Matrix3::from_element(1.0),
                 ..Settings::default()
             },
         ),
         (
-            "--mount",
+            "mount",
             Settings {
                 mount: -Matrix3::identity(),
                 ..Settings::default()
             },
         ),
         (
-            "--mount",
+            "mount",
             Settings {
                 mount: Matrix3::from_element(nan),
                 ..Settings::default()
             },
         ),
         (
-            "--rate-hz",
+            "rate_hz",
             Settings {
                 clock: Clock::Index { rate_hz: 0.0 },
                 ..Settings::default()
             },
         ),
         (
-            "--max-gap",
+            "max_gap",
             Settings {
                 max_gap_secs: nan,
                 ..Settings::default()
             },
         ),
         (
-            "--bias",
+            "bias",
             Settings {
                 bias: Vector3::new(0.0, nan, 0.0),
                 ..Settings::default()
             },
         ),
         (
-            "--gyro-range",
+            "gyro_range",
             Settings {
                 gyro_range: Some(-1.0),
                 ..Settings::default()
             },
         ),
         (
-            "--start",
+            "start",
             Settings {
                 start: Some(3.0),
                 until: Some(2.0),

@@ -11,6 +11,7 @@ use crate::columns::Role;
 use crate::columns::Unit;
 use crate::decode::{Bare, bare_of_text, instant_of_date, unit_of, units_that_fit};
 use strapd_attitude::record::TimeUnit;
+use strapd_attitude::setting::{COLUMNS, RATE_HZ, TIME};
 
 /// Where rows lie in time.
 pub(super) struct Instants {
@@ -46,7 +47,7 @@ impl Roles<'_> {
         let is_refused = given.is_some_and(|given| given.columns.is_empty());
         if let Some(given) = given.filter(|given| !given.columns.is_empty()) {
             let column = given.columns.first().map_or("", String::as_str);
-            let at = place(self.names, column).map_err(|why| format!("--columns stamp: {why}"))?;
+            let at = place(self.names, column).map_err(|why| format!("{COLUMNS} stamp: {why}"))?;
             let stamp = self.stamp(at, given.unit)?;
             return Ok(self.of_stamp(stamp));
         }
@@ -68,7 +69,7 @@ impl Roles<'_> {
                 match (exact.next(), exact.next()) {
                     (Some(one), None) => Ok(self.of_stamp(one)),
                     _ => Err(format!(
-                        "its stamp may be {}: which is meant can not be told\n  help: --columns stamp={}",
+                        "its stamp may be {}: which is meant can not be told\n  help: {COLUMNS} stamp={}",
                         self.listed(several),
                         several
                             .first()
@@ -96,7 +97,7 @@ impl Roles<'_> {
         let given = self.given_of(Role::Counter);
         let column = match given.and_then(|given| given.columns.first()) {
             Some(column) => {
-                Some(place(self.names, column).map_err(|why| format!("--columns counter: {why}"))?)
+                Some(place(self.names, column).map_err(|why| format!("{COLUMNS} counter: {why}"))?)
             }
             None if given.is_some() => None,
             None => {
@@ -109,10 +110,9 @@ impl Roles<'_> {
             return Ok(Instants {
                 clock: Clock::Nothing,
                 column: None,
-                notes: vec![
-                    "no column says when it was measured, and its head no rate: --time index --rate-hz HZ, or --columns stamp=NAME:UNIT"
-                        .to_owned(),
-                ],
+                notes: vec![format!(
+                    "no column says when it was measured, and its head no rate: {TIME} index {RATE_HZ} HZ, or {COLUMNS} stamp=NAME:UNIT"
+                )],
             });
         };
         let period = nearly_whole(1e9 / rate.hz);
@@ -174,7 +174,7 @@ impl Roles<'_> {
             // One that is none among others is counted with its row.
             if numbers.iter().all(|n| !is_number(n)) {
                 return Err(format!(
-                    "`{}` of column `{text}` is no stamp that is known (numbers, RFC 3339)\n  help: --columns stamp=NAME:UNIT names another; --columns stamp=none with --time index --rate-hz HZ does without",
+                    "`{}` of column `{text}` is no stamp that is known (numbers, RFC 3339)\n  help: {COLUMNS} stamp=NAME:UNIT names another; {COLUMNS} stamp=none with {TIME} index {RATE_HZ} HZ does without",
                     crate::text::snippet(odd.as_bytes())
                 ));
             }
@@ -194,7 +194,7 @@ impl Roles<'_> {
                 Ok(of(nanos))
             }
             Some(Err(unit)) => Err(format!(
-                "the unit `{unit}` of its stamps is not known\n  help: --columns stamp={}:UNIT, with ns, us, ms or s",
+                "the unit `{unit}` of its stamps is not known\n  help: {COLUMNS} stamp={}:UNIT, with ns, us, ms or s",
                 self.reference(at)
             )),
             _ => match unit_of(stamps.iter().copied()) {
@@ -206,14 +206,14 @@ impl Roles<'_> {
                     let fits = units_that_fit(stamps.iter().copied());
                     if fits.is_some_and(|(_, fits)| !fits.contains(&by_size)) {
                         return Err(format!(
-                            "`{text}`: {}\n  help: --columns stamp={}:UNIT, with ns, us, ms or s",
+                            "`{text}`: {}\n  help: {COLUMNS} stamp={}:UNIT, with ns, us, ms or s",
                             why.what(),
                             self.reference(at)
                         ));
                     }
                     let mut stamp = of(by_size.nanos(first) as f64);
                     stamp.note = Some(format!(
-                        "the unit of the stamps in `{text}` is not stated; by their size they are taken for {}: --columns stamp={}:ms says otherwise",
+                        "the unit of the stamps in `{text}` is not stated; by their size they are taken for {}: {COLUMNS} stamp={}:ms says otherwise",
                         by_size.name(),
                         self.reference(at)
                     ));
@@ -240,7 +240,7 @@ impl Roles<'_> {
             return Ok(());
         };
         Err(format!(
-            "{} is in {} by its name, but its steps of {step} are those of a gyro only in {}\n  help: --columns stamp={}:{} takes it so, and :{} as its name says",
+            "{} is in {} by its name, but its steps of {step} are those of a gyro only in {}\n  help: {COLUMNS} stamp={}:{} takes it so, and :{} as its name says",
             self.listed(&[at]),
             stated.name(),
             other.name(),
@@ -269,7 +269,7 @@ impl Roles<'_> {
             (None, Some(step)) if step <= FINE_TICKS => Ok(TICK),
             (None, Some(step)) if step >= FINE_MICROS => Ok(MICRO),
             _ => Err(format!(
-                "{} counts in 0.1 ms or in us, and which can not be told\n  help: --columns stamp={}:100us, or :us",
+                "{} counts in 0.1 ms or in us, and which can not be told\n  help: {COLUMNS} stamp={}:100us, or :us",
                 self.listed(&[at]),
                 self.reference(at)
             )),

@@ -12,6 +12,7 @@ use crate::decode::Wanted;
 use std::collections::BTreeMap;
 use strapd_attitude::condition::GyroUnit;
 use strapd_attitude::record::AccelUnit;
+use strapd_attitude::setting::{BODY, COLUMNS};
 
 /// What is known of a table before its roles.
 pub(super) struct Roles<'l> {
@@ -135,7 +136,7 @@ impl Roles<'_> {
         let is_beside = self.wanted != Wanted::Rates && (accel.is_some() || mag.is_some());
         if gyro.is_none() && orientation.is_none() && matrix.is_none() && !is_beside {
             return Err(format!(
-                "none of its columns is a rate or an orientation\n  help: --columns gyro=NAME:NAME:NAME; they are {}",
+                "none of its columns is a rate or an orientation\n  help: {COLUMNS} gyro=NAME:NAME:NAME; they are {}",
                 self.listed(&(0..self.names.len().min(16)).collect::<Vec<_>>())
             ));
         }
@@ -178,7 +179,7 @@ impl Roles<'_> {
         };
         if let Some(at) = of.iter().enumerate().find_map(twice) {
             return Err(format!(
-                "column {} has two roles\n  help: --columns gives each its own",
+                "column {} has two roles\n  help: {COLUMNS} gives each its own",
                 self.listed(&[at])
             ));
         }
@@ -200,7 +201,7 @@ impl Roles<'_> {
         }
         if let Some(axes) = &self.preamble.orientation {
             notes.push(format!(
-                "its head says orientation,{axes}: axes are as recorded unless --body {axes} is given"
+                "its head says orientation,{axes}: axes are as recorded unless {BODY} {axes} is given"
             ));
         }
         table.scales = scales;
@@ -221,7 +222,7 @@ impl Roles<'_> {
             }
             let places = given.columns.iter().map(|column| place(self.names, column));
             let places: Result<Vec<usize>, String> = places.collect();
-            let columns = places.map_err(|why| format!("--columns {}: {why}", kind.name()))?;
+            let columns = places.map_err(|why| format!("{COLUMNS} {}: {why}", kind.name()))?;
             let unit = match given.unit {
                 Some(unit) => Some(unit),
                 None => self.unit(kind, &columns, notes)?.flatten(),
@@ -254,7 +255,7 @@ impl Roles<'_> {
         };
         if let Some([first, second]) = group.twice {
             return Err(format!(
-                "{} is there twice, as columns {} and {}: which of them is meant can not be told\n  help: --columns {}={} takes the first, by its number; {}=none neither",
+                "{} is there twice, as columns {} and {}: which of them is meant can not be told\n  help: {COLUMNS} {}={} takes the first, by its number; {}=none neither",
                 self.listed(&[first]),
                 first + 1,
                 second + 1,
@@ -287,7 +288,7 @@ impl Roles<'_> {
         };
         if let Some(other) = names.iter().find(|name| name.unit != first.unit) {
             return Err(format!(
-                "its {} has several units: `{}` and `{}`\n  help: --columns {}={}:UNIT, where all of them are of one",
+                "its {} has several units: `{}` and `{}`\n  help: {COLUMNS} {}={}:UNIT, where all of them are of one",
                 kind.name(),
                 first.text,
                 other.text,
@@ -299,13 +300,13 @@ impl Roles<'_> {
             (Some(Ok(unit)), _) => Some(Some(*unit)),
             (Some(Err(unit)), Kind::Gyro) => {
                 return Err(format!(
-                    "the unit `{unit}` of its rates is not known\n  help: --columns gyro={}:deg/s (or rad/s, mrad/s, mdps)",
+                    "the unit `{unit}` of its rates is not known\n  help: {COLUMNS} gyro={}:deg/s (or rad/s, mrad/s, mdps)",
                     self.references(columns)
                 ));
             }
             (Some(Err(unit)), Kind::Accel) => {
                 notes.push(format!(
-                    "{} are not used: their unit `{unit}` is not known (--columns accel={}:g)",
+                    "{} are not used: their unit `{unit}` is not known ({COLUMNS} accel={}:g)",
                     self.listed(columns),
                     self.references(columns)
                 ));
@@ -362,7 +363,7 @@ impl Roles<'_> {
         if let Some((_, why)) = aside.first() {
             let columns: Vec<usize> = aside.iter().map(|(at, _)| *at).take(3).collect();
             notes.push(format!(
-                "{} is not used, since it {why}: --columns {}={} uses it",
+                "{} is not used, since it {why}: {COLUMNS} {}={} uses it",
                 self.listed(&columns),
                 kind.name(),
                 self.references(&columns)
@@ -374,11 +375,11 @@ impl Roles<'_> {
         let each: Vec<String> = groups.iter().map(|g| self.listed(&g.columns)).collect();
         let flags: Vec<String> = groups
             .iter()
-            .map(|g| format!("--columns {}={}", kind.name(), self.references(&g.columns)))
+            .map(|g| format!("{COLUMNS} {}={}", kind.name(), self.references(&g.columns)))
             .collect();
         let none = match kind {
             Kind::Gyro => String::new(),
-            _ => format!(", or --columns {}=none", kind.name()),
+            _ => format!(", or {COLUMNS} {}=none", kind.name()),
         };
         format!(
             "its {} may be {}: which is meant can not be told\n  help: {}{none}",

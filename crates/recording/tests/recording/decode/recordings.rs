@@ -274,7 +274,7 @@ fn a_channel_that_can_not_be_decoded_is_refused_by_topic_type_and_encoding() {
         "/test_topic",
         "test_msgs/msg/BasicTypes",
         "wrong_format",
-        "--topic",
+        "topic",
     ] {
         assert!(error.contains(part), "{error}");
     }

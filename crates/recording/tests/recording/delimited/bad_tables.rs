@@ -32,14 +32,14 @@ fn what_can_not_be_told_is_refused_with_the_flag_that_tells_it() {
             &[
                 "several units",
                 "`gyro_x (deg/s)` and `gyro_y (rad/s)`",
-                "--columns gyro=",
+                "columns gyro=",
             ][..],
         ),
         (
             "time_s,gyro_x [LSB],gyro_y [LSB],gyro_z [LSB]",
             &[
                 "unit `LSB` of its rates is not known",
-                "--columns gyro=gyro_x [LSB]:gyro_y [LSB]:gyro_z [LSB]:deg/s",
+                "columns gyro=gyro_x [LSB]:gyro_y [LSB]:gyro_z [LSB]:deg/s",
             ],
         ),
         (
@@ -48,29 +48,29 @@ fn what_can_not_be_told_is_refused_with_the_flag_that_tells_it() {
                 "its gyro may be",
                 "`wx`, `wy`, `wz`",
                 "`left_gyro_x`",
-                "--columns gyro=wx:wy:wz",
+                "columns gyro=wx:wy:wz",
             ],
         ),
         (
             "time_s,gyro_x,gyro_y,gyro_z,acc_x,acc_y,acc_z,accel_hi_x,accel_hi_y,accel_hi_z",
             &[
                 "its accel may be",
-                "--columns accel=acc_x:acc_y:acc_z",
-                "--columns accel=none",
+                "columns accel=acc_x:acc_y:acc_z",
+                "columns accel=none",
             ],
         ),
         (
             "time_s,timestamp_ms,gyro_x,gyro_y,gyro_z",
             &[
                 "its stamp may be `time_s`, `timestamp_ms`",
-                "--columns stamp=time_s",
+                "columns stamp=time_s",
             ],
         ),
         (
             "time_s,gyro_x,gyro_x,gyro_y,gyro_z",
             &[
                 "there twice, as columns 2 and 3",
-                "--columns gyro=2:gyro_y:gyro_z",
+                "columns gyro=2:gyro_y:gyro_z",
             ],
         ),
         (
@@ -78,16 +78,16 @@ fn what_can_not_be_told_is_refused_with_the_flag_that_tells_it() {
             &[
                 "none of its columns names a rate",
                 "`temperature`",
-                "--columns gyro=",
+                "columns gyro=",
             ],
         ),
         (
             "time_s,gyro_raw_x,gyro_raw_y,gyro_raw_z",
-            &["is not calibrated by its name", "--columns gyro="],
+            &["is not calibrated by its name", "columns gyro="],
         ),
         (
             "timestamp,x,y,z",
-            &["of which sensor", "--columns gyro=x:y:z"],
+            &["of which sensor", "columns gyro=x:y:z"],
         ),
         (
             "when,\u{1b}[2J,that,what",
@@ -111,7 +111,7 @@ fn a_unit_of_stamps_that_the_steps_deny_is_not_believed_and_one_that_is_not_said
         &[
             "`time (s)` is in s by its name",
             "steps of 10 are those of a gyro only in ms",
-            "--columns stamp=time (s):ms",
+            "columns stamp=time (s):ms",
             ":s as",
         ],
     );
@@ -146,7 +146,7 @@ fn a_unit_of_stamps_that_the_steps_deny_is_not_believed_and_one_that_is_not_said
     refused(
         "x.csv",
         &named("time", 20.0),
-        &["can not be told", "--columns stamp=time:UNIT"],
+        &["can not be told", "columns stamp=time:UNIT"],
     );
     // One text among them is a bad row, all of them are no stamps.
     refused(
@@ -233,7 +233,7 @@ fn what_is_no_table_of_text_is_called_so() {
     refused(
         "x.csv",
         "1,2,3\n4,5,6\n",
-        &["name columns", "--columns gyro=2:3:4"],
+        &["name columns", "columns gyro=2:3:4"],
     );
     refused("x.csv", "hello\nworld\n", &["begins with `hello"]);
     refused(
