@@ -73,6 +73,12 @@ impl Format {
         }
     }
 
+    /// Whether it is text, lines or rows; everything else is a log of messages on channels.
+    #[must_use]
+    pub fn is_text(self) -> bool {
+        matches!(self, Format::Lines | Format::Table)
+    }
+
     /// The log of messages on channels of which these are the first bytes.
     #[must_use]
     pub(crate) fn of_magic(head: &[u8]) -> Option<Format> {

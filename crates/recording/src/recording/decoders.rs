@@ -3,13 +3,13 @@
 //! Apart from the log because how its messages are understood is asked again for each run, and a log may
 //! have tens of thousands of channels of one schema, or as many schemas.
 
+use crate::decode::{self, Decoder, Effort, Options, Unsupported};
+use crate::mcap::{Channel, Schema};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use strapd_attitude::condition::Clock;
 use strapd_attitude::estimate::Plan;
 use strapd_attitude::record::Nanos;
-use strapd_recording::decode::{self, Decoder, Effort, Options, Unsupported};
-use strapd_recording::mcap::{Channel, Schema};
 
 /// Decoders under the same options. All of a log together cost no more than one [`Effort`].
 #[derive(Debug, Default)]
@@ -117,7 +117,7 @@ impl Decoders {
         match &known.decoder {
             Ok(decoder) => Ok(decoder.of_topic(&channel.topic)),
             Err(why) => Err(Unsupported {
-                topic: strapd_recording::text::printable(&channel.topic),
+                topic: crate::text::printable(&channel.topic),
                 ..why.clone()
             }),
         }
