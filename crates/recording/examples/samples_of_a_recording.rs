@@ -27,6 +27,10 @@ fn main() -> Result<(), Error> {
     let recording = Recording::open(&path, &selection, &pool, &warn)?;
     let mut counts: BTreeMap<String, u64> = BTreeMap::new();
     let lost = recording.samples(&selection, &pool, |topic, sample, _| {
+        if sample.is_beside {
+            // A force or a field of another sensor, to correct with.
+            return Ok::<_, Error>(ControlFlow::Continue(()));
+        }
         let count = counts.entry(topic.to_owned()).or_default();
         *count += 1;
         if *count <= 3 {
@@ -34,7 +38,7 @@ fn main() -> Result<(), Error> {
             let stamp = sample.header.unwrap_or(sample.log);
             println!("{topic} {} {:?} {:?}", stamp.0, sample.gyro, sample.accel);
         }
-        Ok::<_, Error>(ControlFlow::Continue(()))
+        Ok(ControlFlow::Continue(()))
     })?;
     for (topic, count) in counts {
         println!("{topic}: {count} samples");

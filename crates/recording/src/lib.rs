@@ -1,13 +1,13 @@
 //! Recordings of every kind -> samples, with no byte believed before it is checked.
 //!
-//! ```no_run
+//! ```
 //! use std::{ops::ControlFlow, path::Path};
 //! use strapd_recording::{Error, Recording, Selection, Warn, pool::Pool};
 //!
 //! let pool = Pool::new(0)?; // a thread per core; how many changes no bit
 //! let selection = Selection::default(); // its only IMU; a topic, and where values lie in its messages
 //! let warn = Warn::by(|what| eprintln!("{what}"));
-//! let recording = Recording::open(Path::new("flight.mcap"), &selection, &pool, &warn)?;
+//! let recording = Recording::open(Path::new("../../fixtures/xsens_mti.mcap"), &selection, &pool, &warn)?;
 //! let lost = recording.samples(&selection, &pool, |topic, sample, _meaning| {
 //!     println!("{topic} {:?} {:?}", sample.header, sample.gyro); // rad/s; x forward, y left, z up
 //!     Ok::<_, Error>(ControlFlow::Continue(()))

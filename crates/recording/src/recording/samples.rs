@@ -28,7 +28,8 @@ impl Recording {
 
     /// Gives `take` the samples that are selected, in the order of the recording, until it has enough or fails: the topic
     /// of each, or of several publishers on one the name that tells them apart; the sample in rad/s, m/s^2 and body axes
-    /// x forward, y left, z up; and what its format says a rate means. Payloads that could not be read are told to whom
+    /// x forward, y left, z up; and what its format says a rate means. Forces and fields with stamps of their own that
+    /// belong to the samples of the one topic come between them ([`RawSample::is_beside`]). Payloads that could not be read are told to whom
     /// the recording was opened with, and how many were lost comes back.
     ///
     /// # Errors
