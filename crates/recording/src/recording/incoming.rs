@@ -18,7 +18,7 @@ pub enum Incoming<R> {
     /// Messages on channels.
     Messages(Reader),
     /// Lines or rows.
-    Lines(Lines<R>),
+    Lines(Box<Lines<R>>),
 }
 
 /// Whether a stream holds messages or lines; `name` is what errors call it. No more is read than tells it.
@@ -52,7 +52,7 @@ pub fn incoming<R: Read + Send + 'static>(
     let whole = Cursor::new(head).chain(input);
     if format.is_text() {
         let lines = line_input::open(name, format, whole, options)?;
-        return Ok(Incoming::Lines(lines));
+        return Ok(Incoming::Lines(Box::new(lines)));
     }
     line_input::only_for_tables(name, format, options)?;
     Ok(Incoming::Messages(Reader::from_stream(

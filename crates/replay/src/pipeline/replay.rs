@@ -68,7 +68,7 @@ fn piped(
 ) -> Result<RunSummary> {
     match incoming(&run.source.name(), input, &run.selection.decode)? {
         Incoming::Messages(reader) => replay_stream::replay(run, reader, pool, watch),
-        Incoming::Lines(text) => lines::replay(run, text, None, pool, watch),
+        Incoming::Lines(text) => lines::replay(run, *text, None, pool, watch),
     }
 }
 
