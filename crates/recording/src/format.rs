@@ -58,7 +58,7 @@ const ENDINGS: [(&str, Format); 9] = [
 ];
 
 /// Bytes that are looked at: the first line of a table is shorter.
-pub const HEAD: usize = 4096;
+pub(crate) const HEAD: usize = 4096;
 
 impl Format {
     /// What people call it.
@@ -175,7 +175,7 @@ impl Format {
 ///
 /// # Errors
 /// The stream can not be read.
-pub fn head_of(input: &mut impl BufRead) -> std::io::Result<Vec<u8>> {
+pub(crate) fn head_of(input: &mut impl BufRead) -> std::io::Result<Vec<u8>> {
     let mut head = Vec::new();
     while head.len() < HEAD && !tells_enough(&head) {
         let wanted = HEAD - head.len();
