@@ -7,9 +7,9 @@ mod words;
 use super::estimation::{KindArg, TimeArg, UnitArg};
 use super::tables::Tables;
 use super::{Global, Outcome, print};
-use crate::config::{Selection, selection};
+use crate::config::selection;
 use crate::error::{Error, Result};
-use crate::pipeline::input::Input;
+use crate::pipeline::logged;
 use crate::report::page::Noise;
 use crate::sink::Document;
 use clap::Args;
@@ -19,6 +19,8 @@ use strapd_attitude::condition::{Clock, GyroUnit};
 use strapd_attitude::estimate::Plan;
 use strapd_attitude::noise::allan::{AllanFit, Point, cluster_sizes, deviation, fit};
 use strapd_attitude::record::SampleKind;
+use strapd_recording::Input;
+use strapd_recording::Selection;
 use strapd_recording::pool::Pool;
 
 /// Allan deviation of a recording at rest: angle random walk, bias instability, rate random walk,
@@ -119,9 +121,9 @@ pub fn run(global: &Global, args: &Allan) -> Result<Outcome> {
     };
     let (plot, csv) = (open(&args.plot)?, open(&args.csv)?);
     let pool = Pool::new(global.threads)?;
-    let input = Input::open(&args.file)?;
+    let input = logged::open(&args.file)?;
     let gathered = gather::gather(&input, (&selection, &plan), gather::CAPACITY, &pool)?;
-    let axes = analyse(&gathered).map_err(|what| Error::Topic {
+    let axes = analyse(&gathered).map_err(|what| strapd_recording::Error::Topic {
         path: input.name().to_owned(),
         topic: gathered.topic.clone(),
         what,
@@ -131,7 +133,7 @@ pub fn run(global: &Global, args: &Allan) -> Result<Outcome> {
     }
     if let Some(document) = plot {
         let chart = outputs::chart(&gathered.topic, &axes);
-        let svg = chart.svg().map_err(|e| Error::Topic {
+        let svg = chart.svg().map_err(|e| strapd_recording::Error::Topic {
             path: input.name().to_owned(),
             topic: gathered.topic.clone(),
             what: e.to_string(),
@@ -162,7 +164,7 @@ const FOR_REPORT: usize = 1 << 20;
 /// As [`run`], but for outputs.
 pub(super) fn examined(input: &Input, asked: (&Selection, &Plan), pool: &Pool) -> Result<Noise> {
     let gathered = gather::gather(input, asked, FOR_REPORT, pool)?;
-    let fails = |what| Error::Topic {
+    let fails = |what| strapd_recording::Error::Topic {
         path: input.name().to_owned(),
         topic: gathered.topic.clone(),
         what,

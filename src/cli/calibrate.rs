@@ -5,10 +5,9 @@ use super::estimation::{AidArg, Estimation};
 use super::progress::Reporter;
 use super::tables::Tables;
 use super::{Global, Outcome, print};
-use crate::config::Selection;
 use crate::error::{Error, Result};
 use crate::pipeline::replay;
-use crate::pipeline::request::{ReplayRequest, Source};
+use crate::pipeline::request::ReplayRequest;
 use crate::report::calibrating::{Calibrating, Recorded};
 use crate::report::calibration;
 use crate::report::summary::TopicSummary;
@@ -16,6 +15,8 @@ use crate::sink::Target;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use strapd_attitude::estimate::{Aid, Plan, Pooled, SensorCalibration};
+use strapd_recording::Selection;
+use strapd_recording::Source;
 use strapd_recording::pool::Pool;
 
 /// Calibrate a sensor: what recordings of it tell of its bias, scale and axes, of all of them together.

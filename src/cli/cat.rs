@@ -8,17 +8,17 @@ use super::{Global, Outcome};
 use crate::client::remote::Remote;
 use crate::config::selection;
 use crate::error::{Error, Result};
-use crate::pipeline::decoders::Decoders;
-use crate::pipeline::input::Input;
-use crate::pipeline::log::Log;
-use crate::pipeline::topic_reading::TopicReading;
+use crate::pipeline::logged;
 use crate::sink::{RAW_HEADER, push_raw_row};
 use clap::{Args, ValueEnum};
 use std::io::{BufWriter, Write};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use strapd_attitude::record::{RawSample, SampleKind};
+use strapd_recording::Recording;
 use strapd_recording::pool::Pool;
+use strapd_recording::recording::decoders::Decoders;
+use strapd_recording::recording::topic_reading::TopicReading;
 
 /// Decoded samples of a file, or attitudes of a daemon, as NDJSON, CSV or a table: rad/s, m/s^2, axes FLU.
 #[derive(Args, Debug)]
@@ -102,8 +102,8 @@ pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
     let mut options = selection(None, &args.fields, false, [None; 2])?.decode;
     args.tables.put(&mut options)?;
     let pool = Pool::new(global.threads)?;
-    let log = Log::told_apart(
-        &Input::open(&args.source)?,
+    let log = Recording::told_apart(
+        &logged::open(&args.source)?,
         args.topic.as_deref(),
         &options,
         &pool,
@@ -111,7 +111,7 @@ pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
     let mut decoders = Decoders::new(&options);
     let reading = TopicReading::new(&log, args.topic.as_deref(), &mut decoders)?.with_fields();
     let mut printer = Printer::new(args.format, reading.name(), args.count)?;
-    let lost = reading.walk_in_flu(&pool, |raw, kind| {
+    let lost = reading.walk_in_flu::<Error>(&pool, |raw, kind| {
         let wants_more = printer
             .print(raw, kind)
             .map_err(|e| Error::writing("stdout", e))?;

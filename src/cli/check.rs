@@ -4,7 +4,7 @@ use super::tables::Tables;
 use super::{Global, Outcome, print, with_each};
 use crate::error::{Error, Result};
 use crate::pipeline::check::check;
-use crate::pipeline::input::Input;
+use crate::pipeline::logged;
 use crate::report::findings::{Finding, Severity, findings};
 use clap::Args;
 use serde_json::json;
@@ -68,7 +68,7 @@ fn one(
     file: &Path,
     (options, pool): (&Options, &Pool),
 ) -> Result<(String, Outcome)> {
-    let input = Input::open(file)?;
+    let input = logged::open(file)?;
     let checked = check(&input, args.topic.as_deref(), options, pool)?;
     let found = findings(&checked);
     let worst = found.iter().map(|f| f.severity).max();

@@ -4,7 +4,7 @@ use super::tables::Tables;
 use super::{Global, Outcome, print};
 use crate::error::{Error, Result};
 use crate::pipeline::attitude_track::{self, Side};
-use crate::pipeline::input::Input;
+use crate::pipeline::logged;
 use crate::report::against;
 use crate::report::page::{STRETCHES, comparison_json};
 use crate::report::plot::{Axis, Chart, Look, Series};
@@ -99,7 +99,13 @@ pub fn run(global: &Global, args: &Compare) -> Result<Outcome> {
     let mut options = Options::default();
     args.tables.put(&mut options)?;
     let read = |path: &Path, side, topic: &Option<String>| {
-        attitude_track::read(&Input::open(path)?, side, topic.as_deref(), &options, &pool)
+        attitude_track::read(
+            &logged::open(path)?,
+            side,
+            topic.as_deref(),
+            &options,
+            &pool,
+        )
     };
     let estimate = read(&args.estimate, Side::Estimate, &args.topic)?;
     let reference = read(&args.reference, Side::Reference, &args.ref_topic)?;
@@ -114,10 +120,14 @@ pub fn run(global: &Global, args: &Compare) -> Result<Outcome> {
     let told = Told::of(&estimate, (&estimated, &referred), align);
     if let Some(document) = plot {
         let chart = chart(&estimated, &referred, align, errors);
-        document.write(&chart.svg().map_err(|e| Error::Unsupported {
-            path: args.estimate.clone(),
-            what: e.to_string(),
-        })?)?;
+        document.write(
+            &chart
+                .svg()
+                .map_err(|e| strapd_recording::Error::Unsupported {
+                    path: args.estimate.clone(),
+                    what: e.to_string(),
+                })?,
+        )?;
     }
     let exceeded = args
         .max_angle
@@ -269,14 +279,14 @@ fn no_match(
         }
         _ => format!("{}: no attitudes", t.name),
     };
-    Error::Unsupported {
+    strapd_recording::Error::Unsupported {
         path: args.estimate.clone(),
         what: format!(
             "no instant in common with the reference\n  {}\n  {}\n  help: are both on the same clock (replay --time)?",
             span(estimate),
             span(reference)
         ),
-    }
+    }.into()
 }
 
 fn as_text(result: &Comparison, align: Align, estimate: &str, reference: &str) -> String {

@@ -3,7 +3,7 @@
 
 use super::calibration_files::Calibrations;
 use crate::config::{
-    Selection, parse_bias, parse_initial, parse_noise, parse_truncation, selection, unit_quaternion,
+    parse_bias, parse_initial, parse_noise, parse_truncation, selection, unit_quaternion,
 };
 use crate::error::{Error, Result};
 use clap::{Args, ValueEnum};
@@ -14,6 +14,7 @@ use strapd_attitude::condition::{Clock, GyroUnit, OnGap};
 use strapd_attitude::estimate::{Aid, Plan, SensorCalibration, Truncation};
 use strapd_attitude::propagate::{Method, Order, Placement};
 use strapd_attitude::record::SampleKind;
+use strapd_recording::Selection;
 
 /// How the samples are to be understood and integrated.
 #[derive(Args, Debug, Clone)]

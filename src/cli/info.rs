@@ -6,14 +6,15 @@ mod words;
 use super::tables::Tables;
 use super::{Global, Outcome, print, with_each};
 use crate::error::{Error, Result};
-use crate::pipeline::input::Input;
 use crate::pipeline::inspection::look;
-use crate::pipeline::log::{Log, problems};
-use crate::pipeline::topics;
+use crate::pipeline::logged;
 use clap::Args;
 use std::path::{Path, PathBuf};
+use strapd_recording::Recording;
 use strapd_recording::decode::Options;
 use strapd_recording::pool::Pool;
+use strapd_recording::recording::opened::problems;
+use strapd_recording::recording::topics;
 
 /// What a log holds: topics, rates, clocks, frames, and what to do next.
 #[derive(Args, Debug)]
@@ -66,16 +67,17 @@ fn one(
     file: &Path,
     (options, pool): (&Options, &Pool),
 ) -> Result<(String, Outcome)> {
-    let input = Input::open(file)?;
-    let log = Log::told_apart(&input, args.topic.as_deref(), options, pool)?;
+    let input = logged::open(file)?;
+    let log = Recording::told_apart(&input, args.topic.as_deref(), options, pool)?;
     if let Some(topic) = &args.topic
         && !log.has(topic)
     {
-        return Err(Error::NoSuchTopic {
+        return Err(strapd_recording::Error::NoSuchTopic {
             path: input.name().to_owned(),
             topic: topic.clone(),
             topics: topics::listing(&log.candidates()),
-        });
+        }
+        .into());
     }
     let looks = look(&log, args.topic.as_deref(), options, pool)?;
     let survey = &looks.survey;

@@ -5,12 +5,12 @@ use super::replay::CompressionArg;
 use super::{Global, Outcome, print};
 use crate::error::Result;
 use crate::pipeline::recover::{self, Recovered};
-use crate::pipeline::request::Source;
 use crate::report::summary::human_bytes;
 use crate::sink::{Encoding, Options, Target};
 use clap::Args;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
+use strapd_recording::Source;
 use strapd_recording::pool::Pool;
 use strapd_recording::text::printable;
 
@@ -131,7 +131,7 @@ fn text(source: &str, recovered: &Recovered) -> String {
     );
     for found in &survey.channels {
         let topic = printable(&found.channel.topic);
-        let described = crate::pipeline::log_channel::described(&found.channel);
+        let described = strapd_recording::recording::log_channel::described(&found.channel);
         let _ = writeln!(out, "  {topic}  {described}  {} messages", found.messages);
     }
     for (count, what) in [

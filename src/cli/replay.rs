@@ -6,16 +6,18 @@ use super::progress::Reporter;
 use super::serving::{Served, Serving};
 use super::tables::Tables;
 use super::{Global, Outcome, outputs, print};
-use crate::config::{Selection, Shard};
+use crate::config::Shard;
 use crate::error::{Error, Result};
 use crate::pipeline::replay;
-use crate::pipeline::request::{ReplayRequest, Source};
+use crate::pipeline::request::ReplayRequest;
 use crate::report::summary::RunSummary;
 use crate::sink::{Compression, Encoding, Options, Target};
 use clap::{Args, ValueEnum};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use strapd_attitude::estimate::Plan;
+use strapd_recording::Selection;
+use strapd_recording::Source;
 use strapd_recording::pool::Pool;
 
 /// Turn recorded gyro samples into attitude.

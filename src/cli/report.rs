@@ -4,11 +4,10 @@ use super::estimation::Estimation;
 use super::progress::Reporter;
 use super::tables::Tables;
 use super::{Global, Outcome, allan, print};
-use crate::config::Selection;
 use crate::error::{Error, Result};
 use crate::pipeline::attitude_track::{self, Side, Track};
 use crate::pipeline::check::{Drawing, Examination, examine};
-use crate::pipeline::input::Input;
+use crate::pipeline::logged;
 use crate::pipeline::provenance::sha256;
 use crate::report::findings::findings;
 use crate::report::page::{DRAWN, Noise, Page, STRETCHES, Told, longest_rest};
@@ -17,6 +16,8 @@ use crate::sink::Document;
 use clap::Args;
 use std::path::PathBuf;
 use strapd_attitude::estimate::{Bias, Plan};
+use strapd_recording::Input;
+use strapd_recording::Selection;
 use strapd_recording::decode::Options;
 use strapd_recording::pool::Pool;
 use strapd_replay::inspection::CheckedTopic;
@@ -99,7 +100,7 @@ pub fn run(global: &Global, args: &Report) -> Result<Outcome> {
         .map(|path| Document::create(path, &inputs, args.force))
         .transpose()?;
     let pool = Pool::new(global.threads)?;
-    let input = Input::open(&args.file)?;
+    let input = logged::open(&args.file)?;
     let reference = args.read_reference(&pool)?;
     let asked = Examination {
         selection,
@@ -191,7 +192,7 @@ impl Report {
             return Ok(None);
         };
         let track = attitude_track::read(
-            &Input::open(path)?,
+            &logged::open(path)?,
             Side::Reference,
             self.ref_topic.as_deref(),
             &Options::default(),

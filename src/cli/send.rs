@@ -12,19 +12,19 @@ use crate::client::secret::Secret;
 use crate::client::sender::Sender;
 use crate::config::selection;
 use crate::error::{Error, Result};
-use crate::pipeline::decoders::Decoders;
-use crate::pipeline::input::Input;
-use crate::pipeline::log::Log;
+use crate::pipeline::logged;
 use crate::pipeline::pace::Pace;
-use crate::pipeline::topic_reading::TopicReading;
 use clap::Args;
 use serde_json::json;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use strapd_attitude::record::Nanos;
+use strapd_recording::Recording;
 use strapd_recording::decode::Options;
 use strapd_recording::pool::Pool;
+use strapd_recording::recording::decoders::Decoders;
+use strapd_recording::recording::topic_reading::TopicReading;
 use tokio::sync::mpsc;
 
 /// Lines handed over at once by the thread that reads.
@@ -105,8 +105,8 @@ pub fn run(global: &Global, args: &Send) -> Result<Outcome> {
     args.tables.put(&mut options)?;
     // Looked at before anybody is called: a log that can not be read is not the daemon's business.
     let pool = Pool::new(global.threads)?;
-    let log = Log::told_apart(
-        &Input::open(&args.source)?,
+    let log = Recording::told_apart(
+        &logged::open(&args.source)?,
         args.topic.as_deref(),
         &options,
         &pool,
@@ -157,7 +157,7 @@ pub fn run(global: &Global, args: &Send) -> Result<Outcome> {
 /// Reads the log and hands its lines over, until it ends or nobody takes them.
 fn read(
     args: &Send,
-    log: &Log,
+    log: &Recording,
     options: &Options,
     pool: &Pool,
     give: mpsc::Sender<Vec<Line>>,
@@ -167,7 +167,7 @@ fn read(
     let topic = reading.name().to_owned();
     let id = args.id.as_deref().unwrap_or(&topic);
     let (mut batch, mut seq) = (Vec::with_capacity(BATCH), 0);
-    let lost = reading.walk_in_flu(pool, |raw, kind| {
+    let lost = reading.walk_in_flu::<Error>(pool, |raw, kind| {
         batch.push(Line {
             due: raw.header.unwrap_or(raw.log),
             text: line::rate(id, seq, raw, kind).to_string(),

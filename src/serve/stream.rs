@@ -10,7 +10,6 @@ mod resetting;
 pub mod run;
 pub mod stamps;
 
-use crate::pipeline::early_besides;
 use crate::pipeline::session_builder::labelled;
 use crate::report::aid::Aided;
 use crate::report::calibration;
@@ -37,6 +36,7 @@ use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{AttitudeSample, Counts, Nanos, RawSample, Verdict};
 use strapd_attitude::record::{Declared, TimeUnit};
 use strapd_recording::decode::{Ambiguous, Bare, Line};
+use strapd_recording::recording::early_besides;
 
 /// That forces are not used was said; the bits below are verdicts.
 const FORCES: u32 = 1 << 31;

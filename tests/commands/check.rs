@@ -7,7 +7,7 @@ mod recordings;
 
 use std::path::Path;
 use strapd::pipeline::check::check;
-use strapd::pipeline::input::Input;
+use strapd::pipeline::logged;
 use strapd::report::findings::{Finding, Severity, findings};
 use strapd_recording::decode::Options;
 use strapd_recording::pool::Pool;
@@ -16,7 +16,7 @@ fn found(path: &Path) -> Vec<Finding> {
     let pool = Pool::new(2).unwrap();
     findings(
         &check(
-            &Input::open(path).unwrap(),
+            &logged::open(path).unwrap(),
             None,
             &Options::default(),
             &pool,

@@ -10,8 +10,8 @@ use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use strapd::pipeline::recover::{Recover, Recovered, run};
-use strapd::pipeline::request::Source;
 use strapd::sink::{Options, Target};
+use strapd_recording::Source;
 use strapd_recording::mcap::{Message, Order, Reader, Survey, WalkOptions, walk};
 use strapd_recording::pool::Pool;
 

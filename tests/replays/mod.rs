@@ -4,10 +4,11 @@
 use std::path::{Path, PathBuf};
 use strapd::error::Result;
 use strapd::pipeline::replay::run;
-use strapd::pipeline::request::{ReplayRequest, Source};
+use strapd::pipeline::request::ReplayRequest;
 use strapd::report::summary::{RunSummary, TopicSummary};
 use strapd::sink::Target;
 use strapd_attitude::estimate::Plan;
+use strapd_recording::Source;
 use strapd_recording::pool::Pool;
 
 /// A replay of a file into nothing, every setting at its default.

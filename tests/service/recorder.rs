@@ -10,10 +10,10 @@ use mcap::sans_io::{LinearReadEvent, LinearReader};
 use nalgebra::Vector3;
 use std::path::Path;
 use strapd::pipeline::recover::{Recover, Recovered, run};
-use strapd::pipeline::request::Source;
 use strapd::sink::{Options, Target};
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{AttitudeCovariance, AttitudeSample, Nanos, RawSample, Status};
+use strapd_recording::Source;
 use strapd_recording::pool::Pool;
 
 /// Sample `k` of a sensor that sends `rate_hz` a second. Its last digits differ from sample to sample, so

@@ -7,6 +7,9 @@ use crate::text::printable;
 use serde::Deserialize;
 use strapd_attitude::record::Nanos;
 
+/// What lines call the true attitude of simulated samples: a reference to hold estimates against, and no sample.
+pub const TRUTH_ID: &str = "truth";
+
 /// One attitude as a line says it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Attitude {

@@ -171,7 +171,7 @@ enum Plan {
 /// What may be spent on the schemas of one log: a few kilobytes of schema can spell out to tens of thousands of
 /// fields, and a log can hold thousands of schemas. Those of a hundred recordings together spell out to fewer.
 #[derive(Debug, Clone)]
-pub struct Effort {
+pub(crate) struct Effort {
     fields: usize,
 }
 
@@ -223,7 +223,7 @@ impl Decoder {
     ///
     /// # Errors
     /// As [`Decoder::compile`], and when the effort is spent.
-    pub fn compile_within(
+    pub(crate) fn compile_within(
         channel: &Channel<'_>,
         options: &Options,
         effort: &mut Effort,

@@ -58,7 +58,7 @@ const ENDINGS: [(&str, Format); 9] = [
 ];
 
 /// Bytes that are looked at: the first line of a table is shorter.
-pub const HEAD: usize = 4096;
+pub(crate) const HEAD: usize = 4096;
 
 impl Format {
     /// What people call it.
@@ -71,6 +71,12 @@ impl Format {
             Format::Lines => "NDJSON",
             Format::Table => "CSV",
         }
+    }
+
+    /// Whether it is text, lines or rows; everything else is a log of messages on channels.
+    #[must_use]
+    pub fn is_text(self) -> bool {
+        matches!(self, Format::Lines | Format::Table)
     }
 
     /// The log of messages on channels of which these are the first bytes.
@@ -169,7 +175,7 @@ impl Format {
 ///
 /// # Errors
 /// The stream can not be read.
-pub fn head_of(input: &mut impl BufRead) -> std::io::Result<Vec<u8>> {
+pub(crate) fn head_of(input: &mut impl BufRead) -> std::io::Result<Vec<u8>> {
     let mut head = Vec::new();
     while head.len() < HEAD && !tells_enough(&head) {
         let wanted = HEAD - head.len();

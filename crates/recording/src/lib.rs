@@ -1,13 +1,31 @@
-//! Logs of every kind -> samples, with no byte believed before it is checked.
+//! Recordings of every kind -> samples, with no byte believed before it is checked.
+//!
+//! ```
+//! use std::{ops::ControlFlow, path::Path};
+//! use strapd_recording::{Error, Recording, Selection, Warn, pool::Pool};
+//!
+//! let pool = Pool::new(0)?; // a thread per core; how many changes no bit
+//! let selection = Selection::default(); // its only IMU; a topic, and where values lie in its messages
+//! let warn = Warn::by(|what| eprintln!("{what}"));
+//! let recording = Recording::open(Path::new("../../fixtures/xsens_mti.mcap"), &selection, &pool, &warn)?;
+//! let lost = recording.samples(&selection, &pool, |topic, sample, _meaning| {
+//!     println!("{topic} {:?} {:?}", sample.header, sample.gyro); // rad/s; x forward, y left, z up
+//!     Ok::<_, Error>(ControlFlow::Continue(()))
+//! })?;
+//! # Ok::<(), Error>(())
+//! ```
+//!
+//! MCAP, ULog, ROS 1 bags, lines of JSON, tables, a folder of one of them, a pipe or `-`: `examples/samples_of_a_recording.rs` is the whole program.
 //!
 //! ```text
-//! file, stream -> format -> mcap  -> decode -> RawSample
+//! file, stream -> format -> mcap  -> decode            -> recording -> RawSample
 //!                        -> lines -> decode, delimited
 //!                                   text, error: beside it
 //! ```
 //!
 //! | module | arrow | |
 //! |---|---|---|
+//! | [`recording`] | a recording of any kind -> what is in it, and its samples in order | I/O |
 //! | [`mcap`] | MCAP logs, whole or damaged -> messages in a stable order | I/O |
 //! | [`mod@format`] | first bytes and name -> which format | pure |
 //! | [`lines`] | lines of JSON, rows of a table -> what each holds | I/O |
@@ -34,8 +52,13 @@ pub mod lines;
 pub mod mcap;
 pub mod pool;
 pub mod recognise;
+pub mod recording;
 mod records;
 pub mod text;
 mod ulog;
 
 pub use error::{Error, Result};
+pub use recording::input::{Input, Source};
+pub use recording::opened::Recording;
+pub use recording::selection::{Selection, TopicBeside};
+pub use recording::warn::Warn;

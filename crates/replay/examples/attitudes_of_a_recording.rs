@@ -7,9 +7,10 @@
 
 use std::ops::ControlFlow;
 use strapd_attitude::estimate::Aid;
+use strapd_recording::Source;
 use strapd_recording::pool::Pool;
 use strapd_replay::error::Result;
-use strapd_replay::pipeline::request::{ReplayRequest, Source};
+use strapd_replay::pipeline::request::ReplayRequest;
 
 fn main() -> Result<()> {
     let log = std::env::args().nth(1);

@@ -10,28 +10,7 @@ use strapd_attitude::frames::{Body, Nav};
 use strapd_attitude::quaternion::{Quaternion, YawPitchRoll};
 use strapd_attitude::setting::{BIAS, FIELD, INIT, NOISE, SHARD, UNDO_TRUNCATION};
 use strapd_recording::decode::{self, FieldPath, FieldRole};
-
-/// Which samples of a recording, and how its messages are read.
-#[derive(Clone, Debug, Default)]
-pub struct Selection {
-    /// `--topic`.
-    pub topic: Option<String>,
-    /// `--field`, `--ignore-covariance-flag`.
-    pub decode: decode::Options,
-    /// `--accel-topic`.
-    pub accel: Option<TopicBeside>,
-    /// `--mag-topic`.
-    pub mag: Option<TopicBeside>,
-}
-
-/// A topic whose specific forces, or magnetic fields, belong to the samples of another.
-#[derive(Clone, Debug)]
-pub struct TopicBeside {
-    /// Its name.
-    pub topic: String,
-    /// Where the vector lies: the `--field` of its role.
-    pub fields: Vec<FieldPath>,
-}
+use strapd_recording::{Selection, TopicBeside};
 
 /// `--undo-truncation`: `auto`, `on`, `on=STEP` (rad/s), `off`.
 ///

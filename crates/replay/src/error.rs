@@ -2,7 +2,7 @@
 //! flag that helps. Bad samples are not here: they are counted verdicts ([`strapd_attitude::record::Verdict`]).
 
 use std::path::PathBuf;
-use strapd_attitude::setting::{FIELD, FORCE, LISTEN, TOPIC};
+use strapd_attitude::setting::{FORCE, LISTEN};
 
 /// A run that could not be carried out.
 #[derive(Debug, thiserror::Error)]
@@ -39,50 +39,6 @@ pub enum Error {
     /// Standard output was closed by its reader; ends the run quietly.
     #[error("the reader of standard output has gone")]
     BrokenPipe,
-    /// The log holds nothing a rate can be read from.
-    #[error("{}: no IMU topic: nothing in it carries a body rate with a stamp\n  it holds:{topics}\n  help: {} NAME with {} gyro=PATH names a rate in any message", path.display(), TOPIC, FIELD)]
-    NoImuTopic {
-        /// Which file.
-        path: PathBuf,
-        /// What is there, one indented line each.
-        topics: String,
-    },
-    /// The log holds several IMU topics, or several publishers on one, and none was named.
-    #[error("{}: several IMU topics or publishers, and they must not be mixed:{topics}\n  help: {} NAME takes one of them, {} all each of them", path.display(), TOPIC, TOPIC)]
-    SeveralImuTopics {
-        /// Which file.
-        path: PathBuf,
-        /// The candidates, one indented line each.
-        topics: String,
-    },
-    /// The topic named is not in the log.
-    #[error("{}: no topic `{topic}`\n  it holds:{topics}", path.display())]
-    NoSuchTopic {
-        /// Which file.
-        path: PathBuf,
-        /// The topic asked for.
-        topic: String,
-        /// What is there, one indented line each.
-        topics: String,
-    },
-    /// A topic's messages can not be decoded.
-    #[error("{}: {what}", path.display())]
-    Unsupported {
-        /// Which file.
-        path: PathBuf,
-        /// Topic, type, encoding, why, and the flag that helps.
-        what: String,
-    },
-    /// A run over this input can not be carried out with these settings.
-    #[error("{}: {}: {what}", path.display(), strapd_recording::text::printable(topic))]
-    Topic {
-        /// Which file.
-        path: PathBuf,
-        /// Which topic.
-        topic: String,
-        /// What, why, and the flag that helps.
-        what: String,
-    },
     /// An address can not be listened on.
     #[error("cannot listen on {address}: {source}{}", bind_help(source))]
     Bind {

@@ -8,6 +8,7 @@ use strapd_attitude::condition::stillness::{self, Rests};
 use strapd_attitude::condition::{Clock, GyroUnit};
 use strapd_attitude::estimate::{Aid, Aiding, Meaning, Plan};
 use strapd_attitude::record::RawSample;
+use strapd_recording::recording::beside::TopicOfVectors;
 
 /// One topic of samples, looked at.
 #[derive(Debug)]
@@ -108,19 +109,6 @@ impl Aids {
             ..Aids::default()
         }
     }
-}
-
-/// A topic of vectors that could correct the samples of another.
-#[derive(Clone, Debug)]
-pub struct TopicOfVectors {
-    /// Its name.
-    pub topic: String,
-    /// Type and encoding.
-    pub described: String,
-    /// Messages a second of the log; `None` where its length is not known.
-    pub rate_hz: Option<f64>,
-    /// Length of the first vector, in the unit of the file.
-    pub first: Option<f64>,
 }
 
 /// A log, examined.

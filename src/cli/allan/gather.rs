@@ -1,12 +1,6 @@
 //! One topic of a log -> angles at even intervals, and what was wrong with them. I/O.
 
-use crate::config::Selection;
 use crate::error::{Error, Result};
-use crate::pipeline::decoders::Decoders;
-use crate::pipeline::input::Input;
-use crate::pipeline::log::{Log, problems};
-use crate::pipeline::log_channel::described;
-use crate::pipeline::topic_reading::{Taken, TopicReading};
 use crate::report::summary::significant;
 use nalgebra::Vector3;
 use std::ops::ControlFlow;
@@ -16,7 +10,14 @@ use strapd_attitude::estimate::Meaning;
 use strapd_attitude::estimate::Plan;
 use strapd_attitude::noise::allan::AngleRecord;
 use strapd_attitude::record::{Join, Nanos, RateSample, RawSample, SampleKind};
+use strapd_recording::Input;
+use strapd_recording::Recording;
+use strapd_recording::Selection;
 use strapd_recording::pool::Pool;
+use strapd_recording::recording::decoders::Decoders;
+use strapd_recording::recording::log_channel::described;
+use strapd_recording::recording::opened::problems;
+use strapd_recording::recording::topic_reading::{Taken, TopicReading};
 
 /// Angles held at most: 24 bytes each, 200 MB.
 pub(super) const CAPACITY: usize = 1 << 23;
@@ -75,13 +76,16 @@ pub(super) fn gather(
             "--topic all: one topic at a time\n  help: --topic NAME".to_owned(),
         ));
     }
-    let log = Log::told_apart(input, selection.topic.as_deref(), &selection.decode, pool)?;
+    let log = Recording::told_apart(input, selection.topic.as_deref(), &selection.decode, pool)?;
     let mut decoders = Decoders::of_run(plan, &selection.decode);
     let reading = TopicReading::new(&log, selection.topic.as_deref(), &mut decoders)?;
     let topic = reading.name().to_owned();
-    let unsupported = |what: String| Error::Unsupported {
-        path: log.name().to_owned(),
-        what,
+    let unsupported = |what: String| {
+        strapd_recording::Error::Unsupported {
+            path: log.name().to_owned(),
+            what,
+        }
+        .into()
     };
     let Some((known, decoder)) = reading.channels.first() else {
         return Err(unsupported(format!("{topic}: no channel of it")));
@@ -97,12 +101,15 @@ pub(super) fn gather(
         Meaning::new(plan, &decoder.stated().declared),
         capacity,
     );
-    let fails = |what| Error::Topic {
-        path: log.name().to_owned(),
-        topic: topic.clone(),
-        what,
+    let fails = |what| {
+        strapd_recording::Error::Topic {
+            path: log.name().to_owned(),
+            topic: topic.clone(),
+            what,
+        }
+        .into()
     };
-    let survey = reading.walk(pool, |taken| {
+    let survey = reading.walk::<Error>(pool, |taken| {
         match taken {
             Taken::Sample(_, raw) if raw.is_beside => {}
             Taken::Sample(_, raw) => gathering.take(raw).map_err(fails)?,

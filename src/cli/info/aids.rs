@@ -3,8 +3,9 @@
 use crate::cli::shell::flag;
 use crate::report::summary::significant;
 use serde_json::{Value, json};
+use strapd_recording::recording::beside::TopicOfVectors;
 use strapd_recording::text::printable;
-use strapd_replay::inspection::{Aids, TopicOfVectors};
+use strapd_replay::inspection::Aids;
 
 /// Units of a field by the length of the Earth's, 22 to 67 uT, with room for what iron does to it.
 const FIELD_UNITS: [(&str, f64); 5] = [

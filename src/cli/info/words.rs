@@ -1,17 +1,17 @@
 //! What `info` found -> text or JSON. Pure.
 
 use crate::cli::shell::{flag, quoted_file};
-use crate::pipeline::input::Input;
-use crate::pipeline::log_channel::{LogChannel, described, rank};
-use crate::pipeline::request::Source;
 use crate::report::calendar::{date, duration};
 use crate::report::findings::{Finding, of_samples};
 use crate::report::summary::{human_bytes, significant};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
+use strapd_recording::Input;
+use strapd_recording::Source;
 use strapd_recording::format::Format;
 use strapd_recording::mcap::Survey;
+use strapd_recording::recording::log_channel::{LogChannel, described, rank};
 use strapd_recording::text::named_few;
 use strapd_replay::inspection::Inspection;
 

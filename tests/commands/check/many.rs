@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use strapd::inspection::{Checked, CheckedTopic};
 use strapd::pipeline::check::{Examination, check, examine};
-use strapd::pipeline::input::Input;
 use strapd::pipeline::inspection::look;
-use strapd::pipeline::log::Log;
+use strapd::pipeline::logged;
 use strapd::report::findings::findings;
 use strapd_attitude::estimate::Plan;
+use strapd_recording::Recording;
 use strapd_recording::decode::Options;
 use strapd_recording::pool::Pool;
 
@@ -39,13 +39,13 @@ fn several(dir: &Path, topics: usize, samples: usize) -> PathBuf {
     path
 }
 
-fn surveyed(path: &Path, pool: &Pool) -> Log {
-    Log::of(&Input::open(path).unwrap(), &Options::default(), pool).unwrap()
+fn surveyed(path: &Path, pool: &Pool) -> Recording {
+    Recording::of(&logged::open(path).unwrap(), &Options::default(), pool).unwrap()
 }
 
 fn checked(path: &Path, named: Option<&str>) -> Checked {
     check(
-        &Input::open(path).unwrap(),
+        &logged::open(path).unwrap(),
         named,
         &Options::default(),
         &Pool::new(2).unwrap(),
@@ -82,7 +82,7 @@ fn a_topic_that_is_refused_keeps_no_other_from_being_told_about() {
     let path = several(dir.path(), 3, 400);
     // None of them rests, so no bias can be found: each is refused, and each says so.
     let examination = Examination {
-        selection: strapd::config::Selection::default(),
+        selection: strapd_recording::Selection::default(),
         plan: Plan {
             bias: strapd_attitude::estimate::Bias::Auto,
             ..Plan::default()
@@ -93,7 +93,7 @@ fn a_topic_that_is_refused_keeps_no_other_from_being_told_about() {
     };
     let pool = Pool::new(2).unwrap();
     let checked = examine(
-        &Input::open(&path).unwrap(),
+        &logged::open(&path).unwrap(),
         &examination,
         &pool,
         &mut |_| {},
@@ -111,7 +111,7 @@ fn all_topics_are_replayed_in_one_pass() {
     let dir = tempfile::tempdir().unwrap();
     let path = several(dir.path(), 40, 300);
     let examination = Examination {
-        selection: strapd::config::Selection::default(),
+        selection: strapd_recording::Selection::default(),
         plan: Plan::default(),
         reference_topic: String::new(),
         drawing: None,
@@ -120,7 +120,7 @@ fn all_topics_are_replayed_in_one_pass() {
     let mut places: Vec<f64> = Vec::new();
     let pool = Pool::new(2).unwrap();
     let checked = examine(
-        &Input::open(&path).unwrap(),
+        &logged::open(&path).unwrap(),
         &examination,
         &pool,
         &mut |position| {
@@ -220,7 +220,7 @@ fn a_schema_of_many_channels_is_compiled_once_and_all_schemas_within_a_bound() {
         start.elapsed()
     );
     assert!((60..150).contains(&understood), "{understood}");
-    let mut decoders = strapd::pipeline::decoders::Decoders::default();
+    let mut decoders = strapd_recording::recording::decoders::Decoders::default();
     let refused = log
         .channels
         .iter()

@@ -86,7 +86,13 @@ fn stamps_that_are_zero_in_both_clocks_are_refused_with_the_flag_that_helps() {
     let path = dir.path().join("zero.mcap");
     std::fs::write(&path, bytes(PACKINGS[2].1, 4096, &messages)).unwrap();
     let error = done(&replay_of(&path)).unwrap_err();
-    assert!(matches!(error, Error::Topic { .. }), "{error:?}");
+    assert!(
+        matches!(
+            error,
+            Error::Recording(strapd_recording::Error::Topic { .. })
+        ),
+        "{error:?}"
+    );
     let said = error.to_string();
     for word in [TOPIC, "stamps", "--time index --rate-hz"] {
         assert!(said.contains(word), "{word} is missing: {said}");

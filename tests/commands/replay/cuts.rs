@@ -116,10 +116,10 @@ fn assert_documented(result: &Result<RunSummary, Error>, what: &str) {
         Err(
             Error::Recording(strapd_recording::Error::Empty { .. })
             | Error::Recording(strapd_recording::Error::NotMcap { .. })
-            | Error::NoImuTopic { .. }
-            | Error::SeveralImuTopics { .. }
-            | Error::Unsupported { .. }
-            | Error::Topic { .. },
+            | Error::Recording(strapd_recording::Error::NoImuTopic { .. })
+            | Error::Recording(strapd_recording::Error::SeveralImuTopics { .. })
+            | Error::Recording(strapd_recording::Error::Unsupported { .. })
+            | Error::Recording(strapd_recording::Error::Topic { .. }),
         ) => {}
         Err(other) => panic!("{what}: {other:?}"),
     }

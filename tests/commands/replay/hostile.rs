@@ -158,7 +158,13 @@ fn two_imu_topics_are_refused_and_both_are_named_with_the_flag() {
     let Some(error) = refused("hostile", "13_two_imu_topics") else {
         return;
     };
-    assert!(matches!(error, Error::SeveralImuTopics { .. }), "{error:?}");
+    assert!(
+        matches!(
+            error,
+            Error::Recording(strapd_recording::Error::SeveralImuTopics { .. })
+        ),
+        "{error:?}"
+    );
     let said = error.to_string();
     for word in ["    /imu ", "    /imu2 ", "--topic"] {
         assert!(said.contains(word), "{word} is missing: {said}");
@@ -190,7 +196,13 @@ fn a_log_with_a_header_alone_has_no_imu_topic() {
     let Some(error) = refused("hostile", "25_header_only") else {
         return;
     };
-    assert!(matches!(error, Error::NoImuTopic { .. }), "{error:?}");
+    assert!(
+        matches!(
+            error,
+            Error::Recording(strapd_recording::Error::NoImuTopic { .. })
+        ),
+        "{error:?}"
+    );
 }
 
 #[test]

@@ -134,7 +134,13 @@ fn what_only_rest_can_tell_is_refused_on_a_moving_body_with_the_way_out() {
         ),
     ] {
         let error = done(&replay_with(&path, plan)).unwrap_err();
-        assert!(matches!(error, Error::Topic { .. }), "{error:?}");
+        assert!(
+            matches!(
+                error,
+                Error::Recording(strapd_recording::Error::Topic { .. })
+            ),
+            "{error:?}"
+        );
         let said = error.to_string();
         assert!(said.contains("/imu") && said.contains(flag), "{said}");
         assert!(said.contains("never stands still"), "{said}");
@@ -350,7 +356,13 @@ fn a_topic_that_is_not_there_lists_those_that_are() {
     let mut replay = replay_of(&fixture("xsens_mti.mcap"));
     replay.selection.topic = Some("/imu".to_owned());
     let error = done(&replay).unwrap_err();
-    assert!(matches!(error, Error::NoSuchTopic { .. }), "{error:?}");
+    assert!(
+        matches!(
+            error,
+            Error::Recording(strapd_recording::Error::NoSuchTopic { .. })
+        ),
+        "{error:?}"
+    );
     let said = error.to_string();
     assert!(
         said.contains("`/imu`") && said.contains("/imu/data "),
@@ -399,7 +411,13 @@ fn a_log_without_an_imu_lists_what_it_holds() {
     writer.finish().unwrap();
     drop(writer);
     let error = done(&replay_of(&path)).unwrap_err();
-    assert!(matches!(error, Error::NoImuTopic { .. }), "{error:?}");
+    assert!(
+        matches!(
+            error,
+            Error::Recording(strapd_recording::Error::NoImuTopic { .. })
+        ),
+        "{error:?}"
+    );
     let said = error.to_string();
     for word in ["/temperature", "json", "3 messages", "--field gyro="] {
         assert!(said.contains(word), "{word} is missing: {said}");

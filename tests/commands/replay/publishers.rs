@@ -10,7 +10,7 @@ use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use strapd::error::Error;
 use strapd::pipeline::check::check;
-use strapd::pipeline::input::Input;
+use strapd::pipeline::logged;
 use strapd_attitude::record::Verdict;
 use strapd_recording::decode::Options;
 use strapd_recording::pool::Pool;
@@ -136,7 +136,13 @@ fn two_publishers_on_one_topic_are_refused_and_both_are_named() {
     for (path, names) in shared_topics(dir.path()) {
         for replay in [replay_of(&path), replay_named(&path, TOPIC)] {
             let error = done(&replay).unwrap_err();
-            assert!(matches!(error, Error::SeveralImuTopics { .. }), "{error:?}");
+            assert!(
+                matches!(
+                    error,
+                    Error::Recording(strapd_recording::Error::SeveralImuTopics { .. })
+                ),
+                "{error:?}"
+            );
             let said = error.to_string();
             for name in &names {
                 assert!(said.contains(name), "{name} is missing: {said}");
@@ -186,7 +192,7 @@ fn a_check_of_two_publishers_looks_at_each_and_does_not_advise_to_straighten_the
     for (path, names) in shared_topics(dir.path()) {
         let pool = Pool::new(2).unwrap();
         let checked = check(
-            &Input::open(&path).unwrap(),
+            &logged::open(&path).unwrap(),
             None,
             &Options::default(),
             &pool,

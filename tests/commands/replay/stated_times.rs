@@ -8,7 +8,7 @@ use crate::replays::{Bits, attitudes, done, only, replay_by, replay_of, replay_w
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use strapd::pipeline::check::check;
-use strapd::pipeline::input::Input;
+use strapd::pipeline::logged;
 use strapd::report::findings::findings;
 use strapd_attitude::estimate::Plan;
 use strapd_attitude::record::{SampleKind, Verdict};
@@ -358,7 +358,7 @@ fn no_gap_is_advised_to_be_bridged_that_is_a_clock_being_set() {
     let flags = |name: &str, stamp: fn(i64) -> i64| {
         let path = imu_log(dir.path(), name, &motion(600), stamp);
         let checked = check(
-            &Input::open(&path).unwrap(),
+            &logged::open(&path).unwrap(),
             None,
             &Default::default(),
             &pool,

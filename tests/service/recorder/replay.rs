@@ -5,24 +5,25 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
-use strapd::config::Selection;
-use strapd::pipeline::channel_route::{Item, Route};
-use strapd::pipeline::input::Input;
-use strapd::pipeline::log::Log;
+use strapd::pipeline::logged;
 use strapd::pipeline::replay::run;
-use strapd::pipeline::request::{ReplayRequest, Source};
+use strapd::pipeline::request::ReplayRequest;
 use strapd::serve::recorder::{Recorder, Settings};
 use strapd::sink::Compression;
 use strapd::sink::{Options, Target};
 use strapd_attitude::record::RawSample;
+use strapd_recording::Recording;
+use strapd_recording::Selection;
+use strapd_recording::Source;
 use strapd_recording::decode;
 use strapd_recording::mcap::{WalkOptions, walk};
 use strapd_recording::pool::Pool;
+use strapd_recording::recording::channel_route::{Item, Route};
 
 /// The samples of a fixture, decoded as `replay` decodes them.
 fn samples(path: &Path) -> Vec<RawSample> {
-    let log = Log::of(
-        &Input::open(path).unwrap(),
+    let log = Recording::of(
+        &logged::open(path).unwrap(),
         &decode::Options::default(),
         &Pool::new(1).unwrap(),
     )

@@ -11,5 +11,6 @@ mod mcap_damage;
 mod mcap_logs;
 mod mcap_reader;
 mod relative_error;
+mod samples;
 #[path = "../../../../tests/shared_data/mod.rs"]
 mod shared_data;

@@ -2,13 +2,7 @@
 //!
 //! Attitudes in NDJSON and CSV are our own outputs; all else goes through the same walk and decoders as a replay.
 
-use super::channel_route::{Item, Route};
-use super::decoders::Decoders;
-use super::input::Input;
-use super::log::{AHEAD, Log, problems};
-use super::log_channel::{LogChannel, rank};
-use super::simulate::{TRUTH_ID, TRUTH_TOPIC};
-use super::topics;
+use super::simulate::TRUTH_TOPIC;
 use crate::error::{Error, Result};
 use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
@@ -20,10 +14,17 @@ use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{AttitudeCovariance, Nanos};
 use strapd_attitude::setting::{REF_TOPIC, TOPIC};
 use strapd_attitude::worlds::{Convention, World};
-use strapd_recording::attitude_line::Attitude;
+use strapd_recording::Input;
+use strapd_recording::Recording;
+use strapd_recording::attitude_line::{Attitude, TRUTH_ID};
 use strapd_recording::decode::{Options, Role};
 use strapd_recording::format::Format;
 use strapd_recording::pool::Pool;
+use strapd_recording::recording::channel_route::{Item, Route};
+use strapd_recording::recording::decoders::Decoders;
+use strapd_recording::recording::log_channel::{LogChannel, rank};
+use strapd_recording::recording::opened::{AHEAD, problems};
+use strapd_recording::recording::topics;
 use strapd_recording::text::printable;
 
 /// One attitude as found: `[w, x, y, z]`, unchecked.
@@ -87,7 +88,7 @@ pub fn read(
             none if none.is_empty() => from_log(input, side, topic, &plainly, pool),
             some => Ok(plain(some)),
         },
-        Format::Mcap | Format::Ulog | Format::Bag => from_log(input, side, topic, &plainly, pool),
+        _ => from_log(input, side, topic, &plainly, pool),
     }
 }
 
@@ -99,14 +100,14 @@ fn from_log(
     pool: &Pool,
 ) -> Result<Track> {
     let path = input.name();
-    let log = Log::told_apart(input, topic, options, pool)?;
+    let log = Recording::told_apart(input, topic, options, pool)?;
     let known = attitude_channel(path, &log, side, topic)?;
-    let decoder = known
-        .decoder(&mut Decoders::default())
-        .map_err(|why| Error::Unsupported {
+    let decoder = known.decoder(&mut Decoders::default()).map_err(|why| {
+        strapd_recording::Error::Unsupported {
             path: path.to_owned(),
             what: why.to_string(),
-        })?;
+        }
+    })?;
     let stated = orientation_convention(&decoder.stated().declared);
     let mut entries: Vec<Entry> = Vec::new();
     // Of an Imu, what it says of its error.
@@ -118,7 +119,7 @@ fn from_log(
             .is_some_and(|s| s.name == "sensor_msgs/msg/Imu");
     let mut said: Vec<Option<Matrix3<f64>>> = Vec::new();
     let wanted = known.channel.clone();
-    let survey = log.walk(
+    let survey = log.walk::<Error>(
         AHEAD,
         pool,
         |channel| {
@@ -226,7 +227,7 @@ fn in_body(
 /// The channel to take attitudes from: the one named, else the best kind of which there is just one.
 fn attitude_channel<'l>(
     path: &Path,
-    log: &'l Log,
+    log: &'l Recording,
     side: Side,
     topic: Option<&str>,
 ) -> Result<&'l LogChannel> {
@@ -235,10 +236,13 @@ fn attitude_channel<'l>(
             .channels
             .iter()
             .find(|k| k.channel.topic == name)
-            .ok_or_else(|| Error::NoSuchTopic {
-                path: path.to_owned(),
-                topic: name.to_owned(),
-                topics: topics::listing(&log.candidates()),
+            .ok_or_else(|| {
+                strapd_recording::Error::NoSuchTopic {
+                    path: path.to_owned(),
+                    topic: name.to_owned(),
+                    topics: topics::listing(&log.candidates()),
+                }
+                .into()
             });
     }
     let mut decoders = Decoders::default();
@@ -250,23 +254,24 @@ fn attitude_channel<'l>(
         .collect();
     all.sort_by_key(|(goodness, _)| std::cmp::Reverse(*goodness));
     match all.as_slice() {
-        [] => Err(Error::Unsupported {
+        [] => Err(strapd_recording::Error::Unsupported {
             path: path.to_owned(),
             what: format!(
                 "holds no attitude; it holds:{}",
                 topics::listing(&log.candidates())
             ),
-        }),
+        }
+        .into()),
         [(best, known), rest @ ..] if rest.first().is_none_or(|(next, _)| next < best) => Ok(known),
         several => {
             let list: Vec<_> = several.iter().map(|(_, k)| k.candidate()).collect();
-            Err(Error::Unsupported {
+            Err(strapd_recording::Error::Unsupported {
                 path: path.to_owned(),
                 what: format!(
                     "several topics carry an attitude:{}\n  help: {TOPIC} NAME (or {REF_TOPIC} NAME) takes one",
                     topics::listing(&list)
                 ),
-            })
+            }.into())
         }
     }
 }
@@ -401,9 +406,12 @@ struct Row {
 /// The file can not be read, a cell is not a number, or no row has an attitude.
 fn from_csv(input: &Input) -> Result<Vec<(Entry, [f64; 3])>> {
     let path = input.name();
-    let refuse = |what: String| Error::Unsupported {
-        path: path.to_owned(),
-        what: format!("{what}\n  help: columns stamp_ns,qw,qx,qy,qz are needed"),
+    let refuse = |what: String| {
+        strapd_recording::Error::Unsupported {
+            path: path.to_owned(),
+            what: format!("{what}\n  help: columns stamp_ns,qw,qx,qy,qz are needed"),
+        }
+        .into()
     };
     let mut track = Vec::new();
     for row in csv::Reader::from_reader(BufReader::new(input.bytes()?)).deserialize::<Row>() {
@@ -424,8 +432,9 @@ fn from_csv(input: &Input) -> Result<Vec<(Entry, [f64; 3])>> {
 }
 
 fn bad_line(path: &Path, number: u64, what: &str) -> Error {
-    Error::Unsupported {
+    strapd_recording::Error::Unsupported {
         path: path.to_owned(),
         what: format!("line {number}: {what}"),
     }
+    .into()
 }

@@ -3,15 +3,8 @@
 //! Apart from the replay because it is all choice and no work: which topics, under which names, held
 //! against which reference.
 
-use super::beside::{self, Besides};
-use super::channel_route::{Noticed, Route, Taker};
-use super::decoders::Decoders;
-use super::log::Log;
-use super::log_channel::{LogChannel, described, rank};
 use super::request::ReplayRequest;
 use super::session::Found;
-use super::sources::{Source, is_same};
-use super::topics;
 use crate::error::{Error, Result};
 use crate::sink::{Stream, output_topic};
 use std::collections::{BTreeMap, BTreeSet};
@@ -19,14 +12,21 @@ use std::path::Path;
 use std::sync::Arc;
 use strapd_attitude::estimate::Meaning;
 use strapd_attitude::setting::{FIELD, TOPIC};
+use strapd_recording::Recording;
 use strapd_recording::decode::Decoder;
 use strapd_recording::mcap::Channel;
+use strapd_recording::recording::beside::{self, Besides};
+use strapd_recording::recording::channel_route::{Noticed, Route, Taker};
+use strapd_recording::recording::decoders::Decoders;
+use strapd_recording::recording::log_channel::{LogChannel, described, rank};
+use strapd_recording::recording::sources::{Publisher, is_same};
+use strapd_recording::recording::topics;
 
 /// A topic that was chosen, and how its channels are read.
 pub(super) struct Chosen {
     pub(super) found: Found,
     pub(super) stream: Stream,
-    source: Source,
+    source: Publisher,
     /// By id and schema id: the index of a channel met in a walk may differ from the survey's, since the
     /// summary lists them in another order.
     channels: BTreeMap<(u16, u16), Decoder>,
@@ -35,7 +35,7 @@ pub(super) struct Chosen {
 pub(super) fn choose(
     run: &ReplayRequest,
     path: &Path,
-    log: &Log,
+    log: &Recording,
     names: &[String],
 ) -> Result<Vec<Chosen>> {
     let mut taken: BTreeSet<String> = BTreeSet::new();
@@ -57,7 +57,7 @@ pub(super) fn choose(
 pub(super) fn choose_each(
     run: &ReplayRequest,
     path: &Path,
-    log: &Log,
+    log: &Recording,
     names: &[String],
     decoders: &mut Decoders,
 ) -> Vec<Result<Chosen>> {
@@ -70,7 +70,7 @@ pub(super) fn choose_each(
 
 fn choose_one(
     run: &ReplayRequest,
-    (path, log): (&Path, &Log),
+    (path, log): (&Path, &Recording),
     name: &str,
     taken: &BTreeSet<String>,
     decoders: &mut Decoders,
@@ -78,11 +78,12 @@ fn choose_one(
     let mut channels = Vec::new();
     let mut refusals = Vec::new();
     let Some(source) = log.source(name) else {
-        return Err(Error::NoSuchTopic {
+        return Err(strapd_recording::Error::NoSuchTopic {
             path: path.to_owned(),
             topic: name.to_owned(),
             topics: topics::listing(&log.candidates()),
-        });
+        }
+        .into());
     };
     for known in log.channels_of(&source) {
         match known.decoder(decoders) {
@@ -92,20 +93,22 @@ fn choose_one(
     }
     let Some((first, decoder)) = channels.first() else {
         let what = refusals.into_iter().next().unwrap_or_default();
-        return Err(Error::Unsupported {
+        return Err(strapd_recording::Error::Unsupported {
             path: path.to_owned(),
             what,
-        });
+        }
+        .into());
     };
     if !decoder.stated().has_gyro {
-        return Err(Error::Unsupported {
+        return Err(strapd_recording::Error::Unsupported {
             path: path.to_owned(),
             what: format!(
                 "{} ({}): carries no body rate\n  help: {FIELD} gyro=PATH names one",
                 strapd_recording::text::printable(name),
                 described(&first.channel)
             ),
-        });
+        }
+        .into());
     }
     let frame = source.frame.clone().or_else(|| {
         let (_, payload) = first.first.as_ref()?;
@@ -143,7 +146,7 @@ fn choose_one(
 pub(super) fn besides(
     run: &ReplayRequest,
     path: &Path,
-    log: &Log,
+    log: &Recording,
     chosen: &mut [Chosen],
 ) -> Result<Besides> {
     let asked = run.selection.accel.as_ref().or(run.selection.mag.as_ref());
@@ -182,7 +185,7 @@ pub(super) fn which_stamp(decoder: &Decoder) -> Option<String> {
 }
 
 /// A source's name fit for a topic: letters, digits and underscores in place of the label.
-fn plain_name(source: &Source) -> String {
+fn plain_name(source: &Publisher) -> String {
     if source.label.is_empty() {
         return source.topic.clone();
     }
@@ -211,7 +214,7 @@ impl Reference {
 pub(super) fn reference(
     run: &ReplayRequest,
     path: &Path,
-    log: &Log,
+    log: &Recording,
     chosen: &[Chosen],
     apart: bool,
 ) -> Result<Option<Reference>> {
@@ -231,23 +234,24 @@ pub(super) fn reference(
         }
     } else {
         let Some(named) = log.channels.iter().find(|k| k.channel.topic == *asked) else {
-            return Err(Error::NoSuchTopic {
+            return Err(strapd_recording::Error::NoSuchTopic {
                 path: path.to_owned(),
                 topic: asked.clone(),
                 topics: topics::listing(&log.candidates()),
-            });
+            }
+            .into());
         };
         if taken(&named) && !apart {
             return Ok(None);
         }
         named
     };
-    let decoder = found
-        .decoder(&mut Decoders::default())
-        .map_err(|why| Error::Unsupported {
+    let decoder = found.decoder(&mut Decoders::default()).map_err(|why| {
+        strapd_recording::Error::Unsupported {
             path: path.to_owned(),
             what: why.to_string(),
-        })?;
+        }
+    })?;
     Ok(Some(Reference {
         channel: found.channel.clone(),
         resolved: Meaning::new(&run.plan, &decoder.stated().declared),

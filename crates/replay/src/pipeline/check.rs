@@ -5,17 +5,18 @@
 
 use super::attitude_track::Track;
 use super::each::{Told, each};
-use super::input::Input;
 use super::inspection::look_as;
-use super::log::{Log, problems};
 use super::position::Position;
 use super::request::ReplayRequest;
-use crate::config::Selection;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::inspection::{Checked, CheckedTopic, Inspection};
 use strapd_attitude::estimate::Plan;
+use strapd_recording::Input;
+use strapd_recording::Recording;
+use strapd_recording::Selection;
 use strapd_recording::decode;
 use strapd_recording::pool::Pool;
+use strapd_recording::recording::opened::problems;
 
 /// What a report wants of the replays beside their summaries.
 #[derive(Clone, Copy, Debug)]
@@ -81,17 +82,18 @@ pub fn examine(
         .as_deref()
         .filter(|name| *name != "all");
     let path = input.name();
-    let log = Log::told_apart(input, named, &asked.selection.decode, pool)?;
+    let log = Recording::told_apart(input, named, &asked.selection.decode, pool)?;
     for topic in named
         .into_iter()
         .chain(Some(asked.reference_topic.as_str()).filter(|name| !name.is_empty()))
     {
         if !log.has(topic) {
-            return Err(Error::NoSuchTopic {
+            return Err(strapd_recording::Error::NoSuchTopic {
                 path: path.to_owned(),
                 topic: topic.to_owned(),
-                topics: super::topics::listing(&log.candidates()),
-            });
+                topics: strapd_recording::recording::topics::listing(&log.candidates()),
+            }
+            .into());
         }
     }
     let looks = look_as(&log, named, (&asked.selection.decode, &asked.plan), pool)?;
@@ -138,7 +140,7 @@ pub fn examine(
 }
 
 fn integrate(
-    log: &Log,
+    log: &Recording,
     topics: &[String],
     asked: &Examination<'_>,
     has_reference: bool,

@@ -1,7 +1,6 @@
 //! Attitudes of every stream -> every sink of the run. I/O.
 
 use super::audience::{Audience, Turn};
-use super::channel_route::Copied;
 use super::pace::Pace;
 use crate::error::Result;
 use crate::sink::{
@@ -14,6 +13,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use strapd_attitude::record::{AttitudeSample, Nanos, RawSample};
 use strapd_recording::pool::Pool;
+use strapd_recording::recording::channel_route::Copied;
 
 /// What standard output is called in the summary.
 const STDOUT: &str = "standard output";

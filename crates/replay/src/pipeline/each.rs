@@ -6,21 +6,22 @@
 
 use super::channel_choice::{Chosen, besides, choose_each, reference, route};
 use super::check::Drawing;
-use super::decoders::Decoders;
 use super::delivery::{Delivery, Outlet};
 use super::history::History;
-use super::log::{AHEAD, Log};
 use super::position::Position;
 use super::replay::{done, prepare};
 use super::request::ReplayRequest;
 use super::session::{Session, Topic};
 use super::session_builder::labelled;
 use super::summarise;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::sink::{Provenance, Stream};
 use crate::summary::TopicSummary;
 use std::ops::ControlFlow;
+use strapd_recording::Recording;
 use strapd_recording::pool::Pool;
+use strapd_recording::recording::decoders::Decoders;
+use strapd_recording::recording::opened::AHEAD;
 
 /// What became of a topic, or why nothing did.
 pub(super) type Told = std::result::Result<Box<TopicSummary>, String>;
@@ -31,7 +32,7 @@ pub(super) type Told = std::result::Result<Box<TopicSummary>, String>;
 /// The log can not be read.
 pub(super) fn each(
     run: &ReplayRequest,
-    log: &Log,
+    log: &Recording,
     names: &[String],
     drawing: Option<&Drawing<'_>>,
     pool: &Pool,
@@ -117,7 +118,7 @@ pub(super) fn each(
     )?;
     let mut session = Session::new(topics, outlet);
     let span = log.survey.times;
-    log.walk(
+    log.walk::<Error>(
         AHEAD,
         pool,
         |channel| route(&kept, reference.as_ref(), &besides, false, channel),

@@ -3,13 +3,6 @@
 //! Apart from the replay because it integrates nothing: `info` (and later `check`) look before
 //! anyone leaps.
 
-use super::beside::vectors;
-use super::channel_route::{Item, Noticed, Route, Taker};
-use super::decoders::Decoders;
-use super::log::{AHEAD, Log};
-use super::log_channel::{LogChannel, described, rank};
-use super::sources::Source;
-use super::topics::{MOST_TOPICS, PICKED_UNNAMED};
 use crate::error::{Error, Result};
 use crate::inspection::{Aids, Inspection};
 use std::collections::BTreeMap;
@@ -21,9 +14,17 @@ use strapd_attitude::condition::stillness::{self, Limits, Stillness};
 use strapd_attitude::condition::{Clock, GyroUnit, choose_clock};
 use strapd_attitude::estimate::{Conditioned, FEW, Meaning, Plan};
 use strapd_attitude::record::{Declared, RawSample};
+use strapd_recording::Recording;
 use strapd_recording::decode::{self, Options};
 use strapd_recording::mcap::{self, Survey};
 use strapd_recording::pool::Pool;
+use strapd_recording::recording::beside::vectors;
+use strapd_recording::recording::channel_route::{Item, Noticed, Route, Taker};
+use strapd_recording::recording::decoders::Decoders;
+use strapd_recording::recording::log_channel::{LogChannel, described, rank};
+use strapd_recording::recording::opened::AHEAD;
+use strapd_recording::recording::sources::Publisher;
+use strapd_recording::recording::topics::{MOST_TOPICS, PICKED_UNNAMED};
 
 /// What was looked at.
 #[derive(Debug)]
@@ -157,7 +158,7 @@ impl Look {
 ///
 /// # Errors
 /// The log can not be read, or `named` not decoded.
-pub fn look(log: &Log, named: Option<&str>, options: &Options, pool: &Pool) -> Result<Looks> {
+pub fn look(log: &Recording, named: Option<&str>, options: &Options, pool: &Pool) -> Result<Looks> {
     look_as(log, named, (options, &Plan::default()), pool)
 }
 
@@ -166,7 +167,7 @@ pub fn look(log: &Log, named: Option<&str>, options: &Options, pool: &Pool) -> R
 /// # Errors
 /// As [`look`].
 pub fn look_as(
-    log: &Log,
+    log: &Recording,
     named: Option<&str>,
     (options, plan): (&Options, &Plan),
     pool: &Pool,
@@ -186,10 +187,11 @@ pub fn look_as(
             let decoder = match known.decoder(&mut compiled) {
                 Ok(decoder) => decoder,
                 Err(why) if named.is_some() => {
-                    return Err(Error::Unsupported {
+                    return Err(strapd_recording::Error::Unsupported {
                         path: path.to_owned(),
                         what: why.to_string(),
-                    });
+                    }
+                    .into());
                 }
                 Err(why) => {
                     tracing::warn!("{why}");
@@ -209,11 +211,14 @@ pub fn look_as(
             });
         }
     }
-    let unsupported = |what| Error::Unsupported {
-        path: path.to_owned(),
-        what,
+    let unsupported = |what| {
+        strapd_recording::Error::Unsupported {
+            path: path.to_owned(),
+            what,
+        }
+        .into()
     };
-    let survey = log.walk(
+    let survey = log.walk::<Error>(
         AHEAD,
         pool,
         |channel| {
@@ -263,8 +268,11 @@ fn id(channel: &mcap::Channel) -> Id<'_> {
 
 /// The sources to look at, with whether they are named, in the order of the log; and the names of those that are
 /// too many: what is named and the best ranks come first.
-fn wanted<'l>(log: &'l Log, named: Option<&str>) -> (Vec<(&'l Source, bool)>, Vec<String>) {
-    let best = |s: &Source| log.channels_of(s).map(|k| rank(&k.role)).max();
+fn wanted<'l>(
+    log: &'l Recording,
+    named: Option<&str>,
+) -> (Vec<(&'l Publisher, bool)>, Vec<String>) {
+    let best = |s: &Publisher| log.channels_of(s).map(|k| rank(&k.role)).max();
     let mut found: Vec<_> = log
         .sources
         .iter()
@@ -284,7 +292,7 @@ fn wanted<'l>(log: &'l Log, named: Option<&str>) -> (Vec<(&'l Source, bool)>, Ve
     )
 }
 
-fn begin(source: &Source, known: &LogChannel, decoder: &decode::Decoder, plan: &Plan) -> Look {
+fn begin(source: &Publisher, known: &LogChannel, decoder: &decode::Decoder, plan: &Plan) -> Look {
     let resolved = Meaning::new(plan, &decoder.stated().declared);
     let first_frame = || {
         let (_, payload) = known.first.as_ref()?;

@@ -1,7 +1,7 @@
 //! What a reader of the output must be able to find out later -> its metadata. I/O: reads the ends
 //! of the input.
 
-use super::request::{ReplayRequest, Source};
+use super::request::ReplayRequest;
 use super::session::Found;
 use crate::error::Result;
 use crate::sink::{Provenance, Stream, Target};
@@ -11,6 +11,7 @@ use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 use strapd_attitude::estimate::Prepared;
 use strapd_attitude::worlds::EARTH_RATE;
+use strapd_recording::Source;
 
 /// How much of each end of the input goes into its fingerprint.
 const END: u64 = 1 << 20;

@@ -8,7 +8,6 @@
 //! found, and counted as unverified.
 
 use super::position::Position;
-use super::request::Source;
 use crate::error::{Error, Result};
 use crate::sink::{
     Attachment, CopiedChannel, Flow, InputChannel, InputMessage, Options, Sink, Target, Written,
@@ -17,6 +16,7 @@ use std::cell::RefCell;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
+use strapd_recording::Source;
 use strapd_recording::mcap::{self, Channel, Message, Order, Reader, Record, Survey, WalkOptions};
 use strapd_recording::pool::Pool;
 

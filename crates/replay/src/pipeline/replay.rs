@@ -4,27 +4,29 @@
 //! through stamps, then to integrate. A stream is read once; its first samples wait until these are known.
 
 use super::channel_choice::{Chosen, besides, choose, looked_at, reference, route};
-use super::channel_route::Item;
-use super::input::{Input, is_pipe};
-use super::log::{A_LITTLE_AHEAD, AHEAD, Log};
 use super::position::Position;
-use super::request::{ReplayRequest, Source, refused};
+use super::request::{ReplayRequest, refused};
 use super::session::Found;
 use super::session_builder::{begin, labelled};
 use super::summarise;
-use super::{line_input, lines, replay_stream};
-use crate::error::Result;
+use super::{lines, logged, replay_stream};
+use crate::error::{Error, Result};
 use crate::sink::{Flow, Stream};
 use crate::summary::RunSummary;
-use std::io::{BufReader, Read};
+use std::io::Read;
 use std::ops::ControlFlow;
 use std::time::Instant;
 use strapd_attitude::estimate::StampPass;
 use strapd_attitude::estimate::{Patience, Preparation, Prepared};
-use strapd_recording::format::{Format, head_of, open};
-use strapd_recording::mcap::Reader;
+use strapd_recording::Input;
+use strapd_recording::Recording;
+use strapd_recording::Source;
+use strapd_recording::format::open;
 use strapd_recording::pool::Pool;
-use strapd_recording::recognise;
+use strapd_recording::recording::channel_route::Item;
+use strapd_recording::recording::incoming::{Incoming, incoming};
+use strapd_recording::recording::input::is_pipe;
+use strapd_recording::recording::opened::{A_LITTLE_AHEAD, AHEAD};
 
 /// Does it. `watch` is told where it is, often.
 ///
@@ -40,16 +42,15 @@ pub fn run(
     let mut summary = match &run.source {
         Source::File(path) if is_pipe(path) => piped(run, open(path)?, pool, watch)?,
         Source::File(path) => {
-            let input = Input::open(path)?;
+            let input = logged::open(path)?;
             // Of lines and rows who speaks is known when all are read, which only several sensors are worth.
             let is_of_all = run.selection.topic.as_deref() == Some("all");
-            match input.format() {
-                Format::Lines | Format::Table if !is_of_all => {
-                    let text = || input.lines(&run.selection.decode);
-                    let stamps = lines::stamps(run, text()?)?;
-                    lines::replay(run, text()?, stamps, pool, watch)?
-                }
-                _ => file(run, &input, pool, watch)?,
+            if input.format().is_text() && !is_of_all {
+                let text = || input.lines(&run.selection.decode);
+                let stamps = lines::stamps(run, text()?)?;
+                lines::replay(run, text()?, stamps, pool, watch)?
+            } else {
+                file(run, &input, pool, watch)?
             }
         }
         Source::Stdin => piped(run, std::io::stdin(), pool, watch)?,
@@ -65,37 +66,9 @@ fn piped(
     pool: &Pool,
     watch: &mut dyn FnMut(&Position),
 ) -> Result<RunSummary> {
-    let mut input = BufReader::with_capacity(1 << 16, input);
-    let head = head_of(&mut input).map_err(|source| strapd_recording::Error::Read {
-        path: run.source.name(),
-        offset: 0,
-        source,
-    })?;
-    if head.is_empty() {
-        return Err(strapd_recording::Error::Empty {
-            path: run.source.name(),
-        }
-        .into());
-    }
-    let known = Format::of_bytes(&head);
-    if let Some(format) = recognise::marked(&head, &[]).filter(|_| known.is_none()) {
-        let path = run.source.name();
-        return Err(strapd_recording::Error::NotRead { path, format }.into());
-    }
-    // What has no name and tells nothing may still be lines, of which the first is damaged.
-    let shape = || Format::of_shape(&head);
-    let format = known.or_else(shape).unwrap_or(Format::Lines);
-    let whole = std::io::Cursor::new(head).chain(input);
-    match format {
-        Format::Mcap | Format::Ulog | Format::Bag => {
-            line_input::only_for_tables(&run.source.name(), format, &run.selection.decode)?;
-            let reader = Reader::from_stream(run.source.name(), Box::new(whole))?;
-            replay_stream::replay(run, reader, pool, watch)
-        }
-        Format::Lines | Format::Table => {
-            let text = line_input::open(&run.source.name(), format, whole, &run.selection.decode)?;
-            lines::replay(run, text, None, pool, watch)
-        }
+    match incoming(&run.source.name(), input, &run.selection.decode)? {
+        Incoming::Messages(reader) => replay_stream::replay(run, reader, pool, watch),
+        Incoming::Lines(text) => lines::replay(run, *text, None, pool, watch),
     }
 }
 
@@ -106,7 +79,7 @@ fn file(
     watch: &mut dyn FnMut(&Position),
 ) -> Result<RunSummary> {
     let path = input.name();
-    let log = Log::told_apart(
+    let log = Recording::told_apart(
         input,
         run.selection.topic.as_deref(),
         &run.selection.decode,
@@ -140,7 +113,7 @@ fn file(
         session.length(last.saturating_sub(first) as f64 * 1e-9);
     }
     let total: u64 = log.survey.channels.iter().map(|c| c.messages).sum();
-    let survey = log.walk(
+    let survey = log.walk::<Error>(
         AHEAD,
         pool,
         |channel| {
@@ -169,7 +142,7 @@ pub(super) fn done(items: &[Item], span: Option<(u64, u64)>) -> Option<f64> {
 /// Reads as far as needed to know clock, bias and initial attitude of every topic, or why one is refused.
 pub(super) fn prepare(
     run: &ReplayRequest,
-    log: &Log,
+    log: &Recording,
     chosen: &[Chosen],
     pool: &Pool,
 ) -> Result<Vec<Result<Prepared>>> {
@@ -182,7 +155,7 @@ pub(super) fn prepare(
         })
         .collect();
     let mut failures: Vec<Option<String>> = chosen.iter().map(|_| None).collect();
-    log.walk(
+    log.walk::<Error>(
         A_LITTLE_AHEAD,
         pool,
         |channel| looked_at(chosen, channel),

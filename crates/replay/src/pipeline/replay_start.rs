@@ -1,18 +1,18 @@
 //! Items of a stream that can be read only once -> a session, as soon as enough has been seen. I/O
 //! only through the session.
 
-use super::channel_route::Item;
 use super::position::Position;
 use super::request::{ReplayRequest, refused};
 use super::session::{Found, Session};
 use super::session_builder::{begin, labelled};
-use super::topics;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::sink::{Flow, Stream};
 use std::path::Path;
 use strapd_attitude::estimate::{Patience, Preparation};
 use strapd_attitude::estimate::{StampPass, Stamps};
 use strapd_recording::pool::Pool;
+use strapd_recording::recording::channel_route::Item;
+use strapd_recording::recording::topics;
 
 /// A run over a stream: first gathers, then runs.
 pub(super) struct Waiting<'r> {
@@ -126,9 +126,12 @@ impl<'r> Waiting<'r> {
         if self.session.is_none() {
             let _ = self.begin(pool)?;
         }
-        self.session.ok_or_else(|| Error::NoImuTopic {
-            path: self.path.to_owned(),
-            topics: topics::listing(&[]),
+        self.session.ok_or_else(|| {
+            strapd_recording::Error::NoImuTopic {
+                path: self.path.to_owned(),
+                topics: topics::listing(&[]),
+            }
+            .into()
         })
     }
 }

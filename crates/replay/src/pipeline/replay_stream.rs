@@ -3,21 +3,12 @@
 //! Nothing is known before it comes: the first IMU topic is taken, and its first samples wait until
 //! clock, bias and initial attitude are known.
 
-use super::beside;
 use super::channel_choice::which_stamp;
-use super::channel_route::{Item, Noticed, Route, Taker};
-use super::decoders::Decoders;
-use super::held::Held;
-use super::log::{explained, problems};
-use super::log_channel::{LogChannel, described, known, rank};
 use super::position::Position;
 use super::replay_start::Waiting;
 use super::request::ReplayRequest;
 use super::session::Found;
-use super::sources::publisher;
 use super::summarise;
-use super::topics::{self, PICKED_UNNAMED};
-use crate::config::TopicBeside;
 use crate::error::{Error, Result};
 use crate::finding::{Finding, Severity};
 use crate::sink::{Flow, Stream, output_topic};
@@ -28,9 +19,18 @@ use std::path::Path;
 use std::sync::Arc;
 use strapd_attitude::estimate::{Aid, Meaning};
 use strapd_attitude::setting::TOPIC;
+use strapd_recording::TopicBeside;
 use strapd_recording::decode::{Decoder, Unsupported, Wanted};
 use strapd_recording::mcap::{self, Channel, Reader, Survey, WalkOptions};
 use strapd_recording::pool::Pool;
+use strapd_recording::recording::beside;
+use strapd_recording::recording::channel_route::{Item, Noticed, Route, Taker};
+use strapd_recording::recording::decoders::Decoders;
+use strapd_recording::recording::held::Held;
+use strapd_recording::recording::log_channel::{LogChannel, described, known, rank};
+use strapd_recording::recording::opened::{explained, problems};
+use strapd_recording::recording::sources::publisher;
+use strapd_recording::recording::topics::{self, PICKED_UNNAMED};
 
 /// An MCAP that can be read only once.
 pub(super) fn replay(
@@ -270,7 +270,7 @@ impl Picked {
     /// Whether the topic's channels so far are one publisher's.
     fn is_one_body(&self, path: &Path) -> Result<()> {
         if self.channels > 1 && self.noticed.are_several() {
-            return Err(Error::Topic {
+            return Err(strapd_recording::Error::Topic {
                 path: path.to_owned(),
                 topic: self.topic.clone().unwrap_or_default(),
                 what: format!(
@@ -278,7 +278,7 @@ impl Picked {
   help: save it to a file, where {TOPIC} tells them apart",
                     self.channels
                 ),
-            });
+            }.into());
         }
         Ok(())
     }
@@ -286,10 +286,11 @@ impl Picked {
     /// Why nothing was picked.
     fn nothing(self, run: &ReplayRequest, path: &Path, survey: &Survey) -> Error {
         if let Some(what) = self.refusals.into_iter().next() {
-            return Error::Unsupported {
+            return strapd_recording::Error::Unsupported {
                 path: path.to_owned(),
                 what,
-            };
+            }
+            .into();
         }
         let mut decoders = Decoders::default();
         let channels: Vec<LogChannel> = survey
@@ -300,7 +301,7 @@ impl Picked {
         let candidates: Vec<_> = channels.iter().map(LogChannel::candidate).collect();
         let error = match topics::choose(path, &candidates, run.selection.topic.as_deref()) {
             Err(e) => e,
-            Ok(choice) => Error::Unsupported {
+            Ok(choice) => strapd_recording::Error::Unsupported {
                 path: path.to_owned(),
                 what: format!(
                     "no IMU topic; {} may carry a body rate, but is not taken unnamed from a stream, where a better one could still come\n  help: {TOPIC} NAME",
@@ -308,7 +309,7 @@ impl Picked {
                 ),
             },
         };
-        explained(error, &channels, &problems(survey))
+        explained(error, &channels, &problems(survey)).into()
     }
 
     fn passed_over(&self) -> Option<Finding> {
@@ -331,8 +332,9 @@ impl Picked {
 }
 
 fn unsupported(path: &Path, why: &Unsupported) -> Error {
-    Error::Unsupported {
+    strapd_recording::Error::Unsupported {
         path: path.to_owned(),
         what: why.to_string(),
     }
+    .into()
 }

@@ -1,12 +1,12 @@
 //! What a replay is: from where, to where, how. Pure.
 
 use super::audience::Audience;
-use crate::config::Selection;
-use crate::error::Error;
+use crate::error;
 use crate::sink::{self, Target};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use strapd_attitude::estimate::Plan;
+use strapd_recording::{Error, Selection, Source};
 
 /// A replay to be done.
 #[derive(Clone, Debug)]
@@ -65,41 +65,12 @@ impl ReplayRequest {
     }
 }
 
-/// Where a run's data comes from.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Source {
-    /// A file: an MCAP, or NDJSON by its extension.
-    File(PathBuf),
-    /// Standard input: MCAP or NDJSON, told apart by the first bytes.
-    Stdin,
-}
-
-impl Source {
-    /// `-` or a path.
-    #[must_use]
-    pub fn parse(text: &str) -> Source {
-        if text == "-" {
-            Source::Stdin
-        } else {
-            Source::File(PathBuf::from(text))
-        }
-    }
-
-    /// For messages.
-    #[must_use]
-    pub fn name(&self) -> PathBuf {
-        match self {
-            Source::File(path) => path.clone(),
-            Source::Stdin => PathBuf::from("standard input"),
-        }
-    }
-}
-
 /// A topic that can not be run, in the words of the stage that refused it.
-pub(super) fn refused(path: &Path, topic: &str, what: String) -> Error {
+pub(super) fn refused(path: &Path, topic: &str, what: String) -> error::Error {
     Error::Topic {
         path: path.to_owned(),
         topic: topic.to_owned(),
         what,
     }
+    .into()
 }

@@ -1,7 +1,6 @@
 //! Items in order -> estimators -> outlet: the consuming half of a run, whatever the source. I/O
 //! only through the outlet.
 
-use super::channel_route::{Item, Noticed};
 use super::delivery::Outlet;
 use super::history::History;
 use super::position::Position;
@@ -16,6 +15,7 @@ use strapd_attitude::estimate::{Meaning, Prepared};
 use strapd_attitude::record::{AttitudeSample, Nanos};
 use strapd_recording::decode::Undecodable;
 use strapd_recording::pool::Pool;
+use strapd_recording::recording::channel_route::{Item, Noticed};
 
 /// One estimated topic of a run.
 #[derive(Debug)]
@@ -99,7 +99,7 @@ impl Topic {
     /// A topic ready to run.
     ///
     /// # Errors
-    /// [`Error::Topic`] when the settings do not fit it.
+    /// [`strapd_recording::Error::Topic`] when the settings do not fit it.
     pub(super) fn new(
         path: &Path,
         plan: &Plan,
@@ -107,7 +107,7 @@ impl Topic {
         prepared: Prepared,
         against: bool,
     ) -> Result<Topic> {
-        let refuse = |what: String| Error::Topic {
+        let refuse = |what: String| strapd_recording::Error::Topic {
             path: path.to_owned(),
             topic: found.name.clone(),
             what,

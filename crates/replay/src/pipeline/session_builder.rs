@@ -4,13 +4,14 @@
 
 use super::delivery::{Delivery, Outlet};
 use super::provenance;
-use super::request::{ReplayRequest, Source};
+use super::request::ReplayRequest;
 use super::session::{Found, Session, Topic};
 use crate::error::Result;
 use crate::sink::Stream;
 use std::path::{Path, PathBuf};
 use strapd_attitude::estimate::Plan;
 use strapd_attitude::estimate::{Meaning, Prepared};
+use strapd_recording::Source;
 
 /// The output's labels: frames and axes as they will be in the numbers.
 pub fn labelled(

@@ -10,6 +10,7 @@ use std::sync::Arc;
 use std::time::Instant;
 use strapd_attitude::record::{AttitudeCovariance, AttitudeSample, SampleKind, Status};
 use strapd_bodies::synthetic::{Stretch, Synthetic, Truth};
+use strapd_recording::attitude_line::TRUTH_ID;
 use strapd_recording::pool::Pool;
 
 /// The topic of the samples.
@@ -20,8 +21,6 @@ pub const TRUTH_TOPIC: &str = "/truth";
 pub const FIELD_TOPIC: &str = "/imu/mag";
 /// What lines call the samples.
 const ID: &str = "imu";
-/// What lines call the truth.
-pub const TRUTH_ID: &str = "truth";
 
 /// Instants made and written together, when nobody waits for them.
 const BATCH: usize = 2048;

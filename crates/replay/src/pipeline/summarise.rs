@@ -1,7 +1,7 @@
 //! What the stages counted -> the summary of the run. Pure.
 
 use super::delivery::broken;
-use super::request::{ReplayRequest, Source};
+use super::request::ReplayRequest;
 use super::sample_kinds::AgainstRecorded;
 use super::session::{Ended, Topic};
 use crate::finding::{Finding, Severity};
@@ -19,6 +19,7 @@ use strapd_attitude::estimate::{SensorCalibration, learned};
 use strapd_attitude::propagate::Method;
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{Nanos, SampleKind, Verdict};
+use strapd_recording::Source;
 use strapd_recording::format::Format;
 use strapd_recording::mcap::Survey;
 
@@ -47,7 +48,7 @@ pub(super) fn run(run: &ReplayRequest, ended: Ended, survey: &Survey) -> RunSumm
             .iter()
             .filter_map(|target| Some(target.listens()?.to_string()))
             .collect(),
-        file_problems: super::log::problems(survey),
+        file_problems: strapd_recording::recording::opened::problems(survey),
         file_losses: survey.problems.losses(),
         elapsed_secs: 0.0,
     }

@@ -46,7 +46,7 @@ impl McapFile {
 
     /// The magic and the header.
     pub(in crate::sink) fn push_header(&self, out: &mut Vec<u8>, profile: &str) {
-        out.extend_from_slice(MAGIC);
+        out.extend_from_slice(&MAGIC);
         Body::begin(out, HEADER)
             .string(profile)
             .string(concat!("strapd ", env!("CARGO_PKG_VERSION")))
@@ -245,7 +245,7 @@ impl McapFile {
         let crc = crc32fast::hash(&out[summary..covered]);
         out.truncate(covered);
         out.extend_from_slice(&crc.to_le_bytes());
-        out.extend_from_slice(MAGIC);
+        out.extend_from_slice(&MAGIC);
         out
     }
 
@@ -254,7 +254,7 @@ impl McapFile {
         let mut out = Vec::new();
         Body::begin(&mut out, DATA_END).u32(0).end();
         Body::begin(&mut out, FOOTER).u64(0).u64(0).u32(0).end();
-        out.extend_from_slice(MAGIC);
+        out.extend_from_slice(&MAGIC);
         out
     }
 

@@ -1,6 +1,6 @@
 //! A log's channels and first messages -> what is in it and how to read it. I/O.
 //!
-//! Apart from the replay because `info`, `cat` and `compare` ask the same questions first: which
+//! Apart from what is done with samples because whoever wants some asks the same questions first: which
 //! channels, which of them carry a rate or an orientation, and a decoder that has seen a message.
 
 use super::channel_route::{Item, Route};
@@ -8,24 +8,23 @@ use super::decoders::Decoders;
 use super::input::Input;
 use super::line_input::only_for_tables;
 use super::log_channel::{LogChannel, described, known, nanos, rank};
-use super::sources::{self, Source};
+use super::sources::{self, Publisher};
 use super::text_log::TextLog;
 use super::topics::{self, Candidate, Choice, PICKED_UNNAMED};
+use crate::decode::Options;
 use crate::error::{Error, Result};
+use crate::mcap::{self, Channel, Reader, Survey, WalkOptions};
+use crate::pool::Pool;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use strapd_attitude::record::Nanos;
-use strapd_recording::decode::Options;
-use strapd_recording::format::Format;
-use strapd_recording::mcap::{self, Channel, Reader, Survey, WalkOptions};
-use strapd_recording::pool::Pool;
 
 /// A recording, surveyed.
 #[derive(Debug)]
-pub struct Log {
+pub struct Recording {
     input: Input,
     body: Body,
     /// What is in it.
@@ -33,7 +32,7 @@ pub struct Log {
     /// Its channels, with what they can serve as.
     pub channels: Vec<LogChannel>,
     /// Who speaks on its topics: one for each until `sources::tell_apart` has looked.
-    pub sources: Vec<Source>,
+    pub sources: Vec<Publisher>,
     /// What was wrong with it as far as it was read: all of it when it has no summary, otherwise up
     /// to the first message of the last channel.
     pub problems: Vec<String>,
@@ -46,32 +45,28 @@ enum Body {
     Text(Box<TextLog>),
 }
 
-impl Log {
+impl Recording {
     /// Surveys a recording.
     ///
     /// # Errors
     /// It can not be read, or is none.
-    pub fn of(input: &Input, options: &Options, pool: &Pool) -> Result<Log> {
-        match input.format() {
-            format @ (Format::Mcap | Format::Ulog | Format::Bag) => {
-                only_for_tables(input.name(), format, options)?;
-                Log::of_mcap(input, pool)
-            }
-            Format::Lines | Format::Table => {
-                let (text, channels) = TextLog::survey(input, options)?;
-                Ok(Log {
-                    input: input.clone(),
-                    survey: text.surveyed().clone(),
-                    body: Body::Text(Box::new(text)),
-                    sources: sources::by_topic(&channels),
-                    channels,
-                    problems: Vec::new(),
-                })
-            }
+    pub fn of(input: &Input, options: &Options, pool: &Pool) -> Result<Recording> {
+        if !input.format().is_text() {
+            only_for_tables(input.name(), input.format(), options)?;
+            return Recording::of_mcap(input, pool);
         }
+        let (text, channels) = TextLog::survey(input, options)?;
+        Ok(Recording {
+            input: input.clone(),
+            survey: text.surveyed().clone(),
+            body: Body::Text(Box::new(text)),
+            sources: sources::by_topic(&channels),
+            channels,
+            problems: Vec::new(),
+        })
     }
 
-    fn of_mcap(input: &Input, pool: &Pool) -> Result<Log> {
+    fn of_mcap(input: &Input, pool: &Pool) -> Result<Recording> {
         let reader = input.mcap()?;
         let options = WalkOptions {
             pool: Some(pool.rayon()),
@@ -99,7 +94,7 @@ impl Log {
                 known(&found.channel, found.messages, first, &mut decoders)
             })
             .collect();
-        Ok(Log {
+        Ok(Recording {
             problems: match problems(&survey) {
                 none if none.is_empty() => met,
                 whole => whole,
@@ -116,14 +111,14 @@ impl Log {
     /// know. `named` is `--topic`.
     ///
     /// # Errors
-    /// As [`Log::of`].
+    /// As [`Recording::of`].
     pub fn told_apart(
         input: &Input,
         named: Option<&str>,
         options: &Options,
         pool: &Pool,
-    ) -> Result<Log> {
-        let mut log = Log::of(input, options, pool)?;
+    ) -> Result<Recording> {
+        let mut log = Recording::of(input, options, pool)?;
         if let Some(again) = log.reader() {
             log.sources = sources::tell_apart(again, &mut log.channels, named, options, pool)?;
         }
@@ -132,14 +127,14 @@ impl Log {
 
     /// The source of this name. `TOPIC@FRAME` is one even if nobody named that frame so far.
     #[must_use]
-    pub fn source(&self, name: &str) -> Option<Source> {
+    pub fn source(&self, name: &str) -> Option<Publisher> {
         if let Some(known) = self.sources.iter().find(|s| s.name == name) {
             return Some(known.clone());
         }
         let (whole, frame) = sources::by_topic(&self.channels)
             .into_iter()
             .find_map(|s| Some((s.clone(), name.strip_prefix(&s.topic)?.strip_prefix('@')?)))?;
-        Some(Source {
+        Some(Publisher {
             name: name.to_owned(),
             frame: Some(frame.to_owned()),
             label: frame.to_owned(),
@@ -160,7 +155,7 @@ impl Log {
     }
 
     /// The channels of a source.
-    pub fn channels_of<'l>(&'l self, source: &Source) -> impl Iterator<Item = &'l LogChannel> {
+    pub fn channels_of<'l>(&'l self, source: &Publisher) -> impl Iterator<Item = &'l LogChannel> {
         let indices = source.channels.clone();
         indices.into_iter().filter_map(|n| self.channels.get(n))
     }
@@ -226,13 +221,13 @@ impl Log {
     ///
     /// # Errors
     /// It can not be read; as `take`.
-    pub fn walk(
+    pub fn walk<E: From<Error>>(
         &self,
         ahead: usize,
         pool: &Pool,
         select: impl FnMut(&Arc<Channel>) -> Option<Route>,
-        mut take: impl FnMut(&mut Vec<Item>) -> Result<ControlFlow<()>>,
-    ) -> Result<Survey> {
+        mut take: impl FnMut(&mut Vec<Item>) -> std::result::Result<ControlFlow<()>, E>,
+    ) -> std::result::Result<Survey, E> {
         let reader = match &self.body {
             Body::Mcap(reader) => reader.again().map_or_else(|| self.input.mcap(), Ok)?,
             Body::Text(text) => {
@@ -305,7 +300,7 @@ impl Log {
     /// `is_shared`: another source has messages on its channels.
     fn candidate(
         &self,
-        source: &Source,
+        source: &Publisher,
         is_shared: bool,
         rank_of: &dyn Fn(&LogChannel) -> u8,
     ) -> Candidate {

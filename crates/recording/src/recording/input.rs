@@ -6,20 +6,50 @@
 
 use super::folder::{self, Folder};
 use super::line_input;
-use super::request::Source;
+use super::warn::Warn;
+use crate::decode::{Options, Wanted};
+use crate::delimited::Table;
 use crate::error::{Error, Result};
+use crate::format::{Format, open};
+use crate::lines::Lines;
+use crate::mcap::Reader;
 use std::fs::File;
 use std::io::{Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use strapd_recording::decode::{Options, Wanted};
-use strapd_recording::delimited::Table;
-use strapd_recording::format::{Format, open};
-use strapd_recording::lines::Lines;
-use strapd_recording::mcap::Reader;
 
 /// Bytes of a stream that are kept at most.
 const MOST: u64 = 8 << 30;
+
+/// Where a recording comes from.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub enum Source {
+    /// A file: an MCAP, or NDJSON by its extension.
+    File(PathBuf),
+    /// Standard input: MCAP or NDJSON, told apart by the first bytes.
+    Stdin,
+}
+
+impl Source {
+    /// `-` or a path.
+    #[must_use]
+    pub fn parse(text: &str) -> Source {
+        if text == "-" {
+            Source::Stdin
+        } else {
+            Source::File(PathBuf::from(text))
+        }
+    }
+
+    /// For messages.
+    #[must_use]
+    pub fn name(&self) -> PathBuf {
+        match self {
+            Source::File(path) => path.clone(),
+            Source::Stdin => PathBuf::from("standard input"),
+        }
+    }
+}
 
 /// A recording that can be read again.
 #[derive(Clone, Debug)]
@@ -31,6 +61,7 @@ pub struct Input {
     format: Format,
     /// Tables of the same recording.
     beside: Vec<PathBuf>,
+    warn: Warn,
 }
 
 impl Input {
@@ -38,35 +69,45 @@ impl Input {
     ///
     /// # Errors
     /// It can not be opened or read, or is empty; a folder of no recording or of several; there is no room for a stream.
-    pub fn open(path: &Path) -> Result<Input> {
+    pub fn open(path: &Path, warn: &Warn) -> Result<Input> {
         match Source::parse(&path.to_string_lossy()) {
-            source @ Source::Stdin => Input::keep(source, std::io::stdin()),
-            _ if is_pipe(path) => Input::keep(Source::File(path.to_owned()), open(path)?),
+            source @ Source::Stdin => Input::keep(source, std::io::stdin(), warn),
+            _ if is_pipe(path) => Input::of_stream(path, open(path)?, warn),
             source if path.is_dir() => {
                 let Folder {
                     main,
                     format,
                     beside,
-                } = folder::of(path)?;
+                } = folder::of(path, warn)?;
                 Ok(Input {
                     source,
                     name: main,
                     kept: None,
                     format,
                     beside,
+                    warn: warn.clone(),
                 })
             }
             source => Ok(Input {
                 source,
                 name: path.to_owned(),
                 kept: None,
-                format: recognised(path)?,
+                format: recognised(path, warn)?,
                 beside: Vec::new(),
+                warn: warn.clone(),
             }),
         }
     }
 
-    fn keep(source: Source, mut from: impl Read) -> Result<Input> {
+    /// Reads a stream to its end; `name` is what errors call it.
+    ///
+    /// # Errors
+    /// It can not be read, or is empty; there is no room for it.
+    pub fn of_stream(name: &Path, from: impl Read, warn: &Warn) -> Result<Input> {
+        Input::keep(Source::File(name.to_owned()), from, warn)
+    }
+
+    fn keep(source: Source, mut from: impl Read, warn: &Warn) -> Result<Input> {
         let name = source.name();
         let mut file = tempfile::tempfile().map_err(|e| no_room(&name, &e))?;
         let mut block = vec![0; 1 << 18];
@@ -78,31 +119,30 @@ impl Input {
                 Ok(read) => read,
                 Err(e) if e.kind() == std::io::ErrorKind::Interrupted => continue,
                 Err(source) => {
-                    return Err(strapd_recording::Error::Read {
+                    return Err(Error::Read {
                         path: name,
                         offset: have,
                         source,
-                    }
-                    .into());
+                    });
                 }
             };
             let room = usize::try_from(MOST - have).unwrap_or(usize::MAX);
             let taken = block.get(..read.min(room)).unwrap_or_default();
-            let wanted = strapd_recording::format::HEAD.saturating_sub(head.len());
+            let wanted = crate::format::HEAD.saturating_sub(head.len());
             head.extend_from_slice(taken.get(..wanted.min(taken.len())).unwrap_or_default());
             file.write_all(taken).map_err(|e| no_room(&name, &e))?;
             have += taken.len() as u64;
             if taken.len() < read {
-                tracing::warn!(
+                warn.say(&format!(
                     "{}: only the first {} GiB were looked at; save it to a file to look at all of it",
                     name.display(),
                     MOST >> 30
-                );
+                ));
                 break;
             }
         }
         if have == 0 {
-            return Err(strapd_recording::Error::Empty { path: name }.into());
+            return Err(Error::Empty { path: name });
         }
         let named = || Format::of_name(&name);
         Ok(Input {
@@ -114,6 +154,7 @@ impl Input {
             source,
             name,
             beside: Vec::new(),
+            warn: warn.clone(),
         })
     }
 
@@ -129,6 +170,11 @@ impl Input {
         &self.name
     }
 
+    /// Who is told what to know of it.
+    pub(super) fn warn(&self) -> &Warn {
+        &self.warn
+    }
+
     /// What it is.
     #[must_use]
     pub fn format(&self) -> Format {
@@ -141,17 +187,16 @@ impl Input {
     /// It can not be opened.
     pub fn bytes(&self) -> Result<File> {
         let Some(kept) = &self.kept else {
-            return Ok(open(&self.name)?);
+            return open(&self.name);
         };
         let again = kept.try_clone().and_then(|mut file| {
             file.rewind()?;
             Ok(file)
         });
-        let again = again.map_err(|source| strapd_recording::Error::Open {
+        again.map_err(|source| Error::Open {
             path: self.name.clone(),
             source,
-        })?;
-        Ok(again)
+        })
     }
 
     /// Its bytes as an MCAP.
@@ -159,17 +204,17 @@ impl Input {
     /// # Errors
     /// As [`Reader::open`].
     pub fn mcap(&self) -> Result<Reader> {
-        Ok(match &self.kept {
-            None => Reader::open(&self.name)?,
-            Some(_) => Reader::of_file(&self.name, self.bytes()?)?,
-        })
+        match &self.kept {
+            None => Reader::open(&self.name),
+            Some(_) => Reader::of_file(&self.name, self.bytes()?),
+        }
     }
 
     /// Whether it is a table that strapd wrote.
     ///
     /// # Errors
     /// It can not be read, or is no table.
-    pub(super) fn is_own_table(&self, options: &Options) -> Result<bool> {
+    pub fn is_own_table(&self, options: &Options) -> Result<bool> {
         let lines = self
             .lines(&Options::default())
             .or_else(|_| self.lines(options))?;
@@ -188,7 +233,7 @@ impl Input {
         };
         self.beside.iter().try_fold(lines, |lines, beside| {
             let other = line_input::open(beside, Format::Table, open(beside)?, &of_forces)?;
-            Ok(lines.with(other)?)
+            lines.with(other)
         })
     }
 }
@@ -198,16 +243,16 @@ impl Input {
 ///
 /// # Errors
 /// As [`Format::of_file`].
-pub(super) fn recognised(path: &Path) -> Result<Format> {
+fn recognised(path: &Path, warn: &Warn) -> Result<Format> {
     let format = Format::of_file(path)?.unwrap_or(Format::Mcap);
     if let Some(said) = format.contradiction(path) {
-        tracing::warn!("{}: {said}", path.display());
+        warn.say(&format!("{}: {said}", path.display()));
     }
     Ok(format)
 }
 
 /// Whether a path names what can be read only once: a named pipe, a shell's `<(...)`, a device.
-pub(super) fn is_pipe(path: &Path) -> bool {
+pub fn is_pipe(path: &Path) -> bool {
     std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
 }
 

@@ -8,25 +8,25 @@
 use super::decoders::Decoders;
 use super::log_channel::{LogChannel, nanos, rank};
 use super::topics::PICKED_UNNAMED;
+use crate::decode::{Decoder, Options};
 use crate::error::Result;
+use crate::mcap::{self, Channel, Reader, WalkOptions};
+use crate::pool::Pool;
+use crate::text::printable;
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use strapd_attitude::record::Nanos;
-use strapd_recording::decode::{Decoder, Options};
-use strapd_recording::mcap::{self, Channel, Reader, WalkOptions};
-use strapd_recording::pool::Pool;
-use strapd_recording::text::printable;
 
 /// One publisher's samples on a topic.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Source {
+pub struct Publisher {
     /// What `--topic` takes: the topic, unless it has several sources.
     pub name: String,
     /// The topic.
     pub topic: String,
-    /// Its channels, by their place in [`super::log::Log::channels`].
+    /// Its channels, by their place in [`super::opened::Recording::channels`].
     pub channels: Vec<usize>,
     /// The frame its messages name; `None` = any: they name none, or what they name is no frame.
     pub frame: Option<String>,
@@ -36,10 +36,10 @@ pub struct Source {
     pub label: String,
 }
 
-impl Source {
+impl Publisher {
     /// All channels of a topic, whatever they say.
-    fn whole(topic: &str, channels: Vec<usize>) -> Source {
-        Source {
+    fn whole(topic: &str, channels: Vec<usize>) -> Publisher {
+        Publisher {
             name: topic.to_owned(),
             topic: topic.to_owned(),
             channels,
@@ -51,15 +51,15 @@ impl Source {
 }
 
 /// One source for each topic, in order of appearance.
-pub(super) fn by_topic(channels: &[LogChannel]) -> Vec<Source> {
+pub(super) fn by_topic(channels: &[LogChannel]) -> Vec<Publisher> {
     let mut at: HashMap<&str, usize> = HashMap::new();
-    let mut sources: Vec<Source> = Vec::new();
+    let mut sources: Vec<Publisher> = Vec::new();
     for (index, known) in channels.iter().enumerate() {
         let topic = known.channel.topic.as_str();
         let place = *at.entry(topic).or_insert(sources.len());
         match sources.get_mut(place) {
             Some(source) => source.channels.push(index),
-            None => sources.push(Source::whole(topic, vec![index])),
+            None => sources.push(Publisher::whole(topic, vec![index])),
         }
     }
     sources
@@ -92,7 +92,7 @@ pub(super) fn tell_apart(
     named: Option<&str>,
     options: &Options,
     pool: &Pool,
-) -> Result<Vec<Source>> {
+) -> Result<Vec<Publisher>> {
     let sources = by_topic(channels);
     let mut decoders = Decoders::new(options);
     let mut looked: Vec<Looked> = Vec::new();
@@ -238,17 +238,17 @@ impl Standing {
 
 /// The topics in the order in which they are looked at, since that is not without end.
 fn in_turn<'s>(
-    sources: &'s [Source],
+    sources: &'s [Publisher],
     named: Option<&str>,
-) -> impl Iterator<Item = (usize, &'s Source, Standing)> {
-    let is_named = |source: &Source| {
+) -> impl Iterator<Item = (usize, &'s Publisher, Standing)> {
+    let is_named = |source: &Publisher| {
         named
             .and_then(|name| name.strip_prefix(source.topic.as_str()))
             .is_some_and(|rest| rest.is_empty() || rest.starts_with('@'))
     };
     let (first, rest): (Vec<_>, Vec<_>) =
         sources.iter().enumerate().partition(|(_, s)| is_named(s));
-    let of = |standing| move |(place, source): (usize, &'s Source)| (place, source, standing);
+    let of = |standing| move |(place, source): (usize, &'s Publisher)| (place, source, standing);
     first
         .into_iter()
         .map(of(Standing::Named))
@@ -266,12 +266,12 @@ pub(super) fn keep(openings: &mut Vec<(Nanos, Vec<u8>)>, opening: (Nanos, Vec<u8
 
 /// Whether a channel met in a walk is the one the survey knows: the index may differ, since the
 /// summary lists them in another order.
-pub(crate) fn is_same(known: &Channel, met: &Channel) -> bool {
+pub fn is_same(known: &Channel, met: &Channel) -> bool {
     known.id == met.id && known.topic == met.topic && known.schema_id == met.schema_id
 }
 
 /// What a channel says of its publisher: the keys that recorders and converters write.
-pub(super) fn publisher(channel: &Channel) -> String {
+pub fn publisher(channel: &Channel) -> String {
     const KEYS: [&str; 10] = [
         "callerid",
         "publisher",
@@ -389,13 +389,13 @@ impl Speakers {
         apart
     }
 
-    fn sources(&self, whole: &Source) -> Vec<Source> {
+    fn sources(&self, whole: &Publisher) -> Vec<Publisher> {
         let apart = self.apart();
         if self.nameless || apart.is_empty() {
             return vec![whole.clone()];
         }
         if let [(_, frame, _)] = apart.as_slice() {
-            return vec![Source {
+            return vec![Publisher {
                 frame: frame.clone(),
                 ..whole.clone()
             }];
@@ -404,7 +404,7 @@ impl Speakers {
         labels(&apart, &self.publishers)
             .into_iter()
             .zip(&apart)
-            .map(|(label, (_, frame, channels))| Source {
+            .map(|(label, (_, frame, channels))| Publisher {
                 name: format!("{}@{label}", whole.topic),
                 topic: whole.topic.clone(),
                 channels: channels.clone(),

@@ -1,13 +1,13 @@
 //! Lines of JSON or rows of a table: opened, described, and what is wrong with them in words.
 
+use crate::decode::{Ambiguous, Options, Undecodable};
+use crate::delimited::Table;
 use crate::error::{Error, Result};
+use crate::format::Format;
+use crate::lines::Lines;
 use std::io::Read;
 use std::path::Path;
 use strapd_attitude::setting::{COLUMNS, DELIMITER, FIELD};
-use strapd_recording::decode::{Ambiguous, Options, Undecodable};
-use strapd_recording::delimited::Table;
-use strapd_recording::format::Format;
-use strapd_recording::lines::Lines;
 
 /// Begins to read lines or rows.
 ///
@@ -30,7 +30,7 @@ pub(super) fn open<R: Read>(
     if format != Format::Table {
         only_for_tables(path, format, options)?;
     }
-    Ok(Lines::new(path, format, input, options)?)
+    Lines::new(path, format, input, options)
 }
 
 /// `--columns` and `--delimiter` say nothing of anything but a table.

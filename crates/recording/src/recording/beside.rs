@@ -5,37 +5,41 @@
 //! correct what is integrated.
 
 use super::decoders::Decoders;
-use super::log::Log;
 use super::log_channel::{LogChannel, described};
+use super::opened::Recording;
+use super::selection::{Selection, TopicBeside};
 use super::sources::is_same;
 use super::topics;
-use crate::config::{Selection, TopicBeside};
+use crate::decode::{Decoder, Options, Wanted};
 use crate::error::{Error, Result};
-use crate::inspection::TopicOfVectors;
+use crate::mcap::Channel;
+use crate::text::named_few;
+use crate::text::printable;
 use std::path::Path;
 use std::sync::Arc;
 use strapd_attitude::condition::Clock;
 use strapd_attitude::estimate::{Aid, Plan};
 use strapd_attitude::setting::{AID, FIELD, MAG_TOPIC, TIME};
-use strapd_recording::decode::{Decoder, Options, Wanted};
-use strapd_recording::mcap::Channel;
-use strapd_recording::text::named_few;
-use strapd_recording::text::printable;
 
 /// Channels that are read beside those of the samples.
 #[derive(Debug, Default)]
-pub(super) struct Besides {
+pub struct Besides {
     channels: Vec<(Arc<Channel>, Decoder)>,
     /// What was taken unnamed, in words.
-    pub(super) notes: Vec<String>,
+    pub notes: Vec<String>,
 }
 
 impl Besides {
     /// What is read of this channel beside the samples.
-    pub(super) fn decoder(&self, channel: &Channel) -> Option<&Decoder> {
+    pub fn decoder(&self, channel: &Channel) -> Option<&Decoder> {
         let mut channels = self.channels.iter();
         let (_, decoder) = channels.find(|(known, _)| is_same(known, channel))?;
         Some(decoder)
+    }
+
+    pub(super) fn append(&mut self, mut other: Besides) {
+        self.channels.append(&mut other.channels);
+        self.notes.append(&mut other.notes);
     }
 
     fn add(&mut self, found: (&LogChannel, Decoder)) {
@@ -43,8 +47,21 @@ impl Besides {
     }
 }
 
+/// A topic of vectors that could correct the samples of another.
+#[derive(Clone, Debug)]
+pub struct TopicOfVectors {
+    /// Its name.
+    pub topic: String,
+    /// Type and encoding.
+    pub described: String,
+    /// Messages a second of the log; `None` where its length is not known.
+    pub rate_hz: Option<f64>,
+    /// Length of the first vector, in the unit of the file.
+    pub first: Option<f64>,
+}
+
 /// How messages are read that a topic named by a flag carries.
-pub(super) fn options(wanted: Wanted, beside: Option<&TopicBeside>) -> Options {
+pub fn options(wanted: Wanted, beside: Option<&TopicBeside>) -> Options {
     Options {
         wanted,
         fields: beside
@@ -58,10 +75,10 @@ pub(super) fn options(wanted: Wanted, beside: Option<&TopicBeside>) -> Options {
 ///
 /// # Errors
 /// A topic that is not there, or carries nothing of the kind; several that may be meant.
-pub(super) fn choose(
+pub fn choose(
     (plan, selection): (&Plan, &Selection),
     path: &Path,
-    log: &Log,
+    log: &Recording,
     (own, has_field): (&str, bool),
 ) -> Result<Besides> {
     let mut besides = Besides::default();
@@ -85,7 +102,7 @@ pub(super) fn choose(
 ///
 /// # Errors
 /// Several that may be meant, or none.
-pub(super) fn of_fields(plan: &Plan, log: &Log, own: &str) -> Result<Besides> {
+pub(super) fn of_fields(plan: &Plan, log: &Recording, own: &str) -> Result<Besides> {
     let mut besides = Besides::default();
     besides.add(unnamed(plan, log.name(), log, own)?);
     Ok(besides)
@@ -94,7 +111,7 @@ pub(super) fn of_fields(plan: &Plan, log: &Log, own: &str) -> Result<Besides> {
 /// The topics beside `own` with magnetic fields, and with specific forces; and of the fields the one that
 /// `--aid gravity+mag` takes unnamed.
 #[must_use]
-pub fn vectors(log: &Log, own: &str) -> [(Vec<TopicOfVectors>, Option<String>); 2] {
+pub fn vectors(log: &Recording, own: &str) -> [(Vec<TopicOfVectors>, Option<String>); 2] {
     let plan = Plan::default();
     let secs = log
         .survey
@@ -147,7 +164,7 @@ fn named<'l>(
     wanted: Wanted,
     beside: &TopicBeside,
     path: &Path,
-    log: &'l Log,
+    log: &'l Recording,
 ) -> Result<(&'l LogChannel, Decoder)> {
     let mut channels = log.channels.iter();
     let Some(known) = channels.find(|k| k.channel.topic == beside.topic) else {
@@ -179,7 +196,7 @@ fn named<'l>(
 fn unnamed<'l>(
     plan: &Plan,
     path: &Path,
-    log: &'l Log,
+    log: &'l Recording,
     own: &str,
 ) -> Result<(&'l LogChannel, Decoder)> {
     let mut decoders = Decoders::of_run(plan, &options(Wanted::Fields, None));
@@ -223,7 +240,7 @@ fn unnamed<'l>(
 }
 
 /// Whether a topic's fields may be taken unnamed: a vector of no name may be anything.
-pub(super) fn may_be_field(channel: &Channel) -> bool {
+pub fn may_be_field(channel: &Channel) -> bool {
     let schema = channel.schema.as_deref().map_or("", |s| &s.name);
     !schema.ends_with("Vector3Stamped")
 }

@@ -2,8 +2,8 @@
 //!
 //! Apart from the lines because each sensor of a log has a unit of its own.
 
+use crate::decode::{Ambiguous, Bare, Line, MOST_WAITING, unit_of};
 use strapd_attitude::record::{Nanos, RawSample, TimeUnit};
-use strapd_recording::decode::{Ambiguous, Bare, Line, MOST_WAITING, unit_of};
 
 /// Samples that wait at most, where few of them have bare numbers.
 const MOST_HELD: usize = 1024;

@@ -3,15 +3,15 @@
 //! Apart from the log because how its messages are understood is asked again for each run, and a log may
 //! have tens of thousands of channels of one schema, or as many schemas.
 
+use crate::decode::{self, Decoder, Effort, Options, Unsupported};
+use crate::mcap::{Channel, Schema};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use strapd_attitude::condition::Clock;
 use strapd_attitude::estimate::Plan;
 use strapd_attitude::record::Nanos;
-use strapd_recording::decode::{self, Decoder, Effort, Options, Unsupported};
-use strapd_recording::mcap::{Channel, Schema};
 
-/// Decoders under the same options. All of a log together cost no more than one [`Effort`].
+/// Decoders under the same options. The schemas of a log together are compiled within one fixed effort, however many.
 #[derive(Debug, Default)]
 pub struct Decoders {
     options: Options,
@@ -85,7 +85,7 @@ impl Decoders {
     /// The decoder of a channel, which has seen no message.
     ///
     /// # Errors
-    /// As [`Decoder::compile_within`].
+    /// As [`Decoder::compile`].
     pub fn of(&mut self, channel: &Channel) -> Result<Decoder, Unsupported> {
         self.compiled(channel, None)
     }
@@ -93,7 +93,7 @@ impl Decoders {
     /// The same that takes the stamp of this number, of several ([`Options::nth_stamp`]).
     ///
     /// # Errors
-    /// As [`Decoder::compile_within`].
+    /// As [`Decoder::compile`].
     pub fn with_stamp(&mut self, channel: &Channel, nth: usize) -> Result<Decoder, Unsupported> {
         self.compiled(channel, Some(nth))
     }
@@ -117,7 +117,7 @@ impl Decoders {
         match &known.decoder {
             Ok(decoder) => Ok(decoder.of_topic(&channel.topic)),
             Err(why) => Err(Unsupported {
-                topic: strapd_recording::text::printable(&channel.topic),
+                topic: crate::text::printable(&channel.topic),
                 ..why.clone()
             }),
         }

@@ -2,9 +2,9 @@
 //!
 //! Apart from the lines because nobody knows before whose they are, and where the run stands.
 
+use crate::decode::{Class, Line};
 use std::collections::VecDeque;
 use strapd_attitude::record::RawSample;
-use strapd_recording::decode::{Class, Line};
 
 /// What waits at most, in a log and in `serve`; of more the last, since the first attitude wants the latest force.
 pub const MOST: usize = 16;

@@ -4,10 +4,10 @@
 //! be made the error lists what is there.
 
 use crate::error::{Error, Result};
+use crate::text::named_few;
 use std::collections::BTreeSet;
 use std::path::Path;
 use strapd_attitude::setting::TOPIC;
-use strapd_recording::text::named_few;
 
 /// What the choice needs to know of one channel.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -129,7 +129,7 @@ pub fn listing(candidates: &[Candidate]) -> String {
             let count = c
                 .messages
                 .map_or_else(String::new, |n| format!("  {n} messages"));
-            let topic = strapd_recording::text::printable(&c.topic);
+            let topic = crate::text::printable(&c.topic);
             format!("\n    {topic}  {}{count}", c.described)
         })
         .collect();

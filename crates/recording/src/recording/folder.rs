@@ -4,11 +4,12 @@
 //! beside it have what corrects them, or nothing of use here.
 
 use super::line_input;
+use super::warn::Warn;
+use crate::decode::{Options, Wanted};
+use crate::delimited::Table;
 use crate::error::{Error, Result};
+use crate::format::{Format, open};
 use std::path::{Path, PathBuf};
-use strapd_recording::decode::{Options, Wanted};
-use strapd_recording::delimited::Table;
-use strapd_recording::format::{Format, open};
 
 /// Files that are looked at: who has more has no recording there, but an archive.
 const MOST: usize = 1000;
@@ -38,7 +39,7 @@ struct Tables {
 ///
 /// # Errors
 /// It can not be read; there is no recording in it, or more than one.
-pub(super) fn of(path: &Path) -> Result<Folder> {
+pub(super) fn of(path: &Path, warn: &Warn) -> Result<Folder> {
     let unsupported = |what: String| Error::Unsupported {
         path: path.to_owned(),
         what,
@@ -57,7 +58,7 @@ pub(super) fn of(path: &Path) -> Result<Folder> {
         match Format::of_file(file) {
             Ok(Some(Format::Table)) => tables.add(file),
             Ok(Some(format)) => whole.push((file.clone(), format)),
-            Err(why @ strapd_recording::Error::NotRead { .. }) => known = known.or(Some(why)),
+            Err(why @ Error::NotRead { .. }) => known = known.or(Some(why)),
             Ok(None) | Err(_) => {}
         }
     }
@@ -76,14 +77,14 @@ pub(super) fn of(path: &Path) -> Result<Folder> {
     match mains.as_slice() {
         [(main, format)] => Ok(Folder {
             beside: match format {
-                Format::Table => tables.beside(main),
+                Format::Table => tables.beside(main, warn),
                 _ => Vec::new(),
             },
             main: main.clone(),
             format: *format,
         }),
         [] => Err(match known {
-            Some(why) => why.into(),
+            Some(why) => why,
             None => unsupported(format!(
                 "a folder without a recording that is read: {}\n  help: name a file",
                 named(&files)
@@ -118,7 +119,7 @@ impl Tables {
     }
 
     /// Those that correct the rates of `main`; of several that may be meant none, which is said.
-    fn beside(mut self, main: &Path) -> Vec<PathBuf> {
+    fn beside(mut self, main: &Path, warn: &Warn) -> Vec<PathBuf> {
         // Sensor Logger's, of which `Accelerometer` is without gravity.
         for best in ["totalacceleration", "accelerometeruncalibrated"] {
             if let Some(at) = self.forces.iter().position(|file| stem(file) == best) {
@@ -141,11 +142,11 @@ impl Tables {
             match found.as_slice() {
                 [one] if !beside.contains(one) => beside.push(one.clone()),
                 [] | [_] => {}
-                several => tracing::warn!(
+                several => warn.say(&format!(
                     "{}: the {what} is not used, since it may be in {}: take all but one out of the folder",
                     main.display(),
                     named(several)
-                ),
+                )),
             }
         }
         beside
@@ -164,7 +165,7 @@ fn table(file: &Path, wanted: Wanted) -> Option<Table> {
 
 /// The regular files that are not hidden, by name.
 fn files(path: &Path) -> Result<Vec<PathBuf>> {
-    let fail = |source| strapd_recording::Error::Open {
+    let fail = |source| Error::Open {
         path: path.to_owned(),
         source,
     };
@@ -189,7 +190,7 @@ fn stem(file: &Path) -> String {
 fn named(files: &[PathBuf]) -> String {
     let name = |file: &PathBuf| {
         let name = file.file_name().unwrap_or_default().to_string_lossy();
-        strapd_recording::text::printable(&name)
+        crate::text::printable(&name)
     };
     let mut names: Vec<String> = files.iter().take(MOST_SAID).map(name).collect();
     if files.is_empty() {

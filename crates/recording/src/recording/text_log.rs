@@ -10,19 +10,19 @@ use super::early_besides::{EarlyBesides, are_beside};
 use super::input::Input;
 use super::line_input::{described, no_samples, unclear};
 use super::log_channel::LogChannel;
-use super::simulate::TRUTH_ID;
+use crate::attitude_line::TRUTH_ID;
+use crate::decode::{Class, Line, Options, Rank, Role, Stated, Undecodable};
+use crate::delimited::Table;
 use crate::error::{Error, Result};
+use crate::format::Format;
+use crate::lines::Lines;
+use crate::mcap::{Channel, ChannelSurvey, Schema, Survey};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
 use strapd_attitude::record::{Declared, Nanos, RawSample};
-use strapd_recording::decode::{Class, Line, Options, Rank, Role, Stated, Undecodable};
-use strapd_recording::delimited::Table;
-use strapd_recording::format::Format;
-use strapd_recording::lines::Lines;
-use strapd_recording::mcap::{Channel, ChannelSurvey, Schema, Survey};
 
 /// Sensors that are told apart. More are no sensors.
 const MOST_SENSORS: usize = 1024;
@@ -83,9 +83,11 @@ impl TextLog {
         };
         let doubt = table.as_ref().and_then(Table::doubt_of_unit);
         for note in lines.notes().iter().chain(&doubt) {
-            tracing::warn!("{}: {note}", input.name().display());
+            input
+                .warn()
+                .say(&format!("{}: {note}", input.name().display()));
         }
-        let sensors = read(&mut lines, input.name(), |read| {
+        let sensors = read::<Error>(&mut lines, input.name(), |read| {
             if let Read::Samples(place, key, line, samples) = read {
                 if place == met.len() {
                     met.push((
@@ -123,11 +125,11 @@ impl TextLog {
             survey.times = Some(spanning(survey.times, times));
         }
         if sensors.left_out > 0 {
-            tracing::warn!(
+            input.warn().say(&format!(
                 "{}: {} lines are of more than {MOST_SENSORS} sensors, and were left out",
                 input.name().display(),
                 sensors.left_out
-            );
+            ));
         }
         let channels: Vec<LogChannel> = channels.into_iter().map(|(known, _)| known).collect();
         let log = TextLog {
@@ -145,16 +147,16 @@ impl TextLog {
     }
 
     /// Reads all of it once more: the items of the channels that have a way, in the order of the lines.
-    pub(super) fn walk(
+    pub(super) fn walk<E: From<Error>>(
         &self,
         mut select: impl FnMut(&Arc<Channel>) -> Option<Route>,
-        mut take: impl FnMut(&mut Vec<Item>) -> Result<ControlFlow<()>>,
-    ) -> Result<()> {
+        mut take: impl FnMut(&mut Vec<Item>) -> std::result::Result<ControlFlow<()>, E>,
+    ) -> std::result::Result<(), E> {
         let routes: Vec<Option<Route>> = self.channels.iter().map(&mut select).collect();
         let mut items = Vec::with_capacity(BATCH);
         let mut lines = self.input.lines(&self.options)?;
         let mut is_over = false;
-        read(&mut lines, self.input.name(), |read| {
+        read::<E>(&mut lines, self.input.name(), |read| {
             match read {
                 Read::Samples(place, _, _, samples) => {
                     if let Some(Some(route)) = routes.get(place) {
@@ -184,11 +186,11 @@ impl TextLog {
 }
 
 /// Reads a text to its end, or until `take` has enough.
-fn read(
+fn read<E: From<Error>>(
     lines: &mut Lines<File>,
     path: &Path,
-    mut take: impl FnMut(Read<'_>) -> Result<ControlFlow<()>>,
-) -> Result<Sensors> {
+    mut take: impl FnMut(Read<'_>) -> std::result::Result<ControlFlow<()>, E>,
+) -> std::result::Result<Sensors, E> {
     let mut sensors = Sensors::default();
     let mut samples = Vec::new();
     let mut before = None;
@@ -286,7 +288,7 @@ fn read(
         }
     }
     if let Some(why) = first_bad.filter(|_| before.is_none()) {
-        return Err(why);
+        return Err(why.into());
     }
     let places: Vec<(Key, usize)> = std::mem::take(&mut sensors.places).into_iter().collect();
     for (key, place) in places {

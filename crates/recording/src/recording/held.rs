@@ -7,13 +7,13 @@ use super::channel_route::{Copied, Item, Route, Taker};
 use super::decoders::Decoders;
 use super::log_channel::nanos;
 use super::sources::{OPENINGS, OPENINGS_LIMIT, keep};
+use crate::decode::{Decoder, Unsupported};
+use crate::mcap::{Channel, Message};
 use std::sync::Arc;
-use strapd_recording::decode::{Decoder, Unsupported};
-use strapd_recording::mcap::{Channel, Message};
 
 /// Such a channel.
 #[derive(Debug)]
-pub(super) struct Held {
+pub struct Held {
     channel: Arc<Channel>,
     /// As it will be read.
     decoder: Decoder,
@@ -28,7 +28,9 @@ pub(super) struct Held {
 }
 
 impl Held {
-    pub(super) fn new(
+    /// Before its first message; `number` is its own among the channels of the topic.
+    #[must_use]
+    pub fn new(
         channel: &Arc<Channel>,
         decoder: Decoder,
         taker: Taker,
@@ -48,11 +50,14 @@ impl Held {
     }
 
     /// Its messages come as copies, whoever they are for.
-    pub(super) fn route(&self) -> Route {
+    #[must_use]
+    pub fn route(&self) -> Route {
         Route::only_copied(self.channel.clone())
     }
 
-    pub(super) fn is_of(&self, copied: &Copied) -> bool {
+    /// Whether a message is of this channel.
+    #[must_use]
+    pub fn is_of(&self, copied: &Copied) -> bool {
         Arc::ptr_eq(&self.channel, &copied.channel)
     }
 
@@ -60,7 +65,7 @@ impl Held {
     ///
     /// # Errors
     /// As [`Decoder::settle`] and [`Decoder::settle_unit`].
-    pub(super) fn take(
+    pub fn take(
         &mut self,
         copied: Copied,
         decoders: &Decoders,
@@ -86,11 +91,7 @@ impl Held {
     ///
     /// # Errors
     /// As [`Decoder::settle_unit`].
-    pub(super) fn release(
-        &mut self,
-        decoders: &Decoders,
-        out: &mut Vec<Item>,
-    ) -> Result<(), Unsupported> {
+    pub fn release(&mut self, decoders: &Decoders, out: &mut Vec<Item>) -> Result<(), Unsupported> {
         let mut openings = Vec::new();
         for copied in &self.waiting {
             keep(&mut openings, (nanos(copied.log_time), copied.data.clone()));
@@ -107,12 +108,14 @@ impl Held {
     }
 
     /// The channel, and how it is read.
-    pub(super) fn known(&self) -> (Arc<Channel>, Decoder) {
+    #[must_use]
+    pub fn known(&self) -> (Arc<Channel>, Decoder) {
         (self.channel.clone(), self.decoder.clone())
     }
 
     /// Whether messages wait, or the unit of those that come.
-    pub(super) fn is_waiting(&self) -> bool {
+    #[must_use]
+    pub fn is_waiting(&self) -> bool {
         self.route.is_none()
     }
 }

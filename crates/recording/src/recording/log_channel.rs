@@ -2,10 +2,10 @@
 
 use super::decoders::{Decoders, plain};
 use super::topics::Candidate;
+use crate::decode::{Decoder, Rank, Role, Stated, Unsupported, role_of};
+use crate::mcap::Channel;
 use std::sync::Arc;
 use strapd_attitude::record::Nanos;
-use strapd_recording::decode::{Decoder, Rank, Role, Stated, Unsupported, role_of};
-use strapd_recording::mcap::Channel;
 
 /// A channel and its first message.
 #[derive(Clone, Debug)]
@@ -85,7 +85,7 @@ pub fn described(channel: &Channel) -> String {
         .schema
         .as_deref()
         .map_or("(no type)", |s| s.name.as_str());
-    strapd_recording::text::printable(&format!("{name} [{}]", channel.message_encoding))
+    crate::text::printable(&format!("{name} [{}]", channel.message_encoding))
 }
 
 /// A role as a number: higher is more likely "the IMU" (see [`Candidate::rank`]).

@@ -1,14 +1,14 @@
 //! What becomes of the messages of one channel, on the workers. Pure.
 
 use super::log_channel::nanos;
-use super::sources::{Source, Turns, digest};
+use super::sources::{Publisher, Turns, digest};
+use crate::decode::{Decoder, Undecodable};
+use crate::mcap::{Channel, Message};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use strapd_attitude::record::{Nanos, RawSample};
-use strapd_recording::decode::{Decoder, Undecodable};
-use strapd_recording::mcap::{Channel, Message};
 
 /// What a channel's messages are used for.
 #[derive(Debug)]
@@ -62,7 +62,7 @@ const FOREIGN: usize = 16;
 impl Noticed {
     /// For the samples of a source.
     #[must_use]
-    pub fn of(source: &Source) -> Noticed {
+    pub fn of(source: &Publisher) -> Noticed {
         Noticed {
             frame_id: source
                 .frame

@@ -1,0 +1,41 @@
+//! A recording of any kind -> what is in it, and its samples in order. I/O.
+//!
+//! A room of its own because whoever wants samples asks the same things first, whatever the container: what it is, which
+//! topics carry rates, whose they are, and how each message is read. [`opened::Recording`] is all of it at once; a program that does
+//! more with messages than to take samples (`strapd-replay`) walks it with routes of its own.
+//!
+//! ```text
+//! path, stream -> input -> opened (survey, first messages, sources) -> topics -> samples
+//!     folder, line_input, text_log: beside it                          topic_reading, channel_route: on the workers
+//! what comes once -> incoming -> messages, sensor_lines
+//! ```
+//!
+//! | file | |
+//! |---|---|
+//! | [`input`], `folder`, `line_input`, [`incoming`] | what can be read again, the recording in a folder, lines and rows, what comes once |
+//! | [`opened`], `text_log`, [`log_channel`], [`sources`] | what is in a log, or in a text; what a channel can serve as; who speaks on a topic |
+//! | [`selection`], [`topics`], [`beside`], [`decoders`] | what is wanted, the choice of topics, what belongs to their samples, how messages are read |
+//! | [`channel_route`], [`held`], `bare_stamps`, [`early_besides`] | what becomes of messages; those that wait for the unit of their stamps, or for their sensor |
+//! | `samples`, [`topic_reading`], [`sensor_lines`] | all samples that are selected, one topic, one sensor of a text that comes once |
+//! | [`warn`] | who is told what is no error |
+
+mod bare_stamps;
+pub mod beside;
+pub mod channel_route;
+pub mod decoders;
+pub mod early_besides;
+mod folder;
+pub mod held;
+pub mod incoming;
+pub mod input;
+mod line_input;
+pub mod log_channel;
+pub mod opened;
+mod samples;
+pub mod selection;
+pub mod sensor_lines;
+pub mod sources;
+mod text_log;
+pub mod topic_reading;
+pub mod topics;
+pub mod warn;

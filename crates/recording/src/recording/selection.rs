@@ -1,0 +1,27 @@
+//! Which samples of a recording are wanted, and how its messages are read. Pure.
+//!
+//! Apart from the recording because it is asked for before there is one.
+
+use crate::decode::{self, FieldPath};
+
+/// Which samples of a recording, and how its messages are read.
+#[derive(Clone, Debug, Default)]
+pub struct Selection {
+    /// `--topic`.
+    pub topic: Option<String>,
+    /// `--field`, `--ignore-covariance-flag`.
+    pub decode: decode::Options,
+    /// `--accel-topic`.
+    pub accel: Option<TopicBeside>,
+    /// `--mag-topic`.
+    pub mag: Option<TopicBeside>,
+}
+
+/// A topic whose specific forces, or magnetic fields, belong to the samples of another.
+#[derive(Clone, Debug)]
+pub struct TopicBeside {
+    /// Its name.
+    pub topic: String,
+    /// Where the vector lies: the `--field` of its role.
+    pub fields: Vec<FieldPath>,
+}

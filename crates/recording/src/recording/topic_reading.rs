@@ -1,0 +1,282 @@
+//! One topic of a log -> its samples, each channel read by its own decoder. I/O.
+//!
+//! Apart from the replay for who looks at samples and integrates none: which topic, by which decoders, and the walk.
+
+use super::beside::{self, Besides};
+use super::channel_route::{Item, Noticed, Route, Taker};
+use super::decoders::Decoders;
+use super::log_channel::LogChannel;
+use super::opened::{AHEAD, Recording, problems};
+use super::selection::Selection;
+use super::sources::Publisher;
+use super::topics;
+use crate::decode::{Decoder, Undecodable};
+use crate::error::{Error, Result};
+use crate::mcap::{Channel, Survey};
+use crate::pool::Pool;
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+use std::sync::Arc;
+use strapd_attitude::estimate::{Meaning, Plan};
+use strapd_attitude::record::{Nanos, RawSample, SampleKind};
+
+/// A topic, and how it is read.
+#[derive(Debug)]
+pub struct TopicReading<'l> {
+    log: &'l Recording,
+    source: Publisher,
+    /// Something to know about the choice.
+    pub note: Option<String>,
+    /// Its channels, at least one, with their decoders.
+    pub channels: Vec<(&'l LogChannel, Decoder)>,
+    /// By id and schema id: the place among the channels.
+    places: BTreeMap<(u16, u16), usize>,
+    /// What has a topic of its own and belongs to these samples.
+    besides: Besides,
+}
+
+/// What is read.
+#[derive(Debug)]
+pub enum Taken {
+    /// A sample of the channel of this place.
+    Sample(usize, RawSample),
+    /// A payload that could not be decoded, and when it was logged (of a line: its number).
+    Undecodable(Nanos, Undecodable),
+}
+
+impl<'l> TopicReading<'l> {
+    /// The topic called `named`, or the log's IMU.
+    ///
+    /// # Errors
+    /// As [`Recording::choose`]; a channel of it can not be decoded.
+    pub fn new(
+        log: &'l Recording,
+        named: Option<&str>,
+        decoders: &mut Decoders,
+    ) -> Result<TopicReading<'l>> {
+        let choice = log.choose(log.name(), named)?;
+        let topic = choice.topics.first().map_or("", String::as_str);
+        Ok(TopicReading {
+            note: choice.note,
+            ..TopicReading::of(log, topic, decoders)?
+        })
+    }
+
+    /// The topic, or publisher on one, of this name.
+    ///
+    /// # Errors
+    /// It is not there; a channel of it can not be decoded.
+    pub(super) fn of(
+        log: &'l Recording,
+        topic: &str,
+        decoders: &mut Decoders,
+    ) -> Result<TopicReading<'l>> {
+        let source = log.source(topic).ok_or_else(|| Error::NoSuchTopic {
+            path: log.name().to_owned(),
+            topic: topic.to_owned(),
+            topics: topics::listing(&log.candidates()),
+        })?;
+        let mut channels = Vec::new();
+        let mut places = BTreeMap::new();
+        for known in log.channels_of(&source) {
+            let decoder = known.decoder(decoders).map_err(|why| Error::Unsupported {
+                path: log.name().to_owned(),
+                what: why.to_string(),
+            })?;
+            places
+                .entry((known.channel.id, known.channel.schema_id))
+                .or_insert(channels.len());
+            channels.push((known, decoder));
+        }
+        Ok(TopicReading {
+            log,
+            source,
+            note: None,
+            channels,
+            places,
+            besides: Besides::default(),
+        })
+    }
+
+    /// The same with the magnetic fields that a topic of their own has for these samples, where there is one.
+    #[must_use]
+    pub fn with_fields(mut self) -> TopicReading<'l> {
+        let has_field = |(_, decoder): &(&LogChannel, Decoder)| decoder.stated().has_mag;
+        if !self.channels.iter().any(has_field) {
+            let found = beside::of_fields(&Plan::default(), self.log, &self.source.topic);
+            self.besides = found.unwrap_or_default();
+        }
+        self
+    }
+
+    /// The same with what is selected beside its samples, and the fields as [`TopicReading::with_fields`] finds them.
+    ///
+    /// # Errors
+    /// A topic that is not there, or carries nothing of the kind.
+    pub(super) fn with_besides(mut self, selection: &Selection) -> Result<TopicReading<'l>> {
+        if selection.mag.is_none() {
+            self = self.with_fields();
+        }
+        let own = (self.source.topic.as_str(), true);
+        let asked = (&Plan::default(), selection);
+        let named = beside::choose(asked, self.log.name(), self.log, own)?;
+        self.besides.append(named);
+        Ok(self)
+    }
+
+    /// The place of a channel met in a walk among its own.
+    fn place_of(&self, met: &Channel) -> Option<usize> {
+        let place = self.places.get(&(met.id, met.schema_id));
+        place.filter(|_| met.topic == self.source.topic).copied()
+    }
+
+    /// What `--topic` takes.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.source.name
+    }
+
+    /// Reads all of it, in order, until `take` has enough or fails: samples in rad/s, m/s^2 and FLU, each with what the
+    /// format says it means. What is lost is said, and how many that are comes back.
+    ///
+    /// # Errors
+    /// As [`Recording::walk`].
+    pub fn walk_in_flu<E: From<Error>>(
+        &self,
+        pool: &Pool,
+        mut take: impl FnMut(&RawSample, Option<SampleKind>) -> std::result::Result<ControlFlow<()>, E>,
+    ) -> std::result::Result<u64, E> {
+        let each = std::slice::from_ref(self);
+        walk_in_flu(self.log, each, pool, |_, raw, kind| take(raw, kind))
+    }
+
+    /// Reads all of it, in order, until `take` has enough or fails.
+    ///
+    /// # Errors
+    /// As [`Recording::walk`].
+    pub fn walk<E: From<Error>>(
+        &self,
+        pool: &Pool,
+        mut take: impl FnMut(Taken) -> std::result::Result<ControlFlow<()>, E>,
+    ) -> std::result::Result<Survey, E> {
+        let each = std::slice::from_ref(self);
+        walk(self.log, each, pool, |_, taken| take(taken))
+    }
+}
+
+/// [`TopicReading::walk_in_flu`] of several at once, which are told apart by their place.
+pub(super) fn walk_in_flu<E: From<Error>>(
+    log: &Recording,
+    readings: &[TopicReading<'_>],
+    pool: &Pool,
+    mut take: impl FnMut(
+        usize,
+        &RawSample,
+        Option<SampleKind>,
+    ) -> std::result::Result<ControlFlow<()>, E>,
+) -> std::result::Result<u64, E> {
+    let of_channel = |(_, decoder): &(&LogChannel, Decoder)| {
+        let declared = &decoder.stated().declared;
+        let meaning = Meaning::new(&Plan::default(), declared);
+        (meaning, declared.sample_kind)
+    };
+    let meanings: Vec<Vec<(Meaning, Option<SampleKind>)>> = readings
+        .iter()
+        .map(|reading| reading.channels.iter().map(of_channel).collect())
+        .collect();
+    let warn = log.input().warn();
+    let mut undecodable = 0u64;
+    let survey = walk(log, readings, pool, |reading, taken| match taken {
+        Taken::Sample(place, raw) => meanings
+            .get(reading)
+            .and_then(|meanings| meanings.get(place))
+            .map_or(Ok(ControlFlow::Continue(())), |(meaning, kind)| {
+                take(reading, &meaning.in_flu(&raw), *kind)
+            }),
+        Taken::Undecodable(at, why) => {
+            if undecodable == 0 {
+                warn.say(&format!(
+                    "first undecodable payload, {}: {why}",
+                    log.place_of(at)
+                ));
+            }
+            undecodable += 1;
+            Ok(ControlFlow::Continue(()))
+        }
+    })?;
+    for problem in problems(&survey) {
+        warn.say(&format!("{}: {problem}", log.name().display()));
+    }
+    if undecodable > 0 {
+        warn.say(&format!("{undecodable} payloads could not be decoded"));
+    }
+    Ok(undecodable + survey.problems.losses())
+}
+
+/// [`TopicReading::walk`] of several at once, which are told apart by their place.
+fn walk<E: From<Error>>(
+    log: &Recording,
+    readings: &[TopicReading<'_>],
+    pool: &Pool,
+    mut take: impl FnMut(usize, Taken) -> std::result::Result<ControlFlow<()>, E>,
+) -> std::result::Result<Survey, E> {
+    // A stream for each channel of each reading.
+    let streams: Vec<(usize, usize)> = readings
+        .iter()
+        .enumerate()
+        .flat_map(|(at, reading)| (0..reading.channels.len()).map(move |place| (at, place)))
+        .collect();
+    let noticed: Vec<Arc<Noticed>> = readings
+        .iter()
+        .map(|reading| Arc::new(Noticed::of(&reading.source)))
+        .collect();
+    log.walk(
+        AHEAD,
+        pool,
+        |met| {
+            let mut decoder = None;
+            let mut takers = Vec::new();
+            for (stream, (at, place)) in streams.iter().enumerate() {
+                if let (Some(reading), Some(noticed)) = (readings.get(*at), noticed.get(*at))
+                    && reading.place_of(met) == Some(*place)
+                    && let Some((_, own)) = reading.channels.get(*place)
+                {
+                    decoder.get_or_insert(own);
+                    let noticed = noticed.clone();
+                    takers.push(Taker { stream, noticed });
+                }
+            }
+            match decoder {
+                Some(decoder) => Some(Route::to(decoder.clone(), takers)),
+                None => {
+                    let mut besides = readings.iter().map(|reading| &reading.besides);
+                    let decoder = besides.find_map(|besides| besides.decoder(met));
+                    Route::other(decoder.cloned(), None)
+                }
+            }
+        },
+        |items| {
+            for item in items.drain(..) {
+                let (stream, raw) = match item {
+                    Item::Sample(stream, raw) => (stream, Ok(raw)),
+                    Item::Undecodable(stream, why) => (stream, Err(why)),
+                    // In the axes of the samples, as a replay takes it.
+                    Item::Beside(raw) => {
+                        let is_beside = true;
+                        (0, Ok(RawSample { is_beside, ..raw }))
+                    }
+                    Item::Reference(_) | Item::Copy(_) => continue,
+                };
+                let (at, place) = streams.get(stream).copied().unwrap_or_default();
+                let taken = match raw {
+                    Ok(raw) => Taken::Sample(place, raw),
+                    Err(why) => Taken::Undecodable(why.0, why.1),
+                };
+                if take(at, taken)?.is_break() {
+                    return Ok(ControlFlow::Break(()));
+                }
+            }
+            Ok(ControlFlow::Continue(()))
+        },
+    )
+}

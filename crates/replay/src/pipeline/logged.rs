@@ -1,0 +1,20 @@
+//! What a command line names -> a recording that can be read again, its warnings logged. I/O.
+//!
+//! Apart from the reader because that logs nothing itself: it hands out what is to be known as it comes.
+
+use crate::error::Result;
+use std::path::Path;
+use strapd_recording::{Input, Warn};
+
+/// Opens what a command line names.
+///
+/// # Errors
+/// As [`Input::open`].
+pub fn open(path: &Path) -> Result<Input> {
+    Ok(Input::open(path, &warn())?)
+}
+
+/// Logs what is to be known of a recording.
+fn warn() -> Warn {
+    Warn::by(|what| tracing::warn!("{what}"))
+}
