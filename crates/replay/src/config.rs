@@ -3,10 +3,8 @@
 pub mod calibration;
 
 use crate::error::{Error, Result};
-use nalgebra::Vector3;
 use strapd_attitude::estimate::{Bias, Initial, NOISE_FIGURES, NOISE_PRESETS, Noise, Truncation};
-use strapd_attitude::frames::{Body, Nav};
-use strapd_attitude::quaternion::{Quaternion, YawPitchRoll};
+use strapd_attitude::quaternion::{BodyRate, Quaternion, YawPitchRoll};
 use strapd_recording::decode::{self, FieldPath, FieldRole};
 
 /// Which samples of a recording, and how its messages are read.
@@ -121,9 +119,8 @@ pub fn parse_initial(text: &str) -> Result<Initial> {
     }
     if let Some(list) = text.strip_prefix("rpy=") {
         let [roll, pitch, yaw] = numbers::<3>("--init rpy", list)?.map(f64::to_radians);
-        let q: Quaternion<Nav, Body> =
-            Quaternion::from_yaw_pitch_roll(&YawPitchRoll { yaw, pitch, roll });
-        return Ok(Initial::Given(q.wxyz()));
+        let angles = YawPitchRoll { yaw, pitch, roll };
+        return Ok(Initial::Given(Quaternion::from_yaw_pitch_roll(&angles)));
     }
     Err(Error::Usage(format!(
         "--init {text}: expected identity, gravity, first-orientation, q=w,x,y,z or rpy=roll,pitch,yaw (degrees)"
@@ -139,7 +136,7 @@ pub fn parse_bias(text: &str) -> Result<Bias> {
         "none" => Ok(Bias::None),
         "auto" => Ok(Bias::Auto),
         list => numbers::<3>("--bias", list)
-            .map(|b| Bias::Given(Vector3::from(b)))
+            .map(|b| Bias::Given(BodyRate(b.into())))
             .map_err(|_| {
                 Error::Usage(format!(
                     "--bias {text}: expected none, auto, or three numbers x,y,z in rad/s"
@@ -235,7 +232,7 @@ pub fn numbers<const N: usize>(flag: &str, list: &str) -> Result<[f64; N]> {
 ///
 /// # Errors
 /// [`Error::Usage`] when it is not four finite numbers of about unit norm.
-pub fn unit_quaternion(flag: &str, list: &str) -> Result<[f64; 4]> {
+pub fn unit_quaternion<To, From>(flag: &str, list: &str) -> Result<Quaternion<To, From>> {
     let list = list.strip_prefix("q=").unwrap_or(list);
     let q = numbers::<4>(flag, list)?;
     let norm = q.iter().map(|v| v * v).sum::<f64>().sqrt();
@@ -244,7 +241,7 @@ pub fn unit_quaternion(flag: &str, list: &str) -> Result<[f64; 4]> {
             "{flag} q={list}: a unit quaternion w,x,y,z is needed, this one has norm {norm}"
         )));
     }
-    Ok(q.map(|v| v / norm))
+    Ok(Quaternion::assume_unit(q.map(|v| v / norm)))
 }
 
 #[cfg(test)]
@@ -336,7 +333,7 @@ mod tests {
     fn a_quaternion_that_is_no_rotation_is_refused() {
         assert!(matches!(
             parse_initial("q=1,0,0,0"),
-            Ok(Initial::Given([1.0, 0.0, 0.0, 0.0]))
+            Ok(Initial::Given(q)) if q == Quaternion::identity()
         ));
         for bad in ["q=1,1,1,1", "q=0,0,0,0", "q=1,0,0", "q=NaN,0,0,1", "qq", ""] {
             assert!(parse_initial(bad).is_err(), "{bad}");
