@@ -11,7 +11,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::time::Duration;
 use strapd::sink::{Compression, Encoding, Flow, Options, Provenance, Sink, Stream, Target};
-use strapd_attitude::quaternion::Quaternion;
+use strapd_attitude::frames::In;
+use strapd_attitude::quaternion::{BodyRate, Quaternion};
 use strapd_attitude::record::{AttitudeCovariance, AttitudeSample, Nanos, Status};
 
 /// A slow turn with full-entropy noise in rate and acceleration: the worst a compressor meets.
@@ -26,8 +27,12 @@ fn samples(count: usize) -> Vec<AttitudeSample> {
             AttitudeSample {
                 stamp,
                 q_nb: Quaternion::assume_unit([c, 0.6 * s, 0.0, 0.8 * s]),
-                rate: Vector3::new(noise(0.01), noise(0.01), 0.1 + noise(0.01)),
-                accel: Some(Vector3::new(noise(0.1), noise(0.1), 9.8 + noise(0.1))),
+                rate: BodyRate(Vector3::new(noise(0.01), noise(0.01), 0.1 + noise(0.01))),
+                accel: Some(In::assume(Vector3::new(
+                    noise(0.1),
+                    noise(0.1),
+                    9.8 + noise(0.1),
+                ))),
                 covariance: AttitudeCovariance::from_sigma(Vector3::repeat(
                     1e-5 * (k as f64).sqrt(),
                 )),

@@ -30,7 +30,10 @@ fn by_vectors(
         let [before, now] = pair else { continue };
         let h = now.stamp.secs_since(before.stamp);
         let last = out[out.len() - 1];
-        out.push(advanced(&last, phi(k + 1, before.value, now.value, h)));
+        out.push(advanced(
+            &last,
+            phi(k + 1, *before.gyro.as_vector(), *now.gyro.as_vector(), h),
+        ));
     }
     out
 }
@@ -62,7 +65,10 @@ pub fn euler_angles(start: Attitude, rates: &[RateSample]) -> Vec<Attitude> {
     for pair in rates.windows(2) {
         let [before, now] = pair else { continue };
         let h = now.stamp.secs_since(before.stamp);
-        let (w, [sr, cr]) = (before.value, [angles.roll.sin(), angles.roll.cos()]);
+        let (w, [sr, cr]) = (
+            *before.gyro.as_vector(),
+            [angles.roll.sin(), angles.roll.cos()],
+        );
         let across = sr * w.y + cr * w.z;
         let next = YawPitchRoll {
             yaw: angles.yaw + h * across / angles.pitch.cos(),
@@ -134,7 +140,7 @@ pub fn runge_kutta_linear(start: Attitude, rates: &[RateSample]) -> Vec<Attitude
     for pair in rates.windows(2) {
         let [before, now] = pair else { continue };
         let h = now.stamp.secs_since(before.stamp);
-        let (a, b) = (before.value, now.value);
+        let (a, b) = (*before.gyro.as_vector(), *now.gyro.as_vector());
         let last = out[out.len() - 1];
         out.push(runge_kutta(&last, [a, (a + b) * 0.5, b], h));
     }
@@ -151,7 +157,11 @@ pub fn runge_kutta_over_two(start: Attitude, rates: &[RateSample]) -> Vec<Attitu
         };
         let h = now.stamp.secs_since(before.stamp);
         let last = out[out.len() - 1];
-        let rates = [before.value, middle.value, now.value];
+        let rates = [
+            *before.gyro.as_vector(),
+            *middle.gyro.as_vector(),
+            *now.gyro.as_vector(),
+        ];
         out.extend([last, runge_kutta(&last, rates, h)]);
     }
     out

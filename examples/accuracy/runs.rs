@@ -4,8 +4,8 @@ use crate::contenders::Contender;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use strapd_attitude::frames::{Body, Nav};
-use strapd_attitude::quaternion::Quaternion;
-use strapd_attitude::record::{Join, Nanos, RateSample, SampleKind, Status};
+use strapd_attitude::quaternion::{BodyRate, DeltaAngle, Quaternion};
+use strapd_attitude::record::{Join, Measured, Nanos, RateSample, SampleKind, Status};
 use strapd_bodies::motion::{BandLimited, Coning, Motion};
 use strapd_bodies::top::{Case, SymmetricTop};
 
@@ -33,10 +33,10 @@ impl Run {
         for now in stamps {
             let spin = motion.at_nanos(now);
             let from = before.unwrap_or(now);
-            let sample = |start: u64, value| RateSample {
+            let sample = |start: u64, gyro| RateSample {
                 stamp: Nanos(now as i64),
                 start: Nanos(start as i64),
-                value,
+                gyro,
                 accel: None,
                 join: if before.is_none() {
                     Join::Start
@@ -46,8 +46,9 @@ impl Run {
                 status: Status::OK,
                 log: Nanos(now as i64),
             };
-            run.rates.push(sample(now, spin.w_nb_b));
-            let delta = motion.delta_angle(from, now);
+            let rate = Measured::Rate(BodyRate(spin.w_nb_b));
+            run.rates.push(sample(now, rate));
+            let delta = Measured::Increment(DeltaAngle(motion.delta_angle(from, now)));
             run.increments.push(sample(from, delta));
             run.truth.push(spin.q_nb);
             before = Some(now);

@@ -42,7 +42,7 @@ impl Columns {
         for sample in samples {
             self.t.push(sample.stamp.0);
             self.q.extend_from_slice(&sample.q_nb.wxyz());
-            self.rate.extend_from_slice(sample.rate.as_slice());
+            self.rate.extend_from_slice(sample.rate.0.as_slice());
             self.cov.extend_from_slice(&sample.covariance.upper());
             self.status.push(sample.status.0);
             self.reset.push(sample.reset_count);

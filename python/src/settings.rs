@@ -4,7 +4,6 @@
 
 use crate::calibration;
 use crate::refusal::argument;
-use nalgebra::Vector3;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
@@ -13,6 +12,7 @@ use std::sync::Arc;
 use strapd_attitude::condition::{GyroUnit, OnGap};
 use strapd_attitude::estimate::{Aid, Bias, Initial, NOISE_FIGURES, NOISE_PRESETS, Noise, Plan, Truncation};
 use strapd_attitude::propagate::{Method, Order, Placement};
+use strapd_attitude::quaternion::{BodyRate, Quaternion};
 use strapd_attitude::record::SampleKind;
 
 /// Every name there is.
@@ -112,7 +112,7 @@ impl<'a, 'py> Given<'a, 'py> {
             .transpose()
     }
 
-    fn quaternion(&self, name: &str) -> PyResult<Option<[f64; 4]>> {
+    fn quaternion<To, From>(&self, name: &str) -> PyResult<Option<Quaternion<To, From>>> {
         self.get(name)?
             .map(|value| unit_quaternion(name, &value))
             .transpose()
@@ -132,7 +132,10 @@ fn shown(value: &Bound<'_, PyAny>) -> String {
     format!("{short} ({kind})")
 }
 
-fn unit_quaternion(name: &str, value: &Bound<'_, PyAny>) -> PyResult<[f64; 4]> {
+fn unit_quaternion<To, From>(
+    name: &str,
+    value: &Bound<'_, PyAny>,
+) -> PyResult<Quaternion<To, From>> {
     let q: [f64; 4] = value.extract().map_err(|_| {
         argument(format!(
             "{name}: four numbers w, x, y, z are expected, not {}",
@@ -145,7 +148,7 @@ fn unit_quaternion(name: &str, value: &Bound<'_, PyAny>) -> PyResult<[f64; 4]> {
             "{name}: a unit quaternion w, x, y, z is needed, this one has norm {norm}"
         )));
     }
-    Ok(q.map(|v| v / norm))
+    Ok(Quaternion::assume_unit(q.map(|v| v / norm)))
 }
 
 /// The plan that these settings make, checked; `aid` is what it is without one.
@@ -313,7 +316,7 @@ fn bias(given: &Given<'_, '_>) -> PyResult<Bias> {
         },
         Err(_) => {
             let bias: [f64; 3] = value.extract().map_err(|_| wrong())?;
-            Ok(Bias::Given(Vector3::from(bias)))
+            Ok(Bias::Given(BodyRate(bias.into())))
         }
     }
 }

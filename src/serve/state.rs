@@ -12,7 +12,7 @@ use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use strapd_attitude::estimate::Memory;
-use strapd_attitude::quaternion::Quaternion;
+use strapd_attitude::quaternion::{BodyRate, Quaternion};
 use strapd_attitude::record::TimeUnit;
 use strapd_attitude::record::{AttitudeCovariance, AttitudeSample, Nanos, Status};
 
@@ -149,7 +149,7 @@ impl Saved {
         Ok(AttitudeSample {
             stamp: Nanos(self.stamp_ns),
             q_nb: Quaternion::assume_unit(self.q),
-            rate: self.rate.into(),
+            rate: BodyRate(self.rate.into()),
             accel: None,
             covariance: AttitudeCovariance::from_upper(self.covariance),
             status: Status::OK,
@@ -273,7 +273,7 @@ mod tests {
         AttitudeSample {
             stamp: Nanos(1_700_000_000_123_456_789),
             q_nb: Quaternion::assume_unit([0.6, 0.0, 0.8, 0.0]),
-            rate: Vector3::new(0.1, 0.2, 1.0 / 3.0),
+            rate: BodyRate(Vector3::new(0.1, 0.2, 1.0 / 3.0)),
             accel: None,
             covariance: AttitudeCovariance::from_sigma(Vector3::new(0.1, 0.2, 0.3)),
             status: Status::OK,

@@ -395,7 +395,7 @@ fn every_case_is_counted_for_every_method_and_every_kind_and_nothing_is_nan() {
                     let norm = a.q_nb.wxyz().iter().map(|c| c * c).sum::<f64>().sqrt();
                     assert!((norm - 1.0).abs() < 1e-12, "{what}: {a:?}");
                     let matrix = a.covariance.matrix();
-                    let numbers = a.rate.iter().chain(matrix.iter());
+                    let numbers = a.rate.0.iter().chain(matrix.iter());
                     assert!(numbers.copied().all(f64::is_finite), "{what}: {a:?}");
                 }
                 let report = run.propagation;

@@ -6,8 +6,10 @@ use nalgebra::Vector3;
 use std::f64::consts::PI;
 use strapd_attitude::frames::{Attitude, Body, In, Nav};
 use strapd_attitude::propagate::{Method, Order, Placement, Propagator, Sequential, Settings};
-use strapd_attitude::quaternion::{Quaternion, RotationVector, YawPitchRoll};
-use strapd_attitude::record::{AttitudeSample, Join, Nanos, RateSample, SampleKind, Status};
+use strapd_attitude::quaternion::{BodyRate, DeltaAngle, Quaternion, RotationVector, YawPitchRoll};
+use strapd_attitude::record::{
+    AttitudeSample, Join, Measured, Nanos, RateSample, SampleKind, Status,
+};
 use strapd_attitude::worlds::{
     Convention, EARTH_RATE, earth_rate, enu_from_ned, enu_from_nwu, nwu_from_enu,
 };
@@ -45,9 +47,9 @@ fn sample(k: i64, kind: SampleKind, rate: Vector3<f64>, angle: Vector3<f64>) -> 
             SampleKind::Rate => stamp,
             _ => Nanos(stamp.0 - STEP),
         },
-        value: match kind {
-            SampleKind::Rate => rate,
-            _ => angle,
+        gyro: match kind {
+            SampleKind::Rate => Measured::Rate(BodyRate(rate)),
+            _ => Measured::Increment(DeltaAngle(angle)),
         },
         accel: None,
         join: if k == 0 {
@@ -263,7 +265,7 @@ fn ned_and_nwu_are_enu_relabelled() {
         let relabelled: Vec<RateSample> = samples
             .iter()
             .map(|s| RateSample {
-                value: enu.convert_body(other, s.value),
+                gyro: s.gyro.with(enu.convert_body(other, *s.gyro.as_vector())),
                 ..*s
             })
             .collect();
@@ -356,7 +358,8 @@ fn a_reset_returns_to_the_initial_attitude_relative_to_the_world() {
     // Moved on in between, so that "initial" and "as it was" are two things.
     let mut samples = broken(Join::Reset, &pose());
     for s in &mut samples[..2000] {
-        s.value += Vector3::new(0.1, 0.2, -0.3);
+        let moved = s.gyro.as_vector() + Vector3::new(0.1, 0.2, -0.3);
+        s.gyro = s.gyro.with(moved);
     }
     for method in METHODS.into_iter().filter(|m| *m != Method::RotvecSum) {
         let out = run(settings(method, SampleKind::Rate, w_ie()), &samples);

@@ -14,7 +14,8 @@ use strapd::sink::{
     Compression, Encoding, Flow, InputChannel, InputMessage, Options, Provenance, Sink, Stream,
     Target, Written,
 };
-use strapd_attitude::quaternion::Quaternion;
+use strapd_attitude::frames::In;
+use strapd_attitude::quaternion::{BodyRate, Quaternion};
 use strapd_attitude::record::{AttitudeCovariance, AttitudeSample, Nanos, Status};
 
 mod files;
@@ -32,8 +33,9 @@ fn samples(count: usize) -> Vec<AttitudeSample> {
             AttitudeSample {
                 stamp,
                 q_nb: Quaternion::assume_unit([c, 0.6 * s, 0.48 * s, 0.64 * s]),
-                rate: Vector3::new(0.6, 0.48, 0.64 + 1e-6 * t.sin()),
-                accel: (k % 7 != 0).then(|| Vector3::new(0.1 * t.cos(), 0.1 * t.sin(), 9.8)),
+                rate: BodyRate(Vector3::new(0.6, 0.48, 0.64 + 1e-6 * t.sin())),
+                accel: (k % 7 != 0)
+                    .then(|| In::assume(Vector3::new(0.1 * t.cos(), 0.1 * t.sin(), 9.8))),
                 covariance: AttitudeCovariance::from_sigma(
                     Vector3::new(1e-5, 2e-5, 3e-5) * (1.0 + t),
                 ),
@@ -572,8 +574,8 @@ fn any_sample() -> impl Strategy<Value = AttitudeSample> {
         |((q, rate, accel, sigma), (stamp, log, status, reset_count))| AttitudeSample {
             stamp: Nanos(stamp),
             q_nb: Quaternion::assume_unit(q),
-            rate,
-            accel,
+            rate: BodyRate(rate),
+            accel: accel.map(In::assume),
             covariance: AttitudeCovariance {
                 xx: sigma.x,
                 xy: sigma.y,

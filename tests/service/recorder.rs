@@ -11,7 +11,8 @@ use nalgebra::Vector3;
 use std::path::Path;
 use strapd::pipeline::recover::{Recover, Recovered, run};
 use strapd::sink::{Options, Target};
-use strapd_attitude::quaternion::Quaternion;
+use strapd_attitude::frames::In;
+use strapd_attitude::quaternion::{BodyRate, Quaternion};
 use strapd_attitude::record::{AttitudeCovariance, AttitudeSample, Nanos, RawSample, Status};
 use strapd_recording::Source;
 use strapd_recording::pool::Pool;
@@ -38,8 +39,8 @@ fn attitude(raw: &RawSample) -> AttitudeSample {
     AttitudeSample {
         stamp: raw.header.unwrap(),
         q_nb: Quaternion::assume_unit([(0.5 * x).cos(), (0.5 * x).sin(), 0.0, 0.0]),
-        rate: Vector3::new(x, y, z),
-        accel: raw.accel.map(Vector3::from),
+        rate: BodyRate(Vector3::new(x, y, z)),
+        accel: raw.accel.map(|a| In::assume(Vector3::from(a))),
         covariance: AttitudeCovariance::from_sigma(Vector3::new(1e-5, 2e-5, 3e-5)),
         status: Status::OK,
         reset_count: 0,

@@ -41,7 +41,7 @@ fn main() -> Result<(), String> {
     let prepared = preparation.decide()?;
     println!(
         "bias {:?} rad/s, {}",
-        prepared.bias.as_slice(),
+        prepared.bias.0.as_slice(),
         prepared.bias_origin
     );
 

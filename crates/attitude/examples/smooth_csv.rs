@@ -13,7 +13,8 @@
 use nalgebra::Vector3;
 use std::num::NonZero;
 use std::time::Instant;
-use strapd_attitude::quaternion::Quaternion;
+use strapd_attitude::frames::In;
+use strapd_attitude::quaternion::{BodyRate, Quaternion};
 use strapd_attitude::record::Nanos;
 use strapd_attitude::smooth::{Estimate, Outcome, Sample, SampleModel, Settings, smooth};
 
@@ -50,9 +51,9 @@ fn read(path: &str, has_field: bool, cut: Cut) -> Result<Recording, Failure> {
         let is_field = has_field && field.iter().all(|m| m.is_finite());
         let sample = Sample {
             stamp: Nanos(stamp),
-            rate: [g0, g1, g2].into(),
-            force: Some([a0, a1, a2].into()),
-            field: is_field.then_some(field),
+            rate: BodyRate([g0, g1, g2].into()),
+            force: Some(In::assume([a0, a1, a2].into())),
+            field: is_field.then(|| In::assume(field)),
         };
         rows.push((sample, (scored > 0.5).then_some([w, x, y, z])));
     }

@@ -12,7 +12,8 @@ use nalgebra::Vector3;
 use std::convert::Infallible;
 use std::num::NonZero;
 use std::time::Instant;
-use strapd_attitude::quaternion::{Quaternion, RotationVector};
+use strapd_attitude::frames::In;
+use strapd_attitude::quaternion::{BodyRate, Quaternion, RotationVector};
 use strapd_attitude::record::Nanos;
 use strapd_attitude::smooth::{Sample, Samples, Settings, smooth};
 
@@ -43,11 +44,13 @@ impl Samples for Made {
             let noise = ((i * 7919) % 1009) as f64 / 1009.0 - 0.5;
             chunk.push(Sample {
                 stamp: Nanos((t * 1e9).round() as i64),
-                rate: rate.add_scalar(0.005 + 2e-3 * noise),
-                force: Some(to_body * Vector3::new(0.0, 0.0, 9.81) + Vector3::repeat(0.05 * noise)),
+                rate: BodyRate(rate.add_scalar(0.005 + 2e-3 * noise)),
+                force: Some(In::assume(
+                    to_body * Vector3::new(0.0, 0.0, 9.81) + Vector3::repeat(0.05 * noise),
+                )),
                 field: self
                     .has_field
-                    .then(|| to_body * Vector3::new(0.0, 18.0, -45.0)),
+                    .then(|| In::assume(to_body * Vector3::new(0.0, 18.0, -45.0))),
             });
             if chunk.len() == 4096 {
                 take(&chunk);

@@ -21,7 +21,7 @@ mod statistics;
 
 pub use align::{Align, ParseAlignError};
 pub use body_axes::{BodyAxesFit, fit_body_axes};
-pub use consistency::{BoundedError, Consistency, ENOUGH_INSIDE, Known, WithinSigma, consistency};
+pub use consistency::{BoundedError, Consistency, Known, WithinSigma, consistency};
 pub use constant_bias::{BiasFit, fit_constant_bias};
 pub use relative::RelativeError;
 pub use statistics::{Drift, ErrorStats};
@@ -136,14 +136,6 @@ pub fn compare(estimate: &[Stamped], reference: &[Stamped], align: Align) -> Com
 }
 
 /// The errors behind [`Comparison::errors`], one by one, in time order.
-#[must_use]
-pub fn error_series(estimate: &[Stamped], reference: &[Stamped], align: Align) -> Vec<ErrorAt> {
-    let mut series = Vec::new();
-    for_each_error(estimate, reference, align, |at| series.push(*at));
-    series
-}
-
-/// The same without keeping them.
 pub fn for_each_error(
     estimate: &[Stamped],
     reference: &[Stamped],

@@ -123,6 +123,13 @@ impl<F> fmt::Debug for In<F> {
     }
 }
 
+/// Its components x, y, z, for what writes them.
+impl<F> From<In<F>> for [f64; 3] {
+    fn from(vector: In<F>) -> [f64; 3] {
+        vector.v.into()
+    }
+}
+
 impl<F> In<F> {
     /// A human says: these components are resolved in `F`.
     #[must_use]

@@ -14,8 +14,8 @@ mod increments;
 pub mod kernel;
 mod yaw_pitch_roll;
 
-pub use exp_log::exp_minus_one;
 pub use increments::{BodyRate, DeltaAngle, RotationVector};
+pub use kernel::exp_minus_one;
 pub use yaw_pitch_roll::YawPitchRoll;
 
 use crate::frames::{Body, Dcm, In, NotARotation, tag};
@@ -77,7 +77,7 @@ impl<To, From> Quaternion<To, From> {
     /// [`NotARotation::Norm`] when the norm is NaN or outside 0.5 to 2: recorded orientations of
     /// norm 0, 0.07 and 195.7 exist, and none of them was an attitude.
     pub fn try_from_wxyz(wxyz: [f64; 4]) -> Result<Self, NotARotation> {
-        let norm = norm4(wxyz);
+        let norm = kernel::norm(&wxyz);
         if (0.5..=2.0).contains(&norm) {
             Ok(Self::assume_unit(wxyz.map(|c| c / norm)))
         } else {
@@ -94,21 +94,19 @@ impl<To, From> Quaternion<To, From> {
     /// The way back: q_bn from q_nb. Exact.
     #[must_use]
     pub fn inverse(&self) -> Quaternion<From, To> {
-        let [w, x, y, z] = self.wxyz;
-        Quaternion::assume_unit([w, -x, -y, -z])
+        Quaternion::assume_unit(kernel::conjugate(&self.wxyz))
     }
 
     /// Norm 1 to one rounding. For norms between 1e-150 and 1e150; a zero quaternion gives NaN.
     #[must_use]
     pub fn normalised(&self) -> Self {
-        let norm = norm4(self.wxyz);
-        Self::assume_unit(self.wxyz.map(|c| c / norm))
+        Self::assume_unit(kernel::unit(&self.wxyz))
     }
 
     /// The same attitude with the sign nearest to `previous`, so that a stream has no jumps.
     #[must_use]
     pub fn same_sign_as(&self, previous: &Self) -> Self {
-        if dot4(self.wxyz, previous.wxyz) < 0.0 {
+        if kernel::dot(&self.wxyz, &previous.wxyz) < 0.0 {
             Self::assume_unit(self.wxyz.map(|c| -c))
         } else {
             *self
@@ -132,7 +130,7 @@ impl<To, From> Quaternion<To, From> {
             aw * dy - ay * dw - (az * dx - ax * dz),
             aw * dz - az * dw - (ax * dy - ay * dx),
         );
-        2.0 * norm3(&v).atan2(dot4(self.wxyz, other))
+        2.0 * kernel::length(&v).atan2(kernel::dot(&self.wxyz, &other))
     }
 
     /// Shortest great arc from `self` (t = 0) to `other` (t = 1) at constant rate.
@@ -144,22 +142,9 @@ impl<To, From> Quaternion<To, From> {
         self.turned(&(phi.0 * t)).normalised()
     }
 
-    /// The chord instead of the arc: cheaper, same ends and path, rate not constant (for a step of
-    /// angle a it strays from [`Quaternion::slerp`] by at most about a^3/250 rad).
-    #[must_use]
-    pub fn nlerp(&self, other: &Self, t: f64) -> Self {
-        let b = other.same_sign_as(self).wxyz;
-        let mut out = self.wxyz;
-        for (o, b) in out.iter_mut().zip(b) {
-            *o += (b - *o) * t;
-        }
-        Self::assume_unit(out).normalised()
-    }
-
     /// `q exp(phi)`, phi in `From` axes.
     fn turned(&self, phi: &Vector3<f64>) -> Self {
-        let [w, x, y, z] = exp_minus_one(phi);
-        Self::assume_unit(hamilton(self.wxyz, [1.0 + w, x, y, z]))
+        Self::assume_unit(kernel::turned(&self.wxyz, phi))
     }
 
     /// The matrix C with the same subscripts.
@@ -168,21 +153,8 @@ impl<To, From> Quaternion<To, From> {
     /// Entries to 4e-16 for a quaternion of unit norm.
     #[must_use]
     pub fn to_dcm(&self) -> Dcm<To, From> {
-        let [w, x, y, z] = self.wxyz;
-        let (xx, yy, zz) = (x * x, y * y, z * z);
-        let (xy, xz, yz) = (x * y, x * z, y * z);
-        let (wx, wy, wz) = (w * x, w * y, w * z);
-        Dcm::assume(Matrix3::new(
-            1.0 - 2.0 * (yy + zz),
-            2.0 * (xy - wz),
-            2.0 * (xz + wy),
-            2.0 * (xy + wz),
-            1.0 - 2.0 * (xx + zz),
-            2.0 * (yz - wx),
-            2.0 * (xz - wy),
-            2.0 * (yz + wx),
-            1.0 - 2.0 * (xx + yy),
-        ))
+        let [[a, b, c], [d, e, f], [g, h, i]] = kernel::rows(&self.wxyz);
+        Dcm::assume(Matrix3::new(a, b, c, d, e, f, g, h, i))
     }
 
     /// The quaternion of a matrix, w >= 0.
@@ -248,52 +220,15 @@ impl<A, B, C> Mul<Quaternion<B, C>> for Quaternion<A, B> {
     type Output = Quaternion<A, C>;
     /// Hamilton product; not renormalised.
     fn mul(self, right: Quaternion<B, C>) -> Quaternion<A, C> {
-        Quaternion::assume_unit(hamilton(self.wxyz, right.wxyz))
+        Quaternion::assume_unit(kernel::product(&self.wxyz, &right.wxyz))
     }
 }
 
 impl<A, B> Mul<In<B>> for Quaternion<A, B> {
     type Output = In<A>;
     fn mul(self, v: In<B>) -> In<A> {
-        let [w, x, y, z] = self.wxyz;
-        let (u, v) = (Vector3::new(x, y, z), v.as_vector());
-        let t = 2.0 * u.cross(v);
-        In::assume(v + w * t + u.cross(&t))
+        In::assume(kernel::rotated(&self.wxyz, v.into()).into())
     }
-}
-
-fn hamilton([aw, ax, ay, az]: [f64; 4], [bw, bx, by, bz]: [f64; 4]) -> [f64; 4] {
-    [
-        aw * bw - ax * bx - ay * by - az * bz,
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-    ]
-}
-
-fn dot4(a: [f64; 4], b: [f64; 4]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-fn norm4(q: [f64; 4]) -> f64 {
-    dot4(q, q).sqrt()
-}
-
-/// Length of a vector, also where its square leaves the range of f64.
-fn norm3(v: &Vector3<f64>) -> f64 {
-    let square = v.norm_squared();
-    if (1e-280..1e280).contains(&square) {
-        return square.sqrt();
-    }
-    let scale = v.amax();
-    if scale == 0.0 || !scale.is_finite() {
-        return if v.iter().any(|c| c.is_nan()) {
-            f64::NAN
-        } else {
-            scale
-        };
-    }
-    scale * (v / scale).norm()
 }
 
 #[cfg(test)]

@@ -13,8 +13,8 @@ mod declared;
 pub use covariance::AttitudeCovariance;
 pub use declared::{AccelUnit, Declared, GyroUnit, TimeUnit};
 
-use crate::frames::{Body, Nav};
-use crate::quaternion::Quaternion;
+use crate::frames::{Body, In, Nav};
+use crate::quaternion::{BodyRate, DeltaAngle, Quaternion};
 use nalgebra::Vector3;
 
 /// An instant: integer nanoseconds since the epoch of the clock it was read from.
@@ -138,6 +138,57 @@ pub enum Join {
     Reset,
 }
 
+/// What the gyro says of one sample, in body axes: a rate, or what was turned in an interval.
+///
+/// # Convention
+/// [`SampleKind::Rate`] gives the first; [`SampleKind::Average`] and [`SampleKind::DeltaAngle`] the second: conditioning
+/// has multiplied means by their intervals.
+///
+/// To take an angle for a rate, or a rate for an angle, does not compile:
+/// ```compile_fail,E0308
+/// use strapd_attitude::quaternion::DeltaAngle;
+/// use strapd_attitude::record::Measured;
+/// let measured = Measured::Rate(DeltaAngle(nalgebra::Vector3::x()));
+/// ```
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub enum Measured {
+    /// The rate at the sample's instant.
+    Rate(BodyRate),
+    /// Its integral over the sample's interval, from [`RateSample::start`] to [`RateSample::stamp`].
+    Increment(DeltaAngle),
+}
+
+impl Measured {
+    /// Numbers in rad/s for [`SampleKind::Rate`], in rad for the other two; somebody says that they are that.
+    #[must_use]
+    #[inline]
+    pub fn assume(kind: SampleKind, vector: Vector3<f64>) -> Measured {
+        match kind {
+            SampleKind::Rate => Measured::Rate(BodyRate(vector)),
+            SampleKind::Average | SampleKind::DeltaAngle => Measured::Increment(DeltaAngle(vector)),
+        }
+    }
+
+    /// The bare numbers, rad/s or rad, for kernels.
+    #[must_use]
+    #[inline]
+    pub fn as_vector(&self) -> &Vector3<f64> {
+        match self {
+            Measured::Rate(BodyRate(vector)) | Measured::Increment(DeltaAngle(vector)) => vector,
+        }
+    }
+
+    /// Other numbers of the same kind.
+    #[must_use]
+    #[inline]
+    pub fn with(self, vector: Vector3<f64>) -> Measured {
+        match self {
+            Measured::Rate(_) => Measured::Rate(BodyRate(vector)),
+            Measured::Increment(_) => Measured::Increment(DeltaAngle(vector)),
+        }
+    }
+}
+
 /// One conditioned sample: SI, body axes, bias removed, finite, stamps strictly increasing
 /// within a stream except across [`Join::Hold`] and [`Join::Reset`].
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -148,11 +199,10 @@ pub struct RateSample {
     /// equals `stamp` for [`SampleKind::Rate`]. When it is later than the previous sample's
     /// stamp, something between was not recorded.
     pub start: Nanos,
-    /// [`SampleKind::Rate`]: rad/s. Increments (both other kinds): **delta angle in rad**
-    /// over `start..stamp`. Resolved in body axes.
-    pub value: Vector3<f64>,
-    /// Specific force in body axes, m/s^2.
-    pub accel: Option<Vector3<f64>>,
+    /// The rate at `stamp`, or what was turned from `start` to `stamp`.
+    pub gyro: Measured,
+    /// Specific force, m/s^2.
+    pub accel: Option<In<Body>>,
     /// How it connects to its predecessor.
     pub join: Join,
     /// What was noticed about it.
@@ -162,20 +212,21 @@ pub struct RateSample {
 }
 
 impl RateSample {
-    /// What [`RateSample::value`] is over to be a rate: the sample's own interval, s; 1 of a rate.
-    pub(crate) fn own_secs(&self, kind: SampleKind) -> f64 {
-        match kind {
-            SampleKind::Rate => 1.0,
-            SampleKind::Average | SampleKind::DeltaAngle => self.stamp.secs_since(self.start),
+    /// What [`RateSample::gyro`] is over to be a rate: the sample's own interval, s; 1 of a rate.
+    pub(crate) fn own_secs(&self) -> f64 {
+        match self.gyro {
+            Measured::Rate(_) => 1.0,
+            Measured::Increment(_) => self.stamp.secs_since(self.start),
         }
     }
 
-    /// The rate at its instant, or its mean over the sample's interval, rad/s; nothing of an interval without length.
-    pub(crate) fn mean_rate(&self, kind: SampleKind) -> Vector3<f64> {
-        match self.own_secs(kind) {
-            own if own > 0.0 => self.value / own,
-            _ => Vector3::zeros(),
-        }
+    /// The rate at its instant, or its mean over the sample's interval; nothing of an interval without length.
+    pub(crate) fn mean_rate(&self) -> BodyRate {
+        BodyRate(match (self.gyro, self.own_secs()) {
+            (Measured::Rate(BodyRate(rate)), _) => rate,
+            (Measured::Increment(DeltaAngle(angle)), own) if own > 0.0 => angle / own,
+            (Measured::Increment(_), _) => Vector3::zeros(),
+        })
     }
 }
 
@@ -261,12 +312,12 @@ pub struct AttitudeSample {
     /// Body to navigation ("world"), Hamilton, unit norm to 1e-15, sign continuous with the
     /// sample before.
     pub q_nb: Quaternion<Nav, Body>,
-    /// Bias-corrected body rate in rad/s: the sample itself, or the increment divided by its interval.
+    /// Bias-corrected body rate: the sample itself, or the increment divided by its interval.
     /// What a gyro measures: relative to inertial space (w_ib), Earth's rotation included, also where
     /// `q_nb` is relative to a world that turns with it.
-    pub rate: Vector3<f64>,
-    /// Specific force in body axes, m/s^2, copied through.
-    pub accel: Option<Vector3<f64>>,
+    pub rate: BodyRate,
+    /// Specific force, m/s^2, copied through.
+    pub accel: Option<In<Body>>,
     /// Of its error, rad^2, body axes: see [`AttitudeCovariance::sigma`] for three numbers.
     pub covariance: AttitudeCovariance,
     /// What was noticed.
@@ -376,7 +427,7 @@ impl Counts {
     }
 
     /// `n` more.
-    pub fn add_many(&mut self, verdict: Verdict, n: u64) {
+    pub(crate) fn add_many(&mut self, verdict: Verdict, n: u64) {
         if let Some(count) = self.0.get_mut(verdict as usize) {
             *count += n;
         }

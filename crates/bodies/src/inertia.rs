@@ -22,12 +22,13 @@ mod coriolis;
 mod spatial;
 mod validity;
 
-pub use coriolis::{AddedMass, CoriolisForm, coriolis_from_mass_matrix};
+pub use coriolis::{AddedMass, CoriolisForm};
 pub use spatial::{
     Decomposition, mass_matrix_at_cg, mass_matrix_at_origin, rotated_mass_matrix, skew,
     system_transform,
 };
 pub use validity::InertiaError;
+pub(crate) use validity::symmetric;
 
 use nalgebra::{Matrix3, Matrix4, Vector3};
 
@@ -94,7 +95,7 @@ impl RigidBody {
     ///
     /// # Errors
     /// As [`RigidBody::new`].
-    pub fn from_inertia_at_origin(
+    pub(crate) fn from_inertia_at_origin(
         mass: f64,
         r_og_b: Vector3<f64>,
         inertia_o: Matrix3<f64>,

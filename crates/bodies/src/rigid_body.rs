@@ -30,7 +30,7 @@ pub(crate) use integrator::{gauss_legendre6, rk4};
 pub use six_dof::{Pose, Vessel, Wrench};
 pub(crate) use taylor::{Rates, Sine, Trajectory};
 
-use super::inertia::InertiaError;
+use super::inertia::{InertiaError, symmetric};
 use nalgebra::{Cholesky, Matrix3, Vector3};
 use strapd_attitude::frames::{Body, Nav};
 use strapd_attitude::quaternion::Quaternion;
@@ -64,19 +64,7 @@ impl Rotor {
                 what: "inertia tensor",
             });
         }
-        let allowed = 1e-12 * inertia.amax();
-        for (row, column) in [(0, 1), (0, 2), (1, 2)] {
-            let difference = inertia[(row, column)] - inertia[(column, row)];
-            if difference.abs() > allowed {
-                return Err(InertiaError::NotSymmetric {
-                    row,
-                    column,
-                    difference,
-                    allowed,
-                });
-            }
-        }
-        let inertia = 0.5 * (inertia + inertia.transpose());
+        let inertia = symmetric(&inertia, 1e-12 * inertia.amax())?;
         let inverse = Cholesky::new(inertia)
             .ok_or(InertiaError::NotInvertible)?
             .inverse();

@@ -150,7 +150,7 @@ impl SymmetricTop {
 
     /// Largest torque of gravity, `M g arm`, N m.
     #[must_use]
-    pub fn largest_torque(&self) -> f64 {
+    pub(crate) fn largest_torque(&self) -> f64 {
         self.mass * self.gravity * self.arm
     }
 

@@ -3,11 +3,9 @@
 pub mod calibration;
 
 use crate::error::{Error, Result};
-use nalgebra::Vector3;
 use std::fmt::Display;
 use strapd_attitude::estimate::{Bias, Initial, NOISE_FIGURES, NOISE_PRESETS, Noise, Truncation};
-use strapd_attitude::frames::{Body, Nav};
-use strapd_attitude::quaternion::{Quaternion, YawPitchRoll};
+use strapd_attitude::quaternion::{BodyRate, Quaternion, YawPitchRoll};
 use strapd_attitude::setting::{BIAS, FIELD, INIT, NOISE, SHARD, UNDO_TRUNCATION};
 use strapd_recording::decode::{self, FieldPath, FieldRole};
 use strapd_recording::{Selection, TopicBeside};
@@ -102,9 +100,8 @@ pub fn parse_initial(text: &str) -> Result<Initial> {
     }
     if let Some(list) = text.strip_prefix("rpy=") {
         let [roll, pitch, yaw] = numbers::<3>(INIT.to("rpy"), list)?.map(f64::to_radians);
-        let q: Quaternion<Nav, Body> =
-            Quaternion::from_yaw_pitch_roll(&YawPitchRoll { yaw, pitch, roll });
-        return Ok(Initial::Given(q.wxyz()));
+        let angles = YawPitchRoll { yaw, pitch, roll };
+        return Ok(Initial::Given(Quaternion::from_yaw_pitch_roll(&angles)));
     }
     Err(Error::Usage(format!(
         "{INIT} {text}: expected identity, gravity, first-orientation, q=w,x,y,z or rpy=roll,pitch,yaw (degrees)"
@@ -120,7 +117,7 @@ pub fn parse_bias(text: &str) -> Result<Bias> {
         "none" => Ok(Bias::None),
         "auto" => Ok(Bias::Auto),
         list => numbers::<3>(BIAS, list)
-            .map(|b| Bias::Given(Vector3::from(b)))
+            .map(|b| Bias::Given(BodyRate(b.into())))
             .map_err(|_| {
                 Error::Usage(format!(
                     "{BIAS} {text}: expected none, auto, or three numbers x,y,z in rad/s"
@@ -216,7 +213,7 @@ pub fn numbers<const N: usize>(what: impl Display, list: &str) -> Result<[f64; N
 ///
 /// # Errors
 /// [`Error::Usage`] when it is not four finite numbers of about unit norm.
-pub fn unit_quaternion(what: impl Display, list: &str) -> Result<[f64; 4]> {
+pub fn unit_quaternion<To, From>(what: impl Display, list: &str) -> Result<Quaternion<To, From>> {
     let list = list.strip_prefix("q=").unwrap_or(list);
     let q = numbers::<4>(&what, list)?;
     let norm = q.iter().map(|v| v * v).sum::<f64>().sqrt();
@@ -225,7 +222,7 @@ pub fn unit_quaternion(what: impl Display, list: &str) -> Result<[f64; 4]> {
             "{what} q={list}: a unit quaternion w,x,y,z is needed, this one has norm {norm}"
         )));
     }
-    Ok(q.map(|v| v / norm))
+    Ok(Quaternion::assume_unit(q.map(|v| v / norm)))
 }
 
 #[cfg(test)]
@@ -317,7 +314,7 @@ mod tests {
     fn a_quaternion_that_is_no_rotation_is_refused() {
         assert!(matches!(
             parse_initial("q=1,0,0,0"),
-            Ok(Initial::Given([1.0, 0.0, 0.0, 0.0]))
+            Ok(Initial::Given(q)) if q == Quaternion::identity()
         ));
         for bad in ["q=1,1,1,1", "q=0,0,0,0", "q=1,0,0", "q=NaN,0,0,1", "qq", ""] {
             assert!(parse_initial(bad).is_err(), "{bad}");

@@ -89,7 +89,7 @@ impl Aids {
             of_forces
                 .iter()
                 .filter_map(|raw| raw.accel)
-                .map(|f| resolved.force(f).norm())
+                .map(|f| resolved.force(f).as_vector().norm())
         };
         let (sum, n) = forces()
             .filter(|length| length.is_finite())

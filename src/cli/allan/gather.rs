@@ -9,6 +9,7 @@ use strapd_attitude::condition::{ClockWarning, Conditioner, Report, choose_clock
 use strapd_attitude::estimate::Meaning;
 use strapd_attitude::estimate::Plan;
 use strapd_attitude::noise::allan::AngleRecord;
+use strapd_attitude::quaternion::BodyRate;
 use strapd_attitude::record::{Join, Nanos, RateSample, RawSample, SampleKind};
 use strapd_recording::Input;
 use strapd_recording::Recording;
@@ -158,7 +159,7 @@ impl Gathering {
     fn new(plan: &Plan, resolved: Meaning, capacity: usize) -> Gathering {
         Gathering {
             plan: plan.clone(),
-            detector: Stillness::new(resolved.kind, Limits::default()),
+            detector: Stillness::new(Limits::default()),
             resolved,
             first: Vec::new(),
             running: None,
@@ -211,7 +212,7 @@ impl Gathering {
         self.notes.extend(warning.map(|w| w.to_string()));
         let settings = self
             .resolved
-            .conditioning(&self.plan, clock, Vector3::zeros());
+            .conditioning(&self.plan, clock, BodyRate::ZERO);
         let mut conditioner = Conditioner::new(&settings).map_err(|e| e.to_string())?;
         conditioner.push(&first, &mut self.conditioned);
         self.running = Some(conditioner);
@@ -236,13 +237,13 @@ impl Gathering {
     fn add(&mut self, sample: &RateSample, spacing: i64) {
         self.begin.get_or_insert(sample.stamp);
         let value = match self.resolved.kind {
-            SampleKind::Rate | SampleKind::DeltaAngle => sample.value,
+            SampleKind::Rate | SampleKind::DeltaAngle => *sample.gyro.as_vector(),
             SampleKind::Average => {
                 let secs = sample.stamp.secs_since(sample.start);
                 if secs <= 0.0 {
                     return;
                 }
-                sample.value / secs
+                sample.gyro.as_vector() / secs
             }
         };
         match (sample.join, self.last) {

@@ -395,10 +395,10 @@ fn topic_json(looked: &Inspection) -> Value {
         "rests": looked.rests.kept.iter().take(100).map(|r| json!({
             "start_s": looked.rests.first.map(|f| r.start.secs_since(f)),
             "secs": r.secs(),
-            "mean_rate": { "x": r.mean_rate.x, "y": r.mean_rate.y, "z": r.mean_rate.z },
+            "mean_rate": { "x": r.mean_rate.0.x, "y": r.mean_rate.0.y, "z": r.mean_rate.0.z },
         })).collect::<Vec<_>>(),
         "bias": looked.bias.map(|b| json!({
-            "x": b.bias.x, "y": b.bias.y, "z": b.bias.z, "sigma": b.sigma.max(), "rest_s": b.secs })),
+            "x": b.bias.0.x, "y": b.bias.0.y, "z": b.bias.0.z, "sigma": b.sigma.max(), "rest_s": b.secs })),
         "notes": found.iter().map(Finding::line).collect::<Vec<_>>(),
         "findings": found.iter().map(Finding::json).collect::<Vec<_>>(),
     })

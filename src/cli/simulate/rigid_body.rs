@@ -66,7 +66,7 @@ impl RigidBody {
         let rotor = Rotor::new(tensor).map_err(refused)?;
         let q_nb = match parse_initial(&self.attitude) {
             Ok(Initial::Identity) => Quaternion::identity(),
-            Ok(Initial::Given(wxyz)) => Quaternion::assume_unit(wxyz),
+            Ok(Initial::Given(q_nb)) => q_nb,
             _ => {
                 return Err(Error::Usage(format!(
                     "--attitude {}: identity, q=w,x,y,z or rpy=roll,pitch,yaw (degrees) is needed",

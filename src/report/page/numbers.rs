@@ -43,7 +43,7 @@ pub(super) fn topic(topic: &CheckedTopic, noise: Option<&Noise>) -> Value {
             })).collect::<Vec<_>>(),
         },
         "bias": looked.bias.map(|b| json!({
-            "x": b.bias.x, "y": b.bias.y, "z": b.bias.z, "sigma": b.sigma.max(), "rest_s": b.secs })),
+            "x": b.bias.0.x, "y": b.bias.0.y, "z": b.bias.0.z, "sigma": b.sigma.max(), "rest_s": b.secs })),
         "allan": match noise {
             Some(Noise::Measured { json, .. }) => json.clone(),
             Some(Noise::Missing(why)) => json!({ "missing": why }),

@@ -344,12 +344,12 @@ fn rest(topic: &CheckedTopic, out: &mut String) {
             let _ = writeln!(
                 out,
                 "<p>Bias at rest ({:.6}, {:.6}, {:.6}) rad/s, that is ({}, {}, {}) deg/h, &plusmn; {} deg/h, from {} s.</p>",
-                b.bias.x,
-                b.bias.y,
-                b.bias.z,
-                per_hour(b.bias.x),
-                per_hour(b.bias.y),
-                per_hour(b.bias.z),
+                b.bias.0.x,
+                b.bias.0.y,
+                b.bias.0.z,
+                per_hour(b.bias.0.x),
+                per_hour(b.bias.0.y),
+                per_hour(b.bias.0.z),
                 per_hour(b.sigma.max()),
                 significant(b.secs, 3)
             );
@@ -367,9 +367,9 @@ fn rest(topic: &CheckedTopic, out: &mut String) {
                 format!("{:.3}", r.secs()),
                 format!(
                     "{}, {}, {}",
-                    dps(r.mean_rate.x),
-                    dps(r.mean_rate.y),
-                    dps(r.mean_rate.z)
+                    dps(r.mean_rate.0.x),
+                    dps(r.mean_rate.0.y),
+                    dps(r.mean_rate.0.z)
                 ),
             ]
         })

@@ -5,7 +5,7 @@ use crate::serve::channel::Channel;
 use crate::serve::last::Wanted;
 use crate::sink::Stream;
 use nalgebra::Vector3;
-use strapd_attitude::quaternion::Quaternion;
+use strapd_attitude::quaternion::{BodyRate, Quaternion};
 use strapd_attitude::record::{AttitudeCovariance, AttitudeSample, Nanos, Status};
 
 /// A sample with nothing special about it.
@@ -13,7 +13,7 @@ fn sample(stamp: Nanos) -> AttitudeSample {
     AttitudeSample {
         stamp,
         q_nb: Quaternion::assume_unit([0.5, -0.5, 0.5, 0.5]),
-        rate: Vector3::new(0.1, -0.2, 0.3),
+        rate: BodyRate(Vector3::new(0.1, -0.2, 0.3)),
         accel: None,
         covariance: AttitudeCovariance::from_sigma(Vector3::new(1e-3, 2e-3, 3e-3)),
         status: Status::OK,

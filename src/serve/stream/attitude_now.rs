@@ -43,9 +43,10 @@ mod tests {
     use super::*;
     use nalgebra::Vector3;
     use strapd_attitude::aid::{self, Aided, Start};
+    use strapd_attitude::frames::In;
     use strapd_attitude::propagate;
-    use strapd_attitude::quaternion::{Quaternion, RotationVector};
-    use strapd_attitude::record::{AttitudeCovariance, Join, Nanos, RateSample, Status};
+    use strapd_attitude::quaternion::{BodyRate, Quaternion, RotationVector};
+    use strapd_attitude::record::{AttitudeCovariance, Join, Measured, Nanos, RateSample, Status};
 
     #[test]
     fn an_ellipse_that_is_known_comes_back_whatever_the_body_faces() {
@@ -56,8 +57,8 @@ mod tests {
             let first = RateSample {
                 stamp: Nanos(0),
                 start: Nanos(0),
-                value: Vector3::zeros(),
-                accel: Some(Vector3::z() * 9.81),
+                gyro: Measured::Rate(BodyRate::ZERO),
+                accel: Some(In::assume(Vector3::z() * 9.81)),
                 join: Join::Start,
                 status: Status::OK,
                 log: Nanos(0),
@@ -78,7 +79,7 @@ mod tests {
             let last = AttitudeSample {
                 stamp: Nanos(0),
                 q_nb,
-                rate: Vector3::zeros(),
+                rate: BodyRate::ZERO,
                 accel: None,
                 covariance: AttitudeCovariance::from_upper(upper),
                 status: Status::OK,

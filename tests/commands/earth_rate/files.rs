@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use std::path::{Path, PathBuf};
 use strapd_attitude::estimate::{Bias, Initial, Plan};
 use strapd_attitude::frames::{Body, In, Nav};
-use strapd_attitude::quaternion::{Quaternion, YawPitchRoll};
+use strapd_attitude::quaternion::{BodyRate, Quaternion, YawPitchRoll};
 use strapd_attitude::worlds::{Convention, World};
 
 const BIAS: [f64; 3] = [0.003, -0.002, 0.001];
@@ -126,7 +126,7 @@ fn an_unknown_heading_is_warned_of_with_its_size() {
     let path = written(dir.path(), "log.mcap", &still(&level, 0));
     let plan = Plan {
         initial: Initial::Gravity,
-        bias: Bias::Given(BIAS.into()),
+        bias: Bias::Given(BodyRate(BIAS.into())),
         ..plan(World::Enu)
     };
     let (summary, found) = attitudes(&replay_with(&path, plan), dir.path());

@@ -6,6 +6,7 @@ use crate::shared_data::shared;
 use std::collections::BTreeMap;
 use strapd::error::Error;
 use strapd_attitude::estimate::{Bias, Initial, Plan};
+use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::worlds::World;
 
 /// Largest difference of a component, either sign of the quaternion.
@@ -219,7 +220,7 @@ fn px4_in_ned_is_px4_in_enu_seen_from_the_other_convention() {
     let given = |world: World, q: [f64; 4]| {
         let plan = Plan {
             world,
-            initial: Initial::Given(q),
+            initial: Initial::Given(Quaternion::assume_unit(q)),
             ..Plan::default()
         };
         attitudes(&replay_with(&path, plan), dir.path()).1

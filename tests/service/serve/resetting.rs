@@ -10,6 +10,7 @@ use std::net::{SocketAddr, TcpStream};
 use strapd::serve::Settings;
 use strapd::serve::admission::Token;
 use strapd_attitude::estimate::{Bias, Initial, Plan};
+use strapd_attitude::quaternion::Quaternion;
 use tungstenite::client::IntoClientRequest;
 use tungstenite::{Message, WebSocket};
 
@@ -59,7 +60,10 @@ fn after_a_reset_a_gyro_alone_is_one_that_begins_with_that_attitude() {
     let q = [0.5, -0.5, 0.5, 0.5];
     for (asked, initial) in [
         (RESET.to_owned(), Initial::Identity),
-        (with("q=0.5,-0.5,0.5,0.5"), Initial::Given(q)),
+        (
+            with("q=0.5,-0.5,0.5,0.5"),
+            Initial::Given(Quaternion::assume_unit(q)),
+        ),
     ] {
         let mut daemon = Fed::of(&Plan::default());
         daemon.lines((0..500).map(turning));

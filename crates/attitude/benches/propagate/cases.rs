@@ -7,8 +7,10 @@ use strapd_attitude::frames::{Body, Nav};
 use strapd_attitude::propagate::{
     Method, Noise, Order, Placement, Propagator, Sequential, Settings, SettingsError,
 };
-use strapd_attitude::quaternion::{Quaternion, RotationVector};
-use strapd_attitude::record::{AttitudeSample, Join, Nanos, RateSample, SampleKind, Status};
+use strapd_attitude::quaternion::Quaternion;
+use strapd_attitude::record::{
+    AttitudeSample, Join, Measured, Nanos, RateSample, SampleKind, Status,
+};
 
 /// A log, as its samples are made.
 #[derive(Clone, Copy)]
@@ -138,7 +140,7 @@ pub fn log(count: usize, input: &Input) -> Vec<RateSample> {
                 } else {
                     start
                 }),
-                value: value.into(),
+                gyro: Measured::assume(input.kind, value.into()),
                 accel: None,
                 join: if i == 0 {
                     Join::Start
@@ -160,7 +162,7 @@ pub fn run(
     out: &mut Vec<AttitudeSample>,
 ) -> Result<(), SettingsError> {
     let Some(method) = method else {
-        bare(kind, samples);
+        bare(samples);
         return Ok(());
     };
     let noise = Noise {
@@ -184,17 +186,16 @@ pub fn run(
 }
 
 /// `q exp(w dt)`, written out.
-fn bare(kind: SampleKind, samples: &[RateSample]) {
+fn bare(samples: &[RateSample]) {
     let mut q_nb = Quaternion::<Nav, Body>::identity();
     let mut before = samples.first().map_or(Nanos(0), |first| first.stamp);
     for sample in samples {
         let h = sample.stamp.secs_since(before);
         before = sample.stamp;
-        let phi = if kind == SampleKind::Rate {
-            sample.value * h
-        } else {
-            sample.value
+        let angle = match sample.gyro {
+            Measured::Rate(rate) => rate.held_for(h),
+            Measured::Increment(angle) => angle,
         };
-        q_nb = black_box(q_nb.advanced(&RotationVector(phi)));
+        q_nb = black_box(q_nb.advanced(&angle.about_fixed_axis()));
     }
 }

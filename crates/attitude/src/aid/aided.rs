@@ -4,11 +4,11 @@ use super::beside::Beside;
 use super::calibration::Applied;
 use super::filter::{Filter, Innovation, Measured};
 use super::settings::Settings;
-use crate::frames::{Body, Nav};
+use crate::frames::{Body, In, Nav};
 use crate::propagate::{self, Method, Propagator, Sequential, SettingsError};
-use crate::quaternion::Quaternion;
+use crate::quaternion::{BodyRate, Quaternion};
 use crate::record::{AttitudeSample, Join, Nanos, RateSample, SampleKind};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Matrix3;
 use std::collections::VecDeque;
 
 /// Of an attitude that was saved, rad: it is never known better.
@@ -35,8 +35,10 @@ pub enum Start {
 /// # Example
 /// ```
 /// use strapd_attitude::aid::{self, Aided, Start};
+/// use strapd_attitude::frames::In;
 /// use strapd_attitude::propagate;
-/// use strapd_attitude::record::{Join, Nanos, RateSample, Status};
+/// use strapd_attitude::quaternion::BodyRate;
+/// use strapd_attitude::record::{Join, Measured, Nanos, RateSample, Status};
 ///
 /// let mut aided = Aided::new(propagate::Settings::default(), aid::Settings::default(), Start::Level)?;
 /// // At rest for ten seconds, tilted by 0.1 rad; a gyro with a bias of 0.6 deg/s.
@@ -44,8 +46,8 @@ pub enum Start {
 ///     .map(|i| RateSample {
 ///         stamp: Nanos(i * 10_000_000),
 ///         start: Nanos(i * 10_000_000),
-///         value: [0.01, 0.0, 0.0].into(),
-///         accel: Some([0.0, 9.81 * 0.1_f64.sin(), 9.81 * 0.1_f64.cos()].into()),
+///         gyro: Measured::Rate(BodyRate([0.01, 0.0, 0.0].into())),
+///         accel: Some(In::assume([0.0, 9.81 * 0.1_f64.sin(), 9.81 * 0.1_f64.cos()].into())),
 ///         join: if i == 0 { Join::Start } else { Join::Continuous },
 ///         status: Status::OK,
 ///         log: Nanos(i * 10_000_000),
@@ -63,7 +65,6 @@ pub enum Start {
 pub struct Aided {
     pub(super) propagator: Propagator,
     pub(super) filter: Filter,
-    kind: SampleKind,
     start: Start,
     /// What is known where the attitude begins that is begun with now, and where the next reset does.
     begins: Start,
@@ -114,7 +115,6 @@ impl Aided {
         Ok(Aided {
             filter: Filter::new(settings, is_instant, propagation.world_rate),
             propagator,
-            kind: propagation.kind,
             start,
             begins: start,
             anew: None,
@@ -160,17 +160,17 @@ impl Aided {
         self.forces.get_or_insert_default();
     }
 
-    /// Takes a specific force (m/s^2, body axes) measured at `stamp`: it is used at the first gyro sample at or
+    /// Takes a specific force (m/s^2) measured at `stamp`: it is used at the first gyro sample at or
     /// after that, turned on by the rate. One that is half a second from any is counted and not used.
-    pub fn take_force(&mut self, stamp: Nanos, force: Vector3<f64>) {
+    pub fn take_force(&mut self, stamp: Nanos, force: In<Body>) {
         if let Some(forces) = &mut self.forces {
-            forces.take(stamp, force);
+            forces.take(stamp, *force.as_vector());
         }
     }
 
-    /// The same for a magnetic field, any linear unit, body axes.
-    pub fn take_field(&mut self, stamp: Nanos, field: Vector3<f64>) {
-        self.fields.take(stamp, field);
+    /// The same for a magnetic field, any linear unit.
+    pub fn take_field(&mut self, stamp: Nanos, field: In<Body>) {
+        self.fields.take(stamp, *field.as_vector());
     }
 
     /// The filter, for what it has learned.
@@ -272,10 +272,10 @@ impl Aided {
         let applied = self.filter.applied();
         let secs = self.last.map_or(0.0, |last| sample.stamp.secs_since(last));
         self.last = Some(sample.stamp);
-        let rate = sample.mean_rate(self.kind);
+        let BodyRate(rate) = sample.mean_rate();
         let turning = applied.corrected(rate, 1.0);
         let force = match &mut self.forces {
-            None => sample.accel,
+            None => sample.accel.map(|force| *force.as_vector()),
             Some(forces) => forces.at(sample.stamp, &turning),
         };
         let field = self.fields.at(sample.stamp, &turning);
@@ -292,7 +292,9 @@ impl Aided {
             join: sample.join,
         });
         RateSample {
-            value: applied.corrected(sample.value, sample.own_secs(self.kind)),
+            gyro: sample
+                .gyro
+                .with(applied.corrected(*sample.gyro.as_vector(), sample.own_secs())),
             ..*sample
         }
     }
@@ -324,7 +326,7 @@ impl Aided {
             let corrected = AttitudeSample {
                 q_nb,
                 status,
-                covariance: self.filter.attitude_covariance(&r, &sample.rate),
+                covariance: self.filter.attitude_covariance(&r, &sample.rate.0),
                 ..*sample
             };
             self.last_out = Some(q_nb);

@@ -202,8 +202,10 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::aid::{Settings, Start};
+    use crate::frames::In;
     use crate::propagate::{Method, Order};
-    use crate::record::{AttitudeSample, Join, RateSample, Status};
+    use crate::quaternion::BodyRate;
+    use crate::record::{AttitudeSample, Join, Measured, RateSample, Status};
 
     fn sample(i: i64) -> RateSample {
         let t = i as f64 * 0.01;
@@ -212,12 +214,16 @@ mod tests {
         RateSample {
             stamp,
             start: stamp,
-            value: Vector3::new(0.52 * (1.3 * t).cos() + 0.01, 0.3 * (0.7 * t).sin(), -0.005),
-            accel: Some(Vector3::new(
+            gyro: Measured::Rate(BodyRate(Vector3::new(
+                0.52 * (1.3 * t).cos() + 0.01,
+                0.3 * (0.7 * t).sin(),
+                -0.005,
+            ))),
+            accel: Some(In::assume(Vector3::new(
                 0.2 * (9.0 * t).sin(),
                 9.81 * roll.sin(),
                 9.81 * roll.cos(),
-            )),
+            ))),
             join: if i == 0 {
                 Join::Start
             } else {
@@ -251,7 +257,7 @@ mod tests {
             if i % 7 == 0 {
                 let turn = f64::from(i as i32) * 1e-3;
                 let field = Vector3::new(20.0 * turn.sin(), 20.0 * turn.cos(), -40.0);
-                aided.take_field(Nanos(sample(i).stamp.0 + 3_000_000), field);
+                aided.take_field(Nanos(sample(i).stamp.0 + 3_000_000), In::assume(field));
             }
             aided.push(&[sample(i)], &mut out);
         }

@@ -8,7 +8,7 @@ use super::residuals::Residuals;
 use super::rest::Rest;
 use super::surroundings::Surroundings;
 use crate::condition::stillness::level;
-use crate::frames::{Body, Dcm, Nav};
+use crate::frames::{Body, Dcm, In, Nav};
 use crate::quaternion::{Quaternion, RotationVector};
 use nalgebra::{Matrix3, Vector3};
 
@@ -47,7 +47,7 @@ impl Filter {
                 Quaternion::from_dcm(&Dcm::assume(Matrix3::from_rows(&rows)))
             }
             None => {
-                let tilted = level(&force).unwrap_or_else(Quaternion::identity);
+                let tilted = level(&In::assume(force)).unwrap_or_else(Quaternion::identity);
                 let yaw = Vector3::z() * propagated.yaw_pitch_roll().yaw;
                 Quaternion::<Nav, Nav>::from_rotation_vector(&RotationVector(yaw)) * tilted
             }

@@ -48,10 +48,7 @@ pub struct BodyAxesFit {
 pub fn fit_body_axes(estimate: &[Stamped], reference: &[Stamped]) -> Option<BodyAxesFit> {
     let inverse: Vec<Stamped> = reference
         .iter()
-        .map(|(stamp, q)| {
-            let [w, x, y, z] = q.wxyz();
-            (*stamp, Quaternion::assume_unit([w, -x, -y, -z]))
-        })
+        .map(|(stamp, q)| (*stamp, Quaternion::assume_unit(q.inverse().wxyz())))
         .collect();
     let given = fit(&Track::new(estimate), &Track::new(reference))?;
     let inverted = fit(&Track::new(estimate), &Track::new(&inverse))?;
@@ -150,10 +147,7 @@ mod tests {
 
     #[test]
     fn an_inverse_is_recognised() {
-        let conjugate = |q: Quaternion<Nav, Body>| {
-            let [w, x, y, z] = q.wxyz();
-            Quaternion::assume_unit([w, -x, -y, -z])
-        };
+        let conjugate = |q: Quaternion<Nav, Body>| Quaternion::assume_unit(q.inverse().wxyz());
         let fit = fit_body_axes(&track(|q| q), &track(conjugate)).unwrap();
         assert!(fit.inverse && fit.turned < 1e-12, "{fit:?}");
         assert!(fit.as_recorded > 0.3, "{fit:?}");

@@ -60,10 +60,10 @@ pub struct Consistency {
 }
 
 /// The least share within three sigma of an error that sigma is true of.
-pub const ENOUGH_INSIDE: f64 = 0.98;
+const ENOUGH_INSIDE: f64 = 0.98;
 
 impl Consistency {
-    /// Whether less than [`ENOUGH_INSIDE`] of the errors of tilt or heading lie within three sigma.
+    /// Whether less than 98 % of the errors of tilt or heading lie within three sigma.
     #[must_use]
     pub fn is_beyond(&self) -> bool {
         self.tilt.inside.min(self.heading.inside) < ENOUGH_INSIDE

@@ -39,6 +39,12 @@ fn nan() -> Q {
     Q::assume_unit([f64::NAN; 4])
 }
 
+fn error_series(estimate: &[Stamped], reference: &[Stamped], align: Align) -> Vec<ErrorAt> {
+    let mut series = Vec::new();
+    for_each_error(estimate, reference, align, |at| series.push(*at));
+    series
+}
+
 #[test]
 fn an_estimate_equal_to_the_reference_has_no_error() {
     let a = track(500, 100.0, |_, q| q);

@@ -63,7 +63,7 @@ pub(super) struct Gate {
 
 impl Gate {
     pub(super) fn new(settings: &Settings) -> Self {
-        let axes = settings.mount * settings.axes;
+        let axes = settings.mount.as_matrix() * settings.axes.matrix();
         let unless_identity = |m: Matrix3<f64>| (m != Matrix3::identity()).then_some(m);
         Gate {
             kind: settings.kind,

@@ -166,7 +166,7 @@ impl Conditioner {
     }
 
     /// A sample came that its sender has sent before: it is counted, and nothing else.
-    pub fn push_late(&mut self, stamp: Nanos) {
+    pub(crate) fn push_late(&mut self, stamp: Nanos) {
         self.report.note(Verdict::Late, self.index, Some(stamp));
     }
 }

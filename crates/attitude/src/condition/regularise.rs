@@ -16,7 +16,7 @@
 //! A segment ends where conditioning holds or resets (gaps beyond `max_gap`, clock jumps), where
 //! eight stamps in a row are more than half a step off (a changed rate, a lost count), and, offline,
 //! where one line no longer fits: Chow's test on blocks of 256 samples (`line`). Memory:
-//! 56 bytes per segment, at most [`MOST_SEGMENTS`] of them.
+//! 56 bytes per segment, at most a hundred thousand of them.
 
 mod count;
 mod line;
@@ -31,9 +31,9 @@ use std::sync::Arc;
 use tracker::Tracker;
 
 /// Most segments of one stream: beyond, there is no constant rate. 100,000 are 6 MB.
-pub const MOST_SEGMENTS: usize = 100_000;
+const MOST_SEGMENTS: usize = 100_000;
 /// Segments reported one by one.
-pub const SEGMENTS_KEPT: usize = 1000;
+const SEGMENTS_KEPT: usize = 1000;
 /// Jitter, as rms over the step, above which samples can not be counted by their stamps. A stamp is
 /// believed within half a step of its instant, so that jitter of any size is measured as 0.29 at most
 /// (even over the step).
@@ -258,7 +258,7 @@ pub struct Segment {
 pub struct Report {
     /// Samples that went through.
     pub samples: u64,
-    /// Stretches of constant rate; all are counted, the first [`SEGMENTS_KEPT`] kept.
+    /// Stretches of constant rate; all are counted, the first thousand kept.
     pub segments: u64,
     /// The first of them.
     pub kept: Vec<Segment>,
@@ -495,18 +495,18 @@ impl Regulariser {
                 floor.map_or(own, |(_, before)| own.max(before))
             }
         };
-        let value = match self.value {
-            Value::MeanTimesInterval if length > 0 => {
-                sample.value * (new.since(start) as f64 / length as f64)
-            }
-            _ => sample.value,
+        let gyro = match self.value {
+            Value::MeanTimesInterval if length > 0 => sample
+                .gyro
+                .with(sample.gyro.as_vector() * (new.since(start) as f64 / length as f64)),
+            _ => sample.gyro,
         };
         self.before = Some((sample.stamp, new));
         self.note(sample.stamp.since(new), new, begins, step);
         out.push(RateSample {
             stamp: new,
             start,
-            value,
+            gyro,
             ..*sample
         });
     }

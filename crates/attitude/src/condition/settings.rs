@@ -4,9 +4,11 @@
 //! before the first sample, and the hot path needs no checks.
 
 use super::clock::Clock;
+use crate::frames::{AxisMap, Body, Dcm, Sensor};
+use crate::quaternion::BodyRate;
 use crate::record::{GyroUnit, SampleKind};
 use crate::setting::{
-    BIAS, BODY, CALIBRATION, GYRO_RANGE, MAX_GAP, MOUNT, RATE_HZ, START, UNDO_TRUNCATION, UNTIL,
+    BIAS, CALIBRATION, GYRO_RANGE, MAX_GAP, MOUNT, RATE_HZ, START, UNDO_TRUNCATION, UNTIL,
 };
 use nalgebra::{Matrix3, Vector3};
 
@@ -48,17 +50,18 @@ pub struct Settings {
     pub unit: GyroUnit,
     /// Multiply the recorded acceleration by this to get m/s^2.
     pub accel_scale: f64,
-    /// Corrects scale and axes of the gyro, sensor axes.
+    /// Corrects scale and axes of the gyro, sensor axes. No rotation, and so a bare matrix: its columns are what the
+    /// sensor reads of a rate of 1 about each axis, undone.
     pub gyro_matrix: Matrix3<f64>,
-    /// The same for the accelerometer.
+    /// The same for the accelerometer; no rotation either.
     pub accel_matrix: Matrix3<f64>,
-    /// What is left of its bias after that, m/s^2, sensor axes.
+    /// What is left of its bias after that, m/s^2, sensor axes before `axes`.
     pub accel_bias: Vector3<f64>,
-    /// Body axes from source axes: a signed permutation. Determinant -1 is allowed: recordings
+    /// Sensor axes from the columns of the source. A map that mirrors is allowed: recordings
     /// with columns in z,y,x order exist, and naming the columns right is not a reflection.
-    pub axes: Matrix3<f64>,
+    pub axes: AxisMap,
     /// Sensor-to-body rotation C_bs, applied after `axes`.
-    pub mount: Matrix3<f64>,
+    pub mount: Dcm<Body, Sensor>,
     /// Which stamp counts. See [`super::choose_clock`].
     pub clock: Clock,
     /// Longest gap integrated across, seconds.
@@ -68,8 +71,8 @@ pub struct Settings {
     /// Step in rad/s (or rad of a delta angle), sensor axes, to which a driver has cut the rates towards
     /// zero: half of it is put back. See [`truncation`](super::truncation).
     pub truncation_step: Option<f64>,
-    /// Gyro bias in rad/s, body axes, subtracted.
-    pub bias: Vector3<f64>,
+    /// Gyro bias, subtracted.
+    pub bias: BodyRate,
     /// Full scale of the gyro in rad/s, sensor axes: components at or beyond it are flagged.
     pub gyro_range: Option<f64>,
     /// Leave out samples earlier than this, seconds after the first stamp.
@@ -91,13 +94,13 @@ impl Default for Settings {
             gyro_matrix: Matrix3::identity(),
             accel_matrix: Matrix3::identity(),
             accel_bias: Vector3::zeros(),
-            axes: Matrix3::identity(),
-            mount: Matrix3::identity(),
+            axes: AxisMap::IDENTITY,
+            mount: Dcm::identity(),
             clock: Clock::Header,
             max_gap_secs: 0.5,
             on_gap: OnGap::Hold,
             truncation_step: None,
-            bias: Vector3::zeros(),
+            bias: BodyRate::ZERO,
             gyro_range: None,
             start: None,
             until: None,
@@ -120,25 +123,51 @@ impl Settings {
     /// The reorder window for live streams: nothing is held back.
     pub const LIVE_WINDOW: usize = 0;
 
+    /// All of it as text, which tells settings of a saved estimator apart: by numbers alone, so that one of an earlier
+    /// version goes on, whatever types hold them now.
+    pub(crate) fn told(&self) -> String {
+        let Settings {
+            kind,
+            unit,
+            accel_scale,
+            gyro_matrix,
+            accel_matrix,
+            accel_bias,
+            axes,
+            mount,
+            clock,
+            max_gap_secs,
+            on_gap,
+            truncation_step,
+            bias: BodyRate(bias),
+            gyro_range,
+            start,
+            until,
+            reorder_window,
+        } = self;
+        let (axes, mount) = (axes.matrix(), mount.as_matrix());
+        format!(
+            "Settings {{ kind: {kind:?}, unit: {unit:?}, accel_scale: {accel_scale:?}, gyro_matrix: {gyro_matrix:?}, \
+             accel_matrix: {accel_matrix:?}, accel_bias: {accel_bias:?}, axes: {axes:?}, mount: {mount:?}, \
+             clock: {clock:?}, max_gap_secs: {max_gap_secs:?}, on_gap: {on_gap:?}, truncation_step: {truncation_step:?}, \
+             bias: {bias:?}, gyro_range: {gyro_range:?}, start: {start:?}, until: {until:?}, \
+             reorder_window: {reorder_window:?} }}"
+        )
+    }
+
     /// Checks everything a person can get wrong.
     ///
     /// # Errors
     /// [`SettingsError`] names the setting, the value, and the flag that sets it.
-    pub fn validate(&self) -> Result<(), SettingsError> {
+    pub(crate) fn validate(&self) -> Result<(), SettingsError> {
         let fail = |text: String| Err(SettingsError(text));
-        if !is_signed_permutation(&self.axes) {
-            return fail(format!(
-                "{BODY}: {:?} is not a signed permutation of the axes",
-                rows(&self.axes)
-            ));
-        }
-        let excess = (self.mount * self.mount.transpose() - Matrix3::identity()).amax();
+        let excess = self.mount.orthonormality_defect();
+        let determinant = self.mount.as_matrix().determinant();
         // `!(a <= b)` and not `a > b`, so that NaN fails too.
-        if !(excess <= ROTATION_TOLERANCE && self.mount.determinant() > 0.0) {
+        if !(excess <= ROTATION_TOLERANCE && determinant > 0.0) {
             return fail(format!(
-                "{MOUNT}: {:?} is not a rotation (C C^T is off the identity by {excess:.1e}, determinant {:.3})",
-                rows(&self.mount),
-                self.mount.determinant()
+                "{MOUNT}: {:?} is not a rotation (C C^T is off the identity by {excess:.1e}, determinant {determinant:.3})",
+                self.mount
             ));
         }
         if let Clock::Index { rate_hz } = self.clock
@@ -154,11 +183,11 @@ impl Settings {
                 self.max_gap_secs
             ));
         }
-        let bias = self.bias.amax();
-        if !(self.bias.iter().all(|b| b.is_finite()) && bias <= super::gate::HUGE_RATE) {
+        let BodyRate(bias) = self.bias;
+        if !(bias.iter().all(|b| b.is_finite()) && bias.amax() <= super::gate::HUGE_RATE) {
             return fail(format!(
                 "{BIAS}: {:?} rad/s can not be a gyro bias",
-                self.bias.as_slice()
+                bias.as_slice()
             ));
         }
         if !(self.accel_scale.is_finite() && self.accel_scale != 0.0) {
@@ -205,15 +234,6 @@ impl Settings {
     }
 }
 
-fn rows(m: &Matrix3<f64>) -> [[f64; 3]; 3] {
-    m.transpose().into()
-}
-
-fn is_signed_permutation(m: &Matrix3<f64>) -> bool {
-    m.iter().all(|v| [0.0, 1.0, -1.0].contains(v))
-        && (0..3).all(|i| m.row(i).abs().sum() == 1.0 && m.column(i).abs().sum() == 1.0)
-}
-
 /// A setting that can not be; the text names the flag.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SettingsError(pub(super) String);
@@ -225,3 +245,69 @@ impl std::fmt::Display for SettingsError {
 }
 
 impl std::error::Error for SettingsError {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Rotation3;
+
+    /// As they were printed when they held bare numbers, which saved estimators are told apart by.
+    mod bare {
+        use super::*;
+
+        #[derive(Debug)]
+        #[allow(dead_code)]
+        pub(super) struct Settings {
+            pub(super) kind: SampleKind,
+            pub(super) unit: GyroUnit,
+            pub(super) accel_scale: f64,
+            pub(super) gyro_matrix: Matrix3<f64>,
+            pub(super) accel_matrix: Matrix3<f64>,
+            pub(super) accel_bias: Vector3<f64>,
+            pub(super) axes: Matrix3<f64>,
+            pub(super) mount: Matrix3<f64>,
+            pub(super) clock: Clock,
+            pub(super) max_gap_secs: f64,
+            pub(super) on_gap: OnGap,
+            pub(super) truncation_step: Option<f64>,
+            pub(super) bias: Vector3<f64>,
+            pub(super) gyro_range: Option<f64>,
+            pub(super) start: Option<f64>,
+            pub(super) until: Option<f64>,
+            pub(super) reorder_window: usize,
+        }
+    }
+
+    #[test]
+    fn an_estimator_saved_before_settings_had_types_is_known_again() {
+        let turn = *Rotation3::from_euler_angles(0.1, -0.2, 0.3).matrix();
+        let settings = Settings {
+            kind: SampleKind::DeltaAngle,
+            axes: "YxZ".parse().unwrap_or_default(),
+            mount: Dcm::assume(turn),
+            bias: BodyRate(Vector3::new(0.1, -0.0, 1e-300)),
+            gyro_range: Some(4.0),
+            ..Settings::default()
+        };
+        let before = bare::Settings {
+            kind: SampleKind::DeltaAngle,
+            unit: settings.unit,
+            accel_scale: settings.accel_scale,
+            gyro_matrix: settings.gyro_matrix,
+            accel_matrix: settings.accel_matrix,
+            accel_bias: settings.accel_bias,
+            axes: Matrix3::new(0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 1.0),
+            mount: turn,
+            clock: settings.clock,
+            max_gap_secs: settings.max_gap_secs,
+            on_gap: settings.on_gap,
+            truncation_step: settings.truncation_step,
+            bias: Vector3::new(0.1, -0.0, 1e-300),
+            gyro_range: settings.gyro_range,
+            start: settings.start,
+            until: settings.until,
+            reorder_window: settings.reorder_window,
+        };
+        assert_eq!(settings.told(), format!("{before:?}"));
+    }
+}

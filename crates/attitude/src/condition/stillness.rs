@@ -9,9 +9,12 @@
 
 mod estimate;
 
-pub use estimate::{BiasEstimate, NoRest, accel_at_start, estimate_bias, level, rest_at_start};
+pub(crate) use estimate::rest_at_start;
+pub use estimate::{BiasEstimate, NoRest, accel_at_start, estimate_bias, level};
 
-use crate::record::{Join, Nanos, RateSample, SampleKind};
+use crate::frames::{Body, In};
+use crate::quaternion::BodyRate;
+use crate::record::{Join, Nanos, RateSample};
 use nalgebra::Vector3;
 
 /// How many rests are kept; later ones are only counted.
@@ -65,14 +68,14 @@ pub struct Rest {
     pub start: Nanos,
     /// Its last sample.
     pub end: Nanos,
-    /// Mean rate, rad/s, body axes: the gyro's bias (what is left of it after `--bias`).
-    pub mean_rate: Vector3<f64>,
+    /// Mean rate: the gyro's bias (what is left of it after `--bias`).
+    pub mean_rate: BodyRate,
     /// One standard deviation of `mean_rate`, rad/s: the larger of what the noise within windows and
     /// the scatter between windows say, and never below the bias instability.
     pub sigma: Vector3<f64>,
-    /// Mean specific force, body axes, in the recording's unit; `None` where there is no
+    /// Mean specific force, in the recording's unit; `None` where there is no
     /// accelerometer.
-    pub mean_accel: Option<Vector3<f64>>,
+    pub mean_accel: Option<In<Body>>,
     /// One standard deviation of its direction, rad, by the scatter between windows: a body that is held, or begins to
     /// move, is not quite still. 0 without an accelerometer.
     pub tilt_sigma: f64,
@@ -174,19 +177,17 @@ struct Growing {
 #[derive(Clone, Debug)]
 pub struct Stillness {
     limits: Limits,
-    kind: SampleKind,
     window: Option<Window>,
     growing: Option<Growing>,
     rests: Rests,
 }
 
 impl Stillness {
-    /// A detector for samples of this kind.
+    /// A detector that has seen nothing.
     #[must_use]
-    pub fn new(kind: SampleKind, limits: Limits) -> Self {
+    pub fn new(limits: Limits) -> Self {
         Stillness {
             limits,
-            kind,
             window: None,
             growing: None,
             rests: Rests::default(),
@@ -201,16 +202,10 @@ impl Stillness {
             self.window = None;
             self.close();
         }
-        let rate = match self.kind {
-            SampleKind::Rate => sample.value,
-            _ => {
-                let secs = sample.stamp.secs_since(sample.start);
-                if secs <= 0.0 {
-                    return;
-                }
-                sample.value / secs
-            }
-        };
+        if sample.own_secs() <= 0.0 {
+            return;
+        }
+        let BodyRate(rate) = sample.mean_rate();
         let window = self.window.get_or_insert(Window {
             start: sample.stamp,
             end: sample.stamp,
@@ -220,7 +215,7 @@ impl Stillness {
         window.end = sample.stamp;
         window.gyro.push(&rate);
         if let Some(accel) = &sample.accel {
-            window.accel.push(accel);
+            window.accel.push(accel.as_vector());
         }
         if window.gyro.n >= MIN_SAMPLES
             && window.end.secs_since(window.start) >= SLACK * self.limits.window_secs
@@ -312,9 +307,9 @@ impl Stillness {
             self.rests.kept.push(Rest {
                 start: growing.start,
                 end: growing.end,
-                mean_rate: growing.windows.mean,
+                mean_rate: BodyRate(growing.windows.mean),
                 sigma,
-                mean_accel: (growing.accel.n > 0).then_some(growing.accel.mean),
+                mean_accel: (growing.accel.n > 0).then(|| In::assume(growing.accel.mean)),
                 tilt_sigma: growing.accel.direction_sigma(),
                 samples: growing.samples,
             });

@@ -7,7 +7,8 @@ use super::gate::{Entry, finite_accel};
 use super::report::{Gap, Report};
 use super::settings::{OnGap, Settings};
 use super::spacing::{Spacing, Steps};
-use crate::record::{Join, Nanos, RateSample, SampleKind, Status, Verdict};
+use crate::frames::In;
+use crate::record::{Join, Measured, Nanos, RateSample, SampleKind, Status, Verdict};
 use nalgebra::Vector3;
 
 /// Interval of a lone increment that says nothing of its own: only its mean rate depends on it.
@@ -49,7 +50,7 @@ impl Timing {
     pub(super) fn new(settings: &Settings, max_gap_nanos: i64) -> Self {
         Timing {
             kind: settings.kind,
-            bias: settings.bias,
+            bias: settings.bias.0,
             max_gap_nanos,
             on_gap: settings.on_gap,
             spacing: Spacing::new(max_gap_nanos),
@@ -188,8 +189,8 @@ impl Timing {
         RateSample {
             stamp,
             start,
-            value,
-            accel: finite_accel(&entry.accel),
+            gyro: Measured::assume(self.kind, value),
+            accel: finite_accel(&entry.accel).map(In::assume),
             join,
             status,
             log: entry.log,

@@ -45,7 +45,7 @@ impl Grid {
 
     /// Whether the rates were cut towards zero.
     #[must_use]
-    pub fn is_truncated(&self) -> bool {
+    pub(crate) fn is_truncated(&self) -> bool {
         self.zero_bin.is_some_and(|ratio| ratio > WIDE)
     }
 }

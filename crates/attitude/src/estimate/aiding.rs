@@ -7,8 +7,8 @@ use super::meaning::{Meaning, STANDARD_GRAVITY};
 use super::plan::{Aid, BIAS_LEFT, Bias, Initial, Noise, Plan};
 use crate::aid::{self, Settings, Start};
 use crate::frames::{Body, Nav};
-use crate::quaternion::{Quaternion, RotationVector};
-use crate::record::{Nanos, RawSample, SampleKind};
+use crate::quaternion::Quaternion;
+use crate::record::{Nanos, RawSample};
 use crate::setting::{ACCEL_TOPIC, AID, FIELD, SMOOTH};
 use nalgebra::Vector3;
 
@@ -138,7 +138,7 @@ impl Aiding {
         let mut lengths = first
             .iter()
             .filter_map(|raw| raw.accel)
-            .map(|f| resolved.force(f).norm())
+            .map(|f| resolved.force(f).as_vector().norm())
             .filter(|length| length.is_finite() && *length > 0.0);
         let length = lengths.next().ok_or(Unaided::NoForce)?;
         let mut all: Vec<f64> = std::iter::once(length).chain(lengths).collect();
@@ -267,17 +267,14 @@ fn not_turning(resolved: &Meaning, first: &[RawSample]) -> Option<(f64, f64)> {
         if !(0.0..1.0).contains(&step) {
             return None;
         }
-        let turn = resolved.rate(gyro)
-            * match resolved.kind {
-                SampleKind::Rate | SampleKind::Average => step,
-                SampleKind::DeltaAngle => 1.0,
-            };
+        let turn = resolved.turned(gyro, step);
         let force = resolved.force(force);
-        if !turn.iter().chain(force.iter()).all(|v| v.is_finite()) {
+        let mut numbers = turn.0.iter().chain(force.as_vector().iter());
+        if !numbers.all(|v| v.is_finite()) {
             continue;
         }
-        attitude = attitude.advanced(&RotationVector(turn));
-        sum += attitude.to_dcm().as_matrix() * force * step;
+        attitude = attitude.advanced(&turn.about_fixed_axis());
+        sum += (attitude.to_dcm() * force).as_vector() * step;
         secs += step;
     }
     (secs > 0.2).then(|| (sum.norm() / secs, secs))

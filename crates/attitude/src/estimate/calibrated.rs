@@ -183,7 +183,7 @@ pub fn learned(
     };
     if plan.bias != Bias::None {
         known.bias = Some(Known {
-            value: (from_gyro * prepared.bias).into(),
+            value: (from_gyro * prepared.bias.0).into(),
             sigma: Some([BIAS_LEFT.hypot(switched_off); 3]),
             observed: [true; 3],
         });
@@ -225,7 +225,7 @@ pub fn learned(
     known.bias = Some(now_known(
         known.bias.as_ref(),
         [settings.bias_prior; 3],
-        (from_gyro * (prepared.bias + now.bias)).into(),
+        (from_gyro * (prepared.bias.0 + now.bias)).into(),
         about(&from_gyro, bias),
         switched_off,
     ));
@@ -297,7 +297,7 @@ fn by_smoother(
     // As it was at the end.
     if let Some(last) = smoothed.biases().last() {
         let sigma = turned(&from_gyro, last.sigma.into());
-        let value = from_gyro * (prepared.bias + last.value);
+        let value = from_gyro * (prepared.bias.0 + last.value);
         known.bias = Some(now_known(
             known.bias.as_ref(),
             [f64::INFINITY; 3],

@@ -14,9 +14,9 @@ use super::smoothing::{Recording, Smoothing, Told};
 use crate::aid::{self, Aided};
 use crate::condition::regularise::{self, Regulariser};
 use crate::condition::{self, Clock, Conditioner};
-use crate::frames::Nav;
+use crate::frames::{In, Nav};
 use crate::propagate::{self, Executor, Method, Propagator};
-use crate::quaternion::{Quaternion, RotationVector};
+use crate::quaternion::{BodyRate, Quaternion, RotationVector};
 use crate::record::{AttitudeSample, Join, Nanos, RateSample, RawSample};
 use crate::smooth::Looseness;
 use crate::worlds::{Convention, World};
@@ -183,7 +183,8 @@ impl Estimator {
         .map_err(|e| e.to_string())?;
         Ok(Estimator {
             settings: told_apart(&format!(
-                "{settings:?} {:?} {:?} {noise:?}{}{}",
+                "{} {:?} {:?} {noise:?}{}{}",
+                settings.told(),
                 plan.method,
                 prepared.world_rate,
                 // Nothing for a gyro alone: what was saved before there was more goes on.
@@ -193,7 +194,7 @@ impl Estimator {
                     aiding.start,
                     aiding.force_scale,
                     plan.declination,
-                    plan.mag_mount
+                    plan.mag_mount.map(|q_bs| q_bs.wxyz())
                 )),
                 plan.calibration
                     .as_ref()
@@ -337,9 +338,9 @@ impl Estimator {
             }
         }
         let resolved = &besides.resolved;
-        let scale = *besides
-            .force_scale
-            .get_or_insert_with(|| aiding::force_scale(resolved, resolved.force(force).norm()));
+        let scale = *besides.force_scale.get_or_insert_with(|| {
+            aiding::force_scale(resolved, resolved.force(force).as_vector().norm())
+        });
         let force = resolved.calibrated_force(force, scale);
         let place = self.rates.len();
         self.beside.push((place, stamp, Beside::Force(force)));
@@ -527,7 +528,7 @@ impl Asked {
         for sample in out {
             // What a sensor measured late has happened at the stamp already.
             if self.delay != 0.0 {
-                let turn = RotationVector(sample.rate * self.delay);
+                let turn = sample.rate.held_for(self.delay).about_fixed_axis();
                 sample.q_nb = sample.q_nb.advanced(&turn).normalised();
             }
             if let Some(north) = &self.north {
@@ -549,7 +550,7 @@ impl Asked {
             sample.q_nb = (north.inverse() * sample.q_nb).normalised();
         }
         if self.delay != 0.0 {
-            let back = RotationVector(sample.rate * -self.delay);
+            let back = sample.rate.held_for(-self.delay).about_fixed_axis();
             sample.q_nb = sample.q_nb.advanced(&back).normalised();
         }
         sample
@@ -582,9 +583,11 @@ fn told_apart(text: &str) -> u64 {
 fn relabelled(sample: &AttitudeSample, from: Convention, to: Convention) -> AttitudeSample {
     AttitudeSample {
         q_nb: from.convert(to, sample.q_nb),
-        rate: from.convert_body(to, sample.rate),
+        rate: BodyRate(from.convert_body(to, sample.rate.0)),
         covariance: sample.covariance.relabelled(|v| from.convert_body(to, v)),
-        accel: sample.accel.map(|a| from.convert_body(to, a)),
+        accel: sample
+            .accel
+            .map(|a| In::assume(from.convert_body(to, *a.as_vector()))),
         ..*sample
     }
 }

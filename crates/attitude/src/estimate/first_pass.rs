@@ -7,8 +7,8 @@ use super::meaning::Meaning;
 use super::plan::Plan;
 use crate::condition::stillness::{Limits, Rests, Stillness};
 use crate::condition::{Conditioner, choose_clock};
+use crate::quaternion::BodyRate;
 use crate::record::{RateSample, RawSample};
-use nalgebra::Vector3;
 
 /// Samples that tell the clock and hold the first orientation.
 pub const FEW: usize = 512;
@@ -74,7 +74,7 @@ impl Conditioned {
         let (clock, _) = choose_clock(&gathered, self.plan.clock);
         let settings = self
             .resolved
-            .conditioning(&self.plan, clock, Vector3::zeros());
+            .conditioning(&self.plan, clock, BodyRate::ZERO);
         let mut conditioner = Conditioner::new(&settings).map_err(|e| e.to_string())?;
         conditioner.push(&gathered, &mut self.rates);
         self.running = Some(conditioner);
@@ -98,7 +98,7 @@ impl RestPass {
     pub(super) fn new(plan: &Plan, resolved: &Meaning) -> RestPass {
         RestPass {
             conditioned: Conditioned::new(plan, resolved),
-            detector: Stillness::new(resolved.kind, Limits::default()),
+            detector: Stillness::new(Limits::default()),
         }
     }
 

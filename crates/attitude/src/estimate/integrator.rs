@@ -6,17 +6,17 @@ use super::anew::Anew;
 use super::kept::{Spool, SpoolError};
 use super::smoothing::{Recording, Smoothing};
 use crate::aid::{self, Aided};
+use crate::frames::{Body, In};
 use crate::propagate::{self, Executor, Method, Propagator};
 use crate::record::{AttitudeSample, Nanos, RateSample};
-use nalgebra::Vector3;
 
-/// A vector measured beside the gyro, body axes.
+/// A vector measured beside the gyro.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Beside {
     /// Specific force, m/s^2.
-    Force(Vector3<f64>),
+    Force(In<Body>),
     /// Magnetic field.
-    Field(Vector3<f64>),
+    Field(In<Body>),
 }
 
 /// Rates -> attitudes.

@@ -3,7 +3,8 @@
 //! Apart from the smoother because a recording of ten hours does not fit in memory: what does not is written to a file
 //! that is lent. Every number keeps its bits.
 
-use crate::record::{Join, Nanos, RateSample, Status};
+use crate::frames::{Body, In};
+use crate::record::{Join, Measured, Nanos, RateSample, SampleKind, Status};
 use nalgebra::Vector3;
 use std::fmt;
 use std::io::{self, Read, Seek, SeekFrom, Write};
@@ -44,10 +45,10 @@ impl std::error::Error for SpoolError {
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum Event {
     Rate(RateSample),
-    /// Specific force, m/s^2, body axes.
-    Force(Nanos, Vector3<f64>),
-    /// Magnetic field, body axes.
-    Field(Nanos, Vector3<f64>),
+    /// Specific force, m/s^2.
+    Force(Nanos, In<Body>),
+    /// Magnetic field.
+    Field(Nanos, In<Body>),
     /// From here on forces come by themselves.
     ForcesBeside,
 }
@@ -166,10 +167,11 @@ const RATE: u8 = 0;
 const FORCE: u8 = 1;
 const FIELD: u8 = 2;
 const FORCES_BESIDE: u8 = 3;
-/// Of a rate: it has a specific force; its interval, and its log time, differ from its stamp.
+/// Of a rate: it has a specific force; its interval, and its log time, differ from its stamp; it is an increment.
 const HAS_FORCE: u8 = 1 << 2;
 const HAS_START: u8 = 1 << 3;
 const HAS_LOG: u8 = 1 << 4;
+const IS_INCREMENT: u8 = 1 << 5;
 const KIND: u8 = 3;
 
 const JOINS: [Join; 5] = [
@@ -181,10 +183,10 @@ const JOINS: [Join; 5] = [
 ];
 
 fn encode(event: &Event, out: &mut Vec<u8>) {
-    let mut beside = |kind: u8, stamp: &Nanos, vector: &Vector3<f64>| {
+    let mut beside = |kind: u8, stamp: &Nanos, vector: &In<Body>| {
         out.push(kind);
         out.extend(stamp.0.to_le_bytes());
-        put(vector, out);
+        put(vector.as_vector(), out);
     };
     match event {
         Event::ForcesBeside => out.push(FORCES_BESIDE),
@@ -196,7 +198,8 @@ fn encode(event: &Event, out: &mut Vec<u8>) {
             out.push(
                 RATE | flag(rate.accel.is_some(), HAS_FORCE)
                     | flag(start, HAS_START)
-                    | flag(log, HAS_LOG),
+                    | flag(log, HAS_LOG)
+                    | flag(matches!(rate.gyro, Measured::Increment(_)), IS_INCREMENT),
             );
             let join = JOINS.iter().position(|join| *join == rate.join);
             out.push(join.and_then(|join| u8::try_from(join).ok()).unwrap_or(1));
@@ -208,9 +211,9 @@ fn encode(event: &Event, out: &mut Vec<u8>) {
             if log {
                 out.extend(rate.log.0.to_le_bytes());
             }
-            put(&rate.value, out);
+            put(rate.gyro.as_vector(), out);
             if let Some(force) = &rate.accel {
-                put(force, out);
+                put(force.as_vector(), out);
             }
         }
     }
@@ -247,8 +250,8 @@ fn decode(from: &mut Bytes<'_>) -> Option<Event> {
     let [kind] = from.next()?;
     Some(match kind & KIND {
         FORCES_BESIDE => Event::ForcesBeside,
-        FORCE => Event::Force(from.stamp()?, from.vector()?),
-        FIELD => Event::Field(from.stamp()?, from.vector()?),
+        FORCE => Event::Force(from.stamp()?, In::assume(from.vector()?)),
+        FIELD => Event::Field(from.stamp()?, In::assume(from.vector()?)),
         _ => {
             let [join] = from.next()?;
             let status = Status(u16::from_le_bytes(from.next()?));
@@ -264,10 +267,16 @@ fn decode(from: &mut Bytes<'_>) -> Option<Event> {
             Event::Rate(RateSample {
                 stamp,
                 start,
-                value: from.vector()?,
+                gyro: Measured::assume(
+                    match kind & IS_INCREMENT {
+                        0 => SampleKind::Rate,
+                        _ => SampleKind::DeltaAngle,
+                    },
+                    from.vector()?,
+                ),
                 accel: match kind & HAS_FORCE {
                     0 => None,
-                    _ => Some(from.vector()?),
+                    _ => Some(In::assume(from.vector()?)),
                 },
                 join: JOINS.get(usize::from(join)).copied()?,
                 status,
@@ -289,14 +298,20 @@ mod tests {
             .map(|i| {
                 let stamp = Nanos(i64::from(i) * 1_000_003 - 7);
                 match i % 7 {
-                    0 => Event::Force(stamp, vector(i)),
-                    1 => Event::Field(stamp, vector(i)),
+                    0 => Event::Force(stamp, In::assume(vector(i))),
+                    1 => Event::Field(stamp, In::assume(vector(i))),
                     2 => Event::ForcesBeside,
                     kind => Event::Rate(RateSample {
                         stamp,
                         start: if kind == 3 { stamp } else { Nanos(i64::MIN) },
-                        value: vector(i),
-                        accel: (kind > 4).then(|| vector(i + 1)),
+                        gyro: Measured::assume(
+                            match i % 2 {
+                                0 => SampleKind::Rate,
+                                _ => SampleKind::DeltaAngle,
+                            },
+                            vector(i),
+                        ),
+                        accel: (kind > 4).then(|| In::assume(vector(i + 1))),
                         join: JOINS[i as usize % 5],
                         status: Status(i as u16),
                         log: if kind == 6 { stamp } else { Nanos(i64::MAX) },

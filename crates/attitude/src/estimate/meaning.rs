@@ -5,8 +5,8 @@
 use super::plan::Plan;
 use super::sensor_calibration::SensorCalibration;
 use crate::condition::{Clock, GyroUnit, Settings};
-use crate::frames::{Body, BodyAxes, Dcm, Nav, Sensor};
-use crate::quaternion::Quaternion;
+use crate::frames::{AxisMap, Body, BodyAxes, Dcm, In, Nav, Sensor};
+use crate::quaternion::{BodyRate, DeltaAngle, Quaternion};
 use crate::record::{AccelUnit, Declared, RawSample, SampleKind, TimeUnit};
 use crate::worlds::{Convention, World};
 use nalgebra::{Matrix3, Vector3};
@@ -38,9 +38,10 @@ pub struct Meaning {
     pub interval_unit_given: bool,
     /// What is known of the sensor beforehand.
     pub calibration: Option<Arc<SensorCalibration>>,
-    axes: Matrix3<f64>,
-    mount: Matrix3<f64>,
-    /// Magnetometer to body axes.
+    /// Columns of the input to the sensor's axes.
+    axes: AxisMap,
+    mount: Dcm<Body, Sensor>,
+    /// Columns of the magnetometer to body axes. Not a rotation by its type: a relabelling may mirror.
     mag_axes: Matrix3<f64>,
 }
 
@@ -50,16 +51,14 @@ impl Meaning {
     pub fn new(plan: &Plan, declared: &Declared) -> Meaning {
         let body = plan.body.or(declared.body).unwrap_or(BodyAxes::Flu);
         let unit = plan.unit.or(declared.gyro_unit).unwrap_or_default();
-        let mount: Quaternion<Body, Sensor> = plan
-            .mount
-            .map_or_else(Quaternion::identity, Quaternion::assume_unit);
-        let axes = body
-            .c_bs()
-            .map_or_else(Matrix3::identity, |c| *c.as_matrix());
-        let mount = *mount.to_dcm().as_matrix();
-        let mag_mount = plan.mag_mount.map(Quaternion::<Body, Sensor>::assume_unit);
+        let mount = plan.mount.unwrap_or_else(Quaternion::identity).to_dcm();
+        let axes = body.map();
         Meaning {
-            mag_axes: mag_mount.map_or(mount * axes, |q| *q.to_dcm().as_matrix()),
+            mag_axes: plan
+                .mag_mount
+                .map_or(mount.as_matrix() * axes.matrix(), |q| {
+                    *q.to_dcm().as_matrix()
+                }),
             kind: plan.kind.or(declared.sample_kind).unwrap_or_default(),
             is_kind_stated: plan.kind.or(declared.sample_kind).is_some(),
             unit,
@@ -76,9 +75,9 @@ impl Meaning {
         }
     }
 
-    /// Sensor to body axes.
+    /// Columns of the input to body axes; a relabelling may mirror.
     pub(super) fn to_body(&self) -> Matrix3<f64> {
-        self.mount * self.axes
+        self.mount.as_matrix() * self.axes.matrix()
     }
 
     /// Magnetometer to body axes.
@@ -86,9 +85,9 @@ impl Meaning {
         self.mag_axes
     }
 
-    /// The settings of the conditioning stage: `bias` is what is taken out of calibrated rates, body axes.
+    /// The settings of the conditioning stage: `bias` is what is taken out of calibrated rates.
     #[must_use]
-    pub fn conditioning(&self, plan: &Plan, clock: Clock, bias: Vector3<f64>) -> Settings {
+    pub fn conditioning(&self, plan: &Plan, clock: Clock, bias: BodyRate) -> Settings {
         let known = self.calibration.as_deref();
         let matrix =
             |of: fn(&SensorCalibration) -> Matrix3<f64>| known.map_or_else(Matrix3::identity, of);
@@ -113,38 +112,43 @@ impl Meaning {
         }
     }
 
-    /// A recorded rate in rad/s (or delta angle in rad) and body axes.
-    pub(super) fn rate(&self, recorded: [f64; 3]) -> Vector3<f64> {
-        self.mount * self.axes * Vector3::from(recorded) * self.unit.to_rad()
+    /// What a recorded sample turned in `secs`.
+    pub(super) fn turned(&self, recorded: [f64; 3], secs: f64) -> DeltaAngle {
+        let vector = self.to_body() * Vector3::from(recorded) * self.unit.to_rad();
+        match self.kind {
+            SampleKind::Rate | SampleKind::Average => BodyRate(vector).held_for(secs),
+            SampleKind::DeltaAngle => DeltaAngle(vector),
+        }
     }
 
-    /// A recorded specific force in m/s^2 and body axes, as far as the format states its unit.
+    /// A recorded specific force in m/s^2, as far as the format states its unit.
     #[must_use]
-    pub fn force(&self, recorded: [f64; 3]) -> Vector3<f64> {
-        self.to_body() * Vector3::from(recorded) * self.accel_scale
+    pub fn force(&self, recorded: [f64; 3]) -> In<Body> {
+        In::assume(self.to_body() * Vector3::from(recorded) * self.accel_scale)
     }
 
     /// The same, calibrated, where `scale` makes it m/s^2.
-    pub(super) fn calibrated_force(&self, recorded: [f64; 3], scale: f64) -> Vector3<f64> {
-        match &self.calibration {
-            None => self.force(recorded) * scale,
+    pub(super) fn calibrated_force(&self, recorded: [f64; 3], scale: f64) -> In<Body> {
+        In::assume(match &self.calibration {
+            None => self.force(recorded).as_vector() * scale,
             Some(known) => {
                 let force = Vector3::from(recorded) * (self.accel_scale * scale);
                 self.to_body() * (known.force_matrix() * (force - known.force_bias_vector()))
             }
-        }
+        })
     }
 
-    /// A recorded magnetic field in body axes, calibrated, and for how long after its stamp it is that, s.
-    pub(super) fn field(&self, recorded: [f64; 3]) -> (Vector3<f64>, f64) {
+    /// A recorded magnetic field, calibrated, and for how long after its stamp it is that, s.
+    pub(super) fn field(&self, recorded: [f64; 3]) -> (In<Body>, f64) {
         let field = Vector3::from(recorded);
-        match &self.calibration {
+        let (field, lead) = match &self.calibration {
             None => (self.mag_axes * field, 0.0),
             Some(known) => (
                 self.mag_axes * (known.field_matrix() * (field - known.hard_iron_vector())),
                 known.field_lead.map_or(0.0, |lead| lead.value[0]),
             ),
-        }
+        };
+        (In::assume(field), lead)
     }
 
     /// World and body of the output as labels. NED comes with FRD, everything else with FLU.
@@ -158,6 +162,7 @@ impl Meaning {
     /// promises. The same products as in conditioning, so that no bit is lost on the way through one.
     #[must_use]
     pub fn in_flu(&self, raw: &RawSample) -> RawSample {
+        let axes = self.axes.matrix();
         let by = |m: Matrix3<f64>, v: [f64; 3]| {
             if m == Matrix3::identity() {
                 v
@@ -166,9 +171,9 @@ impl Meaning {
             }
         };
         RawSample {
-            gyro: raw.gyro.map(|v| by(self.axes * self.unit.to_rad(), v)),
-            accel: raw.accel.map(|v| by(self.axes * self.accel_scale, v)),
-            mag: raw.mag.map(|v| by(self.axes, v)),
+            gyro: raw.gyro.map(|v| by(axes * self.unit.to_rad(), v)),
+            accel: raw.accel.map(|v| by(axes * self.accel_scale, v)),
+            mag: raw.mag.map(|v| by(axes, v)),
             orientation: raw.orientation.map(|wxyz| {
                 match (self.recorded, Quaternion::<Nav, Body>::try_from_wxyz(wxyz)) {
                     (Convention::EnuFlu, _) | (_, Err(_)) => wxyz,
@@ -196,8 +201,10 @@ impl Meaning {
     pub fn recorded_attitude(&self, wxyz: [f64; 4]) -> Option<Quaternion<Nav, Body>> {
         let q: Quaternion<Nav, Body> = Quaternion::try_from_wxyz(wxyz).ok()?;
         let flu = self.recorded.convert(Convention::EnuFlu, q);
-        let c_bs: Quaternion<Body, Body> = Quaternion::from_dcm(&Dcm::assume(self.mount));
-        Some((flu * c_bs.inverse()).normalised())
+        // What is labelled body here is the sensor: as long as it is not mounted otherwise, they are the same.
+        let q_ns: Quaternion<Nav, Sensor> = Quaternion::assume_unit(flu.wxyz());
+        let q_bs = Quaternion::from_dcm(&self.mount);
+        Some((q_ns * q_bs.inverse()).normalised())
     }
 }
 

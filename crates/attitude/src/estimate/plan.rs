@@ -5,16 +5,15 @@
 
 use super::sensor_calibration::SensorCalibration;
 use crate::condition::{self, Clock, GyroUnit, OnGap};
-use crate::frames::BodyAxes;
+use crate::frames::{Body, BodyAxes, Nav, Sensor};
 use crate::propagate::{self, Method, Propagator};
-use crate::quaternion::Quaternion;
+use crate::quaternion::{BodyRate, Quaternion};
 use crate::record::SampleKind;
 use crate::setting::{
     AID, BIAS, CALIBRATION, DECLINATION, EARTH_RATE, INIT, MAG_HARD_IRON, MAG_MOUNT, METHOD,
     REGULARISE_STAMPS, SENSOR_DELAY, SMOOTH, TIME, WORLD,
 };
 use crate::worlds::World;
-use nalgebra::Vector3;
 use std::sync::Arc;
 
 /// Of a gyro whose bias was removed, rad/s: what the bias may have become since.
@@ -34,8 +33,8 @@ pub struct Plan {
     pub body: Option<BodyAxes>,
     /// `--world`.
     pub world: World,
-    /// `--mount`: C_bs as `[w, x, y, z]`.
-    pub mount: Option<[f64; 4]>,
+    /// `--mount`: q_bs.
+    pub mount: Option<Quaternion<Body, Sensor>>,
     /// `--time`, `--rate-hz`.
     pub clock: Clock,
     /// `--init`, in the convention of `world`.
@@ -63,8 +62,8 @@ pub struct Plan {
     pub is_accel_kinematic: bool,
     /// Specific forces come by [`Estimator::take_beside`](super::Estimator::take_beside), not with the rates.
     pub has_forces_beside: bool,
-    /// `--mag-mount`: magnetometer to body, `[w, x, y, z]`; `None` = as the gyro.
-    pub mag_mount: Option<[f64; 4]>,
+    /// `--mag-mount`: q_bs of the magnetometer; `None` = as the gyro.
+    pub mag_mount: Option<Quaternion<Body, Sensor>>,
     /// `--mag-hard-iron`: prior sigma of hard iron that is looked for, as a share of the field; 0: none is.
     pub mag_hard_iron: f64,
     /// `--declination`, rad: how far magnetic north lies east of true north.
@@ -167,7 +166,7 @@ impl Plan {
             on_gap: self.on_gap,
             bias: match self.bias {
                 Bias::Given(bias) => bias,
-                Bias::None | Bias::Auto => Vector3::zeros(),
+                Bias::None | Bias::Auto => BodyRate::ZERO,
             },
             gyro_range: self.gyro_range,
             start: self.start,
@@ -320,11 +319,11 @@ pub enum Initial {
     Gravity,
     /// The first recorded orientation.
     FirstOrientation,
-    /// Given: `[w, x, y, z]`, unit norm.
-    Given([f64; 4]),
+    /// Given, in the convention of [`Plan::world`].
+    Given(Quaternion<Nav, Body>),
 }
 
-/// `--bias`, rad/s in body axes.
+/// `--bias`.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Bias {
     /// Nothing is subtracted.
@@ -332,7 +331,7 @@ pub enum Bias {
     /// From detected rest; refused when there is none.
     Auto,
     /// Given.
-    Given(Vector3<f64>),
+    Given(BodyRate),
 }
 
 /// `--noise`: what the covariance is made of. 1 sigma, about the body axes x, y, z.

@@ -14,7 +14,7 @@ use crate::condition::truncation::Grid;
 use crate::condition::{Clock, ClockWarning, choose_clock};
 use crate::frames::{Body, In, Nav};
 use crate::propagate::Method;
-use crate::quaternion::{Quaternion, YawPitchRoll};
+use crate::quaternion::{BodyRate, Quaternion, YawPitchRoll};
 use crate::record::{Nanos, RawSample, SampleKind};
 use crate::setting::{
     AID, BIAS, CALIBRATION, DECLINATION, EARTH_RATE, GYRO_UNIT, INIT, REGULARISE_STAMPS, START,
@@ -32,8 +32,8 @@ const REST_SECS: f64 = 60.0;
 pub struct Prepared {
     /// The clock.
     pub clock: Clock,
-    /// Bias removed, rad/s, body axes.
-    pub bias: Vector3<f64>,
+    /// Bias removed.
+    pub bias: BodyRate,
     /// Its uncertainty, rad/s.
     pub bias_sigma: Vector3<f64>,
     /// Where it came from.
@@ -432,12 +432,12 @@ fn decide_bias(
     (plan, resolved): (&Plan, &Meaning),
     rests: &Rests,
     earth: Option<Vector3<f64>>,
-) -> Result<(Vector3<f64>, Vector3<f64>, String), String> {
+) -> Result<(BodyRate, Vector3<f64>, String), String> {
     match plan.bias {
         Bias::None => Ok(match resolved.calibrated_bias(&plan.noise) {
-            Some((bias, sigma)) => (bias, sigma, "as calibrated".to_owned()),
+            Some((bias, sigma)) => (BodyRate(bias), sigma, "as calibrated".to_owned()),
             None => (
-                Vector3::zeros(),
+                BodyRate::ZERO,
                 plan.noise.unremoved_bias().into(),
                 "none".to_owned(),
             ),
@@ -457,7 +457,7 @@ fn decide_bias(
                     .map_err(|e| not_at_start(&e))?
                     .alone();
                 estimate = stillness::estimate_bias(&first, &limits).map_err(refuse)?;
-                estimate.bias -= earth;
+                estimate.bias.0 -= earth;
                 earths = " at the start, less the Earth's rate";
             }
             let sigma = estimate.sigma.max();
@@ -531,11 +531,7 @@ pub(super) fn decide_initial(
                 plan.world,
             ))
         }
-        Initial::Given(wxyz) => Ok((
-            inside(Quaternion::assume_unit(wxyz)),
-            "as given".to_owned(),
-            world,
-        )),
+        Initial::Given(q_nb) => Ok((inside(q_nb), "as given".to_owned(), world)),
         Initial::Gravity => {
             let level =
                 stillness::accel_at_start(rests, &Limits::default()).map_err(|e| not_level(&e))?;

@@ -140,37 +140,37 @@ impl SensorCalibration {
 
     /// `I + G`.
     #[must_use]
-    pub fn gyro_matrix(&self) -> Matrix3<f64> {
+    pub(crate) fn gyro_matrix(&self) -> Matrix3<f64> {
         matrix(self.gyro.as_ref())
     }
 
     /// `I + A`.
     #[must_use]
-    pub fn force_matrix(&self) -> Matrix3<f64> {
+    pub(crate) fn force_matrix(&self) -> Matrix3<f64> {
         matrix(self.force.as_ref())
     }
 
     /// `I + S`.
     #[must_use]
-    pub fn field_matrix(&self) -> Matrix3<f64> {
+    pub(crate) fn field_matrix(&self) -> Matrix3<f64> {
         matrix(self.soft_iron.as_ref())
     }
 
     /// Gyro bias, rad/s.
     #[must_use]
-    pub fn bias_vector(&self) -> Vector3<f64> {
+    pub(crate) fn bias_vector(&self) -> Vector3<f64> {
         vector(self.bias.as_ref())
     }
 
     /// Accelerometer bias, m/s^2.
     #[must_use]
-    pub fn force_bias_vector(&self) -> Vector3<f64> {
+    pub(crate) fn force_bias_vector(&self) -> Vector3<f64> {
         vector(self.force_bias.as_ref())
     }
 
     /// Hard iron, in the field's unit.
     #[must_use]
-    pub fn hard_iron_vector(&self) -> Vector3<f64> {
+    pub(crate) fn hard_iron_vector(&self) -> Vector3<f64> {
         vector(self.hard_iron.as_ref())
     }
 

@@ -5,9 +5,9 @@
 
 use super::kept::{Event, Kept, Spool, SpoolError};
 use crate::aid::{Aided, Beside};
-use crate::frames::{Body, Nav};
+use crate::frames::{Body, In, Nav};
 use crate::propagate::Executor;
-use crate::quaternion::{Quaternion, RotationVector};
+use crate::quaternion::{BodyRate, Quaternion, RotationVector};
 use crate::record::{AttitudeCovariance, AttitudeSample, Nanos, RateSample, SampleKind, Status};
 use crate::smooth::{
     Beforehand, Estimate, FieldUnit, Learned, Looseness, Outcome, Sample, SampleModel, Samples,
@@ -105,7 +105,6 @@ fn is_off<const N: usize>(learned: &Learned<N>, sigmas: f64) -> bool {
 /// What was kept, as the smoother reads it.
 struct Reading<'a> {
     kept: &'a mut Kept,
-    kind: SampleKind,
     has_forces_beside: bool,
     /// Rates whose attitudes have not come yet, where they are wanted.
     waiting: Option<&'a RefCell<VecDeque<RateSample>>>,
@@ -125,25 +124,25 @@ impl Samples for Reading<'_> {
             }
             Event::Force(stamp, force) => {
                 if let Some(forces) = &mut forces {
-                    forces.take(stamp, force);
+                    forces.take(stamp, *force.as_vector());
                 }
             }
-            Event::Field(stamp, field) => fields.take(stamp, field),
+            Event::Field(stamp, field) => fields.take(stamp, *field.as_vector()),
             Event::Rate(rate) => {
-                let turning = rate.mean_rate(self.kind);
+                let turning = rate.mean_rate();
                 if let Some(last) = last.filter(|last| *last >= rate.stamp) {
                     shift = shift.saturating_add(last.since(rate.stamp).saturating_add(APART));
                 }
                 last = Some(rate.stamp);
                 let force = match &mut forces {
                     None => rate.accel,
-                    Some(forces) => forces.at(rate.stamp, &turning),
+                    Some(forces) => forces.at(rate.stamp, &turning.0).map(In::assume),
                 };
                 chunk.push(Sample {
                     stamp: Nanos(rate.stamp.0.saturating_add(shift)),
                     rate: turning,
                     force,
-                    field: fields.at(rate.stamp, &turning),
+                    field: fields.at(rate.stamp, &turning.0).map(In::assume),
                 });
                 if let Some(waiting) = self.waiting {
                     let rate = RateSample {
@@ -198,12 +197,12 @@ impl Smoothing {
         self.aided.expect_forces_beside();
     }
 
-    pub(super) fn take_force(&mut self, stamp: Nanos, force: Vector3<f64>) {
+    pub(super) fn take_force(&mut self, stamp: Nanos, force: In<Body>) {
         self.kept.push(&Event::Force(stamp, force));
         self.aided.take_force(stamp, force);
     }
 
-    pub(super) fn take_field(&mut self, stamp: Nanos, field: Vector3<f64>) {
+    pub(super) fn take_field(&mut self, stamp: Nanos, field: In<Body>) {
         self.kept.push(&Event::Field(stamp, field));
         self.aided.take_field(stamp, field);
     }
@@ -276,7 +275,6 @@ impl Smoothing {
         Reading {
             has_forces_beside: self.fresh.has_forces_beside(),
             kept: &mut self.kept,
-            kind: self.told.kind,
             waiting: None,
         }
     }
@@ -380,7 +378,7 @@ impl Smoothing {
                 out.push(AttitudeSample {
                     stamp: rate.stamp,
                     q_nb,
-                    rate: estimate.rate,
+                    rate: BodyRate(estimate.rate),
                     accel: rate.accel,
                     covariance: AttitudeCovariance::of_navigation_axes(
                         &estimate.covariance,
@@ -413,7 +411,7 @@ mod tests {
     use super::*;
     use crate::aid::{self, Start};
     use crate::propagate::{self, Sequential};
-    use crate::record::Join;
+    use crate::record::{Join, Measured};
     use std::io::Cursor;
 
     const SAMPLES: i64 = 24_000;
@@ -441,12 +439,12 @@ mod tests {
             };
             if i % 8 == 0 {
                 let force = to_body * Vector3::new(push, 0.0, 9.81);
-                smoothing.take_force(Nanos(stamp.0 - 1_000_000), force + bias);
+                smoothing.take_force(Nanos(stamp.0 - 1_000_000), In::assume(force + bias));
             }
             if i % 40 == 0 {
                 smoothing.take_field(
                     Nanos(stamp.0 - 3_000_000),
-                    to_body * Vector3::new(0.0, 20.0, -40.0),
+                    In::assume(to_body * Vector3::new(0.0, 20.0, -40.0)),
                 );
             }
             let wobble = Vector3::new(1.0, -2.0, 1.5) * (1e-3 * (31.0 * t).sin());
@@ -454,7 +452,7 @@ mod tests {
             let sample = RateSample {
                 stamp,
                 start: stamp,
-                value: rate + Vector3::repeat(0.01) + shaken,
+                gyro: Measured::Rate(BodyRate(rate + Vector3::repeat(0.01) + shaken)),
                 accel: None,
                 join: if i == 0 {
                     Join::Start

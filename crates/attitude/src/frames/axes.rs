@@ -19,6 +19,12 @@ use std::str::FromStr;
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Hash)]
 pub struct AxisMap([Take; 3]);
 
+impl Default for AxisMap {
+    fn default() -> AxisMap {
+        AxisMap::IDENTITY
+    }
+}
+
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Hash)]
 struct Take {
     axis: Axis,
@@ -36,6 +42,13 @@ impl AxisMap {
     /// `XYZ`: every axis is itself.
     pub const IDENTITY: AxisMap =
         AxisMap([Take::new(Axis::X), Take::new(Axis::Y), Take::new(Axis::Z)]);
+
+    /// `Xyz`: half a turn about x, which takes FRD to FLU and back.
+    const HALF_TURN_ABOUT_X: AxisMap = AxisMap([
+        Take::new(Axis::X),
+        Take::new(Axis::Y).negated(),
+        Take::new(Axis::Z).negated(),
+    ]);
 
     /// Relabels three components. No arithmetic but signs: exact.
     #[must_use]
@@ -63,7 +76,8 @@ impl AxisMap {
         (!self.mirrors()).then(|| Dcm::assume(self.matrix()))
     }
 
-    fn matrix(self) -> Matrix3<f64> {
+    /// Its signed permutation matrix, for kernels.
+    pub(crate) fn matrix(self) -> Matrix3<f64> {
         let column = |unit: [f64; 3]| Vector3::from(self.apply(unit));
         Matrix3::from_columns(&[
             column([1.0, 0.0, 0.0]),
@@ -80,6 +94,13 @@ impl Take {
         Take {
             axis,
             negated: false,
+        }
+    }
+
+    const fn negated(self) -> Take {
+        Take {
+            negated: !self.negated,
+            ..self
         }
     }
 
@@ -160,14 +181,7 @@ impl fmt::Display for AxisMapError {
             ),
             AxisMapError::Mirrors { map } => {
                 let AxisMap([a, b, c]) = *map;
-                let flipped = AxisMap([
-                    a,
-                    b,
-                    Take {
-                        negated: !c.negated,
-                        ..c
-                    },
-                ]);
+                let flipped = AxisMap([a, b, c.negated()]);
                 write!(
                     f,
                     "axis map `{map}` mirrors: it turns right-handed axes into left-handed ones, \
@@ -196,14 +210,20 @@ pub enum BodyAxes {
 }
 
 impl BodyAxes {
-    /// C_bs from the recorded axes to FLU body axes. `None` for a map that mirrors.
+    /// The relabelling that takes the recorded axes to FLU body axes.
+    #[must_use]
+    pub fn map(self) -> AxisMap {
+        match self {
+            BodyAxes::Flu => AxisMap::IDENTITY,
+            BodyAxes::Frd => AxisMap::HALF_TURN_ABOUT_X,
+            BodyAxes::Map(map) => map,
+        }
+    }
+
+    /// The same as a rotation, C_bs. `None` for a map that mirrors.
     #[must_use]
     pub fn c_bs(self) -> Option<Dcm<Body, Sensor>> {
-        match self {
-            BodyAxes::Flu => Some(Dcm::identity()),
-            BodyAxes::Frd => Some(Dcm::assume(half_turn_about_x())),
-            BodyAxes::Map(map) => map.to_dcm(),
-        }
+        self.map().to_dcm()
     }
 }
 
@@ -235,8 +255,4 @@ impl fmt::Display for BodyAxes {
             BodyAxes::Map(map) => map.fmt(f),
         }
     }
-}
-
-fn half_turn_about_x() -> Matrix3<f64> {
-    Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0))
 }

@@ -22,7 +22,7 @@ mod theory;
 
 pub use fit::{AllanFit, FittedTerm, MAX_MISFIT, fit};
 pub use record::AngleRecord;
-pub use theory::{FLICKER_FLOOR, variance};
+pub use theory::variance;
 
 use std::fmt;
 
@@ -42,7 +42,7 @@ pub struct Point {
 /// A record without an Allan deviation.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum AllanError {
-    /// Fewer than [`MIN_INTERVALS`] intervals in a row.
+    /// Fewer than nine intervals in a row.
     TooShort {
         /// In the longest piece.
         intervals: usize,
@@ -55,7 +55,7 @@ pub enum AllanError {
 }
 
 /// Fewest intervals in a row: nine clusters of one step.
-pub const MIN_INTERVALS: usize = 9;
+const MIN_INTERVALS: usize = 9;
 
 impl fmt::Display for AllanError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

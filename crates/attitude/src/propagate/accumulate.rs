@@ -5,6 +5,8 @@
 //! on a body turning with the Earth 1e-17 instead of 2e-11 (`docs/theory/attitude.md` 5). It is normalised on
 //! output, never in the recursion, where normalising makes constant rotation worse.
 
+use crate::quaternion::kernel;
+
 /// Attitude q_nb under accumulation.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Accumulator {
@@ -36,6 +38,8 @@ impl Accumulator {
     #[inline(always)]
     pub(crate) fn turn(&mut self, [c, x, y, z]: [f64; 4]) {
         let [qw, qx, qy, qz] = self.q;
+        // `kernel::product` adds from left to right, one sum waiting for the other. Here two halves are summed side by
+        // side, which every attitude keeps in its last bits.
         let delta = [
             (qw * c - qx * x) - (qy * y + qz * z),
             (qw * x + qx * c) + (qy * z - qz * y),
@@ -52,18 +56,8 @@ impl Accumulator {
 
     /// A vector of body axes in fixed ones; as exact as the norm, which is within 1e-12.
     #[inline(always)]
-    pub(crate) fn turned(&self, [vx, vy, vz]: [f64; 3]) -> [f64; 3] {
-        let [w, x, y, z] = self.q;
-        let (tx, ty, tz) = (
-            2.0 * (y * vz - z * vy),
-            2.0 * (z * vx - x * vz),
-            2.0 * (x * vy - y * vx),
-        );
-        [
-            vx + w * tx + (y * tz - z * ty),
-            vy + w * ty + (z * tx - x * tz),
-            vz + w * tz + (x * ty - y * tx),
-        ]
+    pub(crate) fn turned(&self, vector: [f64; 3]) -> [f64; 3] {
+        kernel::rotated(&self.q, vector)
     }
 
     /// The unit quaternion. Its sign never jumps: accumulation is continuous and normalising keeps it.
@@ -87,8 +81,11 @@ impl Accumulator {
 
     /// Starts again at `q`, on the side of the sphere where the attitude was.
     pub(crate) fn restart(&mut self, q: [f64; 4]) {
-        let dot: f64 = q.iter().zip(&self.q).map(|(a, b)| a * b).sum();
-        let sign = if dot < 0.0 { -1.0 } else { 1.0 };
+        let sign = if kernel::dot(&q, &self.q) < 0.0 {
+            -1.0
+        } else {
+            1.0
+        };
         *self = Accumulator::new(q.map(|c| c * sign));
     }
 }

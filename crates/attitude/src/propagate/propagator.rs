@@ -15,7 +15,7 @@ use super::settings::{Settings, SettingsError};
 use super::window::{Plan, Step};
 use crate::frames::{Body, Nav};
 use crate::quaternion::Quaternion;
-use crate::record::{AttitudeSample, Join, RateSample, SampleKind, Status};
+use crate::record::{AttitudeSample, Join, Measured, RateSample, SampleKind, Status};
 use nalgebra::Vector3;
 use state::{State, Waiting};
 use std::collections::VecDeque;
@@ -34,9 +34,9 @@ const LARGEST: f64 = 1e3;
 ///
 /// # Example
 /// ```
-/// use strapd_attitude::quaternion::Quaternion;
+/// use strapd_attitude::quaternion::{BodyRate, Quaternion};
 /// use strapd_attitude::propagate::{Method, Propagator, Sequential, Settings};
-/// use strapd_attitude::record::{Join, Nanos, RateSample, SampleKind, Status};
+/// use strapd_attitude::record::{Join, Measured, Nanos, RateSample, SampleKind, Status};
 ///
 /// let mut propagator = Propagator::new(Settings {
 ///     method: Method::Auto,
@@ -49,7 +49,7 @@ const LARGEST: f64 = 1e3;
 ///     .map(|i| RateSample {
 ///         stamp: Nanos(i * 10_000_000),
 ///         start: Nanos(i * 10_000_000),
-///         value: [0.0, 0.0, std::f64::consts::FRAC_PI_2].into(),
+///         gyro: Measured::Rate(BodyRate([0.0, 0.0, std::f64::consts::FRAC_PI_2].into())),
 ///         accel: None,
 ///         join: if i == 0 { Join::Start } else { Join::Continuous },
 ///         status: Status::OK,
@@ -170,8 +170,8 @@ impl Propagator {
         self.state.resume(last);
         self.resumed = true;
         self.last_stamp = last.stamp.0;
-        if last.rate.iter().all(|w| w.abs() <= FASTEST) {
-            self.last_rate = last.rate.into();
+        if last.rate.0.iter().all(|w| w.abs() <= FASTEST) {
+            self.last_rate = last.rate.0.into();
         }
         Ok(())
     }
@@ -305,7 +305,7 @@ impl Propagator {
     }
 
     fn append(&mut self, sample: &RateSample) {
-        let value = [sample.value.x, sample.value.y, sample.value.z];
+        let value = (*sample.gyro.as_vector()).into();
         let bridged = sample.join == Join::Bridge;
         self.track
             .push(sample.stamp.0, sample.start.0, value, bridged);
@@ -322,7 +322,8 @@ impl Propagator {
         } else {
             FASTEST
         };
-        if sample.value.iter().all(|v| v.abs() <= limit) {
+        let sample = &self.as_announced(sample);
+        if sample.gyro.as_vector().iter().all(|v| v.abs() <= limit) {
             return *sample;
         }
         self.state.report.rejected += 1;
@@ -334,11 +335,40 @@ impl Propagator {
         } else {
             1.0
         };
-        sample.value = Vector3::new(x, y, z) * factor;
-        if !sample.value.iter().all(|v| v.abs() <= limit) {
-            sample.value = Vector3::zeros();
-        }
+        let before = Vector3::new(x, y, z) * factor;
+        let is_small = before.iter().all(|v| v.abs() <= limit);
+        sample.gyro = sample
+            .gyro
+            .with(if is_small { before } else { Vector3::zeros() });
         sample
+    }
+
+    /// The sample with a rate or an increment, whichever [`Settings::kind`] has said: windows hold one of the two.
+    #[inline(always)]
+    fn as_announced(&self, sample: &RateSample) -> RateSample {
+        match (sample.gyro, self.track.increments) {
+            (Measured::Rate(_), false) | (Measured::Increment(_), true) => *sample,
+            (other, _) => self.converted(sample, other),
+        }
+    }
+
+    /// What nobody announced: a rate is taken as held since the sample before, an increment as its mean rate.
+    #[cold]
+    fn converted(&self, sample: &RateSample, other: Measured) -> RateSample {
+        let gyro = match other {
+            Measured::Increment(_) => Measured::Rate(sample.mean_rate()),
+            Measured::Rate(rate) => {
+                let since = sample.stamp.0.saturating_sub(self.last_stamp).max(0);
+                let is_first = self.track.len() == 0;
+                Measured::Increment(rate.held_for(if is_first { 0.0 } else { secs(since) }))
+            }
+        };
+        // Whatever interval it had: its rate counts since the sample before.
+        RateSample {
+            gyro,
+            start: sample.stamp,
+            ..*sample
+        }
     }
 
     /// Integrates every interval whose window is known: to the end of the run if it has `ended`.

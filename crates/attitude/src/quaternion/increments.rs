@@ -6,7 +6,8 @@
 
 use nalgebra::Vector3;
 
-/// Angular rate of the body relative to n, resolved in body axes (w_nb_b), rad/s.
+/// Angular rate of the body, resolved in body axes, rad/s: relative to the navigation axes (w_nb_b), or to
+/// inertial space (w_ib_b) where a gyro measured it. A gyro's bias is one, too.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct BodyRate(pub Vector3<f64>);
 
@@ -20,10 +21,20 @@ pub struct DeltaAngle(pub Vector3<f64>);
 pub struct RotationVector(pub Vector3<f64>);
 
 impl BodyRate {
+    /// No turning at all.
+    pub const ZERO: BodyRate = BodyRate(Vector3::new(0.0, 0.0, 0.0));
+
     /// The integral of this rate held for `secs`.
     #[must_use]
     pub fn held_for(self, secs: f64) -> DeltaAngle {
         DeltaAngle(self.0 * secs)
+    }
+}
+
+/// Its components x, y, z, rad/s, for what writes them.
+impl From<BodyRate> for [f64; 3] {
+    fn from(rate: BodyRate) -> [f64; 3] {
+        rate.0.into()
     }
 }
 
@@ -34,18 +45,12 @@ impl DeltaAngle {
     pub fn about_fixed_axis(self) -> RotationVector {
         RotationVector(self.0)
     }
-
-    /// The rotation: delta angle plus a coning term computed by whoever knows the rate's shape.
-    #[must_use]
-    pub fn with_coning(self, coning: &Vector3<f64>) -> RotationVector {
-        RotationVector(self.0 + coning)
-    }
 }
 
 impl RotationVector {
     /// Angle turned, rad.
     #[must_use]
     pub fn angle(&self) -> f64 {
-        super::norm3(&self.0)
+        super::kernel::length(&self.0)
     }
 }

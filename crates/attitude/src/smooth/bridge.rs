@@ -3,11 +3,11 @@
 //! Apart from the stream because these are two curves and a figure for their error.
 
 use super::prepared::{BESIDE, Prepared};
-use super::sample::Sample;
+use super::sample::Numbers;
 use nalgebra::Vector3;
 
 /// Variance that a bridged gap of `secs` leaves of attitude (rad^2) and of velocity ((m/s)^2), each axis.
-pub(super) fn doubt(before: &Sample, after: &Sample, secs: f64) -> [f64; 2] {
+pub(super) fn doubt(before: &Numbers, after: &Numbers, secs: f64) -> [f64; 2] {
     let jump = (after.rate - before.rate).norm();
     let turn = 0.5 * secs * secs * (jump + 0.2 * (before.rate.norm() + after.rate.norm()));
     let (a, b) = (
@@ -27,8 +27,8 @@ pub(super) struct Hermite {
 
 impl Hermite {
     /// Across the gap before sample `i` of the window, whose samples are `interval` apart as a rule.
-    pub(super) fn across(window: &[(Sample, u64)], i: usize, interval: f64) -> Hermite {
-        let of = |sample: &Sample| [sample.rate, sample.force.unwrap_or_default()];
+    pub(super) fn across(window: &[(Numbers, u64)], i: usize, interval: f64) -> Hermite {
+        let of = |sample: &Numbers| [sample.rate, sample.force.unwrap_or_default()];
         let (before, after) = (&window[i - 1].0, &window[i].0);
         let secs = after.stamp.secs_since(before.stamp);
         let ends = [of(before), of(after)];
@@ -42,7 +42,7 @@ impl Hermite {
             if side.len() < 3 || span >= 2.2 * BESIDE as f64 * interval {
                 return chord;
             }
-            let at = |sample: &Sample| sample.stamp.secs_since(first.stamp);
+            let at = |sample: &Numbers| sample.stamp.secs_since(first.stamp);
             let mean = side.iter().map(|(sample, _)| at(sample)).sum::<f64>() / side.len() as f64;
             let square: f64 = side
                 .iter()

@@ -1,6 +1,6 @@
 //! Samples -> those that can be used, in order, each with a force. Pure.
 
-use super::sample::Sample;
+use super::sample::{Numbers, Sample};
 use crate::record::Nanos;
 use nalgebra::Vector3;
 
@@ -19,19 +19,20 @@ pub(super) struct Gate {
     offered: u64,
     last: Option<i64>,
     /// Accepted unless its stamp turns out to have leapt.
-    waiting: Option<(Sample, u64)>,
+    waiting: Option<(Numbers, u64)>,
     /// The last force that was measured.
     force: Option<(Nanos, Vector3<f64>)>,
     /// Samples since then, without one.
-    lacking: Vec<(Sample, u64)>,
+    lacking: Vec<(Numbers, u64)>,
 }
 
 impl Gate {
     /// Gives those that are accepted to `take`, some of them late, with their place in the input.
-    pub(super) fn offer(&mut self, sample: &Sample, take: &mut dyn FnMut(&Sample, u64)) {
+    pub(super) fn offer(&mut self, sample: &Sample, take: &mut dyn FnMut(&Numbers, u64)) {
         let place = self.offered;
         self.offered += 1;
-        if !is_usable(sample) {
+        let sample = Numbers::from(sample);
+        if !is_usable(&sample) {
             return;
         }
         let stamp = sample.stamp.0;
@@ -50,10 +51,10 @@ impl Gate {
                 }
             }
         }
-        self.waiting = Some((*sample, place));
+        self.waiting = Some((sample, place));
     }
 
-    fn accept(&mut self, sample: &Sample, place: u64, take: &mut dyn FnMut(&Sample, u64)) {
+    fn accept(&mut self, sample: &Numbers, place: u64, take: &mut dyn FnMut(&Numbers, u64)) {
         let Some(force) = sample.force else {
             let since = |(stamp, _): &(Nanos, _)| sample.stamp.secs_since(*stamp);
             if self
@@ -71,7 +72,7 @@ impl Gate {
                 if secs <= LONGEST_BRIDGE {
                     let share = lacking.stamp.secs_since(stamp) / secs;
                     let force = Some(before + (force - before) * share);
-                    take(&Sample { force, ..lacking }, its_place);
+                    take(&Numbers { force, ..lacking }, its_place);
                 }
             }
         }
@@ -80,18 +81,18 @@ impl Gate {
     }
 
     /// The last ones.
-    pub(super) fn finish(&mut self, take: &mut dyn FnMut(&Sample, u64)) {
+    pub(super) fn finish(&mut self, take: &mut dyn FnMut(&Numbers, u64)) {
         if let Some((sample, place)) = self.waiting.take() {
             self.accept(&sample, place, take);
         }
         let force = self.force.map(|(_, force)| force);
         for (lacking, place) in self.lacking.drain(..) {
-            take(&Sample { force, ..lacking }, place);
+            take(&Numbers { force, ..lacking }, place);
         }
     }
 }
 
-fn is_usable(sample: &Sample) -> bool {
+fn is_usable(sample: &Numbers) -> bool {
     // NaN is not below anything.
     let is_force = |force: &Vector3<f64>| force.iter().all(|f| f.abs() < LARGEST_FORCE);
     sample.rate.iter().all(|w| w.abs() < LARGEST_RATE) && sample.force.as_ref().is_none_or(is_force)

@@ -9,11 +9,10 @@ use super::result::Sizes;
 use super::sample::{Sample, Samples};
 use super::segments::Segment;
 use super::smoothed::Smoothed;
-use super::sweep::{Sensor, turned};
+use super::sweep::Sensor;
 use crate::frames::{Body, Nav};
 use crate::quaternion::Quaternion;
-use crate::quaternion::exp_minus_one;
-use crate::quaternion::kernel::{normalised, product};
+use crate::quaternion::kernel::{normalised, turned, turned_in_navigation};
 use crate::record::Nanos;
 use nalgebra::{Matrix3, Vector3};
 use std::cell::RefCell;
@@ -197,8 +196,7 @@ impl Smoothed {
     ) -> Estimate {
         let bias = a.bias + (b.bias - a.bias) * share;
         let rate: Vector3<f64> = sensor.gyro * (sample.rate - bias);
-        let [w, x, y, z] = exp_minus_one(&residual);
-        let mut q = product(&[1.0 + w, x, y, z], q);
+        let mut q = turned_in_navigation(&residual, q);
         if self.settings.sensor_delay != 0.0 {
             q = turned(&q, &(rate * self.settings.sensor_delay));
         }

@@ -14,8 +14,7 @@ use super::settings::Settings;
 use super::solver::{Marginal, Solution, Solver};
 use super::survey::Survey;
 use super::sweep::GRAVITY;
-use crate::quaternion::exp_minus_one;
-use crate::quaternion::kernel::{normalised, product};
+use crate::quaternion::kernel::{normalised, turned_in_navigation};
 use nalgebra::Vector3;
 use std::fmt;
 
@@ -233,8 +232,7 @@ impl State {
         };
         for (node, x) in self.nodes.iter_mut().zip(&solution.nodes) {
             let part = |first: usize| Vector3::from_fn(|i, _| share * x[first + i]);
-            let [w, a, b, c] = exp_minus_one(&part(0));
-            node.q = normalised(&product(&[1.0 + w, a, b, c], &node.q));
+            node.q = normalised(&turned_in_navigation(&part(0), &node.q));
             node.velocity += part(VELOCITY);
             node.position += part(2 * VELOCITY);
             node.bias += part(BIAS);

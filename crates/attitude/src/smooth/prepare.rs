@@ -6,7 +6,7 @@
 use super::bridge::{self, Catmull};
 use super::gate::{Gate, LONGEST_BRIDGE};
 use super::prepared::{BESIDE, Prepared};
-use super::sample::Sample;
+use super::sample::{Numbers, Sample};
 use super::settings::{SampleModel, Settings};
 use super::survey::Survey;
 use nalgebra::Vector3;
@@ -21,7 +21,7 @@ pub(super) struct Preparer<'a> {
     survey: &'a Survey,
     gate: Gate,
     /// Accepted, a few of them given on already.
-    window: Vec<(Sample, u64)>,
+    window: Vec<(Numbers, u64)>,
     next: usize,
     /// For instantaneous samples.
     between: Option<Catmull>,
@@ -125,8 +125,8 @@ impl<'a> Preparer<'a> {
     }
 }
 
-fn whole(sample: &Sample, survey: &Survey) -> Sample {
-    Sample {
+fn whole(sample: &Numbers, survey: &Survey) -> Numbers {
+    Numbers {
         rate: survey.whole(&sample.rate),
         ..*sample
     }

@@ -9,8 +9,10 @@ use super::segments::{Segment, median_of};
 use super::settings::Settings;
 use super::survey::Survey;
 use crate::aid::{self, Aided};
+use crate::frames::In;
 use crate::propagate;
-use crate::record::{AttitudeSample, Join, Nanos, RateSample, SampleKind, Status};
+use crate::quaternion::BodyRate;
+use crate::record::{AttitudeSample, Join, Measured, Nanos, RateSample, SampleKind, Status};
 use nalgebra::{Matrix3, Vector3};
 
 /// The real-time filter's view.
@@ -91,8 +93,8 @@ fn pass<S: Samples>(
             let rate = RateSample {
                 stamp,
                 start: Nanos(start),
-                value: (sample.rate - known) * secs,
-                accel: Some(sample.force),
+                gyro: Measured::Increment(BodyRate(sample.rate - known).held_for(secs)),
+                accel: Some(In::assume(sample.force)),
                 join,
                 status: Status::OK,
                 log: stamp,

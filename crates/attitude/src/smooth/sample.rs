@@ -3,23 +3,46 @@
 //! Apart from [`record`](crate::record) because a log of ten hours does not fit in memory: nodes are held, samples
 //! are read again in each pass, from wherever they are.
 
+use crate::frames::{Body, In};
+use crate::quaternion::BodyRate;
 use crate::record::Nanos;
 use nalgebra::Vector3;
 use std::convert::Infallible;
 
-/// One sample of a sensor, body axes.
+/// One sample of a sensor.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Sample {
     /// The instant of force and field, and the end of the interval that a mean rate is of.
     pub stamp: Nanos,
-    /// Rate, rad/s; of a delta angle: divided by its interval. Its meaning is
+    /// Rate; of a delta angle: divided by its interval. Its meaning in time is
     /// [`SampleModel`](super::SampleModel)'s.
-    pub rate: Vector3<f64>,
+    pub rate: BodyRate,
     /// Specific force, m/s^2: +9.81 along the axis that points up at rest. Without one, that
     /// between its neighbours' is taken, a quarter of a second apart at most; otherwise the sample is left out.
-    pub force: Option<Vector3<f64>>,
+    pub force: Option<In<Body>>,
     /// Magnetic field, uT. One that was measured only once comes once.
-    pub field: Option<Vector3<f64>>,
+    pub field: Option<In<Body>>,
+}
+
+/// The numbers of a [`Sample`], for the smoother's own arithmetic, which knows no other axes.
+#[derive(Clone, Copy)]
+pub(super) struct Numbers {
+    pub(super) stamp: Nanos,
+    pub(super) rate: Vector3<f64>,
+    pub(super) force: Option<Vector3<f64>>,
+    pub(super) field: Option<Vector3<f64>>,
+}
+
+impl From<&Sample> for Numbers {
+    fn from(sample: &Sample) -> Numbers {
+        let numbers = |vector: In<Body>| *vector.as_vector();
+        Numbers {
+            stamp: sample.stamp,
+            rate: sample.rate.0,
+            force: sample.force.map(numbers),
+            field: sample.field.map(numbers),
+        }
+    }
 }
 
 /// Samples that can be read from the beginning, again and again.

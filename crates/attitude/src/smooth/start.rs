@@ -9,9 +9,8 @@ use super::sample::Samples;
 use super::segments::Segment;
 use super::settings::Settings;
 use super::survey::Survey;
-use super::sweep::{GRAVITY, rotation, turned};
-use crate::quaternion::exp_minus_one;
-use crate::quaternion::kernel::{normalised, product};
+use super::sweep::GRAVITY;
+use crate::quaternion::kernel::{normalised, product, rows, turned, turned_in_navigation};
 use nalgebra::{Matrix3, Vector3};
 
 /// The mean force over this tells the vertical where a section begins, s.
@@ -110,9 +109,8 @@ impl Forward {
             self.q = turned(&self.q, &((sample.rate - self.bias) * secs));
             self.force += (matrix(&self.q) * sample.force - self.force) * (secs / LOW_PASS);
             let share = LEVELLING * secs / self.force.norm().max(1e-3);
-            let [w, x, y, z] =
-                exp_minus_one(&(Vector3::new(self.force.y, -self.force.x, 0.0) * share));
-            self.q = normalised(&product(&[1.0 + w, x, y, z], &self.q));
+            let up = Vector3::new(self.force.y, -self.force.x, 0.0) * share;
+            self.q = normalised(&turned_in_navigation(&up, &self.q));
             if ends.next_if_eq(&(i + 1)).is_some() {
                 self.nodes.push(self.q);
             }
@@ -123,7 +121,7 @@ impl Forward {
 }
 
 pub(super) fn matrix(q: &[f64; 4]) -> Matrix3<f64> {
-    let r = rotation(q);
+    let r = rows(q);
     Matrix3::from_fn(|i, j| r[i][j])
 }
 

@@ -4,7 +4,7 @@
 //! in, and the size of the field are those of the whole log.
 
 use super::gate::Gate;
-use super::sample::{Sample, Samples};
+use super::sample::{Numbers, Samples};
 use super::settings::{FieldUnit, Settings};
 use crate::condition::truncation::undone;
 use nalgebra::Vector3;
@@ -105,14 +105,14 @@ struct First {
     accepted: u64,
     forceless: u64,
     secs: f64,
-    last: Option<Sample>,
+    last: Option<Numbers>,
     intervals: Intervals,
     differences: Differences,
     fields: Sizes,
 }
 
 impl First {
-    fn take(&mut self, sample: &Sample) {
+    fn take(&mut self, sample: &Numbers) {
         self.accepted += 1;
         if let Some(last) = &self.last {
             let nanos = sample.stamp.since(last.stamp);
@@ -272,7 +272,7 @@ fn zero_bin<S: Samples>(samples: &mut S, step: f64) -> Result<Quantisation, S::E
         }
     };
     let mut gate = Gate::default();
-    let mut take = |window: &mut Vec<Vector3<f64>>, sample: &Sample| {
+    let mut take = |window: &mut Vec<Vector3<f64>>, sample: &Numbers| {
         window.push(sample.rate);
         while looked + AROUND < window.len() {
             look(window, looked);

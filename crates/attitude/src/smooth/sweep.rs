@@ -6,8 +6,7 @@
 
 use super::border::{self, Constants};
 use super::prepared::Prepared;
-use crate::quaternion::exp_minus_one;
-use crate::quaternion::kernel::product;
+use crate::quaternion::kernel::{rows, turned, unit};
 use nalgebra::{Matrix3, Vector3};
 
 /// What is assumed of gravity, m/s^2.
@@ -91,36 +90,6 @@ impl FieldMeans {
     }
 }
 
-/// The matrix of an attitude.
-#[inline(always)]
-pub(super) fn rotation(q: &[f64; 4]) -> [[f64; 3]; 3] {
-    let [w, x, y, z] = *q;
-    [
-        [
-            1.0 - 2.0 * (y * y + z * z),
-            2.0 * (x * y - w * z),
-            2.0 * (x * z + w * y),
-        ],
-        [
-            2.0 * (x * y + w * z),
-            1.0 - 2.0 * (x * x + z * z),
-            2.0 * (y * z - w * x),
-        ],
-        [
-            2.0 * (x * z - w * y),
-            2.0 * (y * z + w * x),
-            1.0 - 2.0 * (x * x + y * y),
-        ],
-    ]
-}
-
-/// `q exp(phi)`.
-#[inline(always)]
-pub(super) fn turned(q: &[f64; 4], phi: &Vector3<f64>) -> [f64; 4] {
-    let [w, x, y, z] = exp_minus_one(phi);
-    product(q, &[1.0 + w, x, y, z])
-}
-
 #[inline(always)]
 fn cross(a: &[f64; 3], b: &[f64; 3]) -> [f64; 3] {
     [
@@ -163,7 +132,7 @@ pub(super) fn sweep<const FIELD: bool>(
     sensor: &Sensor,
 ) -> Swept {
     let mut q = *start;
-    let mut r = rotation(&q);
+    let mut r = rows(&q);
     let (mut d, mut dv, mut dp) = ([[0.0; TURN]; 3], [[0.0; TURN]; 3], [[0.0; TURN]; 3]);
     let (mut own_v, mut own_p) = ([[0.0; OWN]; 3], [[0.0; OWN]; 3]);
     let (mut v, mut p) = ([0.0; 3], [0.0; 3]);
@@ -175,7 +144,7 @@ pub(super) fn sweep<const FIELD: bool>(
         let w: Vector3<f64> = sensor.gyro * u;
         q = turned(&q, &(w * dt));
         let before = r;
-        r = rotation(&q);
+        r = rows(&q);
         let e: [f64; 3] = (sample.force - sensor.force_bias).into();
         let fs: [f64; 3] = (sensor.force * Vector3::from(e)).into();
         let x = cross(&w.into(), &fs);
@@ -217,10 +186,9 @@ pub(super) fn sweep<const FIELD: bool>(
         }
         secs += dt;
     }
-    let norm = (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]).sqrt();
     field.divide::<FIELD>(&sensor.gyro);
     Swept {
-        q: q.map(|c| c / norm),
+        q: unit(&q),
         velocity: v,
         position: p,
         secs,

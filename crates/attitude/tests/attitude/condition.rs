@@ -12,6 +12,8 @@ use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use strapd_attitude::condition::{Clock, Conditioner, OnGap, Report, Settings};
+use strapd_attitude::frames::Dcm;
+use strapd_attitude::quaternion::BodyRate;
 use strapd_attitude::record::{Join, Nanos, RateSample, RawSample, SampleKind, Verdict};
 
 const T0: i64 = 1_700_000_000_000_000_000;
@@ -137,7 +139,7 @@ fn counts_equal_what_a_generator_injected_for_a_hundred_seeds() {
             );
             // What had a stamp of its own is back in the order in which it was made.
             if kind == SampleKind::Rate {
-                let order: Vec<f64> = out.iter().map(|s| s.value.x).collect();
+                let order: Vec<f64> = out.iter().map(|s| s.gyro.as_vector().x).collect();
                 assert!(order.is_sorted(), "seed {seed}");
             }
         }
@@ -156,7 +158,7 @@ fn a_clean_sample_costs_at_most_25_ns() {
             let settings = Settings {
                 kind,
                 reorder_window: window,
-                bias: Vector3::new(1e-3, 0.0, 0.0),
+                bias: BodyRate(Vector3::new(1e-3, 0.0, 0.0)),
                 ..Settings::default()
             };
             let mut blocks = Vec::new();
@@ -250,11 +252,13 @@ fn any_settings() -> impl Strategy<Value = Settings> {
                 ][clock as usize],
                 reorder_window,
                 max_gap_secs,
-                bias: Vector3::new(0.01, -0.02, 0.03),
+                bias: BodyRate(Vector3::new(0.01, -0.02, 0.03)),
                 gyro_range: Some(4.0),
                 start: trims.then_some(0.2),
                 until: trims.then_some(1.0),
-                mount: *nalgebra::Rotation3::from_euler_angles(0.3, -0.2, 1.0).matrix(),
+                mount: Dcm::assume(
+                    *nalgebra::Rotation3::from_euler_angles(0.3, -0.2, 1.0).matrix(),
+                ),
                 ..Settings::default()
             },
         )
@@ -266,7 +270,8 @@ fn all_finite(v: &Vector3<f64>) -> bool {
 
 /// Everything about an output but NaN-free floats compared as bits.
 fn bits(s: &RateSample) -> (Nanos, Nanos, Vec<u64>, Join, u16, Nanos) {
-    let values = s.value.iter().chain(s.accel.iter().flat_map(|a| a.iter()));
+    let force = s.accel.iter().flat_map(|a| a.as_vector().iter());
+    let values = s.gyro.as_vector().iter().chain(force);
     let bits = values.map(|v| v.to_bits()).collect();
     (s.stamp, s.start, bits, s.join, s.status.0, s.log)
 }
@@ -284,8 +289,8 @@ proptest! {
         prop_assert_eq!(report.counts.used(), out.len() as u64);
         let mut before: Option<&RateSample> = None;
         for s in &out {
-            prop_assert!(all_finite(&s.value));
-            prop_assert!(s.accel.iter().all(all_finite));
+            prop_assert!(all_finite(s.gyro.as_vector()));
+            prop_assert!(s.accel.iter().all(|a| all_finite(a.as_vector())));
             match (s.join, before) {
                 (Join::Start, None) | (Join::Hold | Join::Reset, Some(_)) => {}
                 (Join::Continuous | Join::Bridge, Some(p)) => {
@@ -331,7 +336,7 @@ proptest! {
     ) {
         const SHIFT: i64 = 1_700_000_000_000_000_000;
         let (raw, _) = spoil(&mut ChaCha8Rng::seed_from_u64(seed), 6);
-        let settings = Settings { kind, reorder_window: window, bias: Vector3::new(0.1, 0.2, 0.3), ..Settings::default() };
+        let settings = Settings { kind, reorder_window: window, bias: BodyRate(Vector3::new(0.1, 0.2, 0.3)), ..Settings::default() };
         let shifted: Vec<RawSample> = raw.iter().map(|r| RawSample {
             header: r.header.map(|h| Nanos(h.0 + SHIFT)),
             log: Nanos(r.log.0 + SHIFT),
@@ -362,7 +367,7 @@ proptest! {
         prop_assert_eq!(with.len(), without.len());
         for (a, b) in with.iter().zip(&without) {
             prop_assert_eq!((a.stamp, a.start, a.join), (b.stamp, b.start, b.join));
-            prop_assert_eq!(a.value, b.value);
+            prop_assert_eq!(a.gyro, b.gyro);
         }
     }
 }

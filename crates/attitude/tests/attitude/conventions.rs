@@ -173,6 +173,8 @@ fn labels_of_the_command_line_mean_what_they_say() {
     let v_s = In::<Sensor>::assume(Vector3::new(1.0, 2.0, 3.0));
     close(BodyAxes::Flu.c_bs().unwrap() * v_s, [1.0, 2.0, 3.0]);
     close(BodyAxes::Frd.c_bs().unwrap() * v_s, [1.0, -2.0, -3.0]);
+    assert_eq!(BodyAxes::Frd.map(), "Xyz".parse().unwrap());
+    assert_eq!(BodyAxes::Flu.map(), AxisMap::default());
     // gyroflow#144: `YxZ` takes y for x and -x for y.
     let map: BodyAxes = "YxZ".parse().unwrap();
     close(map.c_bs().unwrap() * v_s, [2.0, -1.0, 3.0]);

@@ -8,8 +8,10 @@ use nalgebra::{Matrix3, Matrix6, Vector3};
 use plain::Plain;
 use strapd_attitude::propagate::covariance::{Covariance, Noise};
 use strapd_attitude::propagate::{Method, Propagator, Sequential, Settings};
-use strapd_attitude::quaternion::{Quaternion, RotationVector};
-use strapd_attitude::record::{AttitudeSample, Join, Nanos, RateSample, SampleKind, Status};
+use strapd_attitude::quaternion::{BodyRate, Quaternion, RotationVector};
+use strapd_attitude::record::{
+    AttitudeSample, Join, Measured, Nanos, RateSample, SampleKind, Status,
+};
 use strapd_attitude::worlds::Convention;
 
 /// A body that tumbles: rotation vector of step k, at most `angle` rad or so, never twice the same.
@@ -184,7 +186,7 @@ fn a_reset_forgets_the_attitudes_error_and_not_what_is_unknown_of_the_bias() {
     let at = |secs: i64, join| RateSample {
         stamp: Nanos(secs * 1_000_000_000),
         start: Nanos(secs * 1_000_000_000),
-        value: Vector3::zeros(),
+        gyro: Measured::Rate(BodyRate::ZERO),
         accel: None,
         join,
         status: Status::OK,
@@ -258,7 +260,7 @@ fn tumbling(count: usize) -> Vec<RateSample> {
             RateSample {
                 stamp,
                 start: stamp,
-                value: tumble(k, 5.0),
+                gyro: Measured::Rate(BodyRate(tumble(k, 5.0))),
                 accel: None,
                 join: if k == 0 {
                     Join::Start

@@ -1,12 +1,15 @@
 //! What must hold for any stream: bounds, invariances, and that nothing a sensor may say breaks the state.
 
+use nalgebra::Vector3;
 use proptest::prelude::*;
 use strapd_attitude::frames::In;
 use strapd_attitude::propagate::{
     Executor, Method, Noise, Order, Placement, Propagator, Sequential, Settings,
 };
-use strapd_attitude::quaternion::Quaternion;
-use strapd_attitude::record::{AttitudeSample, Join, Nanos, RateSample, SampleKind, Status};
+use strapd_attitude::quaternion::{BodyRate, Quaternion};
+use strapd_attitude::record::{
+    AttitudeSample, Join, Measured, Nanos, RateSample, SampleKind, Status,
+};
 
 const KINDS: [SampleKind; 3] = [
     SampleKind::Rate,
@@ -90,7 +93,7 @@ fn bits(out: &[AttitudeSample]) -> Vec<([u64; 16], i64, Status, u32)> {
                 .q_nb
                 .wxyz()
                 .into_iter()
-                .chain(a.rate.iter().copied())
+                .chain(a.rate.0.iter().copied())
                 .chain(covariance.iter().copied());
             let mut bits = [0; 16];
             for (bit, number) in bits.iter_mut().zip(numbers) {
@@ -168,7 +171,7 @@ fn hostile(kind: SampleKind) -> impl Strategy<Value = Vec<RateSample>> {
                 RateSample {
                     stamp: Nanos(stamp),
                     start: Nanos(start),
-                    value: value.into(),
+                    gyro: Measured::assume(kind, value.into()),
                     accel: None,
                     join,
                     status: Status::OK,
@@ -207,7 +210,7 @@ fn log(kind: SampleKind, n: i64, origin: i64, jitter: i64) -> Vec<RateSample> {
                 } else {
                     start
                 }),
-                value: value.into(),
+                gyro: Measured::assume(kind, value.into()),
                 accel: None,
                 join: match i {
                     0 => Join::Start,
@@ -247,7 +250,7 @@ proptest! {
                 let norm = q.iter().map(|c| c * c).sum::<f64>().sqrt();
                 // AttitudeSample promises 1e-15; the sum of squares rounds as much again.
                 prop_assert!((norm - 1.0).abs() < 1.5e-15, "{}: norm {:e}", method, norm - 1.0);
-                prop_assert!(a.rate.iter().all(|c| c.is_finite()), "{}", method);
+                prop_assert!(a.rate.0.iter().all(|c| c.is_finite()), "{}", method);
                 prop_assert!(a.covariance.sigma().iter().all(|c| (0.0..=3.2).contains(c)), "{}", method);
                 if let (Some(b), Method::Auto) = (before, method) {
                     let dot: f64 = q.iter().zip(b).map(|(a, b)| a * b).sum();
@@ -376,7 +379,7 @@ fn samples_that_do_not_advance_turn_nothing_and_are_counted() {
         let mut samples = log(kind, 39, 0, 0);
         let mut twin = samples[20];
         twin.join = Join::Continuous;
-        twin.value *= 50.0;
+        twin.gyro = twin.gyro.with(twin.gyro.as_vector() * 50.0);
         samples.insert(21, twin);
         let mut late = samples[10];
         late.join = Join::Continuous;
@@ -408,7 +411,9 @@ fn samples_that_do_not_advance_turn_nothing_and_are_counted() {
 fn a_value_that_is_no_number_is_counted_flagged_and_forgotten() {
     for bad in [f64::NAN, f64::INFINITY, -1e300, 2e4] {
         let mut samples = log(SampleKind::Rate, 39, 0, 0);
-        samples[20].value.y = bad;
+        let mut spoilt = *samples[20].gyro.as_vector();
+        spoilt.y = bad;
+        samples[20].gyro = samples[20].gyro.with(spoilt);
         let mut propagator = propagator(Method::Auto, SampleKind::Rate);
         let mut out = Vec::new();
         propagator.push(&samples, &Sequential, &mut out);
@@ -423,6 +428,50 @@ fn a_value_that_is_no_number_is_counted_flagged_and_forgotten() {
 }
 
 #[test]
+fn a_sample_of_another_kind_than_was_announced_counts_as_what_it_is() {
+    // A constant rate, of which both kinds tell the same. The announced ones are of one kind, every other sample is
+    // of the other.
+    let rate = Vector3::new(0.4, -0.7, 1.1);
+    let step = 10_000_000;
+    let sample = |i: i64, kind: SampleKind| RateSample {
+        stamp: Nanos(i * step),
+        start: Nanos(if kind == SampleKind::Rate { i } else { i - 1 } * step),
+        gyro: match kind {
+            SampleKind::Rate => Measured::Rate(BodyRate(rate)),
+            _ => Measured::Increment(BodyRate(rate).held_for(0.01)),
+        },
+        accel: None,
+        join: if i == 0 {
+            Join::Start
+        } else {
+            Join::Continuous
+        },
+        status: Status::OK,
+        log: Nanos(0),
+    };
+    let (rates, increments) = (SampleKind::Rate, SampleKind::DeltaAngle);
+    for (announced, other) in [(rates, increments), (increments, rates)] {
+        let mixed: Vec<RateSample> = (0..100)
+            .map(|i| sample(i, if i % 2 == 0 { announced } else { other }))
+            .collect();
+        let of_one: Vec<RateSample> = (0..100).map(|i| sample(i, announced)).collect();
+        for method in METHODS {
+            let method = method.for_kind(announced);
+            let (found, expected) = (
+                run(method, announced, &mixed),
+                run(method, announced, &of_one),
+            );
+            for (a, b) in found.iter().zip(&expected) {
+                // An increment over its interval is the rate but for a rounding or two.
+                assert!((a.rate.0 - b.rate.0).norm() < 1e-14, "{method}");
+                assert!(a.q_nb.angle_to(&b.q_nb) < 1e-13, "{method}");
+                assert_eq!(a.status, b.status, "{method}");
+            }
+        }
+    }
+}
+
+#[test]
 fn more_than_half_a_turn_in_a_step_is_said() {
     let samples: Vec<RateSample> = (0..30)
         .map(|i| {
@@ -430,14 +479,14 @@ fn more_than_half_a_turn_in_a_step_is_said() {
             sample.stamp = Nanos(i * 100_000_000);
             sample.join = Join::Continuous;
             // Four radians, and almost twice round.
-            sample.value = [0.0, 40.0, 0.0].into();
+            sample.gyro = Measured::Rate(BodyRate([0.0, 40.0, 0.0].into()));
             sample
         })
         .collect();
     let twice_round: Vec<RateSample> = samples
         .iter()
         .map(|s| RateSample {
-            value: [0.0, 0.0, 125.6].into(),
+            gyro: Measured::Rate(BodyRate([0.0, 0.0, 125.6].into())),
             ..*s
         })
         .collect();

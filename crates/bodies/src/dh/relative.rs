@@ -92,7 +92,7 @@ impl<A, B> RelativeMotion<A, B> {
 
     /// Angular rate of B relative to A, resolved in any F, rad/s.
     #[must_use]
-    pub fn rate_in<F>(&self, c_fa: Dcm<F, A>) -> In<F> {
+    pub(crate) fn rate_in<F>(&self, c_fa: Dcm<F, A>) -> In<F> {
         c_fa * self.w
     }
 

@@ -42,7 +42,7 @@ fn blocks(a: &Matrix3<f64>, b: &Matrix3<f64>, c: &Matrix3<f64>, d: &Matrix3<f64>
 
 /// C(nu) of any symmetric mass matrix, rigid or added: [`CoriolisForm::FromMassMatrix`].
 #[must_use]
-pub fn coriolis_from_mass_matrix(m: &Matrix6<f64>, nu: &Vector6<f64>) -> Matrix6<f64> {
+fn coriolis_from_mass_matrix(m: &Matrix6<f64>, nu: &Vector6<f64>) -> Matrix6<f64> {
     let (p, h) = halves(&(m * nu));
     blocks(&Matrix3::zeros(), &-skew(&p), &-skew(&p), &-skew(&h))
 }
@@ -134,20 +134,7 @@ impl AddedMass {
     pub fn new(m_a: Matrix6<f64>) -> Result<Self, InertiaError> {
         validity::finite("added mass", m_a.norm_squared())?;
         let allowed = SLACK * m_a.amax();
-        for row in 0..6 {
-            for column in row + 1..6 {
-                let difference = m_a[(row, column)] - m_a[(column, row)];
-                if difference.abs() > allowed {
-                    return Err(InertiaError::NotSymmetric {
-                        row,
-                        column,
-                        difference,
-                        allowed,
-                    });
-                }
-            }
-        }
-        let m = 0.5 * (m_a + m_a.transpose());
+        let m = validity::symmetric(&m_a, allowed)?;
         let smallest = SymmetricEigen::try_new(m, f64::EPSILON, 1000)
             .map_or(f64::NAN, |e| e.eigenvalues.min());
         if smallest >= -allowed {

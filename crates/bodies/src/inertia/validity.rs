@@ -1,6 +1,6 @@
 //! Numbers -> physical mass properties, or the reason why not. Pure.
 
-use nalgebra::{Matrix3, SymmetricEigen, Vector3};
+use nalgebra::{Matrix3, SMatrix, SymmetricEigen, Vector3};
 use std::fmt;
 
 /// Relative slack for what rounding does to six numbers that were once exact.
@@ -114,6 +114,27 @@ pub(super) fn finite(what: &'static str, x: f64) -> Result<(), InertiaError> {
     }
 }
 
+/// The matrix, exactly symmetric: the mean of both halves, where they differ by no more than `allowed`.
+pub(crate) fn symmetric<const N: usize>(
+    m: &SMatrix<f64, N, N>,
+    allowed: f64,
+) -> Result<SMatrix<f64, N, N>, InertiaError> {
+    for row in 0..N {
+        for column in row + 1..N {
+            let difference = m[(row, column)] - m[(column, row)];
+            if difference.abs() > allowed {
+                return Err(InertiaError::NotSymmetric {
+                    row,
+                    column,
+                    difference,
+                    allowed,
+                });
+            }
+        }
+    }
+    Ok(0.5 * (m + m.transpose()))
+}
+
 /// The tensor, exactly symmetric, when everything about it is physical.
 pub(super) fn physical(
     mass: f64,
@@ -129,18 +150,7 @@ pub(super) fn physical(
     finite("inertia tensor", inertia_cg.norm_squared())?;
     let scale = inertia_cg.amax();
     let allowed = SLACK * scale;
-    for (row, column) in [(0, 1), (0, 2), (1, 2)] {
-        let difference = inertia_cg[(row, column)] - inertia_cg[(column, row)];
-        if difference.abs() > allowed {
-            return Err(InertiaError::NotSymmetric {
-                row,
-                column,
-                difference,
-                allowed,
-            });
-        }
-    }
-    let tensor = 0.5 * (inertia_cg + inertia_cg.transpose());
+    let tensor = symmetric(inertia_cg, allowed)?;
     let moments = principal_moments(&tensor);
     let [a, b, c] = moments;
     // Zero to rounding is zero: a rod without thickness can not be spun up about itself.

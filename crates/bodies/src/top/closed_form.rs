@@ -182,12 +182,6 @@ impl ClosedForm {
             self.u1.clamp(-1.0, 1.0).acos(),
         )
     }
-
-    /// Time from one lowest point to the next, s.
-    #[must_use]
-    pub fn nutation_period(&self) -> f64 {
-        2.0 * self.quarter.to_f64() / self.kappa.to_f64()
-    }
 }
 
 /// The three roots, ascending, of

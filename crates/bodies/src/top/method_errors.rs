@@ -7,9 +7,9 @@ use crate::rigid_body::Spin;
 use crate::top::{Case, EulerState, SymmetricTop, TopMethod, TopRun, compare};
 use strapd_attitude::frames::{Body, Nav};
 use strapd_attitude::propagate::{Method, Noise, Propagator, Sequential, Settings};
-use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::quaternion::kernel as quat;
-use strapd_attitude::record::{Join, Nanos, RateSample, SampleKind, Status};
+use strapd_attitude::quaternion::{BodyRate, Quaternion};
+use strapd_attitude::record::{Join, Measured, Nanos, RateSample, SampleKind, Status};
 
 /// A way to find the attitude of the top.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -322,7 +322,7 @@ pub fn attitudes(
         .map(|((stamp, spin), k)| RateSample {
             stamp: *stamp,
             start: *stamp,
-            value: spin.w_nb_b,
+            gyro: Measured::Rate(BodyRate(spin.w_nb_b)),
             accel: None,
             join: if k == 0 {
                 Join::Start

@@ -11,6 +11,7 @@ use super::jacobian::{Singularity, Twist};
 use super::joints::{JOINTS, SeedJoints, SeedMotion};
 use super::path::{JointPath, Sinusoid};
 use super::policy::Policy;
+use super::timing::slow_down;
 use super::{Arm, ArmError, Base, Tool};
 use crate::dh::Transform;
 use crate::rest_to_rest::rest_to_rest;
@@ -177,13 +178,7 @@ impl ToolPath {
     /// # Errors
     /// A factor not above zero and finite.
     pub fn slowed(&self, factor: f64) -> Result<Self, ArmError> {
-        bounded("slow-down factor", [factor], 1e9)?;
-        if factor <= 0.0 {
-            return Err(ArmError::Impossible {
-                what: "a slow-down factor must be above zero",
-                value: factor,
-            });
-        }
+        let factor = slow_down(factor)?;
         match self {
             Self::Waves(waves) => Self::waves(waves.map(|w| w.slowed(factor))),
             Self::Line { from, to, duration } => Self::line(*from, *to, duration * factor),

@@ -163,7 +163,7 @@ impl Arm {
     ///
     /// # Errors
     /// As [`Arm::joint_rates`], without the test of feasibility: only the part the arm can do is taken.
-    pub fn joint_accelerations(
+    pub(crate) fn joint_accelerations(
         &self,
         motion: &SeedMotion,
         acceleration: &Twist,

@@ -3,6 +3,7 @@
 use super::error::bounded;
 use super::joints::{JOINTS, SeedJoints, SeedMotion};
 use super::limits::Limits;
+use super::timing::slow_down;
 use super::{Arm, ArmError};
 use crate::rest_to_rest::{PEAK, rest_to_rest};
 
@@ -296,13 +297,7 @@ impl JointPath {
     /// A factor that is not above zero and finite, or takes the path out of what [`JointPath::legs`] and
     /// [`JointPath::sinusoids`] accept.
     pub fn slowed(&self, factor: f64) -> Result<Self, ArmError> {
-        bounded("slow-down factor", [factor], 1e9)?;
-        if factor <= 0.0 {
-            return Err(ArmError::Impossible {
-                what: "a slow-down factor must be above zero",
-                value: factor,
-            });
-        }
+        let factor = slow_down(factor)?;
         match self {
             Self::Sinusoids(joints) => Self::sinusoids(joints.map(|joint| joint.slowed(factor))),
             Self::Legs { from, legs } => {

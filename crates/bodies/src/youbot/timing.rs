@@ -1,7 +1,20 @@
 //! A motion faster than the joints -> by how much to stretch time. Pure.
 
-use super::Arm;
+use super::error::bounded;
 use super::joints::SeedMotion;
+use super::{Arm, ArmError};
+
+/// A factor to slow a path by, when it is above zero and finite.
+pub(super) fn slow_down(factor: f64) -> Result<f64, ArmError> {
+    bounded("slow-down factor", [factor], 1e9)?;
+    if factor <= 0.0 {
+        return Err(ArmError::Impossible {
+            what: "a slow-down factor must be above zero",
+            value: factor,
+        });
+    }
+    Ok(factor)
+}
 
 /// The factor k >= 1 by which a path must be slowed so that no joint exceeds its fastest rate: time
 /// runs k times as long, rates fall by k, accelerations by k^2, the path stays.

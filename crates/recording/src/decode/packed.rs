@@ -284,7 +284,7 @@ fn some_vector(vector: [f64; 3]) -> Option<[f64; 3]> {
 mod tests {
     use super::*;
     use nalgebra::Vector3;
-    use strapd_attitude::quaternion::Quaternion;
+    use strapd_attitude::quaternion::{BodyRate, Quaternion};
     use strapd_attitude::record::{AttitudeCovariance, Status};
 
     /// An attitude with nothing special about it.
@@ -292,7 +292,7 @@ mod tests {
         AttitudeSample {
             stamp,
             q_nb: Quaternion::assume_unit([0.5, -0.5, 0.5, 0.5]),
-            rate: Vector3::new(0.1, -0.2, 0.3),
+            rate: BodyRate(Vector3::new(0.1, -0.2, 0.3)),
             accel: None,
             covariance: AttitudeCovariance::from_sigma(Vector3::new(1e-3, 2e-3, 3e-3)),
             status: Status::OK,
@@ -341,7 +341,7 @@ mod tests {
     fn a_packed_attitude_is_these_bytes() {
         let mut s = sample(Nanos(-1));
         s.q_nb = Quaternion::assume_unit([1.0, 0.0, -0.0, 0.0]);
-        s.rate = Vector3::new(0.5, f64::INFINITY, -2.0);
+        s.rate = BodyRate(Vector3::new(0.5, f64::INFINITY, -2.0));
         s.covariance = AttitudeCovariance::default();
         s.status = Status::HELD.with(Status::RESTARTED);
         s.reset_count = 3;

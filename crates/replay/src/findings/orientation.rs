@@ -43,7 +43,7 @@ pub(super) fn find(topic: &CheckedTopic, out: &mut Vec<Finding>) {
         _ => {}
     }
     if trusted {
-        let at_rest = topic.looked.bias.as_ref().map(|found| found.bias);
+        let at_rest = topic.looked.bias.as_ref().map(|found| found.bias.0);
         told_by_it(summary, recorded, at_rest, out);
     }
 }

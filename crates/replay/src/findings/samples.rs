@@ -369,9 +369,9 @@ fn bias(looked: &Inspection, out: &mut Vec<Finding>) {
         return;
     };
     let to_deg_per_h = |v: f64| v.to_degrees() * 3600.0;
-    let size = to_deg_per_h(found.bias.norm());
+    let size = to_deg_per_h(found.bias.0.norm());
     let sigma = found.sigma.norm();
-    if found.bias.norm() > BIAS_SIGMAS * sigma && size > BIAS_DEG_PER_H {
+    if found.bias.0.norm() > BIAS_SIGMAS * sigma && size > BIAS_DEG_PER_H {
         let bias: [f64; 3] = found.bias.into();
         out.push(
             Finding::new(

@@ -315,7 +315,7 @@ fn begin(source: &Publisher, known: &LogChannel, decoder: &decode::Decoder, plan
         si: Si::new(plan, &decoder.stated().declared, &resolved),
         conditioned: Conditioned::new(plan, &resolved),
         asked: plan.clock,
-        stillness: Stillness::new(resolved.kind, Limits::default()),
+        stillness: Stillness::new(Limits::default()),
         stamps: regularise::Survey::new(),
         resolved,
         undecodable: 0,

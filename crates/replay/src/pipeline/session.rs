@@ -90,7 +90,7 @@ impl Output {
         self.count += samples.len() as u64;
         self.largest_rate = samples
             .iter()
-            .map(|s| s.rate.amax())
+            .map(|s| s.rate.0.amax())
             .fold(self.largest_rate, f64::max);
     }
 }

@@ -8,6 +8,7 @@ use crate::sink::{Content, Flow, Options, Provenance, Stream, Target};
 use crate::summary::simulation::SimulationSummary;
 use std::sync::Arc;
 use std::time::Instant;
+use strapd_attitude::quaternion::BodyRate;
 use strapd_attitude::record::{AttitudeCovariance, AttitudeSample, SampleKind, Status};
 use strapd_bodies::synthetic::{Stretch, Synthetic, Truth};
 use strapd_recording::attitude_line::TRUTH_ID;
@@ -173,7 +174,7 @@ fn as_attitude(truth: &Truth) -> AttitudeSample {
     AttitudeSample {
         stamp: truth.stamp,
         q_nb: truth.spin.q_nb,
-        rate: truth.spin.w_nb_b,
+        rate: BodyRate(truth.spin.w_nb_b),
         accel: None,
         covariance: AttitudeCovariance::default(),
         status: Status::OK,

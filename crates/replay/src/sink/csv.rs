@@ -47,7 +47,7 @@ pub(super) fn push_row(out: &mut Vec<u8>, sample: &AttitudeSample, world: &str) 
     let numbers = q
         .into_iter()
         .chain([roll, pitch, yaw])
-        .chain(sample.rate.iter().copied())
+        .chain(sample.rate.0.iter().copied())
         .chain(sigma.iter().copied());
     for value in numbers {
         out.push(b',');

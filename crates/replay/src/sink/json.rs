@@ -204,7 +204,7 @@ mod tests {
     use super::*;
     use crate::sink::tests::sample;
     use nalgebra::Vector3;
-    use strapd_attitude::quaternion::Quaternion;
+    use strapd_attitude::quaternion::{BodyRate, Quaternion};
     use strapd_attitude::record::Nanos;
     use strapd_attitude::record::{AttitudeCovariance, Status};
 
@@ -220,7 +220,7 @@ mod tests {
         stream.id = "imu0".to_owned();
         let mut s = sample(Nanos(1_700_000_000_005_000_000));
         s.q_nb = Quaternion::identity();
-        s.rate = Vector3::new(0.01, 0.0, -0.2);
+        s.rate = BodyRate(Vector3::new(0.01, 0.0, -0.2));
         let sigma = Vector3::new(0.5, 1.0, 2.0).map(f64::to_radians);
         s.covariance = AttitudeCovariance::from_sigma(sigma);
         let expected = concat!(
@@ -235,7 +235,7 @@ mod tests {
     fn hostile_names_and_values_that_are_not_finite_still_give_json() {
         let stream = Stream::new("a\"\\\n\u{1b}[31m é", "f");
         let mut s = sample(Nanos(-1));
-        s.rate = Vector3::new(f64::NAN, f64::INFINITY, 5e-324);
+        s.rate = BodyRate(Vector3::new(f64::NAN, f64::INFINITY, 5e-324));
         s.status = Status::HELD.with(Status::RESET);
         s.reset_count = 3;
         let line = att(&stream, u64::MAX, &s);

@@ -106,6 +106,7 @@ mod tests {
     use crate::sink::tests::sample;
     use nalgebra::Vector3;
     use serde_json::{Value, json};
+    use strapd_attitude::quaternion::BodyRate;
 
     /// Whether a value is numbers all the way down.
     fn is_numeric(value: &Value) -> bool {
@@ -119,7 +120,7 @@ mod tests {
     fn an_object_is_a_timestamp_and_finite_numbers_under_the_name_of_the_sensor() {
         let object = PlotObject::new(&Stream::new("/imu/data_raw", "imu_link"));
         let mut s = sample(Nanos(1_500_000_000));
-        s.rate = Vector3::new(f64::NAN, 1.0, f64::INFINITY);
+        s.rate = BodyRate(Vector3::new(f64::NAN, 1.0, f64::INFINITY));
         let mut out = Vec::new();
         object.push(&mut out, &s);
         let value: Value = serde_json::from_slice(&out).unwrap();

@@ -2,9 +2,11 @@
 
 use super::golden::{Run, angle_at_end, plain, run, sample};
 use crate::aid::{Aided, Settings, Start};
+use crate::frames::In;
 use crate::propagate;
+use crate::quaternion::BodyRate;
 use crate::quaternion::Quaternion;
-use crate::record::{AttitudeSample, Join, Nanos, RateSample, SampleKind, Status};
+use crate::record::{AttitudeSample, Join, Measured, Nanos, RateSample, SampleKind, Status};
 use nalgebra::{Rotation3, Vector3};
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -148,8 +150,8 @@ fn stream() -> Vec<RateSample> {
             RateSample {
                 stamp,
                 start: before,
-                value: rate * 0.01,
-                accel: Some(force),
+                gyro: Measured::Increment(BodyRate(rate).held_for(0.01)),
+                accel: Some(In::assume(force)),
                 join: if k == 0 {
                     Join::Start
                 } else {
@@ -254,15 +256,15 @@ fn a_rotated_world_does_not_become_bias() {
     // At rest for a minute on an Earth that turns a thousand times faster.
     let rate = Vector3::new(0.0, 0.02, 0.03);
     let propagation = propagate::Settings {
-        world_rate: crate::frames::In::assume(rate),
+        world_rate: In::assume(rate),
         ..propagate::Settings::default()
     };
     let mut aided = Aided::new(propagation, Settings::default(), Start::Level).unwrap();
     let samples: Vec<RateSample> = stream()
         .iter()
         .map(|s| RateSample {
-            value: rate,
-            accel: Some(Vector3::z() * 9.81),
+            gyro: Measured::Rate(BodyRate(rate)),
+            accel: Some(In::assume(Vector3::z() * 9.81)),
             start: s.stamp,
             ..*s
         })
@@ -308,8 +310,8 @@ fn fed(
         let sample = RateSample {
             stamp: Nanos(i * 10_000_000),
             start: Nanos(i * 10_000_000),
-            value: rate,
-            accel: Some(force),
+            gyro: Measured::Rate(BodyRate(rate)),
+            accel: Some(In::assume(force)),
             join: if i == 0 {
                 Join::Start
             } else {
@@ -388,7 +390,7 @@ fn a_push_stands_out_of_the_innovations() {
     for sample in &mut samples[1500..1510] {
         sample.accel = sample
             .accel
-            .map(|force| force + Vector3::new(20.0, 20.0, 0.0));
+            .map(|force| In::assume(force.as_vector() + Vector3::new(20.0, 20.0, 0.0)));
     }
     aided.push(&samples, &mut Vec::new());
     let kept = aided.innovations();

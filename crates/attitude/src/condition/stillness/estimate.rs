@@ -4,16 +4,16 @@
 //! say together.
 
 use super::{Limits, Rest, Rests};
-use crate::frames::{Body, Nav};
-use crate::quaternion::Quaternion;
+use crate::frames::{Body, In, Nav};
+use crate::quaternion::{BodyRate, Quaternion};
 use crate::setting::{BIAS, GYRO_UNIT, INIT, START, UNTIL};
 use nalgebra::Vector3;
 
 /// A gyro bias from rests.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct BiasEstimate {
-    /// rad/s, body axes.
-    pub bias: Vector3<f64>,
+    /// What the gyro reads at rest.
+    pub bias: BodyRate,
     /// One standard deviation, rad/s.
     pub sigma: Vector3<f64>,
     /// From how many rests.
@@ -106,7 +106,7 @@ pub fn estimate_bias(rests: &Rests, limits: &Limits) -> Result<BiasEstimate, NoR
         for rest in &rests.kept {
             let weight = rest.secs() / (rest.sigma[axis] * rest.sigma[axis]);
             weights += weight;
-            sum += weight * rest.mean_rate[axis];
+            sum += weight * rest.mean_rate.0[axis];
         }
         let mean = sum / weights;
         let mut own = 0.0;
@@ -115,7 +115,7 @@ pub fn estimate_bias(rests: &Rests, limits: &Limits) -> Result<BiasEstimate, NoR
             let s2 = rest.sigma[axis] * rest.sigma[axis];
             let share = rest.secs() / s2 / weights;
             own += share * share * s2;
-            scatter += share * (rest.mean_rate[axis] - mean).powi(2);
+            scatter += share * (rest.mean_rate.0[axis] - mean).powi(2);
         }
         let scatter = f64::sqrt(scatter);
         if scatter > MAX_SCATTER {
@@ -125,7 +125,7 @@ pub fn estimate_bias(rests: &Rests, limits: &Limits) -> Result<BiasEstimate, NoR
         sigma[axis] = f64::sqrt(own).max(scatter).max(limits.bias_instability);
     }
     Ok(BiasEstimate {
-        bias,
+        bias: BodyRate(bias),
         sigma,
         rests: rests.count,
         secs: rests.kept.iter().map(Rest::secs).sum(),
@@ -138,7 +138,7 @@ pub fn estimate_bias(rests: &Rests, limits: &Limits) -> Result<BiasEstimate, NoR
 /// [`NoRest::Moving`] without a rest, [`NoRest::NotAtStart`] when the body moves in the first window
 /// (the attitude is wanted at the first sample, and must not have changed since),
 /// [`NoRest::NoAccel`] without an accelerometer.
-pub fn accel_at_start(rests: &Rests, limits: &Limits) -> Result<Vector3<f64>, NoRest> {
+pub fn accel_at_start(rests: &Rests, limits: &Limits) -> Result<In<Body>, NoRest> {
     rest_at_start(rests, limits)?
         .mean_accel
         .ok_or(NoRest::NoAccel)
@@ -149,7 +149,7 @@ pub fn accel_at_start(rests: &Rests, limits: &Limits) -> Result<Vector3<f64>, No
 ///
 /// # Errors
 /// [`NoRest::Moving`] without a rest, [`NoRest::NotAtStart`] when the body moves in the first window.
-pub fn rest_at_start<'r>(rests: &'r Rests, limits: &Limits) -> Result<&'r Rest, NoRest> {
+pub(crate) fn rest_at_start<'r>(rests: &'r Rests, limits: &Limits) -> Result<&'r Rest, NoRest> {
     let (Some(rest), Some(first)) = (rests.kept.first(), rests.first) else {
         return Err(NoRest::Moving {
             stillest: rests.stillest,
@@ -169,7 +169,8 @@ pub fn rest_at_start<'r>(rests: &'r Rests, limits: &Limits) -> Result<&'r Rest, 
 /// World z up (ENU, NWU), body forward-left-up: at rest and level the specific force is +g on z.
 /// Yaw-pitch-roll (z, y, x): the body's x axis projects onto the world's x axis.
 #[must_use]
-pub fn level(accel_b: &Vector3<f64>) -> Option<Quaternion<Nav, Body>> {
+pub fn level(accel_b: &In<Body>) -> Option<Quaternion<Nav, Body>> {
+    let accel_b = accel_b.as_vector();
     let norm = accel_b.norm();
     if !(norm.is_finite() && norm > 0.0) {
         return None;

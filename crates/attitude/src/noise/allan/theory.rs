@@ -3,9 +3,6 @@
 use crate::noise::sensor_error::ImuError;
 use std::f64::consts::{LN_2, PI};
 
-/// Allan deviation of flicker as a part of its bias instability B: sqrt(2 ln 2 / pi).
-pub const FLICKER_FLOOR: f64 = 0.664_282_470_267_960_1;
-
 /// Allan variance at `tau` seconds of the noise of `error`, (rad/s)^2: quantisation, angle random walk,
 /// flicker (without ends), rate random walk, ramp, Gauss-Markov. Constant errors add nothing.
 ///
@@ -56,11 +53,6 @@ fn gauss_markov(sigma: f64, time: f64, tau: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_flicker_floor_is_the_root_of_its_variance() {
-        assert!((FLICKER_FLOOR - (2.0 * LN_2 / PI).sqrt()).abs() < 1e-15);
-    }
 
     #[test]
     fn a_gauss_markov_process_peaks_where_ieee_952_says() {

@@ -4,11 +4,13 @@
 //! unseen. Of the samples only those are kept that a window may still hold.
 
 use super::{Engine, FASTEST, LARGEST, LOOKED_BACK, Propagator, Waiting};
+use crate::frames::In;
 use crate::propagate::accumulate::Accumulator;
 use crate::propagate::classical::LOOK_BACK;
 use crate::propagate::covariance::Carried;
 use crate::propagate::lanes::Triple;
-use crate::record::{Join, Nanos, RateSample, Status};
+use crate::quaternion::BodyRate;
+use crate::record::{Join, Measured, Nanos, RateSample, Status};
 use nalgebra::Vector3;
 use std::collections::VecDeque;
 
@@ -73,7 +75,7 @@ impl Propagator {
         let last = self.last_stamp;
         let row = |waiting: &Waiting| {
             let sample = &waiting.sample;
-            let accel = sample.accel.map(Into::into);
+            let accel = sample.accel.map(|force| (*force.as_vector()).into());
             let age = last.saturating_sub(sample.stamp.0);
             (age, accel, sample.status.0, sample.log.0, waiting.turns)
         };
@@ -200,8 +202,8 @@ fn waiting(last: i64, &(age, accel, status, log, turns): &Row) -> Waiting {
         sample: RateSample {
             stamp,
             start: stamp,
-            value: Vector3::zeros(),
-            accel: accel.map(Vector3::from),
+            gyro: Measured::Rate(BodyRate::ZERO),
+            accel: accel.map(|force| In::assume(Vector3::from(force))),
             join: Join::Continuous,
             status: Status(status),
             log: Nanos(log),

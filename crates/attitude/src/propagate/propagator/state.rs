@@ -11,7 +11,7 @@ use crate::propagate::report::Report;
 use crate::propagate::settings::Settings;
 use crate::propagate::turn::Turn;
 use crate::propagate::window::{Note, Step};
-use crate::quaternion::Quaternion;
+use crate::quaternion::{BodyRate, Quaternion};
 use crate::record::{AttitudeSample, RateSample, Status};
 use nalgebra::Vector3;
 use std::collections::VecDeque;
@@ -193,7 +193,7 @@ impl State {
         out.push(AttitudeSample {
             stamp: sample.stamp,
             q_nb: Quaternion::assume_unit(q_nb),
-            rate: self.rate,
+            rate: BodyRate(self.rate),
             accel: sample.accel,
             covariance: self.covariance.attitude(),
             status: sample.status.with(self.added),
@@ -211,7 +211,8 @@ fn turned_by(phi: Triple<1>) -> Accumulator {
     Accumulator::new([1.0 + c, x, y, z])
 }
 
-/// log of a unit quaternion: the rotation vector of at most half a turn.
+/// log of a unit quaternion: the rotation vector of at most half a turn. Not by
+/// [`Quaternion::rotation_vector`], which divides where this multiplies: the sums of one method begin with these bits.
 fn rotation_vector([w, x, y, z]: [f64; 4]) -> Triple<1> {
     let sign = if w < 0.0 { -1.0 } else { 1.0 };
     let v = Triple::new(x * sign, y * sign, z * sign);

@@ -1,6 +1,8 @@
 //! The figures of an independent computation, to their digits.
 
 use super::logs::{BIAS, FORCE_BIAS, Log, Motion, errors, log, smoothed};
+use crate::frames::In;
+use crate::quaternion::BodyRate;
 use crate::record::Nanos;
 use crate::smooth::border::{self, ALL};
 use crate::smooth::prepare::Preparer;
@@ -46,17 +48,17 @@ fn the_input_is_that_of_the_figures() {
     let hand = log(Motion::Hand);
     let sample = &hand.samples[3000];
     agree(
-        sample.rate.as_slice(),
+        sample.rate.0.as_slice(),
         &[1.507064, -0.019627, 0.362298],
         DIGITS,
     );
     agree(
-        sample.force.unwrap().as_slice(),
+        sample.force.unwrap().as_vector().as_slice(),
         &[-8.533420, 3.905005, -4.989968],
         DIGITS,
     );
     agree(
-        sample.field.unwrap().as_slice(),
+        sample.field.unwrap().as_vector().as_slice(),
         &[46.211861, -19.580033, 7.506694],
         DIGITS,
     );
@@ -260,8 +262,8 @@ fn gridded(on_grid: fn(f64) -> f64) -> (Vec<Sample>, Vec<Vector3<f64>>) {
         .collect();
     let sample = |(i, rate): (i64, &Vector3<f64>)| Sample {
         stamp: Nanos(i * 5_000_000),
-        rate: rate.map(|w| on_grid(w / step) * step),
-        force: Some(Vector3::z() * 9.81),
+        rate: BodyRate(rate.map(|w| on_grid(w / step) * step)),
+        force: Some(In::assume(Vector3::z() * 9.81)),
         field: None,
     };
     ((0..).zip(&rates).map(sample).collect(), rates)
@@ -283,7 +285,7 @@ fn truncation_is_found_and_undone() {
             let sum: Vector3<f64> = (0..rates.len()).map(|k| of(k) - rates[k]).sum();
             (sum / rates.len() as f64).map(f64::to_degrees)
         };
-        let (before, after) = (mean(&|k| samples[k].rate), mean(&|k| prepared[k].rate));
+        let (before, after) = (mean(&|k| samples[k].rate.0), mean(&|k| prepared[k].rate));
         if i == 0 {
             agree(before.as_slice(), &[-0.000581, -0.000170, 0.000087], DIGITS);
             agree(after.as_slice(), &[0.000127, -0.000153, -0.000035], DIGITS);
@@ -301,8 +303,8 @@ fn a_hole_is_filled_by_a_cubic() {
             let t = f64::from(i) * 0.01;
             Sample {
                 stamp: Nanos(i64::from(i) * 10_000_000),
-                rate: Vector3::new((9.0 * t).sin(), (7.0 * t).cos(), t * t),
-                force: Some(Vector3::z() * 9.81),
+                rate: BodyRate(Vector3::new((9.0 * t).sin(), (7.0 * t).cos(), t * t)),
+                force: Some(In::assume(Vector3::z() * 9.81)),
                 field: None,
             }
         })

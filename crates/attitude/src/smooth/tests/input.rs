@@ -1,6 +1,8 @@
 //! Bad input: too little, numbers that are none, an axis that is dead, clocks that jump.
 
 use super::logs::{Motion, errors, log, smoothed};
+use crate::frames::{Body, In};
+use crate::quaternion::BodyRate;
 use crate::record::Nanos;
 use crate::smooth::{FieldUnit, Looseness, Outcome, Sample, Settings, SmoothError, smooth};
 use nalgebra::Vector3;
@@ -8,8 +10,8 @@ use nalgebra::Vector3;
 fn sample(i: i64) -> Sample {
     Sample {
         stamp: Nanos(i * 10_000_000),
-        rate: Vector3::zeros(),
-        force: Some(Vector3::z() * 9.81),
+        rate: BodyRate::ZERO,
+        force: Some(In::assume(Vector3::z() * 9.81)),
         field: None,
     }
 }
@@ -56,19 +58,19 @@ fn a_log_without_forces_is_refused_with_the_reason() {
 fn nothing_but_nan_is_refused_and_some_of_it_is_counted() {
     let nothing: Vec<Sample> = (0..1000)
         .map(|i| Sample {
-            rate: Vector3::repeat(f64::NAN),
+            rate: BodyRate(Vector3::repeat(f64::NAN)),
             ..sample(i)
         })
         .collect();
     assert!(smooth(&mut nothing.as_slice(), &Settings::default()).is_err());
 
     let mut hand = log(Motion::Hand);
-    hand.samples[0].rate.x = f64::INFINITY;
-    hand.samples[2000].rate.y = f64::NAN;
-    hand.samples[2500].force = Some(Vector3::new(0.0, f64::NAN, 9.8));
-    hand.samples[2600].force = Some(Vector3::repeat(1e30));
-    hand.samples[2700].field = Some(Vector3::repeat(f64::NAN));
-    hand.samples[6000].rate.z = 1e9;
+    hand.samples[0].rate.0.x = f64::INFINITY;
+    hand.samples[2000].rate.0.y = f64::NAN;
+    hand.samples[2500].force = Some(In::assume(Vector3::new(0.0, f64::NAN, 9.8)));
+    hand.samples[2600].force = Some(In::assume(Vector3::repeat(1e30)));
+    hand.samples[2700].field = Some(In::assume(Vector3::repeat(f64::NAN)));
+    hand.samples[6000].rate.0.z = 1e9;
     let (smoothed, estimates) = hand.smoothed(&Settings::default());
     assert_eq!(smoothed.counts().rejected, 5);
     assert_eq!(smoothed.outcome(), Outcome::Converged);
@@ -113,14 +115,19 @@ fn is_sane(samples: &[Sample]) {
 
 #[test]
 fn a_dead_axis_and_dead_sensors_give_finite_attitudes() {
+    let without = |vector: In<Body>, axis: usize| {
+        let mut numbers = *vector.as_vector();
+        numbers[axis] = 0.0;
+        In::assume(numbers)
+    };
     for axis in 0..3 {
         for dead in 0..3 {
             let mut hand = log(Motion::Hand);
             for sample in &mut hand.samples {
                 match dead {
-                    0 => sample.rate[axis] = 0.0,
-                    1 => sample.force.as_mut().unwrap()[axis] = 0.0,
-                    _ => sample.field.as_mut().unwrap()[axis] = 0.0,
+                    0 => sample.rate.0[axis] = 0.0,
+                    1 => sample.force = sample.force.map(|force| without(force, axis)),
+                    _ => sample.field = sample.field.map(|field| without(field, axis)),
                 }
             }
             is_sane(&hand.samples);
@@ -128,8 +135,8 @@ fn a_dead_axis_and_dead_sensors_give_finite_attitudes() {
     }
     let zeros: Vec<Sample> = (0..3000)
         .map(|i| Sample {
-            force: Some(Vector3::zeros()),
-            field: Some(Vector3::zeros()),
+            force: Some(In::assume(Vector3::zeros())),
+            field: Some(In::assume(Vector3::zeros())),
             ..sample(i)
         })
         .collect();
@@ -183,8 +190,8 @@ fn minutes_at_rest_drift_by_nothing() {
             let t = i as f64;
             let noise = Vector3::new((1.1 * t).sin(), (2.3 * t).sin(), (3.7 * t).cos());
             Sample {
-                rate: Vector3::new(0.02, -0.01, 0.03) + noise * 1e-3,
-                force: Some(Vector3::z() * 9.81 + noise * 0.02),
+                rate: BodyRate(Vector3::new(0.02, -0.01, 0.03) + noise * 1e-3),
+                force: Some(In::assume(Vector3::z() * 9.81 + noise * 0.02)),
                 ..sample(i)
             }
         })
@@ -212,10 +219,11 @@ fn minutes_at_rest_drift_by_nothing() {
 fn a_field_of_unknown_unit_gives_the_same_attitudes() {
     let hand = log(Motion::Hand);
     let mut gauss = hand.clone();
-    gauss
-        .samples
-        .iter_mut()
-        .for_each(|sample| sample.field = sample.field.map(|field| field * 0.01));
+    gauss.samples.iter_mut().for_each(|sample| {
+        sample.field = sample
+            .field
+            .map(|field| In::assume(field.as_vector() * 0.01))
+    });
     let settings = Settings {
         field_unit: FieldUnit::Unknown,
         ..Settings::default()

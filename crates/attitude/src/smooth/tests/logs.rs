@@ -1,6 +1,7 @@
 //! Recordings by formula, without noise: motion, a gyro and an accelerometer with errors, hard iron.
 
-use crate::quaternion::{Quaternion, RotationVector};
+use crate::frames::In;
+use crate::quaternion::{BodyRate, Quaternion, RotationVector};
 use crate::record::Nanos;
 use crate::smooth::{Estimate, Sample, Settings, Smoothed, smooth};
 use nalgebra::{Matrix3, Vector3};
@@ -104,9 +105,11 @@ pub(super) fn log(motion: Motion) -> Log {
         let force = acceleration(motion, t, share) + Vector3::z() * 9.81;
         samples.push(Sample {
             stamp: Nanos(i64::from(i) * STEP_NANOS),
-            rate: inverse * w + Vector3::from(BIAS),
-            force: Some(to_body * force + Vector3::from(FORCE_BIAS)),
-            field: Some(to_body * Vector3::from(FIELD) + Vector3::from(IRON)),
+            rate: BodyRate(inverse * w + Vector3::from(BIAS)),
+            force: Some(In::assume(to_body * force + Vector3::from(FORCE_BIAS))),
+            field: Some(In::assume(
+                to_body * Vector3::from(FIELD) + Vector3::from(IRON),
+            )),
         });
         truth.push(q);
     }

@@ -83,7 +83,7 @@ fn restless(bias: Vector3<f64>) -> Log {
     hand.truth = hand.truth[1800..4200].to_vec();
     hand.samples
         .iter_mut()
-        .for_each(|sample| sample.rate += bias);
+        .for_each(|sample| sample.rate.0 += bias);
     hand
 }
 

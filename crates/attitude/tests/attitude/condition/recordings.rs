@@ -9,7 +9,8 @@ use strapd_attitude::condition::stillness::{
     Limits, NoRest, Rests, Stillness, accel_at_start, estimate_bias, level,
 };
 use strapd_attitude::condition::{Clock, OnGap, Settings, choose_clock};
-use strapd_attitude::record::{Join, Nanos, RateSample, RawSample, SampleKind, Verdict};
+use strapd_attitude::quaternion::DeltaAngle;
+use strapd_attitude::record::{Join, Measured, Nanos, RateSample, RawSample, SampleKind, Verdict};
 
 fn f64s<const N: usize>(bytes: &[u8], at: usize, big: bool) -> Option<[f64; N]> {
     let mut out = [0.0; N];
@@ -160,8 +161,8 @@ fn read(file: &str, topic: &str) -> Option<Vec<RawSample>> {
     Some(out)
 }
 
-fn rests(kind: SampleKind, samples: &[RateSample]) -> Rests {
-    let mut stillness = Stillness::new(kind, Limits::default());
+fn rests(samples: &[RateSample]) -> Rests {
+    let mut stillness = Stillness::new(Limits::default());
     samples.iter().for_each(|s| stillness.push(s));
     stillness.finish()
 }
@@ -206,7 +207,7 @@ fn colliding_stamps_of_hostile_08_come_out_as_the_recording_they_were_made_from(
         assert_eq!(report.gaps.count, 0);
         assert_eq!(out.len(), 953);
         for (a, b) in out.iter().zip(&expected) {
-            assert_eq!((a.stamp, a.start, a.value), (b.stamp, b.start, b.value));
+            assert_eq!((a.stamp, a.start, a.gyro), (b.stamp, b.start, b.gyro));
         }
     }
 }
@@ -250,7 +251,10 @@ fn the_bad_values_of_hostile_10_are_rejected_and_nothing_else() {
     assert_eq!(report.counts.get(Verdict::NotFinite), 5);
     assert_eq!(report.first_bad(Verdict::NotFinite).unwrap().index, 100);
     assert_eq!(out.len(), 948);
-    assert!(out.iter().all(|s| s.value.iter().all(|v| v.is_finite())));
+    assert!(
+        out.iter()
+            .all(|s| s.gyro.as_vector().iter().all(|v| v.is_finite()))
+    );
     // 100, 200, and 300 to 302: three places.
     assert_eq!((report.gaps.count, report.gaps.missing), (3, 5));
 }
@@ -341,7 +345,8 @@ fn the_means_of_px4_keep_their_own_intervals() {
     let (out, _) = run(&settings(SampleKind::Average), &raw);
     for (r, s) in raw.iter().zip(&out) {
         let secs = r.interval_nanos.unwrap() as f64 * 1e-9;
-        assert_eq!(s.value, Vector3::from(r.gyro.unwrap()) * secs);
+        let angle = Vector3::from(r.gyro.unwrap()) * secs;
+        assert_eq!(s.gyro, Measured::Increment(DeltaAngle(angle)));
     }
     let quality = quality(&raw, Clock::Header);
     assert_eq!(quality.with_interval, 1297);
@@ -356,7 +361,7 @@ fn the_recordings_rest_where_they_rest_and_nowhere_else() {
     for (file, topic) in REAL {
         let Some(raw) = read(file, topic) else { return };
         let (out, _) = run(&settings(SampleKind::Average), &raw);
-        let rests = rests(SampleKind::Average, &out);
+        let rests = rests(&out);
         let bias = estimate_bias(&rests, &limits);
         let level_force = accel_at_start(&rests, &limits);
         let name = file.trim_start_matches("real/");
@@ -370,9 +375,9 @@ fn the_recordings_rest_where_they_rest_and_nowhere_else() {
             // Still for the first second alone.
             "ximu3" => {
                 assert_eq!(rests.count, 1);
-                assert!(bias.unwrap().bias.amax() < 1e-3);
+                assert!(bias.unwrap().bias.0.amax() < 1e-3);
                 let force = level_force.unwrap();
-                assert!((force.norm() - 9.785).abs() < 0.01);
+                assert!((force.as_vector().norm() - 9.785).abs() < 0.01);
                 // The sensor lies flat: tilted by less than half a degree.
                 let q = level(&force).unwrap().wxyz();
                 assert!(2.0 * q[0].acos() < 0.5_f64.to_radians());
@@ -387,7 +392,7 @@ fn the_recordings_rest_where_they_rest_and_nowhere_else() {
                 // The walker stands before and after the walk; the other one lies on a table between moves.
                 let bias = bias.unwrap();
                 assert!(
-                    bias.bias.amax() < 4e-3 && bias.sigma.amax() < 2e-3,
+                    bias.bias.0.amax() < 4e-3 && bias.sigma.amax() < 2e-3,
                     "{name}: {bias:?}"
                 );
                 assert!(rests.secs > 10.0);

@@ -8,7 +8,9 @@ use strapd_attitude::condition::stillness::{
     BiasEstimate, Limits, NoRest, RESTS_KEPT, Rests, Stillness, accel_at_start, estimate_bias,
     level,
 };
-use strapd_attitude::record::{Join, Nanos, RateSample, SampleKind, Status};
+use strapd_attitude::frames::In;
+use strapd_attitude::quaternion::{BodyRate, DeltaAngle};
+use strapd_attitude::record::{Join, Measured, Nanos, RateSample, Status};
 
 const BIAS: Vector3<f64> = Vector3::new(0.011, -0.007, 0.003);
 const NOISE: f64 = 0.003;
@@ -35,8 +37,8 @@ fn body(
             RateSample {
                 stamp,
                 start: stamp,
-                value: rate(t) + BIAS + noise,
-                accel: Some(force(t) + shake),
+                gyro: Measured::Rate(BodyRate(rate(t) + BIAS + noise)),
+                accel: Some(In::assume(force(t) + shake)),
                 join: if n == 0 {
                     Join::Start
                 } else {
@@ -60,7 +62,7 @@ fn upright(_: f64) -> Vector3<f64> {
 }
 
 fn rests(samples: &[RateSample]) -> Rests {
-    let mut stillness = Stillness::new(SampleKind::Rate, Limits::default());
+    let mut stillness = Stillness::new(Limits::default());
     samples.iter().for_each(|s| stillness.push(s));
     stillness.finish()
 }
@@ -75,7 +77,7 @@ fn the_bias_of_a_still_body_is_found_within_its_sigma() {
     for seed in 0..100 {
         let found = bias(&body(seed, 10.0, still, upright)).unwrap();
         for axis in 0..3 {
-            let sigmas = (found.bias[axis] - BIAS[axis]) / found.sigma[axis];
+            let sigmas = (found.bias.0[axis] - BIAS[axis]) / found.sigma[axis];
             assert!(sigmas.abs() < 5.0, "seed {seed}: {sigmas}");
             squares += sigmas * sigmas;
         }
@@ -92,17 +94,17 @@ fn the_bias_of_a_still_body_is_found_within_its_sigma() {
 #[test]
 fn increments_give_the_same_bias_as_rates() {
     let rates = body(1, 10.0, still, upright);
-    let mut stillness = Stillness::new(SampleKind::DeltaAngle, Limits::default());
+    let mut stillness = Stillness::new(Limits::default());
     for s in &rates {
         stillness.push(&RateSample {
             start: Nanos(s.stamp.0 - STEP),
-            value: s.value * 0.005,
+            gyro: Measured::Increment(DeltaAngle(s.gyro.as_vector() * 0.005)),
             ..*s
         });
     }
     let found = estimate_bias(&stillness.finish(), &Limits::default()).unwrap();
     let expected = bias(&rates).unwrap();
-    assert!((found.bias - expected.bias).norm() < 1e-15);
+    assert!((found.bias.0 - expected.bias.0).norm() < 1e-15);
 }
 
 #[test]
@@ -179,14 +181,18 @@ fn a_level_wanted_at_the_start_is_refused_when_the_rest_comes_later() {
 fn level_turns_the_felt_force_upright_and_keeps_yaw_zero() {
     // Two witnesses by hand: on its left side, and nose up, a quarter turn each.
     let h = std::f64::consts::FRAC_1_SQRT_2;
-    let q = level(&Vector3::new(0.0, 9.81, 0.0)).unwrap().wxyz();
+    let q = level(&In::assume(Vector3::new(0.0, 9.81, 0.0)))
+        .unwrap()
+        .wxyz();
     assert!((Vector3::new(q[1], q[2], q[3]) - Vector3::new(h, 0.0, 0.0)).norm() < 1e-15);
-    let q = level(&Vector3::new(9.81, 0.0, 0.0)).unwrap().wxyz();
+    let q = level(&In::assume(Vector3::new(9.81, 0.0, 0.0)))
+        .unwrap()
+        .wxyz();
     assert!((Vector3::new(q[1], q[2], q[3]) - Vector3::new(0.0, -h, 0.0)).norm() < 1e-15);
     let mut rng = ChaCha8Rng::seed_from_u64(10);
     for _ in 0..1000 {
         let force = Vector3::from_fn(|_, _| rng.random_range(-12.0..12.0));
-        let [w, x, y, z] = level(&force).unwrap().wxyz();
+        let [w, x, y, z] = level(&In::assume(force)).unwrap().wxyz();
         let q = UnitQuaternion::new_unchecked(nalgebra::Quaternion::new(w, x, y, z));
         assert!((q.norm() - 1.0).abs() < 1e-15);
         let up = q * force;
@@ -197,8 +203,8 @@ fn level_turns_the_felt_force_upright_and_keeps_yaw_zero() {
         );
         assert!(q.euler_angles().2.abs() < 1e-9);
     }
-    assert!(level(&Vector3::zeros()).is_none());
-    assert!(level(&Vector3::new(f64::NAN, 0.0, 1.0)).is_none());
+    assert!(level(&In::assume(Vector3::zeros())).is_none());
+    assert!(level(&In::assume(Vector3::new(f64::NAN, 0.0, 1.0))).is_none());
 }
 
 #[test]
@@ -218,7 +224,7 @@ fn a_rest_in_which_a_motion_sets_in_tells_the_vertical_less_well_and_says_how_we
         let found = rests(&body(5, 2.75, still, leaning(lean)));
         let rest = found.kept[0];
         let up = rest.mean_accel.unwrap();
-        (up.angle(&DOWNWARD), rest.tilt_sigma)
+        (up.as_vector().angle(&DOWNWARD), rest.tilt_sigma)
     };
     // 0.03 m/s^2 of white noise over 550 samples: 1.3e-4 rad by axis.
     let (off, sigma) = tilt(0.0);

@@ -7,8 +7,10 @@ use rand_chacha::ChaCha8Rng;
 use strapd_attitude::frames::{Body, Nav};
 use strapd_attitude::propagate::covariance::{Covariance, Noise};
 use strapd_attitude::propagate::{Method, Propagator, Sequential, Settings};
-use strapd_attitude::quaternion::{Quaternion, RotationVector};
-use strapd_attitude::record::{AttitudeSample, Join, Nanos, RateSample, SampleKind, Status};
+use strapd_attitude::quaternion::{DeltaAngle, Quaternion, RotationVector};
+use strapd_attitude::record::{
+    AttitudeSample, Join, Measured, Nanos, RateSample, SampleKind, Status,
+};
 
 const STEP: f64 = 0.01;
 
@@ -120,7 +122,7 @@ fn propagated(flight: &Flight, method: Method, noise: &Noise) -> Vec<AttitudeSam
         .map(|(k, angle)| RateSample {
             stamp: Nanos(k * step),
             start: Nanos((k - i64::from(k > 0)) * step),
-            value: *angle,
+            gyro: Measured::Increment(DeltaAngle(*angle)),
             accel: None,
             join: if k == 0 {
                 Join::Start

@@ -185,9 +185,11 @@ fn sigma_behind_a_burst_is_what_happens_within_a_factor_of_two() {
                 .iter()
                 .map(|sample| {
                     let mut sample = *sample;
-                    for v in sample.value.iter_mut() {
+                    let mut noisy = *sample.gyro.as_vector();
+                    for v in noisy.iter_mut() {
                         *v += scale * rng.random_range(-root3..root3);
                     }
+                    sample.gyro = sample.gyro.with(noisy);
                     sample
                 })
                 .collect();

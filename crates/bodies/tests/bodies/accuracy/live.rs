@@ -4,6 +4,7 @@ use super::centred;
 use super::coning::Coning;
 use super::run::{propagator, sample};
 use nalgebra::Vector3;
+use strapd_attitude::frames::In;
 use strapd_attitude::propagate::{Method, Order, Sequential};
 use strapd_attitude::record::{AttitudeSample, Join, Nanos, RateSample, SampleKind, Status};
 
@@ -23,7 +24,7 @@ fn samples(kind: SampleKind) -> Vec<RateSample> {
                 SampleKind::Rate => sample(k * STEP, k * STEP, CONE.rate(k)),
                 _ => sample((k - 1) * STEP, k * STEP, CONE.increment(k)),
             };
-            sample.accel = Some(Vector3::new(k as f64, 0.0, 9.8));
+            sample.accel = Some(In::assume(Vector3::new(k as f64, 0.0, 9.8)));
             sample.log = Nanos(k * STEP + 123_456);
             if k == 31 {
                 sample.join = Join::Bridge;

@@ -198,7 +198,7 @@ fn the_two_peers_without_a_row_are_of_first_order() {
     }
     // About a fixed axis one exponential is exact, and I + [w dt x] turns by the arc tangent.
     let still: Vec<RateSample> = (0..3)
-        .map(|k| sample(k, k * 1_000_000_000, [0.0, 0.3, 0.0]))
+        .map(|k| sample(k * 1_000_000_000, k * 1_000_000_000, [0.0, 0.3, 0.0]))
         .collect();
     let out = first_order_matrix(Quaternion::identity(), &still);
     let [_, _, y, _] = out[2].wxyz();

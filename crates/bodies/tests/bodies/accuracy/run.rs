@@ -2,15 +2,23 @@
 
 use strapd_attitude::propagate::{Method, Propagator, Sequential, Settings};
 use strapd_attitude::quaternion::Quaternion;
-use strapd_attitude::record::{AttitudeSample, Join, Nanos, RateSample, SampleKind, Status};
+use strapd_attitude::record::{
+    AttitudeSample, Join, Measured, Nanos, RateSample, SampleKind, Status,
+};
 
 pub const ARCSEC: f64 = 3600.0;
 
+/// A rate where it has no interval, otherwise an increment.
 pub fn sample(start: i64, stamp: i64, value: [f64; 3]) -> RateSample {
+    let kind = if start == stamp {
+        SampleKind::Rate
+    } else {
+        SampleKind::DeltaAngle
+    };
     RateSample {
         stamp: Nanos(stamp),
         start: Nanos(start),
-        value: value.into(),
+        gyro: Measured::assume(kind, value.into()),
         accel: None,
         join: Join::Continuous,
         status: Status::OK,

@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 use strapd_attitude::frames::{Dcm, In, Sensor};
 use strapd_attitude::propagate::{Method, Noise, Propagator, Sequential, Settings};
 use strapd_attitude::quaternion::Quaternion;
-use strapd_attitude::record::{Join, Nanos, RateSample, SampleKind, Status};
+use strapd_attitude::record::{Join, Measured, Nanos, RateSample, SampleKind, Status};
 use strapd_bodies::dh::Transform;
 use strapd_bodies::youbot::*;
 
@@ -38,15 +38,15 @@ fn propagated(imu: &Gripper, rate_hz: u64, kind: SampleKind) -> f64 {
     let samples: Vec<RateSample> = (0..=20 * rate_hz)
         .map(|i| {
             let (nanos, before) = (i * step, i.saturating_sub(1) * step);
-            let (value, start) = if kind == SampleKind::Rate {
-                (imu.read(nanos).rate.0, nanos)
+            let (gyro, start) = if kind == SampleKind::Rate {
+                (Measured::Rate(imu.read(nanos).rate), nanos)
             } else {
-                (imu.delta_angle(before, nanos).0, before)
+                (Measured::Increment(imu.delta_angle(before, nanos)), before)
             };
             RateSample {
                 stamp: Nanos(nanos as i64),
                 start: Nanos(start as i64),
-                value: [value.x, value.y, value.z].into(),
+                gyro,
                 accel: None,
                 join: if i == 0 {
                     Join::Start

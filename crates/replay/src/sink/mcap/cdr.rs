@@ -280,7 +280,8 @@ mod tests {
     use super::*;
     use crate::sink::tests::sample;
     use nalgebra::Vector3;
-    use strapd_attitude::quaternion::Quaternion;
+    use strapd_attitude::frames::In;
+    use strapd_attitude::quaternion::{BodyRate, Quaternion};
     use strapd_attitude::record::AttitudeCovariance;
 
     fn f64_at(bytes: &[u8], at: usize) -> f64 {
@@ -298,8 +299,8 @@ mod tests {
             // A quarter turn about z: body x is world y, body y is world -x.
             let half = std::f64::consts::FRAC_1_SQRT_2;
             s.q_nb = Quaternion::assume_unit([half, 0.0, 0.0, half]);
-            s.rate = Vector3::new(1.0, 2.0, 3.0);
-            s.accel = Some(Vector3::new(4.0, 5.0, 6.0));
+            s.rate = BodyRate(Vector3::new(1.0, 2.0, 3.0));
+            s.accel = Some(In::assume(Vector3::new(4.0, 5.0, 6.0)));
             s.covariance = AttitudeCovariance {
                 xy: 1.0,
                 xz: 2.0,
