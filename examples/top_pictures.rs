@@ -1,6 +1,6 @@
 //! Draws the pictures of `docs/top.md` into `docs/pictures`: `cargo run --release --example top_pictures`.
 //!
-//! What the seed document shows on screen: the path of the axis for the four classic motions, by the
+//! What the source document shows on screen: the path of the axis for the four classic motions, by the
 //! service's integrator on gyro samples and by the differential equation of the Euler angles; the
 //! error over time for each method; the error over the sample rate.
 
@@ -43,7 +43,7 @@ fn main() -> Result<(), Failure> {
 
 /// Exact motion at every sample.
 fn truth(case: Case, rate_hz: f64) -> Result<(SymmetricTop, EulerState, Vec<Spin>), Failure> {
-    let top = SymmetricTop::seed();
+    let top = SymmetricTop::published();
     let start = case.start(&top, Case::SEED_TILT, Case::SEED_W3)?;
     let mut exact = top.exact(&start)?;
     let steps = (SECS * rate_hz).round() as u64;
@@ -197,7 +197,7 @@ fn error_over_time() -> Result<Chart, Failure> {
     let (top, start, truth) = truth(Case::Cusped, RATE_HZ)?;
     let compared: [Compared; 7] = [
         (
-            "live, w(t_i+1): the seed's",
+            "live, w(t_i+1): the document's",
             How::Top(TopMethod::Live(HeldRate::Right)),
         ),
         ("gyro, w(t_i+1)", How::Top(TopMethod::Gyro(HeldRate::Right))),
@@ -242,7 +242,7 @@ fn error_over_time() -> Result<Chart, Failure> {
 fn error_over_rate() -> Result<Chart, Failure> {
     let compared: [Compared; 7] = [
         (
-            "live, w(t_i+1): the seed's",
+            "live, w(t_i+1): the document's",
             How::Top(TopMethod::Live(HeldRate::Right)),
         ),
         ("gyro, w(t_i+1)", How::Top(TopMethod::Gyro(HeldRate::Right))),

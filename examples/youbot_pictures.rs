@@ -8,7 +8,7 @@
 
 use std::path::Path;
 use strapd::report::plot::{Axis, Chart, Look, Series};
-use strapd_bodies::youbot::{Arm, JointPath, SeedJoints};
+use strapd_bodies::youbot::{Arm, JointPath, TableJoints};
 
 fn main() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/pictures");
@@ -21,7 +21,7 @@ fn main() {
 
 /// Shoulder, elbow, wrist and tool point in the plane of the arm: radial, up; m.
 fn skeleton(arm: &Arm, q: [f64; 5]) -> Vec<[f64; 2]> {
-    let q = SeedJoints::from_degrees(q).unwrap();
+    let q = TableJoints::from_degrees(q).unwrap();
     let poses = arm.link_poses(&q);
     let mut points = vec![[0.0, 0.0], [0.0, arm.parameters().d1]];
     // Link 4 ends in the wrist, where link 3 does.
@@ -35,7 +35,7 @@ fn skeleton(arm: &Arm, q: [f64; 5]) -> Vec<[f64; 2]> {
 /// The tool point for joint 1 at zero, its other joints anywhere between their stops: the outline of
 /// what a fine grid of angles reaches, drawn as the grid's points.
 fn workspace() -> Chart {
-    let arm = Arm::seed();
+    let arm = Arm::published();
     let (min, max) = (arm.limits().min(), arm.limits().max());
     let grid = |joint: usize, steps: u32| {
         let (lo, hi) = (min[joint], max[joint]);
@@ -47,7 +47,7 @@ fn workspace() -> Chart {
     for q2 in grid(1, 120) {
         for q3 in grid(2, 180) {
             for q4 in grid(3, 120) {
-                let q = SeedJoints::new([0.0, q2, q3, q4, 0.0]).unwrap();
+                let q = TableJoints::new([0.0, q2, q3, q4, 0.0]).unwrap();
                 let t = arm.forward(&q).translation();
                 let p = t.as_vector();
                 reached.insert(((p.x / square).round() as i32, (p.z / square).round() as i32));

@@ -67,7 +67,7 @@ impl Run {
 
     /// The seed's top for 1.2 s; rates that divide 1e9.
     pub fn top(rate_hz: u64) -> Result<Self, Failure> {
-        let top = SymmetricTop::seed();
+        let top = SymmetricTop::published();
         let start = Case::Cusped.start(&top, Case::SEED_TILT, Case::SEED_W3)?;
         let mut motion = Motion::HeavyBody(Box::new(top.exact(&start)?));
         let step = 1_000_000_000 / rate_hz;

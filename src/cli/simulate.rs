@@ -25,7 +25,7 @@ use strapd_recording::pool::Pool;
 /// Samples of a synthetic gyro whose true attitude is known exactly.
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:
-  strapd simulate top -o top.mcap                        the seed's top, cusped, 2000 Hz
+  strapd simulate top -o top.mcap                        the published top, cusped, 2000 Hz
   strapd simulate top --case looping --duration 60 -o top.ndjson
   strapd simulate coning --half-angle-deg 1 --frequency-hz 10 --rate-hz 400 -o coning.mcap
   strapd simulate walking --worn foot --rate-hz 200 --duration 120 --noise consumer_mems -o walk.mcap

@@ -33,7 +33,7 @@ static AT_ONCE: LazyLock<Semaphore> = LazyLock::new(|| Semaphore::new(2));
 /// How long one waits for its turn.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// What may be asked; what is left out is the seed document's top.
+/// What may be asked; what is left out is the source document's top.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Request {
@@ -68,7 +68,7 @@ fn within(name: &str, value: Option<f64>, or: f64, low: f64, high: f64) -> Resul
 impl Request {
     /// The top, its start, and how it is looked at.
     fn course(&self) -> Result<(Course, Vec<How>), String> {
-        let seed = SymmetricTop::seed();
+        let seed = SymmetricTop::published();
         let top = compare::body(
             within("mass", self.mass, seed.mass(), 0.01, 100.0)?,
             within("arm", self.arm, seed.arm(), 0.0, 1.0)?,

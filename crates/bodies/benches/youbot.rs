@@ -19,7 +19,7 @@ const POSES: usize = 1000;
 struct Work {
     arm: Arm,
     dynamics: Dynamics,
-    motions: Vec<SeedMotion>,
+    motions: Vec<TableMotion>,
     targets: Vec<Transform<Base, Tool>>,
 }
 
@@ -29,11 +29,11 @@ fn work() -> Work {
     let dynamics = Dynamics::new(arm, published_links(&arm).unwrap(), g_b).unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(1);
     let (min, max) = (arm.limits().min(), arm.limits().max());
-    let motions: Vec<SeedMotion> = (0..POSES)
+    let motions: Vec<TableMotion> = (0..POSES)
         .map(|_| {
             let q = std::array::from_fn(|i| rng.random_range(min[i]..max[i]));
             let mut five = || std::array::from_fn(|_| rng.random_range(-1.5..1.5));
-            SeedMotion::new(SeedJoints::new(q).unwrap(), five(), five()).unwrap()
+            TableMotion::new(TableJoints::new(q).unwrap(), five(), five()).unwrap()
         })
         .collect();
     let targets = motions.iter().map(|m| arm.forward(m.q())).collect();

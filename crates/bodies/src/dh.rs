@@ -9,7 +9,7 @@
 //! z_(i-1) and meets it. `(i-1)A(i) = Rz(theta) Tz(d) Tx(a) Rx(alpha)`.
 //!
 //! # Source
-//! Denavit, Hartenberg 1955; the seed document's (2.1)-(2.5), appendices A and B. Modified
+//! Denavit, Hartenberg 1955; the source document's (2.1)-(2.5), appendices A and B. Modified
 //! (proximal) tables, such as that of Zhang, Li, Xiao 2015, do not fit.
 //!
 //! ```

@@ -7,13 +7,13 @@
 //! `q_nb` takes body to navigation components, the body rate `w_nb_b` is in rad/s in body axes,
 //! torques are about the body's fixed point (or centre of gravity, when free) in body axes.
 //! Euler's equations are `J w_dot = tau - w x (J w)`, for any symmetric J: the third component is
-//! `(Iy - Ix) wx wy`, where the seed document prints `(Ix - Iy)` (eq. 17), which a symmetric top can
+//! `(Iy - Ix) wx wy`, where the source document prints `(Ix - Iy)` (eq. 17), which a symmetric top can
 //! not tell apart.
 //!
 //! # Methods
 //! | [`Method`] | order | use |
 //! |---|---|---|
-//! | `HeldTorque(..)` | 1 | the seed document's own scheme, for comparison |
+//! | `HeldTorque(..)` | 1 | the source document's own scheme, for comparison |
 //! | `Rk4` | 4 | comparison |
 //! | `GaussLegendre6` | 6 | default for any torque; keeps the norm, energy and momentum of a free body to rounding |
 //!
@@ -145,7 +145,7 @@ impl Rotor {
         })
     }
 
-    /// The seed's program: RK4 on Euler's equations with the torque of the step's start held, then
+    /// The document's program: RK4 on Euler's equations with the torque of the step's start held, then
     /// one rotation by a rate held over the step.
     fn step_with_held_torque(
         &self,

@@ -1,7 +1,7 @@
 //! A symmetric top, a case and a spin -> its motion by four methods, one of them exact. Pure.
 //!
 //! A stage of its own because the top is the hardest easy motion there is: it turns fast, it wobbles,
-//! and its solution is known. It is the seed document's own test of attitude integration.
+//! and its solution is known. It is the source document's own test of attitude integration.
 //!
 //! # Convention
 //! Pivot O, axis of symmetry z, centre of gravity at `arm` along it. Navigation z is up, gravity
@@ -10,14 +10,14 @@
 //!
 //! | method | what it does |
 //! |---|---|
-//! | live ([`TopMethod::Live`], A) | the seed's simulation: torque held over a step, RK4, one rotation |
+//! | live ([`TopMethod::Live`], A) | the document's simulation: torque held over a step, RK4, one rotation |
 //! | Euler angles ([`TopMethod::EulerAngles`], B) | the differential equation of the angles (Hasbun); singular upright and hanging |
 //! | gyro ([`TopMethod::Gyro`], C) | rates sampled from B, one rotation a sample: what a gyro user does |
 //! | exact ([`SymmetricTop::exact`], D) | power series in 32 digits ([`HeavyBody`]); proven by [`ClosedForm`] |
 //!
 //! # Source
 //! Goldstein, Classical Mechanics, 2nd ed., 5-7 (eq. 5-77: steady precession; 4-125: body rates).
-//! The seed document's errata are in `docs/top.md`, each with the test that shows it.
+//! The source document's errata are in `docs/top.md`, each with the test that shows it.
 
 mod case;
 mod closed_form;
@@ -86,9 +86,9 @@ impl SymmetricTop {
         })
     }
 
-    /// The seed document's top: 1 kg, 4 cm, 0.002 and 0.0008 kg m^2, 9.8 m/s^2.
+    /// The source document's top: 1 kg, 4 cm, 0.002 and 0.0008 kg m^2, 9.8 m/s^2.
     #[must_use]
-    pub fn seed() -> Self {
+    pub fn published() -> Self {
         Self {
             mass: 1.0,
             arm: 0.04,
@@ -182,7 +182,7 @@ impl SymmetricTop {
         Ok((c / q, q / a))
     }
 
-    /// The spin frequency in Hz that the top must exceed by far to precess at all (seed eq. 25):
+    /// The spin frequency in Hz that the top must exceed by far to precess at all (the document's eq. 25):
     /// `sqrt(M g arm sin(nutation) / (2 pi I3))`. An order of magnitude, not a border.
     #[must_use]
     pub fn spin_threshold_hz(&self, nutation: f64) -> f64 {

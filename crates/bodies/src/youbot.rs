@@ -17,21 +17,21 @@
 //! - Base frame: z up along the axis of joint 1, x forward, origin in the mounting plane (preset
 //!   `seed`) or in that of `arm_link_0` (preset `urdf`). Tool frame: z is the approach, out of the
 //!   gripper; the upright arm has its tool turned by half a turn about z.
-//! - Joint angles have two conventions, and each is a type: [`SeedJoints`] of the document's table
+//! - Joint angles have two conventions, and each is a type: [`TableJoints`] of the document's table
 //!   2.1, and [`DriverJoints`] of the encoders, ROS and the URDF. They run in opposite directions.
 //! - Gravity is an argument.
 //!
 //! # Source
-//! The seed document (Antonov, Artemov, ITMO 2017, sections 1, 2, appendices A and B) as far as it
+//! The source document (Antonov, Artemov, ITMO 2017, sections 1, 2, appendices A and B) as far as it
 //! is right; `crates/bodies/tests/bodies/youbot/errata.rs` names each place where it is not (Y1 to Y21). Lengths: its
 //! table 2.1 and the URDF of mas-group/youbot_description (commit 65489aa). Craig, Introduction to
 //! Robotics, chapters 5 and 6, for the recursions.
 //!
 //! # Example
 //! ```
-//! use strapd_bodies::youbot::{Arm, Policy, SeedJoints};
-//! let arm = Arm::seed();
-//! let q = SeedJoints::from_degrees([20.0, -30.0, -80.0, 60.0, 10.0])?;
+//! use strapd_bodies::youbot::{Arm, Policy, TableJoints};
+//! let arm = Arm::published();
+//! let q = TableJoints::from_degrees([20.0, -30.0, -80.0, 60.0, 10.0])?;
 //! let t_base_tool = arm.forward(&q);
 //! let found = arm.inverse(&t_base_tool, Policy::default(), Some(&q))?;
 //! let nearest = found.nearest(&q)?;
@@ -70,7 +70,7 @@ pub use imu::{Gripper, ImuMount, ImuReading};
 pub use inverse::{BaseTurn, Elbow, Solution, Solutions};
 pub use jacobian::{Singularity, Twist};
 pub use joints::{
-    DriverJoints, DriverMotion, DriverTorques, JOINTS, SeedJoints, SeedMotion, SeedTorques,
+    DriverJoints, DriverMotion, DriverTorques, JOINTS, SeedTorques, TableJoints, TableMotion,
 };
 pub use limits::Limits;
 pub use masses::{gripper, published_links};

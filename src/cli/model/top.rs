@@ -19,7 +19,7 @@ use strapd_bodies::top::{Case, EulerState, SymmetricTop};
 /// The symmetric top: its cases, and how well each method finds its attitude.
 #[derive(Args, Debug)]
 #[command(
-    after_help = "Methods: live-left, live-right, live-mean (the seed's simulation), euler-angles (singular upright and
+    after_help = "Methods: live-left, live-right, live-mean (the document's simulation), euler-angles (singular upright and
 hanging), gyro-left, gyro-right, gyro-mean (one rotation a sample), and those of replay --method on exact
 samples: auto, magnus, commit, dcm-mean, rk4, ...
 
@@ -118,7 +118,7 @@ impl Top {
 
 fn answer(request: &Request) -> std::result::Result<Value, Refusal> {
     let case = compare::case(&request.case)?;
-    let seed = SymmetricTop::seed();
+    let seed = SymmetricTop::published();
     let top = compare::body(
         request.mass.unwrap_or(seed.mass()),
         request.arm.unwrap_or(seed.arm()),

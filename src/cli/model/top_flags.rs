@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 use strapd_bodies::top::method_errors::{body, case};
 use strapd_bodies::top::{Case, EulerAngles, EulerState, SymmetricTop};
 
-/// Which top, and how it starts. The defaults are the seed document's.
+/// Which top, and how it starts. The defaults are the source document's.
 #[derive(Args, Debug, Clone)]
 #[command(next_help_heading = "Top")]
 pub struct TopFlags {
@@ -57,7 +57,7 @@ impl TopFlags {
     /// # Errors
     /// [`Error::Usage`] for a body that can not be.
     pub(crate) fn body(&self) -> Result<SymmetricTop> {
-        let seed = SymmetricTop::seed();
+        let seed = SymmetricTop::published();
         let [across, along] = match &self.inertia {
             Some(list) => numbers("--inertia", list)?,
             None => [seed.transverse(), seed.axial()],
@@ -122,7 +122,7 @@ impl TopFlags {
 
     /// What was asked for, by name.
     pub(crate) fn parameters(&self) -> Vec<(&'static str, String)> {
-        let seed = SymmetricTop::seed();
+        let seed = SymmetricTop::published();
         let inertia = || format!("{},{}", seed.transverse(), seed.axial());
         let mut list = vec![
             ("mass_kg", self.mass.unwrap_or(seed.mass()).to_string()),

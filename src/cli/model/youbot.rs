@@ -15,7 +15,7 @@ use serde_json::{Value, json};
 use std::io::IsTerminal;
 use strapd_attitude::frames::Dcm;
 use strapd_attitude::quaternion::Quaternion;
-use strapd_bodies::youbot::{Arm, ArmError, DriverJoints, DriverMotion, SeedJoints, SeedMotion};
+use strapd_bodies::youbot::{Arm, ArmError, DriverJoints, DriverMotion, TableJoints, TableMotion};
 
 /// The KUKA youBot's arm: kinematics, forces, paths.
 #[derive(Args, Debug)]
@@ -199,16 +199,16 @@ struct Setting {
 impl Setting {
     fn new(preset: Preset, joints: Convention, unit: Unit) -> Setting {
         let arm = match preset {
-            Preset::Seed => Arm::seed(),
+            Preset::Seed => Arm::published(),
             Preset::Urdf => Arm::urdf(),
         };
         Setting { arm, joints, unit }
     }
 
-    fn read(&self, q: [f64; 5]) -> std::result::Result<SeedJoints, Refusal> {
+    fn read(&self, q: [f64; 5]) -> std::result::Result<TableJoints, Refusal> {
         let q = q.map(|angle| self.unit.read(angle));
         match self.joints {
-            Convention::Seed => SeedJoints::new(q),
+            Convention::Seed => TableJoints::new(q),
             Convention::Driver => DriverJoints::new(q).map(|u| self.arm.seed_joints(&u)),
         }
         .map_err(|e| refusal(&e))
@@ -219,7 +219,7 @@ impl Setting {
         q: [f64; 5],
         qd: [f64; 5],
         qdd: [f64; 5],
-    ) -> std::result::Result<SeedMotion, Refusal> {
+    ) -> std::result::Result<TableMotion, Refusal> {
         let zero = &self.arm.parameters().driver_zero;
         let (qd, qdd) = (
             qd.map(|w| self.unit.read(w)),
@@ -227,7 +227,7 @@ impl Setting {
         );
         let q = self.read(q)?;
         match self.joints {
-            Convention::Seed => SeedMotion::new(q, qd, qdd),
+            Convention::Seed => TableMotion::new(q, qd, qdd),
             Convention::Driver => {
                 DriverMotion::new(q.to_driver(zero), qd, qdd).map(|m| m.to_seed(zero))
             }
@@ -235,7 +235,7 @@ impl Setting {
         .map_err(|e| refusal(&e))
     }
 
-    fn say(&self, q: &SeedJoints) -> [f64; 5] {
+    fn say(&self, q: &TableJoints) -> [f64; 5] {
         let q = match self.joints {
             Convention::Seed => q.angles(),
             Convention::Driver => self.arm.driver_joints(q).angles(),

@@ -10,7 +10,7 @@ use strapd_bodies::synthetic::ForceSampling;
 /// A heavy symmetric top on a fixed pivot: spins, precesses, nods.
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:
-  strapd simulate top -o top.mcap                             the seed's: cusped, 20 Hz, 54.57 deg
+  strapd simulate top -o top.mcap                             the document's: cusped, 20 Hz, 54.57 deg
   strapd simulate top --case steady-slow --duration 60 -o top.mcap
   strapd simulate top --euler 0,90,0 --euler-rates 40,0,3600 -o wheel.mcap")]
 pub struct Top {

@@ -1,4 +1,4 @@
-//! Samples -> turns the way others do it: the seed's rules and textbook coning algorithms. Pure.
+//! Samples -> turns the way others do it: the document's rules and textbook coning algorithms. Pure.
 //!
 //! Kept for comparison and to reproduce published figures; none is a good default
 //! (`docs/theory/attitude.md` 1, 6).
@@ -44,7 +44,7 @@ pub(crate) fn step(method: Method, track: &Track, k: usize) -> Step {
         Method::Coning3 => coning(track, k, 3),
         Method::Coning4 => coning(track, k, 4),
         Method::RotvecSum => {
-            // The seed's sum runs over w(t_0) .. w(t_i) for the attitude at t_i+1.
+            // The document's sum runs over w(t_0) .. w(t_i) for the attitude at t_i+1.
             let phi = if track.increments {
                 right * h
             } else {

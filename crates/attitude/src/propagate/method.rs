@@ -41,13 +41,13 @@ pub enum Method {
         /// As there.
         finals: bool,
     },
-    /// The rate at the start of the interval, held: the seed's `w(t_i)`. First order.
+    /// The rate at the start of the interval, held: the document's `w(t_i)`. First order.
     DcmLeft,
-    /// The rate at the end of the interval, held: the seed's `w(t_i+1)`. First order on gyro data.
+    /// The rate at the end of the interval, held: the document's `w(t_i+1)`. First order on gyro data.
     DcmRight,
     /// The mean of both. Second order.
     DcmMean,
-    /// The seed's eq. 13: one rotation by the sum of all rotation vectors. Right only while all of
+    /// The document's eq. 13: one rotation by the sum of all rotation vectors. Right only while all of
     /// them, the initial attitude included, are small or parallel; 25 degrees wrong on generic motion.
     RotvecSum,
     /// Coning-optimised blocks of 2 increments (Miller 1983), for comparison.

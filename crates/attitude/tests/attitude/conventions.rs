@@ -1,5 +1,5 @@
 //! What every sign, order and direction means, each with a witness that a transpose, a swapped order
-//! or a half conversion would fail. The seed's wrong equations are named and refuted
+//! or a half conversion would fail. The document's wrong equations are named and refuted
 //! (docs/top.md).
 
 use nalgebra::{Matrix3, Vector3};
@@ -274,7 +274,7 @@ fn matrices_that_are_no_rotation_are_refused() {
     assert!(try_diagonal([f64::INFINITY, 1.0, 1.0]).is_err());
 }
 
-// ---- the seed's equations ----
+// ---- the document's equations ----
 
 /// A motion with nothing special about it, as yaw, pitch, roll and their rates (closed form).
 fn motion(t: f64) -> (Matrix3<f64>, Vector3<f64>) {
@@ -296,7 +296,7 @@ fn motion(t: f64) -> (Matrix3<f64>, Vector3<f64>) {
     (*c.as_matrix(), w)
 }
 
-/// The seed's CK matrix, entry by entry as printed under its figure 2.
+/// The document's CK matrix, entry by entry as printed under its figure 2.
 fn ck(v: &Vector3<f64>) -> Matrix3<f64> {
     let angle = v.norm();
     let s = if angle > 0.0 {
@@ -373,7 +373,7 @@ fn erratum_eq_15_the_rate_of_c_is_c_times_w_cross() {
     assert!((rate - w.cross_matrix() * c).amax() > 0.5);
 }
 
-/// z-x'-z'' with precession p, nutation th and spin s, as in seed 002.
+/// z-x'-z'' with precession p, nutation th and spin s, as in the top's document.
 fn zxz(p: f64, th: f64, s: f64) -> Q {
     Q::from_rotation_vector(&phi(0.0, 0.0, p))
         .advanced(&phi(th, 0.0, 0.0))

@@ -100,7 +100,7 @@ impl RigidBody {
 
     /// `nu_dot` in body axes from `M nu_dot + C(nu) nu = tau`, `tau` applied at O.
     ///
-    /// The seed's `M nu_dot = tau` holds only at rest (erratum I6).
+    /// The document's `M nu_dot = tau` holds only at rest (erratum I6).
     ///
     /// # Errors
     /// [`InertiaError::NotInvertible`] when the tensor is too near singular to solve with.

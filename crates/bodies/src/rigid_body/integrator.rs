@@ -8,7 +8,7 @@ use std::fmt;
 pub enum HeldRate {
     /// `w(t_i)`
     Left,
-    /// `w(t_i+1)`, the seed document's choice
+    /// `w(t_i+1)`, the source document's choice
     Right,
     /// Their mean
     Mean,
@@ -29,7 +29,7 @@ impl HeldRate {
 /// How a step is taken.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Method {
-    /// The seed document's: torque held over the step, RK4 on the rate, one rotation by a held rate.
+    /// The source document's: torque held over the step, RK4 on the rate, one rotation by a held rate.
     HeldTorque(HeldRate),
     /// Classical fourth-order Runge-Kutta on quaternion and rate together.
     Rk4,

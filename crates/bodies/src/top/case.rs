@@ -33,9 +33,9 @@ impl Case {
         Self::Falling,
     ];
 
-    /// The seed document's tilt, rad.
+    /// The source document's tilt, rad.
     pub const SEED_TILT: f64 = 54.57 * std::f64::consts::PI / 180.0;
-    /// The seed document's spin, 20 turns a second, rad/s.
+    /// The source document's spin, 20 turns a second, rad/s.
     pub const SEED_W3: f64 = 20.0 * std::f64::consts::TAU;
 
     /// The name at the command line.

@@ -1,6 +1,6 @@
 //! A top and a sample rate -> attitudes by methods A, B, C, and their errors against D. Pure.
 //!
-//! The seed document's figure 10, as numbers. The table it leads to is in `docs/top.md`.
+//! The source document's figure 10, as numbers. The table it leads to is in `docs/top.md`.
 
 use super::{EulerState, SymmetricTop, TopError};
 use crate::rigid_body::{HeldRate, Method, Rotor, Spin, gauss_legendre6};

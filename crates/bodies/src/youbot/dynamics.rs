@@ -1,7 +1,7 @@
 //! Joint motion, gravity, a force at the tool -> joint torques; mass matrix and energies. Pure.
 
 use super::error::bounded;
-use super::joints::{JOINTS, SeedJoints, SeedMotion, SeedTorques};
+use super::joints::{JOINTS, SeedTorques, TableJoints, TableMotion};
 use super::recursion::Moving;
 use super::{Arm, ArmError, Base, Tool};
 use crate::inertia::RigidBody;
@@ -125,29 +125,29 @@ impl Dynamics {
     /// 1e-13 N m at the arm's own rates; against pinocchio, see `tests/oracles/youbot_dynamics.py`.
     ///
     /// # Source
-    /// Luh, Walker, Paul 1980; Craig, chapter 6. Tensors about the centre of mass, as the seed document
+    /// Luh, Walker, Paul 1980; Craig, chapter 6. Tensors about the centre of mass, as the source document
     /// has them.
     #[must_use]
-    pub fn torques(&self, motion: &SeedMotion) -> SeedTorques {
+    pub fn torques(&self, motion: &TableMotion) -> SeedTorques {
         let zero = Vector3::zeros();
         self.newton_euler(motion, &zero, &zero)
     }
 
     /// As [`Dynamics::torques`], while the tool presses on the world.
     #[must_use]
-    pub fn torques_with_tip(&self, motion: &SeedMotion, tip: &Wrench) -> SeedTorques {
+    pub fn torques_with_tip(&self, motion: &TableMotion, tip: &Wrench) -> SeedTorques {
         self.newton_euler(motion, tip.force.as_vector(), tip.moment.as_vector())
     }
 
     /// Torques that hold the arm still.
     #[must_use]
-    pub fn gravity_torques(&self, q: &SeedJoints) -> SeedTorques {
+    pub fn gravity_torques(&self, q: &TableJoints) -> SeedTorques {
         self.torques(&q.at_rest())
     }
 
     fn newton_euler(
         &self,
-        motion: &SeedMotion,
+        motion: &TableMotion,
         force: &Vector3<f64>,
         moment: &Vector3<f64>,
     ) -> SeedTorques {
@@ -191,7 +191,7 @@ impl Dynamics {
     /// The mass matrix, kg m^2: symmetric to the bit, positive definite.
     /// Column j holds the torques of unit acceleration of joint j alone, without gravity.
     #[must_use]
-    pub fn mass_matrix(&self, q: &SeedJoints) -> SMatrix<f64, JOINTS, JOINTS> {
+    pub fn mass_matrix(&self, q: &TableJoints) -> SMatrix<f64, JOINTS, JOINTS> {
         let rotations = self.arm.rotations(q);
         let mut m = SMatrix::zeros();
         let zero = Vector3::zeros();
@@ -216,7 +216,7 @@ impl Dynamics {
 
     /// Kinetic and potential energy.
     #[must_use]
-    pub fn energy(&self, motion: &SeedMotion) -> Energy {
+    pub fn energy(&self, motion: &TableMotion) -> Energy {
         let poses = self.arm.link_poses(motion.q());
         let motions = self.arm.link_motions(motion);
         let mut energy = Energy {

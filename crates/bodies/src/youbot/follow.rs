@@ -8,7 +8,7 @@ use super::error::bounded;
 use super::forward::orientation;
 use super::inverse::Solution;
 use super::jacobian::{Singularity, Twist};
-use super::joints::{JOINTS, SeedJoints, SeedMotion};
+use super::joints::{JOINTS, TableJoints, TableMotion};
 use super::path::{JointPath, Sinusoid};
 use super::policy::Policy;
 use super::timing::slow_down;
@@ -39,8 +39,8 @@ pub struct Follower {
     arm: Arm,
     policy: Policy,
     allowed: f64,
-    last: Option<(f64, SeedMotion)>,
-    start: SeedJoints,
+    last: Option<(f64, TableMotion)>,
+    start: TableJoints,
 }
 
 impl Follower {
@@ -51,7 +51,7 @@ impl Follower {
     /// `allowed` not a finite number.
     pub fn new(
         arm: Arm,
-        start: SeedJoints,
+        start: TableJoints,
         policy: Policy,
         allowed: f64,
     ) -> Result<Self, ArmError> {
@@ -70,7 +70,7 @@ impl Follower {
     /// # Errors
     /// [`ArmError::Path`] with the time and the reason: out of reach (by how much), off the plane, past
     /// a stop, singular, or [`ArmError::BranchChange`]. The follower stays where it was.
-    pub fn step(&mut self, secs: f64, wanted: &ToolMotion) -> Result<SeedMotion, ArmError> {
+    pub fn step(&mut self, secs: f64, wanted: &ToolMotion) -> Result<TableMotion, ArmError> {
         bounded("time on the path (s)", [secs], 1e9)?;
         let motion = self.solve(secs, wanted).map_err(|why| ArmError::Path {
             secs,
@@ -80,7 +80,7 @@ impl Follower {
         Ok(motion)
     }
 
-    fn solve(&self, secs: f64, wanted: &ToolMotion) -> Result<SeedMotion, ArmError> {
+    fn solve(&self, secs: f64, wanted: &ToolMotion) -> Result<TableMotion, ArmError> {
         let before = self.last.as_ref().map_or(self.start, |(_, m)| *m.q());
         let found = self
             .arm
@@ -97,18 +97,18 @@ impl Follower {
 /// Rates and accelerations that go with joints and a motion of the gripper.
 fn moving(
     arm: &Arm,
-    q: SeedJoints,
+    q: TableJoints,
     wanted: &ToolMotion,
     allowed: f64,
-) -> Result<SeedMotion, ArmError> {
+) -> Result<TableMotion, ArmError> {
     let qd = arm.joint_rates(&q, &wanted.twist, allowed)?;
-    let coasting = SeedMotion::new(q, qd, [0.0; JOINTS])?;
+    let coasting = TableMotion::new(q, qd, [0.0; JOINTS])?;
     let qdd = arm.joint_accelerations(&coasting, &wanted.acceleration)?;
-    SeedMotion::new(q, qd, qdd)
+    TableMotion::new(q, qd, qdd)
 }
 
 /// The joints went where their rates took them, within half the way and 0.1 rad.
-fn no_jump(last: &SeedMotion, now: &SeedMotion, secs: f64) -> Result<(), ArmError> {
+fn no_jump(last: &TableMotion, now: &TableMotion, secs: f64) -> Result<(), ArmError> {
     for joint in 0..JOINTS {
         let jump = now.q().angles()[joint] - last.q().angles()[joint];
         let expected = 0.5 * secs * (now.qd()[joint] + last.qd()[joint]);
@@ -269,7 +269,7 @@ impl ToolTrack {
     ///
     /// # Errors
     /// As [`ToolTrack::at`] at time zero.
-    pub fn new(arm: Arm, path: ToolPath, start: &SeedJoints) -> Result<Self, ArmError> {
+    pub fn new(arm: Arm, path: ToolPath, start: &TableJoints) -> Result<Self, ArmError> {
         let nearest = || {
             let first = path.at(0.0)?.t_base_tool;
             let found = arm.inverse(&first, exact(), Some(start))?;
@@ -309,14 +309,14 @@ impl ToolTrack {
     ///
     /// # Errors
     /// [`ArmError::Path`] with the time and the reason.
-    pub fn at(&self, secs: f64) -> Result<SeedMotion, ArmError> {
+    pub fn at(&self, secs: f64) -> Result<TableMotion, ArmError> {
         self.solve(secs).map_err(|why| ArmError::Path {
             secs,
             why: Box::new(why),
         })
     }
 
-    fn solve(&self, secs: f64) -> Result<SeedMotion, ArmError> {
+    fn solve(&self, secs: f64) -> Result<TableMotion, ArmError> {
         let wanted = self.path.at(secs)?;
         let pose = &wanted.t_base_tool;
         let found = self.arm.inverse(pose, exact(), None)?;
@@ -371,7 +371,7 @@ fn exact() -> Policy {
 }
 
 /// Whether joint 1 points towards the tool point rather than away from it.
-fn track_side(arm: &Arm, pose: &Transform<Base, Tool>, q: &SeedJoints) -> bool {
+fn track_side(arm: &Arm, pose: &Transform<Base, Tool>, q: &TableJoints) -> bool {
     let r = pose.translation();
     let [q1, ..] = q.angles();
     let towards = r.as_vector().y.atan2(r.as_vector().x);
@@ -379,7 +379,7 @@ fn track_side(arm: &Arm, pose: &Transform<Base, Tool>, q: &SeedJoints) -> bool {
     !(FRAC_PI_2..=3.0 * FRAC_PI_2).contains(&off)
 }
 
-fn elbow_sign(arm: &Arm, q: &SeedJoints) -> f64 {
+fn elbow_sign(arm: &Arm, q: &TableJoints) -> f64 {
     let sine = (q.angles()[2] + arm.parameters().theta_offset[2]).sin();
     // Straight or folded is on both branches.
     if sine.abs() < 1e-6 {

@@ -1,6 +1,6 @@
 //! Joint angles -> pose of the gripper and of every link. Pure.
 
-use super::joints::{JOINTS, SeedJoints};
+use super::joints::{JOINTS, TableJoints};
 use super::{Arm, Base, Link, Tool};
 use crate::dh::Transform;
 use nalgebra::{Matrix3, Vector3};
@@ -22,7 +22,7 @@ pub(super) struct Planar {
 }
 
 impl Arm {
-    pub(super) fn planar(&self, q: &SeedJoints) -> Planar {
+    pub(super) fn planar(&self, q: &TableJoints) -> Planar {
         let p = self.parameters();
         let [q1, q2, q3, q4, q5] = q.angles();
         let [o1, o2, o3, o4, o5] = p.theta_offset;
@@ -64,7 +64,7 @@ impl Arm {
     /// Seed document (2.5), (2.6) with five matrices: the six of its (2.6) to (2.7) agree only when
     /// the numbers of table 2.1 are shifted by one (erratum Y1). Angles in rad (Y4), lengths in m (Y6).
     #[must_use]
-    pub fn forward(&self, q: &SeedJoints) -> Transform<Base, Tool> {
+    pub fn forward(&self, q: &TableJoints) -> Transform<Base, Tool> {
         let k = self.planar(q);
         let (s1, c1) = k.one;
         let [rho, z] = k.tool;
@@ -77,7 +77,7 @@ impl Arm {
     /// Pose of each link's frame in the base frame, from joint 1 outwards: the products of (2.5).
     /// The last is the tool frame.
     #[must_use]
-    pub fn link_poses(&self, q: &SeedJoints) -> [Transform<Base, Link>; JOINTS] {
+    pub fn link_poses(&self, q: &TableJoints) -> [Transform<Base, Link>; JOINTS] {
         let mut t_base_link = Transform::<Base, Link>::identity();
         let mut poses = [t_base_link; JOINTS];
         for ((pose, link), angle) in poses.iter_mut().zip(self.links()).zip(q.angles()) {

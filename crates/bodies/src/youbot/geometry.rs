@@ -1,7 +1,7 @@
 //! Lengths, offsets and ranges -> an arm. Pure.
 
 use super::error::bounded;
-use super::joints::{DriverJoints, JOINTS, SeedJoints};
+use super::joints::{DriverJoints, JOINTS, TableJoints};
 use super::limits::Limits;
 use super::{ArmError, ArmLink0, ArmLink5, Base, Tool};
 use crate::dh::{DhLink, Transform};
@@ -35,10 +35,10 @@ pub struct Parameters {
 }
 
 impl Parameters {
-    /// Table 2.1 of the seed document: the base in the mounting plane, the tool point between the
+    /// Table 2.1 of the source document: the base in the mounting plane, the tool point between the
     /// finger tips. Its 147, 218 and 655 mm are roundings of KUKA's 147, 217.5 and 654.5 (erratum Y18).
     #[must_use]
-    pub fn seed() -> Self {
+    pub fn published() -> Self {
         Self {
             a1: 0.033,
             a2: 0.155,
@@ -62,7 +62,7 @@ impl Parameters {
             a4: 0.002,
             d1: 0.115,
             d5: 0.130,
-            ..Self::seed()
+            ..Self::published()
         }
     }
 }
@@ -117,10 +117,10 @@ impl Arm {
         Self { p, links }
     }
 
-    /// Table 2.1 of the seed document; see [`Parameters::seed`].
+    /// Table 2.1 of the source document; see [`Parameters::published`].
     #[must_use]
-    pub fn seed() -> Self {
-        Self::of(Parameters::seed())
+    pub fn published() -> Self {
+        Self::of(Parameters::published())
     }
 
     /// The published URDF; see [`Parameters::urdf`].
@@ -149,13 +149,13 @@ impl Arm {
 
     /// The encoders' angles in the model's convention.
     #[must_use]
-    pub fn seed_joints(&self, u: &DriverJoints) -> SeedJoints {
+    pub fn seed_joints(&self, u: &DriverJoints) -> TableJoints {
         u.to_seed(&self.p.driver_zero)
     }
 
     /// The model's angles in the encoders' convention.
     #[must_use]
-    pub fn driver_joints(&self, q: &SeedJoints) -> DriverJoints {
+    pub fn driver_joints(&self, q: &TableJoints) -> DriverJoints {
         q.to_driver(&self.p.driver_zero)
     }
 

@@ -2,7 +2,7 @@
 
 use super::error::bounded;
 use super::follow::ToolTrack;
-use super::joints::SeedMotion;
+use super::joints::TableMotion;
 use super::path::JointPath;
 use super::{Arm, ArmError, Base, Tool};
 use crate::dh::Transform;
@@ -49,7 +49,7 @@ impl ImuMount {
 
     /// What it reads during `motion`, under gravity `g_b` (m/s^2, base axes), with its pose.
     #[must_use]
-    pub fn read(&self, arm: &Arm, motion: &SeedMotion, g_b: &In<Base>) -> ImuReading {
+    pub fn read(&self, arm: &Arm, motion: &TableMotion, g_b: &In<Base>) -> ImuReading {
         let t_base_tool = arm.forward(motion.q());
         let [.., tool] = arm.link_motions(motion);
         let (w, wd) = (tool.rate.as_vector(), tool.rate_change.as_vector());
@@ -70,7 +70,7 @@ impl ImuMount {
     ///
     /// `w = (c5 s qd1 + s5 Pd, c5 Pd - s5 s qd1, qd5 - c qd1)` in tool axes, `Pd = qd2 + qd3 + qd4`.
     #[must_use]
-    pub fn rate(&self, arm: &Arm, motion: &SeedMotion) -> BodyRate {
+    pub fn rate(&self, arm: &Arm, motion: &TableMotion) -> BodyRate {
         let k = arm.planar(motion.q());
         let ((s, c), (s5, c5)) = (k.pitch, k.five);
         let [qd1, qd2, qd3, qd4, qd5] = motion.qd();
@@ -160,7 +160,7 @@ impl Gripper {
 
     /// Joints at `nanos` nanoseconds from the start.
     #[must_use]
-    pub fn joints(&self, nanos: u64) -> SeedMotion {
+    pub fn joints(&self, nanos: u64) -> TableMotion {
         self.path.motion(secs(nanos))
     }
 

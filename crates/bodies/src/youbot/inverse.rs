@@ -1,12 +1,12 @@
 //! Pose of the gripper -> every joint vector that takes it there. Pure; no allocation.
 //!
-//! The seed's version has one base branch, one sign too many and no reach test (errata Y9 to Y16);
+//! The document's version has one base branch, one sign too many and no reach test (errata Y9 to Y16);
 //! this one is complete: base turned to the wrist or away from it, elbow up or down.
 
 mod plane;
 
 use super::error::{Reach, bounded};
-use super::joints::{JOINTS, SeedJoints};
+use super::joints::{JOINTS, TableJoints};
 use super::policy::Policy;
 use super::{Arm, ArmError, Base, Tool};
 use crate::dh::Transform;
@@ -45,7 +45,7 @@ pub enum Elbow {
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Solution {
     /// The joints, each within half a turn of the middle of its range.
-    pub q: SeedJoints,
+    pub q: TableJoints,
     /// Which way joint 1 is turned.
     pub base: BaseTurn,
     /// Which way the elbow is bent.
@@ -103,7 +103,7 @@ impl Solutions {
     /// # Errors
     /// [`ArmError::Limit`] when every solution has a joint past its stop; the numbers are those of
     /// the solution that is past by least.
-    pub fn nearest(&self, q_current: &SeedJoints) -> Result<&Solution, ArmError> {
+    pub fn nearest(&self, q_current: &TableJoints) -> Result<&Solution, ArmError> {
         self.nearest_weighted(q_current, &[1.0; JOINTS])
     }
 
@@ -114,7 +114,7 @@ impl Solutions {
     /// As [`Solutions::nearest`]; weights that are not finite or not above zero.
     pub fn nearest_weighted(
         &self,
-        q_current: &SeedJoints,
+        q_current: &TableJoints,
         weights: &[f64; JOINTS],
     ) -> Result<&Solution, ArmError> {
         bounded("weight of a joint", *weights, 1e9)?;
@@ -196,7 +196,7 @@ impl Arm {
         &self,
         target: &Transform<Base, Tool>,
         policy: Policy,
-        q_current: Option<&SeedJoints>,
+        q_current: Option<&TableJoints>,
     ) -> Result<Solutions, ArmError> {
         let r = Dcm::<Base, Tool>::try_from_matrix(*target.rotation().as_matrix())
             .map_err(ArmError::NotARotation)?;
@@ -233,7 +233,7 @@ impl<'a> List<'a> {
     fn new(arm: &'a Arm, plane: &Plane) -> Self {
         let g = arm.parameters();
         let empty = Solution {
-            q: SeedJoints::ZERO,
+            q: TableJoints::ZERO,
             base: BaseTurn::Front,
             elbow: Elbow::Straight,
             within_limits: false,
@@ -350,7 +350,7 @@ impl<'a> List<'a> {
         for (joint, (angle, offset)) in q.iter_mut().zip(offsets).enumerate() {
             *angle = limits.turned_in(joint, *angle - offset);
         }
-        let q = SeedJoints::computed(q);
+        let q = TableJoints::computed(q);
         // Two sides of two elbows: never a fifth.
         if let Some(place) = self.out.found.get_mut(self.out.count) {
             *place = Solution {

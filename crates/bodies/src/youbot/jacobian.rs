@@ -2,7 +2,7 @@
 
 use super::error::bounded;
 use super::forward::Planar;
-use super::joints::{JOINTS, SeedJoints, SeedMotion};
+use super::joints::{JOINTS, TableJoints, TableMotion};
 use super::{Arm, ArmError, Base};
 use nalgebra::{SMatrix, Vector3};
 use std::fmt;
@@ -66,7 +66,7 @@ impl Arm {
     /// The Jacobian J: `[v; w] = J qd`, velocity of the tool point and rate of the gripper, relative to
     /// the base and resolved in it. Column i: `[z x (p - o); z]` of joint i.
     #[must_use]
-    pub fn jacobian(&self, q: &SeedJoints) -> SMatrix<f64, 6, JOINTS> {
+    pub fn jacobian(&self, q: &TableJoints) -> SMatrix<f64, 6, JOINTS> {
         let k = self.planar(q);
         let p = self.parameters();
         let ((s1, c1), (s, c)) = (k.one, k.pitch);
@@ -97,7 +97,7 @@ impl Arm {
     /// How near the two singularities are: `|sin theta3|` of the elbow, and the base's distance of the
     /// tool point from the axis (m) and sine of the approach's tilt as one length. Zero is singular.
     #[must_use]
-    pub fn singularity_measures(&self, q: &SeedJoints) -> [f64; 2] {
+    pub fn singularity_measures(&self, q: &TableJoints) -> [f64; 2] {
         let k = self.planar(q);
         [self.sine_of_elbow(&k).abs(), k.tool[0].hypot(k.pitch.0)]
     }
@@ -106,7 +106,7 @@ impl Arm {
     ///
     /// # Errors
     /// [`ArmError::Singular`] where the base axis is met with vertical approach: more than one is lost.
-    pub fn lost_direction(&self, q: &SeedJoints) -> Result<Twist, ArmError> {
+    pub fn lost_direction(&self, q: &TableJoints) -> Result<Twist, ArmError> {
         let k = self.planar(q);
         let ((s1, c1), (s, c)) = (k.one, k.pitch);
         let rho = k.tool[0];
@@ -124,7 +124,7 @@ impl Arm {
     ///
     /// # Errors
     /// As [`Arm::lost_direction`]; [`ArmError::NotFinite`].
-    pub fn feasible_twist(&self, q: &SeedJoints, twist: &Twist) -> Result<(Twist, f64), ArmError> {
+    pub fn feasible_twist(&self, q: &TableJoints, twist: &Twist) -> Result<(Twist, f64), ArmError> {
         finite(twist)?;
         let lost = self.lost_direction(q)?;
         let (lv, lw) = (lost.v.as_vector(), lost.w.as_vector());
@@ -145,7 +145,7 @@ impl Arm {
     /// [`ArmError::InfeasibleTwist`], [`ArmError::Singular`], [`ArmError::NotFinite`].
     pub fn joint_rates(
         &self,
-        q: &SeedJoints,
+        q: &TableJoints,
         twist: &Twist,
         allowed: f64,
     ) -> Result<[f64; JOINTS], ArmError> {
@@ -165,11 +165,11 @@ impl Arm {
     /// As [`Arm::joint_rates`], without the test of feasibility: only the part the arm can do is taken.
     pub(crate) fn joint_accelerations(
         &self,
-        motion: &SeedMotion,
+        motion: &TableMotion,
         acceleration: &Twist,
     ) -> Result<[f64; JOINTS], ArmError> {
         finite(acceleration)?;
-        let coasting = SeedMotion::new(*motion.q(), motion.qd(), [0.0; JOINTS])?;
+        let coasting = TableMotion::new(*motion.q(), motion.qd(), [0.0; JOINTS])?;
         let [.., tool] = self.link_motions(&coasting);
         let c_base_tool = self.forward(motion.q()).rotation();
         let resolve = |v: &Vector3<f64>| c_base_tool.as_matrix() * v;

@@ -19,7 +19,7 @@ const LARGEST_ACCELERATION: f64 = 1e9;
 ///
 /// Zero: the upper arm and forearm upright, the gripper level and forward. `theta = q + (0, pi/2, 0, 0, 0)`.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct SeedJoints([f64; JOINTS]);
+pub struct TableJoints([f64; JOINTS]);
 
 /// Joint angles u of the encoders, the youBot driver, ROS and the URDF, rad; always finite.
 ///
@@ -27,10 +27,10 @@ pub struct SeedJoints([f64; JOINTS]);
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct DriverJoints([f64; JOINTS]);
 
-/// Angles, rates (rad/s) and accelerations (rad/s^2) in the seed's convention; always finite.
+/// Angles, rates (rad/s) and accelerations (rad/s^2) in the document's convention; always finite.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct SeedMotion {
-    q: SeedJoints,
+pub struct TableMotion {
+    q: TableJoints,
     qd: [f64; JOINTS],
     qdd: [f64; JOINTS],
 }
@@ -43,7 +43,7 @@ pub struct DriverMotion {
     udd: [f64; JOINTS],
 }
 
-/// Joint torques that go with [`SeedJoints`], N m: positive drives q up.
+/// Joint torques that go with [`TableJoints`], N m: positive drives q up.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct SeedTorques(pub [f64; JOINTS]);
 
@@ -51,7 +51,7 @@ pub struct SeedTorques(pub [f64; JOINTS]);
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct DriverTorques(pub [f64; JOINTS]);
 
-impl SeedJoints {
+impl TableJoints {
     /// All joints at zero: the document's figure 2.1a.
     pub const ZERO: Self = Self([0.0; JOINTS]);
 
@@ -66,7 +66,7 @@ impl SeedJoints {
     /// From angles in degrees.
     ///
     /// # Errors
-    /// As [`SeedJoints::new`].
+    /// As [`TableJoints::new`].
     pub fn from_degrees(q: [f64; JOINTS]) -> Result<Self, ArmError> {
         Self::new(q.map(f64::to_radians))
     }
@@ -84,8 +84,8 @@ impl SeedJoints {
 
     /// Standing still here.
     #[must_use]
-    pub fn at_rest(self) -> SeedMotion {
-        SeedMotion {
+    pub fn at_rest(self) -> TableMotion {
+        TableMotion {
             q: self,
             qd: [0.0; JOINTS],
             qdd: [0.0; JOINTS],
@@ -97,7 +97,7 @@ impl DriverJoints {
     /// From angles in rad.
     ///
     /// # Errors
-    /// As [`SeedJoints::new`].
+    /// As [`TableJoints::new`].
     pub fn new(u: [f64; JOINTS]) -> Result<Self, ArmError> {
         bounded("joint angle (rad)", u, LARGEST_ANGLE).map(Self)
     }
@@ -105,7 +105,7 @@ impl DriverJoints {
     /// From angles in degrees.
     ///
     /// # Errors
-    /// As [`SeedJoints::new`].
+    /// As [`TableJoints::new`].
     pub fn from_degrees(u: [f64; JOINTS]) -> Result<Self, ArmError> {
         Self::new(u.map(f64::to_radians))
     }
@@ -118,12 +118,12 @@ impl DriverJoints {
 
     /// The same arm in the other convention: `q = zero - u`.
     #[must_use]
-    pub fn to_seed(&self, driver_zero: &[f64; JOINTS]) -> SeedJoints {
-        SeedJoints(less(driver_zero, &self.0))
+    pub fn to_seed(&self, driver_zero: &[f64; JOINTS]) -> TableJoints {
+        TableJoints(less(driver_zero, &self.0))
     }
 }
 
-impl SeedJoints {
+impl TableJoints {
     /// The same arm in the other convention: `u = zero - q`.
     #[must_use]
     pub fn to_driver(&self, driver_zero: &[f64; JOINTS]) -> DriverJoints {
@@ -131,12 +131,12 @@ impl SeedJoints {
     }
 }
 
-impl SeedMotion {
+impl TableMotion {
     /// From angles, rates in rad/s and accelerations in rad/s^2.
     ///
     /// # Errors
     /// [`ArmError::NotFinite`]; [`ArmError::TooLarge`] beyond 1e5 rad/s or 1e9 rad/s^2.
-    pub fn new(q: SeedJoints, qd: [f64; JOINTS], qdd: [f64; JOINTS]) -> Result<Self, ArmError> {
+    pub fn new(q: TableJoints, qd: [f64; JOINTS], qdd: [f64; JOINTS]) -> Result<Self, ArmError> {
         Ok(Self {
             q,
             qd: bounded("joint rate (rad/s)", qd, LARGEST_RATE)?,
@@ -147,7 +147,7 @@ impl SeedMotion {
     /// A motion the library computed from bounded numbers: finite by construction.
     pub(super) fn computed(q: [f64; JOINTS], qd: [f64; JOINTS], qdd: [f64; JOINTS]) -> Self {
         Self {
-            q: SeedJoints(q),
+            q: TableJoints(q),
             qd,
             qdd,
         }
@@ -155,7 +155,7 @@ impl SeedMotion {
 
     /// Angles, rad.
     #[must_use]
-    pub fn q(&self) -> &SeedJoints {
+    pub fn q(&self) -> &TableJoints {
         &self.q
     }
 
@@ -186,7 +186,7 @@ impl DriverMotion {
     /// From angles, rates in rad/s and accelerations in rad/s^2.
     ///
     /// # Errors
-    /// As [`SeedMotion::new`].
+    /// As [`TableMotion::new`].
     pub fn new(u: DriverJoints, ud: [f64; JOINTS], udd: [f64; JOINTS]) -> Result<Self, ArmError> {
         Ok(Self {
             u,
@@ -215,8 +215,8 @@ impl DriverMotion {
 
     /// The same motion in the other convention: `qd = -ud`.
     #[must_use]
-    pub fn to_seed(&self, driver_zero: &[f64; JOINTS]) -> SeedMotion {
-        SeedMotion {
+    pub fn to_seed(&self, driver_zero: &[f64; JOINTS]) -> TableMotion {
+        TableMotion {
             q: self.u.to_seed(driver_zero),
             qd: self.ud.map(|x| -x),
             qdd: self.udd.map(|x| -x),

@@ -1,6 +1,6 @@
 //! Joint ranges -> whether a joint vector lies in them, and which turn of an angle does. Pure.
 
-use super::joints::{JOINTS, SeedJoints};
+use super::joints::{JOINTS, TableJoints};
 use super::{ArmError, error::bounded};
 use std::f64::consts::{PI, TAU};
 
@@ -44,7 +44,7 @@ impl Limits {
     }
 
     /// The stops: KUKA's A1 ±169, A2 -65..90, A3 -146..151, A4 ±102.5, A5 ±167.5 degrees, turned
-    /// into the seed's convention (opposite signs; A4 = 0 is q4 = 90).
+    /// into the document's convention (opposite signs; A4 = 0 is q4 = 90).
     ///
     /// # Source
     /// URDF limits of mas-group/youbot_description 65489aa and youbot/youbot-ros-pkg 432570a. KUKA's
@@ -90,7 +90,7 @@ impl Limits {
 
     /// Whether every joint is between its stops, 1e-9 rad allowed for rounding.
     #[must_use]
-    pub fn contain(&self, q: &SeedJoints) -> bool {
+    pub fn contain(&self, q: &TableJoints) -> bool {
         self.excess(&q.angles()).iter().all(|e| *e <= SLACK)
     }
 
@@ -98,7 +98,7 @@ impl Limits {
     ///
     /// # Errors
     /// [`ArmError::Limit`] with the joint, its angle and its range.
-    pub fn check(&self, q: &SeedJoints) -> Result<(), ArmError> {
+    pub fn check(&self, q: &TableJoints) -> Result<(), ArmError> {
         let q = q.angles();
         let mut worst = (SLACK, None);
         for (joint, excess) in self.excess(&q).into_iter().enumerate() {

@@ -1,7 +1,7 @@
 //! Time -> joints: sinusoids, rests joined by smooth legs, knots. Pure.
 
 use super::error::bounded;
-use super::joints::{JOINTS, SeedJoints, SeedMotion};
+use super::joints::{JOINTS, TableJoints, TableMotion};
 use super::limits::Limits;
 use super::timing::slow_down;
 use super::{Arm, ArmError};
@@ -61,7 +61,7 @@ const BETWEEN: usize = 16;
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Leg {
     /// Where it ends.
-    pub to: SeedJoints,
+    pub to: TableJoints,
     /// How long it takes, s.
     pub duration: f64,
 }
@@ -74,7 +74,7 @@ pub enum JointPath {
     /// From rest to rest; it stays at the last.
     Legs {
         /// Where it starts.
-        from: SeedJoints,
+        from: TableJoints,
         /// In order.
         legs: Vec<Leg>,
     },
@@ -83,7 +83,7 @@ pub enum JointPath {
         /// Interval, s.
         step: f64,
         /// The first is at zero.
-        knots: Vec<SeedMotion>,
+        knots: Vec<TableMotion>,
     },
 }
 
@@ -103,7 +103,7 @@ impl JointPath {
     ///
     /// # Errors
     /// A duration below a millisecond or above 1e9 s.
-    pub fn legs(from: SeedJoints, legs: Vec<Leg>) -> Result<Self, ArmError> {
+    pub fn legs(from: TableJoints, legs: Vec<Leg>) -> Result<Self, ArmError> {
         for leg in &legs {
             bounded("duration of a leg (s)", [leg.duration], 1e9)?;
             if leg.duration < 1e-3 {
@@ -120,7 +120,7 @@ impl JointPath {
     ///
     /// # Errors
     /// As [`JointPath::legs`].
-    pub fn through(arm: &Arm, points: &[SeedJoints]) -> Result<Self, ArmError> {
+    pub fn through(arm: &Arm, points: &[TableJoints]) -> Result<Self, ArmError> {
         let fastest = arm.parameters().fastest;
         let Some((first, rest)) = points.split_first() else {
             return Err(ArmError::Impossible {
@@ -145,7 +145,7 @@ impl JointPath {
     ///
     /// # Errors
     /// A step below a microsecond or above 1000 s; no knots.
-    pub fn knots(step: f64, knots: Vec<SeedMotion>) -> Result<Self, ArmError> {
+    pub fn knots(step: f64, knots: Vec<TableMotion>) -> Result<Self, ArmError> {
         bounded("interval between knots (s)", [step], 1e3)?;
         if step < 1e-6 || knots.is_empty() {
             return Err(ArmError::Impossible {
@@ -188,25 +188,25 @@ impl JointPath {
     ///
     /// # Errors
     /// [`ArmError::NotFinite`] time; [`ArmError::TooLarge`] beyond 1e9 s.
-    pub fn at(&self, secs: f64) -> Result<SeedMotion, ArmError> {
+    pub fn at(&self, secs: f64) -> Result<TableMotion, ArmError> {
         bounded("time on the path (s)", [secs], 1e9)?;
         let motion = self.motion(secs);
-        SeedMotion::new(
-            SeedJoints::new(motion.q().angles())?,
+        TableMotion::new(
+            TableJoints::new(motion.q().angles())?,
             motion.qd(),
             motion.qdd(),
         )
     }
 
     /// As [`JointPath::at`] for a finite time, without a look at the size of the numbers.
-    pub(super) fn motion(&self, secs: f64) -> SeedMotion {
+    pub(super) fn motion(&self, secs: f64) -> TableMotion {
         match self {
             Self::Sinusoids(joints) => {
                 let (mut q, mut qd, mut qdd) = ([0.0; JOINTS], [0.0; JOINTS], [0.0; JOINTS]);
                 for (i, joint) in joints.iter().enumerate() {
                     [q[i], qd[i], qdd[i]] = joint.at(secs);
                 }
-                SeedMotion::computed(q, qd, qdd)
+                TableMotion::computed(q, qd, qdd)
             }
             Self::Knots { step, knots } => knots::at(*step, knots, secs),
             Self::Legs { from, legs } => {
@@ -238,7 +238,7 @@ impl JointPath {
                         }
                         j.centre + j.amplitude.abs() * side
                     });
-                    limits.check(&SeedJoints::new(farthest)?)?;
+                    limits.check(&TableJoints::new(farthest)?)?;
                 }
                 Ok(())
             }
@@ -308,10 +308,10 @@ impl JointPath {
                 Self::legs(*from, legs)
             }
             Self::Knots { step, knots } => {
-                let slow = |knot: &SeedMotion| {
+                let slow = |knot: &TableMotion| {
                     let qd = knot.qd().map(|w| w / factor);
                     let qdd = knot.qdd().map(|a| a / (factor * factor));
-                    SeedMotion::new(*knot.q(), qd, qdd)
+                    TableMotion::new(*knot.q(), qd, qdd)
                 };
                 let knots: Result<Vec<_>, _> = knots.iter().map(slow).collect();
                 Self::knots(step * factor, knots?)
@@ -333,7 +333,7 @@ impl JointPath {
 }
 
 /// A leg, `secs` after its start.
-fn along(from: &SeedJoints, leg: &Leg, secs: f64) -> SeedMotion {
+fn along(from: &TableJoints, leg: &Leg, secs: f64) -> TableMotion {
     let [s, sd, sdd] = rest_to_rest(secs, leg.duration);
     let start = from.angles();
     let (mut q, mut qd, mut qdd) = (start, [0.0; JOINTS], [0.0; JOINTS]);
@@ -341,5 +341,5 @@ fn along(from: &SeedJoints, leg: &Leg, secs: f64) -> SeedMotion {
         let way = b - a;
         (q[i], qd[i], qdd[i]) = (a + way * s, way * sd, way * sdd);
     }
-    SeedMotion::computed(q, qd, qdd)
+    TableMotion::computed(q, qd, qdd)
 }

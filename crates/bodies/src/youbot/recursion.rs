@@ -1,6 +1,6 @@
 //! Joint motion -> rate, velocity and acceleration of every link. Pure.
 
-use super::joints::{JOINTS, SeedJoints, SeedMotion};
+use super::joints::{JOINTS, TableJoints, TableMotion};
 use super::{Arm, Link};
 use nalgebra::{Matrix3, Vector3};
 use strapd_attitude::frames::In;
@@ -42,7 +42,7 @@ impl Moving {
 
 impl Arm {
     /// `R_i`: from link i to link i-1.
-    pub(super) fn rotations(&self, q: &SeedJoints) -> [Matrix3<f64>; JOINTS] {
+    pub(super) fn rotations(&self, q: &TableJoints) -> [Matrix3<f64>; JOINTS] {
         let mut out = [Matrix3::identity(); JOINTS];
         for ((r, link), angle) in out.iter_mut().zip(self.links()).zip(q.angles()) {
             let (s, c) = (angle + link.theta_offset()).sin_cos();
@@ -81,7 +81,7 @@ impl Arm {
     /// Craig, Introduction to Robotics, chapter 6, for standard link frames: `w_i = R^T (w_(i-1) + z qd_i)`,
     /// `V_i = R^T V_(i-1) + w_i x r_i` and their derivatives.
     #[must_use]
-    pub fn link_motions(&self, motion: &SeedMotion) -> [LinkMotion; JOINTS] {
+    pub fn link_motions(&self, motion: &TableMotion) -> [LinkMotion; JOINTS] {
         let rotations = self.rotations(motion.q());
         let (qd, qdd) = (motion.qd(), motion.qdd());
         let mut before = Moving::base(Vector3::zeros());

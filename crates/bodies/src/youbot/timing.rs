@@ -1,7 +1,7 @@
 //! A motion faster than the joints -> by how much to stretch time. Pure.
 
 use super::error::bounded;
-use super::joints::SeedMotion;
+use super::joints::TableMotion;
 use super::{Arm, ArmError};
 
 /// A factor to slow a path by, when it is above zero and finite.
@@ -21,7 +21,7 @@ pub(super) fn slow_down(factor: f64) -> Result<f64, ArmError> {
 ///
 /// Knows only the instants it is shown: sample finely, or use [`super::JointPath::peak_rates`].
 #[must_use]
-pub fn slow_down_factor<'a>(arm: &Arm, motions: impl IntoIterator<Item = &'a SeedMotion>) -> f64 {
+pub fn slow_down_factor<'a>(arm: &Arm, motions: impl IntoIterator<Item = &'a TableMotion>) -> f64 {
     let fastest = arm.parameters().fastest;
     let mut factor = 1.0_f64;
     for motion in motions {

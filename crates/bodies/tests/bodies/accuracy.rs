@@ -51,7 +51,7 @@ const fn commit(window: usize) -> Method {
     }
 }
 
-/// The seed's top for 1.2 s.
+/// The published top for 1.2 s.
 fn seed_top() -> &'static Top {
     static TOP: OnceLock<Top> = OnceLock::new();
     TOP.get_or_init(|| top::cusped(FINE, FINE * 6 / 5))

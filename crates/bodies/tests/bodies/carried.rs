@@ -228,7 +228,7 @@ fn each_carrier_does_what_its_name_says() {
 
 #[test]
 fn a_lever_arm_adds_the_acceleration_of_its_end() {
-    let top = SymmetricTop::seed();
+    let top = SymmetricTop::published();
     let start = Case::Cusped
         .start(&top, Case::SEED_TILT, Case::SEED_W3)
         .unwrap();

@@ -1,5 +1,5 @@
 //! Inertia against particle clouds computed elsewhere (`golden/inertia_golden.json`), the seed
-//! document's example, and the seed's errors, each refuted by name.
+//! document's example, and the document's errors, each refuted by name.
 // Prints what it measured, for `--nocapture`.
 
 #[allow(unreachable_pub)]
@@ -316,7 +316,7 @@ fn seed_i3_parallel_axes_take_the_distance_of_the_axes_not_of_the_points() {
     let b = seed_example();
     let wrong = b.inertia_cg() + Matrix3::identity() * (b.mass() * b.r_og_b().norm_squared());
     let right = b.inertia_at_origin();
-    // The seed's sentence gives 840, its own numbers say 590.
+    // The document's sentence gives 840, its own numbers say 590.
     assert!((wrong[(0, 0)] - 840.0).abs() < 1e-9);
     assert!((right[(0, 0)] - 590.0).abs() < 1e-9);
     // Two masses of 500 kg at +-1 m along x seen from 1 m along x: nothing changes about x.
@@ -559,7 +559,7 @@ fn free_flight(
     (worst_p, worst_e)
 }
 
-/// C_RB as the seed document prints it.
+/// C_RB as the source document prints it.
 fn seed_c_rb(b: &RigidBody, nu: &Vector6<f64>) -> Matrix6<f64> {
     let (v, w) = (
         Vector3::new(nu[0], nu[1], nu[2]),

@@ -1,4 +1,4 @@
-//! The top: the exact reference proven, the seed document's methods measured against it, the seed's
+//! The top: the exact reference proven, the source document's methods measured against it, the document's
 //! errors refuted by name.
 // Prints what it measured, for `--nocapture`.
 
@@ -42,13 +42,13 @@ fn matrix(q: &Attitude) -> Matrix3<f64> {
     )
 }
 
-/// Rodrigues' formula: what the seed document's matrix CK is, as printed.
+/// Rodrigues' formula: what the source document's matrix CK is, as printed.
 fn ck(v: &Vector3<f64>) -> Matrix3<f64> {
     nalgebra::Rotation3::new(*v).into_inner()
 }
 
 fn start(case: Case) -> (SymmetricTop, EulerState) {
-    let top = SymmetricTop::seed();
+    let top = SymmetricTop::published();
     let start = case.start(&top, Case::SEED_TILT, Case::SEED_W3).unwrap();
     (top, start)
 }
@@ -243,7 +243,7 @@ fn a_heavy_body_with_three_moments_agrees_with_gauss_legendre() {
 
 #[test]
 fn steady_precession_has_the_two_known_roots() {
-    let (slow, fast) = SymmetricTop::seed()
+    let (slow, fast) = SymmetricTop::published()
         .steady_precession(Case::SEED_TILT, Case::SEED_W3)
         .unwrap();
     // Seven digits after the point are given.
@@ -316,7 +316,7 @@ fn cusps_waves_and_loops_are_told_by_the_precession_at_the_top() {
 
 #[test]
 fn a_sleeping_top_sleeps_above_the_threshold_and_wakes_below_it() {
-    let top = SymmetricTop::seed();
+    let top = SymmetricTop::published();
     // Iz^2 w^2 = 4 I1 M g arm.
     let threshold = top.sleeping_threshold();
     assert!((0.0008 * threshold - (4.0 * 0.002 * 9.8 * 0.04_f64).sqrt()).abs() < 1e-15);
@@ -460,8 +460,8 @@ fn the_seed_headline_holds_live_and_not_for_a_gyro() {
 
 #[test]
 fn tilting_to_the_other_side_changes_no_error() {
-    // The seed's own start is a rotation by -54.57 degrees about x.
-    let top = SymmetricTop::seed();
+    // The document's own start is a rotation by -54.57 degrees about x.
+    let top = SymmetricTop::published();
     let methods = held_rate_methods();
     let run = |tilt: f64| {
         let start = Case::Cusped.start(&top, tilt, Case::SEED_W3).unwrap();
@@ -585,7 +585,7 @@ fn gauss_legendre_keeps_the_energy_of_top_and_free_body() {
     assert!((l - first.1).norm() / first.1.norm() < 1e-9);
 }
 
-// ---- the seed document's errors ----
+// ---- the source document's errors ----
 
 /// One classical Runge-Kutta step of any equation for the body rate.
 fn rk4(w: &Vector3<f64>, h: f64, f: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> Vector3<f64> {
@@ -629,7 +629,7 @@ fn seed_equation_17_third_line_gains_energy_on_a_triaxial_body() {
     // RK4: (1e-3)^4 a step.
     assert!(good < 1e-11, "{good}");
     // On the symmetric top no one can tell.
-    let symmetric = SymmetricTop::seed().rotor().unwrap();
+    let symmetric = SymmetricTop::published().rotor().unwrap();
     let w = Vector3::new(3.0, -4.0, 125.0);
     assert_eq!(symmetric.angular_acceleration(&w, &Vector3::zeros()).z, 0.0);
 }
@@ -671,7 +671,7 @@ fn seed_equations_12_and_20_with_the_printed_transpose_are_wrong_and_13_is_an_ap
 
 #[test]
 fn seed_singularity_is_upright_and_hanging_not_at_ninety_degrees() {
-    let top = SymmetricTop::seed();
+    let top = SymmetricTop::published();
     let run = |tilt: f64| {
         let start = Case::Cusped.start(&top, tilt, Case::SEED_W3).unwrap();
         compare(&[TopMethod::EulerAngles], &top, &start, 2000.0, 400).map(|r| r[0].attitude_max)
@@ -693,7 +693,7 @@ fn seed_singularity_is_upright_and_hanging_not_at_ninety_degrees() {
 
 #[test]
 fn what_can_not_be_is_refused_with_its_numbers() {
-    let top = SymmetricTop::seed();
+    let top = SymmetricTop::published();
     let cusped = Case::Cusped
         .start(&top, Case::SEED_TILT, Case::SEED_W3)
         .unwrap();

@@ -1,5 +1,5 @@
 //! The youBot's arm: against vectors of an independent oracle (`golden/youbot_golden.json`), against
-//! itself on random poses, and against the seed document, each of whose errors is refuted by name.
+//! itself on random poses, and against the source document, each of whose errors is refuted by name.
 // Prints what it measured, for `--nocapture`.
 
 #[allow(unreachable_pub)]
@@ -16,7 +16,7 @@ use nalgebra::{Matrix3, Vector3};
 use rand::{Rng, RngExt};
 use strapd_attitude::frames::{Dcm, In};
 use strapd_bodies::dh::Transform;
-use strapd_bodies::youbot::{Arm, Base, Parameters, SeedJoints, Tool};
+use strapd_bodies::youbot::{Arm, Base, Parameters, TableJoints, Tool};
 
 /// Gravity on a level floor, m/s^2.
 fn level() -> In<Base> {
@@ -27,8 +27,8 @@ fn pose(p: Vector3<f64>, r: Matrix3<f64>) -> Transform<Base, Tool> {
     Transform::new(Dcm::assume(r), In::assume(p))
 }
 
-fn degrees(q: [f64; 5]) -> SeedJoints {
-    SeedJoints::from_degrees(q).unwrap()
+fn degrees(q: [f64; 5]) -> TableJoints {
+    TableJoints::from_degrees(q).unwrap()
 }
 
 /// Distance in m and angle in rad between two poses; exact for close ones.
@@ -48,13 +48,13 @@ fn apart(a: &Transform<Base, Tool>, b: &Transform<Base, Tool>) -> (f64, f64) {
 }
 
 /// Joints between their stops, evenly.
-fn in_limits(arm: &Arm, rng: &mut impl Rng) -> SeedJoints {
+fn in_limits(arm: &Arm, rng: &mut impl Rng) -> TableJoints {
     let limits = arm.limits();
     let mut q = limits.min();
     for (angle, hi) in q.iter_mut().zip(limits.max()) {
         *angle = rng.random_range(*angle..hi);
     }
-    SeedJoints::new(q).unwrap()
+    TableJoints::new(q).unwrap()
 }
 
 /// An arm no table lists.
@@ -67,7 +67,7 @@ fn odd_arm() -> Arm {
         d1: 0.2,
         d5: 0.09,
         theta_offset: [0.3, 1.0, -0.2, 0.4, 0.1],
-        ..Parameters::seed()
+        ..Parameters::published()
     })
     .unwrap()
 }

@@ -7,7 +7,7 @@ use strapd_bodies::rigid_body::HeldRate;
 use strapd_bodies::top::method_errors::{Course, How, propagated};
 use strapd_bodies::top::{Case, SymmetricTop, TopMethod};
 
-/// Rate and length of the two figures of the seed document.
+/// Rate and length of the two figures of the source document.
 const FIGURES: [(f64, f64); 2] = [(2000.0, 1.2), (2500.0, 1.45)];
 
 /// Fits of the rate: name, samples, placement.
@@ -29,7 +29,7 @@ const HELD: [(&str, OfHeld); 2] = [("live", TopMethod::Live), ("gyro", TopMethod
 /// Both tables as text.
 pub(super) fn text() -> Result<String, String> {
     let mut out = String::from(
-        "cusped top of the seed document: largest error over the run, axis / attitude, degrees\n\n",
+        "cusped top of the source document: largest error over the run, axis / attitude, degrees\n\n",
     );
     let _ = write!(out, "  {:<16}", "");
     for (name, _) in HELD {
@@ -83,7 +83,7 @@ pub(super) fn text() -> Result<String, String> {
 const MARGIN: usize = 8;
 
 fn cusped(rate_hz: f64, secs: f64) -> Result<Course, String> {
-    let top = SymmetricTop::seed();
+    let top = SymmetricTop::published();
     let start = Case::Cusped
         .start(&top, Case::SEED_TILT, Case::SEED_W3)
         .map_err(|e| e.to_string())?;

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use strapd_attitude::frames::{Dcm, In};
 use strapd_bodies::dh::Transform;
 use strapd_bodies::youbot::{
-    ArmError, Gripper, ImuMount, JointPath, SeedJoints, Sinusoid, ToolPath, ToolTrack,
+    ArmError, Gripper, ImuMount, JointPath, Sinusoid, TableJoints, ToolPath, ToolTrack,
 };
 
 /// Most samples in one answer.
@@ -196,7 +196,7 @@ fn tool(
 ) -> Result<(JointPath, f64), Refusal> {
     let start = match request.q_start {
         Some(q) => setting.read(q)?,
-        None => SeedJoints::ZERO,
+        None => TableJoints::ZERO,
     };
     let refused = |e: ArmError| refusal(&e);
     let track = ToolTrack::new(setting.arm, path, &start).map_err(refused)?;

@@ -5,7 +5,7 @@
 
 use crate::youbot::error::bounded;
 use crate::youbot::policy::Policy;
-use crate::youbot::{ArmError, SeedJoints};
+use crate::youbot::{ArmError, TableJoints};
 use nalgebra::{Matrix3, Vector3};
 
 /// Horizontal parts shorter than this (m, or sine of an angle) have no direction.
@@ -33,7 +33,7 @@ impl Plane {
         p: &Vector3<f64>,
         r: &Matrix3<f64>,
         policy: Policy,
-        q_current: Option<&SeedJoints>,
+        q_current: Option<&TableJoints>,
         offset1: f64,
     ) -> Result<Self, ArmError> {
         let a = r.column(2);
@@ -112,8 +112,8 @@ impl Plane {
 }
 
 /// The wish for joint 1 as an angle of one turn.
-fn free_angle(q_current: Option<&SeedJoints>, offset1: f64) -> f64 {
-    let [q1, ..] = q_current.map_or([0.0; 5], SeedJoints::angles);
+fn free_angle(q_current: Option<&TableJoints>, offset1: f64) -> f64 {
+    let [q1, ..] = q_current.map_or([0.0; 5], TableJoints::angles);
     let (s, c) = (q1 + offset1).sin_cos();
     s.atan2(c)
 }

@@ -1,10 +1,10 @@
 //! Joints, rates and accelerations at equal intervals -> at any instant. Pure.
 
-use crate::youbot::joints::{JOINTS, SeedMotion};
+use crate::youbot::joints::{JOINTS, TableMotion};
 
 /// The polynomials of fifth degree that meet both ends of an interval in value and two derivatives.
 /// Before the first knot and after the last it rests there.
-pub(super) fn at(step: f64, knots: &[SeedMotion], secs: f64) -> SeedMotion {
+pub(super) fn at(step: f64, knots: &[TableMotion], secs: f64) -> TableMotion {
     let place = secs / step;
     // A negative place, and NaN, is knot zero.
     let index = place.floor() as usize;
@@ -15,7 +15,7 @@ pub(super) fn at(step: f64, knots: &[SeedMotion], secs: f64) -> SeedMotion {
             knots.first()
         };
         let q = end.map_or([0.0; JOINTS], |k| k.q().angles());
-        return SeedMotion::computed(q, [0.0; JOINTS], [0.0; JOINTS]);
+        return TableMotion::computed(q, [0.0; JOINTS], [0.0; JOINTS]);
     };
     let Some(to) = knots.get(index + 1) else {
         return *from;
@@ -38,5 +38,5 @@ pub(super) fn at(step: f64, knots: &[SeedMotion], secs: f64) -> SeedMotion {
         qd[i] = rate / step;
         qdd[i] = (add + x * (6.0 * c3 + x * (12.0 * c4 + x * 20.0 * c5))) / (step * step);
     }
-    SeedMotion::computed(q, qd, qdd)
+    TableMotion::computed(q, qd, qdd)
 }

@@ -52,7 +52,7 @@ fn cone_rate(cone: &Coning, k: i64) -> [f64; 3] {
     cone.rate(k).map(|w| w * 100.0 / cone.sampling as f64)
 }
 
-/// In degrees, over 1.2 s of the seed's top.
+/// In degrees, over 1.2 s of the published top.
 fn on_top(peer: Peer, kind: SampleKind, rate: usize) -> f64 {
     let (top, skip) = (seed_top(), FINE / rate);
     let step = (1_000_000_000 / rate) as i64;

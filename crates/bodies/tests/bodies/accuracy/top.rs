@@ -1,4 +1,4 @@
-//! The seed's heavy symmetric top, by Taylor series in double-double: rates and delta angles a perfect
+//! The document's heavy symmetric top, by Taylor series in double-double: rates and delta angles a perfect
 //! gyro would give, and the attitude they must lead to.
 
 use super::double::Double;

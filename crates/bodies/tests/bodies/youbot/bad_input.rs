@@ -8,7 +8,7 @@ use strapd_attitude::frames::{In, NotARotation};
 use strapd_bodies::youbot::*;
 
 fn ask(p: [f64; 3], r: Matrix3<f64>, policy: Policy) -> Result<Solutions, ArmError> {
-    Arm::seed().inverse(&pose(p.into(), r), policy, None)
+    Arm::published().inverse(&pose(p.into(), r), policy, None)
 }
 
 fn upright() -> Matrix3<f64> {
@@ -100,7 +100,7 @@ fn out_of_reach_says_by_how_much() {
 
 #[test]
 fn past_a_stop_names_joint_value_and_range() {
-    let arm = Arm::seed();
+    let arm = Arm::published();
     let q = degrees([0.0, 0.0, 0.0, 200.0, 0.0]);
     let refused = arm.limits().check(&q).unwrap_err();
     assert_eq!(
@@ -136,12 +136,12 @@ fn past_a_stop_names_joint_value_and_range() {
 
 #[test]
 fn singular_says_which() {
-    let arm = Arm::seed();
+    let arm = Arm::published();
     let up = Twist {
         v: In::assume(Vector3::new(0.0, 0.0, 0.1)),
         w: In::assume(Vector3::zeros()),
     };
-    let refused = arm.joint_rates(&SeedJoints::ZERO, &up, 1.0).unwrap_err();
+    let refused = arm.joint_rates(&TableJoints::ZERO, &up, 1.0).unwrap_err();
     assert_eq!(
         refused.to_string(),
         "singular: the elbow is straight or folded (sine 0.0e0)"
@@ -191,17 +191,17 @@ fn an_approach_square_to_the_plane_is_flagged_and_its_residual_exact() {
 #[test]
 fn joints_and_motions_that_are_no_numbers_are_refused() {
     assert_eq!(
-        SeedJoints::new([0.0, 0.0, f64::NAN, 0.0, 0.0]),
+        TableJoints::new([0.0, 0.0, f64::NAN, 0.0, 0.0]),
         Err(ArmError::NotFinite {
             what: "joint angle (rad)"
         })
     );
     assert!(DriverJoints::new([f64::INFINITY; 5]).is_err());
     assert!(matches!(
-        SeedJoints::new([1e7; 5]),
+        TableJoints::new([1e7; 5]),
         Err(ArmError::TooLarge { .. })
     ));
-    let fast = SeedMotion::new(SeedJoints::ZERO, [1e6; 5], [0.0; 5]).unwrap_err();
+    let fast = TableMotion::new(TableJoints::ZERO, [1e6; 5], [0.0; 5]).unwrap_err();
     assert_eq!(
         fast.to_string(),
         "joint rate (rad/s) is 1e6, at most 1e5 is taken"
@@ -219,15 +219,15 @@ fn joints_and_motions_that_are_no_numbers_are_refused() {
     assert!(JointPath::demonstration().slowed(0.0).is_err());
     assert!(
         JointPath::legs(
-            SeedJoints::ZERO,
+            TableJoints::ZERO,
             vec![Leg {
-                to: SeedJoints::ZERO,
+                to: TableJoints::ZERO,
                 duration: 0.0
             }]
         )
         .is_err()
     );
-    assert!(JointPath::through(&Arm::seed(), &[]).is_err());
+    assert!(JointPath::through(&Arm::published(), &[]).is_err());
     assert!(ToolPath::line([0.0; 5], [f64::NAN; 5], 1.0).is_err());
     assert!(
         Wrench::new(
@@ -244,7 +244,7 @@ fn the_largest_motions_taken_give_numbers() {
     let links = published_links(&arm).unwrap();
     let g = In::assume(Vector3::repeat(1e6));
     let dynamics = Dynamics::new(arm, links, g).unwrap();
-    let m = SeedMotion::new(SeedJoints::new([1e6; 5]).unwrap(), [1e5; 5], [-1e9; 5]).unwrap();
+    let m = TableMotion::new(TableJoints::new([1e6; 5]).unwrap(), [1e5; 5], [-1e9; 5]).unwrap();
     let tip = Wrench::new(
         In::assume(Vector3::repeat(1e9)),
         In::assume(Vector3::repeat(-1e9)),
@@ -270,7 +270,7 @@ fn the_largest_motions_taken_give_numbers() {
 #[test]
 fn arms_that_can_not_be_are_refused() {
     let refuse = |p: Parameters| Arm::new(p).unwrap_err().to_string();
-    let seed = Parameters::seed();
+    let seed = Parameters::published();
     assert_eq!(
         refuse(Parameters { a2: 0.0, ..seed }),
         "a2 and a3 must be lengths above a micrometre, not 0"
@@ -310,7 +310,7 @@ fn arms_that_can_not_be_are_refused() {
     ] {
         assert!(ask(AT, upright(), policy).is_err(), "{policy:?}");
     }
-    let arm = Arm::seed();
+    let arm = Arm::published();
     let mut rng = ChaCha8Rng::seed_from_u64(30);
     let q = in_limits(&arm, &mut rng);
     let found = arm

@@ -12,16 +12,16 @@ fn heavy(arm: Arm) -> Dynamics {
     Dynamics::new(arm, published_links(&arm).unwrap(), level()).unwrap()
 }
 
-fn random_motion(arm: &Arm, rng: &mut ChaCha8Rng) -> SeedMotion {
+fn random_motion(arm: &Arm, rng: &mut ChaCha8Rng) -> TableMotion {
     let q = in_limits(arm, rng);
     let mut five = || std::array::from_fn(|_| rng.random_range(-2.0..2.0));
-    SeedMotion::new(q, five(), five()).unwrap()
+    TableMotion::new(q, five(), five()).unwrap()
 }
 
 #[test]
 fn a_force_at_the_tool_is_felt_through_the_jacobian() {
     let mut rng = ChaCha8Rng::seed_from_u64(20);
-    for arm in [Arm::seed(), Arm::urdf(), odd_arm()] {
+    for arm in [Arm::published(), Arm::urdf(), odd_arm()] {
         let dynamics = heavy(arm);
         for _ in 0..200 {
             let m = random_motion(&arm, &mut rng);
@@ -78,7 +78,7 @@ fn work_becomes_energy() {
 #[test]
 fn the_mass_matrix_is_symmetric_positive_and_gives_the_kinetic_energy() {
     let mut rng = ChaCha8Rng::seed_from_u64(21);
-    for arm in [Arm::seed(), Arm::urdf(), odd_arm()] {
+    for arm in [Arm::published(), Arm::urdf(), odd_arm()] {
         let dynamics = heavy(arm);
         for _ in 0..200 {
             let m = random_motion(&arm, &mut rng);
@@ -89,7 +89,7 @@ fn the_mass_matrix_is_symmetric_positive_and_gives_the_kinetic_energy() {
             let kinetic = 0.5 * qd.dot(&(matrix * qd));
             assert!((kinetic - dynamics.energy(&m).kinetic).abs() < 1e-14);
             // The torque is linear in the acceleration, with this matrix.
-            let coasting = SeedMotion::new(*m.q(), m.qd(), [0.0; 5]).unwrap();
+            let coasting = TableMotion::new(*m.q(), m.qd(), [0.0; 5]).unwrap();
             let inertia = SVector::from(dynamics.torques(&m).0)
                 - SVector::from(dynamics.torques(&coasting).0);
             assert!((inertia - matrix * SVector::from(m.qdd())).amax() < 1e-13);
@@ -99,7 +99,7 @@ fn the_mass_matrix_is_symmetric_positive_and_gives_the_kinetic_energy() {
 
 #[test]
 fn gravity_never_asks_for_more_than_the_motors_have() {
-    let arm = Arm::seed();
+    let arm = Arm::published();
     let dynamics = heavy(arm);
     let mut most = [0.0_f64; 5];
     // Every five degrees between the stops; joint 1 does not matter.
@@ -143,7 +143,7 @@ fn the_published_placeholders_are_refused_and_the_gripper_is_physical() {
     let radius = |b: &RigidBody| (b.principal_moments()[2] / b.mass()).sqrt();
     assert!((radius(&finger) - 1.0).abs() < 1e-12);
     // Ours is no larger than the gripper.
-    let arm = Arm::seed();
+    let arm = Arm::published();
     let ours = gripper(&arm).unwrap();
     assert!((ours.mass() - 0.12).abs() < 1e-15);
     assert!(radius(&ours) < 0.04, "{}", radius(&ours));
@@ -161,7 +161,7 @@ fn the_published_placeholders_are_refused_and_the_gripper_is_physical() {
 #[test]
 fn a_payload_is_the_same_welded_on_or_pressing_at_the_tool() {
     // A point-like payload at rest: its weight as a force of the tool on the world.
-    let (arm, mut rng) = (Arm::seed(), ChaCha8Rng::seed_from_u64(23));
+    let (arm, mut rng) = (Arm::published(), ChaCha8Rng::seed_from_u64(23));
     let mut links = published_links(&arm).unwrap();
     let r = Vector3::new(0.01, -0.02, 0.03);
     links[4] = links[4].with_point_mass(0.5, r).unwrap();
@@ -205,7 +205,7 @@ fn impossible_links_stop_at_the_door() {
         wrong,
         Err(InertiaError::TriangleInequality { .. })
     ));
-    let arm = Arm::seed();
+    let arm = Arm::published();
     let mut links = published_links(&arm).unwrap();
     let huge = RigidBody::new(1e7, Vector3::zeros(), Matrix3::identity()).unwrap();
     links[2] = huge;

@@ -1,4 +1,4 @@
-//! The seed document's errors Y1 to Y21, each refuted by name, or the right statement shown beside it.
+//! The source document's errors Y1 to Y21, each refuted by name, or the right statement shown beside it.
 //! Y7 (one pose proves nothing) is the reason for `random.rs`; Y19 repeats an equation.
 
 use super::{apart, degrees, in_limits, level, pose};
@@ -38,7 +38,7 @@ fn a(theta: f64, d: f64, a: f64, alpha: f64) -> Matrix4<f64> {
     )
 }
 
-/// The seed's six matrices below (2.7), with its symbols.
+/// The document's six matrices below (2.7), with its symbols.
 struct Six {
     d1: f64,
     a2: f64,
@@ -66,7 +66,7 @@ impl Six {
     }
 }
 
-fn theta(q: &SeedJoints) -> [f64; 5] {
+fn theta(q: &TableJoints) -> [f64; 5] {
     let mut theta = q.angles();
     theta[1] += FRAC_PI_2;
     theta
@@ -86,7 +86,7 @@ fn near(ours: &[f64], theirs: &[f64], tolerance: f64) {
 
 #[test]
 fn y1_six_matrices_need_the_table_shifted_by_one() {
-    let (arm, mut rng) = (Arm::seed(), rng());
+    let (arm, mut rng) = (Arm::published(), rng());
     for _ in 0..100 {
         let q = in_limits(&arm, &mut rng);
         let ours = arm.forward(&q).to_homogeneous();
@@ -116,13 +116,13 @@ fn y2_the_stray_d2_would_move_the_tool_sideways() {
         d2: 0.02,
         ..Six::SHIFTED
     };
-    let difference = stray.product(theta(&q)) - Arm::seed().forward(&q).to_homogeneous();
+    let difference = stray.product(theta(&q)) - Arm::published().forward(&q).to_homogeneous();
     near(&place(&difference), &[0.0, -0.02, 0.0], 1e-15);
 }
 
 #[test]
 fn y3_the_check_pose_is_in_q_and_not_in_theta() {
-    let arm = Arm::seed();
+    let arm = Arm::published();
     // (2.8), (2.9) as joint angles q: exact.
     let ours = arm.forward(&degrees([0.0, 0.0, 0.0, 90.0, 0.0]));
     let r = Matrix3::from_diagonal(&Vector3::new(-1.0, -1.0, 1.0));
@@ -137,14 +137,14 @@ fn y3_the_check_pose_is_in_q_and_not_in_theta() {
 
 #[test]
 fn y4_its_90_is_in_degrees() {
-    let radians = SeedJoints::new([0.0, 0.0, 0.0, 90.0, 0.0]).unwrap();
-    let p = Arm::seed().forward(&radians).translation();
+    let radians = TableJoints::new([0.0, 0.0, 0.0, 90.0, 0.0]).unwrap();
+    let p = Arm::published().forward(&radians).translation();
     near(p.as_vector().as_slice(), &[-0.065, 0.0, 0.632], 5e-4);
 }
 
 #[test]
 fn y5_the_180_degrees_are_yaw() {
-    let ours = Arm::seed().forward(&degrees([0.0, 0.0, 0.0, 90.0, 0.0]));
+    let ours = Arm::published().forward(&degrees([0.0, 0.0, 0.0, 90.0, 0.0]));
     let ypr = Quaternion::from_dcm(&ours.rotation()).yaw_pitch_roll();
     near(
         &[ypr.yaw.abs(), ypr.pitch, ypr.roll],
@@ -158,7 +158,7 @@ fn y5_the_180_degrees_are_yaw() {
 
 #[test]
 fn y6_lengths_are_in_metres() {
-    let p = Arm::seed().parameters().to_owned();
+    let p = Arm::published().parameters().to_owned();
     near(&[p.d1 + p.a2 + p.a3 + p.d5], &[0.655], 1e-15);
 }
 
@@ -167,22 +167,22 @@ fn y7_a_wrong_table_passes_the_seeds_only_check() {
     let swapped = Arm::new(Parameters {
         a2: 0.135,
         a3: 0.155,
-        ..Parameters::seed()
+        ..Parameters::published()
     })
     .unwrap();
     let check = degrees([0.0, 0.0, 0.0, 90.0, 0.0]);
-    let (p, angle) = apart(&swapped.forward(&check), &Arm::seed().forward(&check));
+    let (p, angle) = apart(&swapped.forward(&check), &Arm::published().forward(&check));
     assert!(p < 2e-16 && angle == 0.0);
     let other = degrees([0.0, 40.0, 0.0, 90.0, 0.0]);
     let bent = degrees([0.0, 0.0, 60.0, 90.0, 0.0]);
-    let (straight, _) = apart(&swapped.forward(&other), &Arm::seed().forward(&other));
-    let (p, _) = apart(&swapped.forward(&bent), &Arm::seed().forward(&bent));
+    let (straight, _) = apart(&swapped.forward(&other), &Arm::published().forward(&other));
+    let (p, _) = apart(&swapped.forward(&bent), &Arm::published().forward(&bent));
     assert!(straight < 2e-16 && p > 0.015, "{straight:e} {p}");
 }
 
 #[test]
 fn y8_the_lost_page_2_11_equals_2_12() {
-    let (arm, mut rng) = (Arm::seed(), rng());
+    let (arm, mut rng) = (Arm::published(), rng());
     for _ in 0..200 {
         let q = in_limits(&arm, &mut rng);
         let (th, t) = (theta(&q), arm.forward(&q).to_homogeneous());
@@ -230,7 +230,7 @@ fn y8_the_lost_page_2_11_equals_2_12() {
 
 #[test]
 fn y9_theta1_from_the_position_alone_loses_poses_and_digits() {
-    let (arm, mut rng) = (Arm::seed(), rng());
+    let (arm, mut rng) = (Arm::published(), rng());
     let (mut front, mut both) = (0, 0);
     let (mut theirs, mut ours) = (0.0, 0.0);
     for _ in 0..MANY {
@@ -271,7 +271,7 @@ fn y9_theta1_from_the_position_alone_loses_poses_and_digits() {
 
 #[test]
 fn y10_theta5_and_theta234_take_the_branch_of_theta1() {
-    let arm = Arm::seed();
+    let arm = Arm::published();
     let q = degrees([30.0, 40.0, 50.0, 60.0, 70.0]);
     let r = *arm.forward(&q).rotation().as_matrix();
     let fifth = |th1: f64| {
@@ -294,7 +294,7 @@ fn y10_theta5_and_theta234_take_the_branch_of_theta1() {
 }
 
 /// Wrist from the shoulder in the arm's plane.
-fn wrist(q: &SeedJoints) -> (f64, f64) {
+fn wrist(q: &TableJoints) -> (f64, f64) {
     let th = theta(q);
     let (s, c) = (th[1] + th[2]).sin_cos();
     (
@@ -317,7 +317,7 @@ fn y11_the_law_of_cosines_subtracts_both_squares() {
 
 #[test]
 fn y12_the_wrists_elevation_is_signed_and_from_the_level() {
-    let arm = Arm::seed();
+    let arm = Arm::published();
     let q = degrees([25.0, 60.0, -20.0, 30.0, 0.0]);
     // 2p4 in frame 2 has no z: the printed Atan2 is a quarter turn for every pose.
     let poses = arm.link_poses(&q);
@@ -337,7 +337,7 @@ fn y12_the_wrists_elevation_is_signed_and_from_the_level() {
 
 #[test]
 fn y13_the_elbows_sign_counts_once() {
-    let arm = Arm::seed();
+    let arm = Arm::published();
     for third in [70.0, -70.0] {
         let q = degrees([0.0, 20.0, third, 0.0, 0.0]);
         let (u, w) = wrist(&q);
@@ -364,7 +364,7 @@ fn y13_the_elbows_sign_counts_once() {
 
 #[test]
 fn y14_without_the_right_turn_of_theta4_poses_are_lost() {
-    let (arm, mut rng) = (Arm::seed(), rng());
+    let (arm, mut rng) = (Arm::published(), rng());
     let limits = arm.limits();
     let mut lost = 0;
     for _ in 0..MANY {
@@ -381,7 +381,7 @@ fn y14_without_the_right_turn_of_theta4_poses_are_lost() {
             let mut unwrapped = s.q.angles();
             unwrapped[1] = th2 - FRAC_PI_2;
             unwrapped[3] = fourth;
-            limits.contain(&SeedJoints::new(unwrapped).unwrap())
+            limits.contain(&TableJoints::new(unwrapped).unwrap())
         });
         lost += usize::from(!reached_unwrapped);
     }
@@ -395,7 +395,7 @@ fn y14_without_the_right_turn_of_theta4_poses_are_lost() {
 
 #[test]
 fn y15_there_are_up_to_four_solutions_and_not_two() {
-    let (arm, mut rng) = (Arm::seed(), rng());
+    let (arm, mut rng) = (Arm::published(), rng());
     let (mut all, mut inside) = ([0; 5], [0; 5]);
     for _ in 0..MANY {
         let q = in_limits(&arm, &mut rng);
@@ -413,7 +413,7 @@ fn y15_there_are_up_to_four_solutions_and_not_two() {
 
 #[test]
 fn y16_unreachable_poses_are_told_apart() {
-    let arm = Arm::seed();
+    let arm = Arm::published();
     let upright = Matrix3::from_diagonal(&Vector3::new(-1.0, -1.0, 1.0));
     let far = arm.inverse(
         &pose(Vector3::new(0.033, 0.0, 0.675), upright),
@@ -437,7 +437,7 @@ fn y16_unreachable_poses_are_told_apart() {
 
 #[test]
 fn y17_the_published_masses_do_not_sum_to_the_data_sheet() {
-    let links = published_links(&Arm::seed()).unwrap();
+    let links = published_links(&Arm::published()).unwrap();
     let sum: f64 = links.iter().map(|l| l.mass()).sum();
     near(&[sum], &[4.985], 1e-12);
     assert!((sum - 5.3).abs() > 0.3);
@@ -447,7 +447,7 @@ fn y17_the_published_masses_do_not_sum_to_the_data_sheet() {
 fn y18_the_tool_length_is_a_parameter() {
     let arm = Arm::new(Parameters {
         d5: 0.2175,
-        ..Parameters::seed()
+        ..Parameters::published()
     })
     .unwrap();
     let p = arm
@@ -458,7 +458,7 @@ fn y18_the_tool_length_is_a_parameter() {
 
 #[test]
 fn y20_the_table_is_standard_and_not_modified() {
-    let (arm, q) = (Arm::seed(), degrees([10.0, 20.0, 30.0, 40.0, 50.0]));
+    let (arm, q) = (Arm::published(), degrees([10.0, 20.0, 30.0, 40.0, 50.0]));
     let g = arm.parameters();
     let rows = [
         (g.a1, FRAC_PI_2, g.d1),
@@ -480,7 +480,7 @@ fn y20_the_table_is_standard_and_not_modified() {
 
 #[test]
 fn y21_the_encoders_count_the_other_way_from_the_folded_pose() {
-    let arm = Arm::seed();
+    let arm = Arm::published();
     let zero = &arm.parameters().driver_zero;
     let u = DriverJoints::from_degrees([10.0, 20.0, -30.0, 40.0, 50.0]).unwrap();
     let q = arm.seed_joints(&u);
@@ -493,7 +493,7 @@ fn y21_the_encoders_count_the_other_way_from_the_folded_pose() {
     // Folded home, against the stops, is inside the limits; and the zero of the driver is not q = 0.
     let home = arm.seed_joints(&DriverJoints::new([0.0; 5]).unwrap());
     assert!(arm.limits().contain(&home));
-    let (p, _) = apart(&arm.forward(&home), &arm.forward(&SeedJoints::ZERO));
+    let (p, _) = apart(&arm.forward(&home), &arm.forward(&TableJoints::ZERO));
     assert!(p > 0.1);
     // Driver soft limits in seed angles (docs/youbot.md).
     let soft = Limits::driver(zero);

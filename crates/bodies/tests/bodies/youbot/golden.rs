@@ -34,8 +34,8 @@ fn numbers(v: &Value) -> Vec<f64> {
 fn five(v: &Value) -> [f64; 5] {
     numbers(v).try_into().unwrap()
 }
-fn joints(v: &Value) -> SeedJoints {
-    SeedJoints::new(five(v)).unwrap()
+fn joints(v: &Value) -> TableJoints {
+    TableJoints::new(five(v)).unwrap()
 }
 fn vector(v: &Value) -> Vector3<f64> {
     Vector3::from_row_slice(&numbers(v))
@@ -44,8 +44,8 @@ fn target(v: &Value) -> Transform<Base, Tool> {
     let m = nalgebra::Matrix4::from_row_slice(&numbers(v));
     Transform::try_from_homogeneous(&m).unwrap()
 }
-fn motion(v: &Value) -> SeedMotion {
-    SeedMotion::new(joints(&v["q"]), five(&v["qd"]), five(&v["qdd"])).unwrap()
+fn motion(v: &Value) -> TableMotion {
+    TableMotion::new(joints(&v["q"]), five(&v["qd"]), five(&v["qdd"])).unwrap()
 }
 
 #[track_caller]
@@ -112,7 +112,7 @@ fn check_pose(arm: &Arm, case: &Value, what: &str) {
     }
     let hint = case
         .get("q1_hint")
-        .map(|h| SeedJoints::new([h.as_f64().unwrap(), 0.0, 0.0, 0.0, 0.0]).unwrap());
+        .map(|h| TableJoints::new([h.as_f64().unwrap(), 0.0, 0.0, 0.0, 0.0]).unwrap());
     let wanted = target(&case["T"]);
     let found = arm
         .inverse(&wanted, Policy::default(), hint.as_ref())
@@ -142,7 +142,7 @@ fn check_pose(arm: &Arm, case: &Value, what: &str) {
 fn every_pose_jacobian_and_solution_of_the_seed_preset() {
     let Some(g) = file() else { return };
     for (i, case) in list(&g["fk_ik"]).iter().enumerate() {
-        check_pose(&Arm::seed(), case, &format!("fk_ik[{i}]"));
+        check_pose(&Arm::published(), case, &format!("fk_ik[{i}]"));
     }
     assert_eq!(list(&g["fk_ik"]).len(), 200);
 }
@@ -163,7 +163,7 @@ fn every_special_pose() {
     let Some(g) = file() else { return };
     let special = g["special"].as_object().unwrap();
     for (name, case) in special {
-        check_pose(&Arm::seed(), case, name);
+        check_pose(&Arm::published(), case, name);
     }
     assert_eq!(special.len(), 9);
 }
@@ -173,7 +173,7 @@ fn every_special_pose() {
 fn the_presets_hold_the_files_numbers() {
     let Some(g) = file() else { return };
     let meta = &g["meta"];
-    for (arm, key) in [(Arm::seed(), "dh"), (Arm::urdf(), "urdf_preset")] {
+    for (arm, key) in [(Arm::published(), "dh"), (Arm::urdf(), "urdf_preset")] {
         close(key, &arm.links().map(|l| l.a()), &meta[key]["a"], 0.0);
         close(key, &arm.links().map(|l| l.d()), &meta[key]["d"], 0.0);
         let limits = arm.limits();
@@ -184,7 +184,10 @@ fn the_presets_hold_the_files_numbers() {
         close(key, &p.fastest, &meta["qd_max"], 0.0);
         close(key, &p.theta_offset, &meta["dh"]["theta_offset"], 0.0);
     }
-    for (arm, key) in [(Arm::seed(), "links_seed"), (Arm::urdf(), "links_urdf")] {
+    for (arm, key) in [
+        (Arm::published(), "links_seed"),
+        (Arm::urdf(), "links_urdf"),
+    ] {
         let links = published_links(&arm).unwrap();
         for (link, theirs) in links.iter().zip(list(&meta[key])) {
             close(key, &[link.mass()], &theirs["m"], 0.0);
@@ -203,7 +206,7 @@ fn the_presets_hold_the_files_numbers() {
 #[cfg_attr(not(has_shared), ignore = "needs ../shared")]
 fn unreachable_targets_under_the_four_policies() {
     let Some(g) = file() else { return };
-    let arm = Arm::seed();
+    let arm = Arm::published();
     let length = g["unreachable"]["lp"].as_f64().unwrap();
     let policies = [
         // The file's plane weighs 0.3 m as much as a radian for every policy.
@@ -267,7 +270,7 @@ fn velocities_accelerations_torques_and_energies() {
     let Some(g) = file() else { return };
     let cases = list(&g["dynamics"]);
     assert_eq!(cases.len(), 100);
-    let (seed, urdf) = (Arm::seed(), Arm::urdf());
+    let (seed, urdf) = (Arm::published(), Arm::urdf());
     let with_links =
         |arm: Arm| Dynamics::new(arm, published_links(&arm).unwrap(), level()).unwrap();
     let (heavy_seed, heavy_urdf) = (with_links(seed), with_links(urdf));
@@ -333,7 +336,7 @@ fn an_imu_on_the_joint_trajectory() {
     }))
     .unwrap();
     assert_eq!(path, JointPath::demonstration());
-    let imu = Gripper::along_joints(Arm::seed(), path, ImuMount::at_tool(), level()).unwrap();
+    let imu = Gripper::along_joints(Arm::published(), path, ImuMount::at_tool(), level()).unwrap();
     let samples = list(&golden["samples"]);
     assert_eq!(samples.len(), 201);
     for sample in samples {
@@ -384,7 +387,7 @@ pub(crate) fn cartesian_path() -> ToolPath {
 #[cfg_attr(not(has_shared), ignore = "needs ../shared")]
 fn the_gripper_along_the_cartesian_trajectory() {
     let Some(g) = file() else { return };
-    let arm = Arm::seed();
+    let arm = Arm::published();
     let path = cartesian_path();
     let samples = list(&g["cartesian_trajectory"]["samples"]);
     assert_eq!(samples.len(), 401);

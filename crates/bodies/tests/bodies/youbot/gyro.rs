@@ -27,8 +27,8 @@ fn on_bracket() -> Gripper {
 }
 
 fn along_the_table() -> Gripper {
-    let start = SeedJoints::new([0.0, 0.106, -1.767, 1.24, 0.0]).unwrap();
-    let track = ToolTrack::new(Arm::seed(), cartesian_path(), &start).unwrap();
+    let start = TableJoints::new([0.0, 0.106, -1.767, 1.24, 0.0]).unwrap();
+    let track = ToolTrack::new(Arm::published(), cartesian_path(), &start).unwrap();
     Gripper::along_track(&track, 20.0, ImuMount::at_tool(), level()).unwrap()
 }
 
@@ -168,8 +168,8 @@ fn delta_angles_are_the_integral_whatever_the_cut() {
 
 #[test]
 fn an_arm_at_rest_reads_gravity_upwards() {
-    let path = JointPath::legs(SeedJoints::ZERO, vec![]).unwrap();
-    let imu = Gripper::along_joints(Arm::seed(), path, ImuMount::at_tool(), level()).unwrap();
+    let path = JointPath::legs(TableJoints::ZERO, vec![]).unwrap();
+    let imu = Gripper::along_joints(Arm::published(), path, ImuMount::at_tool(), level()).unwrap();
     let reading = imu.read(5_000_000_000);
     assert_eq!(reading.rate.0, Vector3::zeros());
     let up = reading.t_base_imu.rotation() * reading.specific_force;

@@ -29,9 +29,9 @@ fn near(ours: &[f64], theirs: &[f64], tolerance: f64) {
 #[test]
 fn joints_rates_and_accelerations_are_derivatives_of_each_other() {
     let legs = JointPath::through(
-        &Arm::seed(),
+        &Arm::published(),
         &[
-            SeedJoints::ZERO,
+            TableJoints::ZERO,
             degrees([90.0, -20.0, 60.0, 45.0, -100.0]),
             degrees([-30.0, 10.0, -60.0, 100.0, 0.0]),
         ],
@@ -50,14 +50,14 @@ fn joints_rates_and_accelerations_are_derivatives_of_each_other() {
 
 #[test]
 fn legs_start_and_end_at_rest_and_use_the_whole_rate() {
-    let (arm, to) = (Arm::seed(), degrees([90.0, -20.0, 60.0, 45.0, -100.0]));
-    let path = JointPath::through(&arm, &[SeedJoints::ZERO, to]).unwrap();
+    let (arm, to) = (Arm::published(), degrees([90.0, -20.0, 60.0, 45.0, -100.0]));
+    let path = JointPath::through(&arm, &[TableJoints::ZERO, to]).unwrap();
     let duration = path.duration().unwrap();
     // The longest way, 100 degrees, at 90 degrees a second and 15/8 of the mean.
     near(&[duration], &[100.0 / 90.0 * 15.0 / 8.0], 1e-14);
-    assert_eq!(path.at(0.0).unwrap(), SeedJoints::ZERO.at_rest());
+    assert_eq!(path.at(0.0).unwrap(), TableJoints::ZERO.at_rest());
     assert_eq!(path.at(duration + 3.0).unwrap(), to.at_rest());
-    assert_eq!(path.at(-1.0).unwrap(), SeedJoints::ZERO.at_rest());
+    assert_eq!(path.at(-1.0).unwrap(), TableJoints::ZERO.at_rest());
     near(&path.peak_rates()[4..], &[FRAC_PI_2], 1e-15);
     let middle = path.at(0.5 * duration).unwrap();
     near(&[middle.qd()[4].abs()], &[FRAC_PI_2], 1e-14);
@@ -65,7 +65,7 @@ fn legs_start_and_end_at_rest_and_use_the_whole_rate() {
 
 #[test]
 fn a_fast_path_is_slowed_uniformly_to_the_fastest_rate() {
-    let arm = Arm::seed();
+    let arm = Arm::published();
     let fast = JointPath::demonstration().slowed(0.25).unwrap();
     let peak = fast.peak_rates();
     near(&peak, &[3.08, 1.54, 2.6, 2.16, 5.12], 1e-12);
@@ -78,7 +78,7 @@ fn a_fast_path_is_slowed_uniformly_to_the_fastest_rate() {
     near(&a.qd(), &b.qd().map(|w| w * factor), 1e-12);
     near(&a.qdd(), &b.qdd().map(|w| w * factor * factor), 1e-11);
     // Sampled, it can be no more.
-    let shown: Vec<SeedMotion> = (0..2000)
+    let shown: Vec<TableMotion> = (0..2000)
         .map(|i| fast.at(0.01 * f64::from(i)).unwrap())
         .collect();
     let sampled = slow_down_factor(&arm, &shown);
@@ -91,12 +91,12 @@ fn a_fast_path_is_slowed_uniformly_to_the_fastest_rate() {
 
 #[test]
 fn a_gripper_path_is_slowed_by_its_joints() {
-    let start = SeedJoints::new([0.0, 0.106, -1.767, 1.24, 0.0]).unwrap();
+    let start = TableJoints::new([0.0, 0.106, -1.767, 1.24, 0.0]).unwrap();
     let fast = cartesian_path().slowed(0.2).unwrap();
-    let track = ToolTrack::new(Arm::seed(), fast, &start).unwrap();
+    let track = ToolTrack::new(Arm::published(), fast, &start).unwrap();
     let factor = track.slow_down_factor(0.0, 8.0, 4000).unwrap();
     assert!(factor > 1.5, "{factor}");
-    let slow = ToolTrack::new(Arm::seed(), fast.slowed(factor).unwrap(), &start).unwrap();
+    let slow = ToolTrack::new(Arm::published(), fast.slowed(factor).unwrap(), &start).unwrap();
     let after = slow.slow_down_factor(0.0, 8.0 * factor, 4000).unwrap();
     near(&[after], &[1.0], 1e-12);
 }
@@ -189,9 +189,9 @@ fn a_path_that_leaves_the_workspace_says_when_and_by_how_much() {
     )
     .unwrap();
     let start = degrees([0.0, -20.0, -100.0, 120.0, 0.0]);
-    let track = ToolTrack::new(Arm::seed(), out, &start).unwrap();
+    let track = ToolTrack::new(Arm::published(), out, &start).unwrap();
     // Sooner or later a stop or the reach ends it, and it says which.
-    let mut follower = Follower::new(Arm::seed(), start, Policy::default(), 1e-9).unwrap();
+    let mut follower = Follower::new(Arm::published(), start, Policy::default(), 1e-9).unwrap();
     let mut last = 0.0;
     let (by_track, by_follower) = loop {
         let a = track.at(last);
@@ -231,10 +231,10 @@ fn a_path_that_leaves_the_workspace_says_when_and_by_how_much() {
 
 #[test]
 fn a_jump_to_another_branch_is_refused() {
-    let arm = Arm::seed();
+    let arm = Arm::published();
     let start = degrees([10.0, 20.0, 60.0, 80.0, 0.0]);
     let other = degrees([80.0, 20.0, 60.0, 80.0, 0.0]);
-    let still = |q: &SeedJoints| ToolMotion {
+    let still = |q: &TableJoints| ToolMotion {
         t_base_tool: arm.forward(q),
         twist: Twist {
             v: In::assume(Vector3::zeros()),
@@ -281,7 +281,7 @@ fn paths_meet_the_base_axis_and_the_stops_with_a_reason() {
         }; 5],
     )
     .unwrap();
-    let refused = Gripper::along_joints(Arm::seed(), swing, ImuMount::at_tool(), level());
+    let refused = Gripper::along_joints(Arm::published(), swing, ImuMount::at_tool(), level());
     assert_eq!(
         refused.unwrap_err().to_string(),
         "joint 2 would be at 171.887 deg, its range is -90.0 to 65.0 deg (seed convention)"
@@ -294,15 +294,15 @@ fn paths_meet_the_base_axis_and_the_stops_with_a_reason() {
         }; 5],
     )
     .unwrap();
-    assert!(still.check(Arm::seed().limits()).is_ok());
-    let arm = Arm::seed();
+    assert!(still.check(Arm::published().limits()).is_ok());
+    let arm = Arm::published();
     let beyond = degrees([0.0, 0.0, 0.0, 200.0, 0.0]);
-    let legs = JointPath::through(&arm, &[SeedJoints::ZERO, beyond]).unwrap();
+    let legs = JointPath::through(&arm, &[TableJoints::ZERO, beyond]).unwrap();
     assert!(matches!(
         legs.check(arm.limits()),
         Err(ArmError::Limit { joint: 4, .. })
     ));
-    let knots = JointPath::knots(0.5, vec![SeedJoints::ZERO.at_rest(), beyond.at_rest()]).unwrap();
+    let knots = JointPath::knots(0.5, vec![TableJoints::ZERO.at_rest(), beyond.at_rest()]).unwrap();
     let said = knots.check(arm.limits()).unwrap_err().to_string();
     assert!(
         said.starts_with("at 0.500000 s of the path: joint 4 would be at 200.000"),
@@ -312,8 +312,8 @@ fn paths_meet_the_base_axis_and_the_stops_with_a_reason() {
 
 #[test]
 fn knots_meet_the_path_they_were_taken_from() {
-    let start = SeedJoints::new([0.0, 0.106, -1.767, 1.24, 0.0]).unwrap();
-    let track = ToolTrack::new(Arm::seed(), cartesian_path(), &start).unwrap();
+    let start = TableJoints::new([0.0, 0.106, -1.767, 1.24, 0.0]).unwrap();
+    let track = ToolTrack::new(Arm::published(), cartesian_path(), &start).unwrap();
     let path = track.joint_path(7.0).unwrap();
     near(&[path.duration().unwrap()], &[7.0], 1e-12);
     let mut worst = [0.0_f64; 3];

@@ -69,7 +69,7 @@ fn there_and_back(arm: &Arm, count: usize, seed: u64) {
 
 #[test]
 fn ten_thousand_joint_vectors_are_found_again() {
-    there_and_back(&Arm::seed(), 10_000, 1);
+    there_and_back(&Arm::published(), 10_000, 1);
     there_and_back(&Arm::urdf(), 10_000, 2);
     there_and_back(&odd_arm(), 10_000, 3);
 }
@@ -77,7 +77,7 @@ fn ten_thousand_joint_vectors_are_found_again() {
 #[test]
 #[ignore = "a million: minutes in the debug profile"]
 fn a_million_joint_vectors_are_found_again() {
-    there_and_back(&Arm::seed(), 1_000_000, 11);
+    there_and_back(&Arm::published(), 1_000_000, 11);
     there_and_back(&Arm::urdf(), 1_000_000, 12);
 }
 
@@ -119,7 +119,7 @@ fn wrist_distances(arm: &Arm, p: &Vector3<f64>, r: &Matrix3<f64>, policy: Policy
 
 /// Any pose in space under every policy: finite numbers, the residuals it says, the right verdict.
 fn anywhere(count: usize, seed: u64) {
-    let arm = Arm::seed();
+    let arm = Arm::published();
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let policies = [
         Policy::default(),
@@ -189,7 +189,7 @@ fn a_million_poses_in_space_get_the_right_verdict() {
 #[test]
 fn the_closed_form_is_the_product_of_the_links() {
     let mut rng = ChaCha8Rng::seed_from_u64(6);
-    for arm in [Arm::seed(), Arm::urdf(), odd_arm()] {
+    for arm in [Arm::published(), Arm::urdf(), odd_arm()] {
         for _ in 0..2_000 {
             let q = in_limits(&arm, &mut rng);
             let [.., last] = arm.link_poses(&q);
@@ -202,7 +202,7 @@ fn the_closed_form_is_the_product_of_the_links() {
 #[test]
 fn the_determinant_of_the_jacobian_knows_both_singularities() {
     let mut rng = ChaCha8Rng::seed_from_u64(7);
-    for arm in [Arm::seed(), odd_arm()] {
+    for arm in [Arm::published(), odd_arm()] {
         let p = *arm.parameters();
         for _ in 0..2_000 {
             let q = in_limits(&arm, &mut rng);
@@ -222,7 +222,7 @@ fn the_determinant_of_the_jacobian_knows_both_singularities() {
 #[test]
 fn rates_are_those_of_the_pseudo_inverse() {
     let mut rng = ChaCha8Rng::seed_from_u64(8);
-    for arm in [Arm::seed(), Arm::urdf(), odd_arm()] {
+    for arm in [Arm::published(), Arm::urdf(), odd_arm()] {
         for _ in 0..500 {
             let q = in_limits(&arm, &mut rng);
             let [sine, base] = arm.singularity_measures(&q);
@@ -253,12 +253,12 @@ fn rates_are_those_of_the_pseudo_inverse() {
 
 #[test]
 fn near_singularities_the_pose_keeps_its_digits() {
-    let arm = Arm::seed();
+    let arm = Arm::published();
     let mut worst = (0.0_f64, 0.0_f64);
     for exponent in 0..40 {
         let tiny = 10.0_f64.powf(-0.5 * f64::from(exponent));
         for elbow in [tiny, -tiny, PI - tiny, tiny - PI] {
-            let q = SeedJoints::new([0.3, 0.2, elbow, 1.0, 0.4]).unwrap();
+            let q = TableJoints::new([0.3, 0.2, elbow, 1.0, 0.4]).unwrap();
             let t = arm.forward(&q);
             let found = arm.inverse(&t, Policy::default(), None).unwrap();
             for s in found.as_slice() {
@@ -277,14 +277,14 @@ fn near_singularities_the_pose_keeps_its_digits() {
 
 #[test]
 fn a_free_joint_1_stays_with_the_current_joints_unless_joint_5_would_hit_its_stop() {
-    let arm = Arm::seed();
+    let arm = Arm::published();
     // Tool point on the base axis, approach straight down.
     for hint in [-2.5, -0.4, 0.0, 1.0, 2.9] {
         for spin in [-3.0, -1.0, 0.2, 2.0, 3.1] {
             let (s, c) = f64::sin_cos(spin);
             let r = Matrix3::new(c, s, 0.0, s, -c, 0.0, 0.0, 0.0, -1.0);
             let target = pose(Vector3::new(0.0, 0.0, 0.11), r);
-            let current = SeedJoints::new([hint, 0.0, 0.0, 0.0, 0.0]).unwrap();
+            let current = TableJoints::new([hint, 0.0, 0.0, 0.0, 0.0]).unwrap();
             let found = arm
                 .inverse(&target, Policy::default(), Some(&current))
                 .unwrap();
@@ -306,7 +306,7 @@ fn a_free_joint_1_stays_with_the_current_joints_unless_joint_5_would_hit_its_sto
 
 #[test]
 fn the_nearest_solution_is_between_the_stops_and_weighs_joints() {
-    let arm = Arm::seed();
+    let arm = Arm::published();
     let mut rng = ChaCha8Rng::seed_from_u64(9);
     for _ in 0..500 {
         let t = arm.forward(&in_limits(&arm, &mut rng));
@@ -335,7 +335,7 @@ fn frames_of_the_urdf_meet_those_of_the_model() {
         ..Parameters::urdf()
     })
     .unwrap();
-    let (seed, mut rng) = (Arm::seed(), ChaCha8Rng::seed_from_u64(10));
+    let (seed, mut rng) = (Arm::published(), ChaCha8Rng::seed_from_u64(10));
     for _ in 0..100 {
         let q = in_limits(&seed, &mut rng);
         let by = |arm: &Arm| -> Transform<ArmLink0, ArmLink5> {
