@@ -205,7 +205,8 @@ fn coning_csv() -> Result<String, Failure> {
     let mut text = "stamp_ns,wx,wy,wz,qw,qx,qy,qz,true_qw,true_qx,true_qy,true_qz\n".to_owned();
     for ((rate, q), truth) in run.rates.iter().zip(&ours).zip(&run.truth) {
         let numbers = rate
-            .value
+            .gyro
+            .as_vector()
             .iter()
             .chain(&q.wxyz())
             .chain(&truth.wxyz())

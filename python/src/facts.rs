@@ -66,7 +66,7 @@ pub fn of<'py>(
     facts.set_item("largest_step_deg", propagation.largest_step.to_degrees())?;
     facts.set_item("undersampled_steps", propagation.undersampled)?;
     let bias = PyDict::new(py);
-    for (name, value) in ["x", "y", "z"].iter().zip(prepared.bias.iter()) {
+    for (name, value) in ["x", "y", "z"].iter().zip(prepared.bias.0.iter()) {
         bias.set_item(name, value)?;
     }
     bias.set_item("origin", &prepared.bias_origin)?;
