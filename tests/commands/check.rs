@@ -9,6 +9,7 @@ use std::path::Path;
 use strapd::pipeline::check::check;
 use strapd::pipeline::logged;
 use strapd::report::findings::{Finding, Severity, findings};
+use strapd_attitude::setting::Choice;
 use strapd_recording::decode::Options;
 use strapd_recording::pool::Pool;
 
@@ -23,6 +24,22 @@ fn found(path: &Path) -> Vec<Finding> {
         )
         .unwrap(),
     )
+}
+
+/// What helps, as the command's flags: here nobody has said how settings are named.
+pub(crate) fn flags(finding: &Finding) -> String {
+    let sets = finding.help.iter().map(|set| {
+        let flag = |choice: &Choice| {
+            let flag = format!(
+                "--{} {}",
+                choice.setting.name().replace('_', "-"),
+                choice.value
+            );
+            flag.trim_end().to_owned()
+        };
+        set.iter().map(flag).collect::<Vec<_>>().join(" ")
+    });
+    sets.collect::<Vec<_>>().join(", or ")
 }
 
 /// The codes of errors and warnings, each once, sorted.

@@ -1,6 +1,6 @@
 //! What a recorded orientation says of the gyro's bias and of sigma, and what it must not be believed in.
 
-use super::{codes, found};
+use super::{codes, flags, found};
 use crate::made_logs::{ImuSample, START, written};
 use crate::program::strapd;
 use serde_json::Value;
@@ -62,8 +62,7 @@ fn a_gyro_that_is_off_by_16000_degrees_an_hour_is_told_with_the_bias_that_cures_
         .iter()
         .find(|f| f.code == "bias-by-orientation")
         .unwrap();
-    let given: Vec<f64> = bias
-        .flags
+    let given: Vec<f64> = flags(bias)
         .strip_prefix("--bias ")
         .unwrap()
         .split(',')
@@ -74,11 +73,11 @@ fn a_gyro_that_is_off_by_16000_degrees_an_hour_is_told_with_the_bias_that_cures_
         assert!((given - bias).abs() < 2e-5, "{bias:?}");
     }
     let beyond = found.iter().find(|f| f.code == "beyond-sigma").unwrap();
-    assert_eq!(beyond.flags, bias.flags);
+    assert_eq!(beyond.help, bias.help);
 
     let before = against(dir.path(), "");
     assert_eq!(before["sigma"]["beyond_3_sigma"], true, "{before}");
-    let after = against(dir.path(), &bias.flags);
+    let after = against(dir.path(), &flags(bias));
     assert_eq!(after["sigma"]["beyond_3_sigma"], false, "{after}");
     assert_eq!(after["bias_left"]["worth_removing"], false, "{after}");
     let (before, after) = (after_long(&before, 0), after_long(&after, 0));

@@ -1,6 +1,6 @@
 //! The recordings of `../shared/logs`: all that their README describes is found, and nothing else.
 
-use super::{codes, found, notes};
+use super::{codes, flags, found, notes};
 use crate::replays::{done, only, replay_with};
 use crate::shared_data::shared;
 use strapd_attitude::estimate::Plan;
@@ -94,7 +94,7 @@ fn evidence_is_the_numbers_of_the_recording() {
     let gap = found.iter().find(|f| f.code == "gap-held").unwrap();
     let longest = gap.evidence["longest_s"].as_f64().unwrap();
     assert!((longest - 2.02).abs() < 1e-9, "{gap:?}");
-    assert_eq!(gap.flags, "--on-gap bridge --max-gap 2.1");
+    assert_eq!(flags(gap), "--on-gap bridge --max-gap 2.1");
 }
 
 /// x-IMU3, BROAD and PX4: followed, the advice brings the gyro closer to the recorded orientation.
@@ -114,7 +114,7 @@ fn the_advice_on_the_meaning_of_a_sample_reduces_the_error() {
             .iter()
             .find(|f| f.code == "sample-kind" && f.topic == topic)
             .unwrap();
-        assert_eq!(advice.flags, "--sample-kind average", "{name}");
+        assert_eq!(flags(advice), "--sample-kind average", "{name}");
         let median = |kind: Option<SampleKind>| {
             let mut replay = replay_with(
                 &path,
