@@ -294,7 +294,7 @@ impl Estimator {
         self.conditioner.stamp_of(raw, near)
     }
 
-    /// See [`Conditioner::push_late`].
+    /// A sample came that its sender has sent before: it is counted, and nothing else.
     pub fn take_late(&mut self, stamp: Nanos) {
         self.conditioner.push_late(stamp);
     }

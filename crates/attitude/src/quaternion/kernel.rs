@@ -194,7 +194,7 @@ pub(crate) fn rows(q: &[f64; 4]) -> [[f64; 3]; 3] {
 }
 
 /// C_nb of a unit quaternion q_nb with its diagonal from four squares, as the bodies' equations of motion take it: other
-/// last bits than [`rows`], which simulated truth keeps.
+/// last bits than `rows`, which simulated truth keeps.
 pub fn matrix(q: &[f64; 4]) -> Matrix3<f64> {
     let [w, x, y, z] = *q;
     Matrix3::new(
