@@ -21,6 +21,8 @@ pub enum Format {
     Ulog,
     /// A bag of ROS 1.
     Bag,
+    /// A recording of ROS 2 in SQLite.
+    Rosbag2,
     /// One JSON object per line.
     Lines,
     /// Rows of cells: the CSV that strapd writes itself, and other makers' tables.
@@ -33,23 +35,27 @@ pub const MCAP_MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
 pub(crate) const ULOG_MAGIC: [u8; 7] = *b"ULog\x01\x12\x35";
 /// The first bytes of a bag of ROS 1.
 pub(crate) const BAG_MAGIC: [u8; 13] = *b"#ROSBAG V2.0\n";
+/// The first bytes of an SQLite database.
+pub(crate) const SQLITE_MAGIC: [u8; 16] = *b"SQLite format 3\0";
 
 /// Bytes that tell a format by themselves, at the beginning.
-const MAGICS: [(&[u8], Format); 3] = [
+const MAGICS: [(&[u8], Format); 4] = [
     (&MCAP_MAGIC, Format::Mcap),
     (&ULOG_MAGIC, Format::Ulog),
     (&BAG_MAGIC, Format::Bag),
+    (&SQLITE_MAGIC, Format::Rosbag2),
 ];
 
 /// The longest of them.
-pub(crate) const LONGEST_MAGIC: usize = BAG_MAGIC.len();
+pub(crate) const LONGEST_MAGIC: usize = SQLITE_MAGIC.len();
 
 /// Endings of names, for what the bytes do not tell.
-const ENDINGS: [(&str, Format); 9] = [
+const ENDINGS: [(&str, Format); 10] = [
     ("mcap", Format::Mcap),
     ("ulg", Format::Ulog),
     ("ulog", Format::Ulog),
     ("bag", Format::Bag),
+    ("db3", Format::Rosbag2),
     ("ndjson", Format::Lines),
     ("jsonl", Format::Lines),
     ("csv", Format::Table),
@@ -68,6 +74,7 @@ impl Format {
             Format::Mcap => "MCAP",
             Format::Ulog => "ULog",
             Format::Bag => "ROS 1 bag",
+            Format::Rosbag2 => "rosbag2 SQLite",
             Format::Lines => "NDJSON",
             Format::Table => "CSV",
         }
@@ -80,6 +87,19 @@ impl Format {
         known
             .find(|(magic, _)| head.starts_with(magic))
             .map(|(_, format)| *format)
+    }
+
+    /// Whether more bytes behind these could make one of [`Format::of_magic`].
+    #[must_use]
+    pub(crate) fn may_be_magic(head: &[u8]) -> bool {
+        let mut known = MAGICS.iter();
+        known.any(|(magic, _)| magic.len() > head.len() && magic.starts_with(head))
+    }
+
+    /// Whether it is read in another order than that of its bytes, so that a stream of it is first put into a file.
+    #[must_use]
+    pub fn is_read_anywhere(self) -> bool {
+        matches!(self, Format::Rosbag2)
     }
 
     /// The format of which these are the first bytes; `None` where they tell nothing.
@@ -190,15 +210,12 @@ pub fn head_of(input: &mut impl BufRead) -> std::io::Result<Vec<u8>> {
 /// Whether more bytes would tell no more.
 fn tells_enough(head: &[u8]) -> bool {
     let text = without_mark(head).trim_ascii_start();
-    let begins_magic = MAGICS
-        .iter()
-        .any(|(magic, _)| magic.starts_with(head) && head.len() < magic.len());
     // What stands before the header of a table is text, too; lines of objects begin with one soon.
     let whole = text.iter().rposition(|b| *b == b'\n');
     let lines = text
         .get(..whole.map_or(0, |end| end + 1))
         .unwrap_or_default();
-    !begins_magic
+    !Format::may_be_magic(head)
         && (Format::of_bytes(head).is_some()
             || (!lines.is_empty() && !delimited::may_be_table(lines)))
 }

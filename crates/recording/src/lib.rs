@@ -16,6 +16,8 @@
 //! | `columns` | what columns of tables are called, and what a user says of them | pure |
 //! | `records` | records as MCAP has them, which other containers are transcribed to | pure |
 //! | `bag` | ROS 1 bags -> the records MCAP has for them | pure |
+//! | `sqlite` | an SQLite database, read only -> the rows of its tables | pure |
+//! | `rosbag2` | recordings of ROS 2 in SQLite -> the records MCAP has for them | pure |
 //! | `ulog` | ULog, the log of PX4 -> the records MCAP has for it | pure |
 //! | [`decode`] | bytes of one message, one line, one packed object -> raw samples | pure |
 //! | [`recognise`] | first bytes of an input -> what it is, and the way in where it is not read | pure |
@@ -35,6 +37,8 @@ pub mod mcap;
 pub mod pool;
 pub mod recognise;
 mod records;
+mod rosbag2;
+mod sqlite;
 pub mod text;
 mod ulog;
 

@@ -46,16 +46,9 @@ const LINES: &str =
 const KNOWN: &[Known] = &[
     (
         0,
-        b"SQLite f",
-        "an SQLite database, as rosbag2 records before ROS 2 Iron (.db3)",
-        "mcap convert FILE log.mcap, or, without ROS: pip install rosbags; \
-         rosbags-convert --src BAG_DIRECTORY --dst converted --dst-storage mcap",
-    ),
-    (
-        0,
         b"rosbag2_",
         "the metadata of a rosbag2 recording",
-        "name the .mcap file beside it",
+        "name the .mcap or .db3 file beside it, or the folder of both",
     ),
     (
         0,

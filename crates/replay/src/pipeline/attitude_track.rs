@@ -86,7 +86,9 @@ pub fn read(
             none if none.is_empty() => from_log(input, side, topic, &plainly, pool),
             some => Ok(plain(some)),
         },
-        Format::Mcap | Format::Ulog | Format::Bag => from_log(input, side, topic, &plainly, pool),
+        Format::Mcap | Format::Ulog | Format::Bag | Format::Rosbag2 => {
+            from_log(input, side, topic, &plainly, pool)
+        }
     }
 }
 

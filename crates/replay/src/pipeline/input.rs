@@ -66,7 +66,11 @@ impl Input {
         }
     }
 
-    fn keep(source: Source, mut from: impl Read) -> Result<Input> {
+    /// Keeps a stream, which is read to its end.
+    ///
+    /// # Errors
+    /// It can not be read, or is empty; there is no room for it.
+    pub(super) fn keep(source: Source, mut from: impl Read) -> Result<Input> {
         let name = source.name();
         let mut file = tempfile::tempfile().map_err(|e| no_room(&name, &e))?;
         let mut block = vec![0; 1 << 18];

@@ -87,7 +87,11 @@ fn piped(
     let format = known.or_else(shape).unwrap_or(Format::Lines);
     let whole = std::io::Cursor::new(head).chain(input);
     match format {
-        Format::Mcap | Format::Ulog | Format::Bag => {
+        // Read in any order, so as a whole: then as a file is.
+        format if format.is_read_anywhere() => {
+            file(run, &Input::keep(run.source.clone(), whole)?, pool, watch)
+        }
+        Format::Mcap | Format::Ulog | Format::Bag | Format::Rosbag2 => {
             line_input::only_for_tables(&run.source.name(), format, &run.selection.decode)?;
             let reader = Reader::from_stream(run.source.name(), Box::new(whole))?;
             replay_stream::replay(run, reader, pool, watch)
