@@ -6,7 +6,7 @@
 mod growth;
 mod mutations;
 
-#[cfg(target_os = "linux")]
+#[cfg(unix)]
 #[path = "../made_databases/mod.rs"]
 mod made_databases;
 #[path = "../made_logs/mod.rs"]

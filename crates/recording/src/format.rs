@@ -5,6 +5,7 @@
 
 use crate::delimited;
 use crate::error::{Error, Result};
+use crate::gpmf;
 use crate::recognise;
 use crate::text::without_mark;
 use std::fs::File;
@@ -23,6 +24,8 @@ pub enum Format {
     Bag,
     /// A recording of ROS 2 in SQLite.
     Rosbag2,
+    /// GPMF, the telemetry of GoPro's cameras, alone or in a video.
+    Gpmf,
     /// One JSON object per line.
     Lines,
     /// Rows of cells: the CSV that strapd writes itself, and other makers' tables.
@@ -39,12 +42,16 @@ pub(crate) const BAG_MAGIC: [u8; 13] = *b"#ROSBAG V2.0\n";
 pub(crate) const SQLITE_MAGIC: [u8; 16] = *b"SQLite format 3\0";
 
 /// Bytes that tell a format by themselves, at the beginning.
-const MAGICS: [(&[u8], Format); 4] = [
+const MAGICS: [(&[u8], Format); 5] = [
     (&MCAP_MAGIC, Format::Mcap),
     (&ULOG_MAGIC, Format::Ulog),
     (&BAG_MAGIC, Format::Bag),
     (&SQLITE_MAGIC, Format::Rosbag2),
+    (&gpmf::MAGIC, Format::Gpmf),
 ];
+
+/// How a video says so, behind four bytes.
+const VIDEO: &[u8] = b"ftyp";
 
 /// The longest of them.
 pub(crate) const LONGEST_MAGIC: usize = SQLITE_MAGIC.len();
@@ -75,6 +82,7 @@ impl Format {
             Format::Ulog => "ULog",
             Format::Bag => "ROS 1 bag",
             Format::Rosbag2 => "rosbag2 SQLite",
+            Format::Gpmf => "GPMF",
             Format::Lines => "NDJSON",
             Format::Table => "CSV",
         }
@@ -87,6 +95,8 @@ impl Format {
         known
             .find(|(magic, _)| head.starts_with(magic))
             .map(|(_, format)| *format)
+            // Whether it has telemetry shows when it is opened.
+            .or_else(|| is_video(head).then_some(Format::Gpmf))
     }
 
     /// Whether more bytes behind these could make one of [`Format::of_magic`].
@@ -99,7 +109,7 @@ impl Format {
     /// Whether it is read in another order than that of its bytes, so that a stream of it is first put into a file.
     #[must_use]
     pub fn is_read_anywhere(self) -> bool {
-        matches!(self, Format::Rosbag2)
+        matches!(self, Format::Rosbag2 | Format::Gpmf)
     }
 
     /// The format of which these are the first bytes; `None` where they tell nothing.
@@ -155,11 +165,13 @@ impl Format {
         let mut head = Vec::new();
         let first = file.by_ref().take(HEAD as u64).read_to_end(&mut head);
         first.map_err(fail)?;
-        if let Some(format) = Format::of_bytes(&head) {
+        let length = file.metadata().map_err(fail)?.len();
+        if let Some(format) = Format::of_bytes(&head)
+            && !(is_video(&head) && !has_telemetry(&mut file, length).map_err(fail)?)
+        {
             return Ok(Some(format));
         }
         // What an archive holds is said at its end.
-        let length = file.metadata().map_err(fail)?.len();
         let last = length.saturating_sub(recognise::LAST as u64);
         let mut tail = Vec::new();
         file.seek(SeekFrom::Start(last)).map_err(fail)?;
@@ -182,6 +194,29 @@ impl Format {
             self.name()
         ))
     }
+}
+
+/// Whether it begins like a video.
+pub(crate) fn is_video(head: &[u8]) -> bool {
+    head.get(4..8) == Some(VIDEO)
+}
+
+/// Whether a video has a track of telemetry, or may have had one and is cut.
+fn has_telemetry(file: &mut File, length: u64) -> std::io::Result<bool> {
+    let index = gpmf::index(length, &mut |at, into| {
+        file.seek(SeekFrom::Start(at))?;
+        let mut have = 0;
+        while let Some(rest) = into.get_mut(have..).filter(|rest| !rest.is_empty()) {
+            match file.read(rest) {
+                Ok(0) => break,
+                Ok(n) => have += n,
+                Err(e) if e.kind() == std::io::ErrorKind::Interrupted => {}
+                Err(e) => return Err(e),
+            }
+        }
+        Ok(have)
+    })?;
+    Ok(index.is_ok_and(|index| gpmf::Movie::of(&index).is_some()))
 }
 
 /// Reads the first bytes of a stream, no more than are needed: a sender of lines may wait for an answer before the

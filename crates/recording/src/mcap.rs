@@ -51,7 +51,7 @@ pub use survey::{ChannelSurvey, Survey, survey};
 pub use walk::{WalkOptions, WalkReport, salvage, walk};
 
 use crate::error::{Error, Result};
-use crate::format::{Format, LONGEST_MAGIC};
+use crate::format::{Format, LONGEST_MAGIC, is_video};
 use crate::recognise::{self, Foreign};
 use input::{Input, LogFile};
 use std::fs::File;
@@ -271,7 +271,11 @@ fn format_of(file: &LogFile) -> Result<Format> {
         bytes.truncate(have);
         Ok(bytes)
     };
-    if let Some(format) = Format::of_magic(&read(0, LONGEST_MAGIC)?) {
+    let head = read(0, LONGEST_MAGIC)?;
+    if let Some(format) = Format::of_magic(&head)
+        && !(is_video(&head)
+            && !container::gpmf::has_track(file).map_err(|e| read_error(&file.path, 0, e))?)
+    {
         return Ok(format);
     }
     let last = file.len.saturating_sub(recognise::LAST as u64);

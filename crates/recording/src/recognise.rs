@@ -79,7 +79,7 @@ const KNOWN: &[Known] = &[
     (
         4,
         b"ftyp",
-        "a video (MP4, MOV)",
+        "a video (MP4, MOV) without the telemetry of a GoPro, or cut before its index",
         "Gyroflow exports the camera's motion data as CSV",
     ),
     (
@@ -291,7 +291,10 @@ mod tests {
         tar.resize(257, 0);
         tar.extend_from_slice(b"ustar\0");
         assert_eq!(name(&tar), Some("a TAR archive"));
-        assert_eq!(name(b"\0\0\0\x14ftypmp42"), Some("a video (MP4, MOV)"));
+        assert_eq!(
+            name(b"\0\0\0\x14ftypmp42"),
+            Some("a video (MP4, MOV) without the telemetry of a GoPro, or cut before its index")
+        );
         let tlog = [
             &1_700_000_000_000_000_u64.to_be_bytes()[..],
             &[0xfd, 9, 0, 0],

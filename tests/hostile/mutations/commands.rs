@@ -55,6 +55,8 @@ fn logs() -> Vec<Vec<u8>> {
         .map(|m| (0, m.log_time, m.payload.as_slice()))
         .collect();
     logs.push(database(1024, &[("/imu", "sensor_msgs/msg/Imu")], &rows));
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures");
+    logs.push(std::fs::read(fixtures.join("gopro_hero6.raw")).unwrap());
     logs
 }
 

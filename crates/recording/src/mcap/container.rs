@@ -3,6 +3,7 @@
 //! A stage of its own so that the walk is one: containers differ in how they are cut, and in nothing behind that.
 
 pub(super) mod bag;
+pub(super) mod gpmf;
 mod pages;
 mod rosbag2;
 mod ulog;
@@ -20,6 +21,7 @@ pub(super) enum Container {
     Ulog(Box<ulog::Scanner>),
     Bag(Box<bag::Scanner>),
     Rosbag2(Box<rosbag2::Scanner>),
+    Gpmf(Box<gpmf::Scanner>),
 }
 
 impl Container {
@@ -36,6 +38,7 @@ impl Container {
             Format::Rosbag2 => {
                 Container::Rosbag2(Box::new(rosbag2::Scanner::new(input, beside, limits)))
             }
+            Format::Gpmf => Container::Gpmf(Box::new(gpmf::Scanner::new(input))),
             // Text is not opened here.
             Format::Mcap | Format::Lines | Format::Table => {
                 Container::Mcap(Box::new(Scanner::new(input, limits, besides)))
@@ -50,6 +53,7 @@ impl Container {
             Container::Ulog(scanner) => scanner.next(),
             Container::Bag(scanner) => scanner.next(),
             Container::Rosbag2(scanner) => scanner.next(),
+            Container::Gpmf(scanner) => scanner.next(),
         }
     }
 
@@ -60,6 +64,7 @@ impl Container {
             Container::Ulog(scanner) => scanner.tape().position(),
             Container::Bag(scanner) => scanner.tape().position(),
             Container::Rosbag2(scanner) => scanner.position(),
+            Container::Gpmf(scanner) => scanner.position(),
         }
     }
 
@@ -69,6 +74,7 @@ impl Container {
             Container::Ulog(scanner) => scanner.recycle(payload),
             Container::Bag(scanner) => scanner.recycle(payload),
             Container::Rosbag2(scanner) => scanner.recycle(payload),
+            Container::Gpmf(_) => {}
         }
     }
 
@@ -76,7 +82,7 @@ impl Container {
     pub(super) fn claimed(&self) -> Option<u64> {
         match self {
             Container::Mcap(scanner) => scanner.claimed(),
-            Container::Ulog(_) | Container::Rosbag2(_) => None,
+            Container::Ulog(_) | Container::Rosbag2(_) | Container::Gpmf(_) => None,
             Container::Bag(scanner) => scanner.claimed(),
         }
     }
@@ -88,6 +94,7 @@ impl Container {
             Container::Ulog(scanner) => scanner.finish(),
             Container::Bag(scanner) => scanner.finish(),
             Container::Rosbag2(scanner) => scanner.finish(),
+            Container::Gpmf(scanner) => scanner.finish(),
         }
     }
 }

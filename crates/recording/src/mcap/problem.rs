@@ -213,6 +213,16 @@ pub enum ProblemKind {
         /// Why.
         why: &'static str,
     },
+    /// A video whose telemetry can not be found, or not all of it.
+    Video {
+        /// Why.
+        why: &'static str,
+    },
+    /// Telemetry of a camera that can not be read.
+    Telemetry {
+        /// What.
+        why: &'static str,
+    },
     /// A file beside a database says that a change of it was not ended.
     Journal,
     /// The summary at the end can not be used; nothing is lost by that.
@@ -373,6 +383,12 @@ impl fmt::Display for ProblemKind {
             }
             ProblemKind::Beside { why } => {
                 write!(f, "the file -wal beside the database: {why}")
+            }
+            ProblemKind::Video { why } => {
+                write!(f, "the telemetry of the video can not be read: {why}")
+            }
+            ProblemKind::Telemetry { why } => {
+                write!(f, "telemetry that can not be read: {why}; skipped")
             }
             ProblemKind::Journal => write!(
                 f,

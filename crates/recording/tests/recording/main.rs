@@ -6,6 +6,7 @@ mod conformance;
 mod containers;
 mod decode;
 mod delimited;
+mod gpmf;
 #[path = "../../../../tests/made_databases/mod.rs"]
 mod made_databases;
 mod mcap_damage;

@@ -288,3 +288,27 @@ fn topics_are_told_apart_and_one_alone_can_be_read() {
     });
     assert_eq!(imu.len(), 251);
 }
+
+#[test]
+#[ignore = "measures: cargo test --release -p strapd-recording --test recording -- --ignored --nocapture messages_a_second"]
+fn messages_a_second() {
+    let imu = expected().swap_remove(0).2;
+    let messages: Vec<Message<'_>> = (0..400_000).map(|n| (0, n * 1_000_000, &imu[..])).collect();
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("long.db3");
+    std::fs::write(&path, database(65_536, &[IMU], &messages)).unwrap();
+    for _ in 0..3 {
+        let begun = std::time::Instant::now();
+        let report = strapd_recording::mcap::walk(
+            Reader::open(&path).unwrap(),
+            &WalkOptions::default(),
+            |_| Some(()),
+            |(), message, out: &mut Vec<u64>| out.push(message.log_time),
+            |_| std::ops::ControlFlow::Continue(()),
+        )
+        .unwrap();
+        assert_eq!(report.items, 400_000);
+        let secs = begun.elapsed().as_secs_f64();
+        println!("{:.2} M messages a second", 0.4 / secs);
+    }
+}

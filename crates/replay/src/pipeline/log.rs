@@ -53,7 +53,11 @@ impl Log {
     /// It can not be read, or is none.
     pub fn of(input: &Input, options: &Options, pool: &Pool) -> Result<Log> {
         match input.format() {
-            format @ (Format::Mcap | Format::Ulog | Format::Bag | Format::Rosbag2) => {
+            format @ (Format::Mcap
+            | Format::Ulog
+            | Format::Bag
+            | Format::Rosbag2
+            | Format::Gpmf) => {
                 only_for_tables(input.name(), format, options)?;
                 Log::of_mcap(input, pool)
             }
