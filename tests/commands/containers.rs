@@ -124,6 +124,36 @@ fn a_ulog_made_an_mcap_gives_the_same_attitude_and_can_be_read_by_the_mcap_crate
 }
 
 #[test]
+fn the_telemetry_of_a_camera_is_read_by_every_command_from_a_file_and_a_pipe() {
+    let dir = bench(&["gopro_hero6.raw", "gopro_fusion.raw"]);
+    let at = dir.path();
+    for camera in ["gopro_hero6.raw", "gopro_fusion.raw"] {
+        strapd(at, &format!("replay {camera} -o file.csv --force")).done();
+        let bytes = std::fs::read(at.join(camera)).unwrap();
+        strapd_fed(at, "replay - -o pipe.csv --force", bytes.clone()).done();
+        assert!(text(at, "file.csv") == text(at, "pipe.csv"), "{camera}");
+        strapd(at, &format!("recover {camera} -o copy.mcap --force")).done();
+        strapd(at, "replay copy.mcap -o copy.csv --force").done();
+        assert!(text(at, "file.csv") == text(at, "copy.csv"), "{camera}");
+        for command in ["info", "cat", "report -o page.html --force"] {
+            strapd(at, &format!("{command} {camera}")).done();
+            strapd_fed(at, &format!("{command} -"), bytes.clone()).done();
+        }
+    }
+    let info = strapd(at, "info gopro_hero6.raw");
+    for words in [
+        "198 messages",
+        "GPMF; written by GoPro Hero6 Black",
+        "gopro/imu",
+    ] {
+        assert!(info.done().out.contains(words), "{words}: {info:?}");
+    }
+    // A video, but of something else.
+    std::fs::write(at.join("v.mp4"), b"\0\0\0\x14ftypmp42\0\0\0\0mp41").unwrap();
+    strapd(at, "info v.mp4").refused(1, &["v.mp4", "a video", "Gyroflow"]);
+}
+
+#[test]
 fn a_log_cut_short_gives_what_came_before_the_cut_says_so_and_exits_with_3() {
     let dir = bench(&[]);
     for (file, samples) in [("px4_flight.ulg", 1_000), ("constant_rate_lz4.bag", 100)] {

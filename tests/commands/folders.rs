@@ -411,7 +411,10 @@ fn a_folder_of_one_log_is_that_log_and_of_none_or_several_is_refused() {
     .unwrap();
     strapd(at, "info rosbag2").refused(
         1,
-        &["the metadata of a rosbag2 recording", "name the .mcap file"],
+        &[
+            "the metadata of a rosbag2 recording",
+            "name the .mcap or .db3 file",
+        ],
     );
     std::fs::copy(fixture("xsens_mti.mcap"), folder.join("rosbag2_0.mcap")).unwrap();
     std::fs::copy(fixture("xsens_mti.mcap"), at.join("alone.mcap")).unwrap();

@@ -1,8 +1,11 @@
 //! Promise: what strapd writes it reads back, whatever the file is called and however it comes.
 
+use crate::made_databases::database;
+use crate::mcap_logs::read_some;
 use crate::program::{strapd, strapd_fed};
 use crate::replays::fixture;
 use std::path::Path;
+use strapd_recording::mcap::{Channel, Order, Reader, WalkOptions};
 
 /// A directory with the same samples as `s.mcap`, `s.ndjson` and `s.csv`.
 fn bench() -> tempfile::TempDir {
@@ -17,7 +20,32 @@ fn bench_of(log: &str) -> tempfile::TempDir {
         let ran = strapd(at, &format!("cat s.mcap --format {format}"));
         std::fs::write(at.join(name), &ran.done().out).unwrap();
     }
+    std::fs::write(at.join("s.db3"), in_sqlite(&at.join("s.mcap"))).unwrap();
     dir
+}
+
+/// The messages of a log as a recording of ROS 2 in SQLite.
+fn in_sqlite(log: &Path) -> Vec<u8> {
+    let reader = Reader::open(log).unwrap();
+    let survey = strapd_recording::mcap::survey(&reader, &WalkOptions::default()).unwrap();
+    let kind = |channel: &Channel| channel.schema.as_deref().unwrap().name.clone();
+    let channels = survey.channels.iter().map(|found| &found.channel);
+    let topics: Vec<(String, String)> = channels.map(|c| (c.topic.clone(), kind(c))).collect();
+    let options = WalkOptions {
+        order: Order::File,
+        ..WalkOptions::default()
+    };
+    let (messages, _) = read_some(reader, &options, |_| true);
+    let nth = |topic: &str| topics.iter().position(|known| known.0 == topic).unwrap();
+    let messages: Vec<_> = messages
+        .iter()
+        .map(|(topic, time, _, data)| (nth(topic), *time, data.as_slice()))
+        .collect();
+    let topics: Vec<_> = topics
+        .iter()
+        .map(|(a, b)| (a.as_str(), b.as_str()))
+        .collect();
+    database(16_384, &topics, &messages)
 }
 
 fn read(at: &Path, name: &str) -> Vec<u8> {
@@ -40,11 +68,17 @@ fn what_a_file_holds_wins_over_what_it_is_called_and_that_is_said() {
     let at = dir.path();
     let (expected, said) = attitudes(at, "s.mcap", Vec::new());
     assert!(!said.contains("is called"), "{said}");
-    for (from, holds) in [("s.mcap", "MCAP"), ("s.ndjson", "NDJSON"), ("s.csv", "CSV")] {
+    for (from, holds) in [
+        ("s.mcap", "MCAP"),
+        ("s.ndjson", "NDJSON"),
+        ("s.csv", "CSV"),
+        ("s.db3", "rosbag2 SQLite"),
+    ] {
         for (to, called) in [
             ("x.mcap", "MCAP"),
             ("x.JSONL", "NDJSON"),
             ("x.csv", "CSV"),
+            ("x.db3", "rosbag2 SQLite"),
             ("x.txt", ""),
             ("x", ""),
         ] {
@@ -209,7 +243,7 @@ fn every_command_reads_every_format_from_a_file_and_from_standard_input() {
             (ran.code, same_but_for_names(&ran.out, keys))
         };
         let expected = of(samples, Vec::new());
-        for file in ["s.mcap", "s.ndjson", "s.csv"] {
+        for file in ["s.mcap", "s.ndjson", "s.csv", "s.db3"] {
             assert_eq!(of(file, Vec::new()), expected, "{command} {file}");
             assert_eq!(of("-", read(at, file)), expected, "{command} - <{file}");
         }

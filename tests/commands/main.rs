@@ -23,6 +23,7 @@ mod recover;
 mod regularise;
 mod replay;
 mod report;
+mod rosbag2;
 mod simulate;
 mod sinks;
 mod smoothing;
@@ -31,6 +32,8 @@ mod tables;
 mod trajectory;
 mod youbot;
 
+#[path = "../made_databases/mod.rs"]
+mod made_databases;
 #[path = "../made_logs/mod.rs"]
 mod made_logs;
 #[path = "../mcap_logs/mod.rs"]

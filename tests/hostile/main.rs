@@ -6,6 +6,9 @@
 mod growth;
 mod mutations;
 
+#[cfg(unix)]
+#[path = "../made_databases/mod.rs"]
+mod made_databases;
 #[path = "../made_logs/mod.rs"]
 mod made_logs;
 #[path = "../../fuzz/parsers.rs"]

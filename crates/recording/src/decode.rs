@@ -517,6 +517,11 @@ fn fifo(channel: &Channel<'_>, options: &Options) -> Option<Fifo> {
     Fifo::compile(&schema.ok()?, is_cdr)
 }
 
+/// The definition of the type of this name as `ros2msg`, where it is the same in every ROS 2.
+pub(crate) fn known_definition(type_name: &str) -> Option<String> {
+    builtin::definition(&ros_name(type_name))
+}
+
 /// What the type of this name is everywhere.
 fn well_known(channel: &Channel<'_>) -> Result<Schema, (String, String)> {
     let dialect = match channel.message_encoding {

@@ -63,6 +63,17 @@ pub enum Error {
         /// What it is, and the way in.
         format: Foreign,
     },
+    /// A stream of what is read in any order could not be put into a file first.
+    #[error(
+        "{}: what comes only once is kept in {} to be read in any order: {source}\n  help: TMPDIR=FOLDER with room, or save it to a file first",
+        path.display(), std::env::temp_dir().display()
+    )]
+    NoRoom {
+        /// What it is called.
+        path: PathBuf,
+        /// Why not.
+        source: std::io::Error,
+    },
     /// What can be read once was to be looked at first.
     #[error("{}: a stream can not be surveyed before it is read", path.display())]
     NotTwice {

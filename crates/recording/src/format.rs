@@ -5,6 +5,7 @@
 
 use crate::delimited;
 use crate::error::{Error, Result};
+use crate::gpmf;
 use crate::recognise;
 use crate::text::without_mark;
 use std::fs::File;
@@ -21,6 +22,10 @@ pub enum Format {
     Ulog,
     /// A bag of ROS 1.
     Bag,
+    /// A recording of ROS 2 in SQLite.
+    Rosbag2,
+    /// GPMF, the telemetry of GoPro's cameras, alone or in a video.
+    Gpmf,
     /// One JSON object per line.
     Lines,
     /// Rows of cells: the CSV that strapd writes itself, and other makers' tables.
@@ -33,23 +38,31 @@ pub const MCAP_MAGIC: [u8; 8] = *b"\x89MCAP0\r\n";
 pub(crate) const ULOG_MAGIC: [u8; 7] = *b"ULog\x01\x12\x35";
 /// The first bytes of a bag of ROS 1.
 pub(crate) const BAG_MAGIC: [u8; 13] = *b"#ROSBAG V2.0\n";
+/// The first bytes of an SQLite database.
+pub(crate) const SQLITE_MAGIC: [u8; 16] = *b"SQLite format 3\0";
 
 /// Bytes that tell a format by themselves, at the beginning.
-const MAGICS: [(&[u8], Format); 3] = [
+const MAGICS: [(&[u8], Format); 5] = [
     (&MCAP_MAGIC, Format::Mcap),
     (&ULOG_MAGIC, Format::Ulog),
     (&BAG_MAGIC, Format::Bag),
+    (&SQLITE_MAGIC, Format::Rosbag2),
+    (&gpmf::MAGIC, Format::Gpmf),
 ];
 
+/// How a video says so, behind four bytes.
+const VIDEO: &[u8] = b"ftyp";
+
 /// The longest of them.
-pub(crate) const LONGEST_MAGIC: usize = BAG_MAGIC.len();
+pub(crate) const LONGEST_MAGIC: usize = SQLITE_MAGIC.len();
 
 /// Endings of names, for what the bytes do not tell.
-const ENDINGS: [(&str, Format); 9] = [
+const ENDINGS: [(&str, Format); 10] = [
     ("mcap", Format::Mcap),
     ("ulg", Format::Ulog),
     ("ulog", Format::Ulog),
     ("bag", Format::Bag),
+    ("db3", Format::Rosbag2),
     ("ndjson", Format::Lines),
     ("jsonl", Format::Lines),
     ("csv", Format::Table),
@@ -68,6 +81,8 @@ impl Format {
             Format::Mcap => "MCAP",
             Format::Ulog => "ULog",
             Format::Bag => "ROS 1 bag",
+            Format::Rosbag2 => "rosbag2 SQLite",
+            Format::Gpmf => "GPMF",
             Format::Lines => "NDJSON",
             Format::Table => "CSV",
         }
@@ -86,6 +101,21 @@ impl Format {
         known
             .find(|(magic, _)| head.starts_with(magic))
             .map(|(_, format)| *format)
+            // Whether it has telemetry shows when it is opened.
+            .or_else(|| is_video(head).then_some(Format::Gpmf))
+    }
+
+    /// Whether more bytes behind these could make one of [`Format::of_magic`].
+    #[must_use]
+    pub(crate) fn may_be_magic(head: &[u8]) -> bool {
+        let mut known = MAGICS.iter();
+        known.any(|(magic, _)| magic.len() > head.len() && magic.starts_with(head))
+    }
+
+    /// Whether it is read in another order than that of its bytes, so that a stream of it is first put into a file.
+    #[must_use]
+    pub fn is_read_anywhere(self) -> bool {
+        matches!(self, Format::Rosbag2 | Format::Gpmf)
     }
 
     /// The format of which these are the first bytes; `None` where they tell nothing.
@@ -141,11 +171,13 @@ impl Format {
         let mut head = Vec::new();
         let first = file.by_ref().take(HEAD as u64).read_to_end(&mut head);
         first.map_err(fail)?;
-        if let Some(format) = Format::of_bytes(&head) {
+        let length = file.metadata().map_err(fail)?.len();
+        if let Some(format) = Format::of_bytes(&head)
+            && !(is_video(&head) && !has_telemetry(&mut file, length).map_err(fail)?)
+        {
             return Ok(Some(format));
         }
         // What an archive holds is said at its end.
-        let length = file.metadata().map_err(fail)?.len();
         let last = length.saturating_sub(recognise::LAST as u64);
         let mut tail = Vec::new();
         file.seek(SeekFrom::Start(last)).map_err(fail)?;
@@ -168,6 +200,29 @@ impl Format {
             self.name()
         ))
     }
+}
+
+/// Whether it begins like a video.
+pub(crate) fn is_video(head: &[u8]) -> bool {
+    head.get(4..8) == Some(VIDEO)
+}
+
+/// Whether a video has a track of telemetry, or may have had one and is cut.
+fn has_telemetry(file: &mut File, length: u64) -> std::io::Result<bool> {
+    let index = gpmf::index(length, &mut |at, into| {
+        file.seek(SeekFrom::Start(at))?;
+        let mut have = 0;
+        while let Some(rest) = into.get_mut(have..).filter(|rest| !rest.is_empty()) {
+            match file.read(rest) {
+                Ok(0) => break,
+                Ok(n) => have += n,
+                Err(e) if e.kind() == std::io::ErrorKind::Interrupted => {}
+                Err(e) => return Err(e),
+            }
+        }
+        Ok(have)
+    })?;
+    Ok(index.is_ok_and(|index| gpmf::Movie::of(&index).is_some()))
 }
 
 /// Reads the first bytes of a stream, no more than are needed: a sender of lines may wait for an answer before the
@@ -196,15 +251,12 @@ pub(crate) fn head_of(input: &mut impl BufRead) -> std::io::Result<Vec<u8>> {
 /// Whether more bytes would tell no more.
 fn tells_enough(head: &[u8]) -> bool {
     let text = without_mark(head).trim_ascii_start();
-    let begins_magic = MAGICS
-        .iter()
-        .any(|(magic, _)| magic.starts_with(head) && head.len() < magic.len());
     // What stands before the header of a table is text, too; lines of objects begin with one soon.
     let whole = text.iter().rposition(|b| *b == b'\n');
     let lines = text
         .get(..whole.map_or(0, |end| end + 1))
         .unwrap_or_default();
-    !begins_magic
+    !Format::may_be_magic(head)
         && (Format::of_bytes(head).is_some()
             || (!lines.is_empty() && !delimited::may_be_table(lines)))
 }

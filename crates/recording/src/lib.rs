@@ -34,6 +34,9 @@
 //! | `columns` | what columns of tables are called, and what a user says of them | pure |
 //! | `records` | records as MCAP has them, which other containers are transcribed to | pure |
 //! | `bag` | ROS 1 bags -> the records MCAP has for them | pure |
+//! | `sqlite` | an SQLite database, read only -> the rows of its tables | pure |
+//! | `rosbag2` | recordings of ROS 2 in SQLite -> the records MCAP has for them | pure |
+//! | `gpmf` | telemetry of GoPro's cameras, alone or in a video -> the records MCAP has for it | pure |
 //! | `ulog` | ULog, the log of PX4 -> the records MCAP has for it | pure |
 //! | [`decode`] | bytes of one message, one line, one packed object -> raw samples | pure |
 //! | [`recognise`] | first bytes of an input -> what it is, and the way in where it is not read | pure |
@@ -48,12 +51,15 @@ pub mod decode;
 pub mod delimited;
 pub mod error;
 pub mod format;
+mod gpmf;
 pub mod lines;
 pub mod mcap;
 pub mod pool;
 pub mod recognise;
 pub mod recording;
 mod records;
+mod rosbag2;
+mod sqlite;
 pub mod text;
 mod ulog;
 

@@ -1,4 +1,4 @@
-//! Logs -> messages in a stable order: MCAP, and what is told as MCAP (ULog, ROS 1 bags). I/O.
+//! Logs -> messages in a stable order: MCAP, and what is told as MCAP (ULog, bags of ROS 1 and of ROS 2 in SQLite). I/O.
 //!
 //! A stage of its own because recordings come damaged, and general readers stop at the first
 //! fault, believe every length, or do not look at checksums. Here every length is held
@@ -21,6 +21,7 @@ mod block;
 mod channels;
 mod container;
 mod input;
+mod kept;
 mod list;
 mod lz4;
 mod messages;
@@ -50,7 +51,7 @@ pub use survey::{ChannelSurvey, Survey, survey};
 pub use walk::{WalkOptions, WalkReport, salvage, walk};
 
 use crate::error::{Error, Result};
-use crate::format::{Format, LONGEST_MAGIC};
+use crate::format::{Format, LONGEST_MAGIC, is_video};
 use crate::recognise::{self, Foreign};
 use input::{Input, LogFile};
 use std::fs::File;
@@ -83,6 +84,17 @@ pub struct Reader {
     input: Input,
     limits: Limits,
     format: Format,
+    /// The files beside a database.
+    beside: Beside,
+}
+
+/// What a recorder that was killed leaves beside a database.
+#[derive(Clone, Debug, Default)]
+struct Beside {
+    /// The file `-wal`.
+    wal: Option<Arc<LogFile>>,
+    /// There is a file `-journal` with pages as they were before a change that was not ended.
+    has_journal: bool,
 }
 
 impl Reader {
@@ -105,7 +117,14 @@ impl Reader {
         if !meta.is_file() {
             return Reader::from_stream(path, Box::new(file));
         }
-        Reader::of_file(path, file)
+        let reader = Reader::of_file(path, file)?;
+        Ok(match reader.format {
+            Format::Rosbag2 => Reader {
+                beside: Beside::of(path),
+                ..reader
+            },
+            _ => reader,
+        })
     }
 
     /// Reads a regular file that is open, whatever its position; `name` is what errors call it.
@@ -123,23 +142,30 @@ impl Reader {
             format: format_of(&file)?,
             input: Input::File(Arc::new(file)),
             limits: Limits::default(),
+            beside: Beside::default(),
         })
     }
 
-    /// Reads a log from a stream; `name` is what errors call it.
+    /// Reads a log from a stream; `name` is what errors call it. What is read in another order than that of its bytes is
+    /// first put into a file without a name.
     ///
     /// # Errors
-    /// [`Error::Empty`], [`Error::NotMcap`], [`Error::Read`].
+    /// [`Error::Empty`], [`Error::NotMcap`], [`Error::Read`], [`Error::NoRoom`].
     pub fn from_stream(name: impl Into<PathBuf>, from: Box<dyn Read + Send>) -> Result<Reader> {
         let (name, mut from) = (name.into(), from);
         let mut magic = Vec::with_capacity(MAGIC.len());
-        // Eight tell every format but a bag, of which they tell that five more follow.
-        for most in [MAGIC.len(), LONGEST_MAGIC] {
-            if most == MAGIC.len() || magic == crate::format::BAG_MAGIC[..MAGIC.len()] {
-                let more = (most - magic.len()) as u64;
-                let read = from.by_ref().take(more).read_to_end(&mut magic);
-                read.map_err(|e| read_error(&name, 0, e))?;
-            }
+        // Eight tell a format, or that more have to.
+        let mut more = MAGIC.len();
+        while more > 0 {
+            let have = magic.len();
+            let read = from.by_ref().take(more as u64).read_to_end(&mut magic);
+            read.map_err(|e| read_error(&name, 0, e))?;
+            let is_open = magic.len() > have && Format::may_be_magic(&magic);
+            more = if is_open {
+                LONGEST_MAGIC - magic.len()
+            } else {
+                0
+            };
         }
         let Some(format) = Format::of_magic(&magic) else {
             let known = recognise::marked(&magic, &[]);
@@ -149,10 +175,14 @@ impl Reader {
         if format != Format::Mcap {
             from = Box::new(std::io::Cursor::new(magic).chain(from));
         }
+        if format.is_read_anywhere() {
+            return Reader::of_file(&name, kept::of(&name, from)?);
+        }
         Ok(Reader {
             input: Input::Stream { name, from },
             limits: Limits::default(),
             format,
+            beside: Beside::default(),
         })
     }
 
@@ -191,11 +221,37 @@ impl Reader {
                 input: Input::File(Arc::clone(file)),
                 limits: self.limits,
                 format: self.format,
+                beside: self.beside.clone(),
             }),
             Input::Stream { .. } => None,
         }
     }
 }
+
+impl Beside {
+    fn of(path: &Path) -> Beside {
+        let journal = Beside::file(path, "-journal");
+        let has_journal = journal.is_some_and(|file| {
+            let mut head = [0; JOURNAL_MAGIC.len()];
+            file.read_at(&mut head, 0).is_ok() && head == JOURNAL_MAGIC
+        });
+        Beside {
+            wal: Beside::file(path, "-wal"),
+            has_journal,
+        }
+    }
+
+    fn file(path: &Path, ending: &str) -> Option<Arc<LogFile>> {
+        let mut name = path.as_os_str().to_owned();
+        name.push(ending);
+        let file = File::open(&name).ok()?;
+        let meta = file.metadata().ok().filter(std::fs::Metadata::is_file)?;
+        Some(Arc::new(LogFile::new(Path::new(&name), file, meta.len())))
+    }
+}
+
+/// The first bytes of a journal that is to be rolled back.
+const JOURNAL_MAGIC: [u8; 8] = [0xd9, 0xd5, 0x05, 0xf9, 0x20, 0xa1, 0x63, 0xd7];
 
 fn read_error(path: &Path, offset: u64, source: std::io::Error) -> Error {
     Error::Read {
@@ -215,7 +271,11 @@ fn format_of(file: &LogFile) -> Result<Format> {
         bytes.truncate(have);
         Ok(bytes)
     };
-    if let Some(format) = Format::of_magic(&read(0, LONGEST_MAGIC)?) {
+    let head = read(0, LONGEST_MAGIC)?;
+    if let Some(format) = Format::of_magic(&head)
+        && !(is_video(&head)
+            && !container::gpmf::has_track(file).map_err(|e| read_error(&file.path, 0, e))?)
+    {
         return Ok(format);
     }
     let last = file.len.saturating_sub(recognise::LAST as u64);

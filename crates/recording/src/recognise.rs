@@ -48,16 +48,9 @@ const LINES: &str =
 const KNOWN: &[Known] = &[
     (
         0,
-        b"SQLite f",
-        "an SQLite database, as rosbag2 records before ROS 2 Iron (.db3)",
-        "mcap convert FILE log.mcap, or, without ROS: pip install rosbags; \
-         rosbags-convert --src BAG_DIRECTORY --dst converted --dst-storage mcap",
-    ),
-    (
-        0,
         b"rosbag2_",
         "the metadata of a rosbag2 recording",
-        "name the .mcap file beside it",
+        "name the .mcap or .db3 file beside it, or the folder of both",
     ),
     (
         0,
@@ -88,7 +81,7 @@ const KNOWN: &[Known] = &[
     (
         4,
         b"ftyp",
-        "a video (MP4, MOV)",
+        "a video (MP4, MOV) without the telemetry of a GoPro, or cut before its index",
         "Gyroflow exports the camera's motion data as CSV",
     ),
     (
@@ -302,7 +295,10 @@ mod tests {
         tar.resize(257, 0);
         tar.extend_from_slice(b"ustar\0");
         assert_eq!(name(&tar), Some("a TAR archive"));
-        assert_eq!(name(b"\0\0\0\x14ftypmp42"), Some("a video (MP4, MOV)"));
+        assert_eq!(
+            name(b"\0\0\0\x14ftypmp42"),
+            Some("a video (MP4, MOV) without the telemetry of a GoPro, or cut before its index")
+        );
         let tlog = [
             &1_700_000_000_000_000_u64.to_be_bytes()[..],
             &[0xfd, 9, 0, 0],

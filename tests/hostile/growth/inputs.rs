@@ -1,6 +1,7 @@
 //! Parsers, and inputs of any length on which each could go wrong: the same thing again and again, or one thing
 //! that is long beside many that refer to it.
 
+use crate::made_databases::database;
 use crate::parsers;
 use std::ops::ControlFlow;
 use strapd_attitude::record::Nanos;
@@ -121,6 +122,13 @@ fn mcap_file(data: &[u8]) {
         |_| ControlFlow::Continue(()),
     );
     assert!(report.is_ok());
+}
+
+/// A recording of ROS 2 in pages of 1 kB.
+fn sqlite(length: usize) -> Vec<u8> {
+    let data = [0; 100];
+    let messages = vec![(0, 7, &data[..]); (length.saturating_sub(3000)) / 128];
+    database(1024, &[("/t", "a/msg/A")], &messages)
 }
 
 /// Cells of a header, and rows under it.
@@ -420,6 +428,22 @@ pub(crate) const CASES: &[Case] = cases! {
             0 => [ulog_record(b'F', b"f:uint64_t timestamp;"), ulog_record(b'A', b"\0\0\0f")].concat(),
             _ => ulog_record(b'D', &[0; 10]),
         });
+        "SQLite: messages": |n| sqlite(n);
+        "SQLite: leaves that are none": |n| {
+            let mut out = sqlite(n);
+            out[3 * 1024..].fill(0x55);
+            out
+        };
+        "SQLite: children that are not there": |n| {
+            let mut out = sqlite(n);
+            let end = 2 * 1024 + 12 + 2 * usize::from(out[2 * 1024 + 4]);
+            out[end..3 * 1024].fill(0x33);
+            out
+        };
+        "GPMF: empty devices": |n| b"DEVC\0\x01\0\0".repeat(n / 8);
+        "GPMF: devices that go on behind the end": |n| b"DEVC\0\xff\xff\xff".repeat(n / 8);
+        "GPMF: garbage": |n| [&b"DEVC\0\x01\0\0"[..], &vec![0x55; n]].concat();
+        "GPMF: garbage between devices": |n| b"DEVC\0\x01\0\0.....".repeat(n / 13);
         "bag: garbage": |n| bag(n, |_| vec![0x55; 9]);
         "bag: heads of chunks that go on behind the end": |n| bag(n, |_| bag_record(5, &[("compression", b"none"), ("size", &[0, 0, 16, 0])], 1 << 20, &[]));
         "bag: empty chunks": |n| bag(n, |_| bag_record(5, &[("compression", b"bz2"), ("size", &[1, 0, 0, 0])], 0, &[]));

@@ -3,6 +3,7 @@
 //! In a process of its own, whose standard output nobody reads; one thread, so that its time is all there is.
 
 use super::{mutate, seeds};
+use crate::made_databases::database;
 use crate::made_logs::{bytes, logged, motion};
 use clap::Parser;
 use rand::{RngExt, SeedableRng};
@@ -47,6 +48,15 @@ fn logs() -> Vec<Vec<u8>> {
     let mut logs = seeds("mcap");
     logs.push(bytes(None, 0, &logged("/imu", &samples)));
     logs.push(bytes(None, 0, &two));
+    // Its pages are as small as SQLite has them, and one page is above all others.
+    let imu = logged("/imu", &samples);
+    let rows: Vec<_> = imu
+        .iter()
+        .map(|m| (0, m.log_time, m.payload.as_slice()))
+        .collect();
+    logs.push(database(1024, &[("/imu", "sensor_msgs/msg/Imu")], &rows));
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures");
+    logs.push(std::fs::read(fixtures.join("gopro_hero6.raw")).unwrap());
     logs
 }
 

@@ -3,9 +3,11 @@
 //! A stage of its own so that the walk is one: containers differ in how they are cut, and in nothing behind that.
 
 pub(super) mod bag;
+pub(super) mod gpmf;
+mod pages;
+mod rosbag2;
 mod ulog;
 
-use super::input::Tape;
 use super::problem::Problems;
 use super::scan::{Besides, Facts, Item, Scanner};
 use super::{Payload, Reader};
@@ -18,6 +20,8 @@ pub(super) enum Container {
     Mcap(Box<Scanner>),
     Ulog(Box<ulog::Scanner>),
     Bag(Box<bag::Scanner>),
+    Rosbag2(Box<rosbag2::Scanner>),
+    Gpmf(Box<gpmf::Scanner>),
 }
 
 impl Container {
@@ -26,10 +30,15 @@ impl Container {
             input,
             limits,
             format,
+            beside,
         } = reader;
         match format {
             Format::Ulog => Container::Ulog(Box::new(ulog::Scanner::new(input))),
             Format::Bag => Container::Bag(Box::new(bag::Scanner::new(input, limits))),
+            Format::Rosbag2 => {
+                Container::Rosbag2(Box::new(rosbag2::Scanner::new(input, beside, limits)))
+            }
+            Format::Gpmf => Container::Gpmf(Box::new(gpmf::Scanner::new(input))),
             // Text is not opened here.
             Format::Mcap | Format::Lines | Format::Table => {
                 Container::Mcap(Box::new(Scanner::new(input, limits, besides)))
@@ -43,14 +52,19 @@ impl Container {
             Container::Mcap(scanner) => scanner.next(),
             Container::Ulog(scanner) => scanner.next(),
             Container::Bag(scanner) => scanner.next(),
+            Container::Rosbag2(scanner) => scanner.next(),
+            Container::Gpmf(scanner) => scanner.next(),
         }
     }
 
-    pub(super) fn tape(&self) -> &Tape {
+    /// Where it has come to, in bytes.
+    pub(super) fn position(&self) -> u64 {
         match self {
-            Container::Mcap(scanner) => scanner.tape(),
-            Container::Ulog(scanner) => scanner.tape(),
-            Container::Bag(scanner) => scanner.tape(),
+            Container::Mcap(scanner) => scanner.tape().position(),
+            Container::Ulog(scanner) => scanner.tape().position(),
+            Container::Bag(scanner) => scanner.tape().position(),
+            Container::Rosbag2(scanner) => scanner.position(),
+            Container::Gpmf(scanner) => scanner.position(),
         }
     }
 
@@ -59,6 +73,8 @@ impl Container {
             Container::Mcap(scanner) => scanner.recycle(payload),
             Container::Ulog(scanner) => scanner.recycle(payload),
             Container::Bag(scanner) => scanner.recycle(payload),
+            Container::Rosbag2(scanner) => scanner.recycle(payload),
+            Container::Gpmf(_) => {}
         }
     }
 
@@ -66,7 +82,7 @@ impl Container {
     pub(super) fn claimed(&self) -> Option<u64> {
         match self {
             Container::Mcap(scanner) => scanner.claimed(),
-            Container::Ulog(_) => None,
+            Container::Ulog(_) | Container::Rosbag2(_) | Container::Gpmf(_) => None,
             Container::Bag(scanner) => scanner.claimed(),
         }
     }
@@ -77,6 +93,8 @@ impl Container {
             Container::Mcap(scanner) => (scanner.facts, scanner.problems),
             Container::Ulog(scanner) => scanner.finish(),
             Container::Bag(scanner) => scanner.finish(),
+            Container::Rosbag2(scanner) => scanner.finish(),
+            Container::Gpmf(scanner) => scanner.finish(),
         }
     }
 }

@@ -42,7 +42,7 @@ pub fn list(
     let mut problems = Problems::default();
     loop {
         let item = scanner.next();
-        let item = item.map_err(|e| read_error(&name, scanner.tape().position(), e))?;
+        let item = item.map_err(|e| read_error(&name, scanner.position(), e))?;
         let flow = match item {
             None => break,
             Some(Item::Other {

@@ -174,6 +174,57 @@ pub enum ProblemKind {
         /// Its flags.
         bits: u64,
     },
+    /// The first page of a database says no layout that there is.
+    Database {
+        /// Why.
+        why: &'static str,
+    },
+    /// A database that ends before its last page.
+    PagesMissing {
+        /// Pages by its header.
+        need: u32,
+        /// Pages that are there.
+        have: u32,
+    },
+    /// Pages behind those of the last transaction of a database: the recorder was stopped.
+    PagesUncommitted {
+        /// How many.
+        pages: u32,
+    },
+    /// A page of a database that can not be read.
+    Page {
+        /// Its number, from 1.
+        page: u32,
+        /// Why.
+        why: &'static str,
+    },
+    /// A row of a database that can not be read, or is no message.
+    Row {
+        /// Why.
+        why: &'static str,
+    },
+    /// A database without a table that is needed.
+    NoTable {
+        /// The table.
+        name: &'static str,
+    },
+    /// The file beside a database with its last pages can not be used, or not as a whole.
+    Beside {
+        /// Why.
+        why: &'static str,
+    },
+    /// A video whose telemetry can not be found, or not all of it.
+    Video {
+        /// Why.
+        why: &'static str,
+    },
+    /// Telemetry of a camera that can not be read.
+    Telemetry {
+        /// What.
+        why: &'static str,
+    },
+    /// A file beside a database says that a change of it was not ended.
+    Journal,
     /// The summary at the end can not be used; nothing is lost by that.
     BadSummary {
         /// Why.
@@ -314,6 +365,34 @@ impl fmt::Display for ProblemKind {
             ProblemKind::UnknownFeature { bits } => write!(
                 f,
                 "the log needs a feature this program does not know (flags {bits:#x})"
+            ),
+            ProblemKind::Database { why } => write!(f, "the database can not be read: {why}"),
+            ProblemKind::PagesMissing { need, have } => {
+                write!(f, "the file is cut: of {need} pages {have} are there")
+            }
+            ProblemKind::PagesUncommitted { pages } => write!(
+                f,
+                "the recorder was stopped: {pages} pages are of no finished transaction; messages in them are read all the same"
+            ),
+            ProblemKind::Page { page, why } => {
+                write!(f, "page {page} of the database can not be read: {why}")
+            }
+            ProblemKind::Row { why } => write!(f, "a row can not be read: {why}; skipped"),
+            ProblemKind::NoTable { name } => {
+                write!(f, "the database has no table {name:?} that can be read")
+            }
+            ProblemKind::Beside { why } => {
+                write!(f, "the file -wal beside the database: {why}")
+            }
+            ProblemKind::Video { why } => {
+                write!(f, "the telemetry of the video can not be read: {why}")
+            }
+            ProblemKind::Telemetry { why } => {
+                write!(f, "telemetry that can not be read: {why}; skipped")
+            }
+            ProblemKind::Journal => write!(
+                f,
+                "a file -journal beside the database says that it is in the middle of a change; `sqlite3 FILE .tables` puts it right"
             ),
             ProblemKind::BadSummary { why } => write!(f, "the summary can not be used: {why}"),
         }

@@ -2,7 +2,9 @@
 //!
 //! Apart from the input that can be read again because nothing is kept: who reads it so takes its samples as they come.
 
+use super::input::Input;
 use super::line_input;
+use super::warn::Warn;
 use crate::decode::Options;
 use crate::error::{Error, Result};
 use crate::format::{Format, head_of};
@@ -19,9 +21,12 @@ pub enum Incoming<R> {
     Messages(Reader),
     /// Lines or rows.
     Lines(Box<Lines<R>>),
+    /// A log that is not read in the order of its bytes: all of it, kept.
+    Whole(Input),
 }
 
-/// Whether a stream holds messages or lines; `name` is what errors call it. No more is read than tells it.
+/// Whether a stream holds messages or lines; `name` is what errors call it. No more is read than tells it, but
+/// of a log that can not be read as it comes; then `warn` is told what [`Input::of_stream`] has to say.
 ///
 /// # Errors
 /// It can not be read, is empty, or of a format that is known and not read; options that are not for its format.
@@ -29,6 +34,7 @@ pub fn incoming<R: Read + Send + 'static>(
     name: &Path,
     input: R,
     options: &Options,
+    warn: &Warn,
 ) -> Result<Incoming<impl Read + use<R>>> {
     let mut input = BufReader::with_capacity(1 << 16, input);
     let head = head_of(&mut input).map_err(|source| Error::Read {
@@ -55,6 +61,9 @@ pub fn incoming<R: Read + Send + 'static>(
         return Ok(Incoming::Lines(Box::new(lines)));
     }
     line_input::only_for_tables(name, format, options)?;
+    if format.is_read_anywhere() {
+        return Ok(Incoming::Whole(Input::of_stream(name, whole, warn)?));
+    }
     Ok(Incoming::Messages(Reader::from_stream(
         name,
         Box::new(whole),

@@ -6,11 +6,15 @@ mod conformance;
 mod containers;
 mod decode;
 mod delimited;
+mod gpmf;
+#[path = "../../../../tests/made_databases/mod.rs"]
+mod made_databases;
 mod mcap_damage;
 #[path = "../../../../tests/mcap_logs/mod.rs"]
 mod mcap_logs;
 mod mcap_reader;
 mod relative_error;
+mod rosbag2;
 mod samples;
 #[path = "../../../../tests/shared_data/mod.rs"]
 mod shared_data;

@@ -15,6 +15,6 @@ pub fn open(path: &Path) -> Result<Input> {
 }
 
 /// Logs what is to be known of a recording.
-fn warn() -> Warn {
+pub(super) fn warn() -> Warn {
     Warn::by(|what| tracing::warn!("{what}"))
 }

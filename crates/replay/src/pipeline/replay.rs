@@ -66,9 +66,11 @@ fn piped(
     pool: &Pool,
     watch: &mut dyn FnMut(&Position),
 ) -> Result<RunSummary> {
-    match incoming(&run.source.name(), input, &run.selection.decode)? {
+    let name = run.source.name();
+    match incoming(&name, input, &run.selection.decode, &logged::warn())? {
         Incoming::Messages(reader) => replay_stream::replay(run, reader, pool, watch),
         Incoming::Lines(text) => lines::replay(run, *text, None, pool, watch),
+        Incoming::Whole(input) => file(run, &input, pool, watch),
     }
 }
 

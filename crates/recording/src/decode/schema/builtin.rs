@@ -112,6 +112,44 @@ const LAYOUTS: &[(&str, &str)] = &[
     ),
 ];
 
+/// The definition of a well-known message as `ros2msg`, for who reads what is made of a recording that has none. The
+/// types of px4_msgs have none here: they change between releases.
+pub(crate) fn definition(ros_name: &str) -> Option<String> {
+    let fields_of = |wanted: &str| {
+        let mut known = LAYOUTS.iter();
+        let found = known.find(|(name, _)| *name == wanted);
+        found.map(|(_, fields)| *fields)
+    };
+    let root = fields_of(ros_name).filter(|_| !ros_name.starts_with("px4_msgs/"))?;
+    let mut text = root.replace(';', "\n");
+    text.push('\n');
+    let package = |name: &str| name.split('/').next().unwrap_or_default().to_owned();
+    let mut open = vec![(package(ros_name), root)];
+    let mut told = Vec::new();
+    while let Some((own, fields)) = open.pop() {
+        for field in fields.split(';') {
+            let kind = field.trim().split([' ', '[']).next().unwrap_or_default();
+            let name = match kind.contains('/') {
+                true => kind.to_owned(),
+                false => format!("{own}/{kind}"),
+            };
+            let inner = match name.as_str() {
+                "builtin_interfaces/Time" => Some("int32 sec;uint32 nanosec"),
+                name => fields_of(name),
+            };
+            let Some(inner) = inner.filter(|_| !told.contains(&name)) else {
+                continue;
+            };
+            text.push_str(&format!("{:=<80}\nMSG: {name}\n", ""));
+            text.push_str(&inner.replace(';', "\n"));
+            text.push('\n');
+            open.push((package(&name), inner));
+            told.push(name);
+        }
+    }
+    Some(text)
+}
+
 /// The layout of a well-known message, by its `pkg/Type` name.
 pub(crate) fn schema(ros_name: &str, dialect: Dialect) -> Option<Schema> {
     let (_, root) = LAYOUTS.iter().find(|(name, _)| *name == ros_name)?;
@@ -127,4 +165,38 @@ pub(crate) fn schema(ros_name: &str, dialect: Dialect) -> Option<Schema> {
         text.push_str(&fields.replace(';', "\n"));
     }
     parse(&text, ros_name, dialect).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn a_definition_told_to_others_is_the_layout_it_was_made_of() {
+        for (name, _) in LAYOUTS.iter().filter(|(name, _)| !name.starts_with("px4")) {
+            let own = schema(name, Dialect::Ros2).unwrap();
+            let told = parse(&definition(name).unwrap(), name, Dialect::Ros2).unwrap();
+            let flat = |schema: &Schema| {
+                let mut open = vec![schema.root];
+                let mut found = Vec::new();
+                while let Some(at) = open.pop() {
+                    for field in &schema.get(at).unwrap().fields {
+                        let kind = match field.kind {
+                            super::super::Kind::Struct(inner) => {
+                                open.push(inner);
+                                None
+                            }
+                            kind => Some(kind),
+                        };
+                        found.push((field.name.clone(), kind, field.many));
+                    }
+                }
+                found
+            };
+            assert_eq!(flat(&told), flat(&own), "{name}");
+        }
+        assert_eq!(definition("px4_msgs/VehicleImu"), None);
+        assert_eq!(definition("std_msgs/String"), None);
+    }
 }

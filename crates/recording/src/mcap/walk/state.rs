@@ -185,7 +185,7 @@ where
         match self.scanner.next() {
             Ok(Some(Item::Block(block))) => Ok(Some(block)),
             Ok(_) => Ok(None),
-            Err(e) => Err(self.failed(self.scanner.tape().position(), e)),
+            Err(e) => Err(self.failed(self.scanner.position(), e)),
         }
     }
 
@@ -343,7 +343,7 @@ where
             self.problems
                 .add(offset, ProblemKind::ShortMessages, Some(n));
         }
-        let (claimed, end) = (self.scanner.claimed(), self.scanner.tape().position());
+        let (claimed, end) = (self.scanner.claimed(), self.scanner.position());
         let (facts, problems) = self.scanner.finish();
         self.problems.merge(problems);
         let mut survey = Survey {

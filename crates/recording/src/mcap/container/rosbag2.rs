@@ -1,0 +1,152 @@
+//! The files of a recording of ROS 2 in SQLite -> blocks of records. I/O.
+//!
+//! Apart from [`crate::rosbag2`], which does the work and knows no files. A database is read in the order of its tables,
+//! not of its bytes, so a stream of one was put into a file before it comes here.
+
+use super::super::block::{Block, Kind, Payload};
+use super::super::input::{Held, Input, LogFile};
+use super::super::problem::{ProblemKind, Problems};
+use super::super::scan::{Facts, Item};
+use super::super::{Beside, Limits};
+use super::pages::FilePages;
+use crate::format::Format;
+use crate::records::transcript::Transcript;
+use crate::rosbag2::{Bag, Fault, FaultKind};
+use std::io;
+use std::sync::Arc;
+
+/// Bytes of records worked on together.
+const RUN: usize = 1 << 20;
+/// Blocks whose memory is kept: as many as are on their way with few threads.
+const SPARE: usize = 8;
+
+/// The walk over a recording.
+#[derive(Debug)]
+pub(in super::super) struct Scanner {
+    /// What is to be opened: the database, and the files beside it.
+    files: Option<(Arc<LogFile>, Beside)>,
+    limits: Limits,
+    open: Option<(FilePages, Bag)>,
+    problems: Problems,
+    distribution: String,
+    /// Where the records told last lie in the file.
+    position: u64,
+    spare: Vec<Vec<u8>>,
+}
+
+impl Scanner {
+    pub(super) fn new(input: Input, beside: Beside, limits: Limits) -> Self {
+        let files = match input {
+            Input::File(file) => Some((file, beside)),
+            Input::Stream { .. } => None,
+        };
+        debug_assert!(files.is_some(), "who opens a stream keeps it in a file");
+        Scanner {
+            files,
+            limits,
+            open: None,
+            problems: Problems::default(),
+            distribution: String::new(),
+            position: 0,
+            spare: Vec::new(),
+        }
+    }
+
+    pub(super) fn position(&self) -> u64 {
+        self.position
+    }
+
+    pub(super) fn recycle(&mut self, payload: Payload) {
+        if let Payload::Held(mut held) = payload
+            && self.spare.len() < SPARE
+        {
+            held.bytes.clear();
+            self.spare.push(held.bytes);
+        }
+    }
+
+    pub(super) fn next(&mut self) -> io::Result<Option<Item>> {
+        let mut to = Transcript {
+            bytes: self.spare.pop().unwrap_or_default(),
+        };
+        if let Some((file, beside)) = self.files.take() {
+            self.begin(file, beside, &mut to)?;
+        }
+        let offset = self.position;
+        while let Some((pages, bag)) = &mut self.open
+            && to.bytes.len() < RUN
+        {
+            let goes_on = bag.next(pages, &mut to)?;
+            for fault in bag.faults.drain(..) {
+                told(fault, pages, &mut self.problems);
+            }
+            self.position = pages.offset(bag.page());
+            if !goes_on {
+                self.open = None;
+            }
+        }
+        if to.bytes.is_empty() {
+            return Ok(None);
+        }
+        let range = 0..to.bytes.len();
+        let held = Held {
+            bytes: to.bytes,
+            range,
+        };
+        Ok(Some(Item::Block(Block {
+            offset,
+            kind: Kind::Transcript,
+            payload: Payload::Held(held),
+        })))
+    }
+
+    fn begin(&mut self, file: Arc<LogFile>, beside: Beside, to: &mut Transcript) -> io::Result<()> {
+        let mut faults = Vec::new();
+        let opened = FilePages::open(file, beside.wal, &mut faults)?;
+        if beside.has_journal {
+            self.problems.add(0, ProblemKind::Journal, None);
+        }
+        for fault in faults {
+            let kind = ProblemKind::Beside { why: fault.why };
+            self.problems.add(fault.offset, kind, None);
+        }
+        match opened {
+            Err(why) => self.problems.add(0, ProblemKind::Database { why }, None),
+            Ok((mut pages, header)) => {
+                let limits = (self.limits.record, self.limits.definitions);
+                let mut bag = Bag::open(&mut pages, header, limits, to)?;
+                for fault in bag.faults.drain(..) {
+                    told(fault, &pages, &mut self.problems);
+                }
+                self.distribution = std::mem::take(&mut bag.distribution);
+                self.open = Some((pages, bag));
+            }
+        }
+        Ok(())
+    }
+
+    pub(super) fn finish(self) -> (Facts, Problems) {
+        let library = match self.distribution.as_str() {
+            "" => "rosbag2".to_owned(),
+            name => format!("rosbag2 of ROS 2 {name}"),
+        };
+        let facts = Facts {
+            format: Format::Rosbag2,
+            library,
+            ..Facts::default()
+        };
+        (facts, self.problems)
+    }
+}
+
+fn told(fault: Fault, pages: &FilePages, problems: &mut Problems) {
+    let kind = match fault.kind {
+        FaultKind::Cut { need, have } => ProblemKind::PagesMissing { need, have },
+        FaultKind::Uncommitted { pages } => ProblemKind::PagesUncommitted { pages },
+        FaultKind::Page { page, why } => ProblemKind::Page { page, why },
+        FaultKind::Row { why } => ProblemKind::Row { why },
+        FaultKind::NoTable { name } => ProblemKind::NoTable { name },
+        FaultKind::TooMany => ProblemKind::TooManyDefinitions,
+    };
+    problems.add(pages.offset(fault.page), kind, fault.messages);
+}
