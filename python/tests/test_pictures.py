@@ -61,7 +61,18 @@ def test_a_plot_has_the_angles_and_their_bands() -> None:
     band = figure.axes[0].collections[0].get_paths()[0].vertices[:, 1]
     roll = _angles.roll_pitch_yaw(ATT.q)[:, 0]
     assert band.max() > roll.max() and band.min() < roll.min()
+    # The first sample knows nothing: what follows is to be seen all the same.
+    bottom, top = figure.axes[0].get_ylim()
+    assert bottom < roll.min() and roll.max() < top < 0.5 * band.max()
     matplotlib.pyplot.close(figure)
+
+
+def test_a_plot_without_sigmas_has_its_lines() -> None:
+    matplotlib = pytest.importorskip("matplotlib")
+    part = ATT[:50]
+    part._cov = np.full_like(part._cov, np.nan)
+    figure = part.plot(figure=matplotlib.figure.Figure())
+    assert all(np.isfinite(axis.get_ylim()).all() for axis in figure.axes)
 
 
 def test_a_plot_against_the_truth_has_the_errors() -> None:

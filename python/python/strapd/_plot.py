@@ -40,6 +40,16 @@ def _unbroken(angles: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     return angles
 
 
+def _limits(values: Any, low: Any, high: Any) -> tuple[float, float]:
+    """From where to where: all of the line, and the band but for its widest moments, such as the first sample's."""
+    # Where sigma is not known the line is all there is.
+    low, high = (np.where(np.isfinite(band), band, values) for band in (low, high))
+    lowest = min(np.nanmin(values), np.nanquantile(low, 0.03))
+    highest = max(np.nanmax(values), np.nanquantile(high, 0.97))
+    margin = 0.05 * max(highest - lowest, 1e-9)
+    return float(lowest - margin), float(highest + margin)
+
+
 def plot(
     att: Attitude,
     reference: Union[Attitude, tuple[npt.ArrayLike, npt.ArrayLike], None] = None,
@@ -73,6 +83,7 @@ def plot(
         line = _unbroken(values[:, i]) if against is None else values[:, i]
         axis.plot(seconds, line, color=colour, linewidth=1, label=name)
         axis.set_ylabel(f"{name}, deg")
+        axis.set_ylim(*_limits(values[:, i], low, high))
         axis.grid(alpha=0.3)
         axis.legend(loc="upper right", fontsize="small")
     axes[0].set_title(title, fontsize="medium")
