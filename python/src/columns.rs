@@ -63,7 +63,7 @@ impl Columns {
 }
 
 /// A flat vector as rows of `width`.
-fn rows(py: Python<'_>, flat: Vec<f64>, width: usize) -> PyResult<Bound<'_, PyArray2<f64>>> {
+pub fn rows(py: Python<'_>, flat: Vec<f64>, width: usize) -> PyResult<Bound<'_, PyArray2<f64>>> {
     let n = flat.len() / width;
     let array: Bound<'_, PyArray1<f64>> = flat.into_pyarray(py);
     array.reshape([n, width])

@@ -1,7 +1,7 @@
 //! numpy arrays -> attitudes as numpy arrays: the compiled half of the Python package `strapd`.
 //!
 //! What a user sees is written in Python (`python/strapd`); here is what has to be fast. Everything is computed by
-//! `strapd-attitude`, the path of the command `strapd replay`, so that both give the same bits.
+//! `strapd-attitude` and read by `strapd-replay`, the path of the command `strapd replay`, so that both give the same bits.
 //!
 //! | module | arrow |
 //! |---|---|
@@ -13,7 +13,11 @@
 //! | [`facts`] | what became of a run -> a dict |
 //! | [`calibration`] | the calibration of a sensor <-> a dict |
 //! | [`compared`] | two attitudes -> how far apart |
-//! | [`written`] | bytes that the command writes -> attitudes |
+//! | [`words`] | the command's flags -> a replay to be done |
+//! | [`recorded`] | a recorded log -> attitudes |
+//! | [`samples_of_log`], [`simulated`], [`raw_columns`] | a recorded log, or a motion -> samples as numpy arrays |
+//! | [`looked`], [`shell`] | a recorded log -> what is in it, and what may spoil it |
+//! | [`errand`], [`noted`] | work that Ctrl-C ends, and what is said on the way |
 
 // What is documented is the Python package; here for who changes it.
 #![allow(missing_docs, unreachable_pub)]
@@ -24,12 +28,20 @@ mod batch;
 mod calibration;
 mod columns;
 mod compared;
+mod errand;
 mod facts;
 mod live;
+mod looked;
+mod noted;
+mod raw_columns;
+mod recorded;
 mod refusal;
 mod samples;
+mod samples_of_log;
 mod settings;
-mod written;
+mod shell;
+mod simulated;
+mod words;
 
 #[pymodule]
 mod _strapd {
@@ -40,9 +52,15 @@ mod _strapd {
     #[pymodule_export]
     use crate::live::Live;
     #[pymodule_export]
+    use crate::looked::{check_log, info};
+    #[pymodule_export]
+    use crate::recorded::replay;
+    #[pymodule_export]
+    use crate::samples_of_log::read;
+    #[pymodule_export]
     use crate::settings::check_settings;
     #[pymodule_export]
-    use crate::written::Written;
+    use crate::simulated::simulate;
 
     #[pymodule_init]
     fn init(module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {

@@ -10,15 +10,39 @@ pub fn argument(what: impl Into<String>) -> PyErr {
 
 /// A run that can not be carried out: `strapd.Error` of this kind.
 pub fn run(py: Python<'_>, kind: &str, what: &str) -> PyErr {
+    raised(py, kind, &in_python(what))
+}
+
+fn raised(py: Python<'_>, kind: &str, what: &str) -> PyErr {
     let error = py
         .import("strapd._errors")
         .and_then(|errors| errors.getattr("Error"))
-        .and_then(|class| class.call1((in_python(what), kind)));
+        .and_then(|class| class.call1((what, kind)));
     error.map_or_else(|failure| failure, PyErr::from_value)
 }
 
-/// The library names the flags of the command; in Python they are arguments: `--max-gap` is `max_gap`.
+/// [`argument`] of a function that takes a log.
+pub fn argument_of_log(what: &str) -> PyErr {
+    PyValueError::new_err(of_log(what))
+}
+
+/// [`run`] over a log.
+pub fn run_of_log(py: Python<'_>, kind: &str, what: &str) -> PyErr {
+    raised(py, kind, &of_log(what))
+}
+
+/// The library names the flags of the command; in Python they are arguments: `--max-gap` is `max_gap`. Of arrays `--time` is
+/// `t`, the stamps themselves.
 pub fn in_python(what: &str) -> String {
+    named(what, &[("sample-kind", "kind"), ("time", "t")])
+}
+
+/// The same of what takes a log, whose arguments have the flags' names.
+pub fn of_log(what: &str) -> String {
+    named(what, &[])
+}
+
+fn named(what: &str, others: &[(&str, &str)]) -> String {
     let mut out = String::with_capacity(what.len());
     let mut rest = what;
     while let Some(at) = rest.find("--") {
@@ -33,10 +57,9 @@ pub fn in_python(what: &str) -> String {
             rest = flag;
             continue;
         }
-        match name {
-            "sample-kind" => out.push_str("kind"),
-            "time" => out.push('t'),
-            other => out.push_str(&other.replace('-', "_")),
+        match others.iter().find(|(flag, _)| *flag == name) {
+            Some((_, argument)) => out.push_str(argument),
+            None => out.push_str(&name.replace('-', "_")),
         }
         rest = &flag[name.len()..];
     }

@@ -10,7 +10,9 @@ use pyo3::types::{PyDict, PyString};
 use std::str::FromStr;
 use std::sync::Arc;
 use strapd_attitude::condition::{GyroUnit, OnGap};
-use strapd_attitude::estimate::{Aid, Bias, Initial, NOISE_FIGURES, NOISE_PRESETS, Noise, Plan, Truncation};
+use strapd_attitude::estimate::{
+    Aid, Bias, Initial, NOISE_FIGURES, NOISE_PRESETS, Noise, Plan, Truncation,
+};
 use strapd_attitude::propagate::{Method, Order, Placement};
 use strapd_attitude::quaternion::{BodyRate, Quaternion};
 use strapd_attitude::record::SampleKind;
@@ -217,16 +219,6 @@ pub fn plan(settings: &Bound<'_, PyDict>, aid: Aid) -> PyResult<Plan> {
 
 fn method(given: &Given<'_, '_>) -> PyResult<Method> {
     let name = given.text("method")?.unwrap_or_else(|| "auto".to_owned());
-    let named: Method = match name.as_str() {
-        "causal" => Method::Magnus {
-            window: 5,
-            order: Order::M6,
-            placement: Placement::Causal,
-        },
-        other => other
-            .parse()
-            .map_err(|e| argument(format!("method: {e}")))?,
-    };
     let window = given
         .get("window")?
         .map(|value| {
@@ -249,7 +241,27 @@ fn method(given: &Given<'_, '_>) -> PyResult<Method> {
         .transpose()?
         .map(|text| text.parse().map_err(|e| argument(format!("order: {e}"))))
         .transpose()?;
-    let finals = given.truth("finals")?;
+    method_of(&name, window, order, given.truth("finals")?).map_err(argument)
+}
+
+/// The method of a name, with window and order where they are given.
+///
+/// # Errors
+/// In words, naming the argument.
+pub fn method_of(
+    name: &str,
+    window: Option<usize>,
+    order: Option<Order>,
+    finals: bool,
+) -> Result<Method, String> {
+    let named: Method = match name {
+        "causal" => Method::Magnus {
+            window: 5,
+            order: Order::M6,
+            placement: Placement::Causal,
+        },
+        other => other.parse().map_err(|e| format!("method: {e}"))?,
+    };
     Ok(match named {
         Method::Magnus {
             window: usual,
@@ -273,9 +285,9 @@ fn method(given: &Given<'_, '_>) -> PyResult<Method> {
         }
         other if window.is_none() && order.is_none() => other,
         _ => {
-            return Err(argument(format!(
+            return Err(format!(
                 "window, order: they belong to method 'magnus', 'causal' or 'commit', not to '{name}'"
-            )));
+            ));
         }
     })
 }

@@ -14,9 +14,11 @@ import pytest
 REPOSITORY = pathlib.Path(__file__).resolve().parents[2]
 FIXTURES = REPOSITORY / "fixtures"
 SHARED = REPOSITORY.parent / "shared"
+#: The recordings.
+LOGS = sorted(path for path in FIXTURES.iterdir() if path.suffix in (".mcap", ".ulg", ".bag"))
 
 #: What the environment would add to the command line.
-OURS = ("STRAPD_BIN", "STRAPD_EXAMPLES", "STRAPD_ALL_TRIALS")
+OURS = ("STRAPD_BIN", "STRAPD_EXAMPLES", "STRAPD_ALL_TRIALS", "STRAPD_HEAVY")
 for name in [name for name in os.environ if name.startswith("STRAPD_") and name not in OURS]:
     del os.environ[name]
 

@@ -10,7 +10,7 @@ import pytest
 import strapd
 from conftest import same_bits, turning
 from scipy.spatial.transform import Rotation
-from strapd._command import unknown
+
 
 T, GYR, ACC = turning(500)
 ATT = strapd.estimate(GYR, ACC, t=T)
@@ -82,15 +82,6 @@ def test_parts_and_flags() -> None:
         ATT[3]
     with pytest.raises(ValueError, match="there is no status 'fine'"):
         ATT.flags("fine")
-
-
-def test_zeros_of_the_command_are_unknown_where_the_end_is() -> None:
-    cov = np.zeros((3, 6))
-    cov[1] = 1.0
-    unknown(cov, [1.0, 2.0, 3.0])
-    assert np.isfinite(cov).all()
-    unknown(cov, [None, None, None])
-    assert np.isnan(cov[[0, 2]]).all() and (cov[1] == 1.0).all()
 
 
 def test_sigma_is_judged_alike_in_every_world() -> None:

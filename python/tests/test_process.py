@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import pathlib
 import signal
 import subprocess
 import sys
@@ -13,9 +14,17 @@ import time
 import numpy as np
 import pytest
 import strapd
-from conftest import FIXTURES, same_bits, turning
+from conftest import FIXTURES, same_bits, say, turning
 
 T, GYR, ACC = turning(2000)
+
+
+@pytest.fixture(scope="session")
+def long_log(command: str, tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
+    """A log of a million samples."""
+    path = tmp_path_factory.mktemp("long") / "long.mcap"
+    say(command, "simulate", "random", "--rate-hz=1000", "--duration=1000", "--compression=lz4", "--quiet", "-o", path)
+    return path
 
 
 def work(seed: int) -> strapd.Attitude:
@@ -93,23 +102,58 @@ def test_ctrl_c_ends_a_long_run(what: str) -> None:
     assert float(done.stdout.split()[-1]) < 3.0, done.stdout
 
 
-def test_ctrl_c_ends_the_command(tmp_path: object) -> None:
+def test_ctrl_c_ends_a_log_that_never_comes(tmp_path: pathlib.Path) -> None:
     script = (
         "import strapd, sys\n"
         "try:\n    strapd.replay(sys.argv[1])\n"
         "except KeyboardInterrupt:\n    print('interrupted')\n"
     )
-    fifo = os.path.join(str(tmp_path), "log.mcap")
+    fifo = tmp_path / "log.mcap"
     os.mkfifo(fifo)
-    # A log that never comes.
-    program = subprocess.Popen([sys.executable, "-c", script, fifo], stdout=subprocess.PIPE, text=True)
+    program = subprocess.Popen([sys.executable, "-c", script, str(fifo)], stdout=subprocess.PIPE, text=True)
     writer = os.open(fifo, os.O_WRONLY)
-    with open(f"/proc/{program.pid}/task/{program.pid}/children") as file:
-        child = file.read().split()
     program.send_signal(signal.SIGINT)
     assert program.communicate(timeout=20)[0] == "interrupted\n"
     os.close(writer)
-    assert child and not any(os.path.exists(f"/proc/{pid}") for pid in child)
+
+
+READS = """
+import os, signal, sys, threading, time, strapd
+path = sys.argv[1]
+threading.Timer(0.5, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+begun = time.monotonic()
+try:
+    while True:
+        WHAT
+except KeyboardInterrupt:
+    print("interrupted after", time.monotonic() - begun - 0.5)
+"""
+
+
+@pytest.mark.parametrize("what", ["strapd.replay(path)", "strapd.open(path)", "strapd.check(path)", "strapd.read(path)"])
+def test_ctrl_c_ends_whatever_reads_a_long_log(what: str, long_log: pathlib.Path) -> None:
+    words = [sys.executable, "-c", READS.replace("WHAT", what), str(long_log)]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert done.stdout.startswith("interrupted after"), done.stdout + done.stderr
+    # A second is promised.
+    assert float(done.stdout.split()[-1]) < 1.0, done.stdout
+
+
+def test_the_interpreter_goes_on_while_a_log_is_read(long_log: pathlib.Path) -> None:
+    ticks, done = 0, threading.Event()
+
+    def tick() -> None:
+        nonlocal ticks
+        while not done.is_set():
+            ticks += 1
+            time.sleep(0.001)
+
+    ticker = threading.Thread(target=tick)
+    ticker.start()
+    strapd.replay(long_log)
+    done.set()
+    ticker.join()
+    assert ticks > 10
 
 
 def test_importing_costs_little_beyond_numpy() -> None:

@@ -25,6 +25,13 @@ if told is not None:
 strapd.estimate(np.zeros((2, 3)), t=[0, 1], world="moon")  # type: ignore[arg-type]
 strapd.estimate(np.zeros((2, 3)), t=[0, 1], colour=1)  # type: ignore[call-arg]
 log: strapd.Log = strapd.open("a.mcap")
+hz: float | None = log.rates["/imu"]
+imu: strapd.Samples = log.read("/imu", time="log")
+walk: strapd.Simulation = strapd.simulate("walking", rate_hz=100, noise={"arw": 0.1}, worn="foot")
+strapd.estimate(walk.gyr, walk.acc, t=walk.t, kind=walk.kind or "rate").plot(walk.truth, align="none")
+error: float = strapd.compare(att, walk.truth)["total"]["rms_deg"]
+strapd.simulate("flying")  # type: ignore[arg-type]
+att.plot(walk.truth, align="north")  # type: ignore[arg-type]
 reveal_type(att.q)
 """
 

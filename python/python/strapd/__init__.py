@@ -9,13 +9,14 @@ Quaternions are w, x, y, z and take **body to world**; the documentation is ``do
 """
 
 from ._attitude import STATUS_BITS, Attitude
-from ._command import Finding, Log, check, replay
-
-# Not in __all__: `from strapd import *` is to leave Python's own alone.
-from ._command import open as open  # noqa: A004
 from ._compare import compare
 from ._errors import Error, LossWarning, ResolutionWarning
 from ._estimation import Estimator, Settings, estimate, integrate
+from ._recordings import Finding, Log, check, replay
+
+# Not in __all__: `from strapd import *` is to leave Python's own alone.
+from ._recordings import open as open  # noqa: A004
+from ._samples import Samples, Simulation, read, simulate
 from ._strapd import __version__
 
 __all__ = [
@@ -27,11 +28,15 @@ __all__ = [
     "Log",
     "LossWarning",
     "ResolutionWarning",
+    "Samples",
     "Settings",
+    "Simulation",
     "__version__",
     "check",
     "compare",
     "estimate",
     "integrate",
+    "read",
     "replay",
+    "simulate",
 ]

@@ -10,7 +10,12 @@ import numpy.typing as npt
 if TYPE_CHECKING:
     import pandas
     import polars
+    import pyarrow
+    from matplotlib.figure import Figure
     from scipy.spatial.transform import Rotation
+
+    from ._angles import Align
+    from ._compare import Track
 
 #: Names of the bits of ``status``.
 STATUS_BITS = {
@@ -41,8 +46,7 @@ class Attitude:
     ``rate``
         float64 (n, 3): rad/s about the body axes, what was known of the bias removed.
     ``status``, ``reset``
-        uint16 and uint32 (n,): what was noticed (``flags``), and how often the attitude was held or reset so far. ``None`` where it came
-        through the command, which does not hand them over.
+        uint16 and uint32 (n,): what was noticed (``flags``), and how often the attitude was held or reset so far.
     ``summary``
         dict: counts, gaps, method, what was learned; the names are those of ``strapd replay --json``.
     """
@@ -50,17 +54,17 @@ class Attitude:
     t: npt.NDArray[np.int64]
     q: npt.NDArray[np.float64]
     rate: npt.NDArray[np.float64]
-    status: Optional[npt.NDArray[np.uint16]]
-    reset: Optional[npt.NDArray[np.uint32]]
+    status: npt.NDArray[np.uint16]
+    reset: npt.NDArray[np.uint32]
     summary: dict[str, Any]
 
-    def __init__(self, columns: dict[str, Any], summary: dict[str, Any], has_status: bool = True) -> None:
+    def __init__(self, columns: dict[str, Any], summary: dict[str, Any]) -> None:
         self.t = columns["t"]
         self.q = columns["q"]
         self.rate = columns["rate"]
         self._cov: npt.NDArray[np.float64] = columns["cov"]
-        self.status = columns["status"] if has_status else None
-        self.reset = columns["reset"] if has_status else None
+        self.status = columns["status"]
+        self.reset = columns["reset"]
         self.summary = summary
 
     @property
@@ -124,7 +128,7 @@ class Attitude:
 
     @property
     def bias_sigma(self) -> Optional[npt.NDArray[np.float64]]:
-        """(3,): one standard deviation of it; ``None`` where nothing was learned and the command does not say."""
+        """(3,): one standard deviation of it; ``None`` where nothing was learned and the run does not say."""
         aid = self.summary["aid"]
         if aid is not None:
             return np.array(aid["sigma"]["gyro_bias_rad_s"])
@@ -139,8 +143,6 @@ class Attitude:
 
     def flags(self, name: str) -> npt.NDArray[np.bool_]:
         """(n,): where the status has this bit (``STATUS_BITS``)."""
-        if self.status is None:
-            raise ValueError("flags: the command hands over no status\n  help: summary has the counts")
         if name not in STATUS_BITS:
             raise ValueError(f"name: there is no status {name!r}\n  help: one of {', '.join(STATUS_BITS)}")
         found: npt.NDArray[np.bool_] = (self.status & STATUS_BITS[name]) != 0
@@ -165,8 +167,7 @@ class Attitude:
         columns.update({f"q{axis}": self.q[:, i] for i, axis in enumerate("wxyz")})
         columns.update({f"w{axis}": self.rate[:, i] for i, axis in enumerate("xyz")})
         columns.update({f"sigma_{axis}": sigma[:, i] for i, axis in enumerate("xyz")})
-        if self.status is not None and self.reset is not None:
-            columns.update(status=self.status, reset=self.reset)
+        columns.update(status=self.status, reset=self.reset)
         return columns
 
     def to_pandas(self) -> pandas.DataFrame:
@@ -181,6 +182,51 @@ class Attitude:
 
         return polars.DataFrame(self.to_dict())
 
+    def to_arrow(self) -> pyarrow.Table:
+        """A table of :meth:`to_dict`, with world, body and method in the metadata of its schema."""
+        import pyarrow
+
+        about = {name: str(self.summary[name]) for name in ("world", "body", "method", "sample_kind", "clock") if name in self.summary}
+        return pyarrow.table(self.to_dict(), metadata={f"strapd.{name}": said for name, said in about.items()})
+
+    def _of_arrow(self) -> Any:
+        """The same by whoever is here: their tables hand themselves on without a copy."""
+        try:
+            return self.to_arrow()
+        except ImportError:
+            pass
+        try:
+            return self.to_polars()
+        except ImportError:
+            raise ImportError("Arrow is spoken through pyarrow or polars\n  help: pip install pyarrow") from None
+
+    def __arrow_c_stream__(self, requested_schema: Any = None) -> Any:
+        """Arrow's PyCapsule protocol: what polars, DuckDB, pandas and pyarrow take an Attitude by."""
+        return self._of_arrow().__arrow_c_stream__(requested_schema)
+
+    def __arrow_c_schema__(self) -> Any:
+        """The columns and their types, by the same protocol."""
+        return self[:0].to_arrow().schema.__arrow_c_schema__()
+
+    def plot(
+        self, reference: Optional[Track] = None, align: Align = "first-heading", figure: Optional[Figure] = None
+    ) -> Figure:
+        """Roll, pitch and yaw with bands of three sigma; with a reference the errors about the body axes. Needs matplotlib.
+
+        :param reference: an :class:`Attitude`, or ``(t, q)``, on the same clock and in the same world.
+        :param align: the constant rotation of the world that is taken out first: ``none``, ``first``, ``first-heading``.
+        :param figure: an empty figure to draw in; else a new one.
+        """
+        from ._plot import plot
+
+        return plot(self, reference, align, figure)
+
+    def _repr_html_(self) -> str:
+        """For notebooks: a few words and a picture, no script."""
+        from ._html import of_attitude
+
+        return of_attitude(self)
+
     def __len__(self) -> int:
         return int(self.t.shape[0])
 
@@ -189,9 +235,8 @@ class Attitude:
         if isinstance(part, (int, np.integer)):
             raise TypeError("a slice, a mask or indices; att.q[i] is one quaternion")
         columns: dict[str, Any] = {"t": self.t[part], "q": self.q[part], "rate": self.rate[part], "cov": self._cov[part]}
-        if self.status is not None and self.reset is not None:
-            columns.update(status=self.status[part], reset=self.reset[part])
-        return Attitude(columns, self.summary, has_status=self.status is not None)
+        columns.update(status=self.status[part], reset=self.reset[part])
+        return Attitude(columns, self.summary)
 
     def __repr__(self) -> str:
         n = len(self)

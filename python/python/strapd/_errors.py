@@ -7,8 +7,8 @@ class Error(RuntimeError):
     """A run that could not be carried out.
 
     ``kind`` says which, for programs: ``refused`` (these samples do not allow it), ``loss`` (samples were lost, and
-    ``strict`` was asked for), ``no_match``, ``closed``, ``command`` (the command ``strapd`` is not here), ``failed``
-    (the command said why), ``killed``, ``protocol``.
+    ``strict`` was asked for), ``no_match``, ``closed``, ``command`` (the command ``strapd`` is not here), ``failed`` (a log can
+    not be read, or has no such topic).
     """
 
     def __init__(self, message: str, kind: str = "failed") -> None:

@@ -1,4 +1,4 @@
-from typing import Any, Optional, final
+from typing import Any, Optional
 
 import numpy as np
 import numpy.typing as npt
@@ -7,7 +7,7 @@ from typing_extensions import Self, disjoint_base
 _Floats = npt.NDArray[np.float64]
 _Nanos = npt.NDArray[np.int64]
 
-__all__ = ["Live", "Written", "__version__", "check_settings", "compare", "estimate"]
+__all__ = ["Live", "__version__", "check_log", "check_settings", "compare", "estimate", "info", "read", "replay", "simulate"]
 
 __version__: str
 
@@ -33,6 +33,24 @@ def compare(
     /,
 ) -> dict[str, Any]: ...
 def check_settings(settings: dict[str, Any]) -> None: ...
+def info(path: str, /) -> tuple[str, list[str]]: ...
+def check_log(path: str, topic: Optional[str], /) -> tuple[str, list[str]]: ...
+def replay(
+    path: str, words: dict[str, list[str]], known: Optional[dict[str, Any]], /
+) -> tuple[list[tuple[str, dict[str, Any]]], str, list[dict[str, Any]], list[str], list[str]]: ...
+def read(path: str, words: dict[str, list[str]], /) -> tuple[dict[str, Any], list[str]]: ...
+def simulate(
+    motion: str,
+    about: dict[str, str],
+    rate_hz: float,
+    duration: float,
+    seed: int,
+    noise: str,
+    kind: str,
+    mag_hz: Optional[float],
+    start: int,
+    /,
+) -> dict[str, Any]: ...
 
 @disjoint_base
 class Live:
@@ -48,9 +66,3 @@ class Live:
     def facts(self) -> Optional[dict[str, Any]]: ...
     @property
     def taken(self) -> int: ...
-
-@final
-class Written:
-    def __new__(cls) -> Self: ...
-    def push(self, piece: bytes) -> None: ...
-    def finish(self) -> dict[str, Any]: ...
