@@ -65,6 +65,11 @@ mod _strapd {
     #[pymodule_init]
     fn init(module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
         use pyo3::types::PyModuleMethods as _;
+        // As flags, which `check` advises for the command; what arguments they are is `refusal`'s, since arrays and logs have
+        // other ones.
+        let _ = strapd_attitude::setting::name_settings(|name, f| {
+            write!(f, "--{}", name.replace('_', "-"))
+        });
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

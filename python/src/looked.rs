@@ -14,14 +14,16 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use strapd_attitude::condition::quality::Advice;
 use strapd_recording::decode::Options;
+use strapd_recording::recording::beside::TopicOfVectors;
+use strapd_recording::recording::log_channel::{LogChannel, rank};
+use strapd_recording::recording::opened::problems;
+use strapd_recording::{Input, Recording};
 use strapd_replay::error::Result;
 use strapd_replay::findings::{Finding, Severity, findings, of_samples};
-use strapd_replay::inspection::{Aids, Inspection, TopicOfVectors};
+use strapd_replay::inspection::{Aids, Inspection};
 use strapd_replay::pipeline::check;
-use strapd_replay::pipeline::input::Input;
 use strapd_replay::pipeline::inspection::{Looks, look};
-use strapd_replay::pipeline::log::{Log, problems};
-use strapd_replay::pipeline::log_channel::{LogChannel, rank};
+use strapd_replay::pipeline::logged;
 
 /// Rests that are listed.
 const RESTS: usize = 100;
@@ -42,8 +44,8 @@ pub fn info(py: Python<'_>, path: PathBuf) -> PyResult<(String, Vec<String>)> {
     let work = move || {
         let pool = pool(0)?;
         let options = Options::default();
-        let input = Input::open(&path)?;
-        let log = Log::told_apart(&input, None, &options, &pool)?;
+        let input = logged::open(&path)?;
+        let log = Recording::told_apart(&input, None, &options, &pool)?;
         let looks = look(&log, None, &options, &pool)?;
         Ok(told(&path, &input, &log, &looks).to_string())
     };
@@ -60,7 +62,7 @@ pub fn check_log(
 ) -> PyResult<(String, Vec<String>)> {
     let work = move || {
         let pool = pool(0)?;
-        let input = Input::open(&path)?;
+        let input = logged::open(&path)?;
         let checked = check::check(&input, topic.as_deref(), &Options::default(), &pool)?;
         let found = findings(&checked);
         let worst = found.iter().map(|f| f.severity).max();
@@ -86,7 +88,7 @@ fn answered(
     ))
 }
 
-fn told(path: &std::path::Path, input: &Input, log: &Log, looks: &Looks) -> Value {
+fn told(path: &std::path::Path, input: &Input, log: &Recording, looks: &Looks) -> Value {
     let survey = &looks.survey;
     let mut read_as: Vec<&str> = log
         .channels
@@ -220,10 +222,10 @@ fn topic_told(looked: &Inspection) -> Value {
         "rests": looked.rests.kept.iter().take(RESTS).map(|r| json!({
             "start_s": looked.rests.first.map(|f| r.start.secs_since(f)),
             "secs": r.secs(),
-            "mean_rate": { "x": r.mean_rate.x, "y": r.mean_rate.y, "z": r.mean_rate.z },
+            "mean_rate": { "x": r.mean_rate.0.x, "y": r.mean_rate.0.y, "z": r.mean_rate.0.z },
         })).collect::<Vec<_>>(),
         "bias": looked.bias.map(|b| json!({
-            "x": b.bias.x, "y": b.bias.y, "z": b.bias.z, "sigma": b.sigma.max(), "rest_s": b.secs })),
+            "x": b.bias.0.x, "y": b.bias.0.y, "z": b.bias.0.z, "sigma": b.sigma.max(), "rest_s": b.secs })),
         "notes": found.iter().map(Finding::line).collect::<Vec<_>>(),
         "findings": found.iter().map(Finding::json).collect::<Vec<_>>(),
     })

@@ -27,7 +27,9 @@ const FIRST_ROOM: usize = 1 << 14;
 pub fn raised(py: Python<'_>, error: &Error) -> PyErr {
     match error {
         Error::Usage(what) => refusal::argument_of_log(what),
-        Error::Topic { .. } => refusal::run_of_log(py, "refused", &error.to_string()),
+        Error::Recording(strapd_recording::Error::Topic { .. }) => {
+            refusal::run_of_log(py, "refused", &error.to_string())
+        }
         _ => refusal::run_of_log(py, "failed", &error.to_string()),
     }
 }

@@ -14,11 +14,11 @@ use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use strapd_attitude::record::SampleKind;
+use strapd_recording::Recording;
+use strapd_recording::recording::decoders::Decoders;
+use strapd_recording::recording::topic_reading::TopicReading;
 use strapd_replay::error::{Error, Result};
-use strapd_replay::pipeline::decoders::Decoders;
-use strapd_replay::pipeline::input::Input;
-use strapd_replay::pipeline::log::Log;
-use strapd_replay::pipeline::topic_reading::TopicReading;
+use strapd_replay::pipeline::logged;
 
 /// Samples between two looks whether to end.
 const BLOCK: usize = 4096;
@@ -65,7 +65,7 @@ fn taken(path: &Path, words: &Words, stopped: &Stopped) -> Result<Found> {
     let selection = words.selection()?;
     let (named, options) = (selection.topic.as_deref(), &selection.decode);
     let pool = pool(words.parsed("threads")?.unwrap_or(0))?;
-    let log = Log::told_apart(&Input::open(path)?, named, options, &pool)?;
+    let log = Recording::told_apart(&logged::open(path)?, named, options, &pool)?;
     let mut decoders = Decoders::new(options);
     let reading = TopicReading::new(&log, named, &mut decoders)?.with_fields();
     let (mut columns, mut meant) = (RawColumns::new(time), None);
@@ -73,7 +73,7 @@ fn taken(path: &Path, words: &Words, stopped: &Stopped) -> Result<Found> {
         columns.push(raw);
         meant = meant.or(kind);
         let is_due = columns.len().is_multiple_of(BLOCK);
-        Ok(match is_due && stopped.is_set() {
+        Ok::<_, Error>(match is_due && stopped.is_set() {
             true => ControlFlow::Break(()),
             false => ControlFlow::Continue(()),
         })

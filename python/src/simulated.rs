@@ -78,7 +78,7 @@ fn made(name: &str, about: &mut About, seed: u64) -> Result<Made, String> {
     };
     Ok(match name {
         "top" => {
-            let top = SymmetricTop::seed();
+            let top = SymmetricTop::published();
             let case = about
                 .text("case")
                 .map_or(Ok(Case::Cusped), |named| case(&named));

@@ -12,13 +12,15 @@ use std::sync::Arc;
 use strapd_attitude::condition::{Clock, GyroUnit, OnGap};
 use strapd_attitude::estimate::{Aid, Plan, SensorCalibration};
 use strapd_attitude::propagate::Method;
+use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::SampleKind;
+use strapd_recording::{Selection, Source};
 use strapd_replay::config::{
-    Selection, calibration, parse_bias, parse_initial, parse_noise, parse_truncation, selection,
+    calibration, parse_bias, parse_initial, parse_noise, parse_truncation, selection,
     unit_quaternion,
 };
 use strapd_replay::error::{Error, Result};
-use strapd_replay::pipeline::request::{ReplayRequest, Source};
+use strapd_replay::pipeline::request::ReplayRequest;
 
 /// A larger file is no calibration.
 const LARGEST_CALIBRATION: u64 = 1 << 16;
@@ -79,7 +81,7 @@ impl Words {
         })
     }
 
-    fn quaternion(&self, name: &str) -> Result<Option<[f64; 4]>> {
+    fn quaternion<To, From>(&self, name: &str) -> Result<Option<Quaternion<To, From>>> {
         let given = self.text(name).map(|text| unit_quaternion(name, text));
         given.transpose()
     }
