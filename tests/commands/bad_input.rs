@@ -439,7 +439,7 @@ fn windows_out_of_range_are_refused_for_every_kind_and_name_the_flag() {
                     Ok(_) => assert!(fits, "{method}, {kind:?}"),
                     Err(why) => {
                         let said = why.to_string();
-                        let range = format!("--window takes {smallest} to 24");
+                        let range = format!("window takes {smallest} to 24");
                         assert!(!fits && said.contains(&range), "{method}, {kind:?}: {said}");
                     }
                 }

@@ -76,7 +76,7 @@ fn a_window_that_no_sample_kind_has_is_a_usage_error_and_one_of_this_log_names_t
         ..plan(one, SampleKind::Rate)
     };
     let said = done(&replay_with(&path, unsaid)).unwrap_err().to_string();
-    assert!(said.contains("--window takes 2 to 24"), "{said}");
+    assert!(said.contains("window takes 2 to 24"), "{said}");
     assert!(done(&replay_with(&path, plan(one, SampleKind::Average))).is_ok());
 }
 

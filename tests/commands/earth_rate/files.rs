@@ -102,9 +102,9 @@ fn a_bias_without_a_rest_at_the_start_is_refused() {
     let said = done(&replay_with(&path, plan(World::Enu)))
         .unwrap_err()
         .to_string();
-    assert!(said.contains("--bias auto with --earth-rate"), "{said}");
+    assert!(said.contains("bias auto with earth_rate"), "{said}");
     assert!(
-        said.contains("--start SECS") && said.contains("--bias x,y,z"),
+        said.contains("start SECS") && said.contains("bias x,y,z"),
         "{said}"
     );
     // Without the flag that rest does.
@@ -134,7 +134,7 @@ fn an_unknown_heading_is_warned_of_with_its_size() {
     // 15.041 cos 48 = 10.064 deg/h: 1.75 of it for 10 degrees, 20.1 at most.
     assert!(said.contains("10 degrees leaves 1.8 deg/h"), "{said}");
     assert!(said.contains("at most 20.1"), "{said}");
-    assert!(said.contains("--init gravity knows no heading"), "{said}");
+    assert!(said.contains("init gravity knows no heading"), "{said}");
     // And so it is: the heading is off by 1 rad, and 2 * 10.064 sin(0.5) deg/h are left over 20 s.
     let (first, last) = (found[0].numbers(), found[1999].numbers());
     let turned = quaternion(first).angle_to(&quaternion(last)).to_degrees();
@@ -150,9 +150,9 @@ fn what_can_not_be_is_refused_before_anything_is_read() {
     let refused = |plan: Plan| plan.check().unwrap_err().to_string();
     let said = refused(plan(World::Start));
     for flag in [
-        "--earth-rate",
-        "--world enu",
-        "--init",
+        "earth_rate",
+        "world enu",
+        "init",
         "rpy=roll,pitch,yaw",
     ] {
         assert!(said.contains(flag), "{said}");

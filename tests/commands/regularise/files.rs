@@ -154,7 +154,7 @@ fn a_log_without_a_rate_is_refused_before_anything_is_written() {
         replay.targets = vec![target(&out)];
         let said = done(&replay).unwrap_err().to_string();
         assert!(said.contains("there is no constant rate"), "{said}");
-        assert!(said.contains("--time index --rate-hz HZ"), "{said}");
+        assert!(said.contains("time index rate_hz HZ"), "{said}");
         assert!(!out.exists());
     }
 }
@@ -167,7 +167,7 @@ fn index_time_has_nothing_to_regularise() {
     };
     let said = plan.check().unwrap_err().to_string();
     assert!(
-        said.contains("--regularise-stamps") && said.contains("--time index"),
+        said.contains("regularise_stamps") && said.contains("time index"),
         "{said}"
     );
 }

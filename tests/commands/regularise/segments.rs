@@ -132,7 +132,7 @@ fn stamps_without_a_rate_are_refused_with_what_helps() {
         let why = survey.finish().expect_err(what);
         let said = why.to_string();
         assert!(said.contains(expected), "{what}: {said}");
-        assert!(said.contains("--time index --rate-hz HZ"), "{said}");
+        assert!(said.contains("time index rate_hz HZ"), "{said}");
     }
 }
 

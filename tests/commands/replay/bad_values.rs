@@ -156,7 +156,7 @@ fn rates_in_degrees_are_integrated_and_the_flag_is_named() {
     let path = written(dir.path(), "deg.mcap", &samples);
     let (summary, _) = attitudes(&replay_with(&path, Plan::default()), dir.path());
     let said = only(&summary).warnings().join("; ");
-    assert!(said.contains("--gyro-unit deg"), "{said}");
+    assert!(said.contains("gyro_unit deg"), "{said}");
     let plan = Plan {
         unit: Some(strapd_attitude::condition::GyroUnit::Deg),
         ..Plan::default()

@@ -122,16 +122,16 @@ fn what_only_rest_can_tell_is_refused_on_a_moving_body_with_the_way_out() {
                 bias: Bias::Auto,
                 ..Plan::default()
             },
-            "--bias auto",
-            ["--bias x,y,z", "--bias none"],
+            "bias auto",
+            ["bias x,y,z", "bias none"],
         ),
         (
             Plan {
                 initial: Initial::Gravity,
                 ..Plan::default()
             },
-            "--init gravity",
-            ["--init identity", "--init rpy="],
+            "init gravity",
+            ["init identity", "init rpy="],
         ),
     ] {
         let error = done(&replay_with(&path, plan)).unwrap_err();
@@ -178,7 +178,7 @@ fn the_first_orientation_is_where_the_attitude_starts() {
         done(&replay_with(&path, plan)).unwrap_err().to_string()
     };
     assert!(error.contains("carry no orientation"), "{error}");
-    assert!(error.contains("--init gravity"), "{error}");
+    assert!(error.contains("init gravity"), "{error}");
 }
 
 #[test]
@@ -287,7 +287,7 @@ fn every_imu_of_a_log_gets_an_output_topic_of_its_own_and_they_are_not_mixed() {
     replay.targets = vec![target(&csv)];
     let error = done(&replay).unwrap_err();
     assert!(matches!(error, Error::Usage(_)), "{error:?}");
-    assert!(error.to_string().contains("--topic"), "{error}");
+    assert!(error.to_string().contains("topic"), "{error}");
     assert!(!csv.exists());
 }
 
@@ -381,7 +381,7 @@ fn a_field_that_is_not_there_lists_those_that_would_do() {
         "/imu/data",
         "`imu.rate`",
         "angular_velocity",
-        "--field gyro=",
+        "field gyro=",
     ] {
         assert!(said.contains(word), "{word} is missing: {said}");
     }
@@ -420,7 +420,7 @@ fn a_log_without_an_imu_lists_what_it_holds() {
         "{error:?}"
     );
     let said = error.to_string();
-    for word in ["/temperature", "json", "3 messages", "--field gyro="] {
+    for word in ["/temperature", "json", "3 messages", "field gyro="] {
         assert!(said.contains(word), "{word} is missing: {said}");
     }
 }

@@ -185,7 +185,7 @@ fn the_messages_own_stamp_is_taken_unless_it_is_none_and_a_nested_one_is() {
         ] {
             let (found, said) = stamps(&path);
             assert_eq!(found, at(offset), "{what}");
-            assert!(said.contains("--field stamp="), "{what}: {said}");
+            assert!(said.contains("field stamp="), "{what}: {said}");
         }
     }
     // Named, it is taken whatever it is.
@@ -240,7 +240,7 @@ fn stamps_in_whole_seconds_give_every_sample_within_the_logs_span_wherever_it_be
             assert_eq!(found, expected, "{kind:?} from {from}");
             let said = topic.warnings().join("; ");
             assert!(
-                said.contains("steps of 1") && said.contains("--time log"),
+                said.contains("steps of 1") && said.contains("time log"),
                 "{said}"
             );
         }
@@ -306,8 +306,8 @@ fn an_interval_in_another_unit_than_thought_is_refused_with_the_flag_that_states
     for word in [
         "1.00e-5 s",
         "0.0100 s",
-        "--field dt=gyro_integral_dt:ms",
-        "--sample-kind rate",
+        "field dt=gyro_integral_dt:ms",
+        "sample_kind rate",
     ] {
         assert!(error.contains(word), "{word} is missing: {error}");
     }
