@@ -86,9 +86,12 @@ pub fn read(
             none if none.is_empty() => from_log(input, side, topic, &plainly, pool),
             some => Ok(plain(some)),
         },
-        Format::Mcap | Format::Ulog | Format::Bag | Format::Rosbag2 | Format::Gpmf => {
-            from_log(input, side, topic, &plainly, pool)
-        }
+        Format::Mcap
+        | Format::Ulog
+        | Format::Bag
+        | Format::Rosbag2
+        | Format::Gpmf
+        | Format::Tlog => from_log(input, side, topic, &plainly, pool),
     }
 }
 

@@ -57,7 +57,8 @@ impl Log {
             | Format::Ulog
             | Format::Bag
             | Format::Rosbag2
-            | Format::Gpmf) => {
+            | Format::Gpmf
+            | Format::Tlog) => {
                 only_for_tables(input.name(), format, options)?;
                 Log::of_mcap(input, pool)
             }

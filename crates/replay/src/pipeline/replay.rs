@@ -91,7 +91,12 @@ fn piped(
         format if format.is_read_anywhere() => {
             file(run, &Input::keep(run.source.clone(), whole)?, pool, watch)
         }
-        Format::Mcap | Format::Ulog | Format::Bag | Format::Rosbag2 | Format::Gpmf => {
+        Format::Mcap
+        | Format::Ulog
+        | Format::Bag
+        | Format::Rosbag2
+        | Format::Gpmf
+        | Format::Tlog => {
             line_input::only_for_tables(&run.source.name(), format, &run.selection.decode)?;
             let reader = Reader::from_stream(run.source.name(), Box::new(whole))?;
             replay_stream::replay(run, reader, pool, watch)
