@@ -423,7 +423,7 @@ fn several_topics_do_not_fit_into_a_table_and_the_message_says_what_does() {
         )
         .unwrap_err()
         .to_string();
-        assert!(error.contains("topic"), "{error}");
+        assert!(error.contains("choose one with topic"), "{error}");
         assert!(!path.exists());
     }
 }

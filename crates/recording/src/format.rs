@@ -6,6 +6,7 @@
 use crate::delimited;
 use crate::error::{Error, Result};
 use crate::gpmf;
+use crate::mavlink;
 use crate::recognise;
 use crate::text::without_mark;
 use std::fs::File;
@@ -26,6 +27,8 @@ pub enum Format {
     Rosbag2,
     /// GPMF, the telemetry of GoPro's cameras, alone or in a video.
     Gpmf,
+    /// A telemetry log of a ground station: frames of MAVLink with times.
+    Tlog,
     /// One JSON object per line.
     Lines,
     /// Rows of cells: the CSV that strapd writes itself, and other makers' tables.
@@ -57,12 +60,13 @@ const VIDEO: &[u8] = b"ftyp";
 pub(crate) const LONGEST_MAGIC: usize = SQLITE_MAGIC.len();
 
 /// Endings of names, for what the bytes do not tell.
-const ENDINGS: [(&str, Format); 10] = [
+const ENDINGS: [(&str, Format); 11] = [
     ("mcap", Format::Mcap),
     ("ulg", Format::Ulog),
     ("ulog", Format::Ulog),
     ("bag", Format::Bag),
     ("db3", Format::Rosbag2),
+    ("tlog", Format::Tlog),
     ("ndjson", Format::Lines),
     ("jsonl", Format::Lines),
     ("csv", Format::Table),
@@ -83,6 +87,7 @@ impl Format {
             Format::Bag => "ROS 1 bag",
             Format::Rosbag2 => "rosbag2 SQLite",
             Format::Gpmf => "GPMF",
+            Format::Tlog => "MAVLink tlog",
             Format::Lines => "NDJSON",
             Format::Table => "CSV",
         }
@@ -103,6 +108,7 @@ impl Format {
             .map(|(_, format)| *format)
             // Whether it has telemetry shows when it is opened.
             .or_else(|| is_video(head).then_some(Format::Gpmf))
+            .or_else(|| mavlink::is_log(head).then_some(Format::Tlog))
     }
 
     /// Whether more bytes behind these could make one of [`Format::of_magic`].
@@ -110,6 +116,7 @@ impl Format {
     pub(crate) fn may_be_magic(head: &[u8]) -> bool {
         let mut known = MAGICS.iter();
         known.any(|(magic, _)| magic.len() > head.len() && magic.starts_with(head))
+            || mavlink::may_be_log(head)
     }
 
     /// Whether it is read in another order than that of its bytes, so that a stream of it is first put into a file.
@@ -173,7 +180,7 @@ impl Format {
         first.map_err(fail)?;
         let length = file.metadata().map_err(fail)?.len();
         if let Some(format) = Format::of_bytes(&head)
-            && !(is_video(&head) && !has_telemetry(&mut file, length).map_err(fail)?)
+            && (!is_video(&head) || has_telemetry(&mut file, length).map_err(fail)?)
         {
             return Ok(Some(format));
         }

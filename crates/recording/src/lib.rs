@@ -37,6 +37,7 @@
 //! | `sqlite` | an SQLite database, read only -> the rows of its tables | pure |
 //! | `rosbag2` | recordings of ROS 2 in SQLite -> the records MCAP has for them | pure |
 //! | `gpmf` | telemetry of GoPro's cameras, alone or in a video -> the records MCAP has for it | pure |
+//! | `mavlink` | telemetry logs of ground stations -> the records MCAP has for them | pure |
 //! | `ulog` | ULog, the log of PX4 -> the records MCAP has for it | pure |
 //! | [`decode`] | bytes of one message, one line, one packed object -> raw samples | pure |
 //! | [`recognise`] | first bytes of an input -> what it is, and the way in where it is not read | pure |
@@ -53,6 +54,7 @@ pub mod error;
 pub mod format;
 mod gpmf;
 pub mod lines;
+mod mavlink;
 pub mod mcap;
 pub mod pool;
 pub mod recognise;

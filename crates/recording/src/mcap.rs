@@ -273,8 +273,8 @@ fn format_of(file: &LogFile) -> Result<Format> {
     };
     let head = read(0, LONGEST_MAGIC)?;
     if let Some(format) = Format::of_magic(&head)
-        && !(is_video(&head)
-            && !container::gpmf::has_track(file).map_err(|e| read_error(&file.path, 0, e))?)
+        && (!is_video(&head)
+            || container::gpmf::has_track(file).map_err(|e| read_error(&file.path, 0, e))?)
     {
         return Ok(format);
     }

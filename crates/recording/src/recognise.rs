@@ -207,12 +207,6 @@ pub fn marked(first: &[u8], last: &[u8]) -> Option<Foreign> {
             false => of(name, way_in),
         };
     }
-    if is_tlog(first) {
-        return of(
-            "a MAVLink telemetry log (.tlog)",
-            "pip install pymavlink; mavlogdump.py --types HIGHRES_IMU,SCALED_IMU,RAW_IMU --format json FILE > imu.ndjson",
-        );
-    }
     let text = first.trim_ascii_start();
     if starts_like(text, b"<!doctype") || starts_like(text, b"<html") {
         return of(
@@ -242,16 +236,6 @@ fn text(first: &[u8]) -> Option<Foreign> {
 fn starts_like(text: &[u8], word: &[u8]) -> bool {
     text.get(..word.len())
         .is_some_and(|head| head.eq_ignore_ascii_case(word))
-}
-
-/// Eight bytes of microseconds since 1970, the greatest first, then a MAVLink frame.
-fn is_tlog(first: &[u8]) -> bool {
-    let Some((stamp, rest)) = first.split_first_chunk::<8>() else {
-        return false;
-    };
-    // From 2001 to 2096.
-    let stamped = (1e15..4e15).contains(&(u64::from_be_bytes(*stamp) as f64));
-    stamped && matches!(rest.first(), Some(0xfd | 0xfe))
 }
 
 /// Whether it is text of which some line has three cells or more.
@@ -299,12 +283,6 @@ mod tests {
             name(b"\0\0\0\x14ftypmp42"),
             Some("a video (MP4, MOV) without the telemetry of a GoPro, or cut before its index")
         );
-        let tlog = [
-            &1_700_000_000_000_000_u64.to_be_bytes()[..],
-            &[0xfd, 9, 0, 0],
-        ]
-        .concat();
-        assert_eq!(name(&tlog), Some("a MAVLink telemetry log (.tlog)"));
         assert!(name(b"\n <!DOCTYPE HTML><p>").unwrap().contains("web page"));
         for table in [
             &b"time,gyro_x,gyro_y\n1,2,3"[..],

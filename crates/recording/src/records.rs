@@ -3,6 +3,7 @@
 //! Below the readers: ULog and bags are transcribed to records here, which the reader of MCAP then takes.
 
 mod bytes;
+pub(crate) mod imu;
 pub(crate) mod transcript;
 
 pub(crate) use bytes::{Bytes, HEAD, head_at};

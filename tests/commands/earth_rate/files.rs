@@ -152,7 +152,7 @@ fn what_can_not_be_is_refused_before_anything_is_read() {
     for flag in [
         "earth_rate",
         "world enu",
-        "init",
+        "init first-orientation",
         "rpy=roll,pitch,yaw",
     ] {
         assert!(said.contains(flag), "{said}");

@@ -171,7 +171,7 @@ fn a_start_beyond_the_end_leaves_nothing_and_that_is_said() {
     assert_eq!(topic.counts.used(), 0);
     let said = topic.warnings().join("; ");
     assert!(said.contains("no sample was used"), "{said}");
-    assert!(said.contains("start"), "{said}");
+    assert!(said.contains("outside start, until"), "{said}");
 }
 
 #[test]

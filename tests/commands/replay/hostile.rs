@@ -166,7 +166,7 @@ fn two_imu_topics_are_refused_and_both_are_named_with_the_flag() {
         "{error:?}"
     );
     let said = error.to_string();
-    for word in ["    /imu ", "    /imu2 ", "topic"] {
+    for word in ["    /imu ", "    /imu2 ", "topic NAME takes one"] {
         assert!(said.contains(word), "{word} is missing: {said}");
     }
 }

@@ -287,7 +287,10 @@ fn every_imu_of_a_log_gets_an_output_topic_of_its_own_and_they_are_not_mixed() {
     replay.targets = vec![target(&csv)];
     let error = done(&replay).unwrap_err();
     assert!(matches!(error, Error::Usage(_)), "{error:?}");
-    assert!(error.to_string().contains("topic"), "{error}");
+    assert!(
+        error.to_string().contains("topic NAME takes one"),
+        "{error}"
+    );
     assert!(!csv.exists());
 }
 
@@ -377,12 +380,7 @@ fn a_field_that_is_not_there_lists_those_that_would_do() {
     replay.selection.decode.fields = vec!["gyro=imu.rate".parse().unwrap()];
     let error = done(&replay).unwrap_err();
     let said = error.to_string();
-    for word in [
-        "/imu/data",
-        "`imu.rate`",
-        "angular_velocity",
-        "field gyro=",
-    ] {
+    for word in ["/imu/data", "`imu.rate`", "angular_velocity", "field gyro="] {
         assert!(said.contains(word), "{word} is missing: {said}");
     }
 }

@@ -147,7 +147,7 @@ fn two_publishers_on_one_topic_are_refused_and_both_are_named() {
             for name in &names {
                 assert!(said.contains(name), "{name} is missing: {said}");
             }
-            assert!(said.contains("topic"), "{said}");
+            assert!(said.contains("topic NAME takes one"), "{said}");
         }
     }
 }

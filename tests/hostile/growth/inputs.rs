@@ -440,6 +440,9 @@ pub(crate) const CASES: &[Case] = cases! {
             out[end..3 * 1024].fill(0x33);
             out
         };
+        "tlog: garbage": |n| [&b"\0\x06\0\0\0\0\0\0\xfd\xff\0"[..], &vec![0x55; n]].concat();
+        "tlog: times": |n| b"\0\x06\0\0\0\0\0\0\xfe\xff".repeat(n / 10);
+        "tlog: messages that are not read": |n| b"\0\x06\0\0\0\0\0\0\xfe\0\0\0\0\x07\0\0".repeat(n / 16);
         "GPMF: empty devices": |n| b"DEVC\0\x01\0\0".repeat(n / 8);
         "GPMF: devices that go on behind the end": |n| b"DEVC\0\xff\xff\xff".repeat(n / 8);
         "GPMF: garbage": |n| [&b"DEVC\0\x01\0\0"[..], &vec![0x55; n]].concat();

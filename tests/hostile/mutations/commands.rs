@@ -57,6 +57,9 @@ fn logs() -> Vec<Vec<u8>> {
     logs.push(database(1024, &[("/imu", "sensor_msgs/msg/Imu")], &rows));
     let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures");
     logs.push(std::fs::read(fixtures.join("gopro_hero6.raw")).unwrap());
+    let mut link = std::fs::read(fixtures.join("ardupilot.tlog")).unwrap();
+    link.truncate(6000);
+    logs.push(link);
     logs
 }
 

@@ -12,6 +12,9 @@ const MOST: usize = 10_000;
 /// From 1904, where videos count from, to 1970, s.
 const EPOCH: u64 = 2_082_844_800;
 
+/// Times of creation that are believed, s since 1970: of this century.
+const CALENDAR: std::ops::Range<u64> = 946_684_800..4_102_444_800;
+
 /// Finds the index of a video, wherever it lies. `read` fills a slice from an offset, less only at the end.
 ///
 /// # Errors
@@ -34,6 +37,11 @@ pub(crate) fn index(
         if kind == *b"moov" {
             if length > LONGEST {
                 return Ok(Err("its index is longer than the limit"));
+            }
+            if length > size - at {
+                return Ok(Err(
+                    "it ends inside its index (moov): the recording was cut",
+                ));
             }
             let mut bytes = vec![0; usize::try_from(length.saturating_sub(before)).unwrap_or(0)];
             let have = read(at + before, &mut bytes)?;
@@ -175,7 +183,7 @@ impl Movie {
             };
             Some(Movie {
                 // A calendar of the last century is not set.
-                created: created.filter(|secs| *secs > 946_684_800).unwrap_or(0),
+                created: created.filter(|secs| CALENDAR.contains(secs)).unwrap_or(0),
                 timescale: u64::from(timescale).max(1),
                 sizes: match word(sizes, 4)? {
                     0 => Ok(table(sizes, 8, 1)),

@@ -41,6 +41,10 @@ pub(super) struct Payload {
     pub(super) rest: usize,
 }
 
+/// Most devices, and most samples, of a payload: the fastest camera has a twentieth of these.
+const MOST_DEVICES: usize = 64;
+const MOST_SAMPLES: usize = 100_000;
+
 /// Axes of the columns where nothing says them: those of the cameras that say none.
 const USUAL: &str = "ZXY";
 
@@ -48,6 +52,10 @@ pub(super) fn payload(bytes: &[u8]) -> Payload {
     let mut found = Payload::default();
     let mut items = Items(bytes);
     for item in items.by_ref().filter(|item| item.key == *b"DEVC") {
+        if found.devices.len() >= MOST_DEVICES {
+            found.refused.push("more devices than a payload may have");
+            break;
+        }
         device(&item, &mut found);
     }
     // What fills a payload up is no loss.
@@ -62,6 +70,7 @@ fn device(item: &Item<'_>, found: &mut Payload) {
     let mut number = 0;
     let mut name = String::new();
     let mut inner = item.inner();
+    let mut streams = Vec::new();
     for item in inner.by_ref() {
         match &item.key {
             b"DVID" => {
@@ -74,21 +83,40 @@ fn device(item: &Item<'_>, found: &mut Payload) {
             // A damaged length took in what follows.
             b"DEVC" => found.refused.push("a device within another"),
             b"TICK" => found.tick = found.tick.or(item.count()),
-            b"STRM" => match stream(number, &item) {
-                Ok(stream) => found.streams.extend(stream),
-                Err(why) => found.refused.push(why),
-            },
+            b"STRM" => streams.push(item),
             _ => {}
         }
     }
     if inner.0.iter().any(|byte| *byte != 0) {
-        found.refused.push("it ends in bytes that are no item");
+        found
+            .refused
+            .push("a device ends in bytes that are no item");
+    }
+    if found.devices.iter().any(|(known, _)| *known == number) {
+        return found.refused.push("a device that is there twice");
+    }
+    for item in streams {
+        let have = found.streams.iter().map(|stream| stream.samples.len());
+        let left = MOST_SAMPLES.saturating_sub(have.sum());
+        match stream(number, &item, left) {
+            // The second of a kind is another sensor, of which nothing else is known.
+            Ok(Some(new))
+                if found
+                    .streams
+                    .iter()
+                    .any(|s| s.device == number && s.what == new.what) =>
+            {
+                found.refused.push("a second sensor of a device");
+            }
+            Ok(new) => found.streams.extend(new),
+            Err(why) => found.refused.push(why),
+        }
     }
     found.devices.push((number, name));
 }
 
-/// The samples of a stream; `None` for one of something else.
-fn stream(device: u32, item: &Item<'_>) -> Result<Option<Stream>, &'static str> {
+/// The samples of a stream, `most` of them; `None` for one of something else.
+fn stream(device: u32, item: &Item<'_>, most: usize) -> Result<Option<Stream>, &'static str> {
     let (mut scale, mut stamp, mut unit) = (Vec::new(), None, String::new());
     let (mut letters, mut name) = (String::new(), String::new());
     let mut data = None;
@@ -132,6 +160,9 @@ fn stream(device: u32, item: &Item<'_>) -> Result<Option<Stream>, &'static str> 
     let mut numbers = item.numbers();
     let mut samples = Vec::new();
     while let (Some(a), Some(b), Some(c)) = (numbers.next(), numbers.next(), numbers.next()) {
+        if samples.len() >= most {
+            return Err("more samples than a payload may have");
+        }
         let raw = [a, b, c];
         let mut sample = [0.0; 3];
         for ((value, divisor), (axis, sign)) in raw.iter().zip(divisors).zip(places) {

@@ -5,11 +5,10 @@
 
 use super::stream::{Payload, Stream, What, payload};
 use crate::decode::known_definition;
+use crate::records::imu;
 use crate::records::transcript::Transcript;
 use std::collections::{BTreeMap, VecDeque};
 
-/// The type the samples are told as.
-const TYPE: &str = "sensor_msgs/msg/Imu";
 /// How far the stamps of a stream may be from the time of its payload, and how far the next payload may be; else they
 /// are damage, ns.
 const FAR: u64 = 5_000_000_000;
@@ -50,7 +49,7 @@ impl Queue {
     /// Tells the rates up to the time `until`, all where there is none, and the first `least` in any case, each with the
     /// last force since the rate before it.
     fn tell(&mut self, channel: u16, until: Option<u64>, least: usize, to: &mut Transcript) {
-        let mut message = Vec::with_capacity(MESSAGE);
+        let mut message = Vec::new();
         let mut told = 0;
         while let Some((time, nth, rate)) = self.rates.front().copied()
             && (told < least || until.is_none_or(|until| time <= until))
@@ -64,7 +63,7 @@ impl Queue {
                 self.forces.pop_front();
                 own = Some(force);
             }
-            write(&mut message, time, rate, own);
+            imu::imu(&mut message, (time, FRAME), rate, own);
             to.message(channel, nth, time, &message);
         }
         if until.is_none() {
@@ -193,8 +192,8 @@ impl Transcriber {
         }
         let number = u16::try_from(self.channels.len()).ok()?;
         if number == 0 {
-            let text = known_definition(TYPE).unwrap_or_default();
-            to.schema(1, TYPE, "ros2msg", text.as_bytes());
+            let text = known_definition(imu::TYPE).unwrap_or_default();
+            to.schema(1, imu::TYPE, "ros2msg", text.as_bytes());
         }
         let topic = match number {
             0 => "gopro/imu".to_owned(),
@@ -215,32 +214,5 @@ impl Transcriber {
     }
 }
 
-/// Bytes of a message.
-const MESSAGE: usize = 4 + 24 + 37 * 8;
 /// What the axes belong to.
-const FRAME: &[u8; 7] = b"camera\0";
-
-/// An Imu as CDR: without orientation, and without force where there is none.
-fn write(out: &mut Vec<u8>, time: u64, rate: [f64; 3], force: Option<[f64; 3]>) {
-    out.clear();
-    out.extend([0, 1, 0, 0]);
-    let secs = i32::try_from(time / 1_000_000_000).unwrap_or(i32::MAX);
-    out.extend(secs.to_le_bytes());
-    out.extend(((time % 1_000_000_000) as u32).to_le_bytes());
-    out.extend((FRAME.len() as u32).to_le_bytes());
-    out.extend(FRAME);
-    // Up to a multiple of eight behind the first four.
-    out.extend([0; 5]);
-    let mut doubles = |values: &[f64]| {
-        for value in values {
-            out.extend(value.to_le_bytes());
-        }
-    };
-    const ABSENT: [f64; 9] = [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
-    doubles(&[0.0, 0.0, 0.0, 1.0]);
-    doubles(&ABSENT);
-    doubles(&rate);
-    doubles(&[0.0; 9]);
-    doubles(&force.unwrap_or_default());
-    doubles(if force.is_some() { &[0.0; 9] } else { &ABSENT });
-}
+const FRAME: &str = "camera";

@@ -4,6 +4,7 @@
 
 pub(super) mod bag;
 pub(super) mod gpmf;
+mod mavlink;
 mod pages;
 mod rosbag2;
 mod ulog;
@@ -22,6 +23,7 @@ pub(super) enum Container {
     Bag(Box<bag::Scanner>),
     Rosbag2(Box<rosbag2::Scanner>),
     Gpmf(Box<gpmf::Scanner>),
+    Tlog(Box<mavlink::Scanner>),
 }
 
 impl Container {
@@ -39,6 +41,7 @@ impl Container {
                 Container::Rosbag2(Box::new(rosbag2::Scanner::new(input, beside, limits)))
             }
             Format::Gpmf => Container::Gpmf(Box::new(gpmf::Scanner::new(input))),
+            Format::Tlog => Container::Tlog(Box::new(mavlink::Scanner::new(input))),
             // Text is not opened here.
             Format::Mcap | Format::Lines | Format::Table => {
                 Container::Mcap(Box::new(Scanner::new(input, limits, besides)))
@@ -54,6 +57,7 @@ impl Container {
             Container::Bag(scanner) => scanner.next(),
             Container::Rosbag2(scanner) => scanner.next(),
             Container::Gpmf(scanner) => scanner.next(),
+            Container::Tlog(scanner) => scanner.next(),
         }
     }
 
@@ -65,6 +69,7 @@ impl Container {
             Container::Bag(scanner) => scanner.tape().position(),
             Container::Rosbag2(scanner) => scanner.position(),
             Container::Gpmf(scanner) => scanner.position(),
+            Container::Tlog(scanner) => scanner.position(),
         }
     }
 
@@ -74,7 +79,7 @@ impl Container {
             Container::Ulog(scanner) => scanner.recycle(payload),
             Container::Bag(scanner) => scanner.recycle(payload),
             Container::Rosbag2(scanner) => scanner.recycle(payload),
-            Container::Gpmf(_) => {}
+            Container::Gpmf(_) | Container::Tlog(_) => {}
         }
     }
 
@@ -82,7 +87,10 @@ impl Container {
     pub(super) fn claimed(&self) -> Option<u64> {
         match self {
             Container::Mcap(scanner) => scanner.claimed(),
-            Container::Ulog(_) | Container::Rosbag2(_) | Container::Gpmf(_) => None,
+            Container::Ulog(_)
+            | Container::Rosbag2(_)
+            | Container::Gpmf(_)
+            | Container::Tlog(_) => None,
             Container::Bag(scanner) => scanner.claimed(),
         }
     }
@@ -95,6 +103,7 @@ impl Container {
             Container::Bag(scanner) => scanner.finish(),
             Container::Rosbag2(scanner) => scanner.finish(),
             Container::Gpmf(scanner) => scanner.finish(),
+            Container::Tlog(scanner) => scanner.finish(),
         }
     }
 }

@@ -223,6 +223,8 @@ pub enum ProblemKind {
         /// What.
         why: &'static str,
     },
+    /// A message whose checksum is wrong (MAVLink).
+    Checksum,
     /// A file beside a database says that a change of it was not ended.
     Journal,
     /// The summary at the end can not be used; nothing is lost by that.
@@ -390,6 +392,7 @@ impl fmt::Display for ProblemKind {
             ProblemKind::Telemetry { why } => {
                 write!(f, "telemetry that can not be read: {why}; skipped")
             }
+            ProblemKind::Checksum => write!(f, "the checksum of a message is wrong; skipped"),
             ProblemKind::Journal => write!(
                 f,
                 "a file -journal beside the database says that it is in the middle of a change; `sqlite3 FILE .tables` puts it right"

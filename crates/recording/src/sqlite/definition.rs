@@ -8,6 +8,9 @@ use std::io;
 
 /// Most tables and indices that are looked at; rosbag2 makes six.
 const MOST: usize = 1000;
+/// Most columns of a table that are looked at, and longest name of one.
+const MOST_COLUMNS: usize = 100;
+const LONGEST_NAME: usize = 255;
 /// Longest statement that is read, bytes.
 const LONGEST: u64 = 1 << 20;
 
@@ -56,11 +59,16 @@ pub(crate) fn definitions(
                 let root = root.and_then(|root| u32::try_from(root).ok());
                 let sql = text(values.next());
                 match (kind.as_deref(), name, root, sql) {
-                    (Some("table"), Some(name), Some(root), Some(sql)) => found.push(Definition {
-                        name,
-                        root,
-                        columns: columns(&sql),
-                    }),
+                    (Some("table"), Some(name), Some(root), Some(sql)) => {
+                        if name.len() <= LONGEST_NAME {
+                            let columns = columns(&sql);
+                            found.push(Definition {
+                                name,
+                                root,
+                                columns,
+                            });
+                        }
+                    }
                     (Some("index" | "view" | "trigger"), ..) => {}
                     _ => is_whole = false,
                 }
@@ -95,7 +103,15 @@ fn columns(sql: &str) -> Vec<String> {
         {
             break;
         }
-        names.push(name.to_owned());
+        let is_kept = name.len() <= LONGEST_NAME;
+        names.push(if is_kept {
+            name.to_owned()
+        } else {
+            String::new()
+        });
+        if names.len() >= MOST_COLUMNS {
+            break;
+        }
     }
     names
 }

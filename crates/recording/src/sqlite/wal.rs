@@ -129,9 +129,8 @@ mod tests {
         assert_eq!(wal.page_size, 4096);
         let frame = [0; FRAME];
         assert_eq!(wal.frame(&frame, &[0; 512]), Err(NoFrame::Old));
-        let mut frame = [7; FRAME];
+        let frame = [7; FRAME];
         assert_eq!(wal.frame(&frame, &[0; 512]), Err(NoFrame::Damaged));
-        frame[0] = 0;
         assert!(Wal::parse(&head[..31]).is_err());
     }
 }

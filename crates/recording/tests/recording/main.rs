@@ -9,6 +9,7 @@ mod delimited;
 mod gpmf;
 #[path = "../../../../tests/made_databases/mod.rs"]
 mod made_databases;
+mod mavlink;
 mod mcap_damage;
 #[path = "../../../../tests/mcap_logs/mod.rs"]
 mod mcap_logs;

@@ -29,10 +29,15 @@ fn told(list: Vec<Read>) -> Told {
     list.into_iter().map(short).collect()
 }
 
-/// What the recordings were made of: each instant's sample, then its truth.
+/// What the recordings were made of: each instant's sample, then its truth, of the first hundred.
 fn expected() -> Told {
-    told(read(Reader::open(&fixture("constant_rate.mcap")).unwrap()).0)
+    let mut all = told(read(Reader::open(&fixture("constant_rate.mcap")).unwrap()).0);
+    all.truncate(200);
+    all
 }
+
+/// How many of them the killed recorder had taken, in the database, and with each transaction beside it.
+const KILLED: [usize; 3] = [48, 64, 80];
 
 fn kinds(report: &WalkReport) -> Vec<ProblemKind> {
     let problems = report.survey.problems.first().iter();
@@ -75,7 +80,7 @@ fn what_a_killed_recorder_committed_beside_the_database_is_read_and_without_that
  {
     let name = "constant_rate_killed.db3";
     let (ours, report) = read(Reader::open(&fixture(name)).unwrap());
-    assert!(told(ours) == expected());
+    assert!(told(ours)[..] == expected()[..KILLED[2]]);
     assert!(report.survey.problems.is_empty(), "{:?}", kinds(&report));
     // ROS 2 Humble has no definitions in its tables: those of the types every ROS has are ours.
     let schema = report.survey.channels[0].channel.schema.as_deref().unwrap();
@@ -83,7 +88,7 @@ fn what_a_killed_recorder_committed_beside_the_database_is_read_and_without_that
     assert!(text.contains("MSG: builtin_interfaces/Time"), "{text}");
     let (_dir, alone) = opened(&bytes(name), None);
     let (ours, report) = read(alone);
-    assert!(told(ours)[..] == expected()[..301]);
+    assert!(told(ours)[..] == expected()[..KILLED[0]]);
     assert!(report.survey.problems.is_empty(), "{:?}", kinds(&report));
 }
 
@@ -103,23 +108,23 @@ fn a_changed_or_cut_file_beside_the_database_gives_its_whole_transactions_and_sa
         (ours.len(), report)
     };
     let mut counts = std::collections::BTreeSet::new();
-    for cut in (0..wal.len()).step_by(512) {
+    for cut in (0..wal.len()).step_by(128) {
         let (n, report) = of(&wal[..cut]);
         counts.insert(n);
         let said = kinds(&report);
         let is_said = said.iter().any(|k| matches!(k, ProblemKind::Beside { .. }));
         // At the end of a transaction nothing tells that another followed.
-        let is_border = cut == 0 || (cut - 32).is_multiple_of(24 + PAGE);
+        let is_border = cut == 0 || (cut - 32).is_multiple_of(24 + 1024);
         assert!(is_said || is_border, "{cut}: {said:?}");
     }
-    assert_eq!(counts.into_iter().collect::<Vec<_>>(), [301, 401]);
-    for at in (0..wal.len()).step_by(997) {
+    assert_eq!(counts.into_iter().collect::<Vec<_>>(), KILLED[..2]);
+    for at in (0..wal.len()).step_by(197) {
         let mut changed = wal.clone();
         changed[at] ^= 4;
         let (n, report) = of(&changed);
-        assert!(n < 502, "{at}");
+        assert!(n < KILLED[2], "{at}");
         // A changed salt is one of another use of the file, which is no damage.
-        let frame = at.saturating_sub(32) % (24 + PAGE);
+        let frame = at.saturating_sub(32) % (24 + 1024);
         let is_said = report.survey.problems.losses() > 0;
         assert!(
             is_said || (8..16).contains(&frame),
@@ -129,9 +134,9 @@ fn a_changed_or_cut_file_beside_the_database_gives_its_whole_transactions_and_sa
     }
     // Of another database.
     let mut other = wal.clone();
-    other[10] = 0x20;
+    other[10] = 0x40;
     let (n, report) = of(&other);
-    assert!(n == 301 && report.survey.problems.losses() > 0);
+    assert!(n == KILLED[0] && report.survey.problems.losses() > 0);
 }
 
 #[test]
@@ -151,8 +156,8 @@ fn a_database_cut_anywhere_gives_every_message_whose_page_is_whole_and_says_that
         }
         assert!(report.survey.problems.losses() > 0, "{cut}");
     }
-    let (ours, _) = read(from_bytes(&whole[..whole.len() / 2]).unwrap());
-    assert!(ours.len() > 150, "{}", ours.len());
+    let (ours, _) = read(from_bytes(&whole[..whole.len() * 3 / 4]).unwrap());
+    assert!(ours.len() > 60, "{}", ours.len());
 }
 
 #[test]
@@ -194,7 +199,7 @@ fn a_lost_page_costs_its_own_rows_alone_and_how_many_is_counted() {
             );
         }
     }
-    assert!(lost_somewhere > 20, "{lost_somewhere}");
+    assert!(lost_somewhere > 8, "{lost_somewhere}");
 }
 
 #[test]
@@ -286,7 +291,7 @@ fn topics_are_told_apart_and_one_alone_can_be_read() {
     let (imu, _) = read_some(reader, &WalkOptions::default(), |topic| {
         topic == "/imu/data_raw"
     });
-    assert_eq!(imu.len(), 251);
+    assert_eq!(imu.len(), 100);
 }
 
 #[test]

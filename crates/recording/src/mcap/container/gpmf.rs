@@ -299,9 +299,8 @@ impl Scanner {
 fn find(file: &LogFile, from: u64) -> io::Result<Option<u64>> {
     let mut at = from;
     let mut size = FIRST;
-    let mut window = Vec::new();
     loop {
-        window.resize(size, 0);
+        let mut window = vec![0; size];
         let have = file.read_at(&mut window, at)?;
         if let Some(found) = next_device(window.get(..have).unwrap_or(&[])) {
             return Ok(Some(at + found as u64));

@@ -1,0 +1,174 @@
+//! Bytes of a log, in any cut -> records, and what was wrong. Pure.
+//!
+//! Apart from the frames because it alone decides where one begins: a frame is believed by its checksum, or, where that can
+//! not be known, if another follows it.
+
+use super::frame::{Checked, Frame, LONGEST, frame, is_log};
+use super::message;
+use crate::decode::known_definition;
+use crate::records::imu;
+use crate::records::transcript::Transcript;
+use std::collections::BTreeMap;
+
+/// Bytes looked at to believe a frame, and to find one.
+const WINDOW: usize = LONGEST + 16;
+
+/// What was wrong, and where.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Fault {
+    pub(crate) offset: u64,
+    pub(crate) kind: FaultKind,
+}
+
+/// What can be wrong with a log.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum FaultKind {
+    /// It ends inside a frame.
+    Cut { need: u64, have: u64 },
+    /// Bytes that are no frame.
+    Garbage { skipped: u64 },
+    /// A frame whose checksum is wrong.
+    Checksum { length: u64 },
+    /// More sensors than there are numbers for.
+    TooMany,
+}
+
+/// What became of the bytes pushed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Step {
+    /// So many were used.
+    Used(usize),
+    /// None, and so many are needed.
+    Need(usize),
+}
+
+/// Who sent a sample: system, component, name of the message, sensor.
+type Sender = (u8, u8, &'static str, u8);
+
+/// A log under way.
+#[derive(Debug, Default)]
+pub(crate) struct Transcriber {
+    at: u64,
+    channels: BTreeMap<Sender, (u16, u32)>,
+    /// The first that sent a sample: its topics have plain names.
+    first: Option<(u8, u8)>,
+    /// Where bytes begin that are no frame.
+    lost: Option<u64>,
+    message: Vec<u8>,
+    pub(crate) faults: Vec<Fault>,
+}
+
+impl Transcriber {
+    /// Uses one frame, or what stands in its place, of `ahead`: the bytes behind those used so far, and whether the log
+    /// ends with them.
+    pub(crate) fn step(&mut self, ahead: &[u8], is_end: bool, to: &mut Transcript) -> Step {
+        if ahead.len() < WINDOW && !is_end {
+            return Step::Need(WINDOW);
+        }
+        let used = match frame(ahead) {
+            Ok(found) if is_believed(&found, ahead) => {
+                self.found();
+                match found.checked {
+                    Checked::Wrong => {
+                        let length = found.total as u64;
+                        self.fault(FaultKind::Checksum { length });
+                    }
+                    Checked::Right => self.tell(&found, to),
+                    Checked::Unknown => {}
+                }
+                found.total
+            }
+            // The end, unless another frame begins within it.
+            Err(Some(need)) if is_end && !has_frame(ahead) => {
+                self.found();
+                let (need, have) = (need as u64, ahead.len() as u64);
+                self.fault(FaultKind::Cut { need, have });
+                ahead.len()
+            }
+            _ => {
+                self.lost.get_or_insert(self.at);
+                let begins = |at: &usize| ahead.get(*at..).is_some_and(is_log);
+                let next = (1..ahead.len()).find(begins);
+                // What could begin a time is looked at again with what follows it.
+                let most = if is_end { ahead.len() } else { ahead.len() - 9 };
+                next.unwrap_or(most).min(most).max(1)
+            }
+        };
+        self.at = self.at.saturating_add(used as u64);
+        if is_end && used == ahead.len() {
+            self.found();
+        }
+        Step::Used(used)
+    }
+
+    /// Tells of the bytes before that were none.
+    fn found(&mut self) {
+        if let Some(offset) = self.lost.take() {
+            let skipped = self.at.saturating_sub(offset);
+            let kind = FaultKind::Garbage { skipped };
+            self.faults.push(Fault { offset, kind });
+        }
+    }
+
+    fn fault(&mut self, kind: FaultKind) {
+        let offset = self.at;
+        self.faults.push(Fault { offset, kind });
+    }
+
+    fn tell(&mut self, found: &Frame<'_>, to: &mut Transcript) {
+        let Some(known) = message::of(found.message) else {
+            return;
+        };
+        let Some(sample) = known.sample(found.payload) else {
+            return;
+        };
+        let own = (found.system, found.component);
+        let sender = (own.0, own.1, known.name, sample.sensor);
+        let first = *self.first.get_or_insert(own);
+        let next = self.channels.len();
+        let (channel, count) = match self.channels.get_mut(&sender) {
+            Some(known) => known,
+            None => {
+                let Some(number) = u16::try_from(next).ok().filter(|n| *n < u16::MAX) else {
+                    return self.fault(FaultKind::TooMany);
+                };
+                if number == 0 {
+                    let text = known_definition(imu::TYPE).unwrap_or_default();
+                    to.schema(1, imu::TYPE, "ros2msg", text.as_bytes());
+                }
+                let mut topic = known.name.to_owned();
+                if sample.sensor > 0 {
+                    topic = format!("{topic}/{}", sample.sensor);
+                }
+                if own != first {
+                    topic = format!("{}.{}/{topic}", own.0, own.1);
+                }
+                let said = known.assumed().map(|unit| ("unit", unit));
+                to.channel(number, 1, &topic, "cdr", said.as_slice());
+                self.channels.entry(sender).or_insert((number, 0))
+            }
+        };
+        let time = found.time.saturating_mul(1000);
+        let stamp = (sample.time, "vehicle");
+        imu::imu(&mut self.message, stamp, sample.rate, Some(sample.force));
+        to.message(*channel, *count, time, &self.message);
+        *count = count.wrapping_add(1);
+    }
+}
+
+/// Whether it is a frame: by its checksum, or because another follows, or nothing.
+fn is_believed(found: &Frame<'_>, ahead: &[u8]) -> bool {
+    let rest = ahead.get(found.total..).unwrap_or(&[]);
+    found.checked == Checked::Right || rest.is_empty() || is_log(rest)
+}
+
+/// Whether a frame begins in these bytes behind the first.
+fn has_frame(ahead: &[u8]) -> bool {
+    (1..ahead.len()).any(|at| {
+        let rest = ahead.get(at..).unwrap_or(&[]);
+        frame(rest).is_ok_and(|found| is_believed(&found, rest))
+    })
+}
+
+#[cfg(test)]
+mod tests;
