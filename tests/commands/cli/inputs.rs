@@ -41,10 +41,10 @@ fn a_log_of_another_format_is_called_by_its_name_with_the_command_that_makes_it_
     let at = dir.path();
     let cases: [(&str, &[u8], &str, &str); 6] = [
         (
-            "bag.db3",
-            b"SQLite format 3\0",
-            "an SQLite database",
-            "mcap convert bag.db3 log.mcap",
+            "clip.mp4",
+            b"\0\0\0\x14ftypmp42\0\0\0\0mp41",
+            "a video (MP4, MOV)",
+            "Gyroflow exports",
         ),
         (
             "log.gz",
