@@ -32,7 +32,7 @@ use strapd_recording::pool::Pool;
 
 What it could not tell is listed with the motion that would show it.")]
 pub struct Calibrate {
-    /// Recordings of one sensor: MCAP, ULog, ROS 1 bag, NDJSON or a table
+    /// Recordings of one sensor: MCAP, ULog, a bag of ROS 1 or 2, NDJSON or a table
     #[arg(required = true, value_name = "LOG")]
     pub logs: Vec<String>,
     /// The calibration, for --calibration

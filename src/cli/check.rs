@@ -24,7 +24,7 @@ use strapd_replay::inspection::Checked;
 
 Exit codes: 0 nothing found; 3 errors or warnings found. Notes alone are no finding.")]
 pub struct Check {
-    /// Recordings: MCAP, ULog, ROS 1 bags, NDJSON, tables, or folders of one; - is standard input
+    /// Recordings: MCAP, ULog, bags of ROS 1 and 2, videos of a GoPro, NDJSON, tables, or folders of one; - is standard input
     #[arg(value_name = "FILE", required = true)]
     pub files: Vec<PathBuf>,
     /// Only this topic, though it be not obviously an IMU's

@@ -31,7 +31,7 @@ use strapd_recording::pool::Pool;
   strapd replay flight.mcap --page                          in a browser, with play, pause and seek
   strapd replay flight.mcap --speed 1 -o udp://127.0.0.1:9870?profile=plotjuggler")]
 pub struct Replay {
-    /// Logs: MCAP, ULog or ROS 1 bag, NDJSON, or - for one of these on standard input
+    /// Logs: MCAP, ULog, a bag of ROS 1 or 2, a video of a GoPro, NDJSON, or - for one of these on standard input
     #[arg(required = true, value_name = "SOURCE")]
     pub sources: Vec<String>,
     /// Where the attitude goes: a .mcap, .ndjson, .csv or .tum (evo) file, a directory, - (NDJSON on stdout),

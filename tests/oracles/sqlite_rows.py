@@ -57,7 +57,9 @@ def make(name, seed, pragmas=(), tables=TABLES, lengths=(324,), count=700, after
 
 made = []
 for size in (512, 1024, 4096, 32768, 65536):
-    made.append(make(f"page_{size}.db3", size, [f"page_size={size}"], lengths=(1, 24, 324, 480, 4000, 90_000 if size < 4096 else 200)))
+    # Rows that just fit into a page, and that just do not.
+    lengths = (1, 24, 324, 4000, 90_000 if size < 4096 else 200, *range(size - 70, size - 20))
+    made.append(make(f"page_{size}.db3", size, [f"page_size={size}"], lengths=lengths, count=900 if size <= 4096 else 200))
 made.append(make("levels.db3", 5, ["page_size=512"], count=9000))
 made.append(make("utf16le.db3", 6, ["encoding='UTF-16le'"]))
 made.append(make("utf16be.db3", 7, ["encoding='UTF-16be'"]))

@@ -39,7 +39,13 @@ fn what_is_not_there_a_directory_empty_or_no_mcap_is_called_so_by_every_command(
 fn a_log_of_another_format_is_called_by_its_name_with_the_command_that_makes_it_readable() {
     let dir = bench();
     let at = dir.path();
-    let cases: [(&str, &[u8], &str, &str); 5] = [
+    let cases: [(&str, &[u8], &str, &str); 6] = [
+        (
+            "clip.mp4",
+            b"\0\0\0\x14ftypmp42\0\0\0\0mp41",
+            "a video (MP4, MOV)",
+            "Gyroflow exports",
+        ),
         (
             "log.gz",
             &[0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 3],
