@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Many logs under several drivers: processor time of all processes a log, and wall time, in turn in one run.
 
-    fleet.py [--logs 200] [--seconds 30] [--rounds 2]
+    fleet.py [--logs 200] [--seconds 30] [--rounds 2] [--drivers REGEX]
 
 Each driver gives a file of attitudes for each log: MCAP by the command, Parquet by Python. Needs the command; a driver that is not here is
 left out, and that is said. Processor time is that of everything below this process; of what Ray starts, which are no children, as it was 50 ms
@@ -11,6 +11,7 @@ before its end.
 import argparse
 import os
 import pathlib
+import re
 import resource
 import shutil
 import statistics
@@ -65,6 +66,7 @@ def main():
     asked.add_argument("--logs", type=int, default=200)
     asked.add_argument("--seconds", type=float, default=30)
     asked.add_argument("--rounds", type=int, default=2)
+    asked.add_argument("--drivers", default="", help="only those whose names this finds")
     given = asked.parse_args()
     from strapd._command import command
 
@@ -93,6 +95,7 @@ def main():
                 drivers[f"{name}"] = [*python, RECIPES / f"many_logs_{recipe}.py", logs, out]
             except ImportError:
                 print(f"NOT MEASURED: {module} is not here", file=sys.stderr)
+        drivers = {name: words for name, words in drivers.items() if re.search(given.drivers, name)}
         env = {**os.environ, "STRAPD_BIN": strapd}
         spent = {name: [] for name in drivers}
         for _ in range(given.rounds):

@@ -103,8 +103,8 @@ def test_lines_and_tables_give_the_bits_of_the_command(command: str, tmp_path: p
     # Columns that nobody can guess.
     rows = (tmp_path / "samples.csv").read_text().splitlines()[1:]
     bare = tmp_path / "bare.csv"
-    bare.write_text("\n".join(["a;b;c;d", *(";".join(row.split(",")[i] for i in (0, 2, 3, 4)) for row in rows)]) + "\n")
-    how = {"columns": "stamp=1:ns,gyro=2:3:4", "delimiter": "semicolon"}
+    bare.write_text("\n".join(["a!b!c!d", *("!".join(row.split(",")[i] for i in (0, 2, 3, 4)) for row in rows)]) + "\n")
+    how = {"columns": "stamp=1:ns,gyro=2:3:4", "delimiter": "!"}
     said = Said(command, tmp_path, bare, f"--columns={how['columns']}", f"--delimiter={how['delimiter']}")
     same_bits(strapd.replay(bare, **how).q, said.q)
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+import pathlib
 import warnings
 
 import numpy as np
 import pytest
 import strapd
+from conftest import FIXTURES
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
@@ -75,15 +77,39 @@ def test_arguments_nobody_thought_of(call: dict[str, object]) -> None:
     assert found.summary["samples"]["total"] == len(np.asarray(call["gyr"]))
 
 
-@settings(max_examples=EXAMPLES, deadline=None, database=None)
-@given(st.binary(max_size=400), st.lists(st.integers(0, 400), max_size=3), st.booleans())
-def test_bytes_that_no_command_wrote(data: bytes, cuts: list[int], has_magic: bool) -> None:
-    reader = strapd._strapd.Written()
-    data = (b"\x89MCAP0\r\n" if has_magic else b"") + data
-    with pytest.raises(strapd.Error):
-        for a, b in zip([0, *sorted(cuts)], [*sorted(cuts), len(data)]):
-            reader.push(data[a:b])
-        reader.finish()
+ALLOWED = (ValueError, TypeError, OverflowError, strapd.Error)
+
+
+@settings(max_examples=max(EXAMPLES // 3, 50), deadline=None, database=None)
+@given(st.dictionaries(st.sampled_from(sorted(values)), anything, max_size=2), st.data())
+def test_flags_nobody_thought_of(flags: dict[str, object], data: st.DataObject) -> None:
+    for name in data.draw(st.lists(st.sampled_from(sorted(values)), max_size=3, unique=True)):
+        flags[name] = data.draw(values[name])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            found = strapd.replay(FIXTURES / "constant_rate.mcap", threads=1, **flags)
+        except ALLOWED as refused:
+            assert "panicked" not in str(refused)
+            return
+    assert isinstance(found, strapd.Attitude) and np.isfinite(found.q).all()
+
+
+@settings(max_examples=max(EXAMPLES // 10, 20), deadline=None, database=None, suppress_health_check=list(HealthCheck))
+@given(st.lists(st.tuples(st.integers(0, 18_280), st.binary(min_size=1, max_size=8)), max_size=4), st.integers(0, 18_281), st.sampled_from([".mcap", ".bag", ".csv"]))
+def test_logs_that_nobody_wrote(tmp_path: pathlib.Path, changes: list[tuple[int, bytes]], length: int, ending: str) -> None:
+    raw = bytearray((FIXTURES / "constant_rate_ros1.mcap").read_bytes())
+    for at, piece in changes:
+        raw[at : at + len(piece)] = piece
+    log = tmp_path / f"log{ending}"
+    log.write_bytes(bytes(raw[:length]) if length % 3 else bytes(raw))
+    for look in (strapd.replay, strapd.read, strapd.open, strapd.check):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            try:
+                look(log)
+            except ALLOWED as refused:
+                assert "panicked" not in str(refused)
 
 
 def test_memory_does_not_stay() -> None:
