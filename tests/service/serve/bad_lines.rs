@@ -216,7 +216,7 @@ fn bad_samples_follow_the_rules_of_conditioning_and_are_said_once_each() {
         let said = held["evidence"][name].as_f64().unwrap();
         assert!((said - secs).abs() < 1e-9, "{held}");
     }
-    assert!(held["flags"].as_str().unwrap().contains("--on-gap bridge"));
+    assert_eq!(held["settings"][0]["on_gap"], "bridge", "{held}");
     let stamps: Vec<u64> = attitudes
         .iter()
         .map(|a| a["stamp"]["nsec"].as_u64().unwrap() / 1_000_000)

@@ -471,7 +471,7 @@ fn gravity_and_bias_begin_what_a_daemon_learns_and_are_refused_of_a_gyro_alone()
             ..Settings::default()
         });
         let why = why.unwrap_err().to_string();
-        assert!(why.contains("--aid gravity"), "{why}");
+        assert!(why.contains("aid gravity"), "{why}");
         let mut daemon = Fed::of(&Plan {
             aid: strapd_attitude::estimate::Aid::Auto,
             ..plan

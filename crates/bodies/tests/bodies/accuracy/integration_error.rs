@@ -88,6 +88,15 @@ fn check(
     }
 }
 
+/// Where a sample begins: a rate at its stamp, an increment a step before it, but for the first.
+fn begin(kind: SampleKind, is_first: bool, stamp: i64, step: i64) -> i64 {
+    match kind {
+        SampleKind::Rate => stamp,
+        _ if is_first => stamp,
+        _ => stamp - step,
+    }
+}
+
 #[test]
 fn on_the_top() {
     let top = seed_top();
@@ -106,7 +115,7 @@ fn on_the_top() {
                     } else {
                         std::array::from_fn(|a| (top.angle[k][a] - top.angle[before][a]).value())
                     };
-                    sample(if i == 0 { stamp } else { stamp - step }, stamp, value)
+                    sample(begin(kind, i == 0, stamp, step), stamp, value)
                 })
                 .collect();
             check(
@@ -137,11 +146,8 @@ fn on_coning() {
                     } else {
                         coning.increment(k)
                     };
-                    sample(
-                        if k == 0 { stamp } else { stamp - 10_000_000 },
-                        stamp,
-                        value,
-                    )
+                    let begin = begin(kind, k == 0, stamp, 10_000_000);
+                    sample(begin, stamp, value)
                 })
                 .collect();
             let truth = |i: usize| coning.attitude(i as i64);
