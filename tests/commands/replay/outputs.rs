@@ -288,7 +288,7 @@ fn every_imu_of_a_log_gets_an_output_topic_of_its_own_and_they_are_not_mixed() {
     let error = done(&replay).unwrap_err();
     assert!(matches!(error, Error::Usage(_)), "{error:?}");
     assert!(
-        error.to_string().contains("topic NAME takes one"),
+        error.to_string().contains("choose one with topic"),
         "{error}"
     );
     assert!(!csv.exists());
