@@ -25,6 +25,8 @@
 //!
 //! # Example
 //! ```
+//! use strapd_attitude::frames::In;
+//! use strapd_attitude::quaternion::BodyRate;
 //! use strapd_attitude::record::Nanos;
 //! use strapd_attitude::smooth::{Outcome, Sample, Settings, smooth};
 //!
@@ -32,8 +34,8 @@
 //! let samples: Vec<Sample> = (0..6000)
 //!     .map(|i| Sample {
 //!         stamp: Nanos(i * 10_000_000),
-//!         rate: [0.01, 0.0, 0.0].into(),
-//!         force: Some([0.0, 9.81 * 0.1_f64.sin(), 9.81 * 0.1_f64.cos()].into()),
+//!         rate: BodyRate([0.01, 0.0, 0.0].into()),
+//!         force: Some(In::assume([0.0, 9.81 * 0.1_f64.sin(), 9.81 * 0.1_f64.cos()].into())),
 //!         field: None,
 //!     })
 //!     .collect();
