@@ -20,6 +20,7 @@
 //! | [`estimate`] | all of these in one: what is asked for and the first samples -> an estimator -> attitude |
 //! | [`noise`] | what a sensor adds: measured, and put in on purpose |
 //! | [`compare`] | two attitudes -> how far apart |
+//! | [`setting`] | what can be set for a run -> what a person reads of it |
 //!
 //! # From raw samples to attitude
 //! A quarter turn about z in a second, in degrees a second and with one reading that is none:
