@@ -18,7 +18,7 @@ set -o pipefail
 until_ctrl_c() {
     "$@" &
     local started=$!
-    for _ in $(seq 600); do
+    for ((n = 0; n < 600; n++)); do
         grep -q 'ready ' "$err" && break
         kill -0 $started 2>/dev/null || break
         sleep 0.1
@@ -27,7 +27,7 @@ until_ctrl_c() {
     wait $started
 }
 end() {
-    for _ in $(seq 50); do
+    for ((n = 0; n < 50; n++)); do
         [ -n "$(jobs -pr)" ] || break
         sleep 0.1
     done
