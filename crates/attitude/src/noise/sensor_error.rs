@@ -18,7 +18,7 @@
 //! true field -> soft iron -> hard iron -> white -> quantisation
 //! ```
 //!
-//! [`ImuError`] holds the sizes, [`ConstantErrors`] what one unit drew of them, `GyroModel` the
+//! [`ImuError`] holds the sizes, `ConstantErrors` what one unit drew of them, `GyroModel` the
 //! state of a running sensor, `StampModel` when it sampled and what its stamps say. The last two
 //! need the feature `random`: ChaCha for the bits, `libm` for the functions, so
 //! one seed gives the same samples on every platform.
