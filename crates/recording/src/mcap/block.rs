@@ -107,6 +107,16 @@ pub(super) enum Payload {
 }
 
 impl Block {
+    /// What another container holds from `offset` on, told as records; nothing of none.
+    pub(super) fn of_records(offset: u64, bytes: Vec<u8>) -> Option<Block> {
+        let range = 0..bytes.len();
+        (!bytes.is_empty()).then_some(Block {
+            offset,
+            kind: Kind::Transcript,
+            payload: Payload::Held(Held { bytes, range }),
+        })
+    }
+
     /// Memory it may take while it is worked on.
     pub(super) fn cost(&self) -> usize {
         let packed = match &self.payload {

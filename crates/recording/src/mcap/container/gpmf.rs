@@ -3,8 +3,8 @@
 //! Apart from [`crate::gpmf`], which does the work and knows no files. A video is read where its index says, which may
 //! stand at its end, so a stream of one was put into a file before it comes here.
 
-use super::super::block::{Block, Kind, Payload};
-use super::super::input::{Held, Input, LogFile};
+use super::super::block::Block;
+use super::super::input::{Input, LogFile};
 use super::super::problem::{ProblemKind, Problems};
 use super::super::scan::{Facts, Item};
 use crate::format::Format;
@@ -96,19 +96,7 @@ impl Scanner {
                 self.step(&file, &mut to)?;
             }
         }
-        if to.bytes.is_empty() {
-            return Ok(None);
-        }
-        let range = 0..to.bytes.len();
-        let held = Held {
-            bytes: to.bytes,
-            range,
-        };
-        Ok(Some(Item::Block(Block {
-            offset,
-            kind: Kind::Transcript,
-            payload: Payload::Held(held),
-        })))
+        Ok(Block::of_records(offset, to.bytes).map(Item::Block))
     }
 
     /// The next payload, or what stands in its place.

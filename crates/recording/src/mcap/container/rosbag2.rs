@@ -3,8 +3,8 @@
 //! Apart from [`crate::rosbag2`], which does the work and knows no files. A database is read in the order of its tables,
 //! not of its bytes, so a stream of one was put into a file before it comes here.
 
-use super::super::block::{Block, Kind, Payload};
-use super::super::input::{Held, Input, LogFile};
+use super::super::block::{Block, Payload};
+use super::super::input::{Input, LogFile};
 use super::super::problem::{ProblemKind, Problems};
 use super::super::scan::{Facts, Item};
 use super::super::{Beside, Limits};
@@ -85,19 +85,7 @@ impl Scanner {
                 self.open = None;
             }
         }
-        if to.bytes.is_empty() {
-            return Ok(None);
-        }
-        let range = 0..to.bytes.len();
-        let held = Held {
-            bytes: to.bytes,
-            range,
-        };
-        Ok(Some(Item::Block(Block {
-            offset,
-            kind: Kind::Transcript,
-            payload: Payload::Held(held),
-        })))
+        Ok(Block::of_records(offset, to.bytes).map(Item::Block))
     }
 
     fn begin(&mut self, file: Arc<LogFile>, beside: Beside, to: &mut Transcript) -> io::Result<()> {

@@ -2,8 +2,8 @@
 //!
 //! Apart from [`crate::ulog`], which does the work and knows no files.
 
-use super::super::block::{Block, Kind, Payload};
-use super::super::input::{Held, Input, Tape};
+use super::super::block::{Block, Payload};
+use super::super::input::{Input, Tape};
 use super::super::problem::{ProblemKind, Problems};
 use super::super::record::op;
 use super::super::scan::{Facts, Item};
@@ -82,19 +82,7 @@ impl Scanner {
                 told(fault, &mut self.problems);
             }
         }
-        if to.bytes.is_empty() {
-            return Ok(None);
-        }
-        let range = 0..to.bytes.len();
-        let held = Held {
-            bytes: to.bytes,
-            range,
-        };
-        Ok(Some(Item::Block(Block {
-            offset,
-            kind: Kind::Transcript,
-            payload: Payload::Held(held),
-        })))
+        Ok(Block::of_records(offset, to.bytes).map(Item::Block))
     }
 
     pub(super) fn finish(self) -> (Facts, Problems) {
