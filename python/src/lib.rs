@@ -16,7 +16,7 @@
 //! | [`words`] | the command's flags -> a replay to be done |
 //! | [`recorded`] | a recorded log -> attitudes |
 //! | [`samples_of_log`], [`simulated`], [`raw_columns`] | a recorded log, or a motion -> samples as numpy arrays |
-//! | [`looked`], [`shell`] | a recorded log -> what is in it, and what may spoil it |
+//! | [`looked`] | a recorded log -> what is in it, and what may spoil it |
 //! | [`errand`], [`noted`] | work that Ctrl-C ends, and what is said on the way |
 
 // What is documented is the Python package; here for who changes it.
@@ -39,7 +39,6 @@ mod refusal;
 mod samples;
 mod samples_of_log;
 mod settings;
-mod shell;
 mod simulated;
 mod words;
 

@@ -15,6 +15,7 @@ use strapd_recording::decode::Options;
 use strapd_recording::pool::Pool;
 use strapd_recording::recording::opened::problems;
 use strapd_recording::recording::topics;
+use strapd_replay::info::Overview;
 
 /// What a log holds: topics, rates, clocks, frames, and what to do next.
 #[derive(Args, Debug)]
@@ -82,7 +83,7 @@ fn one(
     let looks = look(&log, args.topic.as_deref(), options, pool)?;
     let survey = &looks.survey;
     let lossy = survey.problems.losses() > 0;
-    let report = words::Report {
+    let found = Overview {
         input: &input,
         survey,
         problems: problems(survey),
@@ -91,8 +92,8 @@ fn one(
         left_out: &looks.left_out,
     };
     let text = match global.json {
-        true => format!("{}\n", report.json()),
-        false => report.text(),
+        true => format!("{}\n", found.json()),
+        false => words::text(&found),
     };
     let outcome = match lossy {
         true => Outcome::Lossy,

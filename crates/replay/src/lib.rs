@@ -13,6 +13,8 @@
 //! | [`summary`] | a run -> its numbers, for people and for machines | pure |
 //! | [`inspection`] | what looking at a log tells of its topics | pure |
 //! | [`findings`] | what is known about a log -> what is wrong with it, and what helps | pure |
+//! | [`info`] | what looking at a recording told -> JSON, and the command to run next | pure |
+//! | [`shell`] | words of a command -> what a shell takes for them | pure |
 //! | [`error`] | everything that can end a run | pure |
 //!
 //! What the command, the daemon and the Python wheel share: no async runtime, no arguments, no terminal.
@@ -21,7 +23,9 @@ pub mod config;
 pub mod error;
 mod finding;
 pub mod findings;
+pub mod info;
 pub mod inspection;
 pub mod pipeline;
+pub mod shell;
 pub mod sink;
 pub mod summary;

@@ -1,29 +1,14 @@
-//! What may correct an attitude -> words, JSON. Pure.
+//! What may correct an attitude -> words. Pure.
 
-use crate::cli::shell::flag;
 use crate::report::summary::significant;
-use serde_json::{Value, json};
 use strapd_recording::recording::beside::TopicOfVectors;
 use strapd_recording::text::printable;
+use strapd_replay::info::field_unit;
 use strapd_replay::inspection::Aids;
+use strapd_replay::shell::flag;
 
-/// Units of a field by the length of the Earth's, 22 to 67 uT, with room for what iron does to it.
-const FIELD_UNITS: [(&str, f64); 5] = [
-    ("T", 1.0),
-    ("G", 1e-4),
-    ("mG", 1e-7),
-    ("uT", 1e-6),
-    ("nT", 1e-9),
-];
-const EARTHS_FIELD: std::ops::Range<f64> = 1.5e-5..1e-4;
 /// Topics that are named.
 const NAMED: usize = 6;
-
-/// The unit in which a field of this length is the Earth's, where there is one.
-fn field_unit(length: f64) -> Option<&'static str> {
-    let fits = |(_, tesla): &&(&str, f64)| EARTHS_FIELD.contains(&(length * tesla));
-    FIELD_UNITS.iter().find(fits).map(|(name, _)| *name)
-}
 
 /// Lines for people: the force, the field, what to say.
 pub(super) fn lines(aids: &Aids) -> Vec<String> {
@@ -112,54 +97,4 @@ fn field(aids: &Aids) -> Vec<String> {
             )
         })
         .collect()
-}
-
-/// For machines.
-pub(super) fn aids_json(aids: &Aids) -> Value {
-    let topic = |t: &TopicOfVectors| {
-        json!({ "topic": t.topic, "decoded_as": t.described, "rate_hz": t.rate_hz,
-                "first_length": t.first })
-    };
-    let of_field = |t: &TopicOfVectors| {
-        let mut value = topic(t);
-        if let Some(object) = value.as_object_mut() {
-            object.insert("unit".to_owned(), t.first.and_then(field_unit).into());
-        }
-        value
-    };
-    json!({
-        "auto": if aids.gravity { "gravity" } else { "none" },
-        "force": aids.has_force.then(|| json!({
-            "mean_length": aids.mean_force,
-            "unit": if aids.force_scale == 1.0 { "m/s^2" } else { "g" },
-            "plausible": aids.gravity,
-        })),
-        "field": aids.own_field.map(|length| json!({
-            "first_length": length, "unit": field_unit(length) })),
-        "field_topics": aids.fields.0.iter().map(of_field).collect::<Vec<_>>(),
-        "field_topic_taken": aids.fields.1,
-        "force_topics": aids.forces.iter().map(topic).collect::<Vec<_>>(),
-        "notes": aids.notes,
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_earth_s_field_shows_its_unit() {
-        for (length, unit) in [
-            (4.9e-5, Some("T")),
-            (0.49, Some("G")),
-            (490.0, Some("mG")),
-            (49.0, Some("uT")),
-            (49_000.0, Some("nT")),
-            (1.0, None),
-            (5000.0, None),
-            (f64::NAN, None),
-        ] {
-            assert_eq!(field_unit(length), unit, "{length}");
-        }
-    }
 }

@@ -4,7 +4,7 @@ use crate::made_logs::{bytes, logged, motion};
 use std::ffi::OsStr;
 use std::path::Path;
 use std::process::Command;
-use strapd::cli::shell::{flag, quoted, quoted_file};
+use strapd_replay::shell::{flag, quoted, quoted_file};
 
 /// Names that somebody could give a file, a topic or a frame, to be pasted into a shell.
 const HOSTILE: [&str; 22] = [

@@ -150,7 +150,7 @@ fn arguments(data: &[u8]) {
     let _ = strapd::config::parse_bias(text);
     let _ = strapd::config::parse_noise(text);
     let _ = text.parse::<strapd_attitude::propagate::Method>();
-    let _ = strapd::cli::shell::quoted(text);
+    let _ = strapd_replay::shell::quoted(text);
 }
 
 fn sized(bytes: &[u8]) -> Vec<u8> {
