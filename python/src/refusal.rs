@@ -31,7 +31,7 @@ pub fn run_of_log(py: Python<'_>, kind: &str, what: &str) -> PyErr {
     raised(py, kind, &of_log(what))
 }
 
-/// The library names the flags of the command; in Python they are arguments: `--max-gap` is `max_gap`. Of arrays `--time` is
+/// Settings are named as flags in this process (`lib.rs`), which a text shows by their dashes; here they are arguments: `--max-gap` is `max_gap`. Of arrays `--time` is
 /// `t`, the stamps themselves.
 pub fn in_python(what: &str) -> String {
     named(what, &[("sample-kind", "kind"), ("time", "t")])

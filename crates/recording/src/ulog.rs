@@ -17,7 +17,7 @@ mod format;
 mod record;
 mod transcriber;
 
-pub(crate) use transcriber::{Fault, FaultKind, Step, Transcriber};
+pub(crate) use transcriber::{Fault, FaultKind, Transcriber};
 
 /// The first seven bytes of a file. A byte of version and the start's time follow.
 pub(crate) use crate::format::ULOG_MAGIC as MAGIC;

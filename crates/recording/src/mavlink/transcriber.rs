@@ -7,7 +7,7 @@ use super::frame::{Checked, Frame, LONGEST, frame, is_log};
 use super::message;
 use crate::decode::known_definition;
 use crate::records::imu;
-use crate::records::transcript::Transcript;
+use crate::records::transcript::{Step, Transcript};
 use std::collections::BTreeMap;
 
 /// Bytes looked at to believe a frame, and to find one.
@@ -31,15 +31,6 @@ pub(crate) enum FaultKind {
     Checksum { length: u64 },
     /// More sensors than there are numbers for.
     TooMany,
-}
-
-/// What became of the bytes pushed.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum Step {
-    /// So many were used.
-    Used(usize),
-    /// None, and so many are needed.
-    Need(usize),
 }
 
 /// Who sent a sample: system, component, name of the message, sensor.

@@ -7,6 +7,7 @@ pub(super) mod gpmf;
 mod mavlink;
 mod pages;
 mod rosbag2;
+mod streamed;
 mod ulog;
 
 use super::problem::Problems;
@@ -65,7 +66,7 @@ impl Container {
     pub(super) fn position(&self) -> u64 {
         match self {
             Container::Mcap(scanner) => scanner.tape().position(),
-            Container::Ulog(scanner) => scanner.tape().position(),
+            Container::Ulog(scanner) => scanner.position(),
             Container::Bag(scanner) => scanner.tape().position(),
             Container::Rosbag2(scanner) => scanner.position(),
             Container::Gpmf(scanner) => scanner.position(),

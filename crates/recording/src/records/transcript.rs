@@ -11,6 +11,15 @@ pub(crate) struct Transcript {
     pub(crate) bytes: Vec<u8>,
 }
 
+/// What became of the bytes that a reader of another container was given.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Step {
+    /// So many were used.
+    Used(usize),
+    /// None, and so many are needed.
+    Need(usize),
+}
+
 impl Transcript {
     /// A layout of payloads; `id` is not 0.
     pub(crate) fn schema(&mut self, id: u16, name: &str, encoding: &str, data: &[u8]) {

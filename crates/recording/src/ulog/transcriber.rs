@@ -7,7 +7,7 @@
 use super::format::{Format, Formats, Layout};
 use super::record::{HEAD, LONGEST, Look, head, id, look, pair};
 use super::{HEADER, MAGIC};
-use crate::records::transcript::Transcript;
+use crate::records::transcript::{Step, Transcript};
 use std::collections::BTreeMap;
 
 /// Most formats.
@@ -79,15 +79,6 @@ pub(crate) struct Transcriber {
 struct Kind {
     layout: Layout,
     count: u32,
-}
-
-/// What became of the bytes pushed.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum Step {
-    /// So many were used.
-    Used(usize),
-    /// None, and so many are needed.
-    Need(usize),
 }
 
 impl Transcriber {

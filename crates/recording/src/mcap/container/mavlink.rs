@@ -3,11 +3,12 @@
 //! Apart from [`crate::mavlink`], which does the work and knows no files.
 
 use super::super::block::Block;
-use super::super::input::{Input, Tape};
+use super::super::input::Input;
 use super::super::problem::{ProblemKind, Problems};
 use super::super::scan::{Facts, Item};
+use super::streamed::Streamed;
 use crate::format::Format;
-use crate::mavlink::{Fault, FaultKind, Step, Transcriber};
+use crate::mavlink::{Fault, FaultKind, Transcriber};
 use crate::records::transcript::Transcript;
 use std::io;
 
@@ -17,53 +18,39 @@ const RUN: usize = 256 << 10;
 /// The walk over a log.
 #[derive(Debug)]
 pub(in super::super) struct Scanner {
-    tape: Tape,
+    log: Streamed,
     transcriber: Transcriber,
     problems: Problems,
-    /// Bytes that are needed to go on.
-    need: usize,
-    done: bool,
 }
 
 impl Scanner {
     pub(super) fn new(input: Input) -> Self {
         Scanner {
-            tape: Tape::new(input, 0),
+            log: Streamed::new(input),
             transcriber: Transcriber::default(),
             problems: Problems::default(),
-            need: 1,
-            done: false,
         }
     }
 
     pub(super) fn position(&self) -> u64 {
-        self.tape.position()
+        self.log.position()
     }
 
     pub(super) fn next(&mut self) -> io::Result<Option<Item>> {
-        let offset = self.tape.position();
+        let offset = self.log.position();
         let mut to = Transcript::default();
-        while !self.done && to.bytes.len() < RUN {
-            let ahead = self.tape.available(self.need, RUN.max(self.need))?;
-            let is_end = ahead.len() < self.need;
-            let mut rest = ahead;
-            self.need = 1;
-            while !rest.is_empty() && to.bytes.len() < RUN {
-                match self.transcriber.step(rest, is_end, &mut to) {
-                    Step::Used(n) => rest = rest.get(n..).unwrap_or(&[]),
-                    Step::Need(n) => {
-                        self.need = n.max(rest.len() + 1);
-                        break;
-                    }
-                }
+        let Scanner {
+            log,
+            transcriber,
+            problems,
+        } = self;
+        log.next(RUN, &mut to, |rest, is_end, to| {
+            let step = transcriber.step(rest, is_end, to);
+            for fault in transcriber.faults.drain(..) {
+                told(fault, problems);
             }
-            self.done = is_end && rest.is_empty();
-            let used = ahead.len() - rest.len();
-            self.tape.skip(used as u64)?;
-            for fault in self.transcriber.faults.drain(..) {
-                told(fault, &mut self.problems);
-            }
-        }
+            step
+        })?;
         Ok(Block::of_records(offset, to.bytes).map(Item::Block))
     }
 

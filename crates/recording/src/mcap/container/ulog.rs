@@ -3,13 +3,14 @@
 //! Apart from [`crate::ulog`], which does the work and knows no files.
 
 use super::super::block::{Block, Payload};
-use super::super::input::{Input, Tape};
+use super::super::input::Input;
 use super::super::problem::{ProblemKind, Problems};
 use super::super::record::op;
 use super::super::scan::{Facts, Item};
+use super::streamed::Streamed;
 use crate::format::Format;
 use crate::records::transcript::Transcript;
-use crate::ulog::{Fault, FaultKind, Step, Transcriber};
+use crate::ulog::{Fault, FaultKind, Transcriber};
 use std::io;
 
 /// Bytes read, and bytes of records worked on, together.
@@ -18,12 +19,9 @@ const RUN: usize = 1 << 20;
 /// The walk over a ULog.
 #[derive(Debug)]
 pub(in super::super) struct Scanner {
-    tape: Tape,
+    log: Streamed,
     transcriber: Transcriber,
     problems: Problems,
-    /// Bytes that are needed to go on.
-    need: usize,
-    done: bool,
     /// Memory of blocks that were used.
     spare: Vec<Vec<u8>>,
 }
@@ -34,17 +32,15 @@ const SPARE: usize = 8;
 impl Scanner {
     pub(super) fn new(input: Input) -> Self {
         Scanner {
-            tape: Tape::new(input, 0),
+            log: Streamed::new(input),
             transcriber: Transcriber::default(),
             problems: Problems::default(),
-            need: 1,
-            done: false,
             spare: Vec::new(),
         }
     }
 
-    pub(super) fn tape(&self) -> &Tape {
-        &self.tape
+    pub(super) fn position(&self) -> u64 {
+        self.log.position()
     }
 
     pub(super) fn recycle(&mut self, payload: Payload) {
@@ -57,31 +53,23 @@ impl Scanner {
     }
 
     pub(super) fn next(&mut self) -> io::Result<Option<Item>> {
-        let offset = self.tape.position();
+        let offset = self.log.position();
         let mut to = Transcript {
             bytes: self.spare.pop().unwrap_or_default(),
         };
-        while !self.done && to.bytes.len() < RUN {
-            let ahead = self.tape.available(self.need, RUN.max(2 * self.need))?;
-            let is_end = ahead.len() < self.need;
-            let mut rest = ahead;
-            self.need = 1;
-            while !rest.is_empty() && to.bytes.len() < RUN {
-                match self.transcriber.step(rest, is_end, &mut to) {
-                    Step::Used(n) => rest = rest.get(n..).unwrap_or(&[]),
-                    Step::Need(n) => {
-                        self.need = n.max(rest.len() + 1);
-                        break;
-                    }
-                }
+        let Scanner {
+            log,
+            transcriber,
+            problems,
+            ..
+        } = self;
+        log.next(RUN, &mut to, |rest, is_end, to| {
+            let step = transcriber.step(rest, is_end, to);
+            for fault in transcriber.faults.drain(..) {
+                told(fault, problems);
             }
-            self.done = is_end && rest.is_empty();
-            let used = ahead.len() - rest.len();
-            self.tape.skip(used as u64)?;
-            for fault in self.transcriber.faults.drain(..) {
-                told(fault, &mut self.problems);
-            }
-        }
+            step
+        })?;
         Ok(Block::of_records(offset, to.bytes).map(Item::Block))
     }
 
