@@ -28,7 +28,7 @@ pub fn run<T>(name: &str, work: impl Future<Output = Result<T>>) -> Result<T> {
         .worker_threads(1)
         .enable_all()
         .build()
-        .map_err(|e| Error::Usage(format!("{name}: {e}")))?;
+        .map_err(|e| Error::usage(format!("{name}: {e}")))?;
     let outcome = runtime.block_on(work);
     runtime.shutdown_background();
     outcome

@@ -73,6 +73,7 @@ use std::collections::BTreeMap;
 use std::future::Future;
 use std::sync::Arc;
 use std::time::Duration;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Plan;
 
 /// What a daemon is to do.
@@ -257,10 +258,15 @@ impl Reach {
         // A datagram shows no token that others on the way could not read and send again.
         let is_guarded = self.has_token && !matches!(listen, Listen::Udp(_));
         if is_open && !is_guarded && !self.allow_insecure_remote {
-            return Err(Error::Usage(format!(
-                "{} {listen}: others can reach this address, and nothing keeps them out\n  help: --token-file FILE asks clients for a token (not over UDP); --allow-insecure-remote listens all the same; 127.0.0.1 is this machine alone",
-                self.flag
-            )));
+            return Err(Error::usage(
+                Diagnostic::new(format!(
+                    "{} {listen}: others can reach this address, and nothing keeps them out",
+                    self.flag
+                ))
+                .help(
+                    "--token-file FILE asks clients for a token (not over UDP); --allow-insecure-remote listens all the same; 127.0.0.1 is this machine alone",
+                )
+            ));
         }
         Ok(())
     }

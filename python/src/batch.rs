@@ -11,6 +11,7 @@ use crate::settings;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::time::{Duration, Instant};
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{
     Aid, Estimator, Meaning, Patience, Plan, Preparation, Prepared, StampPass,
 };
@@ -25,7 +26,7 @@ const PATIENCE: Duration = Duration::from_millis(100);
 /// Why there is no attitude.
 enum Stop {
     /// In words.
-    Refused(String),
+    Refused(Diagnostic),
     /// Python wants to be asked: Ctrl-C.
     Interrupted(PyErr),
 }
@@ -78,7 +79,7 @@ pub fn estimate<'py>(
     let meaning = Meaning::new(&plan, &Declared::default());
     let computed = py.detach(|| compute(&plan, &meaning, samples));
     let (columns, prepared, estimator) = computed.map_err(|stop| match stop {
-        Stop::Refused(what) => refusal::run(py, "refused", &what),
+        Stop::Refused(what) => refusal::run(py, "refused", what),
         Stop::Interrupted(error) => error,
     })?;
     let facts = facts::of(py, &plan, &meaning, &prepared, &estimator)?;

@@ -43,7 +43,7 @@ pub fn run<T: Send + 'static>(
             // Nobody waits any more: then nobody wants it.
             let _ = done.send(work(&of_work));
         })
-        .map_err(|why| refusal::run(py, "failed", &format!("no thread to work on: {why}")))?;
+        .map_err(|why| refusal::run(py, "failed", format!("no thread to work on: {why}")))?;
     loop {
         let (back, waited) = py.detach(move || wait(result, PATIENCE));
         result = back;

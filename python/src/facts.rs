@@ -82,7 +82,7 @@ pub fn of<'py>(
     let warnings: Vec<String> = prepared
         .warnings
         .iter()
-        .map(|w| crate::refusal::in_python(w))
+        .map(|w| crate::refusal::in_python(&w.to_string()))
         .collect();
     facts.set_item("warnings", warnings)?;
     let known = learned(

@@ -10,6 +10,7 @@ use crate::samples::{Rows, Samples, Times, sample};
 use crate::settings;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{Aid, Estimator, Meaning, Plan, Prepared, at_once};
 use strapd_attitude::propagate::Sequential;
 use strapd_attitude::record::{AttitudeSample, Declared, Nanos, RawSample};
@@ -35,7 +36,7 @@ pub struct Live {
 
 impl Live {
     /// The estimator, which begins with this sample.
-    fn running(&mut self, first: &RawSample) -> Result<&mut Estimator, String> {
+    fn running(&mut self, first: &RawSample) -> Result<&mut Estimator, Diagnostic> {
         if self.running.is_none() {
             let prepared = at_once(&self.plan, &self.meaning, std::slice::from_ref(first))?;
             let estimator = Estimator::live(&self.plan, &self.meaning, &prepared)?;
@@ -43,7 +44,7 @@ impl Live {
         }
         match &mut self.running {
             Some((estimator, _)) => Ok(estimator),
-            None => Err("no estimator".to_owned()),
+            None => Err("no estimator".into()),
         }
     }
 
@@ -144,7 +145,7 @@ impl Live {
         let raw = sample(self.stamp(t)?, gyr, acc, mag, None, None);
         let estimator = self
             .running(&raw)
-            .map_err(|what| refusal::run(py, "refused", &what))?;
+            .map_err(|what| refusal::run(py, "refused", what))?;
         estimator.take(&raw);
         let newest = estimator.attitudes(&Sequential).last().copied();
         self.last = newest.or(self.last);
@@ -170,7 +171,7 @@ impl Live {
         let mut columns = Columns::with_room(samples.len());
         if let Some(first) = samples.part(0, 1).next() {
             self.running(&first)
-                .map_err(|what| refusal::run(py, "refused", &what))?;
+                .map_err(|what| refusal::run(py, "refused", what))?;
         }
         self.taken += samples.len() as u64;
         let (running, last) = (&mut self.running, &mut self.last);

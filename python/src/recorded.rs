@@ -15,6 +15,7 @@ use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_recording::pool::Pool;
 use strapd_replay::error::{Error, Result};
 use strapd_replay::pipeline::request::ReplayRequest;
@@ -28,9 +29,9 @@ pub fn raised(py: Python<'_>, error: &Error) -> PyErr {
     match error {
         Error::Usage(what) => refusal::argument_of_log(what),
         Error::Recording(strapd_recording::Error::Topic { .. }) => {
-            refusal::run_of_log(py, "refused", &error.to_string())
+            refusal::run_of_log(py, "refused", &Diagnostic::from(error))
         }
-        _ => refusal::run_of_log(py, "failed", &error.to_string()),
+        _ => refusal::run_of_log(py, "failed", &Diagnostic::from(error)),
     }
 }
 
@@ -41,7 +42,7 @@ pub fn raised(py: Python<'_>, error: &Error) -> PyErr {
 pub fn pool(threads: usize) -> Result<Pool> {
     // A number that no machine has is asked for by mistake.
     if threads > 1024 {
-        return Err(Error::Usage(format!(
+        return Err(Error::usage(format!(
             "threads: {threads} are more than 1024"
         )));
     }

@@ -2,33 +2,37 @@
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use strapd_attitude::diagnostic::Diagnostic;
 
 /// An argument that can not be: `ValueError`, which names it.
-pub fn argument(what: impl Into<String>) -> PyErr {
-    PyValueError::new_err(in_python(&what.into()))
+pub fn argument(what: impl Into<Diagnostic>) -> PyErr {
+    PyValueError::new_err(in_python(&what.into().to_string()))
 }
 
 /// A run that can not be carried out: `strapd.Error` of this kind.
-pub fn run(py: Python<'_>, kind: &str, what: &str) -> PyErr {
-    raised(py, kind, &in_python(what))
+pub fn run(py: Python<'_>, kind: &str, what: impl Into<Diagnostic>) -> PyErr {
+    raised(py, kind, &what.into(), in_python)
 }
 
-fn raised(py: Python<'_>, kind: &str, what: &str) -> PyErr {
+/// Its text is all of it, its `help` what helps alone.
+fn raised(py: Python<'_>, kind: &str, what: &Diagnostic, named: fn(&str) -> String) -> PyErr {
+    let text = named(&what.to_string());
+    let help = what.helping().map(named);
     let error = py
         .import("strapd._errors")
         .and_then(|errors| errors.getattr("Error"))
-        .and_then(|class| class.call1((what, kind)));
+        .and_then(|class| class.call1((text, kind, help)));
     error.map_or_else(|failure| failure, PyErr::from_value)
 }
 
 /// [`argument`] of a function that takes a log.
-pub fn argument_of_log(what: &str) -> PyErr {
-    PyValueError::new_err(of_log(what))
+pub fn argument_of_log(what: &Diagnostic) -> PyErr {
+    PyValueError::new_err(of_log(&what.to_string()))
 }
 
 /// [`run`] over a log.
-pub fn run_of_log(py: Python<'_>, kind: &str, what: &str) -> PyErr {
-    raised(py, kind, &of_log(what))
+pub fn run_of_log(py: Python<'_>, kind: &str, what: &Diagnostic) -> PyErr {
+    raised(py, kind, what, of_log)
 }
 
 /// Settings are named as flags in this process (`lib.rs`), which a text shows by their dashes; here they are arguments: `--max-gap` is `max_gap`. Of arrays `--time` is

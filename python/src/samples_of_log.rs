@@ -57,7 +57,7 @@ fn taken(path: &Path, words: &Words, stopped: &Stopped) -> Result<Found> {
         "log" => Time::Log,
         "publish" => Time::Publish,
         other => {
-            return Err(Error::Usage(format!(
+            return Err(Error::usage(format!(
                 "time: there is no {other:?}\n  help: one of header, log, publish"
             )));
         }

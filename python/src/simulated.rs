@@ -171,7 +171,7 @@ pub fn simulate<'py>(
     mag_hz: Option<f64>,
     start: i64,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let refused = |what: String| refusal::argument_of_log(&what);
+    let refused = |what: String| refusal::argument_of_log(&what.into());
     let kinds = [
         SampleKind::Rate,
         SampleKind::Average,

@@ -29,7 +29,7 @@ const LARGEST_CALIBRATION: u64 = 1 << 16;
 pub struct Words(BTreeMap<String, Vec<String>>);
 
 fn usage(what: impl Into<String>) -> Error {
-    Error::Usage(what.into())
+    Error::usage(what.into())
 }
 
 impl Words {
@@ -198,7 +198,7 @@ impl Words {
             start: self.parsed("start")?,
             until: self.parsed("until")?,
         };
-        plan.check().map_err(Error::Usage)?;
+        plan.check().map_err(Error::usage)?;
         Ok(plan)
     }
 
@@ -231,7 +231,7 @@ impl Words {
     fn method(&self) -> Result<Method> {
         let name = self.text("method").unwrap_or("auto");
         let (window, order) = (self.parsed("window")?, self.parsed("order")?);
-        method_of(name, window, order, false).map_err(Error::Usage)
+        method_of(name, window, order, false).map_err(Error::usage)
     }
 }
 
@@ -249,5 +249,5 @@ fn read_calibration(path: &Path) -> Result<SensorCalibration> {
     if text.len() as u64 > LARGEST_CALIBRATION {
         return Err(wrong("larger than any calibration"));
     }
-    calibration::parse(&text).map_err(|what| wrong(&what))
+    calibration::parse(&text).map_err(|what| wrong(&what.to_string()))
 }

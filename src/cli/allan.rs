@@ -16,6 +16,7 @@ use clap::Args;
 use gather::Gathered;
 use std::path::PathBuf;
 use strapd_attitude::condition::{Clock, GyroUnit};
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Plan;
 use strapd_attitude::noise::allan::{AllanFit, Point, cluster_sizes, deviation, fit};
 use strapd_attitude::record::SampleKind;
@@ -136,7 +137,7 @@ pub fn run(global: &Global, args: &Allan) -> Result<Outcome> {
         let svg = chart.svg().map_err(|e| strapd_recording::Error::Topic {
             path: input.name().to_owned(),
             topic: gathered.topic.clone(),
-            what: e.to_string(),
+            what: e.to_string().into(),
         })?;
         document.write(&svg)?;
     }
@@ -172,7 +173,7 @@ pub(super) fn examined(input: &Input, asked: (&Selection, &Plan), pool: &Pool) -
     let axes = analyse(&gathered).map_err(fails)?;
     let svg = outputs::chart(&gathered.topic, &axes)
         .svg()
-        .map_err(|e| fails(e.to_string()))?;
+        .map_err(|e| fails(e.to_string().into()))?;
     let mut text = words::text(input.name(), &gathered, &axes);
     for warning in gathered.warnings().iter().chain(&words::doubts(&axes)) {
         text.push_str(&format!("  warning  {warning}\n"));
@@ -185,7 +186,7 @@ pub(super) fn examined(input: &Input, asked: (&Selection, &Plan), pool: &Pool) -
 }
 
 /// The curves and fits of the three axes.
-fn analyse(gathered: &Gathered) -> std::result::Result<Vec<Axis>, String> {
+fn analyse(gathered: &Gathered) -> std::result::Result<Vec<Axis>, Diagnostic> {
     let record = &gathered.record;
     let interval = gathered.interval;
     // Rates were summed in units of the sampling interval.
@@ -206,7 +207,8 @@ fn analyse(gathered: &Gathered) -> std::result::Result<Vec<Axis>, String> {
                 &cluster_sizes(longest, PER_DECADE),
             )
             .map_err(|e| {
-                format!("{e}\n  help: a longer record; --max-gap SECS fills longer gaps")
+                Diagnostic::new(e.to_string())
+                    .help("a longer record; --max-gap SECS fills longer gaps")
             })?;
             points.iter_mut().for_each(|p| p.sigma *= unit);
             let stuck = spread[axis] <= 0.0;
@@ -225,14 +227,15 @@ impl Allan {
         let clock = match (self.time, self.rate_hz) {
             (TimeArg::Index, Some(rate_hz)) => Clock::Index { rate_hz },
             (TimeArg::Index, None) => {
-                return Err(Error::Usage(
-                    "--time index: the sample rate is needed too\n  help: --rate-hz HZ".to_owned(),
+                return Err(Error::usage(
+                    Diagnostic::new("--time index: the sample rate is needed too")
+                        .help("--rate-hz HZ"),
                 ));
             }
             (_, Some(_)) => {
-                return Err(Error::Usage(
-                    "--rate-hz: only --time index uses it\n  help: --time index --rate-hz HZ"
-                        .to_owned(),
+                return Err(Error::usage(
+                    Diagnostic::new("--rate-hz: only --time index uses it")
+                        .help("--time index --rate-hz HZ"),
                 ));
             }
             (TimeArg::Header, None) => Clock::Header,
@@ -248,7 +251,7 @@ impl Allan {
             until: self.until,
             ..Plan::default()
         };
-        plan.check().map_err(Error::Usage)?;
+        plan.check().map_err(Error::usage)?;
         Ok(plan)
     }
 }

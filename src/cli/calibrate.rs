@@ -14,6 +14,7 @@ use crate::report::summary::TopicSummary;
 use crate::sink::Target;
 use clap::Args;
 use std::path::{Path, PathBuf};
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{Aid, Plan, Pooled, SensorCalibration};
 use strapd_recording::Selection;
 use strapd_recording::Source;
@@ -126,21 +127,23 @@ impl Calibrate {
             Some(path) => check_target(path, self.force)?,
             None if global.json || !global.quiet => {}
             None => {
-                return Err(Error::Usage(
-                    "calibrate: nothing would come of it\n  help: -o imu.toml writes the calibration"
-                        .to_owned(),
+                return Err(Error::usage(
+                    Diagnostic::new("calibrate: nothing would come of it")
+                        .help("-o imu.toml writes the calibration"),
                 ));
             }
         }
         if self.estimation.aid == AidArg::None {
-            return Err(Error::Usage(
-                "calibrate: --aid none: the gyro alone tells nothing of its errors\n  help: --aid gravity, or gravity+mag"
-                    .to_owned(),
+            return Err(Error::usage(
+                Diagnostic::new(
+                    "calibrate: --aid none: the gyro alone tells nothing of its errors",
+                )
+                .help("--aid gravity, or gravity+mag"),
             ));
         }
         if self.estimation.topic.as_deref() == Some("all") {
-            return Err(Error::Usage(
-                "calibrate: a calibration is of one sensor\n  help: --topic NAME".to_owned(),
+            return Err(Error::usage(
+                Diagnostic::new("calibrate: a calibration is of one sensor").help("--topic NAME"),
             ));
         }
         let mut names: Vec<&Path> = self.logs.iter().map(Path::new).collect();
@@ -149,7 +152,7 @@ impl Calibrate {
             [a, b] if a == b => Some([a, b]),
             _ => None,
         }) {
-            return Err(Error::Usage(format!(
+            return Err(Error::usage(format!(
                 "calibrate: {} is named twice, and would count for two recordings",
                 twice.display()
             )));
@@ -179,9 +182,12 @@ fn learned(
     let is_lossy = summary.is_lossy();
     match (summary.topics.pop(), summary.topics.len()) {
         (Some(topic), 0) => Ok((topic, is_lossy)),
-        (_, others) => Err(Error::Usage(format!(
-            "calibrate: {log}: {} sensors, and a calibration is of one\n  help: --topic NAME",
-            others + 1
-        ))),
+        (_, others) => Err(Error::usage(
+            Diagnostic::new(format!(
+                "calibrate: {log}: {} sensors, and a calibration is of one",
+                others + 1
+            ))
+            .help("--topic NAME"),
+        )),
     }
 }

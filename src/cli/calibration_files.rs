@@ -9,6 +9,7 @@ use std::fs::File;
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::SensorCalibration;
 
 /// A larger file is no calibration.
@@ -42,7 +43,7 @@ impl Calibrations {
         if files.len() > MOST_FILES {
             return Err(no_calibration(
                 path,
-                &format!("{} files, at most {MOST_FILES} are read", files.len()),
+                format!("{} files, at most {MOST_FILES} are read", files.len()),
             ));
         }
         let mut each = BTreeMap::new();
@@ -51,13 +52,14 @@ impl Calibrations {
             let Some(sensor) = known.sensor.clone() else {
                 return Err(no_calibration(
                     &file,
-                    "names no sensor\n  help: sensor = \"ID\" says whose it is, of several in a folder",
+                    Diagnostic::new("names no sensor")
+                        .help("sensor = \"ID\" says whose it is, of several in a folder"),
                 ));
             };
             if each.insert(sensor.clone(), Arc::new(known)).is_some() {
                 return Err(no_calibration(
                     &file,
-                    &format!("there is another of the sensor `{sensor}` in this folder"),
+                    format!("there is another of the sensor `{sensor}` in this folder"),
                 ));
             }
         }
@@ -84,8 +86,9 @@ fn opening(path: &Path) -> impl Fn(io::Error) -> Error {
     }
 }
 
-fn no_calibration(path: &Path, why: &str) -> Error {
-    Error::Usage(format!("--calibration {}: {why}", path.display()))
+fn no_calibration(path: &Path, why: impl Into<Diagnostic>) -> Error {
+    let place = format!("--calibration {}", path.display());
+    Error::usage(why.into().at(place))
 }
 
 fn read(path: &Path) -> Result<SensorCalibration> {
@@ -102,8 +105,8 @@ fn read(path: &Path) -> Result<SensorCalibration> {
         .and_then(|file| file.take(MAX_BYTES).read_to_end(&mut bytes))
         .map_err(opening(path))?;
     let text = String::from_utf8(bytes)
-        .map_err(|e| no_calibration(path, &format!("is no text: {}", e.utf8_error())))?;
-    parse(&text).map_err(|why| no_calibration(path, &why))
+        .map_err(|e| no_calibration(path, format!("is no text: {}", e.utf8_error())))?;
+    parse(&text).map_err(|why| no_calibration(path, why))
 }
 
 /// Checks that a calibration can be saved there.
@@ -113,10 +116,13 @@ fn read(path: &Path) -> Result<SensorCalibration> {
 pub(super) fn check_target(path: &Path, force: bool) -> Result<()> {
     // So that no slip of the hand replaces a recording.
     if path.extension().is_none_or(|e| e != "toml") {
-        return Err(Error::Usage(format!(
-            "--save-calibration {}: a calibration is a TOML file\n  help: give it a name that ends in .toml",
-            path.display()
-        )));
+        return Err(Error::usage(
+            Diagnostic::new(format!(
+                "--save-calibration {}: a calibration is a TOML file",
+                path.display()
+            ))
+            .help("give it a name that ends in .toml"),
+        ));
     }
     if path.exists() && !force {
         return Err(Error::OutputExists {

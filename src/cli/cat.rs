@@ -14,6 +14,7 @@ use clap::{Args, ValueEnum};
 use std::io::{BufWriter, Write};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::record::{RawSample, SampleKind};
 use strapd_recording::Recording;
 use strapd_recording::pool::Pool;
@@ -93,10 +94,13 @@ pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
         (args.rate_hz.is_some(), "--rate-hz"),
     ] {
         if given {
-            return Err(Error::Usage(format!(
-                "cat {}: {flag} is for daemons\n  help: -n N stops after N samples, --topic NAME takes one topic",
-                args.source.display()
-            )));
+            return Err(Error::usage(
+                Diagnostic::new(format!(
+                    "cat {}: {flag} is for daemons",
+                    args.source.display()
+                ))
+                .help("-n N stops after N samples, --topic NAME takes one topic"),
+            ));
         }
     }
     let mut options = selection(None, &args.fields, false, [None; 2])?.decode;

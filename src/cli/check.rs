@@ -48,7 +48,7 @@ pub fn run(global: &Global, args: &Check) -> Result<Outcome> {
         fields: args
             .fields
             .iter()
-            .map(|f| f.parse().map_err(|e| Error::Usage(format!("--field: {e}"))))
+            .map(|f| f.parse().map_err(|e| Error::usage(format!("--field: {e}"))))
             .collect::<Result<_>>()?,
         ..Options::default()
     };

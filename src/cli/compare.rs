@@ -19,6 +19,7 @@ use strapd_attitude::compare::{
     Align, BiasFit, Comparison, Consistency, ErrorStats, Errors, Known, Stamped, compare,
     consistency, fit_body_axes, fit_constant_bias, for_each_error,
 };
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_recording::decode::Options;
 use strapd_recording::pool::Pool;
 
@@ -72,12 +73,12 @@ pub fn run(global: &Global, args: &Compare) -> Result<Outcome> {
     let align: Align = args
         .align
         .parse()
-        .map_err(|e| Error::Usage(format!("--align {}: {e}", args.align)))?;
+        .map_err(|e| Error::usage(format!("--align {}: {e}", args.align)))?;
     if args
         .max_angle
         .is_some_and(|limit| limit.is_nan() || limit < 0.0)
     {
-        return Err(Error::Usage(
+        return Err(Error::usage(
             "--max-angle: an angle of 0 degrees or more".to_owned(),
         ));
     }
@@ -92,8 +93,9 @@ pub fn run(global: &Global, args: &Compare) -> Result<Outcome> {
         .transpose()?;
     let pool = Pool::new(global.threads)?;
     if args.estimate == args.reference && args.estimate.as_os_str() == "-" {
-        return Err(Error::Usage(
-            "compare - -: standard input comes once\n  help: give one of the two a file".to_owned(),
+        return Err(Error::usage(
+            Diagnostic::new("compare - -: standard input comes once")
+                .help("give one of the two a file"),
         ));
     }
     let mut options = Options::default();
@@ -125,7 +127,7 @@ pub fn run(global: &Global, args: &Compare) -> Result<Outcome> {
                 .svg()
                 .map_err(|e| strapd_recording::Error::Unsupported {
                     path: args.estimate.clone(),
-                    what: e.to_string(),
+                    what: e.to_string().into(),
                 })?,
         )?;
     }
@@ -281,12 +283,14 @@ fn no_match(
     };
     strapd_recording::Error::Unsupported {
         path: args.estimate.clone(),
-        what: format!(
-            "no instant in common with the reference\n  {}\n  {}\n  help: are both on the same clock (replay --time)?",
+        what: Diagnostic::new(format!(
+            "no instant in common with the reference\n  {}\n  {}",
             span(estimate),
             span(reference)
-        ),
-    }.into()
+        ))
+        .help("are both on the same clock (replay --time)?"),
+    }
+    .into()
 }
 
 fn as_text(result: &Comparison, align: Align, estimate: &str, reference: &str) -> String {

@@ -15,6 +15,7 @@ use clap::parser::ValueSource;
 use clap::{ArgAction, ArgMatches, Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
+use strapd_attitude::diagnostic::Diagnostic;
 use toml::{Table, Value};
 
 /// A larger file is no configuration.
@@ -97,7 +98,7 @@ pub fn layered(file: &Path, argv: Vec<OsString>) -> Result<Layered> {
     let sources = sources(file, table.remove("source"))?;
     let command = Cli::command();
     let parse = |argv: &[OsString]| command.clone().try_get_matches_from(argv);
-    let first = parse(&argv).map_err(|e| bad(file, &e.to_string()))?;
+    let first = parse(&argv).map_err(|e| bad(file, e.to_string().trim_end()))?;
     let first = subcommand(file, &first)?;
     let serve = Serve::augment_args(clap::Command::new("serve"));
     let mut whole = argv;
@@ -107,7 +108,7 @@ pub fn layered(file: &Path, argv: Vec<OsString>) -> Result<Layered> {
         whole.push("--".into());
         whole.extend(sources.into_iter().map(OsString::from));
     }
-    let matches = parse(&whole).map_err(|e| bad(file, &e.to_string()))?;
+    let matches = parse(&whole).map_err(|e| bad(file, e.to_string().trim_end()))?;
     let Ok(Cli {
         command: Command::Serve(args),
         ..
@@ -121,7 +122,7 @@ pub fn layered(file: &Path, argv: Vec<OsString>) -> Result<Layered> {
         .map(|(id, value)| {
             let name = format!("[sensor.{id}]");
             let Value::Table(own) = value else {
-                return Err(bad(file, &format!("{name} is no table")));
+                return Err(bad(file, format!("{name} is no table")));
             };
             let known = Sensor::command();
             let mut argv = vec![OsString::from("sensor")];
@@ -135,7 +136,7 @@ pub fn layered(file: &Path, argv: Vec<OsString>) -> Result<Layered> {
                 }
             }
             let parsed =
-                Sensor::try_parse_from(&argv).map_err(|e| bad(file, &format!("{name}: {e}")))?;
+                Sensor::try_parse_from(&argv).map_err(|e| bad(file, format!("{name}: {e}")))?;
             argv.truncate(added);
             Ok((id, parsed.estimation, argv.split_off(1)))
         })
@@ -149,8 +150,9 @@ pub fn layered(file: &Path, argv: Vec<OsString>) -> Result<Layered> {
     })
 }
 
-fn bad(file: &Path, what: &str) -> Error {
-    Error::Usage(format!("--config {}: {}", file.display(), what.trim_end()))
+fn bad(file: &Path, what: impl Into<Diagnostic>) -> Error {
+    let place = format!("--config {}", file.display());
+    Error::usage(what.into().at(place))
 }
 
 fn read(file: &Path) -> Result<Table> {
@@ -163,7 +165,8 @@ fn read(file: &Path) -> Result<Table> {
         return Err(bad(file, "is no text file of a sensible size"));
     }
     let text = std::fs::read_to_string(file).map_err(open)?;
-    text.parse::<Table>().map_err(|e| bad(file, &e.to_string()))
+    text.parse::<Table>()
+        .map_err(|e| bad(file, e.to_string().trim_end()))
 }
 
 fn subcommand(file: &Path, matches: &ArgMatches) -> Result<ArgMatches> {
@@ -187,7 +190,7 @@ fn sources(file: &Path, value: Option<Value>) -> Result<Vec<String>> {
         "expected source = [\"tcp://HOST:PORT\", ...], or [source.ID] with uri = \"...\"";
     let text = |value: Value| match value {
         Value::String(text) => Ok(text),
-        _ => Err(bad(file, &format!("`source`: {EXPECTED}"))),
+        _ => Err(bad(file, format!("`source`: {EXPECTED}"))),
     };
     match value {
         None => Ok(Vec::new()),
@@ -196,15 +199,16 @@ fn sources(file: &Path, value: Option<Value>) -> Result<Vec<String>> {
             .into_iter()
             .map(|(id, value)| {
                 let Value::Table(mut own) = value else {
-                    return Err(bad(file, &format!("[source.{id}]: {EXPECTED}")));
+                    return Err(bad(file, format!("[source.{id}]: {EXPECTED}")));
                 };
                 let uri = own
                     .remove("uri")
-                    .ok_or_else(|| bad(file, &format!("[source.{id}]: uri is missing")))?;
+                    .ok_or_else(|| bad(file, format!("[source.{id}]: uri is missing")))?;
                 if let Some(other) = own.keys().next() {
                     return Err(bad(
                         file,
-                        &format!("[source.{id}] unknown key `{other}`\n  help: there is uri"),
+                        Diagnostic::new(format!("[source.{id}] unknown key `{other}`"))
+                            .help("there is uri"),
                     ));
                 }
                 let uri = text(uri)?;
@@ -237,10 +241,8 @@ fn extend(
                     .collect();
                 bad(
                     file,
-                    &format!(
-                        "{place} unknown key `{key}`\n  help: the keys are the long flags: {}",
-                        names.join(", ")
-                    ),
+                    Diagnostic::new(format!("{place} unknown key `{key}`"))
+                        .help(format!("the keys are the long flags: {}", names.join(", "))),
                 )
             })?;
         if given.is_some_and(|m| is_given(m, arg.get_id().as_str())) {
@@ -264,7 +266,7 @@ fn extend(
                 other => {
                     return Err(bad(
                         file,
-                        &format!(
+                        format!(
                             "{place} `{key}` is a {}, which no flag takes",
                             other.type_str()
                         ),
@@ -314,7 +316,7 @@ impl Layered {
         for (id, estimation, _) in &self.sensors {
             let plan = estimation.selection().and_then(|_| estimation.live_plans());
             let (plan, mut each) = plan.map_err(|why| {
-                Error::Usage(format!(
+                Error::usage(format!(
                     "sensor {}: {why}",
                     strapd_recording::text::printable(id)
                 ))

@@ -11,6 +11,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 use strapd_attitude::condition::{Clock, GyroUnit, OnGap};
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{Aid, Plan, SensorCalibration, Truncation};
 use strapd_attitude::propagate::{Method, Order, Placement};
 use strapd_attitude::record::SampleKind;
@@ -299,10 +300,10 @@ impl Estimation {
         let known = match &self.calibration {
             None => None,
             Some(path) => Some(Calibrations::read(path)?.of_all().ok_or_else(|| {
-                Error::Usage(format!(
-                    "--calibration {}: is a folder\n  help: name the file in it that is of this sensor",
-                    path.display()
-                ))
+                Error::usage(
+                    Diagnostic::new(format!("--calibration {}: is a folder", path.display()))
+                        .help("name the file in it that is of this sensor"),
+                )
             })?),
         };
         self.plan_with(known)
@@ -324,27 +325,29 @@ impl Estimation {
             ),
         ] {
             if topic.is_some() && !is_used {
-                return Err(Error::Usage(format!(
-                    "{flag}: nothing is taken from it with this --aid\n  help: --aid {help}"
-                )));
+                return Err(Error::usage(
+                    Diagnostic::new(format!("{flag}: nothing is taken from it with this --aid"))
+                        .help(format!("--aid {help}")),
+                ));
             }
         }
-        let usage = |flag: &str, e: &dyn std::fmt::Display| Error::Usage(format!("{flag}: {e}"));
+        let usage = |flag: &str, e: &dyn std::fmt::Display| Error::usage(format!("{flag}: {e}"));
         let clock = match (self.time, self.rate_hz) {
             (TimeArg::Header, _) => Clock::Header,
             (TimeArg::Log, _) => Clock::Log,
             (TimeArg::Publish, _) => Clock::Publish,
             (TimeArg::Index, Some(rate_hz)) => Clock::Index { rate_hz },
             (TimeArg::Index, None) => {
-                return Err(Error::Usage(
-                    "--time index: the sample rate is needed too\n  help: --rate-hz HZ".to_owned(),
+                return Err(Error::usage(
+                    Diagnostic::new("--time index: the sample rate is needed too")
+                        .help("--rate-hz HZ"),
                 ));
             }
         };
         if self.rate_hz.is_some() && self.time != TimeArg::Index {
-            return Err(Error::Usage(
-                "--rate-hz: only --time index uses it\n  help: --time index --rate-hz HZ"
-                    .to_owned(),
+            return Err(Error::usage(
+                Diagnostic::new("--rate-hz: only --time index uses it")
+                    .help("--time index --rate-hz HZ"),
             ));
         }
         let plan = Plan {
@@ -391,7 +394,7 @@ impl Estimation {
             start: self.start,
             until: self.until,
         };
-        plan.check().map_err(Error::Usage)?;
+        plan.check().map_err(Error::usage)?;
         Ok(plan)
     }
 
@@ -404,7 +407,7 @@ impl Estimation {
             smooth,
             ..self.plan()?
         };
-        plan.check().map_err(Error::Usage)?;
+        plan.check().map_err(Error::usage)?;
         Ok(plan)
     }
 
@@ -444,7 +447,7 @@ impl Estimation {
     /// Flags that are no use to a live stream.
     fn check_live(&self) -> Result<()> {
         if self.topic.is_some() {
-            return Err(Error::Usage(
+            return Err(Error::usage(
                 "--topic: a sensor is named by `id` in its samples, and chosen with WATCH"
                     .to_owned(),
             ));
@@ -454,9 +457,10 @@ impl Estimation {
             ("--mag-topic", &self.mag_topic),
         ] {
             if topic.is_some() {
-                return Err(Error::Usage(format!(
-                    "{flag}: samples over a socket have no topics\n  help: `accel` and `mag` stand beside `gyro` in a sample"
-                )));
+                return Err(Error::usage(
+                    Diagnostic::new(format!("{flag}: samples over a socket have no topics"))
+                        .help("`accel` and `mag` stand beside `gyro` in a sample"),
+                ));
             }
         }
         Ok(())
@@ -471,12 +475,12 @@ impl Estimation {
             },
             name => name
                 .parse()
-                .map_err(|e| Error::Usage(format!("--method: {e}")))?,
+                .map_err(|e| Error::usage(format!("--method: {e}")))?,
         };
         let asked_order: Option<Order> = self
             .order
             .as_deref()
-            .map(|o| o.parse().map_err(|e| Error::Usage(format!("--order: {e}"))))
+            .map(|o| o.parse().map_err(|e| Error::usage(format!("--order: {e}"))))
             .transpose()?;
         Ok(match named {
             Method::Magnus {
@@ -501,7 +505,7 @@ impl Estimation {
             }
             other if self.window.is_none() && asked_order.is_none() => other,
             _ => {
-                return Err(Error::Usage(format!(
+                return Err(Error::usage(format!(
                     "--window and --order belong to --method magnus, causal or commit, not to {}",
                     self.method
                 )));

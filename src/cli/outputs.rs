@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
+use strapd_attitude::diagnostic::Diagnostic;
 
 /// Resolves every `-o` for one log of `logs`.
 ///
@@ -28,7 +29,7 @@ pub fn resolve(outputs: &[String], log: &str, logs: usize) -> Result<Vec<String>
 /// [`Error::Usage`] naming the file and who would write it.
 pub fn check_distinct(outputs: &[String], logs: &[String]) -> Result<()> {
     if outputs.iter().filter(|name| *name == "-").count() > 1 {
-        return Err(Error::Usage("-o -: given twice".to_owned()));
+        return Err(Error::usage("-o -: given twice".to_owned()));
     }
     let mut writers: BTreeMap<PathBuf, &String> = BTreeMap::new();
     for log in logs {
@@ -39,12 +40,13 @@ pub fn check_distinct(outputs: &[String], logs: &[String]) -> Result<()> {
             let Some(other) = writers.insert(plain(&name), log) else {
                 continue;
             };
-            return Err(Error::Usage(if other == log {
-                format!("-o {name}: given twice")
+            return Err(Error::usage(if other == log {
+                Diagnostic::new(format!("-o {name}: given twice"))
             } else {
-                format!(
-                    "-o {name}: both {other} and {log} would be written there\n  help: give them different names, or run them one by one"
-                )
+                Diagnostic::new(format!(
+                    "-o {name}: both {other} and {log} would be written there"
+                ))
+                .help("give them different names, or run them one by one")
             }));
         }
     }
@@ -62,11 +64,16 @@ pub fn check_chart(path: &Path) -> Result<()> {
     if is_svg || path == Path::new("-") {
         return Ok(());
     }
-    Err(Error::Usage(format!(
-        "--plot {}: charts are written as SVG alone\n  help: --plot {}; a browser, Inkscape or rsvg-convert makes a PNG of it",
-        path.display(),
-        path.with_extension("svg").display()
-    )))
+    Err(Error::usage(
+        Diagnostic::new(format!(
+            "--plot {}: charts are written as SVG alone",
+            path.display()
+        ))
+        .help(format!(
+            "--plot {}; a browser, Inkscape or rsvg-convert makes a PNG of it",
+            path.with_extension("svg").display()
+        )),
+    ))
 }
 
 /// The path without `.` and double slashes, as far as that can be told without asking the disk.
@@ -92,9 +99,12 @@ fn resolve_one(output: &str, log: &str, logs: usize) -> Result<String> {
         return Ok(output.replace("{stem}", &stem(log)));
     }
     if logs > 1 {
-        return Err(Error::Usage(format!(
-            "-o {output}: each of the {logs} logs would be written there\n  help: -o DIR/ or a name with {{stem}}, for example -o out/{{stem}}.mcap"
-        )));
+        return Err(Error::usage(
+            Diagnostic::new(format!(
+                "-o {output}: each of the {logs} logs would be written there"
+            ))
+            .help("-o DIR/ or a name with {stem}, for example -o out/{stem}.mcap"),
+        ));
     }
     Ok(output.to_owned())
 }

@@ -15,6 +15,7 @@ use crate::sink::{Compression, Encoding, Options, Target};
 use clap::{Args, ValueEnum};
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Plan;
 use strapd_recording::Selection;
 use strapd_recording::Source;
@@ -131,7 +132,7 @@ pub(super) fn speed(text: &str) -> Result<Option<f64>> {
         .filter(|factor| factor.is_finite() && *factor > 0.0)
         .map(Some)
         .ok_or_else(|| {
-            Error::Usage(format!(
+            Error::usage(format!(
                 "--speed {text}: expected max, or a factor above 0 such as 1 or 0.5"
             ))
         })
@@ -151,14 +152,14 @@ pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
         .map(|(_, log)| log)
         .collect();
     if global.json && writes_stdout(args) {
-        return Err(Error::Usage(
-            "--json and -o - would both write to stdout\n  help: give the attitude a file name"
-                .to_owned(),
+        return Err(Error::usage(
+            Diagnostic::new("--json and -o - would both write to stdout")
+                .help("give the attitude a file name"),
         ));
     }
     if args.sources.len() > 1 && args.serving.page.is_some() {
-        return Err(Error::Usage(
-            "--page: one log at a time\n  help: give one SOURCE".to_owned(),
+        return Err(Error::usage(
+            Diagnostic::new("--page: one log at a time").help("give one SOURCE"),
         ));
     }
     outputs::check_distinct(&args.outputs, &args.sources)?;
@@ -226,18 +227,23 @@ impl Replay {
         let Some(name) = &self.save_calibration else {
             return Ok(());
         };
-        let wrong = |what: &str| Err(Error::Usage(format!("--save-calibration {name}: {what}")));
+        let wrong = |what: &str, help: &str| {
+            let what = format!("--save-calibration {name}: {what}");
+            Err(Error::usage(Diagnostic::new(what).help(help)))
+        };
         if self.sources.len() > 1 && !name.contains("{stem}") {
             return wrong(
-                "each log would be saved there\n  help: a name with {stem}, for example {stem}.calibration.toml",
+                "each log would be saved there",
+                "a name with {stem}, for example {stem}.calibration.toml",
             );
         }
         if self.estimation.topic.as_deref() == Some("all") {
-            return wrong("a calibration is of one sensor\n  help: --topic NAME");
+            return wrong("a calibration is of one sensor", "--topic NAME");
         }
         if self.estimation.aid == AidArg::None && self.estimation.bias != "auto" {
             return wrong(
-                "the gyro alone learns nothing\n  help: --aid gravity, or --bias auto for the bias of a rest",
+                "the gyro alone learns nothing",
+                "--aid gravity, or --bias auto for the bias of a rest",
             );
         }
         let files = logs.iter().filter_map(|log| self.calibration_file(log));
@@ -251,10 +257,13 @@ impl Replay {
             return Ok(());
         };
         let [topic] = summary.topics.as_slice() else {
-            return Err(Error::Usage(format!(
-                "--save-calibration {file}: {} sensors, and a calibration is of one\n  help: --topic NAME",
-                summary.topics.len()
-            )));
+            return Err(Error::usage(
+                Diagnostic::new(format!(
+                    "--save-calibration {file}: {} sensors, and a calibration is of one",
+                    summary.topics.len()
+                ))
+                .help("--topic NAME"),
+            ));
         };
         calibration_files::write(Path::new(&file), &topic.calibration)?;
         summary.calibration = Some(file);
@@ -275,7 +284,7 @@ impl Replay {
             .out_rate
             .is_some_and(|hz| !(hz.is_finite() && hz > 0.0))
         {
-            return Err(Error::Usage("--out-rate: a rate above 0 Hz".to_owned()));
+            return Err(Error::usage("--out-rate: a rate above 0 Hz".to_owned()));
         }
         let targets = outputs
             .iter()

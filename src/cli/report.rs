@@ -15,6 +15,7 @@ use crate::report::summary::{human_bytes, significant};
 use crate::sink::Document;
 use clap::Args;
 use std::path::PathBuf;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{Bias, Plan};
 use strapd_recording::Input;
 use strapd_recording::Selection;
@@ -76,14 +77,14 @@ pub fn run(global: &Global, args: &Report) -> Result<Outcome> {
     let output = args.output.as_deref();
     match output {
         None if !global.json => {
-            return Err(Error::Usage(
-                "report: where to?\n  help: -o report.html writes the page, --json prints the numbers alone".to_owned(),
-            ));
+            return Err(Error::usage(Diagnostic::new("report: where to?").help(
+                "-o report.html writes the page, --json prints the numbers alone",
+            )));
         }
         Some(path) if global.json && path.as_os_str() == "-" => {
-            return Err(Error::Usage(
-                "--json and -o - would both write to stdout\n  help: give the page a file name"
-                    .to_owned(),
+            return Err(Error::usage(
+                Diagnostic::new("--json and -o - would both write to stdout")
+                    .help("give the page a file name"),
             ));
         }
         _ => {}

@@ -19,6 +19,7 @@ use serde_json::json;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::record::Nanos;
 use strapd_recording::Recording;
 use strapd_recording::decode::Options;
@@ -90,10 +91,13 @@ struct Read {
 pub fn run(global: &Global, args: &Send) -> Result<Outcome> {
     let remote = Remote::parse(&args.address)?;
     if matches!(remote, Remote::UdpListen(_)) {
-        return Err(Error::Usage(format!(
-            "send: {}: listens, and sends nothing\n  help: tcp://HOST:PORT, ws://HOST:PORT or unix:///PATH of a strapd serve",
-            args.address
-        )));
+        return Err(Error::usage(
+            Diagnostic::new(format!(
+                "send: {}: listens, and sends nothing",
+                args.address
+            ))
+            .help("tcp://HOST:PORT, ws://HOST:PORT or unix:///PATH of a strapd serve"),
+        ));
     }
     let pace = Pace::new(replay::speed(&args.speed)?);
     let token = args
@@ -205,7 +209,7 @@ async fn send(
 ) -> Result<Sent> {
     let failed = |what: String| Error::Remote {
         address: remote.to_string(),
-        what,
+        what: what.into(),
     };
     let mut sender = Sender::connect(remote, token).await.map_err(failed)?;
     let (mut sent, mut chunk) = (Sent::default(), String::new());

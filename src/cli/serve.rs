@@ -22,6 +22,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
+use strapd_attitude::diagnostic::Diagnostic;
 
 /// Most sources connected to.
 const MAX_SOURCES: usize = 64;
@@ -121,9 +122,14 @@ fn window(text: &str) -> std::result::Result<Duration, String> {
 fn sent_to(text: &str) -> Result<Target> {
     match Target::parse(text)? {
         target @ (Target::Tcp(_) | Target::Udp { .. }) => Ok(target),
-        _ => Err(Error::Usage(format!(
-            "-o {text}: the daemon sends to tcp://HOST:PORT and udp://HOST:PORT[?profile=plotjuggler]\n  help: --listen waits for watchers, --record FILE.mcap writes a file"
-        ))),
+        _ => Err(Error::usage(
+            Diagnostic::new(format!(
+                "-o {text}: the daemon sends to tcp://HOST:PORT and udp://HOST:PORT[?profile=plotjuggler]"
+            ))
+            .help(
+                "--listen waits for watchers, --record FILE.mcap writes a file",
+            )
+        )),
     }
 }
 
@@ -168,7 +174,7 @@ pub fn run(global: &Global, args: &Serve) -> Result<Outcome> {
         .thread_name("strapd-serve")
         .enable_all()
         .build()
-        .map_err(|e| Error::Usage(format!("--threads {}: {e}", global.threads)))?;
+        .map_err(|e| Error::usage(format!("--threads {}: {e}", global.threads)))?;
     let has_stdin = args.sources.iter().any(|s| s == "-");
     let outcome = runtime.block_on(serve(settings, has_stdin, (state, calibrations)));
     // A thread that waits for standard input would otherwise be waited for.
@@ -198,7 +204,7 @@ async fn serve(
     (state, calibrations): (Option<Arc<Mutex<StateFile>>>, Option<&Path>),
 ) -> Result<Outcome> {
     // Signals first: from the ready line on, one drains.
-    let mut signals = Signals::new().map_err(|e| Error::Usage(format!("signals: {e}")))?;
+    let mut signals = Signals::new().map_err(|e| Error::usage(format!("signals: {e}")))?;
     let server = Server::bind(settings).await?;
     let addresses: Vec<String> = server.addresses().iter().map(ToString::to_string).collect();
     let hub = server.hub().clone();
@@ -281,14 +287,14 @@ impl Serve {
     /// # Errors
     /// [`Error::Usage`] naming the flag.
     fn recording(&self) -> Result<Option<recorder::Settings>> {
-        let named = |flag: &str, error: Error| Error::Usage(format!("--{flag}: {error}"));
+        let named = |flag: &str, error: Error| Error::usage(format!("--{flag}: {error}"));
         // `0` alone is no size with a unit, and the only one that needs none.
         let min_free = match self.min_free.as_str() {
             "0" => 0,
             text => match text.parse::<Split>() {
                 Ok(Split::Bytes(bytes)) => bytes,
                 _ => {
-                    return Err(Error::Usage(format!(
+                    return Err(Error::usage(format!(
                         "--min-free {text}: expected a size such as 256MiB or 1GB, or 0"
                     )));
                 }
@@ -298,10 +304,13 @@ impl Serve {
             return Ok(None);
         };
         if Target::from_path(path)?.format() != Some(Format::Mcap) {
-            return Err(Error::Usage(format!(
-                "--record {}: a recording is an MCAP file\n  help: give it a name that ends in .mcap",
-                path.display()
-            )));
+            return Err(Error::usage(
+                Diagnostic::new(format!(
+                    "--record {}: a recording is an MCAP file",
+                    path.display()
+                ))
+                .help("give it a name that ends in .mcap"),
+            ));
         }
         let mut settings = recorder::Settings::new(path);
         settings.force = self.force;
@@ -327,14 +336,19 @@ impl Serve {
         let mut sources: Vec<Source> = Vec::new();
         for text in self.sources.iter().filter(|s| *s != "-") {
             if !Remote::is_meant(text) {
-                return Err(Error::Usage(format!(
-                    "serve {}: is no source of a daemon; known: tcp://HOST:PORT, ws://HOST:PORT/PATH, unix:///PATH, -\n  help: --listen waits for senders; strapd replay reads a log",
-                    printable_address(text)
-                )));
+                return Err(Error::usage(
+                    Diagnostic::new(format!(
+                        "serve {}: is no source of a daemon; known: tcp://HOST:PORT, ws://HOST:PORT/PATH, unix:///PATH, -",
+                        printable_address(text)
+                    ))
+                    .help(
+                        "--listen waits for senders; strapd replay reads a log",
+                    )
+                ));
             }
             let mut source = Source::parse(text)?;
             if sources.iter().any(|s| s.remote == source.remote) {
-                return Err(Error::Usage(format!(
+                return Err(Error::usage(format!(
                     "serve {}: is given twice",
                     source.name
                 )));
@@ -350,7 +364,7 @@ impl Serve {
             sources.push(source);
         }
         if sources.len() > MAX_SOURCES {
-            return Err(Error::Usage(format!(
+            return Err(Error::usage(format!(
                 "serve: {} sources, at most {MAX_SOURCES} can be connected to",
                 sources.len()
             )));

@@ -12,6 +12,7 @@ use crate::sink::address::Listen;
 use clap::Args;
 use std::path::Path;
 use std::sync::Arc;
+use strapd_attitude::diagnostic::Diagnostic;
 
 /// Where the page is when nothing else is said: beside the daemon's.
 const PAGE: &str = "127.0.0.1:8766";
@@ -78,20 +79,23 @@ impl Serving {
             .collect();
         for (given, flag) in [(self.paused, "--paused"), (self.looping, "--loop")] {
             if given && listen.is_empty() {
-                return Err(Error::Usage(format!(
-                    "{flag}: nobody is served\n  help: --page, or -o ws-listen://127.0.0.1:8766"
-                )));
+                return Err(Error::usage(
+                    Diagnostic::new(format!("{flag}: nobody is served"))
+                        .help("--page, or -o ws-listen://127.0.0.1:8766"),
+                ));
             }
         }
         if self.paused && speed.is_none() {
-            return Err(Error::Usage(
-                "--paused: a run at --speed max is not controlled\n  help: --speed 1".to_owned(),
+            return Err(Error::usage(
+                Diagnostic::new("--paused: a run at --speed max is not controlled")
+                    .help("--speed 1"),
             ));
         }
         if self.looping && !can_rewind {
-            return Err(Error::Usage(format!(
-                "--loop: {source} can be read only once\n  help: give it as a file"
-            )));
+            return Err(Error::usage(
+                Diagnostic::new(format!("--loop: {source} can be read only once"))
+                    .help("give it as a file"),
+            ));
         }
         let cast = if listen.is_empty() {
             None

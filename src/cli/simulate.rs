@@ -18,6 +18,7 @@ use crate::pipeline::simulate;
 use clap::{Args, Subcommand};
 use sampling::Common;
 use std::io::Write;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_bodies::motion::{Carrier, Motion};
 use strapd_bodies::synthetic::ForceSampling;
 use strapd_recording::pool::Pool;
@@ -116,9 +117,9 @@ pub fn run(global: &Global, args: &Simulate) -> Result<Outcome> {
     let (name, common, made) = args.made()?;
     let on_stdout = common.outputs.iter().any(|o| o == "-");
     if global.json && on_stdout {
-        return Err(Error::Usage(
-            "--json and -o - would both write to stdout\n  help: give the samples a file name"
-                .to_owned(),
+        return Err(Error::usage(
+            Diagnostic::new("--json and -o - would both write to stdout")
+                .help("give the samples a file name"),
         ));
     }
     outputs::check_distinct(&common.outputs, &[name.to_owned()])?;

@@ -28,11 +28,11 @@ impl Tables {
         let columns = self.columns.as_deref().map(str::parse);
         options.columns = columns
             .transpose()
-            .map_err(|why| Error::Usage(format!("--columns: {why}")))?;
+            .map_err(|why| Error::usage(format!("--columns: {why}")))?;
         let delimiter = self.delimiter.as_deref().map(str::parse);
         options.delimiter = delimiter
             .transpose()
-            .map_err(|why| Error::Usage(format!("--delimiter: {why}")))?;
+            .map_err(|why| Error::usage(format!("--delimiter: {why}")))?;
         Ok(())
     }
 }

@@ -73,7 +73,7 @@ pub fn run(global: &Global, args: &Watch) -> Result<Outcome> {
         .map(|file| Secret::read("--token-file", file))
         .transpose()?;
     let watching = async {
-        let mut signals = Signals::new().map_err(|e| Error::Usage(format!("signals: {e}")))?;
+        let mut signals = Signals::new().map_err(|e| Error::usage(format!("signals: {e}")))?;
         // Made inside, so that it is restored before anything is said.
         let mut out = if std::io::stdout().is_terminal() {
             let (screen, keys) = Screen::open(use_colour(global.color))?;

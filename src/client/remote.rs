@@ -6,6 +6,7 @@ use crate::error::{Error, Result};
 use crate::sink::address::printable_address;
 use std::fmt;
 use std::path::PathBuf;
+use strapd_attitude::diagnostic::Diagnostic;
 
 /// Where to connect.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -82,10 +83,13 @@ impl Remote {
         let (remote, parameters) = Remote::with_parameters(text, |_| false)?;
         match parameters.first() {
             None => Ok(remote),
-            Some((name, _)) => Err(Error::Usage(format!(
-                "{}: `?{name}=` means nothing here\n  help: {KNOWN}",
-                printable_address(text)
-            ))),
+            Some((name, _)) => Err(Error::usage(
+                Diagnostic::new(format!(
+                    "{}: `?{name}=` means nothing here",
+                    printable_address(text)
+                ))
+                .help(KNOWN),
+            )),
         }
     }
 
@@ -100,13 +104,12 @@ impl Remote {
     ) -> Result<(Remote, Vec<Parameter>)> {
         let refuse = |what: &str| {
             let shown = printable_address(text);
-            Error::Usage(format!("{shown}: {what}\n  help: {KNOWN}"))
+            Error::usage(Diagnostic::new(format!("{shown}: {what}")).help(KNOWN))
         };
         if text.len() > MAX_BYTES || text.chars().any(char::is_control) {
-            return Err(Error::Usage(format!(
-                "{}: is no address\n  help: {KNOWN}",
-                printable_address(text)
-            )));
+            return Err(Error::usage(
+                Diagnostic::new(format!("{}: is no address", printable_address(text))).help(KNOWN),
+            ));
         }
         let (scheme, rest) = text.split_once("://").ok_or_else(|| refuse("no scheme"))?;
         let (rest, _) = rest.split_once('#').unwrap_or((rest, ""));
@@ -157,8 +160,7 @@ impl Place {
     fn parse(text: &str) -> std::result::Result<Place, String> {
         if text.contains('@') {
             return Err(
-                "no user or password goes into an address; --token-file FILE shows a token"
-                    .to_owned(),
+                "no user or password goes into an address; --token-file FILE shows a token".into(),
             );
         }
         let (host, port) = match text.strip_prefix('[') {
@@ -173,7 +175,7 @@ impl Place {
             .map_err(|_| format!("`{port}` is no port"))?;
         let odd = |c: char| c.is_whitespace() || (c == ':' && !text.starts_with('['));
         if host.contains(odd) {
-            return Err("is no host with a port (an IPv6 address goes in brackets)".to_owned());
+            return Err("is no host with a port (an IPv6 address goes in brackets)".into());
         }
         let host = if host.is_empty() { "127.0.0.1" } else { host };
         Ok(Place {

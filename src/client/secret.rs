@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use std::path::Path;
+use strapd_attitude::diagnostic::Diagnostic;
 
 /// A token shorter than this can be guessed.
 const MIN_TOKEN: usize = 16;
@@ -29,29 +30,33 @@ impl Secret {
             path: path.to_owned(),
             source,
         };
-        let refuse = |what: String| Error::Usage(format!("{flag} {}: {what}", path.display()));
+        let refuse =
+            |what: Diagnostic| Error::usage(what.at(format_args!("{flag} {}", path.display())));
         let metadata = std::fs::metadata(path).map_err(open)?;
         #[cfg(unix)]
         {
             use std::os::unix::fs::PermissionsExt;
             let mode = metadata.permissions().mode() & 0o777;
             if mode & 0o077 != 0 {
-                return Err(refuse(format!(
-                    "others can read it (mode {mode:o})\n  help: chmod 600 {}",
-                    path.display()
-                )));
+                return Err(refuse(
+                    Diagnostic::new(format!("others can read it (mode {mode:o})"))
+                        .help(format!("chmod 600 {}", path.display())),
+                ));
             }
         }
         if !metadata.is_file() || metadata.len() > MAX_TOKEN {
-            return Err(refuse("is no file of one short line".to_owned()));
+            return Err(refuse("is no file of one short line".into()));
         }
         let text = std::fs::read_to_string(path).map_err(open)?;
         let token = text.lines().next().unwrap_or_default().trim();
         if token.len() < MIN_TOKEN {
-            return Err(refuse(format!(
-                "holds {} bytes, a token has at least {MIN_TOKEN}\n  help: head -c 32 /dev/urandom | base64 > FILE",
-                token.len()
-            )));
+            return Err(refuse(
+                Diagnostic::new(format!(
+                    "holds {} bytes, a token has at least {MIN_TOKEN}",
+                    token.len()
+                ))
+                .help("head -c 32 /dev/urandom | base64 > FILE"),
+            ));
         }
         Ok(Secret(token.to_owned()))
     }

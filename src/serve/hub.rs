@@ -173,15 +173,15 @@ impl Hub {
     /// # Errors
     /// [`Error::Usage`] when the plan is none for live streams.
     pub fn new(settings: Settings) -> Result<Hub> {
-        let plan = live_plan(&settings.plan).map_err(Error::Usage)?;
+        let plan = live_plan(&settings.plan).map_err(Error::usage)?;
         let plans = settings
             .plans
             .iter()
             .map(|(id, plan)| {
                 let live = live_plan(plan)
-                    .map_err(|what| Error::Usage(format!("sensor {}: {what}", printable(id))))?;
+                    .map_err(|what| Error::usage(format!("sensor {}: {what}", printable(id))))?;
                 let name =
-                    exact_name(id).map_err(|why| Error::Usage(format!("[sensor.ID]: {why}")))?;
+                    exact_name(id).map_err(|why| Error::usage(format!("[sensor.ID]: {why}")))?;
                 Ok((name, live))
             })
             .collect::<Result<_>>()?;

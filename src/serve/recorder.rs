@@ -26,6 +26,7 @@ use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::record::{AttitudeSample, RawSample};
 use worker::Worker;
 
@@ -64,9 +65,10 @@ impl std::str::FromStr for Split {
             })
         });
         parsed.ok_or_else(|| {
-            Error::Usage(format!(
-                "`{text}` is neither a size nor a time\n  help: 512MiB, 2GB, 90s, 10min, 1h"
-            ))
+            Error::usage(
+                Diagnostic::new(format!("`{text}` is neither a size nor a time"))
+                    .help("512MiB, 2GB, 90s, 10min, 1h"),
+            )
         })
     }
 }

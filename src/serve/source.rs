@@ -18,6 +18,7 @@ use crate::client::secret::Secret;
 use crate::error::{Error, Result};
 use crate::sink::address::printable_address;
 use std::path::Path;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_recording::decode::{LineDecoder, Options, exact_name};
 use strapd_recording::text::printable;
 
@@ -64,14 +65,22 @@ impl Source {
         let (remote, parameters) = Remote::with_parameters(text, |p| OURS.contains(&p))?;
         let refuse = |what: String| {
             let shown = printable_address(text);
-            Error::Usage(format!(
-                "serve {shown}: {what}\n  help: ?id=NAME names the sensor; ?proto=auto|ndjson|strapd|sensorserver; ?token-file=FILE"
-            ))
+            Error::usage(
+                Diagnostic::new(format!(
+                    "serve {shown}: {what}"
+                ))
+                .help(
+                    "?id=NAME names the sensor; ?proto=auto|ndjson|strapd|sensorserver; ?token-file=FILE",
+                )
+            )
         };
         if matches!(remote, Remote::UdpListen(_)) {
-            return Err(Error::Usage(format!(
-                "serve {remote}: datagrams are listened for, not fetched\n  help: --listen {remote}"
-            )));
+            return Err(Error::usage(
+                Diagnostic::new(format!(
+                    "serve {remote}: datagrams are listened for, not fetched"
+                ))
+                .help(format!("--listen {remote}")),
+            ));
         }
         let is_web = matches!(remote, Remote::WebSocket { .. });
         let of = |name: &str| {

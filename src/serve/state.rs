@@ -11,6 +11,7 @@ use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Memory;
 use strapd_attitude::quaternion::{BodyRate, Quaternion};
 use strapd_attitude::record::TimeUnit;
@@ -137,14 +138,17 @@ impl Saved {
     ///
     /// # Errors
     /// In words: it is between other axes than those of the stream that is to go on from it.
-    pub fn attitude(&self, labels: &sink::Stream) -> std::result::Result<AttitudeSample, String> {
+    pub fn attitude(
+        &self,
+        labels: &sink::Stream,
+    ) -> std::result::Result<AttitudeSample, Diagnostic> {
         let saved = (&self.world, &self.body);
         let wanted = (&labels.world_axes, &labels.body_axes);
         if saved != wanted {
             return Err(format!(
                 "the attitude saved is of body {} in world {}, and now body {} in world {} is asked for: begun anew",
                 self.body, self.world, labels.body_axes, labels.world_axes
-            ));
+            ).into());
         }
         Ok(AttitudeSample {
             stamp: Nanos(self.stamp_ns),
@@ -184,10 +188,15 @@ impl StateFile {
             Err(source) => return Err(failed(source).into()),
             // To open a FIFO is to wait for its other end, and what is replaced must be a file.
             Ok(found) if !found.is_file() => {
-                return Err(Error::Usage(format!(
-                    "--state {}: is no regular file\n  help: name a file in a folder that the daemon may write to; it is made if it is not there",
-                    path.display()
-                )));
+                return Err(Error::usage(
+                    Diagnostic::new(format!(
+                        "--state {}: is no regular file",
+                        path.display()
+                    ))
+                    .help(
+                        "name a file in a folder that the daemon may write to; it is made if it is not there",
+                    )
+                ));
             }
             Ok(_) => read(path, File::open(path).map_err(failed)?)?,
         };
@@ -248,10 +257,10 @@ fn read(path: &Path, file: File) -> Result<Sensors> {
         source,
     })?;
     let foreign = |why: String| {
-        Error::Usage(format!(
-            "--state {}: {why}\n  help: move it away to begin anew",
-            path.display()
-        ))
+        Error::usage(
+            Diagnostic::new(format!("--state {}: {why}", path.display()))
+                .help("move it away to begin anew"),
+        )
     };
     let document: Document<Sensors> = serde_json::from_slice(&text)
         .map_err(|e| foreign(format!("is no state that strapd has saved: {e}")))?;
@@ -285,7 +294,7 @@ mod tests {
     #[test]
     fn what_was_saved_comes_back_to_the_bit_and_only_between_the_same_axes() -> Result<()> {
         let dir = std::env::temp_dir().join(format!("strapd-state-{}", std::process::id()));
-        std::fs::create_dir_all(&dir).map_err(|e| Error::Usage(e.to_string()))?;
+        std::fs::create_dir_all(&dir).map_err(|e| Error::usage(e.to_string()))?;
         let path = dir.join("s.json");
         let labels = sink::Stream::new("imu", "");
         let (mut file, found) = StateFile::open(&path)?;
@@ -310,13 +319,13 @@ mod tests {
             "{\"strapd_state\":3,\"sensors\":{}}",
             "\u{0}\u{0}",
         ] {
-            std::fs::write(&path, damaged).map_err(|e| Error::Usage(e.to_string()))?;
+            std::fs::write(&path, damaged).map_err(|e| Error::usage(e.to_string()))?;
             let said = StateFile::open(&path).err().map(|e| e.to_string());
             assert!(
                 said.is_some_and(|s| s.contains("move it away")),
                 "{damaged}"
             );
         }
-        std::fs::remove_dir_all(&dir).map_err(|e| Error::Usage(e.to_string()))
+        std::fs::remove_dir_all(&dir).map_err(|e| Error::usage(e.to_string()))
     }
 }

@@ -28,6 +28,7 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 use strapd_attitude::condition::{Clock, Report};
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Estimator;
 use strapd_attitude::estimate::{Aid, Bias, Forces, Memory, Plan};
 use strapd_attitude::estimate::{Meaning, Prepared, SensorCalibration, at_once, learned};
@@ -108,10 +109,12 @@ enum Joining {
 ///
 /// # Errors
 /// In words, with the flag that helps: what a live stream can not do.
-pub fn live_plan(plan: &Plan) -> Result<Plan, String> {
+pub fn live_plan(plan: &Plan) -> Result<Plan, Diagnostic> {
     let mut plan = plan.clone();
     if plan.method == Method::Auto {
-        plan.method = "commit".parse::<Method>().map_err(|e| e.to_string())?;
+        plan.method = "commit"
+            .parse::<Method>()
+            .map_err(|e| Diagnostic::from(&e))?;
     }
     let resolved = Meaning::new(&plan, &Declared::default());
     // An orientation and a specific force, so that only what no sample can bring is refused.
@@ -143,9 +146,9 @@ impl SensorStream {
         saved: Option<Saved>,
         declare: impl FnOnce(&Stream) -> Arc<Channel>,
     ) -> Result<SensorStream, Fault> {
-        let fault = |what: String| Fault {
+        let fault = |what: Diagnostic| Fault {
             id: Some(id.to_string()),
-            ..Fault::new("not_ready", what)
+            ..Fault::new("not_ready", what.to_string())
         };
         let declared = Declared {
             sample_kind: stated.sample_kind,
@@ -160,7 +163,7 @@ impl SensorStream {
         let known = plan.calibration.as_deref();
         prepared
             .warnings
-            .extend(known.and_then(|known| known.mismatch(&id)));
+            .extend(known.and_then(|known| known.mismatch(&id)).map(Into::into));
         let labels = labelled(stream_of(&id), plan, &resolved, &prepared);
         let saved = saved.filter(|saved| match saved.attitude(&labels) {
             Ok(_) => true,
@@ -405,9 +408,9 @@ impl SensorStream {
         stamp: Nanos,
         before: Span,
     ) -> Result<Fault, Fault> {
-        let fault = |what: String| Fault {
+        let fault = |what: Diagnostic| Fault {
             id: Some(self.id.to_string()),
-            ..Fault::new("not_ready", what)
+            ..Fault::new("not_ready", what.to_string())
         };
         let forces = self.prepared.aiding.map(|aiding| aiding.forces);
         let plan = &expecting(plan, forces == Some(Forces::Beside));
@@ -419,7 +422,7 @@ impl SensorStream {
                 "a run that begins between other axes ({}) than those announced ({}); give it another `id`",
                 labels.world_axes,
                 self.channel.stream().world_axes
-            )));
+            ).into()));
         }
         let saved = self.saved.take().map(|saved| saved.resets());
         let resets = saved.or(self.last.map(|l| l.reset_count)).unwrap_or(0);
@@ -583,7 +586,7 @@ impl SensorStream {
         let warnings = &self.prepared.warnings;
         let warnings: Vec<String> = warnings
             .iter()
-            .cloned()
+            .map(ToString::to_string)
             .chain(self.intervals.warning())
             .collect();
         let clock = self.prepared.clock.name();

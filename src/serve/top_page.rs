@@ -129,7 +129,7 @@ impl Request {
         }
         Ok((
             Course::new(top, start, rate_hz, secs)?,
-            How::parse_all(&names)?,
+            How::parse_all(&names).map_err(|e| e.to_string())?,
         ))
     }
 

@@ -6,11 +6,12 @@
 #![allow(clippy::print_stdout)]
 
 use std::f64::consts::{FRAC_PI_2, TAU};
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{Bias, Estimator, Meaning, Patience, Plan, Preparation};
 use strapd_attitude::propagate::Sequential;
 use strapd_attitude::record::{Declared, Nanos, RawSample};
 
-fn main() -> Result<(), String> {
+fn main() -> Result<(), Diagnostic> {
     // At rest for ten seconds with a bias of 0.02 rad/s about z, then a turn of 90 degrees in one.
     let gyro = |k: i64| {
         let ripple = 1e-4 * (k % 7 - 3) as f64;

@@ -56,6 +56,7 @@
 pub mod aid;
 pub mod compare;
 pub mod condition;
+pub mod diagnostic;
 pub mod digits;
 pub mod estimate;
 pub mod frames;

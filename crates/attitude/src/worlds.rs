@@ -4,6 +4,7 @@
 //! into ENU and leaving the body FRD is the classic bug (microstrain_mips#4, vectornav#146,
 //! mavros#216), so a world without its body has no function here.
 
+use crate::diagnostic::Diagnostic;
 use crate::frames::{Enu, Flu, Frd, In, Nav, Ned, Nwu, quoted};
 use crate::quaternion::Quaternion;
 use nalgebra::Vector3;
@@ -76,13 +77,16 @@ pub struct ParseWorldError {
     text: String,
 }
 
+impl From<&ParseWorldError> for Diagnostic {
+    fn from(error: &ParseWorldError) -> Diagnostic {
+        Diagnostic::new(format!("`{}` is no world", error.text))
+            .help("enu, ned, nwu, level or start")
+    }
+}
+
 impl fmt::Display for ParseWorldError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "`{}` is no world\n  help: enu, ned, nwu, level or start",
-            self.text
-        )
+        Diagnostic::from(self).fmt(f)
     }
 }
 

@@ -21,6 +21,7 @@ use crate::motion::{Accelerometer, Motion};
 use crate::rigid_body::Spin;
 use nalgebra::Vector3;
 use std::fmt;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::frames::{Body, In, Nav};
 use strapd_attitude::noise::sensor_error::{
     self, GyroModel, ImuError, ImuErrorFault, MagnetometerModel, MeasureError, StampError,
@@ -110,25 +111,33 @@ pub enum SamplingError {
     },
 }
 
-impl fmt::Display for SamplingError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
+impl From<&SamplingError> for Diagnostic {
+    fn from(error: &SamplingError) -> Diagnostic {
+        match error {
             SamplingError::OutOfRange {
                 what,
                 value,
                 allowed,
-            } => write!(f, "{what} can not be {value}: {allowed}"),
-            SamplingError::UnderSampled { rate_hz, needed_hz } => write!(
-                f,
-                "at {rate_hz} Hz the motion turns half a turn or more from sample to sample\n  help: {RATE_HZ} above {needed_hz:.1}, several times that for a good attitude"
-            ),
-            SamplingError::Errors(fault) => write!(f, "{fault}"),
-            SamplingError::StampOverflow { start } => write!(
-                f,
-                "the stamps, from {} ns on, run over the end of 64-bit nanoseconds\n  help: an earlier {START_STAMP}",
+            } => Diagnostic::new(format!("{what} can not be {value}: {allowed}")),
+            SamplingError::UnderSampled { rate_hz, needed_hz } => Diagnostic::new(format!(
+                "at {rate_hz} Hz the motion turns half a turn or more from sample to sample"
+            ))
+            .help(format!(
+                "{RATE_HZ} above {needed_hz:.1}, several times that for a good attitude"
+            )),
+            SamplingError::Errors(fault) => Diagnostic::new(fault.to_string()),
+            SamplingError::StampOverflow { start } => Diagnostic::new(format!(
+                "the stamps, from {} ns on, run over the end of 64-bit nanoseconds",
                 start.0
-            ),
+            ))
+            .help(format!("an earlier {START_STAMP}")),
         }
+    }
+}
+
+impl fmt::Display for SamplingError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        Diagnostic::from(self).fmt(f)
     }
 }
 

@@ -2,15 +2,16 @@
 //! ([`strapd_attitude::record::Verdict`]).
 
 use crate::recognise::Foreign;
+use std::fmt;
 use std::path::PathBuf;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::setting::{FIELD, TOPIC};
 
 /// A log that could not be read.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug)]
 #[non_exhaustive]
 pub enum Error {
     /// A file could not be opened.
-    #[error("{}: cannot open: {source}", path.display())]
     Open {
         /// Which file.
         path: PathBuf,
@@ -18,7 +19,6 @@ pub enum Error {
         source: std::io::Error,
     },
     /// Reading failed part way.
-    #[error("{}: reading at byte {offset}: {source}", path.display())]
     Read {
         /// Which file.
         path: PathBuf,
@@ -28,19 +28,16 @@ pub enum Error {
         source: std::io::Error,
     },
     /// The path is a directory.
-    #[error("{}: is a directory\n  help: name the .mcap file inside it", path.display())]
     IsDirectory {
         /// Which.
         path: PathBuf,
     },
     /// The file has no bytes.
-    #[error("{}: the file is empty (0 bytes)", path.display())]
     Empty {
         /// Which file.
         path: PathBuf,
     },
     /// The first bytes are not the MCAP magic.
-    #[error("{}: not an MCAP file: it begins with {found}, not with \\x89MCAP0\\r\\n", path.display())]
     NotMcap {
         /// Which file.
         path: PathBuf,
@@ -48,15 +45,13 @@ pub enum Error {
         found: String,
     },
     /// A table without the columns that are needed.
-    #[error("{}: no table that can be read: {why}", path.display())]
     NotTable {
         /// Which file.
         path: PathBuf,
         /// What is missing, and what helps.
-        why: String,
+        why: Diagnostic,
     },
     /// The input is of a known format that is not read.
-    #[error("{}: is {}, which is not read\n  help: {}", path.display(), format.name, format.help(&path.to_string_lossy()))]
     NotRead {
         /// Which input.
         path: PathBuf,
@@ -64,10 +59,6 @@ pub enum Error {
         format: Foreign,
     },
     /// A stream of what is read in any order could not be put into a file first.
-    #[error(
-        "{}: what comes only once is kept in {} to be read in any order: {source}\n  help: TMPDIR=FOLDER with room, or save it to a file first",
-        path.display(), std::env::temp_dir().display()
-    )]
     NoRoom {
         /// What it is called.
         path: PathBuf,
@@ -75,13 +66,11 @@ pub enum Error {
         source: std::io::Error,
     },
     /// What can be read once was to be looked at first.
-    #[error("{}: a stream can not be surveyed before it is read", path.display())]
     NotTwice {
         /// What it is called.
         path: PathBuf,
     },
     /// The log holds nothing a rate can be read from.
-    #[error("{}: no IMU topic: nothing in it carries a body rate with a stamp\n  it holds:{topics}\n  help: {} NAME with {} gyro=PATH names a rate in any message", path.display(), TOPIC, FIELD)]
     NoImuTopic {
         /// Which file.
         path: PathBuf,
@@ -89,7 +78,6 @@ pub enum Error {
         topics: String,
     },
     /// The log holds several IMU topics, or several publishers on one, and none was named.
-    #[error("{}: several IMU topics or publishers, and they must not be mixed:{topics}\n  help: {} NAME takes one of them, {} all each of them", path.display(), TOPIC, TOPIC)]
     SeveralImuTopics {
         /// Which file.
         path: PathBuf,
@@ -97,7 +85,6 @@ pub enum Error {
         topics: String,
     },
     /// The topic named is not in the log.
-    #[error("{}: no topic `{topic}`\n  it holds:{topics}", path.display())]
     NoSuchTopic {
         /// Which file.
         path: PathBuf,
@@ -107,31 +94,126 @@ pub enum Error {
         topics: String,
     },
     /// A topic's messages can not be decoded.
-    #[error("{}: {what}", path.display())]
     Unsupported {
         /// Which file.
         path: PathBuf,
-        /// Topic, type, encoding, why, and the flag that helps.
-        what: String,
+        /// Topic, type, encoding, why, and what helps.
+        what: Diagnostic,
     },
     /// A run over this input can not be carried out with these settings.
-    #[error("{}: {}: {what}", path.display(), crate::text::printable(topic))]
     Topic {
         /// Which file.
         path: PathBuf,
         /// Which topic.
         topic: String,
-        /// What, why, and the flag that helps.
-        what: String,
+        /// What, why, and what helps.
+        what: Diagnostic,
     },
     /// The operating system gives no threads.
-    #[error("cannot start {threads} threads: {source}\n  help: ask for fewer")]
     Threads {
         /// How many were asked for; 0 = one per core.
         threads: usize,
         /// Why not.
         source: rayon::ThreadPoolBuildError,
     },
+}
+
+impl From<&Error> for Diagnostic {
+    fn from(error: &Error) -> Diagnostic {
+        match error {
+            Error::Open { path, source } => {
+                Diagnostic::new(format!("{}: cannot open: {source}", path.display()))
+            }
+            Error::Read {
+                path,
+                offset,
+                source,
+            } => Diagnostic::new(format!(
+                "{}: reading at byte {offset}: {source}",
+                path.display()
+            )),
+            Error::IsDirectory { path } => {
+                Diagnostic::new(format!("{}: is a directory", path.display()))
+                    .help("name the .mcap file inside it")
+            }
+            Error::Empty { path } => {
+                Diagnostic::new(format!("{}: the file is empty (0 bytes)", path.display()))
+            }
+            Error::NotMcap { path, found } => Diagnostic::new(format!(
+                "{}: not an MCAP file: it begins with {found}, not with \\x89MCAP0\\r\\n",
+                path.display()
+            )),
+            Error::NotTable { path, why } => why
+                .clone()
+                .at(format_args!("{}: no table that can be read", path.display())),
+            Error::NotRead { path, format } => Diagnostic::new(format!(
+                "{}: is {}, which is not read",
+                path.display(),
+                format.name
+            ))
+            .help(format.help(&path.to_string_lossy())),
+            Error::NoRoom { path, source } => Diagnostic::new(format!(
+                "{}: what comes only once is kept in {} to be read in any order: {source}",
+                path.display(),
+                std::env::temp_dir().display()
+            ))
+            .help("TMPDIR=FOLDER with room, or save it to a file first"),
+            Error::NotTwice { path } => Diagnostic::new(format!(
+                "{}: a stream can not be surveyed before it is read",
+                path.display()
+            )),
+            Error::NoImuTopic { path, topics } => Diagnostic::new(format!(
+                "{}: no IMU topic: nothing in it carries a body rate with a stamp\n  it holds:{topics}",
+                path.display()
+            ))
+            .help(format!(
+                "{TOPIC} NAME with {FIELD} gyro=PATH names a rate in any message"
+            )),
+            Error::SeveralImuTopics { path, topics } => Diagnostic::new(format!(
+                "{}: several IMU topics or publishers, and they must not be mixed:{topics}",
+                path.display()
+            ))
+            .help(format!(
+                "{TOPIC} NAME takes one of them, {TOPIC} all each of them"
+            )),
+            Error::NoSuchTopic {
+                path,
+                topic,
+                topics,
+            } => Diagnostic::new(format!(
+                "{}: no topic `{topic}`\n  it holds:{topics}",
+                path.display()
+            )),
+            Error::Unsupported { path, what } => what.clone().at(path.display()),
+            Error::Topic { path, topic, what } => what.clone().at(format_args!(
+                "{}: {}",
+                path.display(),
+                crate::text::printable(topic)
+            )),
+            Error::Threads { threads, source } => {
+                Diagnostic::new(format!("cannot start {threads} threads: {source}"))
+                    .help("ask for fewer")
+            }
+        }
+    }
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        Diagnostic::from(self).fmt(f)
+    }
+}
+
+impl std::error::Error for Error {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Error::Open { source, .. }
+            | Error::Read { source, .. }
+            | Error::NoRoom { source, .. } => Some(source),
+            Error::Threads { source, .. } => Some(source),
+            _ => None,
+        }
+    }
 }
 
 /// Result of reading.

@@ -4,6 +4,7 @@ pub mod calibration;
 
 use crate::error::{Error, Result};
 use std::fmt::Display;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{Bias, Initial, NOISE_FIGURES, NOISE_PRESETS, Noise, Truncation};
 use strapd_attitude::quaternion::{BodyRate, Quaternion, YawPitchRoll};
 use strapd_attitude::setting::{BIAS, FIELD, INIT, NOISE, SHARD, UNDO_TRUNCATION};
@@ -25,9 +26,10 @@ pub fn parse_truncation(text: &str) -> Result<Truncation> {
             .filter(|step: &f64| *step > 0.0 && *step < 1.0)
             .map(Truncation::Steps)
             .ok_or_else(|| {
-                Error::Usage(format!(
-                    "{UNDO_TRUNCATION}: `{text}` is none\n  help: auto, on, on=STEP in rad/s (below 1), or off"
-                ))
+                Error::usage(
+                    Diagnostic::new(format!("{UNDO_TRUNCATION}: `{text}` is none"))
+                        .help("auto, on, on=STEP in rad/s (below 1), or off"),
+                )
             })?,
     })
 }
@@ -41,14 +43,16 @@ pub fn parse_noise(text: &str) -> Result<Noise> {
     if let Some(preset) = NOISE_PRESETS.iter().find(|preset| preset.name == text) {
         return Ok(Noise::preset(preset));
     }
-    let wrong = |what: String| {
+    let wrong = |what: &str| {
         let names: Vec<&str> = NOISE_PRESETS.iter().map(|p| p.name).collect();
         let figures = NOISE_FIGURES.map(|figure| format!("{} in {}", figure.key, figure.unit));
-        Error::Usage(format!(
-            "{NOISE} {text}: {what}\n  help: a class ({}), or figures joined by commas ({}), each one number or three x/y/z",
-            names.join(", "),
-            figures.join(", ")
-        ))
+        Error::usage(
+            Diagnostic::new(format!("{NOISE} {text}: {what}")).help(format!(
+                "a class ({}), or figures joined by commas ({}), each one number or three x/y/z",
+                names.join(", "),
+                figures.join(", ")
+            )),
+        )
     };
     let mut given = Vec::new();
     for part in text.split(',') {
@@ -58,16 +62,18 @@ pub fn parse_noise(text: &str) -> Result<Noise> {
             .iter()
             .all(|figure| figure.key != key.replace('_', "-"))
         {
-            return Err(wrong(format!("`{key}` is no class and no figure of noise")));
+            return Err(wrong(&format!(
+                "`{key}` is no class and no figure of noise"
+            )));
         }
         let axes = by_axis(value).ok_or_else(|| {
-            wrong(format!(
+            wrong(&format!(
                 "{key}={value} is neither one number nor three x/y/z, from 0 up"
             ))
         })?;
         given.push((key, axes));
     }
-    Noise::of_figures(text, given).map_err(wrong)
+    Noise::of_figures(text, given).map_err(|why| wrong(why.what()))
 }
 
 /// One number for all axes, or three joined by `/`; finite and not negative.
@@ -103,7 +109,7 @@ pub fn parse_initial(text: &str) -> Result<Initial> {
         let angles = YawPitchRoll { yaw, pitch, roll };
         return Ok(Initial::Given(Quaternion::from_yaw_pitch_roll(&angles)));
     }
-    Err(Error::Usage(format!(
+    Err(Error::usage(format!(
         "{INIT} {text}: expected identity, gravity, first-orientation, q=w,x,y,z or rpy=roll,pitch,yaw (degrees)"
     )))
 }
@@ -119,7 +125,7 @@ pub fn parse_bias(text: &str) -> Result<Bias> {
         list => numbers::<3>(BIAS, list)
             .map(|b| Bias::Given(BodyRate(b.into())))
             .map_err(|_| {
-                Error::Usage(format!(
+                Error::usage(format!(
                     "{BIAS} {text}: expected none, auto, or three numbers x,y,z in rad/s"
                 ))
             }),
@@ -139,7 +145,7 @@ pub fn selection(
 ) -> Result<Selection> {
     let mut fields: Vec<FieldPath> = fields
         .iter()
-        .map(|f| f.parse().map_err(|e| Error::Usage(format!("{FIELD}: {e}"))))
+        .map(|f| f.parse().map_err(|e| Error::usage(format!("{FIELD}: {e}"))))
         .collect::<Result<_>>()?;
     let mut of = |role: FieldRole, topic: Option<&String>| {
         let topic = topic?.clone();
@@ -180,7 +186,7 @@ impl Shard {
             .filter(|(i, n)| i < n)
             .map(|(index, of)| Shard { index, of })
             .ok_or_else(|| {
-                Error::Usage(format!(
+                Error::usage(format!(
                     "{SHARD} {text}: expected i/n with 0 <= i < n, for example {SHARD} 0/4"
                 ))
             })
@@ -202,7 +208,7 @@ pub fn numbers<const N: usize>(what: impl Display, list: &str) -> Result<[f64; N
     parsed
         .and_then(|v| <[f64; N]>::try_from(v).ok())
         .ok_or_else(|| {
-            Error::Usage(format!(
+            Error::usage(format!(
                 "{what} {list}: expected {N} finite numbers separated by commas"
             ))
         })
@@ -218,7 +224,7 @@ pub fn unit_quaternion<To, From>(what: impl Display, list: &str) -> Result<Quate
     let q = numbers::<4>(&what, list)?;
     let norm = q.iter().map(|v| v * v).sum::<f64>().sqrt();
     if (norm - 1.0).abs() > 0.01 {
-        return Err(Error::Usage(format!(
+        return Err(Error::usage(format!(
             "{what} q={list}: a unit quaternion w,x,y,z is needed, this one has norm {norm}"
         )));
     }

@@ -1,86 +1,140 @@
-//! Everything that can end a run. One flat enum; each variant says what, where, why, and the
-//! flag that helps. Bad samples are not here: they are counted verdicts ([`strapd_attitude::record::Verdict`]).
+//! Everything that can end a run. One flat enum; each variant says what, where and why, and apart from that what
+//! helps ([`Diagnostic`]). Bad samples are not here: they are counted verdicts ([`strapd_attitude::record::Verdict`]).
 
 use std::path::PathBuf;
+use std::{fmt, io};
+use strapd_attitude::diagnostic::Diagnostic;
+use strapd_attitude::estimate::SpoolError;
 use strapd_attitude::setting::{FORCE, LISTEN};
 
 /// A run that could not be carried out.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug)]
 #[non_exhaustive]
 pub enum Error {
     /// A log could not be read.
-    #[error(transparent)]
-    Recording(#[from] strapd_recording::Error),
+    Recording(strapd_recording::Error),
     /// Writing failed (disk full, permission, ...).
-    #[error("{}: cannot write: {source}", path.display())]
     Write {
         /// Which file.
         path: PathBuf,
         /// Why.
-        source: std::io::Error,
+        source: io::Error,
     },
     /// There is no room for the samples of a recording that is smoothed.
-    #[error(
-        "{0}\n  help: make room in the folder of the output, or in that of temporary files (TMPDIR)"
-    )]
-    Spool(#[from] strapd_attitude::estimate::SpoolError),
+    Spool(SpoolError),
     /// The output is already there.
-    #[error("{}: already exists\n  help: {} replaces it", path.display(), FORCE)]
     OutputExists {
         /// Which file.
         path: PathBuf,
     },
     /// Output and input are the same file.
-    #[error("{}: is the input; it will not be overwritten, not even with {}\n  help: give another name to -o", path.display(), FORCE)]
     OutputIsInput {
         /// Which file.
         path: PathBuf,
     },
     /// Standard output was closed by its reader; ends the run quietly.
-    #[error("the reader of standard output has gone")]
     BrokenPipe,
     /// An address can not be listened on.
-    #[error("cannot listen on {address}: {source}{}", bind_help(source))]
     Bind {
         /// Where.
         address: String,
         /// Why.
-        source: std::io::Error,
+        source: io::Error,
     },
     /// Nobody takes what is sent there.
-    #[error(
-        "cannot connect to {address}: {source}\n  help: somebody has to listen there first: strapd serve, nc -l PORT, PlotJuggler's UDP server"
-    )]
     Connect {
         /// Where.
         address: String,
         /// Why.
-        source: std::io::Error,
+        source: io::Error,
     },
     /// A daemon can not be reached, or has gone.
-    #[error("{address}: {what}")]
     Remote {
         /// Where.
         address: String,
         /// What, and what it said before.
-        what: String,
+        what: Diagnostic,
     },
     /// A combination of arguments that can not be.
-    #[error("{0}")]
-    Usage(String),
+    Usage(Diagnostic),
 }
 
-fn bind_help(source: &std::io::Error) -> String {
-    match source.kind() {
-        std::io::ErrorKind::AddrInUse => {
-            format!(
-                "\n  help: is another strapd running there? {LISTEN} takes another address; port 0 takes a free port and shows it"
-            )
+impl From<&Error> for Diagnostic {
+    fn from(error: &Error) -> Diagnostic {
+        match error {
+            Error::Recording(error) => error.into(),
+            Error::Write { path, source } => {
+                Diagnostic::new(format!("{}: cannot write: {source}", path.display()))
+            }
+            Error::Spool(error) => Diagnostic::new(error.to_string()).help(
+                "make room in the folder of the output, or in that of temporary files (TMPDIR)",
+            ),
+            Error::OutputExists { path } => {
+                Diagnostic::new(format!("{}: already exists", path.display()))
+                    .help(format!("{FORCE} replaces it"))
+            }
+            Error::OutputIsInput { path } => Diagnostic::new(format!(
+                "{}: is the input; it will not be overwritten, not even with {FORCE}",
+                path.display()
+            ))
+            .help("give another name to -o"),
+            Error::BrokenPipe => Diagnostic::new("the reader of standard output has gone"),
+            Error::Bind { address, source } => {
+                let what = Diagnostic::new(format!("cannot listen on {address}: {source}"));
+                match source.kind() {
+                    io::ErrorKind::AddrInUse => what.help(format!(
+                        "is another strapd running there? {LISTEN} takes another address; port 0 takes a free port and shows it"
+                    )),
+                    io::ErrorKind::PermissionDenied => {
+                        what.help("ports below 1024 need a privilege; take a higher one")
+                    }
+                    _ => what,
+                }
+            }
+            Error::Connect { address, source } => {
+                Diagnostic::new(format!("cannot connect to {address}: {source}")).help(
+                    "somebody has to listen there first: strapd serve, nc -l PORT, PlotJuggler's UDP server",
+                )
+            }
+            Error::Remote { address, what } => what.clone().at(address),
+            Error::Usage(what) => what.clone(),
         }
-        std::io::ErrorKind::PermissionDenied => {
-            "\n  help: ports below 1024 need a privilege; take a higher one".to_owned()
+    }
+}
+
+/// With its help on a line of its own.
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        Diagnostic::from(self).fmt(f)
+    }
+}
+
+impl std::error::Error for Error {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Error::Recording(error) => error.source(),
+            Error::Write { source, .. }
+            | Error::Bind { source, .. }
+            | Error::Connect { source, .. } => Some(source),
+            Error::Spool(error) => Some(error),
+            Error::OutputExists { .. }
+            | Error::OutputIsInput { .. }
+            | Error::BrokenPipe
+            | Error::Remote { .. }
+            | Error::Usage(_) => None,
         }
-        _ => String::new(),
+    }
+}
+
+impl From<strapd_recording::Error> for Error {
+    fn from(error: strapd_recording::Error) -> Error {
+        Error::Recording(error)
+    }
+}
+
+impl From<SpoolError> for Error {
+    fn from(error: SpoolError) -> Error {
+        Error::Spool(error)
     }
 }
 
@@ -88,10 +142,15 @@ fn bind_help(source: &std::io::Error) -> String {
 pub type Result<T> = std::result::Result<T, Error>;
 
 impl Error {
+    /// A combination of arguments that can not be.
+    pub fn usage(what: impl Into<Diagnostic>) -> Error {
+        Error::Usage(what.into())
+    }
+
     /// A failed write to something that has a name but no path; a closed pipe is told apart.
     #[must_use]
-    pub fn writing(name: &str, source: std::io::Error) -> Error {
-        if source.kind() == std::io::ErrorKind::BrokenPipe {
+    pub fn writing(name: &str, source: io::Error) -> Error {
+        if source.kind() == io::ErrorKind::BrokenPipe {
             Error::BrokenPipe
         } else {
             Error::Write {

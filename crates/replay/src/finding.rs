@@ -3,6 +3,7 @@
 //! The type alone: the rules are in [`crate::findings`], which know a run; a run's summary holds what they found.
 
 use serde_json::{Map, Value, json};
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::setting::Choice;
 
 /// How bad a finding is.
@@ -58,6 +59,11 @@ impl Finding {
             advice: String::new(),
             help: Vec::new(),
         }
+    }
+
+    /// What a stage said, its help as the advice.
+    pub(crate) fn said(severity: Severity, code: &'static str, said: &Diagnostic) -> Finding {
+        Finding::new(severity, code, said.what()).advise(said.helping().unwrap_or_default())
     }
 
     pub(crate) fn with(mut self, name: &str, value: impl Into<Value>) -> Finding {

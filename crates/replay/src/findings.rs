@@ -105,9 +105,7 @@ fn replayed(topic: &CheckedTopic, out: &mut Vec<Finding>) {
             out.extend(run::steps(summary.undersampled, summary.largest_step));
         }
         Err(why) => {
-            let (what, help) = why.split_once('\n').unwrap_or((why, ""));
-            let help = help.trim().trim_start_matches("help: ");
-            out.push(Finding::new(Severity::Error, "refused", what).advise(help));
+            out.push(Finding::said(Severity::Error, "refused", why));
         }
     }
 }

@@ -6,6 +6,7 @@ use crate::summary::TopicSummary;
 use strapd_attitude::condition::quality::QualitySummary;
 use strapd_attitude::condition::stillness::{self, Rests};
 use strapd_attitude::condition::{Clock, GyroUnit};
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{Aid, Aiding, Meaning, Plan};
 use strapd_attitude::record::RawSample;
 use strapd_recording::recording::beside::TopicOfVectors;
@@ -38,7 +39,7 @@ pub struct Inspection {
     /// The clock the statistics are on.
     pub clock: Clock,
     /// What was noticed about the clock.
-    pub clock_warning: Option<String>,
+    pub clock_warning: Option<Diagnostic>,
     /// What may correct its attitude.
     pub aid: Aids,
 }
@@ -100,7 +101,7 @@ impl Aids {
             mean_force: (n > 0.0).then(|| sum / n),
             force_scale: aiding.map_or(1.0, |aiding| aiding.force_scale),
             gravity: aiding.is_some(),
-            notes,
+            notes: notes.iter().map(ToString::to_string).collect(),
             own_field: first
                 .iter()
                 .chain(beside)
@@ -140,7 +141,7 @@ impl Checked {
                 Ok(summary) => {
                     words.extend(summary.findings.iter_mut().map(|found| &mut found.what))
                 }
-                Err(why) => words.push(why),
+                Err(why) => words.extend(why.texts()),
             }
         }
         words.extend(self.problems.iter_mut().chain(&mut self.refused));
@@ -158,5 +159,5 @@ pub struct CheckedTopic {
     /// Statistics of the samples as recorded.
     pub looked: Inspection,
     /// What a replay with default flags makes of them, or why it refuses.
-    pub replayed: std::result::Result<Box<TopicSummary>, String>,
+    pub replayed: std::result::Result<Box<TopicSummary>, Diagnostic>,
 }

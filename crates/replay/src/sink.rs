@@ -35,6 +35,7 @@ pub use mcap::payload;
 pub use mcap::{Attachment, Encoding, InputChannel, InputMessage};
 pub use output::Flow;
 pub use output::sync_directory;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::setting::TOPIC;
 pub use stream::{Content, Provenance, Stream, output_topic};
 
@@ -147,10 +148,15 @@ impl Sink {
         let is_several = tables.next().is_some();
         match target.format() {
             Some(Format::Csv | Format::Tum) if is_several => {
-                return Err(Error::Usage(format!(
-                    "a table of one attitude has no column for the topic, and {} topics are estimated\n  help: choose one with {TOPIC}, or write .ndjson or .mcap",
-                    streams.len()
-                )));
+                return Err(Error::usage(
+                    Diagnostic::new(format!(
+                        "a table of one attitude has no column for the topic, and {} topics are estimated",
+                        streams.len()
+                    ))
+                    .help(format!(
+                        "choose one with {TOPIC}, or write .ndjson or .mcap"
+                    ))
+                ));
             }
             _ => {}
         }
@@ -292,7 +298,7 @@ impl Sink {
         let mut rest = samples;
         while !rest.is_empty() {
             let Some(lane) = self.lanes.get_mut(stream) else {
-                return Err(Error::Usage(format!("the output has no stream {stream}")));
+                return Err(Error::usage(format!("the output has no stream {stream}")));
             };
             if lane.left_out {
                 break;

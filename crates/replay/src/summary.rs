@@ -23,6 +23,7 @@ use crate::finding::Finding;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use strapd_attitude::compare::{BiasFit, BodyAxesFit, Consistency};
+use strapd_attitude::diagnostic::Diagnostic;
 pub use strapd_attitude::digits::significant;
 use strapd_attitude::estimate::SensorCalibration;
 use strapd_attitude::record::{Counts, SampleKind, Verdict};
@@ -75,7 +76,7 @@ pub struct TopicSummary {
     /// What corrected the attitude, where something did.
     pub aided: Option<Aided>,
     /// What a smoother made of it, where one was asked for, or why nothing: then the attitude is that of `aided`.
-    pub smoothed: Option<Result<Smoothing, String>>,
+    pub smoothed: Option<Result<Smoothing, Diagnostic>>,
     /// What is known of the sensor at the end.
     pub calibration: SensorCalibration,
     /// Noise behind sigma.
@@ -442,7 +443,7 @@ impl TopicSummary {
         let why = self.smoothed.as_ref()?.as_ref().err()?;
         Some(format!(
             "NOT SMOOTHED: {}; the attitude is the real-time filter's",
-            why.replace("\n  help: ", "; ")
+            why.line()
         ))
     }
 
@@ -538,7 +539,7 @@ impl TopicSummary {
             "aid": self.aided.as_ref().map(Aided::json),
             "smooth": self.smoothed.as_ref().map(|smoothed| match smoothed {
                 Ok(smoothing) => smoothing.json(),
-                Err(why) => json!({ "outcome": "filter", "why": why }),
+                Err(why) => json!({ "outcome": "filter", "why": why.to_string() }),
             }),
             "noise": self.noise,
             "sigma_terms": self.sigma_terms.as_ref().map(SigmaTerms::json),

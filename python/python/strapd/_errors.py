@@ -8,12 +8,13 @@ class Error(RuntimeError):
 
     ``kind`` says which, for programs: ``refused`` (these samples do not allow it), ``loss`` (samples were lost, and
     ``strict`` was asked for), ``no_match``, ``closed``, ``command`` (the command ``strapd`` is not here), ``failed`` (a log can
-    not be read, or has no such topic).
+    not be read, or has no such topic). ``help`` is what helps, alone, where something is known to; the message says it too.
     """
 
-    def __init__(self, message: str, kind: str = "failed") -> None:
+    def __init__(self, message: str, kind: str = "failed", help: str | None = None) -> None:
         super().__init__(message)
         self.kind = kind
+        self.help = help
 
 
 class LossWarning(UserWarning):

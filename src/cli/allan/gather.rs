@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 use std::ops::ControlFlow;
 use strapd_attitude::condition::stillness::{Limits, Rests, Stillness};
 use strapd_attitude::condition::{ClockWarning, Conditioner, Report, choose_clock};
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Meaning;
 use strapd_attitude::estimate::Plan;
 use strapd_attitude::noise::allan::AngleRecord;
@@ -73,15 +74,15 @@ pub(super) fn gather(
     pool: &Pool,
 ) -> Result<Gathered> {
     if selection.topic.as_deref() == Some("all") {
-        return Err(Error::Usage(
-            "--topic all: one topic at a time\n  help: --topic NAME".to_owned(),
+        return Err(Error::usage(
+            Diagnostic::new("--topic all: one topic at a time").help("--topic NAME"),
         ));
     }
     let log = Recording::told_apart(input, selection.topic.as_deref(), &selection.decode, pool)?;
     let mut decoders = Decoders::of_run(plan, &selection.decode);
     let reading = TopicReading::new(&log, selection.topic.as_deref(), &mut decoders)?;
     let topic = reading.name().to_owned();
-    let unsupported = |what: String| {
+    let unsupported = |what: Diagnostic| {
         strapd_recording::Error::Unsupported {
             path: log.name().to_owned(),
             what,
@@ -89,13 +90,14 @@ pub(super) fn gather(
         .into()
     };
     let Some((known, decoder)) = reading.channels.first() else {
-        return Err(unsupported(format!("{topic}: no channel of it")));
+        return Err(unsupported(format!("{topic}: no channel of it").into()));
     };
     let described = described(&known.channel);
     if !decoder.stated().has_gyro {
-        return Err(unsupported(format!(
-            "{topic} ({described}): carries no body rate\n  help: --field gyro=PATH names one"
-        )));
+        return Err(unsupported(
+            Diagnostic::new(format!("{topic} ({described}): carries no body rate"))
+                .help("--field gyro=PATH names one"),
+        ));
     }
     let mut gathering = Gathering::new(
         plan,
@@ -180,7 +182,7 @@ impl Gathering {
         }
     }
 
-    fn take(&mut self, raw: RawSample) -> std::result::Result<(), String> {
+    fn take(&mut self, raw: RawSample) -> std::result::Result<(), Diagnostic> {
         match &mut self.running {
             Some(conditioner) => {
                 conditioner.push(std::slice::from_ref(&raw), &mut self.conditioned);
@@ -203,11 +205,11 @@ impl Gathering {
         }
     }
 
-    fn begin(&mut self) -> std::result::Result<(), String> {
+    fn begin(&mut self) -> std::result::Result<(), Diagnostic> {
         let first = std::mem::take(&mut self.first);
         let (clock, warning) = choose_clock(&first, self.plan.clock);
         if let Some(fatal @ ClockWarning::NoneMoves) = warning {
-            return Err(fatal.to_string());
+            return Err(Diagnostic::from(&fatal));
         }
         self.notes.extend(warning.map(|w| w.to_string()));
         let settings = self
@@ -293,7 +295,7 @@ impl Gathering {
         described: String,
         mut notes: Vec<String>,
         lost_in_file: bool,
-    ) -> std::result::Result<Gathered, String> {
+    ) -> std::result::Result<Gathered, Diagnostic> {
         if self.running.is_none() {
             self.begin()?;
         }
@@ -357,13 +359,17 @@ impl Gathered {
     pub(super) fn warnings(&self) -> Vec<String> {
         let mut all = self.notes.clone();
         if self.moved() {
-            all.push(self.moving());
+            all.push(self.moving().to_string());
         }
         if self.bridges > 0 {
-            all.push(format!(
-                "{} missing samples in {} places were filled with straight lines\n  help: --max-gap 0 splits the record there instead",
-                self.filled, self.bridges
-            ));
+            all.push(
+                Diagnostic::new(format!(
+                    "{} missing samples in {} places were filled with straight lines",
+                    self.filled, self.bridges
+                ))
+                .help("--max-gap 0 splits the record there instead")
+                .to_string(),
+            );
         }
         if self.splits > 0 {
             all.push(format!(
@@ -395,26 +401,20 @@ impl Gathered {
     }
 
     /// How much it moved, and which part did not.
-    fn moving(&self) -> String {
-        let said = format!(
+    fn moving(&self) -> Diagnostic {
+        let said = Diagnostic::new(format!(
             "the sensor moved: at rest for {:.1} of {:.1} s, and motion looks like noise",
             self.resting(),
             self.secs
-        );
+        ));
         let longest = self
             .rests
             .kept
             .iter()
             .max_by(|a, b| a.secs().total_cmp(&b.secs()));
         match (longest.filter(|r| r.secs() >= USEFUL), self.rests.first) {
-            (Some(rest), Some(begin)) => format!(
-                "{said}\n  help: its longest rest is --start {:.1} --until {:.1}",
-                self.skipped + rest.start.secs_since(begin),
-                self.skipped + rest.end.secs_since(begin)
-            ),
-            _ => format!(
-                "{said}\n  help: record the sensor fixed to something heavy; if the rates look too large, --gyro-unit deg"
-            ),
+            (Some(rest), Some(begin)) => said.help(format!("its longest rest is --start {:.1} --until {:.1}", self.skipped + rest.start.secs_since(begin), self.skipped + rest.end.secs_since(begin))),
+            _ => said.help("record the sensor fixed to something heavy; if the rates look too large, --gyro-unit deg"),
         }
     }
 }

@@ -13,6 +13,7 @@ use crate::sink::roll_pitch_yaw;
 use std::collections::BTreeSet;
 use std::io::{BufWriter, Stdout, Write};
 use std::time::{Duration, Instant};
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_recording::attitude_line::Attitude;
 
 const CSV_HEADER: &str = "id,stamp_ns,qw,qx,qy,qz,roll_deg,pitch_deg,yaw_deg,wx,wy,wz,sigma_x_deg,sigma_y_deg,sigma_z_deg,status,world\n";
@@ -33,9 +34,9 @@ pub(super) fn run(args: &Cat, url: &str) -> Result<Outcome> {
     ];
     for (given, flag, help) in file_flags {
         if given {
-            return Err(Error::Usage(format!(
-                "cat {url}: {flag} is for files\n  help: {help}"
-            )));
+            return Err(Error::usage(
+                Diagnostic::new(format!("cat {url}: {flag} is for files")).help(help),
+            ));
         }
     }
     let remote = Remote::parse(url)?;
@@ -50,10 +51,10 @@ pub(super) fn run(args: &Cat, url: &str) -> Result<Outcome> {
 async fn print(args: &Cat, remote: &Remote, token: Option<&Secret>) -> Result<Outcome> {
     let failed = |what: String| Error::Remote {
         address: remote.to_string(),
-        what,
+        what: what.into(),
     };
     // A second one ends the process even when nobody reads our output.
-    let mut signals = Signals::new().map_err(|e| Error::Usage(format!("signals: {e}")))?;
+    let mut signals = Signals::new().map_err(|e| Error::usage(format!("signals: {e}")))?;
     let stop = signals.first(|| false);
     tokio::pin!(stop);
     let until = tokio::time::sleep(args.seconds.map_or(Duration::MAX, Duration::from_secs_f64));
@@ -198,9 +199,10 @@ impl Printer {
         if self.complaints.in_a_row >= MOST_IN_A_ROW {
             self.failure = Some(Error::Remote {
                 address: self.address.clone(),
-                what: format!(
-                    "{MOST_IN_A_ROW} lines in a row that are no attitudes, last: {what}\n  help: is this the port of a strapd?"
-                ),
+                what: Diagnostic::new(format!(
+                    "{MOST_IN_A_ROW} lines in a row that are no attitudes, last: {what}"
+                ))
+                .help("is this the port of a strapd?"),
             });
         }
     }

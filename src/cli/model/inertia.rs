@@ -79,7 +79,7 @@ fn answer(request: &Request) -> std::result::Result<Value, Refusal> {
     let Some(nu) = request.nu.map(Vector6::from) else {
         if request.tau.is_some() || added.is_some() {
             return Err(format!(
-                "{} needs nu\n  help: \"nu\":[0,0,0,0,0,0] for a body at rest",
+                "{} needs nu: \"nu\":[0,0,0,0,0,0] for a body at rest",
                 if added.is_some() { "added_mass" } else { "tau" }
             )
             .into());

@@ -13,6 +13,7 @@ use clap::Args;
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 use std::fmt::Write as _;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_bodies::top::method_errors::{self as compare, Course, How, MethodErrors};
 use strapd_bodies::top::{Case, EulerState, SymmetricTop};
 
@@ -76,19 +77,19 @@ struct Request {
 /// Flags that can not be; standard input or output fails.
 pub(super) fn run(global: &Global, args: &Top) -> Result<Outcome> {
     if args.compare {
-        print(&tables::text().map_err(|e| Error::Usage(format!("model top: {e}")))?)?;
+        print(&tables::text().map_err(|e| Error::usage(format!("model top: {e}")))?)?;
         return Ok(Outcome::Done);
     }
     if args.is_bare() {
         return filter::run(|request: Request| answer(&request));
     }
-    let usage = |e: String| Error::Usage(format!("model top: {e}"));
+    let usage = |e: String| Error::usage(Diagnostic::new(e).at("model top"));
     let top = args.top.body()?;
     let start = args.top.start(&top)?;
     let methods = if args.methods.is_empty() {
         How::defaults()
     } else {
-        How::parse_all(&args.methods).map_err(usage)?
+        How::parse_all(&args.methods).map_err(|e| Error::usage(e.at("model top")))?
     };
     let course = Course::new(
         top,
@@ -131,7 +132,7 @@ fn answer(request: &Request) -> std::result::Result<Value, Refusal> {
         .map_or(Case::SEED_W3, |hz| hz * std::f64::consts::TAU);
     let start: EulerState = case.start(&top, tilt, w3).map_err(|e| e.to_string())?;
     let methods = match &request.methods {
-        Some(names) => How::parse_all(names)?,
+        Some(names) => How::parse_all(names).map_err(|e| e.to_string())?,
         None => How::defaults(),
     };
     let course = Course::new(

@@ -68,7 +68,7 @@ impl TopFlags {
             [across, along],
             self.gravity.unwrap_or(seed.gravity()),
         )
-        .map_err(|e| Error::Usage(format!("top: {e}")))
+        .map_err(|e| Error::usage(format!("top: {e}")))
     }
 
     /// Whether no flag says anything.
@@ -98,7 +98,7 @@ impl TopFlags {
             let case = self.case.unwrap_or(Case::Cusped);
             return case
                 .start(top, tilt, w3)
-                .map_err(|e| Error::Usage(format!("top, case {}: {e}", case.name())));
+                .map_err(|e| Error::usage(format!("top, case {}: {e}", case.name())));
         };
         let degrees = |flag, list: &str| numbers::<3>(flag, list).map(|v| v.map(f64::to_radians));
         let [precession, nutation, spin] = degrees("--euler", euler)?;

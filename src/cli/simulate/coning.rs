@@ -3,6 +3,7 @@
 use super::{Made, parameter, sampling::Common};
 use crate::error::{Error, Result};
 use clap::Args;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_bodies::motion::{self, Motion};
 use strapd_bodies::synthetic::ForceSampling;
 
@@ -34,9 +35,10 @@ impl Coning {
     pub(super) fn made(&self) -> Result<Made> {
         let coning = motion::Coning::new(self.half_angle_deg.to_radians(), self.frequency_hz)
             .map_err(|e| {
-                Error::Usage(format!(
-                    "simulate coning: {e}\n  help: --half-angle-deg up to 180, --frequency-hz up to 15000"
-                ))
+                Error::usage(
+                    Diagnostic::new(format!("simulate coning: {e}"))
+                        .help("--half-angle-deg up to 180, --frequency-hz up to 15000"),
+                )
             })?;
         Ok(Made {
             motion: Motion::Coning(coning),

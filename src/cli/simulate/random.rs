@@ -3,6 +3,7 @@
 use super::{Made, parameter, sampling::Common};
 use crate::error::{Error, Result};
 use clap::Args;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_bodies::motion::{BandLimited, Motion};
 use strapd_bodies::synthetic::ForceSampling;
 
@@ -37,21 +38,23 @@ impl Random {
     pub(super) fn made(&self) -> Result<Made> {
         for (flag, value) in [("--rms", self.rms), ("--f-max", self.f_max)] {
             if !(value >= 0.0 && value.is_finite()) {
-                return Err(Error::Usage(format!("{flag} {value}: 0 or more is needed")));
+                return Err(Error::usage(format!("{flag} {value}: 0 or more is needed")));
             }
         }
         if self.sines == 0 {
-            return Err(Error::Usage(format!(
+            return Err(Error::usage(format!(
                 "--sines 0: 1 to {} are needed",
                 BandLimited::MOST_SINES
             )));
         }
         let motion = BandLimited::random(self.common.seed, self.rms, self.f_max, self.sines)
             .map_err(|e| {
-                Error::Usage(format!(
-                    "simulate random: {e}\n  help: --sines up to {}, --f-max up to 15000",
-                    BandLimited::MOST_SINES
-                ))
+                Error::usage(
+                    Diagnostic::new(format!("simulate random: {e}")).help(format!(
+                        "--sines up to {}, --f-max up to 15000",
+                        BandLimited::MOST_SINES
+                    )),
+                )
             })?;
         Ok(Made {
             motion: Motion::BandLimited(Box::new(motion)),

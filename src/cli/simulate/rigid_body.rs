@@ -61,14 +61,14 @@ struct Heavy {
 
 impl RigidBody {
     pub(super) fn made(&self) -> Result<Made> {
-        let refused = |e: InertiaError| Error::Usage(format!("--inertia {}: {e}", self.inertia));
+        let refused = |e: InertiaError| Error::usage(format!("--inertia {}: {e}", self.inertia));
         let (tensor, mass_times_r) = self.body()?;
         let rotor = Rotor::new(tensor).map_err(refused)?;
         let q_nb = match parse_initial(&self.attitude) {
             Ok(Initial::Identity) => Quaternion::identity(),
             Ok(Initial::Given(q_nb)) => q_nb,
             _ => {
-                return Err(Error::Usage(format!(
+                return Err(Error::usage(format!(
                     "--attitude {}: identity, q=w,x,y,z or rpy=roll,pitch,yaw (degrees) is needed",
                     self.attitude
                 )));
@@ -80,7 +80,7 @@ impl RigidBody {
         };
         let gravity_n = Vector3::new(0.0, 0.0, -self.gravity);
         let body = HeavyBody::new(rotor, mass_times_r, gravity_n, start)
-            .map_err(|e| Error::Usage(format!("simulate rigid-body: {e}")))?;
+            .map_err(|e| Error::usage(format!("simulate rigid-body: {e}")))?;
         Ok(Made {
             motion: Motion::HeavyBody(Box::new(body)),
             force: ForceSampling::Instant,
@@ -97,7 +97,7 @@ impl RigidBody {
     /// Tensor about the fixed point, and mass times the centre of gravity seen from there.
     fn body(&self) -> Result<(Matrix3<f64>, Vector3<f64>)> {
         let text = self.inertia.trim();
-        let usage = |e: &dyn std::fmt::Display| Error::Usage(format!("--inertia {text}: {e}"));
+        let usage = |e: &dyn std::fmt::Display| Error::usage(format!("--inertia {text}: {e}"));
         if text.starts_with('{') {
             let heavy: Heavy = serde_json::from_str(text).map_err(|e| usage(&e))?;
             let r_og_b = Vector3::from(heavy.r_og_b);

@@ -10,6 +10,7 @@ use crate::pipeline::simulate::Simulation;
 use crate::sink::{Options, Target};
 use clap::{Args, ValueEnum};
 use nalgebra::Vector3;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::noise::sensor_error::{ImuError, StampError};
 use strapd_attitude::record::{Nanos, SampleKind};
 use strapd_bodies::field::{Disturbance, Field};
@@ -204,7 +205,7 @@ impl Common {
         let kind = SampleKind::from(self.sample_kind);
         let start = stamp("--start-stamp", &self.start_stamp)?;
         let error = ImuError::parse(&self.noise)
-            .map_err(|e| Error::Usage(format!("--noise {}: {e}", self.noise)))?;
+            .map_err(|e| Error::usage(format!("--noise {}: {e}", self.noise)))?;
         let stamps = self.stamps()?;
         let gravity = made.gravity.unwrap_or(GRAVITY);
         let lever = numbers::<3>("--lever-arm", &self.lever_arm)?;
@@ -223,7 +224,7 @@ impl Common {
             seed: self.seed,
         };
         let source = Synthetic::new(made.motion, sampling)
-            .map_err(|e| Error::Usage(format!("simulate {name}: {e}")))?;
+            .map_err(|e| Error::usage(format!("simulate {name}: {e}")))?;
         let mut parameters = made.parameters;
         parameters.extend([
             parameter("gravity_m_s2", gravity),
@@ -301,7 +302,7 @@ impl Common {
         let Some(rate) = self.mag else {
             return Ok(None);
         };
-        let refused = |flag: &str, why: String| Error::Usage(format!("{flag} {why}"));
+        let refused = |flag: &str, why: String| Error::usage(format!("{flag} {why}"));
         let [strength, dip, declination] = numbers::<3>("--field", &self.field)?;
         if !((0.0..=1e6).contains(&strength) && dip.abs() <= 90.0 && declination.abs() <= 360.0) {
             return Err(refused(
@@ -351,9 +352,10 @@ impl Common {
             burst_length: self.burst,
         };
         stamps.check().map_err(|e| {
-            Error::Usage(format!(
-                "{e}\n  help: --stamp-drift, --jitter, --stamp-jitter, --drop, --burst"
-            ))
+            Error::usage(
+                Diagnostic::new(e.to_string())
+                    .help("--stamp-drift, --jitter, --stamp-jitter, --drop, --burst"),
+            )
         })?;
         Ok(stamps)
     }
@@ -376,7 +378,7 @@ fn stamp(flag: &str, text: &str) -> Result<Nanos> {
         Some(Nanos(sign * whole.checked_add(nanos)?))
     };
     parsed().ok_or_else(|| {
-        Error::Usage(format!(
+        Error::usage(format!(
             "{flag} {text}: seconds with up to nine decimals are needed, at most 292 years"
         ))
     })

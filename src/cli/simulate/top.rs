@@ -24,7 +24,7 @@ pub struct Top {
 
 impl Top {
     pub(super) fn made(&self) -> Result<Made> {
-        let refused = |e| Error::Usage(format!("simulate top: {e}"));
+        let refused = |e| Error::usage(format!("simulate top: {e}"));
         let top = self.top.body()?;
         let start = self.top.start(&top)?;
         let motion = top.exact(&start).map_err(refused)?;

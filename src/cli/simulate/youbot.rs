@@ -48,7 +48,7 @@ impl Youbot {
                 (text, path.display().to_string())
             }
         };
-        let refused = |why: String| Error::Usage(format!("simulate youbot: {name}: {why}"));
+        let refused = |why: String| Error::usage(format!("simulate youbot: {name}: {why}"));
         let prepared = trajectory::from_json(&text, unit, self.common.duration).map_err(refused)?;
         let [x, y, z] = prepared.gravity;
         if x != 0.0 || y != 0.0 {
@@ -93,7 +93,7 @@ fn read(path: &Path) -> Result<String> {
         .read_to_string(&mut text)
         .map_err(fail)?;
     if text.len() as u64 > LONGEST {
-        return Err(Error::Usage(format!(
+        return Err(Error::usage(format!(
             "--trajectory {}: longer than {LONGEST} bytes, which no path is",
             path.display()
         )));

@@ -22,7 +22,7 @@ pub(super) fn topic(topic: &CheckedTopic, noise: Option<&Noise>) -> Value {
         "topic": looked.topic,
         "type": looked.described,
         "frame": looked.frame,
-        "refused": refused,
+        "refused": refused.map(ToString::to_string),
         "replay": run.map(|s| s.json()),
         "first_ns": q.first.map(|n| n.0),
         "last_ns": q.newest.map(|n| n.0),

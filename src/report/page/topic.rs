@@ -28,7 +28,7 @@ pub(super) fn section(
     );
     match &topic.replayed {
         Err(why) => {
-            let why = why.replace("\n  help: ", "; ").replace('\n', " ");
+            let why = why.line();
             let _ = writeln!(out, "<p>No attitude could be had: {}.</p>", escaped(&why));
         }
         Ok(summary) => integrated(summary, stretches, out),
@@ -135,7 +135,7 @@ fn integrated(s: &TopicSummary, stretches: Option<usize>, out: &mut String) {
         rows.add("sigma", &terms.text());
     }
     for warning in s.warnings() {
-        rows.add("warning", &warning.replace("\n  help: ", "; "));
+        rows.add("warning", &warning);
     }
     out.push_str(&rows.html());
     if let Some(smoothing) = s.smoothing() {

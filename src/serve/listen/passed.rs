@@ -8,6 +8,7 @@ use listenfd::ListenFd;
 use std::io;
 use std::net::{TcpListener, UdpSocket};
 use std::os::unix::net::UnixListener;
+use strapd_attitude::diagnostic::Diagnostic;
 
 /// What was passed, until it is taken.
 pub struct Passed {
@@ -79,7 +80,8 @@ impl Passed {
             };
             io::Error::new(
                 io::ErrorKind::NotFound,
-                format!("no such socket from the service manager: {there}\n  help: FileDescriptorName= in a .socket unit names it"),
+                Diagnostic::new(format!("no such socket from the service manager: {there}"))
+                    .help("FileDescriptorName= in a .socket unit names it"),
             )
         })?;
         match &socket {

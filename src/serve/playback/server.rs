@@ -76,7 +76,7 @@ impl Cast {
     ) -> Result<Cast> {
         let playback = Arc::new(playback);
         settings.timeline = Some(playback.clone());
-        let failed = |e: std::io::Error| Error::Usage(format!("cannot serve: {e}"));
+        let failed = |e: std::io::Error| Error::usage(format!("cannot serve: {e}"));
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(1)
             .thread_name("strapd-cast")

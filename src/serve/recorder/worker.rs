@@ -13,6 +13,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::record::{AttitudeSample, RawSample};
 
 /// A chunk is closed early at this size, so that a flood costs memory in the queue alone.
@@ -318,11 +319,12 @@ fn check_free(settings: &Settings) -> Result<()> {
             path: path.to_owned(),
             source: io::Error::new(
                 io::ErrorKind::StorageFull,
-                format!(
-                    "{} free, less than the {} to be left\n  help: --min-free sets the limit",
+                Diagnostic::new(format!(
+                    "{} free, less than the {} to be left",
                     human_bytes(free),
                     human_bytes(settings.min_free)
-                ),
+                ))
+                .help("--min-free sets the limit"),
             ),
         }),
         _ => Ok(()),

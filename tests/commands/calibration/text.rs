@@ -112,10 +112,13 @@ fn what_is_no_calibration_is_refused_with_line_and_key() {
         ("\u{0}", "line 1", ""),
     ] {
         let said = parse(text).unwrap_err();
-        assert!(said.contains(line) && said.contains(key), "{text}: {said}");
+        assert!(
+            said.to_string().contains(line) && said.what().contains(key),
+            "{text}: {said}"
+        );
     }
     let long = format!("sensor = '{}'", "x".repeat(5000));
-    assert!(parse(&long).unwrap_err().contains("4096"));
+    assert!(parse(&long).unwrap_err().what().contains("4096"));
     let many = format!("sources = [{}]", "'a',".repeat(65));
-    assert!(parse(&many).unwrap_err().contains("64"));
+    assert!(parse(&many).unwrap_err().what().contains("64"));
 }

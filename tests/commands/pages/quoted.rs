@@ -9,11 +9,12 @@ use strapd_attitude::record::Nanos;
 mod example {
     #![allow(unreachable_pub)]
     // The README's.
+    use strapd_attitude::diagnostic::Diagnostic;
     use strapd_attitude::estimate::{Estimator, Meaning, Patience, Plan, Preparation};
     use strapd_attitude::propagate::Sequential;
     use strapd_attitude::record::{AttitudeSample, Declared, RawSample};
 
-    pub fn attitudes(samples: &[RawSample]) -> Result<Vec<AttitudeSample>, String> {
+    pub fn attitudes(samples: &[RawSample]) -> Result<Vec<AttitudeSample>, Diagnostic> {
         let plan = Plan::default(); // the flags of `replay`, as fields
         let meaning = Meaning::new(&plan, &Declared::default()); // rad/s at the stamps, x forward, y left, z up
         let mut preparation = Preparation::new(&plan, &meaning, Patience::WholeLog);

@@ -4,6 +4,7 @@
 //! is the laboratory's, and how much of that difference is forgiven must be said.
 
 use super::matching::{Track, for_each_match};
+use crate::diagnostic::Diagnostic;
 use crate::frames::Nav;
 use crate::quaternion::Quaternion;
 use nalgebra::{Matrix4, SymmetricEigen, Vector4};
@@ -96,9 +97,16 @@ impl fmt::Display for Align {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct ParseAlignError;
 
+impl From<&ParseAlignError> for Diagnostic {
+    fn from(error: &ParseAlignError) -> Diagnostic {
+        let ParseAlignError = error;
+        Diagnostic::new("no such alignment").help("none, first, first-heading, heading or best")
+    }
+}
+
 impl fmt::Display for ParseAlignError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("no such alignment\n  help: none, first, first-heading, heading or best")
+        Diagnostic::from(self).fmt(f)
     }
 }
 

@@ -3,6 +3,7 @@
 //! A stage of its own because a sample carries up to three clocks, of which any can be absent,
 //! zero or standing still, and the choice decides every interval after it.
 
+use crate::diagnostic::Diagnostic;
 use crate::record::{Nanos, RawSample};
 use crate::setting::{RATE_HZ, TIME};
 
@@ -75,31 +76,39 @@ pub enum ClockWarning {
     NoneMoves,
 }
 
-impl std::fmt::Display for ClockWarning {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            ClockWarning::Absent { clock } => write!(
-                f,
-                "the messages carry no {clock} stamp: using the log time\n  help: {TIME} log makes this explicit; {TIME} index {RATE_HZ} HZ for a fixed rate"
-            ),
-            ClockWarning::Zero { clock, looked_at } => write!(
-                f,
-                "{looked_at} of {looked_at} {clock} stamps are 0: using the log time\n  help: {TIME} log makes this explicit; {TIME} index {RATE_HZ} HZ for a fixed rate"
-            ),
+impl From<&ClockWarning> for Diagnostic {
+    fn from(error: &ClockWarning) -> Diagnostic {
+        let what = match error {
+            ClockWarning::Absent { clock } => {
+                format!("the messages carry no {clock} stamp: using the log time")
+            }
+            ClockWarning::Zero { clock, looked_at } => {
+                format!("{looked_at} of {looked_at} {clock} stamps are 0: using the log time")
+            }
             ClockWarning::StandsStill {
                 clock,
                 at,
                 looked_at,
-            } => write!(
-                f,
-                "{looked_at} of {looked_at} {clock} stamps are {} ns: that clock stands still, using the log time\n  help: {TIME} log makes this explicit; {TIME} index {RATE_HZ} HZ for a fixed rate",
+            } => format!(
+                "{looked_at} of {looked_at} {clock} stamps are {} ns: that clock stands still, using the log time",
                 at.0
             ),
-            ClockWarning::NoneMoves => write!(
-                f,
-                "neither the message stamps nor the log time advance: integration needs time\n  help: {TIME} index {RATE_HZ} HZ"
-            ),
-        }
+            ClockWarning::NoneMoves => {
+                return Diagnostic::new(
+                    "neither the message stamps nor the log time advance: integration needs time",
+                )
+                .help(format!("{TIME} index {RATE_HZ} HZ"));
+            }
+        };
+        Diagnostic::new(what).help(format!(
+            "{TIME} log makes this explicit; {TIME} index {RATE_HZ} HZ for a fixed rate"
+        ))
+    }
+}
+
+impl std::fmt::Display for ClockWarning {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        Diagnostic::from(self).fmt(f)
     }
 }
 

@@ -23,6 +23,7 @@ mod line;
 mod tracker;
 
 use super::histogram::Histogram;
+use crate::diagnostic::Diagnostic;
 use crate::record::{Join, Nanos, RateSample, SampleKind};
 use crate::setting::{RATE_HZ, REGULARISE_STAMPS, TIME};
 use count::{Counted, Counter};
@@ -214,29 +215,31 @@ pub enum Uneven {
     },
 }
 
-impl std::fmt::Display for Uneven {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{REGULARISE_STAMPS}: there is no constant rate: ")?;
-        match self {
-            Uneven::Jitter { jitter, doubts } => write!(
-                f,
+impl From<&Uneven> for Diagnostic {
+    fn from(error: &Uneven) -> Diagnostic {
+        let why = match error {
+            Uneven::Jitter { jitter, doubts } => format!(
                 "stamps are off even instants by {:.0} % of the step (rms), and {:.1} % of the samples could belong to another instant",
                 jitter * 100.0,
                 doubts * 100.0
-            )?,
-            Uneven::Sparse { steps } => write!(
-                f,
+            ),
+            Uneven::Sparse { steps } => format!(
                 "the commonest step is a {steps:.0}th of the mean one, as where batches are stamped on arrival"
-            )?,
-            Uneven::Restless { segments, samples } => write!(
-                f,
+            ),
+            Uneven::Restless { segments, samples } => format!(
                 "it changes, or samples can not be counted, {segments} times in {samples} samples"
-            )?,
-        }
-        write!(
-            f,
-            "\n  help: {TIME} index {RATE_HZ} HZ if no sample is missing; {TIME} log if that clock is steadier; else the stamps as they are"
-        )
+            ),
+        };
+        Diagnostic::new(format!("{REGULARISE_STAMPS}: there is no constant rate: {why}"))
+            .help(format!(
+                "{TIME} index {RATE_HZ} HZ if no sample is missing; {TIME} log if that clock is steadier; else the stamps as they are"
+            ))
+    }
+}
+
+impl std::fmt::Display for Uneven {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        Diagnostic::from(self).fmt(f)
     }
 }
 

@@ -6,6 +6,7 @@
 use super::meaning::{Meaning, STANDARD_GRAVITY};
 use super::plan::{Aid, BIAS_LEFT, Bias, Initial, Noise, Plan};
 use crate::aid::{self, Settings, Start};
+use crate::diagnostic::Diagnostic;
 use crate::frames::{Body, Nav};
 use crate::quaternion::Quaternion;
 use crate::record::{Nanos, RawSample};
@@ -79,8 +80,8 @@ impl Aiding {
         plan: &Plan,
         resolved: &Meaning,
         first: &[RawSample],
-        warnings: &mut Vec<String>,
-    ) -> Result<Option<Aiding>, String> {
+        warnings: &mut Vec<Diagnostic>,
+    ) -> Result<Option<Aiding>, Diagnostic> {
         let asked = match plan.aid {
             Aid::None => return Ok(None),
             Aid::Auto if plan.smooth => format!("{SMOOTH}"),
@@ -100,23 +101,26 @@ impl Aiding {
             Ok(found) => Ok(Some(found)),
             Err(Unaided::NoForce) if may_do_without => Ok(None),
             Err(Unaided::NoForce) if first.len() <= 1 => {
-                warnings.push(format!("{asked}: the first sample carries no specific force: the attitude is the gyro's until one comes"));
+                warnings.push(format!("{asked}: the first sample carries no specific force: the attitude is the gyro's until one comes").into());
                 let unscaled = Aiding::with_scale((plan, resolved), 1.0);
                 Ok(Some(Aiding {
                     forces: Forces::Unseen,
                     ..unscaled
                 }))
             }
-            Err(Unaided::NoForce) => Err(format!(
-                "{asked}: none of the first {} samples carries a specific force\n  help: {FIELD} accel=PATH or {ACCEL_TOPIC} NAME says where it is, {without}",
+            Err(Unaided::NoForce) => Err(Diagnostic::new(format!(
+                "{asked}: none of the first {} samples carries a specific force",
                 first.len()
-            )),
+            ))
+            .help(format!(
+                "{FIELD} accel=PATH or {ACCEL_TOPIC} NAME says where it is, {without}"
+            ))),
             Err(Unaided::Implausible(why)) if may_do_without => {
-                warnings.push(format!("{why}: the attitude is the gyro's alone"));
+                warnings.push(format!("{why}: the attitude is the gyro's alone").into());
                 Ok(None)
             }
-            Err(Unaided::Implausible(why)) => Err(format!(
-                "{asked}: {why}\n  help: {FIELD} accel=PATH or {ACCEL_TOPIC} NAME names another, {without}"
+            Err(Unaided::Implausible(why)) => Err(Diagnostic::new(format!("{asked}: {why}")).help(
+                format!("{FIELD} accel=PATH or {ACCEL_TOPIC} NAME names another, {without}"),
             )),
         }
     }
@@ -125,7 +129,7 @@ impl Aiding {
         plan: &Plan,
         resolved: &Meaning,
         first: &[RawSample],
-        warnings: &mut Vec<String>,
+        warnings: &mut Vec<Diagnostic>,
     ) -> Result<Aiding, Unaided> {
         if plan.has_forces_beside {
             // Its unit shows in its first, its plausibility in the filter.
@@ -149,7 +153,7 @@ impl Aiding {
         if scale != 1.0 {
             warnings.push(format!(
                 "the first specific force has length {length:.3}: taken to be in g, not in m/s^2"
-            ));
+            ).into());
         }
         let is_plausible = if first.len() > 1 {
             // Who stands first and then runs has gravity in the middle one.

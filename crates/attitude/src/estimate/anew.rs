@@ -9,6 +9,7 @@ use super::plan::{Initial, Plan};
 use super::preparation::{Prepared, decide_initial, learned_on_the_way};
 use crate::aid::Start;
 use crate::condition::stillness::Rests;
+use crate::diagnostic::Diagnostic;
 use crate::frames::{Body, Nav};
 use crate::quaternion::Quaternion;
 use crate::record::RawSample;
@@ -37,12 +38,17 @@ impl Anew {
         resolved: &Meaning,
         prepared: &Prepared,
         next: &RawSample,
-    ) -> Result<Anew, String> {
+    ) -> Result<Anew, Diagnostic> {
         let aiding = prepared.aiding.as_ref();
         if initial == Initial::Gravity && aiding.is_none() {
-            return Err(format!(
-                "gravity: nothing levels this sensor's attitude ({AID} none, or it carries no specific force)\n  help: identity, q=w,x,y,z or rpy=roll,pitch,yaw"
-            ));
+            return Err(
+                Diagnostic::new(format!(
+                    "gravity: nothing levels this sensor's attitude ({AID} none, or it carries no specific force)"
+                ))
+                .help(
+                    "identity, q=w,x,y,z or rpy=roll,pitch,yaw",
+                )
+            );
         }
         let plan = learned_on_the_way(&Plan {
             initial,

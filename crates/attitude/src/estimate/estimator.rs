@@ -14,6 +14,7 @@ use super::smoothing::{Recording, Smoothing, Told};
 use crate::aid::{self, Aided};
 use crate::condition::regularise::{self, Regulariser};
 use crate::condition::{self, Clock, Conditioner};
+use crate::diagnostic::Diagnostic;
 use crate::frames::{In, Nav};
 use crate::propagate::{self, Executor, Method, Propagator};
 use crate::quaternion::{BodyRate, Quaternion, RotationVector};
@@ -97,7 +98,11 @@ impl Estimator {
     ///
     /// # Errors
     /// In words, with the flag that helps: settings that can not be.
-    pub fn new(plan: &Plan, resolved: &Meaning, prepared: &Prepared) -> Result<Estimator, String> {
+    pub fn new(
+        plan: &Plan,
+        resolved: &Meaning,
+        prepared: &Prepared,
+    ) -> Result<Estimator, Diagnostic> {
         if matches!(
             plan.method,
             Method::Live { .. } | Method::CommitProvisional { .. }
@@ -113,7 +118,11 @@ impl Estimator {
     ///
     /// # Errors
     /// As [`Estimator::new`].
-    pub fn live(plan: &Plan, resolved: &Meaning, prepared: &Prepared) -> Result<Estimator, String> {
+    pub fn live(
+        plan: &Plan,
+        resolved: &Meaning,
+        prepared: &Prepared,
+    ) -> Result<Estimator, Diagnostic> {
         let settings = condition::Settings {
             reorder_window: condition::Settings::LIVE_WINDOW,
             ..conditioning(plan, resolved, prepared)
@@ -126,7 +135,7 @@ impl Estimator {
         resolved: &Meaning,
         prepared: &Prepared,
         settings: &condition::Settings,
-    ) -> Result<Estimator, String> {
+    ) -> Result<Estimator, Diagnostic> {
         // What corrects the attitude has a noise of its own.
         let noise = match (prepared.aiding.is_some(), plan.initial) {
             (true, _) => Noise {
@@ -180,7 +189,7 @@ impl Estimator {
                 }
             }),
         }
-        .map_err(|e| e.to_string())?;
+        .map_err(|e| Diagnostic::from(&e))?;
         Ok(Estimator {
             settings: told_apart(&format!(
                 "{} {:?} {:?} {noise:?}{}{}",
@@ -229,7 +238,7 @@ impl Estimator {
     ///
     /// # Errors
     /// In words: it is no rotation.
-    pub fn resume(&mut self, last: &AttitudeSample) -> Result<(), String> {
+    pub fn resume(&mut self, last: &AttitudeSample) -> Result<(), Diagnostic> {
         let last = self.asked.undone(last);
         self.integrator.resume(&last)
     }
@@ -486,7 +495,7 @@ impl Estimator {
     /// # Errors
     /// In words: why it made nothing of it. The attitudes are the filter's then, to the bit.
     #[must_use]
-    pub fn smoothed(&self) -> Option<Result<&Recording, &str>> {
+    pub fn smoothed(&self) -> Option<Result<&Recording, &Diagnostic>> {
         self.integrator.smoothed()
     }
 

@@ -7,6 +7,7 @@ use super::meaning::Meaning;
 use super::plan::Plan;
 use crate::condition::stillness::{Limits, Rests, Stillness};
 use crate::condition::{Conditioner, choose_clock};
+use crate::diagnostic::Diagnostic;
 use crate::quaternion::BodyRate;
 use crate::record::{RateSample, RawSample};
 
@@ -40,7 +41,11 @@ impl Conditioned {
     ///
     /// # Errors
     /// In words, when the settings do not fit.
-    pub fn push(&mut self, raw: &[RawSample], take: impl FnMut(&RateSample)) -> Result<(), String> {
+    pub fn push(
+        &mut self,
+        raw: &[RawSample],
+        take: impl FnMut(&RateSample),
+    ) -> Result<(), Diagnostic> {
         match &mut self.running {
             Some(conditioner) => conditioner.push(raw, &mut self.rates),
             None => {
@@ -58,7 +63,7 @@ impl Conditioned {
     ///
     /// # Errors
     /// In words, when the settings do not fit.
-    pub fn finish(&mut self, take: impl FnMut(&RateSample)) -> Result<(), String> {
+    pub fn finish(&mut self, take: impl FnMut(&RateSample)) -> Result<(), Diagnostic> {
         if self.running.is_none() {
             self.begin()?;
         }
@@ -69,7 +74,7 @@ impl Conditioned {
         Ok(())
     }
 
-    fn begin(&mut self) -> Result<(), String> {
+    fn begin(&mut self) -> Result<(), Diagnostic> {
         let gathered = std::mem::take(&mut self.gathered);
         let (clock, _) = choose_clock(&gathered, self.plan.clock);
         let settings = self
@@ -106,7 +111,7 @@ impl RestPass {
     ///
     /// # Errors
     /// In words, when the settings do not fit.
-    pub(super) fn push(&mut self, raw: &[RawSample]) -> Result<(), String> {
+    pub(super) fn push(&mut self, raw: &[RawSample]) -> Result<(), Diagnostic> {
         let RestPass {
             conditioned,
             detector,
@@ -118,7 +123,7 @@ impl RestPass {
     ///
     /// # Errors
     /// As [`RestPass::push`].
-    pub(super) fn finish(mut self) -> Result<Rests, String> {
+    pub(super) fn finish(mut self) -> Result<Rests, Diagnostic> {
         self.conditioned
             .finish(|sample| self.detector.push(sample))?;
         Ok(self.detector.finish())

@@ -6,6 +6,7 @@ use super::anew::Anew;
 use super::kept::{Spool, SpoolError};
 use super::smoothing::{Recording, Smoothing};
 use crate::aid::{self, Aided};
+use crate::diagnostic::Diagnostic;
 use crate::frames::{Body, In};
 use crate::propagate::{self, Executor, Method, Propagator};
 use crate::record::{AttitudeSample, Nanos, RateSample};
@@ -95,15 +96,15 @@ impl Integrator {
     ///
     /// # Errors
     /// In words.
-    pub(super) fn resume(&mut self, last: &AttitudeSample) -> Result<(), String> {
+    pub(super) fn resume(&mut self, last: &AttitudeSample) -> Result<(), Diagnostic> {
         match self {
             Integrator::Alone(propagator) => propagator.resume(last),
             Integrator::Aided(aided) => aided.resume(last),
             Integrator::Smoothed(_) => {
-                return Err("a smoothed recording has no attitude to go on from".to_owned());
+                return Err("a smoothed recording has no attitude to go on from".into());
             }
         }
-        .map_err(|e| e.to_string())
+        .map_err(|e| Diagnostic::from(&e))
     }
 
     pub(super) fn memory(&self) -> Option<(propagate::Memory, Option<aid::Memory>)> {
@@ -173,7 +174,7 @@ impl Integrator {
     }
 
     /// `None` where nobody asked for a smoother, or the end has not come.
-    pub(super) fn smoothed(&self) -> Option<Result<&Recording, &str>> {
+    pub(super) fn smoothed(&self) -> Option<Result<&Recording, &Diagnostic>> {
         match self {
             Integrator::Smoothed(smoothing) => smoothing.result(),
             Integrator::Alone(_) | Integrator::Aided(_) => None,

@@ -4,6 +4,7 @@
 //! every step a gap, and nothing behind it can tell; and because a daemon looks at them, too.
 
 use crate::condition::Clock;
+use crate::diagnostic::Diagnostic;
 use crate::digits::significant;
 use crate::record::TimeUnit;
 use crate::record::{RawSample, SampleKind};
@@ -61,7 +62,7 @@ impl Mismatch {
 
     /// Why the samples can not be used as they are, with the flags that help; `read` is where the
     /// interval lies and the unit it was read in.
-    pub(super) fn refusal(&self, read: Option<&(String, TimeUnit)>) -> String {
+    pub(super) fn refusal(&self, read: Option<&(String, TimeUnit)>) -> Diagnostic {
         let (path, unit) = match read {
             Some((path, unit)) => (path.as_str(), *unit),
             None => ("PATH", TimeUnit::Second),
@@ -80,9 +81,12 @@ impl Mismatch {
             || "no unit makes them agree".to_owned(),
             |(name, _)| format!("{FIELD} dt={path}:{name} reads it in {name}, which fits"),
         );
-        format!(
-            "{self}: one of the two is wrong, or most samples were left out\n  help: {other}; {FIELD} dt={path}:{own} takes it as it is and bridges the rest; {SAMPLE_KIND} rate leaves it aside; {TIME} log takes other stamps"
-        )
+        Diagnostic::new(format!(
+            "{self}: one of the two is wrong, or most samples were left out"
+        ))
+        .help(format!(
+            "{other}; {FIELD} dt={path}:{own} takes it as it is and bridges the rest; {SAMPLE_KIND} rate leaves it aside; {TIME} log takes other stamps"
+        ))
     }
 }
 

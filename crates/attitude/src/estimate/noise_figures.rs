@@ -4,6 +4,7 @@
 //! data sheet, or from an Allan deviation, means one thing everywhere.
 
 use super::Noise;
+use crate::diagnostic::Diagnostic;
 use std::f64::consts::PI;
 
 const DEG: f64 = PI / 180.0;
@@ -53,24 +54,24 @@ impl Noise {
     pub fn of_figures<'a>(
         name: &str,
         given: impl IntoIterator<Item = (&'a str, [f64; 3])>,
-    ) -> Result<Noise, String> {
+    ) -> Result<Noise, Diagnostic> {
         let mut found: [Option<[f64; 3]>; NOISE_FIGURES.len()] = [None; NOISE_FIGURES.len()];
         for (key, axes) in given {
             let key = key.replace('_', "-");
             let slot = found.iter_mut().zip(&NOISE_FIGURES);
             let Some((slot, figure)) = slot.into_iter().find(|(_, figure)| figure.key == key)
             else {
-                return Err(format!("`{key}` is no class and no figure of noise"));
+                return Err(format!("`{key}` is no class and no figure of noise").into());
             };
             if axes.iter().any(|v| !v.is_finite() || *v < 0.0) {
-                return Err(format!("{key} is a number from 0 up, in {}", figure.unit));
+                return Err(format!("{key} is a number from 0 up, in {}", figure.unit).into());
             }
             let [x, y, z] = axes;
             if !figure.by_axis && (x != y || y != z) {
-                return Err(format!("{key} is one number"));
+                return Err(format!("{key} is one number").into());
             }
             if slot.replace(axes.map(|v| v * figure.si)).is_some() {
-                return Err(format!("{key} is given twice"));
+                return Err(format!("{key} is given twice").into());
             }
         }
         let [
@@ -139,7 +140,7 @@ mod tests {
             ),
         ] {
             let refused = Noise::of_figures("list", given.iter().copied()).unwrap_err();
-            assert!(refused.contains(said), "{given:?}: {refused}");
+            assert!(refused.what().contains(said), "{given:?}: {refused}");
         }
     }
 }

@@ -5,6 +5,7 @@
 
 use super::sensor_calibration::SensorCalibration;
 use crate::condition::{self, Clock, GyroUnit, OnGap};
+use crate::diagnostic::Diagnostic;
 use crate::frames::{Body, BodyAxes, Nav, Sensor};
 use crate::propagate::{self, Method, Propagator};
 use crate::quaternion::{BodyRate, Quaternion};
@@ -159,7 +160,7 @@ impl Plan {
     ///
     /// # Errors
     /// In words, naming the flag.
-    pub fn check(&self) -> Result<(), String> {
+    pub fn check(&self) -> Result<(), Diagnostic> {
         let conditioning = condition::Settings {
             clock: self.clock,
             max_gap_secs: self.max_gap_secs,
@@ -175,19 +176,23 @@ impl Plan {
         };
         conditioning.validate().map_err(|e| e.to_string())?;
         if self.sensor_delay_secs.is_nan() || self.sensor_delay_secs.abs() > LONGEST_DELAY {
-            return Err(format!(
-                "{SENSOR_DELAY}: {} s is no delay of a sensor\n  help: seconds, at most {LONGEST_DELAY}: 0.0023 for 2.3 ms",
+            return Err(Diagnostic::new(format!(
+                "{SENSOR_DELAY}: {} s is no delay of a sensor",
                 self.sensor_delay_secs
-            ));
+            ))
+            .help(format!(
+                "seconds, at most {LONGEST_DELAY}: 0.0023 for 2.3 ms"
+            )));
         }
         self.check_earth_rate()?;
         self.check_field()?;
         self.check_calibration()?;
         self.check_smoothing()?;
         if self.regularise_stamps && matches!(self.clock, Clock::Index { .. }) {
-            return Err(format!(
-                "{REGULARISE_STAMPS}: the stamps of {TIME} index are even already\n  help: leave one of the two out"
-            ));
+            return Err(Diagnostic::new(format!(
+                "{REGULARISE_STAMPS}: the stamps of {TIME} index are even already"
+            ))
+            .help("leave one of the two out"));
         }
         Propagator::new(propagate::Settings {
             method: self.method,
@@ -197,114 +202,134 @@ impl Plan {
             noise: self.noise.with_bias(self.noise.unremoved_bias()),
             ..propagate::Settings::default()
         })
-        .map_err(|e| e.to_string())?;
+        .map_err(|e| Diagnostic::from(&e))?;
         Ok(())
     }
 
     /// A field needs stamps to find its gyro sample by, and a declination a field.
-    fn check_field(&self) -> Result<(), String> {
+    fn check_field(&self) -> Result<(), Diagnostic> {
         let has_field = self.aid == Aid::GravityAndField;
         if self.declination != 0.0 && !has_field {
-            return Err(format!(
-                "{DECLINATION}: only a heading by the magnetic field has one\n  help: {AID} gravity+mag"
-            ));
+            return Err(Diagnostic::new(format!(
+                "{DECLINATION}: only a heading by the magnetic field has one"
+            ))
+            .help(format!("{AID} gravity+mag")));
         }
         if self.declination.is_nan() || self.declination.abs() > std::f64::consts::PI {
             return Err(format!(
                 "{DECLINATION}: degrees from -180 to 180, east of true north positive"
-            ));
+            )
+            .into());
         }
         if self.mag_hard_iron != 0.0 && !has_field {
-            return Err(format!(
-                "{MAG_HARD_IRON}: no magnetic field is used\n  help: {AID} gravity+mag"
-            ));
+            return Err(
+                Diagnostic::new(format!("{MAG_HARD_IRON}: no magnetic field is used"))
+                    .help(format!("{AID} gravity+mag")),
+            );
         }
         if !(0.0..=1.0).contains(&self.mag_hard_iron) {
             return Err(format!(
                 "{MAG_HARD_IRON}: one standard deviation as a share of the field, from 0 to 1: 0.05"
-            ));
+            )
+            .into());
         }
         if self.mag_mount.is_some() && !has_field {
-            return Err(format!(
-                "{MAG_MOUNT}: no magnetic field is used\n  help: {AID} gravity+mag"
-            ));
+            return Err(
+                Diagnostic::new(format!("{MAG_MOUNT}: no magnetic field is used"))
+                    .help(format!("{AID} gravity+mag")),
+            );
         }
         let is_beside = has_field || self.has_forces_beside;
         if is_beside && matches!(self.clock, Clock::Index { .. }) {
-            return Err(format!(
-                "{TIME} index: samples without stamps can not be paired with a field, or a specific force of its own\n  help: {TIME} header, log or publish"
-            ));
+            return Err(
+                Diagnostic::new(format!(
+                    "{TIME} index: samples without stamps can not be paired with a field, or a specific force of its own"
+                ))
+                .help(format!(
+                    "{TIME} header, log or publish"
+                ))
+            );
         }
         if has_field && self.world == World::Level {
-            return Err(format!(
-                "{WORLD} level: with a magnetic field the heading is that of north\n  help: {WORLD} enu, ned or nwu; {AID} gravity for the heading of the start"
-            ));
+            return Err(Diagnostic::new(format!(
+                "{WORLD} level: with a magnetic field the heading is that of north"
+            ))
+            .help(format!(
+                "{WORLD} enu, ned or nwu; {AID} gravity for the heading of the start"
+            )));
         }
         Ok(())
     }
 
     /// A calibration is one of a sensor, and says no other bias than `--bias`.
-    fn check_calibration(&self) -> Result<(), String> {
+    fn check_calibration(&self) -> Result<(), Diagnostic> {
         let Some(known) = &self.calibration else {
             return Ok(());
         };
         known.check().map_err(|e| format!("{CALIBRATION}: {e}"))?;
         if known.bias.is_some() && matches!(self.bias, Bias::Given(_)) {
-            return Err(format!(
-                "{BIAS} x,y,z: the calibration says a bias, too\n  help: leave {BIAS} out, or `bias` out of the file; {BIAS} auto takes that of the rest in this log"
-            ));
+            return Err(
+                Diagnostic::new(format!(
+                    "{BIAS} x,y,z: the calibration says a bias, too"
+                ))
+                .help(format!(
+                    "leave {BIAS} out, or `bias` out of the file; {BIAS} auto takes that of the rest in this log"
+                ))
+            );
         }
         Ok(())
     }
 
     /// A smoother needs forces, and integrates by itself.
-    fn check_smoothing(&self) -> Result<(), String> {
+    fn check_smoothing(&self) -> Result<(), Diagnostic> {
         if !self.smooth {
             return Ok(());
         }
         let what = match self {
             Plan { aid: Aid::None, .. } => {
-                format!(
-                    "{AID} none: a smoother needs the accelerometer\n  help: {AID} gravity or gravity+mag; without {SMOOTH} the gyro alone"
+                Diagnostic::new(format!("{AID} none: a smoother needs the accelerometer")).help(
+                    format!("{AID} gravity or gravity+mag; without {SMOOTH} the gyro alone"),
                 )
             }
-            Plan { method, .. } if *method != Method::Auto => {
-                format!(
-                    "{METHOD}: a smoother integrates between its nodes by itself\n  help: leave one of the two out"
-                )
-            }
+            Plan { method, .. } if *method != Method::Auto => Diagnostic::new(format!(
+                "{METHOD}: a smoother integrates between its nodes by itself"
+            ))
+            .help("leave one of the two out"),
             Plan {
                 latitude_deg: Some(_),
                 ..
-            } => {
-                format!(
-                    "{EARTH_RATE}: the smoother takes the Earth's rotation for bias\n  help: leave one of the two out"
-                )
-            }
-            Plan { mag_hard_iron, .. } if *mag_hard_iron != 0.0 => {
-                format!(
-                    "{MAG_HARD_IRON}: a smoother learns the magnetometer's errors by itself\n  help: leave it out"
-                )
-            }
+            } => Diagnostic::new(format!(
+                "{EARTH_RATE}: the smoother takes the Earth's rotation for bias"
+            ))
+            .help("leave one of the two out"),
+            Plan { mag_hard_iron, .. } if *mag_hard_iron != 0.0 => Diagnostic::new(format!(
+                "{MAG_HARD_IRON}: a smoother learns the magnetometer's errors by itself"
+            ))
+            .help("leave it out"),
             _ => return Ok(()),
         };
-        Err(format!("{SMOOTH} with {what}"))
+        Err(format!("{SMOOTH} with {what}").into())
     }
 
     /// `--earth-rate` needs a latitude that is one, and a world in which the Earth's axis has a place.
-    fn check_earth_rate(&self) -> Result<(), String> {
+    fn check_earth_rate(&self) -> Result<(), Diagnostic> {
         let Some(latitude) = self.latitude_deg else {
             return Ok(());
         };
         if !(-90.0..=90.0).contains(&latitude) {
             return Err(format!(
                 "{EARTH_RATE} {latitude}: a latitude lies between -90 and 90 degrees, north positive"
-            ));
+            ).into());
         }
         if self.world == World::Start {
-            return Err(format!(
-                "{EARTH_RATE}: in {WORLD} start nobody knows where north and up are, and so not how the Earth turns\n  help: {WORLD} enu (or ned, nwu) with {INIT} first-orientation, q=w,x,y,z, rpy=roll,pitch,yaw, or gravity where the heading is 0"
-            ));
+            return Err(
+                Diagnostic::new(format!(
+                    "{EARTH_RATE}: in {WORLD} start nobody knows where north and up are, and so not how the Earth turns"
+                ))
+                .help(format!(
+                    "{WORLD} enu (or ned, nwu) with {INIT} first-orientation, q=w,x,y,z, rpy=roll,pitch,yaw, or gravity where the heading is 0"
+                ))
+            );
         }
         Ok(())
     }

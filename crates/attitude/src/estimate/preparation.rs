@@ -12,6 +12,7 @@ use super::stamps::{StampPass, Stamps};
 use crate::condition::stillness::{self, Limits, NoRest, Rests};
 use crate::condition::truncation::Grid;
 use crate::condition::{Clock, ClockWarning, choose_clock};
+use crate::diagnostic::Diagnostic;
 use crate::frames::{Body, In, Nav};
 use crate::propagate::Method;
 use crate::quaternion::{BodyRate, Quaternion, YawPitchRoll};
@@ -55,7 +56,7 @@ pub struct Prepared {
     /// Step in which the driver cut the rates, rad/s, where that is undone.
     pub truncation_step: Option<f64>,
     /// Things to know.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Diagnostic>,
 }
 
 /// How long rest is sought.
@@ -124,7 +125,7 @@ impl Preparation {
     ///
     /// # Errors
     /// In words, when the settings do not fit.
-    pub fn take(&mut self, raw: &RawSample) -> Result<(), String> {
+    pub fn take(&mut self, raw: &RawSample) -> Result<(), Diagnostic> {
         if raw.is_beside {
             let is_force = raw.accel.is_some();
             self.forces_beside[0] |= is_force;
@@ -182,7 +183,7 @@ impl Preparation {
     ///
     /// # Errors
     /// In words: no usable stamps, no rest, no orientation, and the flag that helps.
-    pub fn decide(self) -> Result<Prepared, String> {
+    pub fn decide(self) -> Result<Prepared, Diagnostic> {
         let Preparation {
             plan,
             resolved,
@@ -198,14 +199,14 @@ impl Preparation {
         let is_known = known.is_some();
         let (clock, warning) = choose_clock(&first, plan.clock);
         if let Some(fatal @ ClockWarning::NoneMoves) = warning {
-            return Err(fatal.to_string());
+            return Err(Diagnostic::from(&fatal));
         }
-        let mut warnings: Vec<String> = warning.iter().map(ToString::to_string).collect();
+        let mut warnings: Vec<Diagnostic> = warning.iter().map(Diagnostic::from).collect();
         if let Some(mismatch) = Mismatch::between(&first, clock, resolved.kind) {
             if !resolved.interval_unit_given {
                 return Err(mismatch.refusal(resolved.interval.as_ref()));
             }
-            warnings.push(format!("{mismatch}: what lies between is bridged"));
+            warnings.push(format!("{mismatch}: what lies between is bridged").into());
         }
         let rests = rest.map_or_else(|| Ok(Rests::default()), RestPass::finish)?;
         // The method of a daemon decides as a daemon: by the first sample.
@@ -243,7 +244,7 @@ impl Preparation {
                 }),
                 Patience::FirstMinute,
             ) if !is_known => {
-                warnings.push(format!("{REGULARISE_STAMPS}: this stream can be read only once, so each stamp was filtered by those before it; a file is fitted as a whole, which is more accurate and gives other numbers"));
+                warnings.push(format!("{REGULARISE_STAMPS}: this stream can be read only once, so each stamp was filtered by those before it; a file is fitted as a whole, which is more accurate and gives other numbers").into());
                 Stamps::Causal { states_interval }
             }
             (Some(stamps), _) => stamps,
@@ -296,7 +297,7 @@ pub fn at_once(
     plan: &Plan,
     resolved: &Meaning,
     together: &[RawSample],
-) -> Result<Prepared, String> {
+) -> Result<Prepared, Diagnostic> {
     let asked = plan;
     let is_force = |raw: &RawSample| raw.is_beside && raw.accel.is_some();
     let first = together.iter().find(|raw| !raw.is_beside);
@@ -311,9 +312,14 @@ pub fn at_once(
     let first_alone = std::slice::from_ref(first);
     let aiding = Aiding::decide(plan, resolved, first_alone, &mut warnings)?;
     if aiding.is_none() && needs_rest(asked) {
-        return Err(format!(
-            "{BIAS} auto and {INIT} gravity: without a specific force that corrects it the attitude needs to be found at rest beforehand, and a live stream waits for nothing\n  help: {AID} gravity with a sensor that carries `accel` learns both on the way; else measure once (`strapd info LOG` shows the bias) and give {BIAS} x,y,z; {INIT} rpy=roll,pitch,yaw or identity"
-        ));
+        return Err(
+            Diagnostic::new(format!(
+                "{BIAS} auto and {INIT} gravity: without a specific force that corrects it the attitude needs to be found at rest beforehand, and a live stream waits for nothing"
+            ))
+            .help(format!(
+                "{AID} gravity with a sensor that carries `accel` learns both on the way; else measure once (`strapd info LOG` shows the bias) and give {BIAS} x,y,z; {INIT} rpy=roll,pitch,yaw or identity"
+            ))
+        );
     }
     let (initial, initial_origin, world) = decide_initial(
         (plan, aiding.as_ref()),
@@ -372,8 +378,8 @@ fn looks_for_truncation(plan: &Plan) -> bool {
 fn decide_truncation(
     plan: &Plan,
     rates: Option<&[[f64; 3]]>,
-    warnings: &mut Vec<String>,
-) -> Result<Option<f64>, String> {
+    warnings: &mut Vec<Diagnostic>,
+) -> Result<Option<f64>, Diagnostic> {
     let known = plan.calibration.as_ref().and_then(|known| known.step());
     let is_asked = plan.truncation == Truncation::On;
     match plan.truncation {
@@ -391,7 +397,7 @@ fn decide_truncation(
             warnings.push(format!(
                 "the driver cut the rates towards zero in steps of {degrees:.4} deg/s{why}: half a step was put back; {UNDO_TRUNCATION} off leaves them, on={:.6e} does it to a stream",
                 grid.step
-            ));
+            ).into());
             Ok(Some(grid.step))
         }
         (
@@ -403,24 +409,34 @@ fn decide_truncation(
         ) => {
             warnings.push(format!(
                 "{CALIBRATION}: its truncation_step was not used: these rates were not cut (the bin about zero is {ratio:.1} times as wide as the others); {UNDO_TRUNCATION} on=STEP insists"
-            ));
+            ).into());
             Ok(None)
         }
         (_, Some(step)) => {
             warnings.push(format!(
                 "the driver cuts the rates towards zero in steps of {:.4} deg/s, says the calibration: half a step was put back; {UNDO_TRUNCATION} off leaves them",
                 step.to_degrees()
-            ));
+            ).into());
             Ok(Some(step))
         }
         (_, None) if !is_asked => Ok(None),
         (_, None) => Err(match rates {
-            None => format!(
-                "{UNDO_TRUNCATION} on: what can not be read twice does not show its step in time\n  help: on=STEP in rad/s, as `strapd replay` of a file says it, or a {CALIBRATION} with its truncation_step"
-            ),
-            Some(_) => format!(
-                "{UNDO_TRUNCATION} on: these rates count in no steps\n  help: on=STEP in rad/s states them, off leaves the rates alone"
-            ),
+            None => {
+                Diagnostic::new(format!(
+                    "{UNDO_TRUNCATION} on: what can not be read twice does not show its step in time"
+                ))
+                .help(format!(
+                    "on=STEP in rad/s, as `strapd replay` of a file says it, or a {CALIBRATION} with its truncation_step"
+                ))
+            }
+            Some(_) => {
+                Diagnostic::new(format!(
+                    "{UNDO_TRUNCATION} on: these rates count in no steps"
+                ))
+                .help(
+                    "on=STEP in rad/s states them, off leaves the rates alone",
+                )
+            }
         }),
     }
 }
@@ -432,7 +448,7 @@ fn decide_bias(
     (plan, resolved): (&Plan, &Meaning),
     rests: &Rests,
     earth: Option<Vector3<f64>>,
-) -> Result<(BodyRate, Vector3<f64>, String), String> {
+) -> Result<(BodyRate, Vector3<f64>, String), Diagnostic> {
     match plan.bias {
         Bias::None => Ok(match resolved.calibrated_bias(&plan.noise) {
             Some((bias, sigma)) => (BodyRate(bias), sigma, "as calibrated".to_owned()),
@@ -481,8 +497,8 @@ pub(super) fn decide_initial(
     resolved: &Meaning,
     gathered: &[RawSample],
     rests: &Rests,
-    warnings: &mut Vec<String>,
-) -> Result<(Quaternion<Nav, Body>, String, World), String> {
+    warnings: &mut Vec<Diagnostic>,
+) -> Result<(Quaternion<Nav, Body>, String, World), Diagnostic> {
     // What the user gives is in the convention of the world asked for.
     let asked = plan.world.convention().unwrap_or(Convention::EnuFlu);
     let inside = |q: Quaternion<Nav, Body>| asked.convert(Convention::EnuFlu, q);
@@ -496,9 +512,12 @@ pub(super) fn decide_initial(
     match plan.initial {
         Initial::Identity | Initial::Gravity if has_field => {
             if plan.declination == 0.0 {
-                warnings.push(format!(
-                    "{world}: north is magnetic north; {DECLINATION} DEG makes it true north"
-                ));
+                warnings.push(
+                    format!(
+                        "{world}: north is magnetic north; {DECLINATION} DEG makes it true north"
+                    )
+                    .into(),
+                );
             }
             Ok((
                 Quaternion::identity(),
@@ -510,7 +529,7 @@ pub(super) fn decide_initial(
             if world != World::Level {
                 warnings.push(format!(
                     "the heading at the first sample was taken as 0 in {world}: gravity does not tell it; {INIT} first-orientation, q=.. or rpy=.. gives a real one"
-                ));
+                ).into());
             }
             Ok((
                 inside(Quaternion::identity()),
@@ -523,7 +542,7 @@ pub(super) fn decide_initial(
                 warnings.push(format!(
                     "the initial attitude was taken as identity in {}: {INIT} gravity, first-orientation, q=.. or rpy=.. gives a real one",
                     plan.world
-                ));
+                ).into());
             }
             Ok((
                 inside(Quaternion::identity()),
@@ -550,7 +569,12 @@ pub(super) fn decide_initial(
                 .filter_map(|s| s.orientation)
                 .find_map(|wxyz| resolved.recorded_attitude(wxyz));
             let q = found.ok_or_else(|| {
-                format!("{INIT} first-orientation: the first samples carry no orientation\n  help: {INIT} gravity, identity, q=w,x,y,z or rpy=roll,pitch,yaw")
+                Diagnostic::new(format!(
+                    "{INIT} first-orientation: the first samples carry no orientation"
+                ))
+                .help(format!(
+                    "{INIT} gravity, identity, q=w,x,y,z or rpy=roll,pitch,yaw"
+                ))
             })?;
             let world = match (plan.world, resolved.recorded) {
                 (World::Start | World::Level, Convention::NedFrd) => World::Ned,
@@ -584,7 +608,7 @@ impl Earth {
     }
 
     /// What it means that nobody said where the body heads.
-    fn heading_warning(self, initial: Initial) -> Option<String> {
+    fn heading_warning(self, initial: Initial) -> Option<Diagnostic> {
         let why = match initial {
             Initial::Gravity => format!("{INIT} gravity knows no heading, 0 was taken"),
             Initial::Identity => format!("{INIT} identity has heading 0"),
@@ -592,33 +616,38 @@ impl Earth {
         };
         let deg_per_h = |w: f64| w.to_degrees() * 3600.0;
         let level = deg_per_h(worlds::EARTH_RATE * self.latitude.cos().abs());
-        Some(format!(
-            "{EARTH_RATE}: {why}: a heading off by 10 degrees leaves {:.1} deg/h of the Earth's rotation, any other at most {:.1} (where nothing taken out leaves {:.1})\n  help: {INIT} first-orientation, q=w,x,y,z or rpy=roll,pitch,yaw states it",
-            2.0 * level * 5_f64.to_radians().sin(),
-            2.0 * level,
-            deg_per_h(worlds::EARTH_RATE),
-        ))
+        Some(
+            Diagnostic::new(format!(
+                "{EARTH_RATE}: {why}: a heading off by 10 degrees leaves {:.1} deg/h of the Earth's rotation, any other at most {:.1} (where nothing taken out leaves {:.1})",
+                2.0 * level * 5_f64.to_radians().sin(),
+                2.0 * level,
+                deg_per_h(worlds::EARTH_RATE)
+            ))
+            .help(format!(
+                "{INIT} first-orientation, q=w,x,y,z or rpy=roll,pitch,yaw states it"
+            ))
+        )
     }
 }
 
 /// Why `--bias auto` with `--earth-rate` can not be.
-fn not_at_start(why: &NoRest) -> String {
-    let said = why.to_string();
-    let why = said.lines().next().unwrap_or_default();
-    format!(
-        "{BIAS} auto with {EARTH_RATE}: {why}; only at the start is the attitude known, and without it a bias and the Earth's rotation are the same\n  help: {START} SECS begins at a rest, {BIAS} x,y,z (rad/s) gives the bias"
-    )
+fn not_at_start(why: &NoRest) -> Diagnostic {
+    let why = Diagnostic::from(why);
+    let why = why.what();
+    Diagnostic::new(format!(
+        "{BIAS} auto with {EARTH_RATE}: {why}; only at the start is the attitude known, and without it a bias and the Earth's rotation are the same"
+    ))
+    .help(format!(
+        "{START} SECS begins at a rest, {BIAS} x,y,z (rad/s) gives the bias"
+    ))
 }
 
 /// Why `--init gravity` can not be. The reasons are those of a bias, the ways out are not.
-fn not_level(why: &NoRest) -> String {
-    let said = format!("{INIT} gravity: {why}");
+fn not_level(why: &NoRest) -> Diagnostic {
+    let said = Diagnostic::from(why).at(format_args!("{INIT} gravity"));
     match why {
         NoRest::Moving { .. } | NoRest::Disagree { .. } => {
-            let why = said.lines().next().unwrap_or_default();
-            format!(
-                "{why}\n  help: {INIT} identity starts unlevelled, {INIT} rpy=roll,pitch,yaw (degrees) as you say; if the rates look too large, {GYRO_UNIT} deg"
-            )
+            said.help(format!("{INIT} identity starts unlevelled, {INIT} rpy=roll,pitch,yaw (degrees) as you say; if the rates look too large, {GYRO_UNIT} deg"))
         }
         NoRest::NotAtStart { .. } | NoRest::NoAccel => said,
     }

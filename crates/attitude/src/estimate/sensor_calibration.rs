@@ -3,6 +3,7 @@
 //! Apart from what the filter knows ([`crate::aid::Calibration`]) because it outlives a run and a mounting: sensor
 //! axes as recorded, everything that was taken out before, and how well each number is known.
 
+use crate::diagnostic::Diagnostic;
 use crate::estimate::Noise;
 use crate::setting::CALIBRATION;
 use nalgebra::{Matrix3, Vector3};
@@ -40,19 +41,21 @@ impl<const N: usize> Known<N> {
         (0..N).all(|i| self.sigma_of(i).is_none())
     }
 
-    fn check(&self, key: &str, unit: &str, largest: f64) -> Result<(), String> {
+    fn check(&self, key: &str, unit: &str, largest: f64) -> Result<(), Diagnostic> {
         for value in self.value {
             if value.is_nan() || value.abs() > largest {
                 return Err(format!(
                     "`{key}`: {value} is no error of a sensor; at most {largest} {unit}"
-                ));
+                )
+                .into());
             }
         }
         for sigma in self.sigma.iter().flatten() {
             if !(*sigma > 0.0 && *sigma <= largest) {
                 return Err(format!(
                     "`{key}`: sigma {sigma} is none; above 0, at most {largest} {unit}"
-                ));
+                )
+                .into());
             }
         }
         Ok(())
@@ -103,13 +106,13 @@ impl SensorCalibration {
     ///
     /// # Errors
     /// In words, naming the key.
-    pub fn check(&self) -> Result<(), String> {
+    pub fn check(&self) -> Result<(), Diagnostic> {
         fn of<const N: usize>(
             known: &Option<Known<N>>,
             key: &str,
             unit: &str,
             largest: f64,
-        ) -> Result<(), String> {
+        ) -> Result<(), Diagnostic> {
             known
                 .as_ref()
                 .map_or(Ok(()), |k| k.check(key, unit, largest))
@@ -124,7 +127,7 @@ impl SensorCalibration {
         of(&self.field_lead, "mag_lead", "s", LEAD)?;
         of(&self.truncation_step, "truncation_step", "rad/s", STEP)?;
         if self.step().is_some_and(|step| step <= 0.0) {
-            return Err("`truncation_step`: a step is above 0".to_owned());
+            return Err("`truncation_step`: a step is above 0".into());
         }
         Ok(())
     }

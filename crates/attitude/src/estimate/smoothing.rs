@@ -5,6 +5,7 @@
 
 use super::kept::{Event, Kept, Spool, SpoolError};
 use crate::aid::{Aided, Beside};
+use crate::diagnostic::Diagnostic;
 use crate::frames::{Body, In, Nav};
 use crate::propagate::Executor;
 use crate::quaternion::{BodyRate, Quaternion, RotationVector};
@@ -57,7 +58,7 @@ pub(super) struct Smoothing {
     last: Option<Nanos>,
     told: Told,
     /// Once the end has come; in words why there is none.
-    result: Option<Result<Recording, String>>,
+    result: Option<Result<Recording, Diagnostic>>,
 }
 
 /// A recording that was smoothed.
@@ -187,9 +188,8 @@ impl Smoothing {
     }
 
     /// What was made of it, once the end has come.
-    pub(super) fn result(&self) -> Option<Result<&Recording, &str>> {
-        let result = self.result.as_ref()?;
-        Some(result.as_ref().map_err(String::as_str))
+    pub(super) fn result(&self) -> Option<Result<&Recording, &Diagnostic>> {
+        Some(self.result.as_ref()?.as_ref())
     }
 
     pub(super) fn expect_forces_beside(&mut self) {
@@ -235,7 +235,7 @@ impl Smoothing {
         out.clear();
         let mut result = match self.smooth(exec.threads()) {
             Err(SmoothError::Read(error)) => return Err(error),
-            Err(other) => Err(other.to_string()),
+            Err(other) => Err(Diagnostic::from(&other)),
             Ok(result) => result,
         };
         match &mut result {
@@ -293,7 +293,7 @@ impl Smoothing {
     fn smooth(
         &mut self,
         threads: usize,
-    ) -> Result<Result<Recording, String>, SmoothError<SpoolError>> {
+    ) -> Result<Result<Recording, Diagnostic>, SmoothError<SpoolError>> {
         let is_taken_as_mean = self.told.kind == SampleKind::Rate
             && !self.told.is_kind_stated
             && self.step().is_some_and(|step| step <= SHORT);
@@ -338,11 +338,11 @@ impl Smoothing {
     fn smooth_by(
         &mut self,
         settings: &Settings,
-    ) -> Result<Result<Smoothed, String>, SmoothError<SpoolError>> {
+    ) -> Result<Result<Smoothed, Diagnostic>, SmoothError<SpoolError>> {
         let smoothed = smooth(&mut self.reading(), settings)?;
         Ok(match smoothed.outcome() {
             // As it is without a smoother: nothing that runs along for its sake is better.
-            Outcome::Filter(why) => Err(format!("it did not converge ({why})")),
+            Outcome::Filter(why) => Err(format!("it did not converge ({why})").into()),
             _ => Ok(smoothed),
         })
     }
@@ -483,7 +483,10 @@ mod tests {
         given.unwrap();
         (
             all,
-            smoothing.result().and_then(Result::err).map(str::to_owned),
+            smoothing
+                .result()
+                .and_then(Result::err)
+                .map(ToString::to_string),
         )
     }
 

@@ -7,6 +7,7 @@ use super::first_pass::{Conditioned, FEW};
 use super::meaning::Meaning;
 use super::plan::Plan;
 use crate::condition::regularise::{Lines, Regulariser, Survey, Value};
+use crate::diagnostic::Diagnostic;
 use crate::record::{RawSample, SampleKind};
 use crate::setting::REGULARISE_STAMPS;
 use std::sync::Arc;
@@ -37,7 +38,7 @@ impl Stamps {
     ///
     /// # Errors
     /// In words: no lines for that meaning.
-    pub fn regulariser(&self, kind: SampleKind) -> Result<Option<Regulariser>, String> {
+    pub fn regulariser(&self, kind: SampleKind) -> Result<Option<Regulariser>, Diagnostic> {
         match self {
             Stamps::AsRecorded => Ok(None),
             Stamps::OnLines {
@@ -121,7 +122,7 @@ impl StampPass {
     ///
     /// # Errors
     /// In words, when the settings do not fit.
-    pub fn push(&mut self, raw: &RawSample) -> Result<(), String> {
+    pub fn push(&mut self, raw: &RawSample) -> Result<(), Diagnostic> {
         self.taken += 1;
         self.states_interval |= self.taken <= FEW && raw.interval_nanos.is_some_and(|n| n > 0);
         for (_, conditioned, survey) in &mut self.surveys {
@@ -134,11 +135,11 @@ impl StampPass {
     ///
     /// # Errors
     /// In words: there is no constant rate.
-    pub fn finish(self) -> Result<Stamps, String> {
+    pub fn finish(self) -> Result<Stamps, Diagnostic> {
         let mut lines = Vec::new();
         for (kind, mut conditioned, mut survey) in self.surveys {
             conditioned.finish(|sample| survey.push(sample))?;
-            let found = survey.finish().map_err(|e| e.to_string())?;
+            let found = survey.finish().map_err(|e| Diagnostic::from(&e))?;
             lines.push((kind, Arc::new(found)));
         }
         Ok(Stamps::OnLines {

@@ -3,6 +3,7 @@
 //! Beside `frames` because these labels are chosen at run time (`--body frd`) and types at compile time.
 
 use super::{Body, Dcm, Sensor, quoted};
+use crate::diagnostic::Diagnostic;
 use nalgebra::{Matrix3, Vector3};
 use std::fmt;
 use std::str::FromStr;
@@ -171,24 +172,29 @@ pub enum AxisMapError {
     },
 }
 
-impl fmt::Display for AxisMapError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            AxisMapError::NotAPermutation { text } => write!(
-                f,
-                "`{text}` is not an axis map\n  help: three letters, each axis once, lower case \
-                 negates: `YxZ` means x' = y, y' = -x, z' = z"
-            ),
+impl From<&AxisMapError> for Diagnostic {
+    fn from(error: &AxisMapError) -> Diagnostic {
+        match error {
+            AxisMapError::NotAPermutation { text } => {
+                Diagnostic::new(format!("`{text}` is not an axis map")).help(
+                    "three letters, each axis once, lower case negates: `YxZ` means x' = y, y' = -x, z' = z",
+                )
+            }
             AxisMapError::Mirrors { map } => {
                 let AxisMap([a, b, c]) = *map;
                 let flipped = AxisMap([a, b, c.negated()]);
-                write!(
-                    f,
-                    "axis map `{map}` mirrors: it turns right-handed axes into left-handed ones, \
-                     and no mounting does that\n  help: change the case of one letter, as in `{flipped}`"
-                )
+                Diagnostic::new(format!(
+                    "axis map `{map}` mirrors: it turns right-handed axes into left-handed ones, and no mounting does that"
+                ))
+                .help(format!("change the case of one letter, as in `{flipped}`"))
             }
         }
+    }
+}
+
+impl fmt::Display for AxisMapError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        Diagnostic::from(self).fmt(f)
     }
 }
 

@@ -58,6 +58,7 @@ pub use magnetometer::MagnetometerModel;
 #[cfg(feature = "random")]
 pub use sampling::{StampModel, Tick};
 
+use crate::diagnostic::Diagnostic;
 use std::fmt;
 
 /// Sizes of a sensor's errors, SI: rad, s, m. Zero or `None` = the term is absent; the default has none.
@@ -177,11 +178,11 @@ const SHORTEST: f64 = 1e-9;
 
 /// A set of sizes that no sensor can have, or text that names none.
 #[derive(Clone, PartialEq, Debug)]
-pub struct ImuErrorFault(pub(super) String);
+pub struct ImuErrorFault(pub(super) Diagnostic);
 
 impl fmt::Display for ImuErrorFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
+        self.0.fmt(f)
     }
 }
 
@@ -201,7 +202,7 @@ impl ImuError {
     /// # Errors
     /// A size that is negative, not finite or beyond any sensor; a term that lacks another it needs.
     pub fn check(&self) -> Result<(), ImuErrorFault> {
-        let fault = |what: String| Err(ImuErrorFault(what));
+        let fault = |what: String| Err(ImuErrorFault(what.into()));
         for term in &TERMS {
             let value = (term.read)(self) / term.si;
             if !(value >= 0.0 && value <= term.most) {

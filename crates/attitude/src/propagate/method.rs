@@ -1,5 +1,6 @@
 //! A name on the command line -> which way to integrate. Pure.
 
+use crate::diagnostic::Diagnostic;
 use crate::record::SampleKind;
 use std::fmt;
 use std::str::FromStr;
@@ -221,11 +222,17 @@ pub struct UnknownName {
     known: Vec<&'static str>,
 }
 
+impl From<&UnknownName> for Diagnostic {
+    fn from(error: &UnknownName) -> Diagnostic {
+        let shown: String = error.given.chars().take(40).collect();
+        Diagnostic::new(format!("unknown {} `{}`", error.what, shown.escape_debug()))
+            .help(format!("one of {}", error.known.join(", ")))
+    }
+}
+
 impl fmt::Display for UnknownName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let shown: String = self.given.chars().take(40).collect();
-        write!(f, "unknown {} `{}`", self.what, shown.escape_debug())?;
-        write!(f, "\n  help: one of {}", self.known.join(", "))
+        Diagnostic::from(self).fmt(f)
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::covariance::Noise;
 use super::method::Method;
+use crate::diagnostic::Diagnostic;
 use crate::frames::{Body, In, Nav};
 use crate::quaternion::Quaternion;
 use crate::record::SampleKind;
@@ -58,30 +59,35 @@ pub enum SettingsError {
     },
 }
 
-impl fmt::Display for SettingsError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
+impl From<&SettingsError> for Diagnostic {
+    fn from(error: &SettingsError) -> Diagnostic {
+        match error {
             SettingsError::Window {
                 given,
                 smallest,
                 largest,
-            } => write!(
-                f,
-                "a window of {given} samples can not be used\n  help: {WINDOW} takes {smallest} to {largest}"
-            ),
-            SettingsError::Initial { wxyz } => write!(
-                f,
-                "the initial attitude {wxyz:?} (w, x, y, z) is not a unit quaternion\n  help: {INIT} q=w,x,y,z with norm 1"
-            ),
-            SettingsError::WorldRate { rate } => write!(
-                f,
-                "the world can not turn at {rate:?} rad/s\n  help: {EARTH_RATE} takes a latitude in degrees, -90 to 90"
-            ),
-            SettingsError::Noise { name, value } => write!(
-                f,
-                "noise {name} = {value} can not be\n  help: {NOISE} takes numbers from 0 up, in SI units"
-            ),
+            } => Diagnostic::new(format!("a window of {given} samples can not be used"))
+                .help(format!("{WINDOW} takes {smallest} to {largest}")),
+            SettingsError::Initial { wxyz } => Diagnostic::new(format!(
+                "the initial attitude {wxyz:?} (w, x, y, z) is not a unit quaternion"
+            ))
+            .help(format!("{INIT} q=w,x,y,z with norm 1")),
+            SettingsError::WorldRate { rate } => {
+                Diagnostic::new(format!("the world can not turn at {rate:?} rad/s")).help(format!(
+                    "{EARTH_RATE} takes a latitude in degrees, -90 to 90"
+                ))
+            }
+            SettingsError::Noise { name, value } => {
+                Diagnostic::new(format!("noise {name} = {value} can not be"))
+                    .help(format!("{NOISE} takes numbers from 0 up, in SI units"))
+            }
         }
+    }
+}
+
+impl fmt::Display for SettingsError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        Diagnostic::from(self).fmt(f)
     }
 }
 

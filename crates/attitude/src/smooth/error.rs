@@ -1,5 +1,6 @@
 //! Why a recording was not smoothed at all. Pure.
 
+use crate::diagnostic::Diagnostic;
 use std::fmt;
 
 /// Why there is no result.
@@ -23,16 +24,24 @@ pub enum SmoothError<E> {
     },
 }
 
+impl<E: fmt::Display> From<&SmoothError<E>> for Diagnostic {
+    fn from(error: &SmoothError<E>) -> Diagnostic {
+        match error {
+            SmoothError::Read(error) => Diagnostic::new(error.to_string()),
+            SmoothError::TooFew { samples, forceless } => Diagnostic::new(format!(
+                "{samples} samples, of which fewer than 2 can be used; {forceless} have no specific force"
+            ))
+            .help("a smoother needs the accelerometer: without it, integrate the gyro alone"),
+            SmoothError::Setting { name, value } => {
+                Diagnostic::new(format!("{name} = {value} can not be"))
+            }
+        }
+    }
+}
+
 impl<E: fmt::Display> fmt::Display for SmoothError<E> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            SmoothError::Read(error) => error.fmt(f),
-            SmoothError::TooFew { samples, forceless } => write!(
-                f,
-                "{samples} samples, of which fewer than 2 can be used; {forceless} have no specific force\n  help: a smoother needs the accelerometer: without it, integrate the gyro alone"
-            ),
-            SmoothError::Setting { name, value } => write!(f, "{name} = {value} can not be"),
-        }
+        Diagnostic::from(self).fmt(f)
     }
 }
 

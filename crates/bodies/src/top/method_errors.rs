@@ -5,6 +5,7 @@
 
 use crate::rigid_body::Spin;
 use crate::top::{Case, EulerState, SymmetricTop, TopMethod, TopRun, compare};
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::frames::{Body, Nav};
 use strapd_attitude::propagate::{Method, Noise, Propagator, Sequential, Settings};
 use strapd_attitude::quaternion::kernel as quat;
@@ -44,7 +45,7 @@ impl How {
     ///
     /// # Errors
     /// An unknown one; says which there are.
-    pub fn parse_all(names: &[String]) -> Result<Vec<How>, String> {
+    pub fn parse_all(names: &[String]) -> Result<Vec<How>, Diagnostic> {
         names
             .iter()
             .map(|name| {
@@ -54,11 +55,8 @@ impl How {
                     .ok_or_else(|| {
                         let own = TopMethod::ALL.iter().map(|m| m.name());
                         let all: Vec<&str> = own.chain(Method::names()).collect();
-                        format!(
-                            "unknown method `{}`\n  help: one of {}",
-                            name.escape_debug(),
-                            all.join(", ")
-                        )
+                        Diagnostic::new(format!("unknown method `{}`", name.escape_debug()))
+                            .help(format!("one of {}", all.join(", ")))
                     })
             })
             .collect()

@@ -4,6 +4,7 @@
 //! and the flag that helps.
 
 use crate::text::{printable, snippet};
+use strapd_attitude::diagnostic::Diagnostic;
 
 /// A channel this crate can not decode: named, explained, with the flag that helps.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -20,23 +21,28 @@ pub struct Unsupported {
     pub help: String,
 }
 
+impl From<&Unsupported> for Diagnostic {
+    fn from(error: &Unsupported) -> Diagnostic {
+        let named = |text: &str, none| {
+            if text.is_empty() {
+                none
+            } else {
+                text.to_owned()
+            }
+        };
+        let type_name = named(&error.type_name, "no type name".to_owned());
+        let encoding = named(&error.encoding, "no encoding".to_owned());
+        Diagnostic::new(format!(
+            "{} ({type_name}, {encoding}): {}",
+            error.topic, error.why
+        ))
+        .help(error.help.as_str())
+    }
+}
+
 impl std::fmt::Display for Unsupported {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let type_name = if self.type_name.is_empty() {
-            "no type name"
-        } else {
-            &self.type_name
-        };
-        let encoding = if self.encoding.is_empty() {
-            "no encoding"
-        } else {
-            &self.encoding
-        };
-        write!(f, "{} ({type_name}, {encoding}): {}", self.topic, self.why)?;
-        if !self.help.is_empty() {
-            write!(f, "\n  help: {}", self.help)?;
-        }
-        Ok(())
+        Diagnostic::from(self).fmt(f)
     }
 }
 

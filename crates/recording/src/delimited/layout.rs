@@ -17,6 +17,7 @@ use crate::decode::{Options, Wanted};
 use crate::text::printable;
 use crate::text::without_mark;
 use roles::Roles;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::setting::{COLUMNS, DELIMITER};
 
 /// Lines, and bytes of them, in which the header is looked for.
@@ -240,7 +241,7 @@ impl Opening {
     ///
     /// # Errors
     /// What is missing or can not be told, in words with their help.
-    pub(crate) fn finish(self) -> Result<(Table, Rows), String> {
+    pub(crate) fn finish(self) -> Result<(Table, Rows), Diagnostic> {
         let Some(found) = self.found else {
             return Err(self.nothing());
         };
@@ -305,10 +306,13 @@ impl Opening {
     }
 
     /// No header: what there is, and what would help.
-    fn nothing(&self) -> String {
+    fn nothing(&self) -> Diagnostic {
         let start = self.lines.first().map_or(&[][..], Vec::as_slice);
         if self.lines.iter().flatten().any(|b| *b == 0) {
-            return "it holds bytes of zero: it is binary, or UTF-16 without its mark\n  help: iconv -f UTF-16LE -t UTF-8 FILE > log.csv, if it is text".to_owned();
+            return Diagnostic::new(
+                "it holds bytes of zero: it is binary, or UTF-16 without its mark",
+            )
+            .help("iconv -f UTF-16LE -t UTF-8 FILE > log.csv, if it is text");
         }
         // The line with the most names.
         let texts = |names: &[Name]| names.iter().filter(|name| !is_number(&name.text)).count();
@@ -324,10 +328,15 @@ impl Opening {
             .filter(|names| texts(names) > 0)
             .max_by_key(|names| texts(names));
         let Some(names) = best else {
-            return format!(
-                "none of its first lines has three cells that could name columns; it begins with `{}`\n  help: a first row with names such as time_s, gyro_x, gyro_y, gyro_z; or {COLUMNS} gyro=2:3:4,stamp=1:s by numbers, and {DELIMITER}",
-                crate::text::snippet(start)
-            );
+            return
+                Diagnostic::new(format!(
+                    "none of its first lines has three cells that could name columns; it begins with `{}`",
+                    crate::text::snippet(start)
+                ))
+                .help(format!(
+                    "a first row with names such as time_s, gyro_x, gyro_y, gyro_z; or {COLUMNS} gyro=2:3:4,stamp=1:s by numbers, and {DELIMITER}"
+                ))
+            ;
         };
         let all: Vec<&str> = names.iter().map(|name| name.text.as_str()).collect();
         let said = all
@@ -336,11 +345,14 @@ impl Opening {
             .join("`, `");
         if let Some(given) = self.given.as_ref().map(Columns::all) {
             let wrong = given.iter().flat_map(|given| &given.columns);
-            let wrong: Vec<String> = wrong
+            let wrong: Vec<Diagnostic> = wrong
                 .filter_map(|column| roles::place(&names, column).err())
                 .collect();
             if let Some(first) = wrong.first() {
-                return format!("{COLUMNS}: {first}; its columns are `{said}`");
+                return Diagnostic::new(format!(
+                    "{COLUMNS}: {}; its columns are `{said}`",
+                    first.what()
+                ));
             }
         }
         let axes = ["x", "y", "z"];
@@ -348,9 +360,14 @@ impl Opening {
             .iter()
             .all(|axis| all.iter().any(|name| name.eq_ignore_ascii_case(axis)))
         {
-            return format!(
-                "its columns x, y, z do not say of which sensor they are (they are rates where the file is called Gyroscope...)\n  help: {COLUMNS} gyro=x:y:z if they are rates"
-            );
+            return
+                Diagnostic::new(
+                    "its columns x, y, z do not say of which sensor they are (they are rates where the file is called Gyroscope...)",
+                )
+                .help(format!(
+                    "{COLUMNS} gyro=x:y:z if they are rates"
+                ))
+            ;
         }
         let aside = names.iter().find_map(|name| match name.meant {
             Meant::Aside {
@@ -359,10 +376,13 @@ impl Opening {
             } => Some(format!("; `{}` {why}", name.text)),
             _ => None,
         });
-        format!(
-            "none of its columns names a rate about x, y and z: `{said}`{}\n  help: {COLUMNS} gyro=NAME:NAME:NAME,stamp=NAME:UNIT says which they are (or numbers, from 1)",
+        Diagnostic::new(format!(
+            "none of its columns names a rate about x, y and z: `{said}`{}",
             aside.unwrap_or_default()
-        )
+        ))
+        .help(format!(
+            "{COLUMNS} gyro=NAME:NAME:NAME,stamp=NAME:UNIT says which they are (or numbers, from 1)"
+        ))
     }
 }
 
@@ -402,7 +422,11 @@ fn says_units(row: &[String], names: &[Name]) -> bool {
 }
 
 /// All of the first rows are longer or shorter than the header: the one or the other is cut wrongly.
-fn check_lengths(rows: &[Vec<String>], names: &[Name], delimiter: Delimiter) -> Result<(), String> {
+fn check_lengths(
+    rows: &[Vec<String>],
+    names: &[Name],
+    delimiter: Delimiter,
+) -> Result<(), Diagnostic> {
     let need = names.len();
     let fits = |row: &Vec<String>| {
         row.len() >= need && row.iter().skip(need).all(|cell| cell.trim().is_empty())
@@ -413,16 +437,15 @@ fn check_lengths(rows: &[Vec<String>], names: &[Name], delimiter: Delimiter) -> 
     if rows.iter().any(fits) {
         return Ok(());
     }
-    let why = match delimiter {
-        Delimiter::Byte(b',') if first.len() + 2 > need * 2 => {
-            ": decimal commas, and commas between the cells? What belongs together can not be told\n  help: export it with semicolons or tabs between the cells, or with decimal points".to_owned()
-        }
-        _ => format!("\n  help: {DELIMITER} says what stands between the cells"),
-    };
-    Err(format!(
-        "its rows have {} cells under {need} names{why}",
-        first.len()
-    ))
+    let what = format!("its rows have {} cells under {need} names", first.len());
+    Err(match delimiter {
+        Delimiter::Byte(b',') if first.len() + 2 > need * 2 => Diagnostic::new(format!(
+            "{what}: decimal commas, and commas between the cells? What belongs together can not be told"
+        ))
+        .help("export it with semicolons or tabs between the cells, or with decimal points"),
+        _ => Diagnostic::new(what)
+            .help(format!("{DELIMITER} says what stands between the cells")),
+    })
 }
 
 impl Name {

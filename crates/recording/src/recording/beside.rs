@@ -18,6 +18,7 @@ use crate::text::printable;
 use std::path::Path;
 use std::sync::Arc;
 use strapd_attitude::condition::Clock;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{Aid, Plan};
 use strapd_attitude::setting::{AID, FIELD, MAG_TOPIC, TIME};
 
@@ -174,20 +175,23 @@ fn named<'l>(
             topics: topics::listing(&log.candidates()),
         });
     };
-    let refuse = |what: String| Error::Unsupported {
+    let refuse = |what: Diagnostic| Error::Unsupported {
         path: path.to_owned(),
         what,
     };
     let mut decoders = Decoders::of_run(plan, &options(wanted, Some(beside)));
     let decoder = known
         .decoder(&mut decoders)
-        .map_err(|why| refuse(why.to_string()))?;
+        .map_err(|why| refuse((&why).into()))?;
     if plan.clock == Clock::Header && !decoder.stated().has_stamp {
-        return Err(refuse(format!(
-            "{} ({}): its messages carry no stamp to find their gyro sample by\n  help: {TIME} log",
-            printable(&beside.topic),
-            described(&known.channel)
-        )));
+        return Err(refuse(
+            Diagnostic::new(format!(
+                "{} ({}): its messages carry no stamp to find their gyro sample by",
+                printable(&beside.topic),
+                described(&known.channel)
+            ))
+            .help(format!("{TIME} log")),
+        ));
     }
     Ok((known, decoder))
 }
@@ -221,18 +225,18 @@ fn unnamed<'l>(
         .map(|(k, _)| k.channel.topic.as_str())
         .collect();
     let what = match names.as_slice() {
-        [] => format!(
-            "{AID} gravity+mag: no topic carries a magnetic field\n  help: {MAG_TOPIC} NAME, with {FIELD} mag=PATH where it has another name; {AID} gravity does without"
+        [] => Diagnostic::new(format!("{AID} gravity+mag: no topic carries a magnetic field")).help(
+            format!("{MAG_TOPIC} NAME, with {FIELD} mag=PATH where it has another name; {AID} gravity does without"),
         ),
-        [_] => String::new(),
-        several => format!(
-            "{AID} gravity+mag: several topics carry a magnetic field: {}\n  help: {MAG_TOPIC} NAME",
+        several => Diagnostic::new(format!(
+            "{AID} gravity+mag: several topics carry a magnetic field: {}",
             named_few(several)
-        ),
+        ))
+        .help(format!("{MAG_TOPIC} NAME")),
     };
-    match (found.pop(), what) {
-        (Some(one), what) if what.is_empty() => Ok(one),
-        (_, what) => Err(Error::Unsupported {
+    match found.pop() {
+        Some(one) if found.is_empty() => Ok(one),
+        _ => Err(Error::Unsupported {
             path: path.to_owned(),
             what,
         }),

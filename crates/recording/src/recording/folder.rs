@@ -10,6 +10,7 @@ use crate::delimited::Table;
 use crate::error::{Error, Result};
 use crate::format::{Format, open};
 use std::path::{Path, PathBuf};
+use strapd_attitude::diagnostic::Diagnostic;
 
 /// Files that are looked at: who has more has no recording there, but an archive.
 const MOST: usize = 1000;
@@ -40,16 +41,16 @@ struct Tables {
 /// # Errors
 /// It can not be read; there is no recording in it, or more than one.
 pub(super) fn of(path: &Path, warn: &Warn) -> Result<Folder> {
-    let unsupported = |what: String| Error::Unsupported {
+    let unsupported = |what: Diagnostic| Error::Unsupported {
         path: path.to_owned(),
         what,
     };
     let files = files(path)?;
     if files.len() > MOST {
-        return Err(unsupported(format!(
-            "a folder of {} files\n  help: name one of them, or the folder of one recording",
-            files.len()
-        )));
+        return Err(unsupported(
+            Diagnostic::new(format!("a folder of {} files", files.len()))
+                .help("name one of them, or the folder of one recording"),
+        ));
     }
     let mut whole: Vec<(PathBuf, Format)> = Vec::new();
     let mut tables = Tables::default();
@@ -85,18 +86,24 @@ pub(super) fn of(path: &Path, warn: &Warn) -> Result<Folder> {
         }),
         [] => Err(match known {
             Some(why) => why,
-            None => unsupported(format!(
-                "a folder without a recording that is read: {}\n  help: name a file",
-                named(&files)
-            )),
+            None => unsupported(
+                Diagnostic::new(format!(
+                    "a folder without a recording that is read: {}",
+                    named(&files)
+                ))
+                .help("name a file"),
+            ),
         }),
         several => {
             let names: Vec<PathBuf> = several.iter().map(|(file, _)| file.clone()).collect();
-            Err(unsupported(format!(
-                "a folder of {} recordings: {}\n  help: name one of them; parts of one recording are not joined",
-                names.len(),
-                named(&names)
-            )))
+            Err(unsupported(
+                Diagnostic::new(format!(
+                    "a folder of {} recordings: {}",
+                    names.len(),
+                    named(&names)
+                ))
+                .help("name one of them; parts of one recording are not joined"),
+            ))
         }
     }
 }

@@ -17,6 +17,7 @@ use std::fs::File;
 use std::io::{Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use strapd_attitude::diagnostic::Diagnostic;
 
 /// Bytes of a stream that are kept at most.
 const MOST: u64 = 8 << 30;
@@ -259,9 +260,10 @@ pub fn is_pipe(path: &Path) -> bool {
 fn no_room(name: &Path, why: &std::io::Error) -> Error {
     Error::Unsupported {
         path: name.to_owned(),
-        what: format!(
-            "what comes only once is kept in {} to be looked at twice: {why}\n  help: TMPDIR=FOLDER with room, or save it to a file first",
+        what: Diagnostic::new(format!(
+            "what comes only once is kept in {} to be looked at twice: {why}",
             std::env::temp_dir().display()
-        ),
+        ))
+        .help("TMPDIR=FOLDER with room, or save it to a file first"),
     }
 }

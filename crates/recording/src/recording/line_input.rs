@@ -7,6 +7,7 @@ use crate::format::Format;
 use crate::lines::Lines;
 use std::io::Read;
 use std::path::Path;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::setting::{COLUMNS, DELIMITER, FIELD};
 
 /// Begins to read lines or rows.
@@ -22,8 +23,8 @@ pub(super) fn open<R: Read>(
     if format == Format::Table && !options.fields.is_empty() {
         return Err(Error::Unsupported {
             path: path.to_owned(),
-            what: format!(
-                "{FIELD} is for messages, and this is a CSV\n  help: {COLUMNS} gyro=NAME:NAME:NAME,stamp=NAME:UNIT says what its columns are"
+            what: Diagnostic::new(format!("{FIELD} is for messages, and this is a CSV")).help(
+                format!("{COLUMNS} gyro=NAME:NAME:NAME,stamp=NAME:UNIT says what its columns are"),
             ),
         });
     }
@@ -43,10 +44,11 @@ pub(super) fn only_for_tables(path: &Path, format: Format, options: &Options) ->
     }
     Err(Error::Unsupported {
         path: path.to_owned(),
-        what: format!(
-            "{COLUMNS} and {DELIMITER} are for tables of text, and this is {}\n  help: {FIELD} says where values lie in messages",
+        what: Diagnostic::new(format!(
+            "{COLUMNS} and {DELIMITER} are for tables of text, and this is {}",
             format.name()
-        ),
+        ))
+        .help(format!("{FIELD} says where values lie in messages")),
     })
 }
 
@@ -54,9 +56,9 @@ pub(super) fn only_for_tables(path: &Path, format: Format, options: &Options) ->
 pub(super) fn unclear(path: &Path, what: &Ambiguous) -> Error {
     Error::Unsupported {
         path: path.to_owned(),
-        what: format!(
-            "{what}\n  help: {FIELD} stamp=NAME:ns (or us, ms, s) says it for a name as it is"
-        ),
+        what: Diagnostic::new(what.to_string()).help(format!(
+            "{FIELD} stamp=NAME:ns (or us, ms, s) says it for a name as it is"
+        )),
     }
 }
 
@@ -72,7 +74,7 @@ pub(super) fn no_samples(path: &Path, lines: &Lines<impl Read>, why: &Undecodabl
     };
     Error::Unsupported {
         path: path.to_owned(),
-        what: format!("line {}: {why}\n  help: {help}", lines.number()),
+        what: Diagnostic::new(format!("line {}: {why}", lines.number())).help(help),
     }
 }
 

@@ -13,6 +13,7 @@ use crate::pool::Pool;
 use crate::text::printable;
 use std::ops::ControlFlow;
 use std::path::Path;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::record::{RawSample, SampleKind};
 
 impl Recording {
@@ -73,10 +74,11 @@ impl Recording {
     fn belongs_to_any(&self, topic: &str, topics: usize) -> Error {
         Error::Unsupported {
             path: self.name().to_owned(),
-            what: format!(
-                "{} could belong to any of {topics} topics\n  help: select one of them",
+            what: Diagnostic::new(format!(
+                "{} could belong to any of {topics} topics",
                 printable(topic)
-            ),
+            ))
+            .help("select one of them"),
         }
     }
 }

@@ -18,6 +18,7 @@ use std::io::Read;
 use std::ops::ControlFlow;
 use std::path::Path;
 use strapd_attitude::condition::Clock;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::record::{Declared, Nanos};
 use strapd_attitude::setting::{COLUMNS, FIELD, RATE_HZ, TIME, TOPIC};
 
@@ -170,10 +171,13 @@ pub fn read<E: From<Error>>(
                         return Err(Error::Topic {
                             path: path.to_owned(),
                             topic: first.clone(),
-                            what: format!(
-                                "line {}: samples of another sensor, `{id}`\n  help: {TOPIC} ID takes one of them, and of a file {TOPIC} all each",
+                            what: Diagnostic::new(format!(
+                                "line {}: samples of another sensor, `{id}`",
                                 lines.number()
-                            ),
+                            ))
+                            .help(format!(
+                                "{TOPIC} ID takes one of them, and of a file {TOPIC} all each"
+                            )),
                         }
                         .into());
                     }
@@ -211,19 +215,25 @@ fn undecodable(number: u64, why: Undecodable) -> Item {
 fn nothing(path: &Path, format: Format) -> Error {
     let what = match format {
         Format::Table => {
-            format!(
-                "no row carries a body rate\n  help: columns gyro_x, gyro_y, gyro_z, in rad/s, or {COLUMNS} gyro=NAME:NAME:NAME"
+            Diagnostic::new(
+                "no row carries a body rate",
             )
+            .help(format!(
+                "columns gyro_x, gyro_y, gyro_z, in rad/s, or {COLUMNS} gyro=NAME:NAME:NAME"
+            ))
         }
         _ => {
-            format!(
-                "no line carries a body rate\n  help: {{\"class\":\"RATE\",\"stamp\":{{\"sec\":1,\"nsec\":0}},\"gyro\":[0.1,0,0]}}, or {FIELD} gyro=PATH"
+            Diagnostic::new(
+                "no line carries a body rate",
             )
+            .help(format!(
+                "{{\"class\":\"RATE\",\"stamp\":{{\"sec\":1,\"nsec\":0}},\"gyro\":[0.1,0,0]}}, or {FIELD} gyro=PATH"
+            ))
         }
     };
     Error::Unsupported {
         path: path.to_owned(),
-        what: what.to_owned(),
+        what,
     }
 }
 
@@ -232,9 +242,12 @@ fn unplaced(path: &Path, lines: &Lines<impl Read>) -> Error {
     let notes = lines.table().map(Table::notes).unwrap_or_default();
     Error::Unsupported {
         path: path.to_owned(),
-        what: format!(
-            "no row says when it was measured\n  help: {TIME} index {RATE_HZ} HZ, or {COLUMNS} stamp=NAME:UNIT\n  note: {}",
+        what: Diagnostic::new(format!(
+            "no row says when it was measured\n  note: {}",
             notes.join("; ")
-        ),
+        ))
+        .help(format!(
+            "{TIME} index {RATE_HZ} HZ, or {COLUMNS} stamp=NAME:UNIT"
+        )),
     }
 }

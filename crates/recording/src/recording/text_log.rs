@@ -111,7 +111,8 @@ impl TextLog {
                     } else {
                         "line"
                     }
-                ),
+                )
+                .into(),
             });
         }
         let channels = named(met, input.format());

@@ -17,6 +17,7 @@ use crate::pool::Pool;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::Arc;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{Meaning, Plan};
 use strapd_attitude::record::{Nanos, RawSample, SampleKind};
 
@@ -81,7 +82,7 @@ impl<'l> TopicReading<'l> {
         for known in log.channels_of(&source) {
             let decoder = known.decoder(decoders).map_err(|why| Error::Unsupported {
                 path: log.name().to_owned(),
-                what: why.to_string(),
+                what: Diagnostic::from(&why),
             })?;
             places
                 .entry((known.channel.id, known.channel.schema_id))

@@ -7,6 +7,7 @@ use crate::error::{Error, Result};
 use crate::text::named_few;
 use std::collections::BTreeSet;
 use std::path::Path;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::setting::TOPIC;
 
 /// What the choice needs to know of one channel.
@@ -60,11 +61,12 @@ pub fn choose(path: &Path, candidates: &[Candidate], named: Option<&str>) -> Res
             if topics.len() > MOST_TOPICS {
                 return Err(Error::Unsupported {
                     path: path.to_owned(),
-                    what: format!(
-                        "{} topics carry a rate, and at most {MOST_TOPICS} are taken at once: {}\n  help: {TOPIC} NAME takes one of them",
+                    what: Diagnostic::new(format!(
+                        "{} topics carry a rate, and at most {MOST_TOPICS} are taken at once: {}",
                         topics.len(),
                         named_few(&topics)
-                    ),
+                    ))
+                    .help(format!("{TOPIC} NAME takes one of them")),
                 });
             }
             Ok(Choice { topics, note: None })

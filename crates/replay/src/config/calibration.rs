@@ -4,6 +4,7 @@
 
 use std::fmt::Write as _;
 use std::ops::Range;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{Known, SensorCalibration};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -20,12 +21,12 @@ const KEYS: &str = "strapd_calibration, sensor, date, sources, bias, G, ba, A, l
 /// What is said of a place in the text.
 struct Wrong {
     at: Range<usize>,
-    what: String,
+    what: Diagnostic,
 }
 
 type Read<T> = std::result::Result<T, Wrong>;
 
-fn wrong<T>(at: &Range<usize>, what: impl Into<String>) -> Read<T> {
+fn wrong<T>(at: &Range<usize>, what: impl Into<Diagnostic>) -> Read<T> {
     Err(Wrong {
         at: at.clone(),
         what: what.into(),
@@ -36,12 +37,12 @@ fn wrong<T>(at: &Range<usize>, what: impl Into<String>) -> Read<T> {
 ///
 /// # Errors
 /// In words, with the line and the key.
-pub fn parse(text: &str) -> std::result::Result<SensorCalibration, String> {
+pub fn parse(text: &str) -> std::result::Result<SensorCalibration, Diagnostic> {
     let document = DeTable::parse(text).map_err(|e| e.to_string().trim_end().to_owned())?;
     let known = table(document.get_ref()).map_err(|e| {
         let before = text.get(..e.at.start).unwrap_or_default();
         let line = 1 + before.bytes().filter(|b| *b == b'\n').count();
-        format!("line {line}: {}", e.what)
+        e.what.at(format_args!("line {line}"))
     })?;
     known.check()?;
     Ok(known)
@@ -83,7 +84,7 @@ fn unknown<T>(at: &Range<usize>, name: &str) -> Read<T> {
     let name = strapd_recording::text::printable(name);
     wrong(
         at,
-        format!("unknown key `{name}`\n  help: there are {KEYS}"),
+        Diagnostic::new(format!("unknown key `{name}`")).help(format!("there are {KEYS}")),
     )
 }
 

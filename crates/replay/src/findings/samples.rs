@@ -27,12 +27,8 @@ pub fn of_samples(looked: &Inspection) -> Vec<Finding> {
     let mut out = Vec::new();
     counted(looked, &mut out);
     if let Some(warning) = &looked.clock_warning {
-        // What was seen on the first line, the flags on those after it.
-        let (what, help) = warning.split_once('\n').unwrap_or((warning, ""));
         out.push(
-            Finding::new(Severity::Warning, "clock", what)
-                .with("clock", looked.clock.name())
-                .advise(help.trim().trim_start_matches("help: ").to_owned()),
+            Finding::said(Severity::Warning, "clock", warning).with("clock", looked.clock.name()),
         );
     }
     for advice in &looked.quality.advice {

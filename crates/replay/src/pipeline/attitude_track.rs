@@ -8,6 +8,7 @@ use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::orientation_convention;
 use strapd_attitude::frames::{Body, Nav};
 use strapd_attitude::quaternion::Quaternion;
@@ -105,7 +106,7 @@ fn from_log(
     let decoder = known.decoder(&mut Decoders::default()).map_err(|why| {
         strapd_recording::Error::Unsupported {
             path: path.to_owned(),
-            what: why.to_string(),
+            what: Diagnostic::from(&why),
         }
     })?;
     let stated = orientation_convention(&decoder.stated().declared);
@@ -259,7 +260,8 @@ fn attitude_channel<'l>(
             what: format!(
                 "holds no attitude; it holds:{}",
                 topics::listing(&log.candidates())
-            ),
+            )
+            .into(),
         }
         .into()),
         [(best, known), rest @ ..] if rest.first().is_none_or(|(next, _)| next < best) => Ok(known),
@@ -267,11 +269,13 @@ fn attitude_channel<'l>(
             let list: Vec<_> = several.iter().map(|(_, k)| k.candidate()).collect();
             Err(strapd_recording::Error::Unsupported {
                 path: path.to_owned(),
-                what: format!(
-                    "several topics carry an attitude:{}\n  help: {TOPIC} NAME (or {REF_TOPIC} NAME) takes one",
+                what: Diagnostic::new(format!(
+                    "several topics carry an attitude:{}",
                     topics::listing(&list)
-                ),
-            }.into())
+                ))
+                .help(format!("{TOPIC} NAME (or {REF_TOPIC} NAME) takes one")),
+            }
+            .into())
         }
     }
 }
@@ -409,7 +413,7 @@ fn from_csv(input: &Input) -> Result<Vec<(Entry, [f64; 3])>> {
     let refuse = |what: String| {
         strapd_recording::Error::Unsupported {
             path: path.to_owned(),
-            what: format!("{what}\n  help: columns stamp_ns,qw,qx,qy,qz are needed"),
+            what: Diagnostic::new(what.to_string()).help("columns stamp_ns,qw,qx,qy,qz are needed"),
         }
         .into()
     };
@@ -434,7 +438,7 @@ fn from_csv(input: &Input) -> Result<Vec<(Entry, [f64; 3])>> {
 fn bad_line(path: &Path, number: u64, what: &str) -> Error {
     strapd_recording::Error::Unsupported {
         path: path.to_owned(),
-        what: format!("line {number}: {what}"),
+        what: format!("line {number}: {what}").into(),
     }
     .into()
 }

@@ -10,6 +10,7 @@ use crate::sink::{Stream, output_topic};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::Arc;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Meaning;
 use strapd_attitude::setting::{FIELD, TOPIC};
 use strapd_recording::Recording;
@@ -95,18 +96,19 @@ fn choose_one(
         let what = refusals.into_iter().next().unwrap_or_default();
         return Err(strapd_recording::Error::Unsupported {
             path: path.to_owned(),
-            what,
+            what: what.into(),
         }
         .into());
     };
     if !decoder.stated().has_gyro {
         return Err(strapd_recording::Error::Unsupported {
             path: path.to_owned(),
-            what: format!(
-                "{} ({}): carries no body rate\n  help: {FIELD} gyro=PATH names one",
+            what: Diagnostic::new(format!(
+                "{} ({}): carries no body rate",
                 strapd_recording::text::printable(name),
                 described(&first.channel)
-            ),
+            ))
+            .help(format!("{FIELD} gyro=PATH names one")),
         }
         .into());
     }
@@ -152,11 +154,14 @@ pub(super) fn besides(
     let asked = run.selection.accel.as_ref().or(run.selection.mag.as_ref());
     let [one] = chosen else {
         if let Some(asked) = asked.filter(|_| !chosen.is_empty()) {
-            return Err(Error::Usage(format!(
-                "{} could belong to any of {} topics\n  help: {TOPIC} NAME takes one of them",
-                strapd_recording::text::printable(&asked.topic),
-                chosen.len()
-            )));
+            return Err(Error::usage(
+                Diagnostic::new(format!(
+                    "{} could belong to any of {} topics",
+                    strapd_recording::text::printable(&asked.topic),
+                    chosen.len()
+                ))
+                .help(format!("{TOPIC} NAME takes one of them")),
+            ));
         }
         return Ok(Besides::default());
     };
@@ -249,7 +254,7 @@ pub(super) fn reference(
     let decoder = found.decoder(&mut Decoders::default()).map_err(|why| {
         strapd_recording::Error::Unsupported {
             path: path.to_owned(),
-            what: why.to_string(),
+            what: Diagnostic::from(&why),
         }
     })?;
     Ok(Some(Reference {

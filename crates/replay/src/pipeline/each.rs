@@ -18,13 +18,14 @@ use crate::error::{Error, Result};
 use crate::sink::{Provenance, Stream};
 use crate::summary::TopicSummary;
 use std::ops::ControlFlow;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_recording::Recording;
 use strapd_recording::pool::Pool;
 use strapd_recording::recording::decoders::Decoders;
 use strapd_recording::recording::opened::AHEAD;
 
 /// What became of a topic, or why nothing did.
-pub(super) type Told = std::result::Result<Box<TopicSummary>, String>;
+pub(super) type Told = std::result::Result<Box<TopicSummary>, Diagnostic>;
 
 /// Integrates the topics called `names`, without outputs; by name, in their order.
 ///
@@ -44,7 +45,7 @@ pub(super) fn each(
     let mut chosen: Vec<Chosen> = Vec::new();
     for found in choose_each(run, path, log, names, &mut decoders) {
         told.push(found.map_or_else(
-            |refused| Some(Err(refused.to_string())),
+            |refused| Some(Err(Diagnostic::from(&refused))),
             |found| {
                 chosen.push(found);
                 None
@@ -59,7 +60,7 @@ pub(super) fn each(
             let refused = refused.to_string();
             let all = told
                 .into_iter()
-                .map(|told| told.unwrap_or_else(|| Err(refused.clone())));
+                .map(|told| told.unwrap_or_else(|| Err(refused.clone().into())));
             return Ok(all.collect());
         }
     };
@@ -88,7 +89,7 @@ pub(super) fn each(
             }
             Err(refused) => {
                 if let Some(slot) = slot {
-                    *slot = Some(Err(refused.to_string()));
+                    *slot = Some(Err(Diagnostic::from(&refused)));
                 }
             }
         }
@@ -132,7 +133,7 @@ pub(super) fn each(
     let mut summaries = summarise::topics(run, session.finish(pool)?).into_iter();
     let mut next = || {
         let summary = summaries.next().map(Box::new);
-        summary.ok_or_else(|| "the replay gave nothing".to_owned())
+        summary.ok_or_else(|| Diagnostic::new("the replay gave nothing"))
     };
     Ok(told
         .into_iter()

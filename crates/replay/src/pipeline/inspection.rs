@@ -12,6 +12,7 @@ use strapd_attitude::condition::quality::Quality;
 use strapd_attitude::condition::regularise;
 use strapd_attitude::condition::stillness::{self, Limits, Stillness};
 use strapd_attitude::condition::{Clock, GyroUnit, choose_clock};
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{Conditioned, FEW, Meaning, Plan};
 use strapd_attitude::record::{Declared, RawSample};
 use strapd_recording::Recording;
@@ -48,7 +49,7 @@ struct Look {
     first: Vec<RawSample>,
     /// The first of other sensors than the gyro.
     beside: Vec<RawSample>,
-    clock: Option<(Clock, Option<String>)>,
+    clock: Option<(Clock, Option<Diagnostic>)>,
     asked: Clock,
     quality: Quality,
     si: Si,
@@ -90,7 +91,7 @@ impl Si {
 }
 
 impl Look {
-    fn take(&mut self, raw: &RawSample) -> std::result::Result<(), String> {
+    fn take(&mut self, raw: &RawSample) -> std::result::Result<(), Diagnostic> {
         if raw.is_beside {
             if self.beside.len() < FEW {
                 self.beside.push(*raw);
@@ -119,10 +120,10 @@ impl Look {
         for raw in self.first.drain(..) {
             self.quality.push(&self.si.of(&raw));
         }
-        self.clock = Some((clock, warning.map(|w| w.to_string())));
+        self.clock = Some((clock, warning.as_ref().map(Diagnostic::from)));
     }
 
-    fn finish(mut self) -> std::result::Result<Inspection, String> {
+    fn finish(mut self) -> std::result::Result<Inspection, Diagnostic> {
         if self.clock.is_none() {
             self.settle();
         }
@@ -189,7 +190,7 @@ pub fn look_as(
                 Err(why) if named.is_some() => {
                     return Err(strapd_recording::Error::Unsupported {
                         path: path.to_owned(),
-                        what: why.to_string(),
+                        what: Diagnostic::from(&why),
                     }
                     .into());
                 }
@@ -211,7 +212,7 @@ pub fn look_as(
             });
         }
     }
-    let unsupported = |what| {
+    let unsupported = |what: Diagnostic| {
         strapd_recording::Error::Unsupported {
             path: path.to_owned(),
             what,

@@ -16,6 +16,7 @@ use crate::summary::RunSummary;
 use std::io::Read;
 use std::ops::ControlFlow;
 use std::time::Instant;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::StampPass;
 use strapd_attitude::estimate::{Patience, Preparation, Prepared};
 use strapd_recording::Input;
@@ -156,7 +157,7 @@ pub(super) fn prepare(
             )
         })
         .collect();
-    let mut failures: Vec<Option<String>> = chosen.iter().map(|_| None).collect();
+    let mut failures: Vec<Option<Diagnostic>> = chosen.iter().map(|_| None).collect();
     log.walk::<Error>(
         A_LITTLE_AHEAD,
         pool,

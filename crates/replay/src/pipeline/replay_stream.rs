@@ -17,6 +17,7 @@ use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{Aid, Meaning};
 use strapd_attitude::setting::TOPIC;
 use strapd_recording::TopicBeside;
@@ -277,7 +278,7 @@ impl Picked {
                     "{} channels of this topic take turns: two publishers, and they must not be mixed
   help: save it to a file, where {TOPIC} tells them apart",
                     self.channels
-                ),
+                ).into(),
             }.into());
         }
         Ok(())
@@ -288,7 +289,7 @@ impl Picked {
         if let Some(what) = self.refusals.into_iter().next() {
             return strapd_recording::Error::Unsupported {
                 path: path.to_owned(),
-                what,
+                what: what.into(),
             }
             .into();
         }
@@ -303,10 +304,15 @@ impl Picked {
             Err(e) => e,
             Ok(choice) => strapd_recording::Error::Unsupported {
                 path: path.to_owned(),
-                what: format!(
-                    "no IMU topic; {} may carry a body rate, but is not taken unnamed from a stream, where a better one could still come\n  help: {TOPIC} NAME",
-                    choice.topics.join(", ")
-                ),
+                what:
+                    Diagnostic::new(format!(
+                        "no IMU topic; {} may carry a body rate, but is not taken unnamed from a stream, where a better one could still come",
+                        choice.topics.join(", ")
+                    ))
+                    .help(format!(
+                        "{TOPIC} NAME"
+                    ))
+                ,
             },
         };
         explained(error, &channels, &problems(survey)).into()
@@ -334,7 +340,7 @@ impl Picked {
 fn unsupported(path: &Path, why: &Unsupported) -> Error {
     strapd_recording::Error::Unsupported {
         path: path.to_owned(),
-        what: why.to_string(),
+        what: Diagnostic::from(why),
     }
     .into()
 }

@@ -5,6 +5,7 @@ use crate::error;
 use crate::sink::{self, Target};
 use std::path::Path;
 use std::sync::Arc;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Plan;
 use strapd_recording::{Error, Selection, Source};
 
@@ -66,7 +67,7 @@ impl ReplayRequest {
 }
 
 /// A topic that can not be run, in the words of the stage that refused it.
-pub(super) fn refused(path: &Path, topic: &str, what: String) -> error::Error {
+pub(super) fn refused(path: &Path, topic: &str, what: Diagnostic) -> error::Error {
     Error::Topic {
         path: path.to_owned(),
         topic: topic.to_owned(),

@@ -11,6 +11,7 @@ use strapd_attitude::compare::{
     Align, Consistency, Known, Stamped, compare, consistency, fit_body_axes, fit_constant_bias,
     for_each_error,
 };
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Estimator;
 use strapd_attitude::estimate::{Initial, Meaning, Plan, Prepared};
 use strapd_attitude::propagate::{Executor, Method};
@@ -125,7 +126,7 @@ impl AgainstRecorded {
         plan: &Plan,
         resolved: &Meaning,
         prepared: &Prepared,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, Diagnostic> {
         let mut prepared = prepared.clone();
         let world = prepared.world;
         let align = match &prepared.aiding {

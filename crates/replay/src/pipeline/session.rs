@@ -9,6 +9,7 @@ use crate::error::{Error, Result};
 use crate::sink::{Flow, Target, Written};
 use std::path::Path;
 use std::sync::Arc;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Estimator;
 use strapd_attitude::estimate::Plan;
 use strapd_attitude::estimate::{Meaning, Prepared};
@@ -107,7 +108,7 @@ impl Topic {
         prepared: Prepared,
         against: bool,
     ) -> Result<Topic> {
-        let refuse = |what: String| strapd_recording::Error::Topic {
+        let refuse = |what: Diagnostic| strapd_recording::Error::Topic {
             path: path.to_owned(),
             topic: found.name.clone(),
             what,

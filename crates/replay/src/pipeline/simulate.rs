@@ -89,7 +89,7 @@ pub fn run(
     while !reader_gone {
         let made = source
             .next_stretch(batch, &mut stretch)
-            .map_err(|e| Error::Usage(format!("simulate {}: {e}", simulation.name)))?;
+            .map_err(|e| Error::usage(format!("simulate {}: {e}", simulation.name)))?;
         if made == 0 {
             break;
         }

@@ -15,6 +15,7 @@ use crate::summary::stamps::{Regularised, Segment};
 use crate::summary::{Gaps, RunSummary, TopicSummary};
 use std::sync::atomic::Ordering;
 use strapd_attitude::condition::regularise;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{SensorCalibration, learned};
 use strapd_attitude::propagate::Method;
 use strapd_attitude::quaternion::Quaternion;
@@ -80,7 +81,7 @@ fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
     let recording = topic.estimator.smoothed().and_then(Result::ok);
     let smoothed = topic.estimator.smoothed().map(|result| {
         let result = result.map(Smoothing::of);
-        result.map_err(str::to_owned)
+        result.map_err(Diagnostic::clone)
     });
     let mut summary = TopicSummary {
         topic: topic.name.clone(),
@@ -156,9 +157,11 @@ fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
         findings: Vec::new(),
         drawn,
     };
-    let said = topic.prepared.warnings.iter().chain(&topic.warnings);
-    summary.findings = said
-        .map(|said| Finding::new(Severity::Warning, "preparation", said.clone()))
+    let prepared = topic.prepared.warnings.iter();
+    let found = topic.warnings.iter();
+    summary.findings = prepared
+        .map(|said| Finding::said(Severity::Warning, "preparation", said))
+        .chain(found.map(|said| Finding::new(Severity::Warning, "preparation", said)))
         .collect();
     let found = findings::of_run(
         &summary,

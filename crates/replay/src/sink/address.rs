@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 use std::fmt::Display;
 use std::net::{IpAddr, SocketAddr, ToSocketAddrs};
 use std::path::PathBuf;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::setting::LISTEN;
 
 /// Something to listen on.
@@ -121,7 +122,7 @@ impl Listen {
     pub fn parse_from(what: impl Display, text: &str) -> Result<Listen> {
         let refuse = |why: &str| {
             let shown = printable_address(text);
-            Error::Usage(format!("{what} {shown}: {why}\n  help: {KNOWN}"))
+            Error::usage(Diagnostic::new(format!("{what} {shown}: {why}")).help(KNOWN))
         };
         let (scheme, rest) = text.split_once("://").ok_or_else(|| refuse("no scheme"))?;
         let address = || -> Result<SocketAddr> {

@@ -13,6 +13,7 @@ use crate::error::{Error, Result};
 use rayon::ThreadPool;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use strapd_attitude::diagnostic::Diagnostic;
 
 /// Uncompressed size at which a chunk of copied messages is closed.
 const COPY_CHUNK_BYTES: usize = 1 << 20;
@@ -31,9 +32,9 @@ impl Sink {
     /// As [`Sink::create`]; [`Error::Usage`] when the target is no MCAP.
     pub fn create_copy(target: &Target, inputs: &[PathBuf], options: Options) -> Result<Sink> {
         if target.format() != Some(super::Format::Mcap) {
-            return Err(Error::Usage(
-                "a copy of an MCAP is an MCAP\n  help: give -o a name that ends in .mcap"
-                    .to_owned(),
+            return Err(Error::usage(
+                Diagnostic::new("a copy of an MCAP is an MCAP")
+                    .help("give -o a name that ends in .mcap"),
             ));
         }
         let output = Output::open(target, inputs, options.force)?;

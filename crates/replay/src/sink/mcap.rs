@@ -19,6 +19,7 @@ use crate::error::{Error, Result};
 use chunk::Chunk;
 use file::McapFile;
 use std::collections::BTreeMap;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::record::Nanos;
 use strapd_attitude::setting::{COPY_INPUT, ENCODING};
 
@@ -50,7 +51,11 @@ impl std::str::FromStr for Encoding {
         [Encoding::Cdr, Encoding::Json]
             .into_iter()
             .find(|e| e.name() == text)
-            .ok_or_else(|| Error::Usage(format!("unknown encoding `{text}`\n  help: cdr or json")))
+            .ok_or_else(|| {
+                Error::usage(
+                    Diagnostic::new(format!("unknown encoding `{text}`")).help("cdr or json"),
+                )
+            })
     }
 }
 
@@ -421,13 +426,16 @@ fn log_time(log: Nanos) -> u64 {
 }
 
 fn only_attitudes_are_json() -> Error {
-    Error::Usage(format!(
-        "only attitudes are written to MCAP as JSON\n  help: {ENCODING} cdr, or write .ndjson"
-    ))
+    Error::usage(
+        Diagnostic::new("only attitudes are written to MCAP as JSON")
+            .help(format!("{ENCODING} cdr, or write .ndjson")),
+    )
 }
 
 fn too_many_channels() -> Error {
-    Error::Usage(format!(
-        "an MCAP file holds at most 65535 channels and schemas\n  help: a copy of this log ({COPY_INPUT}, recover) does not fit into one"
-    ))
+    Error::usage(
+        Diagnostic::new("an MCAP file holds at most 65535 channels and schemas").help(format!(
+            "a copy of this log ({COPY_INPUT}, recover) does not fit into one"
+        )),
+    )
 }

@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::sink::address::{Listen, printable_address};
 use std::path::{Path, PathBuf};
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::setting::{LISTEN, TOKEN_FILE};
 
 /// What a file or pipe is filled with.
@@ -68,9 +69,9 @@ impl Target {
             "-" => return Ok(Target::Stdout),
             "null:" => return Ok(Target::Null),
             "" => {
-                return Err(Error::Usage(format!(
-                    "-o: the name is empty\n  help: {KNOWN}"
-                )));
+                return Err(Error::usage(
+                    Diagnostic::new("-o: the name is empty").help(KNOWN),
+                ));
             }
             _ => {}
         }
@@ -83,7 +84,9 @@ impl Target {
     fn socket(text: &str, scheme: &str, rest: &str) -> Result<Target> {
         let refuse = |what: &str| {
             let shown = printable_address(text);
-            Err(Error::Usage(format!("-o {shown}: {what}\n  help: {KNOWN}")))
+            Err(Error::usage(
+                Diagnostic::new(format!("-o {shown}: {what}")).help(KNOWN),
+            ))
         };
         let (address, query) = match rest.split_once('?') {
             Some((address, query)) => (address, Some(query)),
@@ -144,16 +147,22 @@ impl Target {
             Some("csv") => Format::Csv,
             Some("tum") => Format::Tum,
             Some(other) => {
-                return Err(Error::Usage(format!(
-                    "-o {}: unknown extension `.{other}`\n  help: {KNOWN}",
-                    path.display()
-                )));
+                return Err(Error::usage(
+                    Diagnostic::new(format!(
+                        "-o {}: unknown extension `.{other}`",
+                        path.display()
+                    ))
+                    .help(KNOWN),
+                ));
             }
             None => {
-                return Err(Error::Usage(format!(
-                    "-o {}: no extension, so the format is unknown\n  help: {KNOWN}",
-                    path.display()
-                )));
+                return Err(Error::usage(
+                    Diagnostic::new(format!(
+                        "-o {}: no extension, so the format is unknown",
+                        path.display()
+                    ))
+                    .help(KNOWN),
+                ));
             }
         };
         Ok(Target::File {
@@ -201,7 +210,8 @@ mod tests {
         for text in ["", "out", "out.bag", "s3://b/x.mcap", ".mcap", "x.mcap/"] {
             match Target::parse(text) {
                 Err(Error::Usage(message)) => {
-                    assert!(message.contains("known sinks: FILE.mcap"), "{message}");
+                    let help = message.helping().unwrap_or_default();
+                    assert!(help.contains("known sinks: FILE.mcap"), "{message}");
                 }
                 // Path::extension reads `x.mcap/` as `x.mcap`: a file name with a slash is the
                 // opener's business.

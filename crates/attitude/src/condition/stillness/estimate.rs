@@ -4,6 +4,7 @@
 //! say together.
 
 use super::{Limits, Rest, Rests};
+use crate::diagnostic::Diagnostic;
 use crate::frames::{Body, In, Nav};
 use crate::quaternion::{BodyRate, Quaternion};
 use crate::setting::{BIAS, GYRO_UNIT, INIT, START, UNTIL};
@@ -46,35 +47,44 @@ pub enum NoRest {
     NoAccel,
 }
 
+impl From<&NoRest> for Diagnostic {
+    fn from(error: &NoRest) -> Diagnostic {
+        match error {
+            NoRest::Moving { stillest, limit } => {
+                let quietest = stillest.map(|stillest| {
+                    format!(
+                        ": the quietest half second has a gyro deviation of {stillest:.4} rad/s, still is below {limit:.4}"
+                    )
+                });
+                Diagnostic::new(format!(
+                    "the body never stands still for a second{}",
+                    quietest.unwrap_or_default()
+                ))
+                .help(format!(
+                    "{BIAS} x,y,z (rad/s) from a recording at rest, or {BIAS} none; if the rates look too large, {GYRO_UNIT} deg"
+                ))
+            }
+            NoRest::Disagree { scatter } => Diagnostic::new(format!(
+                "the rests contradict each other by {scatter:.4} rad/s: some are slow turns, not rests"
+            ))
+            .help(format!(
+                "{BIAS} x,y,z (rad/s), or {START}/{UNTIL} around one true rest"
+            )),
+            NoRest::NotAtStart { first_rest_secs } => Diagnostic::new(format!(
+                "the body moves at the start; it first rests {first_rest_secs:.1} s later"
+            ))
+            .help(format!(
+                "{START} {first_rest_secs:.1} begins there; {INIT} identity starts unlevelled"
+            )),
+            NoRest::NoAccel => Diagnostic::new("there is no acceleration to level from")
+                .help(format!("{INIT} identity, or {INIT} rpy=r,p,y")),
+        }
+    }
+}
+
 impl std::fmt::Display for NoRest {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            NoRest::Moving { stillest, limit } => {
-                f.write_str("the body never stands still for a second")?;
-                if let Some(stillest) = stillest {
-                    write!(
-                        f,
-                        ": the quietest half second has a gyro deviation of {stillest:.4} rad/s, still is below {limit:.4}"
-                    )?;
-                }
-                write!(
-                    f,
-                    "\n  help: {BIAS} x,y,z (rad/s) from a recording at rest, or {BIAS} none; if the rates look too large, {GYRO_UNIT} deg"
-                )
-            }
-            NoRest::Disagree { scatter } => write!(
-                f,
-                "the rests contradict each other by {scatter:.4} rad/s: some are slow turns, not rests\n  help: {BIAS} x,y,z (rad/s), or {START}/{UNTIL} around one true rest"
-            ),
-            NoRest::NotAtStart { first_rest_secs } => write!(
-                f,
-                "the body moves at the start; it first rests {first_rest_secs:.1} s later\n  help: {START} {first_rest_secs:.1} begins there; {INIT} identity starts unlevelled"
-            ),
-            NoRest::NoAccel => write!(
-                f,
-                "there is no acceleration to level from\n  help: {INIT} identity, or {INIT} rpy=r,p,y"
-            ),
-        }
+        Diagnostic::from(self).fmt(f)
     }
 }
 

@@ -149,7 +149,7 @@ impl GyroModel {
         error.check()?;
         if !constants.is_finite() {
             return Err(ImuErrorFault(
-                "a constant error is not a finite number".to_owned(),
+                "a constant error is not a finite number".into(),
             ));
         }
         Ok(GyroModel {

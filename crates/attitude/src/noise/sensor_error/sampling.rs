@@ -43,9 +43,10 @@ impl StampModel {
     ) -> Result<StampModel, ImuErrorFault> {
         error.check()?;
         if !(1e-6..=1e8).contains(&rate_hz) {
-            return Err(ImuErrorFault(format!(
-                "a sample rate of {rate_hz} Hz: a number from 1e-6 to 1e8 is needed"
-            )));
+            return Err(ImuErrorFault(
+                format!("a sample rate of {rate_hz} Hz: a number from 1e-6 to 1e8 is needed")
+                    .into(),
+            ));
         }
         Ok(StampModel {
             error: *error,

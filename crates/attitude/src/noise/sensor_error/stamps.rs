@@ -46,9 +46,9 @@ impl StampError {
             if value >= least && value <= most {
                 Ok(())
             } else {
-                Err(ImuErrorFault(format!(
-                    "{name} {value}: a number from {least} to {most} is needed"
-                )))
+                Err(ImuErrorFault(
+                    format!("{name} {value}: a number from {least} to {most} is needed").into(),
+                ))
             }
         };
         within("drift_ppm", self.drift_ppm, -1e5, 1e5)?;
@@ -60,7 +60,7 @@ impl StampError {
             return Err(ImuErrorFault(format!(
                 "drop_probability {} in bursts of {}: the samples between are fewer than one a burst; longer bursts, or fewer drops",
                 self.drop_probability, self.burst_length
-            )));
+            ).into()));
         }
         Ok(())
     }

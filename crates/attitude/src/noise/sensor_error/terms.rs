@@ -1,6 +1,7 @@
 //! Text in the units of data sheets <-> [`ImuError`]. Pure.
 
 use super::{ImuError, ImuErrorFault, PRESETS};
+use crate::diagnostic::Diagnostic;
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 
@@ -148,20 +149,19 @@ impl ImuError {
         let mut seen = Vec::new();
         for part in parts {
             let (key, number) = part.split_once('=').ok_or_else(|| {
-                ImuErrorFault(format!("`{part}`: expected KEY=NUMBER after a comma"))
+                ImuErrorFault(format!("`{part}`: expected KEY=NUMBER after a comma").into())
             })?;
             let term = TERMS
                 .iter()
                 .find(|t| same(t.key, key.trim()))
                 .ok_or_else(|| ImuErrorFault(unknown_key(key)))?;
             if seen.contains(&term.key) {
-                return Err(ImuErrorFault(format!("{} is given twice", term.key)));
+                return Err(ImuErrorFault(format!("{} is given twice", term.key).into()));
             }
             seen.push(term.key);
-            let value: f64 = number
-                .trim()
-                .parse()
-                .map_err(|_| ImuErrorFault(format!("{part}: expected a number, {}", term.unit)))?;
+            let value: f64 = number.trim().parse().map_err(|_| {
+                ImuErrorFault(format!("{part}: expected a number, {}", term.unit).into())
+            })?;
             (term.write)(&mut error, value * term.si);
         }
         error.check()?;
@@ -198,21 +198,16 @@ fn same(name: &str, given: &str) -> bool {
     name.eq_ignore_ascii_case(&given.replace('-', "_"))
 }
 
-fn unknown_preset(name: &str) -> String {
+fn unknown_preset(name: &str) -> Diagnostic {
     let names: Vec<&str> = PRESETS.iter().map(|p| p.name).collect();
-    format!(
-        "`{name}`: no such preset, and not KEY=NUMBER\n  help: presets are none, {}",
-        names.join(", ")
-    )
+    Diagnostic::new(format!("`{name}`: no such preset, and not KEY=NUMBER"))
+        .help(format!("presets are none, {}", names.join(", ")))
 }
 
-fn unknown_key(key: &str) -> String {
+fn unknown_key(key: &str) -> Diagnostic {
     let keys: Vec<String> = TERMS
         .iter()
         .map(|t| format!("{} ({})", t.key, t.unit))
         .collect();
-    format!(
-        "`{key}`: no such term\n  help: terms are {}",
-        keys.join(", ")
-    )
+    Diagnostic::new(format!("`{key}`: no such term")).help(format!("terms are {}", keys.join(", ")))
 }

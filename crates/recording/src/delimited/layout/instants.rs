@@ -10,6 +10,7 @@ use crate::columns::Meant;
 use crate::columns::Role;
 use crate::columns::Unit;
 use crate::decode::{Bare, bare_of_text, instant_of_date, unit_of, units_that_fit};
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::record::TimeUnit;
 use strapd_attitude::setting::{COLUMNS, RATE_HZ, TIME};
 
@@ -42,7 +43,7 @@ const FEW: usize = 4;
 
 impl Roles<'_> {
     /// How rows are placed in time.
-    pub(super) fn instants(&self) -> Result<Instants, String> {
+    pub(super) fn instants(&self) -> Result<Instants, Diagnostic> {
         let given = self.given_of(Role::Stamp);
         let is_refused = given.is_some_and(|given| given.columns.is_empty());
         if let Some(given) = given.filter(|given| !given.columns.is_empty()) {
@@ -68,13 +69,16 @@ impl Roles<'_> {
                 let mut exact = stamps.filter(|stamp| stamp.is_exact);
                 match (exact.next(), exact.next()) {
                     (Some(one), None) => Ok(self.of_stamp(one)),
-                    _ => Err(format!(
-                        "its stamp may be {}: which is meant can not be told\n  help: {COLUMNS} stamp={}",
-                        self.listed(several),
+                    _ => Err(Diagnostic::new(format!(
+                        "its stamp may be {}: which is meant can not be told",
+                        self.listed(several)
+                    ))
+                    .help(format!(
+                        "{COLUMNS} stamp={}",
                         several
                             .first()
                             .map_or_else(String::new, |at| self.reference(*at))
-                    )),
+                    ))),
                 }
             }
         }
@@ -93,7 +97,7 @@ impl Roles<'_> {
     }
 
     /// By a running number, or none, and the rate of the file's head.
-    fn counted(&self) -> Result<Instants, String> {
+    fn counted(&self) -> Result<Instants, Diagnostic> {
         let given = self.given_of(Role::Counter);
         let column = match given.and_then(|given| given.columns.first()) {
             Some(column) => {
@@ -141,7 +145,7 @@ impl Roles<'_> {
     }
 
     /// A column of stamps, with the unit that the user gives, or else with its own.
-    fn stamp(&self, at: usize, given: Option<Unit>) -> Result<Stamp, String> {
+    fn stamp(&self, at: usize, given: Option<Unit>) -> Result<Stamp, Diagnostic> {
         let numbers = self.numbers(at);
         let stated = self.names.get(at).and_then(|name| name.unit.clone());
         let text = self.names.get(at).map_or("", |name| name.text.as_str());
@@ -173,10 +177,15 @@ impl Roles<'_> {
             }
             // One that is none among others is counted with its row.
             if numbers.iter().all(|n| !is_number(n)) {
-                return Err(format!(
-                    "`{}` of column `{text}` is no stamp that is known (numbers, RFC 3339)\n  help: {COLUMNS} stamp=NAME:UNIT names another; {COLUMNS} stamp=none with {TIME} index {RATE_HZ} HZ does without",
-                    crate::text::snippet(odd.as_bytes())
-                ));
+                return Err(
+                    Diagnostic::new(format!(
+                        "`{}` of column `{text}` is no stamp that is known (numbers, RFC 3339)",
+                        crate::text::snippet(odd.as_bytes())
+                    ))
+                    .help(format!(
+                        "{COLUMNS} stamp=NAME:UNIT names another; {COLUMNS} stamp=none with {TIME} index {RATE_HZ} HZ does without"
+                    ))
+                );
             }
         }
         let stamps: Vec<Bare> = numbers.iter().filter_map(|n| bare_of_text(n)).collect();
@@ -193,10 +202,13 @@ impl Roles<'_> {
                 self.check_unit(at, nanos, &stamps)?;
                 Ok(of(nanos))
             }
-            Some(Err(unit)) => Err(format!(
-                "the unit `{unit}` of its stamps is not known\n  help: {COLUMNS} stamp={}:UNIT, with ns, us, ms or s",
+            Some(Err(unit)) => Err(Diagnostic::new(format!(
+                "the unit `{unit}` of its stamps is not known"
+            ))
+            .help(format!(
+                "{COLUMNS} stamp={}:UNIT, with ns, us, ms or s",
                 self.reference(at)
-            )),
+            ))),
             _ => match unit_of(stamps.iter().copied()) {
                 Ok(unit) => Ok(of(unit.nanos(0.0) as f64)),
                 Err(_) if stamps.is_empty() => Ok(of(1.0)),
@@ -205,10 +217,11 @@ impl Roles<'_> {
                     let by_size = TimeUnit::of_magnitude(first);
                     let fits = units_that_fit(stamps.iter().copied());
                     if fits.is_some_and(|(_, fits)| !fits.contains(&by_size)) {
-                        return Err(format!(
-                            "`{text}`: {}\n  help: {COLUMNS} stamp={}:UNIT, with ns, us, ms or s",
-                            why.what(),
-                            self.reference(at)
+                        return Err(Diagnostic::new(format!("`{text}`: {}", why.what())).help(
+                            format!(
+                                "{COLUMNS} stamp={}:UNIT, with ns, us, ms or s",
+                                self.reference(at)
+                            ),
                         ));
                     }
                     let mut stamp = of(by_size.nanos(first) as f64);
@@ -224,7 +237,7 @@ impl Roles<'_> {
     }
 
     /// A unit that the name states, and the steps deny.
-    fn check_unit(&self, at: usize, nanos: f64, stamps: &[Bare]) -> Result<(), String> {
+    fn check_unit(&self, at: usize, nanos: f64, stamps: &[Bare]) -> Result<(), Diagnostic> {
         if stamps.len() < FEW {
             return Ok(());
         }
@@ -239,19 +252,22 @@ impl Roles<'_> {
         let Some(other) = fits.first() else {
             return Ok(());
         };
-        Err(format!(
-            "{} is in {} by its name, but its steps of {step} are those of a gyro only in {}\n  help: {COLUMNS} stamp={}:{} takes it so, and :{} as its name says",
+        Err(Diagnostic::new(format!(
+            "{} is in {} by its name, but its steps of {step} are those of a gyro only in {}",
             self.listed(&[at]),
             stated.name(),
-            other.name(),
+            other.name()
+        ))
+        .help(format!(
+            "{COLUMNS} stamp={}:{} takes it so, and :{} as its name says",
             self.reference(at),
             other.name(),
             stated.name()
-        ))
+        )))
     }
 
     /// Xsens counts in 0.1 ms (MT) or in us (DOT), and does not say which.
-    fn fine(&self, at: usize, stamps: &[Bare]) -> Result<f64, String> {
+    fn fine(&self, at: usize, stamps: &[Bare]) -> Result<f64, Diagnostic> {
         const TICK: f64 = 1e5;
         const MICRO: f64 = 1e3;
         let step = units_that_fit(stamps.iter().copied()).map(|(step, _)| step);
@@ -268,11 +284,14 @@ impl Roles<'_> {
             (Some(nanos), _) => Ok(nanos),
             (None, Some(step)) if step <= FINE_TICKS => Ok(TICK),
             (None, Some(step)) if step >= FINE_MICROS => Ok(MICRO),
-            _ => Err(format!(
-                "{} counts in 0.1 ms or in us, and which can not be told\n  help: {COLUMNS} stamp={}:100us, or :us",
-                self.listed(&[at]),
+            _ => Err(Diagnostic::new(format!(
+                "{} counts in 0.1 ms or in us, and which can not be told",
+                self.listed(&[at])
+            ))
+            .help(format!(
+                "{COLUMNS} stamp={}:100us, or :us",
                 self.reference(at)
-            )),
+            ))),
         }
     }
 }

@@ -11,6 +11,7 @@ use crate::columns::{Kind, Meant, Name};
 use crate::decode::Wanted;
 use std::collections::BTreeMap;
 use strapd_attitude::condition::GyroUnit;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::record::AccelUnit;
 use strapd_attitude::setting::{BODY, COLUMNS};
 
@@ -42,7 +43,7 @@ struct Chosen {
 type Filled<'c> = (&'c Option<Chosen>, Kind, fn(usize) -> Column);
 
 /// Where a column is that the user names, or gives by its number from 1.
-pub(super) fn place(names: &[Name], column: &str) -> Result<usize, String> {
+pub(super) fn place(names: &[Name], column: &str) -> Result<usize, Diagnostic> {
     let all = |is: &dyn Fn(&str) -> bool| -> Vec<usize> {
         let each = names.iter().enumerate();
         each.filter(|(_, name)| is(&name.text))
@@ -56,17 +57,18 @@ pub(super) fn place(names: &[Name], column: &str) -> Result<usize, String> {
     match (found.as_slice(), number(column)) {
         ([one], _) => Ok(*one),
         ([], Some(n)) if n <= names.len() => Ok(n - 1),
-        ([], Some(n)) => Err(format!("there is no column {n} of {}", names.len())),
+        ([], Some(n)) => Err(format!("there is no column {n} of {}", names.len()).into()),
         ([], None) => {
             let column = crate::text::printable(column);
-            Err(format!("there is no column `{column}`"))
+            Err(format!("there is no column `{column}`").into())
         }
         ([first, second, ..], _) => Err(format!(
             "`{}` is there more than once, as columns {} and {}: give its number",
             crate::text::printable(column),
             first + 1,
             second + 1
-        )),
+        )
+        .into()),
     }
 }
 
@@ -123,7 +125,7 @@ impl Roles<'_> {
     ///
     /// # Errors
     /// What can not be told, with the flag that tells it.
-    pub(super) fn table(&self, header: &[u8], delimiter: Delimiter) -> Result<Table, String> {
+    pub(super) fn table(&self, header: &[u8], delimiter: Delimiter) -> Result<Table, Diagnostic> {
         let mut notes = Vec::new();
         let gyro = self.chosen(Kind::Gyro, &mut notes)?;
         let accel = self.chosen(Kind::Accel, &mut notes)?;
@@ -135,10 +137,12 @@ impl Roles<'_> {
         };
         let is_beside = self.wanted != Wanted::Rates && (accel.is_some() || mag.is_some());
         if gyro.is_none() && orientation.is_none() && matrix.is_none() && !is_beside {
-            return Err(format!(
-                "none of its columns is a rate or an orientation\n  help: {COLUMNS} gyro=NAME:NAME:NAME; they are {}",
-                self.listed(&(0..self.names.len().min(16)).collect::<Vec<_>>())
-            ));
+            return Err(
+                Diagnostic::new("none of its columns is a rate or an orientation").help(format!(
+                    "{COLUMNS} gyro=NAME:NAME:NAME; they are {}",
+                    self.listed(&(0..self.names.len().min(16)).collect::<Vec<_>>())
+                )),
+            );
         }
         let instants = self.instants()?;
         let mut of: Vec<(usize, Column)> = Vec::new();
@@ -178,10 +182,10 @@ impl Roles<'_> {
             before.any(|(other, _)| other == at).then_some(*at)
         };
         if let Some(at) = of.iter().enumerate().find_map(twice) {
-            return Err(format!(
-                "column {} has two roles\n  help: {COLUMNS} gives each its own",
-                self.listed(&[at])
-            ));
+            return Err(
+                Diagnostic::new(format!("column {} has two roles", self.listed(&[at])))
+                    .help(format!("{COLUMNS} gives each its own")),
+            );
         }
         let mut table = Table::of_columns(header, columns(self.names, &of), delimiter);
         table.clock = instants.clock;
@@ -215,13 +219,13 @@ impl Roles<'_> {
     }
 
     /// The columns of a kind, where there are any.
-    fn chosen(&self, kind: Kind, notes: &mut Vec<String>) -> Result<Option<Chosen>, String> {
+    fn chosen(&self, kind: Kind, notes: &mut Vec<String>) -> Result<Option<Chosen>, Diagnostic> {
         if let Some(given) = self.given_of(Role::Of(kind)) {
             if given.columns.is_empty() {
                 return Ok(None);
             }
             let places = given.columns.iter().map(|column| place(self.names, column));
-            let places: Result<Vec<usize>, String> = places.collect();
+            let places: Result<Vec<usize>, Diagnostic> = places.collect();
             let columns = places.map_err(|why| format!("{COLUMNS} {}: {why}", kind.name()))?;
             let unit = match given.unit {
                 Some(unit) => Some(unit),
@@ -254,15 +258,18 @@ impl Roles<'_> {
             return Err(self.several(kind, &groups));
         };
         if let Some([first, second]) = group.twice {
-            return Err(format!(
-                "{} is there twice, as columns {} and {}: which of them is meant can not be told\n  help: {COLUMNS} {}={} takes the first, by its number; {}=none neither",
+            return Err(Diagnostic::new(format!(
+                "{} is there twice, as columns {} and {}: which of them is meant can not be told",
                 self.listed(&[first]),
                 first + 1,
-                second + 1,
+                second + 1
+            ))
+            .help(format!(
+                "{COLUMNS} {}={} takes the first, by its number; {}=none neither",
                 kind.name(),
                 self.references(&group.columns),
                 kind.name()
-            ));
+            )));
         }
         let columns = group.columns.clone();
         let Some(unit) = self.unit(kind, &columns, notes)? else {
@@ -278,7 +285,7 @@ impl Roles<'_> {
         kind: Kind,
         columns: &[usize],
         notes: &mut Vec<String>,
-    ) -> Result<Option<Option<Unit>>, String> {
+    ) -> Result<Option<Option<Unit>>, Diagnostic> {
         let names: Vec<&Name> = columns
             .iter()
             .filter_map(|at| self.names.get(*at))
@@ -287,22 +294,28 @@ impl Roles<'_> {
             return Ok(Some(None));
         };
         if let Some(other) = names.iter().find(|name| name.unit != first.unit) {
-            return Err(format!(
-                "its {} has several units: `{}` and `{}`\n  help: {COLUMNS} {}={}:UNIT, where all of them are of one",
+            return Err(Diagnostic::new(format!(
+                "its {} has several units: `{}` and `{}`",
                 kind.name(),
                 first.text,
-                other.text,
+                other.text
+            ))
+            .help(format!(
+                "{COLUMNS} {}={}:UNIT, where all of them are of one",
                 kind.name(),
                 self.references(columns)
-            ));
+            )));
         }
         Ok(match (&first.unit, kind) {
             (Some(Ok(unit)), _) => Some(Some(*unit)),
             (Some(Err(unit)), Kind::Gyro) => {
-                return Err(format!(
-                    "the unit `{unit}` of its rates is not known\n  help: {COLUMNS} gyro={}:deg/s (or rad/s, mrad/s, mdps)",
+                return Err(Diagnostic::new(format!(
+                    "the unit `{unit}` of its rates is not known"
+                ))
+                .help(format!(
+                    "{COLUMNS} gyro={}:deg/s (or rad/s, mrad/s, mdps)",
                     self.references(columns)
-                ));
+                )));
             }
             (Some(Err(unit)), Kind::Accel) => {
                 notes.push(format!(
@@ -371,7 +384,7 @@ impl Roles<'_> {
         }
     }
 
-    fn several(&self, kind: Kind, groups: &[Group]) -> String {
+    fn several(&self, kind: Kind, groups: &[Group]) -> Diagnostic {
         let each: Vec<String> = groups.iter().map(|g| self.listed(&g.columns)).collect();
         let flags: Vec<String> = groups
             .iter()
@@ -381,12 +394,12 @@ impl Roles<'_> {
             Kind::Gyro => String::new(),
             _ => format!(", or {COLUMNS} {}=none", kind.name()),
         };
-        format!(
-            "its {} may be {}: which is meant can not be told\n  help: {}{none}",
+        Diagnostic::new(format!(
+            "its {} may be {}: which is meant can not be told",
             kind.name(),
-            each.join(" or "),
-            flags.join(", or ")
-        )
+            each.join(" or ")
+        ))
+        .help(format!("{}{none}", flags.join(", or ")))
     }
 
     /// Columns by name, for people.

@@ -4,6 +4,7 @@ use super::record::{Body, CHUNK, MESSAGE_INDEX, PREFIX, message_head};
 use crate::error::{Error, Result};
 use std::collections::BTreeMap;
 use std::io::{self, Write};
+use strapd_attitude::diagnostic::Diagnostic;
 
 /// How chunks are packed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -43,9 +44,10 @@ impl std::str::FromStr for Compression {
             .into_iter()
             .find(|c| c.name() == text)
             .ok_or_else(|| {
-                Error::Usage(format!(
-                    "unknown compression `{text}`\n  help: none, lz4 or zstd"
-                ))
+                Error::usage(
+                    Diagnostic::new(format!("unknown compression `{text}`"))
+                        .help("none, lz4 or zstd"),
+                )
             })
     }
 }

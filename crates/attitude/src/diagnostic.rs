@@ -1,0 +1,99 @@
+//! Why something can not be done, and apart from it what helps. Pure.
+//!
+//! Two fields and not one text, because who is told differs: a terminal shows the help on a line of its own, a page behind a
+//! semicolon, a program in Python reads it as `error.help`.
+//!
+//! ```
+//! use strapd_attitude::diagnostic::Diagnostic;
+//! use strapd_attitude::setting::GYRO_UNIT;
+//!
+//! let said = Diagnostic::new("the rates are too large").help(format!("{GYRO_UNIT} deg"));
+//! assert_eq!(said.what(), "the rates are too large");
+//! assert_eq!(said.to_string(), "the rates are too large\n  help: gyro_unit deg");
+//! ```
+
+use std::fmt;
+
+/// What can not be done, where and why; and what helps.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Diagnostic {
+    what: String,
+    help: String,
+}
+
+impl Diagnostic {
+    /// Without help, until [`Diagnostic::help`] gives some.
+    #[must_use]
+    pub fn new(what: impl Into<String>) -> Diagnostic {
+        Diagnostic {
+            what: what.into(),
+            help: String::new(),
+        }
+    }
+
+    /// What helps: settings with their values, or what else can be done.
+    #[must_use]
+    pub fn help(mut self, help: impl Into<String>) -> Diagnostic {
+        self.help = help.into();
+        self
+    }
+
+    /// What can not be done, and why.
+    #[must_use]
+    pub fn what(&self) -> &str {
+        &self.what
+    }
+
+    /// What helps; `None` where nothing is known to.
+    #[must_use]
+    pub fn helping(&self) -> Option<&str> {
+        Some(self.help.as_str()).filter(|help| !help.is_empty())
+    }
+
+    /// The same, with the place before it: `place: what`.
+    #[must_use]
+    pub fn at(mut self, place: impl fmt::Display) -> Diagnostic {
+        self.what = format!("{place}: {}", self.what);
+        self
+    }
+
+    /// Both texts, to put other names into them.
+    pub fn texts(&mut self) -> [&mut String; 2] {
+        [&mut self.what, &mut self.help]
+    }
+
+    /// All of it in one line: `what; help`.
+    #[must_use]
+    pub fn line(&self) -> String {
+        let what = self.what.replace('\n', " ");
+        match self.helping() {
+            Some(help) => format!("{what}; {}", help.replace('\n', " ")),
+            None => what,
+        }
+    }
+}
+
+/// On two lines, the second for the help.
+impl fmt::Display for Diagnostic {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.what)?;
+        match self.helping() {
+            Some(help) => write!(f, "\n  help: {help}"),
+            None => Ok(()),
+        }
+    }
+}
+
+impl std::error::Error for Diagnostic {}
+
+impl From<String> for Diagnostic {
+    fn from(what: String) -> Diagnostic {
+        Diagnostic::new(what)
+    }
+}
+
+impl From<&str> for Diagnostic {
+    fn from(what: &str) -> Diagnostic {
+        Diagnostic::new(what)
+    }
+}
