@@ -2,11 +2,12 @@
 //!
 //! ```sh
 //! cargo run --example third_party_notices > THIRD-PARTY-NOTICES.txt
+//! cargo run --example third_party_notices -- Cargo.toml python/Cargo.toml    # of all that these are linked from
 //! ```
 //!
 //! Permissive licences ask for one thing: that their text goes with the binary. So the text is taken
 //! from the very sources the binary is built from, and a crate that has none fails the run unless it at
-//! least names its licence. Texts that are alike stand once. `packaging/release` ships the result.
+//! least names its licence. Texts that are alike stand once. `packaging/release` ships the result, and `python/build`.
 
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
@@ -29,14 +30,23 @@ struct Notice {
 }
 
 fn main() -> Outcome<()> {
-    let notices = linked(&metadata()?)?
-        .iter()
-        .map(|package| notice(package))
-        .collect::<Outcome<Vec<_>>>()?;
+    let mut manifests: Vec<String> = std::env::args().skip(1).collect();
+    if manifests.is_empty() {
+        manifests.push("Cargo.toml".to_owned());
+    }
+    // By name and version, so that what is in both halves of a wheel stands once.
+    let mut notices = BTreeMap::new();
+    for manifest in &manifests {
+        for package in linked(&metadata(manifest)?)? {
+            let notice = notice(package)?;
+            notices.insert(notice.name.clone(), notice);
+        }
+    }
+    let notices: Vec<Notice> = notices.into_values().collect();
     write(&notices, &mut std::io::stdout().lock())
 }
 
-fn metadata() -> Outcome<Value> {
+fn metadata(manifest: &str) -> Outcome<Value> {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let version = Command::new(&cargo).args(["-vV"]).output()?;
     let host = String::from_utf8(version.stdout)?
@@ -46,6 +56,7 @@ fn metadata() -> Outcome<Value> {
     let out = Command::new(&cargo)
         .args(["metadata", "--locked", "--format-version", "1"])
         .args(["--filter-platform", &host])
+        .args(["--manifest-path", manifest])
         .output()?;
     if !out.status.success() {
         return Err(String::from_utf8_lossy(&out.stderr).into());

@@ -166,3 +166,15 @@ def test_importing_costs_little_beyond_numpy() -> None:
 def test_scipy_and_pandas_are_not_imported() -> None:
     code = "import strapd, sys; print([m for m in ('scipy', 'pandas', 'polars', 'typing_extensions', 'subprocess') if m in sys.modules])"
     assert subprocess.check_output([sys.executable, "-c", code], text=True) == "[]\n"
+
+
+def test_the_licences_of_what_it_is_made_of_come_with_it() -> None:
+    import importlib.metadata
+
+    files = importlib.metadata.files("strapd") or []
+    (notices,) = [file for file in files if file.name == "THIRD-PARTY-NOTICES.txt"]
+    text = notices.read_text()
+    # In the module alone, in the command alone where it is there, and in both.
+    assert "\npyo3 " in text and "\nnalgebra " in text
+    assert ("\naxum " in text) == any(file.name == "strapd" and "bin" in file.parts for file in files)
+    assert "Permission is hereby granted" in text

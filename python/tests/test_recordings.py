@@ -89,7 +89,7 @@ def test_values_become_flags() -> None:
     assert known is None and _recordings.arguments({"calibration": {"bias": [0, 0, 0]}}) == ({}, {"bias": [0, 0, 0]})
 
 
-def test_the_librarys_words_name_arguments_too() -> None:
+def test_the_words_of_the_library_name_arguments_too() -> None:
     """Flags become arguments, those of arrays or of a log, and dashes that are none are left."""
     gyr = np.zeros((600, 3))
     with pytest.raises(strapd.Error) as error:
@@ -99,6 +99,7 @@ def test_the_librarys_words_name_arguments_too() -> None:
     with pytest.raises(strapd.Error) as error:
         strapd.replay(FIXTURES / "constant_rate.mcap", init="first-orientation")
     assert "help: init gravity" in str(error.value) and "--" not in str(error.value) and error.value.kind == "refused"
+    assert error.value.help is not None and error.value.help.startswith("init gravity")
 
 
 def test_several_topics_come_by_name() -> None:

@@ -208,7 +208,7 @@ async fn send(
     lines: &mut mpsc::Receiver<Vec<Line>>,
 ) -> Result<Sent> {
     let failed = |what: String| Error::Remote {
-        address: remote.to_string(),
+        address: remote.to_string().into(),
         what: what.into(),
     };
     let mut sender = Sender::connect(remote, token).await.map_err(failed)?;

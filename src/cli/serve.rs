@@ -14,7 +14,7 @@ use crate::serve::shutdown::Signals;
 use crate::serve::source::Source;
 use crate::serve::state::StateFile;
 use crate::serve::{Server, Settings, listen};
-use crate::sink::address::{DEFAULTS, Listen, printable_address};
+use crate::sink::address::{Address, DEFAULTS, Listen};
 use crate::sink::{Format, Target};
 use clap::Args;
 use std::io::IsTerminal;
@@ -339,7 +339,7 @@ impl Serve {
                 return Err(Error::usage(
                     Diagnostic::new(format!(
                         "serve {}: is no source of a daemon; known: tcp://HOST:PORT, ws://HOST:PORT/PATH, unix:///PATH, -",
-                        printable_address(text)
+                        Address::from(text)
                     ))
                     .help(
                         "--listen waits for senders; strapd replay reads a log",

@@ -2,7 +2,7 @@
 //!
 //! How a word is quoted is [`strapd_replay::shell`]'s.
 
-use crate::sink::address::printable_address;
+use crate::sink::address::Address;
 use std::ffi::{OsStr, OsString};
 use std::path::Path;
 use strapd_replay::shell::quoted;
@@ -43,7 +43,7 @@ fn kept(word: &OsStr, before: &OsStr, with_paths: bool) -> OsString {
     let value = value.unwrap_or_default();
     let head = text.strip_suffix(value).unwrap_or_default();
     if value.contains("://") {
-        return format!("{head}{}", printable_address(value)).into();
+        return format!("{head}{}", Address::from(value)).into();
     }
     let of = |flags: &[&str]| flags.iter().any(|f| *f == flag || OsStr::new(f) == before);
     if with_paths || of(&TOPICS) || !is_path(value, of(&["-o"])) {

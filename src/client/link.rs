@@ -160,7 +160,7 @@ async fn open(remote: &Remote, token: Option<&str>, max_message: usize) -> Resul
         Remote::WebSocket { place, resource } => {
             let stream = dial(place).await?;
             let peer = address(&stream);
-            let web = upgrade(stream, place, resource.asked(), token, max_message).await?;
+            let web = upgrade(stream, place, resource.typed(), token, max_message).await?;
             (Wire::WebSocket(Box::new(web)), format!("ws://{peer}"))
         }
         #[cfg(unix)]

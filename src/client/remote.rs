@@ -3,7 +3,7 @@
 //! known tomorrow.
 
 use crate::error::{Error, Result};
-use crate::sink::address::printable_address;
+use crate::sink::address::Address;
 use std::fmt;
 use std::path::PathBuf;
 use strapd_attitude::diagnostic::Diagnostic;
@@ -17,8 +17,8 @@ pub enum Remote {
     WebSocket {
         /// The machine.
         place: Place,
-        /// What is asked for there.
-        resource: Resource,
+        /// What is asked for there: path and query, beginning with `/`.
+        resource: Address,
     },
     /// Lines over a Unix socket.
     Unix(PathBuf),
@@ -33,30 +33,6 @@ pub struct Place {
     pub host: String,
     /// From 1, but for what is listened on.
     pub port: u16,
-}
-
-/// Path and query of a WebSocket, beginning with `/`. Printed it has no values of the query: they may be keys.
-#[derive(Clone, PartialEq, Eq)]
-pub struct Resource(String);
-
-impl Resource {
-    /// As it is asked for, with everything; for who connects alone.
-    #[must_use]
-    pub fn asked(&self) -> &str {
-        &self.0
-    }
-}
-
-impl fmt::Display for Resource {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&printable_address(&self.0))
-    }
-}
-
-impl fmt::Debug for Resource {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{self}")
-    }
 }
 
 /// A parameter of a query: name and value, decoded.
@@ -86,7 +62,7 @@ impl Remote {
             Some((name, _)) => Err(Error::usage(
                 Diagnostic::new(format!(
                     "{}: `?{name}=` means nothing here",
-                    printable_address(text)
+                    Address::from(text)
                 ))
                 .help(KNOWN),
             )),
@@ -103,12 +79,12 @@ impl Remote {
         ours: impl Fn(&str) -> bool,
     ) -> Result<(Remote, Vec<Parameter>)> {
         let refuse = |what: &str| {
-            let shown = printable_address(text);
+            let shown = Address::from(text);
             Error::usage(Diagnostic::new(format!("{shown}: {what}")).help(KNOWN))
         };
         if text.len() > MAX_BYTES || text.chars().any(char::is_control) {
             return Err(Error::usage(
-                Diagnostic::new(format!("{}: is no address", printable_address(text))).help(KNOWN),
+                Diagnostic::new(format!("{}: is no address", Address::from(text))).help(KNOWN),
             ));
         }
         let (scheme, rest) = text.split_once("://").ok_or_else(|| refuse("no scheme"))?;
@@ -142,7 +118,7 @@ impl Remote {
                 let place = place(authority)?.connectable().map_err(refuse)?;
                 Remote::WebSocket {
                     place,
-                    resource: Resource(path),
+                    resource: path.into(),
                 }
             }
             "wss" | "https" => {
@@ -310,7 +286,7 @@ mod tests {
             r#"ws://phone:8080/sensors/connect?types=["android.sensor.gyroscope","b"]&id=left"#;
         let (remote, parameters) = Remote::with_parameters(phone, |p| p == "id").unwrap();
         let asked = |remote: &Remote| match remote {
-            Remote::WebSocket { resource, .. } => resource.asked().to_owned(),
+            Remote::WebSocket { resource, .. } => resource.typed().to_owned(),
             _ => String::new(),
         };
         assert_eq!(

@@ -82,7 +82,7 @@ impl Listener {
         #[cfg(unix)] passed: &mut Passed,
     ) -> Result<(Listener, Listen)> {
         let fail = |source| Error::Bind {
-            address: listen.to_string(),
+            address: listen.to_string().into(),
             source,
         };
         match listen {

@@ -16,7 +16,7 @@
 use crate::client::remote::{Parameter, Remote};
 use crate::client::secret::Secret;
 use crate::error::{Error, Result};
-use crate::sink::address::printable_address;
+use crate::sink::address::Address;
 use std::path::Path;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_recording::decode::{LineDecoder, Options, exact_name};
@@ -64,7 +64,7 @@ impl Source {
     pub fn parse(text: &str) -> Result<Source> {
         let (remote, parameters) = Remote::with_parameters(text, |p| OURS.contains(&p))?;
         let refuse = |what: String| {
-            let shown = printable_address(text);
+            let shown = Address::from(text);
             Error::usage(
                 Diagnostic::new(format!(
                     "serve {shown}: {what}"
@@ -106,7 +106,7 @@ impl Source {
         };
         let phone = match &remote {
             Remote::WebSocket { resource, .. } => {
-                let asked = resource.asked();
+                let asked = resource.typed();
                 asked.starts_with("/sensor/connect") || asked.starts_with("/sensors/connect")
             }
             _ => false,
@@ -182,7 +182,7 @@ mod tests {
             panic!("{}", phone.remote);
         };
         let asked = "/sensor/connect?type=android.sensor.gyroscope";
-        assert_eq!(resource.asked(), asked);
+        assert_eq!(resource.typed(), asked);
         assert_eq!(phone.name, "ws://p:8080/sensor/connect?type=...&id=phone");
         assert_eq!(of("ws://p:8765/ws").protocol, Protocol::Auto);
         assert_eq!(of("tcp://p:1?proto=ndjson").protocol, Protocol::Lines);

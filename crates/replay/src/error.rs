@@ -1,6 +1,7 @@
 //! Everything that can end a run. One flat enum; each variant says what, where and why, and apart from that what
 //! helps ([`Diagnostic`]). Bad samples are not here: they are counted verdicts ([`strapd_attitude::record::Verdict`]).
 
+use crate::sink::address::Address;
 use std::path::PathBuf;
 use std::{fmt, io};
 use strapd_attitude::diagnostic::Diagnostic;
@@ -37,21 +38,21 @@ pub enum Error {
     /// An address can not be listened on.
     Bind {
         /// Where.
-        address: String,
+        address: Address,
         /// Why.
         source: io::Error,
     },
     /// Nobody takes what is sent there.
     Connect {
         /// Where.
-        address: String,
+        address: Address,
         /// Why.
         source: io::Error,
     },
     /// A daemon can not be reached, or has gone.
     Remote {
         /// Where.
-        address: String,
+        address: Address,
         /// What, and what it said before.
         what: Diagnostic,
     },

@@ -9,6 +9,7 @@ use crate::client::watcher::{Said, Watcher, request};
 use crate::error::{Error, Result};
 use crate::serve::limits::Allowance;
 use crate::serve::shutdown::Signals;
+use crate::sink::address::Address;
 use crate::sink::roll_pitch_yaw;
 use std::collections::BTreeSet;
 use std::io::{BufWriter, Stdout, Write};
@@ -50,7 +51,7 @@ pub(super) fn run(args: &Cat, url: &str) -> Result<Outcome> {
 
 async fn print(args: &Cat, remote: &Remote, token: Option<&Secret>) -> Result<Outcome> {
     let failed = |what: String| Error::Remote {
-        address: remote.to_string(),
+        address: remote.to_string().into(),
         what: what.into(),
     };
     // A second one ends the process even when nobody reads our output.
@@ -98,7 +99,7 @@ struct Printer {
     out: BufWriter<Stdout>,
     format: Format,
     /// Who is listened to.
-    address: String,
+    address: Address,
     left: u64,
     dropped: u64,
     gap_told: bool,
@@ -157,7 +158,7 @@ impl Printer {
         Ok(Printer {
             out,
             format: args.format,
-            address: remote.to_string(),
+            address: remote.to_string().into(),
             left: args.count.unwrap_or(u64::MAX),
             dropped: 0,
             gap_told: false,

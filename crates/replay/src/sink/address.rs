@@ -1,7 +1,7 @@
 //! The word after `--listen` -> what to listen on. Pure but for looking up a host's name.
 
 use crate::error::{Error, Result};
-use std::fmt::Display;
+use std::fmt::{self, Display};
 use std::net::{IpAddr, SocketAddr, ToSocketAddrs};
 use std::path::PathBuf;
 use strapd_attitude::diagnostic::Diagnostic;
@@ -61,10 +61,39 @@ pub const DEFAULTS: [&str; 2] = ["tcp-listen://127.0.0.1:4550", "ws-listen://127
 
 const KNOWN: &str = "known: tcp-listen://HOST:PORT, udp-listen://HOST:PORT, ws-listen://HOST:PORT (and HTTP), unix-listen:///PATH; port 0 takes a free one; fd:NAME for HOST:PORT is a socket of that name (or number) from the service manager";
 
-/// An address as it may be printed, logged and written, whatever was typed: without user and password, and with `...` in
-/// the place of the values behind its `?`. Work grows with the text.
-#[must_use]
-pub fn printable_address(text: &str) -> String {
+/// An address as somebody typed it, which may hold a password or a key. It is printed, logged and written in one form alone:
+/// without user and password, and with `...` in the place of the values behind its `?`.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Address(String);
+
+impl Address {
+    /// With everything, for who connects there.
+    #[must_use]
+    pub fn typed(&self) -> &str {
+        &self.0
+    }
+}
+
+impl<T: Into<String>> From<T> for Address {
+    fn from(typed: T) -> Address {
+        Address(typed.into())
+    }
+}
+
+impl fmt::Display for Address {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(&without_secrets(&self.0))
+    }
+}
+
+impl fmt::Debug for Address {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{self}")
+    }
+}
+
+/// Work grows with the text.
+fn without_secrets(text: &str) -> String {
     let text = strapd_recording::text::printable(text);
     let (scheme, rest) = match text.split_once("://") {
         Some((scheme, rest)) => (format!("{scheme}://"), rest),
@@ -121,7 +150,7 @@ impl Listen {
     /// As [`Listen::parse`].
     pub fn parse_from(what: impl Display, text: &str) -> Result<Listen> {
         let refuse = |why: &str| {
-            let shown = printable_address(text);
+            let shown = Address::from(text);
             Error::usage(Diagnostic::new(format!("{what} {shown}: {why}")).help(KNOWN))
         };
         let (scheme, rest) = text.split_once("://").ok_or_else(|| refuse("no scheme"))?;
@@ -199,9 +228,13 @@ mod tests {
             ("?=s3cret", "?=..."),
             ("", ""),
         ] {
-            assert_eq!(printable_address(text), printed, "{text}");
+            assert_eq!(Address::from(text).to_string(), printed, "{text}");
         }
-        assert!(!printable_address("tcp://\u{1b}[31m:1").contains('\u{1b}'));
+        assert!(
+            !Address::from("tcp://\u{1b}[31m:1")
+                .to_string()
+                .contains('\u{1b}')
+        );
     }
 
     #[test]

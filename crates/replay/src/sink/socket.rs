@@ -33,7 +33,7 @@ pub(crate) fn resolve(name: &str, address: &str) -> Result<Vec<SocketAddr>> {
 
 fn connecting(name: &str, source: io::Error) -> Error {
     Error::Connect {
-        address: name.to_owned(),
+        address: name.into(),
         source,
     }
 }

@@ -1,7 +1,7 @@
 //! The word after `-o` -> where the attitude goes, in which format. Pure.
 
 use crate::error::{Error, Result};
-use crate::sink::address::{Listen, printable_address};
+use crate::sink::address::{Address, Listen};
 use std::path::{Path, PathBuf};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::setting::{LISTEN, TOKEN_FILE};
@@ -83,7 +83,7 @@ impl Target {
 
     fn socket(text: &str, scheme: &str, rest: &str) -> Result<Target> {
         let refuse = |what: &str| {
-            let shown = printable_address(text);
+            let shown = Address::from(text);
             Err(Error::usage(
                 Diagnostic::new(format!("-o {shown}: {what}")).help(KNOWN),
             ))
@@ -256,9 +256,9 @@ mod tests {
             "s3://b/x.mcap",
         ] {
             let said = Target::parse(text).unwrap_err().to_string();
-            let shown = printable_address(text);
+            let shown = Address::from(text);
             assert!(
-                said.contains(&shown) && said.contains("help: known"),
+                said.contains(&shown.to_string()) && said.contains("help: known"),
                 "{said}"
             );
         }
