@@ -1,13 +1,42 @@
-//! What this machine has of what some tests need. A test that needs what is not here is ignored, and
-//! says why; `.ci/run` has everything.
+//! The pages, packed; and what this machine has of what some tests need. A test that needs what is not
+//! here is ignored, and says why; `.ci/run` has everything.
 //!
 //! Looked for when this is built: `touch build.rs` after something was installed.
 
-use std::env;
 use std::path::Path;
+use std::{env, fs, io};
 
-fn main() {
+/// The files of the pages -> one text, packed, and where each begins and ends in it. A quarter of their size in the
+/// command.
+fn pack() -> io::Result<()> {
+    println!("cargo::rerun-if-changed=src/web");
+    let mut files = fs::read_dir("src/web")?
+        .map(|entry| entry.map(|e| e.path()))
+        .collect::<io::Result<Vec<_>>>()?;
+    files.sort();
+    let (mut text, mut places) = (String::new(), String::new());
+    for file in files {
+        let begins = text.len();
+        text += &fs::read_to_string(&file)?;
+        let name = file.file_name().unwrap_or_default();
+        places += &format!("({:?}, {begins}, {}),\n", name, text.len());
+    }
+    let out = env::var("OUT_DIR").map_err(io::Error::other)?;
+    let out = Path::new(&out);
+    fs::write(
+        out.join("web.zst"),
+        zstd::bulk::compress(text.as_bytes(), 22)?,
+    )?;
+    let places = format!(
+        "/// Name, and from where to where in the text.\nconst PLACES: &[(&str, usize, usize)] = &[\n{places}];\nconst LENGTH: usize = {};\n",
+        text.len()
+    );
+    fs::write(out.join("web.rs"), places)
+}
+
+fn main() -> io::Result<()> {
     println!("cargo::rerun-if-changed=build.rs");
+    pack()?;
     for variable in ["STRAPD_CHROMIUM", "STRAPD_ORACLES_PYTHON"] {
         println!("cargo::rerun-if-env-changed={variable}");
     }
@@ -40,4 +69,5 @@ fn main() {
             println!("cargo::rustc-cfg={name}");
         }
     }
+    Ok(())
 }

@@ -59,6 +59,8 @@ mod size_limit;
 #[doc(hidden)]
 pub mod size_limit;
 
+mod web;
+
 use clap::Parser;
 use std::process::ExitCode;
 

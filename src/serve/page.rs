@@ -1,10 +1,10 @@
 //! The live page and the interactive top, compiled in -> answers. Pure.
 //!
-//! Hand-written HTML, CSS and ES modules below `src/web/`: no framework, nothing fetched from
-//! elsewhere, no inline script or style, so that `default-src 'self'` can stand. They hold no secret
-//! and are given without a token; what they ask for is not.
+//! No inline script or style, so that `default-src 'self'` can stand. They hold no secret and are given
+//! without a token; what they ask for is not.
 
 use super::http::answer::{refusal, response};
+use crate::web;
 use axum::Router;
 use axum::body::Body;
 use axum::extract::Path;
@@ -16,32 +16,15 @@ const STYLE: &str = "text/css; charset=utf-8";
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 const PICTURE: &str = "image/svg+xml";
 
-macro_rules! assets {
-    ($($name:literal $kind:ident),* $(,)?) => {
-        &[$(($name, $kind, include_str!(concat!("../web/", $name)))),*]
-    };
+/// The type of a file, by its name.
+fn kind(name: &str) -> &'static str {
+    match name.rsplit_once('.').map_or("", |(_, ending)| ending) {
+        "css" => STYLE,
+        "svg" => PICTURE,
+        "html" => HTML,
+        _ => SCRIPT,
+    }
 }
-
-/// Name below `/page/`, type, text.
-const ASSETS: &[(&str, &str, &str)] = assets![
-    "style.css" STYLE,
-    "icon.svg" PICTURE,
-    "live.js" SCRIPT,
-    "body3d.js" SCRIPT,
-    "demonstration.js" SCRIPT,
-    "history.js" SCRIPT,
-    "horizon.js" SCRIPT,
-    "known.js" SCRIPT,
-    "link.js" SCRIPT,
-    "numbers.js" SCRIPT,
-    "playback.js" SCRIPT,
-    "plot.js" SCRIPT,
-    "quaternion.js" SCRIPT,
-    "sensor.js" SCRIPT,
-    "surface.js" SCRIPT,
-    "top.js" SCRIPT,
-    "topview.js" SCRIPT,
-];
 
 /// What the pages are made of.
 pub(super) fn router() -> Router {
@@ -52,17 +35,21 @@ pub(super) fn router() -> Router {
 
 /// The live page.
 pub(super) fn live() -> Response<Body> {
-    response(StatusCode::OK, HTML, include_str!("../web/live.html"))
+    page("live.html")
 }
 
 /// The interactive top.
 async fn top() -> Response<Body> {
-    response(StatusCode::OK, HTML, include_str!("../web/top.html"))
+    page("top.html")
+}
+
+fn page(name: &'static str) -> Response<Body> {
+    response(StatusCode::OK, HTML, web::text(name).unwrap_or_default())
 }
 
 async fn asset(Path(name): Path<String>) -> Response<Body> {
-    match ASSETS.iter().find(|(known, ..)| *known == name) {
-        Some((_, kind, text)) => response(StatusCode::OK, kind, *text),
+    match web::text(&name).filter(|_| kind(&name) != HTML) {
+        Some(text) => response(StatusCode::OK, kind(&name), text),
         None => refusal(
             StatusCode::NOT_FOUND,
             "not_found",
@@ -75,25 +62,26 @@ async fn asset(Path(name): Path<String>) -> Response<Body> {
 mod tests {
     use super::*;
 
-    const PAGES: [&str; 2] = [
-        include_str!("../web/live.html"),
-        include_str!("../web/top.html"),
-    ];
+    const PAGES: [&str; 2] = ["live.html", "top.html"];
+
+    fn text(name: &str) -> &'static str {
+        web::text(name).unwrap()
+    }
 
     #[test]
     fn the_pages_are_small_and_ask_nobody_else() {
-        let texts = || ASSETS.iter().map(|(.., text)| *text).chain(PAGES);
-        let bytes: usize = texts().map(str::len).sum();
-        assert!(bytes <= 150_000, "{bytes} bytes");
-        for text in texts() {
+        let bytes: usize = web::names().map(|name| text(name).len()).sum();
+        assert!((60_000..=200_000).contains(&bytes), "{bytes} bytes");
+        for name in web::names() {
+            let text = text(name);
             let elsewhere = text.replace("http://www.w3.org/2000/svg", "");
             for word in ["http://", "https://", "url(", "@import"] {
                 // The scheme of one's own address is no address.
                 let said = elsewhere.matches(word).count();
-                assert_eq!(said, 0, "{word} in {}", &text[..60]);
+                assert_eq!(said, 0, "{word} in {name}");
             }
             for inline in ["<style", " style=", " onclick=", "<script>", "javascript:"] {
-                assert!(!text.contains(inline), "{inline} in {}", &text[..60]);
+                assert!(!text.contains(inline), "{inline} in {name}");
             }
         }
     }
@@ -101,18 +89,15 @@ mod tests {
     #[test]
     fn every_part_a_page_names_is_there() {
         for page in PAGES {
-            let named = page.split("\"/page/").skip(1);
-            for name in named.filter_map(|rest| rest.split('"').next()) {
-                assert!(ASSETS.iter().any(|(known, ..)| *known == name), "{name}");
+            for name in text(page).split("\"/page/").skip(1) {
+                let name = name.split('"').next().unwrap();
+                assert!(web::text(name).is_some(), "{page} names {name}");
             }
         }
-        for (from, _, text) in ASSETS.iter().filter(|(_, kind, _)| *kind == SCRIPT) {
-            let named = text.split("from \"./").skip(1);
-            for name in named.filter_map(|rest| rest.split('"').next()) {
-                assert!(
-                    ASSETS.iter().any(|(known, ..)| *known == name),
-                    "{from} imports {name}"
-                );
+        for from in web::names().filter(|name| kind(name) == SCRIPT) {
+            for name in text(from).split("from \"./").skip(1) {
+                let name = name.split('"').next().unwrap();
+                assert!(web::text(name).is_some(), "{from} imports {name}");
             }
         }
     }

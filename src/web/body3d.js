@@ -187,10 +187,29 @@ export class Scene {
     this.tips = axes.map((axis) => this.project(axis).slice(0, 2));
   }
 
-  axis(direction, n) {
+  // The axes of another body alone, thin.
+  triad(toWorld, { width = 1.5, dash = [4, 4], name = "" } = {}) {
+    const { context, colours } = this;
+    context.setLineDash(dash);
+    const axes = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map(toWorld);
+    axes.forEach((axis, n) => this.axis(axis, n, width));
+    context.setLineDash([]);
+    if (!name) return;
+    const [x, y] = this.project(axes[0].map((v) => 1.1 * v));
+    context.font = `600 11px ${FONT}`;
+    context.textAlign = x < this.centre[0] ? "right" : "left";
+    context.textBaseline = "middle";
+    context.lineWidth = 3;
+    context.strokeStyle = colours.surface;
+    context.strokeText(name, x, y);
+    context.fillStyle = colours.text;
+    context.fillText(name, x, y);
+  }
+
+  axis(direction, n, width = 3) {
     const { context, colours } = this;
     context.strokeStyle = [colours.x, colours.y, colours.z][n];
-    context.lineWidth = 3;
+    context.lineWidth = width;
     this.path([this.project([0, 0, 0]), this.project(direction)]);
     context.stroke();
   }
@@ -258,18 +277,18 @@ export function worldNames(world) {
 // At most this many points of a path.
 const MOST = 400;
 
-// The z axis over the last `seconds`, in the world of `view` (z up), oldest first.
-export function zLocus(history, seconds, view) {
+// The z axis over the `seconds` up to number `last`, in the world of `view` (z up), oldest first.
+export function zLocus(history, seconds, view, last) {
   const points = [];
-  if (!history || history.total === 0) return points;
-  const from = history.firstFrom(history.newestTime - seconds);
-  const step = Math.ceil((history.total - from) / MOST) || 1;
+  if (!(last >= history.oldest)) return points;
+  const from = history.firstFrom(history.timeOf(last) - seconds);
+  const step = Math.ceil((last + 1 - from) / MOST) || 1;
   const add = (number) => points.push(view(rotate(history.attitude(number), [0, 0, 1])));
   // Numbers are multiples of the step, so that a path does not tremble as it grows.
-  for (let n = Math.ceil(from / step) * step; n < history.total; n += step) {
+  for (let n = Math.ceil(from / step) * step; n <= last; n += step) {
     if (history.broken[history.slot(n)]) points.push(null);
     add(n);
   }
-  add(history.total - 1);
+  add(last);
   return points;
 }

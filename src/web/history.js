@@ -1,52 +1,38 @@
 // What came of one sensor lately, in rings of fixed size: memory does not grow with time.
 
 import { between, rollPitchYaw } from "./quaternion.js";
+import { Track } from "./track.js";
 
 const CAPACITY = 1 << 15;
 
-export class History {
+export class History extends Track {
   constructor(capacity = CAPACITY) {
-    this.capacity = capacity;
-    this.time = new Float64Array(capacity);
+    super(new Float64Array(capacity));
     this.q = new Float64Array(4 * capacity);
-    this.rate = [0, 1, 2].map(() => new Float32Array(capacity));
+    this.seq = new Float64Array(capacity);
+    this.rate = [0, 1, 2].map(() => new Float64Array(capacity));
     this.angle = [0, 1, 2].map(() => new Float32Array(capacity));
-    this.error = new Float32Array(capacity);
-    // A line must not be drawn from the sample before to this one.
-    this.broken = new Uint8Array(capacity);
+    this.sigma = [0, 1, 2].map(() => new Float32Array(capacity));
+    this.error = new Float64Array(capacity);
     this.clear();
   }
 
   clear() {
-    // Samples ever pushed; the newest is number total - 1.
     this.total = 0;
     this.compared = 0;
   }
 
-  get oldest() {
-    return Math.max(0, this.total - this.capacity);
-  }
-
-  slot(number) {
-    return number % this.capacity;
-  }
-
-  timeOf(number) {
-    return this.time[number % this.capacity];
-  }
-
-  get newestTime() {
-    return this.total > 0 ? this.timeOf(this.total - 1) : NaN;
-  }
-
-  push(time, q, rate, broken) {
+  // Degrees, and degrees a second.
+  push(time, { seq, q, rate, sigma }, broken) {
     const slot = this.total % this.capacity;
     this.time[slot] = time;
+    this.seq[slot] = seq;
     this.q.set([q.w, q.x, q.y, q.z], 4 * slot);
     const angles = rollPitchYaw(q);
     for (let axis = 0; axis < 3; axis++) {
       this.rate[axis][slot] = rate[axis];
       this.angle[axis][slot] = angles[axis];
+      this.sigma[axis][slot] = sigma[axis];
     }
     this.error[slot] = NaN;
     this.broken[slot] = broken ? 1 : 0;
@@ -59,24 +45,22 @@ export class History {
     return { w: this.q[at], x: this.q[at + 1], y: this.q[at + 2], z: this.q[at + 3] };
   }
 
-  // Number of the first sample not before `time`.
-  firstFrom(time) {
-    let low = this.oldest;
-    let high = this.total;
-    while (low < high) {
-      const middle = Math.floor((low + high) / 2);
-      if (this.timeOf(middle) < time) low = middle + 1;
-      else high = middle;
-    }
-    return low;
+  // All that is known of one.
+  sample(number) {
+    const slot = this.slot(number);
+    const of = (values) => values.map((each) => each[slot]);
+    return {
+      time: this.time[slot], seq: this.seq[slot], q: this.attitude(number), error: this.error[slot],
+      rate: of(this.rate), angle: of(this.angle), sigma: of(this.sigma),
+    };
   }
 
-  // Greatest rate of the last `seconds`, looked at here and there: for the length of an arrow.
-  fastest(seconds) {
-    const from = this.firstFrom(this.newestTime - seconds);
-    const step = Math.ceil((this.total - from) / 200) || 1;
+  // Greatest rate of the `seconds` up to number `last`, looked at here and there: for the length of an arrow.
+  fastest(seconds, last) {
+    const from = this.firstFrom(this.timeOf(last) - seconds);
+    const step = Math.ceil((last + 1 - from) / 200) || 1;
     let most = 0;
-    for (let n = Math.ceil(from / step) * step; n < this.total; n += step) {
+    for (let n = Math.ceil(from / step) * step; n <= last; n += step) {
       const slot = this.slot(n);
       const speed = Math.hypot(this.rate[0][slot], this.rate[1][slot], this.rate[2][slot]);
       if (speed > most) most = speed;

@@ -1,22 +1,28 @@
 // The live page: messages -> sensors -> at most 30 pictures a second.
 
 import { Camera, Scene } from "./body3d.js";
+import { Cards } from "./cards.js";
+import { Clocks } from "./clock.js";
 import { demonstration, LAST } from "./demonstration.js";
+import { Fleet } from "./fleet.js";
+import { listen } from "./keys.js";
 import { Link } from "./link.js";
-import { say, whole } from "./numbers.js";
+import { plain, say, whole } from "./numbers.js";
 import { Playback } from "./playback.js";
-import { rollPitchYaw } from "./quaternion.js";
-import { Sensor, taken } from "./sensor.js";
+import { save } from "./save.js";
+import { told } from "./status.js";
 import { palette, Surface } from "./surface.js";
+import { TimeView } from "./timeview.js";
+import { Together } from "./together.js";
+import { publish, seen } from "./window.js";
 
 // Attitudes a second asked for in all, shared among the sensors shown: every sample of one at
 // 1 kHz, and of an 8 kHz one every eighth.
 const BUDGET = 1000;
-// Asked for while nobody looks.
+// Asked for while nobody looks, and of the sensors that are in the table alone.
 const HIDDEN_HZ = 2;
-const MOST_SENSORS = 8;
 const FRAME = 1000 / 30;
-const WINDOWS = [2, 5, 10, 30];
+const WINDOWS = [2, 5, 10, 30, 60, 300];
 
 const parameters = new URLSearchParams(location.search);
 const only = parameters.get("ids")?.split(",").filter(Boolean);
@@ -27,85 +33,76 @@ const asked = Number(parameters.get("rate_hz"));
 const parts = {};
 for (const part of document.querySelectorAll("[data-page]")) parts[part.dataset.page] = part;
 
-const sensors = new Map();
-const left = new Set();
-let [paused, still] = [false, false];
-let seconds = WINDOWS.includes(Number(parameters.get("window"))) ? Number(parameters.get("window")) : 10;
+const clocks = new Clocks();
+let [paused, still, dirty] = [false, false, true];
 let colours = palette();
-let watched = "";
-let [status, statusAt] = [null, 0];
+let [watched, watchedBeside] = ["", ""];
 let [session, run, missed] = [null, null, 0];
-let [frames, fps, framesAt, dirty] = [0, 0, 0, true];
+let [frames, fps, framesAt] = [0, 0, 0];
 
 const touch = () => (dirty = true);
+let cards = null;
+const each = (does) => cards?.forEach(does);
+const chosen = Number(parameters.get("window"));
+const view = new TimeView(WINDOWS.includes(chosen) ? chosen : 10, () => {
+  each((card) => (card.dirty = true));
+  touch();
+});
+// The others are in the table alone.
+cards = new Cards({ parts, view, clocks, only }, {
+  moved: touch,
+  resized: () => draw(performance.now()),
+  changed: () => {
+    each((card) => (card.sensor.isPlayed = playback.isThere));
+    watch();
+    touch();
+  },
+  anew: (id) => link?.send({ class: "RESET", id }),
+  save: (card, kind) => save(card, kind, colours, notice),
+});
+const together = new Together(parts.together, touch);
+const fleet = new Fleet(parts, {
+  choose: (id, on) => {
+    cards.choose(id, on);
+    fleet.sort(null);
+  },
+  shown: (id) => cards.has(id),
+  isSilent: (row) => !(performance.now() - row.heardAt < 5000) && performance.now() - row.since > 2000,
+});
 
-// What programs see; numbers as they came.
-window.__strapd = {
-  state: "connecting",
-  sensors: {},
-  get fps() {
-    return fps;
-  },
-  get frames() {
-    return frames;
-  },
-  get dropped() {
-    return missed;
-  },
-  get session() {
-    return session;
-  },
-  get frozen() {
-    return still;
-  },
-};
-for (const name of ["q", "rpy", "seq"]) {
-  Object.defineProperty(window.__strapd, name, {
-    get: () => Object.values(window.__strapd.sensors)[0]?.[name] ?? null,
-  });
-}
+publish({
+  fps: () => fps,
+  frames: () => frames,
+  dropped: () => missed,
+  session: () => session,
+  frozen: () => still,
+  view: () => ({ live: view.isLive, seconds: view.seconds, range: view.range?.span ?? null }),
+  together: () => together.drawn ?? [],
+});
 
-function sensor(id) {
-  const known = sensors.get(id);
-  if (known) return known;
-  if (only && !only.includes(id)) return null;
-  if (sensors.size >= MOST_SENSORS) {
-    left.add(id);
-    return null;
-  }
-  const made = new Sensor(id, parts.template, touch, () => draw(performance.now()), () => anew(id));
-  made.isPlayed = playback.isThere;
-  sensors.set(id, made);
-  // By name, but truth last: it is what the others are held against.
-  const order = [...sensors.values()].sort(
-    (a, b) => (a.id === "truth") - (b.id === "truth") || a.id.localeCompare(b.id, "en", { numeric: true }),
-  );
-  const next = order[order.indexOf(made) + 1];
-  parts.sensors.insertBefore(made.element, next?.element ?? null);
-  made.placed();
-  for (const each of sensors.values()) each.choose(sensors);
-  parts.waiting.hidden = true;
-  parts.sensors.dataset.count = String(sensors.size);
-  watch();
-  return made;
-}
-
-// Every reader of this sensor sees it begin anew; the daemon takes it from its own page alone.
-function anew(id) {
-  link?.send({ class: "RESET", id });
-}
-
-// Asks for what can be drawn.
+// Asks for what can be drawn, and beside it a few attitudes of all for the table.
 function watch() {
   if (!link?.isOpen) return;
-  const share = Math.max(50, Math.floor(BUDGET / Math.max(1, sensors.size)));
+  const share = Math.max(50, Math.floor(BUDGET / Math.max(1, cards.size)));
   const rate_hz = document.hidden ? HIDDEN_HZ : asked > 0 ? asked : share;
-  const ids = only ?? (left.size ? [...sensors.keys()] : undefined);
+  const ids = only ?? (cards.left.size ? [...cards.keys()] : undefined);
   const request = { class: "WATCH", enable: true, streams: ["ATT"], rate_hz, ids };
   const text = JSON.stringify(request);
-  if (text === watched) return;
+  if (text !== watched) link.send(request);
   watched = text;
-  link.send(request);
+  if (cards.left.size && !beside) beside = new Link(heardBeside, () => (watchedBeside = ""));
+}
+
+let beside = null;
+function heardBeside(message) {
+  if (message.class === "VERSION" && watchedBeside === "") {
+    watchedBeside = "all";
+    beside.send({ class: "WATCH", enable: true, streams: ["ATT"], rate_hz: HIDDEN_HZ });
+  }
+  if (message.class !== "ATT" || cards.has(message.id)) return;
+  cards.left.add(message.id);
+  fleet.heard(message);
+  touch();
 }
 
 function heard(message) {
@@ -114,24 +111,35 @@ function heard(message) {
       greeted(message);
       break;
     case "ATT": {
-      if (paused || still) break;
-      const of = sensor(message.id);
-      if (!of) break;
-      of.take(message);
+      if (!only || only.includes(message.id)) fleet.heard(message);
+      const of = cards.of(message.id);
+      of?.sensor.heard(message);
+      if (paused || still || !of) break;
+      of.sensor.take(message);
+      of.dirty = true;
       touch();
       if (frozen && stopAt !== null && message.seq >= stopAt) freeze();
       break;
     }
-    case "GAP":
+    case "GAP": {
       missed += message.dropped;
-      sensors.get(message.id)?.gap(message);
-      notice(`${whole(message.dropped)} attitudes of ${message.id} dropped: this page was too slow for them`);
+      const of = cards.get(message.id);
+      of?.sensor.gap(message);
+      if (of) of.dirty = true;
+      notice(`${whole(message.dropped)} attitudes of ${plain(message.id)} dropped: this page was too slow for them`);
       break;
+    }
     case "STATUS":
-      told(message);
+      told(parts, message, (source, before, elapsed) => {
+        if (only && !only.includes(source.id)) return;
+        fleet.tell(source, before, elapsed);
+        cards.of(source.id)?.tell(source, before, elapsed);
+      });
+      // A recording that waits, or a view that does, makes nobody silent.
+      cards.arrange(!playback.isThere && !paused);
       break;
     case "RESET":
-      notice(`${message.id} begins anew: ${message.from}`);
+      notice(`${plain(message.id)} begins anew: ${message.from}`);
       break;
     case "PLAYBACK":
       played(message);
@@ -145,10 +153,19 @@ function heard(message) {
 
 function played(message) {
   // A run that began anew: what was received before does not go with what comes.
-  if (run !== null && message.session !== run) for (const each of sensors.values()) each.clear();
+  if (run !== message.session) {
+    if (run !== null) forget();
+    clocks.begin(message.start);
+  }
   run = message.session;
   playback.heard(message);
-  for (const each of sensors.values()) each.isPlayed = true;
+  each((some) => (some.sensor.isPlayed = true));
+}
+
+function forget() {
+  each((some) => some.clear());
+  clocks.begin(null);
+  view.home();
 }
 
 function greeted(version) {
@@ -156,54 +173,27 @@ function greeted(version) {
   session = version.session;
   say(parts.release, `strapd ${version.release}`);
   if (restarted) {
-    for (const each of sensors.values()) each.clear();
+    forget();
+    fleet.forget();
     notice("the daemon was started again: attitudes begin anew");
   }
   watched = "";
-  status = null;
-  left.clear();
+  told(parts, null);
+  if (restarted) cards.left.clear();
   run = null;
   playback.gone();
   watch();
   if (!frozen) link.send({ class: "POLL" });
 }
 
-function told(now) {
-  const at = performance.now();
-  const before = status;
-  const elapsed = (at - statusAt) / 1000;
-  const { sources = [], clients = [] } = now;
-  const sum = (list, field) => list.reduce((total, each) => total + (each[field] ?? 0), 0);
-  const count = (list) => list.reduce((total, source) => total + taken(source), 0);
-  const rate = before ? Math.max(0, count(sources) - count(before.sources ?? [])) / elapsed : NaN;
-  say(parts.total, Number.isFinite(rate) ? `${whole(Math.round(rate))} Hz` : "–");
-  say(parts.clients, whole(clients.length));
-  const dropped = sum(clients, "dropped");
-  say(parts.dropped, whole(dropped));
-  parts.dropped.closest("div").classList.toggle("bad", dropped > 0);
-  const queued = sum(clients, "queued_bytes") / 1024;
-  say(parts.queued, `${queued < 10 ? queued.toFixed(1) : queued.toFixed(0)} KiB`);
-  say(parts.uptime, now.uptime_s < 120 ? `${now.uptime_s.toFixed(0)} s` : `${whole(Math.floor(now.uptime_s / 60))} min`);
-  const gone = now.recording?.stopped ? "recording stopped" : now.recording ? "recording" : "";
-  say(parts.recording, gone);
-  for (const source of sources) {
-    const of = sensor(source.id);
-    of?.tell(source, before?.sources?.find((s) => s.id === source.id), elapsed);
-  }
-  const others = [...left].sort();
-  parts.others.hidden = others.length === 0;
-  say(parts.others, others.length ? `${others.length} more: ${others.slice(0, 8).join(", ")} (?ids=A,B shows others)` : "");
-  [status, statusAt] = [now, at];
-}
-
 function changed(state, words) {
-  window.__strapd.state = state;
+  seen().state = state;
   parts.connection.dataset.state = state;
   say(parts.connection, words);
   parts.token.hidden = state !== "token";
   if (state === "token") parts.tokenInput.focus();
   if (state !== "open") {
-    status = null;
+    told(parts, null);
     playback?.gone();
   }
 }
@@ -222,27 +212,22 @@ function freeze() {
   link?.close();
   changed("frozen", "frozen");
   // Scales remember what they have shown, and that depends on the moment.
-  for (const each of sensors.values()) for (const scale of Object.values(each.scales)) scale.reset();
+  each((some) => Object.values(some.scales).forEach((scale) => scale.reset()));
   draw(Infinity);
 }
 
 function draw(now) {
-  for (const each of sensors.values()) {
-    each.compare();
-    if (!each.surfaces || (!each.dirty && !(each.stale && now - each.shownAt > 100))) continue;
-    each.dirty = false;
-    each.draw(colours, seconds, now);
-    if (!each.last) {
-      delete window.__strapd.sensors[each.id];
-      continue;
-    }
-    window.__strapd.sensors[each.id] = {
-      q: each.last.q, rpy: rollPitchYaw(each.last.q), seq: each.last.seq, stamp: each.last.stamp,
-      error: each.error, worst: each.worst, tips: each.tips, centre: each.centre, scale: each.scale,
-      camera: { ...each.view.camera }, points: each.history.total, dropped: each.dropped,
-      plotted: each.plotted,
-    };
-  }
+  clocks.update(cards.all.map((some) => some.sensor));
+  each((some) => {
+    if (some.sensor.compare(some.against)) some.dirty = true;
+    if (!some.surfaces || (!some.dirty && !(some.stale && now - some.shownAt > 100))) return;
+    some.dirty = false;
+    some.draw(colours, now);
+    seen(some);
+  });
+  parts.live.hidden = view.isLive;
+  fleet.draw(now);
+  if (!parts.fleet.hidden) together.draw(cards.all, view, colours);
 }
 
 // The pose of a body nobody has heard of.
@@ -259,8 +244,7 @@ function tick(now) {
   requestAnimationFrame(tick);
   // A little early rather than a whole frame late.
   if (now - drawnAt < FRAME - 4) return;
-  const some = [...sensors.values()];
-  if (dirty || some.some((each) => each.stale)) {
+  if (dirty || cards.all.some((some) => some.stale)) {
     dirty = false;
     drawnAt = now;
     draw(now);
@@ -278,77 +262,50 @@ function pause(on) {
   parts.pause.setAttribute("aria-pressed", String(on));
   say(parts.pauseWords, on ? "Go on" : "Pause");
   document.body.classList.toggle("paused", on);
-  if (on) return;
   // What came meanwhile was not kept: the lines begin anew.
-  for (const each of sensors.values()) each.interrupted = true;
+  if (!on) each((some) => (some.sensor.interrupted = true));
 }
 
 function zeroYaw() {
-  for (const each of sensors.values()) each.zeroYaw();
-  const on = [...sensors.values()].some((each) => each.view.yaw !== 0);
+  each((some) => some.zeroYaw());
+  const on = cards.all.some((some) => some.view.yaw !== 0);
   parts.zero.setAttribute("aria-pressed", String(on));
   touch();
 }
 
 function reset() {
-  for (const each of sensors.values()) each.home();
+  each((some) => some.home());
   missed = 0;
   parts.zero.setAttribute("aria-pressed", "false");
-  touch();
+  view.home();
 }
 
 function span(value) {
-  seconds = value;
+  view.seconds = value;
   parts.window.value = String(value);
-  for (const each of sensors.values()) {
-    each.dirty = true;
-    for (const scale of Object.values(each.scales)) scale.reset();
-  }
-  touch();
+  each((some) => Object.values(some.scales).forEach((scale) => scale.reset()));
+  view.home();
 }
 
 const playback = new Playback(document.querySelector("#playback"), (message) => link?.send(message));
-
-const KEYS = {
-  " ": () => pause(!paused),
-  z: zeroYaw,
-  r: reset,
-  "[": () => span(WINDOWS[Math.max(0, WINDOWS.indexOf(seconds) - 1)]),
-  "]": () => span(WINDOWS[Math.min(WINDOWS.length - 1, WINDOWS.indexOf(seconds) + 1)]),
-  "?": () => (parts.help.open ? parts.help.close() : parts.help.showModal()),
-  p: () => playback.toggle(),
-  ",": () => playback.step(-5),
-  ".": () => playback.step(5),
-  "-": () => playback.faster(-1),
-  "+": () => playback.faster(1),
-};
-
-document.addEventListener("keydown", (event) => {
-  if (event.ctrlKey || event.metaKey || event.altKey) return;
-  const typing = /^(INPUT|SELECT|TEXTAREA)$/.test(event.target.tagName);
-  const pressing = event.target.tagName === "BUTTON" && event.key === " ";
-  if (typing || pressing || !KEYS[event.key]) return;
-  event.preventDefault();
-  KEYS[event.key]();
-});
-parts.pause.addEventListener("click", () => pause(!paused));
-parts.zero.addEventListener("click", zeroYaw);
-parts.reset.addEventListener("click", reset);
-parts.helpButton.addEventListener("click", () => parts.help.showModal());
-parts.window.addEventListener("change", () => span(Number(parts.window.value)));
-parts.token.addEventListener("submit", (event) => {
-  event.preventDefault();
-  link.authorise(parts.tokenInput.value);
-  parts.tokenInput.value = "";
+listen(parts, {
+  pause: () => pause(!paused),
+  zeroYaw,
+  reset,
+  live: () => view.home(),
+  window: (by) => span(WINDOWS[Math.max(0, Math.min(WINDOWS.length - 1, WINDOWS.indexOf(view.seconds) + by))]),
+  span,
+  playback,
+  authorise: (token) => link.authorise(token),
 });
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
   colours = palette();
   rest();
-  for (const each of sensors.values()) each.dirty = true;
+  each((some) => (some.dirty = true));
   touch();
 });
 document.addEventListener("visibilitychange", watch);
-parts.window.value = String(seconds);
+parts.window.value = String(view.seconds);
 
 rest();
 let link = null;

@@ -32,3 +32,8 @@ export const SECONDS = [[1, "s"], [1e-3, "ms"], [1e-6, "µs"], [1e-9, "ns"]];
 export function whole(value) {
   return Number.isFinite(value) ? value.toLocaleString("en").replaceAll(",", "\u2009") : "–";
 }
+
+// A name from outside: what would steer the direction of the text, or is not seen, is shown and not obeyed.
+export function plain(name) {
+  return name.replace(/[\p{Cc}\p{Cf}\p{Zl}\p{Zp}]/gu, (c) => `\\u{${c.codePointAt(0).toString(16)}}`);
+}

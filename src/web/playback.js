@@ -1,26 +1,11 @@
 // Pause, seek and speed of a recording the daemon plays; not there until the daemon speaks of one.
 
+import { clockTime, later, secondsBetween } from "./clock.js";
 import { fixed, say } from "./numbers.js";
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10, 100];
 // Milliseconds between two seeks while the slider is dragged.
 const SPACING = 100;
-
-const seconds = (from, to) => to.sec - from.sec + (to.nsec - from.nsec) * 1e-9;
-
-function later(stamp, by) {
-  const whole = Math.floor(by);
-  const nsec = stamp.nsec + Math.round((by - whole) * 1e9);
-  return { sec: stamp.sec + whole + Math.floor(nsec / 1e9), nsec: nsec % 1e9 };
-}
-
-function clock(value) {
-  // Rounded first: 59.96 s are a minute.
-  const tenths = Math.round(value * 10);
-  const minutes = Math.floor(tenths / 600);
-  const rest = ((tenths - 600 * minutes) / 10).toFixed(1).padStart(4, "0");
-  return `${minutes}:${rest}`;
-}
 
 export class Playback {
   constructor(element, send) {
@@ -46,12 +31,12 @@ export class Playback {
   // Seconds, NaN where there is no end.
   get length() {
     const { start, end } = this.state;
-    return start && end ? Math.max(0, seconds(start, end)) : NaN;
+    return start && end ? Math.max(0, secondsBetween(start, end)) : NaN;
   }
 
   get place() {
     const { start, at } = this.state;
-    return start ? Math.max(0, seconds(start, at)) : 0;
+    return start ? Math.max(0, secondsBetween(start, at)) : 0;
   }
 
   get isThere() {
@@ -78,7 +63,7 @@ export class Playback {
     slider.max = String(length || 0);
     if (!this.dragging) slider.value = String(at);
     slider.setAttribute("aria-valuetext", `${fixed(at, 1)} of ${fixed(length, 1)} seconds`);
-    say(place, Number.isNaN(length) ? clock(at) : `${clock(at)} / ${clock(length)}`);
+    say(place, Number.isNaN(length) ? clockTime(at) : `${clockTime(at)} / ${clockTime(length)}`);
     say(name, state.file ?? "");
     const chosen = String(state.speed);
     if (![...speed.options].some((o) => o.value === chosen)) speed.append(this.option(state.speed));

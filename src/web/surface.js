@@ -20,9 +20,14 @@ export class Surface {
     this.width = 0;
     this.height = 0;
     this.fit();
-    new ResizeObserver(() => {
+    this.observer = new ResizeObserver(() => {
       if (this.fit()) resized();
-    }).observe(canvas);
+    });
+    this.observer.observe(canvas);
+  }
+
+  gone() {
+    this.observer.disconnect();
   }
 
   fit() {

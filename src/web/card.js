@@ -1,0 +1,268 @@
+// One sensor on the page: its drawing and its numbers, now or where the cursor is.
+
+import { Camera, Scene, steer, upright, worldNames, zLocus } from "./body3d.js";
+import { clockTime } from "./clock.js";
+import { drawHorizon } from "./horizon.js";
+import { Known } from "./known.js";
+import { plain, say, show } from "./numbers.js";
+import { drawPlot } from "./plot.js";
+import { aboutZ, DEGREES, product, rollPitchYaw, rotate } from "./quaternion.js";
+import { Scale } from "./scale.js";
+import { Surface } from "./surface.js";
+import { writeHealth, writeNumbers } from "./writing.js";
+
+// Seconds of the path of the z axis.
+const LOCUS = 10;
+// Milliseconds between two changes of the numbers: faster nobody reads.
+const READABLE = 100;
+
+export class Card {
+  // does: moved() draws soon; resized() at once, a canvas that changes its size is empty; anew() begins it anew;
+  // save(kind) writes a file.
+  constructor(sensor, template, view, does) {
+    this.sensor = sensor;
+    this.id = sensor.id;
+    this.timeView = view;
+    this.view = { camera: new Camera(), yaw: 0 };
+    this.scales = { rate: new Scale(0.2), angle: new Scale(2), error: new Scale(1e-6) };
+    this.against = null;
+    this.element = template.content.firstElementChild.cloneNode(true);
+    this.element.dataset.id = this.id;
+    this.name = plain(this.id);
+    this.element.setAttribute("aria-label", `Sensor ${this.name}`);
+    this.parts = {};
+    for (const part of this.element.querySelectorAll("[data-part]")) this.parts[part.dataset.part] = part;
+    const { parts } = this;
+    say(parts.name, this.name);
+    this.known = new Known(parts, does.anew);
+    this.moved = () => {
+      this.dirty = true;
+      does.moved();
+    };
+    this.resized = () => {
+      this.dirty = true;
+      does.resized();
+    };
+    parts.against.addEventListener("change", () => {
+      this.chosen = parts.against.value;
+      this.forgetErrors();
+      does.moved();
+    });
+    parts.fold.addEventListener("click", () => {
+      this.unfolded = this.isFolded;
+      this.fold(!this.isFolded);
+    });
+    for (const kind of ["png", "csv"]) parts[kind].addEventListener("click", () => does.save(kind));
+    this.fold(false);
+    this.clear();
+  }
+
+  // Once it is on the page, where its canvases have a size.
+  placed() {
+    const surfaces = {};
+    for (const name of ["body", "horizon", "rates", "angles", "errors", "ellipse"]) {
+      surfaces[name] = new Surface(this.parts[name], this.resized);
+    }
+    this.surfaces = surfaces;
+    steer(this.parts.body, this.view.camera, this.moved);
+    const plot = { clock: () => this.sensor.clock, span: () => this.span() };
+    for (const name of ["rates", "angles", "errors"]) this.timeView.attach(this.parts[name], plot);
+  }
+
+  gone() {
+    for (const surface of Object.values(this.surfaces ?? {})) surface.gone();
+    this.element.remove();
+  }
+
+  span() {
+    return this.timeView.span(this.sensor.clock, this.sensor.history.newestTime);
+  }
+
+  clear() {
+    this.sensor.clear();
+    for (const scale of Object.values(this.scales)) scale.reset();
+    this.dirty = true;
+    this.shownAt = -Infinity;
+  }
+
+  home() {
+    this.view.camera.home();
+    this.view.yaw = 0;
+    this.clear();
+  }
+
+  fold(on) {
+    this.isFolded = on;
+    this.element.classList.toggle("folded", on);
+    this.parts.fold.setAttribute("aria-expanded", String(!on));
+    this.dirty = true;
+  }
+
+  zeroYaw() {
+    const yaw = this.sensor.last ? rollPitchYaw(this.sensor.last.q)[2] : 0;
+    this.view.yaw = this.view.yaw === 0 ? yaw : 0;
+    this.dirty = true;
+    this.shownAt = -Infinity;
+  }
+
+  // Which sensor it is compared with: the one chosen, or `truth`.
+  choose(cards) {
+    const others = [...cards.keys()].filter((id) => id !== this.id);
+    const wanted = this.chosen ?? (others.includes("truth") && this.id !== "truth" ? "truth" : "");
+    const select = this.parts.against;
+    const options = ["", ...others];
+    if (options.join("\n") !== [...select.options].map((o) => o.value).join("\n")) {
+      select.replaceChildren(
+        ...options.map((id) => {
+          const option = document.createElement("option");
+          option.value = id;
+          option.textContent = plain(id) || "nothing";
+          return option;
+        }),
+      );
+    }
+    const against = cards.get(wanted)?.sensor ?? null;
+    select.value = against ? wanted : "";
+    if (against !== this.against) {
+      this.against = against;
+      this.forgetErrors();
+    }
+    this.parts.comparison.hidden = others.length === 0;
+    this.parts.errorBox.hidden = !against;
+  }
+
+  forgetErrors() {
+    this.sensor.forgetErrors();
+    this.scales.error.reset();
+    this.dirty = true;
+  }
+
+  draw(colours, now) {
+    const { sensor, surfaces, view, parts } = this;
+    const { history } = sensor;
+    if (this.isFolded) {
+      this.writeAt(now, null);
+      return;
+    }
+    if (!sensor.last) {
+      this.drawNothing(colours, "no data yet");
+      return;
+    }
+    const cursor = this.timeView.cursor(sensor.clock);
+    const at = this.drawPlots(colours, cursor);
+    const isHeld = Number.isFinite(cursor);
+    this.held = isHeld ? { cursor, at: at && history.sample(at.number) } : null;
+    if (isHeld && !at) {
+      this.drawBody(colours, null);
+      this.blank(`no data at ${clockTime(cursor)}`);
+      return;
+    }
+    parts.empty.hidden = true;
+    const number = at?.number ?? history.total - 1;
+    const { q } = isHeld ? history.sample(number) : sensor.last;
+    this.drawBody(colours, { q, number });
+    const zeroed = aboutZ(-view.yaw / DEGREES);
+    const world = sensor.last.world ?? "start";
+    const seen = product(zeroed, q);
+    const heading = rollPitchYaw(seen)[2];
+    drawHorizon(surfaces.horizon, colours, seen, world, heading);
+    this.known.draw(surfaces.ellipse, colours, rollPitchYaw(q)[2], world);
+    this.writeAt(now, heading);
+  }
+
+  // The numbers, no faster than they can be read.
+  writeAt(now, heading) {
+    this.stale = now - this.shownAt < READABLE;
+    if (this.stale) return;
+    this.shownAt = now;
+    if (heading !== null) writeNumbers(this, heading);
+  }
+
+  drawPlots(colours, cursor) {
+    const { sensor, surfaces } = this;
+    const { history } = sensor;
+    const span = this.span();
+    const selected = this.timeView.selection(sensor.clock);
+    const strokes = [colours.x, colours.y, colours.z];
+    const draw = (name, series, names, scale, options) => {
+      const lines = series.map((values, n) => {
+        return { track: history, values, colour: names.length > 1 ? strokes[n] : colours.error, name: names[n] };
+      });
+      return drawPlot(surfaces[name], colours, lines, { span, scale, cursor, selected, ...options });
+    };
+    const { points } = draw("rates", history.rate, ["x", "y", "z"], this.scales.rate);
+    const { at } = draw("angles", history.angle, ["roll", "pitch", "yaw"], this.scales.angle, { wraps: true });
+    if (this.against) draw("errors", [history.error], ["error"], this.scales.error);
+    this.plotted = { points, width: surfaces.rates.width };
+    return at;
+  }
+
+  // The body and who it is compared with, at an instant; null is a neutral pose: nothing is known.
+  drawBody(colours, at) {
+    const { sensor, surfaces, view, against } = this;
+    const scene = new Scene(surfaces.body, view.camera, colours);
+    if (!at) {
+      scene.world([]);
+      scene.body((v) => v);
+      scene.ends();
+      return;
+    }
+    const world = sensor.last.world ?? "start";
+    const zeroed = aboutZ(-view.yaw / DEGREES);
+    const up = upright(world);
+    const toView = (v) => up(rotate(zeroed, v));
+    const seen = product(zeroed, at.q);
+    const { history } = sensor;
+    scene.world(worldNames(world));
+    const own = zLocus(history, LOCUS, toView, at.number);
+    const time = history.timeOf(at.number);
+    const reached = against?.clock === sensor.clock ? (against?.history.firstFrom(time + 1e-9) ?? 0) - 1 : (against?.history.total ?? 0) - 1;
+    const other = against ? zLocus(against.history, LOCUS, toView, reached) : [];
+    scene.locus(other, colours.other, false, 1.5, [4, 4]);
+    scene.locus(own, colours.z, false);
+    if (other.length) {
+      const q = product(zeroed, against.history.attitude(reached));
+      scene.triad((v) => up(rotate(q, v)));
+    }
+    scene.body((v) => up(rotate(seen, v)));
+    scene.locus(other, colours.other, true, 1.5, [4, 4]);
+    scene.locus(own, colours.z, true);
+    const rate = history.sample(at.number).rate;
+    const speed = Math.hypot(...rate);
+    const fastest = Math.max(speed, history.fastest(LOCUS, at.number));
+    if (speed > 1e-4 * DEGREES) {
+      scene.arrow(up(rotate(seen, rate.map((v) => (v * 0.85) / fastest))), colours.rate);
+    }
+    scene.ends();
+    this.tips = scene.tips;
+    this.centre = scene.centre;
+    this.scale = scene.scale;
+  }
+
+  // The body in a neutral pose, and no number.
+  drawNothing(colours, words) {
+    const { surfaces } = this;
+    for (const name of ["rates", "angles", "errors"]) surfaces[name].begin();
+    this.drawBody(colours, null);
+    this.blank(words);
+  }
+
+  blank(words) {
+    const { parts, surfaces } = this;
+    surfaces.horizon.begin();
+    parts.empty.hidden = false;
+    say(parts.empty, words);
+    for (const number of this.element.querySelectorAll(".views data, figcaption data, [data-part=seq]")) show(number, NaN, 0);
+    for (const name of ["stamp", "flags", "frame", "thinning", "dropped", "held"]) say(parts[name], "");
+    for (const name of ["body", "horizon"]) parts[name].setAttribute("aria-label", `${this.name}: ${words}`);
+    for (const name of ["rates", "angles", "errors"]) parts[name].setAttribute("aria-valuetext", words);
+    this.stale = false;
+  }
+
+  // The source as STATUS tells of it.
+  tell(source, before, seconds) {
+    writeHealth(this, source, before, seconds);
+    this.known.tell(source);
+    if (!this.parts.known.hidden) this.moved();
+  }
+}

@@ -1,0 +1,173 @@
+// All sensors in a table: sorted by any column, who is silent last. From STATUS, and a few attitudes a second.
+
+import { fixed, plain, say, whole } from "./numbers.js";
+import { angleBetween, DEGREES, rollPitchYaw } from "./quaternion.js";
+import { taken } from "./sensor.js";
+
+const REDRAWN = 500;
+const degrees = (of, digits) => ({ of, say: (value) => fixed(value, digits) });
+const count = (of) => ({ of, say: (value) => (value === undefined ? "–" : whole(value)), isCount: true });
+
+// Columns by name: a value to sort by, and its words. NaN and undefined are last.
+const COLUMNS = {
+  sensor: { of: (row) => row.id, say: plain },
+  state: { of: (row, now) => row.state(now)[1], say: (value, row, now) => row.state(now)[0] },
+  rate: { of: (row) => row.rate, say: (value) => (Number.isFinite(value) ? `${whole(Math.round(value))}` : "–") },
+  roll: degrees((row) => row.angles[0], 1),
+  pitch: degrees((row) => row.angles[1], 1),
+  yaw: degrees((row) => row.angles[2], 1),
+  speed: degrees((row) => row.speed, 1),
+  sigma: degrees((row) => row.sigma, 2),
+  error: degrees((row) => row.error, 3),
+  gaps: count((row) => row.source?.gaps),
+  lost: count((row) => row.source?.lost),
+};
+
+const NOTHING = [NaN, NaN, NaN];
+
+class Row {
+  constructor(id, template, choose) {
+    this.id = id;
+    this.angles = NOTHING;
+    this.speed = this.sigma = this.error = this.rate = NaN;
+    this.since = performance.now();
+    this.heardAt = NaN;
+    this.element = template.content.firstElementChild.cloneNode(true);
+    this.element.dataset.sensor = id;
+    this.cells = {};
+    for (const cell of this.element.querySelectorAll("[data-cell]")) this.cells[cell.dataset.cell] = cell;
+    this.box = this.element.querySelector("input");
+    this.box.setAttribute("aria-label", `Draw ${plain(id)}`);
+    this.box.addEventListener("change", () => choose(id, this.box.checked));
+    this.alone = this.cells.sensor;
+    this.alone.addEventListener("click", () => choose(id, "alone"));
+  }
+
+  hear(att, now) {
+    const { q, rate, sigma_deg } = att;
+    if (!q) return;
+    this.q = q;
+    this.stamp = att.stamp;
+    this.angles = rollPitchYaw(q);
+    this.speed = rate ? Math.hypot(...rate) * DEGREES : NaN;
+    this.sigma = sigma_deg ? Math.hypot(...sigma_deg) : NaN;
+    if (!att.status?.includes("last")) this.heardAt = now;
+  }
+
+  // In words, and by what it is sorted.
+  state(now) {
+    if (!this.q) return ["no data", Infinity];
+    if (!Number.isFinite(this.heardAt)) return ["ended", 1e9];
+    const ago = (now - this.heardAt) / 1000;
+    return ago < 5 ? ["live", 0] : [`silent ${whole(Math.floor(ago))} s`, ago];
+  }
+}
+
+export class Fleet {
+  // does: choose(id, on | "alone"), shown(id), isSilent(id), moved().
+  constructor(parts, does) {
+    this.parts = parts;
+    this.does = does;
+    this.rows = new Map();
+    this.by = "sensor";
+    this.down = false;
+    this.isFolded = false;
+    this.drawnAt = -Infinity;
+    for (const button of parts.fleetHead.querySelectorAll("button")) {
+      button.addEventListener("click", () => this.sort(button.dataset.sort));
+    }
+    parts.fleetFold.addEventListener("click", () => {
+      this.isFolded = !this.isFolded;
+      this.drawnAt = -Infinity;
+      this.draw(performance.now());
+    });
+  }
+
+  row(id) {
+    let row = this.rows.get(id);
+    if (!row) {
+      row = new Row(id, this.parts.fleetRow, this.does.choose);
+      this.rows.set(id, row);
+    }
+    return row;
+  }
+
+  forget() {
+    for (const row of this.rows.values()) row.element.remove();
+    this.rows.clear();
+  }
+
+  heard(att) {
+    this.row(att.id).hear(att, performance.now());
+  }
+
+  tell(source, before, seconds) {
+    const row = this.row(source.id);
+    row.source = source;
+    row.rate = before && seconds > 0 ? (taken(source) - taken(before)) / seconds : NaN;
+  }
+
+  // null: as before, but at once.
+  sort(by) {
+    if (by) [this.by, this.down] = [by, this.by === by && !this.down];
+    this.drawnAt = -Infinity;
+    this.draw(performance.now());
+  }
+
+  get order() {
+    const now = performance.now();
+    const { of } = COLUMNS[this.by];
+    const sense = this.down ? -1 : 1;
+    const isNothing = (value) => value === undefined || Number.isNaN(value);
+    const keyed = [...this.rows.values()].map((row) => ({ row, value: of(row, now), silent: this.does.isSilent(row) }));
+    return keyed.sort((a, b) => {
+      if (a.silent !== b.silent) return a.silent - b.silent;
+      if (isNothing(a.value) !== isNothing(b.value)) return isNothing(a.value) - isNothing(b.value);
+      const name = a.row.id.localeCompare(b.row.id, "en", { numeric: true });
+      if (typeof a.value === "string") return sense * name;
+      return sense * (a.value - b.value) || name;
+    });
+  }
+
+  draw(now) {
+    const { parts } = this;
+    // Of one sensor, or a sensor and its truth, there is nothing to compare in a table.
+    parts.fleet.hidden = this.rows.size < 3;
+    if (parts.fleet.hidden || now - this.drawnAt < REDRAWN) return;
+    this.drawnAt = now;
+    const truth = this.rows.get("truth");
+    const order = this.order;
+    const silent = order.filter((each) => each.silent).length;
+    parts.fleetFold.hidden = silent === 0;
+    parts.fleetFold.setAttribute("aria-expanded", String(!this.isFolded));
+    say(parts.fleetFold, `${silent} silent`);
+    say(parts.fleetTitle, `${this.rows.size} sensors`);
+    parts.fleetHead.querySelector("[data-column=error]").hidden = !truth;
+    for (const head of parts.fleetHead.querySelectorAll("th[data-column]")) {
+      const isBy = head.dataset.column === this.by;
+      head.setAttribute("aria-sort", isBy ? (this.down ? "descending" : "ascending") : "none");
+    }
+    let at = parts.fleetBody.firstElementChild;
+    for (const { row, silent: isSilent } of order) {
+      // Moved where it must be, and only then: a focus is not lost.
+      if (row.element === at) at = at.nextElementSibling;
+      else parts.fleetBody.insertBefore(row.element, at);
+      row.element.hidden = isSilent && this.isFolded;
+      if (row.element.hidden) continue;
+      row.error = truth?.q && row.q && row !== truth && near(row.stamp, truth.stamp) ? angleBetween(truth.q, row.q) * DEGREES : NaN;
+      row.cells.error.hidden = !truth;
+      row.element.classList.toggle("silent", isSilent);
+      row.box.checked = this.does.shown(row.id);
+      for (const [name, column] of Object.entries(COLUMNS)) {
+        const value = column.of(row, now);
+        say(row.cells[name], column.say(value, row, now));
+        if (column.isCount) row.cells[name].classList.toggle("bad", value > 0);
+      }
+    }
+  }
+}
+
+// Attitudes of two sensors that may be held against each other as they are: within 20 ms.
+function near(a, b) {
+  return a && b && Math.abs(a.sec - b.sec + (a.nsec - b.nsec) * 1e-9) < 0.02;
+}

@@ -1,0 +1,30 @@
+// STATUS -> the line about the daemon, and what each source tells.
+
+import { say, whole } from "./numbers.js";
+import { taken } from "./sensor.js";
+
+let [last, lastAt] = [null, 0];
+
+const sum = (list, field) => list.reduce((total, each) => total + (each[field] ?? 0), 0);
+
+// each(source, before, seconds): one source, and what it told that many seconds ago. null: nothing is known any more.
+export function told(parts, now, each) {
+  const [before, at] = [last, performance.now()];
+  const elapsed = (at - lastAt) / 1000;
+  [last, lastAt] = [now, at];
+  if (!now) return;
+  const { sources = [], clients = [] } = now;
+  const count = (list) => list.reduce((total, source) => total + taken(source), 0);
+  const rate = before ? Math.max(0, count(sources) - count(before.sources ?? [])) / elapsed : NaN;
+  say(parts.total, Number.isFinite(rate) ? `${whole(Math.round(rate))} Hz` : "–");
+  say(parts.clients, whole(clients.length));
+  const dropped = sum(clients, "dropped");
+  say(parts.dropped, whole(dropped));
+  parts.dropped.closest("div").classList.toggle("bad", dropped > 0);
+  const queued = sum(clients, "queued_bytes") / 1024;
+  say(parts.queued, `${queued < 10 ? queued.toFixed(1) : queued.toFixed(0)} KiB`);
+  say(parts.uptime, now.uptime_s < 120 ? `${now.uptime_s.toFixed(0)} s` : `${whole(Math.floor(now.uptime_s / 60))} min`);
+  say(parts.recording, now.recording?.stopped ? "recording stopped" : now.recording ? "recording" : "");
+  const earlier = new Map((before?.sources ?? []).map((source) => [source.id, source]));
+  for (const source of sources) each(source, earlier.get(source.id), elapsed);
+}
