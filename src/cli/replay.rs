@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::pipeline::replay;
 use crate::pipeline::request::ReplayRequest;
 use crate::report::summary::RunSummary;
-use crate::sink::{Compression, Encoding, Options, Target};
+use crate::sink::{Compression, Encoding, Options, Precision, Target};
 use clap::{Args, ValueEnum};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -34,7 +34,7 @@ pub struct Replay {
     /// Logs: MCAP, ULog, a bag of ROS 1 or 2, a video of a GoPro, NDJSON, or - for one of these on standard input
     #[arg(required = true, value_name = "SOURCE")]
     pub sources: Vec<String>,
-    /// Where the attitude goes: a .mcap, .ndjson, .csv or .tum (evo) file, a directory, - (NDJSON on stdout),
+    /// Where the attitude goes: a .mcap, .ndjson, .csv, .tum (evo) or .parquet file, a directory, - (NDJSON on stdout),
     /// null: (nowhere); tcp-listen://HOST:PORT, unix-listen:///PATH, ws-listen://HOST:PORT (whoever
     /// connects); tcp://HOST:PORT, udp://HOST:PORT[?profile=plotjuggler] (somebody who listens).
     /// {stem} stands for the log's name. May be given several times
@@ -68,6 +68,10 @@ pub struct Replay {
     /// Compression of MCAP outputs
     #[arg(long, value_enum, default_value = "zstd", help_heading = "Output")]
     pub compression: CompressionArg,
+    /// Keep numbers of Parquet outputs to 24 bits: attitudes to 1e-7 rad, in half the size
+    #[cfg(feature = "parquet")]
+    #[arg(long, help_heading = "Output")]
+    pub parquet_f32: bool,
     /// Write at most this many attitudes a second; the integration always uses every sample
     #[arg(
         long,
@@ -299,6 +303,7 @@ impl Replay {
                     EncodingArg::Json => Encoding::Json,
                 },
                 compression: self.compression.into(),
+                precision: self.precision(),
             },
             copy_input: self.copy_input,
             out_rate: self.out_rate,
@@ -308,6 +313,21 @@ impl Replay {
             record_paths: self.record_paths,
         };
         Ok((run, served))
+    }
+}
+
+impl Replay {
+    #[cfg(feature = "parquet")]
+    fn precision(&self) -> Precision {
+        match self.parquet_f32 {
+            true => Precision::Single,
+            false => Precision::Double,
+        }
+    }
+
+    #[cfg(not(feature = "parquet"))]
+    fn precision(&self) -> Precision {
+        Precision::default()
     }
 }
 

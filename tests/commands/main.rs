@@ -19,6 +19,7 @@ mod formats;
 mod model;
 #[cfg(unix)]
 mod pages;
+mod parquet;
 mod recover;
 mod regularise;
 mod replay;
