@@ -1,6 +1,7 @@
 //! `strapd replay SOURCE... -o SINK...`: recorded samples -> attitude. I/O.
 
 use super::calibration_files;
+use super::continued;
 use super::estimation::{AidArg, Estimation};
 use super::progress::Reporter;
 use super::serving::{Served, Serving};
@@ -28,6 +29,7 @@ use strapd_recording::pool::Pool;
   strapd replay flight.mcap -o a.mcap --init gravity --bias auto --world enu
   strapd replay flight.mcap --against-recorded              which --sample-kind fits this log
   strapd replay *.mcap -o out/{stem}.csv --shard 0/4        one share of many logs
+  strapd replay --join flight_*.mcap -o attitude.mcap       one recording in several files
   strapd replay flight.mcap --page                          in a browser, with play, pause and seek
   strapd replay flight.mcap --speed 1 -o udp://127.0.0.1:9870?profile=plotjuggler")]
 pub struct Replay {
@@ -50,6 +52,9 @@ pub struct Replay {
     /// How a table is to be read.
     #[command(flatten)]
     pub tables: Tables,
+    /// The SOURCEs are one recording in several files: read in the order of their times, the attitude carried across
+    #[arg(long)]
+    pub join: bool,
     /// Replace outputs that exist
     #[arg(long, help_heading = "Output")]
     pub force: bool,
@@ -147,8 +152,14 @@ pub(super) fn speed(text: &str) -> Result<Option<f64>> {
 /// With one log, whatever ended it. With several, the rest still run; each failure is said.
 pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
     let shard = args.shard.as_deref().map(Shard::parse).transpose()?;
-    let logs: Vec<&String> = args
-        .sources
+    if args.join && shard.is_some() {
+        return Err(Error::Usage(
+            "--join: one recording, of which --shard has no share\n  help: leave one of the two out"
+                .to_owned(),
+        ));
+    }
+    let recordings = args.recordings();
+    let logs: Vec<&String> = recordings
         .iter()
         .enumerate()
         .filter(|(i, _)| shard.is_none_or(|s| s.takes(*i)))
@@ -160,12 +171,12 @@ pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
                 .to_owned(),
         ));
     }
-    if args.sources.len() > 1 && args.serving.page.is_some() {
+    if recordings.len() > 1 && args.serving.page.is_some() {
         return Err(Error::Usage(
             "--page: one log at a time\n  help: give one SOURCE".to_owned(),
         ));
     }
-    outputs::check_distinct(&args.outputs, &args.sources)?;
+    outputs::check_distinct(&args.outputs, recordings)?;
     args.check_calibrations(&logs)?;
     let plan = args.estimation.plan_of_a_recording(args.smooth)?;
     let mut selection = args.estimation.selection()?;
@@ -174,7 +185,7 @@ pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
     let mut outcome = Outcome::Done;
     let mut summaries = Vec::new();
     for log in &logs {
-        let result = outputs::resolve(&args.outputs, log, args.sources.len())
+        let result = outputs::resolve(&args.outputs, log, recordings.len())
             .and_then(|names| args.run(log, &names, (selection.clone(), plan.clone())))
             .and_then(|(mut run, served)| {
                 served.run(|again| {
@@ -212,6 +223,9 @@ pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
             Err(error) => return Err(error),
         }
     }
+    if let Some(said) = continued::said(&summaries) {
+        tracing::warn!("{said}");
+    }
     if global.json {
         say_json(args, &summaries)?;
     }
@@ -219,6 +233,14 @@ pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
 }
 
 impl Replay {
+    /// What is read by itself: each of the sources, of joined ones the first, which stands for all.
+    fn recordings(&self) -> &[String] {
+        match self.join {
+            true => self.sources.get(..1).unwrap_or_default(),
+            false => &self.sources,
+        }
+    }
+
     /// Where the calibration of a log goes.
     fn calibration_file(&self, log: &str) -> Option<String> {
         let name = self.save_calibration.as_ref()?;
@@ -231,7 +253,7 @@ impl Replay {
             return Ok(());
         };
         let wrong = |what: &str| Err(Error::Usage(format!("--save-calibration {name}: {what}")));
-        if self.sources.len() > 1 && !name.contains("{stem}") {
+        if self.recordings().len() > 1 && !name.contains("{stem}") {
             return wrong(
                 "each log would be saved there\n  help: a name with {stem}, for example {stem}.calibration.toml",
             );
@@ -285,8 +307,17 @@ impl Replay {
             .iter()
             .map(|o| Target::parse(o))
             .collect::<Result<_>>()?;
-        let source = Source::parse(log);
-        let can_rewind = matches!(&source, Source::File(path) if path.is_file());
+        let source = match self.sources.as_slice() {
+            several @ [_, _, ..] if self.join => {
+                Source::Parts(several.iter().map(PathBuf::from).collect())
+            }
+            _ => Source::parse(log),
+        };
+        let can_rewind = match &source {
+            Source::File(path) => path.is_file(),
+            Source::Parts(_) => true,
+            Source::Stdin => false,
+        };
         let served =
             self.serving
                 .start(targets, self.speed.as_deref(), (log, can_rewind, false))?;

@@ -25,7 +25,7 @@ use std::fmt::Write as _;
 use strapd_attitude::compare::{BiasFit, BodyAxesFit, Consistency};
 pub use strapd_attitude::digits::significant;
 use strapd_attitude::estimate::SensorCalibration;
-use strapd_attitude::record::{Counts, SampleKind, Verdict};
+use strapd_attitude::record::{Counts, Nanos, SampleKind, Verdict};
 use strapd_attitude::setting::AID;
 use strapd_attitude::worlds::EARTH_RATE;
 
@@ -48,6 +48,8 @@ pub struct TopicSummary {
     pub written: u64,
     /// First to last stamp, s.
     pub duration_secs: f64,
+    /// The first and the last stamp.
+    pub span: Option<(Nanos, Nanos)>,
     /// Median sample rate, Hz.
     pub rate_hz: Option<f64>,
     /// The clock the samples were placed on.

@@ -213,11 +213,18 @@ fn still_wanted(flow: Flow) -> Result<()> {
 pub fn run(run: &Recover, pool: &Pool, watch: &mut dyn FnMut(&Position)) -> Result<Recovered> {
     let reader = match &run.source {
         Source::File(path) => Reader::open(path)?,
+        Source::Parts(_) => {
+            return Err(Error::Usage(
+                "what is recovered is one file\n  help: recover each, and join them then"
+                    .to_owned(),
+            ));
+        }
         Source::Stdin => Reader::from_stream(run.source.name(), Box::new(std::io::stdin()))?,
     };
     let size = reader.size();
     let inputs: Vec<PathBuf> = match &run.source {
         Source::File(path) => vec![path.clone()],
+        Source::Parts(paths) => paths.clone(),
         Source::Stdin => Vec::new(),
     };
     let copying = RefCell::new(Copying {
