@@ -10,6 +10,7 @@ pub mod cat;
 pub mod check;
 pub mod compare;
 pub mod config;
+mod continued;
 pub mod estimation;
 pub mod info;
 pub mod manual;

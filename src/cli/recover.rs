@@ -6,7 +6,7 @@ use super::{Global, Outcome, print};
 use crate::error::Result;
 use crate::pipeline::recover::{self, Recovered};
 use crate::report::summary::human_bytes;
-use crate::sink::{Encoding, Options, Target};
+use crate::sink::{Options, Target};
 use clap::Args;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
@@ -51,8 +51,8 @@ pub fn run(global: &Global, args: &Recover) -> Result<Outcome> {
         target: Target::parse(&args.output)?,
         options: Options {
             force: args.force,
-            encoding: Encoding::default(),
             compression: args.compression.into(),
+            ..Options::default()
         },
     };
     let pool = Pool::new(global.threads)?;

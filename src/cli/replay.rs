@@ -1,6 +1,7 @@
 //! `strapd replay SOURCE... -o SINK...`: recorded samples -> attitude. I/O.
 
 use super::calibration_files;
+use super::continued;
 use super::estimation::{AidArg, Estimation};
 use super::progress::Reporter;
 use super::serving::{Served, Serving};
@@ -11,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::pipeline::replay;
 use crate::pipeline::request::ReplayRequest;
 use crate::report::summary::RunSummary;
-use crate::sink::{Compression, Encoding, Options, Target};
+use crate::sink::{Compression, Encoding, Options, Precision, Target};
 use clap::{Args, ValueEnum};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -29,13 +30,14 @@ use strapd_recording::pool::Pool;
   strapd replay flight.mcap -o a.mcap --init gravity --bias auto --world enu
   strapd replay flight.mcap --against-recorded              which --sample-kind fits this log
   strapd replay *.mcap -o out/{stem}.csv --shard 0/4        one share of many logs
+  strapd replay --join flight_*.mcap -o attitude.mcap       one recording in several files
   strapd replay flight.mcap --page                          in a browser, with play, pause and seek
   strapd replay flight.mcap --speed 1 -o udp://127.0.0.1:9870?profile=plotjuggler")]
 pub struct Replay {
     /// Logs: MCAP, ULog, a bag of ROS 1 or 2, a video of a GoPro, NDJSON, or - for one of these on standard input
     #[arg(required = true, value_name = "SOURCE")]
     pub sources: Vec<String>,
-    /// Where the attitude goes: a .mcap, .ndjson, .csv or .tum (evo) file, a directory, - (NDJSON on stdout),
+    /// Where the attitude goes: a .mcap, .ndjson, .csv, .tum (evo) or .parquet file, a directory, - (NDJSON on stdout),
     /// null: (nowhere); tcp-listen://HOST:PORT, unix-listen:///PATH, ws-listen://HOST:PORT (whoever
     /// connects); tcp://HOST:PORT, udp://HOST:PORT[?profile=plotjuggler] (somebody who listens).
     /// {stem} stands for the log's name. May be given several times
@@ -51,6 +53,9 @@ pub struct Replay {
     /// How a table is to be read.
     #[command(flatten)]
     pub tables: Tables,
+    /// The SOURCEs are one recording in several files: read in the order of their times, the attitude carried across
+    #[arg(long)]
+    pub join: bool,
     /// Replace outputs that exist
     #[arg(long, help_heading = "Output")]
     pub force: bool,
@@ -69,6 +74,10 @@ pub struct Replay {
     /// Compression of MCAP outputs
     #[arg(long, value_enum, default_value = "zstd", help_heading = "Output")]
     pub compression: CompressionArg,
+    /// Keep numbers of Parquet outputs to 24 bits: attitudes to 1e-7 rad, in half the size
+    #[cfg(feature = "parquet")]
+    #[arg(long, help_heading = "Output")]
+    pub parquet_f32: bool,
     /// Write at most this many attitudes a second; the integration always uses every sample
     #[arg(
         long,
@@ -144,8 +153,14 @@ pub(super) fn speed(text: &str) -> Result<Option<f64>> {
 /// With one log, whatever ended it. With several, the rest still run; each failure is said.
 pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
     let shard = args.shard.as_deref().map(Shard::parse).transpose()?;
-    let logs: Vec<&String> = args
-        .sources
+    if args.join && shard.is_some() {
+        return Err(Error::usage(
+            Diagnostic::new("--join: one recording, of which --shard has no share")
+                .help("leave one of the two out"),
+        ));
+    }
+    let recordings = args.recordings();
+    let logs: Vec<&String> = recordings
         .iter()
         .enumerate()
         .filter(|(i, _)| shard.is_none_or(|s| s.takes(*i)))
@@ -157,12 +172,12 @@ pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
                 .help("give the attitude a file name"),
         ));
     }
-    if args.sources.len() > 1 && args.serving.page.is_some() {
+    if recordings.len() > 1 && args.serving.page.is_some() {
         return Err(Error::usage(
             Diagnostic::new("--page: one log at a time").help("give one SOURCE"),
         ));
     }
-    outputs::check_distinct(&args.outputs, &args.sources)?;
+    outputs::check_distinct(&args.outputs, recordings)?;
     args.check_calibrations(&logs)?;
     let plan = args.estimation.plan_of_a_recording(args.smooth)?;
     let mut selection = args.estimation.selection()?;
@@ -171,7 +186,7 @@ pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
     let mut outcome = Outcome::Done;
     let mut summaries = Vec::new();
     for log in &logs {
-        let result = outputs::resolve(&args.outputs, log, args.sources.len())
+        let result = outputs::resolve(&args.outputs, log, recordings.len())
             .and_then(|names| args.run(log, &names, (selection.clone(), plan.clone())))
             .and_then(|(mut run, served)| {
                 served.run(|again| {
@@ -209,6 +224,9 @@ pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
             Err(error) => return Err(error),
         }
     }
+    if let Some(said) = continued::said(&summaries) {
+        tracing::warn!("{said}");
+    }
     if global.json {
         say_json(args, &summaries)?;
     }
@@ -216,6 +234,14 @@ pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
 }
 
 impl Replay {
+    /// What is read by itself: each of the sources, of joined ones the first, which stands for all.
+    fn recordings(&self) -> &[String] {
+        match self.join {
+            true => self.sources.get(..1).unwrap_or_default(),
+            false => &self.sources,
+        }
+    }
+
     /// Where the calibration of a log goes.
     fn calibration_file(&self, log: &str) -> Option<String> {
         let name = self.save_calibration.as_ref()?;
@@ -231,7 +257,7 @@ impl Replay {
             let what = format!("--save-calibration {name}: {what}");
             Err(Error::usage(Diagnostic::new(what).help(help)))
         };
-        if self.sources.len() > 1 && !name.contains("{stem}") {
+        if self.recordings().len() > 1 && !name.contains("{stem}") {
             return wrong(
                 "each log would be saved there",
                 "a name with {stem}, for example {stem}.calibration.toml",
@@ -290,8 +316,17 @@ impl Replay {
             .iter()
             .map(|o| Target::parse(o))
             .collect::<Result<_>>()?;
-        let source = Source::parse(log);
-        let can_rewind = matches!(&source, Source::File(path) if path.is_file());
+        let source = match self.sources.as_slice() {
+            several @ [_, _, ..] if self.join => {
+                Source::Parts(several.iter().map(PathBuf::from).collect())
+            }
+            _ => Source::parse(log),
+        };
+        let can_rewind = match &source {
+            Source::File(path) => path.is_file(),
+            Source::Parts(_) => true,
+            Source::Stdin => false,
+        };
         let served =
             self.serving
                 .start(targets, self.speed.as_deref(), (log, can_rewind, false))?;
@@ -308,6 +343,7 @@ impl Replay {
                     EncodingArg::Json => Encoding::Json,
                 },
                 compression: self.compression.into(),
+                precision: self.precision(),
             },
             copy_input: self.copy_input,
             out_rate: self.out_rate,
@@ -317,6 +353,21 @@ impl Replay {
             record_paths: self.record_paths,
         };
         Ok((run, served))
+    }
+}
+
+impl Replay {
+    #[cfg(feature = "parquet")]
+    fn precision(&self) -> Precision {
+        match self.parquet_f32 {
+            true => Precision::Single,
+            false => Precision::Double,
+        }
+    }
+
+    #[cfg(not(feature = "parquet"))]
+    fn precision(&self) -> Precision {
+        Precision::default()
     }
 }
 

@@ -59,6 +59,7 @@ async fn asset(Path(name): Path<String>) -> Response<Body> {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 

@@ -425,7 +425,7 @@ fn a_folder_of_one_log_is_that_log_and_of_none_or_several_is_refused() {
     strapd(at, "replay rosbag2 -o out.csv --force").refused(
         1,
         &[
-            "a folder of 2 recordings: rosbag2_0.mcap, rosbag2_1.mcap",
+            "rosbag2_1.mcap: 19.040 s of it are in rosbag2/rosbag2_0.mcap too",
             "name one of them",
         ],
     );

@@ -16,9 +16,11 @@ mod earth_rate;
 mod fixtures;
 mod folders;
 mod formats;
+mod joined;
 mod model;
 #[cfg(unix)]
 mod pages;
+mod parquet;
 mod recover;
 mod regularise;
 mod replay;

@@ -136,6 +136,7 @@ fn the_mcap_crate_finds_every_checksum_count_schema_and_index_in_order() {
                 force: true,
                 encoding,
                 compression,
+                ..Options::default()
             };
             let written = write(&path, &samples, options, 2, 777);
             let bytes = fs::read(&path).unwrap();
@@ -280,6 +281,7 @@ fn the_bytes_depend_neither_on_threads_nor_on_how_the_samples_were_cut() {
             force: true,
             encoding,
             compression,
+            ..Options::default()
         };
         write(&path, &samples, options, 1, samples.len());
         let first = fs::read(&path).unwrap();
@@ -681,6 +683,7 @@ fn mcap_ros2_support_and_rosbags_read_what_the_ndjson_says() {
                     force: true,
                     encoding,
                     compression,
+                    ..Options::default()
                 },
                 2,
                 1000,

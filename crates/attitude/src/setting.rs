@@ -130,6 +130,7 @@ settings! {
     GYRO_UNIT = "gyro_unit": "Unit of the recorded rates.";
     IGNORE_COVARIANCE_FLAG = "ignore_covariance_flag": "Take values that a message marks as absent.";
     INIT = "init": "The attitude at the start.";
+    JOIN = "join": "Several files are one recording.";
     LISTEN = "listen": "An address that is listened on.";
     MAG_HARD_IRON = "mag_hard_iron": "Hard iron, to be learned.";
     MAG_MOUNT = "mag_mount": "Mounting of the magnetometer.";

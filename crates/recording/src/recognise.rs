@@ -112,7 +112,7 @@ const KNOWN: &[Known] = &[
         0,
         b"PAR1",
         "a Parquet file",
-        "duckdb -c \"copy (from 'FILE') to 'log.json'\" writes it as lines",
+        "duckdb -c \"copy (select epoch_ns(stamp) as stamp_ns, * exclude stamp from 'FILE') to 'log.csv'\" makes a table that is read, `stamp` being its column of times",
     ),
     (0, b"ARROW1", "an Arrow file", "pyarrow reads it in Python"),
     (

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use strapd_attitude::condition::quality::Advice;
 use strapd_attitude::setting::{
-    AGAINST_RECORDED, BIAS, COLUMNS, Choice, FIELD, GYRO_UNIT, INIT, TOPIC,
+    AGAINST_RECORDED, BIAS, COLUMNS, Choice, FIELD, GYRO_UNIT, INIT, JOIN, TOPIC,
 };
 use strapd_recording::mcap::Survey;
 use strapd_recording::recording::beside::TopicOfVectors;
@@ -64,6 +64,10 @@ impl Overview<'_> {
     pub fn next(&self) -> String {
         let file = match self.input.source() {
             Source::File(path) => quoted_file(path),
+            Source::Parts(paths) => {
+                let files: Vec<String> = paths.iter().map(|path| quoted_file(path)).collect();
+                format!("{JOIN} {}", files.join(" "))
+            }
             Source::Stdin => "-".to_owned(),
         };
         let best = match self.looked {

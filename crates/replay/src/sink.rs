@@ -16,6 +16,8 @@ mod form;
 pub mod json;
 mod mcap;
 mod output;
+#[cfg(feature = "parquet")]
+mod parquet;
 mod plot;
 mod socket;
 mod stream;
@@ -39,7 +41,7 @@ use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::setting::TOPIC;
 pub use stream::{Content, Provenance, Stream, output_topic};
 
-pub use target::{Format, Profile, Target};
+pub use target::{Format, Precision, Profile, Target};
 
 use crate::error::{Error, Result};
 use batch::Batch;
@@ -68,6 +70,8 @@ pub struct Options {
     pub encoding: Encoding,
     /// Chunks of an MCAP.
     pub compression: Compression,
+    /// Numbers of a table in Parquet.
+    pub precision: Precision,
 }
 
 /// What a finished sink has written.
@@ -199,10 +203,18 @@ impl Sink {
                 )?,
                 compression: options.compression,
             },
+            #[cfg(feature = "parquet")]
+            Some(Format::Parquet) => Form::Parquet(Box::new(parquet::Table::new(
+                &streams,
+                provenance,
+                options.precision,
+            ))),
         };
         // A CSV has no rows for truth, a trajectory none for what is no attitude.
-        let is_left_out = |stream: &Stream| match form {
+        let is_left_out = |stream: &Stream| match &form {
             Form::Csv(_) => stream.content == Content::Truth,
+            #[cfg(feature = "parquet")]
+            Form::Parquet(table) => table.leaves_out(stream),
             Form::Tum => matches!(stream.content, Content::Samples(_)),
             _ => false,
         };
@@ -345,6 +357,11 @@ impl Sink {
             if matches!(self.form, Form::Mcap { .. }) {
                 let closing = self.file.closing();
                 let _ = self.put(&closing)?;
+            }
+            #[cfg(feature = "parquet")]
+            if let Form::Parquet(table) = &mut self.form {
+                let closing = table.closing();
+                let _ = self.put_packed(closing)?;
             }
             if let State::Open(output) = std::mem::replace(&mut self.state, State::Closed)
                 && output.finish()? == Flow::Continue
@@ -515,10 +532,26 @@ impl Sink {
                 }
             }
             slot.chunk.clear();
-            Ok(Flow::Continue)
-        } else {
-            self.messages += slot.batch.len() as u64;
-            self.put(&slot.text)
+            return Ok(Flow::Continue);
+        }
+        self.messages += slot.batch.len() as u64;
+        #[cfg(feature = "parquet")]
+        if let Form::Parquet(table) = &mut self.form {
+            let packed = table.push(&slot.batch);
+            return self.put_packed(packed);
+        }
+        self.put(&slot.text)
+    }
+
+    /// Writes what a table has packed, if it could.
+    #[cfg(feature = "parquet")]
+    fn put_packed(&mut self, packed: std::io::Result<Vec<u8>>) -> Result<Flow> {
+        match packed {
+            Ok(bytes) => self.put(&bytes),
+            Err(source) => {
+                let path = self.named();
+                self.note(Err(Error::Write { path, source }))
+            }
         }
     }
 }

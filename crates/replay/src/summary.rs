@@ -26,7 +26,7 @@ use strapd_attitude::compare::{BiasFit, BodyAxesFit, Consistency};
 use strapd_attitude::diagnostic::Diagnostic;
 pub use strapd_attitude::digits::significant;
 use strapd_attitude::estimate::SensorCalibration;
-use strapd_attitude::record::{Counts, SampleKind, Verdict};
+use strapd_attitude::record::{Counts, Nanos, SampleKind, Verdict};
 use strapd_attitude::setting::AID;
 use strapd_attitude::worlds::EARTH_RATE;
 
@@ -49,6 +49,8 @@ pub struct TopicSummary {
     pub written: u64,
     /// First to last stamp, s.
     pub duration_secs: f64,
+    /// The first and the last stamp.
+    pub span: Option<(Nanos, Nanos)>,
     /// Median sample rate, Hz.
     pub rate_hz: Option<f64>,
     /// The clock the samples were placed on.

@@ -41,7 +41,7 @@ impl From<ForceArg> for ForceSampling {
 #[derive(Args, Debug, Clone)]
 #[command(next_help_heading = "Sampling")]
 pub struct Common {
-    /// Where the samples go: .mcap, .ndjson or .csv (.tum: the true attitude alone), - (NDJSON on stdout), null: (nowhere);
+    /// Where the samples go: .mcap, .ndjson, .csv or .parquet (.tum: the true attitude alone), - (NDJSON on stdout), null: (nowhere);
     /// tcp-listen://HOST:PORT, unix-listen:///PATH, ws-listen://HOST:PORT (whoever connects);
     /// tcp://HOST:PORT, udp://HOST:PORT[?profile=plotjuggler] (somebody who listens). May be given
     /// several times

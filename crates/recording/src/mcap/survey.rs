@@ -55,6 +55,35 @@ pub struct Survey {
 }
 
 impl Survey {
+    /// Adds what is in the next file of the same recording, whose channels are these of all.
+    pub(crate) fn append(&mut self, next: &Survey, whole: &[Arc<Channel>]) {
+        if self.channels.is_empty() {
+            self.facts = next.facts.clone();
+            self.has_summary = next.has_summary;
+            self.from_summary = next.from_summary;
+        }
+        self.has_summary &= next.has_summary;
+        self.from_summary &= next.from_summary;
+        self.file_size = match (self.file_size, next.file_size) {
+            (Some(a), Some(b)) => a.checked_add(b),
+            (a, b) => a.or(b),
+        };
+        self.messages = self.messages.saturating_add(next.messages);
+        let all = [self.times, next.times].into_iter().flatten();
+        self.times = all.reduce(|(a, b), (c, d)| (a.min(c), b.max(d)));
+        self.problems.merge(next.problems.clone());
+        for (found, channel) in next.channels.iter().zip(whole) {
+            let mut all = self.channels.iter_mut();
+            match all.find(|of| Arc::ptr_eq(&of.channel, channel)) {
+                Some(of) => of.messages = of.messages.saturating_add(found.messages),
+                None => self.channels.push(ChannelSurvey {
+                    channel: channel.clone(),
+                    ..found.clone()
+                }),
+            }
+        }
+    }
+
     pub(super) fn add_up<'a>(&mut self, channels: impl Iterator<Item = (&'a Arc<Channel>, Tally)>) {
         let mut all = Tally::default();
         for (channel, tally) in channels {

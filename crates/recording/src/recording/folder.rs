@@ -11,6 +11,7 @@ use crate::error::{Error, Result};
 use crate::format::{Format, open};
 use std::path::{Path, PathBuf};
 use strapd_attitude::diagnostic::Diagnostic;
+use strapd_attitude::setting::JOIN;
 
 /// Files that are looked at: who has more has no recording there, but an archive.
 const MOST: usize = 1000;
@@ -25,6 +26,8 @@ pub(super) struct Folder {
     pub(super) format: Format,
     /// Tables with forces or fields of the same recording.
     pub(super) beside: Vec<PathBuf>,
+    /// The files of a recording that is in several.
+    pub(super) parts: Vec<PathBuf>,
 }
 
 /// The tables of a folder, by what they hold.
@@ -83,6 +86,7 @@ pub(super) fn of(path: &Path, warn: &Warn) -> Result<Folder> {
             },
             main: main.clone(),
             format: *format,
+            parts: Vec::new(),
         }),
         [] => Err(match known {
             Some(why) => why,
@@ -95,6 +99,14 @@ pub(super) fn of(path: &Path, warn: &Warn) -> Result<Folder> {
             ),
         }),
         several => {
+            if let Some(format) = split_by_rosbag2(path, several) {
+                return Ok(Folder {
+                    main: path.to_owned(),
+                    format,
+                    beside: Vec::new(),
+                    parts: several.iter().map(|(file, _)| file.clone()).collect(),
+                });
+            }
             let names: Vec<PathBuf> = several.iter().map(|(file, _)| file.clone()).collect();
             Err(unsupported(
                 Diagnostic::new(format!(
@@ -102,7 +114,9 @@ pub(super) fn of(path: &Path, warn: &Warn) -> Result<Folder> {
                     names.len(),
                     named(&names)
                 ))
-                .help("name one of them; parts of one recording are not joined"),
+                .help(format!(
+                    "name one of them; {JOIN} makes one of the files of a recording"
+                )),
             ))
         }
     }
@@ -158,6 +172,14 @@ impl Tables {
         }
         beside
     }
+}
+
+/// The format of a folder that a recorder of ROS 2 wrote in several files, by what it put beside them.
+fn split_by_rosbag2(path: &Path, files: &[(PathBuf, Format)]) -> Option<Format> {
+    let (_, format) = files.first()?;
+    let is_of_ros = matches!(format, Format::Mcap | Format::Rosbag2);
+    let is_alike = files.iter().all(|(_, other)| other == format);
+    (is_of_ros && is_alike && path.join("metadata.yaml").is_file()).then_some(*format)
 }
 
 /// How a file is read as a table with what is wanted in it.

@@ -6,6 +6,7 @@
 
 use super::folder::{self, Folder};
 use super::line_input;
+use super::several;
 use super::warn::Warn;
 use crate::decode::{Options, Wanted};
 use crate::delimited::Table;
@@ -27,6 +28,8 @@ const MOST: u64 = 8 << 30;
 pub enum Source {
     /// A file: an MCAP, or NDJSON by its extension.
     File(PathBuf),
+    /// Several files that continue each other, in any order.
+    Parts(Vec<PathBuf>),
     /// Standard input: MCAP or NDJSON, told apart by the first bytes.
     Stdin,
 }
@@ -47,6 +50,7 @@ impl Source {
     pub fn name(&self) -> PathBuf {
         match self {
             Source::File(path) => path.clone(),
+            Source::Parts(paths) => several::title(paths),
             Source::Stdin => PathBuf::from("standard input"),
         }
     }
@@ -62,6 +66,8 @@ pub struct Input {
     format: Format,
     /// Tables of the same recording.
     beside: Vec<PathBuf>,
+    /// The files it is in, where it is in several.
+    parts: Vec<PathBuf>,
     warn: Warn,
 }
 
@@ -79,6 +85,7 @@ impl Input {
                     main,
                     format,
                     beside,
+                    parts,
                 } = folder::of(path, warn)?;
                 Ok(Input {
                     source,
@@ -86,6 +93,7 @@ impl Input {
                     kept: None,
                     format,
                     beside,
+                    parts,
                     warn: warn.clone(),
                 })
             }
@@ -95,9 +103,45 @@ impl Input {
                 kept: None,
                 format: recognised(path, warn)?,
                 beside: Vec::new(),
+                parts: Vec::new(),
                 warn: warn.clone(),
             }),
         }
+    }
+
+    /// Opens several files that continue each other, in any order.
+    ///
+    /// # Errors
+    /// One can not be opened, comes only once, is a folder or given twice, or is of another format than the first.
+    pub fn joined(paths: &[PathBuf], warn: &Warn) -> Result<Input> {
+        several::checked(paths)?;
+        let mut formats = Vec::new();
+        for path in paths {
+            let format = recognised(path, warn)?;
+            if let Some((first, other)) = formats.first().filter(|(_, other)| *other != format) {
+                let first: &PathBuf = first;
+                return Err(Error::Unsupported {
+                    path: path.clone(),
+                    what: Diagnostic::new(format!(
+                        "{}, and {} is {}: parts of one recording have the same format",
+                        format.name(),
+                        first.display(),
+                        Format::name(*other)
+                    ))
+                    .help("strapd recover makes an MCAP of a log"),
+                });
+            }
+            formats.push((path.clone(), format));
+        }
+        Ok(Input {
+            source: Source::Parts(paths.to_vec()),
+            name: several::title(paths),
+            kept: None,
+            format: formats.first().map_or(Format::Mcap, |(_, format)| *format),
+            beside: Vec::new(),
+            parts: paths.to_vec(),
+            warn: warn.clone(),
+        })
     }
 
     /// Reads a stream to its end; `name` is what errors call it.
@@ -155,6 +199,7 @@ impl Input {
             source,
             name,
             beside: Vec::new(),
+            parts: Vec::new(),
             warn: warn.clone(),
         })
     }
@@ -169,6 +214,12 @@ impl Input {
     #[must_use]
     pub fn name(&self) -> &Path {
         &self.name
+    }
+
+    /// The files it is in, where it is in several.
+    #[must_use]
+    pub fn parts(&self) -> &[PathBuf] {
+        &self.parts
     }
 
     /// Who is told what to know of it.
@@ -187,6 +238,7 @@ impl Input {
     /// # Errors
     /// It can not be opened.
     pub fn bytes(&self) -> Result<File> {
+        self.is_one_file()?;
         let Some(kept) = &self.kept else {
             return open(&self.name);
         };
@@ -200,11 +252,26 @@ impl Input {
         })
     }
 
+    /// Whoever reads bytes must not take those of one part for all.
+    fn is_one_file(&self) -> Result<()> {
+        match self.parts.len() {
+            0 => Ok(()),
+            parts => Err(Error::Unsupported {
+                path: self.name.clone(),
+                what: Diagnostic::new(format!(
+                    "a recording in {parts} files, and here it has to be one"
+                ))
+                .help("strapd replay makes one of them"),
+            }),
+        }
+    }
+
     /// Its bytes as an MCAP.
     ///
     /// # Errors
     /// As [`Reader::open`].
     pub fn mcap(&self) -> Result<Reader> {
+        self.is_one_file()?;
         match &self.kept {
             None => Reader::open(&self.name),
             Some(_) => Reader::of_file(&self.name, self.bytes()?),

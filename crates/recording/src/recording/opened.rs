@@ -8,7 +8,8 @@ use super::decoders::Decoders;
 use super::input::Input;
 use super::line_input::only_for_tables;
 use super::log_channel::{LogChannel, described, known, nanos, rank};
-use super::sources::{self, Publisher};
+use super::parts::{self, Same, Whole};
+use super::sources::{self, Known, Publisher};
 use super::text_log::TextLog;
 use super::topics::{self, Candidate, Choice, PICKED_UNNAMED};
 use crate::decode::Options;
@@ -43,6 +44,8 @@ pub struct Recording {
 enum Body {
     Mcap(Reader),
     Text(Box<TextLog>),
+    /// In the order of their times.
+    Parts(Vec<(Recording, Same)>),
 }
 
 impl Recording {
@@ -51,6 +54,9 @@ impl Recording {
     /// # Errors
     /// It can not be read, or is none.
     pub fn of(input: &Input, options: &Options, pool: &Pool) -> Result<Recording> {
+        if !input.parts().is_empty() {
+            return Recording::of_parts(input, options, pool);
+        }
         if !input.format().is_text() {
             only_for_tables(input.name(), input.format(), options)?;
             return Recording::of_mcap(input, pool);
@@ -63,6 +69,31 @@ impl Recording {
             sources: sources::by_topic(&channels),
             channels,
             problems: Vec::new(),
+        })
+    }
+
+    fn of_parts(input: &Input, options: &Options, pool: &Pool) -> Result<Recording> {
+        let mut logs = Vec::new();
+        for path in input.parts() {
+            let log = Recording::of(&Input::open(path, input.warn())?, options, pool)?;
+            logs.push((parts::times(path, &log.survey)?, log));
+        }
+        logs.sort_by_key(|(times, _)| *times);
+        let mut whole = Whole::new(input.warn());
+        let (mut problems, mut body) = (Vec::new(), Vec::new());
+        for (_, log) in logs {
+            let same = whole.add(log.name(), &log.channels, &log.survey)?;
+            let name = log.name().display();
+            problems.extend(log.problems.iter().map(|what| format!("{name}: {what}")));
+            body.push((log, same));
+        }
+        Ok(Recording {
+            input: input.clone(),
+            body: Body::Parts(body),
+            survey: whole.survey,
+            sources: sources::by_topic(&whole.channels),
+            channels: whole.channels,
+            problems,
         })
     }
 
@@ -119,8 +150,32 @@ impl Recording {
         pool: &Pool,
     ) -> Result<Recording> {
         let mut log = Recording::of(input, options, pool)?;
-        if let Some(again) = log.reader() {
-            log.sources = sources::tell_apart(again, &mut log.channels, named, options, pool)?;
+        let told = {
+            let readers: Vec<(Reader, Known<'_>)> = match &log.body {
+                Body::Parts(parts) => parts
+                    .iter()
+                    .filter_map(|(log, same)| {
+                        let known: Known<'_> = Box::new(|met| same.known(met));
+                        Some((log.reader()?, known))
+                    })
+                    .collect(),
+                _ => {
+                    let known = |reader| (reader, Box::new(Arc::clone) as Known<'_>);
+                    log.reader().into_iter().map(known).collect()
+                }
+            };
+            match readers.is_empty() {
+                true => None,
+                false => {
+                    let channels = &mut log.channels;
+                    Some(sources::tell_apart(
+                        readers, channels, named, options, pool,
+                    )?)
+                }
+            }
+        };
+        if let Some(told) = told {
+            log.sources = told;
         }
         Ok(log)
     }
@@ -195,9 +250,13 @@ impl Recording {
     /// Where a payload lies, in words: of a line its number stands where others have a time.
     #[must_use]
     pub fn place_of(&self, at: Nanos) -> String {
-        match self.body {
+        match &self.body {
             Body::Mcap(_) => format!("logged at {} ns", at.0),
             Body::Text(_) => format!("line {}", at.0),
+            Body::Parts(parts) => match parts.first() {
+                Some((log, _)) => log.place_of(at),
+                None => String::new(),
+            },
         }
     }
 
@@ -212,7 +271,7 @@ impl Recording {
     pub fn reader(&self) -> Option<Reader> {
         match &self.body {
             Body::Mcap(reader) => reader.again(),
-            Body::Text(_) => None,
+            Body::Text(_) | Body::Parts(_) => None,
         }
     }
 
@@ -225,6 +284,39 @@ impl Recording {
         &self,
         ahead: usize,
         pool: &Pool,
+        mut select: impl FnMut(&Arc<Channel>) -> Option<Route>,
+        mut take: impl FnMut(&mut Vec<Item>) -> std::result::Result<ControlFlow<()>, E>,
+    ) -> std::result::Result<Survey, E> {
+        let Body::Parts(parts) = &self.body else {
+            return self.walk_file(ahead, pool, select, take);
+        };
+        let mut survey = Survey::default();
+        let mut is_over = false;
+        for (log, same) in parts {
+            let met = log.walk_file::<E>(
+                ahead,
+                pool,
+                |channel| select(&same.known(channel)),
+                |items| {
+                    let flow = take(items)?;
+                    is_over = flow.is_break();
+                    Ok(flow)
+                },
+            )?;
+            survey.append(&met, &[]);
+            if is_over {
+                break;
+            }
+        }
+        survey.channels.clone_from(&self.survey.channels);
+        Ok(survey)
+    }
+
+    /// The same of a recording in one file.
+    fn walk_file<E: From<Error>>(
+        &self,
+        ahead: usize,
+        pool: &Pool,
         select: impl FnMut(&Arc<Channel>) -> Option<Route>,
         mut take: impl FnMut(&mut Vec<Item>) -> std::result::Result<ControlFlow<()>, E>,
     ) -> std::result::Result<Survey, E> {
@@ -234,6 +326,8 @@ impl Recording {
                 text.walk(select, take)?;
                 return Ok(self.survey.clone());
             }
+            // Its parts are read instead.
+            Body::Parts(_) => return Ok(self.survey.clone()),
         };
         let mut failure = None;
         let report = mcap::walk(

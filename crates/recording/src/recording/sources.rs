@@ -81,13 +81,16 @@ const MOST_FRAMES: usize = 8;
 /// Messages that make a frame: a damaged one, or one all of zeros, is no second body.
 const FEW: u64 = 3;
 
+/// Which channel of the recording is met in one of its files.
+pub(super) type Known<'k> = Box<dyn Fn(&Arc<Channel>) -> Arc<Channel> + 'k>;
+
 /// Who speaks on each topic, from the messages; `named` is looked at though it may carry no rate that is
 /// found without [`Options`].
 ///
 /// # Errors
 /// The log can not be read.
 pub(super) fn tell_apart(
-    reader: Reader,
+    readers: Vec<(Reader, Known<'_>)>,
     channels: &mut [LogChannel],
     named: Option<&str>,
     options: &Options,
@@ -148,51 +151,61 @@ pub(super) fn tell_apart(
         .collect();
     let to_the_end = speakers.values().any(|s| s.several);
     let (mut counts, mut total) = (HashMap::<usize, u64>::new(), 0);
-    mcap::walk(
-        reader,
-        // This usually ends soon.
-        &WalkOptions {
-            pool: Some(pool.rayon()),
-            in_flight: 4 << 20,
-            ..WalkOptions::default()
-        },
-        |met| looked.iter().find(|looked| is_same(&looked.channel, met)),
-        |looked, message, out: &mut Vec<Met>| {
-            let may_be_kept = looked.is_opened && message.data.len() < OPENINGS_LIMIT;
-            out.push(Met {
-                channel: looked.index,
-                frame: looked.decoder.frame_id(message.data),
-                digest: digest(message.data),
-                opening: may_be_kept.then(|| (nanos(message.log_time), message.data.to_vec())),
-                is_bare: looked.is_bare,
-            });
-        },
-        |items| {
-            for mut met in items.drain(..) {
-                if let Some(opening) = met.opening.take()
-                    && let Some(known) = channels.get_mut(met.channel)
-                {
-                    keep(&mut known.openings, opening);
+    let mut is_enough = false;
+    for (reader, known) in readers {
+        if is_enough {
+            break;
+        }
+        mcap::walk(
+            reader,
+            // This usually ends soon.
+            &WalkOptions {
+                pool: Some(pool.rayon()),
+                in_flight: 4 << 20,
+                ..WalkOptions::default()
+            },
+            |met| {
+                let met = known(met);
+                looked.iter().find(|looked| is_same(&looked.channel, &met))
+            },
+            |looked, message, out: &mut Vec<Met>| {
+                let may_be_kept = looked.is_opened && message.data.len() < OPENINGS_LIMIT;
+                out.push(Met {
+                    channel: looked.index,
+                    frame: looked.decoder.frame_id(message.data),
+                    digest: digest(message.data),
+                    opening: may_be_kept.then(|| (nanos(message.log_time), message.data.to_vec())),
+                    is_bare: looked.is_bare,
+                });
+            },
+            |items| {
+                for mut met in items.drain(..) {
+                    if let Some(opening) = met.opening.take()
+                        && let Some(known) = channels.get_mut(met.channel)
+                    {
+                        keep(&mut known.openings, opening);
+                    }
+                    let count = counts.entry(met.channel).or_default();
+                    *count += 1;
+                    total += 1;
+                    missing = missing.saturating_sub(u64::from(*count <= FIRST));
+                    let settles = met.is_bare && *count <= OPENINGS as u64;
+                    unsettled = unsettled.saturating_sub(u64::from(settles));
+                    if let Some(place) = place_of.get(&met.channel)
+                        && let Some(speakers) = speakers.get_mut(place)
+                    {
+                        speakers.take(met);
+                    }
                 }
-                let count = counts.entry(met.channel).or_default();
-                *count += 1;
-                total += 1;
-                missing = missing.saturating_sub(u64::from(*count <= FIRST));
-                let settles = met.is_bare && *count <= OPENINGS as u64;
-                unsettled = unsettled.saturating_sub(u64::from(settles));
-                if let Some(place) = place_of.get(&met.channel)
-                    && let Some(speakers) = speakers.get_mut(place)
-                {
-                    speakers.take(met);
+                if !to_the_end && unsettled == 0 && (missing == 0 || total >= ENOUGH) {
+                    is_enough = true;
+                    ControlFlow::Break(())
+                } else {
+                    ControlFlow::Continue(())
                 }
-            }
-            if !to_the_end && unsettled == 0 && (missing == 0 || total >= ENOUGH) {
-                ControlFlow::Break(())
-            } else {
-                ControlFlow::Continue(())
-            }
-        },
-    )?;
+            },
+        )?;
+    }
     let mut told = Vec::new();
     for (place, source) in sources.into_iter().enumerate() {
         match speakers.remove(&place) {

@@ -3,7 +3,7 @@
 //! Apart from the reader because that logs nothing itself: it hands out what is to be known as it comes.
 
 use crate::error::Result;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use strapd_recording::{Input, Warn};
 
 /// Opens what a command line names.
@@ -12,6 +12,14 @@ use strapd_recording::{Input, Warn};
 /// As [`Input::open`].
 pub fn open(path: &Path) -> Result<Input> {
     Ok(Input::open(path, &warn())?)
+}
+
+/// Opens several files as one recording.
+///
+/// # Errors
+/// As [`Input::joined`].
+pub(super) fn joined(paths: &[PathBuf]) -> Result<Input> {
+    Ok(Input::joined(paths, &warn())?)
 }
 
 /// Logs what is to be known of a recording.

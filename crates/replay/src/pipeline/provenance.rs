@@ -8,7 +8,7 @@ use crate::sink::{Provenance, Stream, Target};
 use sha2::{Digest, Sha256};
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use strapd_attitude::estimate::Prepared;
 use strapd_attitude::worlds::EARTH_RATE;
 use strapd_recording::Source;
@@ -32,21 +32,27 @@ pub fn of(
     };
     put("version".to_owned(), env!("CARGO_PKG_VERSION").to_owned());
     put("command".to_owned(), run.command.clone());
-    let input = run.source.name();
-    let input = match input.file_name() {
-        Some(name) if !run.record_paths => name.to_string_lossy().into_owned(),
-        _ => input.display().to_string(),
+    let files = match &run.source {
+        Source::Parts(paths) => paths.clone(),
+        source => vec![source.name()],
     };
-    put("input".to_owned(), input);
+    let shown = |path: &PathBuf| match path.file_name() {
+        Some(name) if !run.record_paths => name.to_string_lossy().into_owned(),
+        _ => path.display().to_string(),
+    };
+    let names: Vec<String> = files.iter().map(shown).collect();
+    put("input".to_owned(), names.join(", "));
     put("method".to_owned(), run.plan.method.to_string());
     put("noise".to_owned(), run.plan.noise.name.clone());
     // The ends are read only where there is something to write the result into, and never of a
     // pipe: opening it a second time would wait for a second writer.
-    if let Source::File(path) = &run.source
-        && path.is_file()
+    if run.source != Source::Stdin
+        && files.iter().all(|path| path.is_file())
         && run.targets.iter().any(|t| *t != Target::Null)
     {
-        put("input_fingerprint".to_owned(), fingerprint(path)?);
+        let prints = files.iter().map(|path| fingerprint(path));
+        let prints = prints.collect::<Result<Vec<String>>>()?;
+        put("input_fingerprint".to_owned(), prints.join(", "));
     }
     for ((found, prepared), stream) in founds.iter().zip(prepared).zip(streams) {
         let key = |name: &str| match founds {

@@ -16,6 +16,7 @@ use std::cell::RefCell;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_recording::Source;
 use strapd_recording::mcap::{self, Channel, Message, Order, Reader, Record, Survey, WalkOptions};
 use strapd_recording::pool::Pool;
@@ -213,11 +214,18 @@ fn still_wanted(flow: Flow) -> Result<()> {
 pub fn run(run: &Recover, pool: &Pool, watch: &mut dyn FnMut(&Position)) -> Result<Recovered> {
     let reader = match &run.source {
         Source::File(path) => Reader::open(path)?,
+        Source::Parts(_) => {
+            return Err(Error::usage(
+                Diagnostic::new("what is recovered is one file")
+                    .help("recover each, and join them then"),
+            ));
+        }
         Source::Stdin => Reader::from_stream(run.source.name(), Box::new(std::io::stdin()))?,
     };
     let size = reader.size();
     let inputs: Vec<PathBuf> = match &run.source {
         Source::File(path) => vec![path.clone()],
+        Source::Parts(paths) => paths.clone(),
         Source::Stdin => Vec::new(),
     };
     let copying = RefCell::new(Copying {

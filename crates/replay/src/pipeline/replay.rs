@@ -46,7 +46,7 @@ pub fn run(
             let input = logged::open(path)?;
             // Of lines and rows who speaks is known when all are read, which only several sensors are worth.
             let is_of_all = run.selection.topic.as_deref() == Some("all");
-            if input.format().is_text() && !is_of_all {
+            if input.format().is_text() && input.parts().is_empty() && !is_of_all {
                 let text = || input.lines(&run.selection.decode);
                 let stamps = lines::stamps(run, text()?)?;
                 lines::replay(run, text()?, stamps, pool, watch)?
@@ -54,6 +54,7 @@ pub fn run(
                 file(run, &input, pool, watch)?
             }
         }
+        Source::Parts(paths) => file(run, &logged::joined(paths)?, pool, watch)?,
         Source::Stdin => piped(run, std::io::stdin(), pool, watch)?,
     };
     summary.elapsed_secs = begun.elapsed().as_secs_f64();

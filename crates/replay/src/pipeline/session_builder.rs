@@ -55,6 +55,7 @@ pub(super) fn begin(
         .collect::<Result<Vec<_>>>()?;
     let inputs: Vec<PathBuf> = match &run.source {
         Source::File(path) => vec![path.clone()],
+        Source::Parts(paths) => paths.clone(),
         Source::Stdin => Vec::new(),
     };
     let outlet = Outlet::open(

@@ -13,6 +13,7 @@ use crate::summary::sigma::SigmaTerms;
 use crate::summary::smoothing::Smoothing;
 use crate::summary::stamps::{Regularised, Segment};
 use crate::summary::{Gaps, RunSummary, TopicSummary};
+use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use strapd_attitude::condition::regularise;
 use strapd_attitude::diagnostic::Diagnostic;
@@ -92,6 +93,7 @@ fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
         first_losses: first_losses(topic, first),
         written: topic.output.count,
         duration_secs: conditioning.last.map_or(0.0, |last| last.secs_since(first)),
+        span: conditioning.first.zip(conditioning.last),
         rate_hz: conditioning
             .spacing_nanos
             .filter(|n| *n > 0)
@@ -190,9 +192,20 @@ fn calibrated(run: &ReplayRequest, topic: &Topic) -> SensorCalibration {
     let known = learned(of, filter, recording);
     let source = match &run.source {
         Source::File(path) => path.file_name().unwrap_or_default().to_string_lossy(),
+        Source::Parts(paths) => parts_named(paths).into(),
         Source::Stdin => "standard input".into(),
     };
     calibration::described(known, &topic.name, &source, topic.output.last.as_ref())
+}
+
+/// The first of several files, and how many more.
+fn parts_named(paths: &[PathBuf]) -> String {
+    let first = paths.first().and_then(|path| path.file_name());
+    let more = paths.len().saturating_sub(1);
+    format!(
+        "{} and {more} more",
+        first.unwrap_or_default().to_string_lossy()
+    )
 }
 
 /// What was kept to be drawn, with the errors against the reference.

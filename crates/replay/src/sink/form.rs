@@ -8,6 +8,8 @@ use super::csv;
 use super::json::Objects;
 use super::mcap::Layout;
 use super::mcap::chunk::{Chunk, Compression};
+#[cfg(feature = "parquet")]
+use super::parquet::Table;
 use super::tum;
 
 /// How a batch becomes bytes.
@@ -21,6 +23,9 @@ pub(super) enum Form {
     /// With what is in the last column of every row.
     Csv(String),
     Tum,
+    /// Rows are gathered, and so packed where batches are written in order.
+    #[cfg(feature = "parquet")]
+    Parquet(Box<Table>),
     Null,
 }
 
@@ -67,6 +72,8 @@ impl Slot {
                     tum::push_row(&mut self.text, sample);
                 }
             }
+            #[cfg(feature = "parquet")]
+            Form::Parquet(_) => {}
             Form::Null => {}
         }
     }

@@ -17,6 +17,19 @@ pub enum Format {
     Csv,
     /// A trajectory as `evo` reads it.
     Tum,
+    /// A table in Parquet.
+    #[cfg(feature = "parquet")]
+    Parquet,
+}
+
+/// How exactly the numbers of a table in Parquet are kept.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Precision {
+    /// Every bit.
+    #[default]
+    Double,
+    /// 24 bits: attitudes to some 1e-7 rad, in half the size.
+    Single,
 }
 
 /// Where the output goes.
@@ -47,7 +60,7 @@ pub enum Target {
 }
 
 /// The list every message about an unknown sink ends with.
-const KNOWN: &str = "known sinks: FILE.mcap, FILE.ndjson (or .jsonl), FILE.csv, FILE.tum (for evo), - (NDJSON on standard output), null: (discard), tcp-listen://HOST:PORT, unix-listen:///PATH, ws-listen://HOST:PORT (whoever connects), tcp://HOST:PORT, udp://HOST:PORT[?profile=plotjuggler] (somebody who listens)";
+const KNOWN: &str = "known sinks: FILE.mcap, FILE.ndjson (or .jsonl), FILE.csv, FILE.tum (for evo), FILE.parquet (with the feature parquet), - (NDJSON on standard output), null: (discard), tcp-listen://HOST:PORT, unix-listen:///PATH, ws-listen://HOST:PORT (whoever connects), tcp://HOST:PORT, udp://HOST:PORT[?profile=plotjuggler] (somebody who listens)";
 
 /// What the objects sent to somebody look like.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -146,6 +159,22 @@ impl Target {
             Some("ndjson" | "jsonl") => Format::Ndjson,
             Some("csv") => Format::Csv,
             Some("tum") => Format::Tum,
+            #[cfg(feature = "parquet")]
+            Some("parquet" | "pq") => Format::Parquet,
+            #[cfg(not(feature = "parquet"))]
+            Some("parquet" | "pq") => {
+                let name = path.display();
+                let csv = path.with_extension("csv");
+                return Err(Error::usage(
+                    Diagnostic::new(format!(
+                        "-o {name}: this strapd was built without the feature parquet"
+                    ))
+                    .help(format!(
+                        "cargo install strapd --features parquet, or write -o {}, which polars, pandas and duckdb read",
+                        csv.display()
+                    ))
+                ));
+            }
             Some(other) => {
                 return Err(Error::usage(
                     Diagnostic::new(format!(
