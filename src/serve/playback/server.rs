@@ -13,6 +13,7 @@ use crate::serve::shutdown::Signals;
 use crate::serve::{Server, Settings};
 use crate::sink::Stream;
 use crate::sink::address::Listen;
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use strapd_attitude::record::{AttitudeSample, Nanos, RawSample};
@@ -28,6 +29,8 @@ pub struct Cast {
     playback: Arc<Playback>,
     addresses: Vec<Listen>,
     streams: Mutex<Vec<Lane>>,
+    /// Recorded orientations, by the stream they are beside; there is one from the first of them on.
+    recorded: Mutex<BTreeMap<usize, Lane>>,
     text: Mutex<Vec<u8>>,
     server: Mutex<Option<Serving>>,
     forever: bool,
@@ -51,6 +54,18 @@ struct Lane {
     resets: u32,
     /// The last reset count, as it was sent.
     last_reset: u32,
+}
+
+impl Lane {
+    fn new(channel: Arc<Channel>) -> Lane {
+        Lane {
+            channel,
+            next: 0,
+            flood: Flood::default(),
+            resets: 0,
+            last_reset: 0,
+        }
+    }
 }
 
 /// What becomes of a run that has ended.
@@ -103,6 +118,7 @@ impl Cast {
             playback,
             addresses,
             streams: Mutex::default(),
+            recorded: Mutex::default(),
             text: Mutex::default(),
             server: Mutex::new(Some(Serving { stop, thread })),
             forever,
@@ -191,6 +207,10 @@ impl Cast {
 impl Audience for Cast {
     // The streams are those of the run before, if there was one.
     fn begin(&self, streams: &[Stream]) {
+        for lane in lock(&self.recorded).values_mut() {
+            lane.next = 0;
+            lane.channel.begin_anew();
+        }
         let mut lanes = lock(&self.streams);
         if lanes.len() == streams.len() {
             for lane in &mut *lanes {
@@ -200,13 +220,7 @@ impl Audience for Cast {
             return;
         }
         for stream in streams.iter().skip(lanes.len()) {
-            lanes.push(Lane {
-                channel: self.hub.declare(stream),
-                next: 0,
-                flood: Flood::default(),
-                resets: 0,
-                last_reset: 0,
-            });
+            lanes.push(Lane::new(self.hub.declare(stream)));
         }
     }
 
@@ -258,6 +272,19 @@ impl Audience for Cast {
         if let Some(lane) = lock(&self.streams).get_mut(stream) {
             self.hand(lane, Items::Samples(samples), shown);
         }
+    }
+
+    // The page draws them; who watches lines gets what `-o -` says.
+    fn wants_recorded(&self) -> bool {
+        self.forever
+    }
+
+    fn recorded(&self, of: usize, stream: &Stream, samples: &[AttitudeSample], shown: bool) {
+        let mut lanes = lock(&self.recorded);
+        let lane = lanes
+            .entry(of)
+            .or_insert_with(|| Lane::new(self.hub.declare(stream)));
+        self.hand(lane, Items::Attitudes(samples), shown);
     }
 
     fn is_cut(&self) -> bool {
