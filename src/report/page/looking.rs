@@ -160,7 +160,7 @@ mod tests {
     fn nothing_a_log_says_leaves_its_element() {
         let text = inert(&json!({ "name": "</script><!--\u{2028}\u{2029}\"'" }));
         assert!(!text.contains(['<', '\u{2028}', '\u{2029}']), "{text}");
-        let read: Value = serde_json::from_str(&text).unwrap();
+        let read: Value = serde_json::from_str(&text).unwrap_or_default();
         assert_eq!(read["name"], "</script><!--\u{2028}\u{2029}\"'");
     }
 }

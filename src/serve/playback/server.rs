@@ -5,14 +5,15 @@
 //! To the run it is an [`Audience`].
 
 use super::controls::{Grant, Notice, Playback};
+use super::estimated::Estimated;
 use crate::error::{Error, Result};
 use crate::pipeline::audience::{self, Audience};
 use crate::serve::channel::{Channel, Items};
 use crate::serve::hub::{Flood, Hub};
 use crate::serve::shutdown::Signals;
 use crate::serve::{Server, Settings};
-use crate::sink::Stream;
 use crate::sink::address::Listen;
+use crate::sink::{Content, Stream};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
@@ -31,6 +32,8 @@ pub struct Cast {
     streams: Mutex<Vec<Lane>>,
     /// Recorded orientations, by the stream they are beside; there is one from the first of them on.
     recorded: Mutex<BTreeMap<usize, Lane>>,
+    /// What is estimated of the samples of a simulation, for its page.
+    estimated: Mutex<Estimated>,
     text: Mutex<Vec<u8>>,
     server: Mutex<Option<Serving>>,
     forever: bool,
@@ -119,6 +122,7 @@ impl Cast {
             addresses,
             streams: Mutex::default(),
             recorded: Mutex::default(),
+            estimated: Mutex::default(),
             text: Mutex::default(),
             server: Mutex::new(Some(Serving { stop, thread })),
             forever,
@@ -211,6 +215,7 @@ impl Audience for Cast {
             lane.next = 0;
             lane.channel.begin_anew();
         }
+        lock(&self.estimated).begin();
         let mut lanes = lock(&self.streams);
         if lanes.len() == streams.len() {
             for lane in &mut *lanes {
@@ -269,8 +274,15 @@ impl Audience for Cast {
     }
 
     fn samples(&self, stream: usize, samples: &[RawSample], shown: bool) {
-        if let Some(lane) = lock(&self.streams).get_mut(stream) {
-            self.hand(lane, Items::Samples(samples), shown);
+        let mut lanes = lock(&self.streams);
+        let Some(lane) = lanes.get_mut(stream) else {
+            return;
+        };
+        self.hand(lane, Items::Samples(samples), shown);
+        if let (true, Content::Samples(kind)) = (self.forever, lane.channel.stream().content) {
+            let of = (&*self.hub, lane.channel.id());
+            let text = &mut lock(&self.text);
+            lock(&self.estimated).take(of, kind, samples, shown, text);
         }
     }
 

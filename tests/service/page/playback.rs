@@ -291,3 +291,43 @@ fn a_recorded_orientation_is_what_a_replay_is_held_against() {
     assert_eq!(rate, "");
     browser.is_unharmed();
 }
+
+#[test]
+#[cfg_attr(not(has_chromium), ignore = "needs chromium")]
+fn a_page_of_a_simulation_shows_what_would_be_estimated() {
+    let mut browser = Browser::start();
+    let process = Process::of(&[
+        "simulate",
+        "coning",
+        "--duration",
+        "3",
+        "--rate-hz",
+        "200",
+        "--page=127.0.0.1:0",
+        "--paused",
+        "--speed",
+        "3",
+    ]);
+    browser.go(process.address(0), "/");
+    browser.until_open();
+    let play = "document.querySelector('[data-testid=play]')";
+    browser.until(
+        "it waits",
+        &format!("!document.querySelector('[data-testid=playback]').hidden && {play}.textContent === 'Play'"),
+    );
+    // The second run is the first again.
+    let mut worst = Vec::new();
+    for _ in 0..2 {
+        browser.eval(&format!("{play}.click()"));
+        browser.until("it goes", &format!("{play}.textContent === 'Pause'"));
+        browser.until(
+            "its end",
+            &format!("{play}.textContent === 'Again' && __strapd.sensors.imu?.seq === 600 && __strapd.sensors.truth?.seq === 600"),
+        );
+        browser.until("compared", "__strapd.sensors.imu.worst > 0");
+        worst.push(browser.number("__strapd.sensors.imu.worst"));
+    }
+    assert!(worst[0] < 0.05, "{worst:?} deg");
+    assert_eq!(browser.eval("__strapd.sensors.imu.points"), 601);
+    browser.is_unharmed();
+}
