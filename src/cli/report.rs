@@ -35,7 +35,7 @@ const ENOUGH: f64 = 600.0;
   strapd report flight.mcap -o r.html --reference truth.csv          the error against another file
   strapd report flight.mcap --json | jq .verdict                     the same numbers, no page
 
-The page needs no network and no script; it opens from a file, prints, and is at most 2 MB for any log.
+The page needs no network, and no script but to look into its charts; it opens from a file, prints, and is at most 2 MB for any log.
 Exit codes: 0 done; 3 done, but samples were lost or could not be read.")]
 pub struct Report {
     /// A recording: MCAP, NDJSON or CSV; - is standard input

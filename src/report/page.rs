@@ -1,10 +1,11 @@
 //! A log, examined -> one self-contained HTML page, and the same as JSON. Pure.
 //!
 //! No script, no font, no picture from anywhere else: the page is to be mailed, printed and opened
-//! ten years on. What can not be said is said to be so, with the reason.
+//! ten years on. Its own script is named by its hash, and may ask nobody. What can not be said is said to be so, with the reason.
 
 mod charts;
 mod findings;
+mod looking;
 mod markup;
 mod numbers;
 mod reference;
@@ -85,14 +86,16 @@ impl Page<'_> {
 
     fn html_in(&self, stretches: usize) -> String {
         let verdict = self.verdict();
+        let script = looking::script();
         let mut out = format!(
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-             <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; img-src data:\">\n\
+             <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src {2}; connect-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'\">\n\
              <meta name=\"color-scheme\" content=\"light dark\">\n<link rel=\"icon\" href=\"data:,\">\n\
              <title>{0} - strapd report</title>\n<style>\n{1}</style>\n</head>\n<body>\n<main>\n<h1>{0}</h1>\n",
             escaped(self.name()),
             include_str!("page/page.css"),
+            looking::hash(&script),
         );
         let _ = writeln!(
             out,
@@ -111,11 +114,10 @@ impl Page<'_> {
             out.push_str("<section><h2>Attitude</h2>\n<p>There is no topic of gyro samples, so there is nothing to draw.</p></section>\n");
         }
         self.made(&mut out);
-        // The only character that could end the block is written as an escape of JSON.
-        let data = self.json().to_string().replace('<', "\\u003c");
+        let data = looking::inert(&self.json());
         let _ = write!(
             out,
-            "</main>\n<script type=\"application/json\" id=\"report\">{data}</script>\n</body>\n</html>\n"
+            "</main>\n<script type=\"application/json\" id=\"report\">{data}</script>\n<script type=\"module\">{script}</script>\n</body>\n</html>\n"
         );
         out
     }

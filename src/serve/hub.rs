@@ -11,6 +11,7 @@ mod counters;
 mod latecomers;
 mod places;
 mod polling;
+mod referring;
 mod report;
 mod resetting;
 mod saving;
@@ -93,6 +94,8 @@ pub struct Hub {
     channels: RwLock<BTreeMap<u32, Arc<Channel>>>,
     next_channel: AtomicU32,
     polling: Polling,
+    /// What a simulation says the attitude truly is.
+    truth: Mutex<Option<referring::Truth>>,
     next_client: AtomicU64,
     /// Some sensor's samples wait for the unit of their stamps.
     stamps_wait: AtomicBool,
@@ -214,6 +217,7 @@ impl Hub {
             heard: AtomicU64::new(0),
             state: Mutex::default(),
             channels: RwLock::default(),
+            truth: Mutex::default(),
             next_channel: AtomicU32::new(1),
             polling: Polling::default(),
             next_client: AtomicU64::new(1),

@@ -326,7 +326,7 @@ impl Session {
                 scratch.samples.truncate(before);
                 self.refuse(&first_line_must_be_auth(), number);
             }
-            Ok(Message::Samples(_)) if !self.hub.takes_samples() => {
+            Ok(Message::Samples(_) | Message::Reference(_)) if !self.hub.takes_samples() => {
                 self.not_taken(number, line, before, received, scratch);
             }
             Ok(Message::Samples(mut head)) => {
@@ -389,6 +389,18 @@ impl Session {
                     }
                     // Well said, if in vain: not held against it.
                     Err(fault) => self.say(&fault, number, line),
+                }
+            }
+            Ok(Message::Reference(found)) => {
+                self.errors_in_a_row = 0;
+                self.flush(received, scratch, usize::MAX);
+                if let Err(fault) = self
+                    .hub
+                    .refer(self.client.number, &found, &mut scratch.text)
+                    && self.told.len() < MAX_TOLD
+                    && self.told.insert(fault.message.clone())
+                {
+                    self.say(&fault, number, line);
                 }
             }
             Err(fault) if matches!(fault.code, "unknown_class" | "other_sensor") => {

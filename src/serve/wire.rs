@@ -5,9 +5,11 @@
 //! (`docs/protocol.md`).
 
 mod packing;
+mod reference;
 mod resetting;
 
 pub use packing::{broken_packed, packed_stream, unreadable};
+pub use reference::{Reference, TRUTH, stream as reference_stream};
 pub use resetting::{Reset, reset_answer};
 
 use super::chunk::{Dropped, MAX_QUEUED};
@@ -45,6 +47,8 @@ pub enum Message {
     Playback(Action),
     /// Begin a sensor's attitude anew; or why that can not be, which is no fault of samples.
     Reset(Result<Reset, Fault>),
+    /// What the sensors are held against.
+    Reference(Box<Reference>),
     /// Here is the token.
     Auth(String),
 }
@@ -167,6 +171,9 @@ pub fn read_from(
         Some("POLL") => Ok(Message::Poll),
         Some("RESET") => Ok(Message::Reset(resetting::read(line))),
         Some("PLAYBACK") => playback_action(line).map(Message::Playback),
+        Some("ATT") if head.id.as_deref() == Some(TRUTH) => {
+            reference::read(line).map(|found| Message::Reference(Box::new(found)))
+        }
         Some("AUTH") => {
             object::<AuthObject>(line, "bad_auth", "{\"class\":\"AUTH\",\"token\":\"...\"}")
                 .map(|auth| Message::Auth(auth.token))

@@ -16,9 +16,13 @@ const LOCUS = 10;
 // Milliseconds between two changes of the numbers: faster nobody reads.
 const READABLE = 100;
 
+// What the others are held against: a simulator's truth, orientations in a recording.
+export const isRecorded = (id) => /(^| )recorded$/.test(id);
+export const isReference = (id) => id === "truth" || isRecorded(id);
+
 export class Card {
   // does: moved() draws soon; resized() at once, a canvas that changes its size is empty; anew() begins it anew;
-  // save(kind) writes a file.
+  // folded() after it was folded by hand; save(kind) writes a file.
   constructor(sensor, template, view, does) {
     this.sensor = sensor;
     this.id = sensor.id;
@@ -51,9 +55,11 @@ export class Card {
     parts.fold.addEventListener("click", () => {
       this.unfolded = this.isFolded;
       this.fold(!this.isFolded);
+      does.folded();
     });
     for (const kind of ["png", "csv"]) parts[kind].addEventListener("click", () => does.save(kind));
-    this.fold(false);
+    // The card of the sensor it belongs to draws it, dashed.
+    this.fold(isRecorded(this.id));
     this.clear();
   }
 
@@ -105,10 +111,11 @@ export class Card {
     this.shownAt = -Infinity;
   }
 
-  // Which sensor it is compared with: the one chosen, or `truth`.
+  // Which sensor it is compared with: the one chosen, or its reference.
   choose(cards) {
     const others = [...cards.keys()].filter((id) => id !== this.id);
-    const wanted = this.chosen ?? (others.includes("truth") && this.id !== "truth" ? "truth" : "");
+    const usual = [`${this.id} recorded`, "recorded", "truth"].find((id) => others.includes(id));
+    const wanted = this.chosen ?? (isReference(this.id) ? "" : (usual ?? ""));
     const select = this.parts.against;
     const options = ["", ...others];
     if (options.join("\n") !== [...select.options].map((o) => o.value).join("\n")) {
@@ -174,7 +181,8 @@ export class Card {
   writeAt(now, heading) {
     this.stale = now - this.shownAt < READABLE;
     if (this.stale) return;
-    this.shownAt = now;
+    // A picture that stays is drawn at no moment.
+    this.shownAt = Math.min(now, performance.now());
     if (heading !== null) writeNumbers(this, heading);
   }
 
@@ -217,11 +225,13 @@ export class Card {
     const own = zLocus(history, LOCUS, toView, at.number);
     const time = history.timeOf(at.number);
     const reached = against?.clock === sensor.clock ? (against?.history.firstFrom(time + 1e-9) ?? 0) - 1 : (against?.history.total ?? 0) - 1;
-    const other = against ? zLocus(against.history, LOCUS, toView, reached) : [];
+    // As the error is counted.
+    const turn = sensor.turn ?? { w: 1, x: 0, y: 0, z: 0 };
+    const other = against ? zLocus(against.history, LOCUS, (v) => toView(rotate(turn, v)), reached) : [];
     scene.locus(other, colours.other, false, 1.5, [4, 4]);
     scene.locus(own, colours.z, false);
     if (other.length) {
-      const q = product(zeroed, against.history.attitude(reached));
+      const q = product(product(zeroed, turn), against.history.attitude(reached));
       scene.triad((v) => up(rotate(q, v)));
     }
     scene.body((v) => up(rotate(seen, v)));

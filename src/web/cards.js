@@ -1,6 +1,6 @@
 // The sensors that are drawn: which, in which order, and which are folded.
 
-import { Card } from "./card.js";
+import { Card, isRecorded, isReference } from "./card.js";
 import { Sensor } from "./sensor.js";
 
 // As many as two screens hold.
@@ -20,10 +20,11 @@ export class Cards extends Map {
     return [...this.values()];
   }
 
-  // The card of a sensor, made where there is room; else null.
-  of(id) {
+  // The card of a sensor, made where there is room; else null. One that was left out comes where it is wanted alone.
+  of(id, isWanted = false) {
     const known = this.get(id);
     if (known) return known;
+    if (this.left.has(id) && !isWanted) return null;
     const { parts, view, clocks, only } = this.page;
     if (only && !only.includes(id)) return null;
     if (this.size >= MOST) {
@@ -34,6 +35,7 @@ export class Cards extends Map {
       moved: this.does.moved,
       resized: this.does.resized,
       anew: () => this.does.anew(id),
+      folded: () => this.count(),
       save: (kind) => this.does.save(made, kind),
     });
     this.set(id, made);
@@ -49,11 +51,17 @@ export class Cards extends Map {
     for (const card of this.values()) card.choose(this);
     const { parts } = this.page;
     parts.waiting.hidden = this.size > 0;
-    parts.sensors.dataset.count = String(this.size);
+    this.count();
     this.does.changed();
   }
 
-  // By name, but truth last: it is what the others are held against; and behind it who is silent, folded.
+  // One that is not folded has all of the width.
+  count() {
+    this.page.parts.sensors.dataset.count = String(this.all.filter((card) => !card.isFolded).length);
+    this.does.moved();
+  }
+
+  // By name, but truth and what was recorded last: the others are held against it; and behind it who is silent, folded.
   arrange(isJudged) {
     const now = performance.now();
     const isLive = (card) => !card.sensor.isSilent(now);
@@ -62,13 +70,15 @@ export class Cards extends Map {
       for (const card of this.values()) {
         const wasSilent = card.isSilent;
         card.isSilent = !isLive(card);
-        if (card.isSilent !== wasSilent && !card.unfolded) card.fold(card.isSilent);
+        const isChanged = card.isSilent !== Boolean(wasSilent);
+        if (isChanged && !card.unfolded && !isRecorded(card.id)) card.fold(card.isSilent);
       }
+      this.count();
     }
     const order = this.all.sort(
       (a, b) =>
         Boolean(a.isSilent) - Boolean(b.isSilent) ||
-        (a.id === "truth") - (b.id === "truth") ||
+        isReference(a.id) - isReference(b.id) ||
         a.id.localeCompare(b.id, "en", { numeric: true }),
     );
     const { sensors, waiting } = this.page.parts;
@@ -91,7 +101,7 @@ export class Cards extends Map {
     if (on === false) this.remove(id);
     else {
       if (!this.has(id) && this.size >= MOST) this.remove(this.keys().next().value);
-      this.of(id);
+      this.of(id, true);
     }
     this.settle();
   }

@@ -47,7 +47,7 @@ class Row {
     const { q, rate, sigma_deg } = att;
     if (!q) return;
     this.q = q;
-    this.stamp = att.stamp;
+    [this.stamp, this.world] = [att.stamp, att.world];
     this.angles = rollPitchYaw(q);
     this.speed = rate ? Math.hypot(...rate) * DEGREES : NaN;
     this.sigma = sigma_deg ? Math.hypot(...sigma_deg) : NaN;
@@ -154,7 +154,7 @@ export class Fleet {
       else parts.fleetBody.insertBefore(row.element, at);
       row.element.hidden = isSilent && this.isFolded;
       if (row.element.hidden) continue;
-      row.error = truth?.q && row.q && row !== truth && near(row.stamp, truth.stamp) ? angleBetween(truth.q, row.q) * DEGREES : NaN;
+      row.error = near(row, truth) ? angleBetween(truth.q, row.q) * DEGREES : NaN;
       row.cells.error.hidden = !truth;
       row.element.classList.toggle("silent", isSilent);
       row.box.checked = this.does.shown(row.id);
@@ -167,7 +167,9 @@ export class Fleet {
   }
 }
 
-// Attitudes of two sensors that may be held against each other as they are: within 20 ms.
-function near(a, b) {
-  return a && b && Math.abs(a.sec - b.sec + (a.nsec - b.nsec) * 1e-9) < 0.02;
+// Attitudes that may be held against each other as they are: of one world, within 20 ms.
+function near(row, truth) {
+  if (!row.q || !truth?.q || row === truth || row.world !== truth.world) return false;
+  const [a, b] = [row.stamp, truth.stamp];
+  return Math.abs(a.sec - b.sec + (a.nsec - b.nsec) * 1e-9) < 0.02;
 }

@@ -1,5 +1,6 @@
 // Artificial horizon: made from where up is in body axes, so it holds in every world and attitude.
 
+import { fixed } from "./numbers.js";
 import { conjugate, DEGREES, rotate } from "./quaternion.js";
 import { FONT } from "./surface.js";
 
@@ -85,7 +86,7 @@ export function drawHorizon(surface, colours, q, world, heading) {
   context.lineTo(cx + 5, cy - radius * 0.86 + 8);
   context.fill();
 
-  const words = `${heading < -0.05 ? "−" : ""}${Math.abs(heading).toFixed(0)}°`;
+  const words = `${fixed(heading, 0)}°`;
   context.font = `600 11px ${FONT}`;
   context.textAlign = "center";
   context.textBaseline = "middle";

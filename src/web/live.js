@@ -1,5 +1,6 @@
 // The live page: messages -> sensors -> at most 30 pictures a second.
 
+import { Asking } from "./asking.js";
 import { Camera, Scene } from "./body3d.js";
 import { Cards } from "./cards.js";
 import { Clocks } from "./clock.js";
@@ -16,11 +17,6 @@ import { TimeView } from "./timeview.js";
 import { Together } from "./together.js";
 import { publish, seen } from "./window.js";
 
-// Attitudes a second asked for in all, shared among the sensors shown: every sample of one at
-// 1 kHz, and of an 8 kHz one every eighth.
-const BUDGET = 1000;
-// Asked for while nobody looks, and of the sensors that are in the table alone.
-const HIDDEN_HZ = 2;
 const FRAME = 1000 / 30;
 const WINDOWS = [2, 5, 10, 30, 60, 300];
 
@@ -28,7 +24,6 @@ const parameters = new URLSearchParams(location.search);
 const only = parameters.get("ids")?.split(",").filter(Boolean);
 const frozen = parameters.get("frozen") === "1";
 const stopAt = parameters.has("seq") ? Number(parameters.get("seq")) : null;
-const asked = Number(parameters.get("rate_hz"));
 
 const parts = {};
 for (const part of document.querySelectorAll("[data-page]")) parts[part.dataset.page] = part;
@@ -36,7 +31,6 @@ for (const part of document.querySelectorAll("[data-page]")) parts[part.dataset.
 const clocks = new Clocks();
 let [paused, still, dirty] = [false, false, true];
 let colours = palette();
-let [watched, watchedBeside] = ["", ""];
 let [session, run, missed] = [null, null, 0];
 let [frames, fps, framesAt] = [0, 0, 0];
 
@@ -70,6 +64,16 @@ const fleet = new Fleet(parts, {
   isSilent: (row) => !(performance.now() - row.heardAt < 5000) && performance.now() - row.since > 2000,
 });
 
+const asking = new Asking({
+  cards,
+  only,
+  rate: Number(parameters.get("rate_hz")),
+  heardBeside: (att) => {
+    fleet.heard(att);
+    touch();
+  },
+});
+
 publish({
   fps: () => fps,
   frames: () => frames,
@@ -80,29 +84,8 @@ publish({
   together: () => together.drawn ?? [],
 });
 
-// Asks for what can be drawn, and beside it a few attitudes of all for the table.
 function watch() {
-  if (!link?.isOpen) return;
-  const share = Math.max(50, Math.floor(BUDGET / Math.max(1, cards.size)));
-  const rate_hz = document.hidden ? HIDDEN_HZ : asked > 0 ? asked : share;
-  const ids = only ?? (cards.left.size ? [...cards.keys()] : undefined);
-  const request = { class: "WATCH", enable: true, streams: ["ATT"], rate_hz, ids };
-  const text = JSON.stringify(request);
-  if (text !== watched) link.send(request);
-  watched = text;
-  if (cards.left.size && !beside) beside = new Link(heardBeside, () => (watchedBeside = ""));
-}
-
-let beside = null;
-function heardBeside(message) {
-  if (message.class === "VERSION" && watchedBeside === "") {
-    watchedBeside = "all";
-    beside.send({ class: "WATCH", enable: true, streams: ["ATT"], rate_hz: HIDDEN_HZ });
-  }
-  if (message.class !== "ATT" || cards.has(message.id)) return;
-  cards.left.add(message.id);
-  fleet.heard(message);
-  touch();
+  asking.watch(link);
 }
 
 function heard(message) {
@@ -177,7 +160,7 @@ function greeted(version) {
     fleet.forget();
     notice("the daemon was started again: attitudes begin anew");
   }
-  watched = "";
+  asking.forget();
   told(parts, null);
   if (restarted) cards.left.clear();
   run = null;

@@ -13,14 +13,17 @@ const HOLE = 12;
 // Pixels from the cursor to a sample that is told.
 const NEAR = 12;
 // Pixels between samples from which on each is marked.
-const APART = 9;
+const SPACED = 9;
 
 // The part of each line that is drawn, and one instant beyond on both sides.
 function parts(lines, from, to) {
   return lines.map((line) => {
     const { track } = line;
-    const begin = Math.max(track.oldest, track.firstFrom(from) - 1);
-    const end = Math.min(track.total, track.firstFrom(to) + 2);
+    const [first, beyond] = [track.firstFrom(from), track.firstFrom(to)];
+    const begin = Math.max(track.oldest, first - 1);
+    // Where none is inside, nor one on each side, there is nothing.
+    const isEmpty = first === beyond && (first === track.oldest || first === track.total) && track.timeOf(first) !== to;
+    const end = isEmpty ? begin : Math.min(track.total, beyond + 2);
     const count = end - begin;
     const usual = count > 1 ? (track.timeOf(end - 1) - track.timeOf(begin)) / (count - 1) : Infinity;
     return { ...line, begin, end, usual };
@@ -77,7 +80,7 @@ export function drawPlot(surface, colours, lines, { span: [from, to], scale, wra
     points += trace(context, line, { xOf, yOf, wraps });
     context.stroke();
     context.setLineDash([]);
-    if ((line.usual / (to - from)) * width > APART) mark(context, line, xOf, yOf);
+    if ((line.usual / (to - from)) * width > SPACED) mark(context, line, xOf, yOf);
   }
   const at = cursor >= from && cursor <= to ? look(drawn, cursor, ((to - from) / width) * NEAR) : null;
   if (cursor >= from && cursor <= to) drawCursor(context, colours, place, cursor, at);
@@ -145,7 +148,7 @@ function mark(context, { track, values, begin, end }, xOf, yOf) {
 // What each line was at the sample nearest to `time`; null where none is near.
 function look(drawn, time, near) {
   const values = drawn.map(({ track, values: of, usual }) => {
-    const number = track.nearest(time, Math.max(near, Math.min(usual, 1e9) * 0.6));
+    const number = track.nearest(time, Math.max(near, Number.isFinite(usual) ? usual * 0.6 : 0));
     return number < 0 ? null : { number, value: of[track.slot(number)], time: track.timeOf(number) };
   });
   const some = values.find((v) => v && !Number.isNaN(v.value));
@@ -172,7 +175,7 @@ function drawCursor(context, colours, place, cursor, at) {
     context.beginPath();
     context.arc(xOf(at.time), yOf(value), 3, 0, 2 * Math.PI);
     context.fill();
-    told.push([`${name} ${fixed(value, digitsOf(step / 20))}`, colour]);
+    if (name) told.push([`${name} ${fixed(value, digitsOf(step / 20))}`, colour]);
   }
   if (!at) told.push(["no data", colours.muted]);
   box(context, colours, x, told, place);

@@ -2,7 +2,7 @@
 
 import { secondsBetween } from "./clock.js";
 import { History } from "./history.js";
-import { angleBetween, DEGREES } from "./quaternion.js";
+import { angleBetween, conjugate, DEGREES, product } from "./quaternion.js";
 
 // Steps of stamps that jitter is judged by.
 const STEPS = 512;
@@ -13,6 +13,16 @@ const SILENCE = 5000;
 
 // Samples so far, of a recording attitudes: STATUS knows one or the other.
 export const taken = (source) => source.samples ?? source.sent ?? 0;
+
+// What turns another's world into one's own. Worlds of one name are one; else they agree at the first instant of both,
+// in heading only where both are level.
+function aligned(ownWorld, own, world, other) {
+  if (ownWorld === world) return { w: 1, x: 0, y: 0, z: 0 };
+  const whole = product(own, conjugate(other));
+  const norm = Math.hypot(whole.w, whole.z);
+  const isLevel = ownWorld !== "start" && world !== "start" && (ownWorld === "ned") === (world === "ned");
+  return isLevel && norm > 1e-6 ? { w: whole.w / norm, x: 0, y: 0, z: whole.z / norm } : whole;
+}
 
 export class Sensor {
   constructor(id, clocks) {
@@ -42,6 +52,7 @@ export class Sensor {
     this.history.compared = this.history.oldest;
     this.worst = NaN;
     this.error = NaN;
+    this.turn = null;
   }
 
   // Somebody spoke; whether it is shown is another matter.
@@ -108,7 +119,9 @@ export class Sensor {
       const time = Math.min(reached, history.timeOf(number) + offset);
       const truth = against.history.attitudeAt(time);
       if (!truth) continue;
-      const error = angleBetween(truth, history.attitude(number)) * DEGREES;
+      const own = history.attitude(number);
+      this.turn ??= aligned(this.last.world, own, against.last.world, truth);
+      const error = angleBetween(product(this.turn, truth), own) * DEGREES;
       history.error[history.slot(number)] = error;
       this.error = error;
       this.worst = Math.max(Number.isNaN(this.worst) ? 0 : this.worst, error);

@@ -27,6 +27,7 @@ mod packed;
 mod places;
 mod posting;
 mod recording;
+mod reference;
 mod resetting;
 mod runs;
 mod same_bytes;

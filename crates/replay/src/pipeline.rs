@@ -29,6 +29,7 @@ pub mod logged;
 pub mod pace;
 pub mod position;
 pub mod provenance;
+mod recorded;
 pub mod recover;
 pub mod replay;
 mod replay_start;

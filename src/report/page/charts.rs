@@ -1,5 +1,6 @@
 //! What was kept of a run -> charts over time. Pure.
 
+use super::looking;
 use crate::report::plot::{Axis, Chart, Look, Series};
 use crate::report::series::{Drawn, ErrorTrace};
 use crate::report::trace::Traces;
@@ -56,7 +57,8 @@ impl Time {
 }
 
 fn over_time(time: Time, title: &str, unit: &str, series: Vec<Series>) -> Result<String, String> {
-    Chart {
+    let numbers = looking::numbers(time, title, unit, &series);
+    let svg = Chart {
         title: format!("{title}, {unit}"),
         x: time.axis(),
         y: Axis::linear(unit),
@@ -66,7 +68,8 @@ fn over_time(time: Time, title: &str, unit: &str, series: Vec<Series>) -> Result
         ..Chart::default()
     }
     .svg()
-    .map_err(|e| e.to_string())
+    .map_err(|e| e.to_string())?;
+    Ok(format!("{}\n{numbers}", svg.trim()))
 }
 
 fn line(name: &str, color: usize, points: Vec<[f64; 2]>) -> Series {

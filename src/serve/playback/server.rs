@@ -5,14 +5,16 @@
 //! To the run it is an [`Audience`].
 
 use super::controls::{Grant, Notice, Playback};
+use super::estimated::Estimated;
 use crate::error::{Error, Result};
 use crate::pipeline::audience::{self, Audience};
 use crate::serve::channel::{Channel, Items};
 use crate::serve::hub::{Flood, Hub};
 use crate::serve::shutdown::Signals;
 use crate::serve::{Server, Settings};
-use crate::sink::Stream;
 use crate::sink::address::Listen;
+use crate::sink::{Content, Stream};
+use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use strapd_attitude::record::{AttitudeSample, Nanos, RawSample};
@@ -28,6 +30,10 @@ pub struct Cast {
     playback: Arc<Playback>,
     addresses: Vec<Listen>,
     streams: Mutex<Vec<Lane>>,
+    /// Recorded orientations, by the stream they are beside; there is one from the first of them on.
+    recorded: Mutex<BTreeMap<usize, Lane>>,
+    /// What is estimated of the samples of a simulation, for its page.
+    estimated: Mutex<Estimated>,
     text: Mutex<Vec<u8>>,
     server: Mutex<Option<Serving>>,
     forever: bool,
@@ -51,6 +57,18 @@ struct Lane {
     resets: u32,
     /// The last reset count, as it was sent.
     last_reset: u32,
+}
+
+impl Lane {
+    fn new(channel: Arc<Channel>) -> Lane {
+        Lane {
+            channel,
+            next: 0,
+            flood: Flood::default(),
+            resets: 0,
+            last_reset: 0,
+        }
+    }
 }
 
 /// What becomes of a run that has ended.
@@ -103,6 +121,8 @@ impl Cast {
             playback,
             addresses,
             streams: Mutex::default(),
+            recorded: Mutex::default(),
+            estimated: Mutex::default(),
             text: Mutex::default(),
             server: Mutex::new(Some(Serving { stop, thread })),
             forever,
@@ -191,6 +211,11 @@ impl Cast {
 impl Audience for Cast {
     // The streams are those of the run before, if there was one.
     fn begin(&self, streams: &[Stream]) {
+        for lane in lock(&self.recorded).values_mut() {
+            lane.next = 0;
+            lane.channel.begin_anew();
+        }
+        lock(&self.estimated).begin();
         let mut lanes = lock(&self.streams);
         if lanes.len() == streams.len() {
             for lane in &mut *lanes {
@@ -200,13 +225,7 @@ impl Audience for Cast {
             return;
         }
         for stream in streams.iter().skip(lanes.len()) {
-            lanes.push(Lane {
-                channel: self.hub.declare(stream),
-                next: 0,
-                flood: Flood::default(),
-                resets: 0,
-                last_reset: 0,
-            });
+            lanes.push(Lane::new(self.hub.declare(stream)));
         }
     }
 
@@ -255,9 +274,29 @@ impl Audience for Cast {
     }
 
     fn samples(&self, stream: usize, samples: &[RawSample], shown: bool) {
-        if let Some(lane) = lock(&self.streams).get_mut(stream) {
-            self.hand(lane, Items::Samples(samples), shown);
+        let mut lanes = lock(&self.streams);
+        let Some(lane) = lanes.get_mut(stream) else {
+            return;
+        };
+        self.hand(lane, Items::Samples(samples), shown);
+        if let (true, Content::Samples(kind)) = (self.forever, lane.channel.stream().content) {
+            let of = (&*self.hub, lane.channel.id());
+            let text = &mut lock(&self.text);
+            lock(&self.estimated).take(of, kind, samples, shown, text);
         }
+    }
+
+    // The page draws them; who watches lines gets what `-o -` says.
+    fn wants_recorded(&self) -> bool {
+        self.forever
+    }
+
+    fn recorded(&self, of: usize, stream: &Stream, samples: &[AttitudeSample], shown: bool) {
+        let mut lanes = lock(&self.recorded);
+        let lane = lanes
+            .entry(of)
+            .or_insert_with(|| Lane::new(self.hub.declare(stream)));
+        self.hand(lane, Items::Attitudes(samples), shown);
     }
 
     fn is_cut(&self) -> bool {

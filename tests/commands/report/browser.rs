@@ -1,6 +1,6 @@
 //! In headless Chromium: the page opens from a file, without a complaint and without a request.
 
-use crate::made_logs::{motion, written};
+use crate::made_logs::{Logged, bytes, imu_message, motion, written};
 use crate::program::strapd;
 use std::process::Command;
 use std::time::{Duration, Instant};
@@ -65,6 +65,20 @@ fn the_page_opens_from_a_file_without_a_complaint() {
     assert!(dom.contains("id=\"verdict\""), "{dom:.300} {said}");
     assert!(dom.contains("</html>"));
     assert_eq!(complaints(&said), Vec::<&str>::new());
+    // Its script has drawn: charts can be looked into, and are told.
+    let told = dom.matches("aria-valuetext=\"0:").count();
+    assert!(
+        told >= 3 && dom.matches("<canvas").count() == told,
+        "{told} charts: {said}"
+    );
+    // Another script does not run.
+    let html = std::fs::read_to_string(&page).unwrap();
+    let strange = dir.path().join("strange.html");
+    let added = "<main><script>document.title = 'owned';</script>";
+    std::fs::write(&strange, html.replace("<main>", added)).unwrap();
+    let (dom, said) = opened(browser, &strange);
+    assert!(!dom.contains("<title>owned"), "{dom:.300}");
+    assert!(!complaints(&said).is_empty(), "and that is said");
     // Would it be seen? The same page with a request and an error is complained about.
     let html = std::fs::read_to_string(&page).unwrap();
     let spoilt = dir.path().join("spoilt.html");
@@ -75,4 +89,41 @@ fn the_page_opens_from_a_file_without_a_complaint() {
     .unwrap();
     let (_, said) = opened(browser, &spoilt);
     assert!(!complaints(&said).is_empty(), "{said}");
+}
+
+/// A topic, a frame and a file whose names are made to break out of the page.
+#[test]
+#[cfg_attr(not(has_chromium), ignore = "needs chromium")]
+fn names_made_to_run_do_not() {
+    let browser = chromium();
+    let dir = tempfile::tempdir().unwrap();
+    const EVIL: &str = "</script><script>document.title='owned'</script><!--<img src=x onerror=\"document.title='owned'\">\u{2028}'\"`${document.title='owned'}";
+    let messages: Vec<Logged> = motion(2000)
+        .iter()
+        .map(|sample| Logged {
+            topic: EVIL,
+            log_time: sample.stamp as u64,
+            payload: imu_message(EVIL, sample),
+        })
+        .collect();
+    let name = "<!--<script>'\"\u{2028}.mcap";
+    std::fs::write(dir.path().join(name), bytes(Some(None), 4096, &messages)).unwrap();
+    let ran = Command::new(env!("CARGO_BIN_EXE_strapd"))
+        .current_dir(dir.path())
+        .args(["report", name, "-o", "r.html"])
+        .output()
+        .unwrap();
+    assert!(matches!(ran.status.code(), Some(0 | 3)), "{ran:?}");
+    let html = std::fs::read_to_string(dir.path().join("r.html")).unwrap();
+    super::is_sound(&html);
+    let (dom, said) = opened(browser, &dir.path().join("r.html"));
+    assert_eq!(complaints(&said), Vec::<&str>::new());
+    assert!(
+        !dom.contains("<title>owned") && !dom.contains("<img"),
+        "{dom:.500}"
+    );
+    assert!(
+        dom.matches("aria-valuetext=\"0:").count() >= 3,
+        "its own script has run: {said}"
+    );
 }

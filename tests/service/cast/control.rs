@@ -6,6 +6,9 @@ use crate::serve::client::Client;
 use crate::serve::daemon::{Daemon, Process, TCP, WS};
 use serde_json::{Value, json};
 
+/// A page is shown what was recorded as well, as a stream of its own.
+const ESTIMATES: &str = r#"{"class":"WATCH","id":"/imu/data"}"#;
+
 /// Numbers of the attitudes among lines.
 fn seqs(lines: &[String]) -> Vec<u64> {
     let seq = |line: &String| serde_json::from_str::<Value>(line).unwrap()["seq"].as_u64();
@@ -48,7 +51,7 @@ fn attitudes_after_a_seek_forward_or_backward_are_those_of_an_undisturbed_run() 
         "--speed",
         "10",
     ]);
-    let mut client = Client::web(process.address(0)).watching(r#"{"class":"WATCH"}"#);
+    let mut client = Client::web(process.address(0)).watching(ESTIMATES);
     let mut place = client.next_of("PLAYBACK");
     while place["start"].is_null() {
         place = client.next_of("PLAYBACK");
@@ -168,7 +171,7 @@ fn who_comes_after_the_end_or_while_it_waits_sees_what_was_shown_last() {
         "--speed",
         "100",
     ]);
-    let watch = r#"{"class":"WATCH"}"#;
+    let watch = ESTIMATES;
     let last_of_another = |expected: &str| {
         let mut late = Client::web(process.address(0)).watching(watch);
         let mut att = late.next_of("ATT");

@@ -193,6 +193,36 @@ impl Browser {
         self.until("connected", "__strapd.state === 'open'");
     }
 
+    /// The middle of an element, in pixels of the window, and its width; scrolled to.
+    pub(crate) fn place(&mut self, selector: &str) -> [f64; 3] {
+        let found = self.eval(&format!(
+            "(() => {{ const e = document.querySelector(`{selector}`); e.scrollIntoView({{ block: 'center' }}); const r = e.getBoundingClientRect(); return [r.left + r.width / 2, r.top + r.height / 2, r.width]; }})()"
+        ));
+        [0, 1, 2].map(|n| found[n].as_f64().unwrap())
+    }
+
+    /// What a mouse does: `mouseMoved`, `mousePressed`, `mouseReleased`, `mouseWheel`.
+    pub(crate) fn mouse(&mut self, kind: &str, at: [f64; 2], more: Value) {
+        let mut event = json!({"type": kind, "x": at[0], "y": at[1], "pointerType": "mouse"});
+        if let (Some(event), Some(more)) = (event.as_object_mut(), more.as_object()) {
+            event.extend(more.clone());
+        }
+        self.call("Input.dispatchMouseEvent", event);
+    }
+
+    /// A key, pressed where the focus is.
+    pub(crate) fn press(&mut self, key: &str) {
+        let mut down = json!({"type": "keyDown", "key": key, "code": key});
+        if key.len() == 1 {
+            down["text"] = json!(key);
+        }
+        self.call("Input.dispatchKeyEvent", down);
+        self.call(
+            "Input.dispatchKeyEvent",
+            json!({"type": "keyUp", "key": key, "code": key}),
+        );
+    }
+
     /// A picture, as base64 of a PNG.
     pub(crate) fn screenshot(&mut self) -> String {
         let taken = self.call("Page.captureScreenshot", json!({"format": "png"}));

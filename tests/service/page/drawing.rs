@@ -11,7 +11,7 @@ const ELEVATION_DEG: f64 = 24.0;
 const SCALE: f64 = 0.4;
 
 /// The three body axes in world axes, by the columns of C_nb.
-fn axes([w, x, y, z]: [f64; 4]) -> [[f64; 3]; 3] {
+pub(super) fn axes([w, x, y, z]: [f64; 4]) -> [[f64; 3]; 3] {
     [
         [
             w * w + x * x - y * y - z * z,
@@ -32,7 +32,7 @@ fn axes([w, x, y, z]: [f64; 4]) -> [[f64; 3]; 3] {
 }
 
 /// Parallel projection onto a canvas of this size.
-fn projected(v: [f64; 3], width: f64, height: f64) -> [f64; 2] {
+pub(super) fn projected(v: [f64; 3], width: f64, height: f64) -> [f64; 2] {
     let (sa, ca) = AZIMUTH_DEG.to_radians().sin_cos();
     let (se, ce) = ELEVATION_DEG.to_radians().sin_cos();
     let right = -sa * v[0] + ca * v[1];

@@ -186,3 +186,43 @@ fn the_error_is_the_angle_from_the_truth() {
     assert_eq!(titles, json!(["imu0", "truth"]));
     browser.is_unharmed();
 }
+
+#[test]
+#[cfg_attr(not(has_chromium), ignore = "needs chromium")]
+fn a_simulation_is_held_against_its_truth() {
+    let mut browser = Browser::start();
+    let daemon = Daemon::start(listening(&[TCP, WS]));
+    browser.go(daemon.address(1), "/");
+    browser.until_open();
+    let to = format!("tcp://{}", daemon.address(0));
+    let simulated = Command::new(strapd())
+        .args([
+            "simulate",
+            "coning",
+            "--speed",
+            "1",
+            "--duration",
+            "3",
+            "--rate-hz",
+            "200",
+        ])
+        .args(["--quiet", "-o", &to])
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&simulated.stderr);
+    assert!(simulated.status.success() && said.is_empty(), "{said}");
+    let imu = "__strapd.sensors.imu";
+    browser.until(
+        "all of both",
+        &format!("{imu}?.seq === 600 && __strapd.sensors.truth?.seq === 600"),
+    );
+    browser.until("compared", &format!("{imu}.worst > 0"));
+    let against =
+        browser.eval("document.querySelector('[data-id=imu] [data-testid=against]').value");
+    assert_eq!(against, "truth");
+    // Exact samples of a gentle cone: what is left is the integration of rates, and where the worlds lie to each other
+    // is no error.
+    let worst = browser.number(&format!("{imu}.worst"));
+    assert!(worst < 0.05, "{worst} deg");
+    browser.is_unharmed();
+}

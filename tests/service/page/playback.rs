@@ -212,5 +212,122 @@ fn a_replay_is_moved_from_the_page_and_ends_where_a_file_ends() {
     browser.eval("(() => { const slider = document.querySelector('[data-testid=seek]'); slider.value = '12'; slider.dispatchEvent(new Event('change')); })()");
     browser.until("it is there", "document.querySelector('[data-testid=place]').textContent.startsWith('0:12.0') && __strapd.seq === 600");
     assert_eq!(browser.text("thinning"), "every sample");
+    // One clock: the log's, in the bar, in the numbers and under the plots.
+    browser.until(
+        "the numbers say so",
+        "document.querySelector('[data-testid=stamp]').textContent.startsWith('0:12.0')",
+    );
+    let time = browser.number("Object.values(__strapd.sensors)[0].time");
+    assert!((time - 12.0).abs() < 0.03, "{time}");
+    // Of a recording some is not known; what is not has no place.
+    let health = browser.eval("[...document.querySelectorAll('[data-testid=sensor] .strip div')].filter((e) => e.offsetParent && /–$/.test(e.textContent.trim())).map((e) => e.textContent)");
+    assert_eq!(health, json!([]));
+    browser.is_unharmed();
+}
+
+#[test]
+#[cfg_attr(not(has_chromium), ignore = "needs chromium")]
+fn a_recorded_orientation_is_what_a_replay_is_held_against() {
+    let mut browser = Browser::start();
+    // What the command line says of the same.
+    let folder = tempfile::tempdir().unwrap();
+    let estimated = folder.path().join("attitude.mcap");
+    let run = |args: &[&std::ffi::OsStr]| {
+        let output = std::process::Command::new(strapd())
+            .args(args)
+            .env("STRAPD_AID", "none")
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{args:?}");
+        output.stdout
+    };
+    run(&[
+        "replay".as_ref(),
+        LOG.as_ref(),
+        "--quiet".as_ref(),
+        "-o".as_ref(),
+        estimated.as_ref(),
+    ]);
+    let compared = run(&[
+        "compare".as_ref(),
+        estimated.as_ref(),
+        LOG.as_ref(),
+        "--align".as_ref(),
+        "first".as_ref(),
+        "--json".as_ref(),
+    ]);
+    let compared: Value = serde_json::from_slice(&compared).unwrap();
+    let worst = compared["total"]["max_deg"]
+        .as_f64()
+        .unwrap_or_else(|| unreachable!("{compared}"));
+
+    let process = Process::of(&[
+        "replay",
+        LOG,
+        "--page=127.0.0.1:0",
+        "--paused",
+        "--speed",
+        "10",
+    ]);
+    browser.go(process.address(0), "/");
+    browser.until_open();
+    browser.until(
+        "it waits",
+        "!document.querySelector('[data-testid=playback]').hidden",
+    );
+    browser.eval("document.querySelector('[data-testid=play]').click()");
+    browser.until("its end", "document.querySelector('[data-testid=play]').textContent === 'Again' && __strapd.sensors.recorded?.points === 953");
+    let shown = browser.number("__strapd.sensors['/imu/data'].worst");
+    assert!(
+        (shown - worst).abs() < 1e-6,
+        "{shown} on the page, {worst} by the command"
+    );
+    let against = browser
+        .eval("document.querySelector('[data-id=\"/imu/data\"] [data-testid=against]').value");
+    assert_eq!(against, "recorded");
+    // Nothing is said of what a recorded orientation does not know.
+    let rate =
+        browser.eval("document.querySelector('[data-id=recorded] [data-testid=rate-x]').value");
+    assert_eq!(rate, "");
+    browser.is_unharmed();
+}
+
+#[test]
+#[cfg_attr(not(has_chromium), ignore = "needs chromium")]
+fn a_page_of_a_simulation_shows_what_would_be_estimated() {
+    let mut browser = Browser::start();
+    let process = Process::of(&[
+        "simulate",
+        "coning",
+        "--duration",
+        "3",
+        "--rate-hz",
+        "200",
+        "--page=127.0.0.1:0",
+        "--paused",
+        "--speed",
+        "3",
+    ]);
+    browser.go(process.address(0), "/");
+    browser.until_open();
+    let play = "document.querySelector('[data-testid=play]')";
+    browser.until(
+        "it waits",
+        &format!("!document.querySelector('[data-testid=playback]').hidden && {play}.textContent === 'Play'"),
+    );
+    // The second run is the first again.
+    let mut worst = Vec::new();
+    for _ in 0..2 {
+        browser.eval(&format!("{play}.click()"));
+        browser.until("it goes", &format!("{play}.textContent === 'Pause'"));
+        browser.until(
+            "its end",
+            &format!("{play}.textContent === 'Again' && __strapd.sensors.imu?.seq === 600 && __strapd.sensors.truth?.seq === 600"),
+        );
+        browser.until("compared", "__strapd.sensors.imu.worst > 0");
+        worst.push(browser.number("__strapd.sensors.imu.worst"));
+    }
+    assert!(worst[0] < 0.05, "{worst:?} deg");
+    assert_eq!(browser.eval("__strapd.sensors.imu.points"), 601);
     browser.is_unharmed();
 }

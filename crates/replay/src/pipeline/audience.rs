@@ -34,6 +34,16 @@ pub trait Audience: Debug + Send + Sync {
     /// Samples of a stream.
     fn samples(&self, stream: usize, samples: &[RawSample], is_shown: bool);
 
+    /// Whether orientations that were recorded are shown beside those that are estimated.
+    fn wants_recorded(&self) -> bool {
+        false
+    }
+
+    /// Recorded orientations of what stream number `of` estimates, as a stream of their own.
+    fn recorded(&self, of: usize, stream: &Stream, samples: &[AttitudeSample], is_shown: bool) {
+        let _ = (of, stream, samples, is_shown);
+    }
+
     /// Whether the run was told to end before its end.
     fn is_cut(&self) -> bool;
 }

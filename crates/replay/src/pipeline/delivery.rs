@@ -58,6 +58,8 @@ pub(super) struct Outlet {
     kept: Vec<AttitudeSample>,
     pace: Option<Pace>,
     audience: Option<Arc<dyn Audience>>,
+    /// Whether what was handed over last was shown.
+    is_shown: bool,
     closed: bool,
 }
 
@@ -120,6 +122,7 @@ impl Outlet {
             kept: Vec::new(),
             pace: Pace::new(speed),
             audience,
+            is_shown: true,
             closed: false,
         })
     }
@@ -189,6 +192,7 @@ impl Outlet {
                     }
                 }
             };
+            self.is_shown = turn.is_shown;
             let (now, later) = rest.split_at(turn.count.min(rest.len()));
             rest = later;
             if let Some(audience) = &self.audience {
@@ -219,6 +223,13 @@ impl Outlet {
     #[must_use]
     pub(super) fn is_paced(&self) -> bool {
         self.pace.is_some()
+    }
+
+    /// Shows recorded orientations of what a stream estimates, up to what was handed over.
+    pub(super) fn recorded(&self, of: usize, stream: &Stream, samples: &[AttitudeSample]) {
+        if let (Some(audience), false) = (&self.audience, samples.is_empty()) {
+            audience.recorded(of, stream, samples, self.is_shown);
+        }
     }
 
     /// How long the input is, about, for whoever is shown where the run is.

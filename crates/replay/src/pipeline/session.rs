@@ -4,6 +4,7 @@
 use super::delivery::Outlet;
 use super::history::History;
 use super::position::Position;
+use super::recorded::RecordedTrack;
 use super::sample_kinds::AgainstRecorded;
 use crate::error::{Error, Result};
 use crate::sink::{Flow, Target, Written};
@@ -47,6 +48,8 @@ pub(super) struct Topic {
     pub against: Option<AgainstRecorded>,
     /// What is kept to be drawn, for a report.
     pub history: Option<History>,
+    /// The recorded orientation, for who is shown it beside the estimate.
+    pub recorded: Option<RecordedTrack>,
 }
 
 /// Samples that are exactly zero about all axes between two that are not: what a driver without data says. A
@@ -135,6 +138,7 @@ impl Topic {
             first_undecodable: None,
             against,
             history: None,
+            recorded: None,
         })
     }
 
@@ -211,7 +215,8 @@ impl Session {
         pool: &Pool,
     ) -> Result<Flow> {
         // Handed on in time topics must take turns: a batch of one would go by before the other's.
-        let take_turns = self.topics.len() > 1 && self.outlet.is_paced();
+        let several = self.topics.len() > 1 || self.topics.iter().any(|t| t.recorded.is_some());
+        let take_turns = several && self.outlet.is_paced();
         for item in items {
             self.take(item, pool)?;
             if take_turns && self.advance(pool)? == Flow::Closed {
@@ -239,6 +244,9 @@ impl Session {
                 }
                 if let Some(against) = &mut topic.against {
                     against.take(&raw);
+                }
+                if let Some(recorded) = &mut topic.recorded {
+                    recorded.take(&raw);
                 }
             }
             Item::Undecodable(stream, why) => {
@@ -282,6 +290,9 @@ impl Session {
             if self.outlet.write(stream, attitudes, pool)? == Flow::Closed {
                 self.closed = true;
                 return Ok(Flow::Closed);
+            }
+            if let Some(recorded) = &mut topic.recorded {
+                recorded.show(stream, attitudes, &self.outlet);
             }
             if let Some(against) = &mut topic.against {
                 against.advance(pool);
@@ -337,6 +348,7 @@ impl Session {
                 output,
                 history,
                 against,
+                recorded,
                 ..
             } = topic;
             let mut flow = Flow::Continue;
@@ -350,6 +362,9 @@ impl Session {
                 }
                 if flow == Flow::Continue {
                     flow = self.outlet.write(stream, attitudes, pool)?;
+                }
+                if let Some(recorded) = recorded {
+                    recorded.show(stream, attitudes, &self.outlet);
                 }
                 Ok::<(), Error>(())
             })?;

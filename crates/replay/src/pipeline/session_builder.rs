@@ -4,6 +4,7 @@
 
 use super::delivery::{Delivery, Outlet};
 use super::provenance;
+use super::recorded::RecordedTrack;
 use super::request::ReplayRequest;
 use super::session::{Found, Session, Topic};
 use crate::error::Result;
@@ -42,11 +43,17 @@ pub(super) fn begin(
     streams: &[Stream],
 ) -> Result<Session> {
     let provenance = provenance::of(run, &founds, &prepared, streams)?;
+    let shows_recorded = run.audience.as_ref().is_some_and(|a| a.wants_recorded());
     let topics = founds
         .into_iter()
         .zip(prepared)
-        .map(|(found, prepared)| {
+        .zip(streams)
+        .map(|((found, prepared), stream)| {
+            let track = shows_recorded.then(|| {
+                RecordedTrack::new(stream, streams.len() == 1, &found.resolved, &prepared)
+            });
             let mut topic = Topic::new(path, &run.plan, found, prepared, run.against.is_some())?;
+            topic.recorded = track;
             if run.plan.smooth {
                 topic.spool_beside(&run.targets);
             }

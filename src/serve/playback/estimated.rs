@@ -1,0 +1,85 @@
+//! Samples of a simulation that a page is shown -> what the daemon would make of them. Pure but for handing them out.
+//!
+//! A page of a simulation without an estimate would show the truth beside nothing.
+
+use crate::serve::channel::{Channel, Items};
+use crate::serve::hub::Hub;
+use crate::serve::stream::{SensorStream, live_plan};
+use std::sync::Arc;
+use strapd_attitude::estimate::{Aid, Plan};
+use strapd_attitude::record::{RawSample, SampleKind};
+use strapd_recording::decode::Line;
+
+/// The estimate of one stream of samples.
+#[derive(Debug, Default)]
+pub(super) struct Estimated {
+    /// As clients know it, over all runs.
+    channel: Option<Arc<Channel>>,
+    run: Option<(Plan, SensorStream)>,
+    /// It can not be: said once, and not tried again.
+    failed: bool,
+}
+
+impl Estimated {
+    /// The run begins anew.
+    pub(super) fn begin(&mut self) {
+        self.run = None;
+        if let Some(channel) = &self.channel {
+            channel.begin_anew();
+        }
+    }
+
+    /// Takes samples of sensor `id`, and hands out what is made of them.
+    pub(super) fn take(
+        &mut self,
+        (hub, id): (&Hub, &Arc<str>),
+        kind: SampleKind,
+        samples: &[RawSample],
+        shown: bool,
+        text: &mut Vec<u8>,
+    ) {
+        if self.failed {
+            return;
+        }
+        if self.run.is_none() {
+            match self.made(hub, id, kind, samples) {
+                Ok(made) => self.run = Some(made),
+                Err(why) => {
+                    self.failed = true;
+                    tracing::warn!("{id}: the page shows no estimate: {why}");
+                }
+            }
+        }
+        let Some((plan, stream)) = &mut self.run else {
+            return;
+        };
+        stream.take(plan, None, samples);
+        let (first, attitudes, channel) = stream.attitudes();
+        if shown && !attitudes.is_empty() {
+            hub.distribute(channel, first, Items::Attitudes(attitudes), text);
+        }
+    }
+
+    fn made(
+        &mut self,
+        hub: &Hub,
+        id: &Arc<str>,
+        kind: SampleKind,
+        samples: &[RawSample],
+    ) -> Result<(Plan, SensorStream), String> {
+        let plan = live_plan(&Plan {
+            aid: Aid::Auto,
+            ..Plan::default()
+        })
+        .map_err(|why| why.to_string())?;
+        let stated = Line {
+            sample_kind: Some(kind),
+            ..Line::default()
+        };
+        let channel = &mut self.channel;
+        let stream = SensorStream::new(&plan, id.clone(), &stated, samples, None, |labels| {
+            channel.get_or_insert_with(|| hub.declare(labels)).clone()
+        });
+        Ok((plan, stream.map_err(|fault| fault.message)?))
+    }
+}
