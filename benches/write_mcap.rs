@@ -75,6 +75,7 @@ fn bench(c: &mut Criterion) {
                 force: true,
                 encoding,
                 compression,
+                ..Options::default()
             };
             let streams = [Stream::new("/imu/data_raw", "imu_link")];
             let mut bytes = 0;

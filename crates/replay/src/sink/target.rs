@@ -163,7 +163,7 @@ impl Target {
                 let name = path.display();
                 let csv = path.with_extension("csv");
                 return Err(Error::Usage(format!(
-                    "-o {name}: this strapd was built without the feature parquet\n  help: cargo install strapd --features parquet, or write -o {}, which polars, pandas and duckdb read",
+                    "-o {name}: this strapd was built without the feature parquet\n  help: build it with that feature, or write -o {}, which polars, pandas and duckdb read",
                     csv.display()
                 )));
             }
