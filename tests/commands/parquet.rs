@@ -20,7 +20,7 @@ fn a_build_without_the_feature_names_it_and_the_csv() {
         &[
             "-o out/run.parquet",
             "without the feature parquet",
-            "--features parquet",
+            "build it with that feature",
             "-o out/run.csv",
         ],
     );

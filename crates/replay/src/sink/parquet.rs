@@ -77,9 +77,13 @@ impl Table {
     /// It can not be packed.
     pub(super) fn push(&mut self, batch: &Batch) -> std::io::Result<Vec<u8>> {
         let mut out = Vec::new();
-        for sample in &batch.samples {
-            self.push_attitude(batch.stream, sample);
+        let mut rest = batch.samples.as_slice();
+        while !rest.is_empty() {
+            let room = GROUP_ROWS.saturating_sub(self.waiting);
+            let (now, later) = rest.split_at(room.min(rest.len()));
+            self.push_attitudes(batch.stream, now);
             self.pack_when_full(&mut out)?;
+            rest = later;
         }
         for sample in &batch.raw {
             self.push_sample(batch.stream, sample);
@@ -103,28 +107,21 @@ impl Table {
         Ok(out)
     }
 
-    fn push_attitude(&mut self, stream: usize, sample: &AttitudeSample) {
-        let sigma = sample.covariance.sigma();
-        let numbers = sample
-            .q_nb
-            .wxyz()
-            .into_iter()
-            .chain(sample.rate.0.iter().copied())
-            .chain(sigma.iter().copied());
-        let mut columns = self.columns.iter_mut();
-        let whole = |columns: &mut std::slice::IterMut<'_, Column>, value| {
-            if let Some(column) = columns.next() {
-                column.push_whole(Some(value));
+    /// Column by column: what a column holds is asked once for all rows.
+    fn push_attitudes(&mut self, stream: usize, samples: &[AttitudeSample]) {
+        let sigmas: Vec<_> = samples.iter().map(|s| s.covariance.sigma()).collect();
+        for (place, column) in self.columns.iter_mut().enumerate() {
+            match place {
+                0 => column.extend_whole(samples.iter().map(|s| s.stamp.0)),
+                1..=4 => column.extend(samples.iter().map(|s| s.q_nb.wxyz()[place - 1])),
+                5..=7 => column.extend(samples.iter().map(|s| s.rate.0[place - 5])),
+                8..=10 => column.extend(sigmas.iter().map(|sigma| sigma[place - 8])),
+                11 => column.extend_whole(samples.iter().map(|s| i64::from(s.status.0))),
+                12 => column.extend_whole(samples.iter().map(|s| i64::from(s.reset_count))),
+                _ => column.extend_whole(samples.iter().map(|_| stream as i64)),
             }
-        };
-        whole(&mut columns, sample.stamp.0);
-        for (value, column) in numbers.zip(columns.by_ref()) {
-            column.push(Some(value));
         }
-        whole(&mut columns, i64::from(sample.status.0));
-        whole(&mut columns, i64::from(sample.reset_count));
-        whole(&mut columns, stream as i64);
-        self.waiting += 1;
+        self.waiting += samples.len();
     }
 
     fn push_sample(&mut self, stream: usize, sample: &RawSample) {

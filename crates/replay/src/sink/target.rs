@@ -170,7 +170,7 @@ impl Target {
                         "-o {name}: this strapd was built without the feature parquet"
                     ))
                     .help(format!(
-                        "cargo install strapd --features parquet, or write -o {}, which polars, pandas and duckdb read",
+                        "build it with that feature, or write -o {}, which polars, pandas and duckdb read",
                         csv.display()
                     ))
                 ));

@@ -7,7 +7,7 @@ use parquet::basic::{Encoding, LogicalType, Repetition, TimeUnit, Type as Physic
 use parquet::column::writer::ColumnWriter;
 use parquet::data_type::ByteArray;
 use parquet::errors::{ParquetError, Result};
-use parquet::file::properties::WriterPropertiesBuilder;
+use parquet::file::properties::{EnabledStatistics, WriterPropertiesBuilder};
 use parquet::schema::types::{ColumnPath, Type, TypePtr};
 use std::sync::Arc;
 
@@ -56,6 +56,29 @@ impl Column {
         Column {
             present: Some(Vec::new()),
             ..Column::new(name, values)
+        }
+    }
+
+    /// Appends numbers to a column that has no empty cells.
+    pub(super) fn extend(&mut self, numbers: impl Iterator<Item = f64>) {
+        match &mut self.values {
+            Values::Double(values) => values.extend(numbers),
+            Values::Single(values) => values.extend(numbers.map(|value| value as f32)),
+            Values::Stamp(_) | Values::Long(_) | Values::Int(_) | Values::Name(_) => {}
+        }
+    }
+
+    /// Appends whole numbers to a column that has no empty cells, cut to what it holds.
+    pub(super) fn extend_whole(&mut self, numbers: impl Iterator<Item = i64>) {
+        match &mut self.values {
+            Values::Stamp(values) | Values::Long(values) => values.extend(numbers),
+            Values::Int(values) => {
+                values.extend(numbers.map(|value| i32::try_from(value).unwrap_or(i32::MAX)));
+            }
+            Values::Name(values) => {
+                values.extend(numbers.map(|value| u32::try_from(value).unwrap_or_default()));
+            }
+            Values::Double(_) | Values::Single(_) => {}
         }
     }
 
@@ -124,15 +147,22 @@ impl Column {
 
     /// How its pages are packed.
     pub(super) fn packed(&self, properties: WriterPropertiesBuilder) -> WriterPropertiesBuilder {
-        let encoding = match &self.values {
-            Values::Stamp(_) | Values::Long(_) | Values::Int(_) => Encoding::DELTA_BINARY_PACKED,
-            Values::Double(_) | Values::Single(_) => Encoding::BYTE_STREAM_SPLIT,
+        let path = ColumnPath::from(self.name);
+        let without_statistics = |properties: WriterPropertiesBuilder| {
+            properties.set_column_statistics_enabled(path.clone(), EnabledStatistics::None)
+        };
+        match &self.values {
+            Values::Stamp(_) | Values::Long(_) | Values::Int(_) => {
+                properties.set_column_encoding(path, Encoding::DELTA_BINARY_PACKED)
+            }
+            // Their least and greatest would be in an order that the readers of today pass over.
+            Values::Double(_) | Values::Single(_) => without_statistics(properties)
+                .set_column_encoding(path.clone(), Encoding::BYTE_STREAM_SPLIT),
             // By number of the name.
             Values::Name(_) => {
-                return properties.set_column_dictionary_enabled(ColumnPath::from(self.name), true);
+                without_statistics(properties).set_column_dictionary_enabled(path.clone(), true)
             }
-        };
-        properties.set_column_encoding(ColumnPath::from(self.name), encoding)
+        }
     }
 
     /// Writes what is waiting, and empties it.
