@@ -9,7 +9,7 @@ const REACH = 45;
 
 export function drawHorizon(surface, colours, q, world, heading) {
   const context = surface.begin();
-  const radius = Math.min(surface.width, surface.height) / 2 - 2;
+  const radius = Math.max(0, Math.min(surface.width, surface.height) / 2 - 2);
   const [cx, cy] = [surface.width / 2, surface.height / 2];
   const down = world === "ned" ? -1 : 1;
   const inBody = rotate(conjugate(q), [0, 0, down]);
