@@ -83,7 +83,14 @@ fn the_folder_of_a_recording_is_the_recording_and_its_metadata_name_the_way_in()
     assert!(info.done().out.contains("80 messages"), "{info:?}");
     strapd(dir.path(), "info bag/metadata.yaml").refused(1, &["rosbag2", "folder", ".db3"]);
     std::fs::copy(fixture("constant_rate.db3"), folder.join("b.db3")).unwrap();
-    strapd(dir.path(), "info bag").refused(1, &["parts of one recording have the same", "b.db3", "not joined"]);
+    strapd(dir.path(), "info bag").refused(
+        1,
+        &[
+            "parts of one recording have the same",
+            "b.db3",
+            "without --join",
+        ],
+    );
 }
 
 #[test]
