@@ -181,8 +181,9 @@ impl Hub {
             .plans
             .iter()
             .map(|(id, plan)| {
-                let live = live_plan(plan)
-                    .map_err(|what| Error::usage(format!("sensor {}: {what}", printable(id))))?;
+                let live = live_plan(plan).map_err(|what| {
+                    Error::usage(what.at(format_args!("sensor {}", printable(id))))
+                })?;
                 let name =
                     exact_name(id).map_err(|why| Error::usage(format!("[sensor.ID]: {why}")))?;
                 Ok((name, live))

@@ -25,8 +25,11 @@ impl Diagnostic {
     /// Without help, until [`Diagnostic::help`] gives some.
     #[must_use]
     pub fn new(what: impl Into<String>) -> Diagnostic {
+        let what = what.into();
+        // Another one's whole text: its help would be lost in it. `at` and `after` keep it.
+        debug_assert!(!what.contains("\n  help: "), "{what}");
         Diagnostic {
-            what: what.into(),
+            what,
             help: String::new(),
         }
     }
@@ -52,8 +55,14 @@ impl Diagnostic {
 
     /// The same, with the place before it: `place: what`.
     #[must_use]
-    pub fn at(mut self, place: impl fmt::Display) -> Diagnostic {
-        self.what = format!("{place}: {}", self.what);
+    pub fn at(self, place: impl fmt::Display) -> Diagnostic {
+        self.after(format_args!("{place}:"))
+    }
+
+    /// The same, with words before it.
+    #[must_use]
+    pub fn after(mut self, words: impl fmt::Display) -> Diagnostic {
+        self.what = format!("{words} {}", self.what);
         self
     }
 

@@ -125,7 +125,7 @@ impl From<&SamplingError> for Diagnostic {
             .help(format!(
                 "{RATE_HZ} above {needed_hz:.1}, several times that for a good attitude"
             )),
-            SamplingError::Errors(fault) => Diagnostic::new(fault.to_string()),
+            SamplingError::Errors(fault) => fault.into(),
             SamplingError::StampOverflow { start } => Diagnostic::new(format!(
                 "the stamps, from {} ns on, run over the end of 64-bit nanoseconds",
                 start.0

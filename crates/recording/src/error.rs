@@ -3,7 +3,7 @@
 
 use crate::recognise::Foreign;
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::setting::{FIELD, TOPIC};
 
@@ -116,6 +116,16 @@ pub enum Error {
         /// Why not.
         source: rayon::ThreadPoolBuildError,
     },
+}
+
+impl Error {
+    /// What can not be read of this file.
+    pub(crate) fn unsupported(path: &Path, what: impl Into<Diagnostic>) -> Error {
+        Error::Unsupported {
+            path: path.to_owned(),
+            what: what.into(),
+        }
+    }
 }
 
 impl From<&Error> for Diagnostic {

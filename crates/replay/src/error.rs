@@ -65,7 +65,7 @@ impl From<&Error> for Diagnostic {
         match error {
             Error::Recording(error) => error.into(),
             Error::Write { path, source } => {
-                Diagnostic::new(format!("{}: cannot write: {source}", path.display()))
+                caused(format_args!("{}: cannot write", path.display()), source)
             }
             Error::Spool(error) => Diagnostic::new(error.to_string()).help(
                 "make room in the folder of the output, or in that of temporary files (TMPDIR)",
@@ -81,7 +81,7 @@ impl From<&Error> for Diagnostic {
             .help("give another name to -o"),
             Error::BrokenPipe => Diagnostic::new("the reader of standard output has gone"),
             Error::Bind { address, source } => {
-                let what = Diagnostic::new(format!("cannot listen on {address}: {source}"));
+                let what = caused(format_args!("cannot listen on {address}"), source);
                 match source.kind() {
                     io::ErrorKind::AddrInUse => what.help(format!(
                         "is another strapd running there? {LISTEN} takes another address; port 0 takes a free port and shows it"
@@ -101,6 +101,14 @@ impl From<&Error> for Diagnostic {
             Error::Usage(what) => what.clone(),
         }
     }
+}
+
+/// What failed and why; where the cause is one of ours, with its help.
+fn caused(what: fmt::Arguments<'_>, source: &io::Error) -> Diagnostic {
+    let own = source.get_ref().and_then(|why| why.downcast_ref());
+    let why = own.cloned();
+    why.unwrap_or_else(|| Diagnostic::new(source.to_string()))
+        .at(what)
 }
 
 /// With its help on a line of its own.

@@ -266,7 +266,7 @@ impl Plan {
         let Some(known) = &self.calibration else {
             return Ok(());
         };
-        known.check().map_err(|e| format!("{CALIBRATION}: {e}"))?;
+        known.check().map_err(|e| e.at(CALIBRATION))?;
         if known.bias.is_some() && matches!(self.bias, Bias::Given(_)) {
             return Err(
                 Diagnostic::new(format!(
@@ -285,7 +285,7 @@ impl Plan {
         if !self.smooth {
             return Ok(());
         }
-        let what = match self {
+        let refused = match self {
             Plan { aid: Aid::None, .. } => {
                 Diagnostic::new(format!("{AID} none: a smoother needs the accelerometer")).help(
                     format!("{AID} gravity or gravity+mag; without {SMOOTH} the gyro alone"),
@@ -308,7 +308,7 @@ impl Plan {
             .help("leave it out"),
             _ => return Ok(()),
         };
-        Err(format!("{SMOOTH} with {what}").into())
+        Err(refused.after(format_args!("{SMOOTH} with")))
     }
 
     /// `--earth-rate` needs a latitude that is one, and a world in which the Earth's axis has a place.

@@ -180,6 +180,12 @@ const SHORTEST: f64 = 1e-9;
 #[derive(Clone, PartialEq, Debug)]
 pub struct ImuErrorFault(pub(super) Diagnostic);
 
+impl From<&ImuErrorFault> for Diagnostic {
+    fn from(fault: &ImuErrorFault) -> Diagnostic {
+        fault.0.clone()
+    }
+}
+
 impl fmt::Display for ImuErrorFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.0.fmt(f)

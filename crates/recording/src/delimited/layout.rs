@@ -328,15 +328,13 @@ impl Opening {
             .filter(|names| texts(names) > 0)
             .max_by_key(|names| texts(names));
         let Some(names) = best else {
-            return
-                Diagnostic::new(format!(
-                    "none of its first lines has three cells that could name columns; it begins with `{}`",
-                    crate::text::snippet(start)
-                ))
-                .help(format!(
-                    "a first row with names such as time_s, gyro_x, gyro_y, gyro_z; or {COLUMNS} gyro=2:3:4,stamp=1:s by numbers, and {DELIMITER}"
-                ))
-            ;
+            return Diagnostic::new(format!(
+                "none of its first lines has three cells that could name columns; it begins with `{}`",
+                crate::text::snippet(start)
+            ))
+            .help(format!(
+                "a first row with names such as time_s, gyro_x, gyro_y, gyro_z; or {COLUMNS} gyro=2:3:4,stamp=1:s by numbers, and {DELIMITER}"
+            ));
         };
         let all: Vec<&str> = names.iter().map(|name| name.text.as_str()).collect();
         let said = all
@@ -345,14 +343,11 @@ impl Opening {
             .join("`, `");
         if let Some(given) = self.given.as_ref().map(Columns::all) {
             let wrong = given.iter().flat_map(|given| &given.columns);
-            let wrong: Vec<Diagnostic> = wrong
+            let wrong: Vec<String> = wrong
                 .filter_map(|column| roles::place(&names, column).err())
                 .collect();
             if let Some(first) = wrong.first() {
-                return Diagnostic::new(format!(
-                    "{COLUMNS}: {}; its columns are `{said}`",
-                    first.what()
-                ));
+                return format!("{COLUMNS}: {first}; its columns are `{said}`").into();
             }
         }
         let axes = ["x", "y", "z"];
@@ -360,14 +355,12 @@ impl Opening {
             .iter()
             .all(|axis| all.iter().any(|name| name.eq_ignore_ascii_case(axis)))
         {
-            return
-                Diagnostic::new(
-                    "its columns x, y, z do not say of which sensor they are (they are rates where the file is called Gyroscope...)",
-                )
-                .help(format!(
-                    "{COLUMNS} gyro=x:y:z if they are rates"
-                ))
-            ;
+            return Diagnostic::new(
+                "its columns x, y, z do not say of which sensor they are (they are rates where the file is called Gyroscope...)",
+            )
+            .help(format!(
+                "{COLUMNS} gyro=x:y:z if they are rates"
+            ));
         }
         let aside = names.iter().find_map(|name| match name.meant {
             Meant::Aside {

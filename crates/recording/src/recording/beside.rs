@@ -175,10 +175,7 @@ fn named<'l>(
             topics: topics::listing(&log.candidates()),
         });
     };
-    let refuse = |what: Diagnostic| Error::Unsupported {
-        path: path.to_owned(),
-        what,
-    };
+    let refuse = |what: Diagnostic| Error::unsupported(path, what);
     let mut decoders = Decoders::of_run(plan, &options(wanted, Some(beside)));
     let decoder = known
         .decoder(&mut decoders)
@@ -236,10 +233,7 @@ fn unnamed<'l>(
     };
     match found.pop() {
         Some(one) if found.is_empty() => Ok(one),
-        _ => Err(Error::Unsupported {
-            path: path.to_owned(),
-            what,
-        }),
+        _ => Err(Error::unsupported(path, what)),
     }
 }
 

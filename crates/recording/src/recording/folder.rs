@@ -44,10 +44,7 @@ struct Tables {
 /// # Errors
 /// It can not be read; there is no recording in it, or more than one.
 pub(super) fn of(path: &Path, warn: &Warn) -> Result<Folder> {
-    let unsupported = |what: Diagnostic| Error::Unsupported {
-        path: path.to_owned(),
-        what,
-    };
+    let unsupported = |what: Diagnostic| Error::unsupported(path, what);
     let files = files(path)?;
     if files.len() > MOST {
         return Err(unsupported(

@@ -55,7 +55,7 @@ pub(super) struct Whole {
 /// It has none.
 pub(super) fn times(name: &Path, survey: &Survey) -> Result<(u64, u64)> {
     survey.times.ok_or_else(|| {
-        refused(
+        Error::unsupported(
             name,
             Diagnostic::new(
                 "nothing in it has a time, so that its place among the parts is not known",
@@ -88,7 +88,7 @@ fn said_of_border(
     // Of a short file most of it.
     let shortest = (before.1 - before.0).min(after.1 - after.0);
     if secs > OVERLAP_SECS || 2 * common > shortest {
-        return Err(refused(
+        return Err(Error::unsupported(
             b,
             Diagnostic::new(format!(
                 "{secs:.3} s of it are in {} too: recordings of the same time do not continue each other",
@@ -184,7 +184,7 @@ impl Whole {
 
     /// Whether the topics of a part are those of the others, as far as there are rates on them.
     fn is_of_the_same_sensors(&self, name: &Path, channels: &[LogChannel]) -> Result<()> {
-        let refuse = |what: Diagnostic| Err(refused(name, what));
+        let refuse = |what: Diagnostic| Err(Error::unsupported(name, what));
         let before = self.first.display().to_string();
         for known in channels {
             let topic = &known.channel.topic;
@@ -276,11 +276,4 @@ fn is_continued(of: &LogChannel, known: &LogChannel) -> bool {
         && is_same_type
         && a_stated == b_stated
         && publisher(a) == publisher(b)
-}
-
-fn refused(path: &Path, what: impl Into<Diagnostic>) -> Error {
-    Error::Unsupported {
-        path: path.to_owned(),
-        what: what.into(),
-    }
 }

@@ -6,7 +6,7 @@
 use crate::error::{Error, Result};
 use crate::text::printable;
 use std::fs::Metadata;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::setting::JOIN;
 
@@ -20,7 +20,7 @@ const MOST: usize = 1000;
 pub(super) fn checked(paths: &[PathBuf]) -> Result<()> {
     if paths.len() > MOST {
         let first = paths.first().cloned().unwrap_or_default();
-        return Err(refused(
+        return Err(Error::unsupported(
             &first,
             Diagnostic::new(format!(
                 "{} files are to be joined, of at most {MOST}",
@@ -35,14 +35,14 @@ pub(super) fn checked(paths: &[PathBuf]) -> Result<()> {
         let is_folder = found.as_ref().is_ok_and(Metadata::is_dir);
         let is_stream = found.is_ok_and(|found| !found.is_file()) && !is_folder;
         if path.as_os_str() == "-" || is_stream {
-            return Err(refused(
+            return Err(Error::unsupported(
                 path,
                 Diagnostic::new("comes only once, and parts are read twice")
                     .help(format!("save it to a file; {JOIN} takes files")),
             ));
         }
         if is_folder {
-            return Err(refused(
+            return Err(Error::unsupported(
                 path,
                 Diagnostic::new("a folder").help(format!(
                     "{JOIN} takes the files in it; that of a rosbag2 recording needs no {JOIN}"
@@ -54,7 +54,7 @@ pub(super) fn checked(paths: &[PathBuf]) -> Result<()> {
             source,
         })?;
         if let Some((_, other)) = known.iter().find(|(known, _)| *known == place) {
-            return Err(refused(
+            return Err(Error::unsupported(
                 path,
                 Diagnostic::new(format!(
                     "given twice (as {} too)",
@@ -74,12 +74,5 @@ pub(super) fn title(paths: &[PathBuf]) -> PathBuf {
         [] => PathBuf::new(),
         [one] => one.clone(),
         [first, rest @ ..] => PathBuf::from(format!("{} and {} more", first.display(), rest.len())),
-    }
-}
-
-fn refused(path: &Path, what: impl Into<Diagnostic>) -> Error {
-    Error::Unsupported {
-        path: path.to_owned(),
-        what: what.into(),
     }
 }

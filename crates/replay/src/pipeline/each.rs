@@ -57,10 +57,10 @@ pub(super) fn each(
         _ if elsewhere => None,
         Ok(reference) => reference,
         Err(refused) => {
-            let refused = refused.to_string();
+            let refused = Diagnostic::from(&refused);
             let all = told
                 .into_iter()
-                .map(|told| told.unwrap_or_else(|| Err(refused.clone().into())));
+                .map(|told| told.unwrap_or_else(|| Err(refused.clone())));
             return Ok(all.collect());
         }
     };

@@ -43,7 +43,7 @@ struct Chosen {
 type Filled<'c> = (&'c Option<Chosen>, Kind, fn(usize) -> Column);
 
 /// Where a column is that the user names, or gives by its number from 1.
-pub(super) fn place(names: &[Name], column: &str) -> Result<usize, Diagnostic> {
+pub(super) fn place(names: &[Name], column: &str) -> Result<usize, String> {
     let all = |is: &dyn Fn(&str) -> bool| -> Vec<usize> {
         let each = names.iter().enumerate();
         each.filter(|(_, name)| is(&name.text))
@@ -57,18 +57,17 @@ pub(super) fn place(names: &[Name], column: &str) -> Result<usize, Diagnostic> {
     match (found.as_slice(), number(column)) {
         ([one], _) => Ok(*one),
         ([], Some(n)) if n <= names.len() => Ok(n - 1),
-        ([], Some(n)) => Err(format!("there is no column {n} of {}", names.len()).into()),
+        ([], Some(n)) => Err(format!("there is no column {n} of {}", names.len())),
         ([], None) => {
             let column = crate::text::printable(column);
-            Err(format!("there is no column `{column}`").into())
+            Err(format!("there is no column `{column}`"))
         }
         ([first, second, ..], _) => Err(format!(
             "`{}` is there more than once, as columns {} and {}: give its number",
             crate::text::printable(column),
             first + 1,
             second + 1
-        )
-        .into()),
+        )),
     }
 }
 
@@ -225,7 +224,7 @@ impl Roles<'_> {
                 return Ok(None);
             }
             let places = given.columns.iter().map(|column| place(self.names, column));
-            let places: Result<Vec<usize>, Diagnostic> = places.collect();
+            let places: Result<Vec<usize>, String> = places.collect();
             let columns = places.map_err(|why| format!("{COLUMNS} {}: {why}", kind.name()))?;
             let unit = match given.unit {
                 Some(unit) => Some(unit),
