@@ -4,6 +4,7 @@ use crate::refusal::argument;
 use pyo3::BoundObject;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{Known, SensorCalibration};
 
 /// The keys of a calibration that hold text.
@@ -36,9 +37,7 @@ pub fn read(value: &Bound<'_, PyAny>) -> PyResult<SensorCalibration> {
             "mag_lead" => known.field_lead = Some(part(&key, &value)?),
             "truncation_step" => known.truncation_step = Some(part(&key, &value)?),
             _ => {
-                return Err(argument(format!(
-                    "calibration: there is no '{key}'\n  help: bias, G, ba, A, lead, h, S, mag_lead, truncation_step, sensor, date, sources"
-                )));
+                return Err(argument(Diagnostic::new(format!("calibration: there is no '{key}'")).help("bias, G, ba, A, lead, h, S, mag_lead, truncation_step, sensor, date, sources")));
             }
         }
     }

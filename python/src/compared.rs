@@ -8,6 +8,7 @@ use pyo3::types::PyDict;
 use strapd_attitude::compare::{
     self as comparing, Align, Consistency, ErrorStats, Known, Stamped, WithinSigma, consistency,
 };
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::frames::{Body, Nav};
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{AttitudeCovariance, Nanos};
@@ -43,7 +44,8 @@ pub fn compare<'py>(
         return Err(refusal::run(
             py,
             "no_match",
-            "no instant in common with the reference\n  help: are both on the same clock?",
+            Diagnostic::new("no instant in common with the reference")
+                .help("are both on the same clock?"),
         ));
     }
     let dict = PyDict::new(py);

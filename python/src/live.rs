@@ -53,7 +53,7 @@ impl Live {
             return Err(refusal::run(
                 py,
                 "closed",
-                "the estimator is finished\n  help: a new one begins anew",
+                Diagnostic::new("the estimator is finished").help("a new one begins anew"),
             ));
         }
         Ok(())

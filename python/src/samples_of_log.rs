@@ -13,6 +13,7 @@ use pyo3::types::PyDict;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::record::SampleKind;
 use strapd_recording::Recording;
 use strapd_recording::recording::decoders::Decoders;
@@ -57,9 +58,10 @@ fn taken(path: &Path, words: &Words, stopped: &Stopped) -> Result<Found> {
         "log" => Time::Log,
         "publish" => Time::Publish,
         other => {
-            return Err(Error::usage(format!(
-                "time: there is no {other:?}\n  help: one of header, log, publish"
-            )));
+            return Err(Error::usage(
+                Diagnostic::new(format!("time: there is no {other:?}"))
+                    .help("one of header, log, publish"),
+            ));
         }
     };
     let selection = words.selection()?;

@@ -10,6 +10,7 @@ use pyo3::types::{PyDict, PyString};
 use std::str::FromStr;
 use std::sync::Arc;
 use strapd_attitude::condition::{GyroUnit, OnGap};
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{
     Aid, Bias, Initial, NOISE_FIGURES, NOISE_PRESETS, Noise, Plan, Truncation,
 };
@@ -101,10 +102,10 @@ impl<'a, 'py> Given<'a, 'py> {
         let found = all.iter().find(|(known, _)| *known == text);
         found.map(|(_, value)| Some(*value)).ok_or_else(|| {
             let known: Vec<String> = all.iter().map(|(known, _)| format!("'{known}'")).collect();
-            argument(format!(
-                "{name}: there is no {text:?}\n  help: one of {}",
-                known.join(", ")
-            ))
+            argument(
+                Diagnostic::new(format!("{name}: there is no {text:?}"))
+                    .help(format!("one of {}", known.join(", "))),
+            )
         })
     }
 
@@ -375,10 +376,10 @@ fn noise(given: &Given<'_, '_>) -> PyResult<Noise> {
         let name = text.to_str()?;
         let found = NOISE_PRESETS.iter().find(|class| class.name == name);
         return found.map(Noise::preset).ok_or_else(|| {
-            argument(format!(
-                "noise: there is no class {name:?}\n  help: one of {}, or a dict of figures",
-                classes()
-            ))
+            argument(
+                Diagnostic::new(format!("noise: there is no class {name:?}"))
+                    .help(format!("one of {}, or a dict of figures", classes())),
+            )
         });
     }
     let dict = value.cast::<PyDict>().map_err(|_| {
@@ -407,7 +408,7 @@ fn noise(given: &Given<'_, '_>) -> PyResult<Noise> {
     let figures = given.iter().map(|(key, axes)| (key.as_str(), *axes));
     Noise::of_figures("given", figures).map_err(|why| {
         let known = NOISE_FIGURES.map(|f| format!("{} ({})", f.key.replace('-', "_"), f.unit));
-        argument(format!("noise: {why}\n  help: {}", known.join(", ")))
+        argument(Diagnostic::new(format!("noise: {why}")).help(format!("{}", known.join(", "))))
     })
 }
 

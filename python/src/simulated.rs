@@ -12,6 +12,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::noise::sensor_error::{ImuError, StampError};
 use strapd_attitude::record::{Nanos, SampleKind};
 use strapd_bodies::field::Field;
@@ -70,7 +71,7 @@ impl Made {
     }
 }
 
-fn made(name: &str, about: &mut About, seed: u64) -> Result<Made, String> {
+fn made(name: &str, about: &mut About, seed: u64) -> Result<Made, Diagnostic> {
     let carried = |carrier: Carrier| Made {
         motion: Motion::Carried(Box::new(carrier.motion(seed, GRAVITY))),
         force: ForceSampling::AsGyro,
@@ -105,7 +106,8 @@ fn made(name: &str, about: &mut About, seed: u64) -> Result<Made, String> {
             let angle = about.number("half_angle_deg", 10.0_f64)?;
             let frequency = about.number("frequency_hz", 3.0)?;
             let coning = Coning::new(angle.to_radians(), frequency).map_err(|why| {
-                format!("half_angle_deg, frequency_hz: {why}\n  help: up to 180, up to 15000")
+                Diagnostic::new(format!("half_angle_deg, frequency_hz: {why}"))
+                    .help("up to 180, up to 15000")
             })?;
             Made::still(Motion::Coning(coning))
         }
@@ -118,10 +120,12 @@ fn made(name: &str, about: &mut About, seed: u64) -> Result<Made, String> {
                 return Err(format!(
                     "rms, f_max, sines: 0 or more rad/s, 0 or more Hz, 1 to {} are needed",
                     BandLimited::MOST_SINES
-                ));
+                )
+                .into());
             }
-            let motion = BandLimited::random(seed, rms, highest, sines)
-                .map_err(|why| format!("rms, f_max, sines: {why}\n  help: f_max up to 15000"))?;
+            let motion = BandLimited::random(seed, rms, highest, sines).map_err(|why| {
+                Diagnostic::new(format!("rms, f_max, sines: {why}")).help("f_max up to 15000")
+            })?;
             Made::still(Motion::BandLimited(Box::new(motion)))
         }
         "walking" | "running" => {
@@ -130,9 +134,8 @@ fn made(name: &str, about: &mut About, seed: u64) -> Result<Made, String> {
                 Some("hand") => Worn::Hand,
                 Some("foot") => Worn::Foot,
                 Some(other) => {
-                    return Err(format!(
-                        "worn: there is no {other:?}\n  help: one of waist, hand, foot"
-                    ));
+                    return Err(Diagnostic::new(format!("worn: there is no {other:?}"))
+                        .help("one of waist, hand, foot"));
                 }
             };
             carried(match name {
@@ -148,9 +151,7 @@ fn made(name: &str, about: &mut About, seed: u64) -> Result<Made, String> {
         "hand" => carried(Carrier::Hand),
         "boat" => carried(Carrier::Boat),
         _ => {
-            return Err(format!(
-                "motion: there is no {name:?}\n  help: one of top, coning, random, walking, running, circling, arm, car, vibration, drone, hand, boat"
-            ));
+            return Err(Diagnostic::new(format!("motion: there is no {name:?}")).help("one of top, coning, random, walking, running, circling, arm, car, vibration, drone, hand, boat"));
         }
     })
 }
@@ -171,7 +172,7 @@ pub fn simulate<'py>(
     mag_hz: Option<f64>,
     start: i64,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let refused = |what: String| refusal::argument_of_log(&what.into());
+    let refused = |what: Diagnostic| refusal::argument_of_log(&what);
     let kinds = [
         SampleKind::Rate,
         SampleKind::Average,
@@ -181,20 +182,30 @@ pub fn simulate<'py>(
         .into_iter()
         .find(|k| k.name() == kind)
         .ok_or_else(|| {
-            refused(format!(
-                "kind: there is no {kind:?}\n  help: one of rate, average, delta-angle"
-            ))
+            refused(
+                Diagnostic::new(format!("kind: there is no {kind:?}"))
+                    .help("one of rate, average, delta-angle"),
+            )
         })?;
-    let error = ImuError::parse(noise).map_err(|why| refused(format!("noise: {noise}: {why}")))?;
+    let error = ImuError::parse(noise)
+        .map_err(|why| refused(Diagnostic::from(&why).at(format_args!("noise: {noise}"))))?;
     let instants = rate_hz * duration;
     if instants > MOST as f64 {
-        return Err(refused(format!(
-            "rate_hz, duration: {instants:.0} samples are more than {MOST}\n  help: a shorter one, or `strapd simulate` into a file"
-        )));
+        return Err(refused(
+            Diagnostic::new(format!(
+                "rate_hz, duration: {instants:.0} samples are more than {MOST}"
+            ))
+            .help("a shorter one, or `strapd simulate` into a file"),
+        ));
     }
     let mut about = About(about);
     let made = made(&motion, &mut about, seed)
-        .and_then(|made| about.nothing_left(&motion).map(|()| made))
+        .and_then(|made| {
+            about
+                .nothing_left(&motion)
+                .map(|()| made)
+                .map_err(Into::into)
+        })
         .map_err(refused)?;
     let sampling = Sampling {
         rate_hz,
@@ -213,9 +224,9 @@ pub fn simulate<'py>(
         seed,
     };
     let source = Synthetic::new(made.motion, sampling)
-        .map_err(|why| refused(format!("motion: {motion}: {why}")))?;
+        .map_err(|why| refused(Diagnostic::from(&why).at(format_args!("motion: {motion}"))))?;
     let taken = errand::run(py, move |stopped| sampled(source, stopped))?;
-    let taken = taken.map_err(|why| refused(format!("motion: {motion}: {why}")))?;
+    let taken = taken.map_err(|why| refused(format!("motion: {motion}: {why}").into()))?;
     let dict = taken.columns.into_dict(py)?;
     dict.set_item("kind", kind.name())?;
     dict.set_item("truth_t", taken.t.into_pyarray(py))?;

@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::sync::Arc;
 use strapd_attitude::condition::{Clock, GyroUnit, OnGap};
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{Aid, Plan, SensorCalibration};
 use strapd_attitude::propagate::Method;
 use strapd_attitude::quaternion::Quaternion;
@@ -28,8 +29,8 @@ const LARGEST_CALIBRATION: u64 = 1 << 16;
 /// Values by name; the names are the command's, `-` as `_`. Only `field` may have several.
 pub struct Words(BTreeMap<String, Vec<String>>);
 
-fn usage(what: impl Into<String>) -> Error {
-    Error::usage(what.into())
+fn usage(what: impl Into<Diagnostic>) -> Error {
+    Error::usage(what)
 }
 
 impl Words {
@@ -74,10 +75,10 @@ impl Words {
         let found = all.iter().find(|(known, _)| *known == text);
         found.map(|(_, value)| Some(*value)).ok_or_else(|| {
             let known: Vec<&str> = all.iter().map(|(known, _)| *known).collect();
-            usage(format!(
-                "{name}: there is no {text:?}\n  help: one of {}",
-                known.join(", ")
-            ))
+            usage(
+                Diagnostic::new(format!("{name}: there is no {text:?}"))
+                    .help(format!("one of {}", known.join(", "))),
+            )
         })
     }
 
@@ -149,9 +150,10 @@ impl Words {
             ("mag_topic", aid == Aid::GravityAndField, "gravity+mag"),
         ] {
             if self.text(name).is_some() && !is_used {
-                return Err(usage(format!(
-                    "{name}: nothing is taken from it with this aid\n  help: aid={help}"
-                )));
+                return Err(usage(
+                    Diagnostic::new(format!("{name}: nothing is taken from it with this aid"))
+                        .help(format!("aid={help}")),
+                ));
             }
         }
         let plan = Plan {
@@ -209,21 +211,22 @@ impl Words {
             ("index", Some(rate_hz)) => Clock::Index { rate_hz },
             ("index", None) => {
                 return Err(usage(
-                    "time: \"index\" needs the sample rate too\n  help: rate_hz",
+                    Diagnostic::new("time: \"index\" needs the sample rate too").help("rate_hz"),
                 ));
             }
             (_, Some(_)) => {
                 return Err(usage(
-                    "rate_hz: only time=\"index\" uses it\n  help: time=\"index\"",
+                    Diagnostic::new("rate_hz: only time=\"index\" uses it").help("time=\"index\""),
                 ));
             }
             ("header", None) => Clock::Header,
             ("log", None) => Clock::Log,
             ("publish", None) => Clock::Publish,
             (other, None) => {
-                return Err(usage(format!(
-                    "time: there is no {other:?}\n  help: one of header, log, publish, index"
-                )));
+                return Err(usage(
+                    Diagnostic::new(format!("time: there is no {other:?}"))
+                        .help("one of header, log, publish, index"),
+                ));
             }
         })
     }

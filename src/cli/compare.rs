@@ -70,10 +70,9 @@ pub struct Compare {
 /// # Errors
 /// A file can not be read, holds no attitude or several, or the two share no instant.
 pub fn run(global: &Global, args: &Compare) -> Result<Outcome> {
-    let align: Align = args
-        .align
-        .parse()
-        .map_err(|e| Error::usage(format!("--align {}: {e}", args.align)))?;
+    let align: Align = args.align.parse().map_err(|e| {
+        Error::usage(Diagnostic::from(&e).at(format_args!("--align {}", args.align)))
+    })?;
     if args
         .max_angle
         .is_some_and(|limit| limit.is_nan() || limit < 0.0)

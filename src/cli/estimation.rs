@@ -331,7 +331,7 @@ impl Estimation {
                 ));
             }
         }
-        let usage = |flag: &str, e: &dyn std::fmt::Display| Error::usage(format!("{flag}: {e}"));
+        let usage = |flag: &str, e: Diagnostic| Error::usage(e.at(flag));
         let clock = match (self.time, self.rate_hz) {
             (TimeArg::Header, _) => Clock::Header,
             (TimeArg::Log, _) => Clock::Log,
@@ -357,9 +357,12 @@ impl Estimation {
             body: self
                 .body
                 .as_deref()
-                .map(|b| b.parse().map_err(|e| usage("--body", &e)))
+                .map(|b| b.parse().map_err(|e| usage("--body", Diagnostic::from(&e))))
                 .transpose()?,
-            world: self.world.parse().map_err(|e| usage("--world", &e))?,
+            world: self
+                .world
+                .parse()
+                .map_err(|e| usage("--world", Diagnostic::from(&e)))?,
             mount: self
                 .mount
                 .as_deref()
@@ -475,12 +478,15 @@ impl Estimation {
             },
             name => name
                 .parse()
-                .map_err(|e| Error::usage(format!("--method: {e}")))?,
+                .map_err(|e| Error::usage(Diagnostic::from(&e).at("--method")))?,
         };
         let asked_order: Option<Order> = self
             .order
             .as_deref()
-            .map(|o| o.parse().map_err(|e| Error::usage(format!("--order: {e}"))))
+            .map(|o| {
+                o.parse()
+                    .map_err(|e| Error::usage(Diagnostic::from(&e).at("--order")))
+            })
             .transpose()?;
         Ok(match named {
             Method::Magnus {

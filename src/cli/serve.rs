@@ -287,7 +287,9 @@ impl Serve {
     /// # Errors
     /// [`Error::Usage`] naming the flag.
     fn recording(&self) -> Result<Option<recorder::Settings>> {
-        let named = |flag: &str, error: Error| Error::usage(format!("--{flag}: {error}"));
+        let named = |flag: &str, error: Error| {
+            Error::usage(Diagnostic::from(&error).at(format_args!("--{flag}")))
+        };
         // `0` alone is no size with a unit, and the only one that needs none.
         let min_free = match self.min_free.as_str() {
             "0" => 0,

@@ -204,8 +204,9 @@ impl Common {
     pub(super) fn simulation(&self, name: &str, made: Made) -> Result<(Simulation, Served)> {
         let kind = SampleKind::from(self.sample_kind);
         let start = stamp("--start-stamp", &self.start_stamp)?;
-        let error = ImuError::parse(&self.noise)
-            .map_err(|e| Error::usage(format!("--noise {}: {e}", self.noise)))?;
+        let error = ImuError::parse(&self.noise).map_err(|e| {
+            Error::usage(Diagnostic::from(&e).at(format_args!("--noise {}", self.noise)))
+        })?;
         let stamps = self.stamps()?;
         let gravity = made.gravity.unwrap_or(GRAVITY);
         let lever = numbers::<3>("--lever-arm", &self.lever_arm)?;
@@ -224,7 +225,7 @@ impl Common {
             seed: self.seed,
         };
         let source = Synthetic::new(made.motion, sampling)
-            .map_err(|e| Error::usage(format!("simulate {name}: {e}")))?;
+            .map_err(|e| Error::usage(Diagnostic::from(&e).at(format_args!("simulate {name}"))))?;
         let mut parameters = made.parameters;
         parameters.extend([
             parameter("gravity_m_s2", gravity),
@@ -353,7 +354,7 @@ impl Common {
         };
         stamps.check().map_err(|e| {
             Error::usage(
-                Diagnostic::new(e.to_string())
+                Diagnostic::from(&e)
                     .help("--stamp-drift, --jitter, --stamp-jitter, --drop, --burst"),
             )
         })?;

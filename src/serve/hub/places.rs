@@ -8,6 +8,7 @@ use crate::serve::peer::Origin;
 use crate::serve::state::{Saved, Sensors};
 use crate::serve::stream::SensorStream;
 use crate::serve::stream::run::SampleRun;
+use crate::serve::wire::TRUTH;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
@@ -76,6 +77,12 @@ impl Hub {
         if let Some(sensor) = read(&self.sensors).get(id) {
             client.sensors.fetch_add(1, Ordering::Relaxed);
             return Ok(sensor.clone());
+        }
+        if id == TRUTH && lock(&self.truth).is_some() {
+            return Err(Fault::new(
+                "id_in_use",
+                "`truth` is what a simulation sends here: a sensor needs another name",
+            ));
         }
         let mut sensors = write(&self.sensors);
         if let Some(sensor) = sensors.get(id) {

@@ -94,6 +94,8 @@ fn what_is_no_truth_is_refused() {
         refused(&mut one, &truth(1, &q()).replace("\"enu\"", "\"ned\"")),
         "bad_reference"
     );
+    // Whose name no sensor can take.
+    assert_eq!(refused(&mut two, &rate("truth", 0, 1.0)), "id_in_use");
     // After the first has gone.
     drop(one);
     let mut watcher =

@@ -465,7 +465,7 @@ fn decide_bias(
         )),
         Bias::Auto => {
             let limits = Limits::default();
-            let refuse = |e: NoRest| format!("{BIAS} auto: {e}");
+            let refuse = |e: NoRest| Diagnostic::from(&e).at(format_args!("{BIAS} auto"));
             let mut estimate = stillness::estimate_bias(rests, &limits).map_err(refuse)?;
             let mut earths = "";
             if let Some(earth) = earth {

@@ -143,8 +143,8 @@ impl fmt::Display for ArmError {
             } => write!(
                 f,
                 "no pose of a 5-joint arm: the tool point is {position:.3e} m and the approach {angle:.3e} rad \
-                 off the arm's plane, allowed {allowed_position:.0e} m and {allowed_angle:.0e} rad\n  \
-                 help: policy keep-position, keep-approach or weighted takes the nearest pose and states the residual"
+                 off the arm's plane, allowed {allowed_position:.0e} m and {allowed_angle:.0e} rad; \
+                 policy keep-position, keep-approach or weighted takes the nearest pose and states the residual"
             ),
             Self::OutOfReach(reach) => {
                 let [a, b] = reach.excess();

@@ -21,6 +21,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::record::Nanos;
 
 /// A recording, surveyed.
@@ -437,11 +438,10 @@ pub fn explained(error: Error, channels: &[LogChannel], problems: &[String]) -> 
         .iter()
         .filter(sounds_like_one)
         .filter_map(|k| k.decoder(&mut decoders).err())
-        .map(|why| why.to_string());
+        .map(|why| Diagnostic::from(&why));
     for why in refusals.take(SAID) {
         // Its own help is about naming a field; so is the error's.
-        let why = why.lines().next().unwrap_or_default();
-        topics.push_str(&format!("\n  {why}"));
+        topics.push_str(&format!("\n  {}", why.what()));
     }
     for problem in problems.iter().take(SAID) {
         topics.push_str(&format!("\n  the file is damaged: {problem}"));

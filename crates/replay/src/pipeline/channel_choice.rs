@@ -89,14 +89,15 @@ fn choose_one(
     for known in log.channels_of(&source) {
         match known.decoder(decoders) {
             Ok(decoder) => channels.push((known, decoder)),
-            Err(why) => refusals.push(why.to_string()),
+            Err(why) => refusals.push(Diagnostic::from(&why)),
         }
     }
     let Some((first, decoder)) = channels.first() else {
-        let what = refusals.into_iter().next().unwrap_or_default();
+        let none = || Diagnostic::new("no channel of it");
+        let what = refusals.into_iter().next().unwrap_or_else(none);
         return Err(strapd_recording::Error::Unsupported {
             path: path.to_owned(),
-            what: what.into(),
+            what,
         }
         .into());
     };
@@ -126,7 +127,10 @@ fn choose_one(
         described: described(&first.channel),
         resolved: Meaning::new(&run.plan, &decoder.stated().declared),
         noticed: Arc::new(Noticed::of(&source)),
-        warnings: refusals.into_iter().chain(which_stamp(decoder)).collect(),
+        warnings: refusals
+            .into_iter()
+            .chain(which_stamp(decoder).map(Into::into))
+            .collect(),
     };
     let mut by_id = BTreeMap::new();
     for (known, decoder) in channels {
@@ -168,7 +172,9 @@ pub(super) fn besides(
     let has_field = one.channels.values().any(|d| d.stated().has_mag);
     let own = (one.source.topic.as_str(), has_field);
     let mut besides = beside::choose((&run.plan, &run.selection), path, log, own)?;
-    one.found.warnings.append(&mut besides.notes);
+    one.found
+        .warnings
+        .extend(besides.notes.drain(..).map(Diagnostic::from));
     Ok(besides)
 }
 

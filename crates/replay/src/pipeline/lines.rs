@@ -14,6 +14,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
 use strapd_attitude::condition::Clock;
+use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{Meaning, StampPass, Stamps};
 use strapd_recording::Selection;
 use strapd_recording::lines::Lines;
@@ -139,7 +140,12 @@ fn met(run: &ReplayRequest, sensor: Sensor) -> (Found, Stream) {
         described: sensor.described,
         resolved: Meaning::new(&run.plan, &sensor.declared),
         noticed: Arc::default(),
-        warnings: sensor.notes.into_iter().chain(doubt).collect(),
+        warnings: sensor
+            .notes
+            .into_iter()
+            .chain(doubt)
+            .map(Diagnostic::from)
+            .collect(),
     };
     (found, stream)
 }

@@ -92,7 +92,7 @@ fn file(
     let choice = log.choose(path, run.selection.topic.as_deref())?;
     let mut chosen = choose(run, path, &log, &choice.topics)?;
     if let (Some(note), Some(first)) = (choice.note, chosen.first_mut()) {
-        first.found.warnings.push(note);
+        first.found.warnings.push(note.into());
     }
     let reference = reference(run, path, &log, &chosen, false)?;
     let besides = besides(run, path, &log, &mut chosen)?;

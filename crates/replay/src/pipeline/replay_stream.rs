@@ -113,7 +113,7 @@ struct Picked {
     others: BTreeSet<String>,
     /// Where the magnetic field comes from, where no flag says it.
     field_topic: Option<String>,
-    refusals: Vec<String>,
+    refusals: Vec<Diagnostic>,
     /// Decoders with the run's options, and with none.
     decoders: Decoders,
     plain: Decoders,
@@ -172,7 +172,7 @@ impl Picked {
                 )
             }
             Err(why) => {
-                self.refusals.push(why.to_string());
+                self.refusals.push(Diagnostic::from(&why));
                 Route::other(beside, copied)
             }
         }
@@ -191,7 +191,7 @@ impl Picked {
         for (wanted, beside) in named {
             if let Some(beside) = beside.as_ref().filter(|b| b.topic == channel.topic) {
                 return of(wanted, Some(beside))
-                    .map_err(|why| self.refusals.push(why.to_string()))
+                    .map_err(|why| self.refusals.push(Diagnostic::from(&why)))
                     .ok();
             }
         }
@@ -223,7 +223,7 @@ impl Picked {
                 described: described(channel),
                 resolved: Meaning::new(&run.plan, &decoder.stated().declared),
                 noticed: self.noticed.clone(),
-                warnings: which_stamp(decoder).into_iter().collect(),
+                warnings: which_stamp(decoder).into_iter().map(Into::into).collect(),
             },
             Stream::new(&channel.topic, ""),
         ));
@@ -274,12 +274,13 @@ impl Picked {
             return Err(strapd_recording::Error::Topic {
                 path: path.to_owned(),
                 topic: self.topic.clone().unwrap_or_default(),
-                what: format!(
-                    "{} channels of this topic take turns: two publishers, and they must not be mixed
-  help: save it to a file, where {TOPIC} tells them apart",
+                what: Diagnostic::new(format!(
+                    "{} channels of this topic take turns: two publishers, and they must not be mixed",
                     self.channels
-                ).into(),
-            }.into());
+                ))
+                .help(format!("save it to a file, where {TOPIC} tells them apart")),
+            }
+            .into());
         }
         Ok(())
     }
@@ -289,7 +290,7 @@ impl Picked {
         if let Some(what) = self.refusals.into_iter().next() {
             return strapd_recording::Error::Unsupported {
                 path: path.to_owned(),
-                what: what.into(),
+                what,
             }
             .into();
         }

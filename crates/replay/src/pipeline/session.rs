@@ -35,7 +35,7 @@ pub(super) struct Topic {
     /// What was noticed in its payloads.
     pub noticed: Arc<Noticed>,
     /// Things to know, beside those of `prepared`.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Diagnostic>,
     /// Its estimator.
     pub estimator: Estimator,
     /// What came out of it.
@@ -123,7 +123,8 @@ impl Topic {
             .map_err(refuse)?;
         let mut warnings = found.warnings;
         let known = plan.calibration.as_deref();
-        warnings.extend(known.and_then(|known| known.mismatch(&found.name)));
+        let mismatch = known.and_then(|known| known.mismatch(&found.name));
+        warnings.extend(mismatch.map(Diagnostic::from));
         Ok(Topic {
             name: found.name,
             output_topic: found.output_topic,
@@ -179,7 +180,7 @@ pub struct Found {
     /// What is noticed in its payloads.
     pub noticed: Arc<Noticed>,
     /// Things to know.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Diagnostic>,
 }
 
 /// A run from the first integrated sample on.

@@ -159,11 +159,9 @@ fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
         findings: Vec::new(),
         drawn,
     };
-    let prepared = topic.prepared.warnings.iter();
-    let found = topic.warnings.iter();
-    summary.findings = prepared
+    let said = topic.prepared.warnings.iter().chain(&topic.warnings);
+    summary.findings = said
         .map(|said| Finding::said(Severity::Warning, "preparation", said))
-        .chain(found.map(|said| Finding::new(Severity::Warning, "preparation", said)))
         .collect();
     let found = findings::of_run(
         &summary,
