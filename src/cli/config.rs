@@ -316,10 +316,8 @@ impl Layered {
         for (id, estimation, _) in &self.sensors {
             let plan = estimation.selection().and_then(|_| estimation.live_plans());
             let (plan, mut each) = plan.map_err(|why| {
-                Error::usage(format!(
-                    "sensor {}: {why}",
-                    strapd_recording::text::printable(id)
-                ))
+                let id = strapd_recording::text::printable(id);
+                Error::usage(Diagnostic::from(&why).at(format_args!("sensor {id}")))
             })?;
             settings
                 .plans
