@@ -49,9 +49,9 @@ pub mod serve;
 
 #[cfg(feature = "inside")]
 #[doc(hidden)]
-pub use strapd_replay::{config, error, inspection, pipeline, sink};
+pub use strapd_replay::{address, config, error, inspection, pipeline, sink};
 #[cfg(not(feature = "inside"))]
-use strapd_replay::{config, error, pipeline, sink};
+use strapd_replay::{address, config, error, pipeline, sink};
 
 #[cfg(not(feature = "inside"))]
 mod size_limit;

@@ -2,7 +2,7 @@
 //!
 //! How a word is quoted is [`strapd_replay::shell`]'s.
 
-use crate::sink::address::Address;
+use crate::address::Address;
 use std::ffi::{OsStr, OsString};
 use std::path::Path;
 use strapd_replay::shell::quoted;

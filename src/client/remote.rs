@@ -2,8 +2,8 @@
 //! connect. Pure: names are looked up when connecting, so that one that is unknown today may be
 //! known tomorrow.
 
+use crate::address::Address;
 use crate::error::{Error, Result};
-use crate::sink::address::Address;
 use std::fmt;
 use std::path::PathBuf;
 use strapd_attitude::diagnostic::Diagnostic;

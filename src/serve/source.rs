@@ -13,10 +13,10 @@
 //! Stamps: Android's `SensorEvent.timestamp`, the time base of `SystemClock.elapsedRealtimeNanos()`.
 //! Units and the six values of the uncalibrated gyroscope: Android's `SensorEvent.values`.
 
+use crate::address::Address;
 use crate::client::remote::{Parameter, Remote};
 use crate::client::secret::Secret;
 use crate::error::{Error, Result};
-use crate::sink::address::Address;
 use std::path::Path;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_recording::decode::{LineDecoder, Options, exact_name};

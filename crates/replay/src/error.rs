@@ -1,7 +1,7 @@
 //! Everything that can end a run. One flat enum; each variant says what, where and why, and apart from that what
 //! helps ([`Diagnostic`]). Bad samples are not here: they are counted verdicts ([`strapd_attitude::record::Verdict`]).
 
-use crate::sink::address::Address;
+use crate::address::Address;
 use std::path::PathBuf;
 use std::{fmt, io};
 use strapd_attitude::diagnostic::Diagnostic;

@@ -1,6 +1,7 @@
 //! `strapd cat URL`: attitudes of a daemon as NDJSON, CSV or a table. I/O.
 
 use super::{Cat, Format};
+use crate::address::Address;
 use crate::cli::Outcome;
 use crate::client;
 use crate::client::remote::Remote;
@@ -9,7 +10,6 @@ use crate::client::watcher::{Said, Watcher, request};
 use crate::error::{Error, Result};
 use crate::serve::limits::Allowance;
 use crate::serve::shutdown::Signals;
-use crate::sink::address::Address;
 use crate::sink::roll_pitch_yaw;
 use std::collections::BTreeSet;
 use std::io::{BufWriter, Stdout, Write};

@@ -1,7 +1,8 @@
 //! The word after `--listen` -> what to listen on. Pure but for looking up a host's name.
 
+use crate::address::Address;
 use crate::error::{Error, Result};
-use std::fmt::{self, Display};
+use std::fmt::Display;
 use std::net::{IpAddr, SocketAddr, ToSocketAddrs};
 use std::path::PathBuf;
 use strapd_attitude::diagnostic::Diagnostic;
@@ -60,80 +61,6 @@ impl Transport {
 pub const DEFAULTS: [&str; 2] = ["tcp-listen://127.0.0.1:4550", "ws-listen://127.0.0.1:8765"];
 
 const KNOWN: &str = "known: tcp-listen://HOST:PORT, udp-listen://HOST:PORT, ws-listen://HOST:PORT (and HTTP), unix-listen:///PATH; port 0 takes a free one; fd:NAME for HOST:PORT is a socket of that name (or number) from the service manager";
-
-/// An address as somebody typed it, which may hold a password or a key. It is printed, logged and written in one form alone:
-/// without user and password, and with `...` in the place of the values behind its `?`.
-#[derive(Clone, PartialEq, Eq)]
-pub struct Address(String);
-
-impl Address {
-    /// With everything, for who connects there.
-    #[must_use]
-    pub fn typed(&self) -> &str {
-        &self.0
-    }
-}
-
-impl<T: Into<String>> From<T> for Address {
-    fn from(typed: T) -> Address {
-        Address(typed.into())
-    }
-}
-
-impl fmt::Display for Address {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(&without_secrets(&self.0))
-    }
-}
-
-impl fmt::Debug for Address {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{self}")
-    }
-}
-
-/// Work grows with the text.
-fn without_secrets(text: &str) -> String {
-    let text = strapd_recording::text::printable(text);
-    let (scheme, rest) = match text.split_once("://") {
-        Some((scheme, rest)) => (format!("{scheme}://"), rest),
-        None => (String::new(), text.as_str()),
-    };
-    let (rest, query) = match rest.split_once(['?', '#']) {
-        Some((rest, query)) => (rest, Some(query)),
-        None => (rest, None),
-    };
-    // A password may hold any sign: all before the last `@` may be of it, of a query that is none too.
-    let (rest, query) = match query.and_then(|query| query.rsplit_once('@')) {
-        Some((_, host)) if !rest.contains('/') => {
-            let (host, query) = host
-                .split_once('?')
-                .map_or((host, None), |(h, q)| (h, Some(q)));
-            (format!("...@{host}"), query)
-        }
-        _ => match rest.rsplit_once('@') {
-            Some((_, host)) => (format!("...@{host}"), query),
-            None => (rest.to_owned(), query),
-        },
-    };
-    let mut out = scheme + &rest;
-    for (n, part) in query
-        .unwrap_or_default()
-        .split('&')
-        .filter(|part| !part.is_empty())
-        .enumerate()
-    {
-        out.push(if n == 0 { '?' } else { '&' });
-        match part.split_once('=') {
-            Some((name, _)) => {
-                out.push_str(name);
-                out.push_str("=...");
-            }
-            None => out.push_str("..."),
-        }
-    }
-    out
-}
 
 impl Listen {
     /// Reads what the user wrote. A host left out is 127.0.0.1.
@@ -208,34 +135,6 @@ impl std::fmt::Display for Listen {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn an_address_is_printed_without_what_nobody_is_to_see() {
-        for (text, printed) in [
-            ("tcp://host:1", "tcp://host:1"),
-            ("tcp://ada:s3cret@host:1", "tcp://...@host:1"),
-            ("tcp://ada:s3/cr@et@host:1", "tcp://...@host:1"),
-            ("tcp://ada:s3?cr=et@host:1", "tcp://...@host:1"),
-            ("ada:s3cret@host:1", "...@host:1"),
-            (
-                "ws://h:1/a/b?type=x&key=s3cret",
-                "ws://h:1/a/b?type=...&key=...",
-            ),
-            ("ws://h:1/a?s3cret", "ws://h:1/a?..."),
-            ("ws://h:1/a#s3cret", "ws://h:1/a?..."),
-            ("ws://u:s3cret@h:1/?k=s3cret", "ws://...@h:1/?k=..."),
-            ("unix:///run/x.sock", "unix:///run/x.sock"),
-            ("?=s3cret", "?=..."),
-            ("", ""),
-        ] {
-            assert_eq!(Address::from(text).to_string(), printed, "{text}");
-        }
-        assert!(
-            !Address::from("tcp://\u{1b}[31m:1")
-                .to_string()
-                .contains('\u{1b}')
-        );
-    }
 
     #[test]
     fn what_is_listened_on_is_written_as_it_is_read() {

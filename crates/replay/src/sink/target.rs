@@ -1,7 +1,8 @@
 //! The word after `-o` -> where the attitude goes, in which format. Pure.
 
+use crate::address::Address;
 use crate::error::{Error, Result};
-use crate::sink::address::{Address, Listen};
+use crate::sink::address::Listen;
 use std::path::{Path, PathBuf};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::setting::{LISTEN, TOKEN_FILE};
