@@ -53,7 +53,7 @@ pub struct Replay {
     /// How a table is to be read.
     #[command(flatten)]
     pub tables: Tables,
-    /// The SOURCEs are one recording in several files: read in the order of their times, the attitude carried across
+    /// Each SOURCE is a part of one recording: read in the order of their times, the attitude carried across
     #[arg(long)]
     pub join: bool,
     /// Replace outputs that exist
