@@ -14,7 +14,8 @@
 
 use std::fmt;
 
-/// What can not be done, where and why; and what helps.
+/// What can not be done, where and why; and what helps. To make one is marked as what seldom happens, so that the code
+/// around it is made for what does.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Diagnostic {
     what: String,
@@ -23,6 +24,8 @@ pub struct Diagnostic {
 
 impl Diagnostic {
     /// Without help, until [`Diagnostic::help`] gives some.
+    #[cold]
+    #[inline(never)]
     #[must_use]
     pub fn new(what: impl Into<String>) -> Diagnostic {
         let what = what.into();
@@ -35,6 +38,8 @@ impl Diagnostic {
     }
 
     /// What helps: settings with their values, or what else can be done.
+    #[cold]
+    #[inline(never)]
     #[must_use]
     pub fn help(mut self, help: impl Into<String>) -> Diagnostic {
         self.help = help.into();
@@ -60,6 +65,8 @@ impl Diagnostic {
     }
 
     /// The same, with words before it.
+    #[cold]
+    #[inline(never)]
     #[must_use]
     pub fn after(mut self, words: impl fmt::Display) -> Diagnostic {
         self.what = format!("{words} {}", self.what);

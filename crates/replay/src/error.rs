@@ -152,6 +152,8 @@ pub type Result<T> = std::result::Result<T, Error>;
 
 impl Error {
     /// A combination of arguments that can not be.
+    #[cold]
+    #[inline(never)]
     pub fn usage(what: impl Into<Diagnostic>) -> Error {
         Error::Usage(what.into())
     }
