@@ -49,6 +49,12 @@ enum Body {
     Parts(Vec<(Recording, Same)>),
 }
 
+/// Says the way of a channel's messages, once a channel; not for each caller anew, as the walk behind it is long.
+type Select<'s> = &'s mut dyn FnMut(&Arc<Channel>) -> Option<Route>;
+
+/// Gets what becomes of messages, a batch at a time.
+type Take<'t> = &'t mut dyn FnMut(&mut Vec<Item>) -> ControlFlow<()>;
+
 impl Recording {
     /// Surveys a recording.
     ///
@@ -288,20 +294,41 @@ impl Recording {
         mut select: impl FnMut(&Arc<Channel>) -> Option<Route>,
         mut take: impl FnMut(&mut Vec<Item>) -> std::result::Result<ControlFlow<()>, E>,
     ) -> std::result::Result<Survey, E> {
+        let mut failure = None;
+        let survey = self.walk_all(ahead, pool, &mut select, &mut |items| {
+            take(items).unwrap_or_else(|why| {
+                failure = Some(why);
+                ControlFlow::Break(())
+            })
+        })?;
+        match failure {
+            Some(why) => Err(why),
+            None => Ok(survey),
+        }
+    }
+
+    /// Part by part, where there are several.
+    fn walk_all(
+        &self,
+        ahead: usize,
+        pool: &Pool,
+        select: Select<'_>,
+        take: Take<'_>,
+    ) -> Result<Survey> {
         let Body::Parts(parts) = &self.body else {
             return self.walk_file(ahead, pool, select, take);
         };
         let mut survey = Survey::default();
         let mut is_over = false;
         for (log, same) in parts {
-            let met = log.walk_file::<E>(
+            let met = log.walk_file(
                 ahead,
                 pool,
-                |channel| select(&same.known(channel)),
-                |items| {
-                    let flow = take(items)?;
+                &mut |channel| select(&same.known(channel)),
+                &mut |items| {
+                    let flow = take(items);
                     is_over = flow.is_break();
-                    Ok(flow)
+                    flow
                 },
             )?;
             survey.append(&met, &[]);
@@ -314,43 +341,29 @@ impl Recording {
     }
 
     /// The same of a recording in one file.
-    fn walk_file<E: From<Error>>(
+    fn walk_file(
         &self,
         ahead: usize,
         pool: &Pool,
-        select: impl FnMut(&Arc<Channel>) -> Option<Route>,
-        mut take: impl FnMut(&mut Vec<Item>) -> std::result::Result<ControlFlow<()>, E>,
-    ) -> std::result::Result<Survey, E> {
+        select: Select<'_>,
+        take: Take<'_>,
+    ) -> Result<Survey> {
         let reader = match &self.body {
             Body::Mcap(reader) => reader.again().map_or_else(|| self.input.mcap(), Ok)?,
             Body::Text(text) => {
-                text.walk(select, take)?;
+                text.walk::<Error>(select, |items| Ok(take(items)))?;
                 return Ok(self.survey.clone());
             }
             // Its parts are read instead.
             Body::Parts(_) => return Ok(self.survey.clone()),
         };
-        let mut failure = None;
-        let report = mcap::walk(
-            reader,
-            &WalkOptions {
-                pool: Some(pool.rayon()),
-                in_flight: ahead,
-                ..WalkOptions::default()
-            },
-            select,
-            Route::map,
-            |items| {
-                take(items).unwrap_or_else(|why| {
-                    failure = Some(why);
-                    ControlFlow::Break(())
-                })
-            },
-        )?;
-        match failure {
-            Some(why) => Err(why),
-            None => Ok(report.survey),
-        }
+        let options = WalkOptions {
+            pool: Some(pool.rayon()),
+            in_flight: ahead,
+            ..WalkOptions::default()
+        };
+        let report = mcap::walk(reader, &options, select, Route::map, take)?;
+        Ok(report.survey)
     }
 
     /// For the choice of topics: one for each source.
