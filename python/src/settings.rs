@@ -408,7 +408,7 @@ fn noise(given: &Given<'_, '_>) -> PyResult<Noise> {
     let figures = given.iter().map(|(key, axes)| (key.as_str(), *axes));
     Noise::of_figures("given", figures).map_err(|why| {
         let known = NOISE_FIGURES.map(|f| format!("{} ({})", f.key.replace('-', "_"), f.unit));
-        argument(Diagnostic::new(format!("noise: {why}")).help(format!("{}", known.join(", "))))
+        argument(Diagnostic::new(format!("noise: {why}")).help(known.join(", ")))
     })
 }
 
