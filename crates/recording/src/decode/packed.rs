@@ -24,7 +24,7 @@ pub const ATT: usize = 112;
 /// Bytes of a sample, with a specific force, with an interval too, and with a magnetic field.
 pub const RATE: [usize; 4] = [48, 72, 80, 104];
 /// The stamp, or interval, that is none.
-pub const NO_TIME: i64 = i64::MIN;
+const NO_TIME: i64 = i64::MIN;
 /// The sequence number that is none.
 pub const NO_SEQ: u64 = u64::MAX;
 

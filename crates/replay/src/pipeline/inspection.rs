@@ -167,7 +167,7 @@ pub fn look(log: &Recording, named: Option<&str>, options: &Options, pool: &Pool
 ///
 /// # Errors
 /// As [`look`].
-pub fn look_as(
+pub(crate) fn look_as(
     log: &Recording,
     named: Option<&str>,
     (options, plan): (&Options, &Plan),

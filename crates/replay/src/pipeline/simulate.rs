@@ -17,9 +17,9 @@ use strapd_recording::pool::Pool;
 /// The topic of the samples.
 pub const TOPIC: &str = "/imu/data_raw";
 /// The topic of the true attitude; the true rate is on `/truth/rate`.
-pub const TRUTH_TOPIC: &str = "/truth";
+pub(super) const TRUTH_TOPIC: &str = "/truth";
 /// The topic of the magnetic field.
-pub const FIELD_TOPIC: &str = "/imu/mag";
+pub(super) const FIELD_TOPIC: &str = "/imu/mag";
 /// What lines call the samples.
 const ID: &str = "imu";
 
