@@ -21,6 +21,7 @@
 //! | `page`, `top_page` | what a browser gets | pure |
 //! | [`listen`], `http`, `samples` | sockets others come to; samples by `POST` | I/O |
 //! | [`source`], [`connect`], [`upstream`]; `forward` | sockets others listen on: samples from there; attitudes to there | I/O |
+//! | `nats` | subjects of a broker: samples from there, attitudes to there (feature `nats`) | I/O |
 //! | [`shutdown`] | signals -> an orderly end | I/O |
 //!
 //! The wire is described in `docs/protocol.md`.
@@ -39,6 +40,8 @@ pub mod last;
 pub mod limits;
 pub mod listen;
 mod log_throttle;
+#[cfg(feature = "nats")]
+pub mod nats;
 pub mod outbox;
 mod outgoing;
 mod page;
@@ -68,7 +71,7 @@ use listen::{Context, Listener};
 use places::Places;
 use playback::position::Timeline;
 use shutdown::Shutdown;
-use source::Source;
+use source::Endpoint;
 use std::collections::BTreeMap;
 use std::future::Future;
 use std::sync::Arc;
@@ -88,7 +91,7 @@ pub struct Settings {
     /// Where to listen.
     pub listen: Vec<Listen>,
     /// Where to connect for samples.
-    pub sources: Vec<Source>,
+    pub sources: Vec<Endpoint>,
     /// The bounds.
     pub limits: Limits,
     /// What clients must show.
@@ -106,6 +109,9 @@ pub struct Settings {
     pub passed: listen::Passed,
     /// Whom to call and send every attitude to ([`Target::Tcp`], [`Target::Udp`]).
     pub outputs: Vec<Target>,
+    /// Where in NATS every attitude goes.
+    #[cfg(feature = "nats")]
+    pub nats: Vec<nats::address::NatsAddress>,
     /// The replay that is served; no samples are taken then.
     pub timeline: Option<Arc<dyn Timeline>>,
     /// What is served brings samples beside attitudes: clients may ask for them before the first stream is there.
@@ -120,6 +126,8 @@ pub struct Server {
     listeners: Vec<Listener>,
     bound: Vec<Listen>,
     outputs: Vec<Target>,
+    #[cfg(feature = "nats")]
+    nats: Vec<nats::address::NatsAddress>,
 }
 
 impl Settings {
@@ -152,6 +160,8 @@ impl Server {
         let mut passed = std::mem::take(&mut settings.passed);
         let web = std::mem::take(&mut settings.web);
         let outputs = std::mem::take(&mut settings.outputs);
+        #[cfg(feature = "nats")]
+        let nats = std::mem::take(&mut settings.nats);
         let hub = Hub::new(settings)?;
         let mut listeners = Vec::new();
         let mut bound = Vec::new();
@@ -173,6 +183,8 @@ impl Server {
             listeners,
             bound,
             outputs,
+            #[cfg(feature = "nats")]
+            nats,
         })
     }
 
@@ -206,9 +218,24 @@ impl Server {
         for target in self.outputs {
             tokio::spawn(forward::send(target, context()));
         }
+        #[cfg(feature = "nats")]
+        let tenancy = Arc::new(nats::tenure::Tenancy::default());
+        #[cfg(feature = "nats")]
+        for address in self.nats {
+            tokio::spawn(nats::send(address, context(), tenancy.clone()));
+        }
         for outgoing in self.hub.outgoing() {
-            let task = connect::keep(outgoing.clone(), self.hub.clone(), shutdown.running());
-            tokio::spawn(task);
+            let (outgoing, hub) = (outgoing.clone(), self.hub.clone());
+            match outgoing.endpoint().clone() {
+                Endpoint::Source(source) => {
+                    tokio::spawn(connect::keep(*source, outgoing, hub, shutdown.running()));
+                }
+                #[cfg(feature = "nats")]
+                Endpoint::Nats(address) => {
+                    let middle = (hub, tenancy.clone());
+                    tokio::spawn(nats::keep(*address, outgoing, middle, shutdown.running()));
+                }
+            }
         }
         let waits = tokio::spawn(end_waits(self.hub.clone()));
         stop.await;

@@ -12,7 +12,7 @@ use crate::serve::hub::Hub;
 use crate::serve::limits::Limits;
 use crate::serve::recorder::{self, Recorder, Split};
 use crate::serve::shutdown::Signals;
-use crate::serve::source::Source;
+use crate::serve::source::Endpoint;
 use crate::serve::state::StateFile;
 use crate::serve::{Server, Settings, listen};
 use crate::sink::address::{DEFAULTS, Listen};
@@ -119,8 +119,17 @@ fn window(text: &str) -> std::result::Result<Duration, String> {
         .ok_or_else(|| "expected seconds, 0 to 86400".to_owned())
 }
 
+/// Whether the daemon publishes there by NATS.
+fn is_nats(output: &str) -> bool {
+    cfg!(feature = "nats") && output.starts_with("nats://")
+}
+
 /// A sink of the daemon.
 fn sent_to(text: &str) -> Result<Target> {
+    #[cfg(not(feature = "nats"))]
+    if text.starts_with("nats://") {
+        return Err(crate::serve::source::without_nats("-o", text));
+    }
     match Target::parse(text)? {
         target @ (Target::Tcp(_) | Target::Udp { .. }) => Ok(target),
         _ => Err(Error::usage(
@@ -335,8 +344,8 @@ impl Serve {
     ///
     /// # Errors
     /// [`Error::Usage`] naming the source.
-    fn outgoing(&self) -> Result<Vec<Source>> {
-        let mut sources: Vec<Source> = Vec::new();
+    fn outgoing(&self) -> Result<Vec<Endpoint>> {
+        let mut sources: Vec<Endpoint> = Vec::new();
         for text in self.sources.iter().filter(|s| *s != "-") {
             if !Remote::is_meant(text) {
                 return Err(Error::usage(
@@ -349,20 +358,20 @@ impl Serve {
                     )
                 ));
             }
-            let mut source = Source::parse(text)?;
-            if sources.iter().any(|s| s.remote == source.remote) {
+            let mut source = Endpoint::parse(text)?;
+            if sources.iter().any(|s| s.is_same_place(&source)) {
                 return Err(Error::usage(format!(
                     "serve {}: is given twice",
-                    source.name
+                    source.name()
                 )));
             }
             // What tells two apart may be what is not printed.
-            let alike = |s: &Source| {
-                s.name == source.name || s.name.starts_with(&format!("{} (", source.name))
+            let alike = |s: &&Endpoint| {
+                s.name() == source.name() || s.name().starts_with(&format!("{} (", source.name()))
             };
-            match sources.iter().filter(|s| alike(s)).count() {
+            match sources.iter().filter(alike).count() {
                 0 => {}
-                others => source.name.push_str(&format!(" ({})", others + 1)),
+                others => source.is_one_of(others + 1),
             }
             sources.push(source);
         }
@@ -400,7 +409,15 @@ impl Serve {
             outputs: self
                 .output
                 .iter()
+                .filter(|o| !is_nats(o))
                 .map(|o| sent_to(o))
+                .collect::<Result<_>>()?,
+            #[cfg(feature = "nats")]
+            nats: self
+                .output
+                .iter()
+                .filter(|o| is_nats(o))
+                .map(|o| crate::serve::nats::address::NatsAddress::output(o))
                 .collect::<Result<_>>()?,
             limits: Limits {
                 state_window: self.state_window,

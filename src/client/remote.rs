@@ -133,7 +133,8 @@ impl Remote {
 }
 
 impl Place {
-    fn parse(text: &str) -> std::result::Result<Place, String> {
+    /// `HOST:PORT`; a host left out is 127.0.0.1.
+    pub(crate) fn parse(text: &str) -> std::result::Result<Place, String> {
         if text.contains('@') {
             return Err(
                 "no user or password goes into an address; --token-file FILE shows a token".into(),
@@ -189,7 +190,7 @@ impl fmt::Display for Remote {
 }
 
 /// The parameters of a query, decoded; `None` where a `%` is no escape.
-fn parameters(query: &str) -> Option<Vec<Parameter>> {
+pub(crate) fn parameters(query: &str) -> Option<Vec<Parameter>> {
     query
         .split('&')
         .filter(|part| !part.is_empty())

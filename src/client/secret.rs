@@ -26,6 +26,19 @@ impl Secret {
     /// # Errors
     /// It can not be read, others can read it, or it holds no token of 16 bytes.
     pub fn read(flag: &str, path: &Path) -> Result<Secret> {
+        Secret::no_shorter_than(MIN_TOKEN, flag, path)
+    }
+
+    /// The same, where somebody else has chosen it.
+    ///
+    /// # Errors
+    /// It can not be read, others can read it, or it holds nothing.
+    #[cfg(feature = "nats")]
+    pub fn of_others(flag: &str, path: &Path) -> Result<Secret> {
+        Secret::no_shorter_than(1, flag, path)
+    }
+
+    fn no_shorter_than(least: usize, flag: &str, path: &Path) -> Result<Secret> {
         let open = |source| strapd_recording::Error::Open {
             path: path.to_owned(),
             source,
@@ -49,10 +62,10 @@ impl Secret {
         }
         let text = std::fs::read_to_string(path).map_err(open)?;
         let token = text.lines().next().unwrap_or_default().trim();
-        if token.len() < MIN_TOKEN {
+        if token.len() < least {
             return Err(refuse(
                 Diagnostic::new(format!(
-                    "holds {} bytes, a token has at least {MIN_TOKEN}",
+                    "holds {} bytes, a token has at least {least}",
                     token.len()
                 ))
                 .help("head -c 32 /dev/urandom | base64 > FILE"),

@@ -11,7 +11,7 @@ use super::log_throttle;
 use super::outgoing::Outgoing;
 use super::session::{End, Session, Side};
 use super::shutdown::Running;
-use super::source::Protocol;
+use super::source::{Protocol, Source};
 use super::upstream::Event;
 use crate::client::link::{Heard, Link};
 use crate::client::remote::Remote;
@@ -42,13 +42,13 @@ const ATTITUDES: &str = r#"{"class":"WATCH","streams":["ATT"],"last":false}"#;
 /// How long to wait before another attempt: ever longer, and never in step with others who lost the
 /// same peer at the same time.
 #[derive(Debug, Default)]
-struct Redial {
+pub(super) struct Redial {
     failures: u32,
     chance: RandomState,
 }
 
 impl Redial {
-    fn failed(&mut self) -> Duration {
+    pub(super) fn failed(&mut self) -> Duration {
         let whole = FIRST_WAIT * (1 << self.failures.min(6));
         let part = self.chance.hash_one(self.failures) % 512;
         self.failures = self.failures.saturating_add(1);
@@ -59,8 +59,12 @@ impl Redial {
 }
 
 /// Stays connected until the daemon ends.
-pub(super) async fn keep(outgoing: Arc<Outgoing>, hub: Arc<Hub>, mut running: Running) {
-    let source = outgoing.source();
+pub(super) async fn keep(
+    source: Source,
+    outgoing: Arc<Outgoing>,
+    hub: Arc<Hub>,
+    mut running: Running,
+) {
     let name = &source.name;
     // The token of a stream goes in its first line instead.
     let token = source.token.as_ref().map(|t| t.reveal());
@@ -77,7 +81,7 @@ pub(super) async fn keep(outgoing: Arc<Outgoing>, hub: Arc<Hub>, mut running: Ru
                 let began = Instant::now();
                 outgoing.connected(link.peer());
                 log_throttle::info(&format!("{name} connected"), &format!("{name}: connected"));
-                let Some(why) = converse(link, &outgoing, &hub, &mut running).await else {
+                let Some(why) = converse(link, &source, &outgoing, &hub, &mut running).await else {
                     return;
                 };
                 if began.elapsed() >= STEADY {
@@ -102,11 +106,11 @@ pub(super) async fn keep(outgoing: Arc<Outgoing>, hub: Arc<Hub>, mut running: Ru
 /// Listens to one connection. Returns why it ended, `None` when the daemon ends.
 async fn converse(
     mut link: Link,
+    source: &Source,
     outgoing: &Outgoing,
     hub: &Arc<Hub>,
     running: &mut Running,
 ) -> Option<String> {
-    let source = outgoing.source();
     let side = Side::source(source.id.clone(), source.decoder(hub.decode_options()));
     let mut session = Session::with(hub, source.name.clone(), side);
     let mut bytes = Vec::new();

@@ -141,6 +141,8 @@ pub struct Client {
     since: Instant,
     /// How many sensors it sends.
     sensors: AtomicUsize,
+    /// It speaks for many: as many as there may be are its share.
+    is_broker: AtomicBool,
 }
 
 /// What a sender should hear of its samples.
@@ -156,6 +158,12 @@ impl Client {
     /// Whether it is told things as Foxglove's viewers are.
     fn is_viewer(&self) -> bool {
         matches!(self.shape, ClientProtocol::Foxglove { .. })
+    }
+
+    /// It speaks for many: as many sensors as there may be are its share.
+    #[cfg(feature = "nats")]
+    pub fn speaks_for_many(&self) {
+        self.is_broker.store(true, Ordering::Relaxed);
     }
 
     /// It sends a sensor less.
@@ -204,7 +212,7 @@ impl Hub {
             outgoing: settings
                 .sources
                 .into_iter()
-                .map(|source| Arc::new(Outgoing::new(source)))
+                .map(|endpoint| Arc::new(Outgoing::new(endpoint)))
                 .collect(),
             session: format!("{session:08x}"),
             started: Instant::now(),
@@ -310,6 +318,7 @@ impl Hub {
             shape,
             since: Instant::now(),
             sensors: AtomicUsize::new(0),
+            is_broker: AtomicBool::new(false),
         });
         write(&self.clients).insert(client.number, client.clone());
         client
@@ -485,6 +494,13 @@ impl Hub {
                 self.stamps_wait.store(true, Ordering::Relaxed);
             }
         }
+    }
+
+    /// Whether samples of any sensor wait for the unit of their stamps.
+    #[cfg(feature = "nats")]
+    #[must_use]
+    pub fn is_anything_waiting(&self) -> bool {
+        self.stamps_wait.load(Ordering::Relaxed)
     }
 
     /// A line that could not be read stood among the samples of this sensor.

@@ -439,6 +439,26 @@ impl Outbox {
         }
     }
 
+    /// The same for whom attitudes alone are sent, stream by stream: replies go nowhere.
+    #[cfg(feature = "nats")]
+    pub fn take_chunks(&self, most: usize, out: &mut Vec<Chunk>) -> usize {
+        let mut state = self.state();
+        state.control.clear();
+        state.control_bytes = 0;
+        state.gaps.clear();
+        state.labels.clear();
+        state.label_bytes = 0;
+        let mut taken = 0;
+        while taken < most
+            && let Some(chunk) = state.pop()
+        {
+            taken += chunk.bytes.len();
+            state.sent += chunk.count;
+            out.push(chunk);
+        }
+        taken
+    }
+
     /// Moves everything out: what is told to nobody, or read here.
     pub fn discard(&self, out: &mut VecDeque<Bytes>) {
         let attitudes = self.take(usize::MAX, out);

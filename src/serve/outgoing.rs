@@ -1,7 +1,7 @@
 //! A source that is connected to, and how the connection stands. Locks.
 
 use super::log_throttle;
-use super::source::Source;
+use super::source::Endpoint;
 use std::fmt::Write;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
@@ -9,7 +9,7 @@ use std::time::Instant;
 /// A source and how it stands.
 #[derive(Debug)]
 pub struct Outgoing {
-    source: Source,
+    endpoint: Endpoint,
     state: Mutex<State>,
 }
 
@@ -27,9 +27,9 @@ struct State {
 impl Outgoing {
     /// Not yet connected.
     #[must_use]
-    pub fn new(source: Source) -> Outgoing {
+    pub fn new(endpoint: Endpoint) -> Outgoing {
         Outgoing {
-            source,
+            endpoint,
             state: Mutex::new(State {
                 peer: None,
                 since: Instant::now(),
@@ -50,7 +50,7 @@ impl Outgoing {
     pub fn status(&self) -> serde_json::Value {
         let state = self.state();
         serde_json::json!({
-            "uri": self.source.name, "id": self.source.id,
+            "uri": self.name(), "id": self.endpoint.id(),
             "connected": state.peer.is_some(), "peer": state.peer,
             "since_s": state.since.elapsed().as_secs_f64(),
             "attempts": state.attempts, "connections": state.connections,
@@ -59,8 +59,13 @@ impl Outgoing {
     }
 
     /// Where it is.
-    pub(super) fn source(&self) -> &Source {
-        &self.source
+    pub(super) fn endpoint(&self) -> &Endpoint {
+        &self.endpoint
+    }
+
+    /// Its address, for people.
+    pub(super) fn name(&self) -> &str {
+        self.endpoint.name()
     }
 
     /// Another attempt begins.
@@ -88,7 +93,7 @@ impl Outgoing {
     /// Something is wrong with what comes; the connection lives.
     pub(super) fn complain(&self, what: &str) {
         self.state().last_error = Some(what.to_owned());
-        let name = &self.source.name;
+        let name = self.name();
         log_throttle::warn(&format!("{name} says"), &format!("{name}: {what}"));
     }
 }
@@ -127,11 +132,7 @@ pub(super) fn exposition(out: &mut String, all: &[Arc<Outgoing>]) {
             "# HELP strapd_{name} {help}\n# TYPE strapd_{name} {kind}\n"
         );
         for outgoing in all {
-            let uri = outgoing
-                .source
-                .name
-                .replace('\\', "\\\\")
-                .replace('"', "\\\"");
+            let uri = outgoing.name().replace('\\', "\\\\").replace('"', "\\\"");
             let _ = writeln!(
                 out,
                 "strapd_{name}{{uri=\"{uri}\"}} {}",

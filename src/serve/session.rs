@@ -100,6 +100,8 @@ pub enum Side {
 #[derive(Debug)]
 pub struct Naming {
     id: Option<String>,
+    /// What a sensor is called that does not say: the subject of its message does.
+    subject: Option<String>,
     decoder: Option<LineDecoder>,
     /// What the lines call the sensor that is called `id` here, or that has no other name.
     called: Option<Origin>,
@@ -116,7 +118,23 @@ impl Side {
     pub fn source(id: Option<String>, decoder: Option<LineDecoder>) -> Side {
         Side::Source(Box::new(Naming {
             id,
+            subject: None,
             decoder,
+            called: None,
+            events: Vec::new(),
+        }))
+    }
+}
+
+#[cfg(feature = "nats")]
+impl Side {
+    /// A broker, whose messages are of many sensors, or all of the one that is called `id` here.
+    #[must_use]
+    pub fn broker(id: Option<String>) -> Side {
+        Side::Source(Box::new(Naming {
+            id,
+            subject: Some(String::new()),
+            decoder: None,
             called: None,
             events: Vec::new(),
         }))
@@ -127,6 +145,10 @@ impl Naming {
     /// Gives a line's sensor its name here. What comes beside the gyro belongs to it (`is_beside`).
     fn name(&mut self, head: &mut Line, is_beside: bool) -> Result<(), Fault> {
         if self.id.is_none() && head.id.is_some() {
+            return Ok(());
+        }
+        if let Some(subject) = &self.subject {
+            head.id = Some(self.id.as_ref().unwrap_or(subject).clone());
             return Ok(());
         }
         let mut origin = (head.id.clone(), head.sensor.clone());
@@ -238,6 +260,37 @@ impl Session {
     #[must_use]
     pub fn hub(&self) -> &Arc<Hub> {
         &self.hub
+    }
+
+    /// What comes next is of this sensor, where it does not say; no number of a packed stream is bound.
+    #[cfg(feature = "nats")]
+    pub fn of_subject(&mut self, id: &str) {
+        self.bound.clear();
+        self.errors_in_a_row = 0;
+        self.client.speaks_for_many();
+        if let Side::Source(naming) = &mut self.side
+            && let Some(subject) = &mut naming.subject
+        {
+            id.clone_into(subject);
+        }
+    }
+
+    /// The sensors it has sent.
+    #[cfg(feature = "nats")]
+    pub fn sensors(&self) -> impl Iterator<Item = &String> {
+        self.owned.keys()
+    }
+
+    /// The sensor that the subject names, for packed samples whose number is not bound.
+    fn head_of_subject(&self) -> Option<Line> {
+        let Side::Source(naming) = &self.side else {
+            return None;
+        };
+        let subject = naming.subject.as_ref()?;
+        Some(Line {
+            id: Some(naming.id.as_ref().unwrap_or(subject).clone()),
+            ..Line::default()
+        })
     }
 
     /// Whether it has shown the token, or need not.
@@ -446,6 +499,10 @@ impl Session {
         }
         self.say(fault, number, line);
         self.errors_in_a_row += 1;
+        // One bad sensor behind a broker is not all of them.
+        if matches!(&self.side, Side::Source(naming) if naming.subject.is_some()) {
+            return;
+        }
         if self.errors_in_a_row > self.hub.limits().errors_in_a_row {
             let fault = Fault::new(
                 "too_many_errors",

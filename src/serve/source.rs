@@ -42,6 +42,93 @@ pub struct Source {
     pub name: String,
 }
 
+/// Where samples are fetched.
+#[derive(Clone, Debug)]
+pub enum Endpoint {
+    /// Somebody who listens.
+    Source(Box<Source>),
+    /// A subject of NATS.
+    #[cfg(feature = "nats")]
+    Nats(Box<super::nats::address::NatsAddress>),
+}
+
+impl Endpoint {
+    /// Reads what the user wrote: the address of a [`Source`], or of a subject of NATS.
+    ///
+    /// # Errors
+    /// As [`Source::parse`]; NATS is meant and was not built in.
+    pub fn parse(text: &str) -> Result<Endpoint> {
+        #[cfg(feature = "nats")]
+        if super::nats::address::NatsAddress::is_meant(text) {
+            let address = super::nats::address::NatsAddress::source(text)?;
+            return Ok(Endpoint::Nats(Box::new(address)));
+        }
+        #[cfg(not(feature = "nats"))]
+        if text.starts_with("nats://") {
+            return Err(without_nats("serve", text));
+        }
+        Source::parse(text).map(|source| Endpoint::Source(Box::new(source)))
+    }
+
+    /// Its address, for people.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        match self {
+            Endpoint::Source(source) => &source.name,
+            #[cfg(feature = "nats")]
+            Endpoint::Nats(address) => &address.name,
+        }
+    }
+
+    /// What its sensor is called here, where that was said.
+    #[must_use]
+    pub fn id(&self) -> Option<&str> {
+        match self {
+            Endpoint::Source(source) => source.id.as_deref(),
+            #[cfg(feature = "nats")]
+            Endpoint::Nats(address) => address.id.as_deref(),
+        }
+    }
+
+    /// Whether both are the same place.
+    #[must_use]
+    pub fn is_same_place(&self, other: &Endpoint) -> bool {
+        match (self, other) {
+            (Endpoint::Source(one), Endpoint::Source(other)) => one.remote == other.remote,
+            #[cfg(feature = "nats")]
+            (Endpoint::Nats(one), Endpoint::Nats(other)) => {
+                (&one.place, &one.subject) == (&other.place, &other.subject)
+            }
+            #[cfg(feature = "nats")]
+            _ => false,
+        }
+    }
+
+    /// Another one has the same name: it is the `number`th.
+    pub fn is_one_of(&mut self, number: usize) {
+        let name = match self {
+            Endpoint::Source(source) => &mut source.name,
+            #[cfg(feature = "nats")]
+            Endpoint::Nats(address) => &mut address.name,
+        };
+        name.push_str(&format!(" ({number})"));
+    }
+}
+
+/// NATS is meant, and was not built in.
+#[cfg(not(feature = "nats"))]
+pub fn without_nats(before: &str, text: &str) -> Error {
+    Error::usage(
+        Diagnostic::new(format!(
+            "{before} {}: this strapd was built without the feature nats",
+            Address::from(text)
+        ))
+        .help(
+            "cargo install --path . --features nats; or, without it: nats sub --raw 'imu.*' | strapd serve -",
+        ),
+    )
+}
+
 /// How to speak with a source.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Protocol {

@@ -18,7 +18,7 @@ use strapd_attitude::record::TimeUnit;
 use strapd_attitude::record::{AttitudeCovariance, AttitudeSample, Nanos, Status};
 
 /// What this release writes. 1 had neither the run nor the memory.
-const FORMAT: u32 = 2;
+pub(super) const FORMAT: u32 = 2;
 /// A larger file is none of ours: a sensor takes no more than 10 KiB.
 const MAX_BYTES: u64 = 64 << 20;
 /// The last attitude of a sensor, and between which axes it is.

@@ -120,6 +120,9 @@ impl Hub {
     /// Whether a client may send one sensor more.
     fn check_share(&self, client: &Client) -> Result<(), Fault> {
         let refuse = |what: String| Err(Fault::new("too_many_sensors", what));
+        if client.is_broker.load(Ordering::Relaxed) {
+            return Ok(());
+        }
         let most = self.limits.sensors_of_client;
         if client.sensors.load(Ordering::Relaxed) >= most {
             return refuse(format!("one connection sends at most {most} sensors"));
@@ -176,6 +179,29 @@ impl Hub {
         }
         told.push_back(id);
         Ok(())
+    }
+
+    /// Sensors that another worker has had go on from where they were.
+    #[cfg(feature = "nats")]
+    pub fn restore(&self, sensors: Sensors) {
+        let mut saved = lock(&self.saved);
+        for (id, one) in sensors {
+            saved.insert(&id, one, self.limits.sensors);
+        }
+    }
+
+    /// These sensors are another worker's: nothing of them stays.
+    #[cfg(feature = "nats")]
+    pub fn forget(&self, ids: &std::collections::BTreeSet<String>) {
+        let mut sensors = write(&self.sensors);
+        for id in ids {
+            if let Some(sensor) = sensors.remove(id.as_str()) {
+                let mut sensor = lock(&sensor);
+                sensor.gave_way = true;
+                self.withdraw(sensor.stream.channel());
+            }
+            lock(&self.saved).remove(id);
+        }
     }
 
     /// A stream is no more; viewers are told.

@@ -25,6 +25,16 @@ impl Session {
         Ok(())
     }
 
+    /// What samples with this number say; by default what their subject does, within its message.
+    fn bound_or_of_subject(&mut self, stream: u32) -> Option<&Line> {
+        if !self.bound.contains_key(&stream)
+            && let Some(head) = self.head_of_subject()
+        {
+            self.bound.insert(stream, head);
+        }
+        self.bound.get(&stream)
+    }
+
     /// A packed object: a sample as the line would be that says what its number was bound to.
     pub(super) fn packed(
         &mut self,
@@ -41,7 +51,7 @@ impl Session {
                 stream,
                 seq,
                 sample,
-            }) => match self.bound.get(&stream) {
+            }) => match self.bound_or_of_subject(stream) {
                 Some(head) => {
                     let before = scratch.samples.len();
                     // Most are of the run before them: nothing is cloned for those.

@@ -1,0 +1,351 @@
+//! `nats://HOST:PORT/SUBJECT?...` -> a server, what is read or written there, and how. Pure but for
+//! reading secrets from files.
+
+use crate::address::Address;
+use crate::client::remote::{Place, encoded, parameters};
+use crate::client::secret::Secret;
+use crate::error::{Error, Result};
+use std::path::{Path, PathBuf};
+use strapd_attitude::diagnostic::Diagnostic;
+use strapd_recording::decode::exact_name;
+use strapd_recording::text::printable;
+
+/// The port of a server where none is written.
+const PORT: u16 = 4222;
+/// Longer than any address.
+const MAX_BYTES: usize = 2048;
+/// Most partitions that are told apart.
+const MAX_PARTITION: u32 = 65_535;
+const KNOWN_IN: &str = "nats://HOST:PORT/SUBJECT (imu.*; the last token names the sensor) with ?id=NAME, ?stream=NAME (JetStream), ?from=new|all|SEQUENCE, ?state=BUCKET&p=PARTITION, ?user=NAME&password-file=FILE, ?token-file=FILE, ?ca-file=FILE";
+const KNOWN_OUT: &str = "nats://HOST:PORT/SUBJECT (att.{id}) with ?stream=NAME (JetStream), ?user=NAME&password-file=FILE, ?token-file=FILE, ?ca-file=FILE";
+
+/// A subject of a server, and how to get to it.
+#[derive(Clone, Debug)]
+pub struct NatsAddress {
+    /// The server.
+    pub place: Place,
+    /// What is subscribed to, wildcards and all; or where to publish, with `{id}` in it.
+    pub subject: String,
+    /// Who we are there.
+    pub login: Login,
+    /// Whose certificates are believed; TLS is asked for then.
+    pub ca_file: Option<PathBuf>,
+    /// The stream of JetStream that holds the subject; else what is missed is gone.
+    pub stream: Option<String>,
+    /// Where in the stream to begin.
+    pub from: From,
+    /// What the one sensor is called here, whatever its subject.
+    pub id: Option<String>,
+    /// Where the state is kept, so that one worker at a time has these sensors.
+    pub lease: Option<LeaseKey>,
+    /// The address, for people.
+    pub name: String,
+}
+
+/// Who we are at a server.
+#[derive(Clone, Debug, Default)]
+pub enum Login {
+    /// Nobody.
+    #[default]
+    Nobody,
+    /// By name and password.
+    User(String, Secret),
+    /// By a token.
+    Token(Secret),
+}
+
+/// Where in a stream to begin, where nothing is known of what was read before.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum From {
+    /// At what comes next.
+    #[default]
+    New,
+    /// At the first message there is.
+    All,
+    /// At the message with this number.
+    Sequence(u64),
+}
+
+/// The key in a bucket under which a partition's state is kept.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LeaseKey {
+    /// The bucket; made where it is not there.
+    pub bucket: String,
+    /// The key, `p.PARTITION`.
+    pub key: String,
+}
+
+/// Which way samples or attitudes go.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Way {
+    In,
+    Out,
+}
+
+impl NatsAddress {
+    /// Whether a word is meant as one of these.
+    #[must_use]
+    pub fn is_meant(text: &str) -> bool {
+        text.starts_with("nats://")
+    }
+
+    /// Where samples come from.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with what is known; a file of a secret can not be read.
+    pub fn source(text: &str) -> Result<NatsAddress> {
+        NatsAddress::parse(text, Way::In)
+    }
+
+    /// Where attitudes go.
+    ///
+    /// # Errors
+    /// As [`NatsAddress::source`].
+    pub fn output(text: &str) -> Result<NatsAddress> {
+        NatsAddress::parse(text, Way::Out)
+    }
+
+    fn parse(text: &str, way: Way) -> Result<NatsAddress> {
+        let (before, known) = match way {
+            Way::In => ("serve", KNOWN_IN),
+            Way::Out => ("-o", KNOWN_OUT),
+        };
+        let refuse = |what: &str| {
+            let shown = Address::from(text);
+            Error::usage(Diagnostic::new(format!("{before} {shown}: {what}")).help(known))
+        };
+        let rest = text
+            .strip_prefix("nats://")
+            .filter(|_| text.len() <= MAX_BYTES && !text.chars().any(char::is_control))
+            .ok_or_else(|| refuse("is no address of NATS"))?;
+        let (rest, query) = rest.split_once('?').unwrap_or((rest, ""));
+        let given = parameters(query).ok_or_else(|| refuse("a `%` needs two digits after it"))?;
+        let (authority, subject) = rest.split_once('/').unwrap_or((rest, ""));
+        let has_port = match authority.rsplit_once(']') {
+            Some((_, port)) => port.starts_with(':'),
+            None => authority.contains(':'),
+        };
+        let full = match has_port {
+            true => authority.to_owned(),
+            false => format!("{authority}:{PORT}"),
+        };
+        let place = Place::parse(&full).map_err(|what| refuse(&what))?;
+        let ours: &[&str] = match way {
+            Way::In => &[
+                "id",
+                "stream",
+                "from",
+                "state",
+                "p",
+                "user",
+                "password-file",
+                "token-file",
+                "ca-file",
+            ],
+            Way::Out => &["stream", "user", "password-file", "token-file", "ca-file"],
+        };
+        if let Some((other, _)) = given.iter().find(|(n, _)| !ours.contains(&n.as_str())) {
+            return Err(refuse(&format!("there is no ?{}=", printable(other))));
+        }
+        let of = |name: &str| -> Result<Option<&str>> {
+            let mut values = given.iter().filter(|(n, _)| n == name);
+            match (values.next(), values.next()) {
+                (Some(_), Some(_)) => Err(refuse(&format!("?{name}= is given twice"))),
+                (Some((_, value)), None) if value.is_empty() => {
+                    Err(refuse(&format!("?{name}= is empty")))
+                }
+                (value, _) => Ok(value.map(|(_, v)| v.as_str())),
+            }
+        };
+        let login = match (of("user")?, of("password-file")?, of("token-file")?) {
+            (None, None, None) => Login::Nobody,
+            (Some(user), Some(file), None) => Login::User(
+                user.to_owned(),
+                Secret::of_others("password-file", Path::new(file))?,
+            ),
+            (None, None, Some(file)) => {
+                Login::Token(Secret::of_others("token-file", Path::new(file))?)
+            }
+            _ => {
+                return Err(refuse(
+                    "?user= goes with ?password-file=, and ?token-file= with neither",
+                ));
+            }
+        };
+        let named = |name: &str| -> Result<Option<String>> {
+            match of(name)? {
+                Some(value) if !is_name(value) => Err(refuse(&format!(
+                    "?{name}=: a name of letters, digits, - and _"
+                ))),
+                value => Ok(value.map(str::to_owned)),
+            }
+        };
+        let stream = named("stream")?;
+        let from = match of("from")? {
+            None | Some("new") => From::New,
+            Some("all") => From::All,
+            Some(number) => From::Sequence(
+                number
+                    .parse()
+                    .map_err(|_| refuse("?from= is new, all, or the number of a message"))?,
+            ),
+        };
+        let partition = match of("p")? {
+            None => None,
+            Some(p) => Some(
+                p.parse::<u32>()
+                    .ok()
+                    .filter(|p| *p <= MAX_PARTITION)
+                    .ok_or_else(|| refuse("?p= is the number of a partition"))?,
+            ),
+        };
+        let lease = match (named("state")?, partition) {
+            (None, _) => None,
+            (Some(_), None) => return Err(refuse("?state= needs ?p=, the partition it is of")),
+            (Some(bucket), Some(p)) => Some(LeaseKey {
+                bucket,
+                key: format!("p.{p}"),
+            }),
+        };
+        if stream.is_none() && (lease.is_some() || from != From::New) {
+            return Err(refuse(
+                "?state= and ?from= are of a stream: ?stream=NAME names it; without one, what is missed is gone",
+            ));
+        }
+        let subject = match (subject.contains("{p}"), partition) {
+            (true, None) => return Err(refuse("{p} in the subject needs ?p=")),
+            (_, Some(p)) => subject.replace("{p}", &p.to_string()),
+            (false, None) => subject.to_owned(),
+        };
+        check(&subject, way).map_err(refuse)?;
+        let id = match of("id")? {
+            None => None,
+            Some(_) if subject.contains(['*', '>']) => {
+                return Err(refuse(
+                    "?id= names one sensor, and the subject may be of many",
+                ));
+            }
+            Some(id) => Some(exact_name(id).map_err(|why| refuse(&format!("?id=: {why}")))?),
+        };
+        let mut name = format!("nats://{place}/{subject}");
+        for said in ["stream", "id", "state", "p"] {
+            if let Some(value) = of(said)? {
+                name.push(if name.contains('?') { '&' } else { '?' });
+                name.push_str(&format!("{said}={}", printable(value)));
+            }
+        }
+        Ok(NatsAddress {
+            place,
+            subject,
+            login,
+            ca_file: of("ca-file")?.map(PathBuf::from),
+            stream,
+            from,
+            id,
+            lease,
+            name,
+        })
+    }
+
+    /// The subject of this sensor: of its name, what no token can hold is written `%XX`.
+    #[must_use]
+    pub fn subject_of(&self, id: &str) -> String {
+        let token = encoded(id, b"").replace('.', "%2E");
+        self.subject.replace("{id}", &token)
+    }
+}
+
+fn is_name(text: &str) -> bool {
+    text.bytes()
+        .all(|b| b.is_ascii_alphanumeric() || b"-_".contains(&b))
+}
+
+/// Whether a server takes this subject.
+fn check(subject: &str, way: Way) -> std::result::Result<(), &'static str> {
+    if subject.is_empty() {
+        return Err("a subject is needed behind the server");
+    }
+    let mut tokens = subject.split('.').peekable();
+    while let Some(token) = tokens.next() {
+        if token.is_empty() || token.chars().any(|c| c.is_whitespace() || c.is_control()) {
+            return Err("the subject has a token that is empty or holds a blank");
+        }
+        match (way, token) {
+            (Way::In, "*") => {}
+            (Way::In, ">") if tokens.peek().is_none() => {}
+            _ if token.contains(['*', '>']) => {
+                return Err("a wildcard is a whole token of what is subscribed to, and > the last");
+            }
+            _ => {}
+        }
+    }
+    if way == Way::Out && !subject.split('.').any(|token| token == "{id}") {
+        return Err("{id} is to be one token of the subject, so that each sensor has its own");
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_server_and_its_subject_are_read_with_what_belongs_to_them() {
+        let plain = NatsAddress::source("nats://broker/imu.*").unwrap();
+        assert_eq!(plain.name, "nats://broker:4222/imu.*");
+        assert_eq!((plain.from, plain.stream), (From::New, None));
+        let whole =
+            NatsAddress::source("nats://[::1]:7/imu.{p}.>?stream=IMU&from=12&state=STRAPD&p=3")
+                .unwrap();
+        assert_eq!(whole.subject, "imu.3.>");
+        assert_eq!(whole.from, From::Sequence(12));
+        assert_eq!(whole.lease.unwrap().key, "p.3");
+        assert_eq!(
+            whole.name,
+            "nats://[::1]:7/imu.3.>?stream=IMU&state=STRAPD&p=3"
+        );
+        let out = NatsAddress::output("nats://:4222/att.{id}").unwrap();
+        assert_eq!(out.subject_of("imu0"), "att.imu0");
+        assert_eq!(out.subject_of("a.b *>\u{7}"), "att.a%2Eb%20%2A%3E%07");
+    }
+
+    #[test]
+    fn what_no_server_could_take_is_refused_with_what_is_known() {
+        for (text, part) in [
+            ("nats://h", "a subject is needed"),
+            ("nats://h/", "a subject is needed"),
+            ("nats://h/a..b", "empty"),
+            ("nats://h/a b", "blank"),
+            ("nats://h/a.>.b", "wildcard"),
+            ("nats://h/a*", "wildcard"),
+            ("nats://user:secret@h/a", "no user or password"),
+            ("nats://h/a?x=1", "no ?x="),
+            ("nats://h/a?id=b&id=c", "twice"),
+            ("nats://h/a.*?id=b", "many"),
+            ("nats://h/a?from=all", "?stream="),
+            ("nats://h/a?stream=S&state=B", "?p="),
+            ("nats://h/a.{p}", "needs ?p="),
+            ("nats://h/a?stream=S&state=B&p=x", "partition"),
+            ("nats://h/a?stream=a.b", "letters"),
+            ("nats://h/a?user=u", "?password-file="),
+            ("nats://h:0x/a", "no port"),
+        ] {
+            let said = NatsAddress::source(text).unwrap_err().to_string();
+            assert!(
+                said.contains(part) && said.contains("nats://HOST"),
+                "{text}: {said}"
+            );
+            assert!(!said.contains("secret"), "{said}");
+        }
+        for (text, part) in [
+            ("nats://h/att", "{id}"),
+            ("nats://h/att.x{id}", "{id}"),
+            ("nats://h/att.{id}.*", "wildcard"),
+            ("nats://h/att.{id}?from=all", "no ?from="),
+        ] {
+            let said = NatsAddress::output(text).unwrap_err().to_string();
+            assert!(said.contains(part), "{text}: {said}");
+        }
+    }
+}

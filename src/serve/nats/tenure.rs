@@ -1,0 +1,149 @@
+//! The lease -> whether attitudes may leave; the outputs -> whether all have. Locks.
+
+use crate::serve::chunk::MAX_QUEUED;
+use crate::serve::hub::Client;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+use tokio::sync::watch;
+use tokio::time::{sleep, timeout};
+
+/// With more than this waiting for a server, no more samples are taken.
+const CROWDED: usize = MAX_QUEUED / 2;
+/// How often is looked whether there is room.
+const LOOK: Duration = Duration::from_micros(500);
+
+/// Which sensors are ours, and until when.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Tenure {
+    /// No lease is needed.
+    #[default]
+    Free,
+    /// Others may have them.
+    None {
+        /// How many leases came before.
+        number: u64,
+    },
+    /// Ours.
+    Held {
+        /// How many leases came before this one.
+        number: u64,
+        /// From when on others may take it, unless it is renewed.
+        until: Instant,
+    },
+}
+
+impl Tenure {
+    /// Tells one tenure from the next.
+    #[must_use]
+    pub fn number(self) -> u64 {
+        match self {
+            Tenure::Free => 0,
+            Tenure::None { number } | Tenure::Held { number, .. } => number,
+        }
+    }
+
+    /// Whether attitudes may leave now.
+    #[must_use]
+    pub fn permits(self, now: Instant) -> bool {
+        match self {
+            Tenure::Free => true,
+            Tenure::None { .. } => false,
+            Tenure::Held { until, .. } => now < until,
+        }
+    }
+}
+
+/// What the subscription and the outputs of one daemon know of each other.
+#[derive(Debug, Default)]
+pub struct Tenancy {
+    tenure: watch::Sender<Tenure>,
+    outputs: Mutex<Vec<Arc<Client>>>,
+}
+
+impl Tenancy {
+    /// As it is now.
+    #[must_use]
+    pub fn now(&self) -> Tenure {
+        *self.tenure.borrow()
+    }
+
+    /// Told of every change.
+    #[must_use]
+    pub fn changes(&self) -> watch::Receiver<Tenure> {
+        self.tenure.subscribe()
+    }
+
+    /// It changes.
+    pub fn set(&self, tenure: Tenure) {
+        self.tenure.send_replace(tenure);
+    }
+
+    /// Attitudes of this client are published.
+    pub fn add(&self, output: &Arc<Client>) {
+        self.outputs().push(output.clone());
+    }
+
+    fn outputs(&self) -> std::sync::MutexGuard<'_, Vec<Arc<Client>>> {
+        // A list is whole after every statement.
+        self.outputs.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn most_queued(&self) -> usize {
+        let outputs = self.outputs();
+        outputs
+            .iter()
+            .map(|client| client.outbox.level().queued)
+            .max()
+            .unwrap_or(0)
+    }
+
+    /// Whether so much waits to be published that no more samples are to be taken.
+    #[must_use]
+    pub fn is_crowded(&self) -> bool {
+        self.most_queued() > CROWDED
+    }
+
+    /// Until there is room.
+    pub async fn room(&self) {
+        while self.is_crowded() {
+            sleep(LOOK).await;
+        }
+    }
+
+    /// Until every attitude has left and was stored; `false`: not in this time.
+    pub async fn has_published(&self, within: Duration) -> bool {
+        let all = async {
+            while self.most_queued() > 0 {
+                sleep(LOOK).await;
+            }
+        };
+        timeout(within, all).await.is_ok()
+    }
+
+    /// What waits is dropped: the sensors are somebody else's.
+    pub fn forget(&self) {
+        for client in self.outputs().iter() {
+            client.outbox.forget();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn attitudes_leave_while_the_lease_is_held_and_not_a_moment_longer() {
+        let now = Instant::now();
+        let until = now + Duration::from_secs(1);
+        assert!(Tenure::Free.permits(now));
+        assert!(!Tenure::None { number: 1 }.permits(now));
+        let held = Tenure::Held { number: 1, until };
+        assert!(held.permits(until - Duration::from_nanos(1)));
+        assert!(!held.permits(until) && !held.permits(until + Duration::from_secs(9)));
+        let tenancy = Tenancy::default();
+        assert_eq!(tenancy.now(), Tenure::Free);
+        tenancy.set(held);
+        assert_eq!(tenancy.now().number(), 1);
+    }
+}

