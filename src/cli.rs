@@ -264,6 +264,9 @@ pub fn start_diagnostics(global: &Global) {
     // Below that it says each request as it goes out, with tokens and keys.
     let most = targets.default_level().unwrap_or(LevelFilter::OFF);
     let targets = targets.with_target("tungstenite", most.min(LevelFilter::DEBUG));
+    // What it says of its connection we say in our own words.
+    #[cfg(feature = "nats")]
+    let targets = targets.with_target("async_nats", most.min(LevelFilter::WARN));
     let layer = tracing_subscriber::fmt::layer()
         .with_writer(std::io::stderr)
         .with_target(false)

@@ -22,6 +22,22 @@ struct State {
     attempts: u64,
     connections: u64,
     last_error: Option<String>,
+    #[cfg(feature = "nats")]
+    stream: StreamPlace,
+}
+
+/// How far a stream of a broker has been read, and whether we may.
+#[cfg(feature = "nats")]
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct StreamPlace {
+    /// Number of the last message that was taken.
+    pub(super) sequence: Option<u64>,
+    /// How many messages it has behind that.
+    pub(super) lag: Option<u64>,
+    /// Whether the partition is ours, where there is a lease of it.
+    pub(super) is_held: Option<bool>,
+    /// How often it has become ours.
+    pub(super) turns: u64,
 }
 
 impl Outgoing {
@@ -36,6 +52,8 @@ impl Outgoing {
                 attempts: 0,
                 connections: 0,
                 last_error: None,
+                #[cfg(feature = "nats")]
+                stream: StreamPlace::default(),
             }),
         }
     }
@@ -49,12 +67,19 @@ impl Outgoing {
     #[must_use]
     pub fn status(&self) -> serde_json::Value {
         let state = self.state();
+        #[cfg(not(feature = "nats"))]
+        let stream = serde_json::Value::Null;
+        #[cfg(feature = "nats")]
+        let stream = serde_json::json!({
+            "sequence": state.stream.sequence, "lag": state.stream.lag,
+            "held": state.stream.is_held, "turns": state.stream.turns,
+        });
         serde_json::json!({
             "uri": self.name(), "id": self.endpoint.id(),
             "connected": state.peer.is_some(), "peer": state.peer,
             "since_s": state.since.elapsed().as_secs_f64(),
             "attempts": state.attempts, "connections": state.connections,
-            "last_error": state.last_error,
+            "last_error": state.last_error, "stream": stream,
         })
     }
 
@@ -66,6 +91,12 @@ impl Outgoing {
     /// Its address, for people.
     pub(super) fn name(&self) -> &str {
         self.endpoint.name()
+    }
+
+    /// How far it has been read changes.
+    #[cfg(feature = "nats")]
+    pub(super) fn place(&self, change: impl FnOnce(&mut StreamPlace)) {
+        change(&mut self.state().stream);
     }
 
     /// Another attempt begins.

@@ -20,6 +20,7 @@ import struct
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 
 import nats
@@ -27,6 +28,7 @@ from nats.js.api import StorageType, StreamConfig
 
 STRAPD = sys.argv[1]
 EVERY_NS = 10_000_000
+STARTED = []
 
 
 def server_binary():
@@ -48,6 +50,7 @@ class Server:
             + self.more,
             stderr=open(os.path.join(self.folder, "server.log"), "a"),
         )
+        STARTED.append(self.process)
         for _ in range(200):
             found = [n for n in os.listdir(self.folder) if n.endswith(f"{self.process.pid}.ports")]
             if found:
@@ -77,6 +80,7 @@ class Worker:
     def start(self):
         env = {k: v for k, v in os.environ.items() if not k.startswith("STRAPD_")}
         self.process = subprocess.Popen(self.arguments, stderr=self.errors, env=env)
+        STARTED.append(self.process)
 
     def said(self):
         with open(self.log) as f:
@@ -87,9 +91,29 @@ class Worker:
         for _ in range(200):
             for word in self.said().split():
                 if word.startswith("tcp-listen://"):
-                    return int(word.rstrip(",;").rsplit(":", 1)[1])
+                    self.port = int(word.rstrip(",;").rsplit(":", 1)[1])
+                    return self.port
             time.sleep(0.05)
         raise SystemExit(f"no ready line: {self.said()}")
+
+    async def subscribed(self):
+        """Until its source is connected."""
+        await until(lambda: self.status()["outgoing"][0]["connected"], 20, self.said())
+        # That it asks the server for what it wants comes right after.
+        await asyncio.sleep(0.3)
+
+    def status(self):
+        with socket.create_connection(("127.0.0.1", self.port), timeout=5) as poll:
+            poll.sendall(b'{"class":"POLL"}\n')
+            for text in poll.makefile("rb"):
+                if b'"STATUS"' in text:
+                    return json.loads(text)
+
+    def turns(self):
+        return self.status()["outgoing"][0]["stream"]["turns"]
+
+    def has_it(self):
+        return self.status()["outgoing"][0]["stream"]["held"]
 
     def end(self):
         self.process.send_signal(signal.SIGCONT)
@@ -119,7 +143,7 @@ async def until(what, seconds, why):
     end = time.monotonic() + seconds
     while not what():
         if time.monotonic() > end:
-            raise SystemExit(f"waited {seconds} s in vain: {why}")
+            raise SystemExit(f"waited {seconds} s in vain: {why() if callable(why) else why}")
         await asyncio.sleep(0.02)
 
 
@@ -132,22 +156,32 @@ def straight(folder, lines_of):
     watched = watcher.makefile("rb")
     while b'"WATCH"' not in watched.readline():
         pass
-    out = {}
-    for sensor, lines in lines_of.items():
-        sender = socket.create_connection(("127.0.0.1", port))
-        count = 0
-        for text in lines:
-            told = json.loads(text)
-            told["id"] = sensor
-            sender.sendall(json.dumps(told).encode() + b"\n")
-            count += 1
-        got = []
-        while len(got) < count:
+    out = {sensor: [] for sensor in lines_of}
+
+    def watch():
+        left = sum(map(len, lines_of.values()))
+        while left > 0:
             text = watched.readline()
+            assert b'"GAP"' not in text, text
             if b'"ATT"' in text:
-                got.append(text)
-        out[sensor] = got
-        sender.close()
+                out[json.loads(text)["id"]].append(text)
+                left -= 1
+
+    watching = threading.Thread(target=watch)
+    watching.start()
+    for sensor, lines in lines_of.items():
+        with socket.create_connection(("127.0.0.1", port)) as sender:
+            for n, text in enumerate(lines):
+                told = json.loads(text)
+                told["id"] = sensor
+                sender.sendall(json.dumps(told).encode() + b"\n")
+                if n % 100 == 99:
+                    time.sleep(0.01)
+            # Who closes with answers unread resets the connection, and what was on its way is gone.
+            sender.shutdown(socket.SHUT_WR)
+            while sender.recv(4096):
+                pass
+    watching.join()
     worker.end()
     return out
 
@@ -166,8 +200,7 @@ async def core(folder):
 
     await client.subscribe("att.*", cb=take)
     await client.flush()
-    await until(lambda: "connected" in worker.said() or True, 1, "")
-    await asyncio.sleep(0.5)
+    await worker.subscribed()
     count = 500
     samples = {f"s{n}": [line(n, k) for k in range(count)] for n in range(4)}
     for k in range(0, count, 50):
@@ -176,7 +209,7 @@ async def core(folder):
             block = b"".join(lines[k : k + 50]) if n % 2 == 0 else b"".join(packed(n, j) for j in range(k, k + 50))
             await client.publish(f"imu.{sensor}", block)
     await client.flush()
-    await until(lambda: sum(map(len, got.values())) >= 4 * count, 10, f"attitudes: { {k: len(v) for k, v in got.items()} }")
+    await until(lambda: sum(map(len, got.values())) >= 4 * count, 10, lambda: f"attitudes: { {k: len(v) for k, v in got.items()} }")
     await client.close()
     expected = straight(folder, samples)
     for sensor in samples:
@@ -218,7 +251,7 @@ async def faults(folder):
     await client.subscribe("att.*", cb=take)
     await client.subscribe("imu.*.err", cb=hear)
     await client.flush()
-    await asyncio.sleep(0.5)
+    await worker.subscribed()
     for n in range(200):
         await client.publish("imu.bad", b"no sample\n")
     await client.publish("imu.large", b"x" * ((1 << 20) - 10))
@@ -272,7 +305,6 @@ async def handover(folder, kills, stops):
         f"{at}/att.{{id}}?stream=ATT",
     )
     workers = [Worker(folder, f"worker{n}", *arguments) for n in range(2)]
-    ours = [time.monotonic()]
     samples = {f"s{n}": [] for n in range(sensors)}
     stored = {name: [] for name in samples}
     arrivals = []
@@ -297,24 +329,21 @@ async def handover(folder, kills, stops):
 
     sending = asyncio.create_task(send())
 
-    def holder():
-        """Which of the two has the partition: it said so last."""
-        texts = [worker.said() for worker in workers]
-        return [text.rfind("is ours") > text.rfind("another worker's") for text in texts]
-
-    await until(lambda: any(holder()), 10, "one of them takes the partition")
+    for worker in workers:
+        worker.listens()
+    await until(lambda: any(worker.has_it() for worker in workers), 10, "one of them takes the partition")
     await until(lambda: arrivals, 10, "attitudes")
     chance, longest, offsets = random.Random(7), 0.0, []
     for turn in range(kills + stops):
         await asyncio.sleep(chance.uniform(0.6, 1.4))
-        has = [n for n in range(2) if holder()[n] and workers[n].process.poll() is None]
+        has = [n for n in range(2) if workers[n].has_it()]
         assert len(has) == 1, (has, [worker.said() for worker in workers])
         victim, other = workers[has[0]], workers[1 - has[0]]
-        before = other.said().count("is ours")
+        before = other.turns()
         is_kill = turn < kills
         victim.process.send_signal(signal.SIGKILL if is_kill else signal.SIGSTOP)
         began = time.monotonic()
-        await until(lambda: other.said().count("is ours") > before, 10, f"take-over {turn}: {other.said()[-500:]}")
+        await until(lambda: other.turns() > before, 10, f"take-over {turn}: {other.said()[-500:]}")
         mark = time.monotonic()
         await until(lambda: arrivals and arrivals[-1] > mark, 10, "attitudes after the take-over")
         longest = max(longest, arrivals[-1] - began)
@@ -322,15 +351,15 @@ async def handover(folder, kills, stops):
             victim.process.wait()
             open(victim.log, "w").close()
             victim.start()
+            victim.listens()
         else:
             victim.process.send_signal(signal.SIGCONT)
-            seen = victim.said().count("another worker's")
-            await until(lambda: victim.said().count("another worker's") > 0 or seen, 10, f"{turn}: it has not noticed")
+            await until(lambda: not victim.has_it(), 10, f"{turn}: it has not noticed")
     await asyncio.sleep(1)
     ending.set()
     await sending
     count = len(samples["s0"])
-    await until(lambda: all(len(v) >= count for v in stored.values()), 15, f"of {count}: { {k: len(v) for k, v in stored.items()} }")
+    await until(lambda: all(len(v) >= count for v in stored.values()), 15, lambda: f"of {count}: { {k: len(v) for k, v in stored.items()} }")
     await asyncio.sleep(0.5)
     for worker in workers:
         worker.end()
@@ -360,13 +389,6 @@ async def speed(folder):
         for n in range(sensors)
     ]
 
-    def taken(port):
-        with socket.create_connection(("127.0.0.1", port)) as poll:
-            poll.sendall(b'{"class":"POLL"}\n')
-            for text in poll.makefile("rb"):
-                if b'"STATUS"' in text:
-                    return json.loads(text)["counters"]["samples"]
-
     def cpu(worker):
         with open(f"/proc/{worker.process.pid}/stat") as f:
             fields = f.read().rsplit(")", 1)[1].split()
@@ -376,7 +398,9 @@ async def speed(folder):
         source = {"core": [f"{at}/imu.*"], "stream": [f"{at}/js.*?stream=IMU&from=new"], "tcp": []}[way]
         worker = Worker(folder, way, "--listen", "tcp-listen://127.0.0.1:0", *source)
         port = worker.listens()
-        await asyncio.sleep(0.7)
+        if source:
+            await worker.subscribed()
+        taken = lambda: worker.status()["counters"]["samples"]
         began = time.monotonic()
         if way == "tcp":
             with socket.create_connection(("127.0.0.1", port)) as sender:
@@ -385,7 +409,7 @@ async def speed(folder):
                 for n, data in blocks:
                     # The number of the stream in each object.
                     sender.sendall(b"".join(data[i : i + 4] + struct.pack("<I", n) + data[i + 8 : i + 48] for i in range(0, len(data), 48)))
-                while taken(port) < total:
+                while taken() < total:
                     time.sleep(0.01)
         else:
             prefix = "imu" if way == "core" else "js"
@@ -394,7 +418,7 @@ async def speed(folder):
                 if i % 64 == 63:
                     await client.flush()
             await client.flush()
-            while (got := taken(port)) < total:
+            while (got := taken()) < total:
                 await asyncio.sleep(0.01)
                 if time.monotonic() > began + 60:
                     raise SystemExit(f"{way}: {got} of {total}: {worker.said()}")
@@ -431,7 +455,12 @@ def main():
             case _:
                 raise SystemExit(__doc__)
     finally:
-        shutil.rmtree(folder, ignore_errors=True)
+        for process in STARTED:
+            # Nothing outlives its test.
+            if process.poll() is None:
+                process.kill()
+        if "KEEP" not in os.environ:
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 main()

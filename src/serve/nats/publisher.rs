@@ -2,7 +2,7 @@
 
 use super::address::NatsAddress;
 use super::connection::{connect, in_words};
-use super::tenure::Tenancy;
+use super::tenure::{Tenancy, Tenure};
 use crate::serve::chunk::Chunk;
 use crate::serve::connect::Redial;
 use crate::serve::filter::Filter;
@@ -171,7 +171,7 @@ impl Publisher {
         }
         while !batches.is_empty() {
             let tenure = self.tenancy.now();
-            if tenure.number() != number {
+            if tenure.number() != number || matches!(tenure, Tenure::None { .. }) {
                 return;
             }
             let is_there = self.client.connection_state() == State::Connected;

@@ -57,6 +57,8 @@ struct Reader {
     /// Number of the last message of the stream that was taken.
     sequence: Option<u64>,
     complained: Option<Instant>,
+    /// The server of the outputs takes nothing.
+    has_waited_in_vain: bool,
 }
 
 /// Reads until the daemon ends.
@@ -88,6 +90,7 @@ pub(in crate::serve) async fn keep(
     let mut reader = Reader {
         sequence: None,
         complained: None,
+        has_waited_in_vain: false,
         address,
         outgoing,
         hub,
@@ -105,7 +108,11 @@ pub(in crate::serve) async fn keep(
 /// What the connection says of itself.
 fn hear(event: &Event, outgoing: &Outgoing, peer: &str) {
     match event {
-        Event::Connected => outgoing.connected(peer),
+        Event::Connected => {
+            outgoing.connected(peer);
+            let name = outgoing.name();
+            log_throttle::info(&format!("{name} connected"), &format!("{name}: connected"));
+        }
         Event::Disconnected => {
             outgoing.lost("the connection was lost");
             log_throttle::warn(
@@ -140,6 +147,7 @@ impl Reader {
         let worker = worker_name(&self.hub.session());
         let mut redial = Redial::default();
         self.tenancy.set(Tenure::None { number: 0 });
+        self.outgoing.place(|place| place.is_held = Some(false));
         loop {
             let taken = tokio::select! {
                 taken = self.acquire(key, &worker) => taken,
@@ -168,9 +176,14 @@ impl Reader {
                 ),
             );
             self.hub.restore(document.sensors);
+            self.outgoing.place(|place| {
+                place.is_held = Some(true);
+                place.turns += 1;
+            });
             let keeping = tokio::spawn(lease.clone().keep(self.tenancy.clone()));
             let ended = self.read_on(Some((&lease, ids)), running).await;
             keeping.abort();
+            self.outgoing.place(|place| place.is_held = Some(false));
             if ended {
                 lease.release(&self.tenancy).await;
                 return;
@@ -261,9 +274,8 @@ impl Reader {
         tick.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let mut tenure = self.tenancy.changes();
         let tenancy = self.tenancy.clone();
-        let waits = lease.is_some() || self.address.stream.is_some();
         loop {
-            let is_crowded = waits && tenancy.is_crowded();
+            let is_crowded = self.waits() && tenancy.is_crowded();
             let is_lost = async {
                 let is_lost = |t: &Tenure| lease.is_some() && matches!(t, Tenure::None { .. });
                 // Whoever sets it lives as long as we do.
@@ -278,17 +290,29 @@ impl Reader {
                         self.checkpoint(session, lease, ids).await;
                     }
                 }
-                () = tenancy.room(), if is_crowded => {}
+                has_room = tenancy.has_room(PATIENCE), if is_crowded => {
+                    self.has_waited_in_vain = !has_room;
+                }
                 message = messages.next(), if !is_crowded => match message {
                     Ok(Some(message)) => {
-                        self.take(session, &message, waits).await;
+                        self.take(session, &message).await;
                         self.sequence = message.sequence.or(self.sequence);
+                        self.outgoing.place(|place| {
+                            (place.sequence, place.lag) = (self.sequence, message.lag);
+                        });
                     }
                     Ok(None) => return Ended::Failed("the subscription has ended".to_owned()),
                     Err(why) => return Ended::Failed(why),
                 },
             }
         }
+    }
+
+    /// Whether to wait until the outputs have room. A stream keeps what comes meanwhile; without one, a
+    /// server that takes nothing is waited for once.
+    fn waits(&mut self) -> bool {
+        self.has_waited_in_vain &= self.tenancy.is_crowded();
+        self.address.stream.is_some() || !self.has_waited_in_vain
     }
 
     async fn subscribe(&self) -> Result<Messages, String> {
@@ -333,7 +357,7 @@ impl Reader {
     }
 
     /// One message -> samples, step by step.
-    async fn take(&mut self, session: &mut Session, message: &Message, waits: bool) {
+    async fn take(&mut self, session: &mut Session, message: &Message) {
         // Our own answers.
         if message.subject.ends_with(ERRORS) {
             return;
@@ -356,8 +380,8 @@ impl Reader {
                 break;
             }
             yield_now().await;
-            if waits {
-                self.tenancy.room().await;
+            while self.waits() && self.tenancy.is_crowded() {
+                self.has_waited_in_vain = !self.tenancy.has_room(PATIENCE).await;
             }
             in_room(|_, scratch| session.go_on(scratch));
         }
@@ -410,6 +434,8 @@ struct Message {
     payload: Bytes,
     /// Its number in the stream.
     sequence: Option<u64>,
+    /// How many more the stream has.
+    lag: Option<u64>,
 }
 
 enum Messages {
@@ -424,17 +450,20 @@ impl Messages {
                 subject: message.subject,
                 payload: message.payload,
                 sequence: None,
+                lag: None,
             })),
             Messages::Stream(ordered) => match ordered.next().await {
                 None => Ok(None),
                 Some(Err(why)) => Err(in_words(&why)),
                 Some(Ok(message)) => {
-                    let sequence = message.info().map_err(|e| e.to_string())?.stream_sequence;
+                    let info = message.info().map_err(|e| e.to_string())?;
+                    let (sequence, lag) = (info.stream_sequence, info.pending);
                     let message = message.message;
                     Ok(Some(Message {
                         subject: message.subject,
                         payload: message.payload,
                         sequence: Some(sequence),
+                        lag: Some(lag),
                     }))
                 }
             },

@@ -103,21 +103,23 @@ impl Tenancy {
         self.most_queued() > CROWDED
     }
 
-    /// Until there is room.
-    pub async fn room(&self) {
-        while self.is_crowded() {
-            sleep(LOOK).await;
-        }
+    /// Until there is room; `false`: not in this time.
+    pub async fn has_room(&self, within: Duration) -> bool {
+        self.has_fewer(CROWDED, within).await
     }
 
     /// Until every attitude has left and was stored; `false`: not in this time.
     pub async fn has_published(&self, within: Duration) -> bool {
-        let all = async {
-            while self.most_queued() > 0 {
+        self.has_fewer(0, within).await
+    }
+
+    async fn has_fewer(&self, queued: usize, within: Duration) -> bool {
+        let fewer = async {
+            while self.most_queued() > queued {
                 sleep(LOOK).await;
             }
         };
-        timeout(within, all).await.is_ok()
+        timeout(within, fewer).await.is_ok()
     }
 
     /// What waits is dropped: the sensors are somebody else's.

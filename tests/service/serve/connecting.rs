@@ -7,7 +7,7 @@ use std::io::{BufRead, BufReader, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::process::Command;
 use std::sync::mpsc::{Receiver, channel};
-use strapd::serve::source::Source;
+use strapd::serve::source::Endpoint;
 use tungstenite::Message;
 use tungstenite::handshake::server::{Request, Response};
 
@@ -20,7 +20,7 @@ fn listen() -> (TcpListener, SocketAddr) {
 /// A daemon with these sources.
 fn fed_by(sources: &[String]) -> Daemon {
     let mut settings = listening(&[TCP, WS]);
-    settings.sources = sources.iter().map(|s| Source::parse(s).unwrap()).collect();
+    settings.sources = sources.iter().map(|s| Endpoint::parse(s).unwrap()).collect();
     Daemon::start(settings)
 }
 
@@ -109,7 +109,7 @@ fn a_source_that_comes_goes_and_comes_again_is_one_sensor_with_a_gap() {
 fn a_peer_that_says_nothing_stays_connected_beyond_every_limit_on_clients() {
     let (listener, address) = listen();
     let mut settings = listening(&[TCP]);
-    settings.sources = vec![Source::parse(&format!("tcp://{address}")).unwrap()];
+    settings.sources = vec![Endpoint::parse(&format!("tcp://{address}")).unwrap()];
     settings.limits.first_line = std::time::Duration::from_millis(20);
     settings.limits.no_progress = std::time::Duration::from_millis(20);
     let daemon = Daemon::start(settings);
@@ -271,7 +271,7 @@ fn a_daemon_never_listens_to_itself() {
     let (listener, address) = listen();
     drop(listener);
     let mut settings = listening(&[&format!("tcp-listen://{address}")]);
-    settings.sources = vec![Source::parse(&format!("tcp://{address}")).unwrap()];
+    settings.sources = vec![Endpoint::parse(&format!("tcp://{address}")).unwrap()];
     let daemon = Daemon::start(settings);
     eventually("it has noticed", || {
         outgoing(&daemon, 0)["last_error"]
@@ -356,7 +356,7 @@ fn a_file_names_sources_and_their_sensors() {
     assert_eq!(code, Some(0), "{shown}");
     let uri = "ws://phone:8080/sensor/connect?type=android.sensor.gyroscope&id=my%20phone";
     assert!(shown.contains(&format!("source = [\"{uri}\"]")), "{shown}");
-    assert_eq!(Source::parse(uri).unwrap().id.as_deref(), Some("my phone"));
+    assert_eq!(Endpoint::parse(uri).unwrap().id(), Some("my phone"));
     assert_eq!(ask("check", table).0, Some(0));
     assert_eq!(ask("check", "source = [\"tcp://a:1\", \"-\"]\n").0, Some(0));
     for (text, part) in [

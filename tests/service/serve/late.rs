@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
-use strapd::serve::source::Source;
+use strapd::serve::source::Endpoint;
 
 const WATCH: &str = r#"{"class":"WATCH"}"#;
 
@@ -252,7 +252,7 @@ fn a_daemon_behind_a_daemon_takes_no_last_attitude_for_a_sample() {
     let mut sender = Client::tcp(first.address(0));
     send(&mut sender, &mut early, "a", 0..5);
     let mut settings = listening(&[TCP]);
-    settings.sources = vec![Source::parse(&format!("tcp://{}", first.address(0))).unwrap()];
+    settings.sources = vec![Endpoint::parse(&format!("tcp://{}", first.address(0))).unwrap()];
     let second = Daemon::start(settings);
     let mut far = Client::tcp(second.address(0)).watching(WATCH);
     eventually("the second watches the first", || {

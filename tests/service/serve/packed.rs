@@ -15,7 +15,7 @@ use strapd::serve::Settings;
 use strapd::serve::admission::Token;
 use strapd::serve::hub::Hub;
 use strapd::serve::session::{Scratch, Session};
-use strapd::serve::source::Source;
+use strapd::serve::source::Endpoint;
 use strapd_attitude::record::{Nanos, Status};
 
 const WATCH: &str = r#"{"class":"WATCH"}"#;
@@ -527,7 +527,7 @@ fn a_source_that_sends_packed_unasked_is_complained_of_and_left() {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let mut settings = listening(&[TCP]);
     let uri = format!("tcp://{}", listener.local_addr().unwrap());
-    settings.sources = vec![Source::parse(&uri).unwrap()];
+    settings.sources = vec![Endpoint::parse(&uri).unwrap()];
     let daemon = Daemon::start(settings);
     let (mut stream, _) = listener.accept().unwrap();
     // A daemon's label binds nothing here.

@@ -1,0 +1,78 @@
+//! NATS: a real server, fed and watched by a client nobody here wrote (`tests/oracles/nats_workers.py`); and what a
+//! build without it says.
+
+use crate::program::strapd;
+
+#[cfg(not(feature = "nats"))]
+#[test]
+fn a_build_without_the_feature_names_it_and_the_bridge() {
+    let dir = tempfile::tempdir().unwrap();
+    for arguments in [
+        "serve nats://127.0.0.1:4222/imu.*",
+        "serve -o nats://127.0.0.1:4222/att.{id}",
+    ] {
+        let words = ["without the feature nats", "nats sub", "--features nats"];
+        strapd(dir.path(), arguments).refused(2, &words);
+    }
+}
+
+#[cfg(feature = "nats")]
+mod built_with_it {
+    use super::*;
+    use std::path::Path;
+    use std::process::Command;
+
+    /// `STRAPD_ORACLES_PYTHON` names a Python with the packages of `benches/peers/requirements.txt`.
+    fn beside_a_server(what: &str, said: &str) {
+        let python = std::env::var_os("STRAPD_ORACLES_PYTHON").expect("it is not set");
+        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/oracles/nats_workers.py");
+        let output = Command::new(&python)
+            .arg(&script)
+            .arg(assert_cmd::cargo::cargo_bin("strapd"))
+            .args(what.split(' '))
+            .output()
+            .unwrap();
+        let text = String::from_utf8_lossy(&output.stdout).into_owned()
+            + &String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success() && text.contains(said), "{text}");
+        println!("{text}");
+    }
+
+    #[test]
+    #[cfg_attr(
+        not(has_oracles),
+        ignore = "needs STRAPD_ORACLES_PYTHON=PYTHON with the packages of benches/peers/requirements.txt"
+    )]
+    fn lines_and_packed_samples_of_subjects_give_the_bytes_of_tcp() {
+        beside_a_server("core", "each byte as over TCP");
+    }
+
+    #[test]
+    #[cfg_attr(
+        not(has_oracles),
+        ignore = "needs STRAPD_ORACLES_PYTHON=PYTHON with the packages of benches/peers/requirements.txt"
+    )]
+    fn bad_senders_wrong_passwords_and_a_server_that_restarts_are_said_and_survived() {
+        beside_a_server("faults", "errors said for 200 bad lines");
+    }
+
+    /// Fifty of each: minutes (`.ci/full brokers`).
+    #[test]
+    #[ignore = "long: .ci/full brokers"]
+    fn a_worker_that_is_killed_or_stopped_costs_no_attitude_and_no_bit() {
+        beside_a_server("handover 50 50", "none missing, none twice");
+    }
+
+    #[test]
+    fn what_no_server_could_take_is_refused_before_anything_is_bound() {
+        let dir = tempfile::tempdir().unwrap();
+        for (arguments, word) in [
+            ("serve nats://127.0.0.1:4222", "a subject is needed"),
+            ("serve nats://h/imu.*?state=B&p=0", "?stream="),
+            ("serve -o nats://h/att", "{id}"),
+            ("serve nats://h/imu.* nats://h/imu.*", "given twice"),
+        ] {
+            strapd(dir.path(), arguments).refused(2, &[word]);
+        }
+    }
+}
