@@ -20,7 +20,10 @@ fn listen() -> (TcpListener, SocketAddr) {
 /// A daemon with these sources.
 fn fed_by(sources: &[String]) -> Daemon {
     let mut settings = listening(&[TCP, WS]);
-    settings.sources = sources.iter().map(|s| Endpoint::parse(s).unwrap()).collect();
+    settings.sources = sources
+        .iter()
+        .map(|s| Endpoint::parse(s).unwrap())
+        .collect();
     Daemon::start(settings)
 }
 

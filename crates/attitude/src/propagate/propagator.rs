@@ -19,6 +19,7 @@ use crate::record::{AttitudeSample, Join, Measured, RateSample, SampleKind, Stat
 use nalgebra::Vector3;
 use state::{State, Waiting};
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 /// Intervals one call of the executor's function integrates.
 const SEGMENT: usize = 1024;
@@ -90,9 +91,9 @@ pub struct Propagator {
 /// How steps are computed.
 #[derive(Clone, Debug)]
 enum Engine {
-    Sliding(Box<Plan>),
+    Sliding(Arc<Plan>),
     Commit {
-        plan: Box<Plan>,
+        plan: Arc<Plan>,
         /// Whether finals are wanted.
         finals: bool,
         /// What has come out provisionally and is to come out for good.
@@ -113,25 +114,20 @@ impl Propagator {
         let engine = match method {
             Method::Auto => {
                 let window = if increments { 15 } else { 16 };
-                let plan = plan(window, Order::Exact, Placement::Centred, increments)?;
-                Engine::Sliding(Box::new(plan))
+                let plan = plan(window, Order::Exact, Placement::Centred, increments, false)?;
+                Engine::Sliding(plan)
             }
             Method::Magnus {
                 window,
                 order,
                 placement,
-            } => {
-                let plan = plan(window, order, placement, increments)?;
-                Engine::Sliding(Box::new(plan))
-            }
+            } => Engine::Sliding(plan(window, order, placement, increments, false)?),
             Method::CommitProvisional {
                 window,
                 order,
                 finals,
             } => Engine::Commit {
-                plan: Box::new(
-                    plan(window, order, Placement::Centred, increments)?.with_provisional(),
-                ),
+                plan: plan(window, order, Placement::Centred, increments, true)?,
                 finals,
                 open: VecDeque::new(),
             },
@@ -516,7 +512,8 @@ fn plan(
     order: Order,
     placement: Placement,
     increments: bool,
-) -> Result<Plan, SettingsError> {
+    provisional: bool,
+) -> Result<Arc<Plan>, SettingsError> {
     let smallest = if increments { 1 } else { 2 };
     if !(smallest..=LARGEST_WINDOW).contains(&window) {
         return Err(SettingsError::Window {
@@ -525,5 +522,11 @@ fn plan(
             largest: LARGEST_WINDOW,
         });
     }
-    Ok(Plan::new(window, order, placement, increments))
+    Ok(Plan::shared(
+        window,
+        order,
+        placement,
+        increments,
+        provisional,
+    ))
 }

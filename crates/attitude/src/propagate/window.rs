@@ -15,6 +15,8 @@ use super::method::{LARGEST_WINDOW, Order, Placement};
 use super::turn::Turn;
 use super::uniform::{Centred, Skewed};
 use crate::record::Status;
+use std::collections::HashMap;
+use std::sync::{Arc, LazyLock, Mutex, PoisonError, Weak};
 
 /// How many neighbouring intervals go through the kernels together.
 const GROUP: usize = 4;
@@ -134,7 +136,36 @@ pub(crate) struct Plan {
     loud: f64,
 }
 
+/// What makes two plans the same.
+type Key = (usize, Order, Placement, bool, bool);
+
+/// Plans in use: 40 kB each, which a thousand streams of one method share. No more than there are keys.
+static PLANS: LazyLock<Mutex<HashMap<Key, Weak<Plan>>>> = LazyLock::new(Mutex::default);
+
 impl Plan {
+    /// The plan of every stream with this window, `provisional` ones with what those need.
+    pub(crate) fn shared(
+        window: usize,
+        order: Order,
+        placement: Placement,
+        increments: bool,
+        provisional: bool,
+    ) -> Arc<Self> {
+        let key = (window, order, placement, increments, provisional);
+        // A map is whole after every statement.
+        let mut plans = PLANS.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(plan) = plans.get(&key).and_then(Weak::upgrade) {
+            return plan;
+        }
+        let plan = Plan::new(window, order, placement, increments);
+        let plan = Arc::new(match provisional {
+            true => plan.with_provisional(),
+            false => plan,
+        });
+        plans.insert(key, Arc::downgrade(&plan));
+        plan
+    }
+
     pub(crate) fn new(window: usize, order: Order, placement: Placement, increments: bool) -> Self {
         let look_ahead = match (placement, increments) {
             (Placement::Causal, _) => 0,
