@@ -4,7 +4,7 @@
 //! sample, no sample is held back, nothing is looked at before the first attitude leaves, and senders
 //! come and go ([`run`]).
 
-mod attitude_now;
+pub(super) mod attitude_now;
 mod intervals;
 mod resetting;
 pub mod run;
@@ -15,6 +15,7 @@ use crate::report::aid::Aided;
 use crate::report::calibration;
 use crate::report::findings::{Finding, of_sensor};
 use crate::serve::channel::Channel;
+use crate::serve::channel::health::{Health, counted, rate_hz};
 use crate::serve::fault::Fault;
 use crate::serve::recorder::stream_of;
 use crate::serve::state::Saved;
@@ -574,15 +575,15 @@ impl SensorStream {
         self.estimator.conditioning()
     }
 
+    /// What a replay's streams say of themselves, too.
+    pub(super) fn health(&self) -> Health {
+        Health::of(&self.estimator)
+    }
+
     /// What is known of it, for `STATUS`.
     #[must_use]
     pub fn status(&self) -> serde_json::Value {
         let report = self.conditioning();
-        let counts: serde_json::Map<_, _> = Verdict::ALL
-            .into_iter()
-            .filter(|v| report.counts.get(*v) > 0)
-            .map(|v| (v.name().to_owned(), report.counts.get(v).into()))
-            .collect();
         let warnings = &self.prepared.warnings;
         let warnings: Vec<String> = warnings
             .iter()
@@ -600,7 +601,7 @@ impl SensorStream {
             "samples": report.counts.total(),
             "lost": report.counts.lost(),
             "missing": self.missing,
-            "counts": counts,
+            "counts": counted(&report.counts),
             "gaps": report.gaps.count,
             "not_bridged": report.gaps.not_bridged,
             "attitudes": self.next_seq - self.first_seq,
@@ -608,7 +609,7 @@ impl SensorStream {
             "resets": self.resetting.taken,
             "reset": self.last.map_or(0, |l| l.reset_count),
             "last_stamp": self.last.map(|l| stamp(l.stamp)),
-            "rate_hz": report.spacing_nanos.filter(|n| *n > 0).map(|n| 1e9 / n as f64),
+            "rate_hz": rate_hz(report.spacing_nanos),
             "jitter_s": self.jitter_secs,
             "stamp_unit": self.stamps.unit().map(TimeUnit::name),
             "sample_kind": self.resolved.kind.name(),
