@@ -120,7 +120,7 @@ pub fn run(global: &Global, args: &Report) -> Result<Outcome> {
     };
     let mut html = String::new();
     let outcome = match args.files.as_slice() {
-        [file] => args.with_page(global, file, (&asked, &pool), |page| {
+        [file] => args.with_page(global, file, (&asked, &pool), &mut |page| {
             if document.is_some() {
                 html = page.html();
                 tracing::info!("{}", page.sentence());
@@ -130,7 +130,7 @@ pub fn run(global: &Global, args: &Report) -> Result<Outcome> {
         files => {
             let mut several = Several::of(files.len());
             let outcome = with_each(files, |file| {
-                let done = args.with_page(global, file, (&asked, &pool), |page| {
+                let done = args.with_page(global, file, (&asked, &pool), &mut |page| {
                     several.add(page);
                     tracing::info!("{}: {}", page.file, page.sentence());
                     said(global, page)
@@ -182,7 +182,7 @@ impl Report {
         global: &Global,
         file: &Path,
         (asked, pool): (&Examination<'_>, &Pool),
-        take: impl FnOnce(&Page<'_>) -> Result<Outcome>,
+        take: &mut dyn FnMut(&Page<'_>) -> Result<Outcome>,
     ) -> Result<Outcome> {
         let input = logged::open(file)?;
         let mut reporter = Reporter::new(global, &input.name().display().to_string());

@@ -247,16 +247,15 @@ impl Channel {
 
     /// Its line in `STATUS`.
     pub(super) fn status(&self) -> serde_json::Value {
-        let mut status = serde_json::json!({
+        let status = serde_json::json!({
             "id": &*self.id, "class": self.class().name(), "sent": self.sent.load(Ordering::Relaxed),
             "world": self.stream.world_axes, "body": self.stream.body_axes,
         });
-        let health = self.health().clone();
-        if let (Some(fields), Some(health)) = (status.as_object_mut(), health) {
-            let last = self.last().map(|(_, last)| last);
-            fields.extend(health.fields(last.as_ref()));
-        }
-        status
+        let Some(health) = self.health().clone() else {
+            return status;
+        };
+        let last = self.last().map(|(_, last)| last);
+        health.beside(status, last.as_ref())
     }
 
     fn objects(&self, profile: Profile) -> &Objects {

@@ -55,10 +55,15 @@ pub(super) fn heading(board: &Board, now: Instant) -> Line {
         ),
     };
     let plural = if sensors == 1 { "" } else { "s" };
+    let is_silent = |sensor: &&Sensor| silence(sensor, now).is_none_or(|time| time > FOLDED);
+    let silent = match board.sensors.values().filter(is_silent).count() {
+        0 => String::new(),
+        n => format!(", {n} silent"),
+    };
     (
         tone,
         format!(
-            "strapd watch {}  {sensors} sensor{plural}  {state}",
+            "strapd watch {}  {sensors} sensor{plural}{silent}  {state}",
             board.name
         ),
     )
@@ -78,12 +83,7 @@ pub(super) fn body(board: &Board, now: Instant, width: usize) -> Vec<Line> {
         return vec![(Tone::Plain, "nothing has come yet".to_owned())];
     }
     let mut lines = Vec::new();
-    let silence = |sensor: &Sensor| {
-        sensor
-            .heard
-            .map(|heard| now.saturating_duration_since(heard))
-    };
-    let is_silent = |sensor: &Sensor| silence(sensor).is_none_or(|time| time > FOLDED);
+    let is_silent = |sensor: &Sensor| silence(sensor, now).is_none_or(|time| time > FOLDED);
     let all_are = board.sensors.values().all(is_silent);
     // Of one without an attitude there is nothing to unfold.
     let (folded, shown): (Vec<_>, Vec<_>) = board
@@ -113,7 +113,7 @@ pub(super) fn body(board: &Board, now: Instant, width: usize) -> Vec<Line> {
         lines.push((Tone::Plain, String::new()));
     }
     for (id, sensor) in folded {
-        let said = match (silence(sensor), &sensor.attitude) {
+        let said = match (silence(sensor, now), &sensor.attitude) {
             (Some(time), _) => format!("{}  silent for {}", shortened(id), lasting(time)),
             (None, Some(_)) => title(id, sensor),
             (None, None) => format!("{}  {NEVER_HEARD}", shortened(id)),
@@ -122,6 +122,12 @@ pub(super) fn body(board: &Board, now: Instant, width: usize) -> Vec<Line> {
         lines.push((Tone::Alarm, said + &angles.unwrap_or_default()));
     }
     lines
+}
+
+/// Since when it was not heard; `None`: it never was.
+fn silence(sensor: &Sensor, now: Instant) -> Option<Duration> {
+    let heard = sensor.heard?;
+    Some(now.saturating_duration_since(heard))
 }
 
 /// The same behind other characters.
@@ -457,6 +463,7 @@ mod tests {
         of("z", later, &mut board);
         for width in [60, 100] {
             let lines = body(&board, later, width);
+            assert!(heading(&board, later).1.contains("  4 sensors, 3 silent  "));
             assert_eq!(lines[0].1, "z  flu in start  provisional");
             let folded: Vec<&str> = lines[lines.len() - 3..]
                 .iter()

@@ -37,10 +37,10 @@ impl Health {
         }
     }
 
-    /// Named as those of a sensor.
-    pub(super) fn fields(&self, last: Option<&AttitudeSample>) -> Map<String, Value> {
+    /// The same beside what else is told of the stream, which comes first where both tell something.
+    pub(in crate::serve) fn beside(&self, own: Value, last: Option<&AttitudeSample>) -> Value {
         let filter = self.filter.as_ref();
-        let fields = json!({
+        let mut fields = json!({
             "samples": self.counts.total(),
             "lost": self.counts.lost(),
             "missing": self.missing,
@@ -52,15 +52,15 @@ impl Health {
             "aid": filter.map(|filter| Aided::of(filter).json()),
             "attitude": attitude_now(filter, last),
         });
-        match fields {
-            Value::Object(fields) => fields,
-            _ => Map::new(),
+        if let (Some(fields), Value::Object(own)) = (fields.as_object_mut(), own) {
+            fields.extend(own);
         }
+        fields
     }
 }
 
 /// What became of samples, by the names of the verdicts that there were.
-pub(in crate::serve) fn counted(counts: &Counts) -> Map<String, Value> {
+fn counted(counts: &Counts) -> Map<String, Value> {
     Verdict::ALL
         .into_iter()
         .filter(|verdict| counts.get(*verdict) > 0)
@@ -69,6 +69,6 @@ pub(in crate::serve) fn counted(counts: &Counts) -> Map<String, Value> {
 }
 
 /// Samples a second, by the ordinary step.
-pub(in crate::serve) fn rate_hz(spacing_nanos: Option<i64>) -> Option<f64> {
+fn rate_hz(spacing_nanos: Option<i64>) -> Option<f64> {
     spacing_nanos.filter(|n| *n > 0).map(|n| 1e9 / n as f64)
 }
