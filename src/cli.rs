@@ -68,31 +68,50 @@ pub struct Cli {
 #[derive(Args, Debug, Clone)]
 pub struct Global {
     /// Less on stderr: warnings and errors only; no summary
-    #[arg(short, long, global = true)]
+    #[arg(short, long, global = true, help_heading = "Global")]
     pub quiet: bool,
     /// More on stderr; twice for still more
-    #[arg(short, long, global = true, action = clap::ArgAction::Count)]
+    #[arg(short, long, global = true, help_heading = "Global", action = clap::ArgAction::Count)]
     pub verbose: u8,
     /// Colour on stderr
-    #[arg(long, global = true, value_enum, default_value = "auto")]
+    #[arg(
+        long,
+        global = true,
+        help_heading = "Global",
+        value_enum,
+        default_value = "auto"
+    )]
     pub color: When,
     /// Form of the diagnostics on stderr
     #[arg(
         long,
         global = true,
+        help_heading = "Global",
         value_enum,
         default_value = "text",
         env = "STRAPD_LOG_FORMAT"
     )]
     pub log_format: LogFormat,
     /// Progress on stderr: a bar on a terminal, nothing, or one JSON object a second
-    #[arg(long, global = true, value_enum, default_value = "auto")]
+    #[arg(
+        long,
+        global = true,
+        help_heading = "Global",
+        value_enum,
+        default_value = "auto"
+    )]
     pub progress: Progress,
     /// The command's summary as one JSON object on stdout
-    #[arg(long, global = true)]
+    #[arg(long, global = true, help_heading = "Global")]
     pub json: bool,
     /// Worker threads; 0 = one per core. The output does not depend on it
-    #[arg(long, global = true, default_value_t = 0, env = "STRAPD_THREADS")]
+    #[arg(
+        long,
+        global = true,
+        help_heading = "Global",
+        default_value_t = 0,
+        env = "STRAPD_THREADS"
+    )]
     pub threads: usize,
 }
 

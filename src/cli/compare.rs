@@ -52,7 +52,7 @@ pub struct Compare {
     /// Constant rotation of the world to remove first: none, first (equal at the first common
     /// instant), first-heading (the same, about the vertical only), heading (about the vertical, least
     /// squares), best (least squares)
-    #[arg(long, default_value = "first")]
+    #[arg(long, default_value = "first", value_parser = ["none", "first", "first-heading", "heading", "best"])]
     pub align: String,
     /// Fail (exit 4) when the largest total error exceeds this, in degrees
     #[arg(long, value_name = "DEG")]

@@ -17,6 +17,24 @@ use strapd_attitude::propagate::{Method, Order, Placement};
 use strapd_attitude::record::SampleKind;
 use strapd_recording::Selection;
 
+/// `--method`.
+const METHODS: [&str; 12] = [
+    "auto",
+    "magnus",
+    "causal",
+    "commit",
+    "dcm-left",
+    "dcm-right",
+    "dcm-mean",
+    "rotvec-sum",
+    "coning2",
+    "coning3",
+    "coning4",
+    "rk4",
+];
+/// `--world`.
+const WORLDS: [&str; 5] = ["start", "level", "enu", "ned", "nwu"];
+
 /// How the samples are to be understood and integrated.
 #[derive(Args, Debug, Clone)]
 #[command(next_help_heading = "Estimation")]
@@ -34,9 +52,14 @@ pub struct Estimation {
     /// Where a value lies in the message: ROLE=PATH, ROLE one of gyro, accel, mag, orientation, stamp, dt
     #[arg(long = "field", value_name = "ROLE=PATH")]
     pub fields: Vec<String>,
-    /// auto, magnus, causal, commit, dcm-left, dcm-right, dcm-mean, rotvec-sum. `commit` is that of
-    /// `serve`: it waits for no later sample, nor for one that was overtaken
-    #[arg(long, default_value = "auto", env = "STRAPD_METHOD")]
+    /// How rates become turns. `commit` is that of `serve`: it waits for no later sample, nor for one that was
+    /// overtaken
+    #[arg(
+        long,
+        default_value = "auto",
+        env = "STRAPD_METHOD",
+        value_parser = METHODS
+    )]
     pub method: String,
     /// Samples in the window of --method magnus|causal|commit (2 to 24; commit: 6 rates or 5 increments)
     #[arg(long, value_name = "P")]
@@ -110,6 +133,8 @@ pub struct Estimation {
     #[arg(
         long,
         value_name = "WORLD",
+        value_parser = WORLDS,
+        ignore_case = true,
         default_value = "start",
         env = "STRAPD_WORLD"
     )]

@@ -21,7 +21,7 @@ pub struct Completions {
   strapd man | man -l -
   strapd man --out-dir /usr/local/share/man/man1")]
 pub struct Man {
-    /// Write one page per command into this directory instead
+    /// Write one page per command into this directory instead; it is made where there is none
     #[arg(long, value_name = "DIR")]
     pub out_dir: Option<PathBuf>,
 }
@@ -43,7 +43,9 @@ pub fn completions(command: &Completions) -> Result<Outcome> {
 /// Stdout or the directory can not be written.
 pub fn man(command: &Man) -> Result<Outcome> {
     if let Some(dir) = &command.out_dir {
-        clap_mangen::generate_to(Cli::command(), dir).map_err(|source| Error::Write {
+        let written = std::fs::create_dir_all(dir)
+            .and_then(|()| clap_mangen::generate_to(Cli::command(), dir));
+        written.map_err(|source| Error::Write {
             path: dir.clone(),
             source,
         })?;

@@ -94,10 +94,10 @@ pub struct Replay {
     pub serving: Serving,
     /// Print the error against the orientation recorded in the log (on TOPIC, or found) for each
     /// meaning a sample can have
-    #[arg(long, value_name = "TOPIC", num_args = 0..=1, default_missing_value = "", require_equals = true)]
+    #[arg(long, value_name = "TOPIC", num_args = 0..=1, default_missing_value = "", require_equals = true, help_heading = "Estimation")]
     pub against_recorded: Option<String>,
     /// Take only logs i, i+n, i+2n, ... of the list (i from 0)
-    #[arg(long, value_name = "I/N")]
+    #[arg(long, value_name = "I/N", help_heading = "Output")]
     pub shard: Option<String>,
 }
 

@@ -1,20 +1,20 @@
-//! `strapd report FILE -o r.html`: one self-contained page about a log. I/O.
+//! `strapd report FILE... -o r.html`: one self-contained page about a log, or about several. I/O.
 
 use super::estimation::Estimation;
 use super::progress::Reporter;
 use super::tables::Tables;
-use super::{Global, Outcome, allan, print};
+use super::{Global, Outcome, allan, print, with_each};
 use crate::error::{Error, Result};
 use crate::pipeline::attitude_track::{self, Side, Track};
 use crate::pipeline::check::{Drawing, Examination, examine};
 use crate::pipeline::logged;
 use crate::pipeline::provenance::sha256;
 use crate::report::findings::findings;
-use crate::report::page::{DRAWN, Noise, Page, STRETCHES, Told, longest_rest};
+use crate::report::page::{DRAWN, Noise, Page, STRETCHES, Several, Told, longest_rest};
 use crate::report::summary::{human_bytes, significant};
 use crate::sink::Document;
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{Bias, Plan};
 use strapd_recording::Input;
@@ -26,21 +26,22 @@ use strapd_replay::inspection::CheckedTopic;
 /// Rest from which an Allan deviation is worth having, s.
 const ENOUGH: f64 = 600.0;
 
-/// One self-contained HTML page about a log: what is good and what is wrong, rates and attitude,
+/// One self-contained HTML page about a log, or several: what is good and what is wrong, rates and attitude,
 /// gaps, jitter, rest and bias, noise, error against a reference.
 #[derive(Args, Debug)]
 #[command(after_help = "Examples:
   strapd report flight.mcap -o flight.html
   strapd report flight.mcap -o r.html --bias auto --init gravity     every flag of replay's estimation
   strapd report flight.mcap -o r.html --reference truth.csv          the error against another file
+  strapd report *.mcap -o all.html                                   several, side by side in one page
   strapd report flight.mcap --json | jq .verdict                     the same numbers, no page
 
 The page needs no network, and no script but to look into its charts; it opens from a file, prints, and is at most 2 MB for any log.
 Exit codes: 0 done; 3 done, but samples were lost or could not be read.")]
 pub struct Report {
-    /// A recording: MCAP, NDJSON or CSV; - is standard input
-    #[arg(value_name = "FILE")]
-    pub file: PathBuf,
+    /// Recordings: MCAP, ULog, bags of ROS 1 and 2, videos of a GoPro, NDJSON, tables, or folders of one; - is standard input
+    #[arg(value_name = "FILE", required = true)]
+    pub files: Vec<PathBuf>,
     /// The page; - is standard output
     #[arg(short, long, value_name = "FILE.html")]
     pub output: Option<PathBuf>,
@@ -89,19 +90,20 @@ pub fn run(global: &Global, args: &Report) -> Result<Outcome> {
         }
         _ => {}
     }
+    if let (Some(path), [_, _, ..]) = (&args.reference, args.files.as_slice()) {
+        let what = format!("--reference {} is of one log", path.display());
+        return Err(Error::usage(Diagnostic::new(what).help(
+            "one log, or --ref-topic NAME for a reference in each of them",
+        )));
+    }
     let plan = args.estimation.plan_of_a_recording(args.smooth)?;
     let mut selection = args.estimation.selection()?;
     args.tables.put(&mut selection.decode)?;
-    let inputs: Vec<PathBuf> = Some(&args.file)
-        .into_iter()
-        .chain(&args.reference)
-        .cloned()
-        .collect();
+    let inputs: Vec<PathBuf> = args.files.iter().chain(&args.reference).cloned().collect();
     let document = output
         .map(|path| Document::create(path, &inputs, args.force))
         .transpose()?;
     let pool = Pool::new(global.threads)?;
-    let input = logged::open(&args.file)?;
     let reference = args.read_reference(&pool)?;
     let asked = Examination {
         selection,
@@ -116,78 +118,118 @@ pub fn run(global: &Global, args: &Report) -> Result<Outcome> {
         }),
         command: super::shell::recorded_command(args.record_paths),
     };
-    let mut reporter = Reporter::new(global, &input.name().display().to_string());
-    let checked = examine(&input, &asked, &pool, &mut |position| {
-        reporter.update(position);
-    });
-    reporter.finish();
-    let mut checked = checked?;
-    // A page is shown to others.
-    let file = match (args.record_paths, input.name().file_name()) {
-        (false, Some(name)) => {
-            let name = name.to_string_lossy().into_owned();
-            checked.rename(&input.name().display().to_string(), &name);
-            name
+    let mut html = String::new();
+    let outcome = match args.files.as_slice() {
+        [file] => args.with_page(global, file, (&asked, &pool), &mut |page| {
+            if document.is_some() {
+                html = page.html();
+                tracing::info!("{}", page.sentence());
+            }
+            said(global, page)
+        })?,
+        files => {
+            let mut several = Several::of(files.len());
+            let outcome = with_each(files, |file| {
+                let done = args.with_page(global, file, (&asked, &pool), &mut |page| {
+                    several.add(page);
+                    tracing::info!("{}: {}", page.file, page.sentence());
+                    said(global, page)
+                });
+                if let Err(why) = &done {
+                    let name = args.shown(file);
+                    let why = why.to_string().replace('\n', " ");
+                    several.add_unread(&name, &why.replace(&file.display().to_string(), &name));
+                }
+                done
+            })?;
+            if document.is_some() {
+                html = several.html();
+                tracing::info!("{} logs: {}", files.len(), several.sentence());
+            }
+            outcome
         }
-        _ => input.name().display().to_string(),
     };
-    let told = findings(&checked).into_iter().map(|finding| Told {
-        answered: answered(finding.code, &asked.plan),
-        finding,
-    });
-    let page = Page {
-        file,
-        sha256: sha256(input.name(), input.bytes()?)?,
-        command: asked.command.clone(),
-        reference: match (&reference, asked.reference_topic.as_str()) {
-            (Some(track), _) => match args
-                .reference
-                .as_deref()
-                .and_then(|p| Some((p, p.file_name()?)))
-            {
-                Some((path, name)) if !args.record_paths => track
-                    .name
-                    .replace(&path.display().to_string(), &name.to_string_lossy()),
-                _ => track.name.clone(),
-            },
-            (None, "") => String::new(),
-            (None, topic) => format!("the orientation on {topic}"),
-        },
-        findings: told.collect(),
-        noise: checked
-            .topics
-            .iter()
-            .enumerate()
-            .map(|(n, topic)| match n {
-                0..DRAWN => args.noise(&input, (&asked.selection, &asked.plan), topic, &pool),
-                // Each takes a pass over the log.
-                _ => Noise::Missing(
-                    "Not measured of so many topics: strapd report --topic NAME does.".to_owned(),
-                ),
-            })
-            .collect(),
-        checked: &checked,
-    };
-    if let Some(document) = document {
-        let html = page.html();
+    if let (Some(document), Some(path)) = (document, output) {
         document.write(&html)?;
-        let name = output
-            .map(|path| path.display().to_string())
-            .unwrap_or_default();
-        tracing::info!("{}", page.sentence());
-        tracing::info!("wrote {name}  {}", human_bytes(html.len() as u64));
+        let size = human_bytes(html.len() as u64);
+        tracing::info!("wrote {}  {size}", path.display());
     }
+    Ok(outcome)
+}
+
+fn said(global: &Global, page: &Page<'_>) -> Result<Outcome> {
     if global.json {
         print(&format!("{}\n", page.json()))?;
     }
-    Ok(if page.is_lossy() {
-        Outcome::Lossy
-    } else {
-        Outcome::Done
+    Ok(match page.is_lossy() {
+        true => Outcome::Lossy,
+        false => Outcome::Done,
     })
 }
 
 impl Report {
+    /// What a file is called in the page, which is shown to others.
+    fn shown(&self, file: &Path) -> String {
+        match (self.record_paths, file.file_name()) {
+            (false, Some(name)) => name.to_string_lossy().into_owned(),
+            _ => file.display().to_string(),
+        }
+    }
+
+    /// Examines a log, and hands over all that its page says.
+    fn with_page(
+        &self,
+        global: &Global,
+        file: &Path,
+        (asked, pool): (&Examination<'_>, &Pool),
+        take: &mut dyn FnMut(&Page<'_>) -> Result<Outcome>,
+    ) -> Result<Outcome> {
+        let input = logged::open(file)?;
+        let mut reporter = Reporter::new(global, &input.name().display().to_string());
+        let checked = examine(&input, asked, pool, &mut |position| {
+            reporter.update(position);
+        });
+        reporter.finish();
+        let mut checked = checked?;
+        let file = self.shown(input.name());
+        checked.rename(&input.name().display().to_string(), &file);
+        let told = findings(&checked).into_iter().map(|finding| Told {
+            answered: answered(finding.code, &asked.plan),
+            finding,
+        });
+        let track = asked.drawing.as_ref().and_then(|d| d.reference);
+        take(&Page {
+            sha256: sha256(input.name(), input.bytes()?)?,
+            command: asked.command.clone(),
+            reference: match (track, asked.reference_topic.as_str()) {
+                (Some(track), _) => match &self.reference {
+                    Some(path) => track
+                        .name
+                        .replace(&path.display().to_string(), &self.shown(path)),
+                    None => track.name.clone(),
+                },
+                (None, "") => String::new(),
+                (None, topic) => format!("the orientation on {topic}"),
+            },
+            findings: told.collect(),
+            noise: checked
+                .topics
+                .iter()
+                .enumerate()
+                .map(|(n, topic)| match n {
+                    0..DRAWN => self.noise(&input, (&asked.selection, &asked.plan), topic, pool),
+                    // Each takes a pass over the log.
+                    _ => Noise::Missing(
+                        "Not measured of so many topics: strapd report --topic NAME does."
+                            .to_owned(),
+                    ),
+                })
+                .collect(),
+            checked: &checked,
+            file,
+        })
+    }
+
     fn read_reference(&self, pool: &Pool) -> Result<Option<Track>> {
         let Some(path) = &self.reference else {
             return Ok(None);

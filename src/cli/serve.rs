@@ -32,7 +32,12 @@ const MAX_SENSORS: u64 = 4096;
 
 /// Samples in over sockets, attitude out to whoever watches.
 #[derive(Args, Debug)]
-#[command(after_help = "Examples:
+#[command(
+    mut_arg("method", |method| method.default_value("commit")),
+    mut_arg("topic", |topic| topic.hide(true)),
+    mut_arg("accel_topic", |topic| topic.hide(true)),
+    mut_arg("mag_topic", |topic| topic.hide(true)),
+    after_help = "Examples:
   strapd serve                                           TCP on 127.0.0.1:4550, WebSocket and HTTP on 127.0.0.1:8765
   strapd serve --listen tcp-listen://127.0.0.1:0         a free port, named in the ready line
   strapd cat flight.mcap | strapd serve -                lines on standard input, too

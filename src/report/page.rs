@@ -9,12 +9,14 @@ mod looking;
 mod markup;
 mod numbers;
 mod reference;
+mod several;
 mod timeline;
 mod topic;
 mod verdict;
 
 pub use findings::Told;
 pub use numbers::{comparison_json, longest_rest};
+pub use several::Several;
 
 use crate::report::calendar::date;
 use crate::report::summary::human_bytes;
@@ -33,6 +35,23 @@ pub const STRETCHES: usize = 1400;
 pub const DRAWN: usize = 6;
 /// Fewest stretches, when all must fit.
 const FEWEST: usize = 64;
+
+/// A page with its one script, which may ask nobody, and `data` for machines.
+fn document(title: &str, body: &str, data: &Value) -> String {
+    let script = looking::script();
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src {hash}; connect-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'\">\n\
+         <meta name=\"color-scheme\" content=\"light dark\">\n<link rel=\"icon\" href=\"data:,\">\n\
+         <title>{title} - strapd report</title>\n<style>\n{style}</style>\n</head>\n<body>\n<main>\n{body}\
+         </main>\n<script type=\"application/json\" id=\"report\">{data}</script>\n<script type=\"module\">{script}</script>\n</body>\n</html>\n",
+        title = escaped(title),
+        style = include_str!("page/page.css"),
+        hash = looking::hash(&script),
+        data = looking::inert(data),
+    )
+}
 
 /// Allan deviation of a topic, or why there is none.
 #[derive(Clone, Debug)]
@@ -85,21 +104,15 @@ impl Page<'_> {
     }
 
     fn html_in(&self, stretches: usize) -> String {
+        document(self.name(), &self.body(Some(stretches)), &self.json())
+    }
+
+    /// All that is said of the log; no stretches: without a chart.
+    fn body(&self, stretches: Option<usize>) -> String {
         let verdict = self.verdict();
-        let script = looking::script();
         let mut out = format!(
-            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-             <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src {2}; connect-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'\">\n\
-             <meta name=\"color-scheme\" content=\"light dark\">\n<link rel=\"icon\" href=\"data:,\">\n\
-             <title>{0} - strapd report</title>\n<style>\n{1}</style>\n</head>\n<body>\n<main>\n<h1>{0}</h1>\n",
+            "<h1>{}</h1>\n<p id=\"verdict\" class=\"{}\"><strong>{}</strong> {}</p>\n",
             escaped(self.name()),
-            include_str!("page/page.css"),
-            looking::hash(&script),
-        );
-        let _ = writeln!(
-            out,
-            "<p id=\"verdict\" class=\"{}\"><strong>{}</strong> {}</p>",
             verdict.level.name(),
             verdict.level.word(),
             escaped(&verdict.text)
@@ -107,18 +120,13 @@ impl Page<'_> {
         self.facts(&mut out);
         findings::section(&self.findings, &mut out);
         for (index, topic) in self.checked.topics.iter().enumerate() {
-            let drawn = (index < DRAWN).then_some(stretches);
+            let drawn = stretches.filter(|_| index < DRAWN);
             topic::section(self, topic, self.noise.get(index), drawn, &mut out);
         }
         if self.checked.topics.is_empty() {
             out.push_str("<section><h2>Attitude</h2>\n<p>There is no topic of gyro samples, so there is nothing to draw.</p></section>\n");
         }
         self.made(&mut out);
-        let data = looking::inert(&self.json());
-        let _ = write!(
-            out,
-            "</main>\n<script type=\"application/json\" id=\"report\">{data}</script>\n<script type=\"module\">{script}</script>\n</body>\n</html>\n"
-        );
         out
     }
 

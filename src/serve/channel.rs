@@ -3,6 +3,8 @@
 //! Apart from where its samples come from: a sensor of the daemon and a stream of a replay reach
 //! whoever watches in the same way.
 
+pub(super) mod health;
+
 use super::chunk::Chunk;
 use super::filter::Class;
 use super::foxglove::frames;
@@ -11,6 +13,7 @@ use crate::sink::json::Objects;
 use crate::sink::payload::{Payloads, Topic};
 use crate::sink::{Content, Profile, Stream};
 use bytes::Bytes;
+use health::Health;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -35,6 +38,8 @@ pub struct Channel {
     /// Number of the attitude handed out last, and itself.
     last: Mutex<Option<(u64, AttitudeSample)>>,
     sent: AtomicU64,
+    /// Of a stream that something estimates here, and that is no sensor's.
+    health: Mutex<Option<Health>>,
 }
 
 /// Which of an item's times a message is given.
@@ -94,6 +99,7 @@ impl Channel {
             payloads: Payloads::new(stream, streams),
             last: Mutex::new(None),
             sent: AtomicU64::new(0),
+            health: Mutex::new(None),
         }
     }
 
@@ -146,6 +152,16 @@ impl Channel {
     /// Another run begins: what was last in the one before is none of its.
     pub(super) fn begin_anew(&self) {
         *self.last() = None;
+        *self.health() = None;
+    }
+
+    fn health(&self) -> MutexGuard<'_, Option<Health>> {
+        self.health.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// How its samples are up to now.
+    pub(super) fn known(&self, health: Health) {
+        *self.health() = Some(health);
     }
 
     /// Number and topic of each of its channels for viewers.
@@ -231,10 +247,15 @@ impl Channel {
 
     /// Its line in `STATUS`.
     pub(super) fn status(&self) -> serde_json::Value {
-        serde_json::json!({
+        let status = serde_json::json!({
             "id": &*self.id, "class": self.class().name(), "sent": self.sent.load(Ordering::Relaxed),
             "world": self.stream.world_axes, "body": self.stream.body_axes,
-        })
+        });
+        let Some(health) = self.health().clone() else {
+            return status;
+        };
+        let last = self.last().map(|(_, last)| last);
+        health.beside(status, last.as_ref())
     }
 
     fn objects(&self, profile: Profile) -> &Objects {

@@ -4,22 +4,21 @@
 //! sample, no sample is held back, nothing is looked at before the first attitude leaves, and senders
 //! come and go ([`run`]).
 
-mod attitude_now;
+pub(super) mod attitude_now;
 mod intervals;
 mod resetting;
 pub mod run;
 pub mod stamps;
 
 use crate::pipeline::session_builder::labelled;
-use crate::report::aid::Aided;
 use crate::report::calibration;
 use crate::report::findings::{Finding, of_sensor};
 use crate::serve::channel::Channel;
+use crate::serve::channel::health::Health;
 use crate::serve::fault::Fault;
 use crate::serve::recorder::stream_of;
 use crate::serve::state::Saved;
 use crate::sink::Stream;
-use attitude_now::attitude_now;
 use intervals::Intervals;
 use resetting::Resetting;
 use run::{Placed, SampleRun, Span, Standing};
@@ -574,15 +573,15 @@ impl SensorStream {
         self.estimator.conditioning()
     }
 
+    /// What a replay's streams say of themselves, too.
+    pub(super) fn health(&self) -> Health {
+        Health::of(&self.estimator)
+    }
+
     /// What is known of it, for `STATUS`.
     #[must_use]
     pub fn status(&self) -> serde_json::Value {
         let report = self.conditioning();
-        let counts: serde_json::Map<_, _> = Verdict::ALL
-            .into_iter()
-            .filter(|v| report.counts.get(*v) > 0)
-            .map(|v| (v.name().to_owned(), report.counts.get(v).into()))
-            .collect();
         let warnings = &self.prepared.warnings;
         let warnings: Vec<String> = warnings
             .iter()
@@ -595,35 +594,28 @@ impl SensorStream {
             let (sec, nsec) = s.to_sec_nanosec();
             serde_json::json!({"sec": sec, "nsec": nsec})
         };
-        serde_json::json!({
+        let own = serde_json::json!({
             "id": &*self.id,
-            "samples": report.counts.total(),
-            "lost": report.counts.lost(),
+            // By the sender's numbers, not by the stamps.
             "missing": self.missing,
-            "counts": counts,
-            "gaps": report.gaps.count,
-            "not_bridged": report.gaps.not_bridged,
             "attitudes": self.next_seq - self.first_seq,
             "new_runs": self.runs,
             "resets": self.resetting.taken,
             "reset": self.last.map_or(0, |l| l.reset_count),
             "last_stamp": self.last.map(|l| stamp(l.stamp)),
-            "rate_hz": report.spacing_nanos.filter(|n| *n > 0).map(|n| 1e9 / n as f64),
             "jitter_s": self.jitter_secs,
             "stamp_unit": self.stamps.unit().map(TimeUnit::name),
             "sample_kind": self.resolved.kind.name(),
             "gyro_unit": self.resolved.unit.name(),
-            "method": self.estimator.method().name(),
             "world": self.channel.stream().world_axes,
             "body": self.channel.stream().body_axes,
-            "aid": self.estimator.filter().map(|filter| Aided::of(filter).json()),
-            "attitude": attitude_now(self.estimator.filter(), self.last.as_ref()),
             "initial": self.prepared.initial_origin,
             "bias": self.prepared.bias_origin,
             "interval_mismatches": self.intervals.found(),
             "warnings": warnings,
             "findings": found.iter().map(Finding::json).collect::<Vec<_>>(),
-        })
+        });
+        self.health().beside(own, self.last.as_ref())
     }
 }
 

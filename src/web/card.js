@@ -38,6 +38,7 @@ export class Card {
     for (const part of this.element.querySelectorAll("[data-part]")) this.parts[part.dataset.part] = part;
     const { parts } = this;
     say(parts.name, this.name);
+    parts.known.setAttribute("aria-label", `What is known of ${this.name}`);
     this.known = new Known(parts, does.anew);
     this.moved = () => {
       this.dirty = true;

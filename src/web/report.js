@@ -55,7 +55,7 @@ class Picture {
     this.isDrawn = true;
     const span = view.span(this.clock, this.clock.whole[1]);
     const lines = this.lines.map((line) => ({ ...line, name: line.name || "", colour: colours.lines[line.color % 8] }));
-    for (const [line, key] of this.keys) key.style.color = colours.lines[line.color % 8];
+    for (const [line, key] of this.keys) key.style.borderColor = colours.lines[line.color % 8];
     const cursor = view.cursor(this.clock);
     const selected = view.selection(this.clock);
     const { at } = drawPlot(this.surface, colours, lines, { span, scale: this.scale, wraps: this.data.wraps, cursor, selected });

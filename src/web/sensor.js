@@ -11,8 +11,8 @@ const LEAP = 1;
 // Milliseconds without a word after which a sensor is silent, while others speak.
 const SILENCE = 5000;
 
-// Samples so far, of a recording attitudes: STATUS knows one or the other.
-export const taken = (source) => source.samples ?? source.sent ?? 0;
+// Samples so far, of a recording what was shown: those passed over on the way to another place did not come.
+export const taken = (source) => source.sent ?? source.samples ?? 0;
 
 // What turns another's world into one's own. Worlds of one name are one; else they agree at the first instant of both,
 // in heading only where both are level.

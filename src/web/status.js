@@ -12,7 +12,10 @@ export function told(parts, now, each) {
   const [before, at] = [last, performance.now()];
   const elapsed = (at - lastAt) / 1000;
   [last, lastAt] = [now, at];
-  if (!now) return;
+  if (!now) {
+    for (const name of ["total", "clients", "dropped", "queued", "uptime"]) say(parts[name], "–");
+    return;
+  }
   const { sources = [], clients = [] } = now;
   const count = (list) => list.reduce((total, source) => total + taken(source), 0);
   const rate = before ? Math.max(0, count(sources) - count(before.sources ?? [])) / elapsed : NaN;

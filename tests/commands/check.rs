@@ -1,5 +1,6 @@
 //! Promise: `strapd check` finds what is wrong with a log, invents nothing, and its advice helps.
 
+mod advice;
 mod faults;
 mod many;
 mod orientation;

@@ -4,6 +4,7 @@
 mod aiding;
 mod bare_stamps;
 mod flags;
+mod help;
 mod inputs;
 mod manual;
 mod outputs;

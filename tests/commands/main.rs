@@ -17,6 +17,7 @@ mod fixtures;
 mod folders;
 mod formats;
 mod joined;
+mod layouts;
 mod model;
 #[cfg(unix)]
 mod pages;

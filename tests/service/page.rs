@@ -14,5 +14,6 @@ mod live_numbers;
 mod looking;
 mod model_top;
 mod playback;
+mod printing;
 mod saving;
 mod staying_up;

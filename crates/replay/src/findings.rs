@@ -89,6 +89,10 @@ pub fn findings(checked: &Checked) -> Vec<Finding> {
         replayed(topic, &mut of_topic);
         orientation::find(topic, &mut of_topic);
         for finding in &mut of_topic {
+            // As those of its samples.
+            if !topic.looked.is_likely {
+                finding.severity = Severity::Note;
+            }
             finding.topic.clone_from(&topic.looked.topic);
         }
         found.append(&mut of_topic);

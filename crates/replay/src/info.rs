@@ -112,7 +112,7 @@ impl Overview<'_> {
                 help.push(INIT.to("gravity"));
             }
         }
-        if best.quality.with_orientation > 0 {
+        if best.has_reference {
             help.push(AGAINST_RECORDED.into());
         }
         let help: String = help.iter().map(|choice| format!(" {choice}")).collect();
@@ -179,6 +179,7 @@ fn topic_json(looked: &Inspection) -> Value {
         "no_gyro": q.no_gyro,
         "no_stamp": q.no_stamp,
         "with_orientation": q.with_orientation,
+        "orientation_varies": q.orientation_varies,
         "with_accel": q.with_accel,
         "header_minus_log_s": q.offset.map(|o| json!({
             "mean": o.mean_secs, "min": o.min_secs, "max": o.max_secs, "drift_ppm": o.drift_ppm })),

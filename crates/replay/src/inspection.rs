@@ -42,6 +42,10 @@ pub struct Inspection {
     pub clock_warning: Option<Diagnostic>,
     /// What may correct its attitude.
     pub aid: Aids,
+    /// Whether it is as likely the IMU as any: what is taken where nobody names another.
+    pub is_likely: bool,
+    /// Whether there is an orientation to be held against, in its samples or in messages of its own.
+    pub has_reference: bool,
 }
 
 /// What of the samples themselves, or beside them, may correct an attitude.

@@ -188,6 +188,8 @@ fn write_topic(looked: &Inspection, out: &mut String) {
         "   orientation: {}; a sample is taken as {}{}",
         match q.with_orientation {
             0 => "none".to_owned(),
+            _ if !q.orientation_varies && q.with_orientation > 1 =>
+                "always the same: the field is not filled".to_owned(),
             n if n == q.count => "in every message".to_owned(),
             n => format!("in {n} messages"),
         },

@@ -187,7 +187,7 @@ fn as_text(args: &Top, course: &Course, found: &MethodErrors) -> String {
     );
     let _ = writeln!(
         out,
-        "  {:<28} {:e} of the energy",
+        "  {:<28} its energy to {:.1e}",
         "the exact motion keeps", found.energy_drift
     );
     let _ = writeln!(

@@ -68,6 +68,7 @@ pub struct Common {
     /// Samples a second
     #[arg(
         long,
+        help_heading = "Sampling",
         value_name = "HZ",
         default_value_t = 2000.0,
         allow_negative_numbers = true
@@ -76,6 +77,7 @@ pub struct Common {
     /// Seconds from the first sample to the last
     #[arg(
         long,
+        help_heading = "Sampling",
         value_name = "SECS",
         default_value_t = 10.0,
         allow_negative_numbers = true
@@ -83,26 +85,28 @@ pub struct Common {
     pub duration: f64,
     /// What a sample is: the rate at its stamp, the mean over the interval that ends at its stamp, or
     /// the integral over it
-    #[arg(long, value_enum, default_value = "rate")]
+    #[arg(long, help_heading = "Sampling", value_enum, default_value = "rate")]
     pub sample_kind: KindArg,
     /// Where the accelerometer sits: from the point whose motion it is, m, body axes (ahead, left, up)
     #[arg(
         long,
+        help_heading = "Sampling",
         value_name = "X,Y,Z",
         default_value = "0,0,0",
         allow_hyphen_values = true
     )]
     pub lever_arm: String,
     /// What a reading of the accelerometer is [default: as-gyro where the sensor is carried, else instant]
-    #[arg(long, value_enum)]
+    #[arg(long, help_heading = "Sampling", value_enum)]
     pub force_sampling: Option<ForceArg>,
     /// A magnetometer too, so many readings a second [default: one with every sample]
-    #[arg(long, value_name = "HZ", num_args = 0..=1, allow_negative_numbers = true)]
+    #[arg(long, help_heading = "Sampling", value_name = "HZ", num_args = 0..=1, allow_negative_numbers = true)]
     pub mag: Option<Option<f64>>,
     /// The Earth's magnetic field: strength in uT, dip (down is positive) and declination (east is
     /// positive) in degrees; north is the world's y
     #[arg(
         long,
+        help_heading = "Sampling",
         value_name = "UT,DEG,DEG",
         default_value = "48,60,0",
         allow_hyphen_values = true
@@ -112,13 +116,14 @@ pub struct Common {
     /// May be given several times
     #[arg(
         long,
+        help_heading = "Sampling",
         value_name = "FROM,TO,X,Y,Z",
         allow_hyphen_values = true,
         requires = "mag"
     )]
     pub field_disturbance: Vec<String>,
     /// Seed of everything random; the same seed gives the same bytes
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, help_heading = "Sampling", value_name = "N", default_value_t = 1)]
     pub seed: u64,
     /// Errors of the sensor: none, a preset (consumer_mems, industrial_mems, tactical, navigation, ...; with
     /// accelerometer and magnetometer consumer_imu, industrial_imu, rough_imu), or terms in the units of data sheets: arw=0.15,bias-instability=0.5,...
@@ -186,13 +191,19 @@ pub struct Common {
     /// Stamp of the first instant, seconds since 1970 (up to nine decimals)
     #[arg(
         long,
+        help_heading = "Sampling",
         value_name = "SECS",
         default_value = "1700000000",
         allow_hyphen_values = true
     )]
     pub start_stamp: String,
     /// frame_id of the sensor
-    #[arg(long, value_name = "FRAME", default_value = "imu_link")]
+    #[arg(
+        long,
+        help_heading = "Sampling",
+        value_name = "FRAME",
+        default_value = "imu_link"
+    )]
     pub frame_id: String,
 }
 

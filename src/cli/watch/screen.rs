@@ -101,7 +101,7 @@ impl Screen {
             let text: String = text.chars().take(width.saturating_sub(1)).collect();
             queue!(self.out, cursor::MoveTo(0, row))?;
             match tone {
-                Tone::Plain => {}
+                Tone::Plain | Tone::Axes(_) => {}
                 Tone::Heading => queue!(self.out, SetAttribute(Attribute::Bold))?,
                 Tone::Alarm if self.colour => queue!(
                     self.out,
@@ -110,7 +110,10 @@ impl Screen {
                 )?,
                 Tone::Alarm => queue!(self.out, SetAttribute(Attribute::Reverse))?,
             }
-            queue!(self.out, Print(text))?;
+            match tone {
+                Tone::Axes(places) if self.colour => self.figures(&text, *places)?,
+                _ => queue!(self.out, Print(text))?,
+            }
             if *tone != Tone::Plain {
                 queue!(self.out, SetAttribute(Attribute::Reset))?;
                 if self.colour {
@@ -120,6 +123,25 @@ impl Screen {
             queue!(self.out, Clear(ClearType::UntilNewLine))?;
         }
         self.out.flush()
+    }
+
+    /// x red, y green, z blue, as on the page.
+    fn figures(&mut self, text: &str, [x, y, z, end]: [usize; 4]) -> io::Result<()> {
+        let part =
+            |from: usize, until: usize| -> String { text.chars().take(until).skip(from).collect() };
+        queue!(self.out, Print(part(0, x)))?;
+        for (from, until, colour) in [
+            (x, y, Color::Red),
+            (y, z, Color::Green),
+            (z, end, Color::Blue),
+        ] {
+            queue!(
+                self.out,
+                SetForegroundColor(colour),
+                Print(part(from, until))
+            )?;
+        }
+        queue!(self.out, ResetColor, Print(part(end, usize::MAX)))
     }
 }
 

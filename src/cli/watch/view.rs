@@ -5,6 +5,7 @@ use super::board::{Board, LinkState, Sensor};
 use super::horizon::horizon;
 use crate::sink::roll_pitch_yaw;
 use std::time::{Duration, Instant};
+use strapd_recording::attitude_line::Attitude;
 use strapd_recording::text::printable;
 
 /// The horizon's size in characters.
@@ -13,6 +14,8 @@ const PICTURE: (usize, usize) = (21, 7);
 const WIDE: usize = 84;
 /// After this silence a sensor is marked.
 const SILENT: Duration = Duration::from_secs(2);
+/// After this silence it stands behind those that speak, in one line.
+const FOLDED: Duration = Duration::from_secs(5);
 /// What is said of a sensor that has said nothing to us, but what was last before we came.
 const NEVER_HEARD: &str = "silent since this watch began";
 /// Longest name that is shown whole.
@@ -24,6 +27,8 @@ pub(super) enum Tone {
     Plain,
     Heading,
     Alarm,
+    /// Where the figures of x, y and z begin, and where that of z ends, in characters.
+    Axes([usize; 4]),
 }
 
 /// A line of text.
@@ -50,10 +55,15 @@ pub(super) fn heading(board: &Board, now: Instant) -> Line {
         ),
     };
     let plural = if sensors == 1 { "" } else { "s" };
+    let is_silent = |sensor: &&Sensor| silence(sensor, now).is_none_or(|time| time > FOLDED);
+    let silent = match board.sensors.values().filter(is_silent).count() {
+        0 => String::new(),
+        n => format!(", {n} silent"),
+    };
     (
         tone,
         format!(
-            "strapd watch {}  {sensors} sensor{plural}  {state}",
+            "strapd watch {}  {sensors} sensor{plural}{silent}  {state}",
             board.name
         ),
     )
@@ -73,17 +83,20 @@ pub(super) fn body(board: &Board, now: Instant, width: usize) -> Vec<Line> {
         return vec![(Tone::Plain, "nothing has come yet".to_owned())];
     }
     let mut lines = Vec::new();
-    for (id, sensor) in &board.sensors {
+    let is_silent = |sensor: &Sensor| silence(sensor, now).is_none_or(|time| time > FOLDED);
+    let all_are = board.sensors.values().all(is_silent);
+    // Of one without an attitude there is nothing to unfold.
+    let (folded, shown): (Vec<_>, Vec<_>) = board
+        .sensors
+        .iter()
+        .partition(|(_, sensor)| is_silent(sensor) && (!all_are || sensor.attitude.is_none()));
+    for (id, sensor) in shown {
         let alarm = alarm(sensor, now);
         let tone = if alarm { Tone::Alarm } else { Tone::Heading };
         lines.push((tone, title(id, sensor)));
         let figures = figures(sensor, now);
         if width < WIDE {
-            lines.extend(
-                figures
-                    .into_iter()
-                    .map(|text| (Tone::Plain, format!("  {text}"))),
-            );
+            lines.extend(figures.into_iter().map(|line| behind("  ", line)));
         } else {
             let (columns, rows) = PICTURE;
             let rows = rows.max(figures.len());
@@ -92,13 +105,57 @@ pub(super) fn body(board: &Board, now: Instant, width: usize) -> Vec<Line> {
                 None => vec![" ".repeat(columns); rows],
             };
             for (n, row) in picture.iter().enumerate() {
-                let text = figures.get(n).map_or("", String::as_str);
-                lines.push((Tone::Plain, format!("  |{row}|  {text}")));
+                let figure = figures.get(n).cloned();
+                let figure = figure.unwrap_or((Tone::Plain, String::new()));
+                lines.push(behind(&format!("  |{row}|  "), figure));
             }
         }
         lines.push((Tone::Plain, String::new()));
     }
+    for (id, sensor) in folded {
+        let said = match (silence(sensor, now), &sensor.attitude) {
+            (Some(time), _) => format!("{}  silent for {}", shortened(id), lasting(time)),
+            (None, Some(_)) => title(id, sensor),
+            (None, None) => format!("{}  {NEVER_HEARD}", shortened(id)),
+        };
+        let angles = sensor.attitude.as_ref().map(|a| format!("  {}", angles(a)));
+        lines.push((Tone::Alarm, said + &angles.unwrap_or_default()));
+    }
     lines
+}
+
+/// Since when it was not heard; `None`: it never was.
+fn silence(sensor: &Sensor, now: Instant) -> Option<Duration> {
+    let heard = sensor.heard?;
+    Some(now.saturating_duration_since(heard))
+}
+
+/// The same behind other characters.
+fn behind(before: &str, (tone, text): Line) -> Line {
+    let by = before.chars().count();
+    let tone = match tone {
+        Tone::Axes(places) => Tone::Axes(places.map(|place| place + by)),
+        other => other,
+    };
+    (tone, before.to_owned() + &text)
+}
+
+/// Three figures in the colours of the axes, with what stands before and behind them.
+fn axes(before: &str, figures: [String; 3], after: &str) -> Line {
+    let mut text = before.to_owned();
+    let mut places = [text.chars().count(); 4];
+    for (place, figure) in places.iter_mut().skip(1).zip(figures) {
+        text += &figure;
+        *place = text.chars().count();
+    }
+    (Tone::Axes(places), text + after)
+}
+
+fn angles(attitude: &Attitude) -> String {
+    let [roll, pitch, yaw] = roll_pitch_yaw(attitude.q)
+        .map(f64::to_degrees)
+        .map(|v| figure(v, 9, 3));
+    format!("roll {roll}  pitch {pitch}  yaw {yaw}  deg")
 }
 
 /// Whether something is wrong with a sensor now.
@@ -137,7 +194,7 @@ fn shortened(id: &str) -> String {
 }
 
 /// The figures of one sensor, a line each.
-fn figures(sensor: &Sensor, now: Instant) -> Vec<String> {
+fn figures(sensor: &Sensor, now: Instant) -> Vec<Line> {
     let mut lines = Vec::new();
     if let Some(a) = &sensor.attitude {
         let [roll, pitch, yaw] = roll_pitch_yaw(a.q)
@@ -147,33 +204,74 @@ fn figures(sensor: &Sensor, now: Instant) -> Vec<String> {
         let [p, q, r] = a.rate.map(|v| figure(v.to_degrees(), 9, 3));
         let [sx, sy, sz] = a.sigma_deg.map(|v| figure(v, 9, 3).replace('+', " "));
         let (sec, nsec) = a.stamp.unwrap_or_default().to_sec_nanosec();
-        lines.push(format!("roll {roll}  pitch {pitch}  yaw {yaw}  deg"));
-        lines.push(format!("q  w{w}  x{x}  y{y}  z{z}"));
-        lines.push(format!("rate x{p}  y{q}  z{r}  deg/s"));
-        lines.push(format!("sigma {sx}   {sy}   {sz}  deg (1 sigma, x y z)"));
-        lines.extend(knowledge(sensor));
-        lines.push(format!(
-            "stamp {sec}.{nsec:09}  seq {}  resets {}",
-            a.seq, a.reset
+        let three = |names: [&str; 3], [x, y, z]: [String; 3]| {
+            let [a, b, c] = names;
+            [format!("{a}{x}"), format!("{b}{y}"), format!("{c}{z}")]
+        };
+        lines.push(axes(
+            "",
+            three(["roll ", "  pitch ", "  yaw "], [roll, pitch, yaw]),
+            "  deg",
+        ));
+        lines.push(axes(
+            &format!("q  w{w}  "),
+            three(["x", "  y", "  z"], [x, y, z]),
+            "",
+        ));
+        lines.push(axes(
+            "rate ",
+            three(["x", "  y", "  z"], [p, q, r]),
+            "  deg/s",
+        ));
+        lines.push(axes(
+            "sigma ",
+            three(["", "   ", "   "], [sx, sy, sz]),
+            "  deg (1 sigma, x y z)",
+        ));
+        lines.extend(
+            knowledge(sensor)
+                .into_iter()
+                .map(|text| (Tone::Plain, text)),
+        );
+        lines.push((
+            Tone::Plain,
+            format!("stamp {sec}.{nsec:09}  seq {}  resets {}", a.seq, a.reset),
         ));
     }
     let h = &sensor.health;
-    let rate = h.rate_hz.map_or("?".to_owned(), |v| format!("{v:.1}"));
+    let rate = rate(sensor);
     let jitter = h
         .jitter_s
-        .map_or("?".to_owned(), |v| format!("{:.3}", v * 1e3));
-    lines.push(format!(
-        "{rate} Hz  jitter {jitter} ms  samples {}  gaps {}",
-        h.samples, h.gaps
+        .map_or_else(String::new, |v| format!("jitter {:.3} ms  ", v * 1e3));
+    lines.push((
+        Tone::Plain,
+        format!("{rate}{jitter}samples {}  gaps {}", h.samples, h.gaps),
     ));
-    let age = sensor.heard.map_or("?".to_owned(), |heard| {
-        lasting(now.saturating_duration_since(heard))
-    });
-    lines.push(format!(
-        "lost {}  missing {}  dropped {}  last {age} ago",
-        h.lost, h.missing, sensor.dropped
+    lines.push((
+        Tone::Plain,
+        format!(
+            "lost {}  missing {}  dropped {}  {}",
+            h.lost,
+            h.missing,
+            sensor.dropped,
+            age(sensor, now)
+        ),
     ));
     lines
+}
+
+/// Nothing, where nobody knows.
+fn rate(sensor: &Sensor) -> String {
+    let rate = sensor.health.rate_hz;
+    rate.map_or_else(String::new, |v| format!("{v:.1} Hz  "))
+}
+
+/// When it was heard last.
+fn age(sensor: &Sensor, now: Instant) -> String {
+    sensor.heard.map_or_else(
+        || NEVER_HEARD.to_owned(),
+        |heard| format!("last {} ago", lasting(now.saturating_duration_since(heard))),
+    )
 }
 
 /// What corrects it, how well tilt and heading are known, and what was learned of the gyro.
@@ -222,18 +320,19 @@ pub(super) fn plain(board: &Board, now: Instant) -> String {
             ));
             continue;
         };
-        let [roll, pitch, yaw] = roll_pitch_yaw(a.q)
-            .map(f64::to_degrees)
-            .map(|v| figure(v, 9, 3));
         let known: String = knowledge(sensor).iter().map(|l| format!("{l}  ")).collect();
         let h = &sensor.health;
-        let rate = h.rate_hz.map_or("?".to_owned(), |v| format!("{v:.1}"));
-        let age = sensor.heard.map_or("?".to_owned(), |heard| {
-            lasting(now.saturating_duration_since(heard))
-        });
         out.push_str(&format!(
-            "{}  seq {}  roll {roll}  pitch {pitch}  yaw {yaw} deg  {known}{rate} Hz  gaps {}  lost {}  dropped {}  last {age} ago  {}\n",
-            shortened(id), a.seq, h.gaps, h.lost, sensor.dropped, a.status.join(",")
+            "{}  seq {}  {}  {known}{}gaps {}  lost {}  dropped {}  {}  {}\n",
+            shortened(id),
+            a.seq,
+            angles(a),
+            rate(sensor),
+            h.gaps,
+            h.lost,
+            sensor.dropped,
+            age(sensor, now),
+            a.status.join(",")
         ));
     }
     out
@@ -316,7 +415,7 @@ mod tests {
             Tone::Alarm,
             "other  silent since this watch began".to_owned(),
         );
-        assert!(lines.contains(&silent), "{lines:?}");
+        assert_eq!(lines.last(), Some(&silent), "behind those that speak");
         assert!(plain(&board, now).contains("\nother  silent since this watch began  samples 0\n"));
         // Samples of a simulation are no sensor's.
         let (mut board, now) = board_of(&[]);
@@ -340,7 +439,8 @@ mod tests {
         board.connected(now);
         let text = plain(&board, now);
         assert!(
-            text.contains("roll   +90.000") && text.ends_with("last ? ago  provisional,last\n"),
+            text.contains("roll   +90.000")
+                && text.ends_with("silent since this watch began  provisional,last\n"),
             "{text}"
         );
         board.take(Said::Attitude(ATT.as_bytes()), now);
@@ -349,6 +449,56 @@ mod tests {
             tone == Tone::Heading && text.ends_with("  provisional"),
             "{text}"
         );
+    }
+
+    #[test]
+    fn the_silent_stand_behind_those_that_speak_in_a_line_each() {
+        let (mut board, now) = board_of(&[]);
+        let of = |id: &str, at: Instant, board: &mut Board| {
+            let line = ATT.replace("imu\\u001b[31m0", id);
+            board.take(Said::Attitude(line.as_bytes()), at);
+        };
+        of("a", now, &mut board);
+        let later = now + Duration::from_secs(12);
+        of("z", later, &mut board);
+        for width in [60, 100] {
+            let lines = body(&board, later, width);
+            assert!(heading(&board, later).1.contains("  4 sensors, 3 silent  "));
+            assert_eq!(lines[0].1, "z  flu in start  provisional");
+            let folded: Vec<&str> = lines[lines.len() - 3..]
+                .iter()
+                .map(|(tone, text)| {
+                    assert_eq!(*tone, Tone::Alarm);
+                    text.as_str()
+                })
+                .collect();
+            let angles = "roll   +90.000  pitch    +0.000  yaw    +0.000  deg";
+            assert_eq!(folded[0], format!("a  silent for 12 s  {angles}"));
+            assert!(folded[1].starts_with("imu"), "{folded:?}");
+            assert_eq!(folded[2], "other  silent since this watch began");
+            assert!(lines.iter().all(|(_, text)| !text.contains('?')));
+        }
+        // Where nobody speaks, what was last is worth the room.
+        let lines = body(&board, later + Duration::from_secs(30), 100);
+        assert!(lines.len() > 20 && lines[0].1.starts_with("a  flu"));
+    }
+
+    #[test]
+    fn x_y_and_z_have_the_places_of_their_colours() {
+        let (board, now) = board();
+        for width in [60, 100] {
+            let lines = body(&board, now, width);
+            let (tone, text) = lines
+                .iter()
+                .find(|(_, text)| text.contains("rate x"))
+                .unwrap_or_else(|| unreachable!("{lines:?}"));
+            let Tone::Axes([x, y, z, end]) = tone else {
+                unreachable!("{tone:?}")
+            };
+            assert_eq!(text[*x..*y].trim(), "x   +1.000");
+            assert_eq!(text[*y..*z].trim(), "y   +0.000");
+            assert!(text[*z..*end].trim().starts_with('z'), "{text}");
+        }
     }
 
     #[test]

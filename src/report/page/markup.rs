@@ -73,7 +73,8 @@ pub(super) fn table(class: &str, head: &[&str], rows: &[Vec<String>]) -> String 
             all + &format!("<{tag}>{cell}</{tag}>")
         })
     };
-    let head = cells("th", &mut head.iter().map(|cell| escaped(cell)));
+    let head =
+        cells("th", &mut head.iter().map(|cell| escaped(cell))).replace("<th></th>", "<td></td>");
     let mut out = format!("<div class=\"wide\"><table class=\"{class}\">\n<tr>{head}</tr>\n");
     for row in rows {
         let row = cells("td", &mut row.iter().map(|cell| escaped(cell)));

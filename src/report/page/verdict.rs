@@ -7,6 +7,9 @@ use crate::report::findings::Severity;
 use crate::report::summary::{TopicSummary, significant};
 use strapd_replay::inspection::Checked;
 
+/// Topics of a log that are compared with those of others.
+const TOPICS: usize = 6;
+
 /// How good it is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Level {
@@ -105,6 +108,37 @@ impl Verdict {
             text: sentence(&good(best, trusted)) + &wrong,
         }
     }
+}
+
+/// Of each topic that was integrated: duration, rate, lost samples, gaps, turned, error and error over 1 s.
+pub(super) fn figures(checked: &Checked) -> Vec<(String, [String; 7])> {
+    let of = |s: &TopicSummary| {
+        let used = s
+            .drawn
+            .as_deref()
+            .and_then(|drawn| drawn.errors.as_ref())
+            .and_then(|errors| errors.traces.iter().find(|trace| trace.is_used))
+            .map(|trace| &trace.comparison);
+        let deg = |v: f64| significant(v.to_degrees(), 3);
+        let total = used.and_then(|found| found.errors.as_ref());
+        let over = used.and_then(|found| found.relative_1s.as_ref());
+        [
+            format!("{:.3}", s.duration_secs),
+            s.rate_hz.map_or_else(String::new, |hz| significant(hz, 4)),
+            s.counts.lost().to_string(),
+            (s.gaps.bridged + s.gaps.held + s.gaps.resets).to_string(),
+            format!("{:.1}", s.turned.to_degrees()),
+            total.map_or_else(String::new, |found| {
+                format!("{} / {}", deg(found.total.rms), deg(found.total.max))
+            }),
+            over.map_or_else(String::new, |found| deg(found.median)),
+        ]
+    };
+    let runs = checked.topics.iter().filter_map(|topic| {
+        let summary = topic.replayed.as_ref().ok()?;
+        Some((summary.topic.clone(), of(summary)))
+    });
+    runs.take(TOPICS).collect()
 }
 
 fn good(s: &TopicSummary, trusted: bool) -> String {

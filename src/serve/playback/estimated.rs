@@ -54,7 +54,9 @@ impl Estimated {
             return;
         };
         stream.take(plan, None, samples);
+        let health = stream.health();
         let (first, attitudes, channel) = stream.attitudes();
+        channel.known(health);
         if shown && !attitudes.is_empty() {
             hub.distribute(channel, first, Items::Attitudes(attitudes), text);
         }

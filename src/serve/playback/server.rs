@@ -8,6 +8,7 @@ use super::controls::{Grant, Notice, Playback};
 use super::estimated::Estimated;
 use crate::error::{Error, Result};
 use crate::pipeline::audience::{self, Audience};
+use crate::serve::channel::health::Health;
 use crate::serve::channel::{Channel, Items};
 use crate::serve::hub::{Flood, Hub};
 use crate::serve::shutdown::Signals;
@@ -17,6 +18,7 @@ use crate::sink::{Content, Stream};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
+use strapd_attitude::estimate::Estimator;
 use strapd_attitude::record::{AttitudeSample, Nanos, RawSample};
 use tokio::sync::oneshot;
 
@@ -283,6 +285,12 @@ impl Audience for Cast {
             let of = (&*self.hub, lane.channel.id());
             let text = &mut lock(&self.text);
             lock(&self.estimated).take(of, kind, samples, shown, text);
+        }
+    }
+
+    fn known(&self, stream: usize, estimator: &Estimator) {
+        if let Some(lane) = lock(&self.streams).get(stream) {
+            lane.channel.known(Health::of(estimator));
         }
     }
 

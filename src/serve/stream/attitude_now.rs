@@ -6,7 +6,10 @@ use strapd_attitude::record::AttitudeSample;
 
 /// What corrects an attitude now and how well it is known; null before there is one, and of a gyro alone, whose
 /// world has no vertical.
-pub(super) fn attitude_now(filter: Option<&Filter>, last: Option<&AttitudeSample>) -> Value {
+pub(in crate::serve) fn attitude_now(
+    filter: Option<&Filter>,
+    last: Option<&AttitudeSample>,
+) -> Value {
     let (Some(filter), Some(last)) = (filter, last) else {
         return Value::Null;
     };

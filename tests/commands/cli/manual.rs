@@ -49,7 +49,8 @@ fn the_manual_is_one_page_on_stdout_or_one_per_command_in_a_directory() {
         let name = format!("strapd-{command}.1");
         assert!(pages.contains(&name), "{name} is missing: {pages:?}");
     }
-    strapd(dir.path(), "man --out-dir nowhere").refused(1, &["nowhere"]);
+    std::fs::write(dir.path().join("taken"), "").unwrap();
+    strapd(dir.path(), "man --out-dir taken").refused(1, &["taken"]);
 }
 
 #[test]

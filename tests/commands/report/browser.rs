@@ -126,4 +126,22 @@ fn names_made_to_run_do_not() {
         dom.matches("aria-valuetext=\"0:").count() >= 3,
         "its own script has run: {said}"
     );
+    // Beside another log, too.
+    written(dir.path(), "log.mcap", &motion(1000));
+    let ran = Command::new(env!("CARGO_BIN_EXE_strapd"))
+        .current_dir(dir.path())
+        .args(["report", name, "log.mcap", "-o", "both.html"])
+        .output()
+        .unwrap();
+    assert!(matches!(ran.status.code(), Some(0 | 3)), "{ran:?}");
+    let (dom, said) = opened(browser, &dir.path().join("both.html"));
+    assert_eq!(complaints(&said), Vec::<&str>::new());
+    assert!(
+        !dom.contains("<title>owned") && !dom.contains("<img"),
+        "{dom:.500}"
+    );
+    assert!(
+        dom.matches("aria-valuetext=\"0:").count() >= 6,
+        "charts of both: {said}"
+    );
 }

@@ -219,7 +219,19 @@ fn a_replay_is_moved_from_the_page_and_ends_where_a_file_ends() {
     );
     let time = browser.number("Object.values(__strapd.sensors)[0].time");
     assert!((time - 12.0).abs() < 0.03, "{time}");
-    // Of a recording some is not known; what is not has no place.
+    // What became of the samples up to there, and how they are integrated.
+    let said = |name: &str| {
+        format!("document.querySelector('[data-id=\"/imu/data\"] [data-part={name}]').textContent")
+    };
+    for (name, value) in [
+        ("gaps", "0"),
+        ("lost", "0"),
+        ("missing", "0"),
+        ("rateNominal", "of 50"),
+    ] {
+        browser.until(name, &format!("{} === '{value}'", said(name)));
+    }
+    assert_ne!(browser.eval(&said("method")), "–");
     let health = browser.eval("[...document.querySelectorAll('[data-testid=sensor] .strip div')].filter((e) => e.offsetParent && /–$/.test(e.textContent.trim())).map((e) => e.textContent)");
     assert_eq!(health, json!([]));
     browser.is_unharmed();

@@ -62,6 +62,8 @@ pub struct Quality {
     accel_count: u64,
     accel_not_finite: u64,
     orientations: u64,
+    first_orientation: Option<[f64; 4]>,
+    orientation_varies: bool,
     intervals: u64,
     offset: Offset,
     window: Window,
@@ -225,6 +227,8 @@ impl Quality {
             accel_count: 0,
             accel_not_finite: 0,
             orientations: 0,
+            first_orientation: None,
+            orientation_varies: false,
             intervals: 0,
             offset: Offset::default(),
             window: Window::default(),
@@ -237,7 +241,11 @@ impl Quality {
     pub fn push(&mut self, raw: &RawSample) {
         let index = self.count;
         self.count += 1;
-        self.orientations += u64::from(raw.orientation.is_some());
+        if let Some(orientation) = raw.orientation {
+            self.orientations += 1;
+            let first = *self.first_orientation.get_or_insert(orientation);
+            self.orientation_varies |= first != orientation;
+        }
         self.intervals += u64::from(raw.interval_nanos.is_some());
         let stamp = match self.clock {
             Clock::Index { rate_hz } => Some(Nanos((index as f64 * 1e9 / rate_hz) as i64)),

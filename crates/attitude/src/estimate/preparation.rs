@@ -647,7 +647,7 @@ fn not_level(why: &NoRest) -> Diagnostic {
     let said = Diagnostic::from(why).at(format_args!("{INIT} gravity"));
     match why {
         NoRest::Moving { .. } | NoRest::Disagree { .. } => {
-            said.help(format!("{INIT} identity starts unlevelled, {INIT} rpy=roll,pitch,yaw (degrees) as you say; if the rates look too large, {GYRO_UNIT} deg"))
+            said.help(format!("without {INIT} a specific force levels it on the way ({AID} gravity); {INIT} first-orientation takes a recorded one, {INIT} identity starts unlevelled, {INIT} rpy=roll,pitch,yaw (degrees) as you say; if the rates look too large, {GYRO_UNIT} deg"))
         }
         NoRest::NotAtStart { .. } | NoRest::NoAccel => said,
     }

@@ -6,7 +6,7 @@ use crate::summary::against::{beyond_sigma, bias_json, bias_words, consistency_j
 use crate::summary::{Against, Recorded, TopicSummary, significant};
 use nalgebra::Vector3;
 use serde_json::json;
-use strapd_attitude::compare::{BiasFit, BodyAxesFit};
+use strapd_attitude::compare::{BiasFit, BodyAxesFit, Consistency};
 use strapd_attitude::setting::{BIAS, Choice, METHOD, MOUNT, NOISE, SAMPLE_KIND};
 
 /// A meaning is better when its median error is below this share of the other's.
@@ -21,6 +21,8 @@ const MOSTLY_THERE: f64 = 0.5;
 const ANOTHER_MOTION: f64 = 0.5;
 /// Of a motion about one axis other axes look like a bias; one below this share of the motion is believed.
 const SMALL_SHARE: f64 = 0.3;
+/// A heading that is off by more than this is worth a word though sigma allows it, rad (15 degrees).
+const DRIFTED: f64 = 0.26;
 /// Two biases that differ by less than this share are the same.
 const SAME: f64 = 0.3;
 
@@ -103,6 +105,7 @@ fn told_by_it(
         return;
     };
     let Some(what) = beyond_sigma(found) else {
+        heading_drift(found, help, out);
         return;
     };
     let advice = if help.is_some() {
@@ -127,6 +130,34 @@ fn told_by_it(
             .with("noise", summary.noise.clone())
             .advise(advice)
             .help(help),
+    );
+}
+
+/// A heading that sigma allows, and nobody expects.
+fn heading_drift(found: &Consistency, help: Option<Choice>, out: &mut Vec<Finding>) {
+    if found.heading.rms < DRIFTED {
+        return;
+    }
+    let deg = |v: f64| significant(v.to_degrees(), 2);
+    let advice = match help {
+        Some(_) => "without that bias it is less",
+        None => {
+            "the gyro alone does not hold it, nor does gravity: a magnetic field does (--aid gravity+mag)"
+        }
+    };
+    out.push(
+        Finding::new(
+            Severity::Warning,
+            "heading-drift",
+            format!(
+                "the heading leaves the recorded orientation by {} deg (rms), within its sigma of {}",
+                deg(found.heading.rms),
+                deg(found.heading.sigma)
+            ),
+        )
+        .with("sigma", consistency_json(found))
+        .advise(advice)
+        .help(help),
     );
 }
 

@@ -3,8 +3,9 @@
 use super::{Finding, Severity};
 use crate::inspection::Inspection;
 use crate::summary::significant;
+use nalgebra::{Vector3, Vector4};
 use serde_json::json;
-use strapd_attitude::condition::quality::{Advice, AxisStats};
+use strapd_attitude::condition::quality::{Advice, AxisStats, GravityAxis};
 use strapd_attitude::frames::BodyAxes;
 use strapd_attitude::setting::{
     AGAINST_RECORDED, BIAS, BODY, GYRO_RANGE, GYRO_UNIT, IGNORE_COVARIANCE_FLAG, MAX_GAP, MOUNT,
@@ -37,6 +38,10 @@ pub fn of_samples(looked: &Inspection) -> Vec<Finding> {
     silent(looked, &mut out);
     clocks(looked, &mut out);
     bias(looked, &mut out);
+    // What nobody takes unasked spoils nothing.
+    if !looked.is_likely {
+        out.iter_mut().for_each(|f| f.severity = Severity::Note);
+    }
     out
 }
 
@@ -185,8 +190,8 @@ fn advised(looked: &Inspection, advice: &Advice) -> Option<Finding> {
             format!("gravity is on {gravity} at rest: the sensor is mounted on its side"),
         )
         .with("gravity", gravity.to_string())
-        .advise("the attitude is the sensor's; state its mounting to get the body's")
-        .help([MOUNT.to("q=w,x,y,z")]).help([BODY.to("MAP")]),
+        .advise("the attitude is the sensor's; this mounting makes it level (its heading is free)")
+        .help([MOUNT.to(levelled(looked, gravity))]).help([BODY.to("MAP")]),
         Advice::Saturated { axis, at, samples } => Finding::new(
             Error,
             "saturated",
@@ -242,7 +247,13 @@ fn advised(looked: &Inspection, advice: &Advice) -> Option<Finding> {
         )
         .with("rms_share_of_step", jitter)
         .with("segments_of_constant_rate", segments)
-        .advise(format!("if a clock of its own triggers the sensor, straighten its stamps; if it samples when it is asked, keep them: they can not tell, {AGAINST_RECORDED} may"))
+        .advise({
+            let advice = "if a clock of its own triggers the sensor, straighten its stamps; if it samples when it is asked, keep them";
+            match looked.has_reference {
+                true => format!("{advice}: they can not tell, {AGAINST_RECORDED} may"),
+                false => advice.to_owned(),
+            }
+        })
         .help([REGULARISE_STAMPS]),
         Advice::StampsUneven { share } => Finding::new(
             Warning,
@@ -284,6 +295,31 @@ fn advised(looked: &Inspection, advice: &Advice) -> Option<Finding> {
         .advise("no bias can be had from this log: give one, if it is known")
         .help([BIAS.to("x,y,z")]),
     })
+}
+
+/// The shortest turn from the sensor to a body with z up: gravity as a rest shows it, or the axis it is nearest to.
+fn levelled(looked: &Inspection, gravity: GravityAxis) -> String {
+    let longest = looked
+        .rests
+        .kept
+        .iter()
+        .max_by(|a, b| a.secs().total_cmp(&b.secs()));
+    let measured = longest
+        .and_then(|rest| rest.mean_accel)
+        .map(|f| *f.as_vector());
+    let axis = || {
+        let mut axis = Vector3::zeros();
+        if let Some(one) = axis.get_mut(gravity.axis) {
+            *one = if gravity.positive { 1.0 } else { -1.0 };
+        }
+        axis
+    };
+    let up = measured
+        .filter(|f| f.norm() > 0.0)
+        .unwrap_or_else(axis)
+        .normalize();
+    let q = Vector4::new(1.0 + up.z, up.y, 0.0 - up.x, 0.0).normalize();
+    format!("q={:.6},{:.6},{:.6},0", q.x, q.y, q.z)
 }
 
 /// No gyro turns that fast in rad/s.

@@ -5,6 +5,7 @@
 
 use crate::sink::Stream;
 use std::fmt::Debug;
+use strapd_attitude::estimate::Estimator;
 use strapd_attitude::record::{AttitudeSample, Nanos, RawSample};
 
 /// What to do with the next items of a run.
@@ -33,6 +34,11 @@ pub trait Audience: Debug + Send + Sync {
 
     /// Samples of a stream.
     fn samples(&self, stream: usize, samples: &[RawSample], is_shown: bool);
+
+    /// What `estimator` of a stream has taken so far; what came of it was handed over.
+    fn known(&self, stream: usize, estimator: &Estimator) {
+        let _ = (stream, estimator);
+    }
 
     /// Whether orientations that were recorded are shown beside those that are estimated.
     fn wants_recorded(&self) -> bool {

@@ -112,11 +112,14 @@ pub fn examine(
     } else {
         Vec::new()
     };
-    let looked: Vec<Inspection> = looks
+    let mut looked: Vec<Inspection> = looks
         .topics
         .into_iter()
         .filter(|l| named.is_none_or(|name| l.topic == name || l.of == name))
         .collect();
+    if named.is_some() {
+        looked.iter_mut().for_each(|l| l.is_likely = true);
+    }
     let names: Vec<String> = looked.iter().map(|l| l.topic.clone()).collect();
     let replayed = integrate(&log, &names, asked, has_reference, pool, watch)?;
     let topics = looked

@@ -11,6 +11,7 @@ use rayon::ThreadPool;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
+use strapd_attitude::estimate::Estimator;
 use strapd_attitude::record::{AttitudeSample, Nanos, RawSample};
 use strapd_recording::pool::Pool;
 use strapd_recording::recording::channel_route::Copied;
@@ -230,6 +231,19 @@ impl Outlet {
         if let (Some(audience), false) = (&self.audience, samples.is_empty()) {
             audience.recorded(of, stream, samples, self.is_shown);
         }
+    }
+
+    /// Tells whoever is shown the run what is known of a stream by now.
+    pub(super) fn known(&self, stream: usize, estimator: &Estimator) {
+        if let Some(audience) = &self.audience {
+            audience.known(stream, estimator);
+        }
+    }
+
+    /// Whether somebody is shown the run.
+    #[must_use]
+    pub(super) fn has_audience(&self) -> bool {
+        self.audience.is_some()
     }
 
     /// How long the input is, about, for whoever is shown where the run is.

@@ -150,6 +150,8 @@ impl Look {
             clock,
             clock_warning,
             aid: self.aid,
+            is_likely: true,
+            has_reference: false,
         })
     }
 }
@@ -252,12 +254,34 @@ pub(crate) fn look_as(
     for topic in &mut topics {
         let [fields, (forces, _)] = vectors(log, &topic.of);
         (topic.aid.fields, topic.aid.forces) = (fields, forces);
+        topic.has_reference = topic.quality.with_orientation > 0
+            && topic.quality.orientation_varies
+            || has_reference_beside(log, &topic.of);
+    }
+    let rank_of = |topic: &Inspection| {
+        log.channels
+            .iter()
+            .filter(|k| k.channel.topic == topic.of)
+            .map(|k| rank(&k.role))
+            .max()
+    };
+    let best = topics.iter().map(rank_of).max().flatten();
+    for topic in &mut topics {
+        topic.is_likely = rank_of(topic) == best;
     }
     Ok(Looks {
         topics,
         left_out,
         survey,
     })
+}
+
+/// Whether a replay that names none finds one topic of orientations beside the samples' own.
+fn has_reference_beside(log: &Recording, of: &str) -> bool {
+    let mut others = log.channels.iter().filter(|k| {
+        k.channel.topic != of && k.role.has_orientation && rank(&k.role) <= 1 && k.messages > 0
+    });
+    matches!((others.next(), others.next()), (Some(one), None) if !one.role.has_rate)
 }
 
 /// What a channel of the survey and one met in a walk have in common; the index may differ.

@@ -215,8 +215,9 @@ impl Session {
         items: impl Iterator<Item = Item>,
         pool: &Pool,
     ) -> Result<Flow> {
-        // Handed on in time topics must take turns: a batch of one would go by before the other's.
-        let several = self.topics.len() > 1 || self.topics.iter().any(|t| t.recorded.is_some());
+        // Handed on in time topics must take turns: a batch of one would go by before the other's. And of what has
+        // not been shown yet nothing is told.
+        let several = self.topics.len() > 1 || self.outlet.has_audience();
         let take_turns = several && self.outlet.is_paced();
         for item in items {
             self.take(item, pool)?;
@@ -282,6 +283,7 @@ impl Session {
         for (stream, topic) in self.topics.iter_mut().enumerate() {
             let attitudes = topic.estimator.attitudes(pool);
             topic.output.add(attitudes);
+            let is_more_known = !attitudes.is_empty();
             if let Some(history) = &mut topic.history {
                 history.add(attitudes);
             }
@@ -294,6 +296,9 @@ impl Session {
             }
             if let Some(recorded) = &mut topic.recorded {
                 recorded.show(stream, attitudes, &self.outlet);
+            }
+            if is_more_known {
+                self.outlet.known(stream, &topic.estimator);
             }
             if let Some(against) = &mut topic.against {
                 against.advance(pool);
@@ -369,6 +374,7 @@ impl Session {
                 }
                 Ok::<(), Error>(())
             })?;
+            self.outlet.known(stream, estimator);
             if let Some(against) = against {
                 against.finish(pool);
             }

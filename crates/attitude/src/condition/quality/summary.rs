@@ -124,6 +124,8 @@ pub struct QualitySummary {
     pub accel_not_finite: u64,
     /// Samples with an orientation.
     pub with_orientation: u64,
+    /// Whether any of these is another than the first: some drivers fill the field with one.
+    pub orientation_varies: bool,
     /// Samples that state their own integration interval.
     pub with_interval: u64,
     /// Start of the quietest half second.
@@ -174,6 +176,7 @@ pub(super) fn summarise(quality: &Quality) -> QualitySummary {
         with_accel: quality.accel_count,
         accel_not_finite: quality.accel_not_finite,
         with_orientation: quality.orientations,
+        orientation_varies: quality.orientation_varies,
         with_interval: quality.intervals,
         quietest_at: quality.quietest.map(|q| q.start),
         quietest_deviation: quality.quietest.map(|q| q.deviation),
