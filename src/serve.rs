@@ -251,9 +251,11 @@ impl Server {
 
 /// Sees to it that samples do not wait for ever for the unit of their stamps.
 async fn end_waits(hub: Arc<Hub>) {
-    let mut tick = tokio::time::interval(Duration::from_millis(250));
+    const TICK: Duration = Duration::from_millis(250);
+    let mut tick = tokio::time::interval(TICK);
     loop {
         tick.tick().await;
+        hub.forget_silent(TICK);
         hub.end_waits(listen::now());
     }
 }

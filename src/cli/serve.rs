@@ -28,7 +28,7 @@ use strapd_attitude::diagnostic::Diagnostic;
 /// Most sources connected to.
 const MAX_SOURCES: usize = 64;
 /// Most sensors that can be asked for.
-const MAX_SENSORS: u64 = 4096;
+const MAX_SENSORS: u64 = 100_000;
 
 /// Samples in over sockets, attitude out to whoever watches.
 #[derive(Args, Debug)]
@@ -111,6 +111,10 @@ pub struct Serve {
     /// silent longest; one connection sends at most 256, one peer half of all
     #[arg(long, value_name = "N", default_value_t = 1024, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=MAX_SENSORS))]
     pub max_sensors: usize,
+    /// Give up the place of a sensor that was silent for so many seconds; it goes on from its last attitude when it
+    /// comes back [default: its place is another's when all are taken]
+    #[arg(long, value_name = "SECS", value_parser = window)]
+    pub forget_after: Option<Duration>,
     #[command(flatten)]
     #[allow(missing_docs)]
     pub admission: Admission,
@@ -427,6 +431,7 @@ impl Serve {
             limits: Limits {
                 state_window: self.state_window,
                 sensors: self.max_sensors,
+                forget_after: self.forget_after,
                 ..Limits::default()
             },
             ..Settings::default()

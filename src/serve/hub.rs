@@ -88,6 +88,8 @@ pub struct Hub {
     gave_way: Mutex<VecDeque<Arc<str>>>,
     /// Counts what is heard of sensors.
     heard: AtomicU64,
+    /// Counts the calls of [`Hub::forget_silent`].
+    tick: AtomicU64,
     /// How saving attitudes went the last time; `None` when they are not saved.
     state: Mutex<Option<StateStatus>>,
     /// By number.
@@ -111,6 +113,8 @@ pub struct Sensor {
     owner: Option<u64>,
     /// Which number of all that was heard of sensors its last was.
     heard: u64,
+    /// At which tick that was.
+    heard_at: u64,
     /// Another one has its place.
     gave_way: bool,
 }
@@ -224,6 +228,7 @@ impl Hub {
             saved: Mutex::new(Absent::new(settings.saved)),
             gave_way: Mutex::default(),
             heard: AtomicU64::new(0),
+            tick: AtomicU64::new(0),
             state: Mutex::default(),
             channels: RwLock::default(),
             truth: Mutex::default(),
@@ -402,6 +407,7 @@ impl Hub {
             }
         }
         sensor.heard = self.heard.fetch_add(1, Ordering::Relaxed);
+        sensor.heard_at = self.tick.load(Ordering::Relaxed);
         if !sensor.stream.agrees(self.plan_of(&id), run.head) {
             return Err(refuse(
                 "meaning_changed",

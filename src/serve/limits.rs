@@ -27,6 +27,8 @@ pub struct Limits {
     pub ping: Duration,
     /// How long a sensor sent by datagrams stays its sender's after the last.
     pub sender_silence: Duration,
+    /// How long a sensor may be silent and keep its place (`--forget-after`); none: until another needs it.
+    pub forget_after: Option<Duration>,
     /// By when a shutdown has drained.
     pub drain: Duration,
     /// How far back a new connection may send again what a sensor has sent before.
@@ -47,6 +49,7 @@ impl Default for Limits {
             idle: Duration::from_secs(60),
             ping: Duration::from_secs(15),
             sender_silence: Duration::from_secs(5),
+            forget_after: None,
             drain: Duration::from_secs(2),
             state_window: Duration::from_secs(60),
         }

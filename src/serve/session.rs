@@ -580,11 +580,19 @@ impl Session {
             .as_deref()
             .filter(|id| !id.is_empty())
             .unwrap_or(NAMELESS);
-        let news = self.sensor(id, &run).and_then(|sensor| {
-            let news = self.hub.publish(&sensor, &run, &mut scratch.text);
-            self.last = news.is_ok().then_some(sensor);
+        let mut publish = |session: &mut Session| {
+            let sensor = session.sensor(id, &run)?;
+            let news = session.hub.publish(&sensor, &run, &mut scratch.text);
+            session.last = news.is_ok().then_some(sensor);
             news
-        });
+        };
+        let mut news = publish(self);
+        if matches!(&news, Err(fault) if fault.code == GAVE_WAY) && self.owned.remove(id).is_some()
+        {
+            // It was silent for long: it asks for a place again.
+            self.client.let_go();
+            news = publish(self);
+        }
         match news {
             Ok(Feedback { note, faults }) => {
                 if let Some(note) = note {
@@ -597,9 +605,6 @@ impl Session {
             }
             Err(fault) => {
                 count(&self.hub.counters.refused_samples, run.samples.len());
-                if fault.code == GAVE_WAY && self.owned.remove(id).is_some() {
-                    self.client.let_go();
-                }
                 self.say(&fault, 0, &[]);
             }
         }

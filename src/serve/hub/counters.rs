@@ -27,6 +27,8 @@ pub struct Counters {
     pub refused_samples: AtomicU64,
     /// Sensors whose place went to another.
     pub gave_way: AtomicU64,
+    /// Sensors that were silent for too long.
+    pub forgotten: AtomicU64,
     /// Attitudes begun anew because somebody asked.
     pub resets: AtomicU64,
     /// Such requests that were refused.
@@ -38,7 +40,7 @@ pub struct Counters {
 impl Counters {
     /// Each, in a fixed order.
     #[must_use]
-    pub fn named(&self) -> [Counter; 14] {
+    pub fn named(&self) -> [Counter; 15] {
         let counter = |name, counts, n: &AtomicU64| Counter {
             name,
             counts,
@@ -99,6 +101,11 @@ impl Counters {
                 "sensors_gave_way",
                 "Sensors that nobody sent and whose place another took; they go on from there when they come back.",
                 &self.gave_way,
+            ),
+            counter(
+                "sensors_forgotten",
+                "Sensors that were silent for longer than --forget-after; they go on from there when they come back.",
+                &self.forgotten,
             ),
             counter("resets", "RESET requests taken.", &self.resets),
             counter(

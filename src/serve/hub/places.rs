@@ -12,6 +12,7 @@ use crate::serve::wire::TRUTH;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
 /// Sensors that gave way last, in `STATUS`.
 const TOLD: usize = 16;
@@ -110,6 +111,7 @@ impl Hub {
             stream,
             owner: None,
             heard: self.heard.fetch_add(1, Ordering::Relaxed),
+            heard_at: self.tick.load(Ordering::Relaxed),
             gave_way: false,
         }));
         sensors.insert(id, sensor.clone());
@@ -162,15 +164,7 @@ impl Hub {
                 ),
             ));
         };
-        if let Some(sensor) = sensors.remove(&id) {
-            let mut sensor = lock(&sensor);
-            // Somebody may be about to send it.
-            sensor.gave_way = true;
-            if let Some(saved) = sensor.stream.saved() {
-                lock(&self.saved).insert(&id, saved, self.limits.sensors);
-            }
-            self.withdraw(sensor.stream.channel());
-        }
+        self.put_away(sensors, &id);
         count(&self.counters.gave_way, 1);
         let mut told = lock(&self.gave_way);
         told.retain(|known| *known != id);
@@ -179,6 +173,48 @@ impl Hub {
         }
         told.push_back(id);
         Ok(())
+    }
+
+    /// To be called every `tick`: sensors that were silent for longer than they may be give up their places.
+    /// Their attitudes are kept, and go on when they come back.
+    pub fn forget_silent(&self, tick: Duration) {
+        let now = self.tick.fetch_add(1, Ordering::Relaxed) + 1;
+        let Some(after) = self.limits.forget_after else {
+            return;
+        };
+        let most = after.as_nanos().div_ceil(tick.as_nanos().max(1)) as u64;
+        // A pass over all of them now and then, not at every tick.
+        if !now.is_multiple_of((most / 8).max(1)) {
+            return;
+        }
+        let all: Vec<_> = {
+            let sensors = read(&self.sensors);
+            let all = sensors.iter().map(|(id, s)| (id.clone(), s.clone()));
+            all.collect()
+        };
+        let is_silent = |sensor: &Mutex<Sensor>| now - lock(sensor).heard_at.min(now) > most;
+        let silent = all.into_iter().filter(|(_, sensor)| is_silent(sensor));
+        for (id, sensor) in silent {
+            let mut sensors = write(&self.sensors);
+            // It may have spoken meanwhile.
+            if is_silent(&sensor) {
+                self.put_away(&mut sensors, &id);
+                count(&self.counters.forgotten, 1);
+            }
+        }
+    }
+
+    /// A sensor's place is free, and its attitude is kept.
+    fn put_away(&self, sensors: &mut BTreeMap<Arc<str>, Arc<Mutex<Sensor>>>, id: &Arc<str>) {
+        if let Some(sensor) = sensors.remove(id) {
+            let mut sensor = lock(&sensor);
+            // Somebody may be about to send it.
+            sensor.gave_way = true;
+            if let Some(saved) = sensor.stream.saved() {
+                lock(&self.saved).insert(id, saved, self.limits.sensors);
+            }
+            self.withdraw(sensor.stream.channel());
+        }
     }
 
     /// Sensors that another worker has had go on from where they were.

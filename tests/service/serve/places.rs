@@ -3,6 +3,7 @@
 use super::client::{Client, rate};
 use super::daemon::{Daemon, Process, TCP, eventually, listening};
 use serde_json::Value;
+use std::time::Duration;
 use strapd::serve::limits::Limits;
 
 fn with_places(sensors: usize) -> Daemon {
@@ -128,4 +129,44 @@ fn one_connection_sends_256_sensors_and_one_peer_512_and_others_have_the_rest() 
         ids(&daemon.status()).contains(&"late")
     });
     assert_eq!(count(), 1024);
+}
+
+#[test]
+fn a_sensor_that_was_silent_for_long_goes_on_as_if_nothing_had_happened() {
+    let mut settings = listening(&[TCP]);
+    settings.limits.forget_after = Some(Duration::from_millis(500));
+    let daemon = Daemon::start(settings);
+    let mut watcher = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");
+    let mut sender = Client::tcp(daemon.address(0));
+    let mut said = |n: u64, watcher: &mut Client| {
+        // The one that is never silent shows what would have been.
+        let [mut one, mut other] = ["silent", "steady"].map(|id| {
+            sender.send(&rate(id, n, 2.0));
+            watcher.object("ATT")
+        });
+        for att in [&mut one, &mut other] {
+            att.as_object_mut().unwrap().remove("id");
+        }
+        assert_eq!(one, other, "{n}");
+    };
+    for n in 0..30 {
+        said(n, &mut watcher);
+    }
+    let mut keeper = Client::tcp(daemon.address(0));
+    let mut n = 0;
+    eventually("its place is free", || {
+        // Another one goes on meanwhile, and keeps its own.
+        keeper.send(&rate("third", n, 1.0));
+        watcher.object("ATT");
+        n += 1;
+        daemon.status()["counters"]["sensors_forgotten"] == 2
+    });
+    assert_eq!(ids(&daemon.status()), ["third"]);
+    assert_eq!(daemon.status()["places"]["saved"], 2);
+    // No sample is refused: the sender's next one asks for a place again, and the attitude goes on exactly.
+    for n in 30..60 {
+        said(n, &mut watcher);
+    }
+    assert_eq!(daemon.status()["counters"]["samples_refused"], 0);
+    assert_eq!(daemon.status()["counters"]["faults"], 0);
 }
