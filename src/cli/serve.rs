@@ -384,6 +384,18 @@ impl Serve {
             }
             sources.push(source);
         }
+        #[cfg(feature = "nats")]
+        {
+            let is_leased =
+                |s: &&Endpoint| matches!(s, Endpoint::Nats(address) if address.lease.is_some());
+            if sources.iter().filter(is_leased).count() > 1 {
+                return Err(Error::usage(
+                    Diagnostic::new("serve: two partitions, and one daemon takes one").help(
+                        "start a daemon for each: they are cheap, and each can be taken over alone",
+                    ),
+                ));
+            }
+        }
         if sources.len() > MAX_SOURCES {
             return Err(Error::usage(format!(
                 "serve: {} sources, at most {MAX_SOURCES} can be connected to",

@@ -30,6 +30,8 @@ use turn::{Held, Step};
 
 /// Errors said at once before they are thinned.
 const BURST: u32 = 64;
+/// Sensors of one session before it is looked which are there still.
+const MANY: usize = 64;
 /// Unknown classes remembered, so that each is said once.
 const MAX_TOLD: usize = 32;
 
@@ -196,6 +198,8 @@ pub struct Session {
     told: BTreeSet<String>,
     /// The sensors it sends.
     owned: BTreeMap<String, Arc<Mutex<Sensor>>>,
+    /// With so many of these it is looked which are there still.
+    look_at: usize,
     /// What packed samples with a number say, as lines would.
     bound: BTreeMap<u32, Line>,
     /// The one it sent last.
@@ -241,6 +245,7 @@ impl Session {
             errors: Allowance::new(BURST),
             told: BTreeSet::new(),
             owned: BTreeMap::new(),
+            look_at: MANY,
             bound: BTreeMap::new(),
             last: None,
             step: Step::default(),
@@ -617,6 +622,17 @@ impl Session {
     fn sensor(&mut self, id: &str, run: &SampleRun<'_>) -> Result<Arc<Mutex<Sensor>>, Fault> {
         if let Some(sensor) = self.owned.get(id) {
             return Ok(sensor.clone());
+        }
+        if self.owned.len() >= self.look_at {
+            // Who sends ever new sensors keeps none that was put away.
+            self.owned.retain(|_, sensor| {
+                let is_there = self.hub.has_place(sensor);
+                if !is_there {
+                    self.client.let_go();
+                }
+                is_there
+            });
+            self.look_at = MANY.max(2 * self.owned.len());
         }
         let sensor = self.hub.sensor(id, &self.client, run)?;
         self.owned.insert(id.to_owned(), sensor.clone());

@@ -256,6 +256,7 @@ async def faults(folder):
         await client.publish("imu.bad", b"no sample\n")
     await client.publish("imu.large", b"x" * ((1 << 20) - 10))
     await client.publish("imu.empty", b"")
+    await client.publish("imu.\x1b[31m", line(0, 0))
     await client.publish("imu.good", b"".join(line(0, k) for k in range(10)))
     await until(lambda: len(got) >= 10, 10, "the good sensor beside the bad ones")
     await until(lambda: errors, 5, "an error under imu.bad.err")
@@ -267,6 +268,7 @@ async def faults(folder):
     told["id"] = "a.b *>"
     await client.publish("imu.good", json.dumps(told).encode())
     await until(lambda: any(b'"a.b *>"' in one for one in got), 5, "the sensor with an odd name")
+    assert "\x1b" not in worker.said() and "31m" in worker.said(), worker.said()
     # The server goes, and comes back at the same place.
     await client.close()
     server.stop()

@@ -71,6 +71,10 @@ mod built_with_it {
             ("serve nats://h/imu.*?state=B&p=0", "?stream="),
             ("serve -o nats://h/att", "{id}"),
             ("serve nats://h/imu.* nats://h/imu.*", "given twice"),
+            (
+                "serve nats://h/a.*?stream=S&state=B&p=0 nats://h/b.*?stream=S&state=B&p=1",
+                "two partitions",
+            ),
         ] {
             strapd(dir.path(), arguments).refused(2, &[word]);
         }

@@ -204,6 +204,11 @@ impl Hub {
         }
     }
 
+    /// Whether it has not been put away.
+    pub fn has_place(&self, sensor: &Mutex<Sensor>) -> bool {
+        !lock(sensor).gave_way
+    }
+
     /// A sensor's place is free, and its attitude is kept.
     fn put_away(&self, sensors: &mut BTreeMap<Arc<str>, Arc<Mutex<Sensor>>>, id: &Arc<str>) {
         if let Some(sensor) = sensors.remove(id) {

@@ -30,6 +30,8 @@ const TAKE: usize = 64 << 10;
 const PATIENCE: Duration = Duration::from_secs(2);
 /// Between two attempts to store what could not be.
 const AGAIN: Duration = Duration::from_millis(100);
+/// Most sensors whose last message is remembered; what is forgotten is looked up again.
+const MOST: usize = 200_000;
 /// How often is looked whether attitudes may leave.
 const LOOK: Duration = Duration::from_millis(5);
 
@@ -165,7 +167,7 @@ impl Publisher {
     /// Publishes while that is permitted; what belongs to a tenure that is over is dropped.
     async fn publish(&mut self, mut batches: Vec<Batch>) {
         let number = self.tenancy.now().number();
-        if number != self.number {
+        if number != self.number || self.lasts.len() > MOST {
             self.number = number;
             self.lasts.clear();
         }

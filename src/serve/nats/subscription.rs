@@ -23,6 +23,8 @@ use futures_util::StreamExt;
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use strapd_recording::decode::exact_name;
+use strapd_recording::text::printable;
 use tokio::task::yield_now;
 use tokio::time::{MissedTickBehavior, interval, sleep, timeout};
 
@@ -372,7 +374,17 @@ impl Reader {
             return;
         }
         let token = message.subject.rsplit('.').next().unwrap_or_default();
-        session.of_subject(self.address.id.as_deref().unwrap_or(token));
+        let name = match &self.address.id {
+            Some(id) => Ok(id.clone()),
+            None => exact_name(token),
+        };
+        match name {
+            Ok(name) => session.of_subject(&name),
+            Err(why) => {
+                let subject = printable(&message.subject);
+                return self.outgoing.complain(&format!("{subject}: {why}"));
+            }
+        }
         in_room(|_, scratch| session.message(&message.payload, now(), scratch));
         loop {
             session.client().outbox.discard(&mut said);
@@ -398,10 +410,8 @@ impl Reader {
         if let Some(crate::serve::upstream::Event::Complained(what)) =
             crate::serve::upstream::read(error)
         {
-            self.outgoing.complain(&format!(
-                "{}: {what}",
-                strapd_recording::text::printable(&message.subject)
-            ));
+            self.outgoing
+                .complain(&format!("{}: {what}", printable(&message.subject)));
         }
         if self
             .complained
