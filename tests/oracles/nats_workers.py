@@ -268,7 +268,8 @@ async def faults(folder):
     told["id"] = "a.b *>"
     await client.publish("imu.good", json.dumps(told).encode())
     await until(lambda: any(b'"a.b *>"' in one for one in got), 5, "the sensor with an odd name")
-    assert "\x1b" not in worker.said() and "31m" in worker.said(), worker.said()
+    assert "\x1b" not in worker.said(), worker.said()
+    assert all("31m" not in source["id"] for source in worker.status()["sources"])
     # The server goes, and comes back at the same place.
     await client.close()
     server.stop()
