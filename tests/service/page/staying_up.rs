@@ -163,8 +163,12 @@ fn it_connects_again_soon_after_the_daemon_is_back() {
         let mut sender = Client::tcp(tcp);
         sender.send(&rate("imu0", 0, 0.1));
         browser.until("an attitude", "__strapd.seq === 0");
+        let uptime = "document.querySelector('[data-page=uptime]').textContent";
+        browser.until("its uptime", &format!("{uptime} !== '–'"));
         assert!(daemon.stop());
         browser.until("it says so", "__strapd.state !== 'open' && document.querySelector('[data-testid=connection]').textContent.includes('connection lost')");
+        // And nothing of what held before.
+        assert_eq!(browser.eval(uptime), "–");
         std::thread::sleep(Duration::from_millis(gone));
         let session = browser.eval("__strapd.session");
         daemon = Daemon::start(listening(&[&uris[0], &uris[1]]));

@@ -46,7 +46,7 @@ fn every_value_is_shown_with_where_it_comes_from() {
         "gyro-unit = \"deg\" # file",
         "max-gap = \"0.25\" # file",
         "allow-insecure-remote = true # file",
-        "method = \"auto\" # default",
+        "method = \"commit\" # default",
         "body = \"frd\" # file",
     ] {
         assert!(plain.iter().any(|l| l == line), "no `{line}` in {plain:#?}");
