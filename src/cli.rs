@@ -264,6 +264,11 @@ pub fn start_diagnostics(global: &Global) {
     // Below that it says each request as it goes out, with tokens and keys.
     let most = targets.default_level().unwrap_or(LevelFilter::OFF);
     let targets = targets.with_target("tungstenite", most.min(LevelFilter::DEBUG));
+    // These say whole addresses, with the signatures in them.
+    let says_addresses = ["hyper_util", "object_store", "reqwest"];
+    let targets = says_addresses.iter().fold(targets, |targets, name| {
+        targets.with_target(*name, most.min(LevelFilter::ERROR))
+    });
     let layer = tracing_subscriber::fmt::layer()
         .with_writer(std::io::stderr)
         .with_target(false)

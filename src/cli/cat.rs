@@ -97,7 +97,7 @@ pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
             return Err(Error::usage(
                 Diagnostic::new(format!(
                     "cat {}: {flag} is for daemons",
-                    args.source.display()
+                    super::outputs::shown(&args.source.to_string_lossy())
                 ))
                 .help("-n N stops after N samples, --topic NAME takes one topic"),
             ));

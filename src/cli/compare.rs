@@ -125,7 +125,7 @@ pub fn run(global: &Global, args: &Compare) -> Result<Outcome> {
             &chart
                 .svg()
                 .map_err(|e| strapd_recording::Error::Unsupported {
-                    path: args.estimate.clone(),
+                    path: PathBuf::from(&estimate.name),
                     what: e.to_string().into(),
                 })?,
         )?;
@@ -281,7 +281,7 @@ fn no_match(
         _ => format!("{}: no attitudes", t.name),
     };
     strapd_recording::Error::Unsupported {
-        path: args.estimate.clone(),
+        path: PathBuf::from(&estimate.name),
         what: Diagnostic::new(format!(
             "no instant in common with the reference\n  {}\n  {}",
             span(estimate),

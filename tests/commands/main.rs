@@ -32,6 +32,7 @@ mod smoothing;
 mod streams;
 mod tables;
 mod trajectory;
+mod urls;
 mod youbot;
 
 #[path = "../made_databases/mod.rs"]
