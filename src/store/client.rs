@@ -62,7 +62,11 @@ pub(super) fn fault(why: &reqwest::Error, patience: &Patience) -> Fault {
         return Diagnostic::new(innermost(why)).into();
     }
     if why.is_timeout() {
-        let most = patience.silence.max(patience.connect).as_secs_f64();
+        let most = match why.is_connect() {
+            true => patience.connect,
+            false => patience.silence,
+        };
+        let most = most.as_secs_f64();
         return Fault::passing(format!("no answer within {most} s"));
     }
     Fault::passing(innermost(why))

@@ -84,6 +84,7 @@ impl Cloud {
             patience,
             only_https: false,
             is_without_credentials: Arc::default(),
+            is_refused_plain: Arc::default(),
         };
         // Tries are counted by whoever downloads.
         let retry = RetryConfig {
@@ -147,7 +148,7 @@ impl Cloud {
             start: found.range.start,
             body: found
                 .into_stream()
-                .map(|bytes| bytes.map_err(|e| Fault::passing(innermost(&e))))
+                .map(|bytes| bytes.map_err(|e| Fault::passing(broken(&e))))
                 .boxed(),
         }))
     }
@@ -185,7 +186,18 @@ impl Cloud {
                 .help(variables(&self.scheme))
                 .into();
         }
-        Fault::passing(innermost(why))
+        if self.speaker.is_refused_plain.load(Ordering::Relaxed) {
+            return Diagnostic::new("the environment asks for plain http and does not allow it")
+                .help("AWS_ALLOW_HTTP=true, GOOGLE_ALLOW_HTTP=true or AZURE_ALLOW_HTTP=true does")
+                .into();
+        }
+        match own_words(why) {
+            Some(what) => Fault::passing(what),
+            // What a server of credentials says is not ours to print.
+            None => Diagnostic::new("the store can not be asked with these credentials")
+                .help(variables(&self.scheme))
+                .into(),
+        }
     }
 
     /// What helps where the store says this.
@@ -200,6 +212,21 @@ impl Cloud {
             _ => String::new(),
         }
     }
+}
+
+/// What a body was cut by.
+fn broken(why: &Error) -> String {
+    own_words(why).unwrap_or_else(|| "a body was cut".to_owned())
+}
+
+/// Why a request was not answered, where it is we who say so.
+fn own_words(why: &Error) -> Option<String> {
+    let mut cause: &(dyn std::error::Error + 'static) = why;
+    while let Some(next) = cause.source() {
+        cause = next;
+    }
+    let own = cause.downcast_ref::<std::io::Error>();
+    own.map(std::string::ToString::to_string)
 }
 
 fn variables(scheme: &str) -> &'static str {
@@ -224,6 +251,7 @@ struct Speaker {
     only_https: bool,
     /// Nobody answered who would give some.
     is_without_credentials: Arc<AtomicBool>,
+    is_refused_plain: Arc<AtomicBool>,
 }
 
 impl HttpConnector for Speaker {
@@ -261,9 +289,8 @@ impl Speaker {
             METADATA.contains(&host)
         });
         if self.only_https && url.scheme() != "https" && !of_machine {
-            return Err(refused(
-                "plain http is used where the environment allows it (AWS_ALLOW_HTTP=true, AZURE_ALLOW_HTTP=true, GOOGLE_ALLOW_HTTP=true)",
-            ));
+            self.is_refused_plain.store(true, Ordering::Relaxed);
+            return Err(refused("plain http is not allowed"));
         }
         let mut asks = reqwest::Request::new(parts.method, url);
         *asks.headers_mut() = parts.headers;
@@ -277,6 +304,11 @@ impl Speaker {
             }
             self.error(&why)
         })?;
+        if of_machine {
+            let is_refused = !reply.status().is_success();
+            self.is_without_credentials
+                .store(is_refused, Ordering::Relaxed);
+        }
         if let Some(answered) = parts.extensions.get::<Arc<Answered>>() {
             let asked = asked(reply.headers()).map_or(0, |asked| asked.as_millis());
             let asked = u64::try_from(asked).unwrap_or(u64::MAX);

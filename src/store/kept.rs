@@ -6,7 +6,7 @@
 use super::answer::{Part, Version};
 use super::download;
 use super::fault::Fault;
-use super::patience::Patience;
+use super::patience::{Pace, Patience};
 use super::place::Place;
 use super::ranges::{Ranges, pieces};
 use futures_util::StreamExt;
@@ -92,7 +92,7 @@ impl Kept {
         drop(state);
         let (by, mut body) = (Arc::clone(&shared), first.body);
         runtime.spawn(async move {
-            let mut at = range.start;
+            let (mut at, mut pace) = (range.start, Pace::new());
             while at < range.end
                 && let Some(Ok(bytes)) = body.next().await
             {
@@ -102,7 +102,11 @@ impl Kept {
                     return by.ended(Err(fault));
                 }
                 at += bytes.len() as u64;
+                if !pace.holds(bytes.len(), &by.patience) {
+                    break;
+                }
             }
+            drop(body);
             // What was cut is fetched as anything else is.
             by.ended(by.download(at..range.end).await);
         });

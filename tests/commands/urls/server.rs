@@ -9,7 +9,7 @@ use std::time::Duration;
 
 /// How a server behaves.
 #[derive(Clone, Debug)]
-pub enum Manner {
+pub(super) enum Manner {
     /// It knows ranges.
     Good,
     /// It knows none.
@@ -42,9 +42,9 @@ pub enum Manner {
     Packed,
 }
 
-pub struct Server {
+pub(super) struct Server {
     /// `127.0.0.1:PORT`.
-    pub place: String,
+    pub(super) place: String,
     shared: Arc<Shared>,
 }
 
@@ -59,7 +59,7 @@ struct Shared {
 
 impl Server {
     /// Has `object` under every name.
-    pub fn of(manner: Manner, object: Vec<u8>) -> Server {
+    pub(super) fn of(manner: Manner, object: Vec<u8>) -> Server {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let shared = Arc::new(Shared {
             manner,
@@ -79,19 +79,19 @@ impl Server {
         Server { place, shared }
     }
 
-    pub fn file(manner: Manner, path: &std::path::Path) -> Server {
+    pub(super) fn file(manner: Manner, path: &std::path::Path) -> Server {
         Server::of(manner, std::fs::read(path).unwrap())
     }
 
-    pub fn url(&self, name: &str) -> String {
+    pub(super) fn url(&self, name: &str) -> String {
         format!("http://{}/{name}", self.place)
     }
 
-    pub fn asked(&self) -> Vec<String> {
+    pub(super) fn asked(&self) -> Vec<String> {
         self.shared.asked.lock().unwrap().clone()
     }
 
-    pub fn sent(&self) -> usize {
+    pub(super) fn sent(&self) -> usize {
         self.shared.sent.load(Ordering::Relaxed)
     }
 }
@@ -124,21 +124,32 @@ impl Shared {
             _ => {}
         }
         let size = self.object.len();
-        let asked = asked_range(&head).filter(|_| {
-            !matches!(self.manner, Manner::NoRanges | Manner::NoRangesCut)
-        });
+        let asked = asked_range(&head)
+            .filter(|_| !matches!(self.manner, Manner::NoRanges | Manner::NoRangesCut));
         let Some(range) = asked else {
             let length = format!("Content-Length: {size}\r\n");
-            let length = if head.starts_with("HEAD") { length + "ETag: \"1\"\r\n" } else { length };
+            let length = if head.starts_with("HEAD") {
+                length + "ETag: \"1\"\r\n"
+            } else {
+                length
+            };
             self.begin(&mut to, "200 OK", &length)?;
             if head.starts_with("HEAD") {
                 return Ok(());
             }
-            let end = if matches!(self.manner, Manner::NoRangesCut) { size / 2 } else { size };
+            let end = if matches!(self.manner, Manner::NoRangesCut) {
+                size / 2
+            } else {
+                size
+            };
             return self.send(&mut to, 0..end);
         };
         if range.start >= size {
-            return empty(&mut to, "416", &format!("Content-Range: bytes */{size}\r\n"));
+            return empty(
+                &mut to,
+                "416",
+                &format!("Content-Range: bytes */{size}\r\n"),
+            );
         }
         let range = range.start..range.end.min(size);
         let tag = match self.manner {
@@ -161,7 +172,9 @@ impl Shared {
         );
         self.begin(&mut to, "206 Partial Content", &said)?;
         match self.manner {
-            Manner::Cut(after) => self.send(&mut to, range.start..range.end.min(range.start + after)),
+            Manner::Cut(after) => {
+                self.send(&mut to, range.start..range.end.min(range.start + after))
+            }
             Manner::Endless => {
                 self.send(&mut to, range)?;
                 loop {
