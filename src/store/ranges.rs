@@ -127,7 +127,8 @@ mod tests {
                 .all(|p| (4 * mib..8 * mib).contains(&(p.end - p.start)))
         );
         assert_eq!(long.last().map(|p| p.end), Some(25 * mib));
-        assert_eq!(pieces(std::slice::from_ref(&(0..25 * mib)), 5), [0..5]);
+        let cut = pieces(std::slice::from_ref(&(0..25 * mib)), 5);
+        assert_eq!((cut.first(), cut.len()), (Some(&(0..5)), 1));
         // Another order is kept.
         assert_eq!(
             pieces(&[mib..2 * mib, 0..10], 2 * mib),

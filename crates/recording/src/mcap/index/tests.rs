@@ -74,6 +74,9 @@ fn chunks_without_what_is_wanted_are_passed_over_and_the_rest_is_read() {
     assert_eq!(at, [5000, 9000]);
 }
 
+/// Makes the words about a chunk wrong.
+type Change = fn(&mut ChunkIndex<'_>);
+
 #[test]
 fn an_index_that_something_speaks_against_is_not_used() {
     assert!(index(&three(), &COUNTS).is_some());
@@ -82,7 +85,7 @@ fn an_index_that_something_speaks_against_is_not_used() {
     let mut overlapping = three();
     overlapping[1].chunk_start_offset = 1100;
     assert!(index(&overlapping, &COUNTS).is_none(), "overlap");
-    let wrong: [(&str, fn(&mut ChunkIndex<'_>)); 6] = [
+    let wrong: [(&str, Change); 6] = [
         ("no index of messages", |c| c.message_index_offsets.clear()),
         ("a hole before them", |c| c.message_index_offsets[0].1 += 16),
         ("a broken length", |c| c.message_index_length += 1),
