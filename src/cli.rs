@@ -286,6 +286,11 @@ pub fn start_diagnostics(global: &Global) {
     // What it says of its connection we say in our own words.
     #[cfg(feature = "nats")]
     let targets = targets.with_target("async_nats", most.min(LevelFilter::WARN));
+    // These say whole addresses, with the signatures in them.
+    let says_addresses = ["hyper_util", "object_store", "reqwest"];
+    let targets = says_addresses.iter().fold(targets, |targets, name| {
+        targets.with_target(*name, most.min(LevelFilter::ERROR))
+    });
     let layer = tracing_subscriber::fmt::layer()
         .with_writer(std::io::stderr)
         .with_target(false)

@@ -15,6 +15,7 @@
 //! | `serve` | the daemon: samples in over sockets, attitude out | I/O |
 //! | `client` | the other end: a daemon, or whatever sends samples -> lines | I/O |
 //! | `report` | a run -> its page | pure |
+//! | `store` | an address -> what is there, read as a file is (feature `object-store`) | I/O |
 //! | `cli` | arguments -> a run -> what is printed | I/O |
 //!
 //! Reading order: `strapd_attitude::estimate`, `strapd_replay::pipeline::replay`, then one module. Tests, benches, examples and fuzzers see
@@ -47,6 +48,12 @@ mod serve;
 #[doc(hidden)]
 pub mod serve;
 
+#[cfg(all(feature = "object-store", not(feature = "inside")))]
+mod store;
+#[cfg(all(feature = "object-store", feature = "inside"))]
+#[doc(hidden)]
+pub mod store;
+
 #[cfg(feature = "inside")]
 #[doc(hidden)]
 pub use strapd_replay::{address, config, error, inspection, pipeline, sink};
@@ -71,6 +78,8 @@ pub fn main() -> ExitCode {
     let as_flag =
         |name: &str, f: &mut std::fmt::Formatter<'_>| write!(f, "--{}", name.replace('_', "-"));
     let _ = strapd_attitude::setting::name_settings(as_flag);
+    #[cfg(feature = "object-store")]
+    let _ = strapd_recording::elsewhere::reach_by(store::reach);
     let cli = cli::Cli::parse();
     cli::start_diagnostics(&cli.global);
     size_limit::make_size_limit_an_error();

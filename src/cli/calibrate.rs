@@ -2,6 +2,7 @@
 
 use super::calibration_files::{check_target, write};
 use super::estimation::{AidArg, Estimation};
+use super::outputs::shown;
 use super::progress::Reporter;
 use super::tables::Tables;
 use super::{Global, Outcome, print};
@@ -80,14 +81,15 @@ pub fn run(global: &Global, args: &Calibrate) -> Result<Outcome> {
                 let other = told.last().and_then(|t| t.mismatch(&topic.topic));
                 if other.is_some() {
                     tracing::warn!(
-                        "{log}: its sensor is called {}, and that before another name: taken for the same one",
+                        "{}: its sensor is called {}, and that before another name: taken for the same one",
+                        shown(log),
                         topic.topic
                     );
                 }
                 if is_lossy && outcome == Outcome::Done {
                     outcome = Outcome::Lossy;
                 }
-                recorded.push(Recorded::of(log, &topic));
+                recorded.push(Recorded::of(&shown(log), &topic));
                 sources.extend(topic.calibration.sources.iter().cloned());
                 told.push(topic.calibration);
             }
@@ -175,7 +177,7 @@ fn learned(
         command: super::shell::recorded_command(false),
         ..ReplayRequest::new(Source::parse(log))
     };
-    let mut reporter = Reporter::new(global, log);
+    let mut reporter = Reporter::new(global, &shown(log));
     let summary = replay::run(&run, pool, &mut |position| reporter.update(position));
     reporter.finish();
     let mut summary = summary?;
@@ -184,7 +186,8 @@ fn learned(
         (Some(topic), 0) => Ok((topic, is_lossy)),
         (_, others) => Err(Error::usage(
             Diagnostic::new(format!(
-                "calibrate: {log}: {} sensors, and a calibration is of one",
+                "calibrate: {}: {} sensors, and a calibration is of one",
+                shown(log),
                 others + 1
             ))
             .help("--topic NAME"),

@@ -17,6 +17,7 @@ use std::path::PathBuf;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::record::{RawSample, SampleKind};
 use strapd_recording::Recording;
+use strapd_recording::elsewhere;
 use strapd_recording::pool::Pool;
 use strapd_recording::recording::decoders::Decoders;
 use strapd_recording::recording::topic_reading::TopicReading;
@@ -85,7 +86,9 @@ pub enum Format {
 /// The log can not be read or decoded; stdout can not be written.
 pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
     match args.source.to_str() {
-        Some(text) if Remote::is_meant(text) => return url::run(args, text),
+        Some(text) if Remote::is_meant(text) && elsewhere::meant(text).is_none() => {
+            return url::run(args, text);
+        }
         _ => {}
     }
     for (given, flag) in [
@@ -97,7 +100,7 @@ pub fn run(global: &Global, args: &Cat) -> Result<Outcome> {
             return Err(Error::usage(
                 Diagnostic::new(format!(
                     "cat {}: {flag} is for daemons",
-                    args.source.display()
+                    super::outputs::shown(&args.source.to_string_lossy())
                 ))
                 .help("-n N stops after N samples, --topic NAME takes one topic"),
             ));

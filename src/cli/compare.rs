@@ -116,7 +116,7 @@ pub fn run(global: &Global, args: &Compare) -> Result<Outcome> {
     let (estimated, referred) = (attitudes(&estimate), attitudes(&reference));
     let result = compare(&estimated, &referred, align);
     let Some(errors) = &result.errors else {
-        return Err(no_match(args, &estimate, &reference));
+        return Err(no_match(&estimate, &reference));
     };
     let told = Told::of(&estimate, (&estimated, &referred), align);
     if let Some(document) = plot {
@@ -125,7 +125,7 @@ pub fn run(global: &Global, args: &Compare) -> Result<Outcome> {
             &chart
                 .svg()
                 .map_err(|e| strapd_recording::Error::Unsupported {
-                    path: args.estimate.clone(),
+                    path: PathBuf::from(&estimate.name),
                     what: e.to_string().into(),
                 })?,
         )?;
@@ -263,11 +263,7 @@ fn attitudes(track: &attitude_track::Track) -> Vec<Stamped> {
         .collect()
 }
 
-fn no_match(
-    args: &Compare,
-    estimate: &attitude_track::Track,
-    reference: &attitude_track::Track,
-) -> Error {
+fn no_match(estimate: &attitude_track::Track, reference: &attitude_track::Track) -> Error {
     let span = |t: &attitude_track::Track| match (t.entries.first(), t.entries.last()) {
         (Some((a, _)), Some((b, _))) => {
             format!(
@@ -281,7 +277,7 @@ fn no_match(
         _ => format!("{}: no attitudes", t.name),
     };
     strapd_recording::Error::Unsupported {
-        path: args.estimate.clone(),
+        path: PathBuf::from(&estimate.name),
         what: Diagnostic::new(format!(
             "no instant in common with the reference\n  {}\n  {}",
             span(estimate),

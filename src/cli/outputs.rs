@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 use strapd_attitude::diagnostic::Diagnostic;
+use strapd_recording::elsewhere;
 
 /// Resolves every `-o` for one log of `logs`.
 ///
@@ -44,7 +45,9 @@ pub fn check_distinct(outputs: &[String], logs: &[String]) -> Result<()> {
                 Diagnostic::new(format!("-o {name}: given twice"))
             } else {
                 Diagnostic::new(format!(
-                    "-o {name}: both {other} and {log} would be written there"
+                    "-o {name}: both {} and {} would be written there",
+                    shown(other),
+                    shown(log)
                 ))
                 .help("give them different names, or run them one by one")
             }));
@@ -109,12 +112,20 @@ fn resolve_one(output: &str, log: &str, logs: usize) -> Result<String> {
     Ok(output.to_owned())
 }
 
+/// A recording as it is printed.
+pub(super) fn shown(log: &str) -> String {
+    match elsewhere::meant(log) {
+        Some(address) => address.place(),
+        None => log.to_owned(),
+    }
+}
+
 /// The log's name without directory and extension; `stdin` for `-`.
 pub(super) fn stem(log: &str) -> String {
     if log == "-" {
         return "stdin".to_owned();
     }
-    Path::new(log)
+    Path::new(&shown(log))
         .file_stem()
         .map_or_else(|| "log".to_owned(), |s| s.to_string_lossy().into_owned())
 }

@@ -193,7 +193,7 @@ pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
                     if again {
                         run.targets.retain(|target| target.listens().is_some());
                     }
-                    let mut reporter = Reporter::new(global, log);
+                    let mut reporter = Reporter::new(global, &outputs::shown(log));
                     let result =
                         replay::run(&run, &pool, &mut |position| reporter.update(position));
                     reporter.finish();
@@ -326,10 +326,13 @@ impl Replay {
             Source::File(path) => path.is_file(),
             Source::Parts(_) => true,
             Source::Stdin => false,
+            Source::Elsewhere(_) => true,
         };
-        let served =
-            self.serving
-                .start(targets, self.speed.as_deref(), (log, can_rewind, false))?;
+        let served = self.serving.start(
+            targets,
+            self.speed.as_deref(),
+            (&outputs::shown(log), can_rewind, false),
+        )?;
         let run = ReplayRequest {
             source,
             targets: served.targets.clone(),

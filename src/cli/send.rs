@@ -120,7 +120,8 @@ pub fn run(global: &Global, args: &Send) -> Result<Outcome> {
     let (read, sent) = std::thread::scope(|scope| {
         let (options, pool) = (&options, &pool);
         let reader = scope.spawn(move || read(args, &log, options, pool, give));
-        let name = format!("send {}", args.source.display());
+        let source = super::outputs::shown(&args.source.to_string_lossy());
+        let name = format!("send {source}");
         let sent = client::run(&name, send(&remote, token.as_ref(), pace, &mut take));
         // Whoever reads on is told that nobody sends.
         drop(take);

@@ -33,6 +33,7 @@ mod smoothing;
 mod streams;
 mod tables;
 mod trajectory;
+mod urls;
 mod youbot;
 
 #[path = "../made_databases/mod.rs"]

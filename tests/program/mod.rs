@@ -23,6 +23,8 @@ pub fn strapd_fed(dir: &Path, arguments: &str, stdin: impl Into<Vec<u8>>) -> Ran
         // Tests of the integration: the gyro alone, unless one asks for more by --aid.
         .env("STRAPD_AID", "none")
         .env("NO_COLOR", "1")
+        // Servers here are on loopback.
+        .env("NO_PROXY", "127.0.0.1")
         .args(arguments.split_whitespace())
         .write_stdin(stdin)
         .timeout(std::time::Duration::from_secs(120))

@@ -37,6 +37,13 @@ pub enum Error {
         /// Which file.
         path: PathBuf,
     },
+    /// What is at an address can not be had.
+    Unreached {
+        /// The address, as it is printed.
+        path: PathBuf,
+        /// Why, and what helps.
+        what: Diagnostic,
+    },
     /// The first bytes are not the MCAP magic.
     NotMcap {
         /// Which file.
@@ -138,10 +145,12 @@ impl From<&Error> for Diagnostic {
                 path,
                 offset,
                 source,
-            } => Diagnostic::new(format!(
-                "{}: reading at byte {offset}: {source}",
-                path.display()
-            )),
+            } => {
+                let own = source.get_ref().and_then(|why| why.downcast_ref());
+                let why: Option<Diagnostic> = own.cloned();
+                why.unwrap_or_else(|| Diagnostic::new(source.to_string()))
+                    .at(format_args!("{}: reading at byte {offset}", path.display()))
+            }
             Error::IsDirectory { path } => {
                 Diagnostic::new(format!("{}: is a directory", path.display()))
                     .help("name the .mcap file inside it")
@@ -194,7 +203,9 @@ impl From<&Error> for Diagnostic {
                 "{}: no topic `{topic}`\n  it holds:{topics}",
                 path.display()
             )),
-            Error::Unsupported { path, what } => what.clone().at(path.display()),
+            Error::Unsupported { path, what } | Error::Unreached { path, what } => {
+                what.clone().at(path.display())
+            }
             Error::Topic { path, topic, what } => what.clone().at(format_args!(
                 "{}: {}",
                 path.display(),

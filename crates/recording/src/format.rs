@@ -170,6 +170,23 @@ impl Format {
     /// It can not be opened or read, is a directory, or empty; it is of a format that is known and not read.
     pub fn of_file(path: &Path) -> Result<Option<Format>> {
         let mut file = open(path)?;
+        let length = file.metadata().map_err(|source| Error::Read {
+            path: path.to_owned(),
+            offset: 0,
+            source,
+        });
+        Format::of_seekable(path, &mut file, length?.len())
+    }
+
+    /// The same of what is open at its beginning and has a length.
+    ///
+    /// # Errors
+    /// As [`Format::of_file`].
+    pub(crate) fn of_seekable(
+        path: &Path,
+        file: &mut (impl Read + Seek),
+        length: u64,
+    ) -> Result<Option<Format>> {
         let fail = |source| Error::Read {
             path: path.to_owned(),
             offset: 0,
@@ -178,9 +195,8 @@ impl Format {
         let mut head = Vec::new();
         let first = file.by_ref().take(HEAD as u64).read_to_end(&mut head);
         first.map_err(fail)?;
-        let length = file.metadata().map_err(fail)?.len();
         if let Some(format) = Format::of_bytes(&head)
-            && (!is_video(&head) || has_telemetry(&mut file, length).map_err(fail)?)
+            && (!is_video(&head) || has_telemetry(file, length).map_err(fail)?)
         {
             return Ok(Some(format));
         }
@@ -215,7 +231,7 @@ pub(crate) fn is_video(head: &[u8]) -> bool {
 }
 
 /// Whether a video has a track of telemetry, or may have had one and is cut.
-fn has_telemetry(file: &mut File, length: u64) -> std::io::Result<bool> {
+fn has_telemetry(file: &mut (impl Read + Seek), length: u64) -> std::io::Result<bool> {
     let index = gpmf::index(length, &mut |at, into| {
         file.seek(SeekFrom::Start(at))?;
         let mut have = 0;

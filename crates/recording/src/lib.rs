@@ -15,7 +15,7 @@
 //! # Ok::<(), Error>(())
 //! ```
 //!
-//! MCAP, ULog, ROS 1 bags, lines of JSON, tables, a folder of one of them, a pipe or `-`: `examples/samples_of_a_recording.rs` is the whole program.
+//! MCAP, ULog, ROS 1 bags, lines of JSON, tables, a folder of one of them, a pipe, `-`, or an address: `examples/samples_of_a_recording.rs` is the whole program.
 //!
 //! ```text
 //! file, stream -> format -> mcap  -> decode            -> recording -> RawSample
@@ -41,15 +41,19 @@
 //! | `ulog` | ULog, the log of PX4 -> the records MCAP has for it | pure |
 //! | [`decode`] | bytes of one message, one line, one packed object -> raw samples | pure |
 //! | [`recognise`] | first bytes of an input -> what it is, and the way in where it is not read | pure |
+//! | [`address`] | an address -> the one form in which it is printed | pure |
+//! | [`elsewhere`] | an address -> what is read there as a file is | I/O |
 //! | [`text`] | outside text -> what a terminal may show | pure |
 //! | [`pool`] | workers shared by reading, integrating and writing; how many changes no bit | |
 //! | [`error`] | why a log can not be read | |
 
+pub mod address;
 pub mod attitude_line;
 mod bag;
 mod columns;
 pub mod decode;
 pub mod delimited;
+pub mod elsewhere;
 pub mod error;
 pub mod format;
 mod gpmf;

@@ -20,6 +20,7 @@ mod attached;
 mod block;
 mod channels;
 mod container;
+mod index;
 mod input;
 mod kept;
 mod list;
@@ -47,12 +48,14 @@ pub use record::{
     MessageRecord, Record, SchemaRecord, Statistics, op,
 };
 pub use scan::Facts;
-pub use survey::{ChannelSurvey, Survey, survey};
+pub use survey::{ChannelSurvey, PassedChunks, Survey, survey};
 pub use walk::{WalkOptions, WalkReport, salvage, walk};
 
+use crate::elsewhere::{self, Object};
 use crate::error::{Error, Result};
 use crate::format::{Format, LONGEST_MAGIC, is_video};
 use crate::recognise::{self, Foreign};
+use index::Index;
 use input::{Input, LogFile};
 use std::fs::File;
 use std::io::Read;
@@ -86,6 +89,8 @@ pub struct Reader {
     format: Format,
     /// The files beside a database.
     beside: Beside,
+    /// Which chunks of what is elsewhere need not be read.
+    index: Option<Arc<Index>>,
 }
 
 /// What a recorder that was killed leaves beside a database.
@@ -143,6 +148,35 @@ impl Reader {
             input: Input::File(Arc::new(file)),
             limits: Limits::default(),
             beside: Beside::default(),
+            index: None,
+        })
+    }
+
+    /// Reads an object that is elsewhere; `name` is what errors call it.
+    ///
+    /// # Errors
+    /// [`Error::Empty`], [`Error::NotMcap`], [`Error::Read`].
+    pub fn of_object(name: &Path, object: Arc<dyn Object>) -> Result<Reader> {
+        let file = Arc::new(LogFile::of_object(name, Arc::clone(&object)));
+        let (format, limits) = (format_of(&file)?, Limits::default());
+        let index = match format {
+            Format::Mcap => {
+                let found = summary::read(&file, limits);
+                let found = found.map_err(|e| read_error(name, 0, e))?;
+                found.ok().flatten().and_then(|summary| summary.index)
+            }
+            _ => None,
+        };
+        // With an index each walk says what it reads.
+        if index.is_none() {
+            object.expect(elsewhere::whole(object.as_ref()), AHEAD);
+        }
+        Ok(Reader {
+            format,
+            input: Input::File(file),
+            limits,
+            beside: Beside::default(),
+            index: index.map(Arc::new),
         })
     }
 
@@ -183,6 +217,7 @@ impl Reader {
             limits: Limits::default(),
             format,
             beside: Beside::default(),
+            index: None,
         })
     }
 
@@ -222,6 +257,7 @@ impl Reader {
                 limits: self.limits,
                 format: self.format,
                 beside: self.beside.clone(),
+                index: self.index.clone(),
             }),
             Input::Stream { .. } => None,
         }
@@ -249,6 +285,9 @@ impl Beside {
         Some(Arc::new(LogFile::new(Path::new(&name), file, meta.len())))
     }
 }
+
+/// Bytes of an object that are fetched before they are asked for.
+const AHEAD: u64 = WalkOptions::IN_FLIGHT as u64;
 
 /// The first bytes of a journal that is to be rolled back.
 const JOURNAL_MAGIC: [u8; 8] = [0xd9, 0xd5, 0x05, 0xf9, 0x20, 0xa1, 0x63, 0xd7];

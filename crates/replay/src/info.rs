@@ -69,6 +69,7 @@ impl Overview<'_> {
                 format!("{JOIN} {}", files.join(" "))
             }
             Source::Stdin => "-".to_owned(),
+            Source::Elsewhere(_) => quoted_file(&self.input.source().name()),
         };
         let best = match self.looked {
             [] => {

@@ -15,12 +15,10 @@
 //! | [`findings`] | what is known about a log -> what is wrong with it, and what helps | pure |
 //! | [`info`] | what looking at a recording told -> JSON, and the command to run next | pure |
 //! | [`shell`] | words of a command -> what a shell takes for them | pure |
-//! | [`address`] | an address -> the one form in which it is printed | pure |
 //! | [`error`] | everything that can end a run | pure |
 //!
 //! What the command, the daemon and the Python wheel share: no async runtime, no arguments, no terminal.
 
-pub mod address;
 pub mod config;
 pub mod error;
 mod finding;
@@ -31,3 +29,5 @@ pub mod pipeline;
 pub mod shell;
 pub mod sink;
 pub mod summary;
+
+pub use strapd_recording::address;

@@ -13,6 +13,9 @@ use std::sync::Arc;
 /// Buffers larger than this are given back after use, so that one large chunk does not stay.
 const KEEP: usize = 8 << 20;
 
+/// What a block costs that has no bytes.
+const NEXT_TO_NOTHING: usize = 4 << 10;
+
 /// How a chunk is packed.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum Compression {
@@ -85,6 +88,8 @@ pub(super) enum Kind {
     },
     /// The body of one record that a copy takes along: header, attachment, metadata.
     Attached { opcode: u8 },
+    /// A chunk that is not read, and its size if it were: what is looked ahead at is the same as if it were.
+    PassedOver { size: usize },
     Chunk {
         compression: Compression,
         /// Unpacked size as declared, within the limit.
@@ -130,6 +135,7 @@ impl Block {
             Kind::Bag {
                 compression, size, ..
             } if compression != Compression::None => packed + 2 * size,
+            Kind::PassedOver { .. } => NEXT_TO_NOTHING,
             // What is told of it is a copy.
             Kind::Bag { .. } => 2 * packed,
             _ => packed,
@@ -147,7 +153,7 @@ impl Block {
     pub(super) fn indexed(&self) -> Option<u64> {
         match self.kind {
             Kind::Chunk { indexed, .. } | Kind::Bag { indexed, .. } => indexed,
-            Kind::Run | Kind::Transcript | Kind::Attached { .. } => None,
+            Kind::Run | Kind::Transcript | Kind::Attached { .. } | Kind::PassedOver { .. } => None,
         }
     }
 }

@@ -6,7 +6,7 @@
 
 use super::problem::{ProblemKind, Problems};
 use super::record::{ChannelRecord, SchemaRecord, op};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// How a channel's payloads are laid out, in the words of the file.
@@ -194,6 +194,21 @@ impl<D> Table<D> {
             self.add_channel(&r, offset, select, problems);
         }
         self.left = left;
+    }
+
+    /// Defines everything as the summary does, before any of it is met; which channels are wanted.
+    pub(super) fn adopt_all(
+        &mut self,
+        select: &mut dyn FnMut(&Arc<Channel>) -> Option<D>,
+        problems: &mut Problems,
+    ) -> BTreeSet<u16> {
+        for body in std::mem::take(&mut self.fallback.channels).values() {
+            if let Some(r) = ChannelRecord::parse(body) {
+                self.add_channel(&r, 0, select, problems);
+            }
+        }
+        let wanted = self.entries.iter().filter(|e| e.choice.is_some());
+        wanted.map(|e| e.channel.id).collect()
     }
 
     /// Defines `id` as the summary does.

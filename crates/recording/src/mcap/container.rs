@@ -10,6 +10,7 @@ mod rosbag2;
 mod streamed;
 mod ulog;
 
+use super::index::Passed;
 use super::problem::Problems;
 use super::scan::{Besides, Facts, Item, Scanner};
 use super::{Payload, Reader};
@@ -34,6 +35,7 @@ impl Container {
             limits,
             format,
             beside,
+            index: _,
         } = reader;
         match format {
             Format::Ulog => Container::Ulog(Box::new(ulog::Scanner::new(input))),
@@ -47,6 +49,13 @@ impl Container {
             Format::Mcap | Format::Lines | Format::Table => {
                 Container::Mcap(Box::new(Scanner::new(input, limits, besides)))
             }
+        }
+    }
+
+    /// Leaves out these chunks of an MCAP, which stand in this order.
+    pub(super) fn pass_over_chunks(&mut self, passed: &[Passed]) {
+        if let Container::Mcap(scanner) = self {
+            scanner.pass_over_chunks(passed);
         }
     }
 

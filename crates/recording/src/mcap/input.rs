@@ -4,6 +4,7 @@
 //! and a way to hand a stretch of them to another thread. Files are read by position
 //! (no memory map: a file cut by another process must be an error, not a signal), streams in sequence.
 
+use crate::elsewhere::Object;
 use std::fs::File;
 use std::io::{self, Read};
 use std::ops::Range;
@@ -19,15 +20,21 @@ const SPARE_BYTES: usize = 4 << 20;
 const SMALL: usize = 256;
 const SMALL_BYTES: usize = 64 << 10;
 
-/// A regular file, read by position from any thread.
+/// A regular file, or an object elsewhere, read by position from any thread.
 #[derive(Debug)]
 pub(super) struct LogFile {
     pub(super) path: PathBuf,
     /// Length when it was opened; what is appended later is not seen.
     pub(super) len: u64,
-    file: File,
+    bytes: Bytes,
     #[cfg(not(unix))]
     turn: std::sync::Mutex<()>,
+}
+
+#[derive(Debug)]
+enum Bytes {
+    File(File),
+    Object(Arc<dyn Object>),
 }
 
 impl LogFile {
@@ -35,23 +42,57 @@ impl LogFile {
         LogFile {
             path: path.to_owned(),
             len,
-            file,
+            bytes: Bytes::File(file),
             #[cfg(not(unix))]
             turn: std::sync::Mutex::new(()),
         }
     }
 
-    #[cfg(unix)]
+    pub(super) fn of_object(path: &Path, object: Arc<dyn Object>) -> Self {
+        LogFile {
+            path: path.to_owned(),
+            len: object.size(),
+            bytes: Bytes::Object(object),
+            #[cfg(not(unix))]
+            turn: std::sync::Mutex::new(()),
+        }
+    }
+
+    /// What is elsewhere.
+    pub(super) fn object(&self) -> Option<&dyn Object> {
+        match &self.bytes {
+            Bytes::File(_) => None,
+            Bytes::Object(object) => Some(object.as_ref()),
+        }
+    }
+
     fn read_once(&self, buf: &mut [u8], offset: u64) -> io::Result<usize> {
-        std::os::unix::fs::FileExt::read_at(&self.file, buf, offset)
+        match &self.bytes {
+            Bytes::File(file) => self.read_file(file, buf, offset),
+            // As if it ended where it did when it was opened.
+            Bytes::Object(object) => {
+                let left = usize::try_from(self.len.saturating_sub(offset)).unwrap_or(usize::MAX);
+                let most = buf.len().min(left);
+                let Some(room) = buf.get_mut(..most) else {
+                    return Ok(0);
+                };
+                Ok(object.read_at(room, offset)?.min(most))
+            }
+        }
+    }
+
+    #[cfg(unix)]
+    #[allow(clippy::unused_self, reason = "elsewhere one at a time has the turn")]
+    fn read_file(&self, file: &File, buf: &mut [u8], offset: u64) -> io::Result<usize> {
+        std::os::unix::fs::FileExt::read_at(file, buf, offset)
     }
 
     #[cfg(not(unix))]
-    fn read_once(&self, buf: &mut [u8], offset: u64) -> io::Result<usize> {
+    fn read_file(&self, mut file: &File, buf: &mut [u8], offset: u64) -> io::Result<usize> {
         use std::io::{Seek, SeekFrom};
         let _turn = self.turn.lock().unwrap_or_else(|e| e.into_inner());
-        (&self.file).seek(SeekFrom::Start(offset))?;
-        (&self.file).read(buf)
+        file.seek(SeekFrom::Start(offset))?;
+        file.read(buf)
     }
 
     /// Fills `buf` from `offset`; less only at the end of the file.

@@ -8,13 +8,14 @@ mod chunk;
 
 use super::Limits;
 use super::block::{Block, Compression, Kind, Payload};
+use super::index::Passed;
 use super::input::{Held, Input, Tape};
 use super::problem::{ProblemKind, Problems};
 use super::record::{MAGIC, Record, op};
 use super::resync;
 use crate::format::Format;
 use crate::records::{HEAD, head_at};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::io;
 
 /// Bytes of unchunked records worked on together.
@@ -98,6 +99,8 @@ pub(super) struct Scanner {
     done: bool,
     /// How far to read ahead of a record's head.
     peek: usize,
+    /// Chunks that are not read, in order.
+    passed: VecDeque<Passed>,
     /// The end was reached, magic and all.
     complete: bool,
     /// Messages by the statistics of this log's summary.
@@ -125,12 +128,50 @@ impl Scanner {
             crc: Some(crc),
             done: false,
             peek: PEEK,
+            passed: VecDeque::new(),
             complete: false,
             claimed: None,
             claimed_in_all: Some(0),
             facts: Facts::default(),
             problems: Problems::default(),
         }
+    }
+
+    /// Leaves out these chunks, which stand in this order.
+    pub(super) fn pass_over_chunks(&mut self, passed: &[Passed]) {
+        self.passed = passed.iter().copied().collect();
+    }
+
+    /// A chunk that is not read, where the walk has come to one.
+    fn passed_over(&mut self) -> io::Result<Option<Block>> {
+        let at = self.tape.position();
+        while self.passed.front().is_some_and(|next| next.at < at) {
+            self.passed.pop_front();
+        }
+        let Some(next) = self.passed.front().copied().filter(|next| next.at == at) else {
+            return Ok(None);
+        };
+        self.passed.pop_front();
+        (self.section, self.crc, self.trusted) = (Section::Data, None, None);
+        self.tape.skip(next.end.saturating_sub(at))?;
+        if let Some(compression) = next.compression {
+            *self.facts.chunks.entry(compression).or_default() += 1;
+        }
+        Ok(Some(Block {
+            offset: at,
+            kind: Kind::PassedOver {
+                size: next.unpacked,
+            },
+            payload: Payload::Held(Held::default()),
+        }))
+    }
+
+    /// `want` bytes, or as many as there are before a chunk that is not read.
+    fn before_passed(&self, want: usize) -> usize {
+        let next = self.passed.front().map(|next| next.at);
+        let left = next.and_then(|next| next.checked_sub(self.tape.position()));
+        left.and_then(|left| usize::try_from(left).ok())
+            .map_or(want, |left| want.min(left))
     }
 
     pub(super) fn tape(&self) -> &Tape {
@@ -150,8 +191,12 @@ impl Scanner {
                 self.after_footer()?;
                 continue;
             }
+            if let Some(block) = self.passed_over()? {
+                return Ok(Some(Item::Block(block)));
+            }
             let at = self.tape.position();
-            let ahead = self.tape.available(HEAD, self.peek)?;
+            let peek = self.before_passed(self.peek);
+            let ahead = self.tape.available(HEAD, peek)?;
             let Some((opcode, length)) = head_at(ahead, 0) else {
                 let have = ahead.len() as u64;
                 self.end(at, have);
@@ -237,7 +282,7 @@ impl Scanner {
     /// Unchunked schemas, channels and messages: as many whole ones as make about [`RUN`] bytes.
     fn run(&mut self) -> io::Result<Option<Item>> {
         let at = self.tape.position();
-        let mut want = RUN;
+        let mut want = self.before_passed(RUN);
         loop {
             let ahead = self.tape.available(want, want)?;
             let mut n = 0;

@@ -5,6 +5,7 @@
 
 use super::Limits;
 use super::channels::Fallback;
+use super::index::{Gathered, Index};
 use super::input::{Input, LogFile, Tape};
 use super::record::{Footer, MAGIC, Record, Statistics, op};
 use crate::records::{HEAD, head_at};
@@ -24,6 +25,10 @@ pub(super) struct Summary {
     pub(super) statistics: Option<Statistics>,
     /// Chunks by compression name.
     pub(super) chunks: BTreeMap<String, u64>,
+    /// Those of what is elsewhere.
+    gathered: Option<Gathered>,
+    /// Which of them need not be read.
+    pub(super) index: Option<Index>,
     /// Bytes of definitions so far.
     bytes: usize,
 }
@@ -64,7 +69,10 @@ pub(super) fn read(file: &Arc<LogFile>, limits: Limits) -> io::Result<Found> {
     }
     let mut tape = Tape::new(Input::File(Arc::clone(file)), start);
     let mut crc = crc32fast::Hasher::new();
-    let mut summary = Summary::default();
+    let mut summary = Summary {
+        gathered: file.object().map(|_| Gathered::default()),
+        ..Summary::default()
+    };
     while tape.position() < footer_at {
         let left = footer_at - tape.position();
         // Record by record: the section of a long log may be larger than what should be in memory.
@@ -90,6 +98,12 @@ pub(super) fn read(file: &Arc<LogFile>, limits: Limits) -> io::Result<Found> {
     crc.update(end.get(..HEAD + Footer::LEN as usize - 4).unwrap_or(&[]));
     if footer.summary_crc != 0 && crc.finalize() != footer.summary_crc {
         return Ok(Err("its CRC is wrong"));
+    }
+    if footer.summary_crc != 0
+        && let (Some(gathered), Some(statistics)) = (summary.gathered.take(), &summary.statistics)
+    {
+        let index = gathered.index(statistics, start);
+        summary.index = index.filter(|index| index.is_defined_by(&summary.definitions));
     }
     Ok(Ok(Some(summary)))
 }
@@ -122,6 +136,13 @@ impl Summary {
                     return Err("it names too many compressions");
                 }
                 *self.chunks.entry(c.compression.to_owned()).or_default() += 1;
+                self.bytes = match &self.gathered {
+                    Some(_) => self.bytes.saturating_add(body.len()),
+                    None => self.bytes,
+                };
+                if let Some(gathered) = &mut self.gathered {
+                    gathered.add(&c, limits);
+                }
             }
             _ => {}
         }

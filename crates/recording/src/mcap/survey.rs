@@ -6,6 +6,7 @@
 use super::block::Compression;
 use super::channels::{Channel, Table};
 use super::container;
+use super::index::PassedOver;
 use super::input::Input;
 use super::messages::Tally;
 use super::problem::{ProblemKind, Problems};
@@ -52,6 +53,17 @@ pub struct Survey {
     pub from_summary: bool,
     /// What was wrong.
     pub problems: Problems,
+    /// What of it was not read: its summary says that nothing there was wanted.
+    pub passed_over: PassedChunks,
+}
+
+/// Chunks that were not read.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct PassedChunks {
+    /// How many.
+    pub chunks: u64,
+    /// Their bytes as they lie in the file.
+    pub bytes: u64,
 }
 
 impl Survey {
@@ -72,6 +84,8 @@ impl Survey {
         let all = [self.times, next.times].into_iter().flatten();
         self.times = all.reduce(|(a, b), (c, d)| (a.min(c), b.max(d)));
         self.problems.merge(next.problems.clone());
+        self.passed_over.chunks += next.passed_over.chunks;
+        self.passed_over.bytes += next.passed_over.bytes;
         for (found, channel) in next.channels.iter().zip(whole) {
             let mut all = self.channels.iter_mut();
             match all.find(|of| Arc::ptr_eq(&of.channel, channel)) {
@@ -82,6 +96,23 @@ impl Survey {
                 }),
             }
         }
+    }
+
+    /// Takes what was not read from the summary that says what is there.
+    pub(super) fn pass_over(&mut self, passed: &PassedOver) {
+        self.passed_over = PassedChunks {
+            chunks: passed.chunks.len() as u64,
+            bytes: passed.bytes(),
+        };
+        for found in &mut self.channels {
+            let id = found.channel.id;
+            if !passed.is_wanted(id) {
+                found.messages = passed.counts.get(&id).copied().unwrap_or(0);
+                (found.times, found.bytes) = (None, None);
+            }
+        }
+        self.messages = self.channels.iter().map(|found| found.messages).sum();
+        self.times = passed.times;
     }
 
     pub(super) fn add_up<'a>(&mut self, channels: impl Iterator<Item = (&'a Arc<Channel>, Tally)>) {

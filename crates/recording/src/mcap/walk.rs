@@ -9,6 +9,7 @@ mod state;
 
 use super::channels::{Channel, Table};
 use super::container::Container;
+use super::input::Input;
 use super::messages::Message;
 use super::order::{Batch, Lookahead, Merger, Order};
 use super::problem::Problems;
@@ -42,6 +43,8 @@ pub struct WalkOptions<'p> {
     pub lookahead: Lookahead,
     /// Whether to look ahead at all.
     pub order: Order,
+    /// Whether only the first message of each channel matters: of what is elsewhere, no more is fetched then.
+    pub only_firsts: bool,
 }
 
 impl WalkOptions<'_> {
@@ -58,6 +61,7 @@ impl Default for WalkOptions<'_> {
             batch: 1024,
             lookahead: Lookahead::default(),
             order: Order::default(),
+            only_firsts: false,
         }
     }
 }
@@ -175,7 +179,19 @@ where
     let (has_summary, fallback) =
         fallback(&reader, &mut problems).map_err(|e| read_error(&name, 0, e))?;
     let is_stream = file_size.is_none();
-    let shared = Shared::new(Table::new(fallback, limits.definitions), map, options.order);
+    let mut table = Table::new(fallback, limits.definitions);
+    let index = reader.index.clone().filter(|_| besides == Besides::Nothing);
+    let passed = index.map(|index| {
+        let wanted = table.adopt_all(&mut select, &mut problems);
+        let passed = index.passed_over(wanted, options.only_firsts);
+        if let Input::File(file) = &reader.input
+            && let Some(object) = file.object()
+        {
+            object.expect(index.rest(&passed.chunks), options.in_flight as u64);
+        }
+        passed
+    });
+    let shared = Shared::new(table, map, options.order);
     let lookahead = match options.order {
         Order::LogTime => options.lookahead,
         Order::File => Lookahead::NONE,
@@ -185,7 +201,14 @@ where
         select: &mut select,
         consume: &mut consume,
         attached: &mut attached,
-        scanner: Container::new(reader, besides),
+        scanner: {
+            let mut scanner = Container::new(reader, besides);
+            if let Some(passed) = &passed {
+                scanner.pass_over_chunks(&passed.chunks);
+            }
+            scanner
+        },
+        passed,
         merger: Merger::new(lookahead),
         tallies: Vec::new(),
         unknown: BTreeMap::new(),

@@ -8,20 +8,24 @@ use super::folder::{self, Folder};
 use super::line_input;
 use super::several;
 use super::warn::Warn;
+use crate::address::Address;
 use crate::decode::{Options, Wanted};
 use crate::delimited::Table;
+use crate::elsewhere::{self, Found, Object, ObjectBytes};
 use crate::error::{Error, Result};
 use crate::format::{Format, open};
 use crate::lines::Lines;
 use crate::mcap::Reader;
 use std::fs::File;
-use std::io::{Read, Seek, Write};
+use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use strapd_attitude::diagnostic::Diagnostic;
 
 /// Bytes of a stream that are kept at most.
 const MOST: u64 = 8 << 30;
+/// Bytes of a text elsewhere that are fetched before they are read.
+const TEXT_AHEAD: u64 = 32 << 20;
 
 /// Where a recording comes from.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -32,16 +36,30 @@ pub enum Source {
     Parts(Vec<PathBuf>),
     /// Standard input: MCAP or NDJSON, told apart by the first bytes.
     Stdin,
+    /// What is at an address.
+    Elsewhere(Address),
 }
 
 impl Source {
-    /// `-` or a path.
+    /// `-`, an address or a path.
     #[must_use]
     pub fn parse(text: &str) -> Source {
         if text == "-" {
             Source::Stdin
+        } else if let Some(address) = elsewhere::meant(text) {
+            Source::Elsewhere(address)
         } else {
             Source::File(PathBuf::from(text))
+        }
+    }
+
+    /// The files on this machine that it is in.
+    #[must_use]
+    pub fn files(&self) -> Vec<PathBuf> {
+        match self {
+            Source::File(path) => vec![path.clone()],
+            Source::Parts(paths) => paths.clone(),
+            Source::Stdin | Source::Elsewhere(_) => Vec::new(),
         }
     }
 
@@ -52,6 +70,43 @@ impl Source {
             Source::File(path) => path.clone(),
             Source::Parts(paths) => several::title(paths),
             Source::Stdin => PathBuf::from("standard input"),
+            Source::Elsewhere(address) => PathBuf::from(address.place()),
+        }
+    }
+}
+
+/// What is read again, beside files that have a name.
+#[derive(Clone, Debug)]
+enum Kept {
+    /// What came only once.
+    File(Arc<File>),
+    /// What is elsewhere.
+    Object(Arc<dyn Object>),
+}
+
+/// The bytes of an input, in any order.
+#[derive(Debug)]
+pub enum Bytes {
+    /// On this machine.
+    File(File),
+    /// Elsewhere.
+    Object(ObjectBytes),
+}
+
+impl Read for Bytes {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        match self {
+            Bytes::File(file) => file.read(into),
+            Bytes::Object(object) => object.read(into),
+        }
+    }
+}
+
+impl Seek for Bytes {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        match self {
+            Bytes::File(file) => file.seek(to),
+            Bytes::Object(object) => object.seek(to),
         }
     }
 }
@@ -61,8 +116,7 @@ impl Source {
 pub struct Input {
     source: Source,
     name: PathBuf,
-    /// What came only once.
-    kept: Option<Arc<File>>,
+    kept: Option<Kept>,
     format: Format,
     /// Tables of the same recording.
     beside: Vec<PathBuf>,
@@ -72,13 +126,15 @@ pub struct Input {
 }
 
 impl Input {
-    /// Opens what a command line names: a file, a folder of one recording, a pipe, or `-`. A stream is read to its end.
+    /// Opens what a command line names: a file, a folder of one recording, a pipe, `-`, or an address. A stream is read to its end.
     ///
     /// # Errors
-    /// It can not be opened or read, or is empty; a folder of no recording or of several; there is no room for a stream.
+    /// It can not be opened or read, or is empty; a folder of no recording or of several; there is no room for a stream; nothing at
+    /// an address, or no way there.
     pub fn open(path: &Path, warn: &Warn) -> Result<Input> {
         match Source::parse(&path.to_string_lossy()) {
             source @ Source::Stdin => Input::keep(source, std::io::stdin(), warn),
+            Source::Elsewhere(address) => Input::of_address(address, warn),
             _ if is_pipe(path) => Input::of_stream(path, open(path)?, warn),
             source if path.is_dir() => {
                 let Folder {
@@ -107,6 +163,37 @@ impl Input {
                 warn: warn.clone(),
             }),
         }
+    }
+
+    fn of_address(address: Address, warn: &Warn) -> Result<Input> {
+        let name = PathBuf::from(address.place());
+        let found = elsewhere::find(&address).map_err(|what| Error::Unreached {
+            path: name.clone(),
+            what,
+        })?;
+        let source = Source::Elsewhere(address);
+        let object = match found {
+            Found::Stream(from) => return Input::keep(source, from, warn),
+            Found::Object(object) if object.size() == 0 => {
+                return Err(Error::Empty { path: name });
+            }
+            Found::Object(object) => object,
+        };
+        let mut bytes = ObjectBytes::new(Arc::clone(&object));
+        let format = Format::of_seekable(&name, &mut bytes, object.size())?;
+        let format = checked(&name, format, warn);
+        if format.is_text() {
+            object.expect(elsewhere::whole(object.as_ref()), TEXT_AHEAD);
+        }
+        Ok(Input {
+            source,
+            name,
+            kept: Some(Kept::Object(object)),
+            format,
+            beside: Vec::new(),
+            parts: Vec::new(),
+            warn: warn.clone(),
+        })
     }
 
     /// Opens several files that continue each other, in any order.
@@ -195,7 +282,7 @@ impl Input {
                 .or_else(named)
                 .or_else(|| Format::of_shape(&head))
                 .unwrap_or(Format::Mcap),
-            kept: Some(Arc::new(file)),
+            kept: Some(Kept::File(Arc::new(file))),
             source,
             name,
             beside: Vec::new(),
@@ -237,16 +324,20 @@ impl Input {
     ///
     /// # Errors
     /// It can not be opened.
-    pub fn bytes(&self) -> Result<File> {
+    pub fn bytes(&self) -> Result<Bytes> {
         self.is_one_file()?;
-        let Some(kept) = &self.kept else {
-            return open(&self.name);
+        let kept = match &self.kept {
+            None => return Ok(Bytes::File(open(&self.name)?)),
+            Some(Kept::Object(object)) => {
+                return Ok(Bytes::Object(ObjectBytes::new(Arc::clone(object))));
+            }
+            Some(Kept::File(kept)) => kept,
         };
         let again = kept.try_clone().and_then(|mut file| {
             file.rewind()?;
             Ok(file)
         });
-        again.map_err(|source| Error::Open {
+        again.map(Bytes::File).map_err(|source| Error::Open {
             path: self.name.clone(),
             source,
         })
@@ -272,9 +363,11 @@ impl Input {
     /// As [`Reader::open`].
     pub fn mcap(&self) -> Result<Reader> {
         self.is_one_file()?;
-        match &self.kept {
-            None => Reader::open(&self.name),
-            Some(_) => Reader::of_file(&self.name, self.bytes()?),
+        match (&self.kept, self.bytes()?) {
+            (None, _) => Reader::open(&self.name),
+            (Some(Kept::Object(object)), _) => Reader::of_object(&self.name, Arc::clone(object)),
+            (_, Bytes::File(kept)) => Reader::of_file(&self.name, kept),
+            (_, Bytes::Object(_)) => Reader::open(&self.name),
         }
     }
 
@@ -293,14 +386,19 @@ impl Input {
     ///
     /// # Errors
     /// As `line_input::open`.
-    pub fn lines(&self, options: &Options) -> Result<Lines<File>> {
+    pub fn lines(&self, options: &Options) -> Result<Lines<Bytes>> {
         let lines = line_input::open(&self.name, self.format, self.bytes()?, options)?;
         let of_forces = Options {
             wanted: Wanted::Forces,
             ..Options::default()
         };
         self.beside.iter().try_fold(lines, |lines, beside| {
-            let other = line_input::open(beside, Format::Table, open(beside)?, &of_forces)?;
+            let other = line_input::open(
+                beside,
+                Format::Table,
+                Bytes::File(open(beside)?),
+                &of_forces,
+            )?;
             lines.with(other)
         })
     }
@@ -312,11 +410,16 @@ impl Input {
 /// # Errors
 /// As [`Format::of_file`].
 fn recognised(path: &Path, warn: &Warn) -> Result<Format> {
-    let format = Format::of_file(path)?.unwrap_or(Format::Mcap);
+    Ok(checked(path, Format::of_file(path)?, warn))
+}
+
+/// What to take a file for of which the format is known, or not.
+fn checked(path: &Path, format: Option<Format>, warn: &Warn) -> Format {
+    let format = format.unwrap_or(Format::Mcap);
     if let Some(said) = format.contradiction(path) {
         warn.say(&format!("{}: {said}", path.display()));
     }
-    Ok(format)
+    format
 }
 
 /// Whether a path names what can be read only once: a named pipe, a shell's `<(...)`, a device.

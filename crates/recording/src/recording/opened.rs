@@ -494,6 +494,7 @@ fn first_messages(reader: Reader, survey: &Survey) -> Result<(Vec<First>, Vec<St
         // One item a channel: waiting for a batch of them would read the whole log.
         &WalkOptions {
             batch: 1,
+            only_firsts: true,
             ..WalkOptions::default()
         },
         |_| Some(AtomicBool::new(false)),

@@ -3,10 +3,11 @@
 //! Apart from the parts because nothing is opened yet: what comes only once or was given twice is told before a second of
 //! reading.
 
+use crate::elsewhere;
 use crate::error::{Error, Result};
 use crate::text::printable;
 use std::fs::Metadata;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::setting::JOIN;
 
@@ -19,7 +20,7 @@ const MOST: usize = 1000;
 /// A part comes only once, is a folder, or is given twice.
 pub(super) fn checked(paths: &[PathBuf]) -> Result<()> {
     if paths.len() > MOST {
-        let first = paths.first().cloned().unwrap_or_default();
+        let first = paths.first().map(|first| shown(first)).unwrap_or_default();
         return Err(Error::unsupported(
             &first,
             Diagnostic::new(format!(
@@ -31,6 +32,13 @@ pub(super) fn checked(paths: &[PathBuf]) -> Result<()> {
     }
     let mut known: Vec<(PathBuf, &PathBuf)> = Vec::new();
     for path in paths {
+        if let Some(address) = elsewhere::meant(&path.to_string_lossy()) {
+            return Err(Error::unsupported(
+                Path::new(&address.place()),
+                Diagnostic::new("is elsewhere, and parts are read from files")
+                    .help(format!("save it to a file; {JOIN} takes files")),
+            ));
+        }
         let found = std::fs::metadata(path);
         let is_folder = found.as_ref().is_ok_and(Metadata::is_dir);
         let is_stream = found.is_ok_and(|found| !found.is_file()) && !is_folder;
@@ -68,11 +76,22 @@ pub(super) fn checked(paths: &[PathBuf]) -> Result<()> {
     Ok(())
 }
 
+/// A part as it is printed, though it should be none.
+fn shown(path: &Path) -> PathBuf {
+    match elsewhere::meant(&path.to_string_lossy()) {
+        Some(address) => PathBuf::from(address.place()),
+        None => path.to_owned(),
+    }
+}
+
 /// What several files are called together.
 pub(super) fn title(paths: &[PathBuf]) -> PathBuf {
     match paths {
         [] => PathBuf::new(),
-        [one] => one.clone(),
-        [first, rest @ ..] => PathBuf::from(format!("{} and {} more", first.display(), rest.len())),
+        [one] => shown(one),
+        [first, rest @ ..] => {
+            let first = shown(first);
+            PathBuf::from(format!("{} and {} more", first.display(), rest.len()))
+        }
     }
 }

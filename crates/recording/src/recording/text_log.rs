@@ -7,7 +7,7 @@
 use super::bare_stamps::BareStamps;
 use super::channel_route::{Item, Route};
 use super::early_besides::{EarlyBesides, are_beside};
-use super::input::Input;
+use super::input::{Bytes, Input};
 use super::line_input::{described, no_samples, unclear};
 use super::log_channel::LogChannel;
 use crate::attitude_line::TRUTH_ID;
@@ -18,7 +18,6 @@ use crate::format::Format;
 use crate::lines::Lines;
 use crate::mcap::{Channel, ChannelSurvey, Schema, Survey};
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs::File;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
@@ -188,7 +187,7 @@ impl TextLog {
 
 /// Reads a text to its end, or until `take` has enough.
 fn read<E: From<Error>>(
-    lines: &mut Lines<File>,
+    lines: &mut Lines<Bytes>,
     path: &Path,
     mut take: impl FnMut(Read<'_>) -> std::result::Result<ControlFlow<()>, E>,
 ) -> std::result::Result<Sensors, E> {

@@ -2,6 +2,7 @@
 //!
 //! Apart from the reader because that logs nothing itself: it hands out what is to be known as it comes.
 
+use crate::address::Address;
 use crate::error::Result;
 use std::path::{Path, PathBuf};
 use strapd_recording::{Input, Warn};
@@ -12,6 +13,14 @@ use strapd_recording::{Input, Warn};
 /// As [`Input::open`].
 pub fn open(path: &Path) -> Result<Input> {
     Ok(Input::open(path, &warn())?)
+}
+
+/// Opens what is at an address.
+///
+/// # Errors
+/// As [`Input::open`].
+pub(super) fn elsewhere(address: &Address) -> Result<Input> {
+    open(Path::new(address.typed()))
 }
 
 /// Opens several files as one recording.

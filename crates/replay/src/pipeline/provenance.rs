@@ -46,7 +46,7 @@ pub fn of(
     put("noise".to_owned(), run.plan.noise.name.clone());
     // The ends are read only where there is something to write the result into, and never of a
     // pipe: opening it a second time would wait for a second writer.
-    if run.source != Source::Stdin
+    if !run.source.files().is_empty()
         && files.iter().all(|path| path.is_file())
         && run.targets.iter().any(|t| *t != Target::Null)
     {

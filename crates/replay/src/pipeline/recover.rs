@@ -14,7 +14,6 @@ use crate::sink::{
 };
 use std::cell::RefCell;
 use std::ops::ControlFlow;
-use std::path::PathBuf;
 use std::sync::Arc;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_recording::Source;
@@ -221,13 +220,14 @@ pub fn run(run: &Recover, pool: &Pool, watch: &mut dyn FnMut(&Position)) -> Resu
             ));
         }
         Source::Stdin => Reader::from_stream(run.source.name(), Box::new(std::io::stdin()))?,
+        Source::Elsewhere(_) => {
+            return Err(Error::usage(
+                Diagnostic::new("what is recovered is a file").help("save it to one first"),
+            ));
+        }
     };
     let size = reader.size();
-    let inputs: Vec<PathBuf> = match &run.source {
-        Source::File(path) => vec![path.clone()],
-        Source::Parts(paths) => paths.clone(),
-        Source::Stdin => Vec::new(),
-    };
+    let inputs = run.source.files();
     let copying = RefCell::new(Copying {
         pool,
         sink: Sink::create_copy(&run.target, &inputs, run.options)?,

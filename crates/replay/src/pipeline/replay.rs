@@ -12,7 +12,7 @@ use super::summarise;
 use super::{lines, logged, replay_stream};
 use crate::error::{Error, Result};
 use crate::sink::{Flow, Stream};
-use crate::summary::RunSummary;
+use crate::summary::{RunSummary, human_bytes};
 use std::io::Read;
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -42,8 +42,11 @@ pub fn run(
     let begun = Instant::now();
     let mut summary = match &run.source {
         Source::File(path) if is_pipe(path) => piped(run, open(path)?, pool, watch)?,
-        Source::File(path) => {
-            let input = logged::open(path)?;
+        Source::File(_) | Source::Elsewhere(_) => {
+            let input = match &run.source {
+                Source::Elsewhere(address) => logged::elsewhere(address)?,
+                source => logged::open(&source.name())?,
+            };
             // Of lines and rows who speaks is known when all are read, which only several sensors are worth.
             let is_of_all = run.selection.topic.as_deref() == Some("all");
             if input.format().is_text() && input.parts().is_empty() && !is_of_all {
@@ -134,6 +137,15 @@ fn file(
             Ok(ControlFlow::Continue(()))
         },
     )?;
+    let passed = survey.passed_over;
+    if passed.chunks > 0 {
+        tracing::info!(
+            "{}: {} chunks ({}) have nothing of this by the index and were not fetched",
+            path.display(),
+            passed.chunks,
+            human_bytes(passed.bytes)
+        );
+    }
     Ok(summarise::run(run, session.finish(pool)?, &survey))
 }
 

@@ -9,10 +9,9 @@ use super::request::ReplayRequest;
 use super::session::{Found, Session, Topic};
 use crate::error::Result;
 use crate::sink::Stream;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use strapd_attitude::estimate::Plan;
 use strapd_attitude::estimate::{Meaning, Prepared};
-use strapd_recording::Source;
 
 /// The output's labels: frames and axes as they will be in the numbers.
 pub fn labelled(
@@ -60,11 +59,7 @@ pub(super) fn begin(
             Ok(topic)
         })
         .collect::<Result<Vec<_>>>()?;
-    let inputs: Vec<PathBuf> = match &run.source {
-        Source::File(path) => vec![path.clone()],
-        Source::Parts(paths) => paths.clone(),
-        Source::Stdin => Vec::new(),
-    };
+    let inputs = run.source.files();
     let outlet = Outlet::open(
         &run.targets,
         &inputs,

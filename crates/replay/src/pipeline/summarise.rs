@@ -192,6 +192,11 @@ fn calibrated(run: &ReplayRequest, topic: &Topic) -> SensorCalibration {
         Source::File(path) => path.file_name().unwrap_or_default().to_string_lossy(),
         Source::Parts(paths) => parts_named(paths).into(),
         Source::Stdin => "standard input".into(),
+        Source::Elsewhere(_) => {
+            let name = run.source.name();
+            let name = name.file_name().unwrap_or_default().to_string_lossy();
+            name.into_owned().into()
+        }
     };
     calibration::described(known, &topic.name, &source, topic.output.last.as_ref())
 }

@@ -6,6 +6,7 @@ use crate::sink::address::Listen;
 use std::path::{Path, PathBuf};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::setting::{LISTEN, TOKEN_FILE};
+use strapd_recording::elsewhere::SCHEMES;
 
 /// What a file or pipe is filled with.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -134,6 +135,9 @@ impl Target {
                 let address = address.to_owned();
                 Ok(Target::Udp { address, profile })
             }
+            _ if SCHEMES.contains(&scheme) => refuse(
+                "addresses of stores are read, not written to: write a file, and bring it there (aws s3 cp, gcloud storage cp, azcopy)",
+            ),
             _ => refuse(&format!("unknown scheme `{scheme}`")),
         }
     }

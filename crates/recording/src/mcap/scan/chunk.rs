@@ -24,7 +24,8 @@ impl Scanner {
     pub(super) fn chunk(&mut self, at: u64, length: u64) -> io::Result<Option<Item>> {
         self.section = Section::Data;
         let most = HEAD + 40 + NAME as usize;
-        let ahead = self.tape.available(most, self.peek)?;
+        let peek = self.before_passed(self.peek);
+        let ahead = self.tape.available(most, peek)?;
         let head = ahead.get(HEAD..).and_then(|body| {
             let body = body.get(..most - HEAD).unwrap_or(body);
             ChunkHead::parse(body).map(|(head, _)| head)
@@ -156,7 +157,11 @@ impl Scanner {
         let mut messages: Option<u64> = None;
         loop {
             let at = self.tape.position();
-            let head = head_at(self.tape.available(HEAD, self.peek)?, 0);
+            let peek = self.before_passed(self.peek);
+            if peek == 0 {
+                return Ok(messages);
+            }
+            let head = head_at(self.tape.available(HEAD, peek)?, 0);
             let Some((op::MESSAGE_INDEX, length)) = head else {
                 return Ok(messages);
             };

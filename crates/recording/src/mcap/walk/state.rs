@@ -7,6 +7,7 @@ use super::super::attached::intact;
 use super::super::block::{Block, Kind};
 use super::super::channels::{Channel, Table};
 use super::super::container::Container;
+use super::super::index::PassedOver;
 use super::super::messages::{Message, Stop, Tally, pass};
 use super::super::order::{Batch, Merger};
 use super::super::problem::{ProblemKind, Problems};
@@ -24,6 +25,7 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
+use strapd_attitude::diagnostic::Diagnostic;
 
 /// Groups of blocks on their way for each thread: enough that none waits, few enough that what one
 /// thread wrote is still in a cache when another reads it (measured: 6 blocks of 1 MiB beat 24
@@ -48,6 +50,8 @@ pub(super) struct Course<'w, T, D, M> {
     pub(super) least: usize,
     pub(super) hand_over: usize,
     pub(super) items: u64,
+    /// What is left out by an index.
+    pub(super) passed: Option<PassedOver>,
     pub(super) name: PathBuf,
 }
 
@@ -166,9 +170,12 @@ where
                 findings,
                 fault,
             } if self.shared.with_table(|table| findings.hold(table)) => {
-                if let Some((kind, unread)) = fault {
-                    self.problems.add(block.offset, kind, None);
-                    self.problems.skip(unread);
+                match fault {
+                    Some((kind, unread)) => {
+                        self.problems.add(block.offset, kind, None);
+                        self.problems.skip(unread);
+                    }
+                    None => self.agrees(block, &findings)?,
                 }
                 self.add_up(findings, block.offset);
                 Ok(batch)
@@ -206,6 +213,7 @@ where
             Ok(Err(kind)) => self.unusable(block, kind),
             Ok(Ok(records)) => {
                 let mut from = 0;
+                let mut is_whole = true;
                 loop {
                     let stop = self.shared.with_table(|table| {
                         let (map, met) = (&self.shared.map, &mut bench.met);
@@ -219,6 +227,7 @@ where
                                 problems.add(offset, kind, None);
                                 problems.skip((records.len() - at) as u64);
                             }
+                            is_whole = false;
                             break;
                         }
                         Stop::Definition { at } => {
@@ -242,12 +251,34 @@ where
                     }
                 }
                 let findings = Findings::of(&mut bench.met);
+                if is_whole {
+                    self.agrees(block, &findings)?;
+                }
                 self.add_up(findings, offset);
                 self.shared.arrange(&mut batch);
             }
         }
         self.shared.put_bench(bench);
         Ok(batch)
+    }
+
+    /// Holds a chunk against the index by which others are left out.
+    fn agrees(&self, block: &Block, findings: &Findings) -> Result<()> {
+        let (Some(passed), Kind::Chunk { .. }) = (&self.passed, &block.kind) else {
+            return Ok(());
+        };
+        let channels = self.shared.with_table(|table| {
+            let wanted = findings.channels.iter().filter(|(id, index, _)| {
+                passed.is_wanted(*id) && table.entry(*index).is_some_and(|e| e.choice.is_some())
+            });
+            wanted.map(|(_, _, tally)| tally.messages).sum()
+        });
+        if passed.agrees(block.offset, channels) {
+            return Ok(());
+        }
+        let why = Diagnostic::new("its index of chunks is not what is there")
+            .help("save it to a file: of a file all is read");
+        Err(self.failed(block.offset, io::Error::other(why)))
     }
 
     /// Counts a block none of whose messages can be used.
@@ -295,7 +326,7 @@ where
     fn deliver(&mut self, batch: Batch<T>, block: Block) -> Result<ControlFlow<()>> {
         // Not `Block::cost`: this has to be the same for a file and a stream.
         let bytes = match block.kind {
-            Kind::Chunk { size, .. } | Kind::Bag { size, .. } => size,
+            Kind::Chunk { size, .. } | Kind::Bag { size, .. } | Kind::PassedOver { size } => size,
             Kind::Run | Kind::Transcript | Kind::Attached { .. } => block.packed(),
         };
         self.scanner.recycle(block.payload);
@@ -355,11 +386,16 @@ where
             self.tallies.resize(table.len(), Tally::default());
             survey.add_up(table.channels().zip(self.tallies.iter().copied()));
         });
+        if let Some(passed) = &self.passed {
+            survey.pass_over(passed);
+        }
         // Messages without a channel or a head are among those counted as lost.
         let found = survey
             .messages
             .saturating_add(survey.problems.messages_lost());
-        if let Some(claimed) = claimed.filter(|claimed| *claimed != found && !stopped) {
+        // Where chunks are left out, those that were lost may be counted among what is left out, too.
+        let may_differ = self.passed.is_some() && found > survey.messages;
+        if let Some(claimed) = claimed.filter(|n| *n != found && !stopped && !may_differ) {
             let (kind, lost) = match claimed.checked_sub(found) {
                 Some(lost) => (
                     ProblemKind::Missing {

@@ -1,6 +1,6 @@
 //! An address -> the one form in which it is printed. Pure.
 //!
-//! Apart from what is listened on or written to (`sink`), because errors hold addresses, too.
+//! Apart from what is read, listened on or written to there, because errors hold addresses, too.
 
 use std::fmt;
 
@@ -14,6 +14,31 @@ impl Address {
     #[must_use]
     pub fn typed(&self) -> &str {
         &self.0
+    }
+
+    /// What stands before `://`, in small letters; empty where there is none.
+    #[must_use]
+    pub fn scheme(&self) -> String {
+        let scheme = self.0.split_once("://").map_or("", |(scheme, _)| scheme);
+        scheme.to_ascii_lowercase()
+    }
+
+    /// As it is printed, without what stands behind its `?`: its last part then ends as a file's name does.
+    #[must_use]
+    pub fn place(&self) -> String {
+        let printed = self.to_string();
+        match printed.split_once('?') {
+            Some((place, _)) => place.to_owned(),
+            None => printed,
+        }
+    }
+
+    /// Whether it names a user before its host.
+    #[must_use]
+    pub fn names_a_user(&self) -> bool {
+        let rest = self.0.split_once("://").map_or("", |(_, rest)| rest);
+        let host = rest.split(['/', '?', '#']).next();
+        host.is_some_and(|host| host.contains('@'))
     }
 }
 
@@ -37,7 +62,7 @@ impl fmt::Debug for Address {
 
 /// Work grows with the text.
 fn without_secrets(text: &str) -> String {
-    let text = strapd_recording::text::printable(text);
+    let text = crate::text::printable(text);
     let (scheme, rest) = match text.split_once("://") {
         Some((scheme, rest)) => (format!("{scheme}://"), rest),
         None => (String::new(), text.as_str()),
@@ -102,6 +127,17 @@ mod tests {
             ("", ""),
         ] {
             assert_eq!(Address::from(text).to_string(), printed, "{text}");
+        }
+        let address = Address::from("HTTPS://h/a%20b/c.csv?X-Signature=s3cret&x=1#y");
+        assert_eq!(address.scheme(), "https");
+        assert_eq!(address.place(), "HTTPS://h/a%20b/c.csv");
+        for (text, names_one) in [
+            ("https://ada@h/a", true),
+            ("https://ada:s3cret@h:1?x", true),
+            ("https://h/a@b.csv", false),
+            ("s3://bucket/a?x=@", false),
+        ] {
+            assert_eq!(Address::from(text).names_a_user(), names_one, "{text}");
         }
         assert!(
             !Address::from("tcp://\u{1b}[31m:1")

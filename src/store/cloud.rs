@@ -1,0 +1,336 @@
+//! A range of an object in a store: `s3`, `gs`, `az`. I/O, by `object_store`.
+//!
+//! Credentials are those of the environment, as each cloud's own tools take them. Requests go by our own client, which follows no
+//! redirect: a signature is for one host.
+
+use super::answer::{Part, Reply, Version};
+use super::client::{self, innermost};
+use super::fault::{Fault, asked};
+use super::patience::Patience;
+use futures_util::StreamExt;
+use http_body_util::BodyExt;
+use object_store::aws::AmazonS3Builder;
+use object_store::azure::MicrosoftAzureBuilder;
+use object_store::client::{
+    HttpClient, HttpConnector, HttpError, HttpErrorKind, HttpRequest, HttpResponse,
+    HttpResponseBody, HttpService,
+};
+use object_store::gcp::GoogleCloudStorageBuilder;
+use object_store::path::Path;
+use object_store::{
+    ClientConfigKey, ClientOptions, Error, GetOptions, GetRange, ObjectStore, ObjectStoreExt,
+    RetryConfig,
+};
+use reqwest::StatusCode;
+use std::fmt;
+use std::ops::Range;
+use std::pin::Pin;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU16, AtomicU64, Ordering};
+use std::time::Duration;
+use strapd_attitude::diagnostic::Diagnostic;
+use strapd_recording::address::Address;
+
+/// What a cloud's own tools read.
+const S3: &str = "AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY, AWS_SESSION_TOKEN, AWS_REGION and AWS_ENDPOINT_URL are looked at; AWS_SKIP_SIGNATURE=true reads what is public";
+const GS: &str = "GOOGLE_SERVICE_ACCOUNT (a file) and GOOGLE_APPLICATION_CREDENTIALS are looked at; GOOGLE_SKIP_SIGNATURE=true reads what is public";
+const AZ: &str = "AZURE_STORAGE_ACCOUNT_NAME, AZURE_STORAGE_ACCOUNT_KEY, AZURE_STORAGE_SAS_KEY and AZURE_CLIENT_ID are looked at; AZURE_SKIP_SIGNATURE=true reads what is public";
+
+/// Who gives credentials to machines of a cloud, and answers at once or never.
+const METADATA: [&str; 3] = [
+    "169.254.169.254",
+    "fd00:ec2::254",
+    "metadata.google.internal",
+];
+const METADATA_ANSWERS: Duration = Duration::from_secs(2);
+
+/// An object in a store.
+pub(super) struct Cloud {
+    store: Box<dyn ObjectStore>,
+    key: Path,
+    scheme: String,
+    speaker: Speaker,
+}
+
+impl fmt::Debug for Cloud {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Cloud({}, {})", self.scheme, self.key)
+    }
+}
+
+/// What was answered to one request, beside what `object_store` tells of it.
+#[derive(Debug, Default)]
+struct Answered {
+    status: AtomicU16,
+    asked_millis: AtomicU64,
+}
+
+impl Cloud {
+    pub(super) fn of(address: &Address, patience: Patience) -> Result<Cloud, Diagnostic> {
+        let scheme = address.scheme();
+        let rest = address
+            .typed()
+            .split_once("://")
+            .map_or("", |(_, rest)| rest);
+        let (bucket, key) = rest.split_once('/').unwrap_or((rest, ""));
+        let is_plain = !rest.contains(['?', '#']);
+        let key = Path::parse(key).ok().filter(|key| !key.as_ref().is_empty());
+        let Some(key) = key.filter(|_| is_plain && !bucket.is_empty()) else {
+            return Err(Diagnostic::new("is no address of an object")
+                .help(format!("{scheme}://BUCKET/KEY, without a query")));
+        };
+        let speaker = Speaker {
+            client: client::of_cloud(&patience)?,
+            patience,
+            only_https: false,
+            is_without_credentials: Arc::default(),
+            is_refused_plain: Arc::default(),
+        };
+        // Tries are counted by whoever downloads.
+        let retry = RetryConfig {
+            max_retries: 0,
+            ..RetryConfig::default()
+        };
+        let store: Result<Box<dyn ObjectStore>, Error> = match scheme.as_str() {
+            "s3" => AmazonS3Builder::from_env()
+                .with_bucket_name(bucket)
+                .with_retry(retry)
+                .with_http_connector(speaker.clone())
+                .build()
+                .map(|store| Box::new(store) as _),
+            "gs" => GoogleCloudStorageBuilder::from_env()
+                .with_bucket_name(bucket)
+                .with_retry(retry)
+                .with_http_connector(speaker.clone())
+                .build()
+                .map(|store| Box::new(store) as _),
+            _ => MicrosoftAzureBuilder::from_env()
+                .with_container_name(bucket)
+                .with_retry(retry)
+                .with_http_connector(speaker.clone())
+                .build()
+                .map(|store| Box::new(store) as _),
+        };
+        let store = store.map_err(|e| {
+            Diagnostic::new(format!(
+                "the environment does not say how: {}",
+                innermost(&e)
+            ))
+            .help(variables(&scheme))
+        })?;
+        Ok(Cloud {
+            store,
+            key,
+            scheme,
+            speaker,
+        })
+    }
+
+    pub(super) async fn get(&self, range: Range<u64>) -> Result<Reply, Fault> {
+        let answered = Arc::new(Answered::default());
+        let mut options = GetOptions {
+            range: Some(GetRange::Bounded(range.clone())),
+            ..GetOptions::default()
+        };
+        options.extensions.insert(Arc::clone(&answered));
+        let found = match self.store.get_opts(&self.key, options).await {
+            Ok(found) => found,
+            Err(_) if answered.status() == StatusCode::RANGE_NOT_SATISFIABLE.as_u16() => {
+                return self.beyond(range).await;
+            }
+            Err(why) => return Err(self.fault(&why, &answered)),
+        };
+        Ok(Reply::Part(Part {
+            version: Version {
+                size: found.meta.size,
+                tag: found.meta.e_tag.clone(),
+            },
+            start: found.range.start,
+            body: found
+                .into_stream()
+                .map(|bytes| bytes.map_err(|e| Fault::passing(broken(&e))))
+                .boxed(),
+        }))
+    }
+
+    /// What is there though it has no byte in `range`.
+    async fn beyond(&self, range: Range<u64>) -> Result<Reply, Fault> {
+        let found = self.store.head(&self.key).await;
+        let found = found.map_err(|why| self.fault(&why, &Answered::default()))?;
+        Ok(Reply::Part(Part {
+            version: Version {
+                size: found.size,
+                tag: found.e_tag,
+            },
+            start: range.start,
+            body: futures_util::stream::empty().boxed(),
+        }))
+    }
+
+    fn fault(&self, why: &Error, answered: &Answered) -> Fault {
+        let said = match why {
+            Error::NotFound { .. } => StatusCode::NOT_FOUND.as_u16(),
+            Error::PermissionDenied { .. } => StatusCode::FORBIDDEN.as_u16(),
+            Error::Unauthenticated { .. } => StatusCode::UNAUTHORIZED.as_u16(),
+            Error::Precondition { .. } | Error::NotModified { .. } => return Fault::changed(),
+            _ => answered.status(),
+        };
+        if let Ok(status) = StatusCode::from_u16(said)
+            && !status.is_success()
+        {
+            let millis = answered.asked_millis.load(Ordering::Relaxed);
+            return Fault::status(status, (millis > 0).then(|| Duration::from_millis(millis)));
+        }
+        if self.speaker.is_without_credentials.load(Ordering::Relaxed) {
+            return Diagnostic::new("there are no credentials, and this machine is given none")
+                .help(variables(&self.scheme))
+                .into();
+        }
+        if self.speaker.is_refused_plain.load(Ordering::Relaxed) {
+            return Diagnostic::new("the environment asks for plain http and does not allow it")
+                .help("AWS_ALLOW_HTTP=true, GOOGLE_ALLOW_HTTP=true or AZURE_ALLOW_HTTP=true does")
+                .into();
+        }
+        match own_words(why) {
+            Some(what) => Fault::passing(what),
+            // What a server of credentials says is not ours to print.
+            None => Diagnostic::new("the store can not be asked with these credentials")
+                .help(variables(&self.scheme))
+                .into(),
+        }
+    }
+
+    /// What helps where the store says this.
+    pub(super) fn help(&self, status: u16) -> String {
+        match status {
+            401 | 403 => variables(&self.scheme).to_owned(),
+            404 => format!("bucket and key as in {}://BUCKET/KEY", self.scheme),
+            300..=399 => format!(
+                "it is in another region or place; {}",
+                variables(&self.scheme)
+            ),
+            _ => String::new(),
+        }
+    }
+}
+
+/// What a body was cut by.
+fn broken(why: &Error) -> String {
+    own_words(why).unwrap_or_else(|| "a body was cut".to_owned())
+}
+
+/// Why a request was not answered, where it is we who say so.
+fn own_words(why: &Error) -> Option<String> {
+    let mut cause: &(dyn std::error::Error + 'static) = why;
+    while let Some(next) = cause.source() {
+        cause = next;
+    }
+    let own = cause.downcast_ref::<std::io::Error>();
+    own.map(std::string::ToString::to_string)
+}
+
+fn variables(scheme: &str) -> &'static str {
+    match scheme {
+        "s3" => S3,
+        "gs" => GS,
+        _ => AZ,
+    }
+}
+
+impl Answered {
+    fn status(&self) -> u16 {
+        self.status.load(Ordering::Relaxed)
+    }
+}
+
+/// Sends what `object_store` asks for.
+#[derive(Clone, Debug)]
+struct Speaker {
+    client: reqwest::Client,
+    patience: Patience,
+    only_https: bool,
+    /// Nobody answered who would give some.
+    is_without_credentials: Arc<AtomicBool>,
+    is_refused_plain: Arc<AtomicBool>,
+}
+
+impl HttpConnector for Speaker {
+    fn connect(&self, options: &ClientOptions) -> object_store::Result<HttpClient> {
+        let allowed = options.get_config_value(&ClientConfigKey::AllowHttp);
+        Ok(HttpClient::new(Speaker {
+            only_https: allowed.as_deref() != Some("true"),
+            ..self.clone()
+        }))
+    }
+}
+
+/// A future as a trait with async functions has it.
+type Waiting<'a> = Pin<Box<dyn Future<Output = Result<HttpResponse, HttpError>> + Send + 'a>>;
+
+impl HttpService for Speaker {
+    fn call<'s, 'a>(&'s self, request: HttpRequest) -> Waiting<'a>
+    where
+        's: 'a,
+        Self: 'a,
+    {
+        Box::pin(self.send(request))
+    }
+}
+
+impl Speaker {
+    async fn send(&self, request: HttpRequest) -> Result<HttpResponse, HttpError> {
+        let (parts, body) = request.into_parts();
+        let refused =
+            |why: &str| HttpError::new(HttpErrorKind::Unknown, std::io::Error::other(why));
+        let url = parts.uri.to_string();
+        let url = reqwest::Url::parse(&url).map_err(|_| refused("is no address"))?;
+        let of_machine = url.host_str().is_some_and(|host| {
+            let host = host.trim_matches(['[', ']']);
+            METADATA.contains(&host)
+        });
+        if self.only_https && url.scheme() != "https" && !of_machine {
+            self.is_refused_plain.store(true, Ordering::Relaxed);
+            return Err(refused("plain http is not allowed"));
+        }
+        let mut asks = reqwest::Request::new(parts.method, url);
+        *asks.headers_mut() = parts.headers;
+        *asks.body_mut() = body.as_bytes().cloned().map(reqwest::Body::from);
+        if of_machine {
+            *asks.timeout_mut() = Some(METADATA_ANSWERS);
+        }
+        let reply = self.client.execute(asks).await.map_err(|why| {
+            if of_machine {
+                self.is_without_credentials.store(true, Ordering::Relaxed);
+            }
+            self.error(&why)
+        })?;
+        if of_machine {
+            let is_refused = !reply.status().is_success();
+            self.is_without_credentials
+                .store(is_refused, Ordering::Relaxed);
+        }
+        if let Some(answered) = parts.extensions.get::<Arc<Answered>>() {
+            let asked = asked(reply.headers()).map_or(0, |asked| asked.as_millis());
+            let asked = u64::try_from(asked).unwrap_or(u64::MAX);
+            answered.asked_millis.store(asked, Ordering::Relaxed);
+            let status = reply.status().as_u16();
+            answered.status.store(status, Ordering::Relaxed);
+        }
+        let (status, headers) = (reply.status(), reply.headers().clone());
+        let by = self.clone();
+        let body = reqwest::Body::from(reply).map_err(move |why| by.error(&why));
+        let mut out = HttpResponse::new(HttpResponseBody::new(body));
+        *out.status_mut() = status;
+        *out.headers_mut() = headers;
+        Ok(out)
+    }
+
+    fn error(&self, why: &reqwest::Error) -> HttpError {
+        let said = match client::fault(why, &self.patience) {
+            Fault::Passing { what, .. } => what,
+            Fault::Lasting(what) => what.line(),
+            Fault::Refused(status) => status.to_string(),
+        };
+        HttpError::new(HttpErrorKind::Unknown, std::io::Error::other(said))
+    }
+}
