@@ -97,9 +97,8 @@ fn no_way(address: &Address) -> Diagnostic {
         "az" => "azcopy brings it to a file".to_owned(),
         _ => format!("curl -s {place} | strapd replay -"),
     };
-    Diagnostic::new("addresses are read by a build with the feature object-store").help(format!(
-        "cargo install --path . --features object-store; or {pipe}"
-    ))
+    Diagnostic::new("addresses are read by a build with the feature object-store")
+        .help(format!("build it with that feature; or {pipe}"))
 }
 
 /// All of an object.

@@ -7,7 +7,7 @@ use crate::summary::{Against, Recorded, TopicSummary, significant};
 use nalgebra::Vector3;
 use serde_json::json;
 use strapd_attitude::compare::{BiasFit, BodyAxesFit, Consistency};
-use strapd_attitude::setting::{BIAS, Choice, METHOD, MOUNT, NOISE, SAMPLE_KIND};
+use strapd_attitude::setting::{AID, BIAS, Choice, METHOD, MOUNT, NOISE, SAMPLE_KIND};
 
 /// A meaning is better when its median error is below this share of the other's.
 const CLEARLY: f64 = 0.95;
@@ -140,10 +140,10 @@ fn heading_drift(found: &Consistency, help: Option<Choice>, out: &mut Vec<Findin
     }
     let deg = |v: f64| significant(v.to_degrees(), 2);
     let advice = match help {
-        Some(_) => "without that bias it is less",
-        None => {
-            "the gyro alone does not hold it, nor does gravity: a magnetic field does (--aid gravity+mag)"
-        }
+        Some(_) => "without that bias it is less".to_owned(),
+        None => format!(
+            "the gyro alone does not hold it, nor does gravity: a magnetic field does ({AID} gravity+mag)"
+        ),
     };
     out.push(
         Finding::new(
