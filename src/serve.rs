@@ -11,6 +11,7 @@
 //! | [`channel`], [`last`] | a stream as clients know it; its last attitude, for who comes late | pure |
 //! | [`playback`] | a replay or simulation served in place of sensors, and who moves it | I/O; locks |
 //! | [`session`] | one client's lines -> hub, answers | sans-I/O |
+//! | `owned` | the sensors one client sends -> hub, and again when they were put away | locks |
 //! | [`hub`] | samples -> attitudes -> outboxes | locks |
 //! | [`outbox`] | attitudes -> what one client gets, bounded | locks |
 //! | [`recorder`] | what goes through -> MCAP files that survive a crash | a queue; I/O on threads of its own |
@@ -44,6 +45,7 @@ mod log_throttle;
 pub mod nats;
 pub mod outbox;
 mod outgoing;
+mod owned;
 mod page;
 pub mod peer;
 pub mod places;

@@ -12,7 +12,7 @@ use crate::serve::hub::Hub;
 use crate::serve::limits::Limits;
 use crate::serve::recorder::{self, Recorder, Split};
 use crate::serve::shutdown::Signals;
-use crate::serve::source::Endpoint;
+use crate::serve::source::{Endpoint, means_nats};
 use crate::serve::state::StateFile;
 use crate::serve::{Server, Settings, listen};
 use crate::sink::address::{DEFAULTS, Listen};
@@ -128,15 +128,10 @@ fn window(text: &str) -> std::result::Result<Duration, String> {
         .ok_or_else(|| "expected seconds, 0 to 86400".to_owned())
 }
 
-/// Whether the daemon publishes there by NATS.
-fn is_nats(output: &str) -> bool {
-    cfg!(feature = "nats") && output.starts_with("nats://")
-}
-
 /// A sink of the daemon.
 fn sent_to(text: &str) -> Result<Target> {
     #[cfg(not(feature = "nats"))]
-    if text.starts_with("nats://") {
+    if means_nats(text) {
         return Err(crate::serve::source::without_nats("-o", text));
     }
     match Target::parse(text)? {
@@ -430,14 +425,14 @@ impl Serve {
             outputs: self
                 .output
                 .iter()
-                .filter(|o| !is_nats(o))
+                .filter(|o| !(cfg!(feature = "nats") && means_nats(o)))
                 .map(|o| sent_to(o))
                 .collect::<Result<_>>()?,
             #[cfg(feature = "nats")]
             nats: self
                 .output
                 .iter()
-                .filter(|o| is_nats(o))
+                .filter(|o| means_nats(o))
                 .map(|o| crate::serve::nats::address::NatsAddress::output(o))
                 .collect::<Result<_>>()?,
             limits: Limits {

@@ -35,6 +35,8 @@ pub struct Channel {
     /// Number of its first channel for viewers.
     number: u32,
     payloads: Payloads,
+    /// The child of its transform.
+    child: String,
     /// Number of the attitude handed out last, and itself.
     last: Mutex<Option<(u64, AttitudeSample)>>,
     sent: AtomicU64,
@@ -84,11 +86,9 @@ impl Items<'_> {
 }
 
 impl Channel {
-    /// Number `number`, named and labelled as the last of `streams` says, which is all there are.
+    /// Number `number`, named and labelled as `stream` says; its transform has this child.
     #[must_use]
-    pub fn new(number: u32, streams: &[Stream]) -> Channel {
-        let nameless = Stream::default();
-        let stream = streams.last().unwrap_or(&nameless);
+    pub fn new(number: u32, stream: &Stream, child: String) -> Channel {
         Channel {
             id: stream.id.as_str().into(),
             stream: stream.clone(),
@@ -96,11 +96,18 @@ impl Channel {
             plot: Objects::new(stream, Profile::PlotJuggler),
             label: (number, wire::packed_stream(number, stream)),
             number: frames::channel_of(number),
-            payloads: Payloads::new(stream, streams),
+            payloads: Payloads::new(stream, &child),
+            child,
             last: Mutex::new(None),
             sent: AtomicU64::new(0),
             health: Mutex::new(None),
         }
+    }
+
+    /// The child of its transform.
+    #[must_use]
+    pub fn child(&self) -> &str {
+        &self.child
     }
 
     /// Its number.

@@ -41,7 +41,7 @@ use super::stream::stamps::Taken;
 use super::stream::{SensorStream, live_plan};
 use super::wire;
 use crate::error::{Error, Result};
-use crate::sink::Profile;
+use crate::sink::{ChildFrames, Profile};
 use bytes::Bytes;
 use std::collections::{BTreeMap, VecDeque};
 use std::hash::{BuildHasher, RandomState};
@@ -95,6 +95,8 @@ pub struct Hub {
     /// By number.
     channels: RwLock<BTreeMap<u32, Arc<Channel>>>,
     next_channel: AtomicU32,
+    /// Of the transforms of all channels.
+    child_frames: Mutex<ChildFrames>,
     polling: Polling,
     /// What a simulation says the attitude truly is.
     truth: Mutex<Option<referring::Truth>>,
@@ -165,7 +167,6 @@ impl Client {
     }
 
     /// It speaks for many: as many sensors as there may be are its share.
-    #[cfg(feature = "nats")]
     pub fn speaks_for_many(&self) {
         self.is_broker.store(true, Ordering::Relaxed);
     }
@@ -233,6 +234,7 @@ impl Hub {
             channels: RwLock::default(),
             truth: Mutex::default(),
             next_channel: AtomicU32::new(1),
+            child_frames: Mutex::default(),
             polling: Polling::default(),
             next_client: AtomicU64::new(1),
             stamps_wait: AtomicBool::new(false),

@@ -153,6 +153,13 @@ impl Outbox {
         self
     }
 
+    /// Told whenever there is room again.
+    #[cfg(feature = "nats")]
+    #[must_use]
+    pub fn room(&self) -> &Arc<Notify> {
+        &self.room
+    }
+
     fn state(&self) -> MutexGuard<'_, State> {
         // Every change of the state is whole before anything in it could panic.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)

@@ -10,9 +10,10 @@ mod turn;
 mod unpacking;
 
 use super::fault::Fault;
-use super::hub::{Client, Feedback, GAVE_WAY, Hub, Sensor, count};
+use super::hub::{Client, Feedback, Hub, count};
 use super::limits::Allowance;
 use super::log_throttle;
+use super::owned::Owned;
 use super::peer::Peer;
 use super::stream::NAMELESS;
 use super::stream::run::{Placed, SampleRun};
@@ -21,7 +22,7 @@ use super::wire::{self, Message};
 use bytes::Bytes;
 use opening::Opening;
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 use strapd_attitude::record::{Nanos, RawSample};
 use strapd_recording::decode::framing::Framer;
@@ -30,8 +31,6 @@ use turn::{Held, Step};
 
 /// Errors said at once before they are thinned.
 const BURST: u32 = 64;
-/// Sensors of one session before it is looked which are there still.
-const MANY: usize = 64;
 /// Unknown classes remembered, so that each is said once.
 const MAX_TOLD: usize = 32;
 
@@ -128,18 +127,21 @@ impl Side {
     }
 }
 
-#[cfg(feature = "nats")]
 impl Side {
+    /// Whether it speaks for many sensors.
+    fn is_broker(&self) -> bool {
+        matches!(self, Side::Source(naming) if naming.subject.is_some())
+    }
+
+    #[cfg(feature = "nats")]
     /// A broker, whose messages are of many sensors, or all of the one that is called `id` here.
     #[must_use]
     pub fn broker(id: Option<String>) -> Side {
-        Side::Source(Box::new(Naming {
-            id,
-            subject: Some(String::new()),
-            decoder: None,
-            called: None,
-            events: Vec::new(),
-        }))
+        let mut side = Side::source(id, None);
+        if let Side::Source(naming) = &mut side {
+            naming.subject = Some(String::new());
+        }
+        side
     }
 }
 
@@ -197,13 +199,9 @@ pub struct Session {
     errors: Allowance,
     told: BTreeSet<String>,
     /// The sensors it sends.
-    owned: BTreeMap<String, Arc<Mutex<Sensor>>>,
-    /// With so many of these it is looked which are there still.
-    look_at: usize,
+    owned: Owned,
     /// What packed samples with a number say, as lines would.
     bound: BTreeMap<u32, Line>,
-    /// The one it sent last.
-    last: Option<Arc<Mutex<Sensor>>>,
     step: Step,
     /// What waits for the next step.
     held: Option<Held>,
@@ -223,6 +221,9 @@ impl Session {
     #[must_use]
     pub fn with(hub: &Arc<Hub>, peer: impl Into<Peer>, side: Side) -> Session {
         let client = hub.join(peer);
+        if side.is_broker() {
+            client.speaks_for_many();
+        }
         client.outbox.reply(wire::version(&hub.session()));
         let (authorised, opening) = match side {
             Side::Client { trusted } => (trusted || hub.token().is_none(), Opening::Blank),
@@ -244,10 +245,8 @@ impl Session {
             errors_in_a_row: 0,
             errors: Allowance::new(BURST),
             told: BTreeSet::new(),
-            owned: BTreeMap::new(),
-            look_at: MANY,
+            owned: Owned::default(),
             bound: BTreeMap::new(),
-            last: None,
             step: Step::default(),
             held: None,
             last_words: None,
@@ -271,8 +270,6 @@ impl Session {
     #[cfg(feature = "nats")]
     pub fn of_subject(&mut self, id: &str) {
         self.bound.clear();
-        self.errors_in_a_row = 0;
-        self.client.speaks_for_many();
         if let Side::Source(naming) = &mut self.side
             && let Some(subject) = &mut naming.subject
         {
@@ -283,7 +280,7 @@ impl Session {
     /// The sensors it has sent.
     #[cfg(feature = "nats")]
     pub fn sensors(&self) -> impl Iterator<Item = &String> {
-        self.owned.keys()
+        self.owned.ids()
     }
 
     /// The sensor that the subject names, for packed samples whose number is not bound.
@@ -499,13 +496,11 @@ impl Session {
         scratch: &mut Scratch,
     ) {
         self.flush(received, scratch, usize::MAX);
-        if let Some(sensor) = &self.last {
-            self.hub.undecodable(sensor, self.client.number);
-        }
+        self.owned.undecodable(&self.hub, &self.client);
         self.say(fault, number, line);
         self.errors_in_a_row += 1;
         // One bad sensor behind a broker is not all of them.
-        if matches!(&self.side, Side::Source(naming) if naming.subject.is_some()) {
+        if self.side.is_broker() {
             return;
         }
         if self.errors_in_a_row > self.hub.limits().errors_in_a_row {
@@ -580,27 +575,14 @@ impl Session {
             samples: scratch.samples.get(..until).unwrap_or_default(),
             bare: &scratch.bare,
         };
-        let id = head
-            .id
-            .as_deref()
-            .filter(|id| !id.is_empty())
-            .unwrap_or(NAMELESS);
-        let mut publish = |session: &mut Session| {
-            let sensor = session.sensor(id, &run)?;
-            let news = session.hub.publish(&sensor, &run, &mut scratch.text);
-            session.last = news.is_ok().then_some(sensor);
-            news
-        };
-        let mut news = publish(self);
-        if matches!(&news, Err(fault) if fault.code == GAVE_WAY) && self.owned.remove(id).is_some()
-        {
-            // It was silent for long: it asks for a place again.
-            self.client.let_go();
-            news = publish(self);
-        }
+        let news = self
+            .owned
+            .publish(&self.hub, &self.client, &run, &mut scratch.text);
         match news {
             Ok(Feedback { note, faults }) => {
                 if let Some(note) = note {
+                    let id = head.id.as_deref().filter(|id| !id.is_empty());
+                    let id = id.unwrap_or(NAMELESS);
                     log_throttle::info(&format!("run {id}"), &format!("{id}: {}", note.message));
                     self.client.outbox.reply(wire::note(&note));
                 }
@@ -617,26 +599,6 @@ impl Session {
         // Those of a line that is still to come are not there yet.
         scratch.bare.clear();
         scratch.lines.clear();
-    }
-
-    fn sensor(&mut self, id: &str, run: &SampleRun<'_>) -> Result<Arc<Mutex<Sensor>>, Fault> {
-        if let Some(sensor) = self.owned.get(id) {
-            return Ok(sensor.clone());
-        }
-        if self.owned.len() >= self.look_at {
-            // Who sends ever new sensors keeps none that was put away.
-            self.owned.retain(|_, sensor| {
-                let is_there = self.hub.has_place(sensor);
-                if !is_there {
-                    self.client.let_go();
-                }
-                is_there
-            });
-            self.look_at = MANY.max(2 * self.owned.len());
-        }
-        let sensor = self.hub.sensor(id, &self.client, run)?;
-        self.owned.insert(id.to_owned(), sensor.clone());
-        Ok(sensor)
     }
 }
 
@@ -655,7 +617,6 @@ fn first_line_must_be_auth() -> Fault {
 
 impl Drop for Session {
     fn drop(&mut self) {
-        let owned: Vec<_> = std::mem::take(&mut self.owned).into_values().collect();
-        self.hub.leave(&self.client, &owned);
+        self.owned.leave(&self.hub, &self.client);
     }
 }

@@ -58,13 +58,11 @@ impl Endpoint {
     /// # Errors
     /// As [`Source::parse`]; NATS is meant and was not built in.
     pub fn parse(text: &str) -> Result<Endpoint> {
-        #[cfg(feature = "nats")]
-        if super::nats::address::NatsAddress::is_meant(text) {
-            let address = super::nats::address::NatsAddress::source(text)?;
-            return Ok(Endpoint::Nats(Box::new(address)));
-        }
-        #[cfg(not(feature = "nats"))]
-        if text.starts_with("nats://") {
+        if means_nats(text) {
+            #[cfg(feature = "nats")]
+            return super::nats::address::NatsAddress::source(text)
+                .map(|address| Endpoint::Nats(Box::new(address)));
+            #[cfg(not(feature = "nats"))]
             return Err(without_nats("serve", text));
         }
         Source::parse(text).map(|source| Endpoint::Source(Box::new(source)))
@@ -113,6 +111,12 @@ impl Endpoint {
         };
         name.push_str(&format!(" ({number})"));
     }
+}
+
+/// Whether a word is meant as a subject of NATS.
+#[must_use]
+pub fn means_nats(text: &str) -> bool {
+    text.starts_with("nats://")
 }
 
 /// NATS is meant, and was not built in.

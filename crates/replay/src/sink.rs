@@ -39,7 +39,7 @@ pub use output::Flow;
 pub use output::sync_directory;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::setting::TOPIC;
-pub use stream::{Content, Provenance, Stream, output_topic};
+pub use stream::{ChildFrames, Content, Provenance, Stream, output_topic};
 
 pub use target::{Format, Precision, Profile, Target};
 

@@ -1,6 +1,6 @@
 //! What clients are told beside attitudes: which streams there are, and where a replay is. Pure but for locks.
 
-use super::{ClientProtocol, Hub, read, write};
+use super::{ClientProtocol, Hub, lock, read, write};
 use crate::serve::channel::Channel;
 use crate::serve::fault::Fault;
 use crate::serve::filter::Class;
@@ -34,10 +34,9 @@ impl Hub {
     /// A further stream; viewers are told.
     pub fn declare(&self, stream: &Stream) -> Arc<Channel> {
         let mut channels = write(&self.channels);
-        let mut streams: Vec<Stream> = channels.values().map(|c| c.stream().clone()).collect();
-        streams.push(stream.clone());
+        let child = lock(&self.child_frames).take(stream);
         let number = self.next_channel.fetch_add(1, Ordering::Relaxed);
-        let channel = Arc::new(Channel::new(number, &streams));
+        let channel = Arc::new(Channel::new(number, stream, child));
         channels.insert(number, channel.clone());
         // Under the lock: who joins meanwhile finds it in the list, and is not told twice.
         let said = foxglove::channels(std::iter::once(&*channel), false);

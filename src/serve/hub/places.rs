@@ -192,7 +192,11 @@ impl Hub {
             let all = sensors.iter().map(|(id, s)| (id.clone(), s.clone()));
             all.collect()
         };
-        let is_silent = |sensor: &Mutex<Sensor>| now - lock(sensor).heard_at.min(now) > most;
+        let is_silent = |sensor: &Mutex<Sensor>| {
+            let sensor = lock(sensor);
+            // Samples that wait for the unit of their stamps are in no state.
+            now - sensor.heard_at.min(now) > most && !sensor.stream.is_waiting()
+        };
         let silent = all.into_iter().filter(|(_, sensor)| is_silent(sensor));
         for (id, sensor) in silent {
             let mut sensors = write(&self.sensors);
@@ -202,11 +206,6 @@ impl Hub {
                 count(&self.counters.forgotten, 1);
             }
         }
-    }
-
-    /// Whether it has not been put away.
-    pub fn has_place(&self, sensor: &Mutex<Sensor>) -> bool {
-        !lock(sensor).gave_way
     }
 
     /// A sensor's place is free, and its attitude is kept.
@@ -248,7 +247,9 @@ impl Hub {
     /// A stream is no more; viewers are told.
     fn withdraw(&self, channel: &Channel) {
         let mut channels = write(&self.channels);
-        channels.remove(&channel.number());
+        if channels.remove(&channel.number()).is_some() {
+            lock(&self.child_frames).give_back(channel.stream(), channel.child());
+        }
         let numbers: Vec<u32> = channel.topics().map(|(number, _)| number).collect();
         let said = foxglove::withdrawn(&numbers);
         for client in read(&self.clients).values() {

@@ -83,12 +83,6 @@ enum Way {
 }
 
 impl NatsAddress {
-    /// Whether a word is meant as one of these.
-    #[must_use]
-    pub fn is_meant(text: &str) -> bool {
-        text.starts_with("nats://")
-    }
-
     /// Where samples come from.
     ///
     /// # Errors

@@ -1,8 +1,11 @@
 //! An address -> a connection that comes back. I/O.
 
 use super::address::{Login, NatsAddress};
+use crate::serve::connect::Redial;
+use crate::serve::shutdown::Running;
 use async_nats::{Client, ConnectOptions, Event};
 use std::time::Duration;
+use tokio::time::sleep;
 
 /// How long a connection may take, and a request.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -16,7 +19,7 @@ const WAITING: usize = 65_536;
 ///
 /// # Errors
 /// In words.
-pub(super) async fn connect(
+async fn connect(
     address: &NatsAddress,
     heard: impl Fn(&Event) + Send + Sync + Clone + 'static,
 ) -> Result<Client, String> {
@@ -50,6 +53,30 @@ pub(super) async fn connect(
     }
     let server = format!("nats://{}", address.place);
     options.connect(server).await.map_err(|e| in_words(&e))
+}
+
+/// The same, again and again until it is there; `said` is told why it is not. `None`: the daemon ends.
+pub(super) async fn keep_connecting(
+    address: &NatsAddress,
+    heard: impl Fn(&Event) + Send + Sync + Clone + 'static,
+    mut said: impl FnMut(&str),
+    running: &mut Running,
+) -> Option<Client> {
+    let mut redial = Redial::default();
+    loop {
+        let connected = tokio::select! {
+            connected = connect(address, heard.clone()) => connected,
+            () = running.asked() => return None,
+        };
+        match connected {
+            Ok(client) => return Some(client),
+            Err(why) => said(&why),
+        }
+        tokio::select! {
+            () = sleep(redial.failed()) => {}
+            () = running.asked() => return None,
+        }
+    }
 }
 
 /// An error with what caused it.

@@ -179,8 +179,10 @@ impl Lease {
 
     /// Lets it go, so that another need not wait.
     pub(super) async fn release(&self, tenancy: &Tenancy) {
-        // Whatever comes of it, it lapses.
-        let _ = self.write(true).await;
+        // Twice: the answer to the write before may be lost. Whatever comes of it, it lapses.
+        if self.write(true).await.is_err() {
+            let _ = self.write(true).await;
+        }
         tenancy.set(Tenure::None {
             number: self.number,
         });

@@ -1,21 +1,20 @@
 //! An outbox -> messages, each sensor under its own subject. I/O.
 
 use super::address::NatsAddress;
-use super::connection::{connect, in_words};
+use super::connection::{in_words, keep_connecting};
 use super::tenure::{Tenancy, Tenure};
 use crate::serve::chunk::Chunk;
-use crate::serve::connect::Redial;
 use crate::serve::filter::Filter;
 use crate::serve::hub::{Client as Watcher, ClientProtocol, Hub, count};
 use crate::serve::listen::Context;
 use crate::serve::log_throttle;
 use crate::serve::shutdown::Running;
-use async_nats::Client;
 use async_nats::connection::State;
 use async_nats::jetstream::context::{Context as JetStream, PublishErrorKind};
 use async_nats::jetstream::message::PublishMessage;
 use async_nats::jetstream::stream::LastRawMessageErrorKind;
 use async_nats::jetstream::{self};
+use async_nats::{Client, Event};
 use bytes::{Bytes, BytesMut};
 use futures_util::future::join_all;
 use serde::Deserialize;
@@ -46,22 +45,16 @@ pub(in crate::serve) async fn send(address: NatsAddress, context: Context, tenan
     );
     tenancy.add(&watcher);
     hub.watch(&watcher, Some(Filter::default()));
-    let mut redial = Redial::default();
-    let client = loop {
-        let connected = tokio::select! {
-            connected = connect(&address, |_| {}) => connected,
-            () = running.asked() => return hub.leave(&watcher, &[]),
-        };
-        match connected {
-            Ok(client) => break client,
-            Err(why) => {
-                warn(&address, &why);
-                tokio::select! {
-                    () = sleep(redial.failed()) => {}
-                    () = running.asked() => return hub.leave(&watcher, &[]),
-                }
-            }
-        }
+    let name = address.name.clone();
+    // What a server refuses it says here alone: who may not publish there, first of all.
+    let heard = move |event: &Event| match event {
+        Event::Disconnected => warn(&name, "the connection was lost"),
+        Event::ServerError(_) | Event::ClientError(_) => warn(&name, &event.to_string()),
+        _ => {}
+    };
+    let said = |why: &str| warn(&address.name, why);
+    let Some(client) = keep_connecting(&address, heard, said, &mut running).await else {
+        return hub.leave(&watcher, &[]);
     };
     let mut publisher = Publisher {
         jetstream: address
@@ -80,11 +73,9 @@ pub(in crate::serve) async fn send(address: NatsAddress, context: Context, tenan
     hub.leave(&watcher, &[]);
 }
 
-fn warn(address: &NatsAddress, why: &str) {
-    log_throttle::warn(
-        &format!("-o {}", address.name),
-        &format!("-o {}: {why}; trying again", address.name),
-    );
+fn warn(name: &str, why: &str) {
+    let name = format!("-o {name}");
+    log_throttle::warn(&name, &format!("{name}: {why}; trying again"));
 }
 
 struct Publisher {
@@ -188,7 +179,7 @@ impl Publisher {
             batches = match outcome {
                 Ok(left) => left,
                 Err(why) => {
-                    warn(&self.address, &why);
+                    warn(&self.address.name, &why);
                     batches
                 }
             };
@@ -274,7 +265,7 @@ impl Publisher {
             }
         }
         if let Some(why) = failure {
-            warn(&self.address, &why);
+            warn(&self.address.name, &why);
         }
         Ok(left)
     }

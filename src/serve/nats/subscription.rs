@@ -4,7 +4,7 @@
 //! all; what a packed object's number means holds within its message alone.
 
 use super::address::{From, LeaseKey, NatsAddress};
-use super::connection::{connect, in_words};
+use super::connection::{in_words, keep_connecting};
 use super::lease::{Document, Lease, worker_name};
 use super::tenure::{Tenancy, Tenure};
 use crate::serve::connect::Redial;
@@ -70,24 +70,17 @@ pub(in crate::serve) async fn keep(
     (hub, tenancy): (Arc<Hub>, Arc<Tenancy>),
     mut running: Running,
 ) {
-    let mut redial = Redial::default();
-    let client = loop {
+    let heard = {
+        let (outgoing, peer) = (outgoing.clone(), address.place.to_string());
+        move |event: &Event| hear(event, &outgoing, &peer)
+    };
+    outgoing.attempt();
+    let said = |why: &str| {
+        lost(&outgoing, why);
         outgoing.attempt();
-        let heard = {
-            let (outgoing, peer) = (outgoing.clone(), address.place.to_string());
-            move |event: &Event| hear(event, &outgoing, &peer)
-        };
-        let connected = tokio::select! {
-            connected = connect(&address, heard) => connected,
-            () = running.asked() => return,
-        };
-        match connected {
-            Ok(client) => break client,
-            Err(why) => tokio::select! {
-                () = lost(&outgoing, &why, &mut redial) => {}
-                () = running.asked() => return,
-            },
-        }
+    };
+    let Some(client) = keep_connecting(&address, heard, said, &mut running).await else {
+        return;
     };
     let mut reader = Reader {
         sequence: None,
@@ -115,16 +108,7 @@ fn hear(event: &Event, outgoing: &Outgoing, peer: &str) {
             let name = outgoing.name();
             log_throttle::info(&format!("{name} connected"), &format!("{name}: connected"));
         }
-        Event::Disconnected => {
-            outgoing.lost("the connection was lost");
-            log_throttle::warn(
-                &format!("{} lost", outgoing.name()),
-                &format!(
-                    "{}: the connection was lost; trying again until it is there",
-                    outgoing.name()
-                ),
-            );
-        }
+        Event::Disconnected => lost(outgoing, "the connection was lost"),
         Event::SlowConsumer(_) => {
             outgoing.complain("more came than was read; some of it is lost");
         }
@@ -133,14 +117,13 @@ fn hear(event: &Event, outgoing: &Outgoing, peer: &str) {
     }
 }
 
-async fn lost(outgoing: &Outgoing, why: &str, redial: &mut Redial) {
+fn lost(outgoing: &Outgoing, why: &str) {
     outgoing.lost(why);
     let name = outgoing.name();
     log_throttle::warn(
         &format!("{name} lost"),
         &format!("{name}: {why}; trying again until it is there"),
     );
-    sleep(redial.failed()).await;
 }
 
 impl Reader {
@@ -158,8 +141,9 @@ impl Reader {
             let (lease, document) = match taken {
                 Ok(taken) => taken,
                 Err(why) => {
+                    lost(&self.outgoing, &why);
                     tokio::select! {
-                        () = lost(&self.outgoing, &why, &mut redial) => continue,
+                        () = sleep(redial.failed()) => continue,
                         () = running.asked() => return,
                     }
                 }
@@ -238,8 +222,9 @@ impl Reader {
                     if began.elapsed() > Duration::from_secs(5) {
                         redial = Redial::default();
                     }
+                    lost(&self.outgoing, &why);
                     tokio::select! {
-                        () = lost(&self.outgoing, &why, &mut redial) => {}
+                        () = sleep(redial.failed()) => {}
                         () = running.asked() => break true,
                     }
                 }
@@ -317,7 +302,7 @@ impl Reader {
         self.address.stream.is_some() || !self.has_waited_in_vain
     }
 
-    async fn subscribe(&self) -> Result<Messages, String> {
+    async fn subscribe(&mut self) -> Result<Messages, String> {
         let subject = self.address.subject.clone();
         let Some(name) = &self.address.stream else {
             let subscriber = self.client.subscribe(subject).await;
@@ -340,7 +325,14 @@ impl Reader {
                     start_sequence: last + 1,
                 }
             }
-            (None, From::New) => DeliverPolicy::New,
+            // By its number, so that what comes while we are away, or before the first state is saved, is not missed.
+            (None, From::New) => {
+                let last = stream.cached_info().state.last_sequence;
+                self.sequence = Some(last);
+                DeliverPolicy::ByStartSequence {
+                    start_sequence: last + 1,
+                }
+            }
             (None, From::All) => DeliverPolicy::All,
             (None, From::Sequence(start_sequence)) => {
                 DeliverPolicy::ByStartSequence { start_sequence }

@@ -5,12 +5,10 @@ use crate::serve::hub::Client;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 use tokio::sync::watch;
-use tokio::time::{sleep, timeout};
+use tokio::time::timeout_at;
 
 /// With more than this waiting for a server, no more samples are taken.
 const CROWDED: usize = MAX_QUEUED / 2;
-/// How often is looked whether there is room.
-const LOOK: Duration = Duration::from_micros(500);
 
 /// Which sensors are ours, and until when.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -114,12 +112,19 @@ impl Tenancy {
     }
 
     async fn has_fewer(&self, queued: usize, within: Duration) -> bool {
-        let fewer = async {
-            while self.most_queued() > queued {
-                sleep(LOOK).await;
+        let until = Instant::now() + within;
+        loop {
+            // Every outbox of a daemon tells the same; made before it is looked, no room goes unnoticed.
+            let room = self.outputs().first().map(|c| c.outbox.room().clone());
+            let made = room.as_ref().map(|room| room.notified());
+            if self.most_queued() <= queued {
+                return true;
             }
-        };
-        timeout(within, fewer).await.is_ok()
+            let Some(made) = made else { return true };
+            if timeout_at(until.into(), made).await.is_err() {
+                return self.most_queued() <= queued;
+            }
+        }
     }
 
     /// What waits is dropped: the sensors are somebody else's.

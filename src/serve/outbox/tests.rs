@@ -261,13 +261,11 @@ fn a_thousand_new_streams_at_once_are_no_fault_of_who_is_told() {
 
 /// Last attitudes of streams `0..count`, number 7 of each.
 fn lasts(count: usize, form: Form) -> Vec<Last> {
-    let mut streams = Vec::new();
     (0..count)
         .map(|n| {
             let mut stream = Stream::new("imu", "imu");
             stream.id = n.to_string();
-            streams.push(stream);
-            let channel = Arc::new(Channel::new(n as u32 + 1, &streams));
+            let channel = Arc::new(Channel::new(n as u32 + 1, &stream, "imu".to_owned()));
             Last::new(channel, 7, sample(Nanos(1)), Wanted::Object(form))
         })
         .collect()

@@ -4,8 +4,9 @@
 
 use crate::serve::fault::Fault;
 use crate::serve::http::answer::response;
-use crate::serve::hub::{Asker, Client, Feedback, Flood, GAVE_WAY, Hub, Sensor, count, rates_in};
+use crate::serve::hub::{Asker, Client, Feedback, Flood, Hub, count, rates_in};
 use crate::serve::log_throttle;
+use crate::serve::owned::Owned;
 use crate::serve::peer::{Origin, Peer};
 use crate::serve::stream::NAMELESS;
 use crate::serve::stream::run::{Placed, SampleRun};
@@ -13,7 +14,7 @@ use crate::serve::wire::{self, Message};
 use axum::body::Body;
 use axum::http::{Response, StatusCode};
 use serde_json::{Value, json};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 use std::net::IpAddr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use strapd_attitude::record::{Nanos, RawSample};
@@ -42,8 +43,7 @@ struct Known {
 pub(super) struct Poster {
     hub: Arc<Hub>,
     client: Arc<Client>,
-    owned: BTreeMap<String, Arc<Mutex<Sensor>>>,
-    last: Option<Arc<Mutex<Sensor>>>,
+    owned: Owned,
 }
 
 /// What became of a body.
@@ -129,8 +129,7 @@ impl Poster {
                 origin: Origin::Address(from),
             }),
             hub: hub.clone(),
-            owned: BTreeMap::new(),
-            last: None,
+            owned: Owned::default(),
         }
     }
 
@@ -194,9 +193,7 @@ impl Poster {
                 Err(fault) => {
                     self.publish(&mut gathered, usize::MAX, received, &mut taken)
                         .await;
-                    if let Some(sensor) = &self.last {
-                        self.hub.undecodable(sensor, self.client.number);
-                    }
+                    self.owned.undecodable(&self.hub, &self.client);
                     taken.fault(&self.hub, &fault, number, near);
                     in_a_row += 1;
                     if in_a_row > self.hub.limits().errors_in_a_row {
@@ -259,7 +256,10 @@ impl Poster {
                 samples: gathered.samples.get(from..to).unwrap_or_default(),
                 bare: bare.get(from..to.min(bare.len())).unwrap_or_default(),
             };
-            match self.hand_over(&run, &mut gathered.text) {
+            match self
+                .owned
+                .publish(&self.hub, &self.client, &run, &mut gathered.text)
+            {
                 Ok(Feedback { note, faults }) => {
                     taken.samples += rates_in(run.samples) as u64;
                     if let Some(note) = note {
@@ -276,10 +276,6 @@ impl Poster {
                 }
                 Err(fault) => {
                     count(&self.hub.counters.refused_samples, run.samples.len());
-                    let id = head.id.as_deref().unwrap_or(NAMELESS);
-                    if fault.code == GAVE_WAY && self.owned.remove(id).is_some() {
-                        self.client.let_go();
-                    }
                     taken.fault(&self.hub, &fault, 0, &[]);
                 }
             }
@@ -291,29 +287,11 @@ impl Poster {
         }
         gathered.samples.drain(..until);
     }
-
-    fn hand_over(&mut self, run: &SampleRun<'_>, text: &mut Vec<u8>) -> Result<Feedback, Fault> {
-        let id = run.head.id.as_deref().filter(|id| !id.is_empty());
-        let id = id.unwrap_or(NAMELESS);
-        self.last = None;
-        let sensor = match self.owned.get(id) {
-            Some(sensor) => sensor.clone(),
-            None => {
-                let sensor = self.hub.sensor(id, &self.client, run)?;
-                self.owned.insert(id.to_owned(), sensor.clone());
-                sensor
-            }
-        };
-        let news = self.hub.publish(&sensor, run, text)?;
-        self.last = Some(sensor);
-        Ok(news)
-    }
 }
 
 impl Drop for Poster {
     fn drop(&mut self) {
-        let owned: Vec<_> = std::mem::take(&mut self.owned).into_values().collect();
-        self.hub.leave(&self.client, &owned);
+        self.owned.leave(&self.hub, &self.client);
     }
 }
 

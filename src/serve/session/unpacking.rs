@@ -27,7 +27,8 @@ impl Session {
 
     /// What samples with this number say; by default what their subject does, within its message.
     fn bound_or_of_subject(&mut self, stream: u32) -> Option<&Line> {
-        if !self.bound.contains_key(&stream)
+        if self.side.is_broker()
+            && !self.bound.contains_key(&stream)
             && let Some(head) = self.head_of_subject()
         {
             self.bound.insert(stream, head);

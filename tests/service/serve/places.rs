@@ -1,7 +1,7 @@
 //! Places for sensors are given back: to whom, and what becomes of who had them.
 
-use super::client::{Client, rate};
-use super::daemon::{Daemon, Process, TCP, eventually, listening};
+use super::client::{Client, ask, rate};
+use super::daemon::{Daemon, Process, TCP, WS, eventually, listening};
 use serde_json::Value;
 use std::time::Duration;
 use strapd::serve::limits::Limits;
@@ -133,40 +133,51 @@ fn one_connection_sends_256_sensors_and_one_peer_512_and_others_have_the_rest() 
 
 #[test]
 fn a_sensor_that_was_silent_for_long_goes_on_as_if_nothing_had_happened() {
-    let mut settings = listening(&[TCP]);
-    settings.limits.forget_after = Some(Duration::from_millis(500));
-    let daemon = Daemon::start(settings);
-    let mut watcher = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");
-    let mut sender = Client::tcp(daemon.address(0));
-    let mut said = |n: u64, watcher: &mut Client| {
-        // The one that is never silent shows what would have been.
-        let [mut one, mut other] = ["silent", "steady"].map(|id| {
-            sender.send(&rate(id, n, 2.0));
-            watcher.object("ATT")
+    // The same samples to one that forgets and one that does not.
+    let [forgetful, patient] = [Some(Duration::from_millis(500)), None].map(|forget_after| {
+        let mut settings = listening(&[TCP, WS]);
+        settings.limits.forget_after = forget_after;
+        let daemon = Daemon::start(settings);
+        let watcher = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");
+        let sender = Client::tcp(daemon.address(0));
+        (daemon, watcher, sender)
+    });
+    let mut both = [forgetful, patient];
+    let same = |both: &mut [(Daemon, Client, Client); 2], n: u64| {
+        let said = both.each_mut().map(|(daemon, watcher, sender)| {
+            sender.send(&rate("sent", n, 2.0));
+            let sent = watcher.object("ATT");
+            let host = daemon.address(1).to_string();
+            let headers = [("Host", &*host), ("Content-Type", "application/json")];
+            let body = rate("posted", n, 1.0);
+            let (status, answer) = ask(
+                daemon.address(1),
+                "POST /samples",
+                &headers,
+                body.as_bytes(),
+            );
+            assert_eq!(status, 200, "{n}: {answer}");
+            (sent, watcher.object("ATT"))
         });
-        for att in [&mut one, &mut other] {
-            att.as_object_mut().unwrap().remove("id");
-        }
-        assert_eq!(one, other, "{n}");
+        assert_eq!(said[0], said[1], "{n}");
     };
     for n in 0..30 {
-        said(n, &mut watcher);
+        same(&mut both, n);
     }
-    let mut keeper = Client::tcp(daemon.address(0));
-    let mut n = 0;
-    eventually("its place is free", || {
-        // Another one goes on meanwhile, and keeps its own.
-        keeper.send(&rate("third", n, 1.0));
-        watcher.object("ATT");
-        n += 1;
+    let daemon = &both[0].0;
+    eventually("their places are free", || {
         daemon.status()["counters"]["sensors_forgotten"] == 2
     });
-    assert_eq!(ids(&daemon.status()), ["third"]);
+    assert!(ids(&daemon.status()).is_empty());
     assert_eq!(daemon.status()["places"]["saved"], 2);
-    // No sample is refused: the sender's next one asks for a place again, and the attitude goes on exactly.
+    assert_eq!(ids(&both[1].0.status()), ["posted", "sent"]);
+    // No sample is refused: the next one asks for a place again, and the attitude goes on to the bit.
     for n in 30..60 {
-        said(n, &mut watcher);
+        same(&mut both, n);
     }
-    assert_eq!(daemon.status()["counters"]["samples_refused"], 0);
-    assert_eq!(daemon.status()["counters"]["faults"], 0);
+    let counters = both[0].0.status()["counters"].clone();
+    assert_eq!(
+        (&counters["samples_refused"], &counters["faults"]),
+        (&0.into(), &0.into())
+    );
 }

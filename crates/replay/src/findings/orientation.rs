@@ -21,8 +21,8 @@ const MOSTLY_THERE: f64 = 0.5;
 const ANOTHER_MOTION: f64 = 0.5;
 /// Of a motion about one axis other axes look like a bias; one below this share of the motion is believed.
 const SMALL_SHARE: f64 = 0.3;
-/// A heading that is off by more than this is worth a word though sigma allows it, rad (15 degrees).
-const DRIFTED: f64 = 0.26;
+/// A heading that is off by more than this is worth a word though sigma allows it: 15 degrees in rad.
+const DRIFTED: f64 = 15.0 * std::f64::consts::PI / 180.0;
 /// Two biases that differ by less than this share are the same.
 const SAME: f64 = 0.3;
 

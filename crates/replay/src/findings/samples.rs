@@ -318,8 +318,14 @@ fn levelled(looked: &Inspection, gravity: GravityAxis) -> String {
         .filter(|f| f.norm() > 0.0)
         .unwrap_or_else(axis)
         .normalize();
-    let q = Vector4::new(1.0 + up.z, up.y, 0.0 - up.x, 0.0).normalize();
+    let q = level_turn(&up);
     format!("q={:.6},{:.6},{:.6},0", q.x, q.y, q.z)
+}
+
+/// The shortest turn that brings `up`, of length 1, to z; upside down, the half turn about x. w, x, y, z.
+fn level_turn(up: &Vector3<f64>) -> Vector4<f64> {
+    let half = Vector4::new(1.0 + up.z, up.y, 0.0 - up.x, 0.0);
+    half.try_normalize(1e-6).unwrap_or_else(Vector4::y)
 }
 
 /// No gyro turns that fast in rad/s.
@@ -426,4 +432,30 @@ fn bias(looked: &Inspection, out: &mut Vec<Finding>) {
 
 fn axis_name(axis: usize) -> &'static str {
     ["x", "y", "z"].get(axis).copied().unwrap_or("?")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Quaternion, UnitQuaternion};
+
+    #[test]
+    fn whatever_is_up_comes_to_z_upside_down_too() {
+        let ups = [
+            Vector3::x(),
+            -Vector3::x(),
+            Vector3::y(),
+            -Vector3::y(),
+            Vector3::z(),
+            -Vector3::z(),
+            Vector3::new(1e-9, -1e-9, -1.0),
+            Vector3::new(0.6, 0.0, -0.8),
+        ];
+        for up in ups {
+            let q = level_turn(&up);
+            let turn = UnitQuaternion::from_quaternion(Quaternion::new(q.x, q.y, q.z, q.w));
+            let error = (turn * up - Vector3::z()).norm();
+            assert!(error < 1e-5, "{up}: {q}, off by {error}");
+        }
+    }
 }

@@ -14,7 +14,7 @@ mod schemas;
 
 use super::batch::Batch;
 use super::json::{AttObject, FrameTransform};
-use super::stream::{Content, Provenance, Stream, child_frames, named_frame, parent_frame};
+use super::stream::{ChildFrames, Content, Provenance, Stream, named_frame, parent_frame};
 use crate::error::{Error, Result};
 use chunk::Chunk;
 use file::McapFile;
@@ -210,7 +210,8 @@ impl Layout {
             0
         };
 
-        let children = child_frames(streams);
+        let mut frames = ChildFrames::default();
+        let children: Vec<String> = streams.iter().map(|stream| frames.take(stream)).collect();
         let streams = streams
             .iter()
             .zip(attitudes)

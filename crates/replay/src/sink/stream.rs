@@ -115,24 +115,60 @@ pub fn output_topic(input: &str, taken: &BTreeSet<String>) -> String {
         .unwrap_or(attitude)
 }
 
-/// The child frame of each stream's transform: unique, not empty, without leading slash and not
-/// the world itself, all of which tf2 refuses or confuses.
-pub(super) fn child_frames(streams: &[Stream]) -> Vec<String> {
-    let mut used: BTreeSet<(String, String)> = BTreeSet::new();
-    streams
-        .iter()
-        .map(|stream| {
-            let world = parent_frame(stream);
-            let own = stream.frame_id.trim_start_matches('/');
-            let base = if own.is_empty() { NAMELESS_FRAME } else { own };
-            let name = std::iter::once(base.to_owned())
-                .chain((2..).map(|n| format!("{base}_{n}")))
-                .find(|name| *name != world && !used.contains(&(world.clone(), name.clone())))
-                .unwrap_or_default();
-            used.insert((world, name.clone()));
-            name
-        })
-        .collect()
+/// The child frames of transforms: unique under their parent, not empty, without leading slash and not the world itself, all
+/// of which tf2 refuses or confuses. The first free of `NAME`, `NAME_2`, `NAME_3`, ...
+#[derive(Clone, Debug, Default)]
+pub struct ChildFrames {
+    /// Parent and child.
+    used: BTreeSet<(String, String)>,
+    /// By parent and name: no number below this is free.
+    next: BTreeMap<(String, String), u64>,
+}
+
+impl ChildFrames {
+    /// The child of a further stream.
+    pub fn take(&mut self, stream: &Stream) -> String {
+        let world = parent_frame(stream);
+        let next = self
+            .next
+            .entry((world.clone(), base_frame(stream).to_owned()))
+            .or_insert(1);
+        loop {
+            let name = numbered(base_frame(stream), *next);
+            *next += 1;
+            if name != world && self.used.insert((world.clone(), name.clone())) {
+                return name;
+            }
+        }
+    }
+
+    /// The stream with this child is no more.
+    pub fn give_back(&mut self, stream: &Stream, child: &str) {
+        let world = parent_frame(stream);
+        let base = base_frame(stream);
+        self.used.remove(&(world.clone(), child.to_owned()));
+        let number = match child.strip_prefix(base) {
+            Some("") => Some(1),
+            rest => rest.and_then(|rest| rest.strip_prefix('_')?.parse().ok()),
+        };
+        if let (Some(next), Some(number)) = (self.next.get_mut(&(world, base.to_owned())), number) {
+            *next = number.min(*next);
+        }
+    }
+}
+
+fn numbered(base: &str, number: u64) -> String {
+    match number {
+        0 | 1 => base.to_owned(),
+        n => format!("{base}_{n}"),
+    }
+}
+
+fn base_frame(stream: &Stream) -> &str {
+    match stream.frame_id.trim_start_matches('/') {
+        "" => NAMELESS_FRAME,
+        own => own,
+    }
 }
 
 /// The frame an attitude message names: the stream's own, or where it has none the child of its transform.
@@ -200,11 +236,26 @@ mod tests {
 
     #[test]
     fn child_frames_are_unique_named_relative_and_never_the_world() {
-        let frames = ["imu", "/imu", "", "world", "imu"].map(|f| Stream::new("/t", f));
-        assert_eq!(
-            child_frames(&frames),
-            ["imu", "imu_2", "body", "world_2", "imu_3"]
-        );
+        let streams = ["imu", "/imu", "", "world", "imu"].map(|f| Stream::new("/t", f));
+        let mut frames = ChildFrames::default();
+        let taken = streams.each_ref().map(|stream| frames.take(stream));
+        assert_eq!(taken, ["imu", "imu_2", "body", "world_2", "imu_3"]);
+        // One that went leaves its own to the next, and nobody gets what another still has.
+        frames.give_back(&streams[1], "imu_2");
+        let taken = [0, 0, 3].map(|n| frames.take(&streams[n]));
+        assert_eq!(taken, ["imu_2", "imu_4", "world_3"]);
+    }
+
+    #[test]
+    fn a_further_frame_costs_the_same_however_many_there_are() {
+        let stream = Stream::new("/t", "");
+        let mut frames = ChildFrames::default();
+        for n in 1..=50_000 {
+            let name = frames.take(&stream);
+            assert_eq!(name, numbered("body", n));
+        }
+        // Only the first that is free was tried, each time.
+        assert_eq!(frames.next.values().copied().collect::<Vec<_>>(), [50_001]);
     }
 
     #[test]

@@ -11,7 +11,7 @@ use super::file::McapFile;
 use super::{Encoding, IMU_SCHEMA, Provenance, Stream, TF_SCHEMA, TF_TOPIC, push_head};
 use super::{log_time, too_many_channels};
 use crate::error::{Error, Result};
-use crate::sink::stream::{child_frames, named_frame, parent_frame};
+use crate::sink::stream::{ChildFrames, named_frame, parent_frame};
 use std::collections::BTreeMap;
 use std::path::Path;
 use strapd_attitude::record::{AttitudeSample, Nanos, RawSample};
@@ -27,7 +27,7 @@ pub struct LiveMcap {
     compression: Compression,
     metadata: BTreeMap<String, String>,
     transform: u16,
-    streams: Vec<Stream>,
+    frames: ChildFrames,
     layouts: Vec<Layout>,
     chunk: Chunk,
     /// The head, and declarations that have to stand before the next chunk.
@@ -61,7 +61,7 @@ impl LiveMcap {
             compression,
             metadata,
             transform: 0,
-            streams: Vec::new(),
+            frames: ChildFrames::default(),
             layouts: Vec::new(),
             chunk: Chunk::default(),
             declared,
@@ -102,8 +102,7 @@ impl LiveMcap {
         let attitude = self.declare(&stream.output_topic, IMU_SCHEMA, &axes)?;
         let parent = parent_frame(&stream);
         let frame_id = stream.frame_id.clone();
-        self.streams.push(stream.clone());
-        let child = child_frames(&self.streams).pop().unwrap_or_default();
+        let child = self.frames.take(&stream);
         self.layouts.push(Layout {
             input,
             input_imu: cdr::Imu::new(input, &frame_id),

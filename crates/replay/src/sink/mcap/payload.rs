@@ -5,7 +5,7 @@
 use super::cdr::{self, ros_time};
 use super::record::MESSAGE_HEAD;
 use super::{IMU_SCHEMA, TF_SCHEMA, TF_TOPIC, schemas};
-use crate::sink::stream::{Content, Stream, child_frames, named_frame, parent_frame};
+use crate::sink::stream::{Content, Stream, named_frame, parent_frame};
 use strapd_attitude::record::{AttitudeSample, RawSample};
 
 /// A topic and the type of its messages, all `cdr` described as `ros2msg`.
@@ -53,19 +53,16 @@ enum Encoders {
 }
 
 impl Payloads {
-    /// Of `stream`, which is the last of `streams`.
+    /// Of `stream`, whose transform has this child.
     #[must_use]
-    pub fn new(stream: &Stream, streams: &[Stream]) -> Payloads {
+    pub fn new(stream: &Stream, child: &str) -> Payloads {
         let stream = stream.bounded();
         let parent = parent_frame(&stream);
         Payloads(match stream.content {
-            Content::Attitude => {
-                let child = child_frames(streams).pop().unwrap_or_default();
-                Encoders::Attitude {
-                    imu: cdr::Imu::new(0, named_frame(&stream, &child)),
-                    tf: cdr::Tf::new(0, &parent, &child),
-                }
-            }
+            Content::Attitude => Encoders::Attitude {
+                imu: cdr::Imu::new(0, named_frame(&stream, child)),
+                tf: cdr::Tf::new(0, &parent, child),
+            },
             Content::Samples(_) => Encoders::Samples {
                 imu: cdr::Imu::new(0, &stream.frame_id),
             },
