@@ -12,6 +12,7 @@ use super::executor::Executor;
 use super::method::{LARGEST_WINDOW, Method, Order, Placement};
 use super::report::Report;
 use super::settings::{Settings, SettingsError};
+use super::turn::Turn;
 use super::window::{Plan, Step};
 use crate::frames::{Body, Nav};
 use crate::quaternion::Quaternion;
@@ -452,12 +453,17 @@ impl Propagator {
             if newest >= self.next {
                 self.scratch.clear();
                 plan.append_steps(&self.track, self.next, newest, &mut self.scratch);
+                // Sigma goes ahead in one turn: the order of a few samples is nothing it shows, and their steps are most of
+                // what a live sample costs it.
+                let (mut turned, mut span) = (Turn::NONE, 0.0);
                 for (i, step) in self.scratch.iter().enumerate() {
                     ahead.turn(step.turn);
                     difference.add(&ahead, step.outer);
-                    covariance.advance(step.turn, self.track.step(self.next + i));
+                    turned = turned.then(Turn::of(step.turn));
+                    span += self.track.step(self.next + i);
                     covariance.bridge(step.gap_variance);
                 }
+                covariance.advance(turned.parts(), span);
                 if let (true, Some(step)) = (turns, self.scratch.last()) {
                     self.state.added = self.state.added.with(step.status());
                 }

@@ -92,6 +92,16 @@ impl Turn<1> {
         Turn { c: Lanes([c]), v }
     }
 
+    /// From `[cos(a/2) - 1, x, y, z]`.
+    pub(crate) fn of([c, x, y, z]: [f64; 4]) -> Self {
+        let v = Triple {
+            x: Lanes([x]),
+            y: Lanes([y]),
+            z: Lanes([z]),
+        };
+        Turn { c: Lanes([c]), v }
+    }
+
     /// This turn, then `next` about the axes it has turned to.
     pub(crate) fn then(self, next: Self) -> Self {
         // (1 + a)(1 + b) - 1 = a + b + ab, so nothing small is lost against 1.

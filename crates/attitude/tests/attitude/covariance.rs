@@ -304,3 +304,31 @@ fn the_propagator_carries_the_covariance_of_its_own_turns() {
     let (a, b) = (a.covariance.matrix(), b.covariance.matrix());
     assert!((a - b).norm() < 1e-6 * b.norm(), "{a} {b}");
 }
+
+#[test]
+fn what_scale_and_axes_leave_unknown_is_live_what_it_is_in_the_log() {
+    let noise = Noise {
+        bias: [1e-3; 3],
+        scale: 0.01,
+        misalignment: 0.01,
+        ..Noise::default()
+    };
+    let samples = tumbling(3000);
+    let live = Method::CommitProvisional {
+        window: 6,
+        order: strapd_attitude::propagate::Order::M8,
+        finals: false,
+    };
+    let log = pushed(Method::Auto, noise, &samples, 3000);
+    let streamed = pushed(live, noise, &samples, 7);
+    let worst = log
+        .iter()
+        .zip(&streamed)
+        .map(|(a, b)| {
+            let (a, b) = (a.covariance.matrix(), b.covariance.matrix());
+            (a - b).norm() / a.norm().max(1e-9)
+        })
+        .fold(0.0, f64::max);
+    // In one turn over the samples that are not final yet; sigma is told in two digits.
+    assert!(worst < 1e-3, "{worst}");
+}
