@@ -19,8 +19,8 @@ use strapd_attitude::record::Nanos;
 const SAMPLES: usize = 2_000_000;
 /// Samples in a block.
 const BLOCK: usize = 10;
-/// Blocks that make a sensor known.
-const FIRST: usize = 10;
+/// Blocks until a sensor holds all it ever will.
+const FIRST: usize = 40;
 /// Sensors of one connection.
 const OF_ONE: usize = 200;
 

@@ -41,7 +41,7 @@ pub struct Channel {
     last: Mutex<Option<(u64, AttitudeSample)>>,
     sent: AtomicU64,
     /// Of a stream that something estimates here, and that is no sensor's.
-    health: Mutex<Option<Health>>,
+    health: Mutex<Option<Box<Health>>>,
 }
 
 /// Which of an item's times a message is given.
@@ -162,13 +162,13 @@ impl Channel {
         *self.health() = None;
     }
 
-    fn health(&self) -> MutexGuard<'_, Option<Health>> {
+    fn health(&self) -> MutexGuard<'_, Option<Box<Health>>> {
         self.health.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// How its samples are up to now.
     pub(super) fn known(&self, health: Health) {
-        *self.health() = Some(health);
+        *self.health() = Some(Box::new(health));
     }
 
     /// Number and topic of each of its channels for viewers.

@@ -529,6 +529,7 @@ impl Hub {
         if let Some(recorder) = &self.recorder {
             recorder.attitude(id, first_seq, attitudes.to_vec());
         }
+        sensor.stream.trim();
     }
 
     /// Items of a channel, from number `first_seq` on -> outboxes; `text` is room for encoding.

@@ -537,6 +537,11 @@ impl SensorStream {
         (first, attitudes, &self.channel)
     }
 
+    /// Its attitudes are handed out: it waits for its next samples.
+    pub(crate) fn trim(&mut self) {
+        self.estimator.trim();
+    }
+
     /// What has been found wrong, and the kinds of loss that have happened, for the first time to who sends it, since
     /// this was asked last.
     pub fn news(&mut self) -> Vec<Fault> {

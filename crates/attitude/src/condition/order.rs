@@ -14,6 +14,8 @@ use crate::record::{Nanos, Status, Verdict};
 const HISTORY: usize = 64;
 /// Released entries after which the line is shortened.
 const COMPACT_AT: usize = 1024;
+/// The same where nothing waits to be put in order: live, perhaps one of many sensors.
+const COMPACT_LIVE_AT: usize = 96;
 /// Samples with one and the same stamp that are told apart: a second of the fastest gyros, on a clock
 /// that counts whole seconds. A stuck clock makes no more.
 const MAX_COLLISION: usize = 8192;
@@ -47,6 +49,7 @@ pub(super) struct Order {
     floor: Option<Nanos>,
     max_run: usize,
     max_gap_nanos: i64,
+    compact_at: usize,
 }
 
 impl Order {
@@ -61,6 +64,11 @@ impl Order {
             floor: None,
             max_run: window.max(MAX_RUN),
             max_gap_nanos,
+            compact_at: if window == 0 {
+                COMPACT_LIVE_AT
+            } else {
+                COMPACT_AT
+            },
         }
     }
 
@@ -124,7 +132,7 @@ impl Order {
     fn append(&mut self, mut entry: Entry) {
         entry.epoch = self.epoch;
         self.high = Some(entry.stamp);
-        if self.cursor >= COMPACT_AT {
+        if self.cursor >= self.compact_at {
             self.compact();
         }
         self.line.push(entry);

@@ -23,6 +23,9 @@ use crate::smooth::Looseness;
 use crate::worlds::{Convention, World};
 use nalgebra::Vector3;
 
+/// Samples at once that memory is kept for.
+const FEW: usize = 8;
+
 /// An estimator of one stream.
 #[derive(Debug)]
 pub struct Estimator {
@@ -379,6 +382,13 @@ impl Estimator {
         self.propagate(exec);
         self.asked.apply(&mut self.out);
         &self.out
+    }
+
+    /// Gives back the memory that only many samples at once need: one of many sensors waits for its next ones.
+    pub fn trim(&mut self) {
+        self.rates.shrink_to(FEW);
+        self.out.clear();
+        self.out.shrink_to(FEW);
     }
 
     /// What a recording that is smoothed needs beyond some hundred megabytes is kept in `spool`: for

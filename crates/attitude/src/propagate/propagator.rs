@@ -27,7 +27,11 @@ const SEGMENT: usize = 1024;
 /// Samples taken in before outputs are made: bounds memory, whatever is pushed at once.
 const BLOCK: usize = 32 * SEGMENT;
 /// Elements before the interval integrated next that a window may still hold.
-const LOOKED_BACK: usize = LARGEST_WINDOW + classical::LOOK_BACK + 8;
+const LOOKED_BACK: usize = LARGEST_WINDOW + MARGIN;
+/// Beside the window itself.
+const MARGIN: usize = classical::LOOK_BACK + 8;
+/// Elements that are forgotten at once of a live stream.
+const FORGOTTEN_LIVE: usize = 32;
 /// Fastest rate, and largest increment, that is believed: those of [`crate::record::Verdict::Huge`].
 const FASTEST: f64 = 1e4;
 const LARGEST: f64 = 1e3;
@@ -204,6 +208,7 @@ impl Propagator {
                 }
                 if matches!(self.engine, Engine::Commit { .. }) {
                     self.advance_live(out);
+                    self.forget();
                 }
             }
             self.advance(false, exec, out);
@@ -422,10 +427,22 @@ impl Propagator {
         self.track.len().saturating_sub(plan.look_ahead)
     }
 
-    /// Drops elements no window needs any more, now and then.
+    /// Elements before the next that a window may still look at.
+    fn looked_back(&self) -> usize {
+        match &self.engine {
+            Engine::Sliding(plan) | Engine::Commit { plan, .. } => plan.window + MARGIN,
+            Engine::Classical(_) => MARGIN,
+        }
+    }
+
+    /// Drops elements no window needs any more, now and then: soon, where one of many sensors is live.
     fn forget(&mut self) {
-        let needed = self.next.saturating_sub(LOOKED_BACK);
-        if needed >= 2 * SEGMENT {
+        let needed = self.next.saturating_sub(self.looked_back());
+        let enough = match self.engine {
+            Engine::Commit { .. } => FORGOTTEN_LIVE,
+            Engine::Sliding(_) | Engine::Classical(_) => 2 * SEGMENT,
+        };
+        if needed >= enough {
             self.track.drop_front(needed);
             self.next -= needed;
         }

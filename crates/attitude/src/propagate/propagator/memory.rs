@@ -80,7 +80,7 @@ impl Propagator {
             (age, accel, sample.status.0, sample.log.0, waiting.turns)
         };
         let track = &self.track;
-        let from = self.next.saturating_sub(LOOKED_BACK);
+        let from = self.next.saturating_sub(self.looked_back());
         let (attitude, excess) = self.state.attitude.parts();
         Some(Memory {
             initial: self.initial,
