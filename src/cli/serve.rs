@@ -108,7 +108,7 @@ pub struct Serve {
     #[arg(long, value_name = "SECS", value_parser = window, default_value = "60")]
     pub state_window: Duration,
     /// Most sensors at once. One more takes the place of the sensor that nobody sends and that has been
-    /// silent longest; one connection sends at most 256, one peer half of all
+    /// silent longest; one connection sends at most 256 or a quarter of all, one peer half of all
     #[arg(long, value_name = "N", default_value_t = 1024, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=MAX_SENSORS))]
     pub max_sensors: usize,
     /// Give up the place of a sensor that was silent for so many seconds; it goes on from its last attitude when it
@@ -437,9 +437,8 @@ impl Serve {
                 .collect::<Result<_>>()?,
             limits: Limits {
                 state_window: self.state_window,
-                sensors: self.max_sensors,
                 forget_after: self.forget_after,
-                ..Limits::default()
+                ..Limits::of_sensors(self.max_sensors)
             },
             ..Settings::default()
         })

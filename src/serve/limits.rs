@@ -13,7 +13,7 @@ pub struct Limits {
     pub unproven: usize,
     /// Most sensors (`--max-sensors`).
     pub sensors: usize,
-    /// Most sensors of one connection.
+    /// Most sensors of one connection, and numbers of packed streams it may bind.
     pub sensors_of_client: usize,
     /// Consecutive bad lines after which a connection is closed.
     pub errors_in_a_row: u32,
@@ -57,6 +57,17 @@ impl Default for Limits {
 }
 
 impl Limits {
+    /// For so many sensors: a quarter of them from one connection, and no fewer than ever.
+    #[must_use]
+    pub fn of_sensors(sensors: usize) -> Limits {
+        let few = Limits::default();
+        Limits {
+            sensors,
+            sensors_of_client: few.sensors_of_client.max(sensors / 4),
+            ..few
+        }
+    }
+
     /// Most sensors of one peer, over all its connections: half of all, so that nobody takes them from
     /// everybody else, but no fewer than one connection may send.
     #[must_use]

@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 mod cast;
+mod mqtt;
 mod nats;
 mod page;
 mod recorder;

@@ -7,17 +7,15 @@ use strapd_attitude::record::Nanos;
 use strapd_recording::decode::Line;
 use strapd_recording::decode::packed::{self, Object};
 
-/// Numbers of packed streams one client may bind.
-const MAX_BOUND: usize = 256;
-
 impl Session {
     /// From now on packed samples with this number say what a line with this head would.
     pub(super) fn bind(&mut self, stream: u32, head: Line) -> Result<(), Fault> {
-        if self.bound.len() >= MAX_BOUND && !self.bound.contains_key(&stream) {
+        let most = self.hub.limits().sensors_of_client;
+        if self.bound.len() >= most && !self.bound.contains_key(&stream) {
             return Err(Fault::new(
                 "bad_packed",
                 format!(
-                    "one connection binds at most {MAX_BOUND} numbers; give one of them another meaning, or open another connection"
+                    "one connection binds at most {most} numbers; give one of them another meaning, or open another connection"
                 ),
             ));
         }

@@ -14,6 +14,7 @@ use std::sync::Arc;
 use strapd::serve::Settings;
 use strapd::serve::admission::Token;
 use strapd::serve::hub::Hub;
+use strapd::serve::limits::Limits;
 use strapd::serve::session::{Scratch, Session};
 use strapd::serve::source::Endpoint;
 use strapd_attitude::record::{Nanos, Status};
@@ -505,6 +506,34 @@ fn more_packed_streams_at_once_than_replies_may_wait_are_all_named() {
         }
     }
     assert_eq!(named.len(), 200);
+}
+
+#[test]
+fn a_fleet_comes_through_one_connection_up_to_a_quarter_of_all_places() {
+    let mut settings = listening(&[TCP]);
+    settings.limits = Limits::of_sensors(8000);
+    let daemon = Daemon::start(settings);
+    let mut gateway = Client::tcp(daemon.address(0));
+    gateway.object("VERSION");
+    for block in 0..20 {
+        let of_block = block * 100..(block + 1) * 100;
+        let bytes: Vec<u8> = of_block
+            .flat_map(|n| {
+                let named = bind(n, &format!("s{n}")).into_bytes();
+                [named, Sample::lively(0).packed(n)].concat()
+            })
+            .collect();
+        gateway.send_bytes(&bytes);
+    }
+    gateway.send(bind(2000, "one more").trim_end());
+    let error = gateway.object("ERROR");
+    assert_eq!(error["code"], "bad_packed");
+    assert!(error["message"].to_string().contains("2000"), "{error}");
+    let sources = daemon.status()["sources"].clone();
+    let sources = sources.as_array().unwrap();
+    assert_eq!(sources.len(), 2000);
+    let taken = |source: &Value| source["counts"]["accepted"] == 1;
+    assert!(sources.iter().all(taken), "{sources:?}");
 }
 
 #[test]
