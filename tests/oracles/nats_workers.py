@@ -2,6 +2,7 @@
 
     python nats_workers.py STRAPD core                 through subjects as straight over TCP, to the byte
     python nats_workers.py STRAPD faults               bad lines, large payloads, wrong passwords, a server that restarts
+    python nats_workers.py STRAPD full                 a stream of attitudes that is full, and one that reads too slowly
     python nats_workers.py STRAPD handover KILLS STOPS one of two workers is killed, or stopped and woken, again and again
     python nats_workers.py STRAPD speed                samples a second, in turn with straight TCP
 
@@ -24,7 +25,7 @@ import threading
 import time
 
 import nats
-from nats.js.api import StorageType, StreamConfig
+from nats.js.api import DiscardPolicy, StorageType, StreamConfig
 
 STRAPD = sys.argv[1]
 EVERY_NS = 10_000_000
@@ -291,6 +292,86 @@ async def faults(folder):
     server.stop()
 
 
+async def full(folder):
+    """A stream that takes no more loses nothing, once it does again; who reads too slowly is told what it lost."""
+    server = Server(folder)
+    at = f"nats://127.0.0.1:{server.port}"
+    client = await nats.connect(at)
+    stream = client.jetstream()
+    await stream.add_stream(StreamConfig(name="IMU", subjects=["imu.*"], storage=StorageType.MEMORY))
+    small = StreamConfig(name="ATT", subjects=["att.*"], storage=StorageType.MEMORY, max_bytes=400_000, discard=DiscardPolicy.NEW)
+    await stream.add_stream(small)
+    worker = Worker(
+        folder,
+        "worker",
+        "--listen",
+        "tcp-listen://127.0.0.1:0",
+        f"{at}/imu.*?stream=IMU&from=all&state=STRAPD&p=0",
+        "-o",
+        f"{at}/att.{{id}}?stream=ATT",
+    )
+    worker.listens()
+    got, count = [], 4000
+
+    async def take(message):
+        got.extend(message.data.splitlines(keepends=True))
+
+    await stream.subscribe("att.*", cb=take, ordered_consumer=True)
+    samples = [line(0, k) for k in range(count)]
+    for k in range(0, count, 20):
+        await client.publish("imu.s0", b"".join(samples[k : k + 20]))
+    await client.flush()
+    await until(lambda: "maximum bytes" in worker.said(), 10, worker.said)
+    # No more is taken from the source than can wait.
+    await asyncio.sleep(3)
+    stored = len(got)
+    assert 0 < stored < count / 2, stored
+    assert worker.has_it(), worker.said()
+    small.max_bytes = 100_000_000
+    began = time.monotonic()
+    await stream.update_stream(small)
+    await until(lambda: len(got) > stored, 5, worker.said)
+    back = time.monotonic() - began
+    await until(lambda: len(got) >= count, 20, lambda: f"{len(got)} of {count}")
+    said = worker.said().count("maximum bytes")
+    assert worker.end() == 0, worker.said()
+    expected = straight(folder, {"s0": samples})["s0"]
+    assert got == expected, (len(got), len(expected))
+    assert said <= 12, f"said {said} times"
+
+    # Core NATS: the worker stands still while more comes than the server keeps for it.
+    slow = Worker(folder, "slow", "--listen", "tcp-listen://127.0.0.1:0", f"{at}/fast.*")
+    slow.listens()
+    await slow.subscribed()
+    slow.process.send_signal(signal.SIGSTOP)
+    block = b"".join(line(0, k) for k in range(4000))
+    for n in range(400):
+        await client.publish("fast.s0", block)
+        if n % 8 == 7:
+            await client.flush()
+    slow.process.send_signal(signal.SIGCONT)
+    woken = time.monotonic()
+    await until(lambda: "lost" in slow.said() or "slow" in slow.said().lower(), 10, slow.said)
+    last = [line(1, k) for k in range(10)]
+
+    def has_last():
+        return any(source["id"] == "s1" for source in slow.status()["sources"])
+
+    while not has_last():
+        await client.publish("fast.s1", b"".join(last))
+        await asyncio.sleep(0.1)
+        assert time.monotonic() < woken + 20, slow.said()
+    again = time.monotonic() - woken
+    error = slow.status()["outgoing"][0]["last_error"]
+    assert slow.end() == 0
+    await client.close()
+    server.stop()
+    print(
+        f"full: {count} attitudes, none missing, none twice, {back:.1f} s after there was room, said {said} times; "
+        f"one that stood still: {error!r}, taking again after {again:.1f} s"
+    )
+
+
 async def handover(folder, kills, stops):
     """Two workers want one partition; the one that has it is killed, or stopped and woken."""
     sensors = 16
@@ -451,6 +532,8 @@ def main():
                 asyncio.run(core(folder))
             case "faults":
                 asyncio.run(faults(folder))
+            case "full":
+                asyncio.run(full(folder))
             case "handover":
                 asyncio.run(handover(folder, int(sys.argv[3]), int(sys.argv[4])))
             case "speed":

@@ -56,6 +56,15 @@ mod built_with_it {
         beside_a_server("faults", "errors said for 200 bad lines");
     }
 
+    #[test]
+    #[cfg_attr(
+        not(has_oracles),
+        ignore = "needs STRAPD_ORACLES_PYTHON=PYTHON with the packages of benches/peers/requirements.txt"
+    )]
+    fn a_full_stream_costs_no_attitude_and_a_worker_that_stood_still_comes_back() {
+        beside_a_server("full", "none missing, none twice");
+    }
+
     /// Fifty of each: minutes (`.ci/full brokers`).
     #[test]
     #[ignore = "long: .ci/full brokers"]
