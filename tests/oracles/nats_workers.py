@@ -519,8 +519,56 @@ async def speed(folder):
     for way, all_of in figures.items():
         rates, used = sorted(f[0] for f in all_of), sorted(f[1] for f in all_of)
         print(f"speed: {way}: {rates[len(rates) // 2]:.0f} k samples/s ({rates[0]:.0f} to {rates[-1]:.0f}), {used[len(used) // 2]:.2f} us of CPU a sample")
+    await stream.add_stream(StreamConfig(name="ATT", subjects=["ja.*"], storage=StorageType.FILE))
+    ways = {
+        "tcp": ([], None, None),
+        "core": ([f"{at}/rt.*", "-o", f"{at}/ra.{{id}}"], "rt.s0", "ra.s0"),
+        "stream": ([f"{at}/js.*?stream=IMU&from=new", "-o", f"{at}/ja.{{id}}?stream=ATT"], "js.s0", "ja.s0"),
+    }
+    for way, (arguments, subject, answers) in ways.items():
+        worker = Worker(folder, f"trip-{way}", "--listen", "tcp-listen://127.0.0.1:0", *arguments)
+        port = worker.listens()
+        if arguments:
+            await worker.subscribed()
+        times = await (trips_of_tcp(port) if subject is None else trips(client, subject, answers))
+        times.sort()
+        worker.end()
+        print(f"round trip: {way}: p50 {times[len(times) // 2] * 1e3:.2f} ms, p99 {times[len(times) * 99 // 100] * 1e3:.2f} ms")
     await client.close()
     server.stop()
+
+
+TRIPS = 2000
+
+
+async def trips(client, subject, answers):
+    """From before a sample is published until its attitude is here, one after another."""
+    here, times = asyncio.Queue(), []
+    await client.subscribe(answers, cb=here.put)
+    await client.flush()
+    for k in range(TRIPS):
+        text, began = line(0, k), time.monotonic()
+        await client.publish(subject, text)
+        await asyncio.wait_for(here.get(), 5)
+        times.append(time.monotonic() - began)
+    return times
+
+
+async def trips_of_tcp(port):
+    times = []
+    with socket.create_connection(("127.0.0.1", port)) as link:
+        link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        lines = link.makefile("rb")
+        link.sendall(b'{"class":"WATCH"}\n')
+        while b'"WATCH"' not in lines.readline():
+            pass
+        for k in range(TRIPS):
+            text, began = line(0, k), time.monotonic()
+            link.sendall(text)
+            while b'"ATT"' not in lines.readline():
+                pass
+            times.append(time.monotonic() - began)
+    return times
 
 
 def main():
