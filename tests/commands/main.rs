@@ -20,6 +20,7 @@ mod joined;
 mod layouts;
 mod model;
 #[cfg(unix)]
+mod packed;
 mod pages;
 mod parquet;
 mod recover;

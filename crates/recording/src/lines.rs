@@ -1,16 +1,19 @@
-//! Lines of JSON, or rows of a table, from a file or a stream -> what each holds. I/O.
+//! Lines of JSON with packed objects between them, or rows of a table, from a file or a stream -> what each holds. I/O.
 //!
 //! Apart from the decoders because it counts lines and bounds them: what a line holds is theirs to say.
 
 mod beside;
+mod packed;
 
+use crate::decode::packed::{HEAD, MARK, length};
 use crate::decode::{Line, LineDecoder, MAX_LINE, Options, Undecodable};
 use crate::delimited::{Opening, Table};
 use crate::error::{Error, Result};
 use crate::format::Format;
 use beside::Beside;
+use packed::Numbers;
 use std::collections::VecDeque;
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 use strapd_attitude::record::{Declared, Nanos, RawSample};
 
@@ -41,7 +44,8 @@ type Next = (
 /// How a line is read.
 #[derive(Debug)]
 enum Form {
-    Objects(LineDecoder),
+    /// Objects of JSON, and packed ones.
+    Objects(LineDecoder, Numbers),
     Rows(Box<Table>),
 }
 
@@ -54,7 +58,7 @@ impl<R: Read> Lines<R> {
         let mut lines = Lines {
             name: name.to_owned(),
             input: BufReader::with_capacity(1 << 16, input),
-            form: Form::Objects(LineDecoder::new(options).with_besides()),
+            form: Form::Objects(LineDecoder::new(options).with_besides(), Numbers::default()),
             last_read: 0,
             current: 0,
             offset: 0,
@@ -109,8 +113,17 @@ impl<R: Read> Lines<R> {
             }
         }
         Ok(Some(match &mut self.form {
-            // A line has no time but the one in it.
-            Form::Objects(decoder) => decoder.decode(&self.line, Nanos(0), samples),
+            Form::Objects(_, numbers) if self.line.first() == Some(&MARK) => {
+                numbers.decode(&self.line, samples)
+            }
+            Form::Objects(decoder, numbers) => {
+                // A line has no time but the one in it.
+                let line = decoder.decode(&self.line, Nanos(0), samples);
+                if let Ok(line) = &line {
+                    numbers.learn(line, &self.line);
+                }
+                line
+            }
             Form::Rows(table) => table.decode(&self.line, samples),
         }))
     }
@@ -119,7 +132,7 @@ impl<R: Read> Lines<R> {
     #[must_use]
     pub fn format(&self) -> Format {
         match self.form {
-            Form::Objects(_) => Format::Lines,
+            Form::Objects(..) => Format::Lines,
             Form::Rows(_) => Format::Table,
         }
     }
@@ -128,7 +141,7 @@ impl<R: Read> Lines<R> {
     #[must_use]
     pub fn may_have_orientations(&self) -> bool {
         match &self.form {
-            Form::Objects(_) => true,
+            Form::Objects(..) => true,
             Form::Rows(table) => table.has_orientation(),
         }
     }
@@ -137,7 +150,7 @@ impl<R: Read> Lines<R> {
     #[must_use]
     pub fn table(&self) -> Option<&Table> {
         match &self.form {
-            Form::Objects(_) => None,
+            Form::Objects(..) => None,
             Form::Rows(table) => Some(table),
         }
     }
@@ -204,6 +217,14 @@ impl<R: Read> Lines<R> {
             offset,
             source,
         };
+        let is_text = matches!(self.form, Form::Rows(_));
+        // Nothing else of ours begins so, and no text in UTF-8 does.
+        if !is_text && begins_with(&mut self.input, MARK).map_err(fail)? {
+            let read = read_object(&mut self.input, &mut self.line).map_err(fail)?;
+            self.last_read += 1;
+            self.offset += read;
+            return Ok(true);
+        }
         let limit = MAX_LINE as u64 + 1;
         let read = Read::take(&mut self.input, limit)
             .read_until(b'\n', &mut self.line)
@@ -219,5 +240,32 @@ impl<R: Read> Lines<R> {
     fn is_blank(&self) -> bool {
         // Of a longer one, what comes behind may be anything.
         self.line.len() <= MAX_LINE && self.line.iter().all(u8::is_ascii_whitespace)
+    }
+}
+
+fn begins_with(input: &mut impl BufRead, mark: u8) -> std::io::Result<bool> {
+    loop {
+        match input.fill_buf() {
+            Ok(bytes) => return Ok(bytes.first() == Some(&mark)),
+            Err(e) if e.kind() == ErrorKind::Interrupted => {}
+            Err(e) => return Err(e),
+        }
+    }
+}
+
+/// A packed object as long as it says; of one that says no length it can have the beginning, and what is behind it is
+/// skipped up to the next line. How many bytes that were.
+fn read_object(input: &mut impl BufRead, object: &mut Vec<u8>) -> std::io::Result<u64> {
+    let mut more = |count: usize, object: &mut Vec<u8>| {
+        let read = Read::take(&mut *input, count as u64).read_to_end(object)?;
+        Ok::<bool, std::io::Error>(read == count)
+    };
+    let is_there = more(4, object)?;
+    match length(object).filter(|n| is_there && *n >= HEAD) {
+        Some(length) => {
+            more(length - 4, object)?;
+            Ok(object.len() as u64)
+        }
+        None => Ok(object.len() as u64 + input.skip_until(b'\n')? as u64),
     }
 }

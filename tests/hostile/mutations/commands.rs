@@ -60,6 +60,9 @@ fn logs() -> Vec<Vec<u8>> {
     let mut link = std::fs::read(fixtures.join("ardupilot.tlog")).unwrap();
     link.truncate(6000);
     logs.push(link);
+    // Packed objects between lines.
+    let kept = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/seeds/lines/packed");
+    logs.push(std::fs::read(kept).unwrap());
     logs
 }
 

@@ -275,7 +275,7 @@ fn some_time(nanos: i64) -> Option<i64> {
 }
 
 /// As in a line: a vector with `null` in it is none.
-fn some_vector(vector: [f64; 3]) -> Option<[f64; 3]> {
+pub(crate) fn some_vector(vector: [f64; 3]) -> Option<[f64; 3]> {
     Some(vector).filter(|v| !v.iter().any(|c| c.is_nan()))
 }
 

@@ -81,6 +81,17 @@ pub enum Undecodable {
         /// The most there may be.
         limit: u64,
     },
+    /// A packed object that says nothing.
+    #[error("{0}")]
+    Packed(super::packed::Unreadable),
+    /// A packed object of a stream that no line has spoken of.
+    #[error(
+        "packed stream {number}: no line before says which sensor it is, like {{\"class\":\"PACKED\",\"stream\":{number},\"id\":\"imu0\"}}"
+    )]
+    UnknownStream {
+        /// Its number.
+        number: u32,
+    },
     /// A CDR encapsulation this crate does not read.
     #[error("CDR encapsulation {:02x} {:02x} is {what}; only plain CDR (00 00, 00 01) is read", found[0], found[1])]
     Encapsulation {
