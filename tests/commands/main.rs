@@ -16,6 +16,7 @@ mod earth_rate;
 mod fixtures;
 mod folders;
 mod formats;
+mod increments;
 mod joined;
 mod layouts;
 mod model;
