@@ -23,6 +23,7 @@ mod model;
 #[cfg(unix)]
 mod pages;
 mod parquet;
+mod px4;
 mod recover;
 mod regularise;
 mod replay;
