@@ -18,6 +18,7 @@ mod folders;
 mod formats;
 mod increments;
 mod joined;
+mod joined_formats;
 mod layouts;
 mod model;
 #[cfg(unix)]
