@@ -207,6 +207,9 @@ tables = {
     + rows(20, lambda k: [(65_530 + k) % 65_536, "", *moving(k)[3:], *moving(k)[:3], 0, 1, 0, -1, 0, 0, 0, 0, 1], "\t", "\t\r\n"),
     "dot": "sep=,\nDeviceTag:,DOT\nOutputRate:,60Hz\nPacketCounter,SampleTimeFine,Quat_W,Quat_X,Quat_Y,Quat_Z,Acc_X,Acc_Y,Acc_Z,Gyr_X,Gyr_Y,Gyr_Z\n"
     + rows(20, lambda k: [k, (4_294_900_000 + k * 16_667) % 2**32, 1, 0, 0, 0, *moving(k)[3:], *moving(k)[:3]]),
+    "increments": "sep=,\nDeviceTag:,DOT\nOutputRate:,60Hz\nPacketCounter,SampleTimeFine,dq_W,dq_X,dq_Y,dq_Z,dv[1],dv[2],dv[3]\n"
+    + rows(20, lambda k: [k, k * 16_667, 1, *(round(v / 120, 9) for v in moving(k)[:3]), *(round(v / 60, 9) for v in moving(k)[3:])]),
+    "steps": "dt,gx,gy,gz\n" + rows(20, lambda k: [0.01, *moving(k)[:3]]),
     "gcsv": "GYROFLOW IMU LOG\nversion,1.3\norientation,YxZ\ntscale,0.001\ngscale,0.00122\nascale,0.000488\nt,gx,gy,gz,ax,ay,az\n"
     + rows(20, lambda k: [k * 10, *(round(500 * v) for v in moving(k))]),
     "shimmer": "Timestamp_Unix_CAL\tGyro_X_CAL\tGyro_Y_CAL\tGyro_Z_CAL\nms\tdeg/s\tdeg/s\tdeg/s\n"

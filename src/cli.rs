@@ -16,6 +16,8 @@ pub mod info;
 pub mod manual;
 pub mod model;
 pub mod outputs;
+#[cfg(feature = "object-store")]
+mod patterns;
 pub mod progress;
 pub mod recover;
 pub mod replay;
@@ -239,11 +241,30 @@ impl From<Outcome> for ExitCode {
     }
 }
 
+#[cfg(feature = "object-store")]
+impl Cli {
+    /// With the recordings that patterns in addresses mean, in the commands that take several.
+    fn with_patterns(mut self) -> Result<Cli> {
+        use std::mem::take;
+        match &mut self.command {
+            Command::Replay(of) => of.sources = patterns::filled(take(&mut of.sources))?,
+            Command::Calibrate(of) => of.logs = patterns::filled(take(&mut of.logs))?,
+            Command::Info(of) => of.files = patterns::filled(take(&mut of.files))?,
+            Command::Check(of) => of.files = patterns::filled(take(&mut of.files))?,
+            Command::Report(of) => of.files = patterns::filled(take(&mut of.files))?,
+            _ => {}
+        }
+        Ok(self)
+    }
+}
+
 /// Runs the command.
 ///
 /// # Errors
 /// Whatever ended it; see [`Error`].
 pub fn run(cli: Cli) -> Result<Outcome> {
+    #[cfg(feature = "object-store")]
+    let cli = cli.with_patterns()?;
     match cli.command {
         Command::Replay(command) => replay::run(&cli.global, &command),
         Command::Serve(command) => serve::run(&cli.global, &command),

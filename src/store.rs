@@ -17,6 +17,7 @@
 //! | `download` | one range, over as many requests as it takes |
 //! | `kept`, `ranges` | the bytes that are there, and those that are fetched ahead |
 //! | `once` | what comes from its beginning to its end |
+//! | `listed`, `pattern` | what a key with `*` means |
 
 mod answer;
 mod client;
@@ -24,8 +25,10 @@ mod cloud;
 mod download;
 mod fault;
 mod kept;
+pub mod listed;
 mod once;
 pub mod patience;
+mod pattern;
 mod place;
 mod ranges;
 mod web;

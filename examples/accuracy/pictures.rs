@@ -39,7 +39,9 @@ const OF_INCREMENTS_SHOWN: [(&str, &str); 7] = [
 fn shown(kind: SampleKind) -> Result<Vec<(Contender, &'static str)>, Failure> {
     let (all, picked): (&[Contender], _) = match kind {
         SampleKind::Rate => (&OF_RATES, OF_RATES_SHOWN),
-        SampleKind::Average | SampleKind::DeltaAngle => (&OF_INCREMENTS, OF_INCREMENTS_SHOWN),
+        SampleKind::Average | SampleKind::DeltaAngle | SampleKind::Rotation => {
+            (&OF_INCREMENTS, OF_INCREMENTS_SHOWN)
+        }
     };
     picked
         .into_iter()
@@ -92,7 +94,7 @@ fn lines(
 fn words(kind: SampleKind) -> &'static str {
     match kind {
         SampleKind::Rate => "instantaneous rates",
-        SampleKind::Average | SampleKind::DeltaAngle => "delta angles",
+        SampleKind::Average | SampleKind::DeltaAngle | SampleKind::Rotation => "delta angles",
     }
 }
 

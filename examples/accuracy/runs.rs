@@ -120,7 +120,7 @@ impl Run {
     pub fn error(&self, who: &Contender, kind: SampleKind, margin: usize) -> Result<f64, Failure> {
         let samples = match kind {
             SampleKind::Rate => &self.rates,
-            SampleKind::Average | SampleKind::DeltaAngle => &self.increments,
+            SampleKind::Average | SampleKind::DeltaAngle | SampleKind::Rotation => &self.increments,
         };
         let first = self.truth.first().ok_or("no samples")?;
         let found = who.run(kind, *first, samples)?;

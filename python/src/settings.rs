@@ -171,6 +171,7 @@ pub fn plan(settings: &Bound<'_, PyDict>, aid: Aid) -> PyResult<Plan> {
         SampleKind::Rate,
         SampleKind::Average,
         SampleKind::DeltaAngle,
+        SampleKind::Rotation,
     ]
     .map(|kind| (kind.name(), kind));
     let units = [GyroUnit::Rad, GyroUnit::Deg, GyroUnit::Mrad].map(|unit| (unit.name(), unit));

@@ -177,6 +177,7 @@ pub fn simulate<'py>(
         SampleKind::Rate,
         SampleKind::Average,
         SampleKind::DeltaAngle,
+        SampleKind::Rotation,
     ];
     let kind = kinds
         .into_iter()
@@ -184,7 +185,7 @@ pub fn simulate<'py>(
         .ok_or_else(|| {
             refused(
                 Diagnostic::new(format!("kind: there is no {kind:?}"))
-                    .help("one of rate, average, delta-angle"),
+                    .help("one of rate, average, delta-angle, rotation"),
             )
         })?;
     let error = ImuError::parse(noise)

@@ -135,6 +135,7 @@ impl Words {
             SampleKind::Rate,
             SampleKind::Average,
             SampleKind::DeltaAngle,
+            SampleKind::Rotation,
         ];
         let units = [GyroUnit::Rad, GyroUnit::Deg, GyroUnit::Mrad];
         let policies = [OnGap::Hold, OnGap::Bridge, OnGap::Reset];

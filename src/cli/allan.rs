@@ -191,7 +191,7 @@ fn analyse(gathered: &Gathered) -> std::result::Result<Vec<Axis>, Diagnostic> {
     let interval = gathered.interval;
     // Rates were summed in units of the sampling interval.
     let unit = match gathered.resolved.kind {
-        SampleKind::DeltaAngle => 1.0,
+        SampleKind::DeltaAngle | SampleKind::Rotation => 1.0,
         SampleKind::Rate | SampleKind::Average => interval,
     };
     let spread = record.spread();

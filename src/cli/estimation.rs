@@ -68,7 +68,7 @@ pub struct Estimation {
     #[arg(long, value_name = "ORDER")]
     pub order: Option<String>,
     /// What a sample means in time: the rate at its stamp, the mean over the interval that ends at
-    /// its stamp, or the integral over it [default: rate, unless the format says otherwise]
+    /// its stamp, the integral over it, or the whole rotation in it [default: rate, unless the format says otherwise]
     #[arg(long, value_enum, env = "STRAPD_SAMPLE_KIND")]
     pub sample_kind: Option<KindArg>,
     /// What corrects the attitude: auto (gravity where the samples carry a specific force), none (the gyro
@@ -227,6 +227,8 @@ pub enum KindArg {
     Average,
     /// Integral of the rate over it.
     DeltaAngle,
+    /// Rotation vector of the whole turn in it, coning included.
+    Rotation,
 }
 
 impl From<KindArg> for SampleKind {
@@ -235,6 +237,7 @@ impl From<KindArg> for SampleKind {
             KindArg::Rate => SampleKind::Rate,
             KindArg::Average => SampleKind::Average,
             KindArg::DeltaAngle => SampleKind::DeltaAngle,
+            KindArg::Rotation => SampleKind::Rotation,
         }
     }
 }

@@ -67,14 +67,31 @@ struct Answered {
 
 impl Cloud {
     pub(super) fn of(address: &Address, patience: Patience) -> Result<Cloud, Diagnostic> {
+        Cloud::at(address, patience, false)
+    }
+
+    /// What is in a folder, to be listed; without one all that there is.
+    pub(super) fn in_folder(address: &Address, patience: Patience) -> Result<Cloud, Diagnostic> {
+        Cloud::at(address, patience, true)
+    }
+
+    fn at(address: &Address, patience: Patience, is_folder: bool) -> Result<Cloud, Diagnostic> {
         let scheme = address.scheme();
         let rest = address
             .typed()
             .split_once("://")
             .map_or("", |(_, rest)| rest);
         let (bucket, key) = rest.split_once('/').unwrap_or((rest, ""));
+        if key.contains('*') {
+            return Err(Diagnostic::new(
+                "a pattern may mean several objects, and one is read here",
+            )
+            .help("its own key; replay, info, check, report and calibrate take patterns"));
+        }
         let is_plain = !rest.contains(['?', '#']);
-        let key = Path::parse(key).ok().filter(|key| !key.as_ref().is_empty());
+        let key = Path::parse(key)
+            .ok()
+            .filter(|key| is_folder || !key.as_ref().is_empty());
         let Some(key) = key.filter(|_| is_plain && !bucket.is_empty()) else {
             return Err(Diagnostic::new("is no address of an object")
                 .help(format!("{scheme}://BUCKET/KEY, without a query")));
@@ -85,6 +102,7 @@ impl Cloud {
             only_https: false,
             is_without_credentials: Arc::default(),
             is_refused_plain: Arc::default(),
+            latest: Arc::default(),
         };
         // Tries are counted by whoever downloads.
         let retry = RetryConfig {
@@ -151,6 +169,21 @@ impl Cloud {
                 .map(|bytes| bytes.map_err(|e| Fault::passing(broken(&e))))
                 .boxed(),
         }))
+    }
+
+    /// The keys in the folder that this was made for, `most` at most, in no order.
+    pub(super) async fn keys(&self, most: usize) -> Result<Vec<String>, Fault> {
+        let folder = Some(&self.key).filter(|key| !key.as_ref().is_empty());
+        let mut listed = self.store.list(folder);
+        let mut keys = Vec::new();
+        while let Some(found) = listed.next().await {
+            let found = found.map_err(|why| self.fault(&why, &self.speaker.latest))?;
+            keys.push(found.location.to_string());
+            if keys.len() >= most {
+                break;
+            }
+        }
+        Ok(keys)
     }
 
     /// What is there though it has no byte in `range`.
@@ -252,6 +285,8 @@ struct Speaker {
     /// Nobody answered who would give some.
     is_without_credentials: Arc<AtomicBool>,
     is_refused_plain: Arc<AtomicBool>,
+    /// What was answered last, for requests that follow each other.
+    latest: Arc<Answered>,
 }
 
 impl HttpConnector for Speaker {
@@ -309,7 +344,8 @@ impl Speaker {
             self.is_without_credentials
                 .store(is_refused, Ordering::Relaxed);
         }
-        if let Some(answered) = parts.extensions.get::<Arc<Answered>>() {
+        let own = parts.extensions.get::<Arc<Answered>>();
+        for answered in own.into_iter().chain([&self.latest]) {
             let asked = asked(reply.headers()).map_or(0, |asked| asked.as_millis());
             let asked = u64::try_from(asked).unwrap_or(u64::MAX);
             answered.asked_millis.store(asked, Ordering::Relaxed);

@@ -97,7 +97,7 @@ pub(super) fn too_slow(patience: &Patience) -> Fault {
     ))
 }
 
-fn given_up(what: &str, tries: u32) -> Fault {
+pub(super) fn given_up(what: &str, tries: u32) -> Fault {
     Diagnostic::new(format!("{what} ({tries} times)"))
         .help("try again later, or save it to a file first")
         .into()

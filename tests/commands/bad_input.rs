@@ -52,7 +52,7 @@ fn raw(kind: SampleKind, stamp: i64, rate: [f64; 3]) -> RawSample {
         header: Some(Nanos(START + stamp)),
         log: Nanos(START + stamp),
         gyro: Some(match kind {
-            SampleKind::DeltaAngle => rate.map(|w| w * SECS),
+            SampleKind::DeltaAngle | SampleKind::Rotation => rate.map(|w| w * SECS),
             _ => rate,
         }),
         ..RawSample::default()

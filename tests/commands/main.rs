@@ -16,13 +16,16 @@ mod earth_rate;
 mod fixtures;
 mod folders;
 mod formats;
+mod increments;
 mod joined;
+mod joined_formats;
 mod layouts;
 mod model;
 #[cfg(unix)]
 mod packed;
 mod pages;
 mod parquet;
+mod px4;
 mod recover;
 mod regularise;
 mod replay;

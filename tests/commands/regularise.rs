@@ -92,7 +92,7 @@ fn log(seed: u64, kind: SampleKind, faults: Faults) -> Log {
             gyro: Some(match kind {
                 SampleKind::Rate => spin.w_nb_b.into(),
                 SampleKind::Average => (angle / ((to - from) as f64 * 1e-9)).into(),
-                SampleKind::DeltaAngle => angle.into(),
+                SampleKind::DeltaAngle | SampleKind::Rotation => angle.into(),
             }),
             ..RawSample::default()
         });

@@ -35,6 +35,8 @@ fn a_build_without_the_feature_names_it_and_the_pipe() {
 #[cfg(feature = "object-store")]
 mod faults;
 #[cfg(feature = "object-store")]
+mod patterns;
+#[cfg(feature = "object-store")]
 mod secrets;
 #[cfg(feature = "object-store")]
 mod server;

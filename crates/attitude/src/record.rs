@@ -68,6 +68,9 @@ pub enum SampleKind {
     Average,
     /// Integral of the rate over the interval that ends at the stamp, rad.
     DeltaAngle,
+    /// Rotation vector of the whole turn in the interval that ends at the stamp, rad: what the axis did meanwhile (coning)
+    /// is in it, so that turns are multiplied and nothing is added to them.
+    Rotation,
 }
 
 impl SampleKind {
@@ -78,6 +81,7 @@ impl SampleKind {
             SampleKind::Rate => "rate",
             SampleKind::Average => "average",
             SampleKind::DeltaAngle => "delta-angle",
+            SampleKind::Rotation => "rotation",
         }
     }
 
@@ -88,6 +92,7 @@ impl SampleKind {
             SampleKind::Rate,
             SampleKind::Average,
             SampleKind::DeltaAngle,
+            SampleKind::Rotation,
         ]
         .into_iter()
         .find(|kind| kind.name() == name)
@@ -141,8 +146,8 @@ pub enum Join {
 /// What the gyro says of one sample, in body axes: a rate, or what was turned in an interval.
 ///
 /// # Convention
-/// [`SampleKind::Rate`] gives the first; [`SampleKind::Average`] and [`SampleKind::DeltaAngle`] the second: conditioning
-/// has multiplied means by their intervals.
+/// [`SampleKind::Rate`] gives the first, all others the second: conditioning has multiplied means by their intervals. A
+/// [`SampleKind::Rotation`] is one that is integrated by itself alone, since nothing is to be added to it.
 ///
 /// To take an angle for a rate, or a rate for an angle, does not compile:
 /// ```compile_fail,E0308
@@ -159,13 +164,15 @@ pub enum Measured {
 }
 
 impl Measured {
-    /// Numbers in rad/s for [`SampleKind::Rate`], in rad for the other two; somebody says that they are that.
+    /// Numbers in rad/s for [`SampleKind::Rate`], in rad for the others; somebody says that they are that.
     #[must_use]
     #[inline]
     pub fn assume(kind: SampleKind, vector: Vector3<f64>) -> Measured {
         match kind {
             SampleKind::Rate => Measured::Rate(BodyRate(vector)),
-            SampleKind::Average | SampleKind::DeltaAngle => Measured::Increment(DeltaAngle(vector)),
+            SampleKind::Average | SampleKind::DeltaAngle | SampleKind::Rotation => {
+                Measured::Increment(DeltaAngle(vector))
+            }
         }
     }
 
@@ -195,8 +202,7 @@ impl Measured {
 pub struct RateSample {
     /// Instant of the rate, or end of the interval.
     pub stamp: Nanos,
-    /// Start of the interval for [`SampleKind::Average`] and [`SampleKind::DeltaAngle`];
-    /// equals `stamp` for [`SampleKind::Rate`]. When it is later than the previous sample's
+    /// Start of the interval; equals `stamp` for [`SampleKind::Rate`]. When it is later than the previous sample's
     /// stamp, something between was not recorded.
     pub start: Nanos,
     /// The rate at `stamp`, or what was turned from `start` to `stamp`.

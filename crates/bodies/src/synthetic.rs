@@ -27,7 +27,7 @@ use strapd_attitude::noise::sensor_error::{
     self, GyroModel, ImuError, ImuErrorFault, MagnetometerModel, MeasureError, StampError,
     StampModel,
 };
-use strapd_attitude::quaternion::Quaternion;
+use strapd_attitude::quaternion::{Quaternion, RotationVector};
 use strapd_attitude::record::{Nanos, RawSample, SampleKind};
 use strapd_attitude::setting::{RATE_HZ, START_STAMP};
 
@@ -374,6 +374,7 @@ impl Synthetic {
         let mut felt = accelerometer.felt(&mut self.motion, now);
         felt.spin.q_nb = felt.spin.q_nb.same_sign_as(&self.last_q_nb);
         let spin = felt.spin;
+        let turned = self.last_q_nb.inverse() * spin.q_nb;
         self.last_q_nb = spin.q_nb;
         let at = Nanos(self.sampling.start.0 + now as i64);
         out.truth.push(Truth { stamp: at, spin });
@@ -392,7 +393,7 @@ impl Synthetic {
             sampled: mean_b.unwrap_or(force_b),
         };
         let mag = self.field(now, &spin);
-        if let Some(read) = self.measured(at, now, &spin, &forces)? {
+        if let Some(read) = self.measured(at, now, &spin, &turned.rotation_vector(), &forces)? {
             if tick.dropped {
                 self.noticed.dropped += 1;
             } else {
@@ -429,13 +430,14 @@ impl Synthetic {
         Some(compass.sensor.measure(&field_b))
     }
 
-    /// What the sensor reads at `now`. `None` for the
+    /// What the sensor reads at `now`, `turned` since the instant before. `None` for the
     /// interval before the start.
     fn measured(
         &mut self,
         at: Nanos,
         now: u64,
         spin: &Spin,
+        turned: &RotationVector,
         forces: &Forces,
     ) -> Result<Option<Reading>, MeasureError> {
         let rates = self.sampling.kind == SampleKind::Rate;
@@ -461,9 +463,15 @@ impl Synthetic {
         } else {
             self.motion.delta_angle(self.before, now)
         };
+        // What the axis did meanwhile comes after the sensor: its arithmetic adds it to what was read.
+        let coning = match self.sampling.kind {
+            SampleKind::Rotation => turned.0 - delta_angle,
+            _ => Vector3::zeros(),
+        };
         let Some(sensor) = &mut self.sensor else {
             let gyro = match self.sampling.kind {
                 SampleKind::DeltaAngle => delta_angle,
+                SampleKind::Rotation => turned.0,
                 SampleKind::Average | SampleKind::Rate => delta_angle / secs,
             };
             return Ok(Some(Reading {
@@ -483,7 +491,7 @@ impl Synthetic {
         self.noticed.saturated += u64::from(read.saturated);
         self.noticed.force_saturated += u64::from(read.force_saturated);
         Ok(Some(Reading {
-            gyro: read.gyro,
+            gyro: read.gyro + coning,
             force_b: read.specific_force,
         }))
     }

@@ -4,6 +4,7 @@
 
 mod cells;
 mod given;
+mod increments;
 mod names;
 mod units;
 

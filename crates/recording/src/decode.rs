@@ -40,7 +40,8 @@ pub use refusal::{Undecodable, Unsupported, exact_name};
 pub use role::{Rank, Role, role, role_of};
 pub use stamp::{Ambiguous, Bare, MOST_WAITING, unit_of};
 pub(crate) use stamp::{
-    bare as bare_of_text, decimal_in_steps, from_rfc3339 as instant_of_date, units_that_fit,
+    bare as bare_of_text, decimal_in_steps, from_rfc3339 as instant_of_date, units_of_steps,
+    units_that_fit,
 };
 pub use stated::Stated;
 pub use strapd_attitude::condition::GyroUnit;
@@ -55,7 +56,7 @@ use schema::{Schema, builtin, descriptor, idl, ros_name, rosmsg};
 use select::names::{self, Px4};
 use select::{Found, Selection, select};
 use std::sync::Arc;
-use strapd_attitude::record::{Nanos, RawSample, TimeUnit};
+use strapd_attitude::record::{Nanos, RawSample, SampleKind, TimeUnit};
 
 /// Most samples one message may hold.
 pub const MAX_BATCH: usize = 65_536;
@@ -630,7 +631,11 @@ fn state(type_name: &str, selection: &Selection, options: &Options) -> Stated {
     state_by_type(&selection.holder, &mut stated);
     stated.declared.gyro_unit = selection.unit.or(stated.declared.gyro_unit);
     state_px4(names::px4(type_name), &mut stated);
-    stated.declared.sample_kind = selection.kind.or(stated.declared.sample_kind);
+    stated.declared.sample_kind = match (selection.kind, stated.declared.sample_kind) {
+        // The field is called an angle; the type says what is in it.
+        (Some(SampleKind::DeltaAngle), Some(SampleKind::Rotation)) => Some(SampleKind::Rotation),
+        (found, by_type) => found.or(by_type),
+    };
     stated.has_gyro = selection.has(Slot::GYRO, 3);
     stated.has_accel = selection.has(Slot::ACCEL, 3);
     stated.has_mag = selection.has(Slot::MAG, 3);
@@ -673,14 +678,15 @@ fn state_px4(px4: Option<Px4>, stated: &mut Stated) {
     stated.has_stamp = true;
     stated.has_orientation = px4 == Px4::VehicleAttitude;
     stated.declared.sample_kind = Some(match px4 {
-        Px4::SensorCombined => strapd_attitude::record::SampleKind::Average,
-        Px4::VehicleImu => strapd_attitude::record::SampleKind::DeltaAngle,
+        Px4::SensorCombined => SampleKind::Average,
+        // Coning is added before it is sent.
+        Px4::VehicleImu => SampleKind::Rotation,
         Px4::VehicleAngularVelocity
         | Px4::SensorGyro
         | Px4::SensorAccel
         | Px4::SensorMag
         | Px4::VehicleMagnetometer
         | Px4::SensorGyroFifo
-        | Px4::VehicleAttitude => strapd_attitude::record::SampleKind::Rate,
+        | Px4::VehicleAttitude => SampleKind::Rate,
     });
 }

@@ -622,6 +622,9 @@ pub fn meaning(kind: SampleKind) -> &'static str {
         SampleKind::DeltaAngle => {
             "a sample is the angle turned over the interval ending at its stamp"
         }
+        SampleKind::Rotation => {
+            "a sample is the whole rotation in the interval ending at its stamp"
+        }
     }
 }
 

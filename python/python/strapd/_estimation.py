@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from typing_extensions import Unpack
 
-Kind = Literal["rate", "average", "delta-angle"]
+Kind = Literal["rate", "average", "delta-angle", "rotation"]
 Aid = Literal["auto", "none", "gravity", "gravity+mag"]
 Vector = Union["Sequence[float]", npt.NDArray[np.float64]]
 
@@ -141,7 +141,7 @@ def estimate(
     :param rate_hz: samples a second, in place of ``t``.
     :param aid: what corrects the gyro: ``gravity``, ``gravity+mag``, ``none``; ``auto`` takes what there is.
     :param kind: what a sample means in time: the ``rate`` at its stamp, the ``average`` over the interval that ends there, or
-        the ``delta-angle`` turned in it.
+        the ``delta-angle`` turned in it; ``rotation``: the rotation vector of the whole turn in it, coning included.
     :param dt: how long each sample was taken over, as ``t``; where it is not the step between stamps.
     :param orientation: (n, 4) w, x, y, z, for ``init="first-orientation"``.
     :param smooth: the whole recording at once (``strapd replay --smooth``): better than any filter, and calibrated from

@@ -239,7 +239,9 @@ impl Gathering {
     fn add(&mut self, sample: &RateSample, spacing: i64) {
         self.begin.get_or_insert(sample.stamp);
         let value = match self.resolved.kind {
-            SampleKind::Rate | SampleKind::DeltaAngle => *sample.gyro.as_vector(),
+            SampleKind::Rate | SampleKind::DeltaAngle | SampleKind::Rotation => {
+                *sample.gyro.as_vector()
+            }
             SampleKind::Average => {
                 let secs = sample.stamp.secs_since(sample.start);
                 if secs <= 0.0 {

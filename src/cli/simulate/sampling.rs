@@ -83,8 +83,8 @@ pub struct Common {
         allow_negative_numbers = true
     )]
     pub duration: f64,
-    /// What a sample is: the rate at its stamp, the mean over the interval that ends at its stamp, or
-    /// the integral over it
+    /// What a sample is: the rate at its stamp, the mean over the interval that ends at its stamp, the
+    /// integral over it, or the whole rotation in it
     #[arg(long, help_heading = "Sampling", value_enum, default_value = "rate")]
     pub sample_kind: KindArg,
     /// Where the accelerometer sits: from the point whose motion it is, m, body axes (ahead, left, up)

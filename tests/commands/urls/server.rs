@@ -214,7 +214,7 @@ fn empty(to: &mut TcpStream, status: &str, said: &str) -> std::io::Result<()> {
     )
 }
 
-fn asked_range(head: &str) -> Option<Range<usize>> {
+pub(super) fn asked_range(head: &str) -> Option<Range<usize>> {
     let line = head.lines().find_map(|line| {
         let (name, value) = line.split_once(':')?;
         name.eq_ignore_ascii_case("range").then(|| value.trim())

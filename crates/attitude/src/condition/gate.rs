@@ -75,7 +75,7 @@ impl Gate {
                 .truncation_step
                 .map(|step| step / settings.unit.to_rad()),
             huge: match settings.kind {
-                SampleKind::DeltaAngle => HUGE_ANGLE,
+                SampleKind::DeltaAngle | SampleKind::Rotation => HUGE_ANGLE,
                 SampleKind::Rate | SampleKind::Average => HUGE_RATE,
             },
             // A float32 full scale may come out one bit below the number on the data sheet.
@@ -143,7 +143,7 @@ impl Gate {
     fn is_saturated(&self, largest: f64, interval: i64, spacing: Option<i64>) -> bool {
         let rate = match self.kind {
             SampleKind::Rate | SampleKind::Average => largest,
-            SampleKind::DeltaAngle => {
+            SampleKind::DeltaAngle | SampleKind::Rotation => {
                 let nanos = if interval > 0 {
                     Some(interval)
                 } else {

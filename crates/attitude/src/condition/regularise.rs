@@ -71,7 +71,7 @@ impl Value {
         match kind {
             SampleKind::Rate => Value::Rate,
             SampleKind::Average if !states_interval => Value::MeanTimesInterval,
-            SampleKind::Average | SampleKind::DeltaAngle => Value::Angle,
+            SampleKind::Average | SampleKind::DeltaAngle | SampleKind::Rotation => Value::Angle,
         }
     }
 }

@@ -225,7 +225,7 @@ impl Timing {
         };
         let secs = interval as f64 * 1e-9;
         let angle = match self.kind {
-            SampleKind::DeltaAngle => entry.value - self.bias * secs,
+            SampleKind::DeltaAngle | SampleKind::Rotation => entry.value - self.bias * secs,
             SampleKind::Rate | SampleKind::Average => (entry.value - self.bias) * secs,
         };
         (start, angle)
@@ -333,7 +333,7 @@ impl Timing {
     fn entry_rate(&self, entry: &Entry) -> f64 {
         match self.kind {
             SampleKind::Rate | SampleKind::Average => (entry.value - self.bias).norm(),
-            SampleKind::DeltaAngle => {
+            SampleKind::DeltaAngle | SampleKind::Rotation => {
                 let secs = self.own_interval(entry) as f64 * 1e-9;
                 entry.value.norm() / secs
             }

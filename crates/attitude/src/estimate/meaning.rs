@@ -117,7 +117,7 @@ impl Meaning {
         let vector = self.to_body() * Vector3::from(recorded) * self.unit.to_rad();
         match self.kind {
             SampleKind::Rate | SampleKind::Average => BodyRate(vector).held_for(secs),
-            SampleKind::DeltaAngle => DeltaAngle(vector),
+            SampleKind::DeltaAngle | SampleKind::Rotation => DeltaAngle(vector),
         }
     }
 

@@ -102,8 +102,8 @@ impl Preparation {
             stamps: None,
             rates: (looks_for_truncation(plan)
                 && patience == Patience::WholeLog
-                && resolved.kind != SampleKind::DeltaAngle)
-                .then(Vec::new),
+                && !matches!(resolved.kind, SampleKind::DeltaAngle | SampleKind::Rotation))
+            .then(Vec::new),
             known: None,
             forces_beside: [false; 2],
         }

@@ -146,10 +146,17 @@ impl Method {
         }
     }
 
-    /// The method itself, [`Method::Live`] with the window that suits the samples.
+    /// The method itself, [`Method::Live`] with the window that suits the samples. Of turns that are whole by themselves
+    /// the best is each alone, whether there are later ones or not.
     #[must_use]
     pub fn for_kind(self, kind: SampleKind) -> Method {
+        let alone = Method::Magnus {
+            window: 1,
+            order: Order::Exact,
+            placement: Placement::Causal,
+        };
         match self {
+            Method::Auto | Method::Live { .. } if kind == SampleKind::Rotation => alone,
             Method::Live { order, finals } => Method::CommitProvisional {
                 window: if kind == SampleKind::Rate { 6 } else { 5 },
                 order,

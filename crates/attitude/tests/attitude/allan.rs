@@ -28,7 +28,7 @@ fn at_rest(
         let (from, to) = (Nanos(i * interval_nanos), Nanos((i + 1) * interval_nanos));
         let read = gyro.measure(from, to, &truth).unwrap().gyro;
         record.push(&match kind {
-            SampleKind::DeltaAngle => read,
+            SampleKind::DeltaAngle | SampleKind::Rotation => read,
             _ => read * secs,
         });
     }

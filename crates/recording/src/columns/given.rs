@@ -9,15 +9,19 @@ use std::str::FromStr;
 pub(crate) enum Role {
     Of(Kind),
     Stamp,
+    Step,
     Counter,
 }
 
-const ROLES: [(&str, Role); 6] = [
+const ROLES: [(&str, Role); 9] = [
     ("gyro", Role::Of(Kind::Gyro)),
     ("accel", Role::Of(Kind::Accel)),
     ("mag", Role::Of(Kind::Mag)),
     ("orientation", Role::Of(Kind::Orientation)),
+    ("dq", Role::Of(Kind::Turn)),
+    ("dv", Role::Of(Kind::Push)),
     ("stamp", Role::Stamp),
+    ("dt", Role::Step),
     ("counter", Role::Counter),
 ];
 
@@ -25,14 +29,14 @@ impl Role {
     fn parts(self) -> usize {
         match self {
             Role::Of(kind) => kind.parts(),
-            Role::Stamp | Role::Counter => 1,
+            Role::Stamp | Role::Step | Role::Counter => 1,
         }
     }
 
     fn quantity(self) -> Option<Quantity> {
         match self {
             Role::Of(kind) => kind.quantity(),
-            Role::Stamp => Some(Quantity::Time),
+            Role::Stamp | Role::Step => Some(Quantity::Time),
             Role::Counter => None,
         }
     }
@@ -53,6 +57,9 @@ pub(crate) struct Given {
 /// gyro=gx:gy:gz:deg/s           and their unit
 /// stamp=1:us                    one by its number, from 1, and its unit
 /// orientation=qw:qx:qy:qz       w first
+/// dq=dq_W:dq_X:dq_Y:dq_Z        the rotation since the sample before, w first
+/// dv=VelInc_X:VelInc_Y:VelInc_Z the velocity that belongs to it, m/s
+/// dt=step:ms                    the time since the row before, where there is no stamp
 /// counter=PacketCounter         a running number, beside a rate in the file's head
 /// accel=none                    not to be used
 /// ```
@@ -84,7 +91,7 @@ impl FromStr for Columns {
             let role = ROLES.iter().find(|(known, _)| *known == name.trim());
             let (name, role) = role.copied().ok_or_else(|| {
                 format!(
-                    "`{name}` is no role; they are gyro, accel, mag, orientation, stamp, counter"
+                    "`{name}` is no role; they are gyro, accel, mag, orientation, dq, dv, stamp, dt, counter"
                 )
             })?;
             if given.iter().any(|before| before.role == role) {

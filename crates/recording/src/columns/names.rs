@@ -3,6 +3,7 @@
 //! Apart from the layout because a name alone tells only what may be: which of several is meant, and whether all axes
 //! are there, shows in the whole header.
 
+use super::increments::{increment, step};
 use super::units::{Quantity, Unit};
 use crate::text::printable;
 
@@ -16,14 +17,18 @@ pub(crate) enum Kind {
     Orientation,
     /// Of a rotation matrix, sensor to world, by rows.
     Matrix,
+    /// The rotation since the sample before, of which it says all. Parts w, x, y, z.
+    Turn,
+    /// The specific force integrated over the same interval, m/s.
+    Push,
 }
 
 impl Kind {
     /// How many columns it is made of.
     pub(crate) fn parts(self) -> usize {
         match self {
-            Kind::Gyro | Kind::Accel | Kind::Mag => 3,
-            Kind::Orientation => 4,
+            Kind::Gyro | Kind::Accel | Kind::Mag | Kind::Push => 3,
+            Kind::Orientation | Kind::Turn => 4,
             Kind::Matrix => 9,
         }
     }
@@ -36,6 +41,8 @@ impl Kind {
             Kind::Mag => "mag",
             Kind::Orientation => "orientation",
             Kind::Matrix => "matrix",
+            Kind::Turn => "dq",
+            Kind::Push => "dv",
         }
     }
 
@@ -45,7 +52,7 @@ impl Kind {
             Kind::Gyro => Some(Quantity::Rate),
             Kind::Accel => Some(Quantity::Force),
             Kind::Mag => Some(Quantity::Field),
-            Kind::Orientation | Kind::Matrix => None,
+            Kind::Orientation | Kind::Matrix | Kind::Turn | Kind::Push => None,
         }
     }
 }
@@ -59,6 +66,8 @@ pub(crate) enum Meant {
     Aside { kind: Kind, why: &'static str },
     /// A stamp.
     Stamp,
+    /// The time since the row before.
+    Step,
     /// A running number.
     Counter,
     /// Of no use.
@@ -383,6 +392,12 @@ impl Name {
         }
         if let Some(found) = Name::stamp(all) {
             return found;
+        }
+        if let Some(unit) = step(all) {
+            return (Meant::Step, Some(Quantity::Time), unit);
+        }
+        if let Some((kind, part, of)) = increment(all) {
+            return (Meant::Part { kind, part, of }, None, None);
         }
         if let Some(meant) = Name::orientation(all) {
             return (meant, None, None);

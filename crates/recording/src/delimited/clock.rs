@@ -17,6 +17,8 @@ pub(super) enum Clock {
     Dates,
     /// A column of running numbers, so far apart.
     Counter { period: f64, wraps: Wraps },
+    /// A column of steps since the row before, so many nanoseconds in one; their sum until now.
+    Steps { nanos: i64, sum: i64 },
     /// Nothing but the rows themselves, so far apart.
     Rows { period: f64 },
     /// Nothing at all.
@@ -82,7 +84,33 @@ impl Clock {
                 let count = whole().ok_or("is no whole number")?;
                 Ok(at(wraps.unwrapped(count), *period))
             }
+            Clock::Steps { nanos, sum } => {
+                let step = decimal_in_steps(number, *nanos).ok_or("is no number")?;
+                if step.0 < 0 {
+                    return Err("is a step back");
+                }
+                *sum = sum.saturating_add(step.0);
+                Ok(Nanos(*sum))
+            }
             Clock::Rows { .. } | Clock::Nothing => Ok(Nanos(0)),
+        }
+    }
+
+    /// The sum of steps until now, to go back to.
+    pub(super) fn sum(&self) -> Option<i64> {
+        match self {
+            Clock::Steps { sum, .. } => Some(*sum),
+            _ => None,
+        }
+    }
+
+    /// A row is lost, but not the step that it says: those behind it lie where they did.
+    pub(super) fn pass(&mut self, before: i64, number: Option<&str>) {
+        if let Clock::Steps { sum, .. } = self {
+            *sum = before;
+        }
+        if let Some(number) = number {
+            let _ = self.read(number);
         }
     }
 

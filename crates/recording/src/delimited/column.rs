@@ -14,6 +14,8 @@ pub(super) enum Column {
     Orientation(usize),
     /// Of a rotation matrix, by rows.
     Matrix(usize),
+    /// Of the rotation since the sample before.
+    Turn(usize),
 }
 
 /// Whether a line is a comment.

@@ -3,6 +3,7 @@
 //! Apart from the rows because here, once, it is decided and said what numbers mean: nothing of it is guessed in silence,
 //! and what can not be told ends with the flag that tells it.
 
+mod increments;
 mod instants;
 mod roles;
 
@@ -114,10 +115,13 @@ fn names_something(
     }
     let are_there = columns().all(|column| roles::place(names, column).is_ok());
     let is_given = given.iter().any(|given| {
-        matches!(given.role, Role::Of(Kind::Gyro | Kind::Orientation)) && !given.columns.is_empty()
+        matches!(
+            given.role,
+            Role::Of(Kind::Gyro | Kind::Turn | Kind::Orientation)
+        ) && !given.columns.is_empty()
     });
     let kinds: &[Kind] = match wanted {
-        Wanted::Rates => &[Kind::Gyro, Kind::Orientation, Kind::Matrix],
+        Wanted::Rates => &[Kind::Gyro, Kind::Turn, Kind::Orientation, Kind::Matrix],
         Wanted::Forces | Wanted::Fields => &[Kind::Accel, Kind::Mag],
     };
     are_there
@@ -446,7 +450,7 @@ impl Name {
     fn quantity(&self) -> Option<Quantity> {
         match &self.meant {
             Meant::Part { kind, .. } => kind.quantity(),
-            Meant::Stamp => Some(Quantity::Time),
+            Meant::Stamp | Meant::Step => Some(Quantity::Time),
             Meant::Aside { .. } | Meant::Counter | Meant::Nothing => None,
         }
     }

@@ -14,6 +14,8 @@ use crate::text::without_mark;
 use crate::text::{printable, snippet};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 use std::borrow::Cow;
+use strapd_attitude::frames::Sensor;
+use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::record::{Declared, Nanos, RawSample, SampleKind};
 use strapd_attitude::setting::GYRO_UNIT;
 
@@ -65,6 +67,8 @@ pub struct Table {
     pub(super) has_decimal_comma: bool,
     pub(super) clock: Clock,
     pub(super) scales: Scales,
+    /// Over how many nanoseconds its increments were taken.
+    pub(super) interval: Option<i64>,
     /// What its names say of its numbers.
     pub(super) declared: Declared,
     /// The `--columns` that say the same.
@@ -147,6 +151,7 @@ impl Table {
             has_decimal_comma: false,
             clock: Clock::Nothing,
             scales: Scales::default(),
+            interval: None,
             declared: Declared::default(),
             assumed: String::new(),
             notes: Vec::new(),
@@ -177,7 +182,7 @@ impl Table {
     /// What to say where nobody says the unit of its rates.
     #[must_use]
     pub fn doubt_of_unit(&self) -> Option<String> {
-        let is_open = !self.is_own() && self.has(GYRO[0]) && self.declared.gyro_unit.is_none();
+        let is_open = !self.is_own() && self.has_rate() && self.declared.gyro_unit.is_none();
         is_open.then(|| {
             format!("the unit of the rates is not stated, and taken for rad/s: {GYRO_UNIT} deg, if it is deg/s")
         })
@@ -204,7 +209,7 @@ impl Table {
     /// Whether rows have a place for a rate.
     #[must_use]
     pub fn has_rate(&self) -> bool {
-        self.has(GYRO[0])
+        self.has(GYRO[0]) || self.has(Column::Turn(0))
     }
 
     /// Whether rows have a place for a specific force.
@@ -255,13 +260,30 @@ impl Table {
             }
             return Ok(no_row("comment"));
         }
-        let read = if self.is_elsewhere {
-            Err(Undecodable::OtherTable)
-        } else {
-            self.cells(row).and_then(|read| self.line(read, out))
-        };
+        if self.is_elsewhere {
+            self.row += 1;
+            return Err(self.explained(row, Undecodable::OtherTable));
+        }
+        let sum = self.clock.sum();
+        let read = self.cells(row).and_then(|read| self.line(read, out));
         self.row += 1;
-        read.map_err(|why| self.explained(row, why))
+        read.map_err(|why| {
+            let why = self.explained(row, why);
+            if let Some(before) = sum {
+                self.pass(row, before, &why);
+            }
+            why
+        })
+    }
+
+    /// Of a row that is none, the step since the row before, where it is where it should be.
+    fn pass(&mut self, row: &[u8], before: i64, why: &Undecodable) {
+        let is_step = |(column, _): &(Option<Column>, String)| *column == Some(Column::Stamp);
+        let place = self.columns.iter().position(is_step);
+        let place = place.filter(|_| matches!(why, Undecodable::Cell { .. }));
+        let cell = place.and_then(|place| self.delimiter.cells(row).nth(place));
+        let cell = cell.map(|cell| String::from_utf8_lossy(&cell).trim().replace(',', "."));
+        self.clock.pass(before, cell.as_deref());
     }
 
     fn declared_period(&self) -> Option<f64> {
@@ -336,6 +358,8 @@ impl Table {
             _ => vector.map(|v| v.map(|value| value * by)),
         };
         let gyro = scaled(self.whole(read.gyro, Column::Gyro)?, self.scales.gyro);
+        let turn = self.whole(read.turn, Column::Turn)?;
+        let gyro = gyro.or_else(|| turn.map(rotation_vector));
         let accel = scaled(self.whole(read.accel, Column::Accel)?, self.scales.accel);
         let mag = scaled(self.whole(read.mag, Column::Mag)?, self.scales.mag);
         let matrix = self.whole(read.matrix, Column::Matrix)?;
@@ -356,7 +380,7 @@ impl Table {
             accel,
             mag,
             orientation,
-            interval_nanos: read.interval,
+            interval_nanos: read.interval.or(self.interval),
             is_beside: is_others && orientation.is_none(),
         });
         let mut line = Line {
@@ -424,6 +448,12 @@ fn quaternion(rows: &[f64; 9]) -> [f64; 4] {
     [q.w, q.i, q.j, q.k]
 }
 
+/// A turn of the sensor, `[w, x, y, z]`, as a rotation vector, rad; of what is none, not finite.
+fn rotation_vector(wxyz: [f64; 4]) -> [f64; 3] {
+    let turn = Quaternion::<Sensor, Sensor>::try_from_wxyz(wxyz);
+    turn.map_or([f64::NAN; 3], |turn| turn.rotation_vector().0.into())
+}
+
 /// What a row holds.
 #[derive(Default)]
 struct Read {
@@ -436,6 +466,7 @@ struct Read {
     accel: [Option<f64>; 3],
     mag: [Option<f64>; 3],
     orientation: [Option<f64>; 4],
+    turn: [Option<f64>; 4],
     matrix: [Option<f64>; 9],
 }
 
@@ -472,13 +503,14 @@ impl Read {
             Column::Interval => self.interval = Some(whole()?),
             Column::Kind => {
                 let kind = SampleKind::named(text);
-                self.kind = Some(kind.ok_or("is none of rate, average, delta-angle")?);
+                self.kind = Some(kind.ok_or("is none of rate, average, delta-angle, rotation")?);
             }
             Column::Id => self.id = Some(text.to_owned()),
             Column::Gyro(axis) => put(self.gyro.get_mut(axis))?,
             Column::Accel(axis) => put(self.accel.get_mut(axis))?,
             Column::Mag(axis) => put(self.mag.get_mut(axis))?,
             Column::Orientation(part) => put(self.orientation.get_mut(part))?,
+            Column::Turn(part) => put(self.turn.get_mut(part))?,
             Column::Matrix(part) => put(self.matrix.get_mut(part))?,
         }
         Ok(())

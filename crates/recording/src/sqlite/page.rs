@@ -36,7 +36,17 @@ pub(crate) struct Cell<'a> {
 }
 
 /// An unsigned number of one to nine bytes, and how many.
+#[inline]
 pub(crate) fn varint(bytes: &[u8]) -> Option<(u64, usize)> {
+    // Nearly all are short.
+    match *bytes {
+        [a, ..] if a < 0x80 => Some((u64::from(a), 1)),
+        [a, b, ..] if b < 0x80 => Some((u64::from(a & 0x7f) << 7 | u64::from(b), 2)),
+        _ => long_varint(bytes),
+    }
+}
+
+fn long_varint(bytes: &[u8]) -> Option<(u64, usize)> {
     let mut value = 0;
     for (at, byte) in bytes.iter().take(8).enumerate() {
         value = value << 7 | u64::from(byte & 0x7f);
@@ -105,6 +115,7 @@ impl<'a> Page<'a> {
     }
 
     /// A row of a leaf.
+    #[inline]
     pub(crate) fn cell(&self, nth: usize) -> Option<Cell<'a>> {
         let cell = self.bytes.get(self.place(nth)?..)?;
         let (length, used) = varint(cell)?;

@@ -65,6 +65,7 @@ impl<'a> Row<'a> {
 impl<'a> Iterator for Row<'a> {
     type Item = Value<'a>;
 
+    #[inline]
     fn next(&mut self) -> Option<Value<'a>> {
         let (kind, used) = varint(self.kinds)?;
         let length = match kind {
@@ -93,7 +94,11 @@ impl<'a> Iterator for Row<'a> {
 }
 
 /// At most eight bytes, the greatest first, with a sign.
+#[inline]
 fn integer(bytes: &[u8]) -> i64 {
+    if let Ok(whole) = <[u8; 8]>::try_from(bytes) {
+        return i64::from_be_bytes(whole);
+    }
     let first = bytes.first().map_or(0, |b| i64::from(b.cast_signed()));
     let rest = bytes.get(1..).unwrap_or(&[]);
     rest.iter()

@@ -18,8 +18,10 @@ pub(crate) struct Table {
     leaf: Vec<u8>,
     next: usize,
     cells: usize,
-    /// Where rows of the leaf lie, and the number of each in it, to see a place that is named twice.
+    /// Where rows of the leaf lie, and the number of each in it, to see a place that is named twice; `are_apart` where none
+    /// is.
     places: Vec<(usize, usize)>,
+    are_apart: bool,
     /// A row that lies in several pages.
     joined: Vec<u8>,
     overflow: Vec<u8>,
@@ -60,6 +62,7 @@ impl Table {
             next: 0,
             cells: 0,
             places: Vec::new(),
+            are_apart: false,
             joined: Vec::new(),
             overflow: Vec::new(),
             longest,
@@ -96,9 +99,11 @@ impl Table {
         let Some(place) = leaf.place(nth) else {
             return lost("it does not lie in its page");
         };
-        let first = self.places.partition_point(|known| *known < (place, 0));
-        if self.places.get(first) != Some(&(place, nth)) {
-            return lost("another row lies in its place");
+        if !self.are_apart {
+            let first = self.places.partition_point(|known| *known < (place, 0));
+            if self.places.get(first) != Some(&(place, nth)) {
+                return lost("another row lies in its place");
+            }
         }
         let Some(cell) = leaf.cell(nth) else {
             return lost("it does not end in its page");
@@ -153,7 +158,12 @@ impl Table {
             self.cells = page.cells;
             let places = (0..page.cells).filter_map(|nth| Some((page.place(nth)?, nth)));
             self.places.extend(places);
-            self.places.sort_unstable();
+            // Rows that were only added lie one before the other.
+            self.are_apart = self.places.is_sorted_by(|(a, _), (b, _)| a > b);
+            if !self.are_apart {
+                self.places.sort_unstable();
+                self.are_apart = self.places.is_sorted_by(|(a, _), (b, _)| a < b);
+            }
         }
         Ok(None)
     }

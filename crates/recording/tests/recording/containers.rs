@@ -133,7 +133,7 @@ fn the_topics_of_a_flight_say_what_a_sample_is_and_which_is_the_imu() {
             }
         });
     assert_eq!(kinds["sensor_combined"], SampleKind::Average);
-    assert_eq!(kinds["vehicle_imu"], SampleKind::DeltaAngle);
+    assert_eq!(kinds["vehicle_imu"], SampleKind::Rotation);
     assert_eq!(kinds["sensor_gyro"], SampleKind::Rate);
     let best = |least: &str| ranks[least];
     assert!(best("sensor_combined") < best("vehicle_imu"));

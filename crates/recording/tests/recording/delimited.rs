@@ -4,6 +4,7 @@
 //! The files are written here, after their makers' documentation; real ones are read in `tests/commands/tables.rs`.
 
 mod bad_tables;
+mod increments;
 
 use std::fmt::Write;
 use std::io::Read;
@@ -333,6 +334,33 @@ pub fn all() -> Vec<Made> {
                         "  {}   {}",
                         (START + k as i64 * STEP) / 1000,
                         joined("  ", motion(k)[0])
+                    )
+                },
+            )
+        },
+        Made {
+            stamp: |k| (k as i64 + 1) * STEP,
+            gyro_unit: None,
+            ..table("loop.csv", "dt,gx,gy,gz\n", "\n", |k| {
+                format!("0.010,{}", joined(",", motion(k)[0]))
+            })
+        },
+        Made {
+            stamp: |k| k as i64 * 16_667_000,
+            gyro: increments::turned,
+            accel: Some((increments::pushed, SI)),
+            mag: Some(field),
+            ..table(
+                "dot increments.csv",
+                "sep=,\nDeviceTag:,Movella DOT 1\nOutputRate:,60Hz\n\nPacketCounter,SampleTimeFine,dq_W,dq_X,dq_Y,dq_Z,dv[1],dv[2],dv[3],Mag_X,Mag_Y,Mag_Z,Status\n",
+                "\n",
+                |k| {
+                    let numbers = increments::quaternion(k);
+                    let numbers = numbers.into_iter().chain(increments::velocity(k));
+                    format!(
+                        "{k},{},{},0",
+                        k * 16_667,
+                        joined(",", numbers.chain(motion(k)[2]))
                     )
                 },
             )

@@ -161,6 +161,34 @@ fn a_database_cut_anywhere_gives_every_message_whose_page_is_whole_and_says_that
 }
 
 #[test]
+fn a_row_whose_place_another_has_is_lost_and_rows_in_any_order_of_places_are_not() {
+    let all = expected();
+    let messages: Vec<Message<'_>> = (0..8).map(|n| (0, n as u64, &all[2 * n].2[..])).collect();
+    let whole = database(PAGE, &[IMU], &messages);
+    let leaf = (3..whole.len() / PAGE)
+        .map(|page| page * PAGE)
+        .find(|at| whole[*at] == 0x0d && whole[at + 4] == 8)
+        .unwrap();
+    let pointer = |nth: usize| leaf + 8 + 2 * nth..leaf + 10 + 2 * nth;
+    let times = |bytes: &[u8]| {
+        let (ours, report) = read(from_bytes(bytes).unwrap());
+        let times: Vec<u64> = told(ours).into_iter().map(|(_, time, _)| time).collect();
+        (times, kinds(&report))
+    };
+    let mut twice = whole.clone();
+    twice.copy_within(pointer(2), pointer(5).start);
+    let why = "another row lies in its place";
+    let lost = vec![ProblemKind::Row { why }];
+    assert_eq!(times(&twice), (vec![0, 1, 2, 3, 4, 6, 7], lost));
+    let mut turned = whole.clone();
+    turned.copy_within(pointer(1), pointer(2).start);
+    turned[pointer(1)].copy_from_slice(&whole[pointer(2)]);
+    let (mut given, problems) = times(&turned);
+    given.sort_unstable();
+    assert_eq!((given, problems), ((0..8).collect(), Vec::new()));
+}
+
+#[test]
 fn a_lost_page_costs_its_own_rows_alone_and_how_many_is_counted() {
     let whole = bytes("constant_rate.db3");
     let all = expected();

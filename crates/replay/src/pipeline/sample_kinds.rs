@@ -117,6 +117,14 @@ pub(super) fn kinds() -> impl Iterator<Item = SampleKind> {
     MEANINGS.iter().map(|(_, _, kind, _)| *kind)
 }
 
+/// A kind that is tried, where samples are `stated` to be of another: whole turns are angles of their own kind.
+fn among_tried(kind: SampleKind, stated: SampleKind) -> SampleKind {
+    match (kind, stated) {
+        (SampleKind::DeltaAngle, SampleKind::Rotation) => stated,
+        _ => kind,
+    }
+}
+
 impl AgainstRecorded {
     /// For samples understood as `resolved`, but for their meaning.
     ///
@@ -148,7 +156,7 @@ impl AgainstRecorded {
                     ..plan.clone()
                 };
                 let mut resolved = resolved.clone();
-                resolved.kind = *kind;
+                resolved.kind = among_tried(*kind, resolved.kind);
                 Estimator::new(&plan, &resolved, &prepared)
             })
             .collect::<Result<Vec<_>, _>>()?;
@@ -319,7 +327,8 @@ impl AgainstRecorded {
         }
         // The meaning that fits best says most about the axes; but rates taken for angles, or angles for
         // rates, turn at random or hardly at all, and say nothing.
-        let is_angle = |kind: SampleKind| kind == SampleKind::DeltaAngle;
+        let is_angle =
+            |kind: SampleKind| matches!(kind, SampleKind::DeltaAngle | SampleKind::Rotation);
         let best = MEANINGS
             .iter()
             .zip(&self.tracks)
@@ -400,7 +409,7 @@ impl AgainstRecorded {
             Some(ErrorTrace {
                 kind,
                 meaning,
-                is_used: method.is_none() && *sample_kind == used,
+                is_used: method.is_none() && among_tried(*sample_kind, used) == used,
                 comparison,
                 trace,
             })

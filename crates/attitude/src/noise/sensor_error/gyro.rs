@@ -316,7 +316,7 @@ fn quantised(
     rate: Vector3<f64>,
     secs: f64,
 ) -> Vector3<f64> {
-    let increments = kind == SampleKind::DeltaAngle;
+    let increments = matches!(kind, SampleKind::DeltaAngle | SampleKind::Rotation);
     if error.truncation > 0.0 {
         let cut = |v: f64| (v / error.truncation).trunc() * error.truncation;
         return if increments { rate * secs } else { rate }.map(cut);

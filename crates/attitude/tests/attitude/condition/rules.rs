@@ -321,7 +321,7 @@ fn an_increment_behind_missing_samples_covers_its_own_interval_only() {
         let gap = report.gaps.kept[0];
         assert_eq!((gap.missing, gap.length_nanos), (3, 3 * STEP));
         let expected = match k {
-            SampleKind::DeltaAngle => 0.5,
+            SampleKind::DeltaAngle | SampleKind::Rotation => 0.5,
             _ => 0.5 * 0.005,
         };
         assert!((out[50].gyro.as_vector().y - expected).abs() < 1e-15);

@@ -13,7 +13,7 @@ fn meant(text: &str) -> (Option<(Kind, usize)>, Option<&'static str>) {
 
 #[test]
 fn names_of_many_makers_say_the_same() {
-    use Kind::{Accel, Gyro, Mag, Matrix, Orientation};
+    use Kind::{Accel, Gyro, Mag, Matrix, Orientation, Push, Turn};
     for (text, kind, part, unit) in [
         ("gyro_x", Gyro, 0, None),
         ("Gyr_Y", Gyro, 1, None),
@@ -48,6 +48,12 @@ fn names_of_many_makers_say_the_same() {
         ("W Element", Orientation, 0, None),
         ("orientation.w", Orientation, 0, None),
         ("Mat[2][3]", Matrix, 5, None),
+        ("dq_W", Turn, 0, None),
+        ("dQ_Z", Turn, 3, None),
+        ("OriInc_q2", Turn, 2, None),
+        ("OriInc_w", Turn, 0, None),
+        ("dv[1]", Push, 0, None),
+        ("VelInc_Z", Push, 2, None),
     ] {
         assert_eq!(meant(text), (Some((kind, part)), unit), "{text}");
     }
@@ -66,7 +72,6 @@ fn what_only_sounds_like_a_measurement_is_none() {
         "x",
         "q0",
         "status",
-        "dq_W",
         "temperature",
         "",
         "axisP[0]",

@@ -201,6 +201,19 @@ pub(crate) fn units_that_fit(
     Some((step, opening.fits.iter().map(|(unit, _)| *unit).collect()))
 }
 
+/// The same of the steps themselves.
+pub(crate) fn units_of_steps(
+    steps: impl IntoIterator<Item = Bare>,
+) -> Option<(f64, Vec<TimeUnit>)> {
+    let mut sum = 0_i128;
+    let mut until = |step: Bare| {
+        sum = sum.saturating_add(step.0);
+        Bare(sum)
+    };
+    let ends: Vec<Bare> = steps.into_iter().map(&mut until).collect();
+    units_that_fit(std::iter::once(Bare(0)).chain(ends))
+}
+
 /// What the first messages of a log tell.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Told {

@@ -60,9 +60,21 @@ impl Roles<'_> {
             .map(|(at, _)| at)
             .collect();
         let is_counted = self.given_of(Role::Counter).is_some();
+        let says = |role| {
+            self.given_of(role)
+                .is_some_and(|given| !given.columns.is_empty())
+        };
+        if says(Role::Step)
+            && let Some(stepped) = self.stepped()?
+        {
+            return Ok(stepped);
+        }
         match columns.as_slice() {
             _ if is_counted => self.counted(),
-            [] => self.counted(),
+            [] => match self.stepped()? {
+                Some(stepped) => Ok(stepped),
+                None => self.counted(),
+            },
             [one] => Ok(self.of_stamp(self.stamp(*one, None)?)),
             several => {
                 let stamps = several.iter().filter_map(|at| self.stamp(*at, None).ok());
@@ -138,7 +150,7 @@ impl Roles<'_> {
     }
 
     /// The numbers of a column in the first rows.
-    fn numbers(&self, at: usize) -> Vec<String> {
+    pub(super) fn numbers(&self, at: usize) -> Vec<String> {
         let cells = self.rows.iter().filter_map(|row| row.get(at));
         let cells = cells.filter(|cell| !cell.is_empty() && *cell != "-");
         cells.map(|cell| cell.replace(',', ".")).collect()

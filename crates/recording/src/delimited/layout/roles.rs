@@ -12,7 +12,7 @@ use crate::decode::Wanted;
 use std::collections::BTreeMap;
 use strapd_attitude::condition::GyroUnit;
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::record::AccelUnit;
+use strapd_attitude::record::{AccelUnit, SampleKind};
 use strapd_attitude::setting::{BODY, COLUMNS};
 
 /// What is known of a table before its roles.
@@ -34,9 +34,9 @@ pub(super) struct Group {
 }
 
 /// Columns that are one.
-struct Chosen {
-    columns: Vec<usize>,
-    unit: Option<Unit>,
+pub(super) struct Chosen {
+    pub(super) columns: Vec<usize>,
+    pub(super) unit: Option<Unit>,
 }
 
 /// A role, the columns that fill it, and what each of them is.
@@ -110,7 +110,7 @@ pub(super) fn bare_axes(names: &[Name], stem: &str, kind: Kind) -> Option<Vec<us
         Kind::Gyro => &["gyroscope"],
         Kind::Accel => &["totalacceleration", "accelerometer"],
         Kind::Mag => &["magnetometer"],
-        Kind::Orientation | Kind::Matrix => &[],
+        Kind::Orientation | Kind::Matrix | Kind::Turn | Kind::Push => &[],
     };
     let stem = stem.to_lowercase();
     stems.iter().find(|of_kind| stem.starts_with(*of_kind))?;
@@ -128,6 +128,10 @@ impl Roles<'_> {
         let mut notes = Vec::new();
         let gyro = self.chosen(Kind::Gyro, &mut notes)?;
         let accel = self.chosen(Kind::Accel, &mut notes)?;
+        let turn = match gyro {
+            None => self.chosen(Kind::Turn, &mut notes)?,
+            Some(_) => None,
+        };
         let mag = self.chosen(Kind::Mag, &mut notes)?;
         let orientation = self.chosen(Kind::Orientation, &mut notes)?;
         let matrix = match orientation {
@@ -135,7 +139,10 @@ impl Roles<'_> {
             Some(_) => None,
         };
         let is_beside = self.wanted != Wanted::Rates && (accel.is_some() || mag.is_some());
-        if gyro.is_none() && orientation.is_none() && matrix.is_none() && !is_beside {
+        let is_nothing = [&gyro, &turn, &orientation, &matrix]
+            .iter()
+            .all(|chosen| chosen.is_none());
+        if is_nothing && !is_beside {
             return Err(
                 Diagnostic::new("none of its columns is a rate or an orientation").help(format!(
                     "{COLUMNS} gyro=NAME:NAME:NAME; they are {}",
@@ -144,18 +151,26 @@ impl Roles<'_> {
             );
         }
         let instants = self.instants()?;
+        let period = self.period(&instants);
+        let push = match accel {
+            None => self.push(period, &mut notes)?,
+            Some(_) => None,
+        };
         let mut of: Vec<(usize, Column)> = Vec::new();
-        let roles: [Filled<'_>; 5] = [
+        let roles: [Filled<'_>; 7] = [
             (&gyro, Kind::Gyro, Column::Gyro),
             (&accel, Kind::Accel, Column::Accel),
             (&mag, Kind::Mag, Column::Mag),
             (&orientation, Kind::Orientation, Column::Orientation),
             (&matrix, Kind::Matrix, Column::Matrix),
+            (&turn, Kind::Turn, Column::Turn),
+            (&push, Kind::Push, Column::Accel),
         ];
         let mut assumed = Vec::new();
         for (chosen, kind, column) in roles {
             let Some(chosen) = chosen else {
-                if self.given_of(Role::Of(kind)).is_some() {
+                let given = self.given_of(Role::Of(kind));
+                if given.is_some_and(|given| given.columns.is_empty()) {
                     assumed.push(format!("{}=none", kind.name()));
                 }
                 continue;
@@ -199,6 +214,15 @@ impl Roles<'_> {
             table.declared.accel_unit = Some(unit);
             scales.accel = scale;
         }
+        if let (Some(_), Some(period)) = (&push, period) {
+            table.declared.accel_unit = Some(AccelUnit::MetresPerSecondSquared);
+            scales.accel = 1e9 / period as f64;
+        }
+        if turn.is_some() {
+            table.declared.sample_kind = Some(SampleKind::Rotation);
+            table.declared.gyro_unit = Some(GyroUnit::Rad);
+            table.interval = period;
+        }
         if let Some(Unit::Field(scale)) = mag.and_then(|mag| mag.unit) {
             scales.mag = scale;
         }
@@ -218,7 +242,11 @@ impl Roles<'_> {
     }
 
     /// The columns of a kind, where there are any.
-    fn chosen(&self, kind: Kind, notes: &mut Vec<String>) -> Result<Option<Chosen>, Diagnostic> {
+    pub(super) fn chosen(
+        &self,
+        kind: Kind,
+        notes: &mut Vec<String>,
+    ) -> Result<Option<Chosen>, Diagnostic> {
         if let Some(given) = self.given_of(Role::Of(kind)) {
             if given.columns.is_empty() {
                 return Ok(None);

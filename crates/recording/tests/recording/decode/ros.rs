@@ -493,7 +493,7 @@ fn px4_messages_bring_their_own_interval_and_meaning() {
     let sample = decode_one(&decoder, &payload);
     assert_eq!(
         decoder.stated().declared.sample_kind,
-        Some(SampleKind::DeltaAngle)
+        Some(SampleKind::Rotation)
     );
     assert_eq!(
         (sample.gyro, sample.interval_nanos),
