@@ -3,6 +3,7 @@
 use super::calibration_files;
 use super::continued;
 use super::estimation::{AidArg, Estimation};
+use super::known_words;
 use super::progress::Reporter;
 use super::serving::{Served, Serving};
 use super::tables::Tables;
@@ -87,7 +88,13 @@ pub struct Replay {
     )]
     pub out_rate: Option<f64>,
     /// How fast: max, or a factor of data time such as 1 or 0.5 [default: max; with --page or --paused 1]
-    #[arg(long, value_name = "FACTOR", help_heading = "Output")]
+    #[arg(
+        long,
+        value_name = "FACTOR",
+        help_heading = "Output",
+        value_parser = known_words::speed(),
+        hide_possible_values = true
+    )]
     pub speed: Option<String>,
     #[command(flatten)]
     #[allow(missing_docs)]
