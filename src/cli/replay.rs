@@ -41,7 +41,7 @@ pub struct Replay {
     /// Where the attitude goes: a .mcap, .ndjson, .csv, .tum (evo) or .parquet file, a directory, - (NDJSON on stdout),
     /// null: (nowhere); tcp-listen://HOST:PORT, unix-listen:///PATH, ws-listen://HOST:PORT (whoever
     /// connects); tcp://HOST:PORT, udp://HOST:PORT[?profile=plotjuggler] (somebody who listens).
-    /// {stem} stands for the log's name. May be given several times
+    /// {stem} stands for the log's name, and its folder is made, as that of DIR/ is. May be given several times
     #[arg(short, long = "output", value_name = "SINK")]
     pub outputs: Vec<String>,
     #[command(flatten)]
@@ -194,7 +194,11 @@ pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
     let mut summaries = Vec::new();
     for log in &logs {
         let result = outputs::resolve(&args.outputs, log, recordings.len())
-            .and_then(|names| args.run(log, &names, (selection.clone(), plan.clone())))
+            .and_then(|names| {
+                let run = args.run(log, &names, (selection.clone(), plan.clone()))?;
+                outputs::make_folders(&args.outputs, &names)?;
+                Ok(run)
+            })
             .and_then(|(mut run, served)| {
                 served.run(|again| {
                     if again {
@@ -280,9 +284,12 @@ impl Replay {
             );
         }
         let files = logs.iter().filter_map(|log| self.calibration_file(log));
-        files
-            .map(PathBuf::from)
-            .try_for_each(|file| calibration_files::check_target(&file, self.force))
+        files.map(PathBuf::from).try_for_each(|file| {
+            if outputs::is_pattern(name) {
+                outputs::make_folder(&file)?;
+            }
+            calibration_files::check_target(&file, self.force)
+        })
     }
 
     fn save_calibration(&self, log: &str, summary: &mut RunSummary) -> Result<()> {
