@@ -14,6 +14,7 @@ mod continued;
 pub mod estimation;
 pub mod info;
 mod known_words;
+mod made_before;
 pub mod manual;
 pub mod model;
 pub mod outputs;
@@ -246,13 +247,13 @@ impl From<Outcome> for ExitCode {
 /// Whatever ended it; see [`Error`].
 pub fn run(cli: Cli) -> Result<Outcome> {
     match cli.command {
-        Command::Replay(command) => replay::run(&cli.global, &command),
+        Command::Replay(command) => replay::run(&cli.global, *command),
         Command::Serve(command) => serve::run(&cli.global, &command),
         Command::Config(command) => config::run(&command),
-        Command::Calibrate(command) => calibrate::run(&cli.global, &command),
+        Command::Calibrate(command) => calibrate::run(&cli.global, *command),
         Command::Info(command) => info::run(&cli.global, &command),
         Command::Check(command) => check::run(&cli.global, &command),
-        Command::Report(command) => report::run(&cli.global, &command),
+        Command::Report(command) => report::run(&cli.global, *command),
         Command::Compare(command) => compare::run(&cli.global, &command),
         Command::Cat(command) => cat::run(&cli.global, &command),
         Command::Send(command) => send::run(&cli.global, &command),

@@ -4,6 +4,7 @@ use super::calibration_files;
 use super::continued;
 use super::estimation::{AidArg, Estimation};
 use super::known_words;
+use super::made_before;
 use super::progress::Reporter;
 use super::serving::{Served, Serving};
 use super::tables::Tables;
@@ -158,7 +159,10 @@ pub(super) fn speed(text: &str) -> Result<Option<f64>> {
 ///
 /// # Errors
 /// With one log, whatever ended it. With several, the rest still run; each failure is said.
-pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
+pub fn run(global: &Global, mut args: Replay) -> Result<Outcome> {
+    let is_of_one = args.sources.len() == 1;
+    args.sources = made_before::without(args.sources, args.estimation.topic.as_deref())?;
+    let args = &args;
     let shard = args.shard.as_deref().map(Shard::parse).transpose()?;
     if args.join && shard.is_some() {
         return Err(Error::usage(
@@ -239,7 +243,7 @@ pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
         tracing::warn!("{said}");
     }
     if global.json {
-        say_json(args, &summaries)?;
+        say_json(is_of_one, &summaries)?;
     }
     Ok(outcome)
 }
@@ -429,9 +433,9 @@ fn say_warnings(summary: &RunSummary) {
 }
 
 /// One object for one log, an array for several.
-fn say_json(args: &Replay, summaries: &[RunSummary]) -> Result<()> {
+fn say_json(is_of_one: bool, summaries: &[RunSummary]) -> Result<()> {
     let value = match summaries {
-        [one] if args.sources.len() == 1 => one.json(),
+        [one] if is_of_one => one.json(),
         many => many.iter().map(RunSummary::json).collect(),
     };
     print(&format!("{value}\n"))
