@@ -13,6 +13,8 @@ pub mod config;
 mod continued;
 pub mod estimation;
 pub mod info;
+mod known_words;
+mod made_before;
 pub mod manual;
 pub mod model;
 pub mod outputs;
@@ -266,13 +268,13 @@ pub fn run(cli: Cli) -> Result<Outcome> {
     #[cfg(feature = "object-store")]
     let cli = cli.with_patterns()?;
     match cli.command {
-        Command::Replay(command) => replay::run(&cli.global, &command),
+        Command::Replay(command) => replay::run(&cli.global, *command),
         Command::Serve(command) => serve::run(&cli.global, &command),
         Command::Config(command) => config::run(&command),
-        Command::Calibrate(command) => calibrate::run(&cli.global, &command),
+        Command::Calibrate(command) => calibrate::run(&cli.global, *command),
         Command::Info(command) => info::run(&cli.global, &command),
         Command::Check(command) => check::run(&cli.global, &command),
-        Command::Report(command) => report::run(&cli.global, &command),
+        Command::Report(command) => report::run(&cli.global, *command),
         Command::Compare(command) => compare::run(&cli.global, &command),
         Command::Cat(command) => cat::run(&cli.global, &command),
         Command::Send(command) => send::run(&cli.global, &command),

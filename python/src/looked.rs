@@ -31,6 +31,7 @@ pub fn info(py: Python<'_>, path: PathBuf) -> PyResult<(String, Vec<String>)> {
         let looks = look(&log, None, &options, &pool)?;
         let info = Overview {
             input: &input,
+            made_before: log.made_before(),
             survey: &looks.survey,
             problems: problems(&looks.survey),
             channels: &log.channels,

@@ -3,7 +3,7 @@
 use crate::client::remote::encoded;
 use crate::config::calibration::{parse, text_of};
 use crate::error::{Error, Result};
-use crate::sink::sync_directory;
+use crate::sink::{no_folder, sync_directory};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, Read, Write};
@@ -129,7 +129,14 @@ pub(super) fn check_target(path: &Path, force: bool) -> Result<()> {
             path: path.to_owned(),
         });
     }
-    Ok(())
+    // Before hours of work, not after them.
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => Err(Error::Write {
+            path: path.to_owned(),
+            source: no_folder(folder),
+        }),
+        _ => Ok(()),
+    }
 }
 
 /// Writes it: whatever happens, there is a whole one, or the one there was.

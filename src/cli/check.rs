@@ -1,7 +1,7 @@
 //! `strapd check FILE...`: every finding about a log, with the flag that helps. I/O.
 
 use super::tables::Tables;
-use super::{Global, Outcome, print, with_each};
+use super::{Global, Outcome, made_before, print, with_each};
 use crate::error::{Error, Result};
 use crate::pipeline::check::check;
 use crate::pipeline::logged;
@@ -54,7 +54,8 @@ pub fn run(global: &Global, args: &Check) -> Result<Outcome> {
     };
     args.tables.put(&mut options)?;
     let mut between = "";
-    with_each(&args.files, |file| {
+    let files = made_before::without(args.files.clone(), args.topic.as_deref())?;
+    with_each(&files, |file| {
         let (text, outcome) = one(global, args, file, (&options, &pool))?;
         print(&format!("{between}{text}"))?;
         between = if global.json { "" } else { "\n" };

@@ -2,6 +2,7 @@
 //! checked once. Pure but for the calibrations that are read.
 
 use super::calibration_files::Calibrations;
+use super::known_words;
 use crate::config::{
     parse_bias, parse_initial, parse_noise, parse_truncation, selection, unit_quaternion,
 };
@@ -111,7 +112,13 @@ pub struct Estimation {
     pub declination: f64,
     /// Put back what a driver cut from the rates towards zero, half a step: auto (a file shows it), on,
     /// on=STEP in rad/s, off [default: auto where the attitude is aided, else off]
-    #[arg(long, value_name = "WHEN", env = "STRAPD_UNDO_TRUNCATION")]
+    #[arg(
+        long,
+        value_name = "WHEN",
+        env = "STRAPD_UNDO_TRUNCATION",
+        value_parser = known_words::truncation(),
+        hide_possible_values = true
+    )]
     pub undo_truncation: Option<String>,
     /// Delay of the sensor's own filters, in seconds: each attitude is turned on by its rate for so long
     #[arg(
@@ -126,7 +133,13 @@ pub struct Estimation {
     pub gyro_unit: Option<UnitArg>,
     /// Axes of the input: flu, frd, or a map such as YxZ (which sensor axis is x, y, z of the body;
     /// lower case = reversed) [default: flu, unless the format says otherwise]
-    #[arg(long, value_name = "AXES", env = "STRAPD_BODY")]
+    #[arg(
+        long,
+        value_name = "AXES",
+        env = "STRAPD_BODY",
+        value_parser = known_words::body(),
+        hide_possible_values = true
+    )]
     pub body: Option<String>,
     /// World of the output: start (the attitude at the first sample), level (z up, heading of the
     /// start; what --aid gives unless told otherwise), enu, ned, nwu
@@ -147,6 +160,8 @@ pub struct Estimation {
     #[arg(
         long,
         value_name = "INIT",
+        value_parser = known_words::initial(),
+        hide_possible_values = true,
         default_value = "identity",
         allow_hyphen_values = true
     )]
@@ -155,6 +170,8 @@ pub struct Estimation {
     #[arg(
         long,
         value_name = "BIAS",
+        value_parser = known_words::bias(),
+        hide_possible_values = true,
         default_value = "none",
         allow_hyphen_values = true
     )]
@@ -195,7 +212,13 @@ pub struct Estimation {
     /// turn-on-bias (deg/h) and initial (deg), with commas between: arw=0.15,bias-instability=2; each one number, or three x/y/z for
     /// the body axes. The turn-on bias counts unless a bias is removed (--bias); initial is the uncertainty of the initial attitude.
     /// And one number each: scale-ppm and misalignment (deg), which grow with the angle turned, tilt (deg) of --init gravity.
-    #[arg(long, value_name = "NOISE", default_value = "consumer")]
+    #[arg(
+        long,
+        value_name = "NOISE",
+        default_value = "consumer",
+        value_parser = known_words::noise_class(),
+        hide_possible_values = true
+    )]
     pub noise: String,
     /// Skip the first seconds of the data
     #[arg(long, value_name = "SECS", allow_negative_numbers = true)]

@@ -85,6 +85,7 @@ fn one(
     let lossy = survey.problems.losses() > 0;
     let found = Overview {
         input: &input,
+        made_before: log.made_before().filter(|_| args.topic.is_none()),
         survey,
         problems: problems(survey),
         channels: &log.channels,

@@ -21,6 +21,41 @@ pub fn resolve(outputs: &[String], log: &str, logs: usize) -> Result<Vec<String>
         .collect()
 }
 
+/// Makes the folders of a log's outputs that were asked for as folders: by `{stem}`, or by a `/` at the end. That of a
+/// plain name is not made, as it may be a slip of the hand.
+///
+/// # Errors
+/// [`Error::Write`]: a folder can not be made.
+pub fn make_folders(outputs: &[String], names: &[String]) -> Result<()> {
+    let made = outputs
+        .iter()
+        .zip(names)
+        .filter(|(output, name)| is_pattern(output) && !name.contains("://"));
+    made.map(|(_, name)| Path::new(name))
+        .try_for_each(make_folder)
+}
+
+/// Makes the folder a file is to lie in.
+///
+/// # Errors
+/// [`Error::Write`].
+pub fn make_folder(file: &Path) -> Result<()> {
+    match file.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => {
+            std::fs::create_dir_all(folder).map_err(|source| Error::Write {
+                path: folder.to_owned(),
+                source,
+            })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Whether it stands for the names of logs, or for a folder of them.
+pub fn is_pattern(output: &str) -> bool {
+    output.contains("{stem}") || output.ends_with('/')
+}
+
 /// Checks that no two logs of a run, and no two `-o`, lead to the same file.
 ///
 /// All logs are looked at, those of other shards too: what one process would refuse, many must not

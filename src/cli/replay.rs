@@ -3,6 +3,8 @@
 use super::calibration_files;
 use super::continued;
 use super::estimation::{AidArg, Estimation};
+use super::known_words;
+use super::made_before;
 use super::progress::Reporter;
 use super::serving::{Served, Serving};
 use super::tables::Tables;
@@ -40,7 +42,7 @@ pub struct Replay {
     /// Where the attitude goes: a .mcap, .ndjson, .csv, .tum (evo) or .parquet file, a directory, - (NDJSON on stdout),
     /// null: (nowhere); tcp-listen://HOST:PORT, unix-listen:///PATH, ws-listen://HOST:PORT (whoever
     /// connects); tcp://HOST:PORT, udp://HOST:PORT[?profile=plotjuggler] (somebody who listens).
-    /// {stem} stands for the log's name. May be given several times
+    /// {stem} stands for the log's name, and its folder is made, as that of DIR/ is. May be given several times
     #[arg(short, long = "output", value_name = "SINK")]
     pub outputs: Vec<String>,
     #[command(flatten)]
@@ -87,7 +89,13 @@ pub struct Replay {
     )]
     pub out_rate: Option<f64>,
     /// How fast: max, or a factor of data time such as 1 or 0.5 [default: max; with --page or --paused 1]
-    #[arg(long, value_name = "FACTOR", help_heading = "Output")]
+    #[arg(
+        long,
+        value_name = "FACTOR",
+        help_heading = "Output",
+        value_parser = known_words::speed(),
+        hide_possible_values = true
+    )]
     pub speed: Option<String>,
     #[command(flatten)]
     #[allow(missing_docs)]
@@ -151,7 +159,10 @@ pub(super) fn speed(text: &str) -> Result<Option<f64>> {
 ///
 /// # Errors
 /// With one log, whatever ended it. With several, the rest still run; each failure is said.
-pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
+pub fn run(global: &Global, mut args: Replay) -> Result<Outcome> {
+    let is_of_one = args.sources.len() == 1;
+    args.sources = made_before::without(args.sources, args.estimation.topic.as_deref())?;
+    let args = &args;
     let shard = args.shard.as_deref().map(Shard::parse).transpose()?;
     if args.join && shard.is_some() {
         return Err(Error::usage(
@@ -187,7 +198,11 @@ pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
     let mut summaries = Vec::new();
     for log in &logs {
         let result = outputs::resolve(&args.outputs, log, recordings.len())
-            .and_then(|names| args.run(log, &names, (selection.clone(), plan.clone())))
+            .and_then(|names| {
+                let run = args.run(log, &names, (selection.clone(), plan.clone()))?;
+                outputs::make_folders(&args.outputs, &names)?;
+                Ok(run)
+            })
             .and_then(|(mut run, served)| {
                 served.run(|again| {
                     if again {
@@ -228,7 +243,7 @@ pub fn run(global: &Global, args: &Replay) -> Result<Outcome> {
         tracing::warn!("{said}");
     }
     if global.json {
-        say_json(args, &summaries)?;
+        say_json(is_of_one, &summaries)?;
     }
     Ok(outcome)
 }
@@ -273,9 +288,12 @@ impl Replay {
             );
         }
         let files = logs.iter().filter_map(|log| self.calibration_file(log));
-        files
-            .map(PathBuf::from)
-            .try_for_each(|file| calibration_files::check_target(&file, self.force))
+        files.map(PathBuf::from).try_for_each(|file| {
+            if outputs::is_pattern(name) {
+                outputs::make_folder(&file)?;
+            }
+            calibration_files::check_target(&file, self.force)
+        })
     }
 
     fn save_calibration(&self, log: &str, summary: &mut RunSummary) -> Result<()> {
@@ -415,9 +433,9 @@ fn say_warnings(summary: &RunSummary) {
 }
 
 /// One object for one log, an array for several.
-fn say_json(args: &Replay, summaries: &[RunSummary]) -> Result<()> {
+fn say_json(is_of_one: bool, summaries: &[RunSummary]) -> Result<()> {
     let value = match summaries {
-        [one] if args.sources.len() == 1 => one.json(),
+        [one] if is_of_one => one.json(),
         many => many.iter().map(RunSummary::json).collect(),
     };
     print(&format!("{value}\n"))

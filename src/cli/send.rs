@@ -5,7 +5,7 @@
 
 use super::cat::line;
 use super::tables::Tables;
-use super::{Global, Outcome, replay};
+use super::{Global, Outcome, known_words, replay};
 use crate::client;
 use crate::client::remote::Remote;
 use crate::client::secret::Secret;
@@ -62,7 +62,13 @@ pub struct Send {
     #[arg(long, value_name = "NAME")]
     pub id: Option<String>,
     /// How many times as fast as they were measured, or max
-    #[arg(long, value_name = "FACTOR", default_value = "1")]
+    #[arg(
+        long,
+        value_name = "FACTOR",
+        default_value = "1",
+        value_parser = known_words::speed(),
+        hide_possible_values = true
+    )]
     pub speed: String,
     /// The token the daemon asks for is in this file (first line, mode 0600)
     #[arg(long, value_name = "FILE", env = "STRAPD_TOKEN_FILE")]

@@ -6,6 +6,7 @@ mod bare_stamps;
 mod flags;
 mod help;
 mod inputs;
+mod made_before;
 mod manual;
 mod outputs;
 mod paste;

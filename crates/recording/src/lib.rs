@@ -71,6 +71,7 @@ mod ulog;
 
 pub use error::{Error, Result};
 pub use recording::input::{Input, Source};
+pub use recording::made_before::MadeBefore;
 pub use recording::opened::Recording;
 pub use recording::selection::{Selection, TopicBeside};
 pub use recording::warn::Warn;

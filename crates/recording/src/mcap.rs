@@ -48,6 +48,7 @@ pub use record::{
     MessageRecord, Record, SchemaRecord, Statistics, op,
 };
 pub use scan::Facts;
+pub(crate) use survey::OURS;
 pub use survey::{ChannelSurvey, PassedChunks, Survey, survey};
 pub use walk::{WalkOptions, WalkReport, salvage, walk};
 

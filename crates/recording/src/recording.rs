@@ -17,6 +17,7 @@
 //! | [`selection`], [`topics`], [`beside`], [`decoders`] | what is wanted, the choice of topics, what belongs to their samples, how messages are read |
 //! | [`channel_route`], [`held`], `bare_stamps`, [`early_besides`] | what becomes of messages; those that wait for the unit of their stamps, or for their sensor |
 //! | `samples`, [`topic_reading`], [`sensor_lines`] | all samples that are selected, one topic, one sensor of a text that comes once |
+//! | [`made_before`] | whether it is none, but what strapd made of one |
 //! | [`warn`] | who is told what is no error |
 
 mod bare_stamps;
@@ -30,6 +31,7 @@ pub mod incoming;
 pub mod input;
 mod line_input;
 pub mod log_channel;
+pub mod made_before;
 pub mod opened;
 mod parts;
 mod samples;

@@ -41,6 +41,15 @@ pub fn findings(checked: &Checked) -> Vec<Finding> {
             );
         }
     }
+    if let Some(made) = &checked.made_before {
+        found.push(
+            Finding::new(Severity::Warning, "made-before", made.to_string())
+                .with("made_of", made.of.clone())
+                .advise(
+                    "its rates are those of that recording, less the bias: look at the recording",
+                ),
+        );
+    }
     for why in &checked.refused {
         // Its own help follows on lines of its own.
         let what = why.lines().next().unwrap_or_default();

@@ -7,6 +7,7 @@ use crate::inspection::{Aids, Inspection};
 use crate::shell::{flag, quoted_file};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
+use std::path::Path;
 use strapd_attitude::condition::quality::Advice;
 use strapd_attitude::setting::{
     AGAINST_RECORDED, BIAS, COLUMNS, Choice, FIELD, GYRO_UNIT, INIT, JOIN, TOPIC,
@@ -14,7 +15,7 @@ use strapd_attitude::setting::{
 use strapd_recording::mcap::Survey;
 use strapd_recording::recording::beside::TopicOfVectors;
 use strapd_recording::recording::log_channel::{LogChannel, rank};
-use strapd_recording::{Input, Source};
+use strapd_recording::{Input, MadeBefore, Source};
 
 /// Units of a field by the length of the Earth's, 22 to 67 uT, with room for what iron does to it.
 const FIELD_UNITS: [(&str, f64); 5] = [
@@ -33,6 +34,8 @@ const RESTS: usize = 100;
 pub struct Overview<'a> {
     /// The file, or standard input.
     pub input: &'a Input,
+    /// It is no recording, but attitudes made of one.
+    pub made_before: Option<MadeBefore>,
     /// What is in it.
     pub survey: &'a Survey,
     /// What is wrong with it.
@@ -71,6 +74,11 @@ impl Overview<'_> {
             Source::Stdin => "-".to_owned(),
             Source::Elsewhere(_) => quoted_file(&self.input.source().name()),
         };
+        if let Some(made) = &self.made_before {
+            let of = made.of.as_ref().map(|of| quoted_file(Path::new(of)));
+            let of = of.unwrap_or_else(|| "RECORDING".to_owned());
+            return format!("strapd compare {file} {of}   # {made}");
+        }
         let best = match self.looked {
             [] => {
                 return format!(
@@ -130,6 +138,7 @@ impl Overview<'_> {
             "format": survey.facts.format.name(),
             "profile": survey.facts.profile,
             "library": survey.facts.library,
+            "made_before": self.made_before.is_some(),
             "messages": survey.messages,
             "log_time_ns": survey.times.map(|(a, b)| json!({ "first": a.to_string(), "last": b.to_string() })),
             "has_summary": survey.has_summary,

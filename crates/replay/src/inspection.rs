@@ -9,6 +9,7 @@ use strapd_attitude::condition::{Clock, GyroUnit};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{Aid, Aiding, Meaning, Plan};
 use strapd_attitude::record::RawSample;
+use strapd_recording::MadeBefore;
 use strapd_recording::recording::beside::TopicOfVectors;
 
 /// One topic of samples, looked at.
@@ -127,6 +128,8 @@ pub struct Checked {
     pub file_size: Option<u64>,
     /// The profile it names.
     pub profile: String,
+    /// It is none: it holds attitudes made of one.
+    pub made_before: Option<MadeBefore>,
     /// Topics that sound like an IMU's and can not be decoded: why.
     pub refused: Vec<String>,
     /// Its topics of samples.

@@ -36,7 +36,7 @@ pub use mcap::live::{LiveMcap, LiveStream};
 pub use mcap::payload;
 pub use mcap::{Attachment, Encoding, InputChannel, InputMessage};
 pub use output::Flow;
-pub use output::sync_directory;
+pub use output::{no_folder, sync_directory};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::setting::TOPIC;
 pub use stream::{ChildFrames, Content, Provenance, Stream, output_topic};

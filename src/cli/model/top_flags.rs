@@ -1,10 +1,11 @@
 //! The flags that say which top, and how it starts: shared by `simulate top` and `model top`. Pure.
 
+use crate::cli::known_words;
 use crate::config::numbers;
 use crate::error::{Error, Result};
 use clap::Args;
 use std::f64::consts::TAU;
-use strapd_bodies::top::method_errors::{body, case};
+use strapd_bodies::top::method_errors::body;
 use strapd_bodies::top::{Case, EulerAngles, EulerState, SymmetricTop};
 
 /// Which top, and how it starts. The defaults are the source document's.
@@ -12,7 +13,7 @@ use strapd_bodies::top::{Case, EulerAngles, EulerState, SymmetricTop};
 #[command(next_help_heading = "Top")]
 pub struct TopFlags {
     /// cusped, wavy, looping, steady-slow, steady-fast, sleeping or falling [default: cusped]
-    #[arg(long, value_name = "CASE", value_parser = case, conflicts_with_all = ["euler", "euler_rates"])]
+    #[arg(long, value_name = "CASE", value_parser = known_words::top_case(), hide_possible_values = true, conflicts_with_all = ["euler", "euler_rates"])]
     pub case: Option<Case>,
     /// Turns a second about the axis of symmetry (the body's z rate) [default: 20]
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]

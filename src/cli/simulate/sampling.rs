@@ -2,6 +2,7 @@
 
 use super::{Made, parameter};
 use crate::cli::estimation::KindArg;
+use crate::cli::known_words;
 use crate::cli::replay::CompressionArg;
 use crate::cli::serving::{Served, Serving};
 use crate::config::numbers;
@@ -60,7 +61,13 @@ pub struct Common {
     #[arg(long, value_enum, default_value = "zstd", help_heading = "Output")]
     pub compression: CompressionArg,
     /// How fast: max, or a factor of data time such as 1 or 0.5 [default: max; with --page or --paused 1]
-    #[arg(long, value_name = "FACTOR", help_heading = "Output")]
+    #[arg(
+        long,
+        value_name = "FACTOR",
+        help_heading = "Output",
+        value_parser = known_words::speed(),
+        hide_possible_values = true
+    )]
     pub speed: Option<String>,
     #[command(flatten)]
     #[allow(missing_docs)]
@@ -131,6 +138,8 @@ pub struct Common {
         long,
         value_name = "NOISE",
         default_value = "none",
+        value_parser = known_words::noise_of_a_sensor(),
+        hide_possible_values = true,
         help_heading = "Errors"
     )]
     pub noise: String,

@@ -75,7 +75,8 @@ pub(super) fn table(class: &str, head: &[&str], rows: &[Vec<String>]) -> String 
     };
     let head =
         cells("th", &mut head.iter().map(|cell| escaped(cell))).replace("<th></th>", "<td></td>");
-    let mut out = format!("<div class=\"wide\"><table class=\"{class}\">\n<tr>{head}</tr>\n");
+    let mut out =
+        format!("<div class=\"wide\" tabindex=\"0\"><table class=\"{class}\">\n<tr>{head}</tr>\n");
     for row in rows {
         let row = cells("td", &mut row.iter().map(|cell| escaped(cell)));
         let _ = writeln!(out, "<tr>{row}</tr>");

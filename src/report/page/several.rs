@@ -24,8 +24,8 @@ const HEAD: [&str; 9] = [
     "lost",
     "gaps",
     "turned, deg",
-    "error: rms / max, deg",
-    "over 1 s, deg",
+    "error of tilt / heading, deg",
+    "gyro over 1 s, deg",
 ];
 
 /// A page about several logs.
@@ -162,7 +162,7 @@ impl Several {
         let body = format!(
             "<h1>{} logs</h1>\n<p id=\"verdict\" class=\"{}\">{sentence}</p>\n\
              <section id=\"logs\"><h2>Side by side</h2>\n<div class=\"wide\" tabindex=\"0\"><table class=\"numbers\">\n<thead><tr>{head}</tr></thead>\n<tbody>\n{}</tbody></table></div>\n\
-             <p class=\"small\">Error: of the attitude against the log's own reference, where it has one, after one turn of the world that makes the first instant agree; over 1 s the median.</p></section>\n{}",
+             <p class=\"small\">Error: of the attitude against the log's own reference, where it has one, rms over all of it, the worlds laid on each other as the log's part says; of the gyro alone over 1 s the median.</p></section>\n{}",
             self.count,
             level.name(),
             self.rows,

@@ -110,28 +110,18 @@ impl Verdict {
     }
 }
 
-/// Of each topic that was integrated: duration, rate, lost samples, gaps, turned, error and error over 1 s.
+/// Of each topic that was integrated: duration, rate, lost samples, gaps, turned, error, and that of the gyro over 1 s.
 pub(super) fn figures(checked: &Checked) -> Vec<(String, [String; 7])> {
     let of = |s: &TopicSummary| {
-        let used = s
-            .drawn
-            .as_deref()
-            .and_then(|drawn| drawn.errors.as_ref())
-            .and_then(|errors| errors.traces.iter().find(|trace| trace.is_used))
-            .map(|trace| &trace.comparison);
-        let deg = |v: f64| significant(v.to_degrees(), 3);
-        let total = used.and_then(|found| found.errors.as_ref());
-        let over = used.and_then(|found| found.relative_1s.as_ref());
+        let over = s.against.iter().find(|row| row.kind == s.kind.name());
         [
             format!("{:.3}", s.duration_secs),
             s.rate_hz.map_or_else(String::new, |hz| significant(hz, 4)),
             s.counts.lost().to_string(),
             (s.gaps.bridged + s.gaps.held + s.gaps.resets).to_string(),
             format!("{:.1}", s.turned.to_degrees()),
-            total.map_or_else(String::new, |found| {
-                format!("{} / {}", deg(found.total.rms), deg(found.total.max))
-            }),
-            over.map_or_else(String::new, |found| deg(found.median)),
+            whole_error(s).map_or_else(String::new, |parts| parts.join(" / ")),
+            over.map_or_else(String::new, |row| significant(row.median_deg, 3)),
         ]
     };
     let runs = checked.topics.iter().filter_map(|topic| {
@@ -139,6 +129,31 @@ pub(super) fn figures(checked: &Checked) -> Vec<(String, [String; 7])> {
         Some((summary.topic.clone(), of(summary)))
     });
     runs.take(TOPICS).collect()
+}
+
+/// Errors of tilt and heading of the attitude that was made, over the whole run, deg.
+fn whole_error(s: &TopicSummary) -> Option<[String; 2]> {
+    let errors = s.drawn.as_deref()?.errors.as_ref()?;
+    let (found, _) = errors.bounds.as_ref()?;
+    Some([found.tilt.rms, found.heading.rms].map(|rms| significant(rms.to_degrees(), 2)))
+}
+
+/// All of the error first: what the gyro misses over 1 s says little of a heading that drifts for an hour.
+fn from_the_reference(s: &TopicSummary) -> String {
+    let over = s.against.iter().find(|row| row.kind == s.kind.name());
+    let over = over.map(|row| significant(row.median_deg, 3));
+    match (whole_error(s), over) {
+        (Some([tilt, heading]), over) => {
+            let over = over.map_or_else(String::new, |over| {
+                format!("; the gyro alone {over} deg over 1 s")
+            });
+            format!(
+                ", {tilt} deg of tilt and {heading} deg of heading from the reference (rms{over})"
+            )
+        }
+        (None, Some(over)) => format!(", the gyro {over} deg from the reference over 1 s (median)"),
+        (None, None) => String::new(),
+    }
 }
 
 fn good(s: &TopicSummary, trusted: bool) -> String {
@@ -156,16 +171,10 @@ fn good(s: &TopicSummary, trusted: bool) -> String {
         1 => " with one gap".to_owned(),
         n => format!(" with {n} gaps"),
     };
-    let follows = s
-        .against
-        .iter()
-        .find(|row| trusted && row.kind == s.kind.name())
-        .map_or_else(String::new, |row| {
-            format!(
-                ", {} deg from the reference over 1 s (median)",
-                significant(row.median_deg, 3)
-            )
-        });
+    let follows = match trusted {
+        true => from_the_reference(s),
+        false => String::new(),
+    };
     format!(
         "{which} samples{rate} were integrated over {}{gaps}{follows}",
         duration(s.duration_secs)

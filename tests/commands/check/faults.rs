@@ -2,6 +2,7 @@
 
 use super::{codes, found};
 use crate::made_logs::{ImuSample, PACKINGS, START, TOPIC, bytes, logged, written};
+use crate::program::strapd;
 use strapd_bodies::motion::BandLimited;
 
 /// A body on the table for 1.5 s, then moved at random; exact rates and orientation, gravity's reaction
@@ -105,7 +106,73 @@ fn bad_units_and_axes_are_found() {
     assert_eq!(frd, ["looks-frd"]);
     let in_g = with(|_, s| s.accel = s.accel.map(|a| a / 9.80665));
     assert_eq!(in_g, ["accel-unit"]);
+    // These begin behind the rest, and are never still.
+    let moving = |of: &dyn Fn([f64; 3]) -> [f64; 3]| {
+        let mut samples = clean(2);
+        samples.drain(..600);
+        samples.iter_mut().for_each(|s| s.accel = of(s.accel));
+        codes_of(&samples)
+    };
+    let scaled = |by: f64| move |accel: [f64; 3]| accel.map(|a| a * by / 9.80665);
+    assert_eq!(moving(&scaled(9.80665)), Vec::<&str>::new());
+    assert_eq!(moving(&scaled(1.0)), ["accel-unit"]);
+    assert_eq!(moving(&scaled(1000.0)), ["accel-unit"]);
     assert_eq!(with(|_, s| s.gyro[1] += 0.01), ["bias"]);
+}
+
+#[test]
+fn what_becomes_of_forces_in_g_is_said() {
+    let dir = tempfile::tempdir().unwrap();
+    let checked =
+        |file: &str, flags: &str| strapd(dir.path(), &format!("check {file} {flags}")).out;
+    let replayed = |file: &str, flags: &str| {
+        let ran = strapd(
+            dir.path(),
+            &format!("replay {file} -o null: --aid auto {flags}"),
+        );
+        ran.done().out.clone()
+    };
+    let samples = |by: f64| {
+        let mut samples = clean(2);
+        samples.drain(..600);
+        for sample in &mut samples {
+            sample.accel = sample.accel.map(|a| a * by / 9.80665);
+        }
+        samples
+    };
+    // A message of ROS has m/s^2.
+    written(dir.path(), "log.mcap", &samples(1.0));
+    let said = checked("log.mcap", "");
+    assert!(
+        said.contains("100 % of the accelerations have the length of gravity in g, not in m/s^2")
+            && said.contains("no setting says otherwise"),
+        "{said}"
+    );
+    assert!(replayed("log.mcap", "").contains("the gyro's alone"));
+    // A table has what its columns say, if they do.
+    let table = |name: &str, by: f64| {
+        let mut rows = "time_s,gx,gy,gz,ax,ay,az\n".to_owned();
+        for (i, s) in samples(by).iter().enumerate() {
+            let ([x, y, z], [u, v, w]) = (s.gyro, s.accel);
+            rows += &format!("{:.3},{x},{y},{z},{u},{v},{w}\n", i as f64 * 0.005);
+        }
+        std::fs::write(dir.path().join(name), rows).unwrap();
+    };
+    table("g.csv", 1.0);
+    assert!(checked("g.csv", "").contains("-> taken to be in g where gravity corrects"));
+    assert!(replayed("g.csv", "").contains("taken to be in g, not in m/s^2"));
+    table("mg.csv", 1000.0);
+    let said = checked("mg.csv", "");
+    let help = "--columns accel=X:Y:Z:mg";
+    assert!(
+        said.contains("of gravity in mg") && said.contains(help),
+        "{said}"
+    );
+    assert!(replayed("mg.csv", "").contains("the gyro's alone"));
+    let stated = "--columns accel=ax:ay:az:mg";
+    let said = checked("mg.csv", stated);
+    assert!(!said.contains("accel-unit"), "{said}");
+    assert!(replayed("mg.csv", stated).contains("aid      gravity"));
 }
 
 #[test]

@@ -38,6 +38,82 @@ fn completions_for_every_shell_know_every_command() {
     strapd(dir.path(), "completions csh").refused(2, &["csh", "bash"]);
 }
 
+/// What the generated script of bash offers behind a flag of a command.
+fn offered(script: &str, command: &str, flag: &str) -> String {
+    let case = script
+        .split_once(&format!("\n        strapd__subcmd__{command})\n"))
+        .unwrap_or_else(|| panic!("{command} is not in the script"))
+        .1;
+    let case = case.split_once("\n            ;;\n").map_or(case, |c| c.0);
+    let behind = case
+        .split_once(&format!("\n                --{flag})\n"))
+        .unwrap_or_else(|| panic!("{command} has no --{flag}"))
+        .1;
+    behind
+        .split_once("compgen -")
+        .and_then(|(_, offer)| offer.lines().next())
+        .unwrap_or_default()
+        .to_owned()
+}
+
+#[test]
+fn a_flag_that_knows_words_and_takes_others_is_completed_with_the_words() {
+    let dir = tempfile::tempdir().unwrap();
+    let script = strapd(dir.path(), "completions bash").done().out.clone();
+    for (command, flag, words) in [
+        (
+            "replay",
+            "init",
+            "identity gravity first-orientation q= rpy=",
+        ),
+        ("replay", "bias", "none auto"),
+        ("replay", "body", "flu frd"),
+        (
+            "serve",
+            "init",
+            "identity gravity first-orientation q= rpy=",
+        ),
+        ("report", "undo-truncation", "auto on off"),
+        (
+            "replay",
+            "noise",
+            "consumer uncalibrated industrial tactical navigation",
+        ),
+        ("simulate__subcmd__random", "noise", "none consumer_mems "),
+        (
+            "simulate__subcmd__top",
+            "case",
+            "cusped wavy looping steady-slow steady-fast sleeping falling",
+        ),
+        ("model__subcmd__top", "case", "cusped wavy looping"),
+        ("send", "speed", "max 1"),
+    ] {
+        let offer = offered(&script, command, flag);
+        assert!(
+            offer.starts_with(&format!("W \"{words}")),
+            "{command} --{flag}: {offer}"
+        );
+    }
+    // What is not among them is read as before, and refused in the same words; the help names them once.
+    for taken in [
+        "simulate random --duration 0.1 --noise arw=0.2,rrw=1 -o null:",
+        "simulate top --duration 0.1 --case wavy -o log.mcap",
+        "replay log.mcap --init rpy=0,10,20 --noise arw=0.15 --bias -0.1,0,0 --body YxZ --speed 90 -o null:",
+    ] {
+        strapd(dir.path(), taken).done();
+    }
+    strapd(dir.path(), "simulate top --case tumbling -o null:")
+        .refused(2, &["tumbling", "steady-slow"]);
+    strapd(dir.path(), "replay log.mcap --init level -o null:")
+        .refused(2, &["--init level", "first-orientation", "rpy="]);
+    let help = strapd(dir.path(), "replay --help");
+    assert!(
+        !help.out.contains("possible values: identity"),
+        "{}",
+        help.out
+    );
+}
+
 #[test]
 fn the_manual_is_one_page_on_stdout_or_one_per_command_in_a_directory() {
     let dir = tempfile::tempdir().unwrap();

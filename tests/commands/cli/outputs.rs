@@ -82,8 +82,45 @@ fn a_directory_takes_one_output_per_log() {
         names(&at.join("out")),
         ["log.attitude.mcap", "more.attitude.mcap"]
     );
-    strapd(at, "replay log.mcap -o nowhere/a.csv")
-        .refused(1, &["nowhere/a.csv", "directory nowhere does not exist"]);
+    strapd(at, "replay log.mcap -o nowhere/a.csv").refused(
+        1,
+        &[
+            "nowhere/a.csv",
+            "directory nowhere does not exist",
+            "help: make it: mkdir -p nowhere",
+        ],
+    );
+}
+
+#[test]
+fn the_folder_of_a_pattern_is_made_and_that_of_a_plain_name_is_not() {
+    let dir = bench();
+    let at = dir.path();
+    strapd(
+        at,
+        "replay log.mcap -o a/{stem}.csv -o b/{stem}/x.mcap -o c/d/ --aid gravity --save-calibration e/{stem}.toml",
+    )
+    .done();
+    for made in [
+        "a/log.csv",
+        "b/log/x.mcap",
+        "c/d/log.attitude.mcap",
+        "e/log.toml",
+    ] {
+        assert!(at.join(made).is_file(), "{made}: {:?}", names(at));
+    }
+    for (flags, code) in [
+        ("-o f/a.csv", 1),
+        ("-o g/{stem}.bag", 2),
+        ("-o tcp://127.0.0.1:1/{stem}", 2),
+        // Before the work, not after it.
+        ("-o h.csv --aid gravity --save-calibration h/a.toml", 1),
+    ] {
+        strapd(at, &format!("replay log.mcap {flags}")).refused(code, &[]);
+    }
+    assert_eq!(names(at), ["a", "b", "c", "e", "log.mcap"]);
+    // What is in the way is said.
+    strapd(at, "replay log.mcap -o log.mcap/{stem}.csv").refused(1, &["log.mcap", "cannot write"]);
 }
 
 #[test]

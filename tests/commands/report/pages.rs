@@ -325,6 +325,25 @@ fn the_verdict_and_what_was_written_are_said() {
     let html = std::fs::read_to_string(dir.path().join("r.html")).unwrap();
     let verdict = data(&html)["verdict"]["text"].as_str().unwrap().to_owned();
     assert!(ran.err.contains(&verdict), "{}", ran.err);
+    // All of the error of this attitude, as it is held against its sigma, and not that of the gyro over 1 s alone.
+    let (_, judged) = html.split_once("<p id=\"within-sigma\">").unwrap();
+    let rms = |part: &str| {
+        let (_, rest) = judged.split_once(part).unwrap();
+        let (_, rest) = rest.split_once("(rms ").unwrap();
+        rest.split_once(" deg").unwrap().0.to_owned()
+    };
+    let said = format!(
+        ", {} deg of tilt and {} deg of heading from the reference (rms; the gyro alone ",
+        rms("3 sigma: tilt"),
+        rms(", heading")
+    );
+    assert!(verdict.contains(&said), "{said}: {verdict}");
+    // Several beside each other have the same.
+    let two = format!("report {0} {0} -o two.html", log.display());
+    assert_eq!(strapd(dir.path(), &two).code, Some(0));
+    let two = std::fs::read_to_string(dir.path().join("two.html")).unwrap();
+    let cell = format!("<td>{} / {}</td>", rms("3 sigma: tilt"), rms(", heading"));
+    assert_eq!(two.matches(&cell).count(), 2, "{cell}");
     // Of a log nothing can be had of, too.
     let empty = strapd(
         dir.path(),

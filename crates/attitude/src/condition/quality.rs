@@ -14,6 +14,7 @@ pub use summary::{AxisStats, GravityAxis, OffsetStats, QualitySummary, SpacingSt
 use super::clock::Clock;
 use super::histogram::Histogram;
 use crate::record::{Nanos, RawSample};
+use advice::NEAR_ONE;
 use gravity::GravityTrack;
 use nalgebra::Vector3;
 
@@ -61,6 +62,9 @@ pub struct Quality {
     previous: Option<[f64; 3]>,
     accel_count: u64,
     accel_not_finite: u64,
+    /// Of so many its length is near 1, and near 1000.
+    near_one: u64,
+    near_thousand: u64,
     orientations: u64,
     first_orientation: Option<[f64; 4]>,
     orientation_varies: bool,
@@ -226,6 +230,8 @@ impl Quality {
             previous: None,
             accel_count: 0,
             accel_not_finite: 0,
+            near_one: 0,
+            near_thousand: 0,
             orientations: 0,
             first_orientation: None,
             orientation_varies: false,
@@ -384,7 +390,11 @@ impl Quality {
             self.accel_not_finite += 1;
             return None;
         }
-        Some(Vector3::from(accel))
+        let accel = Vector3::from(accel);
+        let length = accel.norm();
+        self.near_one += u64::from(NEAR_ONE.contains(&length));
+        self.near_thousand += u64::from(NEAR_ONE.contains(&(length * 1e-3)));
+        Some(accel)
     }
 
     fn push_window(&mut self, stamp: Nanos, gyro: &[f64; 3], accel: Option<Vector3<f64>>) {

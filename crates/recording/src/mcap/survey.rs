@@ -34,6 +34,9 @@ pub struct ChannelSurvey {
     pub bytes: Option<u64>,
 }
 
+/// How a header names this program, before its version.
+pub(crate) const OURS: &str = "strapd ";
+
 /// What is in a log.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Survey {
@@ -224,7 +227,7 @@ fn from_summary(reader: &Reader, summary: Summary) -> Result<Option<Survey>> {
     Ok(Some(survey))
 }
 
-/// The facts known from the header alone.
+/// The facts known from the header, and of what strapd wrote from the metadata behind it.
 fn header(reader: &Reader) -> Result<Facts> {
     let Some(again) = reader.again() else {
         return Ok(Facts::default());
@@ -232,9 +235,13 @@ fn header(reader: &Reader) -> Result<Facts> {
     let name = again.name().to_owned();
     let mut scanner = Scanner::new(again.input, again.limits, Besides::Everything);
     scanner.next().map_err(|e| read_error(&name, 0, e))?;
+    if scanner.facts.library.starts_with(OURS) {
+        scanner.next().map_err(|e| read_error(&name, 0, e))?;
+    }
     Ok(Facts {
         profile: scanner.facts.profile,
         library: scanner.facts.library,
+        provenance: scanner.facts.provenance,
         ..Facts::default()
     })
 }

@@ -4,6 +4,7 @@
 //! beside it have what corrects them, or nothing of use here.
 
 use super::line_input;
+use super::made_before::MadeBefore;
 use super::warn::Warn;
 use crate::decode::{Options, Wanted};
 use crate::delimited::Table;
@@ -57,12 +58,15 @@ pub(super) fn of(path: &Path, warn: &Warn) -> Result<Folder> {
     let mut known = None;
     for file in &files {
         match Format::of_file(file) {
-            Ok(Some(Format::Table)) => tables.add(file),
             Ok(Some(format)) => whole.push((file.clone(), format)),
             Err(why @ Error::NotRead { .. }) => known = known.or(Some(why)),
             Ok(None) | Err(_) => {}
         }
     }
+    let (of_tables, whole): (Vec<_>, Vec<_>) = without_those_made_before(path, whole, warn)
+        .into_iter()
+        .partition(|(_, format)| *format == Format::Table);
+    of_tables.iter().for_each(|(file, _)| tables.add(file));
     for found in [&mut tables.rates, &mut tables.fields] {
         let is_raw = |file: &PathBuf| stem(file).contains("uncalibrated");
         if found.iter().any(|file| !is_raw(file)) {
@@ -169,6 +173,31 @@ impl Tables {
         }
         beside
     }
+}
+
+/// Of several only recordings: attitudes that were made of one of them may lie beside it, which is said.
+fn without_those_made_before(
+    path: &Path,
+    found: Vec<(PathBuf, Format)>,
+    warn: &Warn,
+) -> Vec<(PathBuf, Format)> {
+    if found.len() < 2 {
+        return found;
+    }
+    let (made, mut left): (Vec<_>, Vec<_>) = found
+        .into_iter()
+        .map(|one| (MadeBefore::in_file(&one.0), one))
+        .partition(|(made, _)| made.is_some());
+    if left.is_empty() {
+        left = made;
+    } else {
+        for (what, (file, _)) in &made {
+            let what = what.iter().map(ToString::to_string).collect::<String>();
+            let (folder, file) = (path.display(), named(std::slice::from_ref(file)));
+            warn.say(&format!("{folder}: {file} is not read: {what}"));
+        }
+    }
+    left.into_iter().map(|(_, one)| one).collect()
 }
 
 /// The format of a folder that a recorder of ROS 2 wrote in several files, by what it put beside them.

@@ -8,6 +8,7 @@ use super::decoders::Decoders;
 use super::input::Input;
 use super::line_input::only_for_tables;
 use super::log_channel::{LogChannel, described, known, nanos, rank};
+use super::made_before::{self, MadeBefore};
 use super::parts::{self, Same, Whole};
 use super::sources::{self, Known, Publisher};
 use super::text_log::TextLog;
@@ -17,6 +18,7 @@ use crate::error::{Error, Result};
 use crate::mcap::{self, Channel, Reader, Survey, WalkOptions};
 use crate::pool::Pool;
 use std::collections::{BTreeMap, BTreeSet};
+use std::io::Read;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::Arc;
@@ -246,6 +248,18 @@ impl Recording {
         }
         topics::choose(path, &self.candidates(), named)
             .map_err(|error| explained(error, &self.channels, &self.problems))
+    }
+
+    /// Whether there is nothing in it but attitudes that strapd made before.
+    #[must_use]
+    pub fn made_before(&self) -> Option<MadeBefore> {
+        if !self.input.format().is_text() {
+            return made_before::in_survey(&self.survey);
+        }
+        let mut head = Vec::new();
+        let bytes = self.input.bytes().ok()?;
+        bytes.take(made_before::HEAD).read_to_end(&mut head).ok()?;
+        made_before::in_text(&head)
     }
 
     /// What it is called in messages.

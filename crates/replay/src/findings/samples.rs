@@ -8,9 +8,10 @@ use serde_json::json;
 use strapd_attitude::condition::quality::{Advice, AxisStats, GravityAxis};
 use strapd_attitude::frames::BodyAxes;
 use strapd_attitude::setting::{
-    AGAINST_RECORDED, BIAS, BODY, GYRO_RANGE, GYRO_UNIT, IGNORE_COVARIANCE_FLAG, MAX_GAP, MOUNT,
-    ON_GAP, RATE_HZ, REGULARISE_STAMPS, TIME,
+    AGAINST_RECORDED, BIAS, BODY, COLUMNS, GYRO_RANGE, GYRO_UNIT, IGNORE_COVARIANCE_FLAG, MAX_GAP,
+    MOUNT, ON_GAP, RATE_HZ, REGULARISE_STAMPS, TIME,
 };
+use strapd_recording::format::Format;
 
 /// Header and recorder's clock further apart than this are different clocks, s.
 const OTHER_CLOCK_SECS: f64 = 1.0;
@@ -167,14 +168,21 @@ fn advised(looked: &Inspection, advice: &Advice) -> Option<Finding> {
                     .help([BODY.to("MAP")]).help([GYRO_UNIT.to("deg")]),
             }
         }
-        Advice::AccelNotInMetres { magnitude, unit } => Finding::new(
-            Warning,
-            "accel-unit",
+        Advice::AccelNotInMetres { magnitude, unit } => not_in_metres(
+            looked,
             format!("acceleration at rest is {magnitude:.3}: plausible in {unit}, not in m/s^2"),
+            unit,
         )
-        .with("magnitude_at_rest", magnitude)
-        .with("plausible_unit", unit)
-        .advise("only levelling uses the acceleration, and its direction alone"),
+        .with("magnitude_at_rest", magnitude),
+        Advice::AccelMostlyOneG { share, unit } => not_in_metres(
+            looked,
+            format!(
+                "{:.0} % of the accelerations have the length of gravity in {unit}, not in m/s^2",
+                100.0 * share
+            ),
+            unit,
+        )
+        .with("share_of_one_g", share),
         Advice::LooksLikeFrd if stated_frd => return None,
         Advice::LooksLikeFrd => Finding::new(
             Warning,
@@ -295,6 +303,26 @@ fn advised(looked: &Inspection, advice: &Advice) -> Option<Finding> {
         .advise("no bias can be had from this log: give one, if it is known")
         .help([BIAS.to("x,y,z")]),
     })
+}
+
+/// An acceleration in another unit than the format has.
+fn not_in_metres(looked: &Inspection, what: String, unit: &'static str) -> Finding {
+    let found = Finding::new(Severity::Warning, "accel-unit", what).with("plausible_unit", unit);
+    if looked.aid.force_scale != 1.0 {
+        return found.advise(
+            "taken to be in g where gravity corrects the attitude; who else reads this log does not know",
+        );
+    }
+    // Of a table the columns say it.
+    let encoding = format!("[{}]", Format::Table.name());
+    match looked.described.ends_with(&encoding) {
+        true => found
+            .advise("so gravity can not correct the attitude: say the unit")
+            .help([COLUMNS.to(format!("accel=X:Y:Z:{unit}"))]),
+        false => found.advise(
+            "so gravity can not correct the attitude, and no setting says otherwise: record m/s^2",
+        ),
+    }
 }
 
 /// The shortest turn from the sensor to a body with z up: gravity as a rest shows it, or the axis it is nearest to.

@@ -133,6 +133,7 @@ pub fn examine(
         file_losses: survey.problems.losses(),
         file_size: survey.file_size,
         profile: survey.facts.profile.clone(),
+        made_before: log.made_before().filter(|_| named.is_none()),
         refused,
         topics,
         left_out: match named {

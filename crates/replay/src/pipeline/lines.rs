@@ -1,6 +1,7 @@
 //! Samples from lines of JSON, or rows of a table -> the same run as from a log. I/O.
 
 use super::position::Position;
+use super::replay::integrated_again;
 use super::replay_start::Waiting;
 use super::request::{ReplayRequest, refused};
 use super::session::Found;
@@ -16,6 +17,7 @@ use std::sync::Arc;
 use strapd_attitude::condition::Clock;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{Meaning, StampPass, Stamps};
+use strapd_recording::MadeBefore;
 use strapd_recording::Selection;
 use strapd_recording::lines::Lines;
 use strapd_recording::mcap::Survey;
@@ -78,7 +80,13 @@ struct Running<'r, 'w> {
 
 impl SensorTaker<Error> for Running<'_, '_> {
     fn meet(&mut self, sensor: Sensor) -> Result<()> {
-        self.waiting.meet(&mut Some(met(self.run, sensor)))
+        let (mut found, stream) = met(self.run, sensor);
+        if self.run.selection.topic.is_none()
+            && let Some(made) = MadeBefore::in_file(&self.run.source.name())
+        {
+            found.warnings.push(integrated_again(&made));
+        }
+        self.waiting.meet(&mut Some((found, stream)))
     }
 
     fn take(&mut self, items: &mut Vec<Item>) -> Result<ControlFlow<()>> {

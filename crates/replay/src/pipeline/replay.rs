@@ -20,6 +20,7 @@ use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::StampPass;
 use strapd_attitude::estimate::{Patience, Preparation, Prepared};
 use strapd_recording::Input;
+use strapd_recording::MadeBefore;
 use strapd_recording::Recording;
 use strapd_recording::Source;
 use strapd_recording::format::open;
@@ -79,6 +80,14 @@ fn piped(
     }
 }
 
+/// What is said where attitudes made before are taken for a recording.
+pub(super) fn integrated_again(made: &MadeBefore) -> Diagnostic {
+    Diagnostic::new(format!(
+        "{made}: its rates are integrated again, less the bias that was taken out of them"
+    ))
+    .help("name what it was made of")
+}
+
 fn file(
     run: &ReplayRequest,
     input: &Input,
@@ -96,6 +105,11 @@ fn file(
     let mut chosen = choose(run, path, &log, &choice.topics)?;
     if let (Some(note), Some(first)) = (choice.note, chosen.first_mut()) {
         first.found.warnings.push(note.into());
+    }
+    if let (Some(made), None, Some(first)) =
+        (log.made_before(), &run.selection.topic, chosen.first_mut())
+    {
+        first.found.warnings.push(integrated_again(&made));
     }
     let reference = reference(run, path, &log, &chosen, false)?;
     let besides = besides(run, path, &log, &mut chosen)?;

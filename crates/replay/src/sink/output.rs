@@ -7,9 +7,11 @@
 use super::socket::{Tcp, Udp};
 use super::target::Target;
 use crate::error::{Error, Result};
+use crate::shell::quoted_file;
 use std::fs::{self, File, Metadata, OpenOptions};
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
+use strapd_attitude::diagnostic::Diagnostic;
 
 /// What standard output is called in messages.
 pub(super) const STDOUT_NAME: &str = "standard output";
@@ -226,11 +228,7 @@ impl PartFile {
         let file = Self::open_and_lock(&part, inputs).map_err(|error| match error {
             PartError::IsInput => Error::OutputIsInput { path: part.clone() },
             PartError::Io(e) if e.kind() == ErrorKind::NotFound => {
-                let parent = place.parent().unwrap_or(Path::new("."));
-                write_error(io::Error::new(
-                    ErrorKind::NotFound,
-                    format!("the directory {} does not exist", parent.display()),
-                ))
+                write_error(no_folder(place.parent().unwrap_or(Path::new("."))))
             }
             PartError::Io(e) => write_error(e),
         })?;
@@ -337,6 +335,16 @@ impl From<io::Error> for PartError {
     fn from(e: io::Error) -> PartError {
         PartError::Io(e)
     }
+}
+
+/// The folder of an output is not there. It is not made: its name may be a slip of the hand.
+#[must_use]
+pub fn no_folder(folder: &Path) -> io::Error {
+    io::Error::new(
+        ErrorKind::NotFound,
+        Diagnostic::new(format!("the directory {} does not exist", folder.display()))
+            .help(format!("make it: mkdir -p {}", quoted_file(folder))),
+    )
 }
 
 /// A renamed file survives a power cut only when its directory is on the disk too.

@@ -29,6 +29,13 @@ pub enum Advice {
         /// The unit it is plausible in.
         unit: &'static str,
     },
+    /// Most accelerations of a recording have the length of one g, but not in m/s^2.
+    AccelMostlyOneG {
+        /// What part of them, 0 to 1.
+        share: f64,
+        /// The unit they are plausible in.
+        unit: &'static str,
+    },
     /// Gravity reads negative on z: the body is front-right-down.
     LooksLikeFrd,
     /// Gravity lies on x or y: the sensor is mounted on its side.
@@ -175,9 +182,14 @@ pub(super) fn advise(
     if quietest.is_some() && still.is_none() {
         advice.push(Advice::NeverStill);
     }
-    if let Some(magnitude) = still.and(summary.accel_at_rest) {
-        advice
-            .extend(accel_unit(magnitude).map(|unit| Advice::AccelNotInMetres { magnitude, unit }));
+    let at_rest = still.and(summary.accel_at_rest);
+    let in_g = |magnitude| accel_unit(magnitude).map(|unit| (magnitude, unit));
+    match at_rest.and_then(in_g) {
+        Some((magnitude, unit)) => advice.push(Advice::AccelNotInMetres { magnitude, unit }),
+        // Who is never at rest has gravity in most of his accelerations.
+        None => advice.extend(mostly_one_g(summary)),
+    }
+    if at_rest.is_some() {
         match summary.gravity {
             Some(GravityAxis {
                 axis: 2,
@@ -256,6 +268,27 @@ fn lacks(summary: &QualitySummary) -> bool {
     let by_time = summary.duration_secs / spacing.median_secs.max(1e-9) + 1.0;
     let distinct = summary.count.saturating_sub(summary.duplicates);
     by_time - distinct as f64 > 0.5 * summary.missing as f64
+}
+
+/// Lengths of one g in g, of a body that moves.
+pub(super) const NEAR_ONE: std::ops::RangeInclusive<f64> = 0.8..=1.25;
+/// Fewer accelerations tell nothing of their unit.
+const FEWEST: u64 = 20;
+
+/// Accelerations without gravity are as long, too, where somebody walks, but not for most of the time: lengths of a normal
+/// spread about nothing lie within [`NEAR_ONE`] in 38 of 100 cases at most.
+fn mostly_one_g(summary: &QualitySummary) -> Option<Advice> {
+    let finite = summary.with_accel.saturating_sub(summary.accel_not_finite);
+    let units = [
+        (summary.accel_near_one, "g"),
+        (summary.accel_near_thousand, "mg"),
+    ];
+    let is_most = |near: u64| finite >= FEWEST && near > finite / 2;
+    let (near, unit) = units.into_iter().find(|(near, _)| is_most(*near))?;
+    Some(Advice::AccelMostlyOneG {
+        share: near as f64 / finite as f64,
+        unit,
+    })
 }
 
 /// The unit in which this is one g, when it is not m/s^2. Gravity is 9.78 to 9.83 m/s^2; scale and

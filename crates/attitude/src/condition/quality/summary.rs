@@ -122,6 +122,10 @@ pub struct QualitySummary {
     pub with_accel: u64,
     /// Of these, with NaN or infinity in it.
     pub accel_not_finite: u64,
+    /// Of these, with a length of 0.8 to 1.25, as of gravity in g.
+    pub accel_near_one: u64,
+    /// Of these, with a length of 800 to 1250, as of gravity in mg.
+    pub accel_near_thousand: u64,
     /// Samples with an orientation.
     pub with_orientation: u64,
     /// Whether any of these is another than the first: some drivers fill the field with one.
@@ -175,6 +179,8 @@ pub(super) fn summarise(quality: &Quality) -> QualitySummary {
         axes: quality.axes.map(axis),
         with_accel: quality.accel_count,
         accel_not_finite: quality.accel_not_finite,
+        accel_near_one: quality.near_one,
+        accel_near_thousand: quality.near_thousand,
         with_orientation: quality.orientations,
         orientation_varies: quality.orientation_varies,
         with_interval: quality.intervals,

@@ -136,6 +136,64 @@ fn gravity_tells_axis_sign_and_unit() {
 }
 
 #[test]
+fn most_forces_of_one_g_tell_the_unit_where_nothing_is_still_and_motion_alone_does_not() {
+    // Turned and shaken about: gravity and 0.3 of it, in every direction, at a rate that is never even.
+    let shaken = |gravity: f64, shake: f64| -> Vec<RawSample> {
+        let at = |n: i64| {
+            let t = n as f64 * 0.01;
+            let (a, b) = ((2.0 * t).sin(), (1.3 * t).cos());
+            let up = nalgebra::Vector3::new(a, b, 0.5 - a * b).normalize();
+            let other =
+                nalgebra::Vector3::new((31.0 * t).sin(), (37.0 * t).cos(), (41.0 * t).sin());
+            RawSample {
+                gyro: Some([(9.0 * t).sin(), (7.0 * t).cos(), 1.0]),
+                accel: Some((up * gravity + other * shake).into()),
+                ..sample(n)
+            }
+        };
+        (0..2000).map(at).collect()
+    };
+    let unit = |raw: &[RawSample]| {
+        let advice = summary(raw).advice;
+        assert!(advice.contains(&Advice::NeverStill), "{advice:?}");
+        advice.iter().find_map(|a| match a {
+            Advice::AccelMostlyOneG { unit, share } if (0.5..=1.0).contains(share) => Some(*unit),
+            _ => None,
+        })
+    };
+    assert_eq!(unit(&shaken(1.0, 0.1)), Some("g"));
+    assert_eq!(unit(&shaken(1000.0, 100.0)), Some("mg"));
+    assert_eq!(unit(&shaken(9.81, 3.0)), None);
+    // Without gravity, of any size.
+    for size in [0.3, 0.6, 0.8, 1.0, 1.3, 2.0] {
+        let mut raw = shaken(0.0, 1.0);
+        // Three numbers that are spread normally, or nearly: the sum of twelve that are even.
+        let mut state = 1_u64;
+        let mut normal = || {
+            let mut even = || {
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1);
+                (state >> 11) as f64 / (1_u64 << 53) as f64
+            };
+            (0..12).map(|_| even()).sum::<f64>() - 6.0
+        };
+        for one in &mut raw {
+            one.accel = Some([size * normal(), size * normal(), size * normal()]);
+        }
+        assert_eq!(unit(&raw), None, "{size}");
+    }
+    // Of a few samples nothing is said.
+    let few = shaken(1.0, 0.1).into_iter().take(19).collect::<Vec<_>>();
+    assert!(
+        !summary(&few)
+            .advice
+            .iter()
+            .any(|a| matches!(a, Advice::AccelMostlyOneG { .. }))
+    );
+}
+
+#[test]
 fn rates_no_gyro_has_are_taken_for_degrees_but_a_spike_is_not() {
     let turning = |n: i64, peak: f64| RawSample {
         gyro: Some([peak * (n as f64 * 0.01).sin(), 0.0, 1.0]),

@@ -1,0 +1,85 @@
+//! A recording -> whether it holds nothing but attitudes that strapd made before. I/O.
+//!
+//! A stage of its own because such files lie beside the recordings they were made of, where a pattern of a shell takes both,
+//! and look like them: an IMU with rates. Those are the recording's, less the bias, and to integrate them again says less
+//! than the recording does.
+
+use crate::format::Format;
+use crate::mcap::{self, OURS, Reader, Survey, WalkOptions};
+use std::collections::BTreeSet;
+use std::fmt;
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+/// First bytes that tell whether to look closer.
+pub(super) const HEAD: u64 = 4096;
+/// How a table of attitudes begins.
+const TABLE: &[u8] = b"stamp_ns,qw,qx,qy,qz,roll_deg,";
+/// How a line with an attitude begins.
+const LINE: &[u8] = b"{\"class\":\"ATT\",";
+/// The transforms beside the attitudes.
+const TRANSFORMS: &str = "/tf";
+
+/// Attitudes of a run of strapd.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct MadeBefore {
+    /// What it was made of, as far as it says so.
+    pub of: Option<String>,
+}
+
+impl fmt::Display for MadeBefore {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let of = self.of.as_deref().map(crate::text::printable);
+        let of = of.map_or_else(String::new, |of| format!(" of {of}"));
+        write!(f, "attitudes that strapd made{of}, and no recording")
+    }
+}
+
+impl MadeBefore {
+    /// What a file on this machine is, as far as that can be told without reading all of it; of anything else, and where it
+    /// can not be read, nothing is said.
+    #[must_use]
+    pub fn in_file(path: &Path) -> Option<MadeBefore> {
+        if !path.is_file() {
+            return None;
+        }
+        let mut head = Vec::new();
+        let file = File::open(path).ok()?;
+        file.take(HEAD).read_to_end(&mut head).ok()?;
+        if let Some(text) = in_text(&head) {
+            return Some(text);
+        }
+        let is_ours = Format::of_magic(&head) == Some(Format::Mcap)
+            && head.windows(OURS.len()).any(|part| part == OURS.as_bytes());
+        let reader = Reader::open(path).ok().filter(|_| is_ours)?;
+        in_survey(&mcap::survey(&reader, &WalkOptions::default()).ok()?)
+    }
+}
+
+/// Its metadata name the topics it was written with, and there are no others.
+pub(super) fn in_survey(survey: &Survey) -> Option<MadeBefore> {
+    let said = &survey.facts.provenance;
+    let outputs: BTreeSet<&str> = said
+        .iter()
+        .filter(|(key, _)| *key == "output_topic" || key.ends_with(" output_topic"))
+        .map(|(_, topic)| topic.as_str())
+        .chain([TRANSFORMS])
+        .collect();
+    let mut topics = survey.channels.iter().map(|c| c.channel.topic.as_str());
+    (outputs.len() > 1 && topics.all(|topic| outputs.contains(topic))).then(|| MadeBefore {
+        of: said.get("input").filter(|name| !name.is_empty()).cloned(),
+    })
+}
+
+/// The first bytes of a text are of attitudes.
+pub(super) fn in_text(head: &[u8]) -> Option<MadeBefore> {
+    let has = |head: &[u8], word: &[u8]| head.windows(word.len()).any(|part| part == word);
+    let first = head.split(|byte| *byte == b'\n').next().unwrap_or_default();
+    // Lines of a daemon and of a simulation have rates between them, and the truth is nobody's estimate.
+    let is_line = first.starts_with(LINE)
+        && has(first, b"\"rotates\":")
+        && !has(first, b"\"id\":\"truth\"")
+        && !has(head, b"\"class\":\"RATE\"");
+    (is_line || head.starts_with(TABLE)).then_some(MadeBefore { of: None })
+}
