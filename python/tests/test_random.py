@@ -29,7 +29,7 @@ anything = st.none() | st.booleans() | st.integers() | floats | st.text(max_size
 values = {
     "method": st.sampled_from(["auto", "magnus", "causal", "commit", "dcm-left", "coning2", "rk4", "rotvec-sum"]) | anything,
     "window": st.integers(0, 30) | anything, "order": st.sampled_from([2, 4, 6, 8, "exact"]) | anything,
-    "kind": st.sampled_from(["rate", "average", "delta-angle"]), "aid": st.sampled_from(["auto", "none", "gravity", "gravity+mag"]),
+    "kind": st.sampled_from(["rate", "average", "delta-angle", "rotation"]), "aid": st.sampled_from(["auto", "none", "gravity", "gravity+mag"]),
     "gyro_unit": st.sampled_from(["rad", "deg", "mrad"]) | anything, "body": st.sampled_from(["flu", "frd", "YxZ", "XXX"]) | anything,
     "world": st.sampled_from(["start", "level", "enu", "ned", "nwu"]) | anything, "mount": anything,
     "init": st.sampled_from(["identity", "gravity", "first-orientation", (0.5, 0.5, 0.5, 0.5)]) | anything,

@@ -39,7 +39,7 @@ class Samples:
     ``dt``
         int64 (n,), ns: what each sample was taken over, 0 where it is not said; or ``None``.
     ``kind``
-        what the format says a sample means (``rate``, ``average``, ``delta-angle``), or ``None``.
+        what the format says a sample means (``rate``, ``average``, ``delta-angle``, ``rotation``), or ``None``.
     ``lost``
         payloads that could not be decoded, and damaged places of the file.
     """

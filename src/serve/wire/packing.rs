@@ -35,6 +35,7 @@ pub(super) fn read(line: &[u8]) -> Result<(u32, Line), Fault> {
                 SampleKind::Rate,
                 SampleKind::Average,
                 SampleKind::DeltaAngle,
+                SampleKind::Rotation,
             ]
             .map(|k| (k.name(), k)),
         )?,
@@ -51,10 +52,10 @@ pub(super) fn read(line: &[u8]) -> Result<(u32, Line), Fault> {
 }
 
 /// The one of `all` that is called `name`.
-fn named<T: Copy>(
+fn named<T: Copy, const N: usize>(
     field: &str,
     name: Option<&str>,
-    all: [(&'static str, T); 3],
+    all: [(&'static str, T); N],
 ) -> Result<Option<T>, Fault> {
     let Some(name) = name else { return Ok(None) };
     let found = all.iter().find(|(known, _)| *known == name);
