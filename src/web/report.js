@@ -44,6 +44,8 @@ class Picture {
       this.canvas.setAttribute(name, value);
     }
     figure.classList.add("looked");
+    // The canvas takes the keys.
+    figure.removeAttribute("tabindex");
     this.surface = new Surface(this.canvas, soon);
     view.attach(this.canvas, { clock: () => clock, span: () => view.span(clock, clock.whole[1]) });
   }

@@ -18,7 +18,7 @@ fn data(html: &str) -> Value {
 
 /// One figure of a page.
 fn figure<'h>(html: &'h str, id: &str) -> Option<&'h str> {
-    let (_, rest) = html.split_once(&format!("<figure id=\"{id}\">"))?;
+    let (_, rest) = html.split_once(&format!("<figure id=\"{id}\" tabindex=\"0\">"))?;
     Some(rest.split_once("</figure>").expect("its end").0)
 }
 
@@ -61,6 +61,13 @@ fn asks_nobody(html: &str) {
     assert!(html.starts_with("<!DOCTYPE html>") && html.ends_with("</html>\n"));
     for part in ["id=\"verdict\"", "id=\"findings\"", "SHA-256", "<code>"] {
         assert!(html.contains(part), "{part}");
+    }
+    // What scrolls where the screen is narrow takes the keyboard.
+    for scrolls in ["<div class=\"wide\"", "<figure "] {
+        for part in html.split(scrolls).skip(1) {
+            let (head, _) = part.split_once('>').unwrap();
+            assert!(head.contains("tabindex=\"0\""), "{scrolls}{head}");
+        }
     }
     // Nothing is fetched: nothing that could, and no script but the page's own, named by its hash.
     let fetching = [

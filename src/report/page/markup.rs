@@ -84,10 +84,14 @@ pub(super) fn table(class: &str, head: &[&str], rows: &[Vec<String>]) -> String 
     out + "</table></div>\n"
 }
 
-/// A chart, or why there is none.
+/// A chart, or why there is none. Where the screen is narrow it scrolls, by keys too.
 pub(super) fn figure(id: &str, svg: Result<String, String>) -> String {
     match svg {
-        Ok(svg) => format!("<figure id=\"{}\">{}</figure>\n", escaped(id), svg.trim()),
+        Ok(svg) => format!(
+            "<figure id=\"{}\" tabindex=\"0\">{}</figure>\n",
+            escaped(id),
+            svg.trim()
+        ),
         Err(why) => format!("<p class=\"small\">{}</p>\n", escaped(&why)),
     }
 }
