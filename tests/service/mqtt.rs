@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::Command;
 
 #[test]
-#[ignore = "needs mosquitto and its clients: .ci/full brokers"]
+#[ignore = "of .ci/full brokers: mosquitto and its clients"]
 fn the_documented_bridge_gives_the_bytes_of_tcp() {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/oracles/mqtt_bridge.py");
     let output = Command::new("python3")
