@@ -173,16 +173,7 @@ pub fn simulate<'py>(
     start: i64,
 ) -> PyResult<Bound<'py, PyDict>> {
     let refused = |what: Diagnostic| refusal::argument_of_log(&what);
-    let kinds = [
-        SampleKind::Rate,
-        SampleKind::Average,
-        SampleKind::DeltaAngle,
-        SampleKind::Rotation,
-    ];
-    let kind = kinds
-        .into_iter()
-        .find(|k| k.name() == kind)
-        .ok_or_else(|| {
+    let kind = SampleKind::named(kind).ok_or_else(|| {
             refused(
                 Diagnostic::new(format!("kind: there is no {kind:?}"))
                     .help("one of rate, average, delta-angle, rotation"),

@@ -131,12 +131,7 @@ impl Words {
 
     fn plan(&self, known: Option<SensorCalibration>) -> Result<Plan> {
         let plain = Plan::default();
-        let kinds = [
-            SampleKind::Rate,
-            SampleKind::Average,
-            SampleKind::DeltaAngle,
-            SampleKind::Rotation,
-        ];
+        let kinds = SampleKind::ALL;
         let units = [GyroUnit::Rad, GyroUnit::Deg, GyroUnit::Mrad];
         let policies = [OnGap::Hold, OnGap::Bridge, OnGap::Reset];
         let aids = [

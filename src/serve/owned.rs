@@ -4,7 +4,6 @@
 
 use super::fault::Fault;
 use super::hub::{Client, Feedback, GAVE_WAY, Hub, Sensor};
-use super::stream::NAMELESS;
 use super::stream::run::SampleRun;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, Weak};
@@ -34,7 +33,7 @@ impl Owned {
         run: &SampleRun<'_>,
         text: &mut Vec<u8>,
     ) -> Result<Feedback, Fault> {
-        let id = id_of(run);
+        let id = run.id();
         let news = self.hand_over(hub, client, run, text);
         if !matches!(&news, Err(fault) if fault.code == GAVE_WAY) {
             return news;
@@ -56,7 +55,7 @@ impl Owned {
         text: &mut Vec<u8>,
     ) -> Result<Feedback, Fault> {
         self.last = None;
-        let id = id_of(run);
+        let id = run.id();
         let known = self.sensors.get(id).map(Weak::upgrade);
         let sensor = match known {
             Some(Some(sensor)) => sensor,
@@ -115,9 +114,4 @@ impl Owned {
         let all: Vec<_> = all.values().filter_map(Weak::upgrade).collect();
         hub.leave(client, &all);
     }
-}
-
-fn id_of<'r>(run: &SampleRun<'r>) -> &'r str {
-    let id = run.head.id.as_deref();
-    id.filter(|id| !id.is_empty()).unwrap_or(NAMELESS)
 }

@@ -15,7 +15,6 @@ use super::limits::Allowance;
 use super::log_throttle;
 use super::owned::Owned;
 use super::peer::Peer;
-use super::stream::NAMELESS;
 use super::stream::run::{Placed, SampleRun};
 use super::upstream::{self, Event};
 use super::wire::{self, Message};
@@ -133,8 +132,8 @@ impl Side {
         matches!(self, Side::Source(naming) if naming.subject.is_some())
     }
 
-    #[cfg(feature = "nats")]
     /// A broker, whose messages are of many sensors, or all of the one that is called `id` here.
+    #[cfg(feature = "nats")]
     #[must_use]
     pub fn broker(id: Option<String>) -> Side {
         let mut side = Side::source(id, None);
@@ -581,8 +580,7 @@ impl Session {
         match news {
             Ok(Feedback { note, faults }) => {
                 if let Some(note) = note {
-                    let id = head.id.as_deref().filter(|id| !id.is_empty());
-                    let id = id.unwrap_or(NAMELESS);
+                    let id = run.id();
                     log_throttle::info(&format!("run {id}"), &format!("{id}: {}", note.message));
                     self.client.outbox.reply(wire::note(&note));
                 }

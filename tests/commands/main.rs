@@ -21,8 +21,8 @@ mod joined;
 mod joined_formats;
 mod layouts;
 mod model;
-#[cfg(unix)]
 mod packed;
+#[cfg(unix)]
 mod pages;
 mod parquet;
 mod px4;

@@ -130,3 +130,49 @@ fn what_is_cut_broken_or_of_a_stream_nobody_named_is_counted_and_the_rest_is_the
     let words = "no line before says which sensor it is";
     assert!(unnamed.err.contains(words), "{unnamed:?}");
 }
+
+#[test]
+fn what_a_line_says_of_units_and_meaning_holds_and_what_it_can_not_mean_is_counted() {
+    let dir = tempfile::tempdir().unwrap();
+    let line = |of: &str| format!("{{\"class\":\"PACKED\",\"stream\":7,\"id\":\"a\"{of}}}\n");
+    // About z, a second long, with one sample at its beginning.
+    let turned = |of: &str, z: f64| {
+        let nanos = |k: u64| 1_700_000_000_000_000_000 + k as i64 * 10_000_000;
+        let objects = (0..=100).flat_map(|k| packed(7, k, nanos(k), &[0.0, 0.0, z]));
+        let bytes = [line(of).into_bytes(), objects.collect()].concat();
+        let ran = strapd_fed(dir.path(), "replay - -o null: --json", bytes);
+        ran.done().json()["topics"][0].clone()
+    };
+    for (of, z, kind) in [
+        ("", 0.5, "rate"),
+        (",\"gyro_unit\":\"deg\"", 0.5_f64.to_degrees(), "rate"),
+        (
+            ",\"gyro_unit\":\"mrad\",\"sample_kind\":\"average\"",
+            500.0,
+            "average",
+        ),
+        (",\"sample_kind\":\"delta-angle\"", 0.005, "delta-angle"),
+        (",\"sample_kind\":\"rotation\"", 0.005, "rotation"),
+    ] {
+        let topic = turned(of, z);
+        let yaw = topic["final"]["yaw_deg"].as_f64().unwrap();
+        assert!((yaw - 0.5_f64.to_degrees()).abs() < 1e-9, "{of}: {yaw}");
+        assert_eq!(topic["sample_kind"], kind, "{of}");
+    }
+    let all = samples(dir.path());
+    let objects: Vec<u8> = all.iter().flat_map(|(_, object)| object.clone()).collect();
+    for (bad, words) in [
+        (line(",\"gyro_unit\":\"rpm\""), "no gyro_unit `rpm`"),
+        (line(",\"sample_kind\":\"mean\""), "no sample_kind `mean`"),
+        (
+            "{\"class\":\"PACKED\",\"id\":\"a\"}\n".to_owned(),
+            "missing field `stream`",
+        ),
+    ] {
+        // Not believed, and nothing bound by the line before is bound anew.
+        let bytes = [NAMES.as_bytes(), &objects, bad.as_bytes(), &objects[..72]].concat();
+        let ran = strapd_fed(dir.path(), "replay - -o null: --json", bytes);
+        assert_eq!(ran.code, Some(3), "{ran:?}");
+        assert!(ran.err.contains(words), "{words}: {}", ran.err);
+    }
+}

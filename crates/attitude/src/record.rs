@@ -85,17 +85,18 @@ impl SampleKind {
         }
     }
 
+    /// All of them.
+    pub const ALL: [SampleKind; 4] = [
+        SampleKind::Rate,
+        SampleKind::Average,
+        SampleKind::DeltaAngle,
+        SampleKind::Rotation,
+    ];
+
     /// The kind of this name.
     #[must_use]
     pub fn named(name: &str) -> Option<SampleKind> {
-        [
-            SampleKind::Rate,
-            SampleKind::Average,
-            SampleKind::DeltaAngle,
-            SampleKind::Rotation,
-        ]
-        .into_iter()
-        .find(|kind| kind.name() == name)
+        Self::ALL.into_iter().find(|kind| kind.name() == name)
     }
 }
 

@@ -119,10 +119,7 @@ impl<R: Read> Lines<R> {
             Form::Objects(decoder, numbers) => {
                 // A line has no time but the one in it.
                 let line = decoder.decode(&self.line, Nanos(0), samples);
-                if let Ok(line) = &line {
-                    numbers.learn(line, &self.line);
-                }
-                line
+                line.and_then(|line| numbers.learn(&line, &self.line).map(|()| line))
             }
             Form::Rows(table) => table.decode(&self.line, samples),
         }))
@@ -217,9 +214,9 @@ impl<R: Read> Lines<R> {
             offset,
             source,
         };
-        let is_text = matches!(self.form, Form::Rows(_));
-        // Nothing else of ours begins so, and no text in UTF-8 does.
-        if !is_text && begins_with(&mut self.input, MARK).map_err(fail)? {
+        // No line of UTF-8 begins so; a row of a table in Latin-1 may.
+        let may_be_packed = matches!(self.form, Form::Objects(..));
+        if may_be_packed && begins_with(&mut self.input, MARK).map_err(fail)? {
             let read = read_object(&mut self.input, &mut self.line).map_err(fail)?;
             self.last_read += 1;
             self.offset += read;

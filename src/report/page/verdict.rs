@@ -113,7 +113,6 @@ impl Verdict {
 /// Of each topic that was integrated: duration, rate, lost samples, gaps, turned, error, and that of the gyro over 1 s.
 pub(super) fn figures(checked: &Checked) -> Vec<(String, [String; 7])> {
     let of = |s: &TopicSummary| {
-        let over = s.against.iter().find(|row| row.kind == s.kind.name());
         [
             format!("{:.3}", s.duration_secs),
             s.rate_hz.map_or_else(String::new, |hz| significant(hz, 4)),
@@ -121,7 +120,7 @@ pub(super) fn figures(checked: &Checked) -> Vec<(String, [String; 7])> {
             (s.gaps.bridged + s.gaps.held + s.gaps.resets).to_string(),
             format!("{:.1}", s.turned.to_degrees()),
             whole_error(s).map_or_else(String::new, |parts| parts.join(" / ")),
-            over.map_or_else(String::new, |row| significant(row.median_deg, 3)),
+            over_one_second(s).unwrap_or_default(),
         ]
     };
     let runs = checked.topics.iter().filter_map(|topic| {
@@ -138,11 +137,15 @@ fn whole_error(s: &TopicSummary) -> Option<[String; 2]> {
     Some([found.tilt.rms, found.heading.rms].map(|rms| significant(rms.to_degrees(), 2)))
 }
 
+/// What the gyro alone misses over 1 s, the median, deg.
+fn over_one_second(s: &TopicSummary) -> Option<String> {
+    let row = s.against.iter().find(|row| row.kind == s.kind.name())?;
+    Some(significant(row.median_deg, 3))
+}
+
 /// All of the error first: what the gyro misses over 1 s says little of a heading that drifts for an hour.
 fn from_the_reference(s: &TopicSummary) -> String {
-    let over = s.against.iter().find(|row| row.kind == s.kind.name());
-    let over = over.map(|row| significant(row.median_deg, 3));
-    match (whole_error(s), over) {
+    match (whole_error(s), over_one_second(s)) {
         (Some([tilt, heading]), over) => {
             let over = over.map_or_else(String::new, |over| {
                 format!("; the gyro alone {over} deg over 1 s")

@@ -8,7 +8,6 @@ use crate::serve::hub::{Asker, Client, Feedback, Flood, Hub, count, rates_in};
 use crate::serve::log_throttle;
 use crate::serve::owned::Owned;
 use crate::serve::peer::{Origin, Peer};
-use crate::serve::stream::NAMELESS;
 use crate::serve::stream::run::{Placed, SampleRun};
 use crate::serve::wire::{self, Message};
 use axum::body::Body;
@@ -263,7 +262,7 @@ impl Poster {
                 Ok(Feedback { note, faults }) => {
                     taken.samples += rates_in(run.samples) as u64;
                     if let Some(note) = note {
-                        let id = head.id.as_deref().unwrap_or(NAMELESS);
+                        let id = run.id();
                         log_throttle::info(
                             &format!("run {id}"),
                             &format!("{id}: {}", note.message),

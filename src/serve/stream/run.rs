@@ -4,6 +4,7 @@
 //! again what was sent before, or may begin anew with stamps that were used already; only the
 //! stamps tell, and to integrate the same samples twice would be an attitude nobody has.
 
+use super::NAMELESS;
 use std::time::Duration;
 use strapd_attitude::record::{Nanos, RawSample};
 use strapd_recording::decode::{Bare, Line};
@@ -36,6 +37,15 @@ pub struct SampleRun<'a> {
     pub samples: &'a [RawSample],
     /// Their stamps that are numbers without a unit, at their places; shorter where no more follow.
     pub bare: &'a [Option<Bare>],
+}
+
+impl<'a> SampleRun<'a> {
+    /// The sensor it is of.
+    #[must_use]
+    pub fn id(&self) -> &'a str {
+        let id = self.head.id.as_deref();
+        id.filter(|id| !id.is_empty()).unwrap_or(NAMELESS)
+    }
 }
 
 /// Where a connection's first sample stands.

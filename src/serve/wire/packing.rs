@@ -1,73 +1,21 @@
 //! Lines that say what packed objects are, and what is wrong with them. Pure.
 
-use super::{Fault, object};
+use super::Fault;
 use crate::sink::{Content, Stream};
 use bytes::Bytes;
-use serde::Deserialize;
 use serde_json::Value;
-use strapd_attitude::record::SampleKind;
-use strapd_recording::decode::packed::Unreadable;
-use strapd_recording::decode::{Class, GyroUnit, Line};
-use strapd_recording::text::printable;
-
-#[derive(Deserialize)]
-struct PackedObject {
-    stream: u32,
-    id: Option<String>,
-    sample_kind: Option<String>,
-    gyro_unit: Option<String>,
-}
+use strapd_recording::decode::Line;
+use strapd_recording::decode::packed::{Unbound, Unreadable, binding};
 
 /// The number of a stream of packed samples, and what each of them says as a line would.
 pub(super) fn read(line: &[u8]) -> Result<(u32, Line), Fault> {
-    let asked: PackedObject = object(
-        line,
-        "bad_packed",
-        "like {\"class\":\"PACKED\",\"stream\":1,\"id\":\"imu0\",\"sample_kind\":\"rate\"}",
-    )?;
-    let head = Line {
-        class: Class::Rate,
-        id: asked.id.as_deref().map(super::name).transpose()?,
-        sample_kind: named(
-            "sample_kind",
-            asked.sample_kind.as_deref(),
-            [
-                SampleKind::Rate,
-                SampleKind::Average,
-                SampleKind::DeltaAngle,
-                SampleKind::Rotation,
-            ]
-            .map(|k| (k.name(), k)),
-        )?,
-        // That of a RATE line that does not say.
-        gyro_unit: named(
-            "gyro_unit",
-            asked.gyro_unit.as_deref(),
-            [GyroUnit::Rad, GyroUnit::Deg, GyroUnit::Mrad].map(|u| (u.name(), u)),
-        )?
-        .or(Some(GyroUnit::Rad)),
-        ..Line::default()
-    };
-    Ok((asked.stream, head))
-}
-
-/// The one of `all` that is called `name`.
-fn named<T: Copy, const N: usize>(
-    field: &str,
-    name: Option<&str>,
-    all: [(&'static str, T); N],
-) -> Result<Option<T>, Fault> {
-    let Some(name) = name else { return Ok(None) };
-    let found = all.iter().find(|(known, _)| *known == name);
-    found.map(|(_, value)| Some(*value)).ok_or_else(|| {
-        let known = all.map(|(known, _)| known).join(", ");
-        Fault::new(
-            "bad_packed",
-            format!(
-                "there is no {field} `{}`; there are: {known}",
-                printable(name)
-            ),
-        )
+    binding(line).map_err(|why| match why {
+        Unbound::Name(why) => super::undecodable(&why),
+        Unbound::Object { column, .. } => Fault {
+            column: Some(column),
+            ..Fault::new("bad_packed", why.to_string())
+        },
+        Unbound::Word { .. } => Fault::new("bad_packed", why.to_string()),
     })
 }
 
@@ -110,6 +58,8 @@ pub fn packed_stream(number: u32, stream: &Stream) -> Bytes {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
+    use strapd_attitude::record::SampleKind;
+    use strapd_recording::decode::{Class, GyroUnit};
 
     #[test]
     fn a_number_is_bound_to_what_a_line_would_say() {

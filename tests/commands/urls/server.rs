@@ -199,8 +199,9 @@ impl Shared {
             _ => (1 << 16, Duration::ZERO),
         };
         for bytes in self.object[range].chunks(piece) {
-            to.write_all(bytes)?;
+            // Before: who has them all may look at once.
             self.sent.fetch_add(bytes.len(), Ordering::Relaxed);
+            to.write_all(bytes)?;
             std::thread::sleep(pause);
         }
         Ok(())

@@ -30,8 +30,8 @@ const BLOCK: usize = 32 * SEGMENT;
 const LOOKED_BACK: usize = LARGEST_WINDOW + MARGIN;
 /// Beside the window itself.
 const MARGIN: usize = classical::LOOK_BACK + 8;
-/// Elements that are forgotten at once of a live stream.
-const FORGOTTEN_LIVE: usize = 32;
+/// Elements that are forgotten at once: few, for who has many live streams.
+const FORGOTTEN: usize = 32;
 /// Fastest rate, and largest increment, that is believed: those of [`crate::record::Verdict::Huge`].
 const FASTEST: f64 = 1e4;
 const LARGEST: f64 = 1e3;
@@ -435,14 +435,10 @@ impl Propagator {
         }
     }
 
-    /// Drops elements no window needs any more, now and then: soon, where one of many sensors is live.
+    /// Drops elements no window needs any more, now and then.
     fn forget(&mut self) {
         let needed = self.next.saturating_sub(self.looked_back());
-        let enough = match self.engine {
-            Engine::Commit { .. } => FORGOTTEN_LIVE,
-            Engine::Sliding(_) | Engine::Classical(_) => 2 * SEGMENT,
-        };
-        if needed >= enough {
+        if needed >= FORGOTTEN {
             self.track.drop_front(needed);
             self.next -= needed;
         }

@@ -274,6 +274,12 @@ fn tumbling(count: usize) -> Vec<RateSample> {
         .collect()
 }
 
+const LIVE: Method = Method::CommitProvisional {
+    window: 6,
+    order: strapd_attitude::propagate::Order::M8,
+    finals: false,
+};
+
 #[test]
 fn the_propagator_carries_the_covariance_of_its_own_turns() {
     let noise = Noise {
@@ -285,11 +291,6 @@ fn the_propagator_carries_the_covariance_of_its_own_turns() {
         ..Noise::default()
     };
     let samples = tumbling(3000);
-    let live = Method::CommitProvisional {
-        window: 6,
-        order: strapd_attitude::propagate::Order::M8,
-        finals: false,
-    };
     let log = pushed(Method::Auto, noise, &samples, 3000);
     let mut alone = Covariance::new(noise);
     for pair in log.windows(2) {
@@ -299,7 +300,7 @@ fn the_propagator_carries_the_covariance_of_its_own_turns() {
         assert!((a - b).norm() < 1e-12 * b.norm(), "{a} {b}");
     }
     // A provisional part is uncertain like any other: live, the last attitude has what the log has.
-    let streamed = pushed(live, noise, &samples, 7);
+    let streamed = pushed(LIVE, noise, &samples, 7);
     let (a, b) = (streamed.last().unwrap(), log.last().unwrap());
     let (a, b) = (a.covariance.matrix(), b.covariance.matrix());
     assert!((a - b).norm() < 1e-6 * b.norm(), "{a} {b}");
@@ -314,13 +315,8 @@ fn what_scale_and_axes_leave_unknown_is_live_what_it_is_in_the_log() {
         ..Noise::default()
     };
     let samples = tumbling(3000);
-    let live = Method::CommitProvisional {
-        window: 6,
-        order: strapd_attitude::propagate::Order::M8,
-        finals: false,
-    };
     let log = pushed(Method::Auto, noise, &samples, 3000);
-    let streamed = pushed(live, noise, &samples, 7);
+    let streamed = pushed(LIVE, noise, &samples, 7);
     let worst = log
         .iter()
         .zip(&streamed)

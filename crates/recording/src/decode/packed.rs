@@ -13,6 +13,9 @@
 //! A `RATE` may end after any of its four parts. What is longer than known is read by its known part. In
 //! a vector NaN is no data, as `null` in a line.
 
+mod binding;
+
+pub use binding::{Unbound, binding};
 use strapd_attitude::record::{AttitudeSample, Nanos, RawSample};
 
 /// The first byte of every packed object.

@@ -81,6 +81,15 @@ pub enum Undecodable {
         /// The most there may be.
         limit: u64,
     },
+    /// A line that binds no packed stream.
+    #[error("{0}")]
+    Unbound(Box<super::packed::Unbound>),
+    /// More packed streams than are remembered.
+    #[error("at most {limit} packed streams are told apart in one recording")]
+    TooManyStreams {
+        /// The most there may be.
+        limit: u64,
+    },
     /// A packed object that says nothing.
     #[error("{0}")]
     Packed(super::packed::Unreadable),

@@ -3,8 +3,7 @@
 //! What a daemon is sent, or sends, may be kept as it is and replayed: the lines `PACKED` say what the numbers mean.
 
 use crate::decode::packed::{self, Object};
-use crate::decode::{Class, Decoded, GyroUnit, Line, Undecodable};
-use serde::Deserialize;
+use crate::decode::{Class, Decoded, Line, Undecodable};
 use std::collections::BTreeMap;
 use strapd_attitude::record::{Nanos, RawSample};
 
@@ -15,31 +14,22 @@ const MOST: usize = 100_000;
 #[derive(Debug, Default)]
 pub(super) struct Numbers(BTreeMap<u32, Line>);
 
-#[derive(Deserialize)]
-struct Number {
-    stream: u32,
-}
-
 impl Numbers {
-    /// From now on what `line`, which was read from these bytes, says of a number holds, if it does.
-    pub(super) fn learn(&mut self, line: &Line, bytes: &[u8]) {
+    /// From now on what a line that was read from these bytes says of a number holds.
+    ///
+    /// # Errors
+    /// It is about one, and does not say which or what; there are too many.
+    pub(super) fn learn(&mut self, line: &Line, bytes: &[u8]) -> Result<(), Undecodable> {
         if !matches!(&line.class, Class::Other(class) if class == "PACKED") {
-            return;
+            return Ok(());
         }
-        let Ok(Number { stream }) = serde_json::from_slice(bytes) else {
-            return;
-        };
-        if self.0.len() < MOST || self.0.contains_key(&stream) {
-            let head = Line {
-                class: Class::Rate,
-                id: line.id.clone(),
-                sample_kind: line.sample_kind,
-                // That of a RATE line that does not say.
-                gyro_unit: line.gyro_unit.or(Some(GyroUnit::Rad)),
-                ..Line::default()
-            };
-            self.0.insert(stream, head);
+        let (number, head) =
+            packed::binding(bytes).map_err(|why| Undecodable::Unbound(Box::new(why)))?;
+        if self.0.len() >= MOST && !self.0.contains_key(&number) {
+            return Err(Undecodable::TooManyStreams { limit: MOST as u64 });
         }
+        self.0.insert(number, head);
+        Ok(())
     }
 
     /// What the line would hold that says the same.

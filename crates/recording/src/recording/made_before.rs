@@ -37,8 +37,8 @@ impl fmt::Display for MadeBefore {
 }
 
 impl MadeBefore {
-    /// What a file on this machine is, as far as that can be told without reading all of it; of anything else, and where it
-    /// can not be read, nothing is said.
+    /// What a file on this machine is, by its beginning and the summary at its end (one of ours without a summary is read
+    /// whole); of anything else, and where it can not be read, nothing is said.
     #[must_use]
     pub fn in_file(path: &Path) -> Option<MadeBefore> {
         if !path.is_file() {
