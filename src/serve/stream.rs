@@ -47,9 +47,6 @@ const OVERTAKEN: u64 = 64;
 /// Nobody who goes on in the same unit begins later than so long after the last stamp.
 const NEAR_NANOS: i64 = 3_600_000_000_000;
 
-/// The name of a sensor that gives none.
-pub const NAMELESS: &str = "imu";
-
 /// One sensor: its estimator, what its attitudes are called, and what has been said of it.
 #[derive(Debug)]
 pub struct SensorStream {

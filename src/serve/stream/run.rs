@@ -4,10 +4,12 @@
 //! again what was sent before, or may begin anew with stamps that were used already; only the
 //! stamps tell, and to integrate the same samples twice would be an attitude nobody has.
 
-use super::NAMELESS;
 use std::time::Duration;
 use strapd_attitude::record::{Nanos, RawSample};
 use strapd_recording::decode::{Bare, Line};
+
+/// The name of a sensor that gives none.
+pub const NAMELESS: &str = "imu";
 
 /// Whether a sender's samples have a place of their own beside their stamps.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]

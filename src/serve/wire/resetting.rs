@@ -2,7 +2,7 @@
 
 use super::{Fault, line, name, object};
 use crate::config::parse_initial;
-use crate::serve::stream::NAMELESS;
+use crate::serve::stream::run::NAMELESS;
 use bytes::Bytes;
 use serde::Deserialize;
 use serde_json::json;
