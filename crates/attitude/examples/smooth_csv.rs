@@ -6,7 +6,7 @@
 //!
 //! Columns: t_ns, gyro (rad/s), force (m/s^2), field (uT), reference (w, x, y, z; sensor to east, north, up), scored.
 //! Errors are those of earth axes; 6D is turned about the vertical so that its heading agrees at the first sample
-//! that is scored, 9D is not. Settings: colour, untruncate, spacing, delay, threads, instant, every, offset, moving.
+//! that is scored, 9D is not. Settings: process (0: independent nodes), unresolved, loose, untruncate, spacing, delay, threads, instant, every, offset, moving.
 
 #![allow(clippy::print_stdout)]
 
@@ -16,7 +16,9 @@ use std::time::Instant;
 use strapd_attitude::frames::In;
 use strapd_attitude::quaternion::{BodyRate, Quaternion};
 use strapd_attitude::record::Nanos;
-use strapd_attitude::smooth::{Estimate, Outcome, Sample, SampleModel, Settings, smooth};
+use strapd_attitude::smooth::{
+    Estimate, Looseness, MotionModel, Outcome, Sample, SampleModel, Settings, smooth,
+};
 
 type Failure = Box<dyn std::error::Error>;
 type Q = Quaternion<(), ()>;
@@ -137,7 +139,16 @@ fn main() -> Result<(), Failure> {
     let (mut has_field, mut files) = (false, Vec::new());
     for argument in std::env::args().skip(1) {
         match argument.split_once('=') {
-            Some(("colour", value)) => settings.colour = value == "1",
+            Some(("process", "0")) => settings.motion = MotionModel::Independent,
+            Some(("unresolved", value)) => settings.has_unresolved = value == "1",
+            Some(("loose", value)) => {
+                let by = value.parse()?;
+                settings.looseness = Looseness {
+                    scale: by,
+                    axes: by,
+                    force: by,
+                };
+            }
             Some(("untruncate", value)) => settings.undo_truncation = value == "1",
             Some(("spacing", value)) => settings.node_spacing = Some(value.parse()?),
             Some(("delay", value)) => settings.sensor_delay = value.parse()?,

@@ -85,7 +85,9 @@ pub use phase::Failure;
 pub(crate) use result::OBSERVED;
 pub use result::{Bias, Calibration, Counts, Learned, Magnetometer, Outcome, Section, Sizes};
 pub use sample::{Sample, Samples};
-pub use settings::{Beforehand, FieldUnit, HeadingReference, Looseness, SampleModel, Settings};
+pub use settings::{
+    Beforehand, FieldUnit, HeadingReference, Looseness, MotionModel, SampleModel, Settings,
+};
 pub use smoothed::Smoothed;
 pub use survey::Quantisation;
 pub use work::smooth;

@@ -37,13 +37,16 @@ pub(super) struct Node {
     pub bias: Vector3<f64>,
 }
 
-/// What a segment adds. Of the later node's own block only the diagonal: every row holds one of its unknowns, by 1.
+/// What a segment adds. Of the later node's own block only the diagonal, and position by velocity: a row holds one of
+/// its unknowns, by 1, and at most a velocity beside a position.
 #[derive(Clone)]
 pub(super) struct Blocks<const W: usize> {
     pub own: [[f64; STATES]; STATES],
     pub next: [[f64; STATES]; STATES],
     pub own_border: [[f64; W]; STATES],
     pub next_own: [f64; STATES],
+    /// Velocity by position of the same axis.
+    pub next_across: [f64; 3],
     pub next_border: [[f64; W]; STATES],
     /// Of the field, uT^2; 0 without.
     pub field_residual: f64,
@@ -56,6 +59,7 @@ impl<const W: usize> Blocks<W> {
             next: [[0.0; STATES]; STATES],
             own_border: [[0.0; W]; STATES],
             next_own: [0.0; STATES],
+            next_across: [0.0; 3],
             next_border: [[0.0; W]; STATES],
             field_residual: 0.0,
         }
@@ -70,10 +74,12 @@ pub(super) struct Row<const W: usize> {
     pub weight: f64,
     /// Which unknown of the later node it holds, by 1.
     pub next: Option<usize>,
+    /// Beside a position: that axis' velocity, and by what.
+    pub second: Option<(usize, f64)>,
 }
 
 impl<const W: usize> Row<W> {
-    fn new(residual: f64, weight: f64, next: Option<usize>) -> Row<W> {
+    pub(super) fn new(residual: f64, weight: f64, next: Option<usize>) -> Row<W> {
         let mut border = [0.0; W];
         border[W - 1] = -residual;
         Row {
@@ -82,6 +88,7 @@ impl<const W: usize> Row<W> {
             span: 0,
             weight,
             next,
+            second: None,
         }
     }
 
@@ -99,18 +106,26 @@ impl<const W: usize> Row<W> {
             if let Some(next) = self.next {
                 blocks.next[a][next] += x;
             }
+            if let Some((second, by)) = self.second {
+                blocks.next[a][second] += x * by;
+            }
             for (sum, j) in blocks.own_border[a][..span].iter_mut().zip(columns) {
                 *sum += x * j;
             }
             blocks.own_border[a][last] += x * self.border[last];
         }
-        if let Some(next) = self.next {
-            blocks.next_own[next] += self.weight;
+        let held = [self.next.map(|next| (next, 1.0)), self.second];
+        for (next, by) in held.into_iter().flatten() {
+            let weight = self.weight * by;
+            blocks.next_own[next] += weight * by;
             let row = &mut blocks.next_border[next];
             for (sum, j) in row[..span].iter_mut().zip(columns) {
-                *sum += self.weight * j;
+                *sum += weight * j;
             }
-            row[last] += self.weight * self.border[last];
+            row[last] += weight * self.border[last];
+        }
+        if let Some((second, by)) = self.second {
+            blocks.next_across[second - VELOCITY] += self.weight * by;
         }
         for a in 0..span {
             let x = self.border[a] * self.weight;
@@ -279,10 +294,14 @@ pub(super) fn assemble<const W: usize>(
     swept: &Swept,
     nodes: [&Node; 2],
     constants: &Constants,
+    motion: Option<[Row<W>; 6]>,
     field_weight: f64,
     (blocks, border): (&mut Blocks<W>, &mut [[f64; W]; W]),
 ) {
     *blocks = Blocks::zero();
+    for row in motion.into_iter().flatten() {
+        row.add(blocks, border);
+    }
     for row in inertial(segment, swept, nodes) {
         if row.weight > 0.0 {
             row.add(blocks, border);

@@ -2,10 +2,15 @@
 //!
 //! A stage of its own because it stands for a low pass of the acceleration: a hand, a machine, a gait do not
 //! accelerate away for ever, and how far they go is learned from the log itself.
+//!
+//! Position about its centre is a stationary process of Matern's covariance with `nu` 3/2, each axis by itself:
+//! `s^2 (1 + l t) exp(-l t)`, whose velocity has the variance `(l s)^2` (state and transition: Hartikainen, Sarkka 2010,
+//! section 3.1). Nodes that were each held to the centre by themselves would count one excursion many times.
 
 use super::border;
-use super::factors::{Node, POSITION, STATES, VELOCITY};
+use super::factors::{Node, POSITION, Row, STATES, VELOCITY};
 use super::segments::Segment;
+use super::settings::MotionModel;
 use nalgebra::Vector3;
 
 /// So many times the root mean square is the sigma.
@@ -14,28 +19,69 @@ const WIDTH: f64 = 3.0;
 const LEAST: [f64; 2] = [0.05, 0.02];
 /// Beyond so many sigmas a node counts less (Cauchy's distribution).
 const ROBUST: f64 = 3.0;
-/// Nearest to 1 that a correlation is taken for.
-const MOST_ALIKE: f64 = 0.98;
+/// The process is flat to so many times the motion's own rate, velocity over position, 1/s: where the body rests, and
+/// where it never does. There what drifts is not told from what moves, and less is taken for known.
+const BAND: [f64; 2] = [3.0, 1.5];
+/// Slowest process, 1/s.
+const SLOWEST: f64 = 0.01;
+/// Least of a variance beside that of the whole process.
+const ROUNDING: f64 = 1e-12;
 
-/// Sigmas of velocity and position over one second, and what each node's count by.
+/// Sigmas of velocity and position, and what each node's count by.
 #[derive(Clone)]
 pub(super) struct Bound {
+    motion: MotionModel,
+    /// m/s, m.
     pub(super) sigma: [f64; 2],
     weights: Vec<[f64; 2]>,
-    /// Of positions, before colour widens it, m.
-    pub(super) reach: f64,
+    /// Of the process: `l` above, 1/s.
+    pace: f64,
+}
+
+/// From the state of a node, position and velocity, to that of the next: `x' = A x + e`, `e` of variance `Q`.
+struct Transition {
+    /// `A`.
+    by: [[f64; 2]; 2],
+    /// Variance of the velocity's part of `e`, and of the position's once that is known.
+    variance: [f64; 2],
+    /// What the position's part has of the velocity's, s.
+    shared: f64,
+}
+
+impl Transition {
+    fn new([speed, place]: [f64; 2], pace: f64, secs: f64) -> Transition {
+        let x = pace * secs;
+        let e = (-x).exp();
+        let by = [[e * (1.0 + x), e * secs], [-e * pace * x, e * (1.0 - x)]];
+        let [p, v] = [place * place, speed * speed];
+        let left = |i: usize, j: usize| by[i][0] * by[j][0] * p + by[i][1] * by[j][1] * v;
+        let speed_left = (v - left(1, 1)).max(ROUNDING * v);
+        let shared = -left(0, 1) / speed_left;
+        let place_left = p - left(0, 0) + left(0, 1) * shared;
+        Transition {
+            by,
+            variance: [speed_left, place_left.max(ROUNDING * p)],
+            shared,
+        }
+    }
 }
 
 impl Bound {
-    pub(super) fn new(nodes: usize) -> Bound {
+    pub(super) fn new(motion: MotionModel, nodes: usize) -> Bound {
         Bound {
+            motion,
             sigma: [0.5, 1.0],
             weights: vec![[1.0; 2]; nodes],
-            reach: 0.0,
+            pace: BAND[0] * 0.5,
         }
     }
 
-    /// Adds the bound of node `k` to its equations: centre among the constants. Returns the weighted square.
+    /// Of velocity and position of the process, m/s and m.
+    fn spread(&self) -> [f64; 2] {
+        [self.pace * self.sigma[1], self.sigma[1]]
+    }
+
+    /// Adds what is known of node `k` by itself to its equations: centre among the constants. Returns the weighted square.
     pub(super) fn add<const W: usize>(
         &self,
         (k, node): (usize, &Node),
@@ -45,14 +91,19 @@ impl Bound {
         border: &mut [[f64; W]; STATES],
         corner: &mut [[f64; W]; W],
     ) -> f64 {
-        let secs_of = |i: Option<usize>| {
+        let joined = |i: Option<usize>| {
             i.and_then(|i| segments.get(i))
                 .filter(|segment| !segment.is_break)
                 .map_or(0.0, |segment| segment.secs)
         };
-        let secs = 0.5 * (secs_of(k.checked_sub(1)) + secs_of(Some(k)));
-        let [v, p] =
-            [0, 1].map(|what| self.weights[k][what] * secs / (self.sigma[what] * self.sigma[what]));
+        let before = joined(k.checked_sub(1));
+        let (sigma, share) = match self.motion {
+            MotionModel::Independent => (self.sigma, 0.5 * (before + joined(Some(k)))),
+            // A section's first; the others follow from it.
+            MotionModel::Process if before == 0.0 => (self.spread(), 1.0),
+            MotionModel::Process => return 0.0,
+        };
+        let [v, p] = [0, 1].map(|what| self.weights[k][what] * share / (sigma[what] * sigma[what]));
         let last = W - 1;
         let off = node.position - centre;
         for i in 0..3 {
@@ -68,14 +119,55 @@ impl Bound {
         v * node.velocity.norm_squared() + p * off.norm_squared()
     }
 
-    /// Learns it anew; velocity and position each wider where neighbours resemble each other, if that is asked for.
-    pub(super) fn learn(
-        &mut self,
-        nodes: &[Node],
+    /// The rows of a segment that moves: velocity, and position less what it shares with that, by axis.
+    pub(super) fn rows<const W: usize>(
+        &self,
+        (k, segment): (usize, &Segment),
+        [a, b]: [&Node; 2],
         centre: &Vector3<f64>,
-        segments: &[Segment],
-        is_coloured: [bool; 2],
-    ) {
+    ) -> Option<[Row<W>; 6]> {
+        if self.motion == MotionModel::Independent || segment.is_break || segment.is_still {
+            return None;
+        }
+        let Transition {
+            by,
+            variance,
+            shared,
+        } = Transition::new(self.spread(), self.pace, segment.secs);
+        let weight =
+            0.25 * (self.weights[k].iter().sum::<f64>() + self.weights[k + 1].iter().sum::<f64>());
+        Some(std::array::from_fn(|at| {
+            let i = at % 3;
+            let (p, v) = (a.position[i] - centre[i], a.velocity[i]);
+            let off = |what: usize| by[what][0] * p + by[what][1] * v;
+            let speed = b.velocity[i] - off(1);
+            let (residual, from, variance, next, second) = if at < 3 {
+                (speed, by[1], variance[0], VELOCITY + i, None)
+            } else {
+                let place = b.position[i] - centre[i] - off(0);
+                let from = [by[0][0] - shared * by[1][0], by[0][1] - shared * by[1][1]];
+                let second = Some((VELOCITY + i, -shared));
+                (
+                    place - shared * speed,
+                    from,
+                    variance[1],
+                    POSITION + i,
+                    second,
+                )
+            };
+            let mut row = Row::new(residual, weight / variance, Some(next));
+            row.second = second;
+            row.own[POSITION + i] = -from[0];
+            row.own[VELOCITY + i] = -from[1];
+            let whole = if at < 3 { 0.0 } else { 1.0 };
+            row.border[border::CENTRE + i] = from[0] - whole;
+            row.span = border::CENTRE + 3;
+            row
+        }))
+    }
+
+    /// Learns it anew.
+    pub(super) fn learn(&mut self, nodes: &[Node], centre: &Vector3<f64>, segments: &[Segment]) {
         let moves = |i: usize| {
             segments
                 .get(i)
@@ -84,34 +176,25 @@ impl Bound {
         let moving: Vec<usize> = (0..nodes.len())
             .filter(|k| moves(*k) || k.checked_sub(1).is_some_and(moves))
             .collect();
+        let squares = |k: usize| {
+            let off = nodes[k].position - centre;
+            [nodes[k].velocity.norm_squared(), off.norm_squared()]
+        };
         if !moving.is_empty() {
             for what in 0..2 {
-                let off = |k: usize| match what {
-                    0 => nodes[k].velocity,
-                    _ => nodes[k].position - centre,
-                };
                 let (mut sum, mut weight) = (0.0, 0.0);
                 for k in &moving {
-                    sum += self.weights[*k][what] * off(*k).norm_squared();
+                    sum += self.weights[*k][what] * squares(*k)[what];
                     weight += self.weights[*k][what];
                 }
-                let colour = if is_coloured[what] {
-                    colour(&moving, off)
-                } else {
-                    1.0
-                };
-                let reach = WIDTH * (sum / weight / 3.0).sqrt();
-                if what == 1 {
-                    self.reach = reach;
-                }
-                self.sigma[what] = (colour * reach).max(LEAST[what]);
+                self.sigma[what] = (WIDTH * (sum / weight / 3.0).sqrt()).max(LEAST[what]);
             }
+            let rests = segments.iter().any(|segment| segment.is_still);
+            let band = BAND[usize::from(!rests)];
+            self.pace = (band * self.sigma[0] / self.sigma[1]).max(SLOWEST);
         }
         for (k, weight) in self.weights.iter_mut().enumerate() {
-            let squares = [
-                nodes[k].velocity.norm_squared(),
-                (nodes[k].position - centre).norm_squared(),
-            ];
+            let squares = squares(k);
             for what in 0..2 {
                 let scale = ROBUST * self.sigma[what];
                 weight[what] = 1.0 / (1.0 + squares[what] / (scale * scale));
@@ -119,32 +202,75 @@ impl Bound {
         }
     }
 
-    /// Of the sigmas, once for each node that moves: what a wider bound costs.
+    /// Twice the logarithm of the sigmas, once for each node that moves: what a wider bound costs.
     pub(super) fn log_norm(&self, segments: &[Segment]) -> f64 {
         let moving = segments
             .iter()
-            .filter(|segment| !segment.is_still && !segment.is_break)
-            .count();
-        6.0 * moving as f64 * (self.sigma[0].ln() + self.sigma[1].ln())
+            .filter(|segment| !segment.is_still && !segment.is_break);
+        let each = moving.map(|segment| match self.motion {
+            MotionModel::Independent => 6.0 * (self.sigma[0].ln() + self.sigma[1].ln()),
+            MotionModel::Process => {
+                let [v, p] = Transition::new(self.spread(), self.pace, segment.secs).variance;
+                3.0 * (v.ln() + p.ln())
+            }
+        });
+        each.sum()
     }
 }
 
-/// By how much a mean of values that resemble their neighbours is known worse than one of as many that do not.
-fn colour(moving: &[usize], value: impl Fn(usize) -> Vector3<f64>) -> f64 {
-    let mean = moving.iter().map(|k| value(*k)).sum::<Vector3<f64>>() / moving.len() as f64;
-    let square = moving
-        .iter()
-        .map(|k| (value(*k) - mean).norm_squared())
-        .sum::<f64>()
-        / moving.len() as f64;
-    let neighbours = || moving.windows(2).filter(|pair| pair[1] == pair[0] + 1);
-    let count = neighbours().count();
-    if count == 0 {
-        return 1.0;
+#[cfg(test)]
+mod tests {
+    use super::Transition;
+
+    #[test]
+    fn a_stationary_process_stays_what_it_is() {
+        for (pace, secs) in [(0.01, 0.005), (0.3, 0.5), (2.0, 0.5), (9.0, 2.0)] {
+            let place = 0.7_f64;
+            let speed = pace * place;
+            let Transition {
+                by,
+                variance,
+                shared,
+            } = Transition::new([speed, place], pace, secs);
+            let start = [place * place, speed * speed];
+            let noise = [
+                [
+                    variance[1] + shared * shared * variance[0],
+                    shared * variance[0],
+                ],
+                [shared * variance[0], variance[0]],
+            ];
+            for i in 0..2 {
+                for j in 0..2 {
+                    let after = by[i][0] * by[j][0] * start[0]
+                        + by[i][1] * by[j][1] * start[1]
+                        + noise[i][j];
+                    let wanted = if i == j { start[i] } else { 0.0 };
+                    let scale = (start[i] * start[j]).sqrt();
+                    assert!(
+                        (after - wanted).abs() < 1e-11 * scale,
+                        "{pace} {secs} {i} {j}: {after}"
+                    );
+                }
+            }
+        }
     }
-    let product: f64 = neighbours()
-        .map(|pair| (value(pair[0]) - mean).dot(&(value(pair[1]) - mean)))
-        .sum();
-    let alike = (product / count as f64 / square.max(3e-12)).clamp(0.0, MOST_ALIKE);
-    ((1.0 + alike) / (1.0 - alike)).sqrt()
+
+    #[test]
+    fn a_short_step_is_integrated_white_noise() {
+        // Derivative of the acceleration's noise: 4 l^3 s^2 of velocity a second, a third of its cube of position.
+        let (pace, place, secs) = (1.5_f64, 0.4_f64, 1e-3_f64);
+        let density = 4.0 * pace.powi(3) * place * place;
+        let Transition {
+            variance, shared, ..
+        } = Transition::new([pace * place, place], pace, secs);
+        assert!((variance[0] / (density * secs) - 1.0).abs() < 5e-3);
+        assert!((shared / (0.5 * secs) - 1.0).abs() < 5e-3);
+        let left = density * secs.powi(3) / 12.0;
+        assert!(
+            (variance[1] / left - 1.0).abs() < 2e-2,
+            "{}",
+            variance[1] / left
+        );
+    }
 }

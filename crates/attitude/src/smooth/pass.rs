@@ -4,8 +4,9 @@
 //! own sums: which thread does a job, and when, moves no bit. While a batch of jobs is swept, the one before it is
 //! given to whoever takes them in order.
 
-use super::border::Constants;
+use super::border::{self, Constants};
 use super::factors::{Blocks, Node, assemble};
+use super::motion::Bound;
 use super::prepare::Preparer;
 use super::prepared::Prepared;
 use super::sample::Samples;
@@ -29,6 +30,7 @@ pub(super) struct Model<'a> {
     pub(super) segments: &'a [Segment],
     pub(super) nodes: &'a [Node],
     pub(super) constants: &'a Constants,
+    pub(super) bound: &'a Bound,
     /// Of the field of each segment, 1/uT^2.
     pub(super) field_weights: &'a [f64],
 }
@@ -104,6 +106,7 @@ impl<const W: usize> Job<W> {
         *self.border = [[0.0; W]; W];
         self.blocks.resize_with(self.ranges.len(), Blocks::zero);
         self.seen.clear();
+        let centre = border::vector(model.constants, border::CENTRE);
         for (i, range) in self.ranges.iter().enumerate() {
             let k = self.first + i;
             let (a, b) = (&model.nodes[k], &model.nodes[k + 1]);
@@ -120,6 +123,7 @@ impl<const W: usize> Job<W> {
                 &swept,
                 [a, b],
                 model.constants,
+                model.bound.rows((k, segment), [a, b], &centre),
                 model.field_weights[k],
                 into,
             );

@@ -4,7 +4,7 @@
 //! ends nowhere.
 
 use super::border::{self, Constants, Priors, WIDE};
-use super::factors::{BIAS, Node, STATES, VELOCITY};
+use super::factors::{BIAS, Node, POSITION, STATES, VELOCITY};
 use super::heading::{FieldTrust, sections};
 use super::motion::Bound;
 use super::pass::{Model, sweep_all};
@@ -27,8 +27,10 @@ const LARGEST_TURN: f64 = 0.5;
 /// Done below this, rad, after so many iterations.
 const DONE: f64 = 1e-6_f64.to_radians();
 const FEWEST: usize = 4;
-/// Turns above this that grow twice running lead nowhere, rad: smaller ones grow when weights change.
+/// Turns above this that grow again and again lead nowhere, rad: smaller ones grow when weights change.
 const DIVERGING: f64 = 0.1;
+/// Times running: where the body rests somewhere, and where nothing holds its attitude.
+const GROWING: [usize; 2] = [3, 2];
 /// A result's last turn is below this, rad; while it is not, there are up to twice as many iterations.
 const SETTLED: f64 = 0.1_f64.to_radians();
 /// And beside the sigma of its node.
@@ -166,12 +168,7 @@ pub(super) fn run<S: Samples, const W: usize>(
                     .after(iteration, &equations.residuals, problem.segments);
         }
         let centre = border::vector(&state.constants, border::CENTRE);
-        state.bound.learn(
-            &state.nodes,
-            &centre,
-            problem.segments,
-            problem.is_coloured(W == WIDE),
-        );
+        state.bound.learn(&state.nodes, &centre, problem.segments);
         growing = if turn > largest && turn > DIVERGING {
             growing + 1
         } else {
@@ -179,7 +176,7 @@ pub(super) fn run<S: Samples, const W: usize>(
         };
         largest = turn;
         phase.failure = problem.failure(state, turn, tilt);
-        if growing >= 2 {
+        if growing >= GROWING[usize::from(!problem.rests())] {
             phase.failure = Some(Failure::Diverging(turn));
             return Ok(phase);
         }
@@ -193,23 +190,19 @@ pub(super) fn run<S: Samples, const W: usize>(
 }
 
 impl Problem<'_> {
-    /// Of velocity, of position. Without a field heading hangs on what gravity says of the gyro's scale, by way of the
-    /// places the body comes back to, and a wide bound of those loses it; where nothing rests that is no use either.
-    fn is_coloured(&self, has_field: bool) -> [bool; 2] {
-        let rests = self.segments.iter().any(|segment| segment.is_still);
-        let colour = self.settings.colour;
-        [colour, colour && (has_field || !rests)]
+    fn rests(&self) -> bool {
+        self.segments.iter().any(|segment| segment.is_still)
     }
 
     fn failure(&self, state: &State, turn: f64, tilt: f64) -> Option<Failure> {
         const FARTHEST: f64 = 100.0;
         const MOST_TILT: f64 = 5.0_f64.to_radians();
-        let strays = state.bound.reach;
+        let [_, strays] = state.bound.sigma;
         if !turn.is_finite() {
             Some(Failure::NotFinite)
         } else if turn > DIVERGING {
             Some(Failure::Unfinished(turn))
-        } else if strays > FARTHEST && !self.segments.iter().any(|segment| segment.is_still) {
+        } else if strays > FARTHEST && !self.rests() {
             Some(Failure::Strays(strays))
         } else if tilt > MOST_TILT {
             Some(Failure::NotUpright(tilt))
@@ -234,7 +227,7 @@ impl State {
             let part = |first: usize| Vector3::from_fn(|i, _| share * x[first + i]);
             node.q = normalised(&turned_in_navigation(&part(0), &node.q));
             node.velocity += part(VELOCITY);
-            node.position += part(2 * VELOCITY);
+            node.position += part(POSITION);
             node.bias += part(BIAS);
         }
         for (constant, x) in self.constants.iter_mut().zip(&solution.border) {
@@ -286,6 +279,7 @@ fn equations<S: Samples, const W: usize>(
         segments,
         nodes: &state.nodes,
         constants: &state.constants,
+        bound: &state.bound,
         field_weights: &state.field_weights,
     };
     let mut finish = |k: usize,
@@ -310,6 +304,10 @@ fn equations<S: Samples, const W: usize>(
             solver.eliminate(&mut own, &blocks.next, &mut border);
             for (j, next) in blocks.next_own.iter().enumerate() {
                 own[j][j] += next;
+            }
+            for (axis, across) in blocks.next_across.iter().enumerate() {
+                own[VELOCITY + axis][POSITION + axis] += across;
+                own[POSITION + axis][VELOCITY + axis] += across;
             }
             add(&mut border, &blocks.next_border);
             residuals.push(blocks.field_residual);

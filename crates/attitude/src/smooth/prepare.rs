@@ -19,6 +19,7 @@ const LONGEST_STEP: f64 = 0.005;
 /// A stream of samples on its way to the sweep.
 pub(super) struct Preparer<'a> {
     survey: &'a Survey,
+    has_unresolved: bool,
     gate: Gate,
     /// Accepted, a few of them given on already.
     window: Vec<(Numbers, u64)>,
@@ -34,6 +35,7 @@ impl<'a> Preparer<'a> {
             .clamp(1.0, 1000.0) as usize;
         Preparer {
             survey,
+            has_unresolved: settings.has_unresolved,
             gate: Gate::default(),
             window: Vec::new(),
             next: 0,
@@ -84,14 +86,19 @@ impl<'a> Preparer<'a> {
                 input: place,
                 is_input: true,
                 is_after_break: false,
+                is_bridged: false,
                 doubt: [0.0; 2],
             };
+            if self.has_unresolved && secs <= GAP * self.survey.interval {
+                prepared.doubt = bridge::unresolved(&self.window, i, secs);
+            }
             if let Some(before) = &before
                 && secs > GAP * self.survey.interval
             {
                 if secs > LONGEST_BRIDGE {
                     prepared.is_after_break = true;
                 } else {
+                    prepared.is_bridged = true;
                     prepared.doubt = bridge::doubt(before, &sample, secs);
                     let more = (secs / self.survey.interval).round() as usize - 1;
                     let parts = (more + 1) as f64;
@@ -105,6 +112,7 @@ impl<'a> Preparer<'a> {
                             force,
                             field: Vector3::repeat(f64::NAN),
                             is_input: false,
+                            is_bridged: false,
                             doubt: [0.0; 2],
                             ..prepared
                         };

@@ -20,6 +20,8 @@ pub(super) struct Prepared {
     pub is_input: bool,
     /// Nothing is known of the time before it.
     pub is_after_break: bool,
-    /// Variance that a gap before it leaves of attitude and velocity: rad^2, (m/s)^2.
+    /// A gap before it was bridged.
+    pub is_bridged: bool,
+    /// Variance that a gap before it, and motion faster than the samples, leave of attitude and velocity: rad^2, (m/s)^2.
     pub doubt: [f64; 2],
 }

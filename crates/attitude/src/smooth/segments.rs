@@ -25,7 +25,7 @@ pub(super) struct Segment {
     /// Nothing is known of the motion.
     pub is_break: bool,
     pub is_still: bool,
-    /// Variance left by gaps, of attitude and of velocity.
+    /// Variance left by gaps and by what is faster than the samples, of attitude and of velocity.
     pub doubt: [f64; 2],
     pub mean_rate: Vector3<f64>,
     /// Largest standard deviation of an axis: rate, force.

@@ -22,6 +22,17 @@ pub enum HeadingReference {
     All,
 }
 
+/// What is taken for the motion of a body that strays no farther and no faster than it is found to.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum MotionModel {
+    /// A stationary process: where it is and how fast bear on where it is next.
+    #[default]
+    Process,
+    /// Velocity and position of each node say nothing of the next one's. It is what the independent computation has
+    /// whose figures the tests hold.
+    Independent,
+}
+
 /// In what the field is measured.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum FieldUnit {
@@ -116,8 +127,10 @@ pub struct Settings {
     pub sample_model: SampleModel,
     /// Whether rates that a driver cut towards zero are put back in the middle of their step.
     pub undo_truncation: bool,
-    /// Whether the motion bound is widened where velocities of neighbouring nodes resemble each other.
-    pub colour: bool,
+    /// What is taken for the motion.
+    pub motion: MotionModel,
+    /// Whether what is faster than the samples counts as noise of them.
+    pub has_unresolved: bool,
     /// Most iterations without the field; twice as many while nodes turn by more than 0.1 deg.
     pub iterations: usize,
     /// Most iterations with it.
@@ -137,7 +150,8 @@ impl Default for Settings {
             field_unit: FieldUnit::Microtesla,
             sample_model: SampleModel::Interval,
             undo_truncation: true,
-            colour: true,
+            motion: MotionModel::default(),
+            has_unresolved: true,
             iterations: 6,
             field_iterations: 9,
             threads: NonZero::<usize>::MIN,

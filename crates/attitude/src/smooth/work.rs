@@ -75,7 +75,7 @@ fn cut<S: Samples>(
     let (mut ready, mut bridged) = (Vec::new(), 0);
     let mut take = |ready: &mut Vec<Prepared>| {
         for sample in ready.drain(..) {
-            bridged += u64::from(sample.doubt[0] > 0.0);
+            bridged += u64::from(sample.is_bridged);
             cutter.take(&sample);
         }
     };
@@ -206,7 +206,7 @@ impl Work {
             bias,
         };
         State {
-            bound: Bound::new(attitudes.len()),
+            bound: Bound::new(self.settings.motion, attitudes.len()),
             nodes: attitudes.into_iter().map(node).collect(),
             constants: [0.0; ALL],
             field_weights: trust.first(&self.segments),

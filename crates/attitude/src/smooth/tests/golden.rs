@@ -10,16 +10,17 @@ use crate::smooth::prepared::Prepared;
 use crate::smooth::segments::{Cutter, find_standstill};
 use crate::smooth::survey::Survey;
 use crate::smooth::sweep::{Sensor, sweep};
-use crate::smooth::{Outcome, Sample, Settings, Smoothed};
+use crate::smooth::{MotionModel, Outcome, Sample, Settings, Smoothed};
 use nalgebra::Vector3;
 
 /// Half of the last digit of six.
 const DIGITS: f64 = 5.1e-7;
 
-/// As the figures were made: before the colour of the motion bound.
+/// As the figures were made.
 fn settings() -> Settings {
     Settings {
-        colour: false,
+        motion: MotionModel::Independent,
+        has_unresolved: false,
         iterations: 12,
         field_iterations: 16,
         ..Settings::default()

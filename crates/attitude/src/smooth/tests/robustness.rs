@@ -1,6 +1,7 @@
 //! Threads, chunks, breaks, no standstill, large biases: what the result must not depend on or break at.
 
 use super::logs::{Log, Motion, conjugate, errors, log, product};
+use crate::frames::In;
 use crate::smooth::{Estimate, Outcome, Sample, SampleModel, Samples, Settings, Smoothed, smooth};
 use nalgebra::Vector3;
 use std::convert::Infallible;
@@ -234,4 +235,42 @@ fn variances_are_those_of_the_equations_of_the_case_and_of_the_clock() {
             }
         }
     }
+}
+
+/// A tap rings in the case for a few milliseconds, of which samples 10 ms apart see one or none, and it is no motion.
+#[test]
+fn taps_are_taken_for_what_they_are() {
+    let mut log = log(Motion::Hand).plain();
+    for i in (1500..4500).step_by(75) {
+        if let Some(force) = &mut log.samples[i].force {
+            let ringing = Vector3::new(60.0, -40.0, 30.0);
+            *force = In::assume(force.as_vector() + ringing);
+        }
+    }
+    let error = |has_unresolved: bool| {
+        let settings = Settings {
+            has_unresolved,
+            ..Settings::default()
+        };
+        let (_, estimates) = log.smoothed(&settings);
+        let [tilt, ..] = errors(&estimates, &log.truth, true);
+        let inside = estimates
+            .iter()
+            .zip(&log.truth)
+            .filter(|(estimate, truth)| {
+                let error = product(&estimate.q_nb.wxyz(), &conjugate(truth));
+                let is_in = |axis: usize| {
+                    let sigma = estimate.covariance[(axis, axis)].sqrt();
+                    (2.0 * error[axis + 1]).abs() < 3.0 * sigma
+                };
+                is_in(0) && is_in(1)
+            });
+        (tilt, inside.count() as f64 / estimates.len() as f64)
+    };
+    let (without, _) = error(false);
+    let (tilt, inside) = error(true);
+    assert!(
+        tilt < 0.5 * without && inside > 0.98,
+        "{tilt} {inside} {without}"
+    );
 }

@@ -4,14 +4,16 @@ use super::golden::prepared;
 use super::logs::{BIAS, Motion, log};
 use crate::quaternion::exp_minus_one;
 use crate::quaternion::kernel::product;
-use crate::smooth::Settings;
 use crate::smooth::border::{self, ALL, Constants, WIDE};
 use crate::smooth::factors::{
-    BIAS as BIAS_STATE, Node, Row, STATES, difference, field, inertial, standstill,
+    BIAS as BIAS_STATE, Blocks, Node, Row, STATES, assemble, difference, field, inertial,
+    standstill,
 };
+use crate::smooth::motion::Bound;
 use crate::smooth::prepared::Prepared;
 use crate::smooth::segments::Segment;
 use crate::smooth::sweep::{Sensor, Swept, sweep};
+use crate::smooth::{MotionModel, Settings};
 use nalgebra::Vector3;
 
 /// Sums are of first order in the time step, and so are their derivatives: what the document grants.
@@ -103,6 +105,13 @@ impl Place {
     }
 }
 
+/// What a row holds of an unknown of the later node.
+fn by_next(row: &Row<WIDE>, unknown: usize) -> f64 {
+    let held = [row.next.map(|next| (next, 1.0)), row.second];
+    let of = |(state, by): (usize, f64)| if state == unknown { by } else { 0.0 };
+    held.into_iter().flatten().map(of).sum()
+}
+
 /// Every row's derivatives by every unknown, against central differences of its residual.
 #[track_caller]
 fn check<const N: usize>(rows: impl Fn(&Place) -> [Row<WIDE>; N]) {
@@ -126,7 +135,7 @@ fn check<const N: usize>(rows: impl Fn(&Place) -> [Row<WIDE>; N]) {
             let claimed: Vec<f64> = three
                 .map(|i| match unknown {
                     k if k < STATES => at[i].own[k],
-                    k if k < 2 * STATES => f64::from(u8::from(at[i].next == Some(k - STATES))),
+                    k if k < 2 * STATES => by_next(&at[i], k - STATES),
                     k if k - 2 * STATES < at[i].span => at[i].border[k - 2 * STATES],
                     _ => 0.0,
                 })
@@ -209,4 +218,71 @@ fn rows_of_a_body_at_rest_are_those_of_differences() {
         nodes[1].q = product(&nodes[1].q, &self::place().nodes[0].q);
         standstill([&nodes[0], &nodes[1]])
     });
+}
+
+fn process(place: &Place) -> [Row<WIDE>; 6] {
+    let centre = border::vector(&place.constants, border::CENTRE);
+    let bound = Bound::new(MotionModel::Process, 2);
+    let nodes = [&place.nodes[0], &place.nodes[1]];
+    bound.rows((0, &place.segment), nodes, &centre).unwrap()
+}
+
+#[test]
+fn rows_of_the_motion_are_those_of_differences() {
+    check(process);
+}
+
+/// What a segment adds is the sum of its rows' products.
+#[test]
+fn the_equations_are_the_products_of_their_rows() {
+    let place = place();
+    let swept = place.swept();
+    let nodes = [&place.nodes[0], &place.nodes[1]];
+    let (mut blocks, mut corner) = (Blocks::<WIDE>::zero(), [[0.0; WIDE]; WIDE]);
+    assemble(
+        &place.segment,
+        &swept,
+        nodes,
+        &place.constants,
+        Some(process(&place)),
+        1.0,
+        (&mut blocks, &mut corner),
+    );
+    let rows = inertial(&place.segment, &swept, nodes)
+        .into_iter()
+        .chain(process(&place))
+        .chain(field(&swept, &place.constants, false, 1.0));
+    let (mut own, mut next) = ([[0.0; STATES]; STATES], [[0.0; STATES]; STATES]);
+    let (mut later, mut border) = ([[0.0; STATES]; STATES], [[0.0; WIDE]; STATES]);
+    for row in rows {
+        for i in 0..STATES {
+            let x = row.weight * by_next(&row, i);
+            for j in 0..STATES {
+                own[i][j] += row.weight * row.own[i] * row.own[j];
+                next[i][j] += row.weight * row.own[i] * by_next(&row, j);
+                later[i][j] += x * by_next(&row, j);
+            }
+            for (sum, j) in border[i].iter_mut().zip(&row.border) {
+                *sum += x * j;
+            }
+        }
+    }
+    let mut found = [[0.0; STATES]; STATES];
+    for i in 0..STATES {
+        found[i][i] = blocks.next_own[i];
+    }
+    for (axis, across) in blocks.next_across.iter().enumerate() {
+        found[3 + axis][6 + axis] = *across;
+        found[6 + axis][3 + axis] = *across;
+    }
+    let agree = |ours: &[f64], theirs: &[f64]| {
+        let size = theirs.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+        for (a, b) in ours.iter().zip(theirs) {
+            assert!((a - b).abs() <= 1e-12 * size, "{ours:?}\n{theirs:?}");
+        }
+    };
+    agree(blocks.own.as_flattened(), own.as_flattened());
+    agree(blocks.next.as_flattened(), next.as_flattened());
+    agree(found.as_flattened(), later.as_flattened());
+    agree(blocks.next_border.as_flattened(), border.as_flattened());
 }
