@@ -76,10 +76,11 @@ pub struct Recording {
     pub sizes: Vec<Sizes>,
 }
 
-/// A gyro whose scale or axes are found so many prior sigmas off is none of its class.
-const BEYOND: f64 = 2.5;
-/// And an accelerometer so many: it has more numbers, and motions that are no noise in them.
-const BEYOND_FORCE: f64 = 3.5;
+/// A sensor is none of its class if a constant is found so many sigmas off: of what a log finds where the class is
+/// right, which is the less the less it sees (the prior's variance less what the log leaves of it).
+const BEYOND: f64 = 3.5;
+/// Least of that, beside the prior's sigma: what a log hardly sees is not looked at.
+const LEAST_SEEN: f64 = 0.1;
 /// And is smoothed again with priors that are so many times as wide: those of one that nobody has calibrated
 /// (`uncalibrated` beside what is expected where nobody says anything).
 const LOOSER: Looseness = Looseness {
@@ -92,15 +93,16 @@ const LOOSER_KNOWN: f64 = 2.5;
 
 fn is_beyond(smoothed: &Smoothed) -> bool {
     let calibration = smoothed.calibration();
-    is_off(&calibration.gyro, BEYOND)
-        || is_off(&calibration.force_bias, BEYOND_FORCE)
-        || is_off(&calibration.force, BEYOND_FORCE)
+    is_off(&calibration.gyro) || is_off(&calibration.force_bias) || is_off(&calibration.force)
 }
 
-/// Whether a constant is so many prior sigmas from nothing.
-fn is_off<const N: usize>(learned: &Learned<N>, sigmas: f64) -> bool {
-    let mut all = learned.value.iter().zip(&learned.prior);
-    all.any(|(value, prior)| value.abs() > sigmas * prior)
+fn is_off<const N: usize>(learned: &Learned<N>) -> bool {
+    let sigmas = learned.sigma.iter().zip(&learned.prior);
+    let mut all = learned.value.iter().zip(sigmas);
+    all.any(|(value, (sigma, prior))| {
+        let seen = (prior * prior - sigma * sigma).max(0.0).sqrt();
+        value.abs() > BEYOND * seen.max(LEAST_SEEN * prior)
+    })
 }
 
 /// What was kept, as the smoother reads it.
