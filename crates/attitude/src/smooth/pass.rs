@@ -1,8 +1,8 @@
 //! One pass over the samples: prepared, cut into segments, swept on several threads, given on in order. Pure.
 //!
 //! A stage of its own because it decides what runs beside what. Segments go in jobs of a fixed size, each with its
-//! own sums: which thread does a job, and when, moves no bit. While a batch of jobs is swept, the one before it is
-//! given to whoever takes them in order.
+//! own samples and sums: which thread does a job, and when, moves no bit. One thread reads, prepares and takes the
+//! results in order; it sweeps, too, where jobs come faster than the others do them.
 
 use super::border::{self, Constants};
 use super::factors::{Blocks, Node, assemble};
@@ -15,15 +15,14 @@ use super::settings::Settings;
 use super::survey::Survey;
 use super::sweep::{Sensor, sweep};
 use crate::smooth::border::WIDE;
-use std::num::NonZero;
+use std::collections::{BTreeMap, VecDeque};
 use std::ops::Range;
-use std::sync::Mutex;
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError, mpsc};
 
 /// Segments of a job.
 const JOB: usize = 8;
-/// Jobs of a batch, and samples after which one is full.
-const BATCH: usize = 32;
-const BATCH_SAMPLES: usize = 1 << 16;
+/// Jobs that wait for each thread that helps.
+const WAITING: usize = 2;
 
 /// What a sweep starts from: the same for all its segments.
 pub(super) struct Model<'a> {
@@ -75,6 +74,7 @@ pub(super) fn by_segment<S: Samples>(
 /// Some segments one after the other, and what they add.
 pub(super) struct Job<const W: usize> {
     pub(super) first: usize,
+    samples: Vec<Prepared>,
     ranges: Vec<Range<usize>>,
     pub(super) blocks: Vec<Blocks<W>>,
     /// What a segment did that is wanted later: mean field (samples and sum), push.
@@ -95,6 +95,7 @@ impl<const W: usize> Job<W> {
     fn new(first: usize) -> Job<W> {
         Job {
             first,
+            samples: Vec::new(),
             ranges: Vec::with_capacity(JOB),
             blocks: Vec::new(),
             seen: Vec::new(),
@@ -102,7 +103,21 @@ impl<const W: usize> Job<W> {
         }
     }
 
-    fn work(&mut self, samples: &[Prepared], model: &Model<'_>, sensor: &Sensor) {
+    fn push(&mut self, samples: &[Prepared]) {
+        let start = self.samples.len();
+        self.samples.extend_from_slice(samples);
+        self.ranges.push(start..self.samples.len());
+    }
+
+    /// To be filled anew, from segment `first` on.
+    fn reused(mut self, first: usize) -> Job<W> {
+        self.first = first;
+        self.samples.clear();
+        self.ranges.clear();
+        self
+    }
+
+    fn work(&mut self, model: &Model<'_>, sensor: &Sensor) {
         *self.border = [[0.0; W]; W];
         self.blocks.resize_with(self.ranges.len(), Blocks::zero);
         self.seen.clear();
@@ -110,7 +125,7 @@ impl<const W: usize> Job<W> {
         for (i, range) in self.ranges.iter().enumerate() {
             let k = self.first + i;
             let (a, b) = (&model.nodes[k], &model.nodes[k + 1]);
-            let samples = &samples[range.clone()];
+            let samples = &self.samples[range.clone()];
             let swept = if W == WIDE {
                 sweep::<true>(samples, &a.q, &a.bias, sensor)
             } else {
@@ -136,45 +151,88 @@ impl<const W: usize> Job<W> {
     }
 }
 
-struct Batch<const W: usize> {
-    samples: Vec<Prepared>,
-    jobs: Vec<Job<W>>,
-    /// Jobs that are made already, to be used again.
+/// Jobs that wait for a thread.
+struct Queue<const W: usize> {
+    /// And whether there will be no more.
+    jobs: Mutex<(VecDeque<Job<W>>, bool)>,
+    changed: Condvar,
+}
+
+impl<const W: usize> Queue<W> {
+    fn new() -> Queue<W> {
+        Queue {
+            jobs: Mutex::new((VecDeque::new(), false)),
+            changed: Condvar::new(),
+        }
+    }
+
+    fn held(&self) -> MutexGuard<'_, (VecDeque<Job<W>>, bool)> {
+        self.jobs.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// How many wait now.
+    fn push(&self, job: Job<W>) -> usize {
+        let mut held = self.held();
+        held.0.push_back(job);
+        self.changed.notify_one();
+        held.0.len()
+    }
+
+    fn pop(&self) -> Option<Job<W>> {
+        self.held().0.pop_front()
+    }
+
+    /// The next one, as soon as there is one; `None` after the last.
+    fn next(&self) -> Option<Job<W>> {
+        let mut held = self.held();
+        loop {
+            if let Some(job) = held.0.pop_front() {
+                return Some(job);
+            }
+            if held.1 {
+                return None;
+            }
+            let waited = self.changed.wait(held);
+            held = waited.unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+}
+
+/// Closes a queue whatever becomes of whoever fills it: those who wait for jobs are let go.
+struct Closing<'a, const W: usize>(&'a Queue<W>);
+
+impl<const W: usize> Drop for Closing<'_, W> {
+    fn drop(&mut self) {
+        self.0.held().1 = true;
+        self.0.changed.notify_all();
+    }
+}
+
+/// Done jobs on their way to whoever takes them in order.
+struct InOrder<const W: usize, F> {
+    take: F,
+    /// First segment of the next one.
+    next: usize,
+    early: BTreeMap<usize, Job<W>>,
+    /// Taken, to be filled again.
     spare: Vec<Job<W>>,
 }
 
-impl<const W: usize> Batch<W> {
-    fn new() -> Batch<W> {
-        Batch {
-            samples: Vec::new(),
-            jobs: Vec::new(),
-            spare: Vec::new(),
+impl<const W: usize, F: FnMut(&Job<W>)> InOrder<W, F> {
+    fn push(&mut self, job: Job<W>) {
+        self.early.insert(job.first, job);
+        while let Some(job) = self.early.remove(&self.next) {
+            (self.take)(&job);
+            self.next += JOB;
+            self.spare.push(job);
         }
     }
 
-    fn clear(&mut self) {
-        self.samples.clear();
-        self.spare.append(&mut self.jobs);
-    }
-
-    fn push(&mut self, k: usize, samples: &[Prepared]) {
-        if k.is_multiple_of(JOB) || self.jobs.is_empty() {
-            let mut job = self.spare.pop().unwrap_or_else(|| Job::new(k));
-            job.first = k;
-            job.ranges.clear();
-            self.jobs.push(job);
+    fn empty_job(&mut self, first: usize) -> Job<W> {
+        match self.spare.pop() {
+            Some(job) => job.reused(first),
+            None => Job::new(first),
         }
-        let start = self.samples.len();
-        self.samples.extend_from_slice(samples);
-        if let Some(job) = self.jobs.last_mut() {
-            job.ranges.push(start..self.samples.len());
-        }
-    }
-
-    /// Only after a whole job: where a batch ends is not seen in the sums.
-    fn is_full(&self, k: usize) -> bool {
-        (k + 1).is_multiple_of(JOB)
-            && (self.jobs.len() >= BATCH || self.samples.len() >= BATCH_SAMPLES)
     }
 }
 
@@ -183,46 +241,61 @@ pub(super) fn sweep_all<S: Samples, const W: usize>(
     samples: &mut S,
     with: (&Survey, &Settings),
     model: &Model<'_>,
-    mut take: impl FnMut(&Job<W>),
+    take: impl FnMut(&Job<W>),
 ) -> Result<(), S::Error> {
-    let sensor = Sensor::of(model.constants);
-    let threads = with.1.threads;
-    let (mut filling, mut done) = (Batch::<W>::new(), Batch::<W>::new());
-    by_segment(samples, with, model.segments, |k, held| {
-        let Some(k) = k else { return };
-        filling.push(k, held);
-        if filling.is_full(k) {
-            work(&mut filling, &done, (model, &sensor), threads, &mut take);
-            std::mem::swap(&mut filling, &mut done);
-            filling.clear();
-        }
-    })?;
-    work(&mut filling, &done, (model, &sensor), threads, &mut take);
-    filling.jobs.iter().for_each(take);
-    Ok(())
-}
-
-/// Sweeps one batch and gives the other on.
-fn work<const W: usize>(
-    batch: &mut Batch<W>,
-    done: &Batch<W>,
-    (model, sensor): (&Model<'_>, &Sensor),
-    threads: NonZero<usize>,
-    take: &mut impl FnMut(&Job<W>),
-) {
-    let samples = &batch.samples;
-    let jobs = Mutex::new(batch.jobs.iter_mut());
-    let next = || jobs.lock().ok().and_then(|mut jobs| jobs.next());
-    let help = || {
-        while let Some(job) = next() {
-            job.work(samples, model, sensor);
-        }
+    let sensor = &Sensor::of(model.constants);
+    let helpers = with.1.threads.get() - 1;
+    let queue = &Queue::<W>::new();
+    let (sender, done) = mpsc::channel();
+    let mut in_order = InOrder {
+        take,
+        next: 0,
+        early: BTreeMap::new(),
+        spare: Vec::new(),
     };
     std::thread::scope(|scope| {
-        for _ in 1..threads.get() {
-            scope.spawn(help);
+        let closing = Closing(queue);
+        for _ in 0..helpers {
+            let sender = sender.clone();
+            scope.spawn(move || {
+                while let Some(mut job) = queue.next() {
+                    job.work(model, sensor);
+                    // Nobody takes it any more where reading has failed.
+                    if sender.send(job).is_err() {
+                        return;
+                    }
+                }
+            });
         }
-        done.jobs.iter().for_each(take);
-        help();
-    });
+        drop(sender);
+        let hand_on = |job: Job<W>, in_order: &mut InOrder<W, _>| {
+            if queue.push(job) > WAITING * helpers
+                && let Some(mut job) = queue.pop()
+            {
+                job.work(model, sensor);
+                in_order.push(job);
+            }
+            done.try_iter().for_each(|job| in_order.push(job));
+        };
+        let mut filling = Job::new(0);
+        by_segment(samples, with, model.segments, |k, held| {
+            let Some(k) = k else { return };
+            filling.push(held);
+            if (k + 1).is_multiple_of(JOB) {
+                let full = std::mem::replace(&mut filling, in_order.empty_job(k + 1));
+                hand_on(full, &mut in_order);
+            }
+        })?;
+        if !filling.ranges.is_empty() {
+            hand_on(filling, &mut in_order);
+        }
+        drop(closing);
+        while let Some(mut job) = queue.pop() {
+            job.work(model, sensor);
+            in_order.push(job);
+        }
+        // Until the last of the helpers has ended.
+        done.iter().for_each(|job| in_order.push(job));
+        Ok(())
+    })
 }
