@@ -33,7 +33,12 @@ pub struct Lines<R> {
     /// Files of the same recording with forces or fields, and what is next in this one.
     beside: Vec<Beside<R>>,
     next: Option<Next>,
+    /// How it begins, as far as that had come.
+    head: Vec<u8>,
 }
+
+/// Bytes of the beginning that are kept.
+pub(crate) const HEAD_KEPT: usize = 4096;
 
 /// What a line held, and its samples; `None` at the end.
 type Next = (
@@ -66,7 +71,9 @@ impl<R: Read> Lines<R> {
             held: VecDeque::new(),
             beside: Vec::new(),
             next: None,
+            head: Vec::new(),
         };
+        lines.keep_head()?;
         if format == Format::Table {
             let stem = name.file_stem().unwrap_or_default().to_string_lossy();
             let mut opening = Opening::new(options, &stem);
@@ -131,6 +138,32 @@ impl<R: Read> Lines<R> {
         match self.form {
             Form::Objects(..) => Format::Lines,
             Form::Rows(_) => Format::Table,
+        }
+    }
+
+    /// Its first bytes, as far as they had come when it was opened.
+    #[must_use]
+    pub(crate) fn head(&self) -> &[u8] {
+        &self.head
+    }
+
+    fn keep_head(&mut self) -> Result<()> {
+        loop {
+            match self.input.fill_buf() {
+                Ok(first) => {
+                    let kept = first.get(..HEAD_KEPT).unwrap_or(first);
+                    self.head = kept.to_vec();
+                    return Ok(());
+                }
+                Err(e) if e.kind() == ErrorKind::Interrupted => {}
+                Err(source) => {
+                    return Err(Error::Read {
+                        path: self.name.clone(),
+                        offset: 0,
+                        source,
+                    });
+                }
+            }
         }
     }
 

@@ -5,6 +5,7 @@
 //! than the recording does.
 
 use crate::format::Format;
+use crate::lines::{HEAD_KEPT, Lines};
 use crate::mcap::{self, OURS, Reader, Survey, WalkOptions};
 use std::collections::BTreeSet;
 use std::fmt;
@@ -13,7 +14,7 @@ use std::io::Read;
 use std::path::Path;
 
 /// First bytes that tell whether to look closer.
-pub(super) const HEAD: u64 = 4096;
+pub(super) const HEAD: u64 = HEAD_KEPT as u64;
 /// How a table of attitudes begins.
 const TABLE: &[u8] = b"stamp_ns,qw,qx,qy,qz,roll_deg,";
 /// How a line with an attitude begins.
@@ -54,6 +55,12 @@ impl MadeBefore {
             && head.windows(OURS.len()).any(|part| part == OURS.as_bytes());
         let reader = Reader::open(path).ok().filter(|_| is_ours)?;
         in_survey(&mcap::survey(&reader, &WalkOptions::default()).ok()?)
+    }
+
+    /// What lines or rows are that are being read, from a file or a pipe: by what had come of them when they were opened.
+    #[must_use]
+    pub fn in_lines(lines: &Lines<impl Read>) -> Option<MadeBefore> {
+        in_text(lines.head())
     }
 }
 
