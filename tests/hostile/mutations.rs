@@ -153,6 +153,12 @@ fn tables() {
 }
 
 #[test]
+fn tables_by_columns() {
+    // Each is put into a file first.
+    survives("parquet", CASES / 4, crate::parsers::parquet);
+}
+
+#[test]
 fn conversations() {
     survives("session", CASES, crate::parsers::session);
 }

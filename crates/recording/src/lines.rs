@@ -22,6 +22,7 @@ use strapd_attitude::record::{Declared, Nanos, RawSample};
 pub struct Lines<R> {
     name: PathBuf,
     input: BufReader<R>,
+    format: Format,
     form: Form,
     /// The line that was read last, and that was given last, from 1.
     last_read: u64,
@@ -63,6 +64,7 @@ impl<R: Read> Lines<R> {
         let mut lines = Lines {
             name: name.to_owned(),
             input: BufReader::with_capacity(1 << 16, input),
+            format,
             form: Form::Objects(LineDecoder::new(options).with_besides(), Numbers::default()),
             last_read: 0,
             current: 0,
@@ -74,7 +76,7 @@ impl<R: Read> Lines<R> {
             head: Vec::new(),
         };
         lines.keep_head()?;
-        if format == Format::Table {
+        if format.is_table() {
             let stem = name.file_stem().unwrap_or_default().to_string_lossy();
             let mut opening = Opening::new(options, &stem);
             while lines.read()? && opening.take(&lines.line) {}
@@ -132,13 +134,10 @@ impl<R: Read> Lines<R> {
         }))
     }
 
-    /// NDJSON or CSV.
+    /// NDJSON, CSV or Parquet.
     #[must_use]
     pub fn format(&self) -> Format {
-        match self.form {
-            Form::Objects(..) => Format::Lines,
-            Form::Rows(_) => Format::Table,
-        }
+        self.format
     }
 
     /// Its first bytes, as far as they had come when it was opened.
