@@ -106,6 +106,7 @@ fn every_command_takes_one_from_a_file_and_from_a_pipe() {
     let columns = said.replace(' ', "\\ ");
     let ran = std::process::Command::new(env!("CARGO_BIN_EXE_strapd"))
         .current_dir(at)
+        .env("STRAPD_AID", "none")
         .args([
             "replay",
             "t.parquet",
