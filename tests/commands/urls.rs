@@ -42,6 +42,8 @@ mod secrets;
 mod server;
 #[cfg(feature = "object-store")]
 mod sparse;
+#[cfg(feature = "object-store")]
+mod uploads;
 
 #[cfg(feature = "object-store")]
 mod built_with_it {

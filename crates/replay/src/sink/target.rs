@@ -281,7 +281,7 @@ mod tests {
 
     #[test]
     fn what_is_not_a_sink_is_refused_with_the_list_of_those_that_are() {
-        for text in ["", "out", "out.bag", "s3://b/x.mcap", ".mcap", "x.mcap/"] {
+        for text in ["", "out", "out.bag", "http://h/x.mcap", ".mcap", "x.mcap/"] {
             match Target::parse(text) {
                 Err(Error::Usage(message)) => {
                     let help = message.helping().unwrap_or_default();
@@ -291,6 +291,14 @@ mod tests {
                 // opener's business.
                 other => assert_eq!(text, "x.mcap/", "{other:?}"),
             }
+        }
+    }
+
+    #[test]
+    fn without_a_way_to_stores_the_feature_is_named() {
+        let said = Target::parse("s3://b/x.mcap").unwrap_err().to_string();
+        for words in ["-o s3://b/x.mcap", "feature object-store", "aws s3 cp"] {
+            assert!(said.contains(words), "{said}");
         }
     }
 
@@ -327,7 +335,7 @@ mod tests {
             "udp-listen://127.0.0.1:1",
             "ws://host:1",
             "unix-listen://relative",
-            "s3://b/x.mcap",
+            "https://h/x.mcap",
         ] {
             let said = Target::parse(text).unwrap_err().to_string();
             let shown = Address::from(text);
