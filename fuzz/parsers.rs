@@ -279,7 +279,7 @@ pub fn parquet(data: &[u8]) {
         }
         samples.clear();
     }
-    assert!(rows <= (1 << 20) + 1024 * data.len() as u64);
+    assert!(rows <= (1 << 20) + 256 * data.len() as u64);
 }
 
 #[derive(Debug, PartialEq, Eq)]

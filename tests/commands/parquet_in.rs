@@ -379,6 +379,11 @@ fn what_strapd_wrote_is_read_back() {
             .join("\n")
     };
     assert_eq!(first(&compared).replace("p.parquet", "p.csv"), first(&same));
+    // In another world, too.
+    strapd(at, "replay s.csv -q --world ned -o n.parquet -o n.csv").done();
+    let ned = strapd(at, "compare n.parquet n.csv");
+    let same = strapd(at, "compare n.csv n.csv");
+    assert_eq!(first(&ned).replace("n.parquet", "n.csv"), first(&same));
     let ran = strapd(at, "replay p.parquet -o null:");
     assert!(ran.done().out.contains("and no recording"), "{}", ran.out);
     let ran = strapd(at, "replay s.parquet p.parquet -o null:");

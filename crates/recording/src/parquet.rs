@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! last bytes -> thrift -> footer -> columns that are read
-//! pages      -> unpack -> encoding -> column -> rows -> text, as of a CSV
+//! pages      -> header -> unpack -> encoding -> column -> rows -> text, as of a CSV
 //! ```
 //!
 //! A room of its own, and not another's crate, because those panic on damaged files: here no length, place or count is
@@ -12,6 +12,7 @@
 mod column;
 mod encoding;
 mod footer;
+mod header;
 mod rows;
 mod thrift;
 mod unpack;

@@ -5,7 +5,8 @@
 
 use super::encoding::{Bytes, Values, differences, plain, runs, texts};
 use super::footer::{Chunk, Leaf, Meaning, Stored};
-use super::thrift::{Bad, Fields, Kind};
+use super::header::{DATA, DATA_2, DICTIONARY, Header, header};
+use super::thrift::Bad;
 use super::unpack::{MOST_PAGE, unpacked};
 use std::io::{self, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::sync::Arc;
@@ -26,6 +27,8 @@ pub(super) struct Column {
     /// Rows of which no page was read.
     left: u64,
     dictionary: Option<Values>,
+    /// Bytes of it.
+    dictionary_size: u64,
     page: Page,
 }
 
@@ -38,27 +41,10 @@ struct Page {
     is_there: Option<Vec<bool>>,
     values: Option<Values>,
     value: usize,
+    /// Bytes of it.
+    size: u64,
     lost: Option<Arc<str>>,
 }
-
-/// What stands before a page.
-#[derive(Clone, Copy, PartialEq, Default, Debug)]
-struct Header {
-    kind: i64,
-    unpacked: usize,
-    packed: usize,
-    crc: Option<u32>,
-    rows: u64,
-    encoding: i64,
-    levels_encoding: i64,
-    /// Bytes of the levels of a page of the second version.
-    levels: Option<(usize, usize)>,
-    is_packed: bool,
-}
-
-const DATA: i64 = 0;
-const DICTIONARY: i64 = 2;
-const DATA_2: i64 = 3;
 
 impl Column {
     pub(super) fn new(leaf: &Leaf, chunk: &Chunk, rows: u64) -> Column {
@@ -69,24 +55,32 @@ impl Column {
             end: chunk.offset.saturating_add(chunk.length),
             left: rows,
             dictionary: None,
+            dictionary_size: 0,
             page: Page::default(),
         }
+    }
+
+    /// Whether the next row is on a page that is not read yet.
+    pub(super) fn is_over(&self) -> bool {
+        self.page.row >= self.page.rows && self.left > 0
+    }
+
+    /// Bytes of memory that it holds.
+    pub(super) fn held(&self) -> u64 {
+        let of_page = match self.page.row < self.page.rows {
+            true => self.page.size,
+            false => 0,
+        };
+        self.dictionary_size + of_page
     }
 
     /// Writes the cell of the next row; what it says is why the row is lost.
     ///
     /// # Errors
-    /// The file can not be read.
-    pub(super) fn write(
-        &mut self,
-        source: &mut (impl Read + Seek),
-        out: &mut Vec<u8>,
-    ) -> io::Result<Option<Arc<str>>> {
-        while self.page.row >= self.page.rows {
-            if self.left == 0 {
-                return Ok(Some("the column has fewer values than rows".into()));
-            }
-            self.turn(source)?;
+    /// It can not be written.
+    pub(super) fn write(&mut self, out: &mut Vec<u8>) -> io::Result<Option<Arc<str>>> {
+        if self.page.row >= self.page.rows {
+            return Ok(Some("the column has fewer values than rows".into()));
         }
         let row = self.page.row as usize;
         self.page.row += 1;
@@ -115,9 +109,13 @@ impl Column {
         Ok(None)
     }
 
-    /// Takes the next page; where there is none to be had, the rows that are left are lost.
-    fn turn(&mut self, source: &mut (impl Read + Seek)) -> io::Result<()> {
-        self.page = match self.read(source)? {
+    /// Takes the next page, which may take so much memory; where there is none to be had, the rows that are left are lost.
+    ///
+    /// # Errors
+    /// The file can not be read.
+    pub(super) fn turn(&mut self, source: &mut (impl Read + Seek), room: u64) -> io::Result<()> {
+        self.page = Page::default();
+        self.page = match self.read(source, room)? {
             Ok(Some(page)) => page,
             Ok(None) => return Ok(()),
             Err(why) => self.lost(self.left, &why),
@@ -139,6 +137,7 @@ impl Column {
     fn read(
         &mut self,
         source: &mut (impl Read + Seek),
+        most: u64,
     ) -> io::Result<Result<Option<Page>, String>> {
         let room = self.end.saturating_sub(self.next);
         if room == 0 {
@@ -173,7 +172,7 @@ impl Column {
         let is_wrong = head.crc.is_some_and(|crc| crc != crc32fast::hash(&bytes));
         let read = match is_wrong {
             true => Err("a page's checksum is wrong".to_owned()),
-            false => self.unpack(&head, &bytes),
+            false => self.unpack(&head, &bytes, most),
         };
         Ok(Ok(match (read, head.kind) {
             (Ok(page), _) => page,
@@ -183,12 +182,27 @@ impl Column {
         }))
     }
 
-    fn unpack(&mut self, head: &Header, bytes: &[u8]) -> Result<Option<Page>, String> {
+    fn unpack(&mut self, head: &Header, bytes: &[u8], room: u64) -> Result<Option<Page>, String> {
         if head.rows > MOST_VALUES {
             return Err(format!(
                 "a page of {} values, over the limit of {MOST_VALUES}",
                 head.rows
             ));
+        }
+        if head.unpacked > MOST_PAGE {
+            return Err(format!(
+                "a page of {} bytes, over the limit of {MOST_PAGE}",
+                head.unpacked
+            ));
+        }
+        // Texts take more than their bytes.
+        let each = if self.leaf.stored == Stored::Bytes {
+            64
+        } else {
+            16
+        };
+        if head.rows * each + head.unpacked as u64 > room {
+            return Err("more is to be held in memory at once than any table needs".to_owned());
         }
         let n = usize::try_from(head.rows).unwrap_or(usize::MAX);
         let mut rest = Bytes(bytes);
@@ -207,7 +221,9 @@ impl Column {
         };
         let stored = self.leaf.stored;
         if head.kind == DICTIONARY {
-            self.dictionary = Some(plain(stored, false, &whole, n)?);
+            let dictionary = plain(stored, false, &whole, n)?;
+            self.dictionary_size = dictionary.size();
+            self.dictionary = Some(dictionary);
             return Ok(None);
         }
         let mut rest = Bytes(&whole);
@@ -240,6 +256,7 @@ impl Column {
         Ok(Some(Page {
             rows: head.rows,
             is_there,
+            size: values.size() + head.rows,
             values: Some(values),
             ..Page::default()
         }))
@@ -298,51 +315,4 @@ pub(super) fn read_at(source: &mut (impl Read + Seek), at: u64, count: u64) -> i
             read => return read.map(|_| bytes),
         }
     }
-}
-
-/// A page's header, and its length.
-fn header(bytes: &[u8]) -> Result<(Header, usize), Bad> {
-    let mut fields = Fields::new(bytes);
-    let mut head = Header {
-        kind: -1,
-        levels_encoding: 3,
-        is_packed: true,
-        ..Header::default()
-    };
-    let length = |fields: &mut Fields<'_>| usize::try_from(fields.size()?).map_err(|_| Bad::Wrong);
-    fields.each(|id, kind, fields| {
-        match (id, kind) {
-            (1, Kind::Whole) => head.kind = fields.whole()?,
-            (2, Kind::Whole) => head.unpacked = length(fields)?,
-            (3, Kind::Whole) => head.packed = length(fields)?,
-            (4, Kind::Whole) => head.crc = Some(fields.whole()? as u32),
-            (5 | 7, Kind::Struct) => fields.each(|id, kind, fields| {
-                match (id, kind) {
-                    (1, Kind::Whole) => head.rows = fields.size()?,
-                    (2, Kind::Whole) => head.encoding = fields.whole()?,
-                    (3, Kind::Whole) => head.levels_encoding = fields.whole()?,
-                    _ => return Ok(false),
-                }
-                Ok(true)
-            })?,
-            (8, Kind::Struct) => {
-                let mut levels = (0, 0);
-                fields.each(|id, kind, fields| {
-                    match (id, kind) {
-                        (1, Kind::Whole) => head.rows = fields.size()?,
-                        (4, Kind::Whole) => head.encoding = fields.whole()?,
-                        (5, Kind::Whole) => levels.1 = length(fields)?,
-                        (6, Kind::Whole) => levels.0 = length(fields)?,
-                        (7, Kind::False) => head.is_packed = false,
-                        _ => return Ok(false),
-                    }
-                    Ok(true)
-                })?;
-                head.levels = Some(levels);
-            }
-            _ => return Ok(false),
-        }
-        Ok(true)
-    })?;
-    Ok((head, fields.used()))
 }

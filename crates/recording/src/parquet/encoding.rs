@@ -260,6 +260,16 @@ pub(super) fn texts(bytes: &[u8], is_after: bool, n: usize) -> Result<Values, St
 }
 
 impl Values {
+    /// Bytes of memory that they take.
+    pub(super) fn size(&self) -> u64 {
+        (match self {
+            Values::Whole(all) => all.len() * 8,
+            Values::Float(all) => all.len() * 4,
+            Values::Double(all) => all.len() * 8,
+            Values::Text(all) => all.iter().map(|text| text.len() + 48).sum(),
+        }) as u64
+    }
+
     /// Those at these places.
     pub(super) fn at(&self, places: &[u32]) -> Result<Values, String> {
         fn picked<T: Clone>(all: &[T], places: &[u32]) -> Result<Vec<T>, String> {

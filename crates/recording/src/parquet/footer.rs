@@ -77,6 +77,8 @@ pub(super) struct Footer {
     pub(super) is_own: bool,
     /// What its samples mean, where strapd wrote them.
     pub(super) sample_kind: Option<String>,
+    /// In which world its attitudes are, where strapd wrote them.
+    pub(super) world: Option<String>,
 }
 
 /// An element of the schema, as it stands there.
@@ -126,8 +128,11 @@ impl Footer {
             Ok(true)
         })?;
         self.is_own |= key == b"strapd.columns";
-        if key == b"strapd.sample_kind" {
-            self.sample_kind = Some(crate::text::printable(&String::from_utf8_lossy(value)));
+        let text = || Some(crate::text::printable(&String::from_utf8_lossy(value)));
+        match key {
+            b"strapd.sample_kind" => self.sample_kind = text(),
+            b"strapd.world" => self.world = text(),
+            _ => {}
         }
         Ok(())
     }

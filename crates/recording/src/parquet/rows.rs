@@ -16,8 +16,10 @@ use strapd_attitude::diagnostic::Diagnostic;
 /// Bytes of a footer.
 const MOST_FOOTER: u64 = 64 << 20;
 /// Rows that a byte of the file may stand for, and those that any file may have: runs of one value cost nothing.
-const ROWS_A_BYTE: u64 = 1024;
+const ROWS_A_BYTE: u64 = 256;
 const ROWS_OF_ANY: u64 = 1 << 20;
+/// Bytes of pages and dictionaries that are held at once, of all columns.
+const MOST_HELD: u64 = 512 << 20;
 /// Bytes of text that are made at once.
 const AHEAD: usize = 1 << 16;
 
@@ -187,14 +189,15 @@ impl<S: Read + Seek> Rows<S> {
                 c => c,
             }));
         }
+        // What a table of text says in every row.
         let has_samples = footer.leaves.iter().any(|leaf| leaf.name == "gyro_x");
-        if let Some(kind) = footer
-            .sample_kind
-            .as_ref()
-            .filter(|_| footer.is_own && has_samples)
-        {
-            head.push_str(",sample_kind");
-            self.behind = format!(",{}", kind.replace([',', '"'], " "));
+        let (name, said) = match has_samples {
+            true => (",sample_kind", &footer.sample_kind),
+            false => (",world", &footer.world),
+        };
+        if let Some(said) = said.as_ref().filter(|_| footer.is_own) {
+            head.push_str(name);
+            self.behind = format!(",{}", said.replace([',', '"'], " "));
         }
         head.push('\n');
         self.text = head.into_bytes();
@@ -212,6 +215,7 @@ impl<S: Read + Seek> Rows<S> {
                 self.begin(&group);
                 continue;
             }
+            self.turn()?;
             self.left -= 1;
             let begun = self.text.len();
             let mut lost = self.why.clone();
@@ -220,7 +224,7 @@ impl<S: Read + Seek> Rows<S> {
                     self.text.push(self.delimiter);
                 }
                 if let Some(column) = column {
-                    let why = column.write(&mut self.source, &mut self.text)?;
+                    let why = column.write(&mut self.text)?;
                     lost = lost.or(why);
                 }
             }
@@ -233,6 +237,18 @@ impl<S: Read + Seek> Rows<S> {
                 }
             }
             self.text.push(b'\n');
+        }
+        Ok(())
+    }
+
+    /// Brings every column to the page of the next row.
+    fn turn(&mut self) -> io::Result<()> {
+        let is_over = |column: &Option<Column>| column.as_ref().is_some_and(Column::is_over);
+        while let Some(n) = self.now.iter().position(is_over) {
+            let held: u64 = self.now.iter().flatten().map(Column::held).sum();
+            if let Some(Some(column)) = self.now.get_mut(n) {
+                column.turn(&mut self.source, MOST_HELD.saturating_sub(held))?;
+            }
         }
         Ok(())
     }

@@ -1,7 +1,7 @@
 //! The body of a page, packed -> its bytes. Pure.
 //!
 //! Apart from the pages because others wrote the unpackers: none is given more room than the page says it needs, and no page
-//! may say more than [`MOST_PAGE`].
+//! may say more than [`MOST_PAGE`], which is asked before.
 
 use std::io::Read;
 
@@ -13,11 +13,6 @@ pub(super) const MOST_PAGE: usize = 64 << 20;
 /// # Errors
 /// In words: it can not be unpacked, or to another length; a codec that is not read.
 pub(super) fn unpacked(codec: i64, body: &[u8], length: usize) -> Result<Vec<u8>, String> {
-    if length > MOST_PAGE {
-        return Err(format!(
-            "a page of {length} bytes, over the limit of {MOST_PAGE}"
-        ));
-    }
     let bad = |name: &str, why: &dyn std::fmt::Display| format!("{name}: {why}");
     let bytes = match codec {
         0 => body.to_vec(),
