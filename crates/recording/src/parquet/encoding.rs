@@ -199,11 +199,16 @@ pub(super) fn differences(
     let wrong = "blocks of differences that can not be";
     let (block, parts) = (bytes.varint()?, bytes.varint()?);
     let (total, mut value) = (bytes.varint()?, bytes.zigzag()?);
-    if block == 0 || block > MOST_BLOCK || parts == 0 || parts > block || block % parts != 0 {
+    if block == 0
+        || block > MOST_BLOCK
+        || parts == 0
+        || parts > block
+        || !block.is_multiple_of(parts)
+    {
         return Err(wrong.to_owned());
     }
     let each = (block / parts) as usize;
-    if each % 8 != 0 || total < n as u64 {
+    if !each.is_multiple_of(8) || total < n as u64 {
         return Err(wrong.to_owned());
     }
     let mut all = Vec::with_capacity(n);
