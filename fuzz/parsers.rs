@@ -5,6 +5,7 @@
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::ops::ControlFlow;
+use std::path::Path;
 use std::sync::{Arc, LazyLock};
 use strapd::serve::hub::Hub;
 use strapd::serve::session::{Scratch, Session};
@@ -16,6 +17,7 @@ use strapd_recording::delimited::Table;
 use strapd_recording::format::Format;
 use strapd_recording::lines::Lines;
 use strapd_recording::mcap::{Reader, WalkOptions, walk};
+use strapd_recording::{Input, Warn};
 
 const NOW: Nanos = Nanos(1_700_000_000_000_000_000);
 
@@ -256,6 +258,28 @@ pub fn delimited(data: &[u8]) {
     let whole = table(rest, usize::MAX, &options);
     let cut = table(rest, 1 + data.len() % 7, &options);
     assert_eq!(format!("{whole:?}"), format!("{cut:?}"));
+}
+
+/// A table in Parquet: every row is a sample, or one that was lost and says why.
+pub fn parquet(data: &[u8]) {
+    if !data.starts_with(b"PAR1") {
+        return;
+    }
+    let quiet = Warn::by(|_| {});
+    let input = Input::of_stream(Path::new("t.parquet"), data, &quiet);
+    let Ok(mut lines) = input.and_then(|input| input.lines(&Options::default())) else {
+        return;
+    };
+    let mut samples = Vec::new();
+    let mut rows = 0u64;
+    while let Ok(Some(line)) = lines.next(&mut samples) {
+        rows += 1;
+        if let Err(why) = line {
+            assert!(!why.to_string().is_empty());
+        }
+        samples.clear();
+    }
+    assert!(rows <= (1 << 20) + 256 * data.len() as u64);
 }
 
 #[derive(Debug, PartialEq, Eq)]

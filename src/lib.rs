@@ -80,6 +80,8 @@ pub fn main() -> ExitCode {
     let _ = strapd_attitude::setting::name_settings(as_flag);
     #[cfg(feature = "object-store")]
     let _ = strapd_recording::elsewhere::reach_by(store::reach);
+    #[cfg(feature = "object-store")]
+    let _ = sink::upload::upload_by(store::upload::WAY);
     let cli = cli::Cli::parse();
     cli::start_diagnostics(&cli.global);
     size_limit::make_size_limit_an_error();

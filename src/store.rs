@@ -17,6 +17,7 @@
 //! | `download` | one range, over as many requests as it takes |
 //! | `kept`, `ranges` | the bytes that are there, and those that are fetched ahead |
 //! | `once` | what comes from its beginning to its end |
+//! | `upload`, `interrupt` | a file to an object, whole or not at all |
 //! | `listed`, `pattern` | what a key with `*` means |
 
 mod answer;
@@ -24,6 +25,7 @@ mod client;
 mod cloud;
 mod download;
 mod fault;
+mod interrupt;
 mod kept;
 pub mod listed;
 mod once;
@@ -31,6 +33,7 @@ pub mod patience;
 mod pattern;
 mod place;
 mod ranges;
+pub mod upload;
 mod web;
 
 use answer::Reply;

@@ -126,7 +126,7 @@ fn resolve_one(output: &str, log: &str, logs: usize) -> Result<String> {
     if output == "-" || output == "null:" {
         return Ok(output.to_owned());
     }
-    if output.contains("://") && logs == 1 {
+    if output.contains("://") && logs == 1 && !is_pattern(output) {
         return Ok(output.to_owned());
     }
     if output.ends_with('/') || Path::new(output).is_dir() {

@@ -166,7 +166,11 @@ impl Served {
             .iter()
             .filter(|t| t.listens().is_none())
             .collect();
-        if cast.playback().is_stopped() && others.iter().any(|t| matches!(t, Target::File { .. })) {
+        if cast.playback().is_stopped()
+            && others
+                .iter()
+                .any(|t| matches!(t, Target::File { .. } | Target::Store { .. }))
+        {
             tracing::warn!("stopped before the end: the files were not written");
             outcome = Outcome::Failed;
         }

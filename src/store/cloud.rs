@@ -7,6 +7,7 @@ use super::answer::{Part, Reply, Version};
 use super::client::{self, innermost};
 use super::fault::{Fault, asked};
 use super::patience::Patience;
+use bytes::Bytes;
 use futures_util::StreamExt;
 use http_body_util::BodyExt;
 use object_store::aws::AmazonS3Builder;
@@ -16,6 +17,7 @@ use object_store::client::{
     HttpResponseBody, HttpService,
 };
 use object_store::gcp::GoogleCloudStorageBuilder;
+use object_store::multipart::{MultipartStore, PartId};
 use object_store::path::Path;
 use object_store::{
     ClientConfigKey, ClientOptions, Error, GetOptions, GetRange, ObjectStore, ObjectStoreExt,
@@ -46,7 +48,9 @@ const METADATA_ANSWERS: Duration = Duration::from_secs(2);
 
 /// An object in a store.
 pub(super) struct Cloud {
-    store: Box<dyn ObjectStore>,
+    store: Arc<dyn ObjectStore>,
+    /// The same, as what takes objects in parts.
+    parts: Arc<dyn MultipartStore>,
     key: Path,
     scheme: String,
     speaker: Speaker,
@@ -56,6 +60,14 @@ impl fmt::Debug for Cloud {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "Cloud({}, {})", self.scheme, self.key)
     }
+}
+
+/// A store, as what is read from and as what takes objects in parts.
+type Both = (Arc<dyn ObjectStore>, Arc<dyn MultipartStore>);
+
+fn both<S: ObjectStore + MultipartStore>(store: S) -> Both {
+    let store = Arc::new(store);
+    (store.clone(), store)
 }
 
 /// What was answered to one request, beside what `object_store` tells of it.
@@ -109,27 +121,27 @@ impl Cloud {
             max_retries: 0,
             ..RetryConfig::default()
         };
-        let store: Result<Box<dyn ObjectStore>, Error> = match scheme.as_str() {
+        let store: Result<Both, Error> = match scheme.as_str() {
             "s3" => AmazonS3Builder::from_env()
                 .with_bucket_name(bucket)
                 .with_retry(retry)
                 .with_http_connector(speaker.clone())
                 .build()
-                .map(|store| Box::new(store) as _),
+                .map(both),
             "gs" => GoogleCloudStorageBuilder::from_env()
                 .with_bucket_name(bucket)
                 .with_retry(retry)
                 .with_http_connector(speaker.clone())
                 .build()
-                .map(|store| Box::new(store) as _),
+                .map(both),
             _ => MicrosoftAzureBuilder::from_env()
                 .with_container_name(bucket)
                 .with_retry(retry)
                 .with_http_connector(speaker.clone())
                 .build()
-                .map(|store| Box::new(store) as _),
+                .map(both),
         };
-        let store = store.map_err(|e| {
+        let (store, parts) = store.map_err(|e| {
             Diagnostic::new(format!(
                 "the environment does not say how: {}",
                 innermost(&e)
@@ -138,6 +150,7 @@ impl Cloud {
         })?;
         Ok(Cloud {
             store,
+            parts,
             key,
             scheme,
             speaker,
@@ -184,6 +197,67 @@ impl Cloud {
             }
         }
         Ok(keys)
+    }
+
+    /// How many bytes the object has; `None` where there is none.
+    pub(super) async fn size(&self) -> Result<Option<u64>, Fault> {
+        self.ask_anew();
+        match self.store.head(&self.key).await {
+            Ok(found) => Ok(Some(found.size)),
+            Err(Error::NotFound { .. }) => Ok(None),
+            Err(why) => Err(self.fault(&why, self.latest())),
+        }
+    }
+
+    /// Puts an object of one piece there, whole or not at all.
+    pub(super) async fn put(&self, bytes: Bytes) -> Result<(), Fault> {
+        self.ask_anew();
+        let put = self.store.put(&self.key, bytes.into()).await;
+        put.map(|_| ())
+            .map_err(|why| self.fault(&why, self.latest()))
+    }
+
+    /// Begins an object of several parts: by this name of it parts are put, and it is completed or given up.
+    pub(super) async fn begin(&self) -> Result<String, Fault> {
+        self.ask_anew();
+        let begun = self.parts.create_multipart(&self.key).await;
+        begun.map_err(|why| self.fault(&why, self.latest()))
+    }
+
+    /// Puts the `n`th part of it there, from 0.
+    pub(super) async fn part(&self, id: &String, n: usize, bytes: Bytes) -> Result<PartId, Fault> {
+        self.ask_anew();
+        let put = self.parts.put_part(&self.key, id, n, bytes.into()).await;
+        put.map_err(|why| self.fault(&why, self.latest()))
+    }
+
+    /// Makes an object of its parts.
+    pub(super) async fn complete(&self, id: &String, parts: Vec<PartId>) -> Result<(), Fault> {
+        self.ask_anew();
+        let made = self.parts.complete_multipart(&self.key, id, parts).await;
+        made.map(|_| ())
+            .map_err(|why| match self.latest().status() {
+                // It answers before it has tried, and says in the body that it failed.
+                200 => Fault::passing("the store did not make an object of the parts"),
+                _ => self.fault(&why, self.latest()),
+            })
+    }
+
+    /// Gives up its parts.
+    pub(super) async fn give_up(&self, id: &String) -> Result<(), Fault> {
+        self.ask_anew();
+        let given_up = self.parts.abort_multipart(&self.key, id).await;
+        given_up.map_err(|why| self.fault(&why, self.latest()))
+    }
+
+    /// What was answered to the last request; requests to write follow each other.
+    fn latest(&self) -> &Answered {
+        &self.speaker.latest
+    }
+
+    fn ask_anew(&self) {
+        self.latest().status.store(0, Ordering::Relaxed);
+        self.latest().asked_millis.store(0, Ordering::Relaxed);
     }
 
     /// What is there though it has no byte in `range`.
@@ -329,7 +403,10 @@ impl Speaker {
         }
         let mut asks = reqwest::Request::new(parts.method, url);
         *asks.headers_mut() = parts.headers;
-        *asks.body_mut() = body.as_bytes().cloned().map(reqwest::Body::from);
+        *asks.body_mut() = Some(match body.as_bytes() {
+            Some(bytes) => reqwest::Body::from(bytes.clone()),
+            None => reqwest::Body::wrap(body),
+        });
         if of_machine {
             *asks.timeout_mut() = Some(METADATA_ANSWERS);
         }

@@ -42,6 +42,8 @@ mod secrets;
 mod server;
 #[cfg(feature = "object-store")]
 mod sparse;
+#[cfg(feature = "object-store")]
+mod uploads;
 
 #[cfg(feature = "object-store")]
 mod built_with_it {
@@ -180,8 +182,10 @@ mod built_with_it {
             &format!("replay --join {there} {there} -o x.mcap"),
         )
         .refused(1, &["is elsewhere", "save it to a file"]);
-        let output = "replay s3.mcap -o s3://bucket/x.mcap";
-        strapd(dir.path(), output).refused(2, &["s3://bucket/x.mcap", "aws s3 cp"]);
+        let output = "replay s3.mcap -o https://h/x.mcap?sig=s3cret";
+        let ran = strapd(dir.path(), output);
+        ran.refused(2, &["https://h/x.mcap", "curl -T"]);
+        assert!(!ran.err.contains("s3cret"), "{}", ran.err);
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
         let empty = Server::of(Manner::Good, Vec::new());
         strapd(dir.path(), &format!("info {}", empty.url("a.mcap")))

@@ -153,6 +153,25 @@ fn tables() {
 }
 
 #[test]
+fn tables_by_columns() {
+    // Each is put into a file first.
+    survives("parquet", CASES / 4, crate::parsers::parquet);
+}
+
+/// Every beginning of one, and every one with a byte at its end.
+#[test]
+fn tables_by_columns_cut_anywhere() {
+    for seed in seeds("parquet").iter().step_by(7) {
+        for end in (0..seed.len()).step_by(3) {
+            crate::parsers::parquet(&seed[..end]);
+            let mut bytes = seed[..end].to_vec();
+            bytes.extend_from_slice(&seed[seed.len() - 8..]);
+            crate::parsers::parquet(&bytes);
+        }
+    }
+}
+
+#[test]
 fn conversations() {
     survives("session", CASES, crate::parsers::session);
 }

@@ -19,4 +19,7 @@ mod rows;
 pub use crate::columns::{Columns, Delimiter};
 pub use rows::Table;
 
+pub(crate) use own::is_own_column;
+pub(crate) use rows::LOST;
+
 pub(crate) use layout::{MOST_HEAD_LINES, Opening, is_header, is_text_of_cells, may_be_table};

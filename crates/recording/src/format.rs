@@ -7,6 +7,7 @@ use crate::delimited;
 use crate::error::{Error, Result};
 use crate::gpmf;
 use crate::mavlink;
+use crate::parquet;
 use crate::recognise;
 use crate::text::without_mark;
 use std::fs::File;
@@ -33,6 +34,8 @@ pub enum Format {
     Lines,
     /// Rows of cells: the CSV that strapd writes itself, and other makers' tables.
     Table,
+    /// The same rows stored by columns, in Parquet.
+    Parquet,
 }
 
 /// The eight bytes at both ends of an MCAP.
@@ -45,12 +48,13 @@ pub(crate) const BAG_MAGIC: [u8; 13] = *b"#ROSBAG V2.0\n";
 pub(crate) const SQLITE_MAGIC: [u8; 16] = *b"SQLite format 3\0";
 
 /// Bytes that tell a format by themselves, at the beginning.
-const MAGICS: [(&[u8], Format); 5] = [
+const MAGICS: [(&[u8], Format); 6] = [
     (&MCAP_MAGIC, Format::Mcap),
     (&ULOG_MAGIC, Format::Ulog),
     (&BAG_MAGIC, Format::Bag),
     (&SQLITE_MAGIC, Format::Rosbag2),
     (&gpmf::MAGIC, Format::Gpmf),
+    (&parquet::MAGIC, Format::Parquet),
 ];
 
 /// How a video says so, behind four bytes.
@@ -60,7 +64,7 @@ const VIDEO: &[u8] = b"ftyp";
 pub(crate) const LONGEST_MAGIC: usize = SQLITE_MAGIC.len();
 
 /// Endings of names, for what the bytes do not tell.
-const ENDINGS: [(&str, Format); 11] = [
+const ENDINGS: [(&str, Format); 12] = [
     ("mcap", Format::Mcap),
     ("ulg", Format::Ulog),
     ("ulog", Format::Ulog),
@@ -72,6 +76,7 @@ const ENDINGS: [(&str, Format); 11] = [
     ("csv", Format::Table),
     ("tsv", Format::Table),
     ("gcsv", Format::Table),
+    ("parquet", Format::Parquet),
 ];
 
 /// Bytes that are looked at: the first line of a table is shorter.
@@ -90,13 +95,20 @@ impl Format {
             Format::Tlog => "MAVLink tlog",
             Format::Lines => "NDJSON",
             Format::Table => "CSV",
+            Format::Parquet => "Parquet",
         }
     }
 
-    /// Whether it is text, lines or rows; everything else is a log of messages on channels.
+    /// Whether it is read as text, lines or rows; everything else is a log of messages on channels.
     #[must_use]
     pub fn is_text(self) -> bool {
-        matches!(self, Format::Lines | Format::Table)
+        self == Format::Lines || self.is_table()
+    }
+
+    /// Whether it is rows under names.
+    #[must_use]
+    pub fn is_table(self) -> bool {
+        matches!(self, Format::Table | Format::Parquet)
     }
 
     /// The log of messages on channels of which these are the first bytes.
@@ -122,7 +134,7 @@ impl Format {
     /// Whether it is read in another order than that of its bytes, so that a stream of it is first put into a file.
     #[must_use]
     pub fn is_read_anywhere(self) -> bool {
-        matches!(self, Format::Rosbag2 | Format::Gpmf)
+        matches!(self, Format::Rosbag2 | Format::Gpmf | Format::Parquet)
     }
 
     /// The format of which these are the first bytes; `None` where they tell nothing.

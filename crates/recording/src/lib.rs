@@ -20,6 +20,7 @@
 //! ```text
 //! file, stream -> format -> mcap  -> decode            -> recording -> RawSample
 //!                        -> lines -> decode, delimited
+//!             parquet -> lines
 //!                                   text, error: beside it
 //! ```
 //!
@@ -32,6 +33,7 @@
 //! | [`attitude_line`] | a line that says an attitude -> numbers | pure |
 //! | [`delimited`] | rows of a table, strapd's own or another maker's -> raw samples | pure |
 //! | `columns` | what columns of tables are called, and what a user says of them | pure |
+//! | `parquet` | tables in Parquet -> the rows of a table, as text | I/O |
 //! | `records` | records as MCAP has them, which other containers are transcribed to | pure |
 //! | `bag` | ROS 1 bags -> the records MCAP has for them | pure |
 //! | `sqlite` | an SQLite database, read only -> the rows of its tables | pure |
@@ -60,6 +62,7 @@ mod gpmf;
 pub mod lines;
 mod mavlink;
 pub mod mcap;
+mod parquet;
 pub mod pool;
 pub mod recognise;
 pub mod recording;

@@ -22,6 +22,7 @@ use strapd_attitude::record::{Declared, Nanos, RawSample};
 pub struct Lines<R> {
     name: PathBuf,
     input: BufReader<R>,
+    format: Format,
     form: Form,
     /// The line that was read last, and that was given last, from 1.
     last_read: u64,
@@ -33,7 +34,12 @@ pub struct Lines<R> {
     /// Files of the same recording with forces or fields, and what is next in this one.
     beside: Vec<Beside<R>>,
     next: Option<Next>,
+    /// How it begins, as far as that had come.
+    head: Vec<u8>,
 }
+
+/// Bytes of the beginning that are kept.
+pub(crate) const HEAD_KEPT: usize = 4096;
 
 /// What a line held, and its samples; `None` at the end.
 type Next = (
@@ -58,6 +64,7 @@ impl<R: Read> Lines<R> {
         let mut lines = Lines {
             name: name.to_owned(),
             input: BufReader::with_capacity(1 << 16, input),
+            format,
             form: Form::Objects(LineDecoder::new(options).with_besides(), Numbers::default()),
             last_read: 0,
             current: 0,
@@ -66,8 +73,10 @@ impl<R: Read> Lines<R> {
             held: VecDeque::new(),
             beside: Vec::new(),
             next: None,
+            head: Vec::new(),
         };
-        if format == Format::Table {
+        lines.keep_head()?;
+        if format.is_table() {
             let stem = name.file_stem().unwrap_or_default().to_string_lossy();
             let mut opening = Opening::new(options, &stem);
             while lines.read()? && opening.take(&lines.line) {}
@@ -125,12 +134,35 @@ impl<R: Read> Lines<R> {
         }))
     }
 
-    /// NDJSON or CSV.
+    /// NDJSON, CSV or Parquet.
     #[must_use]
     pub fn format(&self) -> Format {
-        match self.form {
-            Form::Objects(..) => Format::Lines,
-            Form::Rows(_) => Format::Table,
+        self.format
+    }
+
+    /// Its first bytes, as far as they had come when it was opened.
+    #[must_use]
+    pub(crate) fn head(&self) -> &[u8] {
+        &self.head
+    }
+
+    fn keep_head(&mut self) -> Result<()> {
+        loop {
+            match self.input.fill_buf() {
+                Ok(first) => {
+                    let kept = first.get(..HEAD_KEPT).unwrap_or(first);
+                    self.head = kept.to_vec();
+                    return Ok(());
+                }
+                Err(e) if e.kind() == ErrorKind::Interrupted => {}
+                Err(source) => {
+                    return Err(Error::Read {
+                        path: self.name.clone(),
+                        offset: 0,
+                        source,
+                    });
+                }
+            }
         }
     }
 

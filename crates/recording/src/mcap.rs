@@ -202,7 +202,7 @@ impl Reader {
                 0
             };
         }
-        let Some(format) = Format::of_magic(&magic) else {
+        let Some(format) = Format::of_magic(&magic).filter(|f| !f.is_text()) else {
             let known = recognise::marked(&magic, &[]);
             return Err(refused(&name, &magic, known));
         };
@@ -312,7 +312,7 @@ fn format_of(file: &LogFile) -> Result<Format> {
         Ok(bytes)
     };
     let head = read(0, LONGEST_MAGIC)?;
-    if let Some(format) = Format::of_magic(&head)
+    if let Some(format) = Format::of_magic(&head).filter(|f| !f.is_text())
         && (!is_video(&head)
             || container::gpmf::has_track(file).map_err(|e| read_error(&file.path, 0, e))?)
     {

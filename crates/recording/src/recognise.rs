@@ -108,12 +108,6 @@ const KNOWN: &[Known] = &[
         "a NumPy array (.npy)",
         "numpy.load reads it in Python",
     ),
-    (
-        0,
-        b"PAR1",
-        "a Parquet file",
-        "duckdb -c \"copy (select epoch_ns(stamp) as stamp_ns, * exclude stamp from 'FILE') to 'log.csv'\" makes a table that is read, `stamp` being its column of times",
-    ),
     (0, b"ARROW1", "an Arrow file", "pyarrow reads it in Python"),
     (
         0,

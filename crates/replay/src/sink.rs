@@ -26,6 +26,7 @@ mod target;
 mod tests;
 mod text;
 mod tum;
+pub mod upload;
 
 pub use copy::CopiedChannel;
 pub use csv::{RAW_HEADER, push_raw_row, roll_pitch_yaw};

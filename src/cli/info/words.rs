@@ -51,7 +51,7 @@ fn write_file(info: &Overview<'_>, out: &mut String) {
     }
     let _ = writeln!(out);
     let format = info.input.format();
-    if matches!(format, Format::Lines | Format::Table) {
+    if format.is_text() {
         let _ = writeln!(
             out,
             "          {} samples of {} sensors; {}",

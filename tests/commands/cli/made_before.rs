@@ -1,6 +1,7 @@
 //! Attitudes that strapd made before lie beside the recordings they were made of, and are not taken for some.
 
 use super::{bench, names, strapd};
+use crate::program::strapd_fed;
 use std::path::Path;
 
 /// What a pattern of the shell makes of `*.mcap`, and the like.
@@ -89,6 +90,15 @@ fn alone_they_are_read_and_every_command_says_what_they_are() {
             checked.out.contains("made-before") && checked.code == Some(3),
             "{file}: {checked:?}"
         );
+    }
+    // From a pipe, too, as far as its first bytes tell.
+    for file in ["table.csv", "lines.ndjson"] {
+        let bytes = std::fs::read(at.join(file)).unwrap();
+        let ran = strapd_fed(at, "replay - -o null:", bytes.clone());
+        let said = "and no recording: its rates are integrated again";
+        assert!(ran.done().out.contains(said), "{file}: {}", ran.out);
+        let checked = strapd_fed(at, "check -", bytes);
+        assert!(checked.out.contains("made-before"), "{file}: {checked:?}");
     }
     let named = strapd(at, "replay log.attitude.mcap --topic /imu/data -o null:");
     assert!(!named.done().out.contains("no recording"), "{}", named.out);

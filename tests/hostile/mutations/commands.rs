@@ -60,6 +60,11 @@ fn logs() -> Vec<Vec<u8>> {
     let mut link = std::fs::read(fixtures.join("ardupilot.tlog")).unwrap();
     link.truncate(6000);
     logs.push(link);
+    // Tables by columns: of another program each, and one whose checksums do not hide what is behind them.
+    let tables = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/seeds/parquet");
+    for name in ["duckdb_2", "polars", "nulls_2"] {
+        logs.push(std::fs::read(tables.join(name).with_extension("parquet")).unwrap());
+    }
     // Packed objects between lines.
     let kept = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/seeds/lines/packed");
     logs.push(std::fs::read(kept).unwrap());

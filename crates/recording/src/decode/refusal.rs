@@ -81,6 +81,9 @@ pub enum Undecodable {
         /// The most there may be.
         limit: u64,
     },
+    /// A row that was lost where it was stored.
+    #[error("lost: {0}")]
+    Lost(String),
     /// A line that binds no packed stream.
     #[error("{0}")]
     Unbound(Box<super::packed::Unbound>),

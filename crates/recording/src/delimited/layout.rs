@@ -434,6 +434,10 @@ fn check_lengths(
     if rows.iter().any(fits) {
         return Ok(());
     }
+    let lost = first.first().and_then(|cell| cell.strip_prefix("\0lost "));
+    if let Some(why) = lost {
+        return Err(format!("none of its first rows could be read: {}", printable(why)).into());
+    }
     let what = format!("its rows have {} cells under {need} names", first.len());
     Err(match delimiter {
         Delimiter::Byte(b',') if first.len() + 2 > need * 2 => Diagnostic::new(format!(

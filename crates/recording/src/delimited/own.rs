@@ -2,6 +2,11 @@
 
 use super::column::Column;
 
+/// Whether a column of this name is read.
+pub(crate) fn is_own_column(name: &str) -> bool {
+    COLUMNS.iter().any(|(known, _)| *known == name)
+}
+
 /// Those that are read, by name. Those of a rate behind an attitude, and a quaternion's without their `q`, are in
 /// tables of attitudes. Units and axes are those of `strapd cat`: rad/s (delta angles in rad), m/s^2, x forward, y left,
 /// z up.

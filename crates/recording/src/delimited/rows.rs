@@ -28,6 +28,9 @@ const ORIENTATION: [Column; 4] = [
     Column::Orientation(3),
 ];
 
+/// How a line begins that stands for a row that was lost before it was text; behind it, why.
+pub(crate) const LOST: &[u8] = b"\0lost ";
+
 /// What the numbers of a role are multiplied by before anything is made of them.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Scales {
@@ -241,6 +244,10 @@ impl Table {
                 have: line.len() as u64,
                 limit: MAX_LINE as u64,
             });
+        }
+        if let Some(why) = line.strip_prefix(LOST) {
+            self.row += 1;
+            return Err(Undecodable::Lost(snippet(why.trim_ascii_end())));
         }
         let row = self.delimiter.row(without_mark(line));
         if row.first() == self.header.first() && row == self.header {

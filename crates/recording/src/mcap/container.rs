@@ -46,7 +46,7 @@ impl Container {
             Format::Gpmf => Container::Gpmf(Box::new(gpmf::Scanner::new(input))),
             Format::Tlog => Container::Tlog(Box::new(mavlink::Scanner::new(input))),
             // Text is not opened here.
-            Format::Mcap | Format::Lines | Format::Table => {
+            Format::Mcap | Format::Lines | Format::Table | Format::Parquet => {
                 Container::Mcap(Box::new(Scanner::new(input, limits, besides)))
             }
         }

@@ -56,11 +56,13 @@ pub fn incoming<R: Read + Send + 'static>(
     let shape = || Format::of_shape(&head);
     let format = known.or_else(shape).unwrap_or(Format::Lines);
     let whole = Cursor::new(head).chain(input);
-    if format.is_text() {
+    if format.is_text() && !format.is_read_anywhere() {
         let lines = line_input::open(name, format, whole, options)?;
         return Ok(Incoming::Lines(Box::new(lines)));
     }
-    line_input::only_for_tables(name, format, options)?;
+    if !format.is_table() {
+        line_input::only_for_tables(name, format, options)?;
+    }
     if format.is_read_anywhere() {
         return Ok(Incoming::Whole(Input::of_stream(name, whole, warn)?));
     }

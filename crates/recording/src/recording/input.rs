@@ -16,6 +16,7 @@ use crate::error::{Error, Result};
 use crate::format::{Format, open};
 use crate::lines::Lines;
 use crate::mcap::Reader;
+use crate::parquet::{Rows, Trouble};
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -91,6 +92,8 @@ pub enum Bytes {
     File(File),
     /// Elsewhere.
     Object(ObjectBytes),
+    /// The rows of a table that is stored otherwise, as text; in their order alone.
+    Rows(Box<Rows<Bytes>>),
 }
 
 impl Read for Bytes {
@@ -98,6 +101,7 @@ impl Read for Bytes {
         match self {
             Bytes::File(file) => file.read(into),
             Bytes::Object(object) => object.read(into),
+            Bytes::Rows(rows) => rows.read(into),
         }
     }
 }
@@ -107,6 +111,7 @@ impl Seek for Bytes {
         match self {
             Bytes::File(file) => file.seek(to),
             Bytes::Object(object) => object.seek(to),
+            Bytes::Rows(_) => Err(io::ErrorKind::NotSeekable.into()),
         }
     }
 }
@@ -343,6 +348,29 @@ impl Input {
         })
     }
 
+    /// Its lines or rows as text, from the first: of what is stored otherwise, made of it.
+    ///
+    /// # Errors
+    /// As [`Input::bytes`]; it is no table that is read.
+    pub fn text(&self, options: &Options) -> Result<Bytes> {
+        let bytes = self.bytes()?;
+        if self.format != Format::Parquet {
+            return Ok(bytes);
+        }
+        let rows = Rows::open(bytes, options.columns.as_ref()).map_err(|why| match why {
+            Trouble::Read(source) => Error::Read {
+                path: self.name.clone(),
+                offset: 0,
+                source,
+            },
+            Trouble::Not(what) => Error::Unsupported {
+                path: self.name.clone(),
+                what,
+            },
+        })?;
+        Ok(Bytes::Rows(Box::new(rows)))
+    }
+
     /// Whoever reads bytes must not take those of one part for all.
     fn is_one_file(&self) -> Result<()> {
         match self.parts.len() {
@@ -367,7 +395,7 @@ impl Input {
             (None, _) => Reader::open(&self.name),
             (Some(Kept::Object(object)), _) => Reader::of_object(&self.name, Arc::clone(object)),
             (_, Bytes::File(kept)) => Reader::of_file(&self.name, kept),
-            (_, Bytes::Object(_)) => Reader::open(&self.name),
+            (_, Bytes::Object(_) | Bytes::Rows(_)) => Reader::open(&self.name),
         }
     }
 
@@ -387,7 +415,8 @@ impl Input {
     /// # Errors
     /// As `line_input::open`.
     pub fn lines(&self, options: &Options) -> Result<Lines<Bytes>> {
-        let lines = line_input::open(&self.name, self.format, self.bytes()?, options)?;
+        let bytes = self.text(options)?;
+        let lines = line_input::open(&self.name, self.format, bytes, options)?;
         let of_forces = Options {
             wanted: Wanted::Forces,
             ..Options::default()

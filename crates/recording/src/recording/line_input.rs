@@ -20,15 +20,15 @@ pub(super) fn open<R: Read>(
     input: R,
     options: &Options,
 ) -> Result<Lines<R>> {
-    if format == Format::Table && !options.fields.is_empty() {
+    if format.is_table() && !options.fields.is_empty() {
         return Err(Error::Unsupported {
             path: path.to_owned(),
-            what: Diagnostic::new(format!("{FIELD} is for messages, and this is a CSV")).help(
+            what: Diagnostic::new(format!("{FIELD} is for messages, and this is a table")).help(
                 format!("{COLUMNS} gyro=NAME:NAME:NAME,stamp=NAME:UNIT says what its columns are"),
             ),
         });
     }
-    if format != Format::Table {
+    if !format.is_table() {
         only_for_tables(path, format, options)?;
     }
     Lines::new(path, format, input, options)
@@ -65,7 +65,7 @@ pub(super) fn unclear(path: &Path, what: &Ambiguous) -> Error {
 /// What begins with no line of samples.
 pub(super) fn no_samples(path: &Path, lines: &Lines<impl Read>, why: &Undecodable) -> Error {
     let help = match lines.format() {
-        Format::Table => {
+        format if format.is_table() => {
             format!(
                 "one row per sample under a row of names, as strapd writes a CSV; {COLUMNS} says what they are"
             )
@@ -75,6 +75,19 @@ pub(super) fn no_samples(path: &Path, lines: &Lines<impl Read>, why: &Undecodabl
     Error::Unsupported {
         path: path.to_owned(),
         what: Diagnostic::new(format!("line {}: {why}", lines.number())).help(help),
+    }
+}
+
+/// Rows that are none before the first that is one: beyond, none follows. Of a table that is stored by columns a page of
+/// lost rows.
+const MOST_EARLY: usize = 1000;
+const MOST_EARLY_BY_COLUMNS: usize = 1 << 18;
+
+/// Whether what could not be read so far, before anything that could, may still be of a table: its header is known.
+pub(super) fn is_sure(lines: &Lines<impl Read>, early: usize) -> bool {
+    match lines.format() {
+        Format::Parquet => early <= MOST_EARLY_BY_COLUMNS,
+        _ => early <= MOST_EARLY && lines.table().is_some_and(|table| !table.is_own()),
     }
 }
 

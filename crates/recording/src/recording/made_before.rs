@@ -5,7 +5,9 @@
 //! than the recording does.
 
 use crate::format::Format;
+use crate::lines::{HEAD_KEPT, Lines};
 use crate::mcap::{self, OURS, Reader, Survey, WalkOptions};
+use crate::parquet::Rows;
 use std::collections::BTreeSet;
 use std::fmt;
 use std::fs::File;
@@ -13,9 +15,11 @@ use std::io::Read;
 use std::path::Path;
 
 /// First bytes that tell whether to look closer.
-pub(super) const HEAD: u64 = 4096;
+pub(super) const HEAD: u64 = HEAD_KEPT as u64;
 /// How a table of attitudes begins.
 const TABLE: &[u8] = b"stamp_ns,qw,qx,qy,qz,roll_deg,";
+/// The same of one in Parquet, as text.
+const TABLE_BY_COLUMNS: &[u8] = b"stamp_ns,qw,qx,qy,qz,wx,wy,wz,sigma_x,";
 /// How a line with an attitude begins.
 const LINE: &[u8] = b"{\"class\":\"ATT\",";
 /// The transforms beside the attitudes.
@@ -50,10 +54,22 @@ impl MadeBefore {
         if let Some(text) = in_text(&head) {
             return Some(text);
         }
+        if Format::of_magic(&head) == Some(Format::Parquet) {
+            let rows = Rows::open(File::open(path).ok()?, None).ok()?;
+            let mut text = Vec::new();
+            rows.take(HEAD).read_to_end(&mut text).ok()?;
+            return in_text(&text);
+        }
         let is_ours = Format::of_magic(&head) == Some(Format::Mcap)
             && head.windows(OURS.len()).any(|part| part == OURS.as_bytes());
         let reader = Reader::open(path).ok().filter(|_| is_ours)?;
         in_survey(&mcap::survey(&reader, &WalkOptions::default()).ok()?)
+    }
+
+    /// What lines or rows are that are being read, from a file or a pipe: by what had come of them when they were opened.
+    #[must_use]
+    pub fn in_lines(lines: &Lines<impl Read>) -> Option<MadeBefore> {
+        in_text(lines.head())
     }
 }
 
@@ -81,5 +97,8 @@ pub(super) fn in_text(head: &[u8]) -> Option<MadeBefore> {
         && has(first, b"\"rotates\":")
         && !has(first, b"\"id\":\"truth\"")
         && !has(head, b"\"class\":\"RATE\"");
-    (is_line || head.starts_with(TABLE)).then_some(MadeBefore { of: None })
+    let is_table = [TABLE, TABLE_BY_COLUMNS]
+        .iter()
+        .any(|table| head.starts_with(table));
+    (is_line || is_table).then_some(MadeBefore { of: None })
 }

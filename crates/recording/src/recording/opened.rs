@@ -257,7 +257,7 @@ impl Recording {
             return made_before::in_survey(&self.survey);
         }
         let mut head = Vec::new();
-        let bytes = self.input.bytes().ok()?;
+        let bytes = self.input.text(&Options::default()).ok()?;
         bytes.take(made_before::HEAD).read_to_end(&mut head).ok()?;
         made_before::in_text(&head)
     }

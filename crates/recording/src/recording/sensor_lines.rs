@@ -6,7 +6,7 @@
 use super::bare_stamps::BareStamps;
 use super::channel_route::Item;
 use super::early_besides::{EarlyBesides, are_beside};
-use super::line_input::{described, no_samples, unclear};
+use super::line_input::{described, is_sure, no_samples, unclear};
 use super::selection::Selection;
 use crate::attitude_line::TRUTH_ID;
 use crate::decode::{Class, Undecodable};
@@ -97,8 +97,7 @@ pub fn read<E: From<Error>>(
         match line {
             Err(why) if sensor.is_none() => {
                 first_bad.get_or_insert_with(|| no_samples(path, &lines, &why));
-                let is_sure = lines.table().is_some_and(|table| !table.is_own());
-                if !is_sure || early.len() as u64 > PATIENCE {
+                if !is_sure(&lines, early.len()) {
                     break;
                 }
                 early.push(undecodable(lines.number(), why));
@@ -214,7 +213,7 @@ fn undecodable(number: u64, why: Undecodable) -> Item {
 
 fn nothing(path: &Path, format: Format) -> Error {
     let what = match format {
-        Format::Table => {
+        format if format.is_table() => {
             Diagnostic::new(
                 "no row carries a body rate",
             )

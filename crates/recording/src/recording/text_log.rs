@@ -8,7 +8,7 @@ use super::bare_stamps::BareStamps;
 use super::channel_route::{Item, Route};
 use super::early_besides::{EarlyBesides, are_beside};
 use super::input::{Bytes, Input};
-use super::line_input::{described, no_samples, unclear};
+use super::line_input::{described, is_sure, no_samples, unclear};
 use super::log_channel::LogChannel;
 use crate::attitude_line::TRUTH_ID;
 use crate::decode::{Class, Line, Options, Rank, Role, Stated, Undecodable};
@@ -27,8 +27,6 @@ use strapd_attitude::record::{Declared, Nanos, RawSample};
 const MOST_SENSORS: usize = 1024;
 /// Items that go through the pipeline together.
 const BATCH: usize = 1024;
-/// Rows that are none before the first that is one: beyond, none follows.
-const MOST_EARLY: usize = 1000;
 /// What samples that name no sensor are called.
 const UNNAMED: &str = "imu";
 
@@ -105,7 +103,7 @@ impl TextLog {
                 path: input.name().to_owned(),
                 what: format!(
                     "no {} carries a body rate or an orientation",
-                    if input.format() == Format::Table {
+                    if input.format().is_table() {
                         "row"
                     } else {
                         "line"
@@ -202,8 +200,7 @@ fn read<E: From<Error>>(
             (Ok(line), _) => line,
             (Err(why), None) => {
                 first_bad.get_or_insert_with(|| no_samples(path, lines, &why));
-                let is_sure = lines.table().is_some_and(|table| !table.is_own());
-                if !is_sure || early.len() > MOST_EARLY {
+                if !is_sure(lines, early.len()) {
                     break;
                 }
                 early.push((lines.number(), why));
@@ -372,8 +369,8 @@ fn named(met: Vec<(Key, Met)>, format: Format) -> Vec<(LogChannel, Option<(u64, 
         let schema = Schema {
             id: number.saturating_add(1),
             name: match (format, is_attitude) {
-                (Format::Table, false) => "samples".to_owned(),
-                (Format::Table, true) => "attitudes".to_owned(),
+                (format, false) if format.is_table() => "samples".to_owned(),
+                (format, true) if format.is_table() => "attitudes".to_owned(),
                 _ if met.class.is_empty() => "samples".to_owned(),
                 _ => met.class,
             },

@@ -314,8 +314,10 @@ fn not_in_metres(looked: &Inspection, what: String, unit: &'static str) -> Findi
         );
     }
     // Of a table the columns say it.
-    let encoding = format!("[{}]", Format::Table.name());
-    match looked.described.ends_with(&encoding) {
+    let is_table = [Format::Table, Format::Parquet]
+        .iter()
+        .any(|format| looked.described.ends_with(&format!("[{}]", format.name())));
+    match is_table {
         true => found
             .advise("so gravity can not correct the attitude: say the unit")
             .help([COLUMNS.to(format!("accel=X:Y:Z:{unit}"))]),

@@ -82,8 +82,8 @@ pub fn read(
         }
     };
     match input.format() {
-        Format::Table if input.is_own_table(options)? => from_csv(input).map(plain),
-        Format::Table => from_log(input, side, topic, options, pool),
+        table if table.is_table() && input.is_own_table(options)? => from_csv(input).map(plain),
+        table if table.is_table() => from_log(input, side, topic, options, pool),
         Format::Lines => match from_ndjson(input, side, topic)? {
             // Samples may have orientations beside them.
             none if none.is_empty() => from_log(input, side, topic, &plainly, pool),
@@ -418,7 +418,9 @@ fn from_csv(input: &Input) -> Result<Vec<(Entry, [f64; 3])>> {
         .into()
     };
     let mut track = Vec::new();
-    for row in csv::Reader::from_reader(BufReader::new(input.bytes()?)).deserialize::<Row>() {
+    for row in csv::Reader::from_reader(BufReader::new(input.text(&Options::default())?))
+        .deserialize::<Row>()
+    {
         let row = row.map_err(|e| refuse(e.to_string()))?;
         // A sample without an orientation.
         let (Some(w), Some(x), Some(y), Some(z)) = (row.qw, row.qx, row.qy, row.qz) else {

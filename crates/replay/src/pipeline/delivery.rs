@@ -42,6 +42,7 @@ const SAMPLES: Way<RawSample> = Way {
 fn name(target: &Target) -> String {
     match target {
         Target::File { path, .. } => path.display().to_string(),
+        Target::Store { address, .. } => address.place(),
         Target::Stdout => STDOUT.to_owned(),
         Target::Null => "null:".to_owned(),
         Target::Listen(listen) => listen.to_string(),

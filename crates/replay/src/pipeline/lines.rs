@@ -39,6 +39,7 @@ pub(super) fn replay(
     let path = run.source.name();
     let mut running = Running {
         run,
+        made_before: MadeBefore::in_lines(&input),
         waiting: Waiting::new(run, &path, stamps),
         pool,
         watch,
@@ -73,6 +74,8 @@ pub(super) fn stamps(run: &ReplayRequest, input: Lines<impl Read>) -> Result<Opt
 /// A run.
 struct Running<'r, 'w> {
     run: &'r ReplayRequest,
+    /// That these are attitudes, and no recording.
+    made_before: Option<MadeBefore>,
     waiting: Waiting<'r>,
     pool: &'r Pool,
     watch: &'w mut dyn FnMut(&Position),
@@ -82,9 +85,9 @@ impl SensorTaker<Error> for Running<'_, '_> {
     fn meet(&mut self, sensor: Sensor) -> Result<()> {
         let (mut found, stream) = met(self.run, sensor);
         if self.run.selection.topic.is_none()
-            && let Some(made) = MadeBefore::in_file(&self.run.source.name())
+            && let Some(made) = &self.made_before
         {
-            found.warnings.push(integrated_again(&made));
+            found.warnings.push(integrated_again(made));
         }
         self.waiting.meet(&mut Some((found, stream)))
     }

@@ -50,12 +50,10 @@ pub fn run(
             };
             // Of lines and rows who speaks is known when all are read, which only several sensors are worth.
             let is_of_all = run.selection.topic.as_deref() == Some("all");
-            if input.format().is_text() && input.parts().is_empty() && !is_of_all {
-                let text = || input.lines(&run.selection.decode);
-                let stamps = lines::stamps(run, text()?)?;
-                lines::replay(run, text()?, stamps, pool, watch)?
-            } else {
-                file(run, &input, pool, watch)?
+            let is_whole = input.format().is_text() && input.parts().is_empty();
+            match is_whole {
+                true => whole_text(run, &input, is_of_all, pool, watch)?,
+                false => file(run, &input, pool, watch)?,
             }
         }
         Source::Parts(paths) => file(run, &logged::joined(paths)?, pool, watch)?,
@@ -76,8 +74,28 @@ fn piped(
     match incoming(&name, input, &run.selection.decode, &logged::warn())? {
         Incoming::Messages(reader) => replay_stream::replay(run, reader, pool, watch),
         Incoming::Lines(text) => lines::replay(run, *text, None, pool, watch),
+        Incoming::Whole(input) if input.format().is_text() => {
+            let is_of_all = run.selection.topic.as_deref() == Some("all");
+            whole_text(run, &input, is_of_all, pool, watch)
+        }
         Incoming::Whole(input) => file(run, &input, pool, watch),
     }
+}
+
+/// Lines or rows that can be read again.
+fn whole_text(
+    run: &ReplayRequest,
+    input: &Input,
+    is_of_all: bool,
+    pool: &Pool,
+    watch: &mut dyn FnMut(&Position),
+) -> Result<RunSummary> {
+    if is_of_all {
+        return file(run, input, pool, watch);
+    }
+    let text = || input.lines(&run.selection.decode);
+    let stamps = lines::stamps(run, text()?)?;
+    lines::replay(run, text()?, stamps, pool, watch)
 }
 
 /// What is said where attitudes made before are taken for a recording.

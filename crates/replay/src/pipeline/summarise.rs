@@ -298,7 +298,7 @@ fn first_losses(topic: &Topic, start: Nanos) -> Vec<String> {
 
 /// Whether it was read from lines or rows: their undecodable payloads carry the line's number where others carry a time.
 fn is_text(described: &str) -> bool {
-    [Format::Lines, Format::Table]
+    [Format::Lines, Format::Table, Format::Parquet]
         .iter()
         .map(|format| format.name())
         .any(|name| described == name || described.ends_with(&format!("[{name}]")))

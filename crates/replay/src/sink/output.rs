@@ -6,6 +6,7 @@
 
 use super::socket::{Tcp, Udp};
 use super::target::Target;
+use super::upload::Upload;
 use crate::error::{Error, Result};
 use crate::shell::quoted_file;
 use std::fs::{self, File, Metadata, OpenOptions};
@@ -38,6 +39,8 @@ pub(super) enum Output {
         /// Open for writing.
         file: File,
     },
+    /// An object in a store, not yet there.
+    Upload(Upload),
     /// Standard output.
     Stdout(io::Stdout),
     /// Somebody who listens.
@@ -61,6 +64,7 @@ impl Output {
             Target::Udp { address, .. } => Udp::to(address).map(Output::Udp),
             Target::Stdout => Ok(Output::Stdout(io::stdout())),
             Target::File { path, .. } => Output::file(path, inputs, force),
+            Target::Store { address, .. } => Upload::begin(address, force).map(Output::Upload),
         }
     }
 
@@ -120,6 +124,7 @@ impl Output {
         match self {
             Output::Part(part) => Some(&part.shown),
             Output::Direct { path, .. } => Some(path),
+            Output::Upload(upload) => Some(&upload.shown),
             Output::Stdout(_) | Output::Tcp(_) | Output::Udp(_) | Output::Null => None,
         }
     }
@@ -137,6 +142,7 @@ impl Output {
         let result = match self {
             Output::Part(part) => part.file.write_all(bytes),
             Output::Direct { file, .. } => file.write_all(bytes),
+            Output::Upload(upload) => upload.write(bytes),
             Output::Stdout(stdout) => stdout.write_all(bytes),
             Output::Tcp(tcp) => tcp.write(bytes),
             Output::Udp(udp) => udp.write(bytes),
@@ -166,6 +172,7 @@ impl Output {
         let flow = self.flush()?;
         match self {
             Output::Part(part) => part.publish()?,
+            Output::Upload(upload) => upload.finish()?,
             Output::Tcp(tcp) => tcp.finish(),
             Output::Udp(udp) => udp.finish(),
             Output::Direct { .. } | Output::Stdout(_) | Output::Null => {}

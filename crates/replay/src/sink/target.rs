@@ -3,6 +3,7 @@
 use crate::address::Address;
 use crate::error::{Error, Result};
 use crate::sink::address::Listen;
+use crate::sink::upload;
 use std::path::{Path, PathBuf};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::setting::{LISTEN, TOKEN_FILE};
@@ -44,6 +45,13 @@ pub enum Target {
         /// What it is filled with.
         format: Format,
     },
+    /// An object in a store; the format follows its extension.
+    Store {
+        /// Where.
+        address: Address,
+        /// What it is filled with.
+        format: Format,
+    },
     /// NDJSON on standard output. The reader hanging up ends it quietly.
     Stdout,
     /// Counted and discarded.
@@ -62,7 +70,7 @@ pub enum Target {
 }
 
 /// The list every message about an unknown sink ends with.
-const KNOWN: &str = "known sinks: FILE.mcap, FILE.ndjson (or .jsonl), FILE.csv, FILE.tum (for evo), FILE.parquet (with the feature parquet), - (NDJSON on standard output), null: (discard), tcp-listen://HOST:PORT, unix-listen:///PATH, ws-listen://HOST:PORT (whoever connects), tcp://HOST:PORT, udp://HOST:PORT[?profile=plotjuggler] (somebody who listens)";
+const KNOWN: &str = "known sinks: FILE.mcap, FILE.ndjson (or .jsonl), FILE.csv, FILE.tum (for evo), FILE.parquet (with the feature parquet), s3://BUCKET/KEY, gs://BUCKET/KEY, az://CONTAINER/KEY with such an ending (with the feature object-store), - (NDJSON on standard output), null: (discard), tcp-listen://HOST:PORT, unix-listen:///PATH, ws-listen://HOST:PORT (whoever connects), tcp://HOST:PORT, udp://HOST:PORT[?profile=plotjuggler] (somebody who listens)";
 
 /// What the objects sent to somebody look like.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -135,10 +143,42 @@ impl Target {
                 let address = address.to_owned();
                 Ok(Target::Udp { address, profile })
             }
+            (scheme, _) if upload::SCHEMES.contains(&scheme) => Target::store(text, rest),
             _ if SCHEMES.contains(&scheme) => refuse(
-                "addresses of stores are read, not written to: write a file, and bring it there (aws s3 cp, gcloud storage cp, azcopy)",
+                "web servers are read, not written to: none says whether what came is whole. Write a file, and bring it there (curl -T FILE ADDRESS), or an object of a store (s3://, gs://, az://)",
             ),
             _ => refuse(&format!("unknown scheme `{scheme}`")),
+        }
+    }
+
+    /// An object in a store.
+    fn store(text: &str, rest: &str) -> Result<Target> {
+        let address = Address::from(text);
+        let refuse = |what: &str, help: &str| {
+            let said = Diagnostic::new(format!("-o {address}: {what}"));
+            Err(Error::usage(said.help(help.to_owned())))
+        };
+        if !upload::is_possible() {
+            return refuse(
+                "addresses are written by a build with the feature object-store",
+                "build it with that feature; or write a file, and bring it there (aws s3 cp, gcloud storage cp, azcopy)",
+            );
+        }
+        let key = rest.split_once('/').map_or("", |(_, key)| key);
+        if key.is_empty() || rest.contains(['?', '#', '*']) || address.names_a_user() {
+            return refuse(
+                "is no address of an object",
+                "s3://BUCKET/KEY.mcap, without a query or a user",
+            );
+        }
+        let format = match Target::from_path(Path::new(key)) {
+            Ok(target) => target.format(),
+            Err(Error::Usage(_)) => None,
+            Err(other) => return Err(other),
+        };
+        match format {
+            Some(format) => Ok(Target::Store { address, format }),
+            None => refuse("the ending of its key is no format that is written", KNOWN),
         }
     }
 
@@ -210,7 +250,7 @@ impl Target {
     #[must_use]
     pub fn format(&self) -> Option<Format> {
         match self {
-            Target::File { format, .. } => Some(*format),
+            Target::File { format, .. } | Target::Store { format, .. } => Some(*format),
             Target::Stdout | Target::Tcp(_) | Target::Udp { .. } => Some(Format::Ndjson),
             Target::Null | Target::Listen(_) => None,
         }
@@ -241,7 +281,7 @@ mod tests {
 
     #[test]
     fn what_is_not_a_sink_is_refused_with_the_list_of_those_that_are() {
-        for text in ["", "out", "out.bag", "s3://b/x.mcap", ".mcap", "x.mcap/"] {
+        for text in ["", "out", "out.bag", "http://h/x.mcap", ".mcap", "x.mcap/"] {
             match Target::parse(text) {
                 Err(Error::Usage(message)) => {
                     let help = message.helping().unwrap_or_default();
@@ -251,6 +291,14 @@ mod tests {
                 // opener's business.
                 other => assert_eq!(text, "x.mcap/", "{other:?}"),
             }
+        }
+    }
+
+    #[test]
+    fn without_a_way_to_stores_the_feature_is_named() {
+        let said = Target::parse("s3://b/x.mcap").unwrap_err().to_string();
+        for words in ["-o s3://b/x.mcap", "feature object-store", "aws s3 cp"] {
+            assert!(said.contains(words), "{said}");
         }
     }
 
@@ -287,7 +335,7 @@ mod tests {
             "udp-listen://127.0.0.1:1",
             "ws://host:1",
             "unix-listen://relative",
-            "s3://b/x.mcap",
+            "https://h/x.mcap",
         ] {
             let said = Target::parse(text).unwrap_err().to_string();
             let shown = Address::from(text);

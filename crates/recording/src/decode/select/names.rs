@@ -280,7 +280,8 @@ pub(crate) fn is_nanos(name: &str) -> bool {
 /// Types whose numbers are known by the type's name alone.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Px4 {
-    /// `gyro_rad` is the mean rate over `gyro_integral_dt`.
+    /// `gyro_rad` is the mean rate over `gyro_integral_dt`, with a part of the coning in it (`docs/formats.md`, "Coning in PX4's
+    /// numbers", says why it is no rotation).
     SensorCombined,
     /// `delta_angle` over `delta_angle_dt`.
     VehicleImu,
