@@ -23,11 +23,14 @@
 //! | [`listen`], `http`, `samples` | sockets others come to; samples by `POST` | I/O |
 //! | [`source`], [`connect`], [`upstream`]; `forward` | sockets others listen on: samples from there; attitudes to there | I/O |
 //! | `nats` | subjects of a broker: samples from there, attitudes to there (feature `nats`) | I/O |
+//! | `broker` | what such have in common | pure |
 //! | [`shutdown`] | signals -> an orderly end | I/O |
 //!
 //! The wire is described in `docs/protocol.md`.
 
 pub mod admission;
+#[cfg(feature = "nats")]
+mod broker;
 pub mod channel;
 pub mod chunk;
 pub mod connect;

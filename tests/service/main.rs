@@ -3,6 +3,8 @@
 #![allow(clippy::print_stdout, reason = "figures, with --nocapture")]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
+#[cfg(feature = "nats")]
+mod broker;
 mod cast;
 mod mqtt;
 mod nats;
