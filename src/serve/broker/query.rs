@@ -76,6 +76,16 @@ impl<'a> Query<'a> {
         }
     }
 
+    /// Whether a parameter that has no value is given.
+    #[cfg(feature = "zenoh")]
+    pub(in crate::serve) fn has(&self, name: &str) -> Result<bool> {
+        match self.only(name)? {
+            None => Ok(false),
+            Some("") => Ok(true),
+            Some(_) => Err(self.refusal.say(&format!("?{name} takes no value"))),
+        }
+    }
+
     /// `?user=NAME&password-file=FILE`.
     pub(in crate::serve) fn user(&self) -> Result<Option<(String, Secret)>> {
         match (self.of("user")?, self.of("password-file")?) {
