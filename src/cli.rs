@@ -309,6 +309,9 @@ pub fn start_diagnostics(global: &Global) {
     // What it says of its connection we say in our own words.
     #[cfg(feature = "nats")]
     let targets = targets.with_target("async_nats", most.min(LevelFilter::WARN));
+    // Likewise; and below that it says its configuration, with the password in it.
+    #[cfg(feature = "zenoh")]
+    let targets = targets.with_target("zenoh", LevelFilter::OFF);
     // These say whole addresses, with the signatures in them.
     let says_addresses = ["hyper_util", "object_store", "reqwest"];
     let targets = says_addresses.iter().fold(targets, |targets, name| {

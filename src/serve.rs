@@ -23,11 +23,15 @@
 //! | [`listen`], `http`, `samples` | sockets others come to; samples by `POST` | I/O |
 //! | [`source`], [`connect`], [`upstream`]; `forward` | sockets others listen on: samples from there; attitudes to there | I/O |
 //! | `nats` | subjects of a broker: samples from there, attitudes to there (feature `nats`) | I/O |
+//! | `zenoh` | keys of a router, ROS 2 among them: likewise (feature `zenoh`) | I/O |
+//! | `broker` | what both have in common | pure |
 //! | [`shutdown`] | signals -> an orderly end | I/O |
 //!
 //! The wire is described in `docs/protocol.md`.
 
 pub mod admission;
+#[cfg(any(feature = "nats", feature = "zenoh"))]
+mod broker;
 pub mod channel;
 pub mod chunk;
 pub mod connect;
@@ -62,6 +66,8 @@ mod top_page;
 pub mod upstream;
 pub mod viewer;
 pub mod wire;
+#[cfg(feature = "zenoh")]
+pub mod zenoh;
 
 use crate::error::{Error, Result};
 use crate::sink::Target;
@@ -114,6 +120,9 @@ pub struct Settings {
     /// Where in NATS every attitude goes.
     #[cfg(feature = "nats")]
     pub nats: Vec<nats::address::NatsAddress>,
+    /// Where in zenoh every attitude goes.
+    #[cfg(feature = "zenoh")]
+    pub zenoh: Vec<zenoh::address::ZenohAddress>,
     /// The replay that is served; no samples are taken then.
     pub timeline: Option<Arc<dyn Timeline>>,
     /// What is served brings samples beside attitudes: clients may ask for them before the first stream is there.
@@ -130,6 +139,8 @@ pub struct Server {
     outputs: Vec<Target>,
     #[cfg(feature = "nats")]
     nats: Vec<nats::address::NatsAddress>,
+    #[cfg(feature = "zenoh")]
+    zenoh: Vec<zenoh::address::ZenohAddress>,
 }
 
 impl Settings {
@@ -164,6 +175,8 @@ impl Server {
         let outputs = std::mem::take(&mut settings.outputs);
         #[cfg(feature = "nats")]
         let nats = std::mem::take(&mut settings.nats);
+        #[cfg(feature = "zenoh")]
+        let zenoh = std::mem::take(&mut settings.zenoh);
         let hub = Hub::new(settings)?;
         let mut listeners = Vec::new();
         let mut bound = Vec::new();
@@ -187,6 +200,8 @@ impl Server {
             outputs,
             #[cfg(feature = "nats")]
             nats,
+            #[cfg(feature = "zenoh")]
+            zenoh,
         })
     }
 
@@ -226,6 +241,10 @@ impl Server {
         for address in self.nats {
             tokio::spawn(nats::send(address, context(), tenancy.clone()));
         }
+        #[cfg(feature = "zenoh")]
+        for address in self.zenoh {
+            tokio::spawn(zenoh::send(address, context()));
+        }
         for outgoing in self.hub.outgoing() {
             let (outgoing, hub) = (outgoing.clone(), self.hub.clone());
             match outgoing.endpoint().clone() {
@@ -236,6 +255,10 @@ impl Server {
                 Endpoint::Nats(address) => {
                     let middle = (hub, tenancy.clone());
                     tokio::spawn(nats::keep(*address, outgoing, middle, shutdown.running()));
+                }
+                #[cfg(feature = "zenoh")]
+                Endpoint::Zenoh(address) => {
+                    tokio::spawn(zenoh::keep(*address, outgoing, hub, shutdown.running()));
                 }
             }
         }

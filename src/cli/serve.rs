@@ -12,7 +12,7 @@ use crate::serve::hub::Hub;
 use crate::serve::limits::Limits;
 use crate::serve::recorder::{self, Recorder, Split};
 use crate::serve::shutdown::Signals;
-use crate::serve::source::{Endpoint, means_nats};
+use crate::serve::source::{Endpoint, means_nats, means_zenoh};
 use crate::serve::state::StateFile;
 use crate::serve::{Server, Settings, listen};
 use crate::sink::address::{DEFAULTS, Listen};
@@ -133,6 +133,10 @@ fn sent_to(text: &str) -> Result<Target> {
     #[cfg(not(feature = "nats"))]
     if means_nats(text) {
         return Err(crate::serve::source::without_nats("-o", text));
+    }
+    #[cfg(not(feature = "zenoh"))]
+    if means_zenoh(text) {
+        return Err(crate::serve::source::without_zenoh("-o", text));
     }
     match Target::parse(text)? {
         target @ (Target::Tcp(_) | Target::Udp { .. }) => Ok(target),
@@ -426,6 +430,7 @@ impl Serve {
                 .output
                 .iter()
                 .filter(|o| !(cfg!(feature = "nats") && means_nats(o)))
+                .filter(|o| !(cfg!(feature = "zenoh") && means_zenoh(o)))
                 .map(|o| sent_to(o))
                 .collect::<Result<_>>()?,
             #[cfg(feature = "nats")]
@@ -434,6 +439,13 @@ impl Serve {
                 .iter()
                 .filter(|o| means_nats(o))
                 .map(|o| crate::serve::nats::address::NatsAddress::output(o))
+                .collect::<Result<_>>()?,
+            #[cfg(feature = "zenoh")]
+            zenoh: self
+                .output
+                .iter()
+                .filter(|o| means_zenoh(o))
+                .map(|o| crate::serve::zenoh::address::ZenohAddress::output(o))
                 .collect::<Result<_>>()?,
             limits: Limits {
                 state_window: self.state_window,

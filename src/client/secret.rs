@@ -33,7 +33,7 @@ impl Secret {
     ///
     /// # Errors
     /// It can not be read, others can read it, or it holds nothing.
-    #[cfg(feature = "nats")]
+    #[cfg(any(feature = "nats", feature = "zenoh"))]
     pub fn of_others(flag: &str, path: &Path) -> Result<Secret> {
         Secret::no_shorter_than(1, flag, path)
     }

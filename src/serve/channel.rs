@@ -311,6 +311,28 @@ impl Channel {
         self.chunk(form, first_seq, attitudes.len() as u64, bytes.into())
     }
 
+    /// Attitudes from number `first_seq` on as messages of ROS 2, `sensor_msgs/msg/Imu` in CDR, each by itself.
+    #[cfg(feature = "zenoh")]
+    pub(super) fn messages(&self, first_seq: u64, attitudes: &[AttitudeSample]) -> Vec<Chunk> {
+        let numbered = (first_seq..).zip(attitudes);
+        numbered
+            .map(|(seq, attitude)| {
+                let mut message = Vec::new();
+                self.payloads.attitude(&mut message, attitude);
+                self.chunk(Form::Lines, seq, 1, message.into())
+            })
+            .collect()
+    }
+
+    /// The last of some attitudes, likewise.
+    #[cfg(feature = "zenoh")]
+    pub(super) fn last_message(&self, attitudes: &[(u64, AttitudeSample)]) -> Chunk {
+        let last = attitudes.last();
+        let mut messages = last.map(|(seq, attitude)| self.messages(*seq, &[*attitude]));
+        let message = messages.as_mut().and_then(Vec::pop);
+        message.unwrap_or_else(|| self.chunk(Form::Lines, 0, 0, Bytes::new()))
+    }
+
     /// The objects of items from number `first_seq` on; `text` is room for encoding.
     pub(super) fn chunks(
         &self,

@@ -126,6 +126,9 @@ pub struct Sensor {
 pub enum ClientProtocol {
     /// Lines.
     Lines(Profile),
+    /// A message of ROS 2 for each attitude.
+    #[cfg(feature = "zenoh")]
+    Messages,
     /// Messages of the Foxglove protocol.
     Foxglove {
         /// Whether it can move a playback.
@@ -307,6 +310,8 @@ impl Hub {
         let outbox = match shape {
             ClientProtocol::Lines(Profile::Lines) => Outbox::new(),
             ClientProtocol::Lines(Profile::PlotJuggler) => Outbox::saying(|_, _| Bytes::new()),
+            #[cfg(feature = "zenoh")]
+            ClientProtocol::Messages => Outbox::saying(|_, _| Bytes::new()),
             ClientProtocol::Foxglove { .. } => Outbox::saying(foxglove::gap),
         }
         .telling(self.room_made.clone());
@@ -550,6 +555,19 @@ impl Hub {
         for client in &*watchers {
             let profile = match client.shape {
                 ClientProtocol::Lines(profile) => profile,
+                #[cfg(feature = "zenoh")]
+                ClientProtocol::Messages => {
+                    if let Items::Attitudes(attitudes) = items {
+                        client.outbox.offer(
+                            channel.id(),
+                            attitudes,
+                            &mut |_| channel.messages(first_seq, attitudes),
+                            &|_, kept| channel.last_message(kept),
+                            first_seq,
+                        );
+                    }
+                    continue;
+                }
                 ClientProtocol::Foxglove { .. } => {
                     client.outbox.offer_frames(
                         |wanted| {

@@ -447,7 +447,7 @@ impl Outbox {
     }
 
     /// The same for whom attitudes alone are sent, stream by stream: replies go nowhere.
-    #[cfg(feature = "nats")]
+    #[cfg(any(feature = "nats", feature = "zenoh"))]
     pub fn take_chunks(&self, most: usize, out: &mut Vec<Chunk>) -> usize {
         let mut state = self.state();
         state.control.clear();

@@ -24,6 +24,8 @@ struct State {
     last_error: Option<String>,
     #[cfg(feature = "nats")]
     stream: StreamPlace,
+    #[cfg(feature = "zenoh")]
+    keys: KeysSeen,
 }
 
 /// How far a stream of a broker has been read, and whether we may.
@@ -40,6 +42,34 @@ pub(super) struct StreamPlace {
     pub(super) turns: u64,
 }
 
+/// What was met under the keys of a router.
+#[cfg(feature = "zenoh")]
+#[derive(Clone, Debug, Default)]
+struct KeysSeen {
+    /// The publishers of ROS 2 that say they are there, by their tokens.
+    topics: std::collections::BTreeMap<String, TopicSeen>,
+    /// Messages that gave way to later ones.
+    lost: u64,
+    /// Messages that were too long.
+    refused: u64,
+}
+
+/// A publisher of a topic of ROS 2.
+#[cfg(feature = "zenoh")]
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+pub(super) struct TopicSeen {
+    /// The topic.
+    pub(super) topic: String,
+    /// Whose it is.
+    pub(super) node: String,
+    /// In which domain.
+    pub(super) domain: String,
+}
+
+/// Most publishers that are remembered.
+#[cfg(feature = "zenoh")]
+const MOST_TOPICS: usize = 10_000;
+
 impl Outgoing {
     /// Not yet connected.
     #[must_use]
@@ -54,6 +84,8 @@ impl Outgoing {
                 last_error: None,
                 #[cfg(feature = "nats")]
                 stream: StreamPlace::default(),
+                #[cfg(feature = "zenoh")]
+                keys: KeysSeen::default(),
             }),
         }
     }
@@ -74,13 +106,24 @@ impl Outgoing {
             "sequence": state.stream.sequence, "lag": state.stream.lag,
             "held": state.stream.is_held, "turns": state.stream.turns,
         });
-        serde_json::json!({
+        let status = serde_json::json!({
             "uri": self.name(), "id": self.endpoint.id(),
             "connected": state.peer.is_some(), "peer": state.peer,
             "since_s": state.since.elapsed().as_secs_f64(),
             "attempts": state.attempts, "connections": state.connections,
             "last_error": state.last_error, "stream": stream,
-        })
+        });
+        #[cfg(feature = "zenoh")]
+        let mut status = status;
+        #[cfg(feature = "zenoh")]
+        if let (Endpoint::Zenoh(_), Some(fields)) = (&self.endpoint, status.as_object_mut()) {
+            let topics: Vec<_> = state.keys.topics.values().collect();
+            let seen = serde_json::json!({
+                "topics": topics, "lost": state.keys.lost, "refused": state.keys.refused,
+            });
+            fields.insert("zenoh".to_owned(), seen);
+        }
+        status
     }
 
     /// Where it is.
@@ -97,6 +140,39 @@ impl Outgoing {
     #[cfg(feature = "nats")]
     pub(super) fn place(&self, change: impl FnOnce(&mut StreamPlace)) {
         change(&mut self.state().stream);
+    }
+
+    /// A publisher is there (`Some`), or has gone. `false`: that was known.
+    #[cfg(feature = "zenoh")]
+    pub(super) fn topic(&self, token: &str, seen: Option<TopicSeen>) -> bool {
+        let topics = &mut self.state().keys.topics;
+        match seen {
+            None => topics.remove(token).is_some(),
+            Some(seen) if topics.len() < MOST_TOPICS => {
+                topics.insert(token.to_owned(), seen).is_none()
+            }
+            Some(_) => false,
+        }
+    }
+
+    /// Nothing is known of who is there.
+    #[cfg(feature = "zenoh")]
+    pub(super) fn forget_topics(&self) {
+        self.state().keys.topics.clear();
+    }
+
+    /// Messages gave way to later ones, as `what` says.
+    #[cfg(feature = "zenoh")]
+    pub(super) fn lost_messages(&self, count: u64, what: &str) {
+        self.state().keys.lost += count;
+        self.complain_of("lost messages", what);
+    }
+
+    /// A message was too long, as `what` says.
+    #[cfg(feature = "zenoh")]
+    pub(super) fn refused_message(&self, what: &str) {
+        self.state().keys.refused += 1;
+        self.complain_of("too long", what);
     }
 
     /// Another attempt begins.
@@ -123,9 +199,14 @@ impl Outgoing {
 
     /// Something is wrong with what comes; the connection lives.
     pub(super) fn complain(&self, what: &str) {
+        self.complain_of("says", what);
+    }
+
+    /// The same of a cause that others are not to hide.
+    pub(super) fn complain_of(&self, cause: &str, what: &str) {
         self.state().last_error = Some(what.to_owned());
         let name = self.name();
-        log_throttle::warn(&format!("{name} says"), &format!("{name}: {what}"));
+        log_throttle::warn(&format!("{name} {cause}"), &format!("{name}: {what}"));
     }
 }
 
@@ -133,7 +214,7 @@ impl Outgoing {
 pub(super) fn exposition(out: &mut String, all: &[Arc<Outgoing>]) {
     /// Name, kind, help, and the value of one source.
     type Family = (&'static str, &'static str, &'static str, fn(&State) -> u64);
-    let families: [Family; 3] = [
+    let families: &[Family] = &[
         (
             "outgoing_connected",
             "gauge",
@@ -151,6 +232,27 @@ pub(super) fn exposition(out: &mut String, all: &[Arc<Outgoing>]) {
             "counter",
             "Connections made to a source.",
             |s| s.connections,
+        ),
+        #[cfg(feature = "zenoh")]
+        (
+            "outgoing_lost_messages_total",
+            "counter",
+            "Messages of a source that gave way to later ones before they were read.",
+            |s| s.keys.lost,
+        ),
+        #[cfg(feature = "zenoh")]
+        (
+            "outgoing_refused_messages_total",
+            "counter",
+            "Messages of a source that were too long.",
+            |s| s.keys.refused,
+        ),
+        #[cfg(feature = "zenoh")]
+        (
+            "outgoing_topics",
+            "gauge",
+            "Publishers of ROS 2 that say they are there.",
+            |s| s.keys.topics.len() as u64,
         ),
     ];
     if all.is_empty() {

@@ -102,6 +102,14 @@ impl Owned {
         }
     }
 
+    /// A message of this sensor could not be read; one that never sent any is none yet.
+    #[cfg(feature = "zenoh")]
+    pub fn undecodable_of(&self, id: &str, hub: &Hub, client: &Client) {
+        if let Some(sensor) = self.sensors.get(id).and_then(Weak::upgrade) {
+            hub.undecodable(&sensor, client.number);
+        }
+    }
+
     /// What they are called.
     #[cfg(feature = "nats")]
     pub fn ids(&self) -> impl Iterator<Item = &String> {

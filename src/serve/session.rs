@@ -4,6 +4,8 @@
 //! the hub because it remembers what only matters to one client: which sensor it sent last, how
 //! many lines in a row were bad, whether it has shown the token.
 
+#[cfg(feature = "zenoh")]
+mod decoded;
 mod opening;
 mod resetting;
 mod turn;
@@ -133,7 +135,7 @@ impl Side {
     }
 
     /// A broker, whose messages are of many sensors, or all of the one that is called `id` here.
-    #[cfg(feature = "nats")]
+    #[cfg(any(feature = "nats", feature = "zenoh"))]
     #[must_use]
     pub fn broker(id: Option<String>) -> Side {
         let mut side = Side::source(id, None);
@@ -266,7 +268,7 @@ impl Session {
     }
 
     /// What comes next is of this sensor, where it does not say; no number of a packed stream is bound.
-    #[cfg(feature = "nats")]
+    #[cfg(any(feature = "nats", feature = "zenoh"))]
     pub fn of_subject(&mut self, id: &str) {
         self.bound.clear();
         if let Side::Source(naming) = &mut self.side

@@ -50,13 +50,16 @@ pub enum Endpoint {
     /// A subject of NATS.
     #[cfg(feature = "nats")]
     Nats(Box<super::nats::address::NatsAddress>),
+    /// A key of zenoh.
+    #[cfg(feature = "zenoh")]
+    Zenoh(Box<super::zenoh::address::ZenohAddress>),
 }
 
 impl Endpoint {
-    /// Reads what the user wrote: the address of a [`Source`], or of a subject of NATS.
+    /// Reads what the user wrote: the address of a [`Source`], of a subject of NATS, or of a key of zenoh.
     ///
     /// # Errors
-    /// As [`Source::parse`]; NATS is meant and was not built in.
+    /// As [`Source::parse`]; a broker is meant and was not built in.
     pub fn parse(text: &str) -> Result<Endpoint> {
         if means_nats(text) {
             #[cfg(feature = "nats")]
@@ -64,6 +67,13 @@ impl Endpoint {
                 .map(|address| Endpoint::Nats(Box::new(address)));
             #[cfg(not(feature = "nats"))]
             return Err(without_nats("serve", text));
+        }
+        if means_zenoh(text) {
+            #[cfg(feature = "zenoh")]
+            return super::zenoh::address::ZenohAddress::source(text)
+                .map(|address| Endpoint::Zenoh(Box::new(address)));
+            #[cfg(not(feature = "zenoh"))]
+            return Err(without_zenoh("serve", text));
         }
         Source::parse(text).map(|source| Endpoint::Source(Box::new(source)))
     }
@@ -75,6 +85,8 @@ impl Endpoint {
             Endpoint::Source(source) => &source.name,
             #[cfg(feature = "nats")]
             Endpoint::Nats(address) => &address.name,
+            #[cfg(feature = "zenoh")]
+            Endpoint::Zenoh(address) => &address.name,
         }
     }
 
@@ -85,6 +97,8 @@ impl Endpoint {
             Endpoint::Source(source) => source.id.as_deref(),
             #[cfg(feature = "nats")]
             Endpoint::Nats(address) => address.id.as_deref(),
+            #[cfg(feature = "zenoh")]
+            Endpoint::Zenoh(address) => address.id.as_deref(),
         }
     }
 
@@ -97,7 +111,11 @@ impl Endpoint {
             (Endpoint::Nats(one), Endpoint::Nats(other)) => {
                 (&one.place, &one.subject) == (&other.place, &other.subject)
             }
-            #[cfg(feature = "nats")]
+            #[cfg(feature = "zenoh")]
+            (Endpoint::Zenoh(one), Endpoint::Zenoh(other)) => {
+                (&one.place, &one.key) == (&other.place, &other.key)
+            }
+            #[cfg(any(feature = "nats", feature = "zenoh"))]
             _ => false,
         }
     }
@@ -108,6 +126,8 @@ impl Endpoint {
             Endpoint::Source(source) => &mut source.name,
             #[cfg(feature = "nats")]
             Endpoint::Nats(address) => &mut address.name,
+            #[cfg(feature = "zenoh")]
+            Endpoint::Zenoh(address) => &mut address.name,
         };
         name.push_str(&format!(" ({number})"));
     }
@@ -130,6 +150,24 @@ pub fn without_nats(before: &str, text: &str) -> Error {
         .help(
             "cargo install --path . --features nats; or, without it: nats sub --raw 'imu.*' | strapd serve -",
         ),
+    )
+}
+
+/// Whether a word is meant as a key of zenoh.
+#[must_use]
+pub fn means_zenoh(text: &str) -> bool {
+    text.starts_with("zenoh://")
+}
+
+/// Zenoh is meant, and was not built in.
+#[cfg(not(feature = "zenoh"))]
+pub fn without_zenoh(before: &str, text: &str) -> Error {
+    Error::usage(
+        Diagnostic::new(format!(
+            "{before} {}: this strapd was built without the feature zenoh",
+            Address::from(text)
+        ))
+        .help("cargo install --path . --features zenoh"),
     )
 }
 

@@ -3,12 +3,15 @@
 #![allow(clippy::print_stdout, reason = "figures, with --nocapture")]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
+#[cfg(any(feature = "nats", feature = "zenoh"))]
+mod broker;
 mod cast;
 mod mqtt;
 mod nats;
 mod page;
 mod recorder;
 mod serve;
+mod zenoh;
 
 #[path = "../made_logs/mod.rs"]
 mod made_logs;

@@ -19,23 +19,10 @@ fn a_build_without_the_feature_names_it_and_the_bridge() {
 #[cfg(feature = "nats")]
 mod built_with_it {
     use super::*;
-    use std::path::Path;
-    use std::process::Command;
+    use crate::broker::judged;
 
-    /// `STRAPD_ORACLES_PYTHON` names a Python with the packages of `benches/peers/requirements.txt`.
     fn beside_a_server(what: &str, said: &str) {
-        let python = std::env::var_os("STRAPD_ORACLES_PYTHON").expect("it is not set");
-        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/oracles/nats_workers.py");
-        let output = Command::new(&python)
-            .arg(&script)
-            .arg(assert_cmd::cargo::cargo_bin("strapd"))
-            .args(what.split(' '))
-            .output()
-            .unwrap();
-        let text = String::from_utf8_lossy(&output.stdout).into_owned()
-            + &String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success() && text.contains(said), "{text}");
-        println!("{text}");
+        judged("nats_workers.py", what, said);
     }
 
     #[test]

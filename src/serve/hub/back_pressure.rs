@@ -31,11 +31,23 @@ pub struct Flood {
     until: Option<Instant>,
     /// It waited in vain, and does not wait before this.
     free: Option<Instant>,
+    /// Longest wait for room; `None`: [`PATIENCE`].
+    patience: Option<Duration>,
     /// Somebody watches it: less is read at once, so that what is made of it finds room.
     is_watched: bool,
 }
 
 impl Flood {
+    /// Who waits costs its sender nothing: what comes meanwhile waits elsewhere.
+    #[cfg(feature = "zenoh")]
+    #[must_use]
+    pub fn with_patience(patience: Duration) -> Flood {
+        Flood {
+            patience: Some(patience),
+            ..Flood::default()
+        }
+    }
+
     /// How many bytes to read at once, where there is room for `room`.
     #[must_use]
     pub fn most(&self, room: usize) -> usize {
@@ -71,14 +83,14 @@ impl Flood {
         self.free = self.free.filter(|free| now < *free);
         self.until = Some(match self.free {
             Some(_) => now,
-            None => now + PATIENCE,
+            None => now + self.patience.unwrap_or(PATIENCE),
         });
     }
 
     fn waited(&mut self, outcome: Waited) {
         self.is_watched = outcome != Waited::Nobody;
         if outcome == Waited::InVain && self.free.is_none() {
-            self.free = Some(Instant::now() + PATIENCE);
+            self.free = Some(Instant::now() + self.patience.unwrap_or(PATIENCE));
         }
         self.until = None;
     }

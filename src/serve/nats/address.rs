@@ -1,19 +1,14 @@
 //! `nats://HOST:PORT/SUBJECT?...` -> a server, what is read or written there, and how. Pure but for
 //! reading secrets from files.
 
-use crate::address::Address;
-use crate::client::remote::{Place, encoded, parameters};
+use crate::client::remote::{Place, encoded};
 use crate::client::secret::Secret;
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::serve::broker::query::{Query, Refusal};
 use std::path::{Path, PathBuf};
-use strapd_attitude::diagnostic::Diagnostic;
-use strapd_recording::decode::exact_name;
-use strapd_recording::text::printable;
 
 /// The port of a server where none is written.
 const PORT: u16 = 4222;
-/// Longer than any address.
-const MAX_BYTES: usize = 2048;
 /// Most partitions that are told apart.
 const MAX_PARTITION: u32 = 65_535;
 const KNOWN_IN: &str = "nats://HOST:PORT/SUBJECT (imu.*; the last token names the sensor) with ?id=NAME, ?stream=NAME (JetStream), ?from=new|all|SEQUENCE, ?state=BUCKET&p=PARTITION, ?user=NAME&password-file=FILE, ?token-file=FILE, ?ca-file=FILE";
@@ -86,7 +81,7 @@ impl NatsAddress {
     /// Where samples come from.
     ///
     /// # Errors
-    /// [`Error::Usage`] with what is known; a file of a secret can not be read.
+    /// [`Error::Usage`](crate::error::Error::Usage) with what is known; a file of a secret can not be read.
     pub fn source(text: &str) -> Result<NatsAddress> {
         NatsAddress::parse(text, Way::In)
     }
@@ -104,26 +99,12 @@ impl NatsAddress {
             Way::In => ("serve", KNOWN_IN),
             Way::Out => ("-o", KNOWN_OUT),
         };
-        let refuse = |what: &str| {
-            let shown = Address::from(text);
-            Error::usage(Diagnostic::new(format!("{before} {shown}: {what}")).help(known))
+        let refusal = Refusal {
+            before,
+            text,
+            known,
         };
-        let rest = text
-            .strip_prefix("nats://")
-            .filter(|_| text.len() <= MAX_BYTES && !text.chars().any(char::is_control))
-            .ok_or_else(|| refuse("is no address of NATS"))?;
-        let (rest, query) = rest.split_once('?').unwrap_or((rest, ""));
-        let given = parameters(query).ok_or_else(|| refuse("a `%` needs two digits after it"))?;
-        let (authority, subject) = rest.split_once('/').unwrap_or((rest, ""));
-        let has_port = match authority.rsplit_once(']') {
-            Some((_, port)) => port.starts_with(':'),
-            None => authority.contains(':'),
-        };
-        let full = match has_port {
-            true => authority.to_owned(),
-            false => format!("{authority}:{PORT}"),
-        };
-        let place = Place::parse(&full).map_err(|what| refuse(&what))?;
+        let refuse = |what: &str| refusal.say(what);
         let ours: &[&str] = match way {
             Way::In => &[
                 "id",
@@ -138,36 +119,25 @@ impl NatsAddress {
             ],
             Way::Out => &["stream", "user", "password-file", "token-file", "ca-file"],
         };
-        if let Some((other, _)) = given.iter().find(|(n, _)| !ours.contains(&n.as_str())) {
-            return Err(refuse(&format!("there is no ?{}=", printable(other))));
-        }
-        let of = |name: &str| -> Result<Option<&str>> {
-            let mut values = given.iter().filter(|(n, _)| n == name);
-            match (values.next(), values.next()) {
-                (Some(_), Some(_)) => Err(refuse(&format!("?{name}= is given twice"))),
-                (Some((_, value)), None) if value.is_empty() => {
-                    Err(refuse(&format!("?{name}= is empty")))
-                }
-                (value, _) => Ok(value.map(|(_, v)| v.as_str())),
-            }
+        let (rest, query) = Query::split(refusal, "nats://", ours)?;
+        let (authority, subject) = rest.split_once('/').unwrap_or((rest, ""));
+        let has_port = match authority.rsplit_once(']') {
+            Some((_, port)) => port.starts_with(':'),
+            None => authority.contains(':'),
         };
-        let login = match (of("user")?, of("password-file")?, of("token-file")?) {
-            (None, None, None) => Login::Nobody,
-            (Some(user), Some(file), None) => Login::User(
-                user.to_owned(),
-                Secret::of_others("password-file", Path::new(file))?,
-            ),
-            (None, None, Some(file)) => {
-                Login::Token(Secret::of_others("token-file", Path::new(file))?)
-            }
-            _ => {
-                return Err(refuse(
-                    "?user= goes with ?password-file=, and ?token-file= with neither",
-                ));
-            }
+        let full = match has_port {
+            true => authority.to_owned(),
+            false => format!("{authority}:{PORT}"),
+        };
+        let place = Place::parse(&full).map_err(|what| refuse(&what))?;
+        let login = match (query.user()?, query.of("token-file")?) {
+            (None, None) => Login::Nobody,
+            (Some((user, password)), None) => Login::User(user, password),
+            (None, Some(file)) => Login::Token(Secret::of_others("token-file", Path::new(file))?),
+            _ => return Err(refuse("?token-file= goes with no ?user=")),
         };
         let named = |name: &str| -> Result<Option<String>> {
-            match of(name)? {
+            match query.of(name)? {
                 Some(value) if !is_name(value) => Err(refuse(&format!(
                     "?{name}=: a name of letters, digits, - and _"
                 ))),
@@ -175,7 +145,7 @@ impl NatsAddress {
             }
         };
         let stream = named("stream")?;
-        let from = match of("from")? {
+        let from = match query.of("from")? {
             None | Some("new") => From::New,
             Some("all") => From::All,
             Some(number) => From::Sequence(
@@ -184,7 +154,7 @@ impl NatsAddress {
                     .map_err(|_| refuse("?from= is new, all, or the number of a message"))?,
             ),
         };
-        let partition = match of("p")? {
+        let partition = match query.of("p")? {
             None => None,
             Some(p) => Some(
                 p.parse::<u32>()
@@ -212,27 +182,16 @@ impl NatsAddress {
             (false, None) => subject.to_owned(),
         };
         check(&subject, way).map_err(refuse)?;
-        let id = match of("id")? {
-            None => None,
-            Some(_) if subject.contains(['*', '>']) => {
-                return Err(refuse(
-                    "?id= names one sensor, and the subject may be of many",
-                ));
-            }
-            Some(id) => Some(exact_name(id).map_err(|why| refuse(&format!("?id=: {why}")))?),
-        };
+        let of_many = subject.contains(['*', '>']);
+        let id =
+            query.id(of_many.then_some("?id= names one sensor, and the subject may be of many"))?;
         let mut name = format!("nats://{place}/{subject}");
-        for said in ["stream", "id", "state", "p"] {
-            if let Some(value) = of(said)? {
-                name.push(if name.contains('?') { '&' } else { '?' });
-                name.push_str(&format!("{said}={}", printable(value)));
-            }
-        }
+        query.show(&["stream", "id", "state", "p"], &mut name);
         Ok(NatsAddress {
             place,
             subject,
             login,
-            ca_file: of("ca-file")?.map(PathBuf::from),
+            ca_file: query.of("ca-file")?.map(PathBuf::from),
             stream,
             from,
             id,

@@ -3,11 +3,10 @@
 use super::address::NatsAddress;
 use super::connection::{in_words, keep_connecting};
 use super::tenure::{Tenancy, Tenure};
-use crate::serve::chunk::Chunk;
+use crate::serve::broker::{Batch, TAKE, gathered, warn};
 use crate::serve::filter::Filter;
 use crate::serve::hub::{Client as Watcher, ClientProtocol, Hub, count};
 use crate::serve::listen::Context;
-use crate::serve::log_throttle;
 use crate::serve::shutdown::Running;
 use async_nats::connection::State;
 use async_nats::jetstream::context::{Context as JetStream, PublishErrorKind};
@@ -23,8 +22,6 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tokio::time::{sleep, timeout};
 
-/// Bytes taken from the outbox at once.
-const TAKE: usize = 64 << 10;
 /// How long a server may take for them.
 const PATIENCE: Duration = Duration::from_secs(2);
 /// Between two attempts to store what could not be.
@@ -71,11 +68,6 @@ pub(in crate::serve) async fn send(address: NatsAddress, context: Context, tenan
     publisher.run(&watcher, &mut running).await;
     let _ = timeout(PATIENCE, publisher.client.flush()).await;
     hub.leave(&watcher, &[]);
-}
-
-fn warn(name: &str, why: &str) {
-    let name = format!("-o {name}");
-    log_throttle::warn(&name, &format!("{name}: {why}; trying again"));
 }
 
 struct Publisher {
@@ -126,9 +118,6 @@ impl Place {
 fn lines(bytes: &[u8]) -> impl DoubleEndedIterator<Item = &[u8]> {
     bytes.split(|b| *b == b'\n').filter(|line| !line.is_empty())
 }
-
-/// What one sensor has to publish.
-type Batch = (Arc<str>, Bytes);
 
 impl Publisher {
     async fn run(&mut self, watcher: &Watcher, running: &mut Running) {
@@ -286,19 +275,6 @@ impl Publisher {
     }
 }
 
-/// The attitudes of each sensor in one piece, in their order.
-fn gathered(chunks: Vec<Chunk>) -> Vec<Batch> {
-    let mut all: BTreeMap<Arc<str>, BytesMut> = BTreeMap::new();
-    for chunk in chunks {
-        all.entry(chunk.id)
-            .or_default()
-            .extend_from_slice(&chunk.bytes);
-    }
-    all.into_iter()
-        .map(|(id, bytes)| (id, bytes.freeze()))
-        .collect()
-}
-
 /// The attitudes that are not among those stored up to `last`.
 fn unstored(bytes: &Bytes, last: Place) -> Bytes {
     let is_new = |line: &&[u8]| Place::of(line).is_none_or(|place| !place.is_behind(last));
@@ -347,23 +323,5 @@ mod tests {
         for other in [of(&[(0, 71), (1, 72)]), of(&[(8, 1), (9, 2)])] {
             assert_eq!(unstored(&other, last), other);
         }
-    }
-
-    #[test]
-    fn the_attitudes_of_a_sensor_keep_their_order() {
-        let chunk = |id: &str, text: &str| Chunk {
-            id: id.into(),
-            first_seq: 0,
-            count: 1,
-            bytes: Bytes::copy_from_slice(text.as_bytes()),
-            label: None,
-        };
-        let all = gathered(vec![
-            chunk("b", "1\n"),
-            chunk("a", "2\n"),
-            chunk("b", "3\n"),
-        ]);
-        let text: Vec<_> = all.iter().map(|(id, bytes)| (&**id, &bytes[..])).collect();
-        assert_eq!(text, [("a", &b"2\n"[..]), ("b", b"1\n3\n")]);
     }
 }

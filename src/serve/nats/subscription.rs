@@ -7,6 +7,7 @@ use super::address::{From, LeaseKey, NatsAddress};
 use super::connection::{in_words, keep_connecting};
 use super::lease::{Document, Lease, worker_name};
 use super::tenure::{Tenancy, Tenure};
+use crate::serve::broker::{MAX_PAYLOAD, complaint, lost};
 use crate::serve::connect::Redial;
 use crate::serve::hub::Hub;
 use crate::serve::listen::{in_room, now};
@@ -28,8 +29,6 @@ use strapd_recording::text::printable;
 use tokio::task::yield_now;
 use tokio::time::{MissedTickBehavior, interval, sleep, timeout};
 
-/// A longer payload is refused: what a server allows by itself.
-const MAX_PAYLOAD: usize = 1 << 20;
 /// How often the state is handed to the lease.
 const EVERY: Duration = Duration::from_millis(400);
 /// How long the attitudes of before may take to be stored, so that the state can be.
@@ -115,15 +114,6 @@ fn hear(event: &Event, outgoing: &Outgoing, peer: &str) {
         Event::ServerError(_) | Event::ClientError(_) => outgoing.complain(&event.to_string()),
         Event::LameDuckMode | Event::Draining | Event::Closed => {}
     }
-}
-
-fn lost(outgoing: &Outgoing, why: &str) {
-    outgoing.lost(why);
-    let name = outgoing.name();
-    log_throttle::warn(
-        &format!("{name} lost"),
-        &format!("{name}: {why}; trying again until it is there"),
-    );
 }
 
 impl Reader {
@@ -389,22 +379,15 @@ impl Reader {
             }
             in_room(|_, scratch| session.go_on(scratch));
         }
-        let error = said
-            .iter()
-            .find(|line| line.starts_with(br#"{"class":"ERROR""#));
-        if let Some(error) = error {
-            self.answer(message, error).await;
+        if let Some((error, what)) = complaint(&said) {
+            self.answer(message, error, &what).await;
         }
     }
 
     /// Says to who listens what is wrong with the messages of a subject.
-    async fn answer(&mut self, message: &Message, error: &Bytes) {
-        if let Some(crate::serve::upstream::Event::Complained(what)) =
-            crate::serve::upstream::read(error)
-        {
-            self.outgoing
-                .complain(&format!("{}: {what}", printable(&message.subject)));
-        }
+    async fn answer(&mut self, message: &Message, error: &Bytes, what: &str) {
+        self.outgoing
+            .complain(&format!("{}: {what}", printable(&message.subject)));
         if self
             .complained
             .is_some_and(|t| t.elapsed() < BETWEEN_ERRORS)
