@@ -1,4 +1,4 @@
-//! The script that plays broker, sender and judge for a daemon: `tests/oracles/nats_workers.py`.
+//! The scripts that play broker, sender and judge for a daemon: `tests/oracles/{nats_workers,zenoh_robot}.py`.
 
 use std::path::Path;
 use std::process::Command;

@@ -3,7 +3,7 @@
 #![allow(clippy::print_stdout, reason = "figures, with --nocapture")]
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
-#[cfg(feature = "nats")]
+#[cfg(any(feature = "nats", feature = "zenoh"))]
 mod broker;
 mod cast;
 mod mqtt;
@@ -11,6 +11,7 @@ mod nats;
 mod page;
 mod recorder;
 mod serve;
+mod zenoh;
 
 #[path = "../made_logs/mod.rs"]
 mod made_logs;
