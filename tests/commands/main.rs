@@ -25,6 +25,7 @@ mod packed;
 #[cfg(unix)]
 mod pages;
 mod parquet;
+#[cfg(feature = "parquet")]
 mod parquet_in;
 mod px4;
 mod recover;

@@ -25,6 +25,13 @@ fn a_build_without_the_feature_names_it_and_the_csv() {
         ],
     );
     assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
+    let table = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/seeds/parquet/polars.parquet");
+    for command in ["replay", "info"] {
+        strapd(dir.path(), &format!("{command} {}", table.display())).refused(
+            1,
+            &["polars.parquet", "without the feature parquet", "duckdb -c"],
+        );
+    }
 }
 
 #[cfg(feature = "parquet")]

@@ -152,6 +152,7 @@ fn tables() {
     survives("delimited", CASES / 3, crate::parsers::delimited);
 }
 
+#[cfg(feature = "parquet")]
 #[test]
 fn tables_by_columns() {
     // Each is put into a file first.
@@ -159,6 +160,7 @@ fn tables_by_columns() {
 }
 
 /// Every beginning of one, and every one with a byte at its end.
+#[cfg(feature = "parquet")]
 #[test]
 fn tables_by_columns_cut_anywhere() {
     for seed in seeds("parquet").iter().step_by(7) {

@@ -19,7 +19,9 @@ mod rows;
 pub use crate::columns::{Columns, Delimiter};
 pub use rows::Table;
 
+#[cfg(feature = "parquet")]
 pub(crate) use own::is_own_column;
+#[cfg(feature = "parquet")]
 pub(crate) use rows::LOST;
 
 pub(crate) use layout::{MOST_HEAD_LINES, Opening, is_header, is_text_of_cells, may_be_table};

@@ -62,6 +62,10 @@ mod gpmf;
 pub mod lines;
 mod mavlink;
 pub mod mcap;
+#[cfg(feature = "parquet")]
+mod parquet;
+#[cfg(not(feature = "parquet"))]
+#[path = "parquet/absent.rs"]
 mod parquet;
 pub mod pool;
 pub mod recognise;

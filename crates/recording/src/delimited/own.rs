@@ -3,6 +3,7 @@
 use super::column::Column;
 
 /// Whether a column of this name is read.
+#[cfg(feature = "parquet")]
 pub(crate) fn is_own_column(name: &str) -> bool {
     COLUMNS.iter().any(|(known, _)| *known == name)
 }
