@@ -167,8 +167,7 @@ pub fn plan(settings: &Bound<'_, PyDict>, aid: Aid) -> PyResult<Plan> {
     }
     let given = Given(settings);
     let plain = Plan::default();
-    let kinds = SampleKind::ALL
-    .map(|kind| (kind.name(), kind));
+    let kinds = SampleKind::ALL.map(|kind| (kind.name(), kind));
     let units = [GyroUnit::Rad, GyroUnit::Deg, GyroUnit::Mrad].map(|unit| (unit.name(), unit));
     let on_gaps = [OnGap::Hold, OnGap::Bridge, OnGap::Reset].map(|policy| (policy.name(), policy));
     let aids = [

@@ -174,11 +174,11 @@ pub fn simulate<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let refused = |what: Diagnostic| refusal::argument_of_log(&what);
     let kind = SampleKind::named(kind).ok_or_else(|| {
-            refused(
-                Diagnostic::new(format!("kind: there is no {kind:?}"))
-                    .help("one of rate, average, delta-angle, rotation"),
-            )
-        })?;
+        refused(
+            Diagnostic::new(format!("kind: there is no {kind:?}"))
+                .help("one of rate, average, delta-angle, rotation"),
+        )
+    })?;
     let error = ImuError::parse(noise)
         .map_err(|why| refused(Diagnostic::from(&why).at(format_args!("noise: {noise}"))))?;
     let instants = rate_hz * duration;
