@@ -56,7 +56,13 @@ fn put(address: &Address, file: File) -> Result<(), Diagnostic> {
             _ => in_parts(&cloud, file, size, &patience, &mut interrupt).await,
         };
         if interrupt.has_come() {
-            tracing::error!("{place}: interrupted: nothing is there of this run");
+            let what = match (&put, size) {
+                (Ok(()), _) => "it is there as a whole",
+                // The store may have taken all of the one request, and its answer was not waited for.
+                (Err(_), 0..=PART) => "it is there as a whole, or not at all",
+                (Err(_), _) => "nothing is there of this run",
+            };
+            tracing::error!("{place}: interrupted: {what}");
             interrupt.end();
         }
         put

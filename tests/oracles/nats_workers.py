@@ -290,7 +290,7 @@ async def handover(folder, kills, stops):
         worker.listens()
     await until(lambda: any(worker.has_it() for worker in workers), 10, "one of them takes the partition")
     await until(lambda: arrivals, 10, "attitudes")
-    chance, longest, offsets = random.Random(7), 0.0, []
+    chance, longest = random.Random(7), 0.0
     for turn in range(kills + stops):
         await asyncio.sleep(chance.uniform(0.6, 1.4))
         has = [n for n in range(2) if workers[n].has_it()]

@@ -1,7 +1,7 @@
 //! What stands behind the `?` of a broker's address -> values. Pure but for reading secrets from files.
 
 use crate::address::Address;
-use crate::client::remote::{Parameter, parameters};
+use crate::client::remote::{Parameter, Place, parameters};
 use crate::client::secret::Secret;
 use crate::error::{Error, Result};
 use std::path::Path;
@@ -29,6 +29,19 @@ impl Refusal<'_> {
         let shown = Address::from(self.text);
         let said = Diagnostic::new(format!("{} {shown}: {what}", self.before));
         Error::usage(said.help(self.known))
+    }
+
+    /// Host and port; `port` where none is given.
+    pub(in crate::serve) fn place(&self, authority: &str, port: u16) -> Result<Place> {
+        let has_port = match authority.rsplit_once(']') {
+            Some((_, port)) => port.starts_with(':'),
+            None => authority.contains(':'),
+        };
+        let full = match has_port {
+            true => authority.to_owned(),
+            false => format!("{authority}:{port}"),
+        };
+        Place::parse(&full).map_err(|what| self.say(&what))
     }
 }
 

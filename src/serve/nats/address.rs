@@ -121,15 +121,7 @@ impl NatsAddress {
         };
         let (rest, query) = Query::split(refusal, "nats://", ours)?;
         let (authority, subject) = rest.split_once('/').unwrap_or((rest, ""));
-        let has_port = match authority.rsplit_once(']') {
-            Some((_, port)) => port.starts_with(':'),
-            None => authority.contains(':'),
-        };
-        let full = match has_port {
-            true => authority.to_owned(),
-            false => format!("{authority}:{PORT}"),
-        };
-        let place = Place::parse(&full).map_err(|what| refuse(&what))?;
+        let place = refusal.place(authority, PORT)?;
         let login = match (query.user()?, query.of("token-file")?) {
             (None, None) => Login::Nobody,
             (Some((user, password)), None) => Login::User(user, password),

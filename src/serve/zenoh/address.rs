@@ -83,15 +83,7 @@ impl ZenohAddress {
             _ => return Err(refusal.say("tcp/ or tls/ is to stand before the host")),
         };
         let authority = parts.next().unwrap_or_default();
-        let has_port = match authority.rsplit_once(']') {
-            Some((_, port)) => port.starts_with(':'),
-            None => authority.contains(':'),
-        };
-        let full = match has_port {
-            true => authority.to_owned(),
-            false => format!("{authority}:{PORT}"),
-        };
-        let place = Place::parse(&full).map_err(|what| refusal.say(&what))?;
+        let place = refusal.place(authority, PORT)?;
         let key = parts.next().unwrap_or_default();
         let is_ros = query.has("rmw")?;
         check(key, way, is_ros).map_err(|what| refusal.say(&what))?;

@@ -260,7 +260,7 @@ pub(super) fn sweep_all<S: Samples, const W: usize>(
             scope.spawn(move || {
                 while let Some(mut job) = queue.next() {
                     job.work(model, sensor);
-                    // Nobody takes it any more where reading has failed.
+                    // Whoever takes it outlives the scope.
                     if sender.send(job).is_err() {
                         return;
                     }
