@@ -29,7 +29,9 @@ export class Sensor {
     this.id = id;
     this.clocks = clocks;
     this.history = new History();
+    // Whoever sends under this name sends as regularly when a recording or the daemon begins anew.
     this.steps = new Float64Array(STEPS);
+    this.stepsTaken = 0;
     // Who is there already when the page comes has a moment to speak.
     this.heardAt = performance.now() - 0.6 * SILENCE;
     this.clear();
@@ -42,7 +44,6 @@ export class Sensor {
     this.seen = 0;
     this.skipped = 0;
     this.dropped = 0;
-    this.stepsTaken = 0;
     this.interrupted = false;
     this.forgetErrors();
   }

@@ -232,6 +232,10 @@ fn a_replay_is_moved_from_the_page_and_ends_where_a_file_ends() {
         browser.until(name, &format!("{} === '{value}'", said(name)));
     }
     assert_ne!(browser.eval(&said("method")), "–");
+    // With the next STATUS, too: how regular the stamps were is known from before it went back.
+    const UPTIME: &str = "document.querySelector('[data-page=uptime]').textContent";
+    let before = browser.eval(UPTIME);
+    browser.until("another STATUS", &format!("{UPTIME} !== {before}"));
     let health = browser.eval("[...document.querySelectorAll('[data-testid=sensor] .strip div')].filter((e) => e.offsetParent && /–$/.test(e.textContent.trim())).map((e) => e.textContent)");
     assert_eq!(health, json!([]));
     browser.is_unharmed();
