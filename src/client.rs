@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | [`remote`] | the word on the command line -> where to connect | pure |
 //! | [`link`] | bytes and messages both ways, over any transport | I/O |
+//! | `numbers` | packed attitudes -> what their lines would say | pure |
 //! | [`secret`] | a file -> the token in it | reads it |
 //! | [`sender`] | lines -> a daemon, and what it complains of | I/O |
 //! | [`watcher`] | what a daemon says -> attitudes, state, complaints | I/O |
@@ -11,6 +12,7 @@
 //! `serve` connects out to its sources through [`link`] too; `cat`, `send` and `watch` do.
 
 pub mod link;
+mod numbers;
 pub mod remote;
 pub mod secret;
 pub mod sender;

@@ -24,6 +24,7 @@ use screen::{Key, Screen};
 use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
+use strapd_recording::decode::packed::Form;
 use tokio::sync::mpsc;
 use tokio::time::{MissedTickBehavior, interval, timeout};
 
@@ -85,7 +86,7 @@ pub fn run(global: &Global, args: &Watch) -> Result<Outcome> {
             board: Board::new(remote.to_string(), &args.ids),
             remote: &remote,
             token: token.as_ref(),
-            request: request(&args.ids, Some(RATE_HZ)),
+            request: request(&args.ids, Some(RATE_HZ), Form::Packed),
         };
         tokio::select! {
             ended = watching.on(&mut out) => ended,

@@ -1,11 +1,14 @@
 //! What a daemon says -> attitudes, state, complaints. I/O.
 
 use super::link::{Heard, Link};
+use super::numbers::Numbers;
 use super::remote::Remote;
 use crate::client::secret::Secret;
 use serde::Deserialize;
 use std::borrow::Cow;
+use strapd_recording::attitude_line::Attitude;
 use strapd_recording::decode::framing::{Framed, Framer};
+use strapd_recording::decode::packed::Form;
 use strapd_recording::text::printable;
 
 /// Longest line that is read: the `STATUS` of a thousand sensors.
@@ -16,6 +19,8 @@ const MAX_LINE: usize = 4 << 20;
 pub enum Said<'a> {
     /// An attitude: the line as it came.
     Attitude(&'a [u8]),
+    /// An attitude that came packed.
+    Packed(Attitude),
     /// We were too slow for so many attitudes of a sensor.
     Gap {
         /// Which sensor.
@@ -35,6 +40,7 @@ pub struct Watcher {
     link: Link,
     framer: Framer,
     buffer: Vec<u8>,
+    numbers: Numbers,
     /// What the daemon complained of last: why it closes, if it does.
     complaint: Option<String>,
 }
@@ -59,9 +65,12 @@ struct Gap {
 
 /// The request for the attitudes of `ids` (all when there are none), thinned to `rate_hz`.
 #[must_use]
-pub fn request(ids: &[String], rate_hz: Option<f64>) -> String {
+pub fn request(ids: &[String], rate_hz: Option<f64>, form: Form) -> String {
     let mut request = serde_json::json!({"class": "WATCH", "streams": ["ATT"]});
     if let Some(fields) = request.as_object_mut() {
+        if form == Form::Packed {
+            fields.insert("packed".to_owned(), true.into());
+        }
         if !ids.is_empty() {
             fields.insert("ids".to_owned(), ids.into());
         }
@@ -100,6 +109,7 @@ impl Watcher {
             link,
             framer: Framer::with_limit(MAX_LINE),
             buffer: Vec::new(),
+            numbers: Numbers::default(),
             complaint: None,
         };
         let is_web = matches!(remote, Remote::WebSocket { .. });
@@ -146,16 +156,20 @@ impl Watcher {
             Ok(heard) => heard,
             Err(why) => return Err(self.ended(&why.to_string())),
         };
-        let complaint = &mut self.complaint;
+        let (complaint, numbers) = (&mut self.complaint, &mut self.numbers);
         let mut goes_on = true;
         let mut framed = |framed: Framed<'_>| {
             let said = match framed {
-                Framed::Line(_, line) => understood(line),
+                Framed::Line(_, line) => understood(line, numbers),
+                Framed::Packed(_, object) => Some(match numbers.attitude(object) {
+                    Ok(attitude) => Said::Packed(attitude),
+                    Err(why) => Said::Complaint(why),
+                }),
                 Framed::TooLong(..) => Some(Said::Complaint(format!(
                     "it says a line of more than {MAX_LINE} bytes; skipped"
                 ))),
-                Framed::Packed(..) | Framed::Broken(_) => Some(Said::Complaint(
-                    "it says packed objects, which nobody asked for; skipped".to_owned(),
+                Framed::Broken(_) => Some(Said::Complaint(
+                    "a packed object without a length; skipped up to the next line end".to_owned(),
                 )),
             };
             if let Some(said) = said {
@@ -193,7 +207,7 @@ impl Watcher {
 }
 
 /// What a line says; `None` for what is of no use to a watcher.
-fn understood(line: &[u8]) -> Option<Said<'_>> {
+fn understood<'a>(line: &'a [u8], numbers: &mut Numbers) -> Option<Said<'a>> {
     let object: Object<'_> = match serde_json::from_slice(line) {
         Ok(object) => object,
         Err(_) => {
@@ -212,6 +226,7 @@ fn understood(line: &[u8]) -> Option<Said<'_>> {
                 id: printable(&gap.id),
                 dropped: gap.dropped,
             }),
+        "PACKED" => numbers.learn(line).err().map(Said::Complaint),
         "ERROR" => Some(Said::Complaint(printable(&format!(
             "{}: {}",
             object.code, object.message

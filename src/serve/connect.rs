@@ -34,10 +34,10 @@ const LONGEST_WAIT: Duration = Duration::from_secs(5);
 /// A connection that stood so long was a good one: the waits begin anew.
 const STEADY: Duration = Duration::from_secs(1);
 /// Asks a daemon for its samples: a simulation has some.
-const RATES: &str = r#"{"class":"WATCH","streams":["RATE"]}"#;
+const RATES: &str = r#"{"class":"WATCH","streams":["RATE"],"packed":true}"#;
 /// Asks a daemon that has none for its attitudes.
 /// The last one of each is no sample.
-const ATTITUDES: &str = r#"{"class":"WATCH","streams":["ATT"],"last":false}"#;
+const ATTITUDES: &str = r#"{"class":"WATCH","streams":["ATT"],"last":false,"packed":true}"#;
 
 /// How long to wait before another attempt: ever longer, and never in step with others who lost the
 /// same peer at the same time.

@@ -202,7 +202,7 @@ pub struct Session {
     /// The sensors it sends.
     owned: Owned,
     /// What packed samples with a number say, as lines would.
-    bound: BTreeMap<u32, Line>,
+    bound: BTreeMap<u32, Result<Line, Box<Fault>>>,
     step: Step,
     /// What waits for the next step.
     held: Option<Held>,
@@ -348,6 +348,13 @@ impl Session {
                         return;
                     }
                 }
+                // Of one that may not be mixed with another each sample is refused.
+                Ok(Message::Packed(stream, head)) => {
+                    let (stream, mut head) = (*stream, std::mem::take(head));
+                    let named = naming.name(&mut head, false);
+                    let head = named.map(|()| head).map_err(Box::new);
+                    return self.bind_or_say(stream, head, (number, line), received, scratch);
+                }
                 // What a daemon says of itself; nobody there asks anything of us.
                 Ok(_)
                 | Err(Fault {
@@ -400,10 +407,9 @@ impl Session {
                 }
                 scratch.lines.push((seq, scratch.samples.len()));
             }
-            Ok(Message::Packed(stream, head)) => match self.bind(stream, head) {
-                Ok(()) => self.errors_in_a_row = 0,
-                Err(fault) => self.bad(&fault, number, line, received, scratch),
-            },
+            Ok(Message::Packed(stream, head)) => {
+                self.bind_or_say(stream, Ok(head), (number, line), received, scratch);
+            }
             Ok(Message::Watch(_) | Message::Poll) if matches!(self.side, Side::Deaf { .. }) => {
                 self.errors_in_a_row = 0;
             }

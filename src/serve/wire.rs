@@ -164,10 +164,10 @@ pub fn read_from(
         ));
     }
     match class.as_deref() {
+        Some("PACKED") => packing::read(line).map(|(stream, head)| Message::Packed(stream, head)),
         // What a source says of itself is no request.
         Some(other) if is_source => Err(Fault::new("unknown_class", other.to_owned())),
         Some("WATCH") => watch(line).map(Message::Watch),
-        Some("PACKED") => packing::read(line).map(|(stream, head)| Message::Packed(stream, head)),
         Some("POLL") => Ok(Message::Poll),
         Some("RESET") => Ok(Message::Reset(resetting::read(line))),
         Some("PLAYBACK") => playback_action(line).map(Message::Playback),

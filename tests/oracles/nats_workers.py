@@ -76,11 +76,19 @@ async def core(folder):
     await client.flush()
     await worker.subscribed()
     count = 500
-    samples = {f"s{n}": [line(n, k) for k in range(count)] for n in range(4)}
+    samples = {f"s{n}": [line(n, k) for k in range(count)] for n in range(3)}
+    # What a message says of its number holds in it.
+    samples["s3"] = [json.dumps(json.loads(line(3, k)) | {"sample_kind": "average"}).encode() + b"\n" for k in range(count)]
+    binding = b'{"class":"PACKED","stream":7,"sample_kind":"average"}\n'
     for k in range(0, count, 50):
-        for n, (sensor, lines) in enumerate(samples.items()):
-            # Lines; and packed objects, which name no sensor at all.
-            block = b"".join(lines[k : k + 50]) if n % 2 == 0 else b"".join(packed(n, j) for j in range(k, k + 50))
+        # Lines; packed objects, which name no sensor at all; and some whose number is named.
+        blocks = {
+            "s0": b"".join(samples["s0"][k : k + 50]),
+            "s1": b"".join(packed(1, j) for j in range(k, k + 50)),
+            "s2": b"".join(samples["s2"][k : k + 50]),
+            "s3": binding + b"".join(packed(3, j, 7) for j in range(k, k + 50)),
+        }
+        for sensor, block in blocks.items():
             await client.publish(f"imu.{sensor}", block)
     await client.flush()
     await until(lambda: sum(map(len, got.values())) >= 4 * count, 10, lambda: f"attitudes: { {k: len(v) for k, v in got.items()} }")

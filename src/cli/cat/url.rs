@@ -16,6 +16,7 @@ use std::io::{BufWriter, Stdout, Write};
 use std::time::{Duration, Instant};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_recording::attitude_line::Attitude;
+use strapd_recording::decode::packed::Form;
 
 const CSV_HEADER: &str = "id,stamp_ns,qw,qx,qy,qz,roll_deg,pitch_deg,yaw_deg,wx,wy,wz,sigma_x_deg,sigma_y_deg,sigma_z_deg,status,world\n";
 const TABLE_HEADER: &str = "               stamp s        qw        qx        qy        qz    roll deg   pitch deg     yaw deg     rate x        y        z  status, id\n";
@@ -61,7 +62,12 @@ async fn print(args: &Cat, remote: &Remote, token: Option<&Secret>) -> Result<Ou
     let until = tokio::time::sleep(args.seconds.map_or(Duration::MAX, Duration::from_secs_f64));
     tokio::pin!(until);
     let mut printer = Printer::new(args, remote)?;
-    let request = request(&args.ids, args.rate_hz);
+    // Lines are printed as they came; rows are made of what costs the least to read.
+    let form = match args.format {
+        Format::Ndjson => Form::Lines,
+        Format::Csv | Format::Table => Form::Packed,
+    };
+    let request = request(&args.ids, args.rate_hz, form);
     let mut watcher = tokio::select! {
         connected = Watcher::connect(remote, token, &request) => connected.map_err(failed)?,
         () = &mut until => return Ok(Outcome::Done),
@@ -172,11 +178,24 @@ impl Printer {
         if self.left == 0 || self.failure.is_some() {
             return false;
         }
+        let printed = match said {
+            Said::Attitude(line) => self.line(line),
+            Said::Packed(attitude) => self.packed(&attitude),
+            other => {
+                self.hear(other);
+                Ok(false)
+            }
+        };
+        match printed {
+            Ok(is_one) => self.left -= u64::from(is_one),
+            Err(why) => self.failure = Some(Error::writing("stdout", why)),
+        }
+        self.left > 0 && self.failure.is_none()
+    }
+
+    /// What is no attitude.
+    fn hear(&mut self, said: Said<'_>) {
         match said {
-            Said::Attitude(line) => match self.attitude(line) {
-                Ok(is_one) => self.left -= u64::from(is_one),
-                Err(why) => self.failure = Some(Error::writing("stdout", why)),
-            },
             Said::Gap { id, dropped } => {
                 self.complaints.in_a_row = 0;
                 if !std::mem::replace(&mut self.gap_told, true) {
@@ -187,9 +206,8 @@ impl Printer {
                 self.dropped += dropped;
             }
             Said::Complaint(what) => self.complain(&format!("the daemon says {what}")),
-            Said::Status(_) => self.complaints.in_a_row = 0,
+            Said::Status(_) | Said::Attitude(_) | Said::Packed(_) => self.complaints.in_a_row = 0,
         }
-        self.left > 0 && self.failure.is_none()
     }
 
     /// Says what is wrong, unless that was said; after too much of it there is an end.
@@ -220,8 +238,18 @@ impl Printer {
         }
     }
 
+    /// Prints one that came packed; says whether that was asked for.
+    fn packed(&mut self, attitude: &Attitude) -> std::io::Result<bool> {
+        if self.format == Format::Ndjson {
+            self.complain("it says packed attitudes, which nobody asked for; skipped");
+            self.dropped += 1;
+            return Ok(false);
+        }
+        self.row(attitude).map(|()| true)
+    }
+
     /// Prints one; says whether it was one.
-    fn attitude(&mut self, line: &[u8]) -> std::io::Result<bool> {
+    fn line(&mut self, line: &[u8]) -> std::io::Result<bool> {
         if self.format == Format::Ndjson {
             self.complaints.in_a_row = 0;
             self.out.write_all(&harmless(line))?;
@@ -236,12 +264,15 @@ impl Printer {
                 return Ok(false);
             }
         };
+        self.row(&a).map(|()| true)
+    }
+
+    fn row(&mut self, a: &Attitude) -> std::io::Result<()> {
         self.complaints.in_a_row = 0;
         match self.format {
-            Format::Csv => self.csv(&a)?,
-            _ => self.table(&a)?,
+            Format::Csv => self.csv(a),
+            _ => self.table(a),
         }
-        Ok(true)
     }
 
     fn csv(&mut self, a: &Attitude) -> std::io::Result<()> {

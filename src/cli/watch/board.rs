@@ -141,21 +141,24 @@ impl Board {
         Some(self.sensors.entry(id.to_owned()).or_default())
     }
 
+    fn attitude(&mut self, attitude: Attitude, now: Instant) {
+        if let Some(sensor) = self.sensor(&attitude.id) {
+            // One of before we came: when it was made, nobody says.
+            if !attitude.is_last() {
+                sensor.heard = Some(now);
+            }
+            sensor.attitude = Some(attitude);
+        }
+    }
+
     pub(super) fn take(&mut self, said: Said<'_>, now: Instant) {
         match said {
             Said::Attitude(line) => match Attitude::read(line) {
                 Ok(None) => self.complaint = Some("an attitude without a quaternion".to_owned()),
-                Ok(Some(attitude)) => {
-                    if let Some(sensor) = self.sensor(&attitude.id) {
-                        // One of before we came: when it was made, nobody says.
-                        if !attitude.is_last() {
-                            sensor.heard = Some(now);
-                        }
-                        sensor.attitude = Some(attitude);
-                    }
-                }
+                Ok(Some(attitude)) => self.attitude(attitude, now),
                 Err(why) => self.complaint = Some(format!("an attitude that is none: {why}")),
             },
+            Said::Packed(attitude) => self.attitude(attitude, now),
             Said::Gap { id, dropped } => {
                 if let Some(sensor) = self.sensor(&id) {
                     sensor.dropped = sensor.dropped.saturating_add(dropped);

@@ -1,35 +1,49 @@
 //! Packed objects of a client -> samples, as its lines. Pure.
 
-use super::{Scratch, Session, first_line_must_be_auth, goes_on};
+use super::{Scratch, Session, Side, first_line_must_be_auth, goes_on};
 use crate::serve::fault::Fault;
+use crate::serve::hub::count;
 use crate::serve::wire;
 use strapd_attitude::record::Nanos;
 use strapd_recording::decode::Line;
 use strapd_recording::decode::packed::{self, Object};
 
 impl Session {
-    /// From now on packed samples with this number say what a line with this head would.
-    pub(super) fn bind(&mut self, stream: u32, head: Line) -> Result<(), Fault> {
+    /// From now on packed samples with this number say what a line with this head would, or are refused.
+    /// `said`: the line that says so, and its number.
+    pub(super) fn bind_or_say(
+        &mut self,
+        stream: u32,
+        head: Result<Line, Box<Fault>>,
+        said: (u64, &[u8]),
+        received: Nanos,
+        scratch: &mut Scratch,
+    ) {
+        let (number, line) = said;
         let most = self.hub.limits().sensors_of_client;
         if self.bound.len() >= most && !self.bound.contains_key(&stream) {
-            return Err(Fault::new(
+            let fault = Fault::new(
                 "bad_packed",
                 format!(
                     "one connection binds at most {most} numbers; give one of them another meaning, or open another connection"
                 ),
-            ));
+            );
+            return self.bad(&fault, number, line, received, scratch);
+        }
+        self.errors_in_a_row = 0;
+        if let Err(fault) = &head {
+            self.say(fault, number, line);
         }
         self.bound.insert(stream, head);
-        Ok(())
     }
 
     /// What samples with this number say; by default what their subject does, within its message.
-    fn bound_or_of_subject(&mut self, stream: u32) -> Option<&Line> {
+    fn bound_or_of_subject(&mut self, stream: u32) -> Option<&Result<Line, Box<Fault>>> {
         if self.side.is_broker()
             && !self.bound.contains_key(&stream)
             && let Some(head) = self.head_of_subject()
         {
-            self.bound.insert(stream, head);
+            self.bound.insert(stream, Ok(head));
         }
         self.bound.get(&stream)
     }
@@ -45,13 +59,26 @@ impl Session {
         if !self.authorised {
             return self.refuse(&first_line_must_be_auth(), number);
         }
-        let fault = match packed::read(object, received) {
+        let read = match packed::read(object, received) {
             Ok(Object::Rate {
                 stream,
                 seq,
                 sample,
-            }) => match self.bound_or_of_subject(stream) {
-                Some(head) => {
+            }) => Ok((stream, seq, sample)),
+            // Of a daemon before us the rates are the samples, as those of its lines are.
+            Ok(Object::Att { stream, attitude }) if matches!(self.side, Side::Source(_)) => {
+                let sample = attitude.as_sample(received);
+                Ok((stream, Some(attitude.seq), sample))
+            }
+            Ok(Object::Att { .. }) => Err(Fault::new(
+                "bad_packed",
+                "packed kind 2 (ATT) is none a client sends",
+            )),
+            Err(why) => Err(wire::unreadable(&why)),
+        };
+        let fault = match read {
+            Ok((stream, seq, sample)) => match self.bound_or_of_subject(stream) {
+                Some(Ok(head)) => {
                     let before = scratch.samples.len();
                     // Most are of the run before them: nothing is cloned for those.
                     let begins = (!goes_on(scratch, head)).then(|| head.clone());
@@ -66,6 +93,11 @@ impl Session {
                     }
                     return scratch.lines.push((seq, scratch.samples.len()));
                 }
+                Some(Err(fault)) => {
+                    let fault = fault.clone();
+                    count(&self.hub.counters.refused_samples, 1);
+                    return self.say(&fault, number, &[]);
+                }
                 None => Fault::new(
                     "unknown_stream",
                     format!(
@@ -73,10 +105,7 @@ impl Session {
                     ),
                 ),
             },
-            Ok(Object::Att { .. }) => {
-                Fault::new("bad_packed", "packed kind 2 (ATT) is none a client sends")
-            }
-            Err(why) => wire::unreadable(&why),
+            Err(fault) => fault,
         };
         self.bad(&fault, number, &[], received, scratch);
     }

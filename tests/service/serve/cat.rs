@@ -76,36 +76,113 @@ fn attitudes_come_as_they_were_sent_over_every_transport() {
     }
 }
 
+/// Rows are asked for packed, lines as lines: one says what the other does, each number.
 #[test]
 fn rows_say_the_same_as_lines() {
-    let daemon = Daemon::tcp();
+    let daemon = Daemon::start(listening(&[TCP, WS]));
     let url = format!("tcp://{}", daemon.address(0));
-    let csv = cat(&[&url, "-n", "2", "--format", "csv"]);
-    let table = cat(&[&url, "-n", "2", "--format", "table"]);
-    eventually("both watch", || watchers(&daemon) == 2);
+    let rows = [url.clone(), format!("ws://{}", daemon.address(1))]
+        .map(|url| cat(&[&url, "-n", "3", "--format", "csv"]));
+    let table = cat(&[&url, "-n", "3", "--format", "table"]);
+    let lines = cat(&[&url, "-n", "3"]);
+    eventually("all watch", || watchers(&daemon) == 4);
     let mut sender = Client::tcp(daemon.address(0));
-    for n in 0..2 {
-        sender.send(&rate("i,0", n * 100, std::f64::consts::PI));
+    for n in [0, 100, 10_000] {
+        sender.send(&rate("i,0", n, std::f64::consts::PI));
     }
-    let output = ended(csv);
-    let mut reader = csv::Reader::from_reader(output.stdout.as_slice());
-    let column = |name: &str| {
-        let mut headers = csv::Reader::from_reader(output.stdout.as_slice());
-        let headers = headers.headers().unwrap();
-        headers.iter().position(|h| h == name).unwrap()
-    };
-    let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
-    assert_eq!(rows.len(), 2);
-    assert_eq!(&rows[1][column("id")], "i,0");
-    assert_eq!(&rows[1][column("stamp_ns")], "1700000000100000000");
-    let roll: f64 = rows[1][column("roll_deg")].parse().unwrap();
-    // A tenth of a second at half a turn a second.
-    assert!((roll - 18.0).abs() < 1e-9, "{roll}");
+    let lines = text(&ended(lines).stdout);
+    for rows in rows {
+        let output = ended(rows);
+        assert_eq!(text(&output.stderr), "");
+        let mut reader = csv::Reader::from_reader(output.stdout.as_slice());
+        let headers = reader.headers().unwrap().clone();
+        let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
+        assert_eq!(rows.len(), 3);
+        for (row, line) in rows.iter().zip(lines.lines()) {
+            let line: serde_json::Value = serde_json::from_str(line).unwrap();
+            let cell = |name: &str| &row[headers.iter().position(|h| h == name).unwrap()];
+            let number = |name: &str| match cell(name) {
+                "nan" => serde_json::Value::Null,
+                text => text.parse::<f64>().unwrap().into(),
+            };
+            for (name, part) in [("qw", "w"), ("qx", "x"), ("qy", "y"), ("qz", "z")] {
+                assert_eq!(number(name), line["q"][part], "{name}");
+            }
+            for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+                assert_eq!(number(&format!("w{name}")), line["rate"][axis]);
+                let sigma = number(&format!("sigma_{name}_deg"));
+                assert_eq!(sigma, line["sigma_deg"][axis]);
+            }
+            let status = line["status"].as_array().unwrap();
+            let status: Vec<&str> = status.iter().map(|s| s.as_str().unwrap()).collect();
+            assert_eq!(cell("status"), status.join("|"));
+            assert_eq!((cell("id"), cell("world")), ("i,0", "start"));
+            let stamp = &line["stamp"];
+            assert_eq!(
+                cell("stamp_ns"),
+                format!("{}{:09}", stamp["sec"], stamp["nsec"].as_i64().unwrap())
+            );
+        }
+        let column = headers.iter().position(|h| h == "roll_deg").unwrap();
+        let roll: f64 = rows[1][column].parse().unwrap();
+        // A tenth of a second at half a turn a second.
+        assert!((roll - 18.0).abs() < 1e-9, "{roll}");
+    }
     let output = text(&ended(table).stdout);
-    let last = output.lines().last().unwrap();
+    let second = output.lines().nth(2).unwrap();
     assert!(
-        last.contains("1700000000.100000000") && last.ends_with("i,0"),
+        second.contains("1700000000.100000000") && second.ends_with("i,0"),
         "{output}"
+    );
+}
+
+/// A head of eight bytes and zeros.
+fn object(kind: u8, stream: u8, length: u8) -> Vec<u8> {
+    let mut bytes = vec![0; usize::from(length).max(8)];
+    bytes[..8].copy_from_slice(&[0xf8, kind, length, 0, stream, 0, 0, 0]);
+    bytes
+}
+
+#[test]
+fn packed_attitudes_that_say_nothing_are_told_and_those_that_do_are_taken() {
+    let named = b"{\"class\":\"PACKED\",\"stream\":1,\"id\":\"a\\u001b\",\"world\":\"start\"}\n";
+    let bytes = [
+        object(2, 1, 112),
+        named.to_vec(),
+        object(2, 1, 112),
+        object(2, 9, 112),
+        object(1, 1, 48),
+        object(2, 1, 40),
+        object(7, 1, 20),
+        b"{\"class\":\"PACKED\"}\n".to_vec(),
+        object(2, 1, 112),
+        object(2, 1, 7),
+    ]
+    .concat();
+    let output = ended(cat(&[&impostor(bytes.clone()), "--format", "csv"]));
+    let said = text(&output.stderr);
+    assert_eq!(text(&output.stdout).lines().count(), 3, "two rows: {said}");
+    assert!(
+        text(&output.stdout).contains("a\\u{1b},0,0.0,"),
+        "{output:?}"
+    );
+    for part in [
+        "number 1, which no PACKED line has named",
+        "number 9",
+        "a packed sample",
+        "40 bytes, need 112",
+        "kind 7",
+        "names no stream",
+        "without a length",
+    ] {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+    // Who asked for lines prints no others.
+    let output = ended(cat(&[&impostor(bytes)]));
+    assert_eq!(text(&output.stdout), "");
+    assert!(
+        text(&output.stderr).contains("nobody asked for"),
+        "{output:?}"
     );
 }
 

@@ -9,13 +9,17 @@
 use super::gate::Entry;
 use super::report::Report;
 use crate::record::{Nanos, Status, Verdict};
+use std::hash::{DefaultHasher, Hasher};
 
 /// Released entries kept, so that data sent a second time is recognised.
 const HISTORY: usize = 64;
 /// Released entries after which the line is shortened.
 const COMPACT_AT: usize = 1024;
-/// The same where nothing waits to be put in order: live, perhaps one of many sensors.
-const COMPACT_LIVE_AT: usize = 96;
+/// The same where nothing waits to be put in order: live, perhaps one of many sensors. Of those that leave the
+/// line stamp and digest are kept.
+const COMPACT_LIVE_AT: usize = 7;
+/// Of so many that were kept the first are forgotten.
+const FORGET_AT: usize = 96;
 /// Samples with one and the same stamp that are told apart: a second of the fastest gyros, on a clock
 /// that counts whole seconds. A stuck clock makes no more.
 const MAX_COLLISION: usize = 8192;
@@ -32,9 +36,18 @@ const MAX_RUN: usize = 8;
 /// Longest run of stray stamps that is recognised.
 const MAX_STRAYS: usize = 3;
 
+/// What is still known of an entry that has left the line.
+#[derive(Clone, Copy, Debug)]
+struct Past {
+    stamp: Nanos,
+    digest: u64,
+}
+
 /// Puts entries in order within a bounded window.
 #[derive(Clone, Debug)]
 pub(super) struct Order {
+    /// Live: those of the current epoch that came before the line, sorted.
+    past: Vec<Past>,
     /// Sorted by (epoch, stamp), equal stamps in order of arrival. `..cursor` has been timed.
     pub(super) line: Vec<Entry>,
     pub(super) cursor: usize,
@@ -52,9 +65,24 @@ pub(super) struct Order {
     compact_at: usize,
 }
 
+impl Past {
+    fn of(entry: &Entry) -> Past {
+        let mut hasher = DefaultHasher::new();
+        for value in entry.value.iter().chain(&entry.accel) {
+            hasher.write_u64(value.to_bits());
+        }
+        hasher.write_i64(entry.interval);
+        Past {
+            stamp: entry.stamp,
+            digest: hasher.finish(),
+        }
+    }
+}
+
 impl Order {
     pub(super) fn new(window: usize, max_gap_nanos: i64) -> Self {
         Order {
+            past: Vec::new(),
             line: Vec::new(),
             cursor: 0,
             epoch_from: 0,
@@ -105,6 +133,7 @@ impl Order {
         let current = untimed.iter().position(|e| e.epoch == epoch);
         self.epoch_from = current.unwrap_or(untimed.len());
         self.cursor = 0;
+        self.past.clear();
         self.line = untimed;
         (self.suspects, self.epoch) = (suspects, epoch);
         (self.high, self.floor) = (high, floor);
@@ -140,8 +169,23 @@ impl Order {
 
     #[cold]
     fn compact(&mut self) {
-        let gone = self.cursor.saturating_sub(HISTORY);
-        self.line.drain(..gone);
+        let gone = if self.compact_at == COMPACT_LIVE_AT {
+            let gone = self.cursor.min(self.line.len());
+            if self.past.len() + gone > FORGET_AT {
+                let forgotten = self.past.len().saturating_sub(HISTORY);
+                self.past.drain(..forgotten);
+            }
+            // Not doubled: there are many of these.
+            self.past
+                .reserve_exact(FORGET_AT.saturating_sub(self.past.len()));
+            let of_epoch = self.line.drain(..gone).filter(|e| e.epoch == self.epoch);
+            self.past.extend(of_epoch.map(|e| Past::of(&e)));
+            gone
+        } else {
+            let gone = self.cursor.saturating_sub(HISTORY);
+            self.line.drain(..gone);
+            gone
+        };
         self.cursor -= gone;
         self.epoch_from = self.epoch_from.saturating_sub(gone);
     }
@@ -194,42 +238,63 @@ impl Order {
 
     /// Whether the current epoch holds this very measurement at this very stamp.
     fn is_repeat(&self, entry: &Entry) -> bool {
-        let sharing = self.sharing(entry.stamp);
-        if sharing.len() >= TOO_COARSE {
+        let (past, line) = self.sharing(entry.stamp);
+        if past.len() + line.len() >= TOO_COARSE {
             return false;
         }
-        sharing
-            .iter()
+        let digest = (!past.is_empty()).then(|| Past::of(entry).digest);
+        if past.iter().any(|p| Some(p.digest) == digest) {
+            return true;
+        }
+        line.iter()
             .chain(self.suspects.iter().filter(|e| e.stamp == entry.stamp))
             .take(LOOKED_THROUGH)
             .any(|e| e.same_data(entry))
     }
 
     /// The entries of the current epoch that have this stamp.
-    fn sharing(&self, stamp: Nanos) -> &[Entry] {
-        let line = self.current();
+    fn sharing(&self, stamp: Nanos) -> (&[Past], &[Entry]) {
+        let (past, line) = (&self.past, self.current());
+        let from = past.partition_point(|e| e.stamp < stamp);
+        let to = past.partition_point(|e| e.stamp <= stamp);
+        let past = past.get(from..to).unwrap_or_default();
         let from = line.partition_point(|e| e.stamp < stamp);
         let to = line.partition_point(|e| e.stamp <= stamp);
-        line.get(from..to).unwrap_or_default()
+        (past, line.get(from..to).unwrap_or_default())
     }
 
     fn collisions_at(&self, stamp: Nanos) -> usize {
-        self.sharing(stamp).len()
+        let (past, line) = self.sharing(stamp);
+        past.len() + line.len()
+    }
+
+    /// The stamps of the current epoch next to this one: at or before it, and after it.
+    fn around(&self, stamp: Nanos) -> (Option<Nanos>, Option<Nanos>) {
+        let (past, line) = (&self.past, self.current());
+        let in_line = line.partition_point(|e| e.stamp <= stamp);
+        let in_past = past.partition_point(|e| e.stamp <= stamp);
+        let before = match in_line.checked_sub(1).and_then(|i| line.get(i)) {
+            Some(entry) => Some(entry.stamp),
+            None => in_past
+                .checked_sub(1)
+                .and_then(|i| past.get(i))
+                .map(|p| p.stamp),
+        };
+        let after = match past.get(in_past) {
+            Some(past) => Some(past.stamp),
+            None => line.get(in_line).map(|e| e.stamp),
+        };
+        (before, after)
     }
 
     /// Suspects that no hole in the line was waiting for.
     fn misfits(&self, spacing: Option<i64>) -> usize {
-        let line = self.current();
         let hole = spacing.map_or(i64::MAX, |s| s.saturating_add(s / 2));
         let fits = |s: &Entry| {
-            let after = line.partition_point(|e| e.stamp <= s.stamp);
-            let (Some(before), Some(after)) = (
-                after.checked_sub(1).and_then(|i| line.get(i)),
-                line.get(after),
-            ) else {
+            let (Some(before), Some(after)) = self.around(s.stamp) else {
                 return false;
             };
-            before.stamp < s.stamp && after.stamp.since(before.stamp) >= hole
+            before < s.stamp && after.since(before) >= hole
         };
         self.suspects.iter().filter(|s| !fits(s)).count()
     }
@@ -252,7 +317,10 @@ impl Order {
             for stray in self.line.split_off(self.line.len() - strays) {
                 report.note(Verdict::StrayStamp, stray.index, Some(stray.stamp));
             }
-            self.high = self.current().last().map(|e| e.stamp);
+            self.high = match self.current().last() {
+                Some(entry) => Some(entry.stamp),
+                None => self.past.last().map(|p| p.stamp),
+            };
             for entry in std::mem::take(&mut self.suspects) {
                 self.arrive(entry, spacing, report);
             }
@@ -272,11 +340,15 @@ impl Order {
                 return false;
             };
             let leap = |from: Nanos| stray.stamp.since(from) > self.max_gap_nanos;
-            match cut.checked_sub(1).filter(|i| *i >= self.epoch_from) {
-                Some(before) => self.line.get(before).is_some_and(|before| {
-                    let step = first.since(before.stamp);
-                    step > 0 && step <= self.max_gap_nanos && leap(before.stamp)
-                }),
+            let before = match cut.checked_sub(1).filter(|i| *i >= self.epoch_from) {
+                Some(before) => self.line.get(before).map(|e| e.stamp),
+                None => self.past.last().map(|p| p.stamp),
+            };
+            match before {
+                Some(before) => {
+                    let step = first.since(before);
+                    step > 0 && step <= self.max_gap_nanos && leap(before)
+                }
                 // Nothing but the stray in this epoch: the suspects are the stream.
                 None => *strays == 1 && self.epoch == 0 && leap(first),
             }
@@ -287,6 +359,7 @@ impl Order {
     fn begin_epoch(&mut self, spacing: Option<i64>, report: &mut Report) {
         self.epoch = self.epoch.wrapping_add(1);
         self.epoch_from = self.line.len();
+        self.past.clear();
         self.high = None;
         self.floor = None;
         for entry in std::mem::take(&mut self.suspects) {
@@ -310,5 +383,110 @@ impl Order {
                 self.line.insert(at, entry);
             }
         }
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)]
+mod tests {
+    use super::*;
+    use crate::condition::gate::NO_ACCEL;
+    use nalgebra::Vector3;
+
+    fn entry(index: u64, stamp: i64, value: f64) -> Entry {
+        Entry {
+            stamp: Nanos(stamp),
+            log: Nanos(stamp),
+            value: Vector3::new(value, -value, 0.5),
+            accel: NO_ACCEL,
+            interval: 0,
+            index,
+            epoch: 0,
+            status: Status::OK,
+        }
+    }
+
+    /// Index, stamp, epoch, status.
+    type Released = (u64, i64, u32, u16);
+
+    /// What leaves, as a live stream takes it: each as soon as it stands in the line; what was counted; and the
+    /// most bytes it held.
+    fn released(mut order: Order, entries: &[Entry]) -> (Vec<Released>, String, usize) {
+        let (mut out, mut report, mut most) = (Vec::new(), Report::default(), 0);
+        let take = |order: &mut Order, out: &mut Vec<_>| {
+            while let Some(e) = order.line.get(order.cursor).copied() {
+                order.cursor += 1;
+                order.timed(e.stamp, e.epoch);
+                out.push((e.index, e.stamp.0, e.epoch, e.status.0));
+            }
+        };
+        for entry in entries {
+            order.arrive(*entry, Some(1000), &mut report);
+            take(&mut order, &mut out);
+            most = most.max(
+                order.line.capacity() * size_of::<Entry>()
+                    + order.past.capacity() * size_of::<Past>(),
+            );
+        }
+        order.finish(Some(1000), &mut report);
+        take(&mut order, &mut out);
+        (out, format!("{report:?}"), most)
+    }
+
+    /// A stream in which every fifteenth sample is repeated (now, or later), overtaken, shares a stamp, leaps ahead, or
+    /// sets the clock back.
+    fn faulty(seed: u64) -> Vec<Entry> {
+        let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+        let mut random = |below: u64| {
+            state ^= state << 13;
+            state ^= state >> 7;
+            state ^= state << 17;
+            state % below
+        };
+        let (mut entries, mut now) = (Vec::new(), 1_000_000_i64);
+        for index in 0..2000_u64 {
+            now += 1000;
+            let value = index as f64;
+            match random(75) {
+                0 => entries.push(*entries.last().unwrap_or(&entry(index, now, value))),
+                1 => {
+                    let back = random(20) as usize + 1;
+                    let at = entries.len().saturating_sub(back);
+                    let again = entries.get(at).copied();
+                    entries.extend(again.map(|e| Entry { index, ..e }));
+                }
+                2 => entries.push(entry(index, now - 2000 - random(40_000) as i64, value)),
+                3 => entries.push(entry(index, now - 1000, value)),
+                4 => {
+                    now -= random(90_000) as i64;
+                    entries.push(entry(index, now, value));
+                }
+                5 => entries.push(entry(index, now + 20_000_000, value)),
+                6 => now += 3000,
+                _ => entries.push(entry(index, now, value)),
+            }
+        }
+        entries
+    }
+
+    #[test]
+    fn a_live_stream_that_keeps_digests_releases_what_one_that_keeps_samples_does() {
+        let mut counted = 0;
+        for seed in 1..=200 {
+            let entries = faulty(seed);
+            let live = Order::new(0, 5_000_000);
+            let whole = Order {
+                compact_at: usize::MAX,
+                ..live.clone()
+            };
+            // Nothing is sent again, or fits into a hole, further back than what is kept.
+            let (expected, told, _) = released(whole, &entries);
+            let (out, told_live, most) = released(live, &entries);
+            assert_eq!(out, expected, "{seed}");
+            assert_eq!(told_live, told, "{seed}");
+            assert!(most <= 3 << 10, "{most} bytes");
+            counted += usize::from(told.contains("Repeated") || expected.last().unwrap().2 > 0);
+        }
+        assert_eq!(counted, 200);
     }
 }

@@ -84,6 +84,21 @@ pub struct Attitude {
     pub reset: u32,
 }
 
+impl Attitude {
+    /// The sample that it is to whoever integrates its rates anew.
+    #[must_use]
+    pub fn as_sample(&self, received: Nanos) -> RawSample {
+        RawSample {
+            header: Some(self.stamp),
+            log: received,
+            publish: received,
+            gyro: some_vector(self.rate),
+            orientation: Some(self.q),
+            ..RawSample::default()
+        }
+    }
+}
+
 /// Why an object says nothing.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Unreadable {
@@ -278,7 +293,7 @@ fn some_time(nanos: i64) -> Option<i64> {
 }
 
 /// As in a line: a vector with `null` in it is none.
-pub(crate) fn some_vector(vector: [f64; 3]) -> Option<[f64; 3]> {
+fn some_vector(vector: [f64; 3]) -> Option<[f64; 3]> {
     Some(vector).filter(|v| !v.iter().any(|c| c.is_nan()))
 }
 

@@ -49,12 +49,7 @@ impl Numbers {
                 sample,
             } => (stream, Class::Rate, seq, sample),
             Object::Att { stream, attitude } => {
-                let sample = RawSample {
-                    header: Some(attitude.stamp),
-                    gyro: packed::some_vector(attitude.rate),
-                    orientation: Some(attitude.q),
-                    ..RawSample::default()
-                };
+                let sample = attitude.as_sample(Nanos(0));
                 (stream, Class::Att, Some(attitude.seq), sample)
             }
         };
