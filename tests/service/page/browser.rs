@@ -210,6 +210,17 @@ impl Browser {
         self.call("Input.dispatchMouseEvent", event);
     }
 
+    /// What fingers do: `touchStart`, `touchMove`, `touchEnd`; where those are that are on the screen.
+    pub(crate) fn fingers(&mut self, kind: &str, at: &[[f64; 2]]) {
+        let points: Vec<Value> = at
+            .iter()
+            .enumerate()
+            .map(|(id, [x, y])| json!({"id": id, "x": x, "y": y}))
+            .collect();
+        let event = json!({"type": kind, "touchPoints": points});
+        self.call("Input.dispatchTouchEvent", event);
+    }
+
     /// A key, pressed where the focus is.
     pub(crate) fn press(&mut self, key: &str) {
         let mut down = json!({"type": "keyDown", "key": key, "code": key});

@@ -230,6 +230,87 @@ fn a_keyboard_does_what_a_mouse_does_and_a_screen_reader_hears_it() {
     browser.is_unharmed();
 }
 
+/// Where the plots begin and end, once they no longer show what they did.
+fn range(browser: &mut Browser, before: &Value) -> [f64; 2] {
+    browser.until(
+        "they show something else",
+        &format!("__strapd.view.range && JSON.stringify(__strapd.view.range) !== `{before}`"),
+    );
+    let range = browser.eval("__strapd.view.range");
+    [0, 1].map(|n| number(&range[n]))
+}
+
+#[test]
+#[cfg_attr(not(has_chromium), ignore = "needs chromium")]
+fn a_tap_looks_a_finger_moves_and_two_zoom() {
+    let mut browser = Browser::start();
+    let daemon = Daemon::start(listening(&[WS]));
+    browser.size(390, 844);
+    browser.call(
+        "Emulation.setTouchEmulationEnabled",
+        json!({"enabled": true, "maxTouchPoints": 2}),
+    );
+    page(&mut browser, &daemon);
+    let place = browser.place(RATE);
+    let whole = [0.0, 10.0];
+    // A tap: that instant, and it stays when the finger has gone.
+    let at = |time: f64| pixel(place, time, whole);
+    browser.fingers("touchStart", &[at(4.0)]);
+    browser.fingers("touchEnd", &[]);
+    browser.until(
+        "a cursor",
+        "Math.abs(__strapd.sensors.imu0.held?.cursor - 4) < 0.05",
+    );
+    // The whole of a finger's way is that of what lies below it.
+    let before = json!(whole);
+    browser.fingers("touchStart", &[at(6.0)]);
+    for step in 1..=8 {
+        browser.fingers("touchMove", &[at(6.0 - 0.25 * f64::from(step))]);
+    }
+    browser.fingers("touchEnd", &[]);
+    browser.until("it was moved", "__strapd.view.range[0] > 1.9");
+    let [from, to] = range(&mut browser, &before);
+    assert!(
+        (from - 2.0).abs() < 0.1 && (to - 12.0).abs() < 0.1,
+        "{from} to {to}"
+    );
+    // What is below each of two fingers stays there.
+    let [middle, y, width] = place;
+    let inner = width - LEFT - RIGHT;
+    let part = |part: f64| [middle - width / 2.0 + LEFT + part * inner, y];
+    browser.fingers("touchStart", &[part(0.4)]);
+    browser.fingers("touchStart", &[part(0.4), part(0.6)]);
+    for step in 1..=10 {
+        let by = 0.02 * f64::from(step);
+        browser.fingers("touchMove", &[part(0.4 - by), part(0.6 + by)]);
+    }
+    browser.fingers("touchEnd", &[]);
+    browser.until(
+        "it was zoomed",
+        "__strapd.view.range[1] - __strapd.view.range[0] < 3.4",
+    );
+    let [near, far] = range(&mut browser, &json!([from, to]));
+    let length = to - from;
+    for (before, now) in [(0.4, 0.2), (0.6, 0.8)] {
+        let (was, is) = (from + before * length, near + now * (far - near));
+        assert!((was - is).abs() < 0.05 * length, "{was} s is at {is} s");
+    }
+    // Along the page a finger scrolls it, and the plots stay as they are.
+    let scrolled = browser.number("scrollY");
+    browser.fingers("touchStart", &[[middle, y]]);
+    for step in 1..=10 {
+        browser.fingers("touchMove", &[[middle, y - 15.0 * f64::from(step)]]);
+    }
+    browser.fingers("touchEnd", &[]);
+    browser.until(
+        "the page was scrolled",
+        &format!("scrollY > {scrolled} + 50"),
+    );
+    let after = browser.eval("__strapd.view.range");
+    assert_eq!(after, json!([near, far]));
+    browser.is_unharmed();
+}
+
 #[test]
 #[cfg_attr(not(has_chromium), ignore = "needs chromium")]
 fn where_nothing_came_there_is_no_number() {
