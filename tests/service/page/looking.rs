@@ -293,7 +293,7 @@ fn a_tap_looks_a_finger_moves_and_two_zoom() {
     let length = to - from;
     for (before, now) in [(0.4, 0.2), (0.6, 0.8)] {
         let (was, is) = (from + before * length, near + now * (far - near));
-        assert!((was - is).abs() < 0.05 * length, "{was} s is at {is} s");
+        assert!((was - is).abs() < 0.005 * length, "{was} s is at {is} s");
     }
     // Along the page a finger scrolls it, and the plots stay as they are.
     let scrolled = browser.number("scrollY");
