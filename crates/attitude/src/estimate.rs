@@ -23,6 +23,7 @@ mod plan;
 mod pooled;
 mod preparation;
 mod sensor_calibration;
+mod settings_number;
 mod smoothing;
 mod stamps;
 

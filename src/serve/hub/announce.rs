@@ -39,12 +39,13 @@ impl Hub {
         let channel = Arc::new(Channel::new(number, stream, child));
         channels.insert(number, channel.clone());
         // Under the lock: who joins meanwhile finds it in the list, and is not told twice.
-        let said = foxglove::channels(std::iter::once(&*channel), false);
-        for client in read(&self.clients).values() {
-            if client.is_viewer() {
-                client.outbox.announce(said.clone());
-            }
+        let clients = read(&self.clients);
+        let mut viewers = clients.values().filter(|c| c.is_viewer()).peekable();
+        if viewers.peek().is_some() {
+            let said = foxglove::channels(std::iter::once(&*channel), false);
+            viewers.for_each(|viewer| viewer.outbox.announce(said.clone()));
         }
+        drop(clients);
         channel
     }
 

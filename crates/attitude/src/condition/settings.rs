@@ -11,6 +11,7 @@ use crate::setting::{
     BIAS, CALIBRATION, GYRO_RANGE, MAX_GAP, MOUNT, RATE_HZ, START, UNDO_TRUNCATION, UNTIL,
 };
 use nalgebra::{Matrix3, Vector3};
+use std::fmt;
 
 /// What happens at a gap longer than [`Settings::max_gap_secs`], and at a clock that jumped back.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Hash)]
@@ -125,7 +126,7 @@ impl Settings {
 
     /// All of it as text, which tells settings of a saved estimator apart: by numbers alone, so that one of an earlier
     /// version goes on, whatever types hold them now.
-    pub(crate) fn told(&self) -> String {
+    pub(crate) fn tell(&self, out: &mut impl fmt::Write) -> fmt::Result {
         let Settings {
             kind,
             unit,
@@ -146,7 +147,8 @@ impl Settings {
             reorder_window,
         } = self;
         let (axes, mount) = (axes.matrix(), mount.as_matrix());
-        format!(
+        write!(
+            out,
             "Settings {{ kind: {kind:?}, unit: {unit:?}, accel_scale: {accel_scale:?}, gyro_matrix: {gyro_matrix:?}, \
              accel_matrix: {accel_matrix:?}, accel_bias: {accel_bias:?}, axes: {axes:?}, mount: {mount:?}, \
              clock: {clock:?}, max_gap_secs: {max_gap_secs:?}, on_gap: {on_gap:?}, truncation_step: {truncation_step:?}, \
@@ -308,6 +310,8 @@ mod tests {
             until: settings.until,
             reorder_window: settings.reorder_window,
         };
-        assert_eq!(settings.told(), format!("{before:?}"));
+        let mut told = String::new();
+        assert!(settings.tell(&mut told).is_ok());
+        assert_eq!(told, format!("{before:?}"));
     }
 }

@@ -10,6 +10,7 @@ use super::kept::{Spool, SpoolError};
 use super::meaning::Meaning;
 use super::plan::{Initial, Noise, Plan};
 use super::preparation::Prepared;
+use super::settings_number::settings_number;
 use super::smoothing::{Recording, Smoothing, Told};
 use crate::aid::{self, Aided};
 use crate::condition::regularise::{self, Regulariser};
@@ -194,24 +195,7 @@ impl Estimator {
         }
         .map_err(|e| Diagnostic::from(&e))?;
         Ok(Estimator {
-            settings: told_apart(&format!(
-                "{} {:?} {:?} {noise:?}{}{}",
-                settings.told(),
-                plan.method,
-                prepared.world_rate,
-                // Nothing for a gyro alone: what was saved before there was more goes on.
-                prepared.aiding.map_or_else(String::new, |aiding| format!(
-                    " {:?} {:?} {} {} {:?}",
-                    aiding.settings,
-                    aiding.start,
-                    aiding.force_scale,
-                    plan.declination,
-                    plan.mag_mount.map(|q_bs| q_bs.wxyz())
-                )),
-                plan.calibration
-                    .as_ref()
-                    .map_or_else(String::new, |known| format!(" {known:?}"))
-            )),
+            settings: settings_number(settings, plan, prepared, &noise),
             conditioner: Conditioner::new(settings).map_err(|e| e.to_string())?,
             regulariser: prepared.stamps.regulariser(resolved.kind)?,
             integrator,
@@ -589,13 +573,6 @@ fn conditioning(plan: &Plan, resolved: &Meaning, prepared: &Prepared) -> conditi
 /// True north in axes whose north is magnetic: what a magnetic attitude is turned by, from the left.
 fn turned_north(declination: f64) -> Quaternion<Nav, Nav> {
     Quaternion::from_rotation_vector(&RotationVector(Vector3::z() * -declination))
-}
-
-/// A number for a text, the same in every release (FNV-1a).
-fn told_apart(text: &str) -> u64 {
-    text.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
-    })
 }
 
 /// The same attitude between other axes: world and body change together.
