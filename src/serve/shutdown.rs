@@ -140,7 +140,17 @@ pub struct Signals {
     is_ending: Arc<AtomicBool>,
 }
 
+/// Somebody listens to them.
+static ARE_HEARD: AtomicBool = AtomicBool::new(false);
+
 impl Signals {
+    /// Whether anybody in this process listens, so that they end nothing by themselves.
+    #[cfg(feature = "object-store")]
+    #[must_use]
+    pub fn are_heard() -> bool {
+        ARE_HEARD.load(Ordering::SeqCst)
+    }
+
     /// Starts to listen to them.
     ///
     /// # Errors
@@ -179,6 +189,7 @@ impl Signals {
         is_ready
             .recv()
             .map_err(|_| std::io::Error::other("the thread for signals has gone"))??;
+        ARE_HEARD.store(true, Ordering::SeqCst);
         Ok(Signals { came, is_ending })
     }
 

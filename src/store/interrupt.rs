@@ -1,8 +1,10 @@
 //! Signals that end a process -> whoever has something to take back first. I/O.
 //!
 //! Apart from the upload because it holds for the whole process: from the first upload on, SIGINT and SIGTERM are looked at
-//! here; where none is under way they do what they always do.
+//! here; where none is under way they do what they always do: end the process, or what somebody else who listens (a page that is
+//! served) makes of them.
 
+use crate::serve::shutdown::Signals;
 use std::sync::LazyLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use tokio::sync::watch;
@@ -74,6 +76,7 @@ async fn look() {
             _ = terminate.recv() => SignalKind::terminate(),
         };
         match UNDER_WAY.load(Ordering::SeqCst) {
+            0 if Signals::are_heard() => {}
             0 => end_by(came.as_raw_value()),
             _ => drop(CAME.send_replace(came.as_raw_value())),
         }

@@ -398,3 +398,31 @@ fn who_is_interrupted_gives_the_parts_up() {
         assert_eq!((store.keys().len(), store.uploads()), (0, (1, 0)));
     }
 }
+
+/// What is served after the upload ends in order, as it does where the output is a file.
+#[cfg(unix)]
+#[test]
+fn a_page_that_stays_after_the_upload_ends_in_order() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    long(at);
+    for name in ["INT", "TERM"] {
+        let store = Store::of(Manner::Good);
+        let served = "replay long.mcap --page=127.0.0.1:0 --speed max -o s3://bucket/a.csv";
+        let mut child = store.command(at, served).spawn().unwrap();
+        let begun = Instant::now();
+        while store.keys().is_empty() {
+            assert!(begun.elapsed() < Duration::from_secs(60), "no object comes");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        // Its end is told, and nothing follows it.
+        std::thread::sleep(Duration::from_millis(300));
+        let id = child.id().to_string();
+        Command::new("kill")
+            .args(["-s", name, &id])
+            .status()
+            .unwrap();
+        assert_eq!(child.wait().unwrap().code(), Some(0), "{name}");
+        assert_eq!(store.keys().len(), 1);
+    }
+}
