@@ -93,7 +93,7 @@ impl Attitude {
             log: received,
             publish: received,
             gyro: some_vector(self.rate),
-            orientation: Some(self.q),
+            orientation: Some(self.q).filter(|q| q.iter().all(|v| v.is_finite())),
             ..RawSample::default()
         }
     }
@@ -469,6 +469,27 @@ mod tests {
             unreachable!("a sample");
         };
         assert_eq!(sample.gyro, Some([1.0, f64::INFINITY, 1.0]));
+    }
+
+    #[test]
+    fn an_attitude_is_a_sample_of_what_it_has() {
+        let attitude = Attitude {
+            stamp: Nanos(7),
+            q: [1.0, 0.0, 0.0, 0.0],
+            rate: [0.1, 0.2, 0.3],
+            ..Attitude::default()
+        };
+        let sample = attitude.as_sample(Nanos(9));
+        assert_eq!((sample.header, sample.log), (Some(Nanos(7)), Nanos(9)));
+        assert_eq!(sample.gyro, Some(attitude.rate));
+        assert_eq!(sample.orientation, Some(attitude.q));
+        let nothing = Attitude {
+            q: [1.0, f64::INFINITY, 0.0, 0.0],
+            rate: [0.1, f64::NAN, 0.3],
+            ..attitude
+        };
+        let sample = nothing.as_sample(Nanos(9));
+        assert_eq!((sample.gyro, sample.orientation), (None, None));
     }
 
     fn sized(kind: u8, length: usize) -> Vec<u8> {
