@@ -90,6 +90,14 @@ fn a_directory_takes_one_output_per_log() {
             "help: make it: mkdir -p nowhere",
         ],
     );
+    for what in [
+        "report log.mcap -o s3://bucket/a.html",
+        "report log.mcap -o https://host/a.html",
+        "replay log.mcap -o null: --aid gravity --save-calibration s3://bucket/a.toml",
+    ] {
+        let words = &["to a file, not to an address", "copy it there"];
+        strapd(at, what).refused(1, words);
+    }
 }
 
 #[test]

@@ -347,11 +347,20 @@ impl From<io::Error> for PartError {
 /// The folder of an output is not there. It is not made: its name may be a slip of the hand.
 #[must_use]
 pub fn no_folder(folder: &Path) -> io::Error {
-    io::Error::new(
-        ErrorKind::NotFound,
-        Diagnostic::new(format!("the directory {} does not exist", folder.display()))
-            .help(format!("make it: mkdir -p {}", quoted_file(folder))),
-    )
+    let name = folder.display();
+    let scheme = folder.to_str().and_then(|text| text.split_once(':'));
+    let is_address = scheme.is_some_and(|(scheme, rest)| {
+        let is_word = scheme.len() > 1 && scheme.bytes().all(|b| b.is_ascii_alphanumeric());
+        is_word && (rest.is_empty() || rest.starts_with("//"))
+    });
+    let said = if is_address {
+        Diagnostic::new("this is written to a file, not to an address")
+            .help("name a file, and copy it there; attitudes alone go to s3://, gs:// and az:// by themselves")
+    } else {
+        Diagnostic::new(format!("the directory {name} does not exist"))
+            .help(format!("make it: mkdir -p {}", quoted_file(folder)))
+    };
+    io::Error::new(ErrorKind::NotFound, said)
 }
 
 /// A renamed file survives a power cut only when its directory is on the disk too.
