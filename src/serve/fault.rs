@@ -23,4 +23,13 @@ impl Fault {
             ..Fault::default()
         }
     }
+
+    /// More sensors than one connection may send.
+    #[must_use]
+    pub fn too_many_sensors(most: usize) -> Fault {
+        Fault::new(
+            "too_many_sensors",
+            format!("one connection sends at most {most} sensors"),
+        )
+    }
 }

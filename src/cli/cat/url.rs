@@ -178,24 +178,15 @@ impl Printer {
         if self.left == 0 || self.failure.is_some() {
             return false;
         }
-        let printed = match said {
-            Said::Attitude(line) => self.line(line),
-            Said::Packed(attitude) => self.packed(&attitude),
-            other => {
-                self.hear(other);
-                Ok(false)
-            }
-        };
-        match printed {
-            Ok(is_one) => self.left -= u64::from(is_one),
-            Err(why) => self.failure = Some(Error::writing("stdout", why)),
-        }
-        self.left > 0 && self.failure.is_none()
-    }
-
-    /// What is no attitude.
-    fn hear(&mut self, said: Said<'_>) {
         match said {
+            Said::Attitude(line) => {
+                let printed = self.line(line);
+                self.printed(printed);
+            }
+            Said::Packed(attitude) => {
+                let printed = self.packed(&attitude);
+                self.printed(printed);
+            }
             Said::Gap { id, dropped } => {
                 self.complaints.in_a_row = 0;
                 if !std::mem::replace(&mut self.gap_told, true) {
@@ -206,7 +197,16 @@ impl Printer {
                 self.dropped += dropped;
             }
             Said::Complaint(what) => self.complain(&format!("the daemon says {what}")),
-            Said::Status(_) | Said::Attitude(_) | Said::Packed(_) => self.complaints.in_a_row = 0,
+            Said::Status(_) => self.complaints.in_a_row = 0,
+        }
+        self.left > 0 && self.failure.is_none()
+    }
+
+    /// Whether one was printed, and why not.
+    fn printed(&mut self, printed: std::io::Result<bool>) {
+        match printed {
+            Ok(is_one) => self.left -= u64::from(is_one),
+            Err(why) => self.failure = Some(Error::writing("stdout", why)),
         }
     }
 

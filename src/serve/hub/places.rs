@@ -127,7 +127,7 @@ impl Hub {
         }
         let most = self.limits.sensors_of_client;
         if client.sensors.load(Ordering::Relaxed) >= most {
-            return refuse(format!("one connection sends at most {most} sensors"));
+            return Err(Fault::too_many_sensors(most));
         }
         let Some(who) = client.peer.origin.named() else {
             return Ok(());

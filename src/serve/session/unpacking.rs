@@ -22,6 +22,9 @@ impl Session {
         let (number, line) = said;
         let most = self.hub.limits().sensors_of_client;
         if self.bound.len() >= most && !self.bound.contains_key(&stream) {
+            if self.is_source_with_more() {
+                return self.say(&Fault::too_many_sensors(most), number, line);
+            }
             let fault = Fault::new(
                 "bad_packed",
                 format!(
@@ -35,6 +38,13 @@ impl Session {
             self.say(fault, number, line);
         }
         self.bound.insert(stream, head);
+    }
+
+    /// A source that has more sensors than one connection may send: those that are not bound are refused as their
+    /// lines would be, and nothing is held against it.
+    fn is_source_with_more(&self) -> bool {
+        matches!(self.side, Side::Source(_))
+            && self.bound.len() >= self.hub.limits().sensors_of_client
     }
 
     /// What samples with this number say; by default what their subject does, within its message.
@@ -98,12 +108,19 @@ impl Session {
                     count(&self.hub.counters.refused_samples, 1);
                     return self.say(&fault, number, &[]);
                 }
-                None => Fault::new(
-                    "unknown_stream",
-                    format!(
-                        "number {stream} is bound to no sensor; say {{\"class\":\"PACKED\",\"stream\":{stream},\"id\":\"imu0\"}} first"
-                    ),
-                ),
+                None => {
+                    if self.is_source_with_more() {
+                        let most = self.hub.limits().sensors_of_client;
+                        count(&self.hub.counters.refused_samples, 1);
+                        return self.say(&Fault::too_many_sensors(most), number, &[]);
+                    }
+                    Fault::new(
+                        "unknown_stream",
+                        format!(
+                            "number {stream} is bound to no sensor; say {{\"class\":\"PACKED\",\"stream\":{stream},\"id\":\"imu0\"}} first"
+                        ),
+                    )
+                }
             },
             Err(fault) => fault,
         };

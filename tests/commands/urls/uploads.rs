@@ -351,6 +351,23 @@ fn what_fails_leaves_nothing_and_says_so() {
 }
 
 #[cfg(unix)]
+fn until(what: &str, is_so: impl Fn() -> bool) {
+    let begun = Instant::now();
+    while !is_so() {
+        let waited = begun.elapsed();
+        assert!(waited < Duration::from_secs(60), "waited in vain: {what}");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+#[cfg(unix)]
+fn signal(child: &std::process::Child, name: &str) {
+    let id = child.id().to_string();
+    let sent = Command::new("kill").args(["-s", name, &id]).status();
+    assert!(sent.unwrap().success());
+}
+
+#[cfg(unix)]
 #[test]
 fn who_is_interrupted_gives_the_parts_up() {
     use std::os::unix::process::ExitStatusExt;
@@ -363,19 +380,8 @@ fn who_is_interrupted_gives_the_parts_up() {
             .command(at, "replay long.mcap -q -o s3://bucket/a.csv")
             .spawn()
             .unwrap();
-        let begun = Instant::now();
-        while store.uploads() != (1, 1) {
-            assert!(
-                begun.elapsed() < Duration::from_secs(60),
-                "it does not begin"
-            );
-            std::thread::sleep(Duration::from_millis(20));
-        }
-        let id = child.id().to_string();
-        Command::new("kill")
-            .args(["-s", name, &id])
-            .status()
-            .unwrap();
+        until("it begins", || store.uploads() == (1, 1));
+        signal(&child, name);
         let asked = Instant::now();
         let status = child.wait().unwrap();
         assert!(
@@ -410,18 +416,10 @@ fn a_page_that_stays_after_the_upload_ends_in_order() {
         let store = Store::of(Manner::Good);
         let served = "replay long.mcap --page=127.0.0.1:0 --speed max -o s3://bucket/a.csv";
         let mut child = store.command(at, served).spawn().unwrap();
-        let begun = Instant::now();
-        while store.keys().is_empty() {
-            assert!(begun.elapsed() < Duration::from_secs(60), "no object comes");
-            std::thread::sleep(Duration::from_millis(20));
-        }
+        until("an object comes", || !store.keys().is_empty());
         // Its end is told, and nothing follows it.
         std::thread::sleep(Duration::from_millis(300));
-        let id = child.id().to_string();
-        Command::new("kill")
-            .args(["-s", name, &id])
-            .status()
-            .unwrap();
+        signal(&child, name);
         assert_eq!(child.wait().unwrap().code(), Some(0), "{name}");
         assert_eq!(store.keys().len(), 1);
     }

@@ -2,6 +2,7 @@
 
 use super::client::{Client, get, rate};
 use super::daemon::{Daemon, PATIENCE, TCP, WS, eventually, listening, strapd};
+use super::packed::object;
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -375,4 +376,154 @@ fn a_file_names_sources_and_their_sensors() {
         assert_eq!(code, Some(2), "{text}: {said}");
         assert!(said.contains(part), "{text}: {said}");
     }
+}
+
+#[test]
+fn a_source_that_names_no_packed_stream_is_complained_of_and_left() {
+    let (listener, address) = listen();
+    let daemon = fed_by(&[format!("tcp://{address}")]);
+    let mut stream = accept(&listener);
+    let bytes = object(1, 1, &[0; 40]).repeat(30);
+    // So that it is no stranger who begins with anything.
+    stream
+        .write_all(
+            &[
+                b"{\"class\":\"PACKED\",\"stream\":2,\"id\":\"b\"}\n",
+                &bytes[..],
+            ]
+            .concat(),
+        )
+        .unwrap();
+    eventually("the complaint", || {
+        let said = daemon.status()["outgoing"][0]["last_error"].to_string();
+        said.contains("too many bad lines") || said.contains("unknown_stream")
+    });
+    let mut again = accept(&listener);
+    again.write_all(rate("a", 0, 1.0).as_bytes()).unwrap();
+    again.write_all(b"\n").unwrap();
+    eventually("the sample of the next", || {
+        daemon.status()["sources"][0]["samples"] == 1
+    });
+}
+
+/// What a `PACKED` line says of a source's samples holds, attitudes are the samples that their lines would be, and
+/// of two sensors that would be one the second is refused.
+#[test]
+fn a_source_is_read_packed_as_its_lines_are() {
+    let head = [
+        r#"{"class":"PACKED","stream":1,"id":"a","gyro_unit":"deg"}"#,
+        r#"{"class":"PACKED","stream":2,"id":"b","rotates":"sensor_to_world","world":"enu","body":"flu"}"#,
+        r#"{"class":"PACKED","stream":3,"id":"c"}"#,
+    ];
+    let head = head.map(|line| format!("{line}\n")).concat().into_bytes();
+    let packed = |stream: u32, n: u64| {
+        let stamp = 1_700_000_000_000_000_000_u64 + n * 10_000_000;
+        let [seq, stamp] = [n, stamp].map(u64::to_le_bytes);
+        let floats = |values: &[f64]| {
+            values
+                .iter()
+                .flat_map(|v| v.to_le_bytes())
+                .collect::<Vec<_>>()
+        };
+        let body = match stream {
+            2 => [
+                floats(&[1.0, 0.0, 0.0, 0.0, 0.5, 0.25, -0.125]),
+                vec![0; 32],
+            ]
+            .concat(),
+            _ => floats(&[10.0, -20.0, 30.0]),
+        };
+        object(
+            if stream == 2 { 2 } else { 1 },
+            stream,
+            &[&seq[..], &stamp[..], &body[..]].concat(),
+        )
+    };
+    let blocks = |streams: &[u32]| {
+        let of_all =
+            (0..50).flat_map(|n| streams.iter().flat_map(move |stream| packed(*stream, n)));
+        [head.clone(), of_all.collect()].concat()
+    };
+    let (listener, address) = listen();
+    let daemon = fed_by(&[format!("tcp://{address}")]);
+    let mut stream = accept(&listener);
+    let mut watcher = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");
+    stream.write_all(&blocks(&[1, 2])).unwrap();
+    for n in 0..50 {
+        for (id, rate) in [
+            (
+                "a",
+                [10.0, -20.0, 30.0].map(|v: f64| v * (std::f64::consts::PI / 180.0)),
+            ),
+            ("b", [0.5, 0.25, -0.125]),
+        ] {
+            let att = watcher.object("ATT");
+            assert_eq!((&att["id"], &att["seq"]), (&json!(id), &json!(n)));
+            if n > 0 {
+                assert_eq!(att["rate"], json!(rate), "{att}");
+            }
+        }
+    }
+    assert_eq!(daemon.status()["counters"]["faults"], 0);
+
+    let (listener, address) = listen();
+    let daemon = fed_by(&[format!("tcp://{address}?id=mine")]);
+    let mut stream = accept(&listener);
+    stream.write_all(&blocks(&[1, 3])).unwrap();
+    eventually("the samples of one", || {
+        daemon.status()["sources"][0]["samples"] == 50
+    });
+    eventually("the other is told of", || {
+        let said = daemon.status()["outgoing"][0]["last_error"].to_string();
+        said.contains("several_sensors")
+    });
+    let status = daemon.status();
+    assert_eq!(status["sources"].as_array().unwrap().len(), 1, "{status}");
+    assert_eq!(status["sources"][0]["id"], "mine");
+    assert_eq!(
+        status["outgoing"][0]["connections"], 1,
+        "it is not left for it: {status}"
+    );
+}
+
+/// More of them than one connection may send: those there is a place for go on, of the others it is said, and the
+/// source is not left for it.
+#[test]
+fn a_source_of_more_sensors_than_have_a_place_is_kept_for_those_that_have_one() {
+    let (listener, address) = listen();
+    let daemon = fed_by(&[format!("tcp://{address}")]);
+    let mut stream = accept(&listener);
+    for round in 0..3_u64 {
+        let mut block = Vec::new();
+        for number in 0..300_u32 {
+            if round == 0 {
+                let line =
+                    format!("{{\"class\":\"PACKED\",\"stream\":{number},\"id\":\"s{number}\"}}\n");
+                block.extend(line.into_bytes());
+            }
+            let stamp = 1_700_000_000_000_000_000 + round * 10_000_000;
+            let body = [
+                round.to_le_bytes(),
+                stamp.to_le_bytes(),
+                [0; 8],
+                [0; 8],
+                [0; 8],
+            ];
+            block.extend(object(1, number, &body.concat()));
+        }
+        stream.write_all(&block).unwrap();
+    }
+    eventually("the samples of 256", || {
+        daemon.status()["counters"]["samples"] == 3 * 256
+    });
+    let status = daemon.status();
+    assert_eq!(status["sources"].as_array().unwrap().len(), 256);
+    assert_eq!(status["counters"]["samples_refused"], 3 * 44);
+    let state = &status["outgoing"][0];
+    assert_eq!(
+        (&state["connected"], &state["connections"]),
+        (&json!(true), &json!(1))
+    );
+    let why = state["last_error"].as_str().unwrap();
+    assert!(why.contains("too_many_sensors"), "{why}");
 }

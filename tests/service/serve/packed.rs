@@ -7,8 +7,6 @@ use super::client::{Client, Item, rate};
 use super::daemon::{Daemon, Process, TCP, UDP, WS, eventually, listening, strapd};
 use serde_json::{Value, json};
 use std::collections::VecDeque;
-use std::io::Write;
-use std::net::{TcpListener, TcpStream};
 use std::process::Command;
 use std::sync::Arc;
 use strapd::serve::Settings;
@@ -16,7 +14,6 @@ use strapd::serve::admission::Token;
 use strapd::serve::hub::Hub;
 use strapd::serve::limits::Limits;
 use strapd::serve::session::{Scratch, Session};
-use strapd::serve::source::Endpoint;
 use strapd_attitude::record::{Nanos, Status};
 
 const WATCH: &str = r#"{"class":"WATCH"}"#;
@@ -94,7 +91,7 @@ impl Sample {
     }
 }
 
-fn object(kind: u8, stream: u32, body: &[u8]) -> Vec<u8> {
+pub(super) fn object(kind: u8, stream: u32, body: &[u8]) -> Vec<u8> {
     let [low, high] = u16::try_from(8 + body.len()).unwrap().to_le_bytes();
     let mut object = vec![0xf8, kind, low, high];
     object.extend(stream.to_le_bytes());
@@ -549,119 +546,6 @@ fn where_a_token_is_asked_for_a_packed_object_is_no_way_in() {
         assert_eq!(client.rest(), [Value::Null; 0]);
     }
     assert_eq!(daemon.status()["sources"], json!([]));
-}
-
-/// A daemon with one source, and the source's end of the connection.
-fn fed_by_source(query: &str) -> (Daemon, TcpListener, TcpStream) {
-    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-    let mut settings = listening(&[TCP]);
-    let uri = format!("tcp://{}{query}", listener.local_addr().unwrap());
-    settings.sources = vec![Endpoint::parse(&uri).unwrap()];
-    let daemon = Daemon::start(settings);
-    let (stream, _) = listener.accept().unwrap();
-    (daemon, listener, stream)
-}
-
-#[test]
-fn a_source_that_names_no_packed_stream_is_complained_of_and_left() {
-    let (daemon, listener, mut stream) = fed_by_source("");
-    let bytes = Sample::lively(0).packed(1).repeat(30);
-    // So that it is no stranger who begins with anything.
-    stream
-        .write_all(
-            &[
-                b"{\"class\":\"PACKED\",\"stream\":2,\"id\":\"b\"}\n",
-                &bytes[..],
-            ]
-            .concat(),
-        )
-        .unwrap();
-    eventually("the complaint", || {
-        let said = daemon.status()["outgoing"][0]["last_error"].to_string();
-        said.contains("too many bad lines") || said.contains("unknown_stream")
-    });
-    let (mut again, _) = listener.accept().unwrap();
-    again.write_all(rate("a", 0, 1.0).as_bytes()).unwrap();
-    again.write_all(b"\n").unwrap();
-    eventually("the sample of the next", || {
-        daemon.status()["sources"][0]["samples"] == 1
-    });
-}
-
-/// What a `PACKED` line says of a source's samples holds, attitudes are the samples that their lines would be, and
-/// of two sensors that would be one the second is refused.
-#[test]
-fn a_source_is_read_packed_as_its_lines_are() {
-    let head = [
-        r#"{"class":"PACKED","stream":1,"id":"a","gyro_unit":"deg"}"#,
-        r#"{"class":"PACKED","stream":2,"id":"b","rotates":"sensor_to_world","world":"enu","body":"flu"}"#,
-        r#"{"class":"PACKED","stream":3,"id":"c"}"#,
-    ];
-    let head = head.map(|line| format!("{line}\n")).concat().into_bytes();
-    let packed = |stream: u32, n: u64| {
-        let stamp = 1_700_000_000_000_000_000_u64 + n * 10_000_000;
-        let [seq, stamp] = [n, stamp].map(u64::to_le_bytes);
-        let floats = |values: &[f64]| {
-            values
-                .iter()
-                .flat_map(|v| v.to_le_bytes())
-                .collect::<Vec<_>>()
-        };
-        let body = match stream {
-            2 => [
-                floats(&[1.0, 0.0, 0.0, 0.0, 0.5, 0.25, -0.125]),
-                vec![0; 32],
-            ]
-            .concat(),
-            _ => floats(&[10.0, -20.0, 30.0]),
-        };
-        object(
-            if stream == 2 { 2 } else { 1 },
-            stream,
-            &[&seq[..], &stamp[..], &body[..]].concat(),
-        )
-    };
-    let blocks = |streams: &[u32]| {
-        let of_all =
-            (0..50).flat_map(|n| streams.iter().flat_map(move |stream| packed(*stream, n)));
-        [head.clone(), of_all.collect()].concat()
-    };
-    let (daemon, _listener, mut stream) = fed_by_source("");
-    let mut watcher = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");
-    stream.write_all(&blocks(&[1, 2])).unwrap();
-    for n in 0..50 {
-        for (id, rate) in [
-            (
-                "a",
-                [10.0, -20.0, 30.0].map(|v: f64| v * (std::f64::consts::PI / 180.0)),
-            ),
-            ("b", [0.5, 0.25, -0.125]),
-        ] {
-            let att = watcher.object("ATT");
-            assert_eq!((&att["id"], &att["seq"]), (&json!(id), &json!(n)));
-            if n > 0 {
-                assert_eq!(att["rate"], json!(rate), "{att}");
-            }
-        }
-    }
-    assert_eq!(daemon.status()["counters"]["faults"], 0);
-
-    let (daemon, _listener, mut stream) = fed_by_source("?id=mine");
-    stream.write_all(&blocks(&[1, 3])).unwrap();
-    eventually("the samples of one", || {
-        daemon.status()["sources"][0]["samples"] == 50
-    });
-    eventually("the other is told of", || {
-        let said = daemon.status()["outgoing"][0]["last_error"].to_string();
-        said.contains("several_sensors")
-    });
-    let status = daemon.status();
-    assert_eq!(status["sources"].as_array().unwrap().len(), 1, "{status}");
-    assert_eq!(status["sources"][0]["id"], "mine");
-    assert_eq!(
-        status["outgoing"][0]["connections"], 1,
-        "it is not left for it: {status}"
-    );
 }
 
 /// `strapd ARGS` in one go: what it writes.

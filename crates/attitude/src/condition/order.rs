@@ -15,8 +15,8 @@ use std::hash::{DefaultHasher, Hasher};
 const HISTORY: usize = 64;
 /// Released entries after which the line is shortened.
 const COMPACT_AT: usize = 1024;
-/// The same where nothing waits to be put in order: live, perhaps one of many sensors. Of those that leave the
-/// line stamp and digest are kept.
+/// The same where nothing waits to be put in order: live, perhaps one of many sensors. A line of eight, and of those
+/// that leave it stamp and digest are kept.
 const COMPACT_LIVE_AT: usize = 7;
 /// Of so many that were kept the first are forgotten.
 const FORGET_AT: usize = 96;
@@ -62,7 +62,8 @@ pub(super) struct Order {
     floor: Option<Nanos>,
     max_run: usize,
     max_gap_nanos: i64,
-    compact_at: usize,
+    /// Nothing waits to be put in order.
+    is_live: bool,
 }
 
 impl Past {
@@ -92,11 +93,7 @@ impl Order {
             floor: None,
             max_run: window.max(MAX_RUN),
             max_gap_nanos,
-            compact_at: if window == 0 {
-                COMPACT_LIVE_AT
-            } else {
-                COMPACT_AT
-            },
+            is_live: window == 0,
         }
     }
 
@@ -161,7 +158,11 @@ impl Order {
     fn append(&mut self, mut entry: Entry) {
         entry.epoch = self.epoch;
         self.high = Some(entry.stamp);
-        if self.cursor >= self.compact_at {
+        let most = match self.is_live {
+            true => COMPACT_LIVE_AT,
+            false => COMPACT_AT,
+        };
+        if self.cursor >= most {
             self.compact();
         }
         self.line.push(entry);
@@ -169,7 +170,7 @@ impl Order {
 
     #[cold]
     fn compact(&mut self) {
-        let gone = if self.compact_at == COMPACT_LIVE_AT {
+        let gone = if self.is_live {
             let gone = self.cursor.min(self.line.len());
             if self.past.len() + gone > FORGET_AT {
                 let forgotten = self.past.len().saturating_sub(HISTORY);
@@ -476,7 +477,7 @@ mod tests {
             let entries = faulty(seed);
             let live = Order::new(0, 5_000_000);
             let whole = Order {
-                compact_at: usize::MAX,
+                is_live: false,
                 ..live.clone()
             };
             // Nothing is sent again, or fits into a hole, further back than what is kept.
