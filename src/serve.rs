@@ -83,7 +83,6 @@ use source::Endpoint;
 use std::collections::BTreeMap;
 use std::future::Future;
 use std::sync::Arc;
-use std::time::Duration;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Plan;
 
@@ -276,11 +275,10 @@ impl Server {
 
 /// Sees to it that samples do not wait for ever for the unit of their stamps.
 async fn end_waits(hub: Arc<Hub>) {
-    const TICK: Duration = Duration::from_millis(250);
-    let mut tick = tokio::time::interval(TICK);
+    let mut tick = tokio::time::interval(hub::TICK);
     loop {
         tick.tick().await;
-        hub.forget_silent(TICK);
+        hub.forget_silent();
         hub.end_waits(listen::now());
     }
 }

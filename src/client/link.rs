@@ -31,6 +31,9 @@ const MAX_DATAGRAM: usize = 65_536;
 const IDLE: Duration = Duration::from_secs(15);
 const PROBE: Duration = Duration::from_secs(5);
 const PROBES: u32 = 3;
+/// How long it takes to notice a peer that has vanished.
+pub(crate) const VANISHED: Duration =
+    Duration::from_secs(IDLE.as_secs() + PROBE.as_secs() * PROBES as u64);
 
 /// A connection.
 #[derive(Debug)]

@@ -19,6 +19,7 @@ mod saving;
 pub use back_pressure::Flood;
 pub use counters::{Counters, count};
 use places::Absent;
+pub use places::TICK;
 use polling::Polling;
 use report::StateStatus;
 pub use resetting::Asker;
@@ -342,6 +343,12 @@ impl Hub {
         if client.outbox.level().watching {
             self.watch_changed();
         }
+        self.give_back(client, owned);
+    }
+
+    /// Its sensors, and the truth, may be sent by others.
+    pub fn give_back(&self, client: &Client, owned: &[Arc<Mutex<Sensor>>]) {
+        self.give_truth_back(client);
         for sensor in owned {
             let mut sensor = lock(sensor);
             if sensor.owner == Some(client.number) {
@@ -401,14 +408,14 @@ impl Hub {
             ));
         }
         match sensor.owner {
-            Some(owner) if owner != run.client => {
+            Some(owner) if owner != run.client && !self.is_left(&sensor) => {
                 return Err(refuse(
                     "id_in_use",
                     "another connection sends the samples of this sensor; give this one an `id` of its own".to_owned(),
                 ));
             }
-            Some(_) => {}
-            None => {
+            Some(owner) if owner == run.client => {}
+            _ => {
                 sensor.owner = Some(run.client);
                 sensor.stream.meet();
             }

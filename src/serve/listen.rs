@@ -207,8 +207,12 @@ async fn accept<S, A: Future<Output = io::Result<S>>>(
 /// A connection as it was accepted is made ready.
 fn prepare(stream: &tokio::net::TcpStream) {
     link::prepare(stream);
+    let socket = socket2::SockRef::from(stream);
     // Refused, it is as large as ever.
-    let _ = socket2::SockRef::from(stream).set_send_buffer_size(SEND_BUFFER);
+    let _ = socket.set_send_buffer_size(SEND_BUFFER);
+    // While something is on its way nothing is probed: a peer that has vanished is given up after as long.
+    #[cfg(any(target_os = "linux", target_os = "android"))]
+    let _ = socket.set_tcp_user_timeout(Some(link::VANISHED));
 }
 
 /// Of what kind a connection of lines is before it has said anything.

@@ -116,10 +116,20 @@ impl Owned {
         self.sensors.keys()
     }
 
+    /// The client sends nothing more, but may still watch; others may send its sensors.
+    pub fn give_back(&mut self, hub: &Hub, client: &Client) {
+        hub.give_back(client, &self.take_all(client));
+    }
+
     /// The client has gone; others may send them.
     pub fn leave(&mut self, hub: &Hub, client: &Client) {
+        hub.leave(client, &self.take_all(client));
+    }
+
+    fn take_all(&mut self, client: &Client) -> Vec<Arc<Mutex<Sensor>>> {
+        self.last = None;
         let all = std::mem::take(&mut self.sensors);
-        let all: Vec<_> = all.values().filter_map(Weak::upgrade).collect();
-        hub.leave(client, &all);
+        all.values().for_each(|_| client.let_go());
+        all.values().filter_map(Weak::upgrade).collect()
     }
 }

@@ -55,6 +55,8 @@ struct Signs {
     /// When it was heard last, in ms since the start.
     heard: AtomicU64,
     is_http: AtomicBool,
+    /// It has ended its side, and watches.
+    only_watches: AtomicBool,
     leave: Notify,
 }
 
@@ -143,7 +145,7 @@ impl Places {
         let now = self.now();
         let leaves = of_kind()
             .filter(|(_, seat)| seat.may_have_to_go(now, self.limits.idle))
-            .min_by_key(|(_, seat)| (seat.has_token, seat.heard()))
+            .min_by_key(|(_, seat)| (!seat.only_watches(), seat.has_token, seat.heard()))
             .map(|(number, _)| *number)?;
         // The place is the other's from now on; who had it is on the way out.
         let seat = taken.seats.remove(&leaves)?;
@@ -157,11 +159,15 @@ impl Seat {
         self.signs.heard.load(Ordering::Relaxed)
     }
 
+    fn only_watches(&self) -> bool {
+        self.signs.only_watches.load(Ordering::Relaxed)
+    }
+
     /// Whether it must go when places of its kind are short. A request, or the first line, takes moments:
     /// whoever was longest without a sign of life gives way. Who converses, or has shown the token, goes
-    /// when it did nothing for long.
+    /// when it did nothing for long; a watcher that has ended its side, at any time: it may have gone.
     fn may_have_to_go(&self, now: u64, idle: Duration) -> bool {
-        if self.kind != Kind::Served && !self.has_token {
+        if self.only_watches() || (self.kind != Kind::Served && !self.has_token) {
             return true;
         }
         let is_watching = || {
@@ -184,6 +190,11 @@ impl Place {
         if self.signs.is_http.load(Ordering::Relaxed) {
             self.heard();
         }
+    }
+
+    /// It has ended its side: whether it is still there shows late, and it is the first to give way.
+    pub fn only_watches(&self) {
+        self.signs.only_watches.store(true, Ordering::Relaxed);
     }
 
     /// Who converses there.
@@ -234,7 +245,7 @@ impl Place {
         Fault::new(
             "made_room",
             format!(
-                "others needed its place: it had not shown the token yet, or had sent and watched nothing for {secs} s"
+                "others needed its place: it had not shown the token yet, had ended its side, or had sent and watched nothing for {secs} s"
             ),
         )
     }

@@ -267,6 +267,11 @@ impl Session {
         &self.hub
     }
 
+    /// It sends nothing more: others may send its sensors.
+    pub fn give_back(&mut self) {
+        self.owned.give_back(&self.hub, &self.client);
+    }
+
     /// What comes next is of this sensor, where it does not say; no number of a packed stream is bound.
     #[cfg(any(feature = "nats", feature = "zenoh"))]
     pub fn of_subject(&mut self, id: &str) {

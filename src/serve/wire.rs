@@ -19,6 +19,7 @@ use super::playback::position::{Action, Position};
 use bytes::Bytes;
 use serde::Deserialize;
 use serde_json::{Value, json};
+use std::time::Duration;
 use strapd_attitude::record::{Nanos, RawSample};
 use strapd_recording::decode::packed::Form;
 use strapd_recording::decode::{Class, Line, LineDecoder, MAX_LINE, Undecodable, exact_name};
@@ -390,10 +391,23 @@ pub fn watching(filter: Option<&Filter>, offered: &[Stream]) -> Bytes {
     line(&answer)
 }
 
-/// What a sender is to know, and is no fault.
+/// What a client is to know, and is no fault.
 #[must_use]
 pub fn note(what: &Fault) -> Bytes {
     line(&json!({"class": "NOTE", "code": what.code, "id": what.id, "message": what.message}))
+}
+
+/// The question whether a watcher that has ended its side is still there, after so long without anything to send: its
+/// system answers with a reset if it is not.
+#[must_use]
+pub fn heartbeat(quiet: Duration) -> Bytes {
+    note(&Fault::new(
+        "heartbeat",
+        format!(
+            "nothing to send for {} s; you have ended your side, and this line finds out whether you still read",
+            quiet.as_secs_f64()
+        ),
+    ))
 }
 
 /// The notice that attitudes of `id` were dropped.

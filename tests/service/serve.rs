@@ -19,6 +19,7 @@ mod faults;
 mod frames;
 mod intervals;
 mod late;
+mod leaving;
 mod limits;
 mod opening;
 mod operations;

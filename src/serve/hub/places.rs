@@ -14,6 +14,8 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+/// How often it is looked which sensors were silent for too long.
+pub const TICK: Duration = Duration::from_millis(250);
 /// Sensors that gave way last, in `STATUS`.
 const TOLD: usize = 16;
 
@@ -152,7 +154,7 @@ impl Hub {
             .filter_map(|(id, sensor)| {
                 // One that is being looked at (`STATUS`) is waited for: it may be the one.
                 let sensor = lock(sensor);
-                sensor.owner.is_none().then(|| (sensor.heard, id.clone()))
+                self.is_left(&sensor).then(|| (sensor.heard, id.clone()))
             })
             .min();
         let Some((_, id)) = silent else {
@@ -175,14 +177,27 @@ impl Hub {
         Ok(())
     }
 
-    /// To be called every `tick`: sensors that were silent for longer than they may be give up their places.
+    /// Whether nobody sends a sensor: its sender has gone, or is a broker that has brought nothing of it for as
+    /// long as a sender of datagrams may be silent. A broker stays connected when its publishers go.
+    pub(super) fn is_left(&self, sensor: &Sensor) -> bool {
+        let Some(owner) = sensor.owner else {
+            return true;
+        };
+        let now = self.tick.load(Ordering::Relaxed);
+        now - sensor.heard_at.min(now) > ticks(self.limits.sender_silence)
+            && read(&self.clients)
+                .get(&owner)
+                .is_none_or(|owner| owner.is_broker.load(Ordering::Relaxed))
+    }
+
+    /// To be called every [`TICK`]: sensors that were silent for longer than they may be give up their places.
     /// Their attitudes are kept, and go on when they come back.
-    pub fn forget_silent(&self, tick: Duration) {
+    pub fn forget_silent(&self) {
         let now = self.tick.fetch_add(1, Ordering::Relaxed) + 1;
         let Some(after) = self.limits.forget_after else {
             return;
         };
-        let most = after.as_nanos().div_ceil(tick.as_nanos().max(1)) as u64;
+        let most = ticks(after);
         // A pass over all of them now and then, not at every tick.
         if !now.is_multiple_of((most / 8).max(1)) {
             return;
@@ -272,6 +287,11 @@ impl Hub {
             "gave_way_last": lock(&self.gave_way).iter().map(|id| &**id).collect::<Vec<_>>(),
         })
     }
+}
+
+/// How many ticks a time lasts, no fewer.
+fn ticks(time: Duration) -> u64 {
+    u64::try_from(time.as_nanos().div_ceil(TICK.as_nanos())).unwrap_or(u64::MAX)
 }
 
 impl Origin {

@@ -2,7 +2,7 @@
 //!
 //! It touches no estimate: it is passed on as it came, for who holds the sensors against it.
 
-use super::{Hub, lock, read};
+use super::{Client, Hub, lock, read};
 use crate::serve::channel::{Channel, Items};
 use crate::serve::fault::Fault;
 use crate::serve::wire::{self, Reference, TRUTH};
@@ -14,8 +14,8 @@ pub(super) struct Truth {
     channel: Arc<Channel>,
     /// Number of the next.
     next: u64,
-    /// Who sends it.
-    owner: u64,
+    /// The client that sends it.
+    owner: Option<u64>,
 }
 
 impl Hub {
@@ -34,12 +34,12 @@ impl Hub {
         let truth = truth.get_or_insert_with(|| Truth {
             channel: self.declare(&wire::reference_stream(found.world, found.body)),
             next: 0,
-            owner: client,
+            owner: None,
         });
-        if truth.owner != client && read(&self.clients).contains_key(&truth.owner) {
+        if truth.owner.is_some_and(|owner| owner != client) {
             return Err(Fault::new("id_in_use", "another client sends `truth`"));
         }
-        truth.owner = client;
+        truth.owner = Some(client);
         let stream = truth.channel.stream();
         if stream.world_axes != found.world.to_string() || stream.body_axes != found.body {
             return Err(Fault::new(
@@ -59,5 +59,14 @@ impl Hub {
             text,
         );
         Ok(())
+    }
+
+    /// Others may send the truth that this client has sent.
+    pub(super) fn give_truth_back(&self, client: &Client) {
+        if let Some(truth) = &mut *lock(&self.truth)
+            && truth.owner == Some(client.number)
+        {
+            truth.owner = None;
+        }
     }
 }

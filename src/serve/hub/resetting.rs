@@ -65,7 +65,9 @@ impl Hub {
         if sensor.gave_way {
             return Err(unknown());
         }
-        let is_others = |client: u64| sensor.owner.is_some_and(|owner| owner != client);
+        let is_others = |client: u64| {
+            sensor.owner.is_some_and(|owner| owner != client) && !self.is_left(&sensor)
+        };
         if matches!(asker, Asker::Client(client) if is_others(client)) {
             return Err(fault(
                 "id_in_use",

@@ -13,10 +13,12 @@ use crate::serve::session::Session;
 use crate::serve::shutdown::Running;
 use crate::serve::wire;
 use bytes::{Buf, Bytes};
+use futures_util::FutureExt;
 use std::collections::VecDeque;
 use std::future::{Future, ready};
 use std::io::{self, IoSlice};
 use std::time::Duration;
+use tokio::io::Ready;
 use tokio::task::yield_now;
 use tokio::time::{Instant, MissedTickBehavior, interval, sleep, timeout};
 
@@ -32,6 +34,16 @@ pub(super) trait Duplex: Send + Sync + 'static {
     fn try_write(&self, parts: &[IoSlice<'_>]) -> io::Result<usize>;
     /// Says that nothing more will be written.
     fn end(&self);
+    /// Whether the other end has closed both ways, as far as the system knows.
+    fn is_closed(&self) -> bool;
+    /// Whether the system always knows. Of TCP it does not: who closes says no more than who ends its side alone,
+    /// and its system answers keep-alive probes for a minute afterwards. What is written is answered with a reset.
+    const SHOWS_CLOSE: bool;
+}
+
+/// Whether what waits for a socket to become writable found both its sides closed.
+pub(super) fn is_closed(ready: impl Future<Output = io::Result<Ready>>) -> bool {
+    matches!(ready.now_or_never(), Some(Ok(ready)) if ready.is_write_closed())
 }
 
 /// Attitudes taken from the outbox at once; with what one system call takes.
@@ -117,8 +129,8 @@ pub(super) async fn converse(io: impl Duplex, peer: Peer, context: Context, plac
 }
 
 /// The conversation. Returns why we ended it, if we did.
-async fn talk(
-    io: &impl Duplex,
+async fn talk<D: Duplex>(
+    io: &D,
     session: &mut Session,
     running: &mut Running,
     place: &Place,
@@ -133,6 +145,8 @@ async fn talk(
     let mut reading = true;
     // It has said that it sends nothing more.
     let mut has_ended = false;
+    let mut gave_back = false;
+    let mut written = opened;
     let mut flood = Flood::default();
     let mut closing = None;
     let mut has_place = session.is_authorised();
@@ -165,6 +179,11 @@ async fn talk(
             }
         }
         let held = session.is_held();
+        if has_ended && !held && !gave_back {
+            gave_back = true;
+            session.give_back();
+            place.only_watches();
+        }
         // Whoever sent a request and nothing more still wants the answers.
         if has_ended && !held && closing.is_none() && !outbox.level().watching {
             closing = Some(None);
@@ -182,6 +201,7 @@ async fn talk(
                 Ok(n) => {
                     count(&hub.counters.bytes_out, n);
                     progress = Instant::now();
+                    written = progress;
                 }
                 Err(e) if e.kind() == io::ErrorKind::WouldBlock => {
                     blocked = true;
@@ -273,6 +293,12 @@ async fn talk(
                 return Some(MADE_ROOM);
             }
             _ = tick.tick() => {
+                if has_ended && io.is_closed() {
+                    return None;
+                }
+                if has_ended && !D::SHOWS_CLOSE && !blocked && written.elapsed() >= limits.ping {
+                    outbox.reply(wire::heartbeat(limits.ping));
+                }
                 if blocked && progress.elapsed() >= limits.no_progress {
                     return Some("it took nothing for too long");
                 }

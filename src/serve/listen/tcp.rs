@@ -5,6 +5,7 @@ use super::{Context, accept, prepare, unheard};
 use crate::serve::peer::Peer;
 use std::future::Future;
 use std::io::{self, IoSlice};
+use tokio::io::Interest;
 use tokio::net::{TcpListener, TcpStream};
 
 impl Duplex for TcpStream {
@@ -23,6 +24,10 @@ impl Duplex for TcpStream {
     fn end(&self) {
         duplex::shut(&socket2::SockRef::from(self));
     }
+    fn is_closed(&self) -> bool {
+        duplex::is_closed(self.ready(Interest::WRITABLE))
+    }
+    const SHOWS_CLOSE: bool = false;
 }
 
 pub(super) async fn serve(listener: TcpListener, context: Context) {

@@ -7,6 +7,7 @@ use std::future::Future;
 use std::io::{self, IoSlice};
 use std::os::unix::fs::{FileTypeExt, PermissionsExt};
 use std::path::{Path, PathBuf};
+use tokio::io::Interest;
 use tokio::net::{UnixListener, UnixStream};
 
 /// A socket in the file system; its name goes when it does.
@@ -77,6 +78,10 @@ impl Duplex for UnixStream {
     fn end(&self) {
         duplex::shut(&socket2::SockRef::from(self));
     }
+    fn is_closed(&self) -> bool {
+        duplex::is_closed(self.ready(Interest::WRITABLE))
+    }
+    const SHOWS_CLOSE: bool = true;
 }
 
 pub(super) async fn serve(bound: Bound, context: Context) {

@@ -63,6 +63,35 @@ fn every_transport_of_a_replay_brings_the_bytes_of_standard_output_and_then_clos
 }
 
 #[test]
+fn of_a_run_that_is_paused_who_leaves_keeps_no_place_and_who_ends_its_side_gets_it_all() {
+    let dir = tempfile::tempdir().unwrap();
+    let socket = dir.path().join("s.sock");
+    let unix = format!("unix-listen://{}", socket.display());
+    let mut process = paused(&format!("replay {LOG}"), &[TCP, &unix]);
+    let watch = r#"{"class":"WATCH"}"#;
+    let mut staying = Client::tcp(process.address(0)).watching(watch);
+    staying.shut();
+    for _ in 0..20 {
+        drop(Client::unix(&socket).watching(watch));
+    }
+    let mut asker = Client::tcp(process.address(0));
+    eventually("those who left to be gone", || {
+        asker.send(r#"{"class":"POLL"}"#);
+        let status = asker.next_of("STATUS");
+        status["clients"].as_array().unwrap().len() == 2
+    });
+    asker.send(r#"{"class":"PLAYBACK","action":"play"}"#);
+    let expected = lines_of(&format!("replay {LOG}"));
+    let reader = std::thread::spawn(move || staying.lines());
+    asker.lines();
+    assert!(
+        of_class(&reader.join().unwrap(), "ATT") == expected,
+        "other bytes"
+    );
+    assert_eq!(process.exit(), Some(0));
+}
+
+#[test]
 fn whoever_watches_a_simulation_gets_samples_and_truth_or_one_of_them() {
     let process = paused(SIMULATION, &[TCP]);
     let mut all = Client::tcp(process.address(0)).watching(r#"{"class":"WATCH"}"#);

@@ -221,6 +221,15 @@ fn every_object_shown_is_one_the_daemon_sends_or_takes() {
 }
 
 #[test]
+fn the_page_shows_the_heartbeat_that_is_sent() {
+    let sent = strapd::serve::wire::heartbeat(strapd::serve::limits::Limits::default().ping);
+    assert!(
+        PAGE.contains(std::str::from_utf8(&sent).unwrap()),
+        "{sent:?}"
+    );
+}
+
+#[test]
 fn the_page_names_the_addresses_it_listens_on_by_default() {
     for uri in strapd::sink::address::DEFAULTS {
         let listen = strapd::sink::address::Listen::parse(uri).unwrap();
