@@ -3,8 +3,12 @@
 use crate::error::Result;
 use crate::serve::Settings;
 use crate::serve::admission::{Token, Web};
+use crate::serve::limits::Limits;
 use clap::Args;
 use std::path::PathBuf;
+
+/// Most clients that can be asked for.
+const MAX_CLIENTS: u64 = 100_000;
 
 /// Who may connect.
 #[derive(Args, Debug, Clone)]
@@ -22,6 +26,10 @@ pub struct Admission {
     /// A name this machine is called in HTTP requests. May be given several times
     #[arg(long, value_name = "HOST")]
     pub allow_host: Vec<String>,
+    /// Most clients at once that send or watch; each is an open file. One more is told `too_many_clients`, unless
+    /// somebody gives way who has ended its side, or sent and watched nothing for a minute
+    #[arg(long, value_name = "N", default_value_t = Limits::default().connections, env = "STRAPD_MAX_CLIENTS", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=MAX_CLIENTS))]
+    pub max_clients: usize,
 }
 
 impl Admission {
@@ -37,6 +45,7 @@ impl Admission {
                 hosts: self.allow_host.clone(),
                 origins: self.allow_origin.clone(),
             },
+            limits: settings.limits.of_clients(self.max_clients),
             ..settings
         })
     }

@@ -5,9 +5,8 @@ pub(super) mod connection;
 mod metrics;
 
 use super::foxglove::SUBPROTOCOLS;
-use super::hub::count;
 use super::listen::websocket;
-use super::places::Kind;
+use super::places::{Kind, turned_away};
 use super::{page, samples, top_page};
 use answer::{refusal, response, unauthorised};
 use axum::Router;
@@ -78,7 +77,7 @@ async fn upgrade(
                 Kind::Unproven
             };
             if let Err(fault) = connection.place.become_of(kind, connection.trusted) {
-                count(&connection.hub.counters.refused, 1);
+                turned_away(&connection.hub, &fault);
                 return refusal(StatusCode::SERVICE_UNAVAILABLE, fault.code, &fault.message);
             }
             upgrade

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 /// The bounds. The defaults are those of the documentation; tests shorten the times.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
-    /// Most connections at once, over all listeners, of those who converse.
+    /// Most connections at once, over all listeners, of those who converse (`--max-clients`).
     pub connections: usize,
     /// Most connections of plain HTTP beside them.
     pub http: usize,
@@ -66,6 +66,16 @@ impl Limits {
             sensors,
             sensors_of_client: few.sensors_of_client.max(sensors / 4),
             ..few
+        }
+    }
+
+    /// These, for so many clients: as many may be about to show the token, and no fewer than ever.
+    #[must_use]
+    pub fn of_clients(self, connections: usize) -> Limits {
+        Limits {
+            connections,
+            unproven: Limits::default().unproven.max(connections),
+            ..self
         }
     }
 

@@ -18,7 +18,7 @@ mod unix;
 use super::admission::Web;
 use super::hub::{Hub, count};
 use super::limits::Backoff;
-use super::places::{Kind, Place, Places};
+use super::places::{Kind, Place, Places, turned_away};
 use super::session::Scratch;
 use super::shutdown::Running;
 use super::wire;
@@ -183,8 +183,9 @@ async fn accept<S, A: Future<Output = io::Result<S>>>(
                     count(&context.hub.counters.accepted, 1);
                     serve(stream, context.clone(), place);
                 } else {
-                    count(&context.hub.counters.refused, 1);
-                    let words = wire::error(&context.places.refusal(kind), 0, &[], 0);
+                    let fault = context.places.refusal(kind);
+                    turned_away(&context.hub, &fault);
+                    let words = wire::error(&fault, 0, &[], 0);
                     refuse(stream, context.clone(), words);
                 }
             }
@@ -207,12 +208,10 @@ async fn accept<S, A: Future<Output = io::Result<S>>>(
 /// A connection as it was accepted is made ready.
 fn prepare(stream: &tokio::net::TcpStream) {
     link::prepare(stream);
-    let socket = socket2::SockRef::from(stream);
     // Refused, it is as large as ever.
-    let _ = socket.set_send_buffer_size(SEND_BUFFER);
+    let _ = socket2::SockRef::from(stream).set_send_buffer_size(SEND_BUFFER);
     // While something is on its way nothing is probed: a peer that has vanished is given up after as long.
-    #[cfg(any(target_os = "linux", target_os = "android"))]
-    let _ = socket.set_tcp_user_timeout(Some(link::VANISHED));
+    tcp::expect_notice(stream, link::VANISHED);
 }
 
 /// Of what kind a connection of lines is before it has said anything.

@@ -5,13 +5,17 @@
 //! short, somebody who does nothing with his gives way to whoever comes.
 
 use super::fault::Fault;
-use super::hub::Client;
+use super::hub::{Client, Hub, count};
 use super::limits::Limits;
+use super::log_throttle;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use tokio::sync::Notify;
+
+/// Between two warnings that somebody found no place.
+const MINUTE: Duration = Duration::from_secs(60);
 
 /// What a connection is, as far as places go.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -130,9 +134,13 @@ impl Places {
             Kind::Served => "connections",
         };
         let room = self.room(kind);
+        let help = match kind {
+            Kind::Http => "",
+            Kind::Unproven | Kind::Served => "; --max-clients allows more",
+        };
         Fault::new(
             "too_many_clients",
-            format!("{room} {whose} are served already"),
+            format!("{room} {whose} are served already{help}"),
         )
     }
 
@@ -255,6 +263,16 @@ impl Drop for Place {
     fn drop(&mut self) {
         self.places.taken().seats.remove(&self.number);
     }
+}
+
+/// Counts somebody who found no place, and says so in the log, once a minute with their number.
+pub fn turned_away(hub: &Hub, fault: &Fault) {
+    count(&hub.counters.refused, 1);
+    log_throttle::warn_every(
+        MINUTE,
+        &fault.message,
+        &format!("a client was turned away: {}", fault.message),
+    );
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ mod bad_lines;
 mod bare_stamps;
 mod besides;
 mod cat;
+mod clients;
 mod config;
 mod connecting;
 mod documentation;

@@ -187,7 +187,7 @@ impl Hub {
         now - sensor.heard_at.min(now) > ticks(self.limits.sender_silence)
             && read(&self.clients)
                 .get(&owner)
-                .is_none_or(|owner| owner.is_broker.load(Ordering::Relaxed))
+                .is_some_and(|owner| owner.is_broker.load(Ordering::Relaxed))
     }
 
     /// To be called every [`TICK`]: sensors that were silent for longer than they may be give up their places.

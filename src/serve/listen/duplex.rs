@@ -4,11 +4,12 @@
 //! a client that is worked for is not read from, which is how TCP slows a sender down.
 
 use super::{Context, in_room, now};
+use crate::client::link;
 use crate::serve::fault::Fault;
 use crate::serve::hub::{Flood, count};
 use crate::serve::outbox::Outbox;
 use crate::serve::peer::Peer;
-use crate::serve::places::{Kind, Place};
+use crate::serve::places::{Kind, Place, turned_away};
 use crate::serve::session::Session;
 use crate::serve::shutdown::Running;
 use crate::serve::wire;
@@ -39,6 +40,8 @@ pub(super) trait Duplex: Send + Sync + 'static {
     /// Whether the system always knows. Of TCP it does not: who closes says no more than who ends its side alone,
     /// and its system answers keep-alive probes for a minute afterwards. What is written is answered with a reset.
     const SHOWS_CLOSE: bool;
+    /// Breaks when what was written is not taken notice of for so long.
+    fn expect_notice(&self, within: Duration);
 }
 
 /// Whether what waits for a socket to become writable found both its sides closed.
@@ -173,6 +176,7 @@ async fn talk<D: Duplex>(
         if session.is_authorised() && !has_place && closing.is_none() {
             has_place = true;
             if let Err(fault) = place.become_of(Kind::Served, true) {
+                turned_away(&hub, &fault);
                 outbox.reply(wire::error(&fault, 0, &[], 0));
                 reading = false;
                 closing = Some(Some("there is no place for it"));
@@ -181,6 +185,7 @@ async fn talk<D: Duplex>(
         let held = session.is_held();
         if has_ended && !held && !gave_back {
             gave_back = true;
+            io.expect_notice(link::VANISHED.saturating_sub(limits.ping));
             session.give_back();
             place.only_watches();
         }

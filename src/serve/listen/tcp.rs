@@ -5,6 +5,7 @@ use super::{Context, accept, prepare, unheard};
 use crate::serve::peer::Peer;
 use std::future::Future;
 use std::io::{self, IoSlice};
+use std::time::Duration;
 use tokio::io::Interest;
 use tokio::net::{TcpListener, TcpStream};
 
@@ -28,6 +29,18 @@ impl Duplex for TcpStream {
         duplex::is_closed(self.ready(Interest::WRITABLE))
     }
     const SHOWS_CLOSE: bool = false;
+    fn expect_notice(&self, within: Duration) {
+        expect_notice(self, within);
+    }
+}
+
+/// Breaks a connection whose peer acknowledges nothing for so long, where the system can.
+pub(super) fn expect_notice(stream: &TcpStream, within: Duration) {
+    // Refused, it takes the system's own time.
+    #[cfg(any(target_os = "linux", target_os = "android"))]
+    let _ = socket2::SockRef::from(stream).set_tcp_user_timeout(Some(within));
+    #[cfg(not(any(target_os = "linux", target_os = "android")))]
+    let _ = (stream, within);
 }
 
 pub(super) async fn serve(listener: TcpListener, context: Context) {

@@ -7,6 +7,7 @@ use std::future::Future;
 use std::io::{self, IoSlice};
 use std::os::unix::fs::{FileTypeExt, PermissionsExt};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 use tokio::io::Interest;
 use tokio::net::{UnixListener, UnixStream};
 
@@ -82,6 +83,7 @@ impl Duplex for UnixStream {
         duplex::is_closed(self.ready(Interest::WRITABLE))
     }
     const SHOWS_CLOSE: bool = true;
+    fn expect_notice(&self, _within: Duration) {}
 }
 
 pub(super) async fn serve(bound: Bound, context: Context) {

@@ -7,7 +7,7 @@ use super::{in_room, now};
 use crate::serve::foxglove::frames::{self, Framed};
 use crate::serve::http::connection::Connection;
 use crate::serve::hub::{Client, Flood, Hub, count};
-use crate::serve::places::Kind;
+use crate::serve::places::{Kind, turned_away};
 use crate::serve::session::Session;
 use crate::serve::viewer::Viewer;
 use crate::serve::wire;
@@ -112,6 +112,7 @@ pub(crate) async fn converse(socket: WebSocket, connection: Connection, foxglove
             if session.is_authorised() && !has_place {
                 has_place = true;
                 if let Err(fault) = place.become_of(Kind::Served, true) {
+                    turned_away(&hub, &fault);
                     client.outbox.reply(wire::error(&fault, 0, &[], 0));
                     return Some("there is no place for it");
                 }

@@ -382,7 +382,7 @@ fn half_a_minute_after_three_hundred_watchers_of_every_kind_have_left_all_is_as_
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("s");
     let unix = format!("unix-listen://{}", path.display());
-    let process = Process::start(&["--listen", TCP, "--listen", &unix]);
+    let process = Process::start(&["--listen", TCP, "--listen", &unix, "--max-clients", "1000"]);
     let mut asker = Client::tcp(process.address(0));
     assert_eq!(others(&mut asker), 0);
     let before = files(process.child.id());

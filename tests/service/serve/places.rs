@@ -5,6 +5,8 @@ use super::daemon::{Daemon, Process, TCP, WS, eventually, listening};
 use serde_json::Value;
 use std::time::Duration;
 use strapd::serve::limits::Limits;
+use strapd::serve::session::{Scratch, Session, Side};
+use strapd_attitude::record::Nanos;
 
 fn with_places(sensors: usize) -> Daemon {
     let mut settings = listening(&[TCP]);
@@ -129,6 +131,68 @@ fn one_connection_sends_256_sensors_and_one_peer_512_and_others_have_the_rest() 
         ids(&daemon.status()).contains(&"late")
     });
     assert_eq!(count(), 1024);
+}
+
+#[test]
+fn a_sensor_that_a_broker_brings_no_more_is_nobodys_after_a_while() {
+    let mut settings = listening(&[TCP]);
+    settings.limits = Limits {
+        sensors: 2,
+        sender_silence: Duration::from_secs(2),
+        ..Limits::default()
+    };
+    let daemon = Daemon::start(settings);
+    let side = Side::source(None, None);
+    let mut broker = Session::with(&daemon.hub, "broker".to_owned(), side);
+    broker.client().speaks_for_many();
+    let mut scratch = Scratch::default();
+    let mut bring = |id: &str, n: u64| {
+        broker.message(rate(id, n, 1.0).as_bytes(), Nanos(0), &mut scratch);
+    };
+    let mut sender = Client::tcp(daemon.address(0));
+    sender.object("VERSION");
+    let mut watcher = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");
+    bring("b", 0);
+    bring("a", 0);
+    sender.send(&rate("a", 1, 1.0));
+    assert_eq!(sender.object("ERROR")["code"], "id_in_use");
+    sender.send(&rate("c", 1, 1.0));
+    assert_eq!(sender.object("ERROR")["code"], "too_many_sensors");
+    let taken = |watcher: &mut Client, id: &str| {
+        let said = watcher.object("ATT");
+        assert_eq!((&said["id"], said["seq"].is_u64()), (&id.into(), true));
+    };
+    taken(&mut watcher, "b");
+    taken(&mut watcher, "a");
+    // Its publishers have gone, and it stays.
+    let mut n = 2;
+    eventually("the sensor to be nobody's", || {
+        sender.send(&rate("a", n, 1.0));
+        n += 1;
+        std::thread::sleep(Duration::from_millis(20));
+        daemon.status()["sources"][0]["samples"].as_u64() > Some(1)
+    });
+    taken(&mut watcher, "a");
+    sender.send(&rate("c", 1, 1.0));
+    while watcher.object("ATT")["id"] != "c" {}
+    let status = daemon.status();
+    assert_eq!(ids(&status), ["a", "c"]);
+    assert_eq!(status["places"]["gave_way_last"], serde_json::json!(["b"]));
+    // Who sends them keeps them, and when it goes they are the broker's again.
+    let refused = || {
+        daemon.status()["counters"]["samples_refused"]
+            .as_u64()
+            .unwrap()
+    };
+    let before = refused();
+    bring("a", 100);
+    bring("b", 100);
+    assert_eq!(refused(), before + 2);
+    drop(sender);
+    eventually("both to be free", || {
+        bring("b", 100);
+        ids(&daemon.status()).contains(&"b")
+    });
 }
 
 #[test]
