@@ -4,7 +4,9 @@
 //! is counted and shows in `STATUS`.
 
 use super::{Context, in_room, now};
+use crate::serve::fault::Fault;
 use crate::serve::peer::Peer;
+use crate::serve::places::turned_away;
 use crate::serve::session::{Session, Side};
 use bytes::Bytes;
 use std::collections::{HashMap, VecDeque};
@@ -42,7 +44,8 @@ pub(super) async fn serve(socket: UdpSocket, context: Context) {
                 // An error is an answer to nobody's question (a port that was closed), or none.
                 let Ok((n, peer)) = socket.try_recv_from(&mut buffer) else { continue };
                 if senders.len() >= MAX_SENDERS && !senders.contains_key(&peer) {
-                    crate::serve::hub::count(&hub.counters.refused, 1);
+                    let what = format!("{MAX_SENDERS} senders of datagrams are heard already");
+                    turned_away(&hub, &Fault::new("too_many_clients", what));
                     continue;
                 }
                 let sender = senders.entry(peer).or_insert_with(|| Sender {
