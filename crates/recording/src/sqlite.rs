@@ -37,8 +37,11 @@ use std::io;
 
 /// Who has the pages of a database, numbered from 1.
 pub(crate) trait Pages {
-    /// How many there are.
+    /// The greatest number of one that is there.
     fn count(&self) -> u32;
+
+    /// The next that is there behind this number: not every number up to [`Pages::count`] is.
+    fn following(&self, number: u32) -> Option<u32>;
 
     /// Copies a page, without the bytes reserved at its end, in place of what is in `into`; whether it is there as a
     /// whole.

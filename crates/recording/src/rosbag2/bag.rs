@@ -4,7 +4,7 @@
 //! pages, once, and read in its place.
 
 use super::catalogue::Catalogue;
-use super::message::{Messages, Places};
+use super::message::{Messages, Places, SPARE};
 use super::topics::{Small, TOPIC};
 use crate::records::transcript::Transcript;
 use crate::sqlite::{
@@ -140,8 +140,8 @@ impl Bag {
             ),
             (None, unreached) => {
                 let mut table = Table::of(None, longest);
-                let leaves = unreached.unwrap_or_default();
-                table.put_first(leaves.within((i64::MIN, i64::MAX)));
+                let mut leaves = unreached.unwrap_or_default();
+                table.put_first(leaves.take((i64::MIN, i64::MAX)).into_iter());
                 (table, [0, 1, 2, 3, 4, 5].map(Some))
             }
         };
@@ -161,6 +161,7 @@ impl Bag {
                 places: places.unwrap_or(Places::USUAL),
                 topics,
                 longest,
+                spare: SPARE,
                 unpacked: Vec::new(),
             },
             catalogue: None,
@@ -206,8 +207,7 @@ impl Bag {
         };
         self.is_damaged = true;
         self.look_around(pages)?;
-        let found = self.catalogue.iter().flat_map(|known| known.within(rows));
-        let leaves: Vec<u32> = found.filter(|leaf| !self.seen.has(*leaf)).collect();
+        let leaves = self.unreached(rows);
         if !leaves.is_empty() {
             // It was a page above them, and its own rows are none.
             let above = self.faults.iter_mut().rev();
@@ -233,6 +233,14 @@ impl Bag {
         (rows <= u64::from(self.header.usable / 8)).then_some(rows)
     }
 
+    /// Leaves with these rows that no tree has reached.
+    fn unreached(&mut self, rows: (i64, i64)) -> Vec<u32> {
+        let catalogue = self.catalogue.as_mut();
+        let mut leaves = catalogue.map_or_else(Vec::new, |known| known.take(rows));
+        leaves.retain(|leaf| !self.seen.has(*leaf));
+        leaves
+    }
+
     fn look_around(&mut self, pages: &mut dyn Pages) -> io::Result<()> {
         if self.catalogue.is_none() {
             let first = |page: &Page<'_>| self.messages.first_of(page);
@@ -256,9 +264,7 @@ impl Bag {
             true => i64::MIN,
             false => self.last,
         };
-        let found = self.catalogue.iter();
-        let found = found.flat_map(|known| known.within((low, i64::MAX)));
-        let leaves: Vec<u32> = found.filter(|leaf| !self.seen.has(*leaf)).collect();
+        let leaves = self.unreached((low, i64::MAX));
         self.table.put_first(leaves.into_iter());
         Ok(true)
     }

@@ -4,7 +4,9 @@
 //! hundreds of leaves costs none of their rows.
 
 use crate::sqlite::{Header, Page, Pages, Seen};
+use std::collections::BTreeSet;
 use std::io;
+use std::ops::Bound;
 
 /// Most leaves that are kept: those of 16 GiB in pages of 4 kB.
 const MOST: usize = 4 << 20;
@@ -12,7 +14,7 @@ const MOST: usize = 4 << 20;
 /// Leaves by the number of their first row.
 #[derive(Debug, Default)]
 pub(super) struct Catalogue {
-    leaves: Vec<(i64, u32)>,
+    leaves: BTreeSet<(i64, u32)>,
     /// There were more than are kept.
     pub(super) is_full: bool,
 }
@@ -31,7 +33,9 @@ impl Catalogue {
         let free = free(pages, header)?;
         let mut found = Catalogue::default();
         let mut bytes = Vec::new();
-        for number in 1..=pages.count() {
+        let mut last = 0;
+        while let Some(number) = pages.following(last) {
+            last = number;
             if seen.has(number) || free.has(number) || !pages.page(number, &mut bytes)? {
                 continue;
             }
@@ -43,21 +47,25 @@ impl Catalogue {
             if found.is_full {
                 break;
             }
-            found.leaves.push((row, number));
+            found.leaves.insert((row, number));
         }
-        found.leaves.sort_unstable();
         Ok(found)
     }
 
-    /// Those whose first row is above the first, and no more than the last.
-    pub(super) fn within(&self, (low, high): (i64, i64)) -> impl Iterator<Item = u32> {
+    /// Takes out those whose first row is above the first, and no more than the last: each is given once, however often
+    /// its rows are missed.
+    pub(super) fn take(&mut self, (low, high): (i64, i64)) -> Vec<u32> {
         let from = match low {
-            i64::MIN => 0,
-            _ => self.leaves.partition_point(|(row, _)| *row <= low),
+            i64::MIN => Bound::Unbounded,
+            _ => Bound::Excluded((low, u32::MAX)),
         };
-        let to = self.leaves.partition_point(|(row, _)| *row <= high);
-        let found = self.leaves.get(from..to).unwrap_or(&[]);
-        found.iter().map(|(_, page)| *page)
+        let to = Bound::Included((high.max(low), u32::MAX));
+        let mut taken = Vec::new();
+        while let Some(leaf) = self.leaves.range((from, to)).next().copied() {
+            self.leaves.remove(&leaf);
+            taken.push(leaf.1);
+        }
+        taken
     }
 }
 

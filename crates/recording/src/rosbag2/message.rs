@@ -11,6 +11,8 @@ use std::io::Read;
 const ZSTD: [u8; 4] = [0x28, 0xb5, 0x2f, 0xfd];
 /// Bytes that one packed may stand for, and what may come to that: an image of one colour packs well.
 const UNPACKED: (u64, u64) = (1000, 1 << 20);
+/// What may come to that for all messages together: of half a megabyte, ten thousand would be unpacked.
+pub(super) const SPARE: u64 = 256 << 20;
 
 /// Where the columns stand in a row.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -37,6 +39,8 @@ pub(super) struct Messages {
     pub(super) topics: BTreeMap<i64, u16>,
     /// Longest message that is unpacked.
     pub(super) longest: u64,
+    /// Bytes that messages may still be unpacked to beyond what theirs stand for.
+    pub(super) spare: u64,
     pub(super) unpacked: Vec<u8>,
 }
 
@@ -66,14 +70,16 @@ impl Messages {
             return Ok(());
         }
         let (times, more) = UNPACKED;
-        let most = (data.len() as u64).saturating_mul(times) + more;
-        let most = most.min(self.longest);
+        let own = (data.len() as u64).saturating_mul(times);
+        let most = own.saturating_add(more.min(self.spare)).min(self.longest);
         self.unpacked.clear();
         let decoder = zstd::stream::read::Decoder::with_buffer(data);
         let read = decoder.and_then(|decoder| {
             let mut decoder = decoder.take(most + 1);
             decoder.read_to_end(&mut self.unpacked)
         });
+        let beyond = (self.unpacked.len() as u64).saturating_sub(own);
+        self.spare = self.spare.saturating_sub(beyond);
         read.map_err(|_| "it does not unpack")?;
         if self.unpacked.len() as u64 > most {
             return Err("it unpacks to more than the limit");

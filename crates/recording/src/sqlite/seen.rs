@@ -3,30 +3,38 @@
 //! Apart because it is what keeps the work in bounds: a page belongs to one place of one tree, so the second that names it
 //! is wrong, and no circle can be walked.
 
-/// A bit for each page.
+use std::collections::BTreeMap;
+
+/// A bit for each page that was used; memory grows with those, and not with the greatest number.
 #[derive(Debug, Default)]
-pub(crate) struct Seen(Vec<u64>);
+pub(crate) struct Seen {
+    words: BTreeMap<u32, u64>,
+    last: u32,
+}
 
 impl Seen {
     /// For pages up to this number.
     pub(crate) fn up_to(pages: u32) -> Seen {
-        Seen(vec![0; pages as usize / 64 + 1])
+        Seen {
+            words: BTreeMap::new(),
+            last: pages,
+        }
     }
 
     /// Marks a page; false where it was marked, or is none.
     pub(crate) fn mark(&mut self, page: u32) -> bool {
-        let bit = 1 << (page % 64);
-        match self.0.get_mut(page as usize / 64) {
-            Some(word) if page > 0 && *word & bit == 0 => {
-                *word |= bit;
-                true
-            }
-            _ => false,
+        if page == 0 || page > self.last {
+            return false;
         }
+        let word = self.words.entry(page / 64).or_default();
+        let bit = 1 << (page % 64);
+        let is_new = *word & bit == 0;
+        *word |= bit;
+        is_new
     }
 
     pub(crate) fn has(&self, page: u32) -> bool {
-        let word = self.0.get(page as usize / 64);
-        word.is_none_or(|word| word & (1 << (page % 64)) != 0)
+        let word = self.words.get(&(page / 64));
+        page > self.last || word.is_some_and(|word| word & (1 << (page % 64)) != 0)
     }
 }

@@ -1,7 +1,7 @@
 //! Recordings of ROS 2 in SQLite: the messages of the log they were made of, from files and pipes, with and without what
 //! a killed recorder left beside them; cut, and with each page lost in turn.
 
-use crate::made_databases::{Message, Topic, database};
+use crate::made_databases::{Message, Topic, database, sealed};
 use crate::mcap_logs::{Read, from_bytes, read, read_some};
 use std::path::PathBuf;
 use strapd_recording::format::Format;
@@ -139,6 +139,44 @@ fn a_changed_or_cut_file_beside_the_database_gives_its_whole_transactions_and_sa
     assert!(n == KILLED[0] && report.survey.problems.losses() > 0);
 }
 
+/// A page that lies beyond everything costs neither time nor memory, whether its transaction gives it a number or not.
+#[test]
+fn a_far_page_in_the_file_beside_the_database_is_no_page_of_it() {
+    let (database, wal) = (
+        bytes("constant_rate_killed.db3"),
+        bytes("constant_rate_killed.db3-wal"),
+    );
+    let frame = |nth: usize| 32 + nth * (24 + 1024);
+    let frames = (wal.len() - 32) / (24 + 1024);
+    for far in [3_000_000_u32, u32::MAX - 1] {
+        for is_committed in [false, true] {
+            let mut changed = wal.clone();
+            changed[frame(8)..][..4].copy_from_slice(&far.to_be_bytes());
+            for nth in (0..frames).filter(|_| is_committed) {
+                let size = &mut changed[frame(nth) + 4..][..4];
+                if size != [0; 4] {
+                    size.copy_from_slice(&far.to_be_bytes());
+                }
+            }
+            sealed(&mut changed);
+            let (_dir, reader) = opened(&database, Some(&changed));
+            let start = std::time::Instant::now();
+            let (ours, report) = read(reader);
+            let said = kinds(&report);
+            let ours = told(ours);
+            let all = expected();
+            assert!(ours.len() >= KILLED[0] && ours.iter().all(|m| all.contains(m)));
+            let is_beside = |kind: &ProblemKind| matches!(kind, ProblemKind::Beside { .. });
+            assert_eq!(said.iter().any(is_beside), !is_committed, "{far}: {said:?}");
+            // They take milliseconds; a look at each number would take minutes.
+            assert!(
+                start.elapsed() < std::time::Duration::from_secs(20),
+                "{far}"
+            );
+        }
+    }
+}
+
 #[test]
 fn a_database_cut_anywhere_gives_every_message_whose_page_is_whole_and_says_that_it_is_cut() {
     let whole = bytes("constant_rate.db3");
@@ -271,6 +309,25 @@ fn messages_that_were_packed_one_by_one_are_unpacked_and_a_bomb_among_them_is_re
     let why: Vec<String> = kinds(&report).iter().map(ToString::to_string).collect();
     assert!(why[0].contains("more than the limit"), "{why:?}");
     assert!(why[1].contains("does not unpack"), "{why:?}");
+}
+
+/// Of 60 bytes each, a megabyte is unpacked: what all of them may come to has an end, and what is beyond it is counted.
+#[test]
+fn messages_that_unpack_to_more_than_their_share_are_read_up_to_a_bound_for_all() {
+    let zeros = zstd::bulk::compress(&vec![0; 1 << 20], 1).unwrap();
+    assert!(zeros.len() < 100);
+    let messages: Vec<Message<'_>> = (0..400).map(|n| (0, n, &zeros[..])).collect();
+    let (ours, report) = read(from_bytes(&database(PAGE, &[IMU], &messages)).unwrap());
+    // A quarter of a gibibyte beyond a thousand times what they are packed in.
+    let share = (1 << 20) - 1000 * zeros.len();
+    let all = (256 << 20) / share;
+    assert!((all..=all + 1).contains(&ours.len()), "{}", ours.len());
+    let lost = 400 - ours.len() as u64;
+    assert_eq!(report.survey.problems.messages_lost(), lost);
+    let why = ProblemKind::Row {
+        why: "it unpacks to more than the limit",
+    };
+    assert_eq!(kinds(&report).first(), Some(&why));
 }
 
 #[test]

@@ -13,6 +13,10 @@ use std::sync::Arc;
 /// Bytes read at most at a time, where pages follow each other.
 const WINDOW: usize = 256 << 10;
 
+/// What is wrong with a frame whose number no transaction gave out.
+const BEYOND: &str =
+    "a page in it lies beyond the size that its transaction commits; it is left out";
+
 /// Pages in two files.
 #[derive(Debug)]
 pub(super) struct FilePages {
@@ -22,6 +26,8 @@ pub(super) struct FilePages {
     committed: BTreeMap<u32, u64>,
     page_size: u32,
     usable: usize,
+    /// Pages in the database itself.
+    own: u32,
     count: u32,
     /// What was read ahead, and where it begins.
     window: Vec<u8>,
@@ -54,12 +60,14 @@ impl FilePages {
             Ok(header) => header,
             Err(why) => return Ok(Err(why)),
         };
-        let count = file.len / u64::from(header.page_size);
+        let own = file.len / u64::from(header.page_size);
+        // More than the format can number are none.
+        let own = u32::try_from(own).unwrap_or(u32::MAX - 1);
         let mut pages = FilePages {
             page_size: header.page_size,
             usable: header.usable as usize,
-            // More than the format can number are none.
-            count: u32::try_from(count).unwrap_or(u32::MAX - 1),
+            own,
+            count: own,
             file,
             beside: None,
             committed: BTreeMap::new(),
@@ -137,7 +145,13 @@ impl FilePages {
                     pending.insert(found.page, at + wal::FRAME as u64);
                     if let Some(size) = found.commits {
                         pages = Some(size);
+                        let mut beyond = pending.split_off(&size.saturating_add(1));
+                        if let Some((_, at)) = beyond.pop_first() {
+                            fault(at, BEYOND);
+                        }
                         self.committed.append(&mut pending);
+                        // What an earlier transaction had there was given back.
+                        self.committed.split_off(&size.saturating_add(1));
                     }
                 }
             }
@@ -192,6 +206,15 @@ impl Pages for FilePages {
         self.count
     }
 
+    fn following(&self, number: u32) -> Option<u32> {
+        let next = number.checked_add(1)?;
+        if next <= self.own {
+            return Some(next);
+        }
+        let mut committed = self.committed.range(next..);
+        committed.next().map(|(number, _)| *number)
+    }
+
     fn page(&mut self, number: u32, into: &mut Vec<u8>) -> io::Result<bool> {
         into.clear();
         match (self.committed.get(&number), &self.beside) {
@@ -199,6 +222,7 @@ impl Pages for FilePages {
                 into.resize(self.usable, 0);
                 Ok(beside.read_at(into, *at)? == self.usable)
             }
+            _ if number > self.own => Ok(false),
             _ => self.read_page(self.offset(number), into),
         }
     }
