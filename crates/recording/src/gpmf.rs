@@ -15,11 +15,14 @@ mod stream;
 mod transcriber;
 
 pub(crate) use klv::{HEAD as ITEM_HEAD, length as item_length, next_device};
-pub(crate) use movie::{Movie, Sample, index};
+pub(crate) use movie::{Lasts, Movie, Sample, index};
 pub(crate) use transcriber::Transcriber;
 
 /// The first bytes of a stream without a video around it.
 pub(crate) const MAGIC: [u8; 5] = *b"DEVC\0";
+
+/// What a payload is taken to last where nothing says it, ns: cameras write one a second.
+pub(crate) const SECOND: u64 = 1_000_000_000;
 
 /// Longest payload that is read, bytes; those in use are a hundredth of that.
 pub(crate) const LONGEST: u64 = 4 << 20;

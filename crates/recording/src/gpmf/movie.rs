@@ -104,6 +104,16 @@ fn table(bytes: &[u8], at: usize, each: usize) -> Vec<u32> {
     words.take(count.saturating_mul(each)).collect()
 }
 
+/// How long a payload lasts by its track, ns.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Lasts {
+    /// The track says it of this one.
+    Own(u64),
+    /// The track says it of several alike, of which the last may have been cut.
+    Alike(u64),
+    Unsaid,
+}
+
 /// One payload.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Sample {
@@ -111,7 +121,7 @@ pub(crate) struct Sample {
     pub(crate) size: u64,
     /// From the beginning of the track, ns.
     pub(crate) at: u64,
-    pub(crate) lasts: u64,
+    pub(crate) lasts: Lasts,
 }
 
 /// The track of telemetry of a video.
@@ -238,12 +248,12 @@ impl Iterator for Movie {
         let per_chunk = run(next.run)
             .and_then(|run| run.get(1))
             .filter(|n| **n > 0)?;
-        let lasts = loop {
+        let (lasts, alike) = loop {
             match self.lengths.get(2 * next.length..2 * next.length + 2) {
-                Some([count, lasts]) if next.used < *count => break *lasts,
+                Some([count, lasts]) if next.used < *count => break (*lasts, *count),
                 Some(_) => (next.length, next.used) = (next.length + 1, 0),
-                // Those without a length last as long as the last.
-                None => break self.lengths.last().copied()?,
+                // Those without a length are as far apart as the last.
+                None => break (self.lengths.last().copied()?, 0),
             }
         };
         let (at, end) = (next.time, next.time.saturating_add(u64::from(lasts)));
@@ -251,7 +261,11 @@ impl Iterator for Movie {
             offset: next.offset,
             size: u64::from(size),
             at: self.nanos(at),
-            lasts: self.nanos(end).saturating_sub(self.nanos(at)),
+            lasts: match (alike, self.nanos(end).saturating_sub(self.nanos(at))) {
+                (0, _) => Lasts::Unsaid,
+                (1, lasts) => Lasts::Own(lasts),
+                (_, lasts) => Lasts::Alike(lasts),
+            },
         };
         next.time = end;
         next.used = next.used.saturating_add(1);

@@ -5,7 +5,7 @@
 use super::klv::{Item, Items};
 
 /// What was measured.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(super) enum What {
     /// rad/s.
     Rate,

@@ -4,6 +4,7 @@
 //! between the beginnings of both.
 
 use super::stream::{Payload, Stream, What, payload};
+use super::{Lasts, SECOND};
 use crate::decode::known_definition;
 use crate::records::imu;
 use crate::records::transcript::Transcript;
@@ -21,6 +22,8 @@ pub(crate) struct Transcriber {
     channels: BTreeMap<u32, u16>,
     /// Samples that are not told yet, by channel.
     queues: BTreeMap<u16, Queue>,
+    /// What the payloads so far took by the beginnings of those that followed, ns, and their samples, by device and kind.
+    so_far: BTreeMap<(u32, What), (u64, u64)>,
     /// A stamp of the camera's clock, us, and the time it stands for, ns.
     anchor: Option<(u64, u64)>,
     /// What a camera calls itself.
@@ -32,9 +35,9 @@ pub(crate) struct Transcriber {
 
 #[derive(Debug)]
 struct Timed {
-    /// When it begins and how long it lasts, ns.
+    /// When it begins, ns, and how long it lasts by the track.
     at: u64,
-    lasts: u64,
+    lasts: Lasts,
     payload: Payload,
 }
 
@@ -74,7 +77,7 @@ impl Queue {
 
 impl Transcriber {
     /// Takes the next payload; `at` and `lasts` are of the track, ns. Tells the one before.
-    pub(crate) fn push(&mut self, at: u64, lasts: u64, bytes: &[u8], to: &mut Transcript) {
+    pub(crate) fn push(&mut self, at: u64, lasts: Lasts, bytes: &[u8], to: &mut Transcript) {
         let mut payload = payload(bytes);
         self.refused.append(&mut payload.refused);
         self.rest = payload.rest;
@@ -147,9 +150,10 @@ impl Transcriber {
         }
     }
 
-    /// When the samples of a stream were taken.
+    /// When the samples of a stream were taken: evenly up to the next payload; where none follows, as long as the track
+    /// says, or at the step of the payloads before.
     fn times(
-        &self,
+        &mut self,
         now: &Timed,
         next: Option<&Timed>,
         of: &Stream,
@@ -162,8 +166,31 @@ impl Transcriber {
             Some(self.begin(next, stream))
         });
         let end = follower.filter(|end| *end > begin && end - begin < FAR);
-        let lasts = end.map_or(now.lasts, |end| end - begin);
         let count = of.samples.len().max(1) as u64;
+        let so_far = self.so_far.entry((of.device, of.what)).or_default();
+        let lasts = match end {
+            Some(end) => {
+                let (took, samples) = *so_far;
+                *so_far = (took.saturating_add(end - begin), samples + count);
+                end - begin
+            }
+            None => {
+                let at_that_step = match *so_far {
+                    (_, 0) => None,
+                    (took, samples) => {
+                        let lasts = u128::from(took) * u128::from(count) / u128::from(samples);
+                        u64::try_from(lasts).ok()
+                    }
+                };
+                match (now.lasts, at_that_step) {
+                    (Lasts::Own(lasts), _) | (Lasts::Alike(lasts), None) => lasts,
+                    // As it was where nothing shows that it was cut.
+                    (Lasts::Alike(lasts), Some(step)) if lasts.abs_diff(step) < lasts / 10 => lasts,
+                    (_, Some(step)) => step,
+                    (Lasts::Unsaid, None) => SECOND,
+                }
+            }
+        };
         move |nth| {
             let part = u128::from(lasts) * nth as u128 / u128::from(count);
             begin.saturating_add(u64::try_from(part).unwrap_or(u64::MAX))

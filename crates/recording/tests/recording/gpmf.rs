@@ -207,6 +207,55 @@ fn samples_lie_evenly_between_the_beginnings_of_payloads() {
     assert_eq!(alone[198].log.0 - alone[0].log.0, 1_000_000_000);
 }
 
+/// An item: its key, the kind of its values, how large one is and how many, and their bytes, filled up to four.
+fn item(key: &[u8; 4], kind: u8, size: u8, bytes: &[u8]) -> Vec<u8> {
+    let count = (bytes.len() / usize::from(size)) as u16;
+    let mut item = [&key[..], &[kind, size], &count.to_be_bytes(), bytes].concat();
+    item.resize(item.len().next_multiple_of(4), 0);
+    item
+}
+
+/// A payload of so many rates.
+fn rates(count: usize) -> Vec<u8> {
+    let rates: Vec<u8> = (0..3 * count)
+        .flat_map(|n| (n as i16).to_be_bytes())
+        .collect();
+    let scale = item(b"SCAL", b's', 2, &1000_i16.to_be_bytes());
+    let stream = [scale, item(b"GYRO", b's', 6, &rates)].concat();
+    let number = item(b"DVID", b'L', 4, &1_u32.to_be_bytes());
+    let device = [number, item(b"STRM", 0, 1, &stream)].concat();
+    item(b"DEVC", 0, 1, &device)
+}
+
+/// Where a recording was stopped, the camera's last payload is of less than a second.
+#[test]
+fn samples_of_the_last_payload_are_as_far_apart_as_those_before_unless_the_track_says_how_long_it_is()
+ {
+    let payloads = [rates(200), rates(200), rates(118)];
+    let last_step = |bytes: &[u8]| {
+        let (ours, report) = samples(bytes);
+        assert_eq!(ours.len(), 518, "{:?}", report.survey.problems);
+        (ours[517].log.0 - ours[400].log.0) / 117
+    };
+    assert_eq!(last_step(&payloads.concat()), 5_000_000);
+    // One length for all is not that of the last.
+    let whole: Vec<&[u8]> = payloads.iter().map(Vec::as_slice).collect();
+    let alike = video(&whole, 1, b"gpmd");
+    assert_eq!(last_step(&alike), 5_005_000);
+    // A length of its own is: here 0.8 s.
+    let table = boxed(b"stts", &[&words(&[0, 1, 3, 1001])]);
+    let own = boxed(b"stts", &[&words(&[0, 2, 2, 1001, 1, 800])]);
+    let at = memchr::memmem::find(&alike, &table).unwrap();
+    let mut changed = [&alike[..at], &own, &alike[at + table.len()..]].concat();
+    for kind in [b"stbl", b"minf", b"mdia", b"trak", b"moov"] {
+        // The last of its kind: that of the telemetry, which the index ends with.
+        let at = memchr::memmem::rfind(&changed, kind).unwrap() - 4;
+        let length = u32::from_be_bytes(changed[at..at + 4].try_into().unwrap()) + 8;
+        changed[at..at + 4].copy_from_slice(&length.to_be_bytes());
+    }
+    assert_eq!(last_step(&changed), 800_000_000 / 118);
+}
+
 #[test]
 fn the_cameras_own_stamps_are_preferred_to_the_time_of_the_payload() {
     let raw = fixture("gopro_fusion.raw");

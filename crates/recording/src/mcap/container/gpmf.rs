@@ -9,7 +9,8 @@ use super::super::problem::{ProblemKind, Problems};
 use super::super::scan::{Facts, Item};
 use crate::format::Format;
 use crate::gpmf::{
-    self, ITEM_HEAD, LONGEST, MAGIC, Movie, Sample, Transcriber, item_length, next_device,
+    self, ITEM_HEAD, LONGEST, Lasts, MAGIC, Movie, SECOND, Sample, Transcriber, item_length,
+    next_device,
 };
 use crate::records::transcript::Transcript;
 use std::io;
@@ -22,8 +23,6 @@ const FIRST: usize = 256;
 const WINDOW: usize = 256 << 10;
 /// Bytes of a device up to the end of its number, which is its first item.
 const DEVICE: usize = ITEM_HEAD + ITEM_HEAD + 4;
-/// What a payload is taken to last where nothing says it, ns: cameras write one a second.
-const SECOND: u64 = 1_000_000_000;
 
 /// The walk over a recording.
 #[derive(Debug)]
@@ -254,7 +253,7 @@ impl Scanner {
         self.position = from;
         let tick = Transcriber::tick(&self.bytes).map(|millis| millis.saturating_mul(1_000_000));
         let time = tick.unwrap_or((count + 1).saturating_mul(SECOND));
-        self.transcriber.push(time, SECOND, &self.bytes, to);
+        self.transcriber.push(time, Lasts::Unsaid, &self.bytes, to);
         self.complain();
         let count = count + 1;
         self.source = Source::Bare { at, count };
