@@ -249,29 +249,38 @@ fn new() -> Thrift {
 
 /// A table of `stamp_ns`, `gyro_x`, `gyro_y`, `gyro_z`, whose columns all have the one page `body` behind `head`.
 fn table(rows: i64, codec: i64, head: Thrift, body: &[u8]) -> Vec<u8> {
+    let page = [&head.0[..], &[0], body].concat();
+    table_of_groups(rows, codec, &[page])
+}
+
+/// The same of several groups of rows, each with its page.
+fn table_of_groups(rows: i64, codec: i64, pages: &[Vec<u8>]) -> Vec<u8> {
     let mut bytes = b"PAR1".to_vec();
-    bytes.extend(head.0);
-    bytes.push(0);
-    bytes.extend(body);
-    let length = bytes.len() as i64 - 4;
     let mut schema = vec![new().text(4, "schema").number(1, 4)];
-    let mut chunks = Vec::new();
-    for name in ["stamp_ns", "gyro_x", "gyro_y", "gyro_z"] {
+    let names = ["stamp_ns", "gyro_x", "gyro_y", "gyro_z"];
+    for name in names {
         let kind = if name == "stamp_ns" { 2 } else { 5 };
         schema.push(new().number(1, kind).number(2, 0).text(1, name));
-        let about = new()
-            .number(4, codec)
-            .number(1, rows)
-            .number(2, length)
-            .number(2, 4);
-        chunks.push(new().inside(3, about));
     }
-    let group = new().list(1, chunks).number(2, rows);
+    let mut groups = Vec::new();
+    for page in pages {
+        let about = || {
+            new()
+                .number(4, codec)
+                .number(1, rows)
+                .number(2, page.len() as i64)
+                .number(2, bytes.len() as i64)
+        };
+        let chunks = names.map(|_| new().inside(3, about())).into();
+        groups.push(new().list(1, chunks).number(2, rows));
+        bytes.extend(page);
+    }
+    let all = rows.saturating_mul(pages.len() as i64);
     let footer = new()
         .number(1, 1)
         .list(1, schema)
-        .number(1, rows)
-        .list(1, vec![group]);
+        .number(1, all)
+        .list(1, groups);
     let size = footer.0.len() as u32 + 1;
     bytes.extend(footer.0);
     bytes.push(0);
@@ -291,6 +300,39 @@ fn page(unpacked: i64, packed: usize, rows: i64, encoding: i64) -> Thrift {
         .number(1, unpacked)
         .number(1, packed as i64)
         .inside(2, data)
+}
+
+#[test]
+fn a_damaged_group_of_rows_costs_its_own_rows_whichever_it_is() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = dir.path();
+    let group = |nth: i64| {
+        let stamps = (1..=100).flat_map(|n| ((nth * 100 + n) * 5_000_000).to_le_bytes());
+        let body: Vec<u8> = stamps.collect();
+        [page(800, 800, 100, 0).0, vec![0], body].concat()
+    };
+    for damaged in 0..3 {
+        let mut pages: Vec<Vec<u8>> = (0..3).map(group).collect();
+        pages[damaged][..8].fill(0xff);
+        std::fs::write(at.join("d.parquet"), table_of_groups(100, 0, &pages)).unwrap();
+        let ran = strapd(at, "replay d.parquet -o null:");
+        assert_eq!((ran.code, lost(&ran)), (Some(3), 100), "{damaged}: {ran:?}");
+        assert_eq!(samples(at, "d.parquet").lines().count(), 201, "{damaged}");
+        // Where the lines are is said of the file.
+        assert!(
+            ran.out.contains("header is damaged"),
+            "{damaged}: {}",
+            ran.out
+        );
+    }
+    // Of none is anything known.
+    let mut pages: Vec<Vec<u8>> = (0..2).map(group).collect();
+    for page in &mut pages {
+        page[..8].fill(0xff);
+    }
+    std::fs::write(at.join("d.parquet"), table_of_groups(100, 0, &pages)).unwrap();
+    let words = ["none of its first rows could be read", "header is damaged"];
+    strapd(at, "replay d.parquet -o null:").refused(1, &words);
 }
 
 #[test]

@@ -24,4 +24,6 @@ pub(crate) use own::is_own_column;
 #[cfg(feature = "parquet")]
 pub(crate) use rows::LOST;
 
-pub(crate) use layout::{MOST_HEAD_LINES, Opening, is_header, is_text_of_cells, may_be_table};
+pub(crate) use layout::{
+    Held, MOST_HEAD_LINES, Opening, is_header, is_text_of_cells, may_be_table,
+};

@@ -7,7 +7,7 @@ mod packed;
 
 use crate::decode::packed::{HEAD, MARK, length};
 use crate::decode::{Line, LineDecoder, MAX_LINE, Options, Undecodable};
-use crate::delimited::{Opening, Table};
+use crate::delimited::{Held, Opening, Table};
 use crate::error::{Error, Result};
 use crate::format::Format;
 use beside::Beside;
@@ -30,7 +30,7 @@ pub struct Lines<R> {
     offset: u64,
     line: Vec<u8>,
     /// Rows of a table that were looked at before, with their numbers.
-    held: VecDeque<(u64, Vec<u8>)>,
+    held: VecDeque<Held>,
     /// Files of the same recording with forces or fields, and what is next in this one.
     beside: Vec<Beside<R>>,
     next: Option<Next>,
@@ -227,8 +227,14 @@ impl<R: Read> Lines<R> {
 
     /// The next line: one that was looked at before, or from the input.
     fn next_line(&mut self) -> Result<bool> {
-        if let Some((number, line)) = self.held.pop_front() {
-            (self.current, self.line) = (number, line);
+        if let Some(held) = self.held.front_mut().filter(|held| held.times > 1) {
+            (self.current, self.line) = (held.number, held.line.clone());
+            held.number += 1;
+            held.times -= 1;
+            return Ok(true);
+        }
+        if let Some(held) = self.held.pop_front() {
+            (self.current, self.line) = (held.number, held.line);
             return Ok(true);
         }
         let is_there = self.read()?;

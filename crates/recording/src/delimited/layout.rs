@@ -9,7 +9,7 @@ mod roles;
 
 use super::column::{Column, is_comment};
 use super::preamble::Preamble;
-use super::rows::Table;
+use super::rows::{LOST, Table};
 use crate::columns::Delimiter;
 use crate::columns::{Columns, Role};
 use crate::columns::{Kind, Meant, Name};
@@ -18,6 +18,7 @@ use crate::decode::{Options, Wanted};
 use crate::text::printable;
 use crate::text::without_mark;
 use roles::Roles;
+use std::collections::BTreeMap;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::setting::{COLUMNS, DELIMITER};
 
@@ -147,13 +148,21 @@ pub(crate) struct Opening {
     stem: String,
     wanted: Wanted,
     lines: Vec<Vec<u8>>,
+    /// How often a line followed itself, by its place.
+    repeated: BTreeMap<usize, u64>,
     bytes: usize,
     found: Option<Found>,
     rows: usize,
 }
 
-/// Rows, each with the number of its line, from 1.
-type Rows = Vec<(u64, Vec<u8>)>;
+/// A line that was looked at, once or several times the same.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) struct Held {
+    /// The number of the first, from 1.
+    pub(crate) number: u64,
+    pub(crate) line: Vec<u8>,
+    pub(crate) times: u64,
+}
 
 /// Where the header is.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -173,6 +182,7 @@ impl Opening {
             stem: stem.to_owned(),
             wanted: options.wanted,
             lines: Vec::new(),
+            repeated: BTreeMap::new(),
             bytes: 0,
             found: None,
             rows: 0,
@@ -182,6 +192,16 @@ impl Opening {
     /// Takes the next line, blank ones too. Whether there must be more.
     pub(crate) fn take(&mut self, line: &[u8]) -> bool {
         let is_blank = line.iter().all(u8::is_ascii_whitespace);
+        if self.found.is_some() && line.starts_with(LOST) {
+            // A group of rows that is lost tells nothing of those that are not.
+            match self.lines.last() {
+                Some(last) if last == line => {
+                    *self.repeated.entry(self.lines.len() - 1).or_default() += 1;
+                }
+                _ => self.lines.push(line.to_owned()),
+            }
+            return true;
+        }
         self.bytes += line.len();
         if self.found.is_none() && !is_blank {
             self.found = self.header(line);
@@ -245,7 +265,7 @@ impl Opening {
     ///
     /// # Errors
     /// What is missing or can not be told, in words with their help.
-    pub(crate) fn finish(self) -> Result<(Table, Rows), Diagnostic> {
+    pub(crate) fn finish(self) -> Result<(Table, Vec<Held>), Diagnostic> {
         let Some(found) = self.found else {
             return Err(self.nothing());
         };
@@ -253,7 +273,7 @@ impl Opening {
         let first_row = found.at + usize::from(found.is_header);
         let mut behind = self.lines.iter().enumerate().skip(first_row);
         if found.is_own {
-            return Ok((Table::own(line)?, numbered(behind)));
+            return Ok((Table::own(line)?, numbered(behind, &self.repeated)));
         }
         let preamble = self.lines.iter().take(found.at).map(Vec::as_slice);
         let preamble = Preamble::of(preamble);
@@ -281,6 +301,9 @@ impl Opening {
             .filter(|line| is_row(line))
             .map(|line| text_cells(line, found.delimiter))
             .collect();
+        if !rows.iter().all(|row| why_lost(row).is_some()) {
+            rows.retain(|row| why_lost(row).is_none());
+        }
         // Rows of units, and of what else is said of columns (Shimmer), before the first numbers.
         let mut above = 0;
         while let Some(row) = rows.first().filter(|row| says_units(row, &names)) {
@@ -306,7 +329,7 @@ impl Opening {
         };
         let mut table = roles.table(header, found.delimiter)?;
         table.given = self.given;
-        Ok((table, numbered(behind)))
+        Ok((table, numbered(behind, &self.repeated)))
     }
 
     /// No header: what there is, and what would help.
@@ -383,10 +406,22 @@ impl Opening {
     }
 }
 
-fn numbered<'l>(lines: impl Iterator<Item = (usize, &'l Vec<u8>)>) -> Rows {
-    lines
-        .map(|(at, line)| (at as u64 + 1, line.clone()))
-        .collect()
+fn numbered<'l>(
+    lines: impl Iterator<Item = (usize, &'l Vec<u8>)>,
+    repeated: &BTreeMap<usize, u64>,
+) -> Vec<Held> {
+    let mut before = 0;
+    let held = |(at, line): (usize, &Vec<u8>)| {
+        let again = repeated.get(&at).copied().unwrap_or(0);
+        let number = at as u64 + 1 + before;
+        before += again;
+        Held {
+            number,
+            line: line.clone(),
+            times: 1 + again,
+        }
+    };
+    lines.map(held).collect()
 }
 
 /// The cells of a row as text, for what is looked at only once.
@@ -418,6 +453,11 @@ fn says_units(row: &[String], names: &[Name]) -> bool {
     of_roles().any(is_unit) && !of_roles().any(|(cell, _)| is_number(cell))
 }
 
+/// Why a row was lost before it came here.
+fn why_lost(row: &[String]) -> Option<&str> {
+    row.first()?.strip_prefix("\0lost ")
+}
+
 /// All of the first rows are longer or shorter than the header: the one or the other is cut wrongly.
 fn check_lengths(
     rows: &[Vec<String>],
@@ -434,8 +474,7 @@ fn check_lengths(
     if rows.iter().any(fits) {
         return Ok(());
     }
-    let lost = first.first().and_then(|cell| cell.strip_prefix("\0lost "));
-    if let Some(why) = lost {
+    if let Some(why) = why_lost(first) {
         return Err(format!("none of its first rows could be read: {}", printable(why)).into());
     }
     let what = format!("its rows have {} cells under {need} names", first.len());
