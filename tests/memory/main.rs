@@ -157,8 +157,45 @@ fn memory_is_bounded_by_what_is_in_flight_whatever_the_file() {
         assert!(grown <= 66, "{declared}: {grown} MiB");
         eprintln!("bomb declaring {declared}: peak grew by {grown} MiB");
     }
+    empty_messages_take_no_more_than_their_chunk(&path);
     recovering_holds_little_of_a_long_record(dir.path());
     a_table_is_read_row_by_row();
+}
+
+/// Two chunks of 60 MiB of messages without a payload, of each of which an item of some hundred bytes is made.
+fn empty_messages_take_no_more_than_their_chunk(path: &Path) {
+    let record = |opcode: u8, body: &[u8]| {
+        [&[opcode][..], &(body.len() as u64).to_le_bytes(), body].concat()
+    };
+    let text = |text: &str| [&(text.len() as u32).to_le_bytes(), text.as_bytes()].concat();
+    let channel = [&[1, 0, 0, 0][..], &text("/t"), &text("cdr"), &text("")].concat();
+    let message = record(op::MESSAGE, &[&[1, 0][..], &[0; 20]].concat());
+    let many = (60 << 20) / message.len();
+    {
+        let records = message.repeat(many);
+        let size = (records.len() as u64).to_le_bytes();
+        let head = [&[0; 16][..], &size, &[0; 4], &text(""), &size].concat();
+        let mut file = std::fs::File::create(path).unwrap();
+        file.write_all(&MAGIC).unwrap();
+        file.write_all(&record(op::CHANNEL, &channel)).unwrap();
+        for _ in 0..2 {
+            let length = (head.len() + records.len()) as u64;
+            file.write_all(&[op::CHUNK]).unwrap();
+            file.write_all(&length.to_le_bytes()).unwrap();
+            file.write_all(&head).unwrap();
+            file.write_all(&records).unwrap();
+        }
+    }
+    for threads in [1, 8] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        let pool = pool.build().unwrap();
+        let mut messages = 0;
+        let grown = added(|| messages = count(Reader::open(path).unwrap(), &pool).0);
+        assert_eq!(messages, 2 * many as u64);
+        eprintln!("empty messages, {threads} threads: peak grew by {grown} MiB");
+        // The chunk, and 64 MiB.
+        assert!(grown <= 60 + 64, "{threads} threads: {grown} MiB");
+    }
 }
 
 /// 100 MB of a table from nowhere: a line of 60 MB, and rows behind it.

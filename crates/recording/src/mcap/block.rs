@@ -3,11 +3,14 @@
 //! A stage of its own because it is what worker threads do, each with its own buffers: read,
 //! unpack within declared bounds, compare the CRC. Nothing of a chunk is used before its CRC holds.
 
-use super::input::{Held, LogFile};
+mod bag;
+
+use super::input::{Held, LogFile, Stretch};
 use super::problem::ProblemKind;
-use crate::bag;
+use super::record::op;
 use crate::records::transcript::Transcript;
-use std::io;
+use crate::records::{HEAD, head_at};
+use std::io::{self, BufReader};
 use std::sync::Arc;
 
 /// Buffers larger than this are given back after use, so that one large chunk does not stay.
@@ -132,12 +135,9 @@ impl Block {
             Kind::Chunk {
                 compression, size, ..
             } if compression != Compression::None => packed + size,
-            Kind::Bag {
-                compression, size, ..
-            } if compression != Compression::None => packed + 2 * size,
-            Kind::PassedOver { .. } => NEXT_TO_NOTHING,
             // What is told of it is a copy.
-            Kind::Bag { .. } => 2 * packed,
+            Kind::Bag { size, .. } => packed + size,
+            Kind::PassedOver { .. } => NEXT_TO_NOTHING,
             _ => packed,
         }
     }
@@ -204,6 +204,23 @@ impl Buffers {
     /// # Errors
     /// Only when the file itself can not be read.
     pub(super) fn open<'a>(&'a mut self, block: &'a Block) -> io::Result<Opened<'a>> {
+        let bag = match block.kind {
+            Kind::Bag {
+                compression,
+                size,
+                is_cut,
+                ..
+            } => Some((compression, size, is_cut)),
+            _ => None,
+        };
+        self.told.bytes.clear();
+        if let (Some(bag @ (Compression::None, ..)), Payload::At { file, offset, len }) =
+            (bag, &block.payload)
+        {
+            let mut packed = BufReader::new(Stretch::of(file, *offset, *len));
+            let told = bag::open((&mut packed, *len), bag, &mut self.plain, &mut self.told)?;
+            return Ok(told.map(|()| self.told.bytes.as_slice()));
+        }
         let mut seen = crc32fast::Hasher::new();
         let packed = match &block.payload {
             Payload::Held(held) => {
@@ -231,21 +248,9 @@ impl Buffers {
                 raw
             }
         };
-        if let Kind::Bag {
-            compression,
-            size,
-            is_cut,
-            ..
-        } = block.kind
-        {
-            self.told.bytes.clear();
-            let told = open_bag(
-                packed,
-                compression,
-                (size, is_cut),
-                &mut self.plain,
-                &mut self.told,
-            );
+        if let Some(bag) = bag {
+            let (mut bytes, length) = (packed, packed.len());
+            let told = bag::open((&mut bytes, length), bag, &mut self.plain, &mut self.told)?;
             return Ok(told.map(|()| self.told.bytes.as_slice()));
         }
         let Kind::Chunk {
@@ -278,7 +283,13 @@ impl Buffers {
                     _ => unzstd(&mut self.zstd, packed, plain).map(Unpacked::All),
                 };
                 match unpacked {
-                    Ok(Unpacked::All(n)) if n == size => plain,
+                    Ok(Unpacked::All(n)) if n == size => {
+                        if packed.len() < size / LEAST_RECORD && are_too_many(plain, packed.len()) {
+                            let why = TOO_MANY.to_owned();
+                            return Ok(Err(ProblemKind::Unpack { why }));
+                        }
+                        plain
+                    }
                     // What follows the records says itself what it is.
                     Ok(Unpacked::Records(end)) => {
                         return Ok(Ok(plain.get(..end).unwrap_or(&[])));
@@ -316,71 +327,37 @@ impl Buffers {
     }
 }
 
-/// Unpacks a bag's chunk no further than there are records, and tells them.
-fn open_bag(
-    packed: &[u8],
-    compression: Compression,
-    (size, is_cut): (usize, bool),
-    plain: &mut Vec<u8>,
-    told: &mut Transcript,
-) -> Result<(), ProblemKind> {
-    let mut lz4;
-    let mut bzip2;
-    let decoder: &mut dyn io::Read = match compression {
-        Compression::Lz4 => {
-            lz4 = lz4_flex::frame::FrameDecoder::new(packed);
-            &mut lz4
+/// Messages that a packed byte may stand for, and those that any chunk may have: two that differ in nothing but their
+/// time take three bytes.
+const MESSAGES_A_BYTE: usize = 4;
+const MESSAGES_OF_ANY: usize = 64;
+/// Bytes of the shortest message record of an MCAP, four of which a packed byte may stand for.
+const LEAST_RECORD: usize = MESSAGES_A_BYTE * 31;
+
+const TOO_MANY: &str = "it has more messages than so few bytes can tell apart";
+
+/// How many messages a chunk of so many packed bytes may have.
+pub(super) fn most_messages(packed: usize) -> usize {
+    packed
+        .saturating_mul(MESSAGES_A_BYTE)
+        .saturating_add(MESSAGES_OF_ANY)
+}
+
+/// Whether there are more messages in a chunk than its packed bytes can tell apart: work for nothing, without end.
+fn are_too_many(records: &[u8], packed: usize) -> bool {
+    let mut left = most_messages(packed);
+    let mut at = 0_usize;
+    while let Some((opcode, length)) = head_at(records, at) {
+        if opcode == op::MESSAGE {
+            let Some(less) = left.checked_sub(1) else {
+                return true;
+            };
+            left = less;
         }
-        Compression::Bzip2 => {
-            bzip2 = bzip2::bufread::BzDecoder::new(packed);
-            &mut bzip2
-        }
-        Compression::None | Compression::Zstd => {
-            if packed.len() != size && !is_cut {
-                let (declared, actual) = (size as u64, packed.len() as u64);
-                return Err(ProblemKind::ChunkSize { declared, actual });
-            }
-            bag::transcribe(packed, is_cut, told);
-            return Ok(());
-        }
-    };
-    let plain = room(plain, size);
-    let (mut have, mut at, mut is_end) = (0, 0, false);
-    while !is_end {
-        let known = plain.get(..have).unwrap_or(&[]);
-        let is_none = loop {
-            match bag::next_record(known, at) {
-                Ok(end) => at = end,
-                Err(is_none) => break is_none,
-            }
-        };
-        if is_none && at < have {
-            // Nothing behind this can be a record: of 2 kB of zeros, 64 MiB would be unpacked.
-            break;
-        }
-        let end = size.min(have + PIECE);
-        let mut beyond = [0];
-        let piece = match plain.get_mut(have..end).filter(|piece| !piece.is_empty()) {
-            Some(piece) => piece,
-            // One byte more would be one too many; this also verifies what checksum there is at the end.
-            None => &mut beyond[..],
-        };
-        match decoder.read(piece) {
-            Ok(n) => {
-                have += n;
-                is_end = n == 0 || have > size;
-            }
-            Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
-            Err(_) if is_cut => break,
-            Err(e) => return Err(ProblemKind::Unpack { why: e.to_string() }),
-        }
+        let length = usize::try_from(length).unwrap_or(usize::MAX);
+        at = (at + HEAD).saturating_add(length);
     }
-    if is_end && have != size && !is_cut {
-        let (declared, actual) = (size as u64, have as u64);
-        return Err(ProblemKind::ChunkSize { declared, actual });
-    }
-    bag::transcribe(plain.get(..have.min(size)).unwrap_or(&[]), is_cut, told);
-    Ok(())
+    false
 }
 
 /// Bytes a packed one stands for from which on a chunk is looked at before it is unpacked: only zeros and the
@@ -399,7 +376,7 @@ enum Unpacked {
 /// Unpacks piece by piece, and no further than there are records. Of 2 kB of zeros, 64 MiB would be unpacked,
 /// and none of them used.
 fn unzstd_records(packed: &[u8], plain: &mut [u8]) -> io::Result<Unpacked> {
-    const HEAD: usize = 9;
+    let mut left = most_messages(packed.len());
     let mut decoder = zstd::stream::read::Decoder::with_buffer(packed)?;
     let (mut have, mut at) = (0, 0_usize);
     loop {
@@ -409,6 +386,11 @@ fn unzstd_records(packed: &[u8], plain: &mut [u8]) -> io::Result<Unpacked> {
         {
             if *opcode == 0 {
                 return Ok(Unpacked::Records(at + HEAD));
+            }
+            if *opcode == op::MESSAGE {
+                left = left
+                    .checked_sub(1)
+                    .ok_or_else(|| io::Error::other(TOO_MANY))?;
             }
             let length = usize::try_from(u64::from_le_bytes(*length)).unwrap_or(usize::MAX);
             at = (at + HEAD).saturating_add(length);

@@ -110,6 +110,32 @@ impl LogFile {
     }
 }
 
+/// Bytes of a file, from one place to another.
+#[derive(Debug)]
+pub(super) struct Stretch<'f> {
+    file: &'f LogFile,
+    at: u64,
+    left: usize,
+}
+
+impl<'f> Stretch<'f> {
+    pub(super) fn of(file: &'f LogFile, at: u64, left: usize) -> Self {
+        Stretch { file, at, left }
+    }
+}
+
+impl Read for Stretch<'_> {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        let most = self.left.min(into.len());
+        let n = self
+            .file
+            .read_at(into.get_mut(..most).unwrap_or(&mut []), self.at)?;
+        self.at += n as u64;
+        self.left -= n;
+        Ok(n)
+    }
+}
+
 /// Where the bytes come from.
 pub(super) enum Input {
     File(Arc<LogFile>),

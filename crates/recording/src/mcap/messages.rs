@@ -4,7 +4,7 @@
 //! one table look-up per message, no allocation but the items.
 
 use super::channels::{Channel, NONE, Table};
-use super::order::Batch;
+use super::order::{Batch, PIECE};
 use super::problem::ProblemKind;
 use super::record::{MessageRecord, op};
 use crate::records::{HEAD, head_at};
@@ -111,6 +111,10 @@ impl Met {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Stop {
     End,
+    /// Enough items for now; the next record is at this offset in the block.
+    Full {
+        at: usize,
+    },
     /// A schema or channel record the table does not hold, at this offset in the block.
     Definition {
         at: usize,
@@ -143,7 +147,7 @@ impl Stop {
                 Some((kind, at))
             }
             Stop::NoRecord { at } => Some((ProblemKind::NoInnerRecord { at: at as u64 }, at)),
-            Stop::End | Stop::Definition { .. } | Stop::Adopt { .. } => None,
+            Stop::End | Stop::Full { .. } | Stop::Definition { .. } | Stop::Adopt { .. } => None,
         }
     }
 }
@@ -212,7 +216,11 @@ pub(super) fn pass<T, D>(
                                 inner,
                             };
                             map(choice, &message, &mut batch.items);
-                            batch.stamp(m.log_time);
+                            batch.stamp(m.log_time, m.data.len());
+                            if batch.weight() >= PIECE {
+                                let at = body_at + body.len();
+                                return Stop::Full { at };
+                            }
                         }
                     } else if table.can_adopt(m.channel_id) {
                         return Stop::Adopt {

@@ -16,6 +16,8 @@ pub struct Lookahead {
     pub bytes: usize,
     /// Items held back because blocks overlap, at most, in bytes.
     pub held_bytes: usize,
+    /// ... or bytes of the items in those blocks: of empty messages, a hundred fit where one of use does.
+    pub item_bytes: usize,
 }
 
 impl Lookahead {
@@ -24,6 +26,7 @@ impl Lookahead {
         blocks: 0,
         bytes: 0,
         held_bytes: 0,
+        item_bytes: 0,
     };
 }
 
@@ -33,6 +36,7 @@ impl Default for Lookahead {
             blocks: 32,
             bytes: 4 << 20,
             held_bytes: 8 << 20,
+            item_bytes: 24 << 20,
         }
     }
 }
@@ -54,7 +58,15 @@ pub(super) struct Batch<T> {
     times: Vec<u64>,
     /// How often the log time stepped back from one message to the next.
     steps_back: u64,
+    /// Memory of the items, and of what they hold elsewhere, at most about, bytes.
+    weight: usize,
 }
+
+/// Weight from which on the items of a block are passed on, and more are made of it only then.
+pub(super) const PIECE: usize = 8 << 20;
+
+/// What an item may have allocated beside the payload.
+const ALLOCATED: usize = 64;
 
 impl<T> Default for Batch<T> {
     fn default() -> Self {
@@ -62,20 +74,23 @@ impl<T> Default for Batch<T> {
             items: Vec::new(),
             times: Vec::new(),
             steps_back: 0,
+            weight: 0,
         }
     }
 }
 
 impl<T> Batch<T> {
-    /// Gives every item appended since the last call this log time.
+    /// Gives every item appended since the last call this log time; they were made of a payload of so many bytes.
     #[inline]
-    pub(super) fn stamp(&mut self, log_time: u64) {
+    pub(super) fn stamp(&mut self, log_time: u64, payload: usize) {
         if self.items.len() <= self.times.len() {
             // A `map` that removes items it was not given would break the pairing.
             self.times.truncate(self.items.len());
             return;
         }
         self.steps_back += u64::from(self.times.last().is_some_and(|t| *t > log_time));
+        let own = (self.items.len() - self.times.len()).saturating_mul(size_of::<T>() + 8);
+        self.weight = (self.weight + payload + ALLOCATED).saturating_add(own);
         self.times.resize(self.items.len(), log_time);
     }
 
@@ -83,6 +98,11 @@ impl<T> Batch<T> {
         self.items.clear();
         self.times.clear();
         self.steps_back = 0;
+        self.weight = 0;
+    }
+
+    pub(super) fn weight(&self) -> usize {
+        self.weight
     }
 
     /// Memory behind it, bytes.
@@ -117,6 +137,10 @@ impl<T> Batch<T> {
 
     /// Moves the first `n` items to `out`.
     fn move_front(&mut self, n: usize, out: &mut Batch<T>) {
+        let part = self.weight as u128 * n as u128 / self.items.len().max(1) as u128;
+        let part = usize::try_from(part).unwrap_or(self.weight);
+        self.weight -= part;
+        out.weight += part;
         out.items.extend(self.items.drain(..n));
         out.times.extend(self.times.drain(..n));
     }
@@ -128,13 +152,17 @@ impl<T> Batch<T> {
         } else {
             self.items.append(&mut later.items);
             self.times.append(&mut later.times);
+            self.weight += std::mem::take(&mut later.weight);
         }
         put(later);
     }
 
     /// Both in one, in order; on equal times `self`'s come first.
     fn merge(&mut self, mut later: Batch<T>) -> Batch<T> {
-        let mut out = Batch::default();
+        let mut out = Batch {
+            weight: self.weight + later.weight,
+            ..Batch::default()
+        };
         out.items.reserve(self.items.len() + later.items.len());
         out.times.reserve(self.times.len() + later.times.len());
         let mut right = later.times.drain(..).zip(later.items.drain(..)).peekable();
@@ -169,6 +197,7 @@ pub(super) struct Merger<T> {
     /// Blocks and bytes behind the front of the window.
     blocks: usize,
     bytes: usize,
+    weight: usize,
     /// Greatest log time taken in.
     greatest: Option<u64>,
     /// Greatest log time let go.
@@ -184,6 +213,7 @@ impl<T> Merger<T> {
             window: VecDeque::new(),
             blocks: 0,
             bytes: 0,
+            weight: 0,
             greatest: None,
             reached: None,
             late: 0,
@@ -209,6 +239,7 @@ impl<T> Merger<T> {
         if !self.window.is_empty() {
             self.blocks += 1;
             self.bytes += bytes;
+            self.weight += batch.weight;
         }
         self.window.push_back(Waiting {
             batch,
@@ -222,6 +253,7 @@ impl<T> Merger<T> {
         if let Some(next) = self.window.front() {
             self.blocks = self.blocks.saturating_sub(next.blocks);
             self.bytes = self.bytes.saturating_sub(next.bytes);
+            self.weight = self.weight.saturating_sub(next.batch.weight);
         }
         Some(gone.batch)
     }
@@ -242,7 +274,10 @@ impl<T> Merger<T> {
                 }
                 continue;
             };
-            let full = self.blocks >= self.lookahead.blocks || self.bytes >= self.lookahead.bytes;
+            let ahead = &self.lookahead;
+            let full = self.blocks >= ahead.blocks
+                || self.bytes >= ahead.bytes
+                || self.weight >= ahead.item_bytes;
             let overflow = front.batch.bytes() > self.lookahead.held_bytes && front.blocks > 1;
             if !(last || full || overflow) {
                 return None;
@@ -276,6 +311,7 @@ impl<T> Merger<T> {
             let next = self.window.pop_front()?;
             self.blocks = self.blocks.saturating_sub(next.blocks);
             self.bytes = self.bytes.saturating_sub(next.bytes);
+            self.weight = self.weight.saturating_sub(next.batch.weight);
             self.window.push_front(Waiting {
                 batch: front.batch.merge(next.batch),
                 blocks: front.blocks + next.blocks,

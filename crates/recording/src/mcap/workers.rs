@@ -11,13 +11,16 @@ use super::order::{Batch, Order};
 use super::problem::ProblemKind;
 use std::collections::BTreeMap;
 use std::io;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::Sender;
 use std::sync::{Mutex, MutexGuard, PoisonError, RwLock};
 
 /// Batches kept for reuse, and the largest worth keeping.
 const SPARE: usize = 64;
 const SPARE_BYTES: usize = 4 << 20;
+
+/// Weight of all items that may wait for their turn; a block of more is given back, and done when its turn has come.
+const MOST_WAITING: usize = 16 << 20;
 
 /// What one worker needs and the next can use again.
 #[derive(Debug, Default)]
@@ -33,6 +36,8 @@ pub(super) struct Shared<T, D, M> {
     pub(super) map: M,
     pub(super) cancelled: AtomicBool,
     order: Order,
+    /// Weight of the items that workers have made, and the walk has not taken yet.
+    waiting: AtomicUsize,
     benches: Mutex<Vec<Bench>>,
     batches: Mutex<Vec<Batch<T>>>,
 }
@@ -49,6 +54,7 @@ impl<T, D, M> Shared<T, D, M> {
             map,
             cancelled: AtomicBool::new(false),
             order,
+            waiting: AtomicUsize::new(0),
             benches: Mutex::default(),
             batches: Mutex::default(),
         }
@@ -81,6 +87,22 @@ impl<T, D, M> Shared<T, D, M> {
         if batches.len() < SPARE && batch.capacity_bytes() <= SPARE_BYTES {
             batches.push(batch);
         }
+    }
+
+    /// Weight of the items that wait for their turn.
+    pub(super) fn waiting(&self) -> usize {
+        self.waiting.load(Ordering::Relaxed)
+    }
+
+    fn wait(&self, piece: &Piece<T>) -> usize {
+        let weight = piece.batch.weight();
+        weight + self.waiting.fetch_add(weight, Ordering::Relaxed)
+    }
+
+    /// Takes pieces that waited.
+    pub(super) fn take(&self, pieces: &[Piece<T>]) {
+        let weight = pieces.iter().map(|piece| piece.batch.weight()).sum();
+        self.waiting.fetch_sub(weight, Ordering::Relaxed);
     }
 
     /// Runs `look` on the table as it is now.
@@ -124,11 +146,27 @@ impl Findings {
     }
 }
 
+/// Items of a block, all or some, and the bytes of its records they were made of.
+#[derive(Debug)]
+pub(super) struct Piece<T> {
+    pub(super) batch: Batch<T>,
+    pub(super) bytes: usize,
+}
+
+impl<T> Default for Piece<T> {
+    fn default() -> Self {
+        Piece {
+            batch: Batch::default(),
+            bytes: 0,
+        }
+    }
+}
+
 /// What became of a block.
 #[derive(Debug)]
 pub(super) enum Done<T> {
     Walked {
-        batch: Batch<T>,
+        pieces: Vec<Piece<T>>,
         findings: Findings,
         /// What ended the pass early, and bytes of the block behind it.
         fault: Option<(ProblemKind, u64)>,
@@ -163,32 +201,22 @@ where
             Err(e) => Done::Failed(e),
             Ok(Err(kind)) => Done::Bad(kind),
             Ok(Ok(records)) => {
-                let mut batch = self.batch();
-                let stop = self.with_table(|table| {
-                    pass(
-                        records,
-                        0,
-                        place(block),
-                        table,
-                        &self.map,
-                        &mut bench.met,
-                        &mut batch,
-                    )
-                });
+                let mut pieces = Vec::new();
+                let stop = self.pieces(records, place(block), &mut bench.met, &mut pieces);
                 let fault = stop
                     .fault()
                     .map(|(kind, at)| (kind, records.len().saturating_sub(at) as u64));
                 match stop {
-                    Stop::End | Stop::Broken { .. } | Stop::NoRecord { .. } => {
-                        self.arrange(&mut batch);
-                        Done::Walked {
-                            batch,
-                            findings: Findings::of(&mut bench.met),
-                            fault,
+                    Stop::End | Stop::Broken { .. } | Stop::NoRecord { .. } => Done::Walked {
+                        pieces,
+                        findings: Findings::of(&mut bench.met),
+                        fault,
+                    },
+                    Stop::Full { .. } | Stop::Definition { .. } | Stop::Adopt { .. } => {
+                        self.take(&pieces);
+                        for piece in pieces {
+                            self.put_batch(piece.batch);
                         }
-                    }
-                    Stop::Definition { .. } | Stop::Adopt { .. } => {
-                        self.put_batch(batch);
                         Done::InOrder
                     }
                 }
@@ -196,6 +224,40 @@ where
         };
         self.put_bench(bench);
         done
+    }
+}
+
+impl<T, D, M> Shared<T, D, M>
+where
+    M: Fn(&D, &Message<'_>, &mut Vec<T>),
+{
+    /// Makes the items of a block, as long as they need not be too many at once; why that ended.
+    fn pieces(
+        &self,
+        records: &[u8],
+        place: Place,
+        met: &mut Met,
+        pieces: &mut Vec<Piece<T>>,
+    ) -> Stop {
+        let mut from = 0;
+        loop {
+            let mut batch = self.batch();
+            let stop = self
+                .with_table(|table| pass(records, from, place, table, &self.map, met, &mut batch));
+            self.arrange(&mut batch);
+            let end = match stop {
+                Stop::Full { at } => at,
+                _ => records.len(),
+            };
+            let bytes = end.saturating_sub(from);
+            let piece = Piece { batch, bytes };
+            let waiting = self.wait(&piece);
+            pieces.push(piece);
+            if !matches!(stop, Stop::Full { .. }) || waiting > MOST_WAITING {
+                return stop;
+            }
+            from = end;
+        }
     }
 }
 

@@ -380,3 +380,79 @@ fn order_and_times_of_a_bag_are_those_of_its_records() {
     let (ours, _) = read(from_bytes(&bytes("constant_rate_lz4.bag")).unwrap());
     assert!(ours == in_order(ours.clone()));
 }
+
+/// A record of a bag: its fields, and data.
+fn bag_record(fields: &[(&str, &[u8])], data: &[u8]) -> Vec<u8> {
+    let of = |(name, value): &(&str, &[u8])| {
+        let length = (name.len() + 1 + value.len()) as u32;
+        [&length.to_le_bytes()[..], name.as_bytes(), b"=", value].concat()
+    };
+    let fields: Vec<u8> = fields.iter().flat_map(of).collect();
+    let (head, length) = (fields.len() as u32, data.len() as u32);
+    [
+        &head.to_le_bytes()[..],
+        &fields,
+        &length.to_le_bytes(),
+        data,
+    ]
+    .concat()
+}
+
+/// A bag of one chunk of these records, packed with bzip2.
+fn bag_of(records: &[u8]) -> Vec<u8> {
+    let mut encoder = bzip2::write::BzEncoder::new(Vec::new(), bzip2::Compression::best());
+    std::io::Write::write_all(&mut encoder, records).unwrap();
+    let packed = encoder.finish().unwrap();
+    let size = (records.len() as u32).to_le_bytes();
+    let chunk = bag_record(
+        &[("op", &[5]), ("compression", b"bz2"), ("size", &size)],
+        &packed,
+    );
+    [&b"#ROSBAG V2.0\n"[..], &chunk].concat()
+}
+
+fn first_problem(bag: &[u8]) -> (usize, ProblemKind) {
+    let (ours, report) = read(from_bytes(bag).unwrap());
+    (ours.len(), report.survey.problems.first()[0].kind.clone())
+}
+
+/// Messages that differ in nothing are no recording, and cost as much as those that are.
+#[test]
+fn a_chunk_of_more_messages_than_its_bytes_can_tell_apart_is_refused() {
+    let connection = bag_record(
+        &[("op", &[7]), ("conn", &[0; 4]), ("topic", b"/t")],
+        &[&11_u32.to_le_bytes()[..], b"type=a/B..."].concat(),
+    );
+    let message = |time: u32| {
+        let time = [time.to_le_bytes(), [0; 4]].concat();
+        bag_record(&[("op", &[2]), ("conn", &[0; 4]), ("time", &time)], b"")
+    };
+    let same = [connection.clone(), message(7).repeat(100_000)].concat();
+    let (n, kind) = first_problem(&bag_of(&same));
+    assert!(
+        n == 0 && matches!(kind, ProblemKind::Unpack { .. }),
+        "{n} {kind:?}"
+    );
+    // Of those that differ in their time alone, each is one.
+    let apart: Vec<u8> = (0..20_000).flat_map(message).collect();
+    let (n, kind) = first_problem(&bag_of(&[connection, apart].concat()));
+    assert_eq!((n, kind), (20_000, ProblemKind::NoIndex));
+}
+
+/// A block of bzip2 takes the time of its size, whatever it is packed in: 45 bytes of zeros fill the largest.
+#[test]
+fn a_chunk_of_bzip2_is_given_no_larger_blocks_than_its_bytes_can_fill() {
+    let (n, kind) = first_problem(&bag_of(&vec![0; 60 << 20]));
+    assert!(
+        n == 0 && matches!(kind, ProblemKind::Unpack { .. }),
+        "{kind:?}"
+    );
+    // An image of one colour is nothing like it.
+    let black = bag_record(
+        &[("op", &[2]), ("conn", &[0; 4]), ("time", &[0; 8])],
+        &vec![0; 900_000],
+    );
+    let connection = bag_record(&[("op", &[7]), ("conn", &[0; 4]), ("topic", b"/t")], b"");
+    let (n, _) = first_problem(&bag_of(&[connection, black].concat()));
+    assert_eq!(n, 1);
+}

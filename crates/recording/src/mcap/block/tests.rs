@@ -55,3 +55,41 @@ fn a_chunk_of_records_alone_has_no_such_end() {
     let huge = zstd::bulk::compress(&[5, 255, 255, 255, 255, 255, 255, 255, 255, 0], 1).unwrap();
     assert_eq!(unpacked(&huge, 10), Unpacked::All(10));
 }
+
+#[test]
+fn a_packed_chunk_has_no_more_messages_than_its_bytes_can_tell_apart() {
+    let message = |time: u64| {
+        let mut record = record(op::MESSAGE, 22);
+        record[15..23].copy_from_slice(&time.to_le_bytes());
+        record
+    };
+    // Just suspect, and most suspect.
+    for times in [6_000, 1_000_000] {
+        let same = message(7).repeat(times);
+        let packed = zstd::bulk::compress(&same, 19).unwrap();
+        let mut buffers = Buffers::default();
+        let block = |packed: Vec<u8>, size: usize| Block {
+            offset: 0,
+            kind: Kind::Chunk {
+                compression: Compression::Zstd,
+                size,
+                crc: 0,
+                indexed: None,
+            },
+            payload: Payload::Held(Held {
+                range: 0..packed.len(),
+                bytes: packed,
+            }),
+        };
+        let block_of_same = block(packed, same.len());
+        let opened = buffers.open(&block_of_same).unwrap();
+        assert!(
+            matches!(opened, Err(ProblemKind::Unpack { .. })),
+            "{times}: {opened:?}"
+        );
+        let apart: Vec<u8> = (0..20_000).flat_map(message).collect();
+        let packed = zstd::bulk::compress(&apart, 19).unwrap();
+        let block = block(packed, apart.len());
+        assert_eq!(buffers.open(&block).unwrap(), Ok(&apart[..]));
+    }
+}

@@ -10,7 +10,7 @@ fn batch(times: &[u64], from: usize) -> Batch<Item> {
     let mut batch = Batch::default();
     for (i, time) in times.iter().enumerate() {
         batch.items.push((*time, from + i));
-        batch.stamp(*time);
+        batch.stamp(*time, 0);
     }
     batch.sort();
     batch
@@ -39,6 +39,7 @@ fn lookahead(blocks: usize, held_items: usize) -> Lookahead {
         blocks,
         bytes: usize::MAX,
         held_bytes,
+        item_bytes: usize::MAX,
     }
 }
 

@@ -15,7 +15,7 @@ use super::super::read_error;
 use super::super::record::Record;
 use super::super::scan::Item;
 use super::super::survey::Survey;
-use super::super::workers::{Done, Findings, Outcome, Shared, Ticket, place};
+use super::super::workers::{Done, Findings, Outcome, Piece, Shared, Ticket, place};
 use super::WalkReport;
 use crate::error::{Error, Result};
 use crate::records::{HEAD, head_at};
@@ -61,8 +61,7 @@ where
 {
     pub(super) fn alone(&mut self) -> Result<ControlFlow<()>> {
         while let Some(block) = self.next_block()? {
-            let batch = self.in_order(&block)?;
-            if self.deliver(batch, block)?.is_break() {
+            if self.in_order(block)?.is_break() {
                 return Ok(ControlFlow::Break(()));
             }
         }
@@ -96,15 +95,14 @@ where
                 if queue.is_empty() && self.shared.with_table(Table::is_empty) {
                     // No channel is known: the next definition would send every block back.
                     for block in group {
-                        let batch = self.in_order(&block)?;
-                        if self.deliver(batch, block)?.is_break() {
+                        if self.in_order(block)?.is_break() {
                             return Ok(ControlFlow::Break(()));
                         }
                     }
                     continue;
                 }
                 let more = group.iter().map(Block::cost).sum::<usize>();
-                if !queue.is_empty() && cost + more > in_flight {
+                if !queue.is_empty() && cost + more + self.shared.waiting() > in_flight {
                     staged = Some(group);
                     break;
                 }
@@ -136,8 +134,7 @@ where
                 return Ok(ControlFlow::Break(()));
             };
             for (block, done) in done {
-                let batch = self.accept(&block, done)?;
-                if self.deliver(batch, block)?.is_break() {
+                if self.accept(block, done)?.is_break() {
                     return Ok(ControlFlow::Break(()));
                 }
             }
@@ -158,31 +155,34 @@ where
     }
 
     /// Takes a worker's answer, or does the block again where it rests on other definitions.
-    fn accept(&mut self, block: &Block, done: Done<T>) -> Result<Batch<T>> {
+    fn accept(&mut self, block: Block, done: Done<T>) -> Result<ControlFlow<()>> {
         match done {
             Done::Failed(e) => Err(self.failed(block.offset, e)),
             Done::Bad(kind) => {
-                self.unusable(block, kind);
-                Ok(Batch::default())
+                self.unusable(&block, kind);
+                Ok(self.deliver(Vec::new(), block))
             }
             Done::Walked {
-                batch,
+                pieces,
                 findings,
                 fault,
-            } if self.shared.with_table(|table| findings.hold(table)) => {
+            } => {
+                self.shared.take(&pieces);
+                if !self.shared.with_table(|table| findings.hold(table)) {
+                    for piece in pieces {
+                        self.shared.put_batch(piece.batch);
+                    }
+                    return self.in_order(block);
+                }
                 match fault {
                     Some((kind, unread)) => {
                         self.problems.add(block.offset, kind, None);
                         self.problems.skip(unread);
                     }
-                    None => self.agrees(block, &findings)?,
+                    None => self.agrees(&block, &findings)?,
                 }
                 self.add_up(findings, block.offset);
-                Ok(batch)
-            }
-            Done::Walked { batch, .. } => {
-                self.shared.put_batch(batch);
-                self.in_order(block)
+                Ok(self.deliver(pieces, block))
             }
             Done::InOrder => self.in_order(block),
         }
@@ -201,27 +201,41 @@ where
     }
 
     /// Does a block whose predecessors are all done, taking in its definitions.
-    fn in_order(&mut self, block: &Block) -> Result<Batch<T>> {
+    fn in_order(&mut self, block: Block) -> Result<ControlFlow<()>> {
         let mut bench = self.shared.bench();
-        let mut batch = self.shared.batch();
-        let offset = block.offset;
-        match bench.buffers.open(block) {
+        let mut piece = Piece {
+            batch: self.shared.batch(),
+            bytes: 0,
+        };
+        let (offset, mut left) = (block.offset, size(&block));
+        match bench.buffers.open(&block) {
             Ok(Ok(body)) if matches!(block.kind, Kind::Attached { .. }) => {
-                self.attach(block, body);
+                self.attach(&block, body);
             }
             Err(e) => return Err(self.failed(offset, e)),
-            Ok(Err(kind)) => self.unusable(block, kind),
+            Ok(Err(kind)) => self.unusable(&block, kind),
             Ok(Ok(records)) => {
-                let mut from = 0;
+                let (mut from, mut begin) = (0, 0);
                 let mut is_whole = true;
-                loop {
+                let mut flow = ControlFlow::Continue(());
+                while flow.is_continue() {
                     let stop = self.shared.with_table(|table| {
                         let (map, met) = (&self.shared.map, &mut bench.met);
-                        pass(records, from, place(block), table, map, met, &mut batch)
+                        let batch = &mut piece.batch;
+                        pass(records, from, place(&block), table, map, met, batch)
                     });
                     let (select, problems) = (&mut *self.select, &mut self.problems);
                     match stop {
                         Stop::End => break,
+                        Stop::Full { at } => {
+                            let mut full = Piece {
+                                batch: std::mem::replace(&mut piece.batch, self.shared.batch()),
+                                bytes: at - begin,
+                            };
+                            self.shared.arrange(&mut full.batch);
+                            flow = self.push(full, &mut left);
+                            (from, begin) = (at, at);
+                        }
                         Stop::Broken { .. } | Stop::NoRecord { .. } => {
                             if let Some((kind, at)) = stop.fault() {
                                 problems.add(offset, kind, None);
@@ -251,15 +265,20 @@ where
                     }
                 }
                 let findings = Findings::of(&mut bench.met);
-                if is_whole {
-                    self.agrees(block, &findings)?;
+                if is_whole && flow.is_continue() {
+                    self.agrees(&block, &findings)?;
                 }
                 self.add_up(findings, offset);
-                self.shared.arrange(&mut batch);
+                if flow.is_break() {
+                    return Ok(flow);
+                }
+                self.shared.arrange(&mut piece.batch);
             }
         }
         self.shared.put_bench(bench);
-        Ok(batch)
+        piece.bytes = left;
+        self.scanner.recycle(block.payload);
+        Ok(self.push(piece, &mut left))
     }
 
     /// Holds a chunk against the index by which others are left out.
@@ -322,16 +341,24 @@ where
         }
     }
 
-    /// Puts a batch in order and lets go of what is ripe.
-    fn deliver(&mut self, batch: Batch<T>, block: Block) -> Result<ControlFlow<()>> {
-        // Not `Block::cost`: this has to be the same for a file and a stream.
-        let bytes = match block.kind {
-            Kind::Chunk { size, .. } | Kind::Bag { size, .. } | Kind::PassedOver { size } => size,
-            Kind::Run | Kind::Transcript | Kind::Attached { .. } => block.packed(),
-        };
+    /// Puts the pieces of a block in order and lets go of what is ripe.
+    fn deliver(&mut self, mut pieces: Vec<Piece<T>>, block: Block) -> ControlFlow<()> {
+        let mut left = size(&block);
         self.scanner.recycle(block.payload);
-        self.merger.push(batch, bytes);
-        Ok(self.let_go(false))
+        let mut last = pieces.pop().unwrap_or_default();
+        for piece in pieces {
+            self.push(piece, &mut left)?;
+        }
+        last.bytes = left;
+        self.push(last, &mut left)
+    }
+
+    /// Puts a piece in order, of a block of which so many bytes are left, and lets go of what is ripe.
+    fn push(&mut self, piece: Piece<T>, left: &mut usize) -> ControlFlow<()> {
+        let bytes = piece.bytes.min(*left);
+        *left -= bytes;
+        self.merger.push(piece.batch, bytes);
+        self.let_go(false)
     }
 
     fn let_go(&mut self, last: bool) -> ControlFlow<()> {
@@ -420,6 +447,14 @@ where
             steps_back: self.merger.steps_back(),
             stopped,
         }
+    }
+}
+
+/// What a block counts for where it is looked ahead. Not `Block::cost`: this has to be the same for a file and a stream.
+fn size(block: &Block) -> usize {
+    match block.kind {
+        Kind::Chunk { size, .. } | Kind::Bag { size, .. } | Kind::PassedOver { size } => size,
+        Kind::Run | Kind::Transcript | Kind::Attached { .. } => block.packed(),
     }
 }
 
