@@ -2,10 +2,13 @@
 //! good inputs (`fuzz/seeds`) changed at random: the functions are those of the fuzzers in `fuzz/`.
 //!
 //! `STRAPD_MUTATIONS=1000000 cargo test --release --test hostile mutations` runs as many cases for each;
-//! `STRAPD_MUTANTS=200000` as many changed logs through all commands.
+//! `STRAPD_MUTANTS=200000` as many changed logs through all commands, half of them changed as their formats know them;
+//! `STRAPD_MUTANTS_OF=db3` leaves it at those of one format.
 
 #[cfg(target_os = "linux")]
 mod commands;
+#[cfg(target_os = "linux")]
+mod structured;
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

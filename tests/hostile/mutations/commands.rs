@@ -2,6 +2,7 @@
 //!
 //! In a process of its own, whose standard output nobody reads; one thread, so that its time is all there is.
 
+use super::structured::{Changed, Formats};
 use super::{mutate, seeds};
 use crate::made_databases::database;
 use crate::made_logs::{bytes, logged, motion};
@@ -16,7 +17,7 @@ use strapd_recording::mcap::{MAGIC, op};
 
 /// What one command may take for one log of some 10 kB, in a debug build on any machine: processor time, s, and
 /// bytes read; they take 5 ms, and read the log a few times.
-const SECS: f64 = 4.0;
+const SECS: f64 = if cfg!(debug_assertions) { 4.0 } else { 2.0 };
 const READ: u64 = 64 << 20;
 /// Most memory of the process, MiB: what the largest chunk takes, twice, and the process itself.
 const MEMORY: u64 = 400;
@@ -75,9 +76,9 @@ fn record(opcode: u8, body: &[u8]) -> Vec<u8> {
     [&[opcode][..], &(body.len() as u64).to_le_bytes(), body].concat()
 }
 
-/// Changed records in a chunk whose checksum is right: what a broken writer makes.
-fn in_a_chunk(records: &[u8], packing: usize) -> Vec<u8> {
-    let (name, packed) = match packing % 3 {
+/// Records packed in turn not at all, with zstd and with LZ4: how, and what came of it.
+pub(super) fn packed(records: &[u8], packing: usize) -> (&'static str, Vec<u8>) {
+    match packing % 3 {
         0 => ("", records.to_vec()),
         1 => ("zstd", zstd::bulk::compress(records, 1).unwrap()),
         _ => {
@@ -85,7 +86,12 @@ fn in_a_chunk(records: &[u8], packing: usize) -> Vec<u8> {
             std::io::Write::write_all(&mut encoder, records).unwrap();
             ("lz4", encoder.finish().unwrap())
         }
-    };
+    }
+}
+
+/// Changed records in a chunk whose checksum is right: what a broken writer makes.
+fn in_a_chunk(records: &[u8], packing: usize) -> Vec<u8> {
+    let (name, packed) = packed(records, packing);
     let mut body = vec![0; 16];
     body.extend((records.len() as u64).to_le_bytes());
     body.extend(crc32fast::hash(records).to_le_bytes());
@@ -140,27 +146,43 @@ fn run(command: &str, log: &Path, out: &Path) {
     }
 }
 
+/// Writes a changed recording, and what is beside it.
+fn write(log: &Path, changed: &Changed) {
+    std::fs::write(log, &changed.bytes).unwrap();
+    let beside = Path::new(&format!("{}-wal", log.display())).to_owned();
+    match &changed.wal {
+        Some(wal) => std::fs::write(beside, wal).unwrap(),
+        None => drop(std::fs::remove_file(beside)),
+    }
+}
+
 /// As many changed logs as asked for, from the first asked for.
 fn work(from: usize, cases: usize) {
     let dir = tempfile::tempdir().unwrap();
     let (log, out) = (dir.path().join("log.mcap"), dir.path().join("out"));
-    let logs = logs();
+    let (logs, formats) = (logs(), Formats::new());
+    let is_one_format = std::env::var("STRAPD_MUTANTS_OF").is_ok();
     let (start, mut slowest, mut reads) = (Instant::now(), 0.0_f64, 0);
     for case in from..from + cases {
         // Each case by itself, so that one can be run again.
         let mut rng = ChaCha8Rng::seed_from_u64(case as u64);
         let whole = &logs[case % logs.len()];
         let other = &logs[rng.random_range(0..logs.len())];
-        let changed = if rng.random() {
-            let mut records = data_of(whole).to_vec();
-            mutate(&mut records, other, &mut rng);
-            in_a_chunk(&records, case)
-        } else {
-            let mut changed = whole.clone();
-            mutate(&mut changed, other, &mut rng);
-            changed
+        let changed = match rng.random_range(0..4) {
+            _ if is_one_format => formats.change(case, &mut rng),
+            0 => {
+                let mut records = data_of(whole).to_vec();
+                mutate(&mut records, other, &mut rng);
+                in_a_chunk(&records, case).into()
+            }
+            1 => {
+                let mut changed = whole.clone();
+                mutate(&mut changed, other, &mut rng);
+                changed.into()
+            }
+            _ => formats.change(case, &mut rng),
         };
-        std::fs::write(&log, &changed).unwrap();
+        write(&log, &changed);
         let command = COMMANDS[rng.random_range(0..COMMANDS.len())];
         let before = (spent(), number("/proc/self/io", "rchar: "));
         let outcome = catch_unwind(AssertUnwindSafe(|| run(command, &log, &out)));
@@ -171,7 +193,7 @@ fn work(from: usize, cases: usize) {
         reads = reads.max(read);
         if outcome.is_err() || secs > SECS || read > READ || memory > MEMORY {
             let kept = std::env::temp_dir().join(format!("strapd-mutant-{case}.mcap"));
-            std::fs::write(&kept, &changed).unwrap();
+            write(&kept, &changed);
             panic!(
                 "case {case}, strapd {command}: {secs:.2} s, {read} bytes read, {memory} MiB; kept as {}",
                 kept.display()
