@@ -26,7 +26,7 @@ impl From<Vec<u8>> for Changed {
     }
 }
 
-/// What changes the recordings of one format, and its name.
+/// The name of a format, and what changes its recordings.
 type Format = (&'static str, Box<dyn Fn(&mut ChaCha8Rng) -> Changed>);
 
 /// Every format, each with recordings of its own.
@@ -46,7 +46,7 @@ impl Formats {
         ])
     }
 
-    /// One of a format whose turn it is, or of the one that is asked for.
+    /// A changed recording of the format whose turn it is, or of the one that is asked for.
     pub(super) fn change(&self, nth: usize, rng: &mut ChaCha8Rng) -> Changed {
         let asked = std::env::var("STRAPD_MUTANTS_OF").ok();
         let of = |name: &String| self.0.iter().position(|(known, _)| known == name);
@@ -60,7 +60,7 @@ fn fixture(name: &str) -> Vec<u8> {
     std::fs::read(fixtures.join(name)).unwrap()
 }
 
-/// Another number in place of one: its neighbours, the ends of every width, or any.
+/// Another number instead of one: its neighbours, the ends of every width, or any.
 fn number(was: u64, rng: &mut ChaCha8Rng) -> u64 {
     match rng.random_range(0..9) {
         0 => 0,
@@ -75,7 +75,7 @@ fn number(was: u64, rng: &mut ChaCha8Rng) -> u64 {
     }
 }
 
-/// Another number in place of that of `width` bytes at a place, the least first.
+/// Another number instead of that of `width` bytes at a place, the least first.
 fn renumber(bytes: &mut [u8], at: usize, width: usize, rng: &mut ChaCha8Rng) {
     let Some(slot) = bytes.get_mut(at..at + width) else {
         return;

@@ -227,7 +227,7 @@ fn rates(count: usize) -> Vec<u8> {
     item(b"DEVC", 0, 1, &device)
 }
 
-/// Where a recording was stopped, the camera's last payload is of less than a second.
+/// A camera's last payload holds less than a second if the recording was stopped within one.
 #[test]
 fn samples_of_the_last_payload_are_as_far_apart_as_those_before_unless_the_track_says_how_long_it_is()
  {

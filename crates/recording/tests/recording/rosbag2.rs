@@ -311,7 +311,7 @@ fn messages_that_were_packed_one_by_one_are_unpacked_and_a_bomb_among_them_is_re
     assert!(why[1].contains("does not unpack"), "{why:?}");
 }
 
-/// Of 60 bytes each, a megabyte is unpacked: what all of them may come to has an end, and what is beyond it is counted.
+/// Messages of 60 bytes unpack to a megabyte each: the total has a bound, and what is beyond it is counted.
 #[test]
 fn messages_that_unpack_to_more_than_their_share_are_read_up_to_a_bound_for_all() {
     let zeros = zstd::bulk::compress(&vec![0; 1 << 20], 1).unwrap();

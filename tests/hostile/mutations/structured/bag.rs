@@ -12,7 +12,7 @@ struct Record {
     /// Names and values.
     fields: Vec<(Vec<u8>, Vec<u8>)>,
     data: Vec<u8>,
-    /// Of a chunk, in place of its data.
+    /// The records of a chunk, instead of its data.
     inner: Vec<Record>,
 }
 

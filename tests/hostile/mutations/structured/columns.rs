@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 /// A value of Thrift's compact protocol.
 #[derive(Clone)]
 enum Value {
-    /// True, false: its kind says which.
+    /// A truth value: its kind says which.
     Flag,
     Byte(u8),
     Whole(u64),

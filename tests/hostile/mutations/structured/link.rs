@@ -7,10 +7,10 @@ use rand_chacha::ChaCha8Rng;
 #[derive(Clone)]
 struct Frame {
     time: Vec<u8>,
-    /// From the mark to the payload, whose length is its second byte.
+    /// The bytes from the mark to the payload, whose length is the second.
     head: Vec<u8>,
     payload: Vec<u8>,
-    /// What its kind adds to the checksum.
+    /// The byte that its kind adds to the checksum.
     extra: u8,
 }
 

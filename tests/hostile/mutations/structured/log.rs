@@ -10,11 +10,11 @@ use strapd_recording::mcap::{MAGIC, op};
 struct Record {
     opcode: u8,
     body: Vec<u8>,
-    /// Of a chunk, in place of the end of its body.
+    /// The records of a chunk, instead of the end of its body.
     inner: Vec<Record>,
 }
 
-/// Before the checksum of a chunk's records, its size; behind it how they are packed.
+/// Bytes of a chunk's body before the size of its records.
 const CHUNK_HEAD: usize = 16;
 
 fn parse(bytes: &[u8]) -> Vec<Record> {

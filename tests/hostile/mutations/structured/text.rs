@@ -51,7 +51,7 @@ const NAMES: [&str; 16] = [
     "gyro",
 ];
 
-/// Where pieces begin that these letters part, with the pieces between.
+/// The cells of a line, and the letters between them.
 fn pieces(line: &str) -> Vec<String> {
     let parts = |c: char| ",;\t:[]{} ".contains(c);
     let mut found = vec![String::new()];
