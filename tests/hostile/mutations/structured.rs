@@ -135,7 +135,7 @@ fn rearrange<T: Clone>(parts: &mut Vec<T>, rng: &mut ChaCha8Rng) {
         3 => parts.truncate(at.max(1)),
         _ => {
             let part = parts[at].clone();
-            let times = 1 << rng.random_range(0..11);
+            let times = 1 << rng.random_range(0..7);
             parts.splice(other..other, std::iter::repeat_n(part, times));
         }
     }

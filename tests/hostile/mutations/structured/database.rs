@@ -6,6 +6,8 @@ use crate::made_logs::{logged, motion};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
+/// Bytes of a page of the recordings that are changed.
+const PAGE: usize = 1024;
 const WAL_HEAD: usize = 32;
 const FRAME: usize = 24;
 
@@ -40,8 +42,7 @@ fn change_page(page: &mut [u8], head: usize, rng: &mut ChaCha8Rng) {
 }
 
 fn change(bytes: &mut Vec<u8>, rng: &mut ChaCha8Rng) {
-    let size = usize::from(bytes[16]) << 8 | usize::from(bytes[17]);
-    let count = bytes.len() / size;
+    let count = bytes.len() / PAGE;
     if rng.random_range(0..4) == 0 {
         // Sizes, versions, how many pages there are, and which are free.
         let (at, width) = [
@@ -57,7 +58,7 @@ fn change(bytes: &mut Vec<u8>, rng: &mut ChaCha8Rng) {
         return renumber_big(bytes, at, width, rng);
     }
     if rng.random_range(0..6) == 0 {
-        let mut pages: Vec<Vec<u8>> = bytes.chunks(size).map(<[u8]>::to_vec).collect();
+        let mut pages: Vec<Vec<u8>> = bytes.chunks(PAGE).map(<[u8]>::to_vec).collect();
         let first = pages.remove(0);
         rearrange(&mut pages, rng);
         *bytes = [first, pages.concat()].concat();
@@ -65,11 +66,11 @@ fn change(bytes: &mut Vec<u8>, rng: &mut ChaCha8Rng) {
     }
     let page = rng.random_range(0..count);
     let head = if page == 0 { 100 } else { 0 };
-    change_page(&mut bytes[page * size..(page + 1) * size], head, rng);
+    change_page(&mut bytes[page * PAGE..(page + 1) * PAGE], head, rng);
 }
 
 fn change_wal(wal: &mut Vec<u8>, rng: &mut ChaCha8Rng) {
-    let size = FRAME + (usize::from(wal[10]) << 8 | usize::from(wal[11]));
+    let size = FRAME + PAGE;
     let count = (wal.len() - WAL_HEAD) / size;
     let at = WAL_HEAD + rng.random_range(0..count.max(1)) * size;
     match rng.random_range(0..8) {
