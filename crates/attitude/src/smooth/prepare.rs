@@ -8,13 +8,17 @@ use super::gate::{Gate, LONGEST_BRIDGE};
 use super::prepared::{BESIDE, Prepared};
 use super::sample::{Numbers, Sample};
 use super::settings::{SampleModel, Settings};
-use super::survey::Survey;
+use super::survey::{LONGEST, Survey};
 use nalgebra::Vector3;
 
 /// Longer steps, in ordinary ones, are gaps.
 const GAP: f64 = 1.6;
 /// Instantaneous samples farther apart get others between them, s.
 const LONGEST_STEP: f64 = 0.005;
+/// Samples that gaps may be filled with beyond [`FILLED`] for each that was measured: where stamps come in bursts the
+/// ordinary step says nothing of the time between these, and the work is to grow with the samples.
+const FILLED_BEFOREHAND: usize = 10_000;
+const FILLED: usize = 20;
 
 /// A stream of samples on its way to the sweep.
 pub(super) struct Preparer<'a> {
@@ -26,6 +30,8 @@ pub(super) struct Preparer<'a> {
     next: usize,
     /// For instantaneous samples.
     between: Option<Catmull>,
+    /// Samples that gaps may still be filled with.
+    fillers: usize,
 }
 
 impl<'a> Preparer<'a> {
@@ -40,6 +46,7 @@ impl<'a> Preparer<'a> {
             window: Vec::new(),
             next: 0,
             between: (settings.sample_model == SampleModel::Instant).then(|| Catmull::new(parts)),
+            fillers: FILLED_BEFOREHAND,
         }
     }
 
@@ -75,6 +82,9 @@ impl<'a> Preparer<'a> {
             let (sample, place) = self.window[i];
             let before = i.checked_sub(1).map(|j| self.window[j].0);
             let secs = before.map_or(0.0, |before| sample.stamp.secs_since(before.stamp));
+            let is_far = before.is_some_and(|before| sample.stamp.since(before.stamp) > LONGEST);
+            let is_gap = is_far || secs > GAP * self.survey.interval;
+            self.fillers = self.fillers.saturating_add(FILLED);
             let mut prepared = Prepared {
                 stamp: sample.stamp.0,
                 secs,
@@ -89,18 +99,20 @@ impl<'a> Preparer<'a> {
                 is_bridged: false,
                 doubt: [0.0; 2],
             };
-            if self.has_unresolved && secs <= GAP * self.survey.interval {
+            if self.has_unresolved && !is_gap {
                 prepared.doubt = bridge::unresolved(&self.window, i, secs);
             }
             if let Some(before) = &before
-                && secs > GAP * self.survey.interval
+                && is_gap
             {
                 if secs > LONGEST_BRIDGE {
                     prepared.is_after_break = true;
                 } else {
                     prepared.is_bridged = true;
                     prepared.doubt = bridge::doubt(before, &sample, secs);
-                    let more = (secs / self.survey.interval).round() as usize - 1;
+                    let wanted = (secs / self.survey.interval).round() as usize - 1;
+                    let more = wanted.min(self.fillers);
+                    self.fillers -= more;
                     let parts = (more + 1) as f64;
                     let curve = bridge::Hermite::across(&self.window, i, self.survey.interval);
                     for j in 1..=more {

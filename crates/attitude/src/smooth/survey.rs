@@ -21,7 +21,7 @@ const AROUND: usize = 8;
 /// More different intervals than this are counted in coarser bins.
 const MOST_INTERVALS: usize = 1 << 14;
 /// A step longer than this is no time of which anything is known, ns.
-const LONGEST: i64 = 10_000_000_000;
+pub(super) const LONGEST: i64 = 10_000_000_000;
 /// A field of unknown unit has this median, uT.
 const FIELD: f64 = 50.0;
 

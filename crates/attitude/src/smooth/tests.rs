@@ -5,3 +5,4 @@ mod input;
 mod logs;
 mod robustness;
 mod slopes;
+mod spans;
