@@ -6,8 +6,11 @@ use crate::parsers;
 use std::ops::ControlFlow;
 use strapd_attitude::record::Nanos;
 use strapd_recording::decode::framing::Framer;
-use strapd_recording::decode::{Channel, FieldPath, decode_line, role};
+use strapd_recording::decode::{Channel, FieldPath, Options, decode_line, role};
 use strapd_recording::mcap::{MAGIC, Reader, WalkOptions, op, walk};
+use strapd_recording::pool::Pool;
+use strapd_recording::recording::warn::Warn;
+use strapd_recording::{Input, Recording};
 
 /// A parser and what it is fed.
 pub(crate) struct Case {
@@ -122,6 +125,40 @@ fn mcap_file(data: &[u8]) {
         |_| ControlFlow::Continue(()),
     );
     assert!(report.is_ok());
+}
+
+/// What `info`, `check` and `report` look at, topic by topic.
+fn looked_at(data: &[u8]) {
+    let mut file = tempfile::NamedTempFile::new().unwrap();
+    std::io::Write::write_all(&mut file, data).unwrap();
+    let (pool, options) = (Pool::new(1).unwrap(), Options::default());
+    let input = Input::open(file.path(), &Warn::by(|_| {})).unwrap();
+    let log = Recording::told_apart(&input, None, &options, &pool).unwrap();
+    let looks = strapd_replay::pipeline::inspection::look(&log, None, &options, &pool).unwrap();
+    assert!(looks.topics.len() > 1 || data.len() < 1000);
+}
+
+/// Topics with a message each, and a type each, as in every bag of ROS 1.
+fn own_types(length: usize) -> Vec<u8> {
+    let said = "# what the type is for\n".repeat(25);
+    records(length, |n| {
+        let text =
+            format!("uint64 timestamp\nfloat32[3] gyro_rad\nuint32 gyro_integral_dt\n{said}# {n}");
+        let (id, schema) = ((n as u16).to_le_bytes(), (1 + n as u16).to_le_bytes());
+        let name = sized(b"px4_msgs/msg/SensorCombined");
+        let of_schema = [name, sized(b"ros2msg"), sized(text.as_bytes())].concat();
+        let topic = sized(format!("/t{n}").as_bytes());
+        let of_channel = [topic, sized(b"cdr"), sized(b"")].concat();
+        [
+            record(op::SCHEMA, &[&schema[..], &of_schema].concat()),
+            record(op::CHANNEL, &[&id[..], &schema, &of_channel].concat()),
+            record(
+                op::MESSAGE,
+                &[&id[..], &[0; 20], &[0, 1, 0, 0], &[0; 24]].concat(),
+            ),
+        ]
+        .concat()
+    })
 }
 
 /// A recording of ROS 2 in pages of 1 kB.
@@ -278,6 +315,9 @@ fn pieces(head: Vec<u8>, length: usize, piece: impl Fn(usize) -> Vec<u8>) -> Vec
 }
 
 pub(crate) const CASES: &[Case] = cases! {
+    looked_at => {
+        "log: topics of a type each": own_types;
+    }
     idl => {
         "IDL: tokens on one line": |n| again("struct A { double x; }; ", "; ", "", n);
         "IDL: members": |n| again("struct A { ", "double x; ", "};", n);

@@ -109,55 +109,88 @@ pub(super) fn of_fields(plan: &Plan, log: &Recording, own: &str) -> Result<Besid
     Ok(besides)
 }
 
-/// The topics beside `own` with magnetic fields, and with specific forces; and of the fields the one that
-/// `--aid gravity+mag` takes unnamed.
-#[must_use]
-pub fn vectors(log: &Recording, own: &str) -> [(Vec<TopicOfVectors>, Option<String>); 2] {
-    let plan = Plan::default();
+/// The topics of a log with vectors of their own. Found once for all topics of samples: each schema of the log is
+/// compiled for it.
+#[derive(Debug)]
+pub struct Vectors<'l> {
+    fields: Vec<TopicOfVectors>,
+    forces: Vec<TopicOfVectors>,
+    /// The channels of which `--aid gravity+mag` takes one unnamed.
+    unnamed: Vec<Readable<'l>>,
+}
+
+/// A channel, and how it is read.
+type Readable<'l> = (&'l LogChannel, Decoder);
+
+impl<'l> Vectors<'l> {
+    /// The topics of `log` with magnetic fields, and with specific forces.
+    #[must_use]
+    pub fn of(log: &'l Recording) -> Vectors<'l> {
+        let plan = Plan::default();
+        let fields = readable(&plan, log, Wanted::Fields);
+        Vectors {
+            forces: listed(log, Wanted::Forces, &readable(&plan, log, Wanted::Forces)),
+            fields: listed(log, Wanted::Fields, &fields),
+            unnamed: stamped(&plan, fields),
+        }
+    }
+
+    /// The topics beside `own` with magnetic fields, of these the one that `--aid gravity+mag` takes unnamed, and the
+    /// topics beside it with specific forces.
+    #[must_use]
+    pub fn beside(&self, own: &str) -> (Vec<TopicOfVectors>, Option<String>, Vec<TopicOfVectors>) {
+        let others = |all: &[TopicOfVectors]| -> Vec<TopicOfVectors> {
+            all.iter().filter(|t| t.topic != own).cloned().collect()
+        };
+        let fields = others(&self.fields);
+        let taken = one_beside(&self.unnamed, own).ok();
+        let taken = taken.map(|(known, _)| known.channel.topic.clone());
+        let is_listed = |name: &String| fields.iter().any(|t| t.topic == *name);
+        let taken = taken.filter(is_listed);
+        (fields, taken, others(&self.forces))
+    }
+}
+
+/// The channels with vectors of this kind, with their decoders.
+fn readable<'l>(plan: &Plan, log: &'l Recording, wanted: Wanted) -> Vec<Readable<'l>> {
+    let mut decoders = Decoders::of_run(plan, &options(wanted, None));
+    let channels = log.channels.iter();
+    channels
+        .filter(|known| known.messages > 0 && may_be_field(&known.channel))
+        .filter_map(|known| Some((known, known.decoder(&mut decoders).ok()?)))
+        .collect()
+}
+
+/// Those of them that have no rate: one beside it makes samples of their own.
+fn listed(log: &Recording, wanted: Wanted, found: &[Readable<'_>]) -> Vec<TopicOfVectors> {
     let secs = log
         .survey
         .times
         .map(|(a, b)| b.saturating_sub(a) as f64 * 1e-9);
-    [Wanted::Fields, Wanted::Forces].map(|wanted| {
-        let mut decoders = Decoders::of_run(&plan, &options(wanted, None));
-        let channels = log.channels.iter().filter(|known| {
-            known.channel.topic != own && known.messages > 0 && may_be_field(&known.channel)
-        });
-        let found: Vec<TopicOfVectors> = channels
-            .filter_map(|known| {
-                let decoder = known.decoder(&mut decoders).ok()?;
-                let stated = decoder.stated();
-                // A rate beside it makes samples of their own.
-                if stated.has_gyro || known.role.has_rate || !stated.has_stamp {
-                    return None;
-                }
-                let mut samples = Vec::new();
-                if let Some((at, payload)) = &known.first {
-                    let _ = decoder.decode(payload, *at, *at, &mut samples);
-                }
-                let vector = samples.first().and_then(|raw| match wanted {
-                    Wanted::Fields => raw.mag,
-                    _ => raw.accel,
-                });
-                Some(TopicOfVectors {
-                    topic: known.channel.topic.clone(),
-                    described: described(&known.channel),
-                    rate_hz: secs
-                        .filter(|secs| *secs > 0.0)
-                        .map(|secs| known.messages.saturating_sub(1) as f64 / secs),
-                    first: vector.map(|[x, y, z]| x.hypot(y).hypot(z)),
-                })
-            })
-            .collect();
-        let taken = match wanted {
-            Wanted::Fields => unnamed(&plan, Path::new(""), log, own).ok(),
-            _ => None,
-        };
-        let taken = taken.map(|(known, _)| known.channel.topic.clone());
-        let is_listed = |name: &String| found.iter().any(|t| t.topic == *name);
-        let taken = taken.filter(is_listed);
-        (found, taken)
-    })
+    let listed = found.iter().filter(|(known, decoder)| {
+        let stated = decoder.stated();
+        !stated.has_gyro && !known.role.has_rate && stated.has_stamp
+    });
+    listed
+        .map(|(known, decoder)| {
+            let mut samples = Vec::new();
+            if let Some((at, payload)) = &known.first {
+                let _ = decoder.decode(payload, *at, *at, &mut samples);
+            }
+            let vector = samples.first().and_then(|raw| match wanted {
+                Wanted::Fields => raw.mag,
+                _ => raw.accel,
+            });
+            TopicOfVectors {
+                topic: known.channel.topic.clone(),
+                described: described(&known.channel),
+                rate_hz: secs
+                    .filter(|secs| *secs > 0.0)
+                    .map(|secs| known.messages.saturating_sub(1) as f64 / secs),
+                first: vector.map(|[x, y, z]| x.hypot(y).hypot(z)),
+            }
+        })
+        .collect()
 }
 
 fn named<'l>(
@@ -193,30 +226,31 @@ fn named<'l>(
     Ok((known, decoder))
 }
 
+/// The topic whose field is taken unnamed.
+fn unnamed<'l>(plan: &Plan, path: &Path, log: &'l Recording, own: &str) -> Result<Readable<'l>> {
+    let found = stamped(plan, readable(plan, log, Wanted::Fields));
+    let one = one_beside(&found, own).map_err(|what| Error::unsupported(path, what))?;
+    Ok(one.clone())
+}
+
+/// Those whose messages can be placed in time.
+fn stamped<'l>(plan: &Plan, mut found: Vec<Readable<'l>>) -> Vec<Readable<'l>> {
+    found.retain(|(_, decoder)| decoder.stated().has_stamp || plan.clock != Clock::Header);
+    found
+}
+
 /// The one topic with a field, or of several the one beside the samples: `/imu/mag` beside `/imu/data`.
-fn unnamed<'l>(
-    plan: &Plan,
-    path: &Path,
-    log: &'l Recording,
+fn one_beside<'f, 'l>(
+    all: &'f [Readable<'l>],
     own: &str,
-) -> Result<(&'l LogChannel, Decoder)> {
-    let mut decoders = Decoders::of_run(plan, &options(Wanted::Fields, None));
-    let has_stamp = |decoder: &Decoder| decoder.stated().has_stamp || plan.clock != Clock::Header;
-    let mut found: Vec<(&LogChannel, Decoder)> = log
-        .channels
-        .iter()
-        .filter(|known| known.messages > 0 && may_be_field(&known.channel))
-        .filter_map(|known| Some((known, known.decoder(&mut decoders).ok()?)))
-        .filter(|(_, decoder)| has_stamp(decoder))
-        .collect();
-    if found.len() > 1 {
-        let folder = |topic: &str| topic.rsplit_once('/').map(|(folder, _)| folder.to_owned());
-        let beside =
-            |(known, _): &(&LogChannel, Decoder)| folder(&known.channel.topic) == folder(own);
-        if found.iter().filter(|k| beside(k)).count() == 1 {
-            found.retain(beside);
-        }
-    }
+) -> std::result::Result<&'f Readable<'l>, Diagnostic> {
+    let folder = |topic: &str| topic.rsplit_once('/').map(|(folder, _)| folder.to_owned());
+    let is_beside = |(known, _): &&Readable<'_>| folder(&known.channel.topic) == folder(own);
+    let mut beside = all.iter().filter(is_beside);
+    let found = match (all, beside.next(), beside.next()) {
+        ([one], ..) | (_, Some(one), None) => return Ok(one),
+        _ => all,
+    };
     let names: Vec<&str> = found
         .iter()
         .map(|(k, _)| k.channel.topic.as_str())
@@ -231,10 +265,7 @@ fn unnamed<'l>(
         ))
         .help(format!("{MAG_TOPIC} NAME")),
     };
-    match found.pop() {
-        Some(one) if found.is_empty() => Ok(one),
-        _ => Err(Error::unsupported(path, what)),
-    }
+    Err(what)
 }
 
 /// Whether a topic's fields may be taken unnamed: a vector of no name may be anything.

@@ -33,7 +33,16 @@ impl LogChannel {
             of: self.channel.topic.clone(),
             described: described(&self.channel),
             messages: Some(self.messages),
-            rank: rank(&self.role),
+            rank: self.rank(),
+        }
+    }
+
+    /// How likely this is "the IMU" ([`rank`]): a channel without a message is none, whatever its type.
+    #[must_use]
+    pub fn rank(&self) -> u8 {
+        match self.messages {
+            0 => 0,
+            _ => rank(&self.role),
         }
     }
 

@@ -19,7 +19,7 @@ use strapd_recording::Recording;
 use strapd_recording::decode::{self, Options};
 use strapd_recording::mcap::{self, Survey};
 use strapd_recording::pool::Pool;
-use strapd_recording::recording::beside::vectors;
+use strapd_recording::recording::beside::Vectors;
 use strapd_recording::recording::channel_route::{Item, Noticed, Route, Taker};
 use strapd_recording::recording::decoders::Decoders;
 use strapd_recording::recording::log_channel::{LogChannel, described, rank};
@@ -184,7 +184,7 @@ pub(crate) fn look_as(
         let noticed = Arc::new(Noticed::of(source));
         let mut begun = None;
         for known in log.channels_of(source) {
-            if rank(&known.role) < PICKED_UNNAMED && !is_named {
+            if known.rank() < PICKED_UNNAMED && !is_named {
                 continue;
             }
             let decoder = match known.decoder(&mut compiled) {
@@ -251,9 +251,10 @@ pub(crate) fn look_as(
         .into_iter()
         .map(|look| look.finish().map_err(unsupported))
         .collect::<Result<Vec<_>>>()?;
+    let vectors = Vectors::of(log);
     for topic in &mut topics {
-        let [fields, (forces, _)] = vectors(log, &topic.of);
-        (topic.aid.fields, topic.aid.forces) = (fields, forces);
+        let (fields, taken, forces) = vectors.beside(&topic.of);
+        (topic.aid.fields, topic.aid.forces) = ((fields, taken), forces);
         topic.has_reference = topic.quality.with_orientation > 0
             && topic.quality.orientation_varies
             || has_reference_beside(log, &topic.of);
@@ -262,7 +263,7 @@ pub(crate) fn look_as(
         log.channels
             .iter()
             .filter(|k| k.channel.topic == topic.of)
-            .map(|k| rank(&k.role))
+            .map(LogChannel::rank)
             .max()
     };
     let best = topics.iter().map(rank_of).max().flatten();
@@ -297,7 +298,7 @@ fn wanted<'l>(
     log: &'l Recording,
     named: Option<&str>,
 ) -> (Vec<(&'l Publisher, bool)>, Vec<String>) {
-    let best = |s: &Publisher| log.channels_of(s).map(|k| rank(&k.role)).max();
+    let best = |s: &Publisher| log.channels_of(s).map(LogChannel::rank).max();
     let mut found: Vec<_> = log
         .sources
         .iter()
