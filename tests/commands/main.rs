@@ -13,6 +13,7 @@ mod check;
 mod cli;
 mod containers;
 mod earth_rate;
+mod empty_topics;
 mod fixtures;
 mod folders;
 mod formats;

@@ -14,7 +14,7 @@ use strapd_attitude::setting::{
 };
 use strapd_recording::mcap::Survey;
 use strapd_recording::recording::beside::TopicOfVectors;
-use strapd_recording::recording::log_channel::{LogChannel, rank};
+use strapd_recording::recording::log_channel::LogChannel;
 use strapd_recording::{Input, MadeBefore, Source};
 
 /// Units of a field by the length of the Earth's, 22 to 67 uT, with room for what iron does to it.
@@ -90,7 +90,8 @@ impl Overview<'_> {
                 let mut ranks = BTreeMap::new();
                 for known in self.channels {
                     let topic = known.channel.topic.as_str();
-                    ranks.entry(topic).or_insert_with(|| rank(&known.role));
+                    let best = ranks.entry(topic).or_insert(0);
+                    *best = known.rank().max(*best);
                 }
                 let of = |l: &Inspection| ranks.get(l.of.as_str()).copied().unwrap_or(0);
                 let best = several.iter().map(of).max().unwrap_or(0);

@@ -6,7 +6,7 @@ use crate::report::summary::{human_bytes, significant};
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use strapd_recording::format::Format;
-use strapd_recording::recording::log_channel::{LogChannel, described, rank};
+use strapd_recording::recording::log_channel::{LogChannel, described};
 use strapd_recording::text::named_few;
 use strapd_replay::info::Overview;
 use strapd_replay::inspection::Inspection;
@@ -108,7 +108,10 @@ fn write_others(info: &Overview<'_>, out: &mut String) {
         .filter(|k| !looked.contains(k.channel.topic.as_str()))
         .collect();
     for known in others.iter().take(OTHERS) {
-        let what = match (rank(&known.role), known.role.has_orientation) {
+        let what = match (
+            known.rank(),
+            known.role.has_orientation && known.messages > 0,
+        ) {
             (1.., _) => "  (carries a rate: --topic takes it)",
             (_, true) => "  (carries an orientation: compare takes it)",
             _ => "",

@@ -167,7 +167,8 @@ pub fn survey(reader: &Reader, options: &WalkOptions<'_>) -> Result<Survey> {
 }
 
 fn from_summary(reader: &Reader, summary: Summary) -> Result<Option<Survey>> {
-    let Some(statistics) = summary.statistics else {
+    // Topics without a message are not chosen: that there is none anywhere is looked up.
+    let Some(statistics) = summary.statistics.filter(|s| s.message_count > 0) else {
         return Ok(None);
     };
     let mut problems = Problems::default();
@@ -196,8 +197,7 @@ fn from_summary(reader: &Reader, summary: Summary) -> Result<Option<Survey>> {
         has_summary: true,
         from_summary: true,
         messages: statistics.message_count,
-        times: (statistics.message_count > 0)
-            .then_some((statistics.message_start_time, statistics.message_end_time)),
+        times: Some((statistics.message_start_time, statistics.message_end_time)),
         facts: header(reader)?,
         problems,
         ..Survey::default()

@@ -17,6 +17,7 @@ use crate::decode::Options;
 use crate::error::{Error, Result};
 use crate::mcap::{self, Channel, Reader, Survey, WalkOptions};
 use crate::pool::Pool;
+use crate::text::printable;
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::Read;
 use std::ops::ControlFlow;
@@ -404,7 +405,7 @@ impl Recording {
                     .strip_suffix("/data")
                     .is_some_and(|name| inputs.contains(name))
         };
-        let rank_of = |known: &LogChannel| match rank(&known.role) {
+        let rank_of = |known: &LogChannel| match known.rank() {
             best if is_our_attitude(known) => best.min(PICKED_UNNAMED),
             best => best,
         };
@@ -460,6 +461,13 @@ pub fn explained(error: Error, channels: &[LogChannel], problems: &[String]) -> 
         let name = k.channel.schema.as_deref().map_or("", |s| &s.name);
         !k.role.has_rate && name.to_ascii_lowercase().contains("imu")
     };
+    let is_empty = |k: &&LogChannel| k.messages == 0 && rank(&k.role) >= PICKED_UNNAMED;
+    for empty in channels.iter().filter(is_empty).take(SAID) {
+        topics.push_str(&format!(
+            "\n  {} is of an IMU and has no message",
+            printable(&empty.channel.topic)
+        ));
+    }
     let mut decoders = Decoders::default();
     let refusals = channels
         .iter()

@@ -3,7 +3,7 @@
 //! Apart from the recording because a part is one itself: it is surveyed and read as if it were alone. What makes them one
 //! is here: that the times of one follow those of the other, and which channel of a part is which of the whole.
 
-use super::log_channel::{LogChannel, described, rank};
+use super::log_channel::{LogChannel, described};
 use super::sources::{is_same, publisher};
 use super::topics::PICKED_UNNAMED;
 use super::warn::Warn;
@@ -240,9 +240,7 @@ impl Whole {
 
 /// The topics that are sensors.
 fn imus(channels: &[LogChannel]) -> Vec<&str> {
-    let is_one = |known: &&LogChannel| {
-        known.messages > 0 && known.role.has_rate && rank(&known.role) > PICKED_UNNAMED
-    };
+    let is_one = |known: &&LogChannel| known.rank() > PICKED_UNNAMED;
     let topics = channels.iter().filter(is_one);
     topics.map(|known| known.channel.topic.as_str()).collect()
 }
