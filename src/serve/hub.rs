@@ -468,6 +468,12 @@ impl Hub {
         }
         self.deliver(sensor, id, text);
         let faults = sensor.stream.news();
+        for fault in faults.iter().filter(|f| f.code == Fault::STAMP_UNIT) {
+            log_throttle::warn(
+                &format!("stamp unit {id}"),
+                &format!("{id}: {}", fault.message),
+            );
+        }
         Ok(Feedback { note, faults })
     }
 

@@ -8,6 +8,7 @@ pub(super) mod attitude_now;
 mod intervals;
 mod resetting;
 pub mod run;
+mod stamp_unit;
 pub mod stamps;
 
 use crate::pipeline::session_builder::labelled;
@@ -22,6 +23,7 @@ use crate::sink::Stream;
 use intervals::Intervals;
 use resetting::Resetting;
 use run::{Placed, SampleRun, Span, Standing};
+use stamp_unit::StampUnit;
 use stamps::{Stamps, Taken};
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -65,6 +67,8 @@ pub struct SensorStream {
     ambiguous: Option<Fault>,
     /// Whether the samples' intervals can be true.
     intervals: Intervals,
+    /// Whether its stamps can be in the unit of their name.
+    stamp_unit: StampUnit,
     /// What was asked of it.
     resetting: Resetting,
     /// First stamp of the run.
@@ -179,6 +183,7 @@ impl SensorStream {
             stamps: Stamps::new(saved.as_ref().and_then(Saved::unit)),
             ambiguous: None,
             intervals: Intervals::default(),
+            stamp_unit: StampUnit::default(),
             resetting: Resetting::default(),
             saved,
             first: None,
@@ -259,6 +264,7 @@ impl SensorStream {
         self.told = 0;
         self.counted = self.conditioning().counts;
         self.intervals.reopen();
+        self.stamp_unit.meet();
     }
 
     /// The samples of a run whose stamps are known by now: `None` where these are all that came, as they
@@ -427,6 +433,7 @@ impl SensorStream {
         (self.first, self.last) = (None, None);
         self.joining = Joining::Joined;
         self.intervals.begin();
+        self.stamp_unit.begin();
         self.runs += 1;
         let secs = |nanos: Nanos| nanos.0 as f64 * 1e-9;
         let seen = match before.first {
@@ -487,6 +494,7 @@ impl SensorStream {
                 self.reset_if_asked(plan, raw);
                 self.estimator.take(raw);
                 self.intervals.take(raw, plan.clock, self.resolved.kind);
+                self.stamp_unit.take(raw, plan.clock);
             }
         }
         self.first = self.first.or(self.conditioning().first);
@@ -545,6 +553,7 @@ impl SensorStream {
         let counts = self.estimator.conditioning().counts;
         let mut news = Vec::from_iter(self.ambiguous.take());
         news.extend(self.intervals.news(&self.id));
+        news.extend(self.stamp_unit.news(&self.id));
         if std::mem::take(&mut self.has_unused_forces) && self.told & FORCES == 0 {
             self.told |= FORCES;
             news.push(Fault {
@@ -591,7 +600,8 @@ impl SensorStream {
             .chain(self.intervals.warning())
             .collect();
         let clock = self.prepared.clock.name();
-        let found = of_sensor(report, &self.estimator.propagation(), clock);
+        let mut found = of_sensor(report, &self.estimator.propagation(), clock);
+        found.extend(self.stamp_unit.finding());
         let stamp = |s: Nanos| {
             let (sec, nsec) = s.to_sec_nanosec();
             serde_json::json!({"sec": sec, "nsec": nsec})

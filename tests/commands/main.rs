@@ -37,6 +37,7 @@ mod rosbag2;
 mod simulate;
 mod sinks;
 mod smoothing;
+mod stamp_units;
 mod streams;
 mod tables;
 mod trajectory;

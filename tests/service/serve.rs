@@ -36,6 +36,7 @@ mod same_bytes;
 mod secrets;
 mod sending;
 mod slow_readers;
+mod stamp_units;
 mod state;
 mod storms;
 mod strangers;

@@ -40,8 +40,8 @@ pub use refusal::{Undecodable, Unsupported, exact_name};
 pub use role::{Rank, Role, role, role_of};
 pub use stamp::{Ambiguous, Bare, MOST_WAITING, unit_of};
 pub(crate) use stamp::{
-    bare as bare_of_text, decimal_in_steps, from_rfc3339 as instant_of_date, units_of_steps,
-    units_that_fit,
+    SHORTEST_STEP, bare as bare_of_text, decimal_in_steps, from_rfc3339 as instant_of_date,
+    units_of_steps, units_that_fit,
 };
 pub use stated::Stated;
 pub use strapd_attitude::condition::GyroUnit;
@@ -120,6 +120,13 @@ pub struct Options {
 }
 
 impl Options {
+    /// Whether the user says in which unit the stamps are.
+    #[must_use]
+    pub(crate) fn states_stamp_unit(&self) -> bool {
+        let mut fields = self.fields.iter();
+        self.columns.is_some() || fields.any(|f| f.role == FieldRole::Stamp && f.unit.is_some())
+    }
+
     /// Whether the user says where the samples' own interval lies, and in which unit.
     #[must_use]
     pub fn states_interval_unit(&self) -> bool {

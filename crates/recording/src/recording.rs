@@ -39,6 +39,7 @@ pub mod selection;
 pub mod sensor_lines;
 mod several;
 pub mod sources;
+pub mod stated_nanos;
 mod text_log;
 pub mod topic_reading;
 pub mod topics;

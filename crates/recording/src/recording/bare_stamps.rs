@@ -2,6 +2,7 @@
 //!
 //! Apart from the lines because each sensor of a log has a unit of its own.
 
+use super::stated_nanos::{StatedNanos, TooFast};
 use crate::decode::{Ambiguous, Bare, Line, MOST_WAITING, unit_of};
 use strapd_attitude::record::{Nanos, RawSample, TimeUnit};
 
@@ -13,6 +14,8 @@ const MOST_HELD: usize = 1024;
 pub(super) struct BareStamps {
     unit: Option<TimeUnit>,
     waiting: Vec<(RawSample, Option<Bare>)>,
+    /// Those that are none.
+    stated: StatedNanos,
 }
 
 impl BareStamps {
@@ -26,7 +29,12 @@ impl BareStamps {
         line: &Line,
     ) -> Result<impl Iterator<Item = RawSample>, Ambiguous> {
         let bare = line.bare.iter().copied().chain(std::iter::repeat(None));
-        self.waiting.extend(samples.drain(..).zip(bare));
+        for (raw, bare) in samples.drain(..).zip(bare) {
+            if let (Some(stamp), None, false) = (raw.header, bare, raw.is_beside) {
+                self.stated.take(stamp);
+            }
+            self.waiting.push((raw, bare));
+        }
         let mut numbers = self.numbers();
         let (first, ninth) = (numbers.next(), numbers.nth(MOST_WAITING - 1));
         let certain = first.and_then(Bare::certain_unit);
@@ -42,6 +50,16 @@ impl BareStamps {
     /// Several units would do, or none.
     pub(super) fn settle(&mut self) -> Result<impl Iterator<Item = RawSample>, Ambiguous> {
         self.release(true)
+    }
+
+    /// What is wrong with stamps that are in nanoseconds by their name.
+    pub(super) fn too_fast(&self) -> Option<TooFast> {
+        self.stated.too_fast()
+    }
+
+    /// How many of their steps are known.
+    pub(super) fn steps(&self) -> u64 {
+        self.stated.steps()
     }
 
     /// Those of the samples that wait: what is of other sensors than the gyro comes at other steps.

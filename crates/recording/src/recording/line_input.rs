@@ -62,6 +62,12 @@ pub(super) fn unclear(path: &Path, what: &Ambiguous) -> Error {
     }
 }
 
+/// Whether stamps that are nanoseconds by their name are held against their steps: a table of another maker was, by its
+/// first rows, and who states the unit is believed.
+pub(super) fn are_judged(lines: &Lines<impl Read>, options: &Options) -> bool {
+    lines.table().is_none_or(Table::is_own) && !options.states_stamp_unit()
+}
+
 /// What begins with no line of samples.
 pub(super) fn no_samples(path: &Path, lines: &Lines<impl Read>, why: &Undecodable) -> Error {
     let help = match lines.format() {

@@ -6,7 +6,7 @@
 use super::bare_stamps::BareStamps;
 use super::channel_route::Item;
 use super::early_besides::{EarlyBesides, are_beside};
-use super::line_input::{described, is_sure, no_samples, unclear};
+use super::line_input::{are_judged, described, is_sure, no_samples, unclear};
 use super::selection::Selection;
 use crate::attitude_line::TRUTH_ID;
 use crate::decode::{Class, Undecodable};
@@ -24,6 +24,8 @@ use strapd_attitude::setting::{COLUMNS, FIELD, RATE_HZ, TIME, TOPIC};
 
 /// Samples that are handed over together.
 const BATCH: usize = 2048;
+/// Steps between stamps after which the unit that their name states is judged; at the end fewer do.
+const STEPS: u64 = 4096;
 /// Lines without any sample before the first, after which this is no log of samples.
 const PATIENCE: u64 = 1000;
 
@@ -90,6 +92,11 @@ pub fn read<E: From<Error>>(
     let (mut early, mut first_bad) = (Vec::new(), None);
     let mut early_besides = EarlyBesides::default();
     let mut has_rates = false;
+    let is_judged = clock == Clock::Header && are_judged(&lines, &selection.decode);
+    let refused = |bare: &BareStamps| match bare.too_fast().filter(|_| is_judged) {
+        Some(found) => Err(Error::unsupported(path, found.in_file(format.is_table()))),
+        None => Ok(()),
+    };
     let mut samples = Vec::new();
     let mut items = Vec::with_capacity(BATCH);
     let mut closed = false;
@@ -185,6 +192,9 @@ pub fn read<E: From<Error>>(
                 let known = bare.take(&mut samples, &line);
                 let known = known.map_err(|what| unclear(path, &what))?;
                 items.extend(known.map(|raw| Item::Sample(0, raw)));
+                if bare.steps() == STEPS {
+                    refused(&bare)?;
+                }
             }
         }
         // With nothing left in the buffer the next line may be long in coming: what is known goes
@@ -199,6 +209,9 @@ pub fn read<E: From<Error>>(
     }
     if sensor.is_none() {
         return Err(first_bad.unwrap_or_else(|| nothing(path, format)).into());
+    }
+    if bare.steps() < STEPS {
+        refused(&bare)?;
     }
     let last = bare.settle().map_err(|what| unclear(path, &what))?;
     items.extend(last.map(|raw| Item::Sample(0, raw)));

@@ -8,7 +8,7 @@ use super::bare_stamps::BareStamps;
 use super::channel_route::{Item, Route};
 use super::early_besides::{EarlyBesides, are_beside};
 use super::input::{Bytes, Input};
-use super::line_input::{described, is_sure, no_samples, unclear};
+use super::line_input::{are_judged, described, is_sure, no_samples, unclear};
 use super::log_channel::LogChannel;
 use crate::attitude_line::TRUTH_ID;
 use crate::decode::{Class, Line, Options, Rank, Role, Stated, Undecodable};
@@ -59,6 +59,22 @@ struct Sensors {
     left_out: u64,
 }
 
+impl Sensors {
+    /// Refuses stamps whose name says nanoseconds and whose steps say another unit.
+    fn check_nanos(&self, lines: &Lines<Bytes>, options: &Options, path: &Path) -> Result<()> {
+        if !are_judged(lines, options) {
+            return Ok(());
+        }
+        match self.bare.iter().find_map(BareStamps::too_fast) {
+            Some(found) => Err(Error::unsupported(
+                path,
+                found.in_file(lines.format().is_table()),
+            )),
+            None => Ok(()),
+        }
+    }
+}
+
 /// The next of a text.
 enum Read<'l> {
     /// What a line says, and its samples, of the channel of this place; more may still wait for their stamps.
@@ -98,6 +114,7 @@ impl TextLog {
             }
             Ok(ControlFlow::Continue(()))
         })?;
+        sensors.check_nanos(&lines, options, input.name())?;
         if met.is_empty() {
             return Err(Error::Unsupported {
                 path: input.name().to_owned(),

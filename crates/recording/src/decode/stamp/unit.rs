@@ -11,7 +11,9 @@ use strapd_attitude::record::TimeUnit;
 pub const MOST_WAITING: usize = 8;
 
 /// Steps of a gyro's samples, ns: 20 us to 2 s.
-const STEPS: std::ops::RangeInclusive<i128> = 20_000..=2_000_000_000;
+const STEPS: std::ops::RangeInclusive<i128> = SHORTEST_STEP as i128..=2_000_000_000;
+/// The shortest of them, ns.
+pub(crate) const SHORTEST_STEP: i64 = 20_000;
 /// 2000-01-01 to 2100-01-01, ns since 1970.
 const OUR_TIME: std::ops::Range<i128> = 946_684_800_000_000_000..4_102_444_800_000_000_000;
 
@@ -38,6 +40,16 @@ impl Bare {
     pub fn in_unit(self, unit: TimeUnit) -> Nanos {
         let nanos = self.nanos(unit);
         Nanos(i64::try_from(nanos).unwrap_or(if nanos < 0 { i64::MIN } else { i64::MAX }))
+    }
+
+    /// Whether it is an instant at all, were this its unit.
+    pub(crate) fn is_instant_in(self, unit: TimeUnit) -> bool {
+        i64::try_from(self.nanos(unit)).is_ok()
+    }
+
+    /// Whether it is an instant of our time, were this its unit.
+    pub(crate) fn is_of_our_time_in(self, unit: TimeUnit) -> bool {
+        OUR_TIME.contains(&self.nanos(unit))
     }
 
     /// So many billionths.
@@ -140,8 +152,8 @@ impl Opening {
         let step = steps.get(steps.len().saturating_sub(1) / 2).copied();
         let first = stamps.first().copied().unwrap_or(0);
         let fits = |(unit, _): &(TimeUnit, &str)| {
-            let is_an_instant = i64::try_from(Bare(first).nanos(*unit)).is_ok();
-            is_an_instant && step.is_none_or(|step| STEPS.contains(&Bare(step).nanos(*unit)))
+            Bare(first).is_instant_in(*unit)
+                && step.is_none_or(|step| STEPS.contains(&Bare(step).nanos(*unit)))
         };
         Opening {
             first,
@@ -156,7 +168,7 @@ impl Opening {
 
     /// Of those that fit, the one whose instants are of our time.
     fn of_our_time(&self) -> Option<TimeUnit> {
-        let is_ours = |unit: &TimeUnit| OUR_TIME.contains(&Bare(self.first).nanos(*unit));
+        let is_ours = |unit: &TimeUnit| Bare(self.first).is_of_our_time_in(*unit);
         let mut ours = self.fits.iter().map(|(unit, _)| *unit).filter(is_ours);
         ours.next().filter(|_| ours.next().is_none())
     }

@@ -1,0 +1,76 @@
+//! Stamps in another unit than their name says: a replay refuses them, a daemon says so once, in `STATUS` too, and goes on.
+
+use super::client::Client;
+use super::daemon::{Daemon, eventually};
+use serde_json::Value;
+
+/// Samples with these stamps.
+fn lines(stamps: impl Iterator<Item = i64>) -> String {
+    let line = |(n, stamp): (usize, i64)| {
+        format!(
+            "{{\"id\":\"imu0\",\"stamp_ns\":{stamp},\"gyro\":[0.001,0,0.0{:02}]}}\n",
+            n % 100
+        )
+    };
+    stamps.enumerate().map(line).collect()
+}
+
+fn codes_said(daemon: &Daemon, sent: &str) -> Vec<Value> {
+    let mut sender = Client::tcp(daemon.address(0));
+    sender.object("VERSION");
+    sender.send_bytes(sent.as_bytes());
+    sender.shut();
+    let said = sender.rest();
+    eventually("the sender has gone", || daemon.hub.connected() == 0);
+    said.into_iter()
+        .filter(|s| s["code"] == "stamp_unit")
+        .collect()
+}
+
+fn findings(daemon: &Daemon) -> Vec<Value> {
+    let status = daemon.status();
+    let all = status["sources"][0]["findings"].as_array().unwrap().clone();
+    all.into_iter()
+        .filter(|f| f["code"] == "stamp-unit")
+        .collect()
+}
+
+const MS: i64 = 1_700_000_000_000;
+
+#[test]
+fn another_unit_is_said_once_with_the_one_that_fits_and_is_in_status() {
+    for (unit, stamp) in [
+        ("ms", (|n| MS + 10 * n) as fn(i64) -> i64),
+        ("us", |n| MS * 1000 + 10_000 * n),
+        ("s", |n| MS / 1000 + n),
+    ] {
+        let daemon = Daemon::tcp();
+        let said = codes_said(&daemon, &lines((0..600).map(stamp)));
+        assert_eq!(said.len(), 1, "{unit}: {said:?}");
+        let message = said[0]["message"].as_str().unwrap();
+        for words in [
+            format!("stamp_{unit}"),
+            format!("--field stamp=stamp_ns:{unit}"),
+        ] {
+            assert!(message.contains(&words), "{words}: {message}");
+        }
+        let found = findings(&daemon);
+        assert_eq!(found.len(), 1, "{unit}: {found:?}");
+        assert_eq!(found[0]["severity"], "error");
+        assert_eq!(found[0]["evidence"]["unit"], unit);
+    }
+}
+
+#[test]
+fn fast_sensors_and_what_was_held_back_are_no_other_unit() {
+    for stamp in [
+        (|n| MS + 125_000 * n) as fn(i64) -> i64,
+        |n| MS * 1_000_000 + 31_250 * n,
+        |n| MS + n / 10 * 100_000_000 + n % 10 * 5_000,
+    ] {
+        let daemon = Daemon::tcp();
+        let said = codes_said(&daemon, &lines((0..600).map(stamp)));
+        assert_eq!(said, Vec::<Value>::new());
+        assert_eq!(findings(&daemon), Vec::<Value>::new());
+    }
+}
