@@ -112,6 +112,7 @@ pub fn sample(
         accel: acc.filter(is_there),
         mag: mag.filter(is_there),
         orientation: orientation.filter(|q| !q.iter().any(|x| x.is_nan())),
+        orientation_resets: None,
         interval_nanos: dt.filter(|dt| *dt > 0),
         is_beside: false,
     }

@@ -16,10 +16,11 @@ use serde_json::Value;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use strapd_attitude::compare::{
-    Align, BiasFit, Comparison, Consistency, ErrorStats, Errors, Known, Stamped, compare,
-    consistency, fit_body_axes, fit_constant_bias, for_each_error,
+    Align, BiasFit, Comparison, Consistency, ErrorStats, Errors, Known, Reference, Stamped,
+    compare, consistency, fit_body_axes, fit_constant_bias, for_each_error,
 };
 use strapd_attitude::diagnostic::Diagnostic;
+use strapd_attitude::record::Nanos;
 use strapd_recording::decode::Options;
 use strapd_recording::pool::Pool;
 
@@ -114,13 +115,24 @@ pub fn run(global: &Global, args: &Compare) -> Result<Outcome> {
         tracing::warn!("{problem}");
     }
     let (estimated, referred) = (attitudes(&estimate), attitudes(&reference));
-    let result = compare(&estimated, &referred, align);
+    // Whichever of the two was set anew: another world begins.
+    let cuts: Vec<Nanos> = estimate
+        .cuts
+        .iter()
+        .chain(&reference.cuts)
+        .copied()
+        .collect();
+    let referred = Reference {
+        rows: &referred,
+        cuts: &cuts,
+    };
+    let result = compare(&estimated, referred, align);
     let Some(errors) = &result.errors else {
         return Err(no_match(&estimate, &reference));
     };
-    let told = Told::of(&estimate, (&estimated, &referred), align);
+    let told = Told::of(&estimate, (&estimated, referred), align);
     if let Some(document) = plot {
-        let chart = chart(&estimated, &referred, align, errors);
+        let chart = chart(&estimated, referred, align, errors);
         document.write(
             &chart
                 .svg()
@@ -167,7 +179,7 @@ const OTHER_AXES: f64 = 0.7;
 impl Told {
     fn of(
         estimate: &attitude_track::Track,
-        (estimated, referred): (&[Stamped], &[Stamped]),
+        (estimated, referred): (&[Stamped], Reference<'_>),
         align: Align,
     ) -> Told {
         let known: Vec<Known> = estimated
@@ -179,7 +191,7 @@ impl Told {
                 covariance: *covariance,
             })
             .collect();
-        let axes = fit_body_axes(estimated, referred);
+        let axes = fit_body_axes(estimated, referred.rows);
         // About one axis alone a bias and other axes can not be told apart.
         let is_bias = |fit: &BiasFit| {
             fit.is_worth_removing()
@@ -216,7 +228,7 @@ impl Told {
 }
 
 /// The errors over time, with their statistics in the legend.
-fn chart(estimate: &[Stamped], reference: &[Stamped], align: Align, errors: &Errors) -> Chart {
+fn chart(estimate: &[Stamped], reference: Reference<'_>, align: Align, errors: &Errors) -> Chart {
     let mut traces = Traces::<3>::new(STRETCHES);
     let mut first = None;
     for_each_error(estimate, reference, align, |at| {
@@ -296,6 +308,9 @@ fn as_text(result: &Comparison, align: Align, estimate: &str, reference: &str) -
         "  matched  {} reference samples over {secs:.3} s",
         result.samples
     );
+    if let Some(words) = against::resets(result.parts.saturating_sub(1)) {
+        let _ = writeln!(out, "           {words}");
+    }
     let left = &result.left_out;
     for (count, what) in [
         (

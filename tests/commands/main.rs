@@ -17,6 +17,7 @@ mod empty_topics;
 mod fixtures;
 mod folders;
 mod formats;
+mod heading_resets;
 mod increments;
 mod joined;
 mod joined_formats;

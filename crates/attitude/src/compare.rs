@@ -16,6 +16,7 @@ mod body_axes;
 mod consistency;
 mod constant_bias;
 mod matching;
+mod reference;
 mod relative;
 mod statistics;
 
@@ -23,6 +24,7 @@ pub use align::{Align, ParseAlignError};
 pub use body_axes::{BodyAxesFit, fit_body_axes};
 pub use consistency::{BoundedError, Consistency, Known, WithinSigma, consistency};
 pub use constant_bias::{BiasFit, fit_constant_bias};
+pub use reference::Reference;
 pub use relative::RelativeError;
 pub use statistics::{Drift, ErrorStats};
 
@@ -42,8 +44,10 @@ pub struct Comparison {
     pub samples: usize,
     /// Instants of the first and the last of them.
     pub span: Option<(Nanos, Nanos)>,
-    /// The constant rotation from the world of the estimate to that of the reference.
+    /// The constant rotation from the world of the estimate to that of the reference, of its first part.
     pub alignment: Quaternion<Nav, Nav>,
+    /// Parts of the reference that were aligned each by itself, from one [cut](Reference::cuts) to the next.
+    pub parts: usize,
     /// Absolute errors; `None` without a match.
     pub errors: Option<Errors>,
     /// Straight-line growth of the error; `None` with fewer than two instants.
@@ -100,21 +104,39 @@ pub struct ErrorAt {
 /// # Source
 /// Heading and inclination: Laidig, Caruso, Cereatti, Seel, "BROAD", Data 6(7), 2021, section 4.1.
 #[must_use]
-pub fn compare(estimate: &[Stamped], reference: &[Stamped], align: Align) -> Comparison {
-    let (estimate, reference) = (Track::new(estimate), Track::new(reference));
+pub fn compare<'r>(
+    estimate: &[Stamped],
+    reference: impl Into<Reference<'r>>,
+    align: Align,
+) -> Comparison {
+    let Reference { rows, cuts } = reference.into();
+    let (estimate, reference) = (Track::new(estimate), Track::new(rows));
+    let parts = reference.parts(cuts);
     let mut total = Vec::new();
     let mut heading = Vec::new();
     let mut inclination = Vec::new();
     let mut span: Option<(Nanos, Nanos)> = None;
     let mut drift = DriftFit::default();
-    let (alignment, left_out) = each_error(&estimate, &reference, align, |at, error| {
-        let (first, _) = *span.get_or_insert((at.stamp, at.stamp));
-        span = Some((first, at.stamp));
-        total.push(at.total);
-        heading.push(at.heading.abs());
-        inclination.push(at.inclination);
-        drift.add(at.stamp.secs_since(first), error);
-    });
+    let (mut alignment, mut left_out) = (None, LeftOut::default());
+    for part in &parts {
+        let mut of_part = DriftFit::default();
+        let (turn, left) = each_error(&estimate, part, align, |at, error| {
+            let (first, _) = *span.get_or_insert((at.stamp, at.stamp));
+            span = Some((first, at.stamp));
+            total.push(at.total);
+            heading.push(at.heading.abs());
+            inclination.push(at.inclination);
+            of_part.add(at.stamp.secs_since(first), error);
+        });
+        drift = drift.pooled(of_part);
+        alignment.get_or_insert(turn);
+        left_out = LeftOut {
+            bad_estimates: left.bad_estimates,
+            bad_references: left_out.bad_references + left.bad_references,
+            outside: left_out.outside + left.outside,
+            in_gap: left_out.in_gap + left.in_gap,
+        };
+    }
     let samples = total.len();
     let errors = ErrorStats::of(&mut total)
         .zip(ErrorStats::of(&mut heading))
@@ -127,27 +149,27 @@ pub fn compare(estimate: &[Stamped], reference: &[Stamped], align: Align) -> Com
     Comparison {
         samples,
         span,
-        alignment,
+        alignment: alignment.unwrap_or(Quaternion::identity()),
+        parts: parts.len(),
         errors,
         drift: drift.finish(),
-        relative_1s: relative::over_one_second(&estimate, &reference),
+        relative_1s: relative::over_one_second(&estimate, &parts),
         left_out,
     }
 }
 
 /// The errors behind [`Comparison::errors`], one by one, in time order.
-pub fn for_each_error(
+pub fn for_each_error<'r>(
     estimate: &[Stamped],
-    reference: &[Stamped],
+    reference: impl Into<Reference<'r>>,
     align: Align,
     mut visit: impl FnMut(&ErrorAt),
 ) {
-    each_error(
-        &Track::new(estimate),
-        &Track::new(reference),
-        align,
-        |at, _| visit(&at),
-    );
+    let Reference { rows, cuts } = reference.into();
+    let (estimate, reference) = (Track::new(estimate), Track::new(rows));
+    for part in reference.parts(cuts) {
+        each_error(&estimate, &part, align, |at, _| visit(&at));
+    }
 }
 
 fn each_error(

@@ -405,6 +405,7 @@ impl Synthetic {
                     accel: Some(read.force_b.into()),
                     mag: mag.map(Into::into),
                     orientation: Some(spin.q_nb.wxyz()),
+                    orientation_resets: None,
                     interval_nanos: (!rates).then_some((now - self.before) as i64),
                     is_beside: false,
                 });

@@ -166,6 +166,8 @@ pub struct Recorded {
     pub bias: Option<BiasFit>,
     /// The bias that was removed before, rad/s.
     pub removed: [f64; 3],
+    /// Times its source set it anew: errors are those of the parts between, each aligned by itself.
+    pub resets: usize,
 }
 
 /// What one log became.
@@ -427,6 +429,10 @@ impl TopicSummary {
                     row.kind, row.median_deg, row.p95_deg, row.meaning
                 ),
             );
+        }
+        let resets = self.recorded.map_or(0, |recorded| recorded.resets);
+        if let Some(words) = against::resets(resets) {
+            line(out, "", &words);
         }
         if let Some(found) = self.recorded.and_then(|r| r.consistency) {
             line(out, "", &against::within_sigma(&found));

@@ -98,6 +98,7 @@ pub fn comparison_json(result: &Comparison) -> Value {
     };
     json!({
         "samples": result.samples,
+        "parts": result.parts,
         "span_s": result.span.map(|(a, b)| b.secs_since(a)),
         "left_out": {
             "bad_estimates": result.left_out.bad_estimates,

@@ -272,7 +272,13 @@ fn an_orientation_in_samples_with_whole_seconds_is_compared_at_the_stamps_they_g
 
 /// PX4's `sensor_combined` as its ROS 2 bridge writes it, the interval in `unit` nanoseconds.
 fn px4_log(dir: &Path, name: &str, unit: i64) -> PathBuf {
-    let text = "uint64 timestamp\nfloat32[3] gyro_rad\nuint32 gyro_integral_dt\n".to_owned();
+    let interval = ((STEP / unit) as u32).to_le_bytes();
+    px4_log_with(dir, name, "uint32", &interval)
+}
+
+/// The same with an interval of this type, and these bytes.
+fn px4_log_with(dir: &Path, name: &str, number: &str, interval: &[u8]) -> PathBuf {
+    let text = format!("uint64 timestamp\nfloat32[3] gyro_rad\n{number} gyro_integral_dt\n");
     let messages: Vec<(i64, Vec<u8>)> = motion(600)
         .iter()
         .map(|s| {
@@ -281,7 +287,7 @@ fn px4_log(dir: &Path, name: &str, unit: i64) -> PathBuf {
             for v in s.gyro {
                 cdr.put(&(v as f32).to_le_bytes());
             }
-            cdr.put(&((STEP / unit) as u32).to_le_bytes());
+            cdr.put(interval);
             (s.stamp, cdr.done())
         })
         .collect();
@@ -314,6 +320,24 @@ fn an_interval_in_another_unit_than_thought_is_refused_with_the_flag_that_states
     let (_, found) = attitudes(&replay_by(&wrong, "dt=gyro_integral_dt:ms"), dir.path());
     let bits = |a: &[Bits]| a.iter().map(|a| a.wxyz).collect::<Vec<_>>();
     assert_eq!(bits(&found), bits(&expected));
+}
+
+#[test]
+fn an_interval_that_is_a_floating_point_number_is_in_seconds() {
+    let dir = tempfile::tempdir().unwrap();
+    let whole = px4_log(dir.path(), "us.mcap", 1_000);
+    let (_, expected) = attitudes(&replay_of(&whole), dir.path());
+    let secs = STEP as f64 * 1e-9;
+    for (name, number, interval) in [
+        ("f32.mcap", "float32", (secs as f32).to_le_bytes().to_vec()),
+        ("f64.mcap", "float64", secs.to_le_bytes().to_vec()),
+    ] {
+        let log = px4_log_with(dir.path(), name, number, &interval);
+        let (summary, found) = attitudes(&replay_of(&log), dir.path());
+        assert_eq!(only(&summary).kind, SampleKind::Average, "{name}");
+        assert_eq!(only(&summary).gaps.bridged, 0, "{name}");
+        assert_eq!(found, expected, "{name}");
+    }
 }
 
 #[test]

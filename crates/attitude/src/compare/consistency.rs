@@ -10,7 +10,7 @@
 
 use super::matching::{Track, for_each_match};
 use super::statistics::quantile;
-use super::{Align, Stamped};
+use super::{Align, Reference, Stamped};
 use crate::frames::{Body, Nav};
 use crate::quaternion::Quaternion;
 use crate::record::{AttitudeCovariance, Nanos};
@@ -88,12 +88,13 @@ const EXPLAINED: f64 = 0.5;
 /// without a common instant, or where no sigma is stated. Who claims to be level (an alignment of the heading alone) and
 /// leaves the reference's tilt by a constant is judged by what is left without it: `leaning` says so.
 #[must_use]
-pub fn consistency(
+pub fn consistency<'r>(
     estimate: &[Known],
-    reference: &[Stamped],
+    reference: impl Into<Reference<'r>>,
     align: Align,
     mut visit: impl FnMut(&BoundedError),
 ) -> Option<Consistency> {
+    let reference: Reference<'_> = reference.into();
     let mut rows: Vec<&Known> = estimate
         .iter()
         .filter(|known| {
@@ -103,36 +104,40 @@ pub fn consistency(
         .collect();
     rows.sort_by_key(|known| known.stamp);
     let stamped: Vec<Stamped> = rows.iter().map(|k| (k.stamp, k.q_nb)).collect();
-    let (estimated, referred) = (Track::new(&stamped), Track::new(reference));
+    let (estimated, referred) = (Track::new(&stamped), Track::new(reference.rows));
+    let parts = referred.parts(reference.cuts);
+    let longest = parts.iter().max_by_key(|part| part.rows.len())?;
     let reference_noise = scatter_of_a_step(&estimated, &referred)?;
 
     let judge = |align: Align, visit: &mut dyn FnMut(&BoundedError)| {
-        let rotation = align.rotation(&estimated, &referred);
         let mut sums = Sums::default();
-        let _ = for_each_match(&estimated, &referred, |stamp, q_ref_est, place| {
-            // Between two estimates the later one's sigma: it is the larger of the gyro alone.
-            let Some(known) = rows.get(place) else {
-                return ControlFlow::Continue(());
-            };
-            let error = (q_ref_est * rotation.inverse()).inverse();
-            let own = known
-                .covariance
-                .in_navigation_axes(&(rotation * known.q_nb));
-            sums.is_stated |= own.trace() > 0.0;
-            let at = bounded(stamp, &error, &own, 2.0 * reference_noise.powi(2));
-            sums.add(&at);
-            visit(&at);
-            ControlFlow::Continue(())
-        });
-        (rotation, sums)
+        for part in &parts {
+            let rotation = align.rotation(&estimated, part);
+            let _ = for_each_match(&estimated, part, |stamp, q_ref_est, place| {
+                // Between two estimates the later one's sigma: it is the larger of the gyro alone.
+                let Some(known) = rows.get(place) else {
+                    return ControlFlow::Continue(());
+                };
+                let error = (q_ref_est * rotation.inverse()).inverse();
+                let own = known
+                    .covariance
+                    .in_navigation_axes(&(rotation * known.q_nb));
+                sums.is_stated |= own.trace() > 0.0;
+                let at = bounded(stamp, &error, &own, 2.0 * reference_noise.powi(2));
+                sums.add(&at);
+                visit(&at);
+                ControlFlow::Continue(())
+            });
+        }
+        sums
     };
     let mut align = align;
     let mut silent = |_: &BoundedError| {};
     let mut leaning = None;
     if matches!(align, Align::FirstHeading | Align::Heading) {
-        let (_, level) = judge(align, &mut silent);
-        let (turn, best) = judge(Align::Best, &mut silent);
-        let [w, x, y, z] = turn.wxyz();
+        let level = judge(align, &mut silent);
+        let best = judge(Align::Best, &mut silent);
+        let [w, x, y, z] = Align::Best.rotation(&estimated, longest).wxyz();
         let lean = 2.0 * x.hypot(y).atan2(w.hypot(z));
         let is_beyond = level.tilt.finish(level.samples)?.inside < ENOUGH_INSIDE;
         if is_beyond && best.tilt.squares < EXPLAINED.powi(2) * level.tilt.squares {
@@ -140,7 +145,7 @@ pub fn consistency(
             align = Align::Best;
         }
     }
-    let (_, sums) = judge(align, &mut visit);
+    let sums = judge(align, &mut visit);
     // Without any noise stated there is nothing to judge.
     sums.is_stated.then_some(())?;
     Some(Consistency {

@@ -10,9 +10,9 @@
 //! the recording agree with each other: what no window knows of the others (a scale error, a bias that wanders, a
 //! reference that lags) is in it.
 
-use super::Stamped;
 use super::matching::Track;
 use super::statistics::quantile;
+use super::{Reference, Stamped};
 use crate::frames::Body;
 use crate::quaternion::{Quaternion, RotationVector};
 use crate::record::Nanos;
@@ -75,12 +75,20 @@ impl BiasFit {
 /// The constant bias that explains best how `estimate` turns otherwise than `reference`; `None` where fewer than ten
 /// seconds can be compared.
 #[must_use]
-pub fn fit_constant_bias(estimate: &[Stamped], reference: &[Stamped]) -> Option<BiasFit> {
-    let (estimate, reference) = (Track::new(estimate), Track::new(reference));
+pub fn fit_constant_bias<'r>(
+    estimate: &[Stamped],
+    reference: impl Into<Reference<'r>>,
+) -> Option<BiasFit> {
+    let Reference { rows, cuts } = reference.into();
+    let (estimate, reference) = (Track::new(estimate), Track::new(rows));
     if estimate.spacing > COARSE {
         return None;
     }
-    let windows = windows(&estimate, &reference);
+    let parts = reference.parts(cuts);
+    let windows: Vec<Window> = parts
+        .iter()
+        .flat_map(|part| windows(&estimate, part))
+        .collect();
     if windows.len() < FEWEST {
         return None;
     }
@@ -176,7 +184,8 @@ fn windows(estimate: &Track<'_>, reference: &Track<'_>) -> Vec<Window> {
     let mut found: Vec<Window> = Vec::new();
     let rows = &reference.rows;
     let (mut at, mut later) = (0, 0);
-    let mut place = 0; // the first estimate later than the window's start
+    // The first estimate later than the window's start.
+    let mut place = rows.first().map_or(0, |(start, _)| estimate.until(*start));
     while let Some((start, q_start)) = rows.get(at) {
         at += 1;
         let wanted = start.0.saturating_add(WINDOW);

@@ -16,7 +16,7 @@ const LONGEST_BRIDGE: i64 = 4;
 pub(super) struct Track<'a> {
     pub(super) rows: Cow<'a, [Stamped]>,
     /// How many rows were no attitude.
-    bad: usize,
+    pub(super) bad: usize,
     /// Median distance of successive distinct stamps, in nanoseconds; 0 when there are none.
     pub(super) spacing: i64,
 }
@@ -96,7 +96,11 @@ pub(super) fn for_each_match(
         bad_references: reference.bad,
         ..LeftOut::default()
     };
-    let mut after = 0; // the first estimate later than the reference sample
+    // The first estimate later than the reference sample.
+    let mut after = reference
+        .rows
+        .first()
+        .map_or(0, |(stamp, _)| estimate.until(*stamp));
     for (stamp, q_ref) in reference.rows.iter() {
         while estimate.rows.get(after).is_some_and(|(t, _)| t <= stamp) {
             after += 1;

@@ -26,14 +26,15 @@ pub struct RelativeError {
 /// For every reference sample at t with another at t + 1 s (the nearest, within half the median
 /// spacing): the angle of `(q_ref(t)* q_ref(t+1))* (q_est(t)* q_est(t+1))`, estimates nearest to
 /// the stamps of the two reference samples and not further than one median spacing.
-pub(super) fn over_one_second(
-    estimate: &Track<'_>,
-    reference: &Track<'_>,
-) -> Option<RelativeError> {
+///
+/// Nothing is compared across the parts of the reference.
+pub(super) fn over_one_second(estimate: &Track<'_>, parts: &[Track<'_>]) -> Option<RelativeError> {
     let mut errors = Vec::new();
-    each_second(estimate, reference, |truth, found| {
-        errors.push(truth.angle_to(&found));
-    });
+    for reference in parts {
+        each_second(estimate, reference, |truth, found| {
+            errors.push(truth.angle_to(&found));
+        });
+    }
     Some(RelativeError {
         count: errors.len(),
         median: quantile(&mut errors, 0.5)?,
@@ -47,9 +48,12 @@ pub(super) fn each_second(
     reference: &Track<'_>,
     mut visit: impl FnMut(Quaternion<Body, Body>, Quaternion<Body, Body>),
 ) {
-    let mut later = Nearest::new(reference);
-    let mut estimate_at_start = Nearest::new(estimate);
-    let mut estimate_at_end = Nearest::new(estimate);
+    let Some((first, _)) = reference.rows.first() else {
+        return;
+    };
+    let mut later = Nearest::new(reference, *first);
+    let mut estimate_at_start = Nearest::new(estimate, *first);
+    let mut estimate_at_end = Nearest::new(estimate, *first);
     for (start, ref_start) in reference.rows.iter() {
         let end = Nanos(start.0.saturating_add(INTERVAL_NANOS));
         let Some((end, ref_end)) = later.find(end, 1) else {
@@ -74,8 +78,10 @@ struct Nearest<'a> {
 }
 
 impl<'a> Nearest<'a> {
-    fn new(track: &'a Track<'a>) -> Nearest<'a> {
-        Nearest { track, at: 0 }
+    /// For instants from `first` on.
+    fn new(track: &'a Track<'a>, first: Nanos) -> Nearest<'a> {
+        let at = track.until(first).saturating_sub(1);
+        Nearest { track, at }
     }
 
     /// `None` when it is further away than `half_spacings` halves of the median spacing.

@@ -93,6 +93,15 @@ impl DriftFit {
         self.s_t_phi += dt * (phi - self.mean_phi);
     }
 
+    /// The line of both, each from wherever it begins.
+    pub(super) fn pooled(self, later: DriftFit) -> DriftFit {
+        DriftFit {
+            s_tt: self.s_tt + later.s_tt,
+            s_t_phi: self.s_t_phi + later.s_t_phi,
+            ..later
+        }
+    }
+
     pub(super) fn finish(self) -> Option<Drift> {
         (self.s_tt > 0.0).then(|| Drift {
             rate_n: self.s_t_phi / self.s_tt,

@@ -352,3 +352,51 @@ fn alignments_are_known_by_name() {
     }
     assert_eq!("Best ".parse::<Align>(), Err(ParseAlignError));
 }
+
+/// A reference whose heading is another from each cut on, and an estimate with a bias.
+fn reset_twice() -> (Vec<Stamped>, Vec<Stamped>, Vec<Nanos>) {
+    let reference = track(6000, 100.0, |t, q| {
+        let heading = [0.0, 1.2, -0.7][(t / 20.0) as usize];
+        world(0.0, 0.0, heading) * q
+    });
+    let estimate = track(6000, 100.0, |t, q| world(0.0, 0.0, 1e-3 * t) * q);
+    (estimate, reference, vec![nanos(20.0), nanos(40.0)])
+}
+
+#[test]
+fn a_reference_that_is_set_anew_is_cut_and_each_part_aligned_by_itself() {
+    let (estimate, rows, cuts) = reset_twice();
+    let whole = compare(&estimate, &rows, Align::First);
+    assert!(whole.errors.unwrap().heading.rms > 0.5 && whole.parts == 1);
+    let reference = Reference {
+        rows: &rows,
+        cuts: &cuts,
+    };
+    let found = compare(&estimate, reference, Align::First);
+    // Twenty seconds of 1 mrad/s.
+    let errors = found.errors.unwrap();
+    assert!((errors.heading.max - 0.02).abs() < 1e-4, "{errors:?}");
+    assert_eq!((found.parts, found.samples), (3, 6000));
+    let drift = found.drift.unwrap().rate_n.z;
+    assert!((drift - 1e-3).abs() < 1e-6, "a line in each: {drift}");
+    let relative = found.relative_1s.unwrap();
+    assert_eq!(relative.count, 3 * 1900, "nothing across a cut");
+    assert!(relative.p95 < 1.1e-3, "{relative:?}");
+    let mut last = None;
+    for_each_error(&estimate, reference, Align::First, |at| {
+        assert!(at.heading.abs() < 0.021 && last.replace(at.stamp) < Some(at.stamp));
+    });
+}
+
+#[test]
+fn cuts_before_and_after_everything_in_any_order_and_twice_are_none() {
+    let (estimate, rows, cuts) = reset_twice();
+    let mut more = vec![nanos(-5.0), nanos(90.0), cuts[1], cuts[0], cuts[1]];
+    let found = |cuts: &[Nanos]| {
+        let reference = Reference { rows: &rows, cuts };
+        compare(&estimate, reference, Align::Heading)
+    };
+    assert_eq!(found(&more), found(&cuts));
+    more.clear();
+    assert_eq!(found(&more), compare(&estimate, &rows, Align::Heading));
+}

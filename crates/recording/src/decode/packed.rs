@@ -196,6 +196,7 @@ pub fn read(object: &[u8], received: Nanos) -> Result<Object, Unreadable> {
             accel: floats_at(object, 48).and_then(some_vector),
             mag: floats_at(object, 80).and_then(some_vector),
             orientation: None,
+            orientation_resets: None,
             interval_nanos: u64_at(object, 72).and_then(|n| some_time(n.cast_signed())),
             is_beside: false,
         };

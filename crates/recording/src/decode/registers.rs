@@ -39,6 +39,8 @@ impl Slot {
     pub(crate) const STAMP: Slot = Slot(20);
     /// A stamp's nanoseconds.
     pub(crate) const STAMP_NANOS: Slot = Slot(21);
+    /// How often the orientation was set anew.
+    pub(crate) const RESETS: Slot = Slot(22);
 
     /// The slot `n` further on.
     pub(crate) fn plus(self, n: u8) -> Slot {
@@ -47,7 +49,7 @@ impl Slot {
 
     /// Whether it takes integers exactly.
     pub(crate) fn is_integer(self) -> bool {
-        self.0 >= Slot::STAMP.0
+        self == Slot::STAMP || self == Slot::STAMP_NANOS
     }
 
     /// Bits of this slot and the `n - 1` after it.
@@ -224,6 +226,9 @@ impl Form {
                     self.orientation(q, marked(Slot::ORIENTATION_MARK))
                 }),
             is_beside: false,
+            orientation_resets: registers
+                .has(Slot::RESETS, 1)
+                .then(|| (registers.get(Slot::RESETS) as i64) as u8),
             interval_nanos: registers.has(Slot::INTERVAL, 1).then(|| {
                 let unit = match self.interval {
                     // An interval is no instant: without a stated unit it is seconds.

@@ -387,6 +387,7 @@ impl Table {
             accel,
             mag,
             orientation,
+            orientation_resets: None,
             interval_nanos: read.interval.or(self.interval),
             is_beside: is_others && orientation.is_none(),
         });

@@ -2,7 +2,9 @@
 
 use super::{Finding, Severity};
 use crate::inspection::CheckedTopic;
-use crate::summary::against::{beyond_sigma, bias_json, bias_words, consistency_json, removing};
+use crate::summary::against::{
+    beyond_sigma, bias_json, bias_words, consistency_json, removing, resets,
+};
 use crate::summary::{Against, Recorded, TopicSummary, significant};
 use nalgebra::Vector3;
 use serde_json::json;
@@ -37,6 +39,10 @@ pub(super) fn find(topic: &CheckedTopic, out: &mut Vec<Finding>) {
         return;
     };
     let is_seen = summary.gaps.total_secs <= MOSTLY_THERE * summary.duration_secs;
+    if let Some(what) = resets(recorded.resets) {
+        let note = Finding::new(Severity::Note, "orientation-reset", what);
+        out.push(note.with("resets", recorded.resets));
+    }
     let trusted = is_truth(recorded, is_seen, out);
     let used = summary.kind.name();
     match best_meaning(&summary.against) {

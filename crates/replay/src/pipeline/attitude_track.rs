@@ -12,7 +12,7 @@ use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::orientation_convention;
 use strapd_attitude::frames::{Body, Nav};
 use strapd_attitude::quaternion::Quaternion;
-use strapd_attitude::record::{AttitudeCovariance, Nanos};
+use strapd_attitude::record::{AttitudeCovariance, Nanos, RawSample};
 use strapd_attitude::setting::{REF_TOPIC, TOPIC};
 use strapd_attitude::worlds::{Convention, World};
 use strapd_recording::Input;
@@ -38,6 +38,8 @@ pub struct Track {
     pub name: String,
     /// In file order; ENU (or start) and FLU.
     pub entries: Vec<Entry>,
+    /// Instants from which on it is another world's: its source has set it anew.
+    pub cuts: Vec<Nanos>,
     /// What the file says of the error of each of them, in body axes (FLU); empty where it does not of all.
     pub covariances: Vec<AttitudeCovariance>,
     /// What was wrong with the file.
@@ -78,6 +80,7 @@ pub fn read(
                 Vec::new()
             },
             entries: read.into_iter().map(|(entry, _)| entry).collect(),
+            cuts: Vec::new(),
             problems: Vec::new(),
         }
     };
@@ -111,6 +114,7 @@ fn from_log(
     })?;
     let stated = orientation_convention(&decoder.stated().declared);
     let mut entries: Vec<Entry> = Vec::new();
+    let (mut resets, mut cuts) = (None, Vec::new());
     // Of an Imu, what it says of its error.
     let is_imu = known.channel.message_encoding == "cdr"
         && known
@@ -133,7 +137,9 @@ fn from_log(
             entries.extend(items.drain(..).filter_map(|item| match item {
                 Item::Reference(raw) => {
                     let stamp = raw.header.filter(|s| s.0 != 0).unwrap_or(raw.log);
-                    raw.orientation.map(|wxyz| (stamp, wxyz))
+                    let wxyz = raw.orientation?;
+                    cuts.extend(cut(&mut resets, &raw, stamp));
+                    Some((stamp, wxyz))
                 }
                 Item::Copy(message) => {
                     said.push(imu_covariance(&message.data));
@@ -166,9 +172,17 @@ fn from_log(
     Ok(Track {
         name: format!("{} {}", path.display(), known.channel.topic),
         entries,
+        cuts,
         covariances,
         problems: problems(&survey),
     })
+}
+
+/// The instant of an orientation that its source has set anew since the one before.
+pub(super) fn cut(resets: &mut Option<u8>, raw: &RawSample, stamp: Nanos) -> Option<Nanos> {
+    let now = raw.orientation_resets?;
+    let before = resets.replace(now)?;
+    (now != before).then_some(stamp)
 }
 
 /// The convention behind our own `world` label; `start` and what is not known are taken as ENU, FLU.

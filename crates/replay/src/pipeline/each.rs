@@ -145,6 +145,6 @@ fn draw(topic: &mut Topic, drawing: &Drawing<'_>) {
     topic.history = Some(History::new(topic.prepared.clock, drawing.stretches));
     topic.estimator.keep_innovations();
     if let (Some(against), Some(track)) = (&mut topic.against, drawing.reference) {
-        against.take_reference_track(&track.entries);
+        against.take_reference_track(track);
     }
 }

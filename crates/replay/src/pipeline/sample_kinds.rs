@@ -3,13 +3,14 @@
 //! What a sample means in time matters more than the order of the integrator and is written in no
 //! log; where an orientation was recorded too, it can be seen.
 
+use super::attitude_track::{Track, cut};
 use crate::summary::series::{ErrorTrace, Errors};
 use crate::summary::trace::Traces;
 use crate::summary::{Against, Recorded};
 use std::collections::HashMap;
 use strapd_attitude::compare::{
-    Align, Consistency, Known, Stamped, compare, consistency, fit_body_axes, fit_constant_bias,
-    for_each_error,
+    Align, Consistency, Known, Reference, Stamped, compare, consistency, fit_body_axes,
+    fit_constant_bias, for_each_error,
 };
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Estimator;
@@ -61,6 +62,9 @@ pub(super) struct AgainstRecorded {
     estimators: Vec<Estimator>,
     tracks: Vec<Thinned<Stamped>>,
     reference: Thinned<Stamped>,
+    /// How often it said it was set anew, and when that was.
+    resets: Option<u8>,
+    cuts: Vec<Nanos>,
     /// What the run itself put out, in the world it was asked for, with what it says of its error.
     own: Thinned<Known>,
     world: World,
@@ -167,6 +171,8 @@ impl AgainstRecorded {
             tracks: estimators.iter().map(|_| Thinned::new()).collect(),
             estimators,
             reference: Thinned::new(),
+            resets: None,
+            cuts: Vec::new(),
             own: Thinned::new(),
             world,
             align,
@@ -221,9 +227,10 @@ impl AgainstRecorded {
     }
 
     /// The reference is this track, of the body whose attitude is estimated, and not in the log.
-    pub(super) fn take_reference_track(&mut self, entries: &[(Nanos, [f64; 4])]) {
+    pub(super) fn take_reference_track(&mut self, track: &Track) {
         self.own_reference = false;
-        for (stamp, wxyz) in entries {
+        self.cuts.clone_from(&track.cuts);
+        for (stamp, wxyz) in &track.entries {
             match Quaternion::try_from_wxyz(*wxyz) {
                 Ok(attitude) => self.reference.push((*stamp, attitude)),
                 Err(_) => self.unusable += 1,
@@ -252,6 +259,9 @@ impl AgainstRecorded {
         let Some(recorded) = raw.orientation else {
             return;
         };
+        if let Some(stamp) = stamp.filter(|_| self.cuts.len() < MOST) {
+            self.cuts.extend(cut(&mut self.resets, raw, stamp));
+        }
         match (stamp, self.resolved.recorded_attitude(recorded)) {
             (Some(stamp), Some(attitude)) if self.own_reference && self.received.len() < MOST => {
                 self.reference.push((stamp, attitude));
@@ -311,6 +321,14 @@ impl AgainstRecorded {
         self.move_references();
     }
 
+    /// What is compared with.
+    fn referred(&self) -> Reference<'_> {
+        Reference {
+            rows: &self.reference.entries,
+            cuts: &self.cuts,
+        }
+    }
+
     /// Recorded orientations that could be used.
     #[must_use]
     pub(super) fn references(&self) -> usize {
@@ -341,11 +359,12 @@ impl AgainstRecorded {
             constant: entries.len() > 1
                 && first.is_some_and(|first| entries.iter().all(|(_, q)| *q == first)),
             axes: best,
-            consistency: consistency(&self.own.entries, entries, self.align, |_| {}),
+            consistency: consistency(&self.own.entries, self.referred(), self.align, |_| {}),
             bias: self
                 .used()
-                .and_then(|track| fit_constant_bias(&track.entries, entries)),
+                .and_then(|track| fit_constant_bias(&track.entries, self.referred())),
             removed: self.removed,
+            resets: self.cuts.len(),
         })
     }
 
@@ -365,19 +384,14 @@ impl AgainstRecorded {
     ) -> Option<(Consistency, Traces<4>)> {
         let mut trace = Traces::new(stretches);
         let mut last = i64::MIN;
-        let found = consistency(
-            &self.own.entries,
-            &self.reference.entries,
-            self.align,
-            |at| {
-                last = last.max(x(at.stamp));
-                let [tilt, heading] = [at.tilt, at.heading];
-                trace.push(
-                    last,
-                    [tilt[0], tilt[1], heading[0], heading[1]].map(f64::to_degrees),
-                );
-            },
-        )?;
+        let found = consistency(&self.own.entries, self.referred(), self.align, |at| {
+            last = last.max(x(at.stamp));
+            let [tilt, heading] = [at.tilt, at.heading];
+            trace.push(
+                last,
+                [tilt[0], tilt[1], heading[0], heading[1]].map(f64::to_degrees),
+            );
+        })?;
         Some((found, trace))
     }
 
@@ -394,7 +408,7 @@ impl AgainstRecorded {
             &(&'static str, &'static str, SampleKind, Option<Method>),
             &Thinned<Stamped>,
         )| {
-            let reference = &self.reference.entries;
+            let reference = self.referred();
             let comparison = compare(&track.entries, reference, Align::First);
             comparison.errors?;
             let mut trace = Traces::new(stretches);
@@ -430,7 +444,7 @@ impl AgainstRecorded {
             .iter()
             .zip(&self.tracks)
             .filter_map(|((kind, meaning, ..), track)| {
-                let found = compare(&track.entries, &self.reference.entries, Align::First);
+                let found = compare(&track.entries, self.referred(), Align::First);
                 found.relative_1s.map(|r| Against {
                     kind,
                     meaning,

@@ -131,10 +131,24 @@ impl Recorded {
             "usable": self.usable,
             "unusable": self.unusable,
             "constant": self.constant,
+            "resets": self.resets,
             "sigma": self.consistency.as_ref().map(consistency_json),
             "bias_left": self.bias.as_ref().map(bias_json),
         })
     }
+}
+
+/// What is done where the reference was set anew so many times, in words; `None` where it never was.
+#[must_use]
+pub fn resets(times: usize) -> Option<String> {
+    let times = match times {
+        0 => return None,
+        1 => "once".to_owned(),
+        n => format!("{n} times"),
+    };
+    Some(format!(
+        "the recorded orientation was reset {times} by its estimator: cut there, each part aligned by itself"
+    ))
 }
 
 /// How the worlds are laid on each other, in words.

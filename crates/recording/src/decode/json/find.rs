@@ -6,7 +6,7 @@ use super::scan::{MAX_DEPTH, Scanner};
 use super::trie::Target;
 use crate::decode::fields::FieldRole;
 use crate::decode::registers::Slot;
-use crate::decode::select::names::{Meaning, Px4, is_nanos, is_seconds, meaning};
+use crate::decode::select::names::{Meaning, Px4, interval_unit, is_nanos, is_seconds, meaning};
 use crate::decode::{MAX_BATCH, Undecodable, Wanted};
 use std::borrow::Cow;
 use strapd_attitude::record::SampleKind;
@@ -199,17 +199,18 @@ impl<'a, 'p> Seeker<'a, 'p> {
             }
             Some(Meaning::GyroInterval(unit)) if self.auto_interval => {
                 found.px4 = true;
-                found.interval = unit;
                 found.kind.get_or_insert(SampleKind::Average);
-                self.number(Slot::INTERVAL, found)?;
+                found.interval = self.interval(unit, Slot::INTERVAL, found)?;
             }
             Some(Meaning::Interval(unit)) if self.auto_interval => {
                 found.interval = unit;
                 self.number(Slot::INTERVAL, found)?;
             }
             Some(Meaning::AccelInterval(unit)) if self.auto_accel => {
-                found.accel_interval = unit;
-                self.number(Slot::ACCEL_INTERVAL, found)?;
+                found.accel_interval = self.interval(unit, Slot::ACCEL_INTERVAL, found)?;
+            }
+            Some(Meaning::OrientationResets) if self.auto_orientation => {
+                self.number(Slot::RESETS, found)?;
             }
             _ => self.other(key, depth, found)?,
         }
@@ -343,6 +344,15 @@ impl<'a, 'p> Seeker<'a, 'p> {
             found.registers.float(slot, value);
         }
         Ok(())
+    }
+
+    /// An interval under a name of PX4's, and its unit: JSON has no types, and none is shorter than a microsecond.
+    fn interval(&mut self, named: TimeUnit, slot: Slot, found: &mut Found<'a>) -> Scan<TimeUnit> {
+        let Some(value) = self.scanner.float()? else {
+            return Ok(named);
+        };
+        found.registers.float(slot, value);
+        Ok(interval_unit(named, value > 0.0 && value < 1.0))
     }
 
     /// The first number of an array.

@@ -135,6 +135,7 @@ fn sample<const BIG: bool>(
             [double(3), double(0), double(1), double(2)],
             is_mark(double(4)),
         ),
+        orientation_resets: None,
         interval_nanos: None,
         is_beside: false,
     })

@@ -31,11 +31,13 @@ pub(crate) enum Meaning {
     MagAxis { axis: u8 },
     /// An orientation.
     Orientation { rank: u8 },
+    /// How often an orientation was set anew.
+    OrientationResets,
     /// A stamp.
     Stamp { rank: u8, unit: TimeUnit },
     /// Something that holds a stamp.
     Header,
-    /// The interval of a delta angle or an average.
+    /// The interval of a delta angle or an average; of a floating-point field in seconds ([`interval_unit`]).
     GyroInterval(TimeUnit),
     /// The interval of a delta velocity.
     AccelInterval(TimeUnit),
@@ -212,6 +214,7 @@ fn rare_names(name: &str) -> Option<Meaning> {
     match name {
         "orientation" => Some(Meaning::Orientation { rank: 0 }),
         "quaternion" => Some(Meaning::Orientation { rank: 0 }),
+        "quatresetcounter" => Some(Meaning::OrientationResets),
         "quat" | "q" | "qnb" => Some(Meaning::Orientation { rank: 1 }),
         "bodyrate" | "bodyrates" => gyro(1),
         "wx" | "wy" | "wz" => gyro_tail(name.get(1..)?, 3),
@@ -299,6 +302,15 @@ pub(crate) enum Px4 {
     SensorGyroFifo,
     /// `q` as w, x, y, z: FRD to NED.
     VehicleAttitude,
+}
+
+/// The unit of an interval whose name is PX4's: whole numbers count in what it says, and floating-point ones, which older
+/// firmware logged, are seconds.
+pub(crate) fn interval_unit(named: TimeUnit, is_float: bool) -> TimeUnit {
+    match is_float {
+        true => TimeUnit::Second,
+        false => named,
+    }
 }
 
 /// PX4's own messages, as `px4_msgs/msg/SensorCombined`, `px4.sensor_combined` or `sensor_combined`.

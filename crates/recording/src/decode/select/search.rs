@@ -8,7 +8,7 @@ use super::shapes::{end_of, quaternion, stamp_at, stamp_in, structs_on, text_nea
 use super::{End, Found, Pick, Selection, StampFields, Step, batch_of, path_text, px4_stamp};
 use crate::decode::fields::FieldRole;
 use crate::decode::registers::{Slot, StampForm};
-use crate::decode::schema::{Field, Kind, Many, Schema, Struct, last_name};
+use crate::decode::schema::{Field, Kind, Many, Number, Schema, Struct, last_name};
 use crate::decode::{Options, Wanted};
 use std::collections::{BTreeSet, VecDeque};
 use strapd_attitude::condition::GyroUnit;
@@ -360,7 +360,7 @@ fn beside_gyro(schema: &Schema, gyro: &[Step], given: bool, selection: &mut Sele
                 if !selection.has(Slot::INTERVAL, 1) {
                     selection.interval = path_text(schema, &path);
                     selection.take(vec![path], Slot::INTERVAL);
-                    selection.form.interval = unit;
+                    selection.form.interval = names::interval_unit(unit, is_float(field));
                 }
                 selection.kind.get_or_insert(SampleKind::Average);
             }
@@ -457,6 +457,10 @@ fn find_alone(
     None
 }
 
+fn is_float(field: &Field) -> bool {
+    End::from(field).number().is_some_and(Number::is_float)
+}
+
 /// A delta velocity is a specific force only with its interval.
 fn take_delta_velocity(
     structure: &Struct,
@@ -469,7 +473,10 @@ fn take_delta_velocity(
         .iter()
         .enumerate()
         .find_map(|(index, field)| match names::meaning(&field.name) {
-            Some(Meaning::AccelInterval(unit)) => Some((with(site, Step::Field(index)), unit)),
+            Some(Meaning::AccelInterval(unit)) => {
+                let unit = names::interval_unit(unit, is_float(field));
+                Some((with(site, Step::Field(index)), unit))
+            }
             _ => None,
         });
     if let (Some(velocity), Some((path, unit)), false) =
@@ -550,6 +557,14 @@ fn find_orientation(
                 Slot::ORIENTATION_MARK,
                 selection,
             );
+            let is_counter = |field: &Field| {
+                names::meaning(&field.name) == Some(Meaning::OrientationResets)
+                    && End::from(field).number().is_some()
+            };
+            let counter = structure.fields.iter().position(is_counter);
+            if let Some(index) = counter.filter(|_| !site.each) {
+                selection.take(vec![with(&site.path, Step::Field(index))], Slot::RESETS);
+            }
             return;
         }
     }

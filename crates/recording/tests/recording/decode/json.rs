@@ -442,3 +442,30 @@ fn lines_of_our_own_wire_and_of_gpsd_and_sensorserver_are_read() {
         assert!(decode_line(bad, LOG, &mut out).is_err());
     }
 }
+
+#[test]
+fn an_interval_of_px4_with_a_fraction_is_in_seconds() {
+    let decoder = Decoder::compile(&channel("json", "SensorCombined", ""), &options(&[])).unwrap();
+    for (interval, nanos) in [
+        ("5007", 5_007_000),
+        ("0.005007", 5_007_000),
+        ("4e-3", 4_000_000),
+    ] {
+        let line = format!(
+            "{{\"timestamp\":27329869,\"gyro_rad\":[0.1,0.2,0.3],\"gyro_integral_dt\":{interval}}}"
+        );
+        let sample = decode_one(&decoder, line.as_bytes());
+        assert_eq!(sample.interval_nanos, Some(nanos), "{interval}");
+    }
+}
+
+#[test]
+fn an_attitude_of_px4_says_how_often_it_was_set_anew() {
+    let decoder = Decoder::compile(&channel("json", "VehicleAttitude", ""), &options(&[])).unwrap();
+    let line =
+        r#"{"timestamp":1,"q":[1,0,0,0],"delta_q_reset":[0.9,0,0,0.1],"quat_reset_counter":7}"#;
+    assert_eq!(
+        decode_one(&decoder, line.as_bytes()).orientation_resets,
+        Some(7)
+    );
+}
