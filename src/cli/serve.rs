@@ -174,8 +174,7 @@ pub fn run(global: &Global, args: &Serve) -> Result<Outcome> {
         Some(layered) => layered.settings()?,
         None => asked.settings()?,
     };
-    let recorder = args.recording()?.map(Recorder::start).transpose()?;
-    settings.recorder = recorder.as_ref().map(Recorder::handle);
+    let recording = args.recording()?;
     let state = match &args.state {
         Some(path) => {
             let (file, saved) = StateFile::open(path)?;
@@ -184,6 +183,9 @@ pub fn run(global: &Global, args: &Serve) -> Result<Outcome> {
         }
         None => None,
     };
+    // After the state, which may be another daemon's: a recording that is replaced is gone.
+    let recorder = recording.map(Recorder::start).transpose()?;
+    settings.recorder = recorder.as_ref().map(Recorder::handle);
     let mut builder = tokio::runtime::Builder::new_multi_thread();
     if global.threads > 0 {
         builder.worker_threads(global.threads);

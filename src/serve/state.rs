@@ -1,11 +1,12 @@
 //! Attitudes <-> the file a restarted daemon goes on from (`--state`). Pure, but for [`StateFile`].
 //!
 //! One JSON object, written under another name, synced and renamed: whatever happens, there is a whole
-//! one, at most a second old.
+//! one, at most a second old. Since the file is replaced again and again, the lock that keeps a second daemon
+//! out is that of another one beside it, `.NAME.lock`, which stays.
 
 use super::stream::run::Span;
 use crate::error::{Error, Result};
-use crate::sink::{self, sync_directory};
+use crate::sink::{self, claim_or_warn, sync_directory};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
@@ -169,11 +170,13 @@ pub struct StateFile {
     path: PathBuf,
     temporary: PathBuf,
     written: Vec<u8>,
+    /// Locked while this daemon lives.
+    _lock: File,
 }
 
 impl StateFile {
     /// Reads what a daemon before this one has left, if there was one, and shows that the file can be
-    /// written.
+    /// written, and that no other daemon does.
     ///
     /// # Errors
     /// [`strapd_recording::Error::Open`], [`Error::Write`]; [`Error::Usage`] when it is no state file: to begin anew in
@@ -183,8 +186,8 @@ impl StateFile {
             path: path.to_owned(),
             source,
         };
-        let sensors = match std::fs::metadata(path) {
-            Err(e) if e.kind() == io::ErrorKind::NotFound => Sensors::new(),
+        let exists = match std::fs::metadata(path) {
+            Err(e) if e.kind() == io::ErrorKind::NotFound => false,
             Err(source) => return Err(failed(source).into()),
             // To open a FIFO is to wait for its other end, and what is replaced must be a file.
             Ok(found) if !found.is_file() => {
@@ -198,13 +201,19 @@ impl StateFile {
                     )
                 ));
             }
-            Ok(_) => read(path, File::open(path).map_err(failed)?)?,
+            Ok(_) => true,
         };
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        // First of all: what another daemon writes is no state to go on from.
+        let lock = locked(path)?;
+        let sensors = match exists {
+            true => read(path, File::open(path).map_err(failed)?)?,
+            false => Sensors::new(),
+        };
         let mut file = StateFile {
-            temporary: path.with_file_name(format!(".{name}.part")),
+            temporary: beside(path, ".part"),
             path: path.to_owned(),
             written: Vec::new(),
+            _lock: lock,
         };
         file.write(&sensors)?;
         Ok((file, sensors))
@@ -247,6 +256,44 @@ impl StateFile {
         self.written = text;
         Ok(())
     }
+}
+
+/// The name of a hidden file in the same folder.
+fn beside(path: &Path, ending: &str) -> PathBuf {
+    let mut name = std::ffi::OsString::from(".");
+    name.push(path.file_name().unwrap_or_default());
+    name.push(ending);
+    path.with_file_name(name)
+}
+
+/// The file that is locked in place of the one at `path`.
+///
+/// # Errors
+/// [`Error::Write`]: another daemon has it, or it can not be made.
+fn locked(path: &Path) -> Result<File> {
+    let lock = beside(path, ".lock");
+    let failed = |path: &Path, source| Error::Write {
+        path: path.to_owned(),
+        source,
+    };
+    // What is no file may be waited for without end, or be somebody else's.
+    if lock.symlink_metadata().is_ok_and(|found| !found.is_file()) {
+        let why = io::Error::new(
+            io::ErrorKind::AlreadyExists,
+            "is in the way and is no regular file",
+        );
+        return Err(failed(&lock, why));
+    }
+    let mut options = OpenOptions::new();
+    options.write(true).create(true).truncate(false);
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+    let file = options.open(&lock).map_err(|e| match e.kind() {
+        io::ErrorKind::NotFound => failed(path, e),
+        _ => failed(&lock, e),
+    })?;
+    claim_or_warn(&file, path).map_err(|e| failed(path, e))?;
+    Ok(file)
 }
 
 fn read(path: &Path, file: File) -> Result<Sensors> {
@@ -301,6 +348,10 @@ mod tests {
         assert!(found.is_empty());
         let sensors = Sensors::from([("imu".to_owned(), Saved::new(&sample(), &labels))]);
         file.write(&sensors)?;
+        // One daemon at a time.
+        let said = StateFile::open(&path).err().map(|e| e.to_string());
+        assert!(said.is_some_and(|s| s.contains("is writing it")));
+        drop(file);
         let (_, found) = StateFile::open(&path)?;
         assert_eq!(found, sensors);
         assert_eq!(

@@ -8,6 +8,7 @@
 
 pub mod address;
 mod batch;
+mod claim;
 mod copy;
 mod csv;
 mod decimate;
@@ -28,6 +29,7 @@ mod text;
 mod tum;
 pub mod upload;
 
+pub use claim::{claim_or_warn, unclaimed};
 pub use copy::CopiedChannel;
 pub use csv::{RAW_HEADER, push_raw_row, roll_pitch_yaw};
 pub use decimate::Decimator;
@@ -37,7 +39,7 @@ pub use mcap::live::{LiveMcap, LiveStream};
 pub use mcap::payload;
 pub use mcap::{Attachment, Encoding, InputChannel, InputMessage};
 pub use output::Flow;
-pub use output::{no_folder, sync_directory};
+pub use output::{is_named, no_folder, sync_directory};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::setting::TOPIC;
 pub use stream::{ChildFrames, Content, Provenance, Stream, output_topic};

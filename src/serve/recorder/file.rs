@@ -4,8 +4,8 @@
 //! What a write that failed has left behind is cut off, so the file ends at a chunk and can be closed.
 
 use crate::error::{Error, Result};
-use crate::sink::LiveMcap;
-use std::fs::{File, OpenOptions, TryLockError};
+use crate::sink::{LiveMcap, claim_or_warn, is_named, unclaimed};
+use std::fs::{File, OpenOptions};
 use std::io::{self, ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -31,6 +31,11 @@ impl RecordingFile {
             path: path.to_owned(),
             source,
         };
+        // What another process is writing is not replaced; who has just begun it finds it locked.
+        let replaced = match force {
+            true => unclaimed(path).map_err(error)?,
+            false => None,
+        };
         if force && path.symlink_metadata().is_ok_and(|found| found.is_file()) {
             // Not emptied: whoever holds or links the old file keeps it.
             std::fs::remove_file(path).map_err(error)?;
@@ -45,8 +50,12 @@ impl RecordingFile {
                 },
                 _ => error(source),
             })?;
-        if let Err(TryLockError::WouldBlock) = file.try_lock() {
-            return Err(error(io::Error::from(ErrorKind::ResourceBusy)));
+        drop(replaced);
+        claim_or_warn(&file, path).map_err(error)?;
+        // Another process may have replaced it before it was locked.
+        if !file.metadata().is_ok_and(|opened| is_named(&opened, path)) {
+            let why = "another process has just replaced it";
+            return Err(error(io::Error::new(ErrorKind::ResourceBusy, why)));
         }
         let mut recording = RecordingFile {
             path: path.to_owned(),

@@ -36,6 +36,11 @@ impl Names {
         }
     }
 
+    /// Whether there are others to go on to behind this name.
+    pub(super) fn is_numbered(&self, name: &Path) -> bool {
+        name != self.path
+    }
+
     fn number(&self, n: u64) -> PathBuf {
         let mut name = self.path.file_stem().unwrap_or_default().to_owned();
         name.push(format!("_{n:04}."));

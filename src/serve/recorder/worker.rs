@@ -84,9 +84,15 @@ impl Worker {
     }
 
     fn begin(&mut self, force: bool) -> Result<()> {
-        let path = self.names.next();
-        let live = LiveMcap::new(self.settings.compression, &self.settings.provenance)?;
-        let file = RecordingFile::create(&path, live, force)?;
+        let (path, file) = loop {
+            let path = self.names.next();
+            let live = LiveMcap::new(self.settings.compression, &self.settings.provenance)?;
+            match RecordingFile::create(&path, live, force) {
+                // Another process took the number meanwhile.
+                Err(Error::OutputExists { .. }) if self.names.is_numbered(&path) => {}
+                created => break (path, created?),
+            }
+        };
         self.opened = Instant::now();
         self.synced = self.opened;
         for recorded in self.streams.values_mut() {

@@ -203,6 +203,31 @@ impl Process {
         address.parse().unwrap()
     }
 
+    /// `strapd ARGS` of a second process, which is refused for a file that this one writes.
+    pub(crate) fn assert_refuses(&self, args: &[&str]) {
+        let mut second = Command::new(strapd())
+            .args(args)
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let start = Instant::now();
+        while second.try_wait().unwrap().is_none() && start.elapsed() < PATIENCE {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        // One that was not refused serves until it is ended.
+        let _ = second.kill();
+        let output = second.wait_with_output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{args:?}: {said}");
+        let who = match cfg!(target_os = "linux") {
+            true => format!("process {} is writing it", self.child.id()),
+            false => "another process is writing it".to_owned(),
+        };
+        assert!(said.contains(&who), "{args:?}: {said}");
+    }
+
     /// Sends a signal.
     pub(crate) fn signal(&self, name: &str) {
         let done = Command::new("kill")

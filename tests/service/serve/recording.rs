@@ -142,3 +142,31 @@ fn a_recording_that_can_not_begin_is_said_before_anything_listens() {
     }
     assert_eq!(std::fs::read(path).unwrap(), b"precious");
 }
+
+#[test]
+fn what_one_daemon_records_no_other_process_replaces() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("a.mcap");
+    let (mut process, mut sender, mut watcher) = recording(&path, &["--force"]);
+    let log = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/xsens_mti.mcap");
+    let (name, log) = (path.to_str().unwrap(), log.to_str().unwrap());
+    let serve = ["serve", "--listen", TCP, "--min-free", "0", "--force"];
+    process.assert_refuses(&[&serve[..], &["--record", name]].concat());
+    process.assert_refuses(&["replay", log, "-o", name, "--force"]);
+    for n in 0..100 {
+        sender.send(&rate("imu0", n, 1.0));
+        watcher.object("ATT");
+    }
+    process.signal("TERM");
+    assert_eq!(process.exit(), Some(0));
+    let bytes = std::fs::read(&path).unwrap();
+    let stats = mcap::Summary::read(&bytes).unwrap().unwrap().stats.unwrap();
+    assert_eq!(stats.message_count, 300, "sample, attitude, transform");
+    // With nobody writing it, it is replaced as ever; and a lock that a killed process had holds nobody up.
+    let (mut process, ..) = recording(&path, &["--force"]);
+    process.child.kill().unwrap();
+    process.child.wait().unwrap();
+    let (mut process, ..) = recording(&path, &["--force"]);
+    process.signal("TERM");
+    assert_eq!(process.exit(), Some(0));
+}

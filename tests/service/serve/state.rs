@@ -22,6 +22,34 @@ fn through(sender: &mut Client, watcher: &mut Client, numbers: std::ops::Range<u
     last
 }
 
+#[test]
+fn a_second_daemon_with_the_same_state_is_refused_until_the_first_has_gone() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("state.json");
+    let (mut process, mut sender, mut watcher) = started(&path, &[]);
+    let last = through(&mut sender, &mut watcher, 0..100);
+    // A recording that it would have replaced is still there.
+    let recording = dir.path().join("a.mcap");
+    std::fs::write(&recording, b"precious").unwrap();
+    let named = |path: &Path| path.to_str().unwrap().to_owned();
+    let (state, recorded) = (named(&path), named(&recording));
+    let serve = ["serve", "--listen", TCP, "--min-free", "0", "--force"];
+    process.assert_refuses(&[&serve[..], &["--state", &state, "--record", &recorded]].concat());
+    let by_another_name = named(&dir.path().join(".").join("state.json"));
+    process.assert_refuses(&["serve", "--listen", TCP, "--state", &by_another_name]);
+    assert_eq!(std::fs::read(&recording).unwrap(), b"precious");
+    eventually("the last attitude in the file", || {
+        std::fs::read_to_string(&path).is_ok_and(|text| text.contains("1700000000099000000"))
+    });
+    // Killed, it leaves no lock behind, and its state.
+    process.child.kill().unwrap();
+    process.child.wait().unwrap();
+    let (_process, mut sender, mut watcher) = started(&path, &[]);
+    let first = through(&mut sender, &mut watcher, 100..101);
+    assert_eq!(first["reset"], last["reset"]);
+    assert!(!first["status"].to_string().contains("started"), "{first}");
+}
+
 fn sigma(att: &Value) -> f64 {
     att["sigma_deg"][0].as_f64().unwrap()
 }

@@ -4,6 +4,7 @@
 //! formats is. A regular file is written under a temporary name in the same directory, synced, and
 //! given its name only when complete: a run that dies leaves no finished-looking file.
 
+use super::claim::{claim, is_busy, unclaimed};
 use super::socket::{Tcp, Udp};
 use super::target::Target;
 use super::upload::Upload;
@@ -116,6 +117,7 @@ impl Output {
         }
         // Through a link the file it points to is replaced, not the link.
         let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_path_buf());
+        unclaimed(&place).map_err(write_error)?;
         PartFile::create(path, &place, inputs, force).map(Output::Part)
     }
 
@@ -264,20 +266,14 @@ impl PartFile {
                 .truncate(false)
                 .write(true)
                 .open(part)?;
-            match file.try_lock() {
-                Ok(()) => {}
-                Err(fs::TryLockError::WouldBlock) => {
-                    return Err(PartError::Io(io::Error::new(
-                        ErrorKind::ResourceBusy,
-                        format!("another run is writing it (as {})", part.display()),
-                    )));
-                }
-                // A file system without locks: then there is no such protection.
-                Err(fs::TryLockError::Error(_)) => {}
+            // A file system without locks: then there is no such protection.
+            if let Err(e) = claim(&file)
+                && is_busy(&e)
+            {
+                return Err(PartError::Io(e));
             }
             let opened = file.metadata()?;
-            let named = fs::symlink_metadata(part);
-            if named.is_ok_and(|named| !cfg!(unix) || is_same_file(&opened, &named)) {
+            if is_named(&opened, part) {
                 if is_one_of(part, &opened, inputs) {
                     return Err(PartError::IsInput);
                 }
@@ -299,6 +295,8 @@ impl PartFile {
         };
         self.file.sync_all().map_err(write_error)?;
         if self.force {
+            // Somebody may have begun to write there meanwhile.
+            let _kept = unclaimed(&self.place).map_err(write_error)?;
             fs::rename(&self.part, &self.place).map_err(write_error)?;
         } else {
             // A link, unlike a rename, never replaces a file that appeared while we were writing.
@@ -390,6 +388,13 @@ fn is_one_of(path: &Path, metadata: &Metadata, inputs: &[PathBuf]) -> bool {
         let same_name = canonical.is_some() && fs::canonicalize(input).ok() == canonical;
         same_name || fs::metadata(input).is_ok_and(|m| is_same_file(&m, metadata))
     })
+}
+
+/// Whether an open file still has this name; where the system does not tell, any file of that name is taken for it.
+#[must_use]
+pub fn is_named(opened: &Metadata, path: &Path) -> bool {
+    let named = fs::symlink_metadata(path);
+    named.is_ok_and(|named| !cfg!(unix) || is_same_file(opened, &named))
 }
 
 /// Device and inode agree: hard links are the same file.
