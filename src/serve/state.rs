@@ -17,11 +17,18 @@ use strapd_attitude::estimate::Memory;
 use strapd_attitude::quaternion::{BodyRate, Quaternion};
 use strapd_attitude::record::TimeUnit;
 use strapd_attitude::record::{AttitudeCovariance, AttitudeSample, Nanos, Status};
+use strapd_recording::text::printable;
 
 /// What this release writes. 1 had neither the run nor the memory.
 pub(super) const FORMAT: u32 = 2;
 /// A larger file is none of ours: a sensor takes no more than 10 KiB.
 const MAX_BYTES: u64 = 64 << 20;
+/// No attitude is less certain, rad^2: one of which nothing is known has pi^2 about each axis.
+const MAX_VARIANCE: f64 = 1e3;
+/// Rounding of a variance of nothing.
+const ROUNDING: f64 = 1e-12;
+/// No body turns faster, rad/s.
+const MAX_RATE: f64 = 1e9;
 /// The last attitude of a sensor, and between which axes it is.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Saved {
@@ -97,7 +104,8 @@ impl Saved {
             last_ns: last.map(|l| l.0).filter(|l| *l != self.stamp_ns),
             seq,
             unit: unit.map(|unit| unit.name().to_owned()),
-            memory: memory.map(Box::new),
+            // What would be refused is not saved: the attitude alone is held, as from other settings.
+            memory: memory.filter(Memory::is_plausible).map(Box::new),
             ..self
         }
     }
@@ -135,6 +143,36 @@ impl Saved {
         self.memory.as_deref()
     }
 
+    /// Checks that a daemon can have saved it.
+    ///
+    /// # Errors
+    /// In words: what can not be.
+    pub(super) fn check(&self) -> std::result::Result<(), String> {
+        let norm = self.q.iter().map(|c| c * c).sum::<f64>().sqrt();
+        if (norm - 1.0).abs() > 1e-6 {
+            return Err("`q` is no unit quaternion".to_owned());
+        }
+        let [xx, xy, xz, yy, yz, zz] = self.covariance;
+        let is_variance = |v: f64| (-ROUNDING..=MAX_VARIANCE).contains(&v);
+        let is_within = |both: f64, a: f64, b: f64| {
+            both.powi(2) <= a.max(0.0) * b.max(0.0) * (1.0 + 1e-6) + ROUNDING
+        };
+        let is_covariance = [xx, yy, zz].into_iter().all(is_variance)
+            && is_within(xy, xx, yy)
+            && is_within(xz, xx, zz)
+            && is_within(yz, yy, zz);
+        if !is_covariance {
+            return Err("`covariance` is none".to_owned());
+        }
+        if !self.rate.iter().all(|rate| rate.abs() <= MAX_RATE) {
+            return Err("`rate` is none".to_owned());
+        }
+        match self.memory().is_none_or(Memory::is_plausible) {
+            true => Ok(()),
+            false => Err("`memory` holds what no filter can know".to_owned()),
+        }
+    }
+
     /// As it was.
     ///
     /// # Errors
@@ -162,6 +200,17 @@ impl Saved {
             log: Nanos(self.stamp_ns),
         })
     }
+}
+
+/// Checks that a daemon can have saved all of them.
+///
+/// # Errors
+/// In words: which sensor's state can not be, and why.
+pub(super) fn check(sensors: &Sensors) -> std::result::Result<(), String> {
+    sensors.iter().try_for_each(|(id, saved)| {
+        let named = |why| format!("sensor {}: {why}", printable(id));
+        saved.check().map_err(named)
+    })
 }
 
 /// The file.
@@ -317,13 +366,21 @@ fn read(path: &Path, file: File) -> Result<Sensors> {
             document.strapd_state
         )));
     }
+    check(&document.sensors)
+        .map_err(|why| foreign(format!("is no state that strapd has saved: {why}")))?;
     Ok(document.sensors)
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
+    use crate::serve::Settings;
+    use crate::serve::hub::Hub;
+    use crate::serve::session::{Scratch, Session};
     use nalgebra::Vector3;
+    use serde_json::Value;
+    use std::sync::Arc;
 
     fn sample() -> AttitudeSample {
         AttitudeSample {
@@ -336,6 +393,100 @@ mod tests {
             reset_count: 3,
             log: Nanos(1_700_000_000_123_456_789),
         }
+    }
+
+    /// A daemon that goes on from these for five seconds of samples; how uncertain the last attitude is, as a client
+    /// is told.
+    fn gone_on(saved: Sensors, from: u64) -> (Sensors, Value) {
+        let settings = Settings {
+            saved,
+            ..Settings::default()
+        };
+        let hub = Arc::new(Hub::new(settings).unwrap());
+        let mut session = Session::new(&hub, "sender".to_owned(), true);
+        let mut scratch = Scratch::default();
+        for n in from..from + 500 {
+            let (secs, nanos) = (1_700_000_000 + n / 100, n % 100 * 10_000_000);
+            let line = format!(
+                "{{\"id\":\"imu\",\"stamp\":{{\"sec\":{secs},\"nsec\":{nanos}}},\"gyro\":[0.01,-0.02,0.{n:03}],\"accel\":[0.1,0.2,9.8],\"mag\":[20,5,-40]}}\n",
+                n = n % 7
+            );
+            session.bytes(line.as_bytes(), Nanos(0), &mut scratch);
+            while session.is_held() {
+                session.go_on(&mut scratch);
+            }
+        }
+        let status: Value = serde_json::from_slice(&hub.status()).unwrap();
+        (hub.saved(), status["sources"][0]["sigma_deg"].clone())
+    }
+
+    /// Calls with every number of a value changed in turn.
+    fn changed(value: &Value, to: &[f64], call: &mut impl FnMut(String, Value)) {
+        let pointers = {
+            let mut all = Vec::new();
+            let mut open = vec![(String::new(), value)];
+            while let Some((at, value)) = open.pop() {
+                match value {
+                    Value::Number(_) => all.push(at),
+                    Value::Array(some) => {
+                        open.extend(
+                            some.iter()
+                                .enumerate()
+                                .map(|(n, v)| (format!("{at}/{n}"), v)),
+                        );
+                    }
+                    Value::Object(some) => {
+                        open.extend(some.iter().map(|(name, v)| (format!("{at}/{name}"), v)));
+                    }
+                    _ => {}
+                }
+            }
+            all
+        };
+        for at in pointers {
+            for number in to {
+                let mut other = value.clone();
+                if let Some(place) = other.pointer_mut(&at) {
+                    *place = (*number).into();
+                }
+                call(format!("{at} = {number:e}"), other);
+            }
+        }
+    }
+
+    #[test]
+    fn a_number_that_cannot_be_is_refused_or_does_no_lasting_harm() {
+        let (sensors, sigma) = gone_on(Sensors::new(), 0);
+        assert!(sigma["tilt"].is_f64(), "{sigma}");
+        let text = serde_json::to_value(&sensors).unwrap();
+        let (mut refused, mut taken) = (0, 0);
+        changed(&text, &[-1e308, 1e308, -1.0], &mut |what, other| {
+            let Ok(sensors) = serde_json::from_value::<Sensors>(other) else {
+                refused += 1;
+                return;
+            };
+            if check(&sensors).is_err() {
+                refused += 1;
+                return;
+            }
+            taken += 1;
+            let (after, sigma) = gone_on(sensors, 500);
+            for name in ["tilt", "heading"] {
+                let sigma = sigma[name].as_f64();
+                assert!(
+                    sigma.is_some_and(|s| (0.0..1e3).contains(&s)),
+                    "{what}: {name} {sigma:?}"
+                );
+            }
+            // What it leaves is taken again.
+            assert_eq!(check(&after), Ok(()), "{what}");
+        });
+        assert!(refused > 2 * taken && taken > 0, "{refused} {taken}");
+        // The one that was found, and the words.
+        let mut other = text.clone();
+        other["imu"]["covariance"][0] = (-1e308).into();
+        let why = check(&serde_json::from_value(other).unwrap()).unwrap_err();
+        assert_eq!(why, "sensor imu: `covariance` is none");
     }
 
     #[test]

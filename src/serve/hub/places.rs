@@ -229,7 +229,7 @@ impl Hub {
             let mut sensor = lock(&sensor);
             // Somebody may be about to send it.
             sensor.gave_way = true;
-            if let Some(saved) = sensor.stream.saved() {
+            if let Some(saved) = sensor.stream.saved().filter(|last| last.check().is_ok()) {
                 lock(&self.saved).insert(id, saved, self.limits.sensors);
             }
             self.withdraw(sensor.stream.channel());

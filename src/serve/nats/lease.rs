@@ -268,6 +268,8 @@ impl Document {
                 document.strapd_state
             ));
         }
+        super::super::state::check(&document.sensors)
+            .map_err(|why| format!("what is stored is no state of strapd: {why}"))?;
         Ok(document)
     }
 }

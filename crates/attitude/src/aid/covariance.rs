@@ -257,7 +257,10 @@ impl Covariance {
         let within = |i: usize, j: usize| {
             self.rows[i][j].powi(2) <= self.rows[i][i] * self.rows[j][j] * (1.0 + 1e-9)
         };
-        self.is_sound() && (0..self.states).all(|i| (0..i).all(|j| within(i, j)))
+        let is_small = |i: usize| self.rows[i][i] <= super::memory::LARGEST;
+        self.is_sound()
+            && (0..self.states).all(is_small)
+            && (0..self.states).all(|i| (0..i).all(|j| within(i, j)))
     }
 
     /// Smallest pivot of the factor of the matrix scaled to ones on its diagonal, over the states that are not

@@ -1,6 +1,7 @@
 //! Samples since the last correction -> sums. Pure.
 
 use super::calibration::Applied;
+use super::memory::LARGEST;
 use nalgebra::{Matrix3, Vector3};
 
 /// What is added up between two corrections. Earth axes but for `rate`.
@@ -52,6 +53,24 @@ impl Interval {
             field_in_body: Vector3::zeros(),
             by_iron: Vector3::zeros(),
         }
+    }
+
+    /// Whether its sums can be: what a file says may be anything.
+    pub(super) fn is_plausible(&self) -> bool {
+        let times = [self.secs, self.force_secs, self.fields];
+        let vectors = [
+            &self.force,
+            &self.lead,
+            &self.rate,
+            &self.field,
+            &self.field_in_body,
+            &self.by_iron,
+        ];
+        let mut scaled = self.scaled.iter().flatten();
+        times.iter().all(|time| (0.0..=LARGEST).contains(time))
+            && vectors.iter().all(|sum| sum.amax() <= LARGEST)
+            && self.attitude.amax() <= LARGEST
+            && scaled.all(|sum| sum.abs() <= LARGEST)
     }
 
     /// The attitude `r` at the end of `secs` in which the mean rate was measured as `rate`.

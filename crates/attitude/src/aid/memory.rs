@@ -25,7 +25,7 @@ const SCALE: f64 = 0.5;
 const FORCE_BIAS: f64 = 100.0;
 const LEAD: f64 = 1.0;
 /// No sum over an interval between corrections, speed, place or field is larger.
-const LARGEST: f64 = 1e9;
+pub(super) const LARGEST: f64 = 1e9;
 
 /// What an [`Aided`] knows at one moment; [`Aided::recall`] puts another there. Of a method without latency
 /// some 7 kB of text.
@@ -159,7 +159,8 @@ impl Memory {
         self.forces.is_some()
     }
 
-    fn is_plausible(&self) -> bool {
+    /// Whether a filter can have known it, whatever its settings.
+    pub(crate) fn is_plausible(&self) -> bool {
         let calibration = &self.calibration;
         let is_unit = |q: &[f64; 4]| (q.iter().map(|c| c * c).sum::<f64>() - 1.0).abs() < 1e-9;
         let beside = self.forces.iter().chain([&self.fields]);
@@ -190,7 +191,10 @@ impl Memory {
             && self.last_out.iter().all(is_unit)
             && numbers.all(|number| number.abs() <= LARGEST)
             && self.nominal >= 0.0
-            && self.interval.secs >= 0.0
+            && self.interval.is_plausible()
+            && self.residuals.is_plausible()
+            && self.surroundings.is_plausible()
+            && self.plausibility.is_plausible()
             && self.given.len() <= MOST_GIVEN
             && self.rest.is_bounded()
             && beside.into_iter().all(Beside::is_bounded)

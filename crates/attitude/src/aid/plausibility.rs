@@ -7,6 +7,7 @@
 //! `T`: a body that walks, runs or is shaken passes after a second or a few, and no length of a single sample
 //! has to be gravity's.
 
+use super::memory::LARGEST;
 use nalgebra::Vector3;
 
 /// First and last time at which it is judged, s.
@@ -38,6 +39,16 @@ pub(super) enum Plausibility {
 }
 
 impl Plausibility {
+    /// Whether it can have been seen: what a file says may be anything.
+    pub(super) fn is_plausible(&self) -> bool {
+        match self {
+            Plausibility::Seen(sum, secs) => {
+                sum.amax() <= LARGEST && (0.0..=LARGEST).contains(secs)
+            }
+            Plausibility::Open | Plausibility::Given | Plausibility::Denied => true,
+        }
+    }
+
     /// Takes a force in earth axes that stands for `secs`. Says whether it has just been found to be none.
     pub(super) fn denies(&mut self, secs: f64, force: &Vector3<f64>, gravity: f64) -> bool {
         let (sum, before) = match *self {

@@ -1,5 +1,6 @@
 //! Residuals of the specific force, one after another -> the variance of the next. Pure.
 
+use super::memory::LARGEST;
 use super::settings::Settings;
 
 /// What residuals have been like.
@@ -22,6 +23,15 @@ impl Residuals {
             product: 0.0,
             last: [0.0; 2],
         }
+    }
+
+    /// Whether they can be: what a file says may be anything.
+    pub(super) fn is_plausible(&self) -> bool {
+        let is_mean = |square: f64| (0.0..=LARGEST).contains(&square);
+        is_mean(self.density)
+            && is_mean(self.square)
+            && self.product.abs() <= LARGEST
+            && self.last.iter().all(|residual| residual.abs() <= LARGEST)
     }
 
     /// The reference was left: what comes has nothing to do with what was.

@@ -1,5 +1,6 @@
 //! Rate and force -> whether the sensor is at rest. Pure.
 
+use super::memory::LARGEST;
 use super::settings::Settings;
 use nalgebra::Vector3;
 use std::collections::VecDeque;
@@ -86,7 +87,16 @@ impl Rest {
 
     /// Whether it can have come about.
     pub(super) fn is_bounded(&self) -> bool {
+        let is_small = |v: &Vector3<f64>| v.amax() <= LARGEST;
+        let is_time = |secs: f64| (0.0..=LARGEST).contains(&secs);
         self.open.len() <= MOST_OPEN
+            && is_small(&self.rate)
+            && is_small(&self.force)
+            && is_time(self.quiet)
+            && self
+                .open
+                .iter()
+                .all(|(rate, secs)| is_small(rate) && is_time(*secs))
     }
 
     pub(super) fn is_quiet(&self, settings: &Settings) -> bool {

@@ -1,5 +1,6 @@
 //! The magnetic fields that were met, and which of them headings are believed in. Pure.
 
+use super::memory::LARGEST;
 use super::settings::Settings;
 
 /// Norm and dip of a field.
@@ -46,6 +47,21 @@ pub(super) struct Surroundings {
 }
 
 impl Surroundings {
+    /// Whether a field can have been so: what a file says may be anything.
+    pub(super) fn is_plausible(&self) -> bool {
+        let is_amount = |number: &f64| (0.0..=LARGEST).contains(number);
+        let mut fields = self.reference.iter().chain(&self.other);
+        let amounts = [
+            self.other_secs,
+            self.deviation,
+            self.contradicted,
+            self.mean_norm,
+        ];
+        amounts.iter().all(is_amount)
+            && fields
+                .all(|field| field.norm > 0.0 && is_amount(&field.norm) && field.dip.abs() <= 4.0)
+    }
+
     /// Mean norm of the field, where hard iron is looked for.
     pub(super) fn mean_norm(&self) -> f64 {
         self.mean_norm

@@ -13,6 +13,9 @@ use nalgebra::Vector3;
 /// Most samples that wait for what follows them.
 const MOST_WAITING: usize = 16;
 
+/// No value of a sample is larger, whatever its unit.
+const LARGEST: f64 = 1e9;
+
 /// What a conditioner knows at one moment; [`Conditioner::recall`] puts another there.
 #[derive(Clone, PartialEq, Debug)]
 #[cfg_attr(
@@ -46,6 +49,30 @@ type Before = (i64, i64, [f64; 3], u32);
 type Row = (i64, i64, [f64; 3], Option<[f64; 3]>, i64, u32, u16);
 
 impl Memory {
+    /// Whether a conditioner can have known it, whatever the settings.
+    pub(crate) fn is_plausible(&self) -> bool {
+        let stamps = [
+            self.index_base,
+            self.trimmed_from,
+            self.high,
+            self.floor,
+            self.first,
+            self.last,
+        ];
+        let rows = || self.suspects.iter().chain(&self.untimed);
+        stamps
+            .into_iter()
+            .flatten()
+            .chain(rows().map(|row| row.0))
+            .chain(self.previous.iter().flat_map(|p| [p.0, p.1]))
+            .all(|stamp| stamp.unsigned_abs() <= MAX_STAMP as u64)
+            && rows().all(|row| row.2.iter().all(|v| v.abs() <= 2e4))
+            && self
+                .previous
+                .iter()
+                .all(|p| p.2.iter().all(|v| v.abs() <= LARGEST))
+    }
+
     /// The last stamp that was used.
     #[must_use]
     pub fn last(&self) -> Option<Nanos> {
@@ -88,26 +115,7 @@ impl Conditioner {
     /// stays. `false`, and nothing has changed, when no conditioner can have known it.
     #[must_use]
     pub fn recall(&mut self, memory: &Memory) -> bool {
-        let stamps = [
-            memory.index_base,
-            memory.trimmed_from,
-            memory.high,
-            memory.floor,
-            memory.first,
-            memory.last,
-        ];
-        let rows = || memory.suspects.iter().chain(&memory.untimed);
-        let can_be = stamps
-            .into_iter()
-            .flatten()
-            .chain(rows().map(|row| row.0))
-            .chain(memory.previous.iter().flat_map(|p| [p.0, p.1]))
-            .all(|stamp| stamp.unsigned_abs() <= MAX_STAMP as u64)
-            && rows().all(|row| row.2.iter().all(|v| v.abs() <= 2e4))
-            && memory
-                .previous
-                .iter()
-                .all(|p| p.2.iter().all(|v| v.is_finite()))
+        let can_be = memory.is_plausible()
             && memory.suspects.len().max(memory.untimed.len()) <= MOST_WAITING
             && memory.untimed.is_sorted_by_key(|row| (row.5, row.0))
             && memory.index < u64::MAX / 4

@@ -85,6 +85,17 @@ impl Memory {
         self.conditioning.last()
     }
 
+    /// Whether an estimator can have known it, whatever its settings: a file may say anything.
+    #[must_use]
+    pub fn is_plausible(&self) -> bool {
+        let scale = self.force_scale.unwrap_or(1.0);
+        self.conditioning.is_plausible()
+            && self.propagation.is_plausible()
+            && self.aiding.as_ref().is_none_or(aid::Memory::is_plausible)
+            && scale.is_finite()
+            && scale > 0.0
+    }
+
     /// Whether specific forces came in messages of their own.
     #[must_use]
     pub fn has_forces_beside(&self) -> bool {

@@ -366,6 +366,30 @@ pub struct Carried {
     distorted: Option<[Rows; 3]>,
 }
 
+impl Carried {
+    /// Whether a covariance can have been so: what a file says may be anything.
+    pub(crate) fn is_plausible(&self) -> bool {
+        /// No variance, product or time is larger.
+        const LARGEST: f64 = 1e12;
+        /// Rounding of a variance of nothing.
+        const ROUNDING: f64 = 1e-12;
+        let distorted = self.distorted.iter().flatten().flatten();
+        let rows = self.turned.iter().chain(&self.cross).chain(distorted);
+        let mut numbers = rows.flatten().chain(&self.attitude).chain(&self.bias);
+        let variance = |place: usize| self.attitude[place] + self.alike.max(0.0);
+        // xx, xy, xz, yy, yz, zz.
+        let pairs = [(1, 0, 3), (2, 0, 5), (4, 3, 5)];
+        numbers.all(|v| v.abs() <= LARGEST)
+            && (0.0..=LARGEST).contains(&self.alike)
+            && self.bias.iter().all(|v| *v >= 0.0)
+            && [0, 3, 5].into_iter().all(|n| variance(n) >= -ROUNDING)
+            && pairs.into_iter().all(|(both, a, b)| {
+                let most = variance(a).max(0.0) * variance(b).max(0.0);
+                self.attitude[both].powi(2) <= most * (1.0 + 1e-6) + ROUNDING
+            })
+    }
+}
+
 impl Covariance {
     /// What [`carry`](Self::carry) needs.
     pub(crate) fn carried(&self) -> Carried {
@@ -382,12 +406,7 @@ impl Covariance {
 
     /// Goes on from what another of the same noise has carried; `false` when that can not be.
     pub(crate) fn carry(&mut self, carried: &Carried) -> bool {
-        let distorted = carried.distorted.iter().flatten().flatten();
-        let rows = carried.turned.iter().chain(&carried.cross);
-        let rows = rows.chain(distorted).flatten();
-        let mut numbers = rows.chain(&carried.attitude).chain(&carried.bias);
-        let is_sound = numbers.all(|v| v.is_finite()) && (0.0..f64::MAX).contains(&carried.alike);
-        if !is_sound || carried.distorted.is_some() != self.is_distorted {
+        if !carried.is_plausible() || carried.distorted.is_some() != self.is_distorted {
             return false;
         }
         self.distorted = carried.distorted.unwrap_or([ZERO; 3]);

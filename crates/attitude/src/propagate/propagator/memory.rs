@@ -61,6 +61,29 @@ type Element = (i64, i64, f64, f64, f64, bool);
 /// Of a sample that waits: ns before the last, specific force, status bits, log time, whether it turns.
 type Row = (i64, Option<[f64; 3]>, u16, i64, bool);
 
+impl Memory {
+    /// Whether a propagator can have known it, whatever the settings.
+    pub(crate) fn is_plausible(&self) -> bool {
+        let unit = |q: &[f64; 4]| {
+            let norm = q.iter().map(|c| c * c).sum::<f64>().sqrt();
+            (norm - 1.0).abs() < 1e-6
+        };
+        /// No sum of rotations and no rate between two samples is larger, rad, rad/s.
+        const MOST: f64 = 1e15;
+        let small = |v: &f64| v.abs() <= MOST;
+        unit(&self.attitude)
+            && unit(&self.initial)
+            && self.excess.iter().all(|c| c.abs() < 1e-6)
+            && self.sum.iter().flatten().all(small)
+            && self.rates.iter().flatten().all(small)
+            && self
+                .samples
+                .iter()
+                .all(|e| e.1 >= 0 && [e.2, e.3, e.4].iter().all(small))
+            && self.covariance.is_plausible()
+    }
+}
+
 impl Propagator {
     /// What it knows; `None` before the first sample of a run.
     #[must_use]
@@ -166,23 +189,15 @@ impl Propagator {
         } else {
             FASTEST
         };
-        let unit = |q: &[f64; 4]| {
-            let norm = q.iter().map(|c| c * c).sum::<f64>().sqrt();
-            (norm - 1.0).abs() < 1e-6
-        };
         let small = |v: &f64| v.abs() <= limit;
         let elements = memory.samples.iter();
         let in_order = memory.samples.windows(2).all(|pair| match pair {
             [a, b] => a.0 > b.0 && b.0 >= 0,
             _ => true,
         });
-        unit(&memory.attitude)
-            && unit(&memory.initial)
-            && memory.excess.iter().all(|c| c.abs() < 1e-6)
+        memory.is_plausible()
             && memory.sum.is_some() == self.state.sum.is_some()
-            && memory.sum.iter().flatten().all(|c| c.is_finite())
             && memory.world_since.is_some() == self.state.world.is_some()
-            && memory.rates.iter().flatten().all(|c| c.is_finite())
             && elements.len() <= LOOKED_BACK + MOST_WAITING
             && (1..=elements.len()).contains(&memory.next)
             // Whoever has dropped some looks no further back than to what is there.
@@ -190,7 +205,7 @@ impl Propagator {
             && memory.before < u64::MAX / 4
             && in_order
             && memory.samples.last().is_some_and(|last| last.0 == 0)
-            && elements.clone().all(|e| e.1 >= 0 && [e.2, e.3, e.4].iter().all(small))
+            && elements.clone().all(|e| [e.2, e.3, e.4].iter().all(small))
             && memory.waiting.len().max(memory.open.len()) <= MOST_WAITING
     }
 }
