@@ -9,7 +9,7 @@ use super::fault::{Fault, asked};
 use super::patience::Patience;
 use bytes::Bytes;
 use futures_util::StreamExt;
-use http_body_util::BodyExt;
+use http_body_util::{BodyExt, Limited};
 use object_store::aws::AmazonS3Builder;
 use object_store::azure::MicrosoftAzureBuilder;
 use object_store::client::{
@@ -27,11 +27,12 @@ use reqwest::StatusCode;
 use std::fmt;
 use std::ops::Range;
 use std::pin::Pin;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU16, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU16, AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_recording::address::Address;
+use strapd_recording::text::snippet;
 
 /// What a cloud's own tools read.
 const S3: &str = "AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY, AWS_SESSION_TOKEN, AWS_REGION and AWS_ENDPOINT_URL are looked at; AWS_SKIP_SIGNATURE=true reads what is public";
@@ -45,6 +46,11 @@ const METADATA: [&str; 3] = [
     "metadata.google.internal",
 ];
 const METADATA_ANSWERS: Duration = Duration::from_secs(2);
+
+/// Bytes of one page of a listing: a thousand keys of a kilobyte each, and as much again around them, are a fraction.
+const MOST_OF_PAGE: usize = 16 << 20;
+/// Pages of a listing without a key that may follow each other.
+const MOST_EMPTY: usize = 100;
 
 /// An object in a store.
 pub(super) struct Cloud {
@@ -62,6 +68,16 @@ impl fmt::Debug for Cloud {
     }
 }
 
+/// What was listed.
+#[derive(Debug, Default)]
+pub(super) struct Keys {
+    /// How many keys there were, and how many of them are wanted.
+    pub(super) looked_at: usize,
+    pub(super) wanted: usize,
+    /// The first of those.
+    pub(super) kept: Vec<String>,
+}
+
 /// A store, as what is read from and as what takes objects in parts.
 type Both = (Arc<dyn ObjectStore>, Arc<dyn MultipartStore>);
 
@@ -75,6 +91,8 @@ fn both<S: ObjectStore + MultipartStore>(store: S) -> Both {
 struct Answered {
     status: AtomicU16,
     asked_millis: AtomicU64,
+    /// What the body is said to be, where the store itself answered, and not who gives credentials.
+    form: Mutex<Option<String>>,
 }
 
 impl Cloud {
@@ -114,6 +132,7 @@ impl Cloud {
             only_https: false,
             is_without_credentials: Arc::default(),
             is_refused_plain: Arc::default(),
+            empty_pages: Arc::default(),
             latest: Arc::default(),
         };
         // Tries are counted by whoever downloads.
@@ -184,15 +203,30 @@ impl Cloud {
         }))
     }
 
-    /// The keys in the folder that this was made for, `most` at most, in no order.
-    pub(super) async fn keys(&self, most: usize) -> Result<Vec<String>, Fault> {
+    /// The keys in the folder that this was made for, of which `most` are looked at, and of those that are `wanted` as
+    /// many kept, in no order.
+    pub(super) async fn keys(
+        &self,
+        (most, most_wanted): (usize, usize),
+        is_wanted: impl Fn(&str) -> bool,
+    ) -> Result<Keys, Fault> {
+        self.ask_anew();
+        self.speaker.empty_pages.store(0, Ordering::Relaxed);
         let folder = Some(&self.key).filter(|key| !key.as_ref().is_empty());
         let mut listed = self.store.list(folder);
-        let mut keys = Vec::new();
+        let mut keys = Keys::default();
         while let Some(found) = listed.next().await {
             let found = found.map_err(|why| self.fault(&why, &self.speaker.latest))?;
-            keys.push(found.location.to_string());
-            if keys.len() >= most {
+            self.speaker.empty_pages.store(0, Ordering::Relaxed);
+            keys.looked_at += 1;
+            let key = found.location.as_ref();
+            if is_wanted(key) {
+                keys.wanted += 1;
+                if keys.kept.len() < most_wanted {
+                    keys.kept.push(key.to_owned());
+                }
+            }
+            if keys.looked_at >= most {
                 break;
             }
         }
@@ -256,6 +290,7 @@ impl Cloud {
     }
 
     fn ask_anew(&self) {
+        *self.latest().form() = None;
         self.latest().status.store(0, Ordering::Relaxed);
         self.latest().asked_millis.store(0, Ordering::Relaxed);
     }
@@ -298,8 +333,25 @@ impl Cloud {
                 .help("AWS_ALLOW_HTTP=true, GOOGLE_ALLOW_HTTP=true or AZURE_ALLOW_HTTP=true does")
                 .into();
         }
+        if let Some(what) = lasting_words(why) {
+            return Diagnostic::new(what)
+                .help("the address of the store, and of a gateway or proxy before it")
+                .into();
+        }
         match own_words(why) {
             Some(what) => Fault::passing(what),
+            None if answered.form().is_some() => {
+                let form = answered.form().clone().unwrap_or_default();
+                let form = match form.as_str() {
+                    "" => String::new(),
+                    form => format!(" ({form})"),
+                };
+                Diagnostic::new(format!(
+                    "what answers there{form} is not what a store says: it cannot be read as XML"
+                ))
+                .help("the address of the store, and of a gateway or proxy before it")
+                .into()
+            }
             // What a server of credentials says is not ours to print.
             None => Diagnostic::new("the store can not be asked with these credentials")
                 .help(variables(&self.scheme))
@@ -336,6 +388,22 @@ fn own_words(why: &Error) -> Option<String> {
     own.map(std::string::ToString::to_string)
 }
 
+/// The same of what no other try will change.
+fn lasting_words(why: &Error) -> Option<String> {
+    let mut cause: &(dyn std::error::Error + 'static) = why;
+    while let Some(next) = cause.source() {
+        cause = next;
+    }
+    let own = cause.downcast_ref::<std::io::Error>();
+    let own = own.filter(|own| own.kind() == std::io::ErrorKind::InvalidData);
+    own.map(std::string::ToString::to_string)
+}
+
+fn lasting(what: String) -> HttpError {
+    let why = std::io::Error::new(std::io::ErrorKind::InvalidData, what);
+    HttpError::new(HttpErrorKind::Unknown, why)
+}
+
 fn variables(scheme: &str) -> &'static str {
     match scheme {
         "s3" => S3,
@@ -345,6 +413,11 @@ fn variables(scheme: &str) -> &'static str {
 }
 
 impl Answered {
+    fn form(&self) -> MutexGuard<'_, Option<String>> {
+        // Every change is whole before anything could panic.
+        self.form.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     fn status(&self) -> u16 {
         self.status.load(Ordering::Relaxed)
     }
@@ -359,6 +432,8 @@ struct Speaker {
     /// Nobody answered who would give some.
     is_without_credentials: Arc<AtomicBool>,
     is_refused_plain: Arc<AtomicBool>,
+    /// Pages of a listing since the last key.
+    empty_pages: Arc<AtomicUsize>,
     /// What was answered last, for requests that follow each other.
     latest: Arc<Answered>,
 }
@@ -371,6 +446,13 @@ impl HttpConnector for Speaker {
             ..self.clone()
         }))
     }
+}
+
+/// Whether a request asks what there is: S3 and GCS, Azure.
+fn is_listing(url: &reqwest::Url) -> bool {
+    url.query_pairs().any(|(name, value)| {
+        (name == "list-type" && value == "2") || (name == "comp" && value == "list")
+    })
 }
 
 /// A future as a trait with async functions has it.
@@ -401,6 +483,14 @@ impl Speaker {
             self.is_refused_plain.store(true, Ordering::Relaxed);
             return Err(refused("plain http is not allowed"));
         }
+        let is_listing = is_listing(&url);
+        if is_listing && self.empty_pages.fetch_add(1, Ordering::Relaxed) >= MOST_EMPTY {
+            return Err(lasting(format!(
+                "{MOST_EMPTY} pages of the listing in a row had no key, and the store says that there are more"
+            )));
+        }
+        // Who gives credentials is asked without any.
+        let of_store = is_listing || parts.headers.contains_key(reqwest::header::AUTHORIZATION);
         let mut asks = reqwest::Request::new(parts.method, url);
         *asks.headers_mut() = parts.headers;
         *asks.body_mut() = Some(match body.as_bytes() {
@@ -428,11 +518,26 @@ impl Speaker {
             answered.asked_millis.store(asked, Ordering::Relaxed);
             let status = reply.status().as_u16();
             answered.status.store(status, Ordering::Relaxed);
+            let form = reply.headers().get(reqwest::header::CONTENT_TYPE);
+            let form = form.map_or("".into(), |form| String::from_utf8_lossy(form.as_bytes()));
+            *answered.form() = of_store.then(|| snippet(form.as_bytes()));
         }
         let (status, headers) = (reply.status(), reply.headers().clone());
         let by = self.clone();
         let body = reqwest::Body::from(reply).map_err(move |why| by.error(&why));
-        let mut out = HttpResponse::new(HttpResponseBody::new(body));
+        let body = match is_listing {
+            true => HttpResponseBody::new(Limited::new(body, MOST_OF_PAGE).map_err(|why| {
+                match why.downcast::<HttpError>() {
+                    Ok(own) => *own,
+                    Err(_) => lasting(format!(
+                        "a page of the listing has more than {} MiB",
+                        MOST_OF_PAGE >> 20
+                    )),
+                }
+            })),
+            false => HttpResponseBody::new(body),
+        };
+        let mut out = HttpResponse::new(body);
         *out.status_mut() = status;
         *out.headers_mut() = headers;
         Ok(out)

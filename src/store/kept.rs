@@ -130,7 +130,9 @@ impl Kept {
         let range = match planned.and_then(|n| state.plan.get(n)) {
             Some(piece) => state.asked.gap(at, piece.end),
             None => {
-                let range = state.asked.gap(at, end.max(at + LOOK).min(size));
+                let range = state
+                    .asked
+                    .gap(at, end.max(at.saturating_add(LOOK)).min(size));
                 // At the end of an object stands what is in it.
                 let is_end = size - at < LOOK && range.end == size;
                 let before = size.saturating_sub(LOOK).max(state.asked.end_before(at));

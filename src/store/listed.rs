@@ -3,7 +3,7 @@
 //! Apart from the reading because nothing is read yet, and because only stores can say what they have: a web server is asked
 //! for what one knows.
 
-use super::cloud::Cloud;
+use super::cloud::{Cloud, Keys};
 use super::download::given_up;
 use super::fault::Fault;
 use super::patience::Patience;
@@ -40,21 +40,24 @@ pub fn meant(address: &Address) -> Option<Result<Vec<String>, Diagnostic>> {
         )));
     }
     let place = format!("{}://{bucket}/", address.scheme());
-    Some(list(&place, &pattern).map(|keys| {
+    Some(list(&place, key, &pattern).map(|keys| {
         let address = |key: &String| format!("{place}{key}");
         keys.iter().map(address).collect()
     }))
 }
 
-fn list(place: &str, pattern: &Pattern<'_>) -> Result<Vec<String>, Diagnostic> {
+fn list(place: &str, key: &str, pattern: &Pattern<'_>) -> Result<Vec<String>, Diagnostic> {
     let patience = Patience::default();
     let folder = pattern.folder();
     let cloud = Cloud::in_folder(&Address::from(format!("{place}{folder}")), patience)?;
     let runtime = runtime().map_err(|e| Diagnostic::new(format!("cannot start threads: {e}")))?;
+    let key = key.to_owned();
     let (keys, cloud) = wait(runtime, async move {
+        let pattern = Pattern::of(&key);
+        let is_meant = |key: &str| pattern.as_ref().is_some_and(|own| own.means(key));
         let mut failed = 0;
         loop {
-            match cloud.keys(MOST_KEYS).await {
+            match cloud.keys((MOST_KEYS, MOST_MEANT), is_meant).await {
                 Err(Fault::Passing { what, asked }) => {
                     failed += 1;
                     if failed >= patience.tries {
@@ -68,9 +71,12 @@ fn list(place: &str, pattern: &Pattern<'_>) -> Result<Vec<String>, Diagnostic> {
     })
     .ok_or_else(|| Diagnostic::new("the request was given up"))?;
     let keys = keys.map_err(|fault| fault.told(|status| cloud.help(status)))?;
-    let is_all = keys.len() < MOST_KEYS;
-    let looked_at = keys.len();
-    let mut meant: Vec<String> = keys.into_iter().filter(|key| pattern.means(key)).collect();
+    let Keys {
+        looked_at,
+        wanted,
+        kept: mut meant,
+    } = keys;
+    let is_all = looked_at < MOST_KEYS;
     meant.sort_unstable();
     let below = match folder.as_str() {
         "" => "the bucket".to_owned(),
@@ -82,7 +88,7 @@ fn list(place: &str, pattern: &Pattern<'_>) -> Result<Vec<String>, Diagnostic> {
         ))
         .help("a pattern with more folders before its first *"));
     }
-    match meant.len() {
+    match wanted {
         0 => Err(Diagnostic::new(format!(
             "the pattern means none of the {looked_at} objects in {below}"
         ))

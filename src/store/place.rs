@@ -11,6 +11,16 @@ use std::ops::Range;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_recording::address::Address;
 
+/// No store takes a larger object: what is counted from what a server claims must not overflow.
+const MOST: u64 = 1 << 50;
+
+fn too_large(size: u64) -> Fault {
+    Diagnostic::new(format!(
+        "the server says that the object has {size} bytes, and no store takes one of more than {MOST}"
+    ))
+    .into()
+}
+
 /// Where an object is.
 #[derive(Debug)]
 pub(super) enum Place {
@@ -29,9 +39,16 @@ impl Place {
 
     /// Asks for a range.
     pub(super) async fn get(&self, range: Range<u64>) -> Result<Reply, Fault> {
-        match self {
+        let reply = match self {
             Place::Web(web) => web.get(range).await,
             Place::Cloud(cloud) => cloud.get(range).await,
+        }?;
+        match &reply {
+            Reply::Part(part) if part.version.size > MOST => Err(too_large(part.version.size)),
+            Reply::All {
+                size: Some(size), ..
+            } if *size > MOST => Err(too_large(*size)),
+            _ => Ok(reply),
         }
     }
 

@@ -62,7 +62,9 @@ pub(super) fn pieces(ranges: &[Range<u64>], size: u64) -> Vec<Range<u64>> {
         let range = range.start.min(size)..range.end.min(size);
         match joined.last_mut() {
             _ if range.is_empty() => {}
-            Some(last) if range.start >= last.start && range.start <= last.end + NEAR => {
+            Some(last)
+                if range.start >= last.start && range.start <= last.end.saturating_add(NEAR) =>
+            {
                 last.end = last.end.max(range.end);
             }
             _ => joined.push(range),
@@ -129,6 +131,9 @@ mod tests {
         assert_eq!(long.last().map(|p| p.end), Some(25 * mib));
         let cut = pieces(std::slice::from_ref(&(0..25 * mib)), 5);
         assert_eq!((cut.first(), cut.len()), (Some(&(0..5)), 1));
+        let end = u64::MAX;
+        let last = [end - 20..end - 10, end - 5..end];
+        assert_eq!(pieces(&last, end), [end - 20..end]);
         // Another order is kept.
         assert_eq!(
             pieces(&[mib..2 * mib, 0..10], 2 * mib),

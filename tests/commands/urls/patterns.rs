@@ -45,6 +45,25 @@ impl Store {
         Store { place, asked }
     }
 
+    /// One that answers each request by `answers`.
+    fn by(answers: impl Fn(TcpStream) -> std::io::Result<()> + Send + 'static) -> Store {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let place = listener.local_addr().unwrap().to_string();
+        let asked = Arc::new(Mutex::new(Vec::new()));
+        let heads = Arc::clone(&asked);
+        std::thread::spawn(move || {
+            for stream in listener.incoming().flatten() {
+                let mut reader = BufReader::new(stream.try_clone().unwrap());
+                let mut head = String::new();
+                while reader.read_line(&mut head).unwrap() > 2 {}
+                heads.lock().unwrap().push(head);
+                // Who asked may have enough before the end.
+                let _ = answers(stream);
+            }
+        });
+        Store { place, asked }
+    }
+
     fn run(&self, dir: &Path, arguments: &str) -> Ran {
         let output = assert_cmd::Command::cargo_bin("strapd")
             .unwrap()
@@ -239,4 +258,80 @@ fn a_pattern_that_means_nothing_or_can_not_be_asked_is_told() {
     busy.run(at, "check s3://bucket/*.mcap")
         .refused(1, &["503 Service Unavailable"]);
     assert_eq!(busy.listings(), 5);
+}
+
+#[test]
+fn a_listing_that_never_ends_or_is_none_is_named_for_what_it_is() {
+    let dir = tempfile::tempdir().unwrap();
+    let xml = "Content-Type: application/xml\r\n";
+    let run = "info s3://bucket/2024/*.mcap";
+    // There is always more, and never a key.
+    let store = Store::by(move |to| {
+        let body = "<?xml version=\"1.0\"?><ListBucketResult><IsTruncated>true</IsTruncated><NextContinuationToken>1</NextContinuationToken></ListBucketResult>";
+        answer(to, "200 OK", xml, body.as_bytes())
+    });
+    let ran = store.run(dir.path(), run);
+    assert_ne!(ran.code, Some(0), "{ran:?}");
+    assert!(
+        ran.err
+            .contains("100 pages of the listing in a row had no key"),
+        "{ran:?}"
+    );
+    assert_eq!(store.listings(), 100);
+
+    // A page of 200 MB is not kept.
+    let store = Store::by(move |mut to| {
+        write!(
+            to,
+            "HTTP/1.1 200 OK\r\nConnection: close\r\nContent-Length: 200000000\r\n{xml}\r\n"
+        )?;
+        to.write_all(b"<?xml version=\"1.0\"?><ListBucketResult>")?;
+        (0..200).try_for_each(|_| to.write_all(&[b' '; 1_000_000]))
+    });
+    let ran = store.run(dir.path(), run);
+    assert!(
+        ran.err
+            .contains("a page of the listing has more than 16 MiB"),
+        "{ran:?}"
+    );
+    assert_eq!(store.listings(), 1);
+
+    // A page for people is no fault of the credentials.
+    let store = Store::by(|to| {
+        answer(
+            to,
+            "200 OK",
+            "Content-Type: text/html\r\n",
+            b"<html><p>Sign in to the network",
+        )
+    });
+    let ran = store.run(dir.path(), run);
+    assert!(
+        ran.err.contains("(text/html) is not what a store says"),
+        "{ran:?}"
+    );
+    assert!(!ran.err.contains("credentials"), "{ran:?}");
+}
+
+#[test]
+fn a_size_that_no_object_has_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    for size in [u64::MAX, i64::MAX as u64, 1 << 51] {
+        let store = Store::by(move |to| {
+            let said = format!(
+                "Content-Range: bytes 0-9/{size}\r\nETag: \"1\"\r\nLast-Modified: Tue, 24 Nov 2026 20:00:00 GMT\r\n"
+            );
+            answer(to, "206 Partial Content", &said, b"0123456789")
+        });
+        for run in [
+            "info s3://bucket/a.mcap".to_owned(),
+            format!("info http://{}/a.mcap", store.place),
+        ] {
+            let ran = store.run(dir.path(), &run);
+            assert!(
+                ran.err.contains("and no store takes one of more than"),
+                "{run}: {ran:?}"
+            );
+        }
+    }
 }
