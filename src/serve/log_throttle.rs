@@ -7,8 +7,12 @@ use std::time::{Duration, Instant};
 /// Between two lines of one cause.
 const INTERVAL: Duration = Duration::from_secs(10);
 
-/// When each cause was said last, and how often it was not since. There are as many as there are
-/// places that warn, and sources.
+/// Causes that are told apart at once, and what those beyond are called together: a name that somebody else gives
+/// may be part of one.
+const MOST: usize = 512;
+const OTHERS: &str = "others";
+
+/// When each cause was said last, and how often it was not since.
 static SAID: LazyLock<Mutex<HashMap<String, (Instant, u64)>>> = LazyLock::new(Mutex::default);
 
 /// Informs, unless the same cause was spoken of just now.
@@ -38,6 +42,13 @@ pub(super) fn warn_every(interval: Duration, cause: &str, what: &str) {
 
 fn due(cause: &str, interval: Duration, now: Instant) -> Option<u64> {
     let mut said = SAID.lock().unwrap_or_else(PoisonError::into_inner);
+    let cause = match said.len() >= MOST && !said.contains_key(cause) {
+        true => {
+            said.retain(|_, (last, _)| now.saturating_duration_since(*last) < INTERVAL);
+            if said.len() < MOST { cause } else { OTHERS }
+        }
+        false => cause,
+    };
     match said.get_mut(cause) {
         Some((last, suppressed)) if now.saturating_duration_since(*last) < interval => {
             *suppressed += 1;
@@ -81,5 +92,19 @@ mod tests {
             due("test a", INTERVAL, start + Duration::from_secs(11)),
             None
         );
+    }
+
+    #[test]
+    fn ever_new_causes_are_one_beyond_some_and_are_forgotten() {
+        // Later than what other tests say meanwhile.
+        let start = Instant::now() + 10 * INTERVAL;
+        let said = (0..10_000)
+            .filter(|n| due(&format!("test {n}"), start).is_some())
+            .count();
+        assert!(said <= MOST + 1, "{said}");
+        let known = || SAID.lock().unwrap_or_else(PoisonError::into_inner).len();
+        assert!(known() <= MOST + 1, "{}", known());
+        assert!(due("test later", start + INTERVAL).is_some());
+        assert!(known() < 10, "{}", known());
     }
 }

@@ -52,6 +52,8 @@ struct KeysSeen {
     lost: u64,
     /// Messages that were too long.
     refused: u64,
+    /// Lines of the log about publishers in a minute, and when that began.
+    said: (Option<Instant>, u32),
 }
 
 /// A publisher of a topic of ROS 2.
@@ -69,6 +71,11 @@ pub(super) struct TopicSeen {
 /// Most publishers that are remembered.
 #[cfg(feature = "zenoh")]
 const MOST_TOPICS: usize = 10_000;
+/// Lines of the log about them in a minute.
+#[cfg(feature = "zenoh")]
+const MOST_TOPIC_LINES: u32 = 32;
+#[cfg(feature = "zenoh")]
+const MINUTE: std::time::Duration = std::time::Duration::from_secs(60);
 
 impl Outgoing {
     /// Not yet connected.
@@ -153,6 +160,17 @@ impl Outgoing {
             }
             Some(_) => false,
         }
+    }
+
+    /// Whether another line of the log about one of them may be written: some in a minute.
+    #[cfg(feature = "zenoh")]
+    pub(super) fn may_say_topic(&self, now: Instant) -> bool {
+        let (minute, lines) = &mut self.state().keys.said;
+        if minute.is_none_or(|begun| now.saturating_duration_since(begun) >= MINUTE) {
+            (*minute, *lines) = (Some(now), 0);
+        }
+        *lines = lines.saturating_add(1);
+        *lines <= MOST_TOPIC_LINES
     }
 
     /// Nothing is known of who is there.

@@ -306,18 +306,15 @@ fn meet(outgoing: &Outgoing, wanted: &KeyExpr<'_>, sample: &Sample) {
     if !outgoing.topic(text, is_there.then_some(seen)) {
         return;
     }
-    let (cause, what) = (
-        format!("{name} {topic}"),
-        format!("{topic} of {node}, domain {domain}"),
-    );
-    match is_there {
-        true => log_throttle::info(
-            &format!("{cause} there"),
-            &format!("{name}: {what}, is there"),
-        ),
-        false => log_throttle::warn(
-            &format!("{cause} gone"),
-            &format!("{name}: {what}, has gone"),
-        ),
+    let what = format!("{topic} of {node}, domain {domain}");
+    let what = match is_there {
+        true => format!("{name}: {what}, is there"),
+        false => format!("{name}: {what}, has gone"),
+    };
+    match (outgoing.may_say_topic(Instant::now()), is_there) {
+        (true, true) => tracing::info!("{what}"),
+        (true, false) => tracing::warn!("{what}"),
+        // `STATUS` lists them all.
+        (false, _) => log_throttle::info(&format!("{name} topics"), &what),
     }
 }
