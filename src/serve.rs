@@ -45,6 +45,7 @@ pub mod last;
 pub mod limits;
 pub mod listen;
 mod log_throttle;
+mod losses;
 #[cfg(feature = "nats")]
 pub mod nats;
 pub mod outbox;
@@ -280,6 +281,7 @@ async fn end_waits(hub: Arc<Hub>) {
         tick.tick().await;
         hub.forget_silent();
         hub.end_waits(listen::now());
+        hub.losses.tick();
     }
 }
 

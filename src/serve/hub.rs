@@ -32,6 +32,7 @@ use super::fault::Fault;
 use super::foxglove;
 use super::limits::Limits;
 use super::log_throttle;
+use super::losses::{Losses, Lost};
 use super::outbox::Outbox;
 use super::outgoing::Outgoing;
 use super::peer::Peer;
@@ -39,7 +40,7 @@ use super::playback::position::Timeline;
 use super::recorder::Handle;
 use super::stream::run::{Placed, SampleRun};
 use super::stream::stamps::Taken;
-use super::stream::{SensorStream, live_plan};
+use super::stream::{Fate, SensorStream, live_plan};
 use super::wire;
 use crate::error::{Error, Result};
 use crate::sink::{ChildFrames, Profile};
@@ -104,6 +105,8 @@ pub struct Hub {
     next_client: AtomicU64,
     /// Some sensor's samples wait for the unit of their stamps.
     stamps_wait: AtomicBool,
+    /// Streams of which nothing is used.
+    pub(in crate::serve) losses: Losses,
     /// What was counted.
     pub counters: Counters,
 }
@@ -162,6 +165,8 @@ pub struct Feedback {
     pub note: Option<Fault>,
     /// What was not used, the first time.
     pub faults: Vec<Fault>,
+    /// None of the samples was used: why, and how many.
+    pub lost: Option<(Fault, u64)>,
 }
 
 impl Client {
@@ -242,6 +247,7 @@ impl Hub {
             polling: Polling::default(),
             next_client: AtomicU64::new(1),
             stamps_wait: AtomicBool::new(false),
+            losses: Losses::default(),
             counters: Counters::default(),
         })
     }
@@ -437,19 +443,19 @@ impl Hub {
         if sensor.stream.is_waiting() {
             self.stamps_wait.store(true, Ordering::Relaxed);
         }
-        self.integrate(&mut sensor, &id, lines, samples, run.placed, text)
+        self.integrate(&mut sensor, lines, samples, (run.placed, run.first), text)
     }
 
     /// Samples whose stamps are known -> attitudes.
     fn integrate(
         &self,
         sensor: &mut Sensor,
-        id: &Arc<str>,
         lines: &[(Option<u64>, usize)],
         samples: &[RawSample],
-        placed: Placed,
+        (placed, first): (Placed, (u64, &[u8])),
         text: &mut Vec<u8>,
     ) -> std::result::Result<Feedback, Fault> {
+        let id = &sensor.stream.id().clone();
         let plan = self.plan_of(id);
         let window = self.limits.state_window;
         let note = sensor.stream.join(plan, samples, window, placed)?;
@@ -467,6 +473,7 @@ impl Hub {
             recorder.input(id, rates.copied().collect());
         }
         self.deliver(sensor, id, text);
+        let lost = self.judge(sensor, id, first);
         let faults = sensor.stream.news();
         for fault in faults.iter().filter(|f| f.code == Fault::STAMP_UNIT) {
             log_throttle::warn(
@@ -474,7 +481,28 @@ impl Hub {
                 &format!("{id}: {}", fault.message),
             );
         }
-        Ok(Feedback { note, faults })
+        Ok(Feedback { note, faults, lost })
+    }
+
+    /// Whether samples of a sensor are used, for the log. `first`: the number and beginning of their line.
+    fn judge(&self, sensor: &mut Sensor, id: &str, first: (u64, &[u8])) -> Option<(Fault, u64)> {
+        match sensor.stream.fate() {
+            Fate::Open => None,
+            Fate::Used => {
+                self.losses.over(id);
+                None
+            }
+            Fate::Lost(fault, count) => {
+                self.losses.add(&Lost {
+                    source: id,
+                    fault: &fault,
+                    first,
+                    count,
+                    is_whole: !sensor.stream.has_attitudes(),
+                });
+                Some((fault, count))
+            }
+        }
     }
 
     /// Samples that wait for the unit of their stamps are taken by what is known.
@@ -484,8 +512,8 @@ impl Hub {
         }
         let id = sensor.stream.id().clone();
         let Taken { lines, samples } = sensor.stream.overdue();
-        let placed = Placed::ByStamp;
-        let feedback = self.integrate(sensor, &id, &lines, &samples, placed, &mut Vec::new());
+        let stands = (Placed::ByStamp, (0, &[][..]));
+        let feedback = self.integrate(sensor, &lines, &samples, stands, &mut Vec::new());
         let (note, faults) = match feedback {
             Ok(feedback) => (feedback.note, feedback.faults),
             Err(fault) => (None, vec![fault]),

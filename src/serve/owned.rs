@@ -103,7 +103,6 @@ impl Owned {
     }
 
     /// A message of this sensor could not be read; one that never sent any is none yet.
-    #[cfg(feature = "zenoh")]
     pub fn undecodable_of(&self, id: &str, hub: &Hub, client: &Client) {
         if let Some(sensor) = self.sensors.get(id).and_then(Weak::upgrade) {
             hub.undecodable(&sensor, client.number);

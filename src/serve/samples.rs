@@ -63,7 +63,12 @@ pub(super) async fn post(
     if hub.token().is_some() && !connection.trusted {
         return unauthorised();
     }
+    let is_text = parts.uri.query().is_none_or(is_text);
     let name = match asked {
+        _ if !is_text => {
+            let why = "the address holds bytes that are no UTF-8, so that two names would be one";
+            return refusal(StatusCode::BAD_REQUEST, "bad_id", why);
+        }
         Ok(Query(asked)) => match asked.id.as_deref().map(exact_name).transpose() {
             Ok(name) => name.filter(|id| !id.is_empty()),
             Err(why) => {
@@ -102,6 +107,26 @@ pub(super) async fn post(
         .take(objects, name.as_deref(), now())
         .await;
     taken.answer()
+}
+
+/// Whether the bytes that a query stands for are UTF-8.
+fn is_text(query: &str) -> bool {
+    let mut bytes = Vec::with_capacity(query.len());
+    let mut rest = query.as_bytes();
+    while let Some((first, behind)) = rest.split_first() {
+        let digits = behind.get(..2).filter(|_| *first == b'%');
+        let digits = digits.and_then(|digits| std::str::from_utf8(digits).ok());
+        let escaped = digits.and_then(|digits| {
+            let are_hex = digits.bytes().all(|b| b.is_ascii_hexdigit());
+            u8::from_str_radix(digits, 16).ok().filter(|_| are_hex)
+        });
+        bytes.push(escaped.unwrap_or(*first));
+        rest = match escaped {
+            Some(_) => behind.get(2..).unwrap_or_default(),
+            None => behind,
+        };
+    }
+    std::str::from_utf8(&bytes).is_ok()
 }
 
 /// What is answered to any other method.

@@ -6,6 +6,7 @@
 
 #[cfg(feature = "zenoh")]
 mod decoded;
+mod losing;
 mod opening;
 mod resetting;
 mod turn;
@@ -15,6 +16,7 @@ use super::fault::Fault;
 use super::hub::{Client, Feedback, Hub, count};
 use super::limits::Allowance;
 use super::log_throttle;
+use super::losses::Lost;
 use super::owned::Owned;
 use super::peer::Peer;
 use super::stream::run::{Placed, SampleRun};
@@ -28,6 +30,7 @@ use std::time::{Duration, Instant};
 use strapd_attitude::record::{Nanos, RawSample};
 use strapd_recording::decode::framing::Framer;
 use strapd_recording::decode::{Bare, Line, LineDecoder};
+use strapd_recording::text::MAX_NEAR;
 use turn::{Held, Step};
 
 /// Errors said at once before they are thinned.
@@ -43,6 +46,8 @@ pub struct Scratch {
     bare: Vec<Option<Bare>>,
     lines: Vec<(Option<u64>, usize)>,
     head: Option<Line>,
+    /// The number of the run's first line, and its beginning.
+    first: (u64, Vec<u8>),
     text: Vec<u8>,
 }
 
@@ -135,7 +140,7 @@ impl Side {
     }
 
     /// A broker, whose messages are of many sensors, or all of the one that is called `id` here.
-    #[cfg(any(feature = "nats", feature = "zenoh"))]
+    #[cfg(any(test, feature = "nats", feature = "zenoh"))]
     #[must_use]
     pub fn broker(id: Option<String>) -> Side {
         let mut side = Side::source(id, None);
@@ -199,6 +204,8 @@ pub struct Session {
     errors_in_a_row: u32,
     errors: Allowance,
     told: BTreeSet<String>,
+    /// Some of its samples were taken.
+    has_sent: bool,
     /// The sensors it sends.
     owned: Owned,
     /// What packed samples with a number say, as lines would.
@@ -246,6 +253,7 @@ impl Session {
             errors_in_a_row: 0,
             errors: Allowance::new(BURST),
             told: BTreeSet::new(),
+            has_sent: false,
             owned: Owned::default(),
             bound: BTreeMap::new(),
             step: Step::default(),
@@ -273,7 +281,7 @@ impl Session {
     }
 
     /// What comes next is of this sensor, where it does not say; no number of a packed stream is bound.
-    #[cfg(any(feature = "nats", feature = "zenoh"))]
+    #[cfg(any(test, feature = "nats", feature = "zenoh"))]
     pub fn of_subject(&mut self, id: &str) {
         self.bound.clear();
         if let Side::Source(naming) = &mut self.side
@@ -291,12 +299,8 @@ impl Session {
 
     /// The sensor that the subject names, for packed samples whose number is not bound.
     fn head_of_subject(&self) -> Option<Line> {
-        let Side::Source(naming) = &self.side else {
-            return None;
-        };
-        let subject = naming.subject.as_ref()?;
         Some(Line {
-            id: Some(naming.id.as_ref().unwrap_or(subject).clone()),
+            id: Some(self.subject()?),
             ..Line::default()
         })
     }
@@ -350,6 +354,7 @@ impl Session {
                         );
                         scratch.samples.truncate(before);
                         self.say(&fault, number, line);
+                        self.lose(&fault, number, line);
                         return;
                     }
                 }
@@ -403,7 +408,7 @@ impl Session {
                 let bare = std::mem::take(&mut head.bare);
                 if !goes_on(scratch, &head) {
                     self.flush(received, scratch, before);
-                    scratch.head = Some(head);
+                    scratch.begin(head, number, line);
                 }
                 if !bare.is_empty() {
                     let first = scratch.lines.last().map_or(0, |(_, end)| *end);
@@ -508,8 +513,12 @@ impl Session {
         scratch: &mut Scratch,
     ) {
         self.flush(received, scratch, usize::MAX);
-        self.owned.undecodable(&self.hub, &self.client);
+        match self.subject() {
+            Some(subject) => self.owned.undecodable_of(&subject, &self.hub, &self.client),
+            None => self.owned.undecodable(&self.hub, &self.client),
+        }
         self.say(fault, number, line);
+        self.lose(fault, number, line);
         self.errors_in_a_row += 1;
         // One bad sensor behind a broker is not all of them.
         if self.side.is_broker() {
@@ -568,6 +577,7 @@ impl Session {
         count(&self.hub.counters.faults, 1);
         // Nothing of the line is repeated: it may hold a token with a slip.
         self.client.outbox.reply(wire::error(fault, number, &[], 0));
+        self.lose(fault, number, &[]);
         self.end = Some(End::Unauthorised);
     }
 
@@ -586,12 +596,15 @@ impl Session {
             lines: &scratch.lines,
             samples: scratch.samples.get(..until).unwrap_or_default(),
             bare: &scratch.bare,
+            first: (scratch.first.0, &scratch.first.1),
         };
         let news = self
             .owned
             .publish(&self.hub, &self.client, &run, &mut scratch.text);
         match news {
-            Ok(Feedback { note, faults }) => {
+            Ok(Feedback { note, faults, .. }) => {
+                self.has_sent = true;
+                self.hub.losses.over(&self.client.peer.name);
                 if let Some(note) = note {
                     let id = run.id();
                     log_throttle::info(&format!("run {id}"), &format!("{id}: {}", note.message));
@@ -604,12 +617,31 @@ impl Session {
             Err(fault) => {
                 count(&self.hub.counters.refused_samples, run.samples.len());
                 self.say(&fault, 0, &[]);
+                self.hub.losses.add(&Lost {
+                    source: run.id(),
+                    fault: &fault,
+                    first: run.first,
+                    count: run.samples.len() as u64,
+                    // Another may send it as it should.
+                    is_whole: fault.code != "id_in_use",
+                });
             }
         }
         scratch.samples.drain(..until);
         // Those of a line that is still to come are not there yet.
         scratch.bare.clear();
         scratch.lines.clear();
+    }
+}
+
+impl Scratch {
+    /// A run begins with this line.
+    fn begin(&mut self, head: Line, number: u64, line: &[u8]) {
+        self.head = Some(head);
+        self.first.0 = number;
+        self.first.1.clear();
+        let near = line.get(..line.len().min(MAX_NEAR)).unwrap_or_default();
+        self.first.1.extend_from_slice(near);
     }
 }
 

@@ -6,6 +6,7 @@
 
 pub(super) mod attitude_now;
 mod intervals;
+mod losing;
 mod resetting;
 pub mod run;
 mod stamp_unit;
@@ -21,6 +22,8 @@ use crate::serve::recorder::stream_of;
 use crate::serve::state::Saved;
 use crate::sink::Stream;
 use intervals::Intervals;
+pub use losing::Fate;
+use losing::Losing;
 use resetting::Resetting;
 use run::{Placed, SampleRun, Span, Standing};
 use stamp_unit::StampUnit;
@@ -65,6 +68,8 @@ pub struct SensorStream {
     stamps: Stamps,
     /// What is to be said of them.
     ambiguous: Option<Fault>,
+    /// Why there is no unit.
+    why_no_stamp: Option<String>,
     /// Whether the samples' intervals can be true.
     intervals: Intervals,
     /// Whether its stamps can be in the unit of their name.
@@ -88,6 +93,7 @@ pub struct SensorStream {
     /// Verdicts that were said to who sends it, as bits, and what was counted when it came.
     told: u32,
     counted: Counts,
+    losing: Losing,
     /// Specific forces came that this attitude can not use.
     has_unused_forces: bool,
     /// Forces and fields that came before the first rate, the last few.
@@ -182,6 +188,7 @@ impl SensorStream {
             joining: Joining::Undecided,
             stamps: Stamps::new(saved.as_ref().and_then(Saved::unit)),
             ambiguous: None,
+            why_no_stamp: None,
             intervals: Intervals::default(),
             stamp_unit: StampUnit::default(),
             resetting: Resetting::default(),
@@ -196,6 +203,7 @@ impl SensorStream {
             jitter_secs: 0.0,
             told: 0,
             counted: Counts::default(),
+            losing: Losing::default(),
             has_unused_forces: false,
             early: VecDeque::new(),
         })
@@ -307,6 +315,7 @@ impl SensorStream {
         let Some(why) = why else { return };
         // Not said of each of them once more.
         self.told |= 1 << Verdict::NoStamp as u32;
+        self.why_no_stamp = Some(why.to_string());
         self.ambiguous = Some(Fault {
             id: Some(self.id.to_string()),
             ..Fault::new("ambiguous_stamp", why.to_string())
@@ -570,7 +579,10 @@ impl SensorStream {
                 if verdict != Verdict::Undecodable {
                     news.push(Fault {
                         id: Some(self.id.to_string()),
-                        ..Fault::new(verdict.name(), explained(verdict))
+                        ..Fault::new(
+                            verdict.name(),
+                            format!("not used: {}. Said once; STATUS counts", explained(verdict)),
+                        )
                     });
                 }
             }
@@ -640,8 +652,8 @@ fn expecting(plan: &Plan, forces_beside: bool) -> Plan {
 }
 
 /// What a verdict means to the one who sent the sample, and what helps.
-fn explained(verdict: Verdict) -> String {
-    let what = match verdict {
+fn explained(verdict: Verdict) -> &'static str {
+    match verdict {
         Verdict::NoGyro => "a sample without a body rate (absent, or null as NaN becomes in JSON)",
         Verdict::NotFinite => "a body rate that is not finite",
         Verdict::Huge => {
@@ -656,6 +668,5 @@ fn explained(verdict: Verdict) -> String {
         }
         Verdict::StrayStamp => "a stamp far ahead of its neighbours",
         other => other.name(),
-    };
-    format!("not used: {what}. Said once; STATUS counts")
+    }
 }

@@ -1,17 +1,32 @@
 // STATUS -> the line about the daemon, and what each source tells.
 
-import { say, whole } from "./numbers.js";
+import { plain, say, whole } from "./numbers.js";
 import { taken } from "./sensor.js";
 
 let [last, lastAt] = [null, 0];
 
 const sum = (list, field) => list.reduce((total, each) => total + (each[field] ?? 0), 0);
 
+// Seconds after which samples that were not used are no news.
+const NEWS = 60;
+
+// Streams of which nothing is used, the last first.
+function refused(part, all) {
+  const now = all.filter((loss) => loss.last_s_ago < NEWS);
+  part.hidden = now.length === 0;
+  const [last] = now;
+  if (!last) return;
+  const place = last.line ? `, first at line ${last.line}, column ${last.column}` : "";
+  const more = now.length > 1 ? ` (and ${whole(now.length - 1)} more in STATUS)` : "";
+  say(part, `${plain(last.source)}: ${whole(last.count)} samples not used${place}: ${plain(last.message)}${more}`);
+}
+
 // each(source, before, seconds): one source, and what it told that many seconds ago. null: nothing is known any more.
 export function told(parts, now, each) {
   const [before, at] = [last, performance.now()];
   const elapsed = (at - lastAt) / 1000;
   [last, lastAt] = [now, at];
+  refused(parts.refused, now?.refused ?? []);
   if (!now) {
     for (const name of ["total", "clients", "dropped", "queued", "uptime"]) say(parts[name], "–");
     return;

@@ -22,6 +22,7 @@ mod intervals;
 mod late;
 mod leaving;
 mod limits;
+mod losses;
 mod opening;
 mod operations;
 mod packaging;

@@ -52,7 +52,7 @@ impl Hub {
             .collect();
         wire::status(serde_json::json!({
             "session": self.session, "uptime_s": self.uptime_secs(),
-            "sources": sources, "places": self.places(), "outgoing": outgoing, "clients": clients, "counters": counters,
+            "sources": sources, "refused": self.losses.status(), "places": self.places(), "outgoing": outgoing, "clients": clients, "counters": counters,
             "state": lock(&self.state).as_ref().map(|s| serde_json::json!({
                 "saved_s_ago": s.saved.map(|t| t.elapsed().as_secs_f64()), "failed": s.failed,
             })),
@@ -72,7 +72,7 @@ impl Hub {
             .iter()
             .filter_map(|sensor| {
                 let sensor = lock(sensor);
-                let last = sensor.stream.saved()?;
+                let last = sensor.stream.saved().filter(|last| last.check().is_ok())?;
                 Some((sensor.stream.id().to_string(), last))
             })
             .collect();

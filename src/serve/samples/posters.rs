@@ -6,6 +6,7 @@ use crate::serve::fault::Fault;
 use crate::serve::http::answer::response;
 use crate::serve::hub::{Asker, Client, Feedback, Flood, Hub, count, rates_in};
 use crate::serve::log_throttle;
+use crate::serve::losses::Lost;
 use crate::serve::owned::Owned;
 use crate::serve::peer::{Origin, Peer};
 use crate::serve::stream::run::{Placed, SampleRun};
@@ -18,6 +19,7 @@ use std::net::IpAddr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use strapd_attitude::record::{Nanos, RawSample};
 use strapd_recording::decode::{Bare, Line, Objects};
+use strapd_recording::text::MAX_NEAR;
 use tokio::time::{Instant, sleep};
 
 /// Samples published at once: what is made of them must find room with those who watch.
@@ -43,6 +45,8 @@ pub(super) struct Poster {
     hub: Arc<Hub>,
     client: Arc<Client>,
     owned: Owned,
+    /// Some of its samples were taken.
+    has_sent: bool,
 }
 
 /// What became of a body.
@@ -72,6 +76,8 @@ struct Gathered {
     bare: Vec<Option<Bare>>,
     /// The sender's number of each object, and where its samples end.
     lines: Vec<(Option<u64>, usize)>,
+    /// The number of the first object, and its beginning.
+    first: (u64, Vec<u8>),
     /// Room for encoding.
     text: Vec<u8>,
 }
@@ -129,6 +135,7 @@ impl Poster {
             }),
             hub: hub.clone(),
             owned: Owned::default(),
+            has_sent: false,
         }
     }
 
@@ -183,7 +190,10 @@ impl Poster {
                         gathered.bare.extend(bare);
                     }
                     gathered.lines.push((head.seq, gathered.samples.len()));
-                    gathered.head.get_or_insert(head);
+                    if gathered.head.is_none() {
+                        gathered.first = (number, near.iter().take(MAX_NEAR).copied().collect());
+                        gathered.head = Some(head);
+                    }
                     if gathered.samples.len() >= AT_ONCE {
                         self.publish(&mut gathered, usize::MAX, received, &mut taken)
                             .await;
@@ -194,6 +204,13 @@ impl Poster {
                         .await;
                     self.owned.undecodable(&self.hub, &self.client);
                     taken.fault(&self.hub, &fault, number, near);
+                    self.hub.losses.add(&Lost {
+                        source: name.unwrap_or(&self.client.peer.name),
+                        fault: &fault,
+                        first: (number, near),
+                        count: 1,
+                        is_whole: !self.has_sent,
+                    });
                     in_a_row += 1;
                     if in_a_row > self.hub.limits().errors_in_a_row {
                         break;
@@ -254,13 +271,16 @@ impl Poster {
                 lines: &within(&lines, from, to),
                 samples: gathered.samples.get(from..to).unwrap_or_default(),
                 bare: bare.get(from..to.min(bare.len())).unwrap_or_default(),
+                first: (gathered.first.0, &gathered.first.1),
             };
             match self
                 .owned
                 .publish(&self.hub, &self.client, &run, &mut gathered.text)
             {
-                Ok(Feedback { note, faults }) => {
+                Ok(Feedback { note, faults, lost }) => {
                     taken.samples += rates_in(run.samples) as u64;
+                    self.has_sent = true;
+                    self.hub.losses.over(&self.client.peer.name);
                     if let Some(note) = note {
                         let id = run.id();
                         log_throttle::info(
@@ -269,13 +289,31 @@ impl Poster {
                         );
                         taken.notes.push(format!("{id}: {}", note.message));
                     }
+                    // Said once for a sensor, and counted for each object.
+                    let said = faults.len() as u64;
                     for fault in faults {
                         taken.fault(&self.hub, &fault, 0, &[]);
+                    }
+                    if let Some((fault, samples)) = lost {
+                        let objects = objects_of(run.lines, samples);
+                        taken.errors += objects.saturating_sub(said);
+                        let first = &run.first;
+                        taken
+                            .first
+                            .get_or_insert_with(|| wire::error_object(&fault, first.0, first.1, 0));
                     }
                 }
                 Err(fault) => {
                     count(&self.hub.counters.refused_samples, run.samples.len());
-                    taken.fault(&self.hub, &fault, 0, &[]);
+                    self.hub.losses.add(&Lost {
+                        source: run.id(),
+                        fault: &fault,
+                        first: run.first,
+                        count: run.samples.len() as u64,
+                        is_whole: fault.code != "id_in_use",
+                    });
+                    taken.fault(&self.hub, &fault, run.first.0, run.first.1);
+                    taken.errors += (run.lines.len() as u64).saturating_sub(1);
                 }
             }
             if to < until || to - from == AT_ONCE {
@@ -292,6 +330,13 @@ impl Drop for Poster {
     fn drop(&mut self) {
         self.owned.leave(&self.hub, &self.client);
     }
+}
+
+/// How many of these objects so many samples are, counted from the end.
+fn objects_of(lines: &[(Option<u64>, usize)], samples: u64) -> u64 {
+    let all = lines.last().map_or(0, |(_, end)| *end);
+    let used = all.saturating_sub(usize::try_from(samples).unwrap_or(usize::MAX));
+    lines.iter().filter(|(_, end)| *end > used).count() as u64
 }
 
 /// The part of some lines that lies between two samples; a line that began before has no number there.

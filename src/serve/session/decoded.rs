@@ -3,6 +3,7 @@
 use super::{Scratch, Session};
 use crate::serve::fault::Fault;
 use crate::serve::hub::count;
+use crate::serve::losses::Lost;
 use strapd_attitude::record::{Nanos, RawSample};
 use strapd_recording::decode::Line;
 
@@ -22,10 +23,11 @@ impl Session {
             return;
         }
         self.errors_in_a_row = 0;
-        scratch.head = Some(Line {
+        let head = Line {
             id: Some(id.to_owned()),
             ..Line::default()
-        });
+        };
+        scratch.begin(head, 0, &[]);
         scratch.samples.extend_from_slice(samples);
         scratch.lines.extend_from_slice(messages);
         self.flush(received, scratch, usize::MAX);
@@ -35,6 +37,13 @@ impl Session {
     pub fn unreadable(&mut self, id: &str, what: &str) {
         self.owned.undecodable_of(id, &self.hub, &self.client);
         self.unused(what);
+        self.hub.losses.add(&Lost {
+            source: id,
+            fault: &Fault::new("undecodable", what),
+            first: (0, &[]),
+            count: 1,
+            is_whole: !self.has_sent,
+        });
     }
 
     /// A message that is passed over, which is said elsewhere.

@@ -99,13 +99,14 @@ impl Session {
                     self.errors_in_a_row = 0;
                     if let Some(head) = begins {
                         self.flush(received, scratch, before);
-                        scratch.head = Some(head);
+                        scratch.begin(head, number, &[]);
                     }
                     return scratch.lines.push((seq, scratch.samples.len()));
                 }
                 Some(Err(fault)) => {
                     let fault = fault.clone();
                     count(&self.hub.counters.refused_samples, 1);
+                    self.lose(&fault, number, &[]);
                     return self.say(&fault, number, &[]);
                 }
                 None => {

@@ -39,6 +39,8 @@ pub struct SampleRun<'a> {
     pub samples: &'a [RawSample],
     /// Their stamps that are numbers without a unit, at their places; shorter where no more follow.
     pub bare: &'a [Option<Bare>],
+    /// The number of the first line, 0 where it has none, and its beginning.
+    pub first: (u64, &'a [u8]),
 }
 
 impl<'a> SampleRun<'a> {

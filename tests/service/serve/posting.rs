@@ -390,3 +390,52 @@ fn a_replay_takes_no_posts() {
     assert_eq!(status, 400);
     assert!(said.contains("samples_not_taken"), "{said}");
 }
+
+#[test]
+fn names_that_are_no_text_are_refused_and_errors_count_objects() {
+    let daemon = Daemon::start(listening(&[TCP, WS]));
+    let host = daemon.address(1).to_string();
+    let headers = [("Host", &*host), JSON];
+    let body = rate("", 0, 1.0).replace("\"id\":\"\",", "");
+    for (name, expected) in [
+        ("%ff", 400),
+        ("%fe", 400),
+        ("a%C3", 400),
+        ("%ed%a0%80", 400),
+        ("%C3%A9", 200),
+        ("100%25", 200),
+    ] {
+        let target = format!("POST /samples?id={name}");
+        let (status, answer) = ask(daemon.address(1), &target, &headers, body.as_bytes());
+        assert_eq!(status, expected, "{name}: {answer}");
+    }
+    assert_eq!(daemon.status()["sources"].as_array().unwrap().len(), 2);
+
+    // Another sends it: each object of the array is an error.
+    let mut owner = Client::tcp(daemon.address(0)).watching("{\"class\":\"WATCH\"}");
+    owner.send(&rate("taken", 0, 1.0));
+    owner.object("ATT");
+    let lines: Vec<String> = (1..31).map(|n| rate("taken", n, 1.0)).collect();
+    let (status, said) = post(&daemon, 1, &[JSON], &format!("[{}]", lines.join(",")));
+    assert_eq!(
+        (status, &said["code"]),
+        (400, &json!("id_in_use")),
+        "{said}"
+    );
+    assert_eq!(
+        (&said["objects"], &said["errors"]),
+        (&json!(30), &json!(30)),
+        "{said}"
+    );
+    // So are those that no estimator can use, in every post.
+    for _ in 0..2 {
+        let unstamped = vec!["{\"id\":\"b\",\"gyro\":[1,0,0]}"; 300].join("\n");
+        let (status, said) = post(&daemon, 1, &[LINES], &unstamped);
+        assert_eq!((status, &said["code"]), (400, &json!("no_stamp")), "{said}");
+        assert_eq!(
+            (&said["objects"], &said["errors"]),
+            (&json!(300), &json!(300)),
+            "{said}"
+        );
+    }
+}
