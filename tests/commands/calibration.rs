@@ -3,7 +3,7 @@
 mod several;
 mod text;
 
-use crate::program::strapd;
+use crate::program::{strapd, strapd_fed};
 use crate::shared_data::shared;
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use serde_json::Value;
@@ -314,9 +314,10 @@ fn a_known_step_of_truncation_is_undone_in_what_can_be_read_only_once() {
     let at = dir.path();
     log(at, "h.ndjson", 1, 5);
     std::fs::write(at.join("c.toml"), "truncation_step = 0.001\n").unwrap();
+    let lines = std::fs::read(at.join("h.ndjson")).unwrap();
     let run = |flags: &str| {
-        let ran = strapd(at, &format!("replay h.ndjson -o - --quiet {flags}"));
-        attitudes(&ran.done().out, "")
+        let replay = format!("replay - -o - --quiet {flags}");
+        attitudes(&strapd_fed(at, &replay, lines.clone()).done().out, "")
     };
     for aid in ["none", "gravity"] {
         let by_flag = run(&format!("--aid {aid} --undo-truncation on=0.001"));
@@ -328,7 +329,7 @@ fn a_known_step_of_truncation_is_undone_in_what_can_be_read_only_once() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn the_same_recording_saves_the_same_bytes_on_any_number_of_threads() {
     let dir = tempfile::tempdir().unwrap();
     let at = dir.path();

@@ -9,6 +9,7 @@ mod cuts;
 mod hostile;
 mod in_memory;
 mod outputs;
+mod prepared;
 mod publishers;
 mod recordings;
 mod stated_times;

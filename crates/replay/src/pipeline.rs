@@ -12,7 +12,7 @@
 //! | `channel_choice` | which topics are read, under which names, held against which reference |
 //! | `replay_start`, `session_builder`, `session`, `delivery`, `pace`, `position`, `audience` | a run under way: what waits, what goes out, when, and who may stop it |
 //! | `inspection`, `check`, `each`, `history`, `sample_kinds`, `attitude_track` | looking at a log, and holding it against others |
-//! | `in_memory` | the attitudes of a replay for a program that asks for them |
+//! | `in_memory`, `samples` | for a program: the attitudes of a replay; those of samples that it holds itself |
 //! | `recover`, `simulate`, `summarise`, `provenance` | the other runs, and what is said at their end |
 
 pub mod attitude_track;
@@ -36,6 +36,7 @@ mod replay_start;
 mod replay_stream;
 pub mod request;
 mod sample_kinds;
+pub mod samples;
 mod session;
 pub mod session_builder;
 pub mod simulate;

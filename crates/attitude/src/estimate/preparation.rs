@@ -81,8 +81,6 @@ pub struct Preparation {
     stamps: Option<StampPass>,
     /// Rates (rad/s, sensor axes), where it is to be seen whether they were cut.
     rates: Option<Vec<[f64; 3]>>,
-    /// What a pass before this one found.
-    known: Option<Stamps>,
     /// Specific forces came in messages of their own; before the first sample.
     forces_beside: [bool; 2],
 }
@@ -104,7 +102,6 @@ impl Preparation {
                 && patience == Patience::WholeLog
                 && !matches!(resolved.kind, SampleKind::DeltaAngle | SampleKind::Rotation))
             .then(Vec::new),
-            known: None,
             forces_beside: [false; 2],
         }
     }
@@ -113,12 +110,6 @@ impl Preparation {
     #[must_use]
     pub fn with_stamps(self, stamps: Option<StampPass>) -> Preparation {
         Preparation { stamps, ..self }
-    }
-
-    /// The same with stamps that were looked at before.
-    #[must_use]
-    pub fn with_known_stamps(self, known: Option<Stamps>) -> Preparation {
-        Preparation { known, ..self }
     }
 
     /// Takes the next sample.
@@ -192,11 +183,9 @@ impl Preparation {
             rest,
             stamps,
             rates,
-            known,
             forces_beside,
             ..
         } = self;
-        let is_known = known.is_some();
         let (clock, warning) = choose_clock(&first, plan.clock);
         if let Some(fatal @ ClockWarning::NoneMoves) = warning {
             return Err(Diagnostic::from(&fatal));
@@ -236,14 +225,14 @@ impl Preparation {
             earth.map(|e| e.felt_by(&initial)),
         )?;
         let found = stamps.map(StampPass::finish).transpose()?;
-        let stamps = match (known.or(found), patience) {
+        let stamps = match (found, patience) {
             (None, _) => Stamps::AsRecorded,
             (
                 Some(Stamps::OnLines {
                     states_interval, ..
                 }),
                 Patience::FirstMinute,
-            ) if !is_known => {
+            ) => {
                 warnings.push(format!("{REGULARISE_STAMPS}: this stream can be read only once, so each stamp was filtered by those before it; a file is fitted as a whole, which is more accurate and gives other numbers").into());
                 Stamps::Causal { states_interval }
             }

@@ -2,7 +2,7 @@
 
 use super::position::Position;
 use super::replay::integrated_again;
-use super::replay_start::Waiting;
+use super::replay_start::{Waiting, preparation};
 use super::request::{ReplayRequest, refused};
 use super::session::Found;
 use super::summarise;
@@ -16,7 +16,7 @@ use std::path::Path;
 use std::sync::Arc;
 use strapd_attitude::condition::Clock;
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::estimate::{Meaning, StampPass, Stamps};
+use strapd_attitude::estimate::{Meaning, Patience, Preparation, Prepared};
 use strapd_recording::MadeBefore;
 use strapd_recording::Selection;
 use strapd_recording::lines::Lines;
@@ -25,14 +25,14 @@ use strapd_recording::pool::Pool;
 use strapd_recording::recording::channel_route::Item;
 use strapd_recording::recording::sensor_lines::{Sensor, SensorTaker, read};
 
-/// Replays lines; `stamps` is what [`stamps`] found.
+/// Replays lines; `prepared` is what [`prepare`] found, of those that can be read twice.
 ///
 /// # Errors
 /// As [`super::replay::run`]; several sensors in one stream and none named.
 pub(super) fn replay(
     run: &ReplayRequest,
     input: Lines<impl Read>,
-    stamps: Option<Stamps>,
+    prepared: Option<Prepared>,
     pool: &Pool,
     watch: &mut dyn FnMut(&Position),
 ) -> Result<RunSummary> {
@@ -40,7 +40,7 @@ pub(super) fn replay(
     let mut running = Running {
         run,
         made_before: MadeBefore::in_lines(&input),
-        waiting: Waiting::new(run, &path, stamps),
+        waiting: Waiting::new(run, &path, prepared),
         pool,
         watch,
     };
@@ -49,26 +49,23 @@ pub(super) fn replay(
     Ok(summarise::run(run, ended, &Survey::default()))
 }
 
-/// Reads a file of lines for its stamps alone, where these are to be regularised.
+/// Reads a file of lines as far as is needed to know how it begins, as any other file; `None` where it holds no sensor.
 ///
 /// # Errors
-/// As [`replay`]; there is no constant rate.
-pub(super) fn stamps(run: &ReplayRequest, input: Lines<impl Read>) -> Result<Option<Stamps>> {
-    if !run.plan.regularise_stamps {
-        return Ok(None);
-    }
+/// As [`replay`].
+pub(super) fn prepare(run: &ReplayRequest, input: Lines<impl Read>) -> Result<Option<Prepared>> {
     let path = run.source.name();
     let mut looking = Looking {
         run,
         path: &path,
-        pass: None,
+        preparation: None,
     };
     read(wanted(run), input, &path, &mut looking)?;
-    let Some((name, pass)) = looking.pass else {
-        return Ok(None);
-    };
-    let found = pass.finish().map_err(|what| refused(&path, &name, what))?;
-    Ok(Some(found))
+    let decided = looking.preparation.map(|(name, preparation)| {
+        let decided = preparation.decide();
+        decided.map_err(|what| refused(&path, &name, what))
+    });
+    decided.transpose()
 }
 
 /// A run.
@@ -106,31 +103,36 @@ impl SensorTaker<Error> for Running<'_, '_> {
     }
 }
 
-/// A pass for the stamps.
+/// The pass before the run.
 struct Looking<'r> {
     run: &'r ReplayRequest,
     path: &'r Path,
-    pass: Option<(String, StampPass)>,
+    preparation: Option<(String, Preparation)>,
 }
 
 impl SensorTaker<Error> for Looking<'_> {
     fn meet(&mut self, sensor: Sensor) -> Result<()> {
         let (found, _) = met(self.run, sensor);
-        self.pass = StampPass::new(&self.run.plan, &found.resolved, self.run.other_kinds())
-            .map(|pass| (found.name, pass));
+        let preparation = preparation(self.run, &found, Patience::WholeLog);
+        self.preparation = Some((found.name, preparation));
         Ok(())
     }
 
     fn take(&mut self, items: &mut Vec<Item>) -> Result<ControlFlow<()>> {
+        let Some((name, preparation)) = &mut self.preparation else {
+            return Ok(ControlFlow::Continue(()));
+        };
         for item in items.drain(..) {
-            if let (Item::Sample(_, raw), Some((name, pass))) = (item, &mut self.pass)
-                && !raw.is_beside
-            {
-                pass.push(&raw)
+            if let Item::Sample(_, raw) = item {
+                preparation
+                    .take(&raw)
                     .map_err(|what| refused(self.path, name, what))?;
             }
         }
-        Ok(ControlFlow::Continue(()))
+        Ok(match preparation.wants_more() {
+            true => ControlFlow::Continue(()),
+            false => ControlFlow::Break(()),
+        })
     }
 
     fn pause(&mut self) -> Result<()> {

@@ -5,6 +5,7 @@
 
 use super::channel_choice::{Chosen, besides, choose, looked_at, reference, route};
 use super::position::Position;
+use super::replay_start::preparation;
 use super::request::{ReplayRequest, refused};
 use super::session::Found;
 use super::session_builder::{begin, labelled};
@@ -17,7 +18,6 @@ use std::io::Read;
 use std::ops::ControlFlow;
 use std::time::Instant;
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::estimate::StampPass;
 use strapd_attitude::estimate::{Patience, Preparation, Prepared};
 use strapd_recording::Input;
 use strapd_recording::MadeBefore;
@@ -94,8 +94,8 @@ fn whole_text(
         return file(run, input, pool, watch);
     }
     let text = || input.lines(&run.selection.decode);
-    let stamps = lines::stamps(run, text()?)?;
-    lines::replay(run, text()?, stamps, pool, watch)
+    let prepared = lines::prepare(run, text()?)?;
+    lines::replay(run, text()?, prepared, pool, watch)
 }
 
 /// What is said where attitudes made before are taken for a recording.
@@ -196,11 +196,7 @@ pub(super) fn prepare(
 ) -> Result<Vec<Result<Prepared>>> {
     let mut preparations: Vec<Preparation> = chosen
         .iter()
-        .map(|c| {
-            Preparation::new(&run.plan, &c.found.resolved, Patience::WholeLog).with_stamps(
-                StampPass::new(&run.plan, &c.found.resolved, run.other_kinds()),
-            )
-        })
+        .map(|c| preparation(run, &c.found, Patience::WholeLog))
         .collect();
     let mut failures: Vec<Option<Diagnostic>> = chosen.iter().map(|_| None).collect();
     log.walk::<Error>(

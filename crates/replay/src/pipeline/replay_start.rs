@@ -8,18 +8,23 @@ use super::session_builder::{begin, labelled};
 use crate::error::Result;
 use crate::sink::{Flow, Stream};
 use std::path::Path;
-use strapd_attitude::estimate::{Patience, Preparation};
-use strapd_attitude::estimate::{StampPass, Stamps};
+use strapd_attitude::estimate::{Patience, Preparation, Prepared, StampPass};
 use strapd_recording::pool::Pool;
 use strapd_recording::recording::channel_route::Item;
 use strapd_recording::recording::topics;
 
-/// A run over a stream: first gathers, then runs.
+/// What decides how the samples of `found` begin, before it has seen any.
+pub(super) fn preparation(run: &ReplayRequest, found: &Found, patience: Patience) -> Preparation {
+    let stamps = StampPass::new(&run.plan, &found.resolved, run.other_kinds());
+    Preparation::new(&run.plan, &found.resolved, patience).with_stamps(stamps)
+}
+
+/// A run over a stream: first gathers, then runs; over a file that was read before, runs at once.
 pub(super) struct Waiting<'r> {
     run: &'r ReplayRequest,
     path: &'r Path,
-    /// What a pass over the file found, where it is one.
-    stamps: Option<Stamps>,
+    /// What a pass over the file has decided, where it is one.
+    prepared: Option<Prepared>,
     gathering: Option<(Found, Stream, Preparation)>,
     held: Vec<Item>,
     session: Option<Session>,
@@ -29,12 +34,12 @@ impl<'r> Waiting<'r> {
     pub(super) fn new(
         run: &'r ReplayRequest,
         path: &'r Path,
-        stamps: Option<Stamps>,
+        prepared: Option<Prepared>,
     ) -> Waiting<'r> {
         Waiting {
             run,
             path,
-            stamps,
+            prepared,
             gathering: None,
             held: Vec::new(),
             session: None,
@@ -44,16 +49,11 @@ impl<'r> Waiting<'r> {
     /// The stream's topic is known.
     pub(super) fn meet(&mut self, found: &mut Option<(Found, Stream)>) -> Result<()> {
         if let Some((found, stream)) = found.take() {
-            let preparation =
-                Preparation::new(&self.run.plan, &found.resolved, Patience::FirstMinute);
-            let preparation = match self.stamps.take() {
-                None => preparation.with_stamps(StampPass::new(
-                    &self.run.plan,
-                    &found.resolved,
-                    self.run.other_kinds(),
-                )),
-                known => preparation.with_known_stamps(known),
-            };
+            if let Some(prepared) = self.prepared.take() {
+                self.session = Some(self.session(found, stream, prepared)?);
+                return Ok(());
+            }
+            let preparation = preparation(self.run, &found, Patience::FirstMinute);
             self.gathering = Some((found, stream, preparation));
         }
         Ok(())
@@ -70,7 +70,8 @@ impl<'r> Waiting<'r> {
         pool: &Pool,
     ) -> Result<Flow> {
         if let Some(session) = &mut self.session {
-            return session.consume(items, pool);
+            let held = std::mem::take(&mut self.held);
+            return session.consume(held.into_iter().chain(items), pool);
         }
         let Some((found, _, preparation)) = &mut self.gathering else {
             self.held.extend(items);
@@ -101,10 +102,14 @@ impl<'r> Waiting<'r> {
         let prepared = preparation
             .decide()
             .map_err(|what| refused(self.path, &found.name, what))?;
-        let stream = labelled(stream, &self.run.plan, &found.resolved, &prepared);
-        let session = begin(self.run, self.path, vec![found], vec![prepared], &[stream])?;
+        let session = self.session(found, stream, prepared)?;
         let held = std::mem::take(&mut self.held);
         self.session.insert(session).consume(held.into_iter(), pool)
+    }
+
+    fn session(&self, found: Found, stream: Stream, prepared: Prepared) -> Result<Session> {
+        let stream = labelled(stream, &self.run.plan, &found.resolved, &prepared);
+        begin(self.run, self.path, vec![found], vec![prepared], &[stream])
     }
 
     /// Pushes what is known out to whoever reads it as it comes.

@@ -63,7 +63,7 @@ pub(super) struct LoneZeros {
 }
 
 impl LoneZeros {
-    fn take(&mut self, gyro: Option<[f64; 3]>) {
+    pub(super) fn take(&mut self, gyro: Option<[f64; 3]>) {
         let Some(gyro) = gyro else { return };
         let is_zero = gyro == [0.0; 3];
         self.count += u64::from(self.last_is_lone && !is_zero);
@@ -86,7 +86,7 @@ pub(super) struct Output {
 }
 
 impl Output {
-    fn add(&mut self, samples: &[AttitudeSample]) {
+    pub(super) fn add(&mut self, samples: &[AttitudeSample]) {
         if self.first.is_none() {
             self.first = samples.first().copied();
         }

@@ -65,7 +65,8 @@ pub(super) fn topics(run: &ReplayRequest, ended: Ended) -> Vec<TopicSummary> {
         .collect()
 }
 
-fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
+/// What became of one topic.
+pub(super) fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
     let drawn = drawn(topic);
     let conditioning = topic.estimator.conditioning();
     let propagation = topic.estimator.propagation();

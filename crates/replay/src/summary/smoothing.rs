@@ -5,7 +5,7 @@ use crate::finding::{Finding, Severity};
 use serde_json::{Value, json};
 use strapd_attitude::estimate::Recording;
 use strapd_attitude::setting::{NOISE, SAMPLE_KIND, SMOOTH};
-use strapd_attitude::smooth::{Calibration, Counts, Learned, Outcome, Sizes};
+use strapd_attitude::smooth::{Bias, Calibration, Counts, Learned, Outcome, Sizes};
 
 /// A recording that was smoothed.
 #[derive(Clone, Debug)]
@@ -15,6 +15,8 @@ pub struct Smoothing {
     calibration: Calibration,
     /// Of the gyro, in the middle of the recording: bias and one sigma, deg/s.
     bias: ([f64; 3], [f64; 3]),
+    /// The same at its end.
+    last_bias: ([f64; 3], [f64; 3]),
     /// By how much it wanders over the recording, deg/s.
     wander: f64,
     sections: usize,
@@ -86,6 +88,9 @@ impl Smoothing {
         let biases: Vec<_> = smoothed.biases().collect();
         let middle = biases.get(biases.len() / 2);
         let deg = |v: &nalgebra::Vector3<f64>| v.map(f64::to_degrees).into();
+        let said = |bias: Option<&Bias>| {
+            bias.map_or(([0.0; 3], [0.0; 3]), |b| (deg(&b.value), deg(&b.sigma)))
+        };
         let span = |axis: usize| {
             let of = biases.iter().filter_map(|b| b.value.get(axis).copied());
             let (low, high) = of.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), b| {
@@ -98,7 +103,8 @@ impl Smoothing {
             outcome: smoothed.outcome(),
             counts: *smoothed.counts(),
             calibration: *smoothed.calibration(),
-            bias: middle.map_or(([0.0; 3], [0.0; 3]), |b| (deg(&b.value), deg(&b.sigma))),
+            bias: said(middle),
+            last_bias: said(biases.last()),
             wander: wander.to_degrees(),
             sections: smoothed.sections().len(),
             has_north: smoothed.sections().iter().any(|section| section.has_north),
@@ -338,7 +344,10 @@ impl Smoothing {
             "has_north": self.has_north,
             "velocity_bound_m_s": self.bound[0],
             "position_bound_m": self.bound[1],
-            "gyro_bias_deg_s": { "value": self.bias.0, "sigma": self.bias.1, "wander": self.wander },
+            "gyro_bias_deg_s": {
+                "value": self.bias.0, "sigma": self.bias.1, "wander": self.wander,
+                "last": self.last_bias.0, "last_sigma": self.last_bias.1,
+            },
             "G": numbers(&c.gyro),
             "ba": numbers(&c.force_bias),
             "A": numbers(&c.force),
