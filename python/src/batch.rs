@@ -1,35 +1,20 @@
 //! All samples at once -> attitudes. Pure but for Python's objects.
 //!
-//! The steps of a replay of a file: the samples are looked at once as far as is needed to know clock, bias, initial
-//! attitude and lines through stamps, then integrated.
+//! The run of a replay of a file, by the crate that the command has it from (`strapd-replay`).
 
+use crate::calibration;
 use crate::columns::Columns;
-use crate::facts;
 use crate::refusal;
 use crate::samples::{Rows, Samples, Times};
 use crate::settings;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::time::{Duration, Instant};
-use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::estimate::{
-    Aid, Estimator, Meaning, Patience, Plan, Preparation, Prepared, StampPass,
-};
-use strapd_attitude::propagate::Sequential;
-use strapd_attitude::record::Declared;
+use strapd_attitude::estimate::Aid;
+use strapd_replay::pipeline::samples::{Stop, estimate as run};
 
-/// Samples between two looks at the clock.
-const BLOCK: usize = 4096;
-/// How long Ctrl-C waits at most, beside one block.
+/// How long Ctrl-C waits at most, beside the samples between two looks.
 const PATIENCE: Duration = Duration::from_millis(100);
-
-/// Why there is no attitude.
-enum Stop {
-    /// In words.
-    Refused(Diagnostic),
-    /// Python wants to be asked: Ctrl-C.
-    Interrupted(PyErr),
-}
 
 /// Asks Python for signals, ten times a second.
 pub struct Signals {
@@ -54,6 +39,15 @@ impl Signals {
     }
 }
 
+/// Attitudes, the summary as JSON, its warnings, the sigma of the bias that was removed beforehand, and the calibration.
+type Estimated<'py> = (
+    Bound<'py, PyDict>,
+    String,
+    Vec<String>,
+    [f64; 3],
+    Bound<'py, PyDict>,
+);
+
 /// Attitudes of samples that are all there, and what became of them.
 #[pyfunction]
 #[pyo3(signature = (gyr, t, acc, mag, orientation, dt, settings, /))]
@@ -67,7 +61,7 @@ pub fn estimate<'py>(
     orientation: Option<Rows<'py>>,
     dt: Option<Times<'py>>,
     settings: &Bound<'py, PyDict>,
-) -> PyResult<(Bound<'py, PyDict>, Bound<'py, PyDict>)> {
+) -> PyResult<Estimated<'py>> {
     let plan = settings::plan(settings, Aid::Auto)?;
     let samples = Samples::new(
         &gyr,
@@ -76,49 +70,25 @@ pub fn estimate<'py>(
         orientation.as_ref(),
         dt.as_ref(),
     )?;
-    let meaning = Meaning::new(&plan, &Declared::default());
-    let computed = py.detach(|| compute(&plan, &meaning, samples));
-    let (columns, prepared, estimator) = computed.map_err(|stop| match stop {
+    let (columns, done) = py.detach(|| {
+        let mut signals = Signals::new();
+        let mut columns = Columns::with_room(samples.len());
+        let done = run(&plan, samples.part(0, samples.len()), |attitudes| {
+            columns.extend(attitudes);
+            signals.look()
+        });
+        (columns, done)
+    });
+    let done = done.map_err(|stop| match stop {
         Stop::Refused(what) => refusal::run(py, "refused", what),
-        Stop::Interrupted(error) => error,
+        Stop::Ended(error) => error,
     })?;
-    let facts = facts::of(py, &plan, &meaning, &prepared, &estimator)?;
-    Ok((columns.into_dict(py)?, facts))
-}
-
-fn compute(
-    plan: &Plan,
-    meaning: &Meaning,
-    samples: Samples<'_>,
-) -> Result<(Columns, Prepared, Estimator), Stop> {
-    let mut signals = Signals::new();
-    let mut look = || signals.look().map_err(Stop::Interrupted);
-    let blocks = || {
-        (0..samples.len())
-            .step_by(BLOCK)
-            .map(|from| (from, from + BLOCK))
-    };
-    let mut preparation = Preparation::new(plan, meaning, Patience::WholeLog)
-        .with_stamps(StampPass::new(plan, meaning, []));
-    for (from, to) in blocks() {
-        for raw in samples.part(from, to) {
-            preparation.take(&raw).map_err(Stop::Refused)?;
-        }
-        if !preparation.wants_more() {
-            break;
-        }
-        look()?;
-    }
-    let prepared = preparation.decide().map_err(Stop::Refused)?;
-    let mut estimator = Estimator::new(plan, meaning, &prepared).map_err(Stop::Refused)?;
-    let mut columns = Columns::with_room(samples.len());
-    for (from, to) in blocks() {
-        for raw in samples.part(from, to) {
-            estimator.take(&raw);
-        }
-        columns.extend(estimator.attitudes(&Sequential));
-        look()?;
-    }
-    columns.extend(&estimator.finish(&Sequential));
-    Ok((columns, prepared, estimator))
+    let warnings = done.summary.warnings();
+    Ok((
+        columns.into_dict(py)?,
+        done.summary.json().to_string(),
+        warnings.iter().map(|w| refusal::in_python(w)).collect(),
+        done.bias_sigma,
+        calibration::write(py, &done.calibration)?,
+    ))
 }

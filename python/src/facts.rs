@@ -1,4 +1,6 @@
-//! What became of a run -> a dict, under the names of `strapd replay --json`. Pure but for Python's objects.
+//! What is known of a live estimator -> a dict, under the names of `strapd replay --json`. Pure but for Python's objects.
+//!
+//! Apart from the summary of a replay because it is asked for with every few samples.
 
 use crate::calibration;
 use pyo3::prelude::*;
@@ -85,11 +87,7 @@ pub fn of<'py>(
         .map(|w| crate::refusal::in_python(&w.to_string()))
         .collect();
     facts.set_item("warnings", warnings)?;
-    let known = learned(
-        (plan, meaning, prepared),
-        estimator.filter(),
-        estimator.smoothed().and_then(Result::ok),
-    );
+    let known = learned((plan, meaning, prepared), estimator.filter(), None);
     facts.set_item("calibration", calibration::write(py, &known)?)?;
     Ok(facts)
 }

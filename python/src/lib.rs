@@ -10,7 +10,7 @@
 //! | [`columns`] | attitudes -> columns -> numpy arrays over their memory |
 //! | [`batch`] | all samples at once -> attitudes |
 //! | [`live`] | samples as they come -> attitudes |
-//! | [`facts`] | what became of a run -> a dict |
+//! | [`facts`] | what is known of a live estimator -> a dict |
 //! | [`calibration`] | the calibration of a sensor <-> a dict |
 //! | [`compared`] | two attitudes -> how far apart |
 //! | [`words`] | the command's flags -> a replay to be done |

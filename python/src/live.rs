@@ -117,6 +117,12 @@ impl Live {
             return Err(argument(format!("rate_hz: {rate} is no sample rate")));
         }
         let plan = settings::plan(settings, Aid::Auto)?;
+        if plan.smooth {
+            return Err(argument(
+                Diagnostic::new("smooth: only a whole recording can be smoothed")
+                    .help("estimate(.., smooth=True), of samples that are all there"),
+            ));
+        }
         Ok(Live {
             meaning: Meaning::new(&plan, &Declared::default()),
             plan,

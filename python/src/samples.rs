@@ -77,7 +77,7 @@ impl<'a> Samples<'a> {
     }
 
     /// Those of a range, in order.
-    pub fn part(self, from: usize, to: usize) -> impl Iterator<Item = RawSample> {
+    pub fn part(self, from: usize, to: usize) -> impl Iterator<Item = RawSample> + Clone {
         (from..to.min(self.len())).filter_map(move |i| self.get(i))
     }
 

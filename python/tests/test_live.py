@@ -83,3 +83,8 @@ def test_a_finished_estimator_is_closed() -> None:
             use()
         assert error.value.kind == "closed"
     assert len(strapd.Estimator().finish()) == 0
+
+
+def test_a_live_sensor_can_not_be_smoothed() -> None:
+    with pytest.raises(ValueError, match=r"smooth: only a whole recording can be smoothed(.|\n)*estimate"):
+        strapd.Estimator(smooth=True)

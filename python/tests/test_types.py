@@ -28,7 +28,7 @@ log: strapd.Log = strapd.open("a.mcap")
 hz: float | None = log.rates["/imu"]
 imu: strapd.Samples = log.read("/imu", time="log")
 walk: strapd.Simulation = strapd.simulate("walking", rate_hz=100, noise={"arw": 0.1}, worn="foot")
-strapd.estimate(walk.gyr, walk.acc, t=walk.t, kind=walk.kind or "rate").plot(walk.truth, align="none")
+strapd.estimate(walk.gyr, walk.acc, t=walk.t, kind=walk.kind).plot(walk.truth, align="none")
 error: float = strapd.compare(att, walk.truth)["total"]["rms_deg"]
 strapd.simulate("flying")  # type: ignore[arg-type]
 att.plot(walk.truth, align="north")  # type: ignore[arg-type]

@@ -10,7 +10,7 @@ Quaternions are w, x, y, z and take **body to world**; the documentation is ``do
 
 from ._attitude import STATUS_BITS, Attitude
 from ._compare import compare
-from ._errors import Error, LossWarning, ResolutionWarning
+from ._errors import Error, LossWarning, ResolutionWarning, SmoothingWarning
 from ._estimation import Estimator, Settings, estimate, integrate
 from ._recordings import Finding, Log, check, replay
 
@@ -31,6 +31,7 @@ __all__ = [
     "Samples",
     "Settings",
     "Simulation",
+    "SmoothingWarning",
     "__version__",
     "check",
     "compare",

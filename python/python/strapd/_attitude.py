@@ -119,21 +119,44 @@ class Attitude:
         return list(self.summary["warnings"])
 
     @property
+    def smoothing(self) -> Optional[str]:
+        """How smoothing ended: ``converged``, ``unsettled``, ``without_field``, or ``filter`` where the attitude is the filter's.
+
+        ``None`` where nobody asked for it.
+        """
+        smooth = self.summary.get("smooth")
+        return None if smooth is None else str(smooth["outcome"])
+
+    @property
     def bias(self) -> npt.NDArray[np.float64]:
-        """(3,): the gyro's bias at the end, rad/s about the body axes: what was removed beforehand and what was learned."""
+        """(3,): the gyro's bias at the end, rad/s about the body axes: what was removed beforehand and what was learned.
+
+        Learned by what made the attitude: of a smoothed recording the smoother, else the filter. The filter's alone is
+        ``summary["aid"]["learned"]``.
+        """
         before = self.summary["bias_rad_s"]
         bias = np.array([before["x"], before["y"], before["z"]])
-        aid = self.summary["aid"]
-        return bias if aid is None else bias + aid["learned"]["gyro_bias_rad_s"]
+        learned = self._learned_bias()
+        return bias if learned is None else bias + learned[0]
 
     @property
     def bias_sigma(self) -> Optional[npt.NDArray[np.float64]]:
         """(3,): one standard deviation of it; ``None`` where nothing was learned and the run does not say."""
-        aid = self.summary["aid"]
-        if aid is not None:
-            return np.array(aid["sigma"]["gyro_bias_rad_s"])
+        learned = self._learned_bias()
+        if learned is not None:
+            return learned[1]
         sigma = self.summary.get("bias_sigma_rad_s")
         return None if sigma is None else np.array(sigma)
+
+    def _learned_bias(self) -> Optional[tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]]:
+        """The bias beside what was removed beforehand, and its sigma, by what made the attitude."""
+        if self.smoothing not in (None, "filter"):
+            smoothed = self.summary["smooth"]["gyro_bias_deg_s"]
+            return np.radians(smoothed["last"]), np.radians(smoothed["last_sigma"])
+        aid = self.summary["aid"]
+        if aid is None:
+            return None
+        return np.array(aid["learned"]["gyro_bias_rad_s"]), np.array(aid["sigma"]["gyro_bias_rad_s"])
 
     @property
     def calibration(self) -> Optional[dict[str, Any]]:
@@ -246,6 +269,8 @@ class Attitude:
         w, x, y, z = self.q[-1]
         aid = self.summary["aid"]
         by = "gyro alone" if aid is None else aid["by"]
+        if self.smoothing is not None:
+            by += {"converged": ", smoothed", "filter": ", NOT SMOOTHED"}.get(self.smoothing, f", smoothed ({self.smoothing})")
         lost = f", lost {self.lost} of {self.summary['samples']['total']} samples" if self.lost else ""
         return (
             f"<strapd.Attitude: {n} over {secs:.3f} s, {by}, world {self.world}, body {self.body}{lost}; "

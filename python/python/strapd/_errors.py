@@ -21,5 +21,9 @@ class LossWarning(UserWarning):
     """Done, but samples were lost: the attitude was carried across them."""
 
 
+class SmoothingWarning(UserWarning):
+    """Done, but not as ``smooth=True`` asks: not smoothed at all, not settled, or without the field."""
+
+
 class ResolutionWarning(UserWarning):
     """Float seconds that are too large to tell samples apart well."""

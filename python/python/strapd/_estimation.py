@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import warnings
 from typing import TYPE_CHECKING, Any, Literal, Optional, TypedDict, Union
@@ -11,7 +12,7 @@ import numpy.typing as npt
 
 from . import _inputs, _strapd
 from ._attitude import Attitude
-from ._errors import Error, LossWarning
+from ._errors import Error, LossWarning, SmoothingWarning
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -88,6 +89,13 @@ def tell(what: Optional[str], strict: bool, depth: int) -> None:
     warnings.warn(what, LossWarning, stacklevel=depth)
 
 
+def tell_smoothing(summary: dict[str, Any], depth: int) -> None:
+    """Shouts where a recording was not smoothed as asked; who is told called so many functions ago."""
+    for finding in summary["findings"]:
+        if finding["code"] in ("not-smoothed", "smoothing"):
+            warnings.warn(finding["what"], SmoothingWarning, stacklevel=depth)
+
+
 def _run(
     gyr: npt.ArrayLike,
     t: Optional[npt.ArrayLike],
@@ -100,7 +108,7 @@ def _run(
     rates = _inputs.rates(gyr)
     n = rates.shape[0]
     acc, mag, orientation = beside
-    columns, summary = _strapd.estimate(
+    columns, answer, said, bias_sigma, calibration = _strapd.estimate(
         rates,
         _inputs.stamps(t, rate_hz, n),
         _optional("acc", acc, n),
@@ -109,7 +117,10 @@ def _run(
         None if dt is None else _inputs.intervals(dt, n),
         _ready(settings),
     )
+    # As a replay says it; its arguments are those of this function.
+    summary: dict[str, Any] = {**json.loads(answer), "warnings": said, "bias_sigma_rad_s": bias_sigma, "calibration": calibration}
     tell(loss(summary), strict, depth=4)
+    tell_smoothing(summary, depth=4)
     return Attitude(columns, summary)
 
 
@@ -121,7 +132,7 @@ def estimate(
     rate_hz: Optional[float] = None,
     aid: Aid = "auto",
     *,
-    kind: Kind = "rate",
+    kind: Optional[Kind] = None,
     method: str = "auto",
     dt: Optional[npt.ArrayLike] = None,
     orientation: Optional[npt.ArrayLike] = None,
@@ -140,12 +151,13 @@ def estimate(
     :param t: (n,) integer nanoseconds, float seconds or datetime64.
     :param rate_hz: samples a second, in place of ``t``.
     :param aid: what corrects the gyro: ``gravity``, ``gravity+mag``, ``none``; ``auto`` takes what there is.
-    :param kind: what a sample means in time: the ``rate`` at its stamp, the ``average`` over the interval that ends there, or
-        the ``delta-angle`` turned in it; ``rotation``: the rotation vector of the whole turn in it, coning included.
+    :param kind: what a sample means in time: the ``rate`` at its stamp (as without it), the ``average`` over the interval that ends
+        there, or the ``delta-angle`` turned in it; ``rotation``: the rotation vector of the whole turn in it, coning included.
     :param dt: how long each sample was taken over, as ``t``; where it is not the step between stamps.
     :param orientation: (n, 4) w, x, y, z, for ``init="first-orientation"``.
     :param smooth: the whole recording at once (``strapd replay --smooth``): better than any filter, and calibrated from
-        the recording itself. Rates in steps of 5 ms and less are taken as means since the one before.
+        the recording itself. Rates in steps of 5 ms and less are taken as means since the one before, unless ``kind`` says
+        ``rate``. What could not be smoothed as asked is a :class:`SmoothingWarning`.
     :param strict: raise :class:`Error` where samples were lost, instead of a :class:`LossWarning`.
     :param settings: see :class:`Settings`.
     :raises ValueError: an argument that can not be, by name.
@@ -162,9 +174,6 @@ def estimate(
         if acc is None:
             raise ValueError("acc: needed for smooth=True")
         given["smooth"] = True
-        if kind == "rate":
-            # As the command takes samples of which nobody says what they mean.
-            del given["kind"]
     return _run(gyr, t, rate_hz, (acc, mag, orientation), dt, strict, given)
 
 

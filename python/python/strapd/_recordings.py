@@ -10,7 +10,7 @@ import numpy as np
 
 from . import _strapd
 from ._attitude import Attitude
-from ._estimation import tell
+from ._estimation import tell, tell_smoothing
 
 if TYPE_CHECKING:
     from ._samples import Samples
@@ -112,6 +112,8 @@ def replay(path: Path, *, strict: bool = False, **flags: Any) -> Union[Attitude,
         tell("\n".join([*lost, *said]) or f"{path}: samples were lost", strict, depth=3)
     else:
         note(said)
+    for facts in summary["topics"]:
+        tell_smoothing(facts, depth=3)
     found = {}
     for (name, columns), facts, calibration in zip(topics, summary["topics"], calibrations):
         found[name] = Attitude(columns, {**facts, "calibration": calibration, "file_problems": summary["file_problems"]})

@@ -20,7 +20,7 @@ def estimate(
     dt: Optional[_Nanos],
     settings: dict[str, Any],
     /,
-) -> tuple[dict[str, Any], dict[str, Any]]: ...
+) -> tuple[dict[str, Any], str, list[str], list[float], dict[str, Any]]: ...
 def compare(
     t: _Nanos,
     q: _Floats,
