@@ -100,7 +100,7 @@ mod built_with_it {
     }
 
     #[test]
-    #[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+    #[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
     fn real_and_broken_recordings_give_the_bits_of_their_files() {
         for log in [
             "real/broad07_60s_ros2_zstd.mcap",

@@ -101,7 +101,7 @@ fn samples_of_rest() -> usize {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn a_heading_that_drifts_far_is_said_though_sigma_allows_it() {
     let Some(path) = shared("logs/real/husky_ros1_lz4.mcap") else {
         return;

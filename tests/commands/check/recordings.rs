@@ -55,7 +55,7 @@ const FINDINGS: [(&str, &[&str]); 24] = [
 ];
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn what_is_known_of_each_recording_is_found_and_nothing_else() {
     for (name, expected) in FINDINGS {
         let Some(path) = shared(&format!("logs/{name}.mcap")) else {
@@ -67,7 +67,7 @@ fn what_is_known_of_each_recording_is_found_and_nothing_else() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn choices_are_noted() {
     for (name, note) in [
         ("real/husky_ros1_lz4", "mounted-on-side"),
@@ -84,7 +84,7 @@ fn choices_are_noted() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn evidence_is_the_numbers_of_the_recording() {
     let Some(path) = shared("logs/hostile/09_gap_2s.mcap") else {
         return;
@@ -98,7 +98,7 @@ fn evidence_is_the_numbers_of_the_recording() {
 
 /// x-IMU3, BROAD and PX4: followed, the advice brings the gyro closer to the recorded orientation.
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn the_advice_on_the_meaning_of_a_sample_reduces_the_error() {
     for (name, topic, at_most) in [
         ("ximu3_ros2_zstd", "/imu", 0.4),

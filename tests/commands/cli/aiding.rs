@@ -142,7 +142,7 @@ fn scored(dir: &Path, log: &Path, truth: &Truth, flags: &str) -> [f64; 4] {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn on_recordings_with_optical_truth_it_is_as_good_as_it_says() {
     let dir = tempfile::tempdir().unwrap();
     // Found 1.75 / 1.09 and 0.73 / 0.57 (VQF 2.06 / 1.02 and 2.76 / 0.47); 99.9 % within three sigma.
@@ -175,7 +175,7 @@ fn on_recordings_with_optical_truth_it_is_as_good_as_it_says() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn with_a_magnetometer_the_heading_is_that_of_north() {
     let dir = tempfile::tempdir().unwrap();
     let log = broad("15_undisturbed_fast_translation_A.mcap");
@@ -198,7 +198,7 @@ fn with_a_magnetometer_the_heading_is_that_of_north() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn a_specific_force_of_a_topic_of_its_own_is_as_good_as_one_beside_the_rate() {
     let dir = tempfile::tempdir().unwrap();
     let log = broad("15_undisturbed_fast_translation_A.mcap");
@@ -214,7 +214,7 @@ fn a_specific_force_of_a_topic_of_its_own_is_as_good_as_one_beside_the_rate() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn a_file_a_pipe_and_any_number_of_threads_give_the_same_bits() {
     for aid in ["gravity", "gravity+mag"] {
         same_bits(&format!(

@@ -198,7 +198,7 @@ fn a_wrong_field_or_topic_lists_what_would_do() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn an_encoding_nobody_knows_is_an_error_that_names_it() {
     let Some(path) = shared("logs/native/rosbag2_wrong_format.mcap") else {
         return;

@@ -33,7 +33,7 @@ fn close(what: &str, ours: &Value, theirs: &Value, relative: f64) {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn every_golden_body_is_answered() {
     let Some(golden) = golden() else { return };
     let bodies = golden["bodies"].as_array().unwrap();
@@ -80,7 +80,7 @@ fn every_golden_body_is_answered() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn every_golden_composite_is_answered() {
     let Some(golden) = golden() else { return };
     let composites = golden["composites"].as_array().unwrap();
@@ -119,7 +119,7 @@ fn the_example_of_the_seed_has_the_product_it_left_out() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn what_no_matter_can_be_is_refused_by_name_and_number_and_the_run_goes_on() {
     let Some(golden) = golden() else { return };
     let mut requests: Vec<Value> = golden["invalid"]

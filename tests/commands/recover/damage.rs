@@ -47,7 +47,7 @@ fn logs_in(folder: &Path) -> Vec<PathBuf> {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn every_hostile_and_foreign_log_gives_what_the_walk_yields() {
     let dir = tempfile::tempdir().unwrap();
     let output = dir.path().join("out.mcap");

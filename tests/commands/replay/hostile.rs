@@ -36,7 +36,7 @@ fn assert_verdicts(topic: &TopicSummary, expected: &[(Verdict, u64)]) {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn a_log_without_a_summary_section_gives_all_its_samples() {
     let Some(summary) = hostile("01_no_summary") else {
         return;
@@ -46,7 +46,7 @@ fn a_log_without_a_summary_section_gives_all_its_samples() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn a_log_cut_inside_a_chunk_gives_every_whole_chunk_and_says_so() {
     let Some(summary) = hostile("02_truncated_mid_chunk") else {
         return;
@@ -68,7 +68,7 @@ fn a_log_cut_inside_a_chunk_gives_every_whole_chunk_and_says_so() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn big_endian_cdr_gives_what_little_endian_gives() {
     let Some(summary) = hostile("06_big_endian_cdr") else {
         return;
@@ -81,7 +81,7 @@ fn big_endian_cdr_gives_what_little_endian_gives() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn zero_header_stamps_fall_back_to_log_time_and_that_is_said() {
     let Some(summary) = hostile("07_zero_header_stamps") else {
         return;
@@ -95,7 +95,7 @@ fn zero_header_stamps_fall_back_to_log_time_and_that_is_said() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn pairs_with_the_same_stamp_are_counted_and_none_is_divided_by() {
     let Some(summary) = hostile("08_duplicate_stamps") else {
         return;
@@ -118,7 +118,7 @@ fn pairs_with_the_same_stamp_are_counted_and_none_is_divided_by() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn a_gap_of_two_seconds_is_held_measured_and_costs_certainty() {
     let Some(summary) = hostile("09_gap_2s") else {
         return;
@@ -138,7 +138,7 @@ fn a_gap_of_two_seconds_is_held_measured_and_costs_certainty() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn nan_and_infinity_are_rejected_counted_and_leave_the_attitude_finite() {
     let Some(summary) = hostile("10_nan_inf") else {
         return;
@@ -153,7 +153,7 @@ fn nan_and_infinity_are_rejected_counted_and_leave_the_attitude_finite() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn two_imu_topics_are_refused_and_both_are_named_with_the_flag() {
     let Some(error) = refused("hostile", "13_two_imu_topics") else {
         return;
@@ -172,7 +172,7 @@ fn two_imu_topics_are_refused_and_both_are_named_with_the_flag() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn payloads_that_are_too_short_are_counted_and_the_first_is_explained() {
     let Some(summary) = hostile("16_short_and_empty_payloads") else {
         return;
@@ -191,7 +191,7 @@ fn payloads_that_are_too_short_are_counted_and_the_first_is_explained() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn a_log_with_a_header_alone_has_no_imu_topic() {
     let Some(error) = refused("hostile", "25_header_only") else {
         return;
@@ -206,7 +206,7 @@ fn a_log_with_a_header_alone_has_no_imu_topic() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn the_log_that_hangs_the_mcap_crate_ends_at_once() {
     let begun = Instant::now();
     let Some(summary) = hostile("mcap-0.25.0-hang") else {
@@ -225,7 +225,7 @@ fn the_log_that_hangs_the_mcap_crate_ends_at_once() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn an_unknown_message_encoding_is_named_with_its_topic() {
     let Some(error) = refused("native", "rosbag2_wrong_format") else {
         return;
@@ -245,7 +245,7 @@ fn an_unknown_message_encoding_is_named_with_its_topic() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn the_only_imu_of_ninety_four_topics_is_found_and_the_other_rates_are_mentioned() {
     let Some(path) = shared("logs/native/rosbags_rs_all_types.mcap") else {
         return;
@@ -259,7 +259,7 @@ fn the_only_imu_of_ninety_four_topics_is_found_and_the_other_rates_are_mentioned
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn one_sample_with_a_zero_stamp_is_an_attitude() {
     let Some(path) = shared("logs/native/rosbag2parquet_array_msgs.mcap") else {
         return;
@@ -271,7 +271,7 @@ fn one_sample_with_a_zero_stamp_is_an_attitude() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn json_messages_with_an_empty_schema_are_read() {
     let Some(path) = shared("logs/native/mcap_explorer_demo_json_imu.mcap") else {
         return;
@@ -282,7 +282,7 @@ fn json_messages_with_an_empty_schema_are_read() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn a_cut_log_without_an_imu_says_both() {
     let Some(error) = refused("native", "tiryoh_test_sample_truncated") else {
         return;

@@ -111,7 +111,7 @@ fn gravity_levels_a_body_at_rest_and_its_bias_is_found() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn what_only_rest_can_tell_is_refused_on_a_moving_body_with_the_way_out() {
     let Some(path) = shared("logs/real/broad07_60s_ros2_zstd.mcap") else {
         return;
@@ -182,7 +182,7 @@ fn the_first_orientation_is_where_the_attitude_starts() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn px4_in_ned_is_px4_in_enu_seen_from_the_other_convention() {
     let Some(path) = shared("logs/real/px4_fmuv6c_json_zstd.mcap") else {
         return;

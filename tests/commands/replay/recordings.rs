@@ -33,7 +33,7 @@ const REAL: [(&str, u64, u64, &str); 7] = [
 ];
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn every_recording_replays_into_every_format_with_the_same_attitudes_in_each() {
     for (name, total, used, topic) in REAL {
         let Some(path) = shared(&format!("logs/real/{name}.mcap")) else {
@@ -96,7 +96,7 @@ fn against(path: &Path, plan: Plan) -> [f64; 3] {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn gyro_alone_meets_the_gates_with_samples_taken_as_means() {
     // The gates of issue 2: the table's figures and 0.3 to 1 % of room, for the table was computed
     // with a first-order step where this integrates to higher order.
@@ -122,7 +122,7 @@ fn gyro_alone_meets_the_gates_with_samples_taken_as_means() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn the_other_meanings_of_a_sample_give_the_table_of_the_recordings() {
     // `logs/README.md`: instantaneous (trapezoid + a x b h^2/12), held. 3 % is the room the issue
     // gives: the table has three digits, and its medians are of nearest, not interpolated, samples.
@@ -154,7 +154,7 @@ fn the_other_meanings_of_a_sample_give_the_table_of_the_recordings() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn a_recorded_orientation_on_a_topic_of_its_own_can_be_named() {
     let Some(path) = shared("logs/real/ximu3_ros2_zstd.mcap") else {
         return;

@@ -175,7 +175,7 @@ fn served(kind: SampleKind, lines: &[&[u8]]) -> Vec<u8> {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn every_recording_gives_the_bytes_of_a_replay_whatever_its_stamps_and_samples_are_like() {
     let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures");
     let folders = [Some(fixtures), shared_data::shared("logs/real")];

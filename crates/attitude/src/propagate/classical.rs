@@ -120,7 +120,7 @@ mod tests {
     use crate::propagate::shared_data;
 
     #[test]
-    #[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+    #[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
     fn block_weights_equal_the_golden_fractions() {
         let Some(path) = shared_data::shared("golden/attitude.json") else {
             return;

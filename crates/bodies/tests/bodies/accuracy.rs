@@ -101,7 +101,7 @@ fn assert_near(found: f64, expected: f64, part: f64, what: &str) {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn the_tests_own_top_equals_the_golden_rows() {
     let Some(path) = crate::shared_data::shared("golden/attitude.json") else {
         return;

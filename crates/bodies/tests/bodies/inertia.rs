@@ -61,7 +61,7 @@ fn rows6(m: &Matrix6<f64>) -> Vec<f64> {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn every_golden_body_agrees_in_every_quantity() {
     let Some(golden) = golden() else { return };
     let bodies = golden["bodies"].as_array().unwrap();
@@ -109,7 +109,7 @@ fn every_golden_body_agrees_in_every_quantity() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn all_three_coriolis_matrices_are_skew_and_have_the_same_product() {
     let Some(golden) = golden() else { return };
     for g in golden["bodies"].as_array().unwrap() {
@@ -133,7 +133,7 @@ fn all_three_coriolis_matrices_are_skew_and_have_the_same_product() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn a_mass_matrix_comes_apart_into_the_body_it_was_made_of() {
     let Some(golden) = golden() else { return };
     for g in golden["bodies"].as_array().unwrap() {
@@ -179,7 +179,7 @@ fn a_far_away_body_confesses_the_digits_it_lost() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn every_golden_composite_agrees() {
     let Some(golden) = golden() else { return };
     let composites = golden["composites"].as_array().unwrap();
@@ -218,7 +218,7 @@ fn every_golden_composite_agrees() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn every_golden_invalid_body_is_refused_for_its_own_reason() {
     let Some(golden) = golden() else { return };
     let cases = golden["invalid"].as_array().unwrap();
@@ -292,7 +292,7 @@ fn seed_example() -> RigidBody {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn seed_i2_the_example_has_a_product_of_inertia_of_150() {
     let m = seed_example().mass_matrix();
     // Products of a thousand, a half and three tenths: one rounding of 150.
@@ -606,7 +606,7 @@ fn seed_i7_its_c_rb_makes_momentum_of_nothing() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn seed_i7_an_energy_test_does_not_see_the_wrong_c_rb() {
     let Some(golden) = golden() else { return };
     for g in golden["bodies"].as_array().unwrap() {
@@ -629,7 +629,7 @@ fn seed_i6_without_the_coriolis_term_a_free_body_gains_momentum() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn a_free_body_keeps_momentum_and_energy_with_and_without_added_mass() {
     let Some(golden) = golden() else { return };
     for g in golden["bodies"].as_array().unwrap().iter().take(10) {

@@ -63,7 +63,7 @@ const MS: u64 = 1_000_000;
 // ---- the reference ----
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn the_exact_top_agrees_with_the_golden_rows() {
     let Some(path) = crate::shared_data::shared("golden/attitude.json") else {
         return;

@@ -155,7 +155,7 @@ fn ours(reader: Reader) -> Vec<(String, Value)> {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn every_conformance_file_lists_as_its_authors_say() {
     let Some(root) = crate::shared_data::shared("logs/conformance") else {
         return;
@@ -189,7 +189,7 @@ fn every_conformance_file_lists_as_its_authors_say() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn every_attachment_of_the_suite_has_the_crc_it_carries() {
     let Some(root) = crate::shared_data::shared("logs/conformance/mcap/OneAttachment") else {
         return;

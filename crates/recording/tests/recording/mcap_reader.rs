@@ -40,7 +40,7 @@ fn oracle(path: &Path) -> Vec<Read> {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn recordings_hold_what_the_mcap_crate_reads_in_order_of_log_time() {
     let mut files = 0;
     for path in ["logs/real", "logs/native", "logs/hostile"]
@@ -71,7 +71,7 @@ fn recordings_hold_what_the_mcap_crate_reads_in_order_of_log_time() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn a_recording_cut_in_a_chunk_gives_every_chunk_before_the_cut() {
     let Some(path) = crate::shared_data::shared("logs/hostile/02_truncated_mid_chunk.mcap") else {
         return;
@@ -94,7 +94,7 @@ fn a_recording_cut_in_a_chunk_gives_every_chunk_before_the_cut() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn the_truncated_native_file_ends_with_a_problem() {
     let Some(path) = crate::shared_data::shared("logs/native/tiryoh_test_sample_truncated.mcap")
     else {
@@ -105,7 +105,7 @@ fn the_truncated_native_file_ends_with_a_problem() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn the_file_that_hangs_the_mcap_crate_ends_at_once() {
     let Some(path) = crate::shared_data::shared("logs/hostile/mcap-0.25.0-hang.mcap") else {
         return;
@@ -123,7 +123,7 @@ fn the_file_that_hangs_the_mcap_crate_ends_at_once() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn hostile_recordings_hold_as_many_messages_as_their_table_says() {
     // logs/README.md, message level: 953 in the log these are variants of.
     let table = [

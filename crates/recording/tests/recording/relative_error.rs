@@ -108,7 +108,7 @@ fn agrees(log: Option<Log>, table: [&str; 3]) {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn broad_07_against_optical_truth() {
     let log = read(
         "broad07_60s_ros2_zstd",
@@ -120,7 +120,7 @@ fn broad_07_against_optical_truth() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn x_imu3_against_its_on_board_orientation() {
     let log = read(
         "ximu3_ros2_zstd",
@@ -132,14 +132,14 @@ fn x_imu3_against_its_on_board_orientation() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn xsens_against_its_own_orientation() {
     let log = read("xsens_mti_ros2_none", "/imu", None, &Wire::Cdr);
     agrees(log, ["1.828 / 4.21", "1.390 / 2.97", "1.501 / 3.36"]);
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn husky_against_its_own_orientation() {
     let log = read("husky_ros1_lz4", "/imu/data", None, &Wire::Ros1);
     agrees(log, ["0.451 / 1.46", "0.438 / 1.36", "0.438 / 1.39"]);

@@ -223,7 +223,7 @@ fn compare(file: &str, which: &str, settings: Settings, columns: [usize; 4]) -> 
 const ROUNDED: f64 = 0.6e-6;
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn the_golden_case_comes_out_to_all_its_digits() {
     for which in ["6D", "9D"] {
         let worst = compare("golden.txt", which, plain(), [0, 2, 3, 4]);
@@ -232,7 +232,7 @@ fn the_golden_case_comes_out_to_all_its_digits() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn the_golden_case_with_coloured_residuals_comes_out_to_all_its_digits() {
     for which in ["6D", "9D"] {
         // From before what simulated motions asked for.

@@ -25,7 +25,7 @@ fn assert_equal(found: &Moments<1>, golden: &[Triple<1>], h: f64) {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn moments_equal_the_golden_ones() {
     let Some(path) = shared_data::shared("golden/attitude.json") else {
         return;

@@ -55,7 +55,7 @@ fn vector(value: &serde_json::Value) -> Triple<1> {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn every_order_equals_the_golden_vectors() {
     let Some(golden) = golden() else { return };
     let cases = golden["magnus"].as_array().unwrap();

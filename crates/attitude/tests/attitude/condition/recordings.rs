@@ -191,7 +191,7 @@ fn settings(kind: SampleKind) -> Settings {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn colliding_stamps_of_hostile_08_come_out_as_the_recording_they_were_made_from() {
     let (Some(spoilt), Some(good)) = (
         read("hostile/08_duplicate_stamps.mcap", "/imu"),
@@ -213,7 +213,7 @@ fn colliding_stamps_of_hostile_08_come_out_as_the_recording_they_were_made_from(
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn the_gap_of_hostile_09_is_found_with_its_length_and_the_policy_applied() {
     let Some(raw) = read("hostile/09_gap_2s.mcap", "/imu") else {
         return;
@@ -242,7 +242,7 @@ fn the_gap_of_hostile_09_is_found_with_its_length_and_the_policy_applied() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn the_bad_values_of_hostile_10_are_rejected_and_nothing_else() {
     let Some(raw) = read("hostile/10_nan_inf.mcap", "/imu") else {
         return;
@@ -260,7 +260,7 @@ fn the_bad_values_of_hostile_10_are_rejected_and_nothing_else() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn the_zero_stamps_of_hostile_07_fall_back_to_log_time() {
     let (Some(raw), Some(good)) = (
         read("hostile/07_zero_header_stamps.mcap", "/imu"),
@@ -294,7 +294,7 @@ fn the_zero_stamps_of_hostile_07_fall_back_to_log_time() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn the_repeats_and_losses_of_the_gait_recording_are_told_apart() {
     let Some(raw) = read("real/xio_gait_short_walk_protobuf_batch.mcap", "/imu") else {
         return;
@@ -321,7 +321,7 @@ fn the_repeats_and_losses_of_the_gait_recording_are_told_apart() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn sound_recordings_pass_whole_and_contiguous() {
     for (file, topic) in REAL {
         if file.contains("gait") || file.contains("fusion") {
@@ -337,7 +337,7 @@ fn sound_recordings_pass_whole_and_contiguous() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn the_means_of_px4_keep_their_own_intervals() {
     let Some(raw) = read("real/px4_fmuv6c_json_zstd.mcap", "/sensor_combined") else {
         return;
@@ -355,7 +355,7 @@ fn the_means_of_px4_keep_their_own_intervals() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn the_recordings_rest_where_they_rest_and_nowhere_else() {
     let limits = Limits::default();
     for (file, topic) in REAL {
@@ -403,7 +403,7 @@ fn the_recordings_rest_where_they_rest_and_nowhere_else() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn a_recording_in_degrees_is_found_out_by_gravity() {
     let Some(raw) = read("real/xio_fusion_ros2_lz4.mcap", "/imu") else {
         return;

@@ -73,7 +73,7 @@ fn as_kind(rates: &[(i64, [f64; 3])], kind: SampleKind) -> (Vec<RateSample>, Vec
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn bursts_cut_out_of_recordings_are_bridged_better_than_straight_and_sigma_says_how_well() {
     for (method, kind) in [
         (Method::Auto, SampleKind::Rate),

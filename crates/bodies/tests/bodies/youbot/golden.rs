@@ -138,7 +138,7 @@ fn check_pose(arm: &Arm, case: &Value, what: &str) {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn every_pose_jacobian_and_solution_of_the_seed_preset() {
     let Some(g) = file() else { return };
     for (i, case) in list(&g["fk_ik"]).iter().enumerate() {
@@ -148,7 +148,7 @@ fn every_pose_jacobian_and_solution_of_the_seed_preset() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn every_pose_jacobian_and_solution_of_the_urdf_preset() {
     let Some(g) = file() else { return };
     for (i, case) in list(&g["fk_ik_urdf_preset"]).iter().enumerate() {
@@ -158,7 +158,7 @@ fn every_pose_jacobian_and_solution_of_the_urdf_preset() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn every_special_pose() {
     let Some(g) = file() else { return };
     let special = g["special"].as_object().unwrap();
@@ -169,7 +169,7 @@ fn every_special_pose() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn the_presets_hold_the_files_numbers() {
     let Some(g) = file() else { return };
     let meta = &g["meta"];
@@ -203,7 +203,7 @@ fn the_presets_hold_the_files_numbers() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn unreachable_targets_under_the_four_policies() {
     let Some(g) = file() else { return };
     let arm = Arm::published();
@@ -265,7 +265,7 @@ fn unreachable_targets_under_the_four_policies() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn velocities_accelerations_torques_and_energies() {
     let Some(g) = file() else { return };
     let cases = list(&g["dynamics"]);
@@ -323,7 +323,7 @@ fn velocities_accelerations_torques_and_energies() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn an_imu_on_the_joint_trajectory() {
     let Some(g) = file() else { return };
     let golden = &g["gyro_joint_trajectory"];
@@ -384,7 +384,7 @@ pub(crate) fn cartesian_path() -> ToolPath {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn the_gripper_along_the_cartesian_trajectory() {
     let Some(g) = file() else { return };
     let arm = Arm::published();

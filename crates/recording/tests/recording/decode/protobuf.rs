@@ -222,7 +222,7 @@ fn a_descriptor_set_without_the_message_or_with_circles_is_no_trouble() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn every_sample_of_the_protobuf_recording_equals_what_prost_reflect_reads() {
     use prost_reflect::{DescriptorPool, DynamicMessage, Value};
     let Some(messages) =

@@ -80,7 +80,7 @@ fn all(relative: &str) -> Option<BTreeMap<String, Topic>> {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn every_recording_gives_as_many_samples_as_its_readme_says() {
     let expected: &[(&str, &Expected)] = &[
         (
@@ -150,7 +150,7 @@ fn every_recording_gives_as_many_samples_as_its_readme_says() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn the_variants_of_one_log_hold_the_same_numbers() {
     let read = |name: &str| Some(all(&format!("logs/{name}.mcap"))?.remove("/imu")?.0);
     let Some(plain) = read("real/xsens_mti_ros2_none") else {
@@ -190,7 +190,7 @@ fn the_variants_of_one_log_hold_the_same_numbers() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn recorded_rates_are_plausible_and_stamps_lie_near_the_recorders_clock() {
     for (name, topic, rate_below) in [
         // The largest rate of each, by mcap-ros2-support, mcap-ros1-support and json: 12.33, 4.61,
@@ -220,7 +220,7 @@ fn recorded_rates_are_plausible_and_stamps_lie_near_the_recorders_clock() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn the_imu_topic_of_every_recording_is_the_best_ranked_one() {
     for (file, expected) in [
         ("real/broad07_60s_ros2_zstd", vec!["/imu"]),
@@ -262,7 +262,7 @@ fn the_imu_topic_of_every_recording_is_the_best_ranked_one() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn a_channel_that_can_not_be_decoded_is_refused_by_topic_type_and_encoding() {
     let Some(messages) = messages("logs/native/rosbag2_wrong_format.mcap") else {
         return;
@@ -281,7 +281,7 @@ fn a_channel_that_can_not_be_decoded_is_refused_by_topic_type_and_encoding() {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn layouts_built_in_equal_the_schema_texts_of_recordings() {
     let Some(messages) = messages("logs/native/rosbags_rs_all_types.mcap") else {
         return;
