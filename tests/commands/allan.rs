@@ -1,24 +1,24 @@
 //! `strapd allan`: what it prints, writes, warns of and refuses.
 
 use crate::made_logs::{ImuSample, START, STEP, written};
+use crate::program::ended;
 use serde_json::Value;
 use std::path::Path;
+use std::process::Command;
 use strapd_attitude::noise::sensor_error::{ConstantErrors, GyroModel, ImuError, Truth};
 use strapd_attitude::record::{Nanos, SampleKind};
 
 /// Stdout, stderr and exit code of `strapd allan` in `dir`.
 fn allan(dir: &Path, arguments: &str) -> (String, String, Option<i32>) {
-    let output = assert_cmd::Command::cargo_bin("strapd")
-        .unwrap()
+    let mut command = Command::new(env!("CARGO_BIN_EXE_strapd"));
+    command
         .current_dir(dir)
         .env_remove("STRAPD_TIME")
         .env_remove("STRAPD_LOG")
         .env("NO_COLOR", "1")
         .arg("allan")
-        .args(arguments.split_whitespace())
-        .timeout(std::time::Duration::from_secs(60))
-        .output()
-        .unwrap();
+        .args(arguments.split_whitespace());
+    let output = ended(&command, "");
     (
         String::from_utf8(output.stdout).unwrap(),
         String::from_utf8(output.stderr).unwrap(),

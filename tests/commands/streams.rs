@@ -97,7 +97,7 @@ fn file_standard_input_and_cat_in_a_pipe_give_the_same_attitudes() {
 
 /// Axes FRD, means with an interval of their own: a line must carry what the format says.
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn a_format_that_says_more_than_a_line_gives_the_same_attitudes_through_lines_and_rows() {
     let dir = tempfile::tempdir().unwrap();
     for log in [
@@ -150,7 +150,7 @@ fn same_every_way(log: &Path, dir: &Path) {
 }
 
 #[test]
-#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]
 fn a_stream_takes_the_imu_and_not_a_twist_that_comes_before_it() {
     let Some(log) = crate::shared_data::shared("logs/native/rosbags_rs_all_types.mcap") else {
         return;
@@ -302,8 +302,8 @@ fn a_named_pipe_is_read_like_standard_input() {
         .arg("replay")
         .arg(&pipe)
         .args(["-o", "-"])
-        // A second open of the pipe would wait for a second writer, for ever.
-        .timeout(std::time::Duration::from_secs(120))
+        // A second open of the pipe would wait for a second writer, for ever: by the clock, as a last resort.
+        .timeout(std::time::Duration::from_secs(600))
         .output()
         .unwrap();
     writer.join().unwrap();
@@ -390,10 +390,13 @@ fn a_line_is_answered_while_the_pipe_stays_open() {
     }
     to.flush().unwrap();
     // The pipe is still open: what is known must come out.
-    let first = receiver.recv_timeout(std::time::Duration::from_secs(120));
+    let first = receiver.recv_timeout(std::time::Duration::from_secs(600));
     drop(to);
     let lines = reader.join();
     assert!(child.wait().unwrap().success());
-    assert!(first.is_ok(), "no attitude within 120 s of 2000 samples");
+    assert!(
+        first.is_ok(),
+        "timed out: no attitude of 2000 samples within 600 s by the clock, a last resort"
+    );
     assert_eq!(lines.unwrap(), 2000);
 }

@@ -11,5 +11,7 @@ mod mutations;
 mod made_databases;
 #[path = "../made_logs/mod.rs"]
 mod made_logs;
+#[path = "../meter/mod.rs"]
+mod meter;
 #[path = "../../fuzz/parsers.rs"]
 mod parsers;

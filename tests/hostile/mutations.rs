@@ -1,20 +1,22 @@
 //! Promise: no bytes from outside make anything panic, hang or lie. Every parser, fed with its
 //! good inputs (`fuzz/seeds`) changed at random: the functions are those of the fuzzers in `fuzz/`.
 //!
-//! `STRAPD_MUTATIONS=1000000 cargo test --release --test hostile mutations` runs as many cases for each;
-//! `STRAPD_MUTANTS=200000` as many changed logs through all commands, half of them changed as their formats know them;
-//! `STRAPD_MUTANTS_OF=db3` leaves it at those of one format.
+//! `cargo test` tries a few thousand cases of each, in seconds; `STRAPD_MUTATIONS=1000000 cargo test --release --test hostile
+//! mutations` as many, `STRAPD_MUTANTS=200000` as many changed logs through all commands, half of them changed as their formats
+//! know them; `STRAPD_MUTANTS_OF=db3` leaves it at those of one format. `.ci/run` and `.ci/full` say how many are asked of a
+//! change.
 
 #[cfg(target_os = "linux")]
 mod commands;
 #[cfg(target_os = "linux")]
 mod structured;
 
+use crate::meter::Meter;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 fn seeds(target: &str) -> Vec<Vec<u8>> {
     let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR"))
@@ -77,8 +79,14 @@ fn mutate(bytes: &mut Vec<u8>, other: &[u8], rng: &mut ChaCha8Rng) {
     }
 }
 
+/// A whole number of the environment.
+fn asked(name: &str) -> Option<usize> {
+    let text = std::env::var(name).ok()?;
+    let number = text.parse();
+    Some(number.unwrap_or_else(|why| panic!("{name}={text}: {why}")))
+}
+
 fn survives(target: &str, cases: usize, parse: fn(&[u8])) {
-    let cases = std::env::var("STRAPD_MUTATIONS").map_or(cases, |n| n.parse().unwrap());
     let seeds = seeds(target);
     for seed in &seeds {
         parse(seed);
@@ -86,6 +94,7 @@ fn survives(target: &str, cases: usize, parse: fn(&[u8])) {
     // A fixed generator: the same bytes everywhere, every time.
     let mut rng = ChaCha8Rng::seed_from_u64(target.bytes().map(u64::from).sum());
     let mut slowest = Duration::ZERO;
+    let mut meter = Meter::start();
     for case in 0..cases {
         let mut bytes = seeds[case % seeds.len()].clone();
         mutate(
@@ -98,68 +107,68 @@ fn survives(target: &str, cases: usize, parse: fn(&[u8])) {
             bytes.truncate(200);
             rng.fill_bytes(&mut bytes);
         }
-        let start = Instant::now();
         let outcome = catch_unwind(AssertUnwindSafe(|| parse(&bytes)));
-        slowest = slowest.max(start.elapsed());
-        assert!(
-            outcome.is_ok(),
-            "{target}, case {case}: {:?}",
-            bytes.escape_ascii().to_string()
-        );
+        let input = bytes.escape_ascii();
+        assert!(outcome.is_ok(), "{target}, case {case}: {input}");
         // They take microseconds; a loop over a forged count would take minutes.
-        assert!(
-            start.elapsed() < Duration::from_secs(20),
-            "{target}, case {case}: {:?}",
-            bytes.escape_ascii().to_string()
-        );
+        let took = meter.lap(LONGEST, format_args!("{target}, case {case}: {input}"));
+        slowest = slowest.max(took);
     }
     eprintln!("{target}: {cases} cases, the slowest {slowest:?}");
 }
 
-/// Enough for every parser in CI; together within a minute on two quiet cores.
-const CASES: usize = 100_000;
+/// Processor time of one input.
+const LONGEST: Duration = Duration::from_secs(20);
+
+/// For every parser, unless more are asked for: together within ten seconds of one core.
+const CASES: usize = 4_000;
+
+/// The cases of each parser.
+fn cases() -> usize {
+    asked("STRAPD_MUTATIONS").unwrap_or(CASES)
+}
 
 #[test]
 fn cdr() {
-    survives("cdr", CASES, crate::parsers::cdr);
+    survives("cdr", cases(), crate::parsers::cdr);
 }
 
 #[test]
 fn ros1() {
-    survives("ros1", CASES, crate::parsers::ros1);
+    survives("ros1", cases(), crate::parsers::ros1);
 }
 
 #[test]
 fn json() {
-    survives("json", CASES, crate::parsers::json);
+    survives("json", cases(), crate::parsers::json);
 }
 
 #[test]
 fn protobuf() {
-    survives("protobuf", CASES, crate::parsers::protobuf);
+    survives("protobuf", cases(), crate::parsers::protobuf);
 }
 
 #[test]
 fn schemas() {
-    survives("schema", CASES, crate::parsers::schema);
+    survives("schema", cases(), crate::parsers::schema);
 }
 
 #[test]
 fn lines() {
-    survives("lines", CASES, crate::parsers::lines);
+    survives("lines", cases(), crate::parsers::lines);
 }
 
 #[test]
 fn tables() {
     // Each is read twice.
-    survives("delimited", CASES / 3, crate::parsers::delimited);
+    survives("delimited", cases() / 3, crate::parsers::delimited);
 }
 
 #[cfg(feature = "parquet")]
 #[test]
 fn tables_by_columns() {
     // Each is put into a file first.
-    survives("parquet", CASES / 4, crate::parsers::parquet);
+    survives("parquet", cases() / 4, crate::parsers::parquet);
 }
 
 /// Every beginning of one, and every one with a byte at its end.
@@ -178,17 +187,17 @@ fn tables_by_columns_cut_anywhere() {
 
 #[test]
 fn conversations() {
-    survives("session", CASES, crate::parsers::session);
+    survives("session", cases(), crate::parsers::session);
 }
 
 #[test]
 fn viewers() {
-    survives("foxglove", CASES, crate::parsers::foxglove);
+    survives("foxglove", cases(), crate::parsers::foxglove);
 }
 
 #[test]
 fn logs() {
-    survives("mcap", CASES, crate::parsers::mcap);
+    survives("mcap", cases(), crate::parsers::mcap);
 }
 
 /// The mutations reach both sides: what is accepted, and what is not.

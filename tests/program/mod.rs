@@ -1,7 +1,12 @@
 //! The binary, run in a directory, and how it ended.
 #![allow(dead_code, unreachable_pub, clippy::unwrap_used, clippy::expect_used)]
 
+mod bounded;
+
+pub use bounded::ended;
+
 use std::path::Path;
+use std::process::Command;
 
 /// How a command ended.
 #[derive(Debug)]
@@ -12,9 +17,10 @@ pub struct Ran {
 }
 
 /// `strapd` in `dir` with these arguments, split at spaces, and this on its standard input.
+#[track_caller]
 pub fn strapd_fed(dir: &Path, arguments: &str, stdin: impl Into<Vec<u8>>) -> Ran {
-    let output = assert_cmd::Command::cargo_bin("strapd")
-        .unwrap()
+    let mut command = Command::new(assert_cmd::cargo::cargo_bin("strapd"));
+    command
         .current_dir(dir)
         // The user's own settings must not decide a test.
         .env_remove("STRAPD_TIME")
@@ -25,11 +31,8 @@ pub fn strapd_fed(dir: &Path, arguments: &str, stdin: impl Into<Vec<u8>>) -> Ran
         .env("NO_COLOR", "1")
         // Servers here are on loopback.
         .env("NO_PROXY", "127.0.0.1")
-        .args(arguments.split_whitespace())
-        .write_stdin(stdin)
-        .timeout(std::time::Duration::from_secs(120))
-        .output()
-        .unwrap();
+        .args(arguments.split_whitespace());
+    let output = ended(&command, stdin);
     Ran {
         code: output.status.code(),
         out: String::from_utf8(output.stdout).unwrap(),
@@ -37,6 +40,7 @@ pub fn strapd_fed(dir: &Path, arguments: &str, stdin: impl Into<Vec<u8>>) -> Ran
     }
 }
 
+#[track_caller]
 pub fn strapd(dir: &Path, arguments: &str) -> Ran {
     strapd_fed(dir, arguments, "")
 }

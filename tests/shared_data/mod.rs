@@ -1,5 +1,5 @@
 //! Where the recordings and golden vectors lie. They are not part of this repository: a test that
-//! needs them is marked `#[cfg_attr(not(has_shared), ignore = "needs ../shared")]` (`build.rs`), and is
+//! needs them is marked `#[cfg_attr(not(has_shared), ignore = "needs ../shared (optional recordings)")]` (`build.rs`), and is
 //! listed as ignored on a machine without them.
 
 use std::path::{Path, PathBuf};
@@ -18,7 +18,7 @@ pub fn shared(relative: &str) -> Option<PathBuf> {
         .join(relative);
     assert!(
         path.exists(),
-        "{} is absent; mark the test `#[cfg_attr(not(has_shared), ignore = \"needs ../shared\")]`",
+        "{} is absent: a recording of the maintainers, which no change needs (CONTRIBUTING.md). The test that asks for it is to be marked `#[cfg_attr(not(has_shared), ignore = \"needs ../shared (optional recordings)\")]`",
         path.display()
     );
     Some(path)

@@ -186,6 +186,9 @@ fn spelled_out(n: usize) -> String {
     )
 }
 
+/// By the clock, for what takes seconds; each schema for itself would take hours.
+const LAST_RESORT: Duration = Duration::from_secs(600);
+
 #[test]
 fn a_schema_of_many_channels_is_compiled_once_and_all_schemas_within_a_bound() {
     let dir = tempfile::tempdir().unwrap();
@@ -201,8 +204,8 @@ fn a_schema_of_many_channels_is_compiled_once_and_all_schemas_within_a_bound() {
     assert!(log.channels.iter().all(|k| k.role.has_rate));
     eprintln!("one schema: {:?}", start.elapsed());
     assert!(
-        start.elapsed() < Duration::from_secs(10),
-        "{:?}",
+        start.elapsed() < LAST_RESORT,
+        "timed out: {:?}",
         start.elapsed()
     );
     // As many schemas: what is beyond the bound is refused, and said.
@@ -215,8 +218,8 @@ fn a_schema_of_many_channels_is_compiled_once_and_all_schemas_within_a_bound() {
     let understood = log.channels.iter().filter(|k| k.role.has_rate).count();
     eprintln!("{understood} of 2000 schemas: {:?}", start.elapsed());
     assert!(
-        start.elapsed() < Duration::from_secs(60),
-        "{:?}",
+        start.elapsed() < LAST_RESORT,
+        "timed out: {:?}",
         start.elapsed()
     );
     assert!((60..150).contains(&understood), "{understood}");

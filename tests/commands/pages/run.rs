@@ -150,17 +150,15 @@ impl Place {
     fn bash(&self, script: &str, path: &str) -> std::process::Output {
         let file: PathBuf = self.bin.path().join("script");
         std::fs::write(&file, script).unwrap();
-        let mut bash = assert_cmd::Command::new("/bin/bash");
+        let mut bash = std::process::Command::new("/bin/bash");
         for (name, _) in std::env::vars().filter(|(name, _)| name.starts_with("STRAPD_")) {
             bash.env_remove(name);
         }
         bash.arg(file)
             .current_dir(self.path())
             .env("NO_COLOR", "1")
-            .env("PATH", path)
-            .timeout(std::time::Duration::from_secs(60))
-            .output()
-            .unwrap()
+            .env("PATH", path);
+        crate::program::ended(&bash, "")
     }
 }
 

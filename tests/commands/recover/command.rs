@@ -1,19 +1,17 @@
 //! The command: exit codes, what it says, and what it refuses.
 
 use super::{furnished, walked};
+use crate::program::ended;
 use std::path::Path;
-use std::process::Output;
+use std::process::{Command, Output};
 
 fn strapd(dir: &Path, arguments: &str, stdin: Vec<u8>) -> Output {
-    assert_cmd::Command::cargo_bin("strapd")
-        .unwrap()
+    let mut command = Command::new(env!("CARGO_BIN_EXE_strapd"));
+    command
         .current_dir(dir)
         .env_remove("STRAPD_LOG")
-        .args(arguments.split_whitespace())
-        .write_stdin(stdin)
-        .timeout(std::time::Duration::from_secs(60))
-        .output()
-        .unwrap()
+        .args(arguments.split_whitespace());
+    ended(&command, stdin)
 }
 
 fn text(bytes: &[u8]) -> String {

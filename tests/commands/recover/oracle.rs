@@ -29,7 +29,7 @@ fn sha256(messages: &[Whole]) -> String {
 #[test]
 #[cfg_attr(
     not(all(has_shared, has_oracles)),
-    ignore = "needs ../shared and STRAPD_ORACLES_PYTHON=PYTHON with the packages of benches/peers/requirements.txt"
+    ignore = "needs ../shared (optional recordings) and STRAPD_ORACLES_PYTHON=PYTHON with the packages of benches/peers/requirements.txt"
 )]
 fn python_mcap_reads_every_recovered_log() {
     let python = std::env::var_os("STRAPD_ORACLES_PYTHON").expect("it is not set");

@@ -36,10 +36,14 @@ fn opened(browser: &str, page: &std::path::Path) -> (String, String) {
         .unwrap();
     let begun = Instant::now();
     while running.try_wait().unwrap().is_none() {
-        if begun.elapsed() > Duration::from_secs(60) {
+        // By the clock, as a last resort.
+        if begun.elapsed() > Duration::from_secs(600) {
             running.kill().unwrap();
             let _ = running.wait();
-            panic!("Chromium did not end: {:?}", std::fs::read_to_string(&err));
+            panic!(
+                "timed out: Chromium did not end within 600 s: {:?}",
+                std::fs::read_to_string(&err)
+            );
         }
         std::thread::sleep(Duration::from_millis(50));
     }

@@ -2,11 +2,12 @@
 
 use super::fixture;
 use super::server::asked_range;
-use crate::program::Ran;
+use crate::program::{Ran, ended};
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Write};
 use std::net::{TcpListener, TcpStream};
 use std::path::Path;
+use std::process::Command;
 use std::sync::{Arc, Mutex};
 
 /// Keys on a page of a listing.
@@ -65,8 +66,8 @@ impl Store {
     }
 
     fn run(&self, dir: &Path, arguments: &str) -> Ran {
-        let output = assert_cmd::Command::cargo_bin("strapd")
-            .unwrap()
+        let mut command = Command::new(env!("CARGO_BIN_EXE_strapd"));
+        command
             .current_dir(dir)
             .env("NO_PROXY", "127.0.0.1")
             .env("AWS_ENDPOINT_URL", format!("http://{}", self.place))
@@ -74,10 +75,8 @@ impl Store {
             .env("AWS_ACCESS_KEY_ID", "ada")
             .env("AWS_SECRET_ACCESS_KEY", "s3cret")
             .env("AWS_REGION", "eu-west-1")
-            .args(arguments.split_whitespace())
-            .timeout(std::time::Duration::from_secs(120))
-            .output()
-            .unwrap();
+            .args(arguments.split_whitespace());
+        let output = ended(&command, "");
         Ran {
             code: output.status.code(),
             out: String::from_utf8_lossy(&output.stdout).into_owned(),

@@ -2,21 +2,20 @@
 
 use super::fixture;
 use super::server::{Manner, Server};
-use crate::program::Ran;
+use crate::program::{Ran, ended};
 use std::path::Path;
+use std::process::Command;
 
 const SECRET: &str = "s3cret";
 
 fn strapd(dir: &Path, arguments: &str, variables: &[(&str, &str)]) -> Ran {
-    let output = assert_cmd::Command::cargo_bin("strapd")
-        .unwrap()
+    let mut command = Command::new(env!("CARGO_BIN_EXE_strapd"));
+    command
         .current_dir(dir)
         .env("NO_PROXY", "127.0.0.1")
         .envs(variables.iter().copied())
-        .args(arguments.split_whitespace())
-        .timeout(std::time::Duration::from_secs(120))
-        .output()
-        .unwrap();
+        .args(arguments.split_whitespace());
+    let output = ended(&command, "");
     Ran {
         code: output.status.code(),
         out: String::from_utf8_lossy(&output.stdout).into_owned(),

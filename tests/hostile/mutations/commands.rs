@@ -3,9 +3,10 @@
 //! In a process of its own, whose standard output nobody reads; one thread, so that its time is all there is.
 
 use super::structured::{Changed, Formats};
-use super::{mutate, seeds};
+use super::{asked, mutate, seeds};
 use crate::made_databases::database;
 use crate::made_logs::{bytes, logged, motion};
+use crate::meter::spent;
 use clap::Parser;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -118,13 +119,6 @@ fn data_of(log: &[u8]) -> &[u8] {
     log.get(from..at.min(log.len())).unwrap_or(log)
 }
 
-/// Processor time of this thread, s.
-fn spent() -> f64 {
-    let stat = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
-    let nanos = stat.split(' ').next().and_then(|n| n.parse::<f64>().ok());
-    nanos.unwrap_or(0.0) * 1e-9
-}
-
 /// A number of a file of `/proc`, behind its name.
 fn number(file: &str, name: &str) -> u64 {
     let text = std::fs::read_to_string(file).unwrap_or_default();
@@ -184,9 +178,9 @@ fn work(from: usize, cases: usize) {
         };
         write(&log, &changed);
         let command = COMMANDS[rng.random_range(0..COMMANDS.len())];
-        let before = (spent(), number("/proc/self/io", "rchar: "));
+        let before = (spent().unwrap(), number("/proc/self/io", "rchar: "));
         let outcome = catch_unwind(AssertUnwindSafe(|| run(command, &log, &out)));
-        let secs = spent() - before.0;
+        let secs = (spent().unwrap() - before.0).as_secs_f64();
         let read = number("/proc/self/io", "rchar: ") - before.1;
         let memory = number("/proc/self/status", "VmHWM:") >> 10;
         slowest = slowest.max(secs);
@@ -221,7 +215,6 @@ const COUNT: &str = "STRAPD_MUTANTS";
 #[test]
 #[ignore = "run by the other two, in a process whose output nobody reads"]
 fn worker() {
-    let asked = |name: &str| std::env::var(name).ok().and_then(|n| n.parse().ok());
     if let Some(cases) = asked(COUNT) {
         work(asked(FROM).unwrap_or(0), cases);
     }
@@ -252,11 +245,10 @@ fn survive(cases: usize, workers: usize) {
     }
 }
 
-/// As many as a quiet core does in a minute (3 ms each, of a debug build).
+/// 3 ms each, of a debug build; `.ci/run` and `.ci/full` ask for more.
 #[test]
 fn changed_logs_harm_no_command() {
-    let asked = std::env::var(COUNT).ok().and_then(|n| n.parse().ok());
-    survive(asked.unwrap_or(20_000), 1);
+    survive(asked(COUNT).unwrap_or(1_500), 1);
 }
 
 #[test]

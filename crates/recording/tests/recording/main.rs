@@ -14,6 +14,8 @@ mod mcap_damage;
 #[path = "../../../../tests/mcap_logs/mod.rs"]
 mod mcap_logs;
 mod mcap_reader;
+#[path = "../../../../tests/meter/mod.rs"]
+mod meter;
 mod relative_error;
 mod rosbag2;
 mod samples;

@@ -2,8 +2,9 @@
 
 use crate::mcap_logs::{PACKINGS, Read, fine, from_bytes, log, messages, on_disk, pool};
 use crate::mcap_logs::{random, read, read_some, stretches};
+use crate::meter::Meter;
 use std::path::Path;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use strapd_recording::Error;
 use strapd_recording::mcap::{ProblemKind, Reader, op};
 
@@ -150,14 +151,10 @@ fn mutated_logs_end() {
                     break;
                 }
             }
-            let start = Instant::now();
+            let mut meter = Meter::start();
             read_both(&broken, dir.path(), &pool);
-            // Promised are 200 ms per 100 kB; these logs have 10 kB and are read twice. A busy
-            // machine may stall a thread, so the bound here only tells a hang from a delay.
-            assert!(
-                start.elapsed() < Duration::from_secs(5),
-                "{name}, case {case}"
-            );
+            // Promised are 200 ms per 100 kB; these logs have 10 kB and are read twice.
+            meter.lap(Duration::from_secs(5), format_args!("{name}, case {case}"));
         }
     }
 }
