@@ -1,10 +1,10 @@
-//! What repeats -> one log line for each cause in ten seconds or more, with how many were not said. I/O.
+//! Repeated events -> one log line for each cause in ten seconds or more, with how many were not logged. I/O.
 
 use std::collections::HashMap;
 use std::sync::{LazyLock, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Between two lines of one cause.
+/// Time between two lines of one cause.
 const INTERVAL: Duration = Duration::from_secs(10);
 
 /// Causes that are told apart at once, and what those beyond are called together: a name that somebody else gives
@@ -12,7 +12,7 @@ const INTERVAL: Duration = Duration::from_secs(10);
 const MOST: usize = 512;
 const OTHERS: &str = "others";
 
-/// When each cause was said last, and how often it was not since.
+/// Time from which each cause may be logged again, and how often it was not since.
 static SAID: LazyLock<Mutex<HashMap<String, (Instant, u64)>>> = LazyLock::new(Mutex::default);
 
 /// Informs, unless the same cause was spoken of just now.
@@ -44,25 +44,21 @@ fn due(cause: &str, interval: Duration, now: Instant) -> Option<u64> {
     let mut said = SAID.lock().unwrap_or_else(PoisonError::into_inner);
     let cause = match said.len() >= MOST && !said.contains_key(cause) {
         true => {
-            said.retain(|_, (last, _)| now.saturating_duration_since(*last) < INTERVAL);
+            said.retain(|_, (next, _)| now < *next);
             if said.len() < MOST { cause } else { OTHERS }
         }
         false => cause,
     };
-    match said.get_mut(cause) {
-        Some((last, suppressed)) if now.saturating_duration_since(*last) < interval => {
-            *suppressed += 1;
-            None
-        }
-        Some((last, suppressed)) => {
-            *last = now;
-            Some(std::mem::take(suppressed))
-        }
-        None => {
-            said.insert(cause.to_owned(), (now, 0));
-            Some(0)
-        }
+    let Some((next, suppressed)) = said.get_mut(cause) else {
+        said.insert(cause.to_owned(), (now + interval, 0));
+        return Some(0);
+    };
+    if now < *next {
+        *suppressed += 1;
+        return None;
     }
+    *next = now + interval;
+    Some(std::mem::take(suppressed))
 }
 
 #[cfg(test)]
@@ -85,7 +81,11 @@ mod tests {
             Some(9)
         );
         assert_eq!(
-            due("test b", 6 * INTERVAL, start + Duration::from_secs(59)),
+            due("test b", 6 * INTERVAL, start + Duration::from_secs(10)),
+            Some(0)
+        );
+        assert_eq!(
+            due("test b", INTERVAL, start + Duration::from_secs(69)),
             None
         );
         assert_eq!(
@@ -99,12 +99,12 @@ mod tests {
         // Later than what other tests say meanwhile.
         let start = Instant::now() + 10 * INTERVAL;
         let said = (0..10_000)
-            .filter(|n| due(&format!("test {n}"), start).is_some())
+            .filter(|n| due(&format!("test {n}"), INTERVAL, start).is_some())
             .count();
         assert!(said <= MOST + 1, "{said}");
         let known = || SAID.lock().unwrap_or_else(PoisonError::into_inner).len();
         assert!(known() <= MOST + 1, "{}", known());
-        assert!(due("test later", start + INTERVAL).is_some());
+        assert!(due("test later", INTERVAL, start + INTERVAL).is_some());
         assert!(known() < 10, "{}", known());
     }
 }

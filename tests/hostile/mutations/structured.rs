@@ -102,7 +102,7 @@ fn scribble(body: &mut Vec<u8>, rng: &mut ChaCha8Rng) {
     let at = rng.random_range(0..body.len());
     match rng.random_range(0..6) {
         0 => body.truncate(at),
-        1 => body.extend(vec![rng.random(); 1 << rng.random_range(0..12)]),
+        1 => body.extend(vec![rng.random::<u8>(); 1 << rng.random_range(0..12)]),
         2 => rng.fill_bytes(&mut body[at..]),
         3 => body[at] ^= 1 << rng.random_range(0..8),
         _ => {
