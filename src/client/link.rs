@@ -31,7 +31,7 @@ const MAX_DATAGRAM: usize = 65_536;
 const IDLE: Duration = Duration::from_secs(15);
 const PROBE: Duration = Duration::from_secs(5);
 const PROBES: u32 = 3;
-/// How long it takes to notice a peer that has vanished.
+/// The time after which a peer that has vanished is noticed.
 pub(crate) const VANISHED: Duration =
     Duration::from_secs(IDLE.as_secs() + PROBE.as_secs() * PROBES as u64);
 

@@ -352,7 +352,7 @@ impl Hub {
         self.give_back(client, owned);
     }
 
-    /// Its sensors, and the truth, may be sent by others.
+    /// Lets others send its sensors and the truth.
     pub fn give_back(&self, client: &Client, owned: &[Arc<Mutex<Sensor>>]) {
         self.give_truth_back(client);
         for sensor in owned {

@@ -69,7 +69,7 @@ impl Limits {
         }
     }
 
-    /// These, for so many clients: as many may be about to show the token, and no fewer than ever.
+    /// The bounds for so many clients: as many may be about to show the token, and no fewer than ever.
     #[must_use]
     pub fn of_clients(self, connections: usize) -> Limits {
         Limits {

@@ -14,7 +14,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use tokio::sync::Notify;
 
-/// Between two warnings that somebody found no place.
+/// The time between two warnings that somebody found no place.
 const MINUTE: Duration = Duration::from_secs(60);
 
 /// What a connection is, as far as places go.
@@ -59,7 +59,7 @@ struct Signs {
     /// When it was heard last, in ms since the start.
     heard: AtomicU64,
     is_http: AtomicBool,
-    /// It has ended its side, and watches.
+    /// Whether it has ended its side, and watches.
     only_watches: AtomicBool,
     leave: Notify,
 }
@@ -200,7 +200,7 @@ impl Place {
         }
     }
 
-    /// It has ended its side: whether it is still there shows late, and it is the first to give way.
+    /// Marks one that has ended its side: whether it is still there shows late, and it is the first to give way.
     pub fn only_watches(&self) {
         self.signs.only_watches.store(true, Ordering::Relaxed);
     }

@@ -275,7 +275,7 @@ impl Session {
         &self.hub
     }
 
-    /// It sends nothing more: others may send its sensors.
+    /// Lets others send its sensors: nothing more comes of it.
     pub fn give_back(&mut self) {
         self.owned.give_back(&self.hub, &self.client);
     }

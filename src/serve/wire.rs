@@ -391,7 +391,7 @@ pub fn watching(filter: Option<&Filter>, offered: &[Stream]) -> Bytes {
     line(&answer)
 }
 
-/// What a client is to know, and is no fault.
+/// A notice to a client, which is no fault.
 #[must_use]
 pub fn note(what: &Fault) -> Bytes {
     line(&json!({"class": "NOTE", "code": what.code, "id": what.id, "message": what.message}))

@@ -14,7 +14,7 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-/// How often it is looked which sensors were silent for too long.
+/// The time between two looks for sensors that were silent for too long.
 pub const TICK: Duration = Duration::from_millis(250);
 /// Sensors that gave way last, in `STATUS`.
 const TOLD: usize = 16;
@@ -289,7 +289,7 @@ impl Hub {
     }
 }
 
-/// How many ticks a time lasts, no fewer.
+/// The number of ticks in a time, rounded up.
 fn ticks(time: Duration) -> u64 {
     u64::try_from(time.as_nanos().div_ceil(TICK.as_nanos())).unwrap_or(u64::MAX)
 }

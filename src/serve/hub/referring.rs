@@ -61,7 +61,7 @@ impl Hub {
         Ok(())
     }
 
-    /// Others may send the truth that this client has sent.
+    /// Lets others send the truth that this client has sent.
     pub(super) fn give_truth_back(&self, client: &Client) {
         if let Some(truth) = &mut *lock(&self.truth)
             && truth.owner == Some(client.number)

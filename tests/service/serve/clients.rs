@@ -10,7 +10,7 @@ use std::process::Command;
 const SECRET: &str = "correct horse battery";
 const AUTH: &str = "{\"class\":\"AUTH\",\"token\":\"correct horse battery\"}";
 
-/// What becomes of one who asks for a WebSocket, with more headers: all of the answer.
+/// The answer to a request for a WebSocket with more headers, where it is refused.
 fn upgrade(address: SocketAddr, more: &str) -> String {
     let mut stream = TcpStream::connect(address).unwrap();
     stream.set_read_timeout(Some(PATIENCE)).unwrap();
@@ -48,7 +48,7 @@ fn warnings(mut process: Process) -> Vec<String> {
         .collect()
 }
 
-/// Answered, and so one of those who are served.
+/// A client that was answered, and so is served.
 fn served(mut client: Client) -> Client {
     client.send("{\"class\":\"POLL\"}");
     client.next_of("STATUS");

@@ -14,7 +14,7 @@ use strapd::serve::limits::Limits;
 
 const WATCH: &str = "{\"class\":\"WATCH\"}";
 const FROM_NOW: &str = "{\"class\":\"WATCH\",\"last\":false}";
-/// How soon a daemon has noticed those who have gone without a word.
+/// The time in which a daemon notices those who have gone without a word.
 const NOTICED: Duration = Duration::from_secs(30);
 
 /// A daemon on TCP, WebSocket and the Unix socket at `path` that asks soon who is still there.
@@ -25,14 +25,14 @@ fn curious(path: &Path) -> Daemon {
     Daemon::start(settings)
 }
 
-/// How a watcher leaves.
+/// The way a watcher leaves.
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum Leaving {
-    /// It has read all it was sent and closes: over TCP as if it had ended its side alone.
+    /// A close after all was read: over TCP as if its side alone had ended.
     Closes,
-    /// It closes with something unread: over TCP a reset.
+    /// A close with something unread: over TCP a reset.
     Resets,
-    /// It ends its side first, goes on watching for a moment, and closes.
+    /// An end of its side, a moment of watching, a close.
     EndsFirst,
 }
 
@@ -84,7 +84,7 @@ fn crowd_leaves(tcp: SocketAddr, unix: &Path) {
     });
 }
 
-/// One that ends its side and goes on watching.
+/// A client that ends its side and goes on watching.
 fn half_closed(mut client: Client) -> Client {
     client.send(WATCH);
     client.next_of("WATCH");
@@ -277,7 +277,7 @@ fn who_has_ended_its_side_gives_way_first_the_one_silent_longest_before_the_othe
     assert_eq!(watcher.object("ATT")["seq"], 1);
 }
 
-/// How many connections have ever got a place, by a `STATUS`.
+/// The number of connections that ever got a place, by a `STATUS`.
 fn accepted(status: &Value) -> u64 {
     status["counters"]["connections_accepted"].as_u64().unwrap()
 }
@@ -294,7 +294,7 @@ fn cat(address: SocketAddr, args: &[&str]) -> Child {
         .unwrap()
 }
 
-/// So many watchers that are processes: some end by themselves, some are killed, some are stopped before.
+/// Watchers that are processes: some end by themselves, some are killed, some are stopped before.
 fn processes_leave(address: SocketAddr, each: u64, mut accepted: impl FnMut() -> u64) {
     let mut leaving: Vec<Child> = (0..each).map(|_| cat(address, &["-x", "0.1"])).collect();
     leaving
@@ -329,7 +329,7 @@ fn watchers_that_are_processes_keep_no_place_whether_they_end_or_are_killed() {
     assert!(began.elapsed() < NOTICED, "{:?}", began.elapsed());
 }
 
-/// How many files a process has open.
+/// The number of files a process has open.
 #[cfg(target_os = "linux")]
 fn files(pid: u32) -> usize {
     let open = std::fs::read_dir(format!("/proc/{pid}/fd")).unwrap();
@@ -341,7 +341,7 @@ fn poll(asker: &mut Client) -> Value {
     asker.next_of("STATUS")
 }
 
-/// Who is connected to a daemon, as it says, but for who asks.
+/// The number of clients of a daemon, but for the one that asks.
 #[cfg(target_os = "linux")]
 fn others(asker: &mut Client) -> usize {
     poll(asker)["clients"].as_array().unwrap().len() - 1
@@ -374,7 +374,7 @@ fn three_hundred_watchers_that_leave_at_once_leave_no_file_open() {
     assert_eq!(process.exit(), Some(0));
 }
 
-/// With the times of the documentation: nobody is asked before 15 s have passed.
+/// The times are those of the documentation: nobody is asked before 15 s have passed.
 #[test]
 #[cfg(target_os = "linux")]
 #[ignore = "takes a minute: 300 processes, and 30 s until all are noticed"]
