@@ -115,7 +115,7 @@ fn lines_of_the_wrong_shape_are_reported_with_their_column_and_good_ones_are_not
     let mut bad = Client::tcp(process.address(0));
     for n in 0..15 {
         good.send(&super::client::rate("good", n, 1.0));
-        good.object("ATT");
+        good.next_of("ATT");
         bad.send("{\"id\":\"bad\",\"gyro\":[0.1,0]}");
     }
     let said = warnings.recv_timeout(PATIENCE).unwrap();
@@ -127,7 +127,7 @@ fn lines_of_the_wrong_shape_are_reported_with_their_column_and_good_ones_are_not
     // One now and then that is sent twice or cannot be is no stream that is lost.
     for n in 15..60 {
         good.send(&super::client::rate("good", n, 1.0));
-        good.object("ATT");
+        good.next_of("ATT");
         if n % 5 == 0 {
             good.send(&super::client::rate("good", n - 10, 1.0));
             good.send("nonsense");
