@@ -72,7 +72,7 @@ pub struct SensorStream {
     why_no_stamp: Option<String>,
     /// Whether the samples' intervals can be true.
     intervals: Intervals,
-    /// Whether its stamps can be in the unit of their name.
+    /// Check of the unit of its stamps.
     stamp_unit: StampUnit,
     /// What was asked of it.
     resetting: Resetting,

@@ -119,7 +119,7 @@ pub struct RawSample {
     pub mag: Option<[f64; 3]>,
     /// Recorded orientation `[w, x, y, z]`, sensor to world, as found: not checked, not normalised.
     pub orientation: Option<[f64; 4]>,
-    /// How often the source has set its orientation anew so far, and begins again at 256 (PX4 `quat_reset_counter`).
+    /// Count of the resets of the orientation by its source so far, modulo 256 (PX4 `quat_reset_counter`).
     pub orientation_resets: Option<u8>,
     /// The message's own integration interval in nanoseconds (PX4 `gyro_integral_dt`, `delta_angle_dt`).
     pub interval_nanos: Option<i64>,

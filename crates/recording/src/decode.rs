@@ -120,7 +120,7 @@ pub struct Options {
 }
 
 impl Options {
-    /// Whether the user says in which unit the stamps are.
+    /// Returns whether the user states the unit of the stamps.
     #[must_use]
     pub(crate) fn states_stamp_unit(&self) -> bool {
         let mut fields = self.fields.iter();

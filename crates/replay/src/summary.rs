@@ -166,7 +166,7 @@ pub struct Recorded {
     pub bias: Option<BiasFit>,
     /// The bias that was removed before, rad/s.
     pub removed: [f64; 3],
-    /// Times its source set it anew: errors are those of the parts between, each aligned by itself.
+    /// Resets by its source: errors are those of the parts between, each aligned by itself.
     pub resets: usize,
 }
 

@@ -23,12 +23,12 @@ pub(super) struct StampUnit {
 }
 
 impl StampUnit {
-    /// Somebody else sends, and hears again what is wrong.
+    /// Prepares to tell another sender what is wrong.
     pub(super) fn meet(&mut self) {
         self.is_unsaid = self.found.is_some();
     }
 
-    /// A run begins.
+    /// Begins a run.
     pub(super) fn begin(&mut self) {
         *self = StampUnit::default();
     }
@@ -53,7 +53,7 @@ impl StampUnit {
         self.is_unsaid |= self.found.is_some() && !was_found;
     }
 
-    /// What is to be said to who sends them, once.
+    /// Returns the fault to report to the sender, once.
     pub(super) fn news(&mut self, id: &str) -> Option<Fault> {
         let found = self.found.as_ref()?;
         std::mem::take(&mut self.is_unsaid).then(|| Fault {
@@ -65,7 +65,7 @@ impl StampUnit {
         })
     }
 
-    /// The same for `STATUS`.
+    /// The finding for `STATUS`.
     pub(super) fn finding(&self) -> Option<Finding> {
         let found = self.found.as_ref()?;
         let evidence = [

@@ -127,7 +127,7 @@ fn mcap_file(data: &[u8]) {
     assert!(report.is_ok());
 }
 
-/// What `info`, `check` and `report` look at, topic by topic.
+/// A log as `info`, `check` and `report` look at it, topic by topic.
 fn looked_at(data: &[u8]) {
     let mut file = tempfile::NamedTempFile::new().unwrap();
     std::io::Write::write_all(&mut file, data).unwrap();

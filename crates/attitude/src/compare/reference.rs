@@ -52,7 +52,7 @@ impl Track<'_> {
             .collect()
     }
 
-    /// How many rows are not after an instant.
+    /// Counts the rows that are not after an instant.
     pub(super) fn until(&self, instant: Nanos) -> usize {
         self.rows.partition_point(|(stamp, _)| *stamp <= instant)
     }

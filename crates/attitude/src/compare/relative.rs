@@ -78,7 +78,7 @@ struct Nearest<'a> {
 }
 
 impl<'a> Nearest<'a> {
-    /// For instants from `first` on.
+    /// Begins at the row before `first`, the earliest instant that will be asked for.
     fn new(track: &'a Track<'a>, first: Nanos) -> Nearest<'a> {
         let at = track.until(first).saturating_sub(1);
         Nearest { track, at }

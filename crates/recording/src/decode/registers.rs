@@ -39,7 +39,7 @@ impl Slot {
     pub(crate) const STAMP: Slot = Slot(20);
     /// A stamp's nanoseconds.
     pub(crate) const STAMP_NANOS: Slot = Slot(21);
-    /// How often the orientation was set anew.
+    /// Count of the orientation's resets.
     pub(crate) const RESETS: Slot = Slot(22);
 
     /// The slot `n` further on.

@@ -14,7 +14,7 @@ const MOST_HELD: usize = 1024;
 pub(super) struct BareStamps {
     unit: Option<TimeUnit>,
     waiting: Vec<(RawSample, Option<Bare>)>,
-    /// Those that are none.
+    /// Steps of the stamps that state their unit.
     stated: StatedNanos,
 }
 
@@ -52,12 +52,12 @@ impl BareStamps {
         self.release(true)
     }
 
-    /// What is wrong with stamps that are in nanoseconds by their name.
+    /// Returns the fault of stamps that are in nanoseconds by their name, if there is one.
     pub(super) fn too_fast(&self) -> Option<TooFast> {
         self.stated.too_fast()
     }
 
-    /// How many of their steps are known.
+    /// Returns the number of their steps.
     pub(super) fn steps(&self) -> u64 {
         self.stated.steps()
     }

@@ -161,7 +161,7 @@ fn readable<'l>(plan: &Plan, log: &'l Recording, wanted: Wanted) -> Vec<Readable
         .collect()
 }
 
-/// Those of them that have no rate: one beside it makes samples of their own.
+/// The topics of channels without a rate: with one, they are samples of their own.
 fn listed(log: &Recording, wanted: Wanted, found: &[Readable<'_>]) -> Vec<TopicOfVectors> {
     let secs = log
         .survey
@@ -233,7 +233,7 @@ fn unnamed<'l>(plan: &Plan, path: &Path, log: &'l Recording, own: &str) -> Resul
     Ok(one.clone())
 }
 
-/// Those whose messages can be placed in time.
+/// Keeps the channels whose messages can be placed in time.
 fn stamped<'l>(plan: &Plan, mut found: Vec<Readable<'l>>) -> Vec<Readable<'l>> {
     found.retain(|(_, decoder)| decoder.stated().has_stamp || plan.clock != Clock::Header);
     found

@@ -62,8 +62,8 @@ pub(super) fn unclear(path: &Path, what: &Ambiguous) -> Error {
     }
 }
 
-/// Whether stamps that are nanoseconds by their name are held against their steps: a table of another maker was, by its
-/// first rows, and who states the unit is believed.
+/// Returns whether stamps that are nanoseconds by their name are held against their steps. Tables of other makers were,
+/// by their first rows; a unit that the user states is believed.
 pub(super) fn are_judged(lines: &Lines<impl Read>, options: &Options) -> bool {
     lines.table().is_none_or(Table::is_own) && !options.states_stamp_unit()
 }

@@ -37,7 +37,7 @@ impl LogChannel {
         }
     }
 
-    /// How likely this is "the IMU" ([`rank`]): a channel without a message is none, whatever its type.
+    /// The [`rank`] of its role: 0 for a channel without a message, whatever its type.
     #[must_use]
     pub fn rank(&self) -> u8 {
         match self.messages {

@@ -24,7 +24,7 @@ use strapd_attitude::setting::{COLUMNS, FIELD, RATE_HZ, TIME, TOPIC};
 
 /// Samples that are handed over together.
 const BATCH: usize = 2048;
-/// Steps between stamps after which the unit that their name states is judged; at the end fewer do.
+/// Steps between stamps after which the unit of their name is judged; fewer are judged at the end.
 const STEPS: u64 = 4096;
 /// Lines without any sample before the first, after which this is no log of samples.
 const PATIENCE: u64 = 1000;

@@ -1,6 +1,6 @@
 //! Stamps that are nanoseconds by their name -> whether their steps are those of a gyro. Pure.
 //!
-//! Apart from [bare stamps](super::bare_stamps) because nothing waits: such stamps are believed until all of them are known.
+//! Apart from `bare_stamps` because nothing waits: such stamps are believed until all of them are known.
 //! A table of another maker is judged by its first rows; here the whole counts, as a sensor may begin with a burst.
 
 use crate::decode::{Bare, SHORTEST_STEP, units_of_steps};
@@ -8,7 +8,7 @@ use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::record::{Nanos, TimeUnit};
 use strapd_attitude::setting::{COLUMNS, FIELD};
 
-/// Fewer steps are no rate.
+/// Least number of steps that is judged.
 const FEWEST: u64 = 8;
 /// Steps of which the ordinary one is named.
 const FIRST: usize = 64;
@@ -21,7 +21,7 @@ pub struct StatedNanos {
     last: Option<Nanos>,
     steps: u64,
     short: u64,
-    /// ns.
+    /// Sum of the steps, none of them above [`PAUSE`], ns.
     sum: i64,
     first: Vec<Bare>,
 }
@@ -54,13 +54,13 @@ impl StatedNanos {
         }
     }
 
-    /// How many steps there are.
+    /// Returns the number of steps.
     #[must_use]
     pub fn steps(&self) -> u64 {
         self.steps
     }
 
-    /// What is wrong, where the ordinary step is shorter than any gyro's, bursts apart, and is one in another unit.
+    /// Returns the steps if most are shorter than any gyro's, other than in bursts, and would be a gyro's in another unit.
     #[must_use]
     pub fn too_fast(&self) -> Option<TooFast> {
         let is_ordinary = self.steps >= FEWEST && 2 * self.short > self.steps;
@@ -84,7 +84,7 @@ impl StatedNanos {
 }
 
 impl TooFast {
-    /// What is seen, without what helps.
+    /// Describes what is seen, without what helps.
     #[must_use]
     pub fn what(&self) -> String {
         let names: Vec<&str> = self.fits.iter().map(|unit| unit.name()).collect();
@@ -101,7 +101,7 @@ impl TooFast {
         self.fits.first().map_or("us", |unit| unit.name())
     }
 
-    /// What is seen in rows or lines of a file, and the setting that says otherwise.
+    /// The error for rows or lines of a file, with the setting that states the unit.
     pub(super) fn in_file(&self, is_table: bool) -> Diagnostic {
         let unit = self.unit();
         let help = match is_table {

@@ -38,7 +38,7 @@ pub struct Track {
     pub name: String,
     /// In file order; ENU (or start) and FLU.
     pub entries: Vec<Entry>,
-    /// Instants from which on it is another world's: its source has set it anew.
+    /// Instants of its resets: from each on its world is another.
     pub cuts: Vec<Nanos>,
     /// What the file says of the error of each of them, in body axes (FLU); empty where it does not of all.
     pub covariances: Vec<AttitudeCovariance>,
@@ -178,7 +178,7 @@ fn from_log(
     })
 }
 
-/// The instant of an orientation that its source has set anew since the one before.
+/// Returns the instant of an orientation if its source has reset it since the one before.
 pub(super) fn cut(resets: &mut Option<u8>, raw: &RawSample, stamp: Nanos) -> Option<Nanos> {
     let now = raw.orientation_resets?;
     let before = resets.replace(now)?;

@@ -62,7 +62,7 @@ pub(super) struct AgainstRecorded {
     estimators: Vec<Estimator>,
     tracks: Vec<Thinned<Stamped>>,
     reference: Thinned<Stamped>,
-    /// How often it said it was set anew, and when that was.
+    /// Count of its resets that its last message stated, and the instants of those that were seen.
     resets: Option<u8>,
     cuts: Vec<Nanos>,
     /// What the run itself put out, in the world it was asked for, with what it says of its error.
@@ -321,7 +321,7 @@ impl AgainstRecorded {
         self.move_references();
     }
 
-    /// What is compared with.
+    /// The reference, cut at its resets.
     fn referred(&self) -> Reference<'_> {
         Reference {
             rows: &self.reference.entries,

@@ -138,7 +138,7 @@ impl Recorded {
     }
 }
 
-/// What is done where the reference was set anew so many times, in words; `None` where it never was.
+/// Describes how a reference with so many resets is compared; `None` without any.
 #[must_use]
 pub fn resets(times: usize) -> Option<String> {
     let times = match times {

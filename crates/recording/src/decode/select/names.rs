@@ -31,7 +31,7 @@ pub(crate) enum Meaning {
     MagAxis { axis: u8 },
     /// An orientation.
     Orientation { rank: u8 },
-    /// How often an orientation was set anew.
+    /// Count of an orientation's resets.
     OrientationResets,
     /// A stamp.
     Stamp { rank: u8, unit: TimeUnit },

@@ -42,12 +42,12 @@ impl Bare {
         Nanos(i64::try_from(nanos).unwrap_or(if nanos < 0 { i64::MIN } else { i64::MAX }))
     }
 
-    /// Whether it is an instant at all, were this its unit.
+    /// Returns whether it is an instant at all in this unit.
     pub(crate) fn is_instant_in(self, unit: TimeUnit) -> bool {
         i64::try_from(self.nanos(unit)).is_ok()
     }
 
-    /// Whether it is an instant of our time, were this its unit.
+    /// Returns whether it is an instant of our time in this unit.
     pub(crate) fn is_of_our_time_in(self, unit: TimeUnit) -> bool {
         OUR_TIME.contains(&self.nanos(unit))
     }
