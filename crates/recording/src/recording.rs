@@ -15,7 +15,7 @@
 //! | [`input`], `folder`, `line_input`, [`incoming`] | what can be read again, the recording in a folder, lines and rows, what comes once |
 //! | [`opened`], `text_log`, [`log_channel`], [`sources`] | what is in a log, or in a text; what a channel can serve as; who speaks on a topic |
 //! | [`selection`], [`topics`], [`beside`], [`decoders`] | what is wanted, the choice of topics, what belongs to their samples, how messages are read |
-//! | [`channel_route`], [`held`], `bare_stamps`, [`early_besides`] | what becomes of messages; those that wait for the unit of their stamps, or for their sensor |
+//! | [`channel_route`], [`held`], `bare_stamps`, [`stated_nanos`], [`early_besides`] | what becomes of messages; those that wait for the unit of their stamps, or for their sensor |
 //! | `samples`, [`topic_reading`], [`sensor_lines`] | all samples that are selected, one topic, one sensor of a text that comes once |
 //! | [`made_before`] | whether it is none, but what strapd made of one |
 //! | [`warn`] | who is told what is no error |
