@@ -667,6 +667,9 @@ fn explained(verdict: Verdict) -> &'static str {
             "a sample without a usable stamp (absent, 0, or a bare number of no unit); send `stamp`, or start the daemon with --time log to use the time of arrival"
         }
         Verdict::StrayStamp => "a stamp far ahead of its neighbours",
+        Verdict::FarStamp => {
+            "a stamp more than 146 years from 1970; the sender's clock, or the unit of its stamps, is wrong"
+        }
         other => other.name(),
     }
 }

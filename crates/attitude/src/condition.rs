@@ -24,6 +24,8 @@
 //! | ... by more | dropped | `Late` |
 //! | clock set back, and it stays so | held (or reset), integration goes on behind it | `Accepted` |
 //! | one stamp far ahead, the rest carries on before it | dropped | `StrayStamp` |
+//! | no stamp, or zero amid others | dropped | `NoStamp` |
+//! | a stamp more than 146 years from the epoch | dropped | `FarStamp` |
 //! | step above 1.5 times the ordinary | bridged up to `max_gap_secs`, beyond it `on_gap` | `Accepted` |
 //! | ... but the stamps catch up | a late stamp, not a gap | `Accepted` |
 //!
@@ -49,6 +51,7 @@ pub mod truncation;
 
 pub use crate::record::GyroUnit;
 pub use clock::{Clock, ClockWarning, choose_clock};
+pub use histogram::Histogram;
 pub use memory::Memory;
 pub use report::{FirstBad, GAPS_KEPT, Gap, Gaps, Report};
 pub use settings::{OnGap, Settings, SettingsError};
@@ -192,7 +195,8 @@ impl Conditioner {
                 }
                 self.pass(raw, stamp, index, out);
             }
-            _ => self.reject(Verdict::NoStamp, index, stamp),
+            Some(_) => self.reject(Verdict::FarStamp, index, stamp),
+            None => self.reject(Verdict::NoStamp, index, None),
         }
     }
 

@@ -20,6 +20,7 @@ use std::fmt;
 pub struct Diagnostic {
     what: String,
     help: String,
+    code: Option<&'static str>,
 }
 
 impl Diagnostic {
@@ -34,6 +35,7 @@ impl Diagnostic {
         Diagnostic {
             what,
             help: String::new(),
+            code: None,
         }
     }
 
@@ -44,6 +46,19 @@ impl Diagnostic {
     pub fn help(mut self, help: impl Into<String>) -> Diagnostic {
         self.help = help.into();
         self
+    }
+
+    /// The same by a stable name, under which it is listed among findings.
+    #[must_use]
+    pub fn coded(mut self, code: &'static str) -> Diagnostic {
+        self.code = Some(code);
+        self
+    }
+
+    /// Its stable name, where it has one.
+    #[must_use]
+    pub fn code(&self) -> Option<&'static str> {
+        self.code
     }
 
     /// What can not be done, and why.

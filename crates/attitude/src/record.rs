@@ -359,7 +359,7 @@ pub enum Verdict {
     DuplicateStamp,
     /// Older than what was already integrated, beyond the reorder window.
     Late,
-    /// Its stamp is absent, zero while others' are not, or more than 146 years from the epoch.
+    /// Its stamp is absent, or zero while others' are not.
     NoStamp,
     /// Outside `--start`, `--until`.
     Trimmed,
@@ -368,11 +368,13 @@ pub enum Verdict {
     Restamped,
     /// Its stamp leaps far ahead, and its successors carry on from its predecessors.
     StrayStamp,
+    /// Its stamp is more than 146 years from the epoch.
+    FarStamp,
 }
 
 impl Verdict {
     /// Every verdict, in the order of [`Counts`].
-    pub const ALL: [Verdict; 13] = [
+    pub const ALL: [Verdict; 14] = [
         Verdict::Accepted,
         Verdict::Reordered,
         Verdict::Undecodable,
@@ -386,6 +388,7 @@ impl Verdict {
         Verdict::Trimmed,
         Verdict::Restamped,
         Verdict::StrayStamp,
+        Verdict::FarStamp,
     ];
 
     /// The name in summaries and JSON.
@@ -405,6 +408,7 @@ impl Verdict {
             Verdict::Trimmed => "trimmed",
             Verdict::Restamped => "restamped",
             Verdict::StrayStamp => "stray_stamp",
+            Verdict::FarStamp => "far_stamp",
         }
     }
 
@@ -436,7 +440,7 @@ impl Counts {
     }
 
     /// `n` more.
-    pub(crate) fn add_many(&mut self, verdict: Verdict, n: u64) {
+    pub fn add_many(&mut self, verdict: Verdict, n: u64) {
         if let Some(count) = self.0.get_mut(verdict as usize) {
             *count += n;
         }

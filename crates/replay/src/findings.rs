@@ -8,6 +8,7 @@
 mod orientation;
 mod run;
 mod samples;
+mod verdicts;
 
 pub use run::of_sensor;
 pub(crate) use run::{Noted, of_run};
@@ -93,10 +94,7 @@ pub fn findings(checked: &Checked) -> Vec<Finding> {
         );
     }
     for topic in &checked.topics {
-        let mut of_topic = Vec::new();
-        of_topic.extend(of_samples(&topic.looked));
-        replayed(topic, &mut of_topic);
-        orientation::find(topic, &mut of_topic);
+        let mut of_topic = of_run_and_samples(topic);
         for finding in &mut of_topic {
             // As those of its samples.
             if !topic.looked.is_likely {
@@ -110,17 +108,36 @@ pub fn findings(checked: &Checked) -> Vec<Finding> {
     found
 }
 
-/// What only integrating shows.
-fn replayed(topic: &CheckedTopic, out: &mut Vec<Finding>) {
-    match &topic.replayed {
-        Ok(summary) => {
-            out.extend(run::gaps(&summary.gaps));
-            out.extend(run::steps(summary.undersampled, summary.largest_step));
-        }
+/// What the samples show, and what integrating them does: the same as a replay says of its run.
+fn of_run_and_samples(topic: &CheckedTopic) -> Vec<Finding> {
+    let summary = match &topic.replayed {
+        Ok(summary) => summary,
         Err(why) => {
-            out.push(Finding::said(Severity::Error, "refused", why));
+            let mut found = of_samples(&topic.looked);
+            found.push(Finding::said(Severity::Error, "refused", why));
+            return found;
         }
+    };
+    let mut found = samples::of_counted(&topic.looked, &summary.counts);
+    run::missing(&summary.gaps, &mut found);
+    found.extend(run::gaps(&summary.gaps));
+    found.extend(run::steps(summary.undersampled, summary.largest_step));
+    orientation::find(topic, &mut found);
+    if summary.findings.iter().any(|f| f.code == "coarse-stamps") {
+        found.retain(|f| f.code != "shared-stamps");
     }
+    let known: Vec<&str> = found.iter().map(|f| f.code).collect();
+    let is_new = |f: &&Finding| !known.contains(&f.code) && !orientation::CODES.contains(&f.code);
+    let new: Vec<Finding> = summary.findings.iter().filter(is_new).cloned().collect();
+    found.extend(new.into_iter().map(|finding| Finding {
+        // What the run decided, and said.
+        severity: match finding.code {
+            "preparation" => Severity::Note,
+            _ => finding.severity,
+        },
+        ..finding
+    }));
+    found
 }
 
 #[cfg(test)]

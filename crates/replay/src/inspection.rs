@@ -8,7 +8,7 @@ use strapd_attitude::condition::stillness::{self, Rests};
 use strapd_attitude::condition::{Clock, GyroUnit};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{Aid, Aiding, Meaning, Plan};
-use strapd_attitude::record::RawSample;
+use strapd_attitude::record::{Counts, RawSample};
 use strapd_recording::MadeBefore;
 use strapd_recording::recording::beside::TopicOfVectors;
 
@@ -35,6 +35,8 @@ pub struct Inspection {
     pub rests: Rests,
     /// The bias they give.
     pub bias: Option<stillness::BiasEstimate>,
+    /// What becomes of its samples in a run by default.
+    pub counts: Counts,
     /// Payloads that could not be decoded.
     pub undecodable: u64,
     /// The clock the statistics are on.

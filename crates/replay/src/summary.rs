@@ -7,6 +7,7 @@ pub mod aid;
 pub mod calendar;
 pub mod calibrating;
 pub mod calibration;
+pub mod gaps;
 pub mod series;
 pub(crate) mod sigma;
 pub(crate) mod simulation;
@@ -15,6 +16,7 @@ pub mod stamps;
 pub mod trace;
 
 use self::aid::Aided;
+pub use self::gaps::Gaps;
 use self::series::Drawn;
 use self::sigma::SigmaTerms;
 use self::smoothing::Smoothing;
@@ -111,27 +113,6 @@ pub struct TopicSummary {
     pub findings: Vec<Finding>,
     /// What is drawn of it, where a report asked for that.
     pub drawn: Option<Box<Drawn>>,
-}
-
-/// Gaps and jumps.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Gaps {
-    /// Bridged by interpolation.
-    pub bridged: u64,
-    /// Attitude held over.
-    pub held: u64,
-    /// Attitude reset at.
-    pub resets: u64,
-    /// Seconds missing in all.
-    pub total_secs: f64,
-    /// Seconds missing where nothing was integrated: held over, or reset at.
-    pub held_secs: f64,
-    /// The longest of those, s; 0 where only clocks jumped back.
-    pub longest_held_secs: f64,
-    /// The longest, s.
-    pub longest_secs: f64,
-    /// Where the longest begins, seconds after the first sample.
-    pub longest_at_secs: f64,
 }
 
 /// Error against a recorded orientation for one meaning of a sample.
@@ -280,7 +261,15 @@ impl TopicSummary {
     /// Whether samples were lost, or time in which nothing is known.
     #[must_use]
     pub fn is_lossy(&self) -> bool {
-        self.counts.lost() + self.left_out > 0 || self.gaps.held + self.gaps.resets > 0
+        self.counts.lost() + self.left_out > 0
+            || self.gaps.held + self.gaps.resets > 0
+            || !self.has_attitude()
+    }
+
+    /// Whether a sample was used, so that there is an attitude.
+    #[must_use]
+    pub fn has_attitude(&self) -> bool {
+        self.counts.used() > 0
     }
 
     fn write_text(&self, source: &str, damaged: bool, out: &mut String) {
@@ -318,6 +307,23 @@ impl TopicSummary {
         if let Some(why) = self.not_smoothed() {
             line(out, "smooth", &why);
         }
+        match self.has_attitude() {
+            true => self.write_attitude(out),
+            false => line(out, "final", "no attitude: no sample was used"),
+        }
+        line(out, "gaps", &self.gaps.text());
+        line(out, "lost", &self.lost_text(damaged));
+        for first in &self.first_losses {
+            line(out, "", first);
+        }
+        self.write_against(out);
+        for warning in self.warnings() {
+            line(out, "warning", &warning);
+        }
+    }
+
+    /// What corrected the attitude, what was taken out, what it is at the end, and how well it is known.
+    fn write_attitude(&self, out: &mut String) {
         let (name, lines) = match (self.smoothing(), &self.aided) {
             (Some(smoothing), _) => ("smooth", smoothing.lines()),
             (None, Some(aided)) => ("aid", aided.lines()),
@@ -390,15 +396,6 @@ impl TopicSummary {
                 },
             ),
         );
-        line(out, "gaps", &self.gaps.text());
-        line(out, "lost", &self.lost_text(damaged));
-        for first in &self.first_losses {
-            line(out, "", first);
-        }
-        self.write_against(out);
-        for warning in self.warnings() {
-            line(out, "warning", &warning);
-        }
     }
 
     fn write_against(&self, out: &mut String) {
@@ -561,15 +558,18 @@ impl TopicSummary {
                 "not_integrated_s": self.gaps.held_secs,
                 "longest_s": self.gaps.longest_secs,
                 "longest_at_s": self.gaps.longest_at_secs,
+                "jumps_back": self.gaps.jumps_back,
+                "farthest_back_s": self.gaps.farthest_back_secs,
+                "farthest_back_at_s": self.gaps.farthest_back_at_secs,
             },
             "turned_deg": self.turned.to_degrees(),
             "largest_step_deg": self.largest_step.to_degrees(),
             "undersampled_steps": self.undersampled,
-            "final": {
+            "final": self.has_attitude().then(|| json!({
                 "q": { "w": w, "x": x, "y": y, "z": z },
                 "roll_deg": roll, "pitch_deg": pitch, "yaw_deg": yaw,
                 "sigma_deg": self.final_sigma.map(f64::to_degrees),
-            },
+            })),
             "against_recorded": self.against.iter().map(|a| json!({
                 "kind": a.kind, "median_deg": a.median_deg, "p95_deg": a.p95_deg, "pairs": a.pairs,
             })).collect::<Vec<_>>(),
@@ -577,45 +577,6 @@ impl TopicSummary {
             "warnings": self.warnings(),
             "findings": self.findings.iter().map(Finding::json).collect::<Vec<_>>(),
         })
-    }
-}
-
-impl Gaps {
-    /// What an integration error says nothing of.
-    fn not_in_the_error(&self) -> String {
-        let parts: Vec<String> = [
-            (self.bridged, self.total_secs - self.held_secs, "bridged"),
-            (self.held + self.resets, self.held_secs, "held or reset"),
-        ]
-        .into_iter()
-        .filter(|(count, ..)| *count > 0)
-        .map(|(count, secs, what)| {
-            format!("{count} gaps of {:.3} s that were {what}", secs.max(0.0))
-        })
-        .collect();
-        if parts.is_empty() {
-            return String::new();
-        }
-        format!(
-            "; not in it: {}, where nothing was measured",
-            parts.join(", ")
-        )
-    }
-
-    fn text(&self) -> String {
-        let count = self.bridged + self.held + self.resets;
-        if count == 0 {
-            return "none".to_owned();
-        }
-        format!(
-            "{count}: {} bridged, {} held, {} reset; {:.3} s in all, longest {:.3} s at {:.3} s",
-            self.bridged,
-            self.held,
-            self.resets,
-            self.total_secs,
-            self.longest_secs,
-            self.longest_at_secs
-        )
     }
 }
 

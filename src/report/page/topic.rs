@@ -121,18 +121,8 @@ fn integrated(s: &TopicSummary, stretches: Option<usize>, out: &mut String) {
             s.largest_step.to_degrees()
         ),
     );
-    let [yaw, pitch, roll] = s.final_ypr.map(f64::to_degrees);
-    let sigma = s.final_sigma.into_iter().fold(0.0, f64::max).to_degrees();
-    rows.add(
-        "at the end",
-        &format!(
-            "roll {roll:.3}, pitch {pitch:.3}, yaw {yaw:.3} deg, one sigma of {} deg at most; {}",
-            significant(sigma, 2),
-            s.drift_text()
-        ),
-    );
-    if let Some(terms) = &s.sigma_terms {
-        rows.add("sigma", &terms.text());
+    if s.has_attitude() {
+        at_the_end(s, &mut rows);
     }
     for warning in s.warnings() {
         rows.add("warning", &warning);
@@ -151,6 +141,23 @@ fn integrated(s: &TopicSummary, stretches: Option<usize>, out: &mut String) {
         (Some(drawn), Some(stretches)) => plots(s, drawn, stretches, out),
         (Some(_), None) => out.push_str("<p>Not drawn, to keep this page small: <code>strapd report --topic NAME</code> draws it.</p>\n"),
         (None, _) => out.push_str("<p>No sample was used, so there is nothing to draw.</p>\n"),
+    }
+}
+
+/// The last attitude, and how well it is known.
+fn at_the_end(s: &TopicSummary, rows: &mut Rows) {
+    let [yaw, pitch, roll] = s.final_ypr.map(f64::to_degrees);
+    let sigma = s.final_sigma.into_iter().fold(0.0, f64::max).to_degrees();
+    rows.add(
+        "at the end",
+        &format!(
+            "roll {roll:.3}, pitch {pitch:.3}, yaw {yaw:.3} deg, one sigma of {} deg at most; {}",
+            significant(sigma, 2),
+            s.drift_text()
+        ),
+    );
+    if let Some(terms) = &s.sigma_terms {
+        rows.add("sigma", &terms.text());
     }
 }
 

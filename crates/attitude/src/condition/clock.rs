@@ -97,12 +97,14 @@ impl From<&ClockWarning> for Diagnostic {
                 return Diagnostic::new(
                     "neither the message stamps nor the log time advance: integration needs time",
                 )
-                .help(format!("{TIME} index {RATE_HZ} HZ"));
+                .help(format!("{TIME} index {RATE_HZ} HZ"))
+                .coded("clock");
             }
         };
         Diagnostic::new(what).help(format!(
             "{TIME} log makes this explicit; {TIME} index {RATE_HZ} HZ for a fixed rate"
         ))
+        .coded("clock")
     }
 }
 

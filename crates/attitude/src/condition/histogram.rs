@@ -15,14 +15,22 @@ const BINS: usize = 64 * PER_OCTAVE;
 /// # Accuracy
 /// Percentiles are off by at most 3.2 % of their value; exact where a bin holds one value.
 #[derive(Clone, Debug)]
-pub(super) struct Histogram {
+pub struct Histogram {
     bins: Vec<(u64, f64)>,
     count: u64,
     max: i64,
 }
 
+impl Default for Histogram {
+    fn default() -> Histogram {
+        Histogram::new()
+    }
+}
+
 impl Histogram {
-    pub(super) fn new() -> Self {
+    /// Without a value.
+    #[must_use]
+    pub fn new() -> Self {
         Histogram {
             bins: vec![(0, 0.0); BINS],
             count: 0,
@@ -30,7 +38,8 @@ impl Histogram {
         }
     }
 
-    pub(super) fn add(&mut self, nanos: i64) {
+    /// Counts one value; a negative one as 0.
+    pub fn add(&mut self, nanos: i64) {
         let nanos = nanos.max(0);
         if let Some((count, sum)) = self.bins.get_mut(bin(nanos)) {
             *count += 1;
@@ -62,7 +71,8 @@ impl Histogram {
     }
 
     /// The value below or at which the share `q` of all values lies, nanoseconds; 0 of nothing.
-    pub(super) fn quantile(&self, q: f64) -> f64 {
+    #[must_use]
+    pub fn quantile(&self, q: f64) -> f64 {
         let rank = (q * self.count as f64).ceil().max(1.0);
         let mut seen = 0;
         for (count, sum) in &self.bins {

@@ -23,6 +23,8 @@ const PRIMING: usize = 64;
 /// Length of the windows in which the quietest is looked for, and fewest samples in one.
 const WINDOW_NANOS: i64 = 500_000_000;
 const WINDOW_SAMPLES: u64 = 8;
+/// A step longer than an hour, nanoseconds, is a clock that was set, or another recording: no samples are missing in it.
+pub const LONGEST_GAP_NANOS: i64 = 3_600_000_000_000;
 
 /// Streaming statistics of one topic, in the units and axes of the source. Bounded memory (about
 /// 70 kB), and the same numbers however the samples come in blocks.
@@ -342,6 +344,9 @@ impl Quality {
         self.spacing.add(step);
         if step > nominal.saturating_add(nominal / 2) {
             self.gaps += 1;
+            if step > LONGEST_GAP_NANOS {
+                return 0;
+            }
             let whole = step.saturating_add(nominal / 2) / nominal;
             let missing = u64::try_from(whole - 1).unwrap_or(0);
             self.missing = self.missing.saturating_add(missing);

@@ -40,6 +40,8 @@ pub struct Gaps {
     pub total_nanos: i64,
     /// The longest, nanoseconds.
     pub longest_nanos: i64,
+    /// By how much the clock jumped back, nanoseconds: all jumps together.
+    pub back_nanos: i64,
     /// Nanoseconds in those that were not bridged, together and in the longest.
     pub not_bridged_nanos: (i64, i64),
     /// Sum of the rotation bounds, rad.
@@ -55,6 +57,8 @@ impl Gaps {
         self.jumps_back += u64::from(gap.length_nanos < 0);
         self.missing = self.missing.saturating_add(gap.missing);
         self.total_nanos = self.total_nanos.saturating_add(gap.length_nanos.max(0));
+        let back = gap.length_nanos.min(0).saturating_abs();
+        self.back_nanos = self.back_nanos.saturating_add(back);
         self.longest_nanos = self.longest_nanos.max(gap.length_nanos);
         if gap.join != Join::Bridge {
             let (total, longest) = &mut self.not_bridged_nanos;
@@ -101,6 +105,14 @@ pub struct Report {
 }
 
 impl Report {
+    /// Nanoseconds from the first sample used to the last, as if the clock had never jumped back.
+    #[must_use]
+    pub fn duration_nanos(&self) -> i64 {
+        let span = self.first.zip(self.last);
+        let span = span.map_or(0, |(first, last)| last.0.saturating_sub(first.0));
+        span.saturating_add(self.gaps.back_nanos)
+    }
+
     /// The first sample that got this verdict; `None` for [`Verdict::Accepted`] and where there was none.
     #[must_use]
     pub fn first_bad(&self, verdict: Verdict) -> Option<FirstBad> {

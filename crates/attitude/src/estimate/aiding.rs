@@ -7,6 +7,7 @@ use super::meaning::{Meaning, STANDARD_GRAVITY};
 use super::plan::{Aid, BIAS_LEFT, Bias, Initial, Noise, Plan};
 use crate::aid::{self, Settings, Start};
 use crate::diagnostic::Diagnostic;
+use crate::digits::significant;
 use crate::frames::{Body, Nav};
 use crate::quaternion::Quaternion;
 use crate::record::{Nanos, RawSample};
@@ -18,6 +19,8 @@ const IN_G: std::ops::Range<f64> = 0.4..4.0;
 const IN_SI: std::ops::RangeInclusive<f64> = 4.0..=40.0;
 /// How far the mean of the first second may be from gravity, as a share.
 const FAR: f64 = 0.15;
+/// A mean shorter than this share of gravity is that of accelerations without it.
+const WITHOUT_GRAVITY: f64 = 0.5;
 /// Of an initial attitude that was given, or found at rest, rad.
 const TILT_GIVEN: f64 = 0.3;
 const TILT_AT_REST: f64 = 0.05;
@@ -116,7 +119,8 @@ impl Aiding {
                 "{FIELD} accel=PATH or {ACCEL_TOPIC} NAME says where it is, {without}"
             ))),
             Err(Unaided::Implausible(why)) if may_do_without => {
-                warnings.push(format!("{why}: the attitude is the gyro's alone").into());
+                let what = format!("{why}: the attitude is the gyro's alone");
+                warnings.push(Diagnostic::new(what).coded("force-implausible"));
                 Ok(None)
             }
             Err(Unaided::Implausible(why)) => Err(Diagnostic::new(format!("{asked}: {why}")).help(
@@ -139,21 +143,28 @@ impl Aiding {
                 ..unscaled
             });
         }
-        let mut lengths = first
-            .iter()
-            .filter_map(|raw| raw.accel)
+        let forces = first.iter().filter_map(|raw| raw.accel);
+        let is_number = |v: &f64| v.is_finite();
+        let lengths = forces
+            .filter(|f| f.iter().all(is_number))
             .map(|f| resolved.force(f).as_vector().norm())
-            .filter(|length| length.is_finite() && *length > 0.0);
-        let length = lengths.next().ok_or(Unaided::NoForce)?;
-        let mut all: Vec<f64> = std::iter::once(length).chain(lengths).collect();
-        let mean = all.iter().sum::<f64>() / all.len() as f64;
-        let middle = all.len() / 2;
-        let median = *all.select_nth_unstable_by(middle, f64::total_cmp).1;
+            .filter(|length| *length > 0.0);
+        let (mut lengths, endless): (Vec<f64>, Vec<f64>) = lengths.partition(is_number);
+        if lengths.is_empty() && !endless.is_empty() {
+            return Err(Unaided::Implausible(
+                "the specific force is beyond all numbers: no accelerometer measures that (force_implausible)".to_owned(),
+            ));
+        }
+        let length = *lengths.first().ok_or(Unaided::NoForce)?;
+        let mean = lengths.iter().sum::<f64>() / lengths.len() as f64;
+        let middle = lengths.len() / 2;
+        let median = *lengths.select_nth_unstable_by(middle, f64::total_cmp).1;
         let scale = force_scale(resolved, length);
         if scale != 1.0 {
-            warnings.push(format!(
+            let what = format!(
                 "the first specific force has length {length:.3}: taken to be in g, not in m/s^2"
-            ).into());
+            );
+            warnings.push(Diagnostic::new(what).coded("accel-unit"));
         }
         let is_plausible = if first.len() > 1 {
             // Who stands first and then runs has gravity in the middle one.
@@ -168,9 +179,10 @@ impl Aiding {
         };
         if !is_plausible {
             return Err(Unaided::Implausible(format!(
-                "the specific force has a mean length of {:.3} m/s^2 in the first {} samples, and gravity {STANDARD_GRAVITY}: acceleration without gravity can not level (force_implausible)",
+                "the specific force has a mean length of {:.3} m/s^2 in the first {} samples, and gravity {STANDARD_GRAVITY}: {} (force_implausible)",
                 mean * scale,
                 first.len(),
+                no_gravity(mean * scale),
             )));
         }
         Ok(Aiding::with_scale((plan, resolved), scale))
@@ -198,6 +210,22 @@ impl Aiding {
             forces: Forces::WithRates,
         }
     }
+}
+
+/// What a mean specific force of this length is, m/s^2, that is not gravity.
+fn no_gravity(length: f64) -> String {
+    let share = length / STANDARD_GRAVITY;
+    if share < WITHOUT_GRAVITY {
+        return "acceleration without gravity can not level".to_owned();
+    }
+    let why = if (length * 1e-3 - 1.0).abs() <= FAR {
+        "it looks like mg"
+    } else if share > IN_SI.end() / STANDARD_GRAVITY {
+        "its unit or scale is wrong"
+    } else {
+        "its unit or scale is wrong, or the body accelerates all the time"
+    };
+    format!("{} times as long as that, so {why}", significant(share, 3))
 }
 
 /// Puts in what a class of sensors says, and leaves what it says nothing of.

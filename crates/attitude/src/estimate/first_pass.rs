@@ -9,7 +9,7 @@ use crate::condition::stillness::{Limits, Rests, Stillness};
 use crate::condition::{Conditioner, choose_clock};
 use crate::diagnostic::Diagnostic;
 use crate::quaternion::BodyRate;
-use crate::record::{RateSample, RawSample};
+use crate::record::{Counts, RateSample, RawSample};
 
 /// Samples that tell the clock and hold the first orientation.
 pub const FEW: usize = 512;
@@ -57,6 +57,13 @@ impl Conditioned {
         }
         self.hand_on(take);
         Ok(())
+    }
+
+    /// What became of those that were conditioned so far.
+    #[must_use]
+    pub fn counts(&self) -> Counts {
+        let running = self.running.as_ref();
+        running.map_or_else(Counts::default, |conditioner| conditioner.report().counts)
     }
 
     /// Hands on what is left.

@@ -28,6 +28,15 @@ const DRIFTED: f64 = 15.0 * std::f64::consts::PI / 180.0;
 /// Two biases that differ by less than this share are the same.
 const SAME: f64 = 0.3;
 
+/// Codes of what is said of a recorded orientation: of a log that is examined it is said once it is known for a truth.
+pub(super) const CODES: [&str; 5] = [
+    "sample-kind",
+    "bias-by-orientation",
+    "beyond-sigma",
+    "heading-drift",
+    "no-reference",
+];
+
 pub(super) fn find(topic: &CheckedTopic, out: &mut Vec<Finding>) {
     let Ok(summary) = &topic.replayed else {
         return;

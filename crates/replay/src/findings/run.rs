@@ -3,6 +3,7 @@
 use super::{Finding, Severity, orientation, samples};
 use crate::summary::{Gaps, TopicSummary, significant};
 use strapd_attitude::condition::Report;
+use strapd_attitude::condition::quality::LONGEST_GAP_NANOS;
 use strapd_attitude::propagate;
 use strapd_attitude::record::Verdict;
 use strapd_attitude::setting::{
@@ -12,8 +13,6 @@ use strapd_attitude::setting::{
 
 /// Largest turn per step that integrates well whatever the motion: beyond, aliasing is near.
 const LARGE_STEP_DEG: f64 = 30.0;
-/// Longest gap that anybody would bridge.
-const LONGEST_BRIDGE_SECS: f64 = 3600.0;
 /// Above this a rate is probably not in rad/s: 200 rad/s is 11,500 deg/s, five times what most gyros
 /// can measure.
 const UNLIKELY_RATE: f64 = 200.0;
@@ -115,31 +114,13 @@ pub(crate) fn of_run(summary: &TopicSummary, noted: &Noted<'_>) -> Vec<Finding> 
 /// What a live sensor's counts show, for `STATUS`. `clock`: of its stamps.
 #[must_use]
 pub fn of_sensor(report: &Report, propagation: &propagate::Report, clock: &str) -> Vec<Finding> {
-    let seconds = |nanos: i64| nanos as f64 * 1e-9;
-    let held = Gaps {
-        held: propagation.holds,
-        resets: propagation.resets,
-        held_secs: report.gaps.not_bridged_nanos.0 as f64 * 1e-9,
-        longest_held_secs: report.gaps.not_bridged_nanos.1 as f64 * 1e-9,
-        longest_at_secs: longest_at(report).map_or(0.0, seconds),
-        ..Gaps::default()
-    };
+    let held = Gaps::of(report, propagation);
     let mut out: Vec<Finding> = gaps(&held).into_iter().collect();
     out.extend(steps(propagation.undersampled, propagation.largest_step));
     out.extend(stamps(report, clock));
     out.extend(saturated(report));
     out.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
     out
-}
-
-/// When the longest gap was, ns after the first sample.
-fn longest_at(report: &Report) -> Option<i64> {
-    let gaps = &report.gaps;
-    let longest = gaps
-        .kept
-        .iter()
-        .find(|g| g.length_nanos == gaps.longest_nanos)?;
-    Some(longest.start.0.saturating_sub(report.first?.0))
 }
 
 /// Whether it is more than an opinion about the motion, of which a replay's own numbers tell.
@@ -161,38 +142,59 @@ fn nothing_used(summary: &TopicSummary) -> Finding {
     Finding::new(Severity::Error, "nothing-used", what).with("samples", total)
 }
 
+/// Puts in what the run missed, in place of what the steps of the first samples make of it.
+pub(super) fn missing(gaps: &Gaps, found: &mut Vec<Finding>) {
+    let Some(at) = found.iter().position(|f| f.code == "missing") else {
+        return;
+    };
+    if gaps.missing == 0 {
+        found.remove(at);
+    } else if let Some(old) = found.get_mut(at) {
+        *old = samples::missing_samples(gaps.missing, gaps.longest_missing_secs, gaps.forward());
+    }
+}
+
 /// Gaps and clock jumps that were not integrated over.
 pub(super) fn gaps(gaps: &Gaps) -> Option<Finding> {
     let breaks = gaps.held + gaps.resets;
     if breaks == 0 {
         return None;
     }
+    let forward = breaks.saturating_sub(gaps.jumps_back);
     let longest = gaps.longest_held_secs;
-    let held = Finding::new(
-        Severity::Error,
-        "gap-held",
+    let of_gaps = (forward > 0).then(|| {
+        let (what, are) = match forward {
+            1 => ("gap or clock jump", "is"),
+            _ => ("gaps or clock jumps", "are"),
+        };
         format!(
-            "{breaks} gaps or clock jumps are too long to integrate over, the longest {longest:.3} s, {:.1} s after the start",
+            "{forward} {what} {are} too long to integrate over, the longest {longest:.3} s, {:.1} s after the start",
             gaps.longest_at_secs
-        ),
-    )
-    .with("count", breaks)
-    .with("longest_s", longest)
-    .with("longest_at_s", gaps.longest_at_secs)
-    .with("total_s", gaps.held_secs);
+        )
+    });
+    let what: Vec<String> = of_gaps.into_iter().chain(gaps.back_text()).collect();
+    let held = Finding::new(Severity::Error, "gap-held", what.join("; "))
+        .with("count", breaks)
+        .with("longest_s", longest)
+        .with("longest_at_s", gaps.longest_at_secs)
+        .with("total_s", gaps.held_secs)
+        .with("jumps_back", gaps.jumps_back)
+        .with("farthest_back_s", gaps.farthest_back_secs)
+        .with("farthest_back_at_s", gaps.farthest_back_at_secs);
+    let hour = LONGEST_GAP_NANOS as f64 * 1e-9;
     // Nobody bridges an hour, or a clock that was set back: such a stamp is wrong, or another clock's.
-    Some(
-        if (f64::MIN_POSITIVE..=LONGEST_BRIDGE_SECS).contains(&longest) {
-            held.advise("the attitude is held there; bridge them where the motion was slow")
-                .help([
-                    ON_GAP.to("bridge"),
-                    MAX_GAP.to(format!("{:.1}", (longest * 10.0).ceil() / 10.0)),
-                ])
-        } else {
-            held.advise("the attitude is held there; a clock was set, or is not always the same one: another may be steadier")
-            .help([TIME.to("log")]).help([TIME.to("header")])
-        },
-    )
+    Some(match gaps.jumps_back == 0 && longest <= hour {
+        true => held
+            .advise("the attitude is held there; bridge them where the motion was slow")
+            .help([
+                ON_GAP.to("bridge"),
+                MAX_GAP.to(format!("{:.1}", (longest * 10.0).ceil() / 10.0)),
+            ]),
+        false => held
+            .advise("the attitude is held there; a clock was set, or is not always the same one: another may be steadier")
+            .help([TIME.to("log")])
+            .help([TIME.to("header")]),
+    })
 }
 
 /// Steps that turn far.

@@ -1,12 +1,13 @@
 //! Statistics of the samples as recorded -> findings. Pure.
 
-use super::{Finding, Severity};
+use super::{Finding, Severity, verdicts};
 use crate::inspection::Inspection;
 use crate::summary::significant;
 use nalgebra::{Vector3, Vector4};
 use serde_json::json;
 use strapd_attitude::condition::quality::{Advice, AxisStats, GravityAxis};
 use strapd_attitude::frames::BodyAxes;
+use strapd_attitude::record::Counts;
 use strapd_attitude::setting::{
     AGAINST_RECORDED, BIAS, BODY, COLUMNS, GYRO_RANGE, GYRO_UNIT, IGNORE_COVARIANCE_FLAG, MAX_GAP,
     MOUNT, ON_GAP, RATE_HZ, REGULARISE_STAMPS, TIME,
@@ -26,8 +27,13 @@ const LONG_RUN: u64 = 20;
 /// What the samples of a topic show as they were recorded.
 #[must_use]
 pub fn of_samples(looked: &Inspection) -> Vec<Finding> {
-    let mut out = Vec::new();
-    counted(looked, &mut out);
+    of_counted(looked, &looked.counts)
+}
+
+/// The same where a run has counted what became of them.
+pub(super) fn of_counted(looked: &Inspection, counts: &Counts) -> Vec<Finding> {
+    let mut out = verdicts::find(counts);
+    rows(looked, counts.total(), &mut out);
     if let Some(warning) = &looked.clock_warning {
         out.push(
             Finding::said(Severity::Warning, "clock", warning).with("clock", looked.clock.name()),
@@ -71,55 +77,16 @@ fn silent(looked: &Inspection, out: &mut Vec<Finding>) {
     }
 }
 
-/// Rows that are bad in themselves.
-fn counted(looked: &Inspection, out: &mut Vec<Finding>) {
-    use Severity::{Error, Warning};
+/// Rows that are bad in themselves, though they be used.
+fn rows(looked: &Inspection, total: u64, out: &mut Vec<Finding>) {
+    use Severity::Warning;
     let q = &looked.quality;
-    let total = q.count + looked.undecodable;
     let repeated = q.repeated_rows.saturating_sub(q.duplicates);
     // A rest, or a steady turn, without noise repeats itself for long; a sensor read too often does not.
     let longest = q.axes.iter().map(|a| a.longest_run).max().unwrap_or(0);
     let is_read_too_often =
         repeated as f64 > REPEATED_SHARE * total as f64 && longest < LONG_RUN && total >= LONG_RUN;
     let found = [
-        some(
-            (looked.undecodable, total),
-            (Error, "undecodable"),
-            "payloads can not be decoded",
-            "they are left out and counted",
-        ),
-        some(
-            (q.not_finite, total),
-            (Error, "not-finite"),
-            "samples have NaN or infinity in the gyro",
-            "they are left out; the attitude is carried across them",
-        ),
-        gyro_absent(q.no_gyro, total),
-        some(
-            (q.no_stamp, total),
-            (Error, "no-stamp"),
-            "samples have no stamp",
-            "take the recorder's time",
-        )
-        .map(|found| found.help([TIME.to("log")])),
-        some(
-            (q.collisions, total),
-            (Warning, "shared-stamps"),
-            "samples share their stamp with another that has other data",
-            "each is given a stamp of its own between its neighbours, where there is room",
-        ),
-        some(
-            (q.duplicates.saturating_sub(q.collisions), total),
-            (Warning, "repeats"),
-            "samples repeat their predecessor, stamp and data",
-            "they are left out",
-        ),
-        some(
-            (q.disorder, total),
-            (Warning, "disorder"),
-            "samples are older than one before them",
-            "those within the reorder window are put back in place, later ones are left out",
-        ),
         some(
             (repeated, total),
             (Warning, "repeated-rows"),
@@ -285,16 +252,7 @@ fn advised(looked: &Inspection, advice: &Advice) -> Option<Finding> {
         Advice::SamplesMissing {
             missing,
             longest_secs,
-        } => Finding::new(
-            Warning,
-            "missing",
-            format!("{missing} samples are missing, at most {longest_secs:.3} s at a time"),
-        )
-        .with("missing", missing)
-        .with("longest_s", longest_secs)
-        .with("gaps", looked.quality.gaps)
-        .advise("bridged by interpolation where short")
-        .help([MAX_GAP.to("SECS"), ON_GAP.to("hold|bridge|reset")]),
+        } => missing_samples(missing, longest_secs, looked.quality.gaps),
         Advice::NeverStill => Finding::new(
             Note,
             "never-still",
@@ -303,6 +261,20 @@ fn advised(looked: &Inspection, advice: &Advice) -> Option<Finding> {
         .advise("no bias can be had from this log: give one, if it is known")
         .help([BIAS.to("x,y,z")]),
     })
+}
+
+/// So many samples are missing.
+pub(super) fn missing_samples(missing: u64, longest_secs: f64, gaps: u64) -> Finding {
+    Finding::new(
+        Severity::Warning,
+        "missing",
+        format!("{missing} samples are missing, at most {longest_secs:.3} s at a time"),
+    )
+    .with("missing", missing)
+    .with("longest_s", longest_secs)
+    .with("gaps", gaps)
+    .advise("bridged by interpolation where short")
+    .help([MAX_GAP.to("SECS"), ON_GAP.to("hold|bridge|reset")])
 }
 
 /// An acceleration in another unit than the format has.
@@ -392,7 +364,7 @@ pub(super) fn zero_rows(n: u64, total: u64) -> Option<Finding> {
 }
 
 /// So many of all, where there are any.
-fn some(
+pub(super) fn some(
     (n, total): (u64, u64),
     (severity, code): (Severity, &'static str),
     what: &str,

@@ -14,7 +14,7 @@ use strapd_attitude::condition::stillness::{self, Limits, Stillness};
 use strapd_attitude::condition::{Clock, GyroUnit, choose_clock};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::{Conditioned, FEW, Meaning, Plan};
-use strapd_attitude::record::{Declared, RawSample};
+use strapd_attitude::record::{Declared, RawSample, Verdict};
 use strapd_recording::Recording;
 use strapd_recording::decode::{self, Options};
 use strapd_recording::mcap::{self, Survey};
@@ -133,6 +133,8 @@ impl Look {
             self.stamps.push(sample);
         })?;
         let rests = self.stillness.finish();
+        let mut counts = self.conditioned.counts();
+        counts.add_many(Verdict::Undecodable, self.undecodable);
         let mut quality = self.quality.summary();
         quality.judge_lines(&self.stamps.finish());
         Ok(Inspection {
@@ -146,6 +148,7 @@ impl Look {
             quality_unit: self.si.unit,
             bias: stillness::estimate_bias(&rests, &Limits::default()).ok(),
             rests,
+            counts,
             undecodable: self.undecodable,
             clock,
             clock_warning,

@@ -10,6 +10,7 @@ use crate::error::{Error, Result};
 use crate::sink::{Flow, Target, Written};
 use std::path::Path;
 use std::sync::Arc;
+use strapd_attitude::condition::Histogram;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Estimator;
 use strapd_attitude::estimate::Plan;
@@ -73,7 +74,7 @@ impl LoneZeros {
 }
 
 /// What came out of an estimator.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Output {
     /// First attitude.
     pub first: Option<AttitudeSample>,
@@ -83,6 +84,8 @@ pub(super) struct Output {
     pub count: u64,
     /// Largest component of any rate, rad/s.
     pub largest_rate: f64,
+    /// Between attitudes, nanoseconds.
+    steps: Histogram,
 }
 
 impl Output {
@@ -90,12 +93,28 @@ impl Output {
         if self.first.is_none() {
             self.first = samples.first().copied();
         }
+        let mut last = self.last.map(|last| last.stamp);
+        for sample in samples {
+            // A clock that was set back, or far ahead, makes no step.
+            let step = last.replace(sample.stamp).map(|last| sample.stamp.since(last));
+            if let Some(step) = step.filter(|step| *step > 0) {
+                self.steps.add(step);
+            }
+        }
         self.last = samples.last().copied().or(self.last);
         self.count += samples.len() as u64;
         self.largest_rate = samples
             .iter()
             .map(|s| s.rate.0.amax())
             .fold(self.largest_rate, f64::max);
+    }
+}
+
+impl Output {
+    /// The median rate, Hz; `None` below two attitudes.
+    pub(super) fn rate_hz(&self) -> Option<f64> {
+        let step = self.steps.quantile(0.5);
+        (step > 0.0).then(|| 1e9 / step)
     }
 }
 

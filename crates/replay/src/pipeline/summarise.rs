@@ -75,10 +75,6 @@ pub(super) fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
     let q = last.map_or_else(Quaternion::identity, |s| s.q_nb);
     let angles = q.yaw_pitch_roll();
     let gaps = &conditioning.gaps;
-    let longest = gaps
-        .kept
-        .iter()
-        .find(|g| g.length_nanos == gaps.longest_nanos);
     let first = conditioning.first.unwrap_or_default();
     let recording = topic.estimator.smoothed().and_then(Result::ok);
     let smoothed = topic.estimator.smoothed().map(|result| {
@@ -93,12 +89,9 @@ pub(super) fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
         left_out: topic.noticed.left_out().iter().map(|(_, n)| n).sum(),
         first_losses: first_losses(topic, first),
         written: topic.output.count,
-        duration_secs: conditioning.last.map_or(0.0, |last| last.secs_since(first)),
+        duration_secs: conditioning.duration_nanos() as f64 * 1e-9,
         span: conditioning.first.zip(conditioning.last),
-        rate_hz: conditioning
-            .spacing_nanos
-            .filter(|n| *n > 0)
-            .map(|n| 1e9 / n as f64),
+        rate_hz: topic.output.rate_hz(),
         clock: topic.prepared.clock.name().to_owned(),
         stamps: topic
             .estimator
@@ -135,16 +128,7 @@ pub(super) fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
             .integration_error
             .filter(|_| recording.is_none()),
         input_axes: topic.resolved.body.to_string(),
-        gaps: Gaps {
-            bridged: gaps.count.saturating_sub(gaps.not_bridged),
-            held: propagation.holds,
-            resets: propagation.resets,
-            total_secs: gaps.total_nanos as f64 * 1e-9,
-            held_secs: gaps.not_bridged_nanos.0 as f64 * 1e-9,
-            longest_held_secs: gaps.not_bridged_nanos.1 as f64 * 1e-9,
-            longest_secs: gaps.longest_nanos as f64 * 1e-9,
-            longest_at_secs: longest.map_or(0.0, |g| g.start.secs_since(first)),
-        },
+        gaps: Gaps::of(conditioning, &propagation),
         turned: propagation.angle_turned,
         largest_step: propagation.largest_step,
         undersampled: propagation.undersampled,
@@ -162,7 +146,7 @@ pub(super) fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
     };
     let said = topic.prepared.warnings.iter().chain(&topic.warnings);
     summary.findings = said
-        .map(|said| Finding::said(Severity::Warning, "preparation", said))
+        .map(|said| Finding::said(Severity::Warning, said.code().unwrap_or("preparation"), said))
         .collect();
     let found = findings::of_run(
         &summary,
@@ -278,7 +262,7 @@ fn first_losses(topic: &Topic, start: Nanos) -> Vec<String> {
             let at = bad
                 .stamp
                 // A stamp that is none says nothing about when.
-                .filter(|_| *verdict != Verdict::NoStamp)
+                .filter(|_| !matches!(verdict, Verdict::NoStamp | Verdict::FarStamp))
                 .map_or_else(String::new, |s| format!(" at {:.6} s", s.secs_since(start)));
             format!(
                 "first {}: sample {}{at}",
