@@ -36,6 +36,7 @@ mod stated;
 pub use fields::{BadFieldPath, FieldPath, FieldRole};
 pub use json::line::{Class, Line, LineDecoder, MAX_LINE, decode_line};
 pub use json::objects::{Object, Objects};
+pub(crate) use refusal::defining;
 pub use refusal::{Undecodable, Unsupported, exact_name};
 pub use role::{Rank, Role, role, role_of};
 pub use stamp::{Ambiguous, Bare, MOST_WAITING, unit_of};
@@ -597,8 +598,8 @@ fn read_schema(channel: &Channel<'_>) -> Result<Schema, (String, String)> {
     if text.trim().is_empty() {
         // std_msgs/Empty has an empty definition, too, but nothing in it is wanted.
         return builtin::schema(&ros_name(channel.schema_name), dialect).ok_or((
-            "its schema text is empty, and the type is none of the well-known ones".to_owned(),
-            String::new(),
+            refusal::UNDEFINED.to_owned(),
+            refusal::defining(channel.schema_name),
         ));
     }
     match channel.schema_encoding {

@@ -1,6 +1,7 @@
 //! Why a log can not be read, or not as a whole, or holds no samples that were meant. Bad samples are not here: they are counted verdicts
 //! ([`strapd_attitude::record::Verdict`]).
 
+use crate::decode::defining;
 use crate::recognise::Foreign;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -83,6 +84,8 @@ pub enum Error {
         path: PathBuf,
         /// What is there, one indented line each.
         topics: String,
+        /// Messages of a type that nothing defines, so that no value in them has a name.
+        undefined: Option<String>,
     },
     /// The log holds several IMU topics, or several publishers on one, and none was named.
     SeveralImuTopics {
@@ -181,13 +184,18 @@ impl From<&Error> for Diagnostic {
                 "{}: a stream can not be surveyed before it is read",
                 path.display()
             )),
-            Error::NoImuTopic { path, topics } => Diagnostic::new(format!(
+            Error::NoImuTopic {
+                path,
+                topics,
+                undefined,
+            } => Diagnostic::new(format!(
                 "{}: no IMU topic: nothing in it carries a body rate with a stamp\n  it holds:{topics}",
                 path.display()
             ))
-            .help(format!(
-                "{TOPIC} NAME with {FIELD} gyro=PATH names a rate in any message"
-            )),
+            .help(match undefined {
+                Some(kind) => defining(kind),
+                None => format!("{TOPIC} NAME with {FIELD} gyro=PATH names a rate in any message"),
+            }),
             Error::SeveralImuTopics { path, topics } => Diagnostic::new(format!(
                 "{}: several IMU topics or publishers, and they must not be mixed:{topics}",
                 path.display()

@@ -21,6 +21,27 @@ pub struct Unsupported {
     pub help: String,
 }
 
+/// Why a type is not read whose definition is not there.
+pub(super) const UNDEFINED: &str =
+    "its schema text is empty, and the type is none of the well-known ones";
+
+/// What helps where a recording holds no definition of `kind`.
+pub(crate) fn defining(kind: &str) -> String {
+    let package = kind.split('/').next().unwrap_or_default();
+    format!(
+        "ROS 2 before Iron wrote no definitions; where {package} is installed, this writes an MCAP that has them: echo '{{output_bags: [{{uri: defined, storage_id: mcap, all: true, all_topics: true}}]}}' > defined.yaml && ros2 bag convert -i RECORDING -o defined.yaml"
+    )
+}
+
+impl Unsupported {
+    /// Whether nothing says what its messages hold, so that no field of them has a name. Those of `std_msgs` have none
+    /// that could be a rate.
+    #[must_use]
+    pub fn is_undefined(&self) -> bool {
+        self.why == UNDEFINED && !self.type_name.starts_with("std_msgs/")
+    }
+}
+
 impl From<&Unsupported> for Diagnostic {
     fn from(error: &Unsupported) -> Diagnostic {
         let named = |text: &str, none| {

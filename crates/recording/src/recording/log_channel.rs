@@ -46,6 +46,21 @@ impl LogChannel {
         }
     }
 
+    /// Whether it carries transforms, and the first message names no frame `frame`: they are of another body, mounted
+    /// to it nobody knows how. Of no name this is not known.
+    #[must_use]
+    pub fn is_of_another_frame(&self, frame: &str) -> bool {
+        let schema = self.channel.schema.as_deref().map_or("", |s| &s.name);
+        let is_transform = ["TFMessage", "FrameTransform", "FrameTransforms"]
+            .iter()
+            .any(|name| schema.ends_with(name));
+        let frame = frame.trim_start_matches('/');
+        let first = self.first.as_ref();
+        is_transform
+            && !frame.is_empty()
+            && first.is_some_and(|(_, payload)| !names(payload, frame.as_bytes()))
+    }
+
     /// A decoder for it that has seen its first message.
     ///
     /// # Errors
@@ -85,6 +100,16 @@ impl LogChannel {
         decoders.settle_unit(&mut decoder, first)?;
         Ok(decoder)
     }
+}
+
+/// Whether a payload holds this name whole, in whatever encoding: all of them have texts as they are.
+fn names(payload: &[u8], name: &[u8]) -> bool {
+    let is_of_name = |byte: &u8| byte.is_ascii_alphanumeric() || *byte == b'_' || *byte == b'-';
+    payload.windows(name.len()).enumerate().any(|(at, window)| {
+        let before = at.checked_sub(1).and_then(|at| payload.get(at));
+        let after = payload.get(at.saturating_add(name.len()));
+        window == name && !before.is_some_and(is_of_name) && !after.is_some_and(is_of_name)
+    })
 }
 
 /// `sensor_msgs/msg/Imu [cdr]`, fit for a terminal.
@@ -139,4 +164,20 @@ pub fn known(
 #[must_use]
 pub fn nanos(time: u64) -> Nanos {
     Nanos(i64::try_from(time).unwrap_or(i64::MAX))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_frame_is_named_whole_or_not_at_all() {
+        let transform = b"\x05\0\0\0odom\0\0\0\0\x0a\0\0\0base_link\0".as_slice();
+        assert!(names(transform, b"base_link") && names(transform, b"odom"));
+        for other in ["imu_link", "base", "link", "base_link_2", "od"] {
+            assert!(!names(transform, other.as_bytes()), "{other}");
+        }
+        assert!(names(br#"{"child_frame_id":"/imu_link"}"#, b"imu_link"));
+        assert!(!names(b"", b"imu_link"));
+    }
 }

@@ -13,7 +13,7 @@ use super::parts::{self, Same, Whole};
 use super::sources::{self, Known, Publisher};
 use super::text_log::TextLog;
 use super::topics::{self, Candidate, Choice, PICKED_UNNAMED};
-use crate::decode::Options;
+use crate::decode::{Options, Unsupported};
 use crate::error::{Error, Result};
 use crate::mcap::{self, Channel, Reader, Survey, WalkOptions};
 use crate::pool::Pool;
@@ -454,7 +454,10 @@ impl Recording {
 /// "No IMU topic" with what is wrong with those that sound like one, and with the file.
 #[must_use]
 pub fn explained(error: Error, channels: &[LogChannel], problems: &[String]) -> Error {
-    let Error::NoImuTopic { path, mut topics } = error else {
+    let Error::NoImuTopic {
+        path, mut topics, ..
+    } = error
+    else {
         return error;
     };
     let sounds_like_one = |k: &&LogChannel| {
@@ -481,7 +484,17 @@ pub fn explained(error: Error, channels: &[LogChannel], problems: &[String]) -> 
     for problem in problems.iter().take(SAID) {
         topics.push_str(&format!("\n  the file is damaged: {problem}"));
     }
-    Error::NoImuTopic { path, topics }
+    let undefined = channels
+        .iter()
+        .filter(|k| k.messages > 0)
+        .filter_map(|k| k.decoder(&mut decoders).err())
+        .find(Unsupported::is_undefined)
+        .map(|why| why.type_name);
+    Error::NoImuTopic {
+        path,
+        topics,
+        undefined,
+    }
 }
 
 /// Bytes on their way at once through a walk to the end.

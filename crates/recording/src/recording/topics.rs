@@ -87,6 +87,7 @@ pub fn choose(path: &Path, candidates: &[Candidate], named: Option<&str>) -> Res
         _ if best < PICKED_UNNAMED => Err(Error::NoImuTopic {
             path: path.to_owned(),
             topics: listing(candidates),
+            undefined: None,
         }),
         _ => {
             let topics = imus(best);

@@ -135,6 +135,7 @@ impl<'r> Waiting<'r> {
             strapd_recording::Error::NoImuTopic {
                 path: self.path.to_owned(),
                 topics: topics::listing(&[]),
+                undefined: None,
             }
             .into()
         })
