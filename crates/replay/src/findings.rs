@@ -13,7 +13,7 @@ mod verdicts;
 pub use run::of_sensor;
 pub(crate) use run::{Noted, of_run};
 pub use samples::of_samples;
-use strapd_attitude::setting::{FIELD, TOPIC};
+use strapd_attitude::setting::{AID, FIELD, TOPIC};
 
 pub use crate::finding::{Finding, Severity};
 
@@ -52,12 +52,16 @@ pub fn findings(checked: &Checked) -> Vec<Finding> {
         );
     }
     for why in &checked.refused {
-        // Its own help follows on lines of its own.
-        let what = why.lines().next().unwrap_or_default();
+        let what = why.what().lines().next().unwrap_or_default();
+        let finding = Finding::new(Severity::Error, "no-imu-topic", what);
+        let help = why.helping().unwrap_or_default();
         found.push(
-            Finding::new(Severity::Error, "no-imu-topic", what)
-                .advise("name the topic and where the rate lies in it")
-                .help([TOPIC.to("NAME"), FIELD.to("gyro=PATH")]),
+            match help.contains(FIELD.to("gyro=PATH").to_string().as_str()) {
+                true => finding
+                    .advise("name the topic and where the rate lies in it")
+                    .help([TOPIC.to("NAME"), FIELD.to("gyro=PATH")]),
+                false => finding.advise(help),
+            },
         );
     }
     if checked.topics.len() > 1 {
@@ -92,6 +96,10 @@ pub fn findings(checked: &Checked) -> Vec<Finding> {
             .advise("examine one by its name")
             .help([TOPIC.to("NAME")]),
         );
+    }
+    if checked.is_gyro_alone {
+        let what = format!("the gyro alone was judged, as {AID} none asks");
+        found.push(Finding::new(Severity::Note, "gyro-alone", what));
     }
     for topic in &checked.topics {
         let mut of_topic = of_run_and_samples(topic);

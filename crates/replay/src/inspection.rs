@@ -133,7 +133,9 @@ pub struct Checked {
     /// It is none: it holds attitudes made of one.
     pub made_before: Option<MadeBefore>,
     /// Topics that sound like an IMU's and can not be decoded: why.
-    pub refused: Vec<String>,
+    pub refused: Vec<Diagnostic>,
+    /// Nothing was to correct the attitude that is judged.
+    pub is_gyro_alone: bool,
     /// Its topics of samples.
     pub topics: Vec<CheckedTopic>,
     /// Topics of samples beyond those, which were not examined.
@@ -153,7 +155,8 @@ impl Checked {
                 Err(why) => words.extend(why.texts()),
             }
         }
-        words.extend(self.problems.iter_mut().chain(&mut self.refused));
+        words.extend(self.refused.iter_mut().flat_map(Diagnostic::texts));
+        words.extend(&mut self.problems);
         for word in words {
             if word.contains(path) {
                 *word = word.replace(path, name);
@@ -167,6 +170,6 @@ impl Checked {
 pub struct CheckedTopic {
     /// Statistics of the samples as recorded.
     pub looked: Inspection,
-    /// What a replay with default flags makes of them, or why it refuses.
+    /// What a replay with the same settings makes of them, or why it refuses.
     pub replayed: std::result::Result<Box<TopicSummary>, Diagnostic>,
 }

@@ -13,6 +13,7 @@
 //! | `replay_start`, `session_builder`, `session`, `delivery`, `pace`, `position`, `audience` | a run under way: what waits, what goes out, when, and who may stop it |
 //! | `inspection`, `check`, `each`, `history`, `sample_kinds`, `attitude_track` | looking at a log, and holding it against others |
 //! | `in_memory`, `samples` | for a program: the attitudes of a replay; those of samples that it holds itself |
+//! | `unmet` | what was asked for and could not be done |
 //! | `recover`, `simulate`, `summarise`, `provenance` | the other runs, and what is said at their end |
 
 pub mod attitude_track;
@@ -41,3 +42,4 @@ mod session;
 pub mod session_builder;
 pub mod simulate;
 mod summarise;
+mod unmet;

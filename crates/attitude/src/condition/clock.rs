@@ -101,10 +101,11 @@ impl From<&ClockWarning> for Diagnostic {
                 .coded("clock");
             }
         };
-        Diagnostic::new(what).help(format!(
-            "{TIME} log makes this explicit; {TIME} index {RATE_HZ} HZ for a fixed rate"
-        ))
-        .coded("clock")
+        Diagnostic::new(what)
+            .help(format!(
+                "{TIME} log makes this explicit; {TIME} index {RATE_HZ} HZ for a fixed rate"
+            ))
+            .coded("clock")
     }
 }
 

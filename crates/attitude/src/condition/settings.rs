@@ -221,6 +221,9 @@ impl Settings {
                 return fail(format!("{flag}: {secs} s is not a time after the start"));
             }
         }
+        if let Some(until) = self.until.filter(|until| *until < 0.0) {
+            return fail(format!("{UNTIL} {until}: no sample is before the first"));
+        }
         if let (Some(start), Some(until)) = (self.start, self.until)
             && start > until
         {

@@ -1,6 +1,7 @@
 //! What a run has counted -> findings, the same of a log and of a live sensor. Pure.
 
 use super::{Finding, Severity, orientation, samples};
+use crate::summary::aid::Frozen;
 use crate::summary::{Gaps, TopicSummary, significant};
 use strapd_attitude::condition::Report;
 use strapd_attitude::condition::quality::LONGEST_GAP_NANOS;
@@ -30,6 +31,8 @@ pub(crate) struct Noted<'a> {
     pub(crate) zeros: u64,
     /// Stamps with a second or more of nanoseconds.
     pub(crate) stamps_carried: u64,
+    /// Where the magnetic field stood still while the body rotated.
+    pub(crate) frozen_field: Option<Frozen>,
     /// Frames of other bodies on the topic, and how many messages named them.
     pub(crate) left_out: &'a [(String, u64)],
     /// Orientations that were compared with; `None` where none were to be.
@@ -59,10 +62,16 @@ pub(crate) fn of_run(summary: &TopicSummary, noted: &Noted<'_>) -> Vec<Finding> 
                     format!("not smoothed: {why}"),
                 )
             }));
+            out.extend(aided.given_up());
             out.extend(aided.doubt(&summary.noise));
         }
         (None, None) => {}
     }
+    out.extend(
+        noted
+            .frozen_field
+            .map(|frozen| field_frozen(noted.conditioning, frozen)),
+    );
     out.extend(samples::zero_rows(noted.zeros, total));
     if noted.stamps_carried > 0 {
         let n = noted.stamps_carried;
@@ -82,7 +91,7 @@ pub(crate) fn of_run(summary: &TopicSummary, noted: &Noted<'_>) -> Vec<Finding> 
             .unwrap_or((&summary.topic, ""));
         out.push(
             Finding::new(
-                Severity::Warning,
+                Severity::Error,
                 "other-frame",
                 format!("{n} messages name the frame `{frame}`, another body's, and were left out"),
             )
@@ -224,6 +233,24 @@ pub(super) fn steps(undersampled: u64, largest_step: f64) -> Option<Finding> {
         .with("largest_step_deg", step_deg)
         .advise("sample faster; delta angles suffer less than rates")
     })
+}
+
+/// A magnetometer that says the same while the body rotates.
+fn field_frozen(report: &Report, frozen: Frozen) -> Finding {
+    let at = report
+        .first
+        .map_or(0.0, |first| frozen.from.secs_since(first));
+    Finding::new(
+        Severity::Warning,
+        "field-frozen",
+        format!(
+            "the magnetic field stood still to the bit for {:.3} s while the body rotated, first {at:.3} s after the start",
+            frozen.secs
+        ),
+    )
+    .with("secs", frozen.secs)
+    .with("first_at_s", at)
+    .advise("the heading is the gyro's there: the magnetometer or its driver hung")
 }
 
 /// Stamps that several samples share.

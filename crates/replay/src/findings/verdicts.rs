@@ -5,7 +5,7 @@
 use super::samples::{gyro_absent, some};
 use super::{Finding, Severity};
 use strapd_attitude::record::{Counts, Verdict};
-use strapd_attitude::setting::{GYRO_UNIT, START, TIME, UNTIL};
+use strapd_attitude::setting::{GYRO_UNIT, RATE_HZ, START, TIME, UNTIL};
 
 /// Each verdict that samples got, but for those that were plainly used.
 pub(super) fn find(counts: &Counts) -> Vec<Finding> {
@@ -73,7 +73,7 @@ fn of(verdict: Verdict, n: u64, total: u64) -> Option<Finding> {
             "samples have a stamp more than 146 years from 1970, before 1824 or after 2116",
             "they are left out: the clock, or the unit of its numbers, is wrong; take the recorder's time",
         )
-        .map(|found| found.help([TIME.to("log")])),
+        .map(|found| found.help([TIME.to("log")]).help([TIME.to("index"), RATE_HZ.to("HZ")])),
         Verdict::Trimmed => found(
             (Note, "trimmed"),
             &format!("samples lie outside {START}, {UNTIL}"),

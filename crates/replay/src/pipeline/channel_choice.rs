@@ -235,8 +235,13 @@ pub(super) fn reference(
     let names: BTreeSet<&str> = chosen.iter().map(|c| c.source.topic.as_str()).collect();
     let taken = |k: &&LogChannel| names.contains(k.channel.topic.as_str());
     let found = if asked.is_empty() {
+        let is_other_body = |k: &LogChannel| {
+            let mut frames = chosen.iter().map(|c| c.stream.frame_id.as_str());
+            frames.all(|frame| k.is_of_another_frame(frame))
+        };
         let mut others = log.channels.iter().filter(|k| {
-            !taken(k) && k.role.has_orientation && rank(&k.role) <= 1 && k.messages > 0
+            let is_orientation = k.role.has_orientation && rank(&k.role) <= 1 && k.messages > 0;
+            !taken(k) && is_orientation && !is_other_body(k)
         });
         match (others.next(), others.next()) {
             // An odometry's or a camera's pose beside an IMU that has its own is another matter.

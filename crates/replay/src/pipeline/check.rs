@@ -10,7 +10,8 @@ use super::position::Position;
 use super::request::ReplayRequest;
 use crate::error::Result;
 use crate::inspection::{Checked, CheckedTopic, Inspection};
-use strapd_attitude::estimate::Plan;
+use strapd_attitude::diagnostic::Diagnostic;
+use strapd_attitude::estimate::{Aid, Plan};
 use strapd_recording::Input;
 use strapd_recording::Recording;
 use strapd_recording::Selection;
@@ -42,7 +43,7 @@ pub struct Examination<'a> {
     pub command: String,
 }
 
-/// Examines a log, or one topic of it, with default flags.
+/// Examines a log, or one topic of it, as a replay with default flags understands it.
 ///
 /// # Errors
 /// It can not be read, or holds no such topic.
@@ -58,7 +59,10 @@ pub fn check(
             decode: options.clone(),
             ..Selection::default()
         },
-        plan: Plan::default(),
+        plan: Plan {
+            aid: Aid::Auto,
+            ..Plan::default()
+        },
         reference_topic: String::new(),
         drawing: None,
         command: "strapd check".to_owned(),
@@ -106,7 +110,7 @@ pub fn examine(
         // With what it says about channels that only sound like one.
         log.choose(path, None)
             .err()
-            .map(|e| e.to_string())
+            .map(|e| Diagnostic::from(&e))
             .into_iter()
             .collect()
     } else {
@@ -135,6 +139,7 @@ pub fn examine(
         profile: survey.facts.profile.clone(),
         made_before: log.made_before().filter(|_| named.is_none()),
         refused,
+        is_gyro_alone: asked.plan.aid == Aid::None,
         topics,
         left_out: match named {
             Some(_) => Vec::new(),

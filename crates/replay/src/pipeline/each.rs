@@ -130,11 +130,9 @@ pub(super) fn each(
             Ok(ControlFlow::Continue(()))
         },
     )?;
-    let mut summaries = summarise::topics(run, session.finish(pool)?).into_iter();
-    let mut next = || {
-        let summary = summaries.next().map(Box::new);
-        summary.ok_or_else(|| Diagnostic::new("the replay gave nothing"))
-    };
+    let mut summaries = summarise::topics(run, session.finish_each(pool)?).into_iter();
+    let nothing = || Err(Diagnostic::new("the replay gave nothing"));
+    let mut next = || summaries.next().unwrap_or_else(nothing);
     Ok(told
         .into_iter()
         .map(|told| told.unwrap_or_else(&mut next))

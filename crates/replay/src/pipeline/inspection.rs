@@ -260,7 +260,7 @@ pub(crate) fn look_as(
         (topic.aid.fields, topic.aid.forces) = ((fields, taken), forces);
         topic.has_reference = topic.quality.with_orientation > 0
             && topic.quality.orientation_varies
-            || has_reference_beside(log, &topic.of);
+            || has_reference_beside(log, &topic.of, &topic.frame);
     }
     let rank_of = |topic: &Inspection| {
         log.channels
@@ -281,9 +281,10 @@ pub(crate) fn look_as(
 }
 
 /// Whether a replay that names none finds one topic of orientations beside the samples' own.
-fn has_reference_beside(log: &Recording, of: &str) -> bool {
+fn has_reference_beside(log: &Recording, of: &str, frame: &str) -> bool {
     let mut others = log.channels.iter().filter(|k| {
-        k.channel.topic != of && k.role.has_orientation && rank(&k.role) <= 1 && k.messages > 0
+        let is_orientation = k.role.has_orientation && rank(&k.role) <= 1 && k.messages > 0;
+        k.channel.topic != of && is_orientation && !k.is_of_another_frame(frame)
     });
     matches!((others.next(), others.next()), (Some(one), None) if !one.role.has_rate)
 }

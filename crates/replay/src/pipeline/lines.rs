@@ -45,7 +45,7 @@ pub(super) fn replay(
         watch,
     };
     read(wanted(run), input, &path, &mut running)?;
-    let ended = running.waiting.into_session(pool)?.finish(pool)?;
+    let ended = running.waiting.into_session(pool)?.finish(run, pool)?;
     Ok(summarise::run(run, ended, &Survey::default()))
 }
 

@@ -71,12 +71,16 @@ fn piped(
     watch: &mut dyn FnMut(&Position),
 ) -> Result<RunSummary> {
     let name = run.source.name();
+    if run.selection.topic.as_deref() == Some("all") {
+        // Which topics there are is known at the end of a stream alone.
+        let input = Input::of_stream(&name, input, &logged::warn())?;
+        return file(run, &input, pool, watch);
+    }
     match incoming(&name, input, &run.selection.decode, &logged::warn())? {
         Incoming::Messages(reader) => replay_stream::replay(run, reader, pool, watch),
         Incoming::Lines(text) => lines::replay(run, *text, None, pool, watch),
         Incoming::Whole(input) if input.format().is_text() => {
-            let is_of_all = run.selection.topic.as_deref() == Some("all");
-            whole_text(run, &input, is_of_all, pool, watch)
+            whole_text(run, &input, false, pool, watch)
         }
         Incoming::Whole(input) => file(run, &input, pool, watch),
     }
@@ -178,7 +182,7 @@ fn file(
             human_bytes(passed.bytes)
         );
     }
-    Ok(summarise::run(run, session.finish(pool)?, &survey))
+    Ok(summarise::run(run, session.finish(run, pool)?, &survey))
 }
 
 /// How much of a log of this span lies before the last of `items`.

@@ -90,7 +90,7 @@ pub(super) fn replay(
         return Err(picked.nothing(run, &path, &report.survey));
     }
     let session = waiting.into_session(pool)?;
-    let mut summary = summarise::run(run, session.finish(pool)?, &report.survey);
+    let mut summary = summarise::run(run, session.finish(run, pool)?, &report.survey);
     if let Some(topic) = summary.topics.first_mut() {
         topic.findings.extend(picked.passed_over());
     }
@@ -124,7 +124,7 @@ impl Picked {
         let copied = run.copy_input.then(|| channel.clone());
         let beside = self.beside(run, channel);
         let found = known(channel, 0, None, &mut self.plain);
-        let named = run.selection.topic.as_deref().filter(|t| *t != "all");
+        let named = run.selection.topic.as_deref();
         let wanted = match (&self.topic, named) {
             (Some(topic), _) => {
                 let is_same = *topic == channel.topic;

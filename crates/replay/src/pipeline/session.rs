@@ -5,7 +5,9 @@ use super::delivery::Outlet;
 use super::history::History;
 use super::position::Position;
 use super::recorded::RecordedTrack;
+use super::request::{ReplayRequest, refused};
 use super::sample_kinds::AgainstRecorded;
+use super::unmet::{FieldWatch, is_outside, unmet};
 use crate::error::{Error, Result};
 use crate::sink::{Flow, Target, Written};
 use std::path::Path;
@@ -13,9 +15,9 @@ use std::sync::Arc;
 use strapd_attitude::condition::Histogram;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Estimator;
-use strapd_attitude::estimate::Plan;
+use strapd_attitude::estimate::{Aid, Plan};
 use strapd_attitude::estimate::{Meaning, Prepared};
-use strapd_attitude::record::{AttitudeSample, Nanos};
+use strapd_attitude::record::{AttitudeSample, Nanos, RawSample};
 use strapd_recording::decode::Undecodable;
 use strapd_recording::pool::Pool;
 use strapd_recording::recording::channel_route::{Item, Noticed};
@@ -43,6 +45,10 @@ pub(super) struct Topic {
     pub output: Output,
     /// Samples without any rate amid others.
     pub zeros: LoneZeros,
+    /// The stamp of the last sample, used or not.
+    pub last_stamp: Option<Nanos>,
+    /// Whether its magnetic field is one, where it is to tell north.
+    pub field: Option<FieldWatch>,
     /// The first payload that could not be decoded.
     pub first_undecodable: Option<(Nanos, Undecodable)>,
     /// Its comparison with the recorded orientation.
@@ -96,7 +102,9 @@ impl Output {
         let mut last = self.last.map(|last| last.stamp);
         for sample in samples {
             // A clock that was set back, or far ahead, makes no step.
-            let step = last.replace(sample.stamp).map(|last| sample.stamp.since(last));
+            let step = last
+                .replace(sample.stamp)
+                .map(|last| sample.stamp.since(last));
             if let Some(step) = step.filter(|step| *step > 0) {
                 self.steps.add(step);
             }
@@ -140,6 +148,8 @@ impl Topic {
             .then(|| AgainstRecorded::new(plan, &found.resolved, &prepared))
             .transpose()
             .map_err(refuse)?;
+        let field =
+            (plan.aid == Aid::GravityAndField).then(|| FieldWatch::new(found.resolved.kind));
         let mut warnings = found.warnings;
         let known = plan.calibration.as_deref();
         let mismatch = known.and_then(|known| known.mismatch(&found.name));
@@ -155,11 +165,31 @@ impl Topic {
             estimator,
             output: Output::default(),
             zeros: LoneZeros::default(),
+            last_stamp: None,
+            field,
             first_undecodable: None,
             against,
             history: None,
             recorded: None,
         })
+    }
+
+    /// Notes the stamp of a sample, and looks at its field.
+    fn watch(&mut self, raw: &RawSample) {
+        let Some(stamp) = self.prepared.clock.read(raw) else {
+            return;
+        };
+        if !raw.is_beside {
+            self.last_stamp = Some(stamp);
+        }
+        let Some(field) = &mut self.field else { return };
+        let raw = self.resolved.in_flu(raw);
+        if let Some(mag) = raw.mag {
+            field.take_field(mag, stamp);
+        }
+        if let Some(gyro) = raw.gyro.filter(|_| !raw.is_beside) {
+            field.take_rate(gyro, stamp);
+        }
     }
 
     /// What does not fit in memory of a recording that is smoothed goes to a file without a name in the folder of the
@@ -253,6 +283,7 @@ impl Session {
                 let Some(topic) = self.topics.get_mut(stream) else {
                     return Ok(());
                 };
+                topic.watch(&raw);
                 if raw.is_beside {
                     topic.estimator.take(&raw);
                     return Ok(());
@@ -289,6 +320,7 @@ impl Session {
             }
             Item::Beside(raw) => {
                 for topic in &mut self.topics {
+                    topic.watch(&raw);
                     topic.estimator.take_beside(&raw);
                 }
             }
@@ -365,8 +397,46 @@ impl Session {
     /// No more items: writes the rest and completes the outputs.
     ///
     /// # Errors
+    /// As [`Outlet::write`] and [`Outlet::finish`]; something was asked for that could not be done.
+    pub(super) fn finish(mut self, run: &ReplayRequest, pool: &Pool) -> Result<Ended> {
+        self.finish_topics(pool)?;
+        // Whoever had enough has seen no end.
+        if !self.closed {
+            self.refuse(run)?;
+        }
+        self.complete()
+    }
+
+    /// The same of topics that have nothing to do with each other.
+    ///
+    /// # Errors
     /// As [`Outlet::write`] and [`Outlet::finish`].
-    pub(super) fn finish(mut self, pool: &Pool) -> Result<Ended> {
+    pub(super) fn finish_each(mut self, pool: &Pool) -> Result<Ended> {
+        self.finish_topics(pool)?;
+        self.complete()
+    }
+
+    fn refuse(&self, run: &ReplayRequest) -> Result<()> {
+        // One that ended before the others has no sample in a late window.
+        let is_window_empty = self.topics.iter().all(is_outside);
+        let mut asked = self
+            .topics
+            .iter()
+            .filter(|topic| is_window_empty || !is_outside(topic));
+        let found = asked.find_map(|topic| Some((topic, unmet(&run.plan, topic)?)));
+        found.map_or(Ok(()), |(topic, what)| {
+            Err(refused(&run.source.name(), &topic.name, what))
+        })
+    }
+
+    fn complete(self) -> Result<Ended> {
+        Ok(Ended {
+            topics: self.topics,
+            outputs: self.outlet.finish()?,
+        })
+    }
+
+    fn finish_topics(&mut self, pool: &Pool) -> Result<()> {
         for (stream, topic) in self.topics.iter_mut().enumerate() {
             let Topic {
                 estimator,
@@ -400,11 +470,11 @@ impl Session {
             if let Some(history) = history {
                 history.corrected(&estimator.innovations());
             }
+            if let Some(field) = &mut topic.field {
+                field.finish();
+            }
         }
-        Ok(Ended {
-            topics: self.topics,
-            outputs: self.outlet.finish()?,
-        })
+        Ok(())
     }
 }
 

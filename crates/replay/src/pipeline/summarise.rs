@@ -1,9 +1,11 @@
 //! What the stages counted -> the summary of the run. Pure.
 
 use super::delivery::broken;
+use super::each::Told;
 use super::request::ReplayRequest;
 use super::sample_kinds::AgainstRecorded;
 use super::session::{Ended, Topic};
+use super::unmet::{FieldWatch, unmet};
 use crate::finding::{Finding, Severity};
 use crate::findings;
 use crate::summary::aid::Aided;
@@ -56,13 +58,13 @@ pub(super) fn run(run: &ReplayRequest, ended: Ended, survey: &Survey) -> RunSumm
     }
 }
 
-/// What became of each topic of a run without outputs.
-pub(super) fn topics(run: &ReplayRequest, ended: Ended) -> Vec<TopicSummary> {
-    let mut topics = ended.topics;
-    topics
-        .iter_mut()
-        .map(|topic| of_topic(run, topic))
-        .collect()
+/// What became of each topic of a run without outputs, or why it has not what was asked for.
+pub(super) fn topics(run: &ReplayRequest, ended: Ended) -> Vec<Told> {
+    let told = |mut topic: Topic| match unmet(&run.plan, &topic) {
+        Some(what) => Err(what),
+        None => Ok(Box::new(of_topic(run, &mut topic))),
+    };
+    ended.topics.into_iter().map(told).collect()
 }
 
 /// What became of one topic.
@@ -146,7 +148,13 @@ pub(super) fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
     };
     let said = topic.prepared.warnings.iter().chain(&topic.warnings);
     summary.findings = said
-        .map(|said| Finding::said(Severity::Warning, said.code().unwrap_or("preparation"), said))
+        .map(|said| {
+            Finding::said(
+                Severity::Warning,
+                said.code().unwrap_or("preparation"),
+                said,
+            )
+        })
         .collect();
     let found = findings::of_run(
         &summary,
@@ -157,6 +165,7 @@ pub(super) fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
             zeros: topic.zeros.count,
             stamps_carried: topic.noticed.stamps_carried.load(Ordering::Relaxed),
             left_out: &topic.noticed.left_out(),
+            frozen_field: topic.field.as_ref().and_then(FieldWatch::frozen),
             references: topic.against.as_ref().map(|a| a.references() as u64),
         },
     );

@@ -5,6 +5,7 @@ use crate::finding::{Finding, Severity};
 use nalgebra::Vector3;
 use serde_json::{Value, json};
 use strapd_attitude::aid::{Calibration, Filter, Report};
+use strapd_attitude::record::Nanos;
 use strapd_attitude::setting::{AID, NOISE};
 
 /// The filter at the end of a run.
@@ -17,6 +18,15 @@ pub struct Aided {
     report: Report,
     calibration: Calibration,
     sigma: Calibration,
+}
+
+/// Where a magnetic field stood still while the body rotated.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct Frozen {
+    /// For so long in all, s.
+    pub(crate) secs: f64,
+    /// From when on, the first time.
+    pub(crate) from: Nanos,
 }
 
 /// Parts in a million.
@@ -165,6 +175,19 @@ impl Aided {
                 ),
                 one("accelerometer lead, ms", found.lead * 1e3, sigma.lead * 1e3),
             ]
+        })
+    }
+
+    /// What is to be said where the forces have no gravity in them after all.
+    #[must_use]
+    pub fn given_up(&self) -> Option<Finding> {
+        (self.started && self.is_implausible).then(|| {
+            Finding::new(
+                Severity::Warning,
+                "force-implausible",
+                "gravity was given up on the way: what the accelerometer says does not turn as the gyro does, or is no gravity (force_implausible)",
+            )
+            .advise("look at the unit and the axes of both")
         })
     }
 

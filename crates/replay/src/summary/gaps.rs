@@ -54,6 +54,7 @@ impl Gaps {
         };
         // Stamps that jumped back are of an earlier time, not of an earlier moment of the run.
         let mut back: i64 = 0;
+        let mut longest_at = None;
         for gap in &gaps.kept {
             let after = |first: i64| gap.start.0.saturating_sub(first).saturating_add(back);
             let at = secs(report.first.map_or(0, |first| after(first.0)));
@@ -69,9 +70,10 @@ impl Gaps {
                 found.longest_missing_secs = found.longest_missing_secs.max(secs(gap.length_nanos));
             }
             if gap.length_nanos == gaps.longest_nanos && gap.length_nanos > 0 {
-                found.longest_at_secs = at;
+                longest_at.get_or_insert(at);
             }
         }
+        found.longest_at_secs = longest_at.unwrap_or(0.0);
         found
     }
 
@@ -95,13 +97,21 @@ impl Gaps {
             farthest_back_at_secs: at,
             ..
         } = self;
-        let which = |by: &str| format!("by {by}{:.3} s, {at:.3} s after the start", self.farthest_back_secs);
+        let which = |by: &str| {
+            format!(
+                "by {by}{:.3} s, {at:.3} s after the start",
+                self.farthest_back_secs
+            )
+        };
         match self.jumps_back {
             0 => None,
             // Of one that is not among those kept the size is not known.
             _ if *by == 0.0 => Some(format!("the clock was set back {} times", self.jumps_back)),
             1 => Some(format!("the clock was set back once, {}", which(""))),
-            n => Some(format!("the clock was set back {n} times, {}", which("up to "))),
+            n => Some(format!(
+                "the clock was set back {n} times, {}",
+                which("up to ")
+            )),
         }
     }
 
