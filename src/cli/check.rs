@@ -1,16 +1,17 @@
 //! `strapd check FILE...`: every finding about a log, with the flag that helps. I/O.
 
+use super::estimation::Estimation;
 use super::tables::Tables;
 use super::{Global, Outcome, made_before, print, with_each};
-use crate::error::{Error, Result};
-use crate::pipeline::check::check;
+use crate::error::Result;
+use crate::pipeline::check::{Examination, examine};
 use crate::pipeline::logged;
-use crate::report::findings::{Finding, Severity, findings};
+use crate::report::findings::Severity;
+use crate::report::page::Told;
 use clap::Args;
 use serde_json::json;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use strapd_recording::decode::Options;
 use strapd_recording::pool::Pool;
 use strapd_recording::text::printable;
 use strapd_replay::inspection::Checked;
@@ -20,19 +21,19 @@ use strapd_replay::inspection::Checked;
 #[command(after_help = "Examples:
   strapd check flight.mcap
   strapd check *.mcap                               (one behind the other)
+  strapd check flight.mcap --bias auto --gyro-range 34.9     judged as replay with these flags makes it
+  strapd check flight.mcap --aid none                        the gyro alone
   strapd check flight.mcap --json | jq '.findings[] | select(.severity != \"note\")'
 
-Exit codes: 0 nothing found; 3 errors or warnings found. Notes alone are no finding.")]
+It judges the attitude that replay makes with the same flags, and marks what a flag deals with.
+Exit codes: 0 nothing found; 3 errors or warnings found. Notes alone are no finding, nor is what a flag deals with.")]
 pub struct Check {
     /// Recordings: MCAP, ULog, bags of ROS 1 and 2, videos of a GoPro, NDJSON, tables, or folders of one; - is standard input
     #[arg(value_name = "FILE", required = true)]
     pub files: Vec<PathBuf>,
-    /// Only this topic, though it be not obviously an IMU's
-    #[arg(long, value_name = "NAME")]
-    pub topic: Option<String>,
-    /// Where a value lies in the message: ROLE=PATH, as in replay
-    #[arg(long = "field", value_name = "ROLE=PATH")]
-    pub fields: Vec<String>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub estimation: Estimation,
     /// How a table is to be read.
     #[command(flatten)]
     pub tables: Tables,
@@ -44,19 +45,19 @@ pub struct Check {
 /// The log can not be read, or the topic named is not in it.
 pub fn run(global: &Global, args: &Check) -> Result<Outcome> {
     let pool = Pool::new(global.threads)?;
-    let mut options = Options {
-        fields: args
-            .fields
-            .iter()
-            .map(|f| f.parse().map_err(|e| Error::usage(format!("--field: {e}"))))
-            .collect::<Result<_>>()?,
-        ..Options::default()
+    let mut selection = args.estimation.selection()?;
+    args.tables.put(&mut selection.decode)?;
+    let asked = Examination {
+        selection,
+        plan: args.estimation.plan()?,
+        reference_topic: String::new(),
+        drawing: None,
+        command: "strapd check".to_owned(),
     };
-    args.tables.put(&mut options)?;
     let mut between = "";
-    let files = made_before::without(args.files.clone(), args.topic.as_deref())?;
+    let files = made_before::without(args.files.clone(), args.estimation.topic.as_deref())?;
     with_each(&files, |file| {
-        let (text, outcome) = one(global, args, file, (&options, &pool))?;
+        let (text, outcome) = one(global, file, &asked, &pool)?;
         print(&format!("{between}{text}"))?;
         between = if global.json { "" } else { "\n" };
         Ok(outcome)
@@ -65,18 +66,19 @@ pub fn run(global: &Global, args: &Check) -> Result<Outcome> {
 
 fn one(
     global: &Global,
-    args: &Check,
     file: &Path,
-    (options, pool): (&Options, &Pool),
+    asked: &Examination<'_>,
+    pool: &Pool,
 ) -> Result<(String, Outcome)> {
     let input = logged::open(file)?;
-    let checked = check(&input, args.topic.as_deref(), options, pool)?;
-    let found = findings(&checked);
-    let worst = found.iter().map(|f| f.severity).max();
+    let checked = examine(&input, asked, pool, &mut |_| {})?;
+    let found = Told::all(&checked, &asked.plan);
+    let open = found.iter().filter(|told| told.answered.is_none());
+    let worst = open.map(|told| told.finding.severity).max();
     let text = if global.json {
         let value = json!({
             "file": input.name().display().to_string(),
-            "findings": found.iter().map(Finding::json).collect::<Vec<_>>(),
+            "findings": found.iter().map(in_json).collect::<Vec<_>>(),
             "worst": worst.map(Severity::name),
         });
         format!("{value}\n")
@@ -90,7 +92,15 @@ fn one(
     Ok((text, outcome))
 }
 
-fn text(file: &Path, checked: &Checked, found: &[Finding]) -> String {
+/// As a program in Python has it, which sets nothing that could deal with a finding.
+fn in_json(told: &Told) -> serde_json::Value {
+    match told.answered {
+        Some(_) => told.json(),
+        None => told.finding.json(),
+    }
+}
+
+fn text(file: &Path, checked: &Checked, found: &[Told]) -> String {
     let mut out = String::new();
     let topics: Vec<String> = checked
         .topics
@@ -104,7 +114,8 @@ fn text(file: &Path, checked: &Checked, found: &[Finding]) -> String {
         })
         .collect();
     let _ = writeln!(out, "{}  {}", file.display(), topics.join(", "));
-    for finding in found {
+    for told in found {
+        let finding = &told.finding;
         let topic = if checked.topics.len() > 1 && !finding.topic.is_empty() {
             format!("{}: ", printable(&finding.topic))
         } else {
@@ -117,6 +128,10 @@ fn text(file: &Path, checked: &Checked, found: &[Finding]) -> String {
             finding.code,
             finding.what
         );
+        if let Some(flag) = told.answered {
+            let _ = writeln!(out, "  {:<31} -> dealt with by {flag}", "");
+            continue;
+        }
         let advice = match (finding.advice.as_str(), finding.flags().as_str()) {
             ("", "") => continue,
             (advice, "") => advice.to_owned(),
@@ -125,7 +140,7 @@ fn text(file: &Path, checked: &Checked, found: &[Finding]) -> String {
         };
         let _ = writeln!(out, "  {:<31} -> {advice}", "");
     }
-    let count = |severity| found.iter().filter(|f| f.severity == severity).count();
+    let count = |severity| found.iter().filter(|told| told.is_open(severity)).count();
     let _ = writeln!(
         out,
         "{}",

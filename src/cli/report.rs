@@ -9,14 +9,13 @@ use crate::pipeline::attitude_track::{self, Side, Track};
 use crate::pipeline::check::{Drawing, Examination, examine};
 use crate::pipeline::logged;
 use crate::pipeline::provenance::sha256;
-use crate::report::findings::findings;
 use crate::report::page::{DRAWN, Noise, Page, STRETCHES, Several, Told, longest_rest};
 use crate::report::summary::{human_bytes, significant};
 use crate::sink::Document;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use strapd_attitude::diagnostic::Diagnostic;
-use strapd_attitude::estimate::{Bias, Plan};
+use strapd_attitude::estimate::Plan;
 use strapd_recording::Input;
 use strapd_recording::Selection;
 use strapd_recording::decode::Options;
@@ -37,7 +36,7 @@ const ENOUGH: f64 = 600.0;
   strapd report flight.mcap --json | jq .verdict                     the same numbers, no page
 
 The page needs no network, and no script but to look into its charts; it opens from a file, prints, and is at most 2 MB for any log.
-Exit codes: 0 done; 3 done, but samples were lost or could not be read.")]
+Exit codes: 0 done; 3 done, but an error was found (the verdict is `bad`): samples were lost, or the attitude will be wrong.")]
 pub struct Report {
     /// Recordings: MCAP, ULog, bags of ROS 1 and 2, videos of a GoPro, NDJSON, tables, or folders of one; - is standard input
     #[arg(value_name = "FILE", required = true)]
@@ -195,10 +194,6 @@ impl Report {
         let mut checked = checked?;
         let file = self.shown(input.name());
         checked.rename(&input.name().display().to_string(), &file);
-        let told = findings(&checked).into_iter().map(|finding| Told {
-            answered: answered(finding.code, &asked.plan),
-            finding,
-        });
         let track = asked.drawing.as_ref().and_then(|d| d.reference);
         take(&Page {
             sha256: sha256(input.name(), input.bytes()?)?,
@@ -213,7 +208,7 @@ impl Report {
                 (None, "") => String::new(),
                 (None, topic) => format!("the orientation on {topic}"),
             },
-            findings: told.collect(),
+            findings: Told::all(&checked, &asked.plan),
             noise: checked
                 .topics
                 .iter()
@@ -284,19 +279,4 @@ impl Report {
             Noise::Missing(format!("It could not be had: {why}"))
         })
     }
-}
-
-/// The flag of this run that deals with a finding about the samples as recorded.
-fn answered(code: &str, plan: &Plan) -> Option<&'static str> {
-    let (is_given, flag) = match code {
-        "unit-degrees" => (plan.unit.is_some(), "--gyro-unit"),
-        "unit-against-gravity" if plan.unit.is_some() => (true, "--gyro-unit"),
-        "unit-against-gravity" | "looks-frd" => (plan.body.is_some(), "--body"),
-        "mounted-on-side" => (plan.mount.is_some(), "--mount"),
-        "bias" => (plan.bias != Bias::None, "--bias"),
-        "jitter" => (plan.regularise_stamps, "--regularise-stamps"),
-        "sample-kind-unknown" => (plan.kind.is_some(), "--sample-kind"),
-        _ => (false, ""),
-    };
-    is_given.then_some(flag)
 }

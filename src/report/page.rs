@@ -24,8 +24,8 @@ use markup::{Rows, escaped};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::Path;
-use strapd_replay::inspection::{Checked, CheckedTopic};
-use verdict::Verdict;
+use strapd_replay::inspection::Checked;
+use verdict::{Level, Verdict};
 
 /// Largest page, bytes.
 pub const LARGEST: usize = 2_000_000;
@@ -158,16 +158,10 @@ impl Page<'_> {
         })
     }
 
-    /// Whether anything was lost or could not be done: exit code 3.
+    /// Whether anything was lost or could not be done, by the verdict: exit code 3.
     #[must_use]
     pub fn is_lossy(&self) -> bool {
-        let lossy = |t: &CheckedTopic| match &t.replayed {
-            Ok(s) => s.is_lossy() || t.looked.undecodable > 0,
-            Err(_) => true,
-        };
-        self.checked.file_losses > 0
-            || self.checked.topics.is_empty()
-            || self.checked.topics.iter().any(lossy)
+        self.verdict().level == Level::Bad
     }
 
     /// The file's name without its directory.

@@ -2,6 +2,7 @@
 
 mod advice;
 mod faults;
+mod judged;
 mod many;
 mod orientation;
 mod recordings;

@@ -1,9 +1,11 @@
 //! Findings -> their part of the page. Pure.
 
 use super::markup::{escaped, sentence};
-use crate::report::findings::{Finding, Severity};
+use crate::report::findings::{Finding, Severity, findings};
 use serde_json::Value;
 use std::fmt::Write as _;
+use strapd_attitude::estimate::{Bias, Plan};
+use strapd_replay::inspection::Checked;
 
 /// Most findings written out; the worst come first.
 const SHOWN: usize = 200;
@@ -18,8 +20,19 @@ pub struct Told {
 }
 
 impl Told {
+    /// Everything that is found about a log examined by `plan`.
+    #[must_use]
+    pub fn all(checked: &Checked, plan: &Plan) -> Vec<Told> {
+        let told = |finding: Finding| Told {
+            answered: answered(finding.code, plan),
+            finding,
+        };
+        findings(checked).into_iter().map(told).collect()
+    }
+
     /// Whether it is as bad as `severity`, and nothing was done about it.
-    pub(super) fn is_open(&self, severity: Severity) -> bool {
+    #[must_use]
+    pub fn is_open(&self, severity: Severity) -> bool {
         self.answered.is_none() && self.finding.severity == severity
     }
 
@@ -32,6 +45,21 @@ impl Told {
         }
         value
     }
+}
+
+/// The flag of this run that deals with a finding about the samples as recorded.
+fn answered(code: &str, plan: &Plan) -> Option<&'static str> {
+    let (is_given, flag) = match code {
+        "unit-degrees" => (plan.unit.is_some(), "--gyro-unit"),
+        "unit-against-gravity" if plan.unit.is_some() => (true, "--gyro-unit"),
+        "unit-against-gravity" | "looks-frd" => (plan.body.is_some(), "--body"),
+        "mounted-on-side" => (plan.mount.is_some(), "--mount"),
+        "bias" => (plan.bias != Bias::None, "--bias"),
+        "jitter" => (plan.regularise_stamps, "--regularise-stamps"),
+        "sample-kind-unknown" => (plan.kind.is_some(), "--sample-kind"),
+        _ => (false, ""),
+    };
+    is_given.then_some(flag)
 }
 
 pub(super) fn section(told: &[Told], out: &mut String) {

@@ -58,10 +58,9 @@ impl Verdict {
             .map(|s| &**s)
             .max_by_key(used)
             .filter(|s| s.counts.used() > 0);
-        let lossy = runs().any(|s| s.is_lossy());
         let level = match (best, errors, warnings) {
             (None, ..) => Level::Bad,
-            _ if errors > 0 || lossy => Level::Bad,
+            _ if errors > 0 => Level::Bad,
             (_, _, 1..) => Level::Warning,
             _ => Level::Good,
         };
