@@ -7,8 +7,9 @@
 //! ```text
 //! samples -> interval, step of the rates                              survey
 //! samples -> those that can be used, without holes                    prepare, bridge
-//! -> segments between nodes, standstill                               segments
+//! -> segments between nodes, standstill                               segments, rests
 //! -> attitudes to begin with                                          start, realtime
+//! -> the axis that stays vertical, about which the bias is held       planar
 //! segment -> turn, push, way, and their derivatives                   sweep
 //! -> normal equations                                                 factors, border, motion, heading
 //! -> corrections, covariance                                          solver
@@ -63,9 +64,11 @@ mod motion;
 mod output;
 mod pass;
 mod phase;
+mod planar;
 mod prepare;
 mod prepared;
 mod realtime;
+mod rests;
 mod result;
 mod sample;
 mod segments;
@@ -79,12 +82,15 @@ mod sweep;
 mod tests;
 mod work;
 
+pub(crate) use border::FORCE_SCALE;
 pub use error::SmoothError;
 pub use output::Estimate;
 pub use phase::Failure;
+pub use planar::Held;
 pub(crate) use result::OBSERVED;
 pub use result::{Bias, Calibration, Counts, Learned, Magnetometer, Outcome, Section, Sizes};
 pub use sample::{Sample, Samples};
+pub(crate) use settings::BIAS_SIGMA;
 pub use settings::{
     Beforehand, FieldUnit, HeadingReference, Looseness, MotionModel, SampleModel, Settings,
 };

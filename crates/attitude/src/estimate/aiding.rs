@@ -228,6 +228,20 @@ fn no_gravity(length: f64) -> String {
     format!("{} times as long as that, so {why}", significant(share, 3))
 }
 
+impl Aiding {
+    /// One standard deviation of what is left of a bias that was said, measured at rest or calibrated, rad/s, body axes.
+    pub(super) fn stated_bias(&self, plan: &Plan) -> [Option<f64>; 3] {
+        let left = (plan.bias != Bias::None).then_some(self.settings.bias_prior);
+        match self.settings.prior.bias {
+            Some(known) => known
+                .diagonal()
+                .map(|variance| Some(variance.sqrt()))
+                .into(),
+            None => [left; 3],
+        }
+    }
+}
+
 /// Puts in what a class of sensors says, and leaves what it says nothing of.
 fn of_class(settings: &mut Settings, class: &Noise) {
     let largest = |axes: [f64; 3]| axes.into_iter().fold(0.0, f64::max);

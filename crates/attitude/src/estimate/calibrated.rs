@@ -130,6 +130,8 @@ impl Meaning {
             Some((known.value[0], known.sigma_of(0)?))
         };
         Beforehand {
+            // By the filter's settings, which have what flags say of it, too.
+            gyro_bias: [None; 3],
             gyro: matrix(&c, &calibration.gyro),
             force_bias: std::array::from_fn(|n| {
                 let known = calibration.force_bias.as_ref()?;

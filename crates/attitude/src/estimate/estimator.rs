@@ -20,7 +20,7 @@ use crate::frames::{In, Nav};
 use crate::propagate::{self, Executor, Method, Propagator};
 use crate::quaternion::{BodyRate, Quaternion, RotationVector};
 use crate::record::{AttitudeSample, Join, Nanos, RateSample, RawSample};
-use crate::smooth::Looseness;
+use crate::smooth::{Beforehand, Looseness};
 use crate::worlds::{Convention, World};
 use nalgebra::Vector3;
 
@@ -195,7 +195,12 @@ impl Estimator {
                             axes: aiding.settings.cross_prior / usual.cross_prior,
                             force: aiding.settings.force_bias_prior / usual.force_bias_prior,
                         },
-                        known: resolved.beforehand(),
+                        bias_sigma: plan.noise.bias_of_class(),
+                        gyro_range: aiding.settings.gyro_range,
+                        known: Beforehand {
+                            gyro_bias: aiding.stated_bias(plan),
+                            ..resolved.beforehand()
+                        },
                     };
                     let smoothing = Smoothing::new(aided, told);
                     Integrator::Smoothed(Box::new(smoothing))

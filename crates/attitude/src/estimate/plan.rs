@@ -14,6 +14,7 @@ use crate::setting::{
     AID, BIAS, CALIBRATION, DECLINATION, EARTH_RATE, INIT, MAG_HARD_IRON, MAG_MOUNT, METHOD,
     REGULARISE_STAMPS, SENSOR_DELAY, SMOOTH, TIME, WORLD,
 };
+use crate::smooth::BIAS_SIGMA;
 use crate::worlds::World;
 use std::sync::Arc;
 
@@ -519,6 +520,14 @@ impl Noise {
         let [x, y, z] = self.turn_on_bias;
         let [u, v, w] = self.unstable_bias();
         [x.hypot(u), y.hypot(v), z.hypot(w)]
+    }
+
+    /// One standard deviation of the bias after switching on, rad/s; that of the default class where nothing is said.
+    pub(super) fn bias_of_class(&self) -> f64 {
+        match self.turn_on_bias.into_iter().fold(0.0, f64::max) {
+            0.0 => BIAS_SIGMA,
+            class => class,
+        }
     }
 
     /// The same for an attitude that begins level by the accelerometer at a rest that tells the vertical to `scatter`, rad.

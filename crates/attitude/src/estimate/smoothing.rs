@@ -11,8 +11,8 @@ use crate::propagate::Executor;
 use crate::quaternion::{BodyRate, Quaternion, RotationVector};
 use crate::record::{AttitudeCovariance, AttitudeSample, Nanos, RateSample, SampleKind, Status};
 use crate::smooth::{
-    Beforehand, Estimate, FieldUnit, Learned, Looseness, Outcome, Sample, SampleModel, Samples,
-    Settings, Sizes, SmoothError, Smoothed, smooth,
+    Beforehand, Estimate, FORCE_SCALE, FieldUnit, Learned, Looseness, Outcome, Sample, SampleModel,
+    Samples, Settings, Sizes, SmoothError, Smoothed, smooth,
 };
 use nalgebra::Vector3;
 use std::cell::RefCell;
@@ -41,6 +41,10 @@ pub(super) struct Told {
     pub(super) heading: Option<f64>,
     /// How many times as far off as sensors of the default class this one may be.
     pub(super) looseness: Looseness,
+    /// Standard deviation of the gyro's bias in its class, rad/s.
+    pub(super) bias_sigma: f64,
+    /// Range of the gyro, rad/s; 0: not known.
+    pub(super) gyro_range: f64,
     /// What is known of this one.
     pub(super) known: Beforehand,
 }
@@ -91,9 +95,23 @@ const LOOSER: Looseness = Looseness {
 /// So many times as wide is what a calibration file says.
 const LOOSER_KNOWN: f64 = 2.5;
 
-fn is_beyond(smoothed: &Smoothed) -> bool {
+fn is_beyond(smoothed: &Smoothed, looseness: Looseness) -> bool {
     let calibration = smoothed.calibration();
-    is_off(&calibration.gyro) || is_off(&calibration.force_bias) || is_off(&calibration.force)
+    let force = own_scales(calibration.force, FORCE_SCALE * looseness.scale);
+    is_off(&calibration.gyro) || is_off(&calibration.force_bias) || is_off(&force)
+}
+
+/// Without what the scales of all axes have in common, which is known of no accelerometer: each is then known to `own`.
+fn own_scales(mut force: Learned<9>, own: f64) -> Learned<9> {
+    const SCALES: [usize; 3] = [0, 4, 8];
+    if SCALES.iter().all(|i| force.prior[*i] > own) {
+        let common = SCALES.iter().map(|i| force.value[*i]).sum::<f64>() / 3.0;
+        for i in SCALES {
+            force.value[i] -= common;
+            (force.sigma[i], force.prior[i]) = (0.0, own);
+        }
+    }
+    force
 }
 
 fn is_off<const N: usize>(learned: &Learned<N>) -> bool {
@@ -306,6 +324,8 @@ impl Smoothing {
         let settings = Settings {
             sample_model,
             field_unit: FieldUnit::Unknown,
+            bias_sigma: self.told.bias_sigma,
+            gyro_range: self.told.gyro_range,
             looseness: self.told.looseness,
             known: self.told.known,
             // What a driver cut off is put back before, where it is.
@@ -322,7 +342,7 @@ impl Smoothing {
             known: settings.known.widened(LOOSER_KNOWN),
             ..settings
         };
-        let again = if is_beyond(&smoothed) {
+        let again = if is_beyond(&smoothed, settings.looseness) {
             // Priors that lead nowhere are none to prefer.
             self.smooth_by(&looser)?.ok()
         } else {
@@ -414,6 +434,7 @@ mod tests {
     use crate::aid::{self, Start};
     use crate::propagate::{self, Sequential};
     use crate::record::{Join, Measured};
+    use crate::smooth::BIAS_SIGMA;
     use std::io::Cursor;
 
     const SAMPLES: i64 = 24_000;
@@ -499,6 +520,8 @@ mod tests {
                 kind: SampleKind::Rate,
                 is_kind_stated: true,
                 heading: None,
+                bias_sigma: BIAS_SIGMA,
+                gyro_range: 0.0,
                 looseness: Looseness::default(),
                 known: Beforehand::default(),
             },

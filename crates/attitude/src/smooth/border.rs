@@ -49,6 +49,10 @@ pub(super) struct Priors {
     mean: Constants,
 }
 
+/// Scales of the accelerometer: of each axis by itself, and what all have in common.
+pub(crate) const FORCE_SCALE: f64 = 0.0015;
+const FORCE_SHARED: f64 = 0.05;
+
 /// Hard iron is of this size, uT, or of any (Cauchy's distribution).
 pub(super) const IRON_SCALE: f64 = 1.0;
 
@@ -66,7 +70,8 @@ impl Priors {
                 };
             }
         };
-        matrix(FORCE, 0.0015, 0.001);
+        let (force_own, force_shared) = (FORCE_SCALE * scale, FORCE_SHARED * scale);
+        matrix(FORCE, force_own.hypot(force_shared) / scale, 0.001);
         matrix(FIELD, 0.015, 0.008);
         let mut put = |range: std::ops::Range<usize>, value: f64| sigma[range].fill(value);
         put(FORCE_BIAS..FORCE, 0.04 * force);
@@ -94,10 +99,15 @@ impl Priors {
                 pair[(0, 0)].sqrt()
             };
         }
-        let scales = scales.try_inverse().unwrap_or_default();
-        for i in 0..3 {
-            for j in 0..3 {
-                information[GYRO + 4 * i][GYRO + 4 * j] = scales[(i, j)];
+        // An accelerometer's share far more: the sizes of gravity and of g, a reference that drifts.
+        let of_force = Matrix3::from_diagonal_element(force_own * force_own)
+            + Matrix3::repeat(force_shared * force_shared);
+        for (first, scales) in [(GYRO, scales), (FORCE, of_force)] {
+            let scales = scales.try_inverse().unwrap_or_default();
+            for i in 0..3 {
+                for j in 0..3 {
+                    information[first + 4 * i][first + 4 * j] = scales[(i, j)];
+                }
             }
         }
         let pair = pair.try_inverse().unwrap_or_default();

@@ -8,6 +8,7 @@ use super::factors::{BIAS, Node, POSITION, STATES, VELOCITY};
 use super::heading::{FieldTrust, sections};
 use super::motion::Bound;
 use super::pass::{Model, sweep_all};
+use super::planar::Along;
 use super::sample::Samples;
 use super::segments::Segment;
 use super::settings::Settings;
@@ -15,7 +16,7 @@ use super::solver::{Marginal, Solution, Solver};
 use super::survey::Survey;
 use super::sweep::GRAVITY;
 use crate::quaternion::kernel::{normalised, turned_in_navigation};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use std::fmt;
 
 /// A heading that nothing tells is held to this, rad.
@@ -47,7 +48,9 @@ pub(super) struct Problem<'a> {
     pub(super) trust: &'a FieldTrust,
     /// Of the gyro's bias beforehand, rad/s.
     pub(super) bias: Vector3<f64>,
-    pub(super) bias_sigma: f64,
+    pub(super) bias_sigma: Vector3<f64>,
+    /// The same along the axis that stays vertical, without the field.
+    pub(super) along: Option<Along>,
 }
 
 /// What the iterations improve.
@@ -74,6 +77,8 @@ pub enum Failure {
     Strays(f64),
     /// The mean force is this far off the vertical, rad.
     NotUpright(f64),
+    /// The accelerometer's bias was found to be this large, m/s^2.
+    ForceBias(f64),
 }
 
 impl fmt::Display for Failure {
@@ -94,6 +99,9 @@ impl fmt::Display for Failure {
             Failure::NotUpright(off) => {
                 let off = off.to_degrees();
                 write!(f, "the mean force was {off:.1} deg off the vertical")
+            }
+            Failure::ForceBias(bias) => {
+                write!(f, "the accelerometer's bias came out as {bias:.2} m/s^2")
             }
         }
     }
@@ -190,6 +198,16 @@ pub(super) fn run<S: Samples, const W: usize>(
 }
 
 impl Problem<'_> {
+    /// Weights of the first node's bias beforehand, and about what it scatters.
+    fn first_bias(&self, has_field: bool) -> (Matrix3<f64>, Vector3<f64>) {
+        let weights = self.bias_sigma.map(|sigma| 1.0 / (sigma * sigma));
+        let weights = Matrix3::from_diagonal(&weights);
+        match &self.along {
+            Some(along) if !has_field => along.put_in(&weights, &self.bias),
+            _ => (weights, self.bias),
+        }
+    }
+
     fn rests(&self) -> bool {
         self.segments.iter().any(|segment| segment.is_still)
     }
@@ -197,6 +215,8 @@ impl Problem<'_> {
     fn failure(&self, state: &State, turn: f64, tilt: f64) -> Option<Failure> {
         const FARTHEST: f64 = 100.0;
         const MOST_TILT: f64 = 5.0_f64.to_radians();
+        const MOST_BIAS: f64 = 0.6;
+        let bias = border::vector(&state.constants, border::FORCE_BIAS).norm();
         let [_, strays] = state.bound.sigma;
         if !turn.is_finite() {
             Some(Failure::NotFinite)
@@ -206,6 +226,8 @@ impl Problem<'_> {
             Some(Failure::Strays(strays))
         } else if tilt > MOST_TILT {
             Some(Failure::NotUpright(tilt))
+        } else if bias > MOST_BIAS {
+            Some(Failure::ForceBias(bias))
         } else {
             None
         }
@@ -262,10 +284,13 @@ fn equations<S: Samples, const W: usize>(
     for i in 0..BIAS {
         own[i][i] = 1.0 / (ANYWHERE * ANYWHERE);
     }
-    let weight = 1.0 / (problem.bias_sigma * problem.bias_sigma);
+    let (weights, centre) = problem.first_bias(W == WIDE);
+    let pull = -weights * (state.nodes[0].bias - centre);
     for i in 0..3 {
-        own[BIAS + i][BIAS + i] = weight;
-        border[BIAS + i][last] = -weight * (state.nodes[0].bias[i] - problem.bias[i]);
+        for j in 0..3 {
+            own[BIAS + i][BIAS + j] = weights[(i, j)];
+        }
+        border[BIAS + i][last] = pull[i];
     }
     let centre = border::vector(&state.constants, border::CENTRE);
     let count = segments.len();

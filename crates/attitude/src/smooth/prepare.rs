@@ -13,6 +13,8 @@ use nalgebra::Vector3;
 
 /// Longer steps, in ordinary ones, are gaps.
 const GAP: f64 = 1.6;
+/// A rate of at least this share of the gyro's range is at it: a bias may have been taken out.
+pub(super) const NEAR_RANGE: f64 = 0.99;
 /// Instantaneous samples farther apart get others between them, s.
 const LONGEST_STEP: f64 = 0.005;
 /// Samples that gaps may be filled with beyond [`FILLED`] for each that was measured: where stamps come in bursts the
@@ -24,6 +26,8 @@ const FILLED: usize = 20;
 pub(super) struct Preparer<'a> {
     survey: &'a Survey,
     has_unresolved: bool,
+    /// Rates from here on may be any beyond, rad/s.
+    range: f64,
     gate: Gate,
     /// Accepted, a few of them given on already.
     window: Vec<(Numbers, u64)>,
@@ -42,6 +46,10 @@ impl<'a> Preparer<'a> {
         Preparer {
             survey,
             has_unresolved: settings.has_unresolved,
+            range: match settings.gyro_range {
+                0.0 => f64::INFINITY,
+                range => range * NEAR_RANGE,
+            },
             gate: Gate::default(),
             window: Vec::new(),
             next: 0,
@@ -102,6 +110,8 @@ impl<'a> Preparer<'a> {
             if self.has_unresolved && !is_gap {
                 prepared.doubt = bridge::unresolved(&self.window, i, secs);
             }
+            let clipped = sample.rate.iter().filter(|rate| rate.abs() >= self.range);
+            let unknown: f64 = clipped.map(|rate| (0.5 * rate * secs).powi(2)).sum();
             if let Some(before) = &before
                 && is_gap
             {
@@ -133,6 +143,7 @@ impl<'a> Preparer<'a> {
                     prepared.secs = secs / parts;
                 }
             }
+            prepared.doubt[0] += unknown;
             self.give(prepared, out);
         }
     }

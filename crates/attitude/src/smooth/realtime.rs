@@ -4,9 +4,10 @@
 //! what the result falls back to.
 
 use super::pass::by_segment;
+use super::prepare::NEAR_RANGE;
 use super::sample::Samples;
 use super::segments::{Segment, median_of};
-use super::settings::Settings;
+use super::settings::{BIAS_SIGMA, Settings};
 use super::survey::Survey;
 use crate::aid::{self, Aided};
 use crate::frames::In;
@@ -28,25 +29,43 @@ pub(super) struct Realtime {
 /// Prior sigma of the gyro's bias, rad/s: of any gyro, since the recording has time to tell.
 const BIAS_PRIOR: f64 = 0.1;
 
-/// Runs it over all samples, twice: what it learned of the bias is known from the start the second time. Heading is
-/// that of the first sample.
+/// Runs it over all samples: twice, so that what it learned of the bias is known from the start the second time, where
+/// nothing is known of it beforehand. Heading is that of the first sample.
 pub(super) fn run<S: Samples>(
     samples: &mut S,
     with: (&Survey, &Settings),
     segments: &[Segment],
 ) -> Result<Option<Realtime>, S::Error> {
+    let usual = aid::Settings::default();
+    // A sensor of a better class has less of a bias.
+    let share = with.1.bias_sigma / BIAS_SIGMA;
+    let class = usual.bias_prior * share;
+    let settings = aid::Settings {
+        bias_prior: class,
+        gyro_range: with.1.gyro_range * NEAR_RANGE,
+        ..usual
+    };
+    if with.1.known.gyro_bias.iter().any(Option::is_some) {
+        let known = with.1.bias_sigmas();
+        let bias = Matrix3::from_diagonal(&known.component_mul(&known));
+        let prior = aid::Prior {
+            bias: Some(bias),
+            ..settings.prior
+        };
+        let settings = aid::Settings { prior, ..settings };
+        return pass(samples, with, segments, (settings, Vector3::zeros()));
+    }
     let wide = aid::Settings {
-        bias_prior: BIAS_PRIOR,
-        ..aid::Settings::default()
+        bias_prior: BIAS_PRIOR * share.min(1.0),
+        ..settings
     };
     match pass(samples, with, segments, (wide, Vector3::zeros()))? {
         Some(found) => {
             // What the motion does not show (about the vertical, often) stays near nothing, where biases are.
-            let class = aid::Settings::default().bias_prior;
             let sure = found.bias.zip_map(&found.bias_sigma, |bias, sigma| {
                 bias * class * class / (class * class + sigma * sigma)
             });
-            pass(samples, with, segments, (aid::Settings::default(), sure))
+            pass(samples, with, segments, (settings, sure))
         }
         None => Ok(None),
     }

@@ -151,9 +151,7 @@ pub enum Outcome {
     Converged,
     /// The same, but in the last iteration a node still turned by this, rad.
     Unsettled(f64),
-    /// The smoother's without the field, turned north: with it, it led nowhere.
-    WithoutField(Failure),
-    /// The real-time filter's: the smoother led nowhere.
+    /// The real-time filter's: the smoother led nowhere, without the field or with it.
     Filter(Failure),
 }
 

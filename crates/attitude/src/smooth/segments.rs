@@ -3,6 +3,7 @@
 //! A stage of its own because the unknowns of the problem are its nodes, and a standstill is decided by segment.
 
 use super::prepared::Prepared;
+use super::rests;
 use nalgebra::Vector3;
 
 /// Fewer samples than this after the last node do not get one.
@@ -10,7 +11,7 @@ const FEWEST: usize = 5;
 /// Largest deviation at rest: of the rate (rad/s), of the force (m/s^2), and of the mean rate from the median one.
 pub(super) const STILL_RATE: f64 = 0.5_f64.to_radians();
 const STILL_FORCE: f64 = 0.2;
-const STILL_MEAN: f64 = 0.5_f64.to_radians();
+pub(super) const STILL_MEAN: f64 = 0.5_f64.to_radians();
 /// A log without noise has thresholds of nothing.
 const SLACK: f64 = 1e-9;
 
@@ -28,6 +29,7 @@ pub(super) struct Segment {
     /// Variance left by gaps and by what is faster than the samples, of attitude and of velocity.
     pub doubt: [f64; 2],
     pub mean_rate: Vector3<f64>,
+    pub mean_force: Vector3<f64>,
     /// Largest standard deviation of an axis: rate, force.
     pub spread: [f64; 2],
 }
@@ -97,6 +99,7 @@ impl Sums {
             is_still: false,
             doubt: self.doubt,
             mean_rate: self.mean[0],
+            mean_force: self.mean[1],
             spread,
         }
     }
@@ -189,7 +192,7 @@ pub(super) fn find_standstill(segments: &mut [Segment]) -> Option<Vector3<f64>> 
         .iter()
         .map(|segment| !segment.is_break && segment.spread[0] < rate && segment.spread[1] < force)
         .collect();
-    let bias = median_rate(segments, |i| quiet[i])?;
+    let bias = rests::rate_of(segments, &quiet)?;
     for (quiet, segment) in quiet.iter_mut().zip(segments.iter()) {
         *quiet &= (segment.mean_rate - bias).norm() < STILL_MEAN;
     }
@@ -210,7 +213,10 @@ pub(super) fn find_standstill(segments: &mut [Segment]) -> Option<Vector3<f64>> 
 }
 
 /// Median of the mean rates of the chosen segments, each axis.
-fn median_rate(segments: &[Segment], is_chosen: impl Fn(usize) -> bool) -> Option<Vector3<f64>> {
+pub(super) fn median_rate(
+    segments: &[Segment],
+    is_chosen: impl Fn(usize) -> bool,
+) -> Option<Vector3<f64>> {
     let chosen: Vec<Vector3<f64>> = segments
         .iter()
         .enumerate()

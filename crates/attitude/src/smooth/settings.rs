@@ -1,6 +1,10 @@
 //! What the smoother is told about a recording and how to treat it. Pure.
 
+use nalgebra::Vector3;
 use std::num::NonZero;
+
+/// Standard deviation of the gyro's bias in the default class, rad/s.
+pub(crate) const BIAS_SIGMA: f64 = 1.0_f64.to_radians();
 
 /// What a gyro value is the rate of.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -47,6 +51,8 @@ pub enum FieldUnit {
 /// what is left, body axes, matrices row by row. `None`: as of any sensor.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Beforehand {
+    /// Of the gyro's bias, rad/s.
+    pub gyro_bias: [Option<f64>; 3],
     /// Of the gyro's scale and axes.
     pub gyro: [Option<f64>; 9],
     /// Of the accelerometer's bias, m/s^2.
@@ -65,8 +71,9 @@ impl Beforehand {
     /// The same, known so many times worse.
     #[must_use]
     pub fn widened(mut self, by: f64) -> Beforehand {
-        let sigmas = self.gyro.iter_mut().chain(&mut self.force_bias);
-        for sigma in sigmas.chain(&mut self.force).chain(&mut self.field) {
+        let gyro = self.gyro_bias.iter_mut().chain(&mut self.gyro);
+        let force = self.force_bias.iter_mut().chain(&mut self.force);
+        for sigma in gyro.chain(force).chain(&mut self.field) {
             *sigma = sigma.map(|sigma| sigma * by);
         }
         for time in [&mut self.force_time, &mut self.field_time] {
@@ -113,6 +120,10 @@ impl Looseness {
 pub struct Settings {
     /// Time between nodes, s. `None`: 0.5, 1 above an hour, 2 above four hours, more beyond a day (as many nodes).
     pub node_spacing: Option<f64>,
+    /// Standard deviation of the gyro's bias in the sensor's class, rad/s.
+    pub bias_sigma: f64,
+    /// Range of the gyro, rad/s: a rate at it may be any beyond. 0: not known.
+    pub gyro_range: f64,
     /// By how much the sigmas of calibration constants are larger than after a calibration in the factory.
     pub looseness: Looseness,
     /// What is known of this one.
@@ -143,6 +154,8 @@ impl Default for Settings {
     fn default() -> Settings {
         Settings {
             node_spacing: None,
+            bias_sigma: BIAS_SIGMA,
+            gyro_range: 0.0,
             looseness: Looseness::default(),
             known: Beforehand::default(),
             sensor_delay: 0.0,
@@ -174,6 +187,12 @@ impl Settings {
                 return Some(("looseness", looseness));
             }
         }
+        if !in_range(self.bias_sigma, 1e-9, 1.0) {
+            return Some(("bias_sigma", self.bias_sigma));
+        }
+        if !in_range(self.gyro_range, 0.0, f64::MAX) {
+            return Some(("gyro_range", self.gyro_range));
+        }
         if !in_range(self.sensor_delay, -1.0, 1.0) {
             return Some(("sensor_delay", self.sensor_delay));
         }
@@ -181,6 +200,23 @@ impl Settings {
             return Some(("iterations", 0.0));
         }
         None
+    }
+
+    /// One standard deviation of the gyro's bias beforehand, rad/s.
+    pub(super) fn bias_sigmas(&self) -> Vector3<f64> {
+        Vector3::from(
+            self.known
+                .gyro_bias
+                .map(|sigma| sigma.unwrap_or(self.bias_sigma)),
+        )
+    }
+
+    /// About what it scatters, where `found` is the first guess: nothing, about axes of which it is known.
+    pub(super) fn bias_beforehand(&self, found: &Vector3<f64>) -> Vector3<f64> {
+        Vector3::from_fn(|i, _| match self.known.gyro_bias[i] {
+            Some(_) => 0.0,
+            None => found[i],
+        })
     }
 
     /// Time between nodes of a log so long, s.

@@ -4,6 +4,7 @@
 
 use super::border::Constants;
 use super::factors::Node;
+use super::planar::Held;
 use super::result::{Bias, Calibration, Counts, Outcome, Section};
 use super::segments::Segment;
 use super::settings::Settings;
@@ -33,6 +34,7 @@ pub struct Smoothed {
     pub(super) outcome: Outcome,
     pub(super) calibration: Calibration,
     pub(super) bound: [f64; 2],
+    pub(super) held: Option<Held>,
     pub(super) counts: Counts,
 }
 
@@ -59,6 +61,13 @@ impl Smoothed {
     #[must_use]
     pub fn bound(&self) -> [f64; 2] {
         self.bound
+    }
+
+    /// The bias that was held, where motion does not tell it: one axis of the body stays vertical, and no field tells the
+    /// heading.
+    #[must_use]
+    pub fn held(&self) -> Option<Held> {
+        self.held
     }
 
     /// What became of the samples.
@@ -95,7 +104,7 @@ impl Smoothed {
             .sections
             .get(section)
             .is_some_and(|section| section.has_north);
-        let is_turned = matches!(self.outcome, Outcome::WithoutField(_) | Outcome::Filter(_));
+        let is_turned = matches!(self.outcome, Outcome::Filter(_));
         if is_turned && has_north {
             covariance[(2, 2)] += TURNED * TURNED;
         }

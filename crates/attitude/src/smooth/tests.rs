@@ -3,6 +3,7 @@
 mod golden;
 mod input;
 mod logs;
+mod planar;
 mod robustness;
 mod slopes;
 mod spans;

@@ -9,9 +9,11 @@ use super::heading::{FieldTrust, sections, turn_north};
 use super::motion::Bound;
 use super::pass::by_segment;
 use super::phase::{Failure, Phase, Problem, State, run};
+use super::planar::{Along, Held, Main, headed};
 use super::prepare::Preparer;
 use super::prepared::Prepared;
 use super::realtime::{self, Realtime};
+use super::rests::{keep_rests, rests};
 use super::result::{Calibration, Counts, Outcome, Section};
 use super::sample::Samples;
 use super::segments::{Cutter, STILL_RATE, Segment, find_standstill};
@@ -24,8 +26,6 @@ use super::sweep::{Sensor, sweep};
 use crate::record::Nanos;
 use nalgebra::{Matrix3, Vector3};
 
-/// Of the gyro's bias beforehand, rad/s.
-const BIAS_SIGMA: f64 = 1.0_f64.to_radians();
 /// The stillest segment is at rest if its mean rate is this near to the filter's bias, rad/s.
 const NEAR: f64 = 2.0_f64.to_radians();
 /// The field may be another while a log moves that rests in more segments than this.
@@ -53,7 +53,8 @@ pub fn smooth<S: Samples>(
     let spacing = settings.spacing(survey.secs);
     let (mut segments, first, bridged) =
         cut(samples, (&survey, settings), spacing).map_err(SmoothError::Read)?;
-    let still = find_standstill(&mut segments);
+    find_standstill(&mut segments);
+    let still = keep_rests(&mut segments, settings.bias_sigma);
     let work = Work {
         survey,
         settings: *settings,
@@ -106,10 +107,27 @@ struct Solved {
     marginals: Vec<Marginal>,
     outcome: Outcome,
     iterations: [u64; 2],
+    held: Option<Held>,
 }
 
-fn settled(unsettled: Option<f64>) -> Outcome {
-    unsettled.map_or(Outcome::Converged, Outcome::Unsettled)
+impl Solved {
+    fn of<const W: usize>(
+        state: State,
+        phase: &Phase<W>,
+        iterations: [u64; 2],
+    ) -> Result<Solved, Failure> {
+        let known = phase.solver.as_ref().and_then(Solver::covariance);
+        let (covariance, marginals) = known.ok_or(Failure::NotFinite)?;
+        let unsettled = phase.unsettled(&marginals);
+        Ok(Solved {
+            outcome: unsettled.map_or(Outcome::Converged, Outcome::Unsettled),
+            state,
+            covariance,
+            marginals,
+            iterations,
+            held: None,
+        })
+    }
 }
 
 impl Work {
@@ -122,23 +140,21 @@ impl Work {
         samples: &mut S,
         still: Option<Vector3<f64>>,
     ) -> Result<Smoothed, S::Error> {
-        let rests = self
-            .segments
-            .iter()
-            .filter(|segment| segment.is_still)
-            .count();
-        let is_separate =
-            self.settings.heading_reference == HeadingReference::Standstill && rests > RESTS;
+        let stills = self.segments.iter().filter(|segment| segment.is_still);
+        let is_separate = self.settings.heading_reference == HeadingReference::Standstill
+            && stills.count() > RESTS;
         let priors = Priors::new(&self.settings, is_separate);
         let trust = FieldTrust::new(self.settings.heading_reference, self.spacing);
-        let problem = |bias: Vector3<f64>| Problem {
+        let known = self.settings.bias_sigmas();
+        let problem = |bias: Vector3<f64>, along: Option<Along>| Problem {
             survey: &self.survey,
             settings: &self.settings,
             segments: &self.segments,
             priors: &priors,
             trust: &trust,
-            bias,
-            bias_sigma: BIAS_SIGMA,
+            bias: self.settings.bias_beforehand(&bias),
+            bias_sigma: known,
+            along,
         };
         let mut filter = None;
         let mut starts = Vec::new();
@@ -157,25 +173,59 @@ impl Work {
                 }
             }
         }
-        let mut best: Option<(Problem<'_>, State, Phase<NARROW>)> = None;
+        let mut best: Option<(Problem<'_>, State, Phase<NARROW>, Option<Held>)> = None;
+        let rests = rests(&self.segments);
+        let mut main = None;
         for (bias, nodes) in starts {
-            let problem = problem(bias);
-            let mut state = self.state(nodes, bias, &trust);
+            let upright = Main::of(&self.segments, &nodes);
+            let held = upright
+                .as_ref()
+                .and_then(|main| main.by_rests(&rests, &known, self.settings.bias_sigma));
+            let along = held.map(|held| held.along());
+            let problem = problem(bias, along.or(upright.map(|main| main.free())));
+            let nodes: Vec<_> = nodes.into_iter().map(|q| (q, bias)).collect();
+            let mut state = self.state(nodes, &trust);
             let phase = run::<S, NARROW>(samples, &problem, &mut state, self.settings.iterations)?;
-            let is_better = best.as_ref().is_none_or(|(_, _, other)| {
+            let is_better = best.as_ref().is_none_or(|(_, _, other, _)| {
                 (phase.failure.is_none(), -phase.cost) > (other.failure.is_none(), -other.cost)
             });
             if is_better {
-                best = Some((problem, state, phase));
+                main = upright;
+                best = Some((problem, state, phase, held));
             }
         }
-        let Some((problem, state, phase)) = best else {
+        if let (Some(main), Some((problem, state, phase, held @ None))) = (main, &mut best)
+            && !matches!(phase.failure, Some(Failure::Strays(_)))
+        {
+            let solver = phase.solver.as_ref().filter(|_| phase.failure.is_none());
+            let covariance = solver.and_then(Solver::covariance);
+            let solved = covariance
+                .as_ref()
+                .map(|(_, left)| (&state.nodes[..], &left[..]));
+            let found = main.by_motion(&self.segments, solved, filter.as_ref(), &known);
+            let nodes = match (solved, &filter) {
+                (None, Some(filter)) => {
+                    let (_, bias) = found.along().put_in(&Matrix3::zeros(), &filter.bias);
+                    let headings = forward(samples, self.with(), &self.segments, &bias)?;
+                    let nodes = headed(&filter.nodes, &headings).into_iter();
+                    nodes.map(|q| (q, bias)).collect()
+                }
+                _ => found.begun(&self.segments, &state.nodes),
+            };
+            problem.along = Some(found.along());
+            *held = Some(found);
+            *state = self.state(nodes, &trust);
+            let iterations = phase.iterations;
+            *phase = run::<S, NARROW>(samples, problem, state, self.settings.iterations)?;
+            phase.iterations += iterations;
+        }
+        let Some((problem, state, phase, held)) = best else {
             return self.fallen_back(samples, filter, Failure::NotFinite, &priors);
         };
         if let Some(failure) = phase.failure {
             return self.fallen_back(samples, filter, failure, &priors);
         }
-        let solved = self.with_field(samples, &problem, state, phase)?;
+        let solved = self.with_field(samples, &problem, (state, held), phase)?;
         match solved {
             Ok(solved) => Ok(self.finish(solved, &priors)),
             Err(failure) => self.fallen_back(samples, filter, failure, &priors),
@@ -198,28 +248,29 @@ impl Work {
         }
     }
 
-    fn state(&self, attitudes: Vec<[f64; 4]>, bias: Vector3<f64>, trust: &FieldTrust) -> State {
-        let node = |q| Node {
+    fn state(&self, nodes: Vec<([f64; 4], Vector3<f64>)>, trust: &FieldTrust) -> State {
+        let node = |(q, bias)| Node {
             q,
             velocity: Vector3::zeros(),
             position: Vector3::zeros(),
             bias,
         };
         State {
-            bound: Bound::new(self.settings.motion, attitudes.len()),
-            nodes: attitudes.into_iter().map(node).collect(),
+            bound: Bound::new(self.settings.motion, nodes.len()),
+            nodes: nodes.into_iter().map(node).collect(),
             constants: [0.0; ALL],
             field_weights: trust.first(&self.segments),
             has_north: Vec::new(),
         }
     }
 
-    /// The phase with the field, where there is one; that without, where it leads nowhere.
+    /// The phase with the field, where there is one. Where it leads nowhere so do the attitudes without it: what is solved
+    /// without a north is turned by one wherever the gyro has brought it.
     fn with_field<S: Samples>(
         &self,
         samples: &mut S,
         problem: &Problem<'_>,
-        mut state: State,
+        (mut state, held): (State, Option<Held>),
         plain: Phase<NARROW>,
     ) -> Result<Result<Solved, Failure>, S::Error> {
         let mut iterations = [plain.iterations as u64, 0];
@@ -230,57 +281,22 @@ impl Work {
             &mut state.nodes,
             &mut state.constants,
         );
-        let before = state.clone();
-        let mut without_field = None;
-        if has_north.contains(&true) && self.settings.field_iterations > 0 {
-            drop(plain);
-            state.has_north = has_north.clone();
-            let phase =
-                run::<S, WIDE>(samples, problem, &mut state, self.settings.field_iterations)?;
-            iterations[1] = phase.iterations as u64;
-            let known = phase.solver.as_ref().and_then(Solver::covariance);
-            match (phase.failure, known) {
-                (None, Some((covariance, marginals))) => {
-                    let outcome = settled(phase.unsettled(&marginals));
-                    return Ok(Ok(Solved {
-                        state,
-                        covariance,
-                        marginals,
-                        outcome,
-                        iterations,
-                    }));
-                }
-                (failure, _) => {
-                    let failure = failure.unwrap_or(Failure::NotFinite);
-                    without_field = Some(Outcome::WithoutField(failure));
-                }
+        state.has_north = has_north;
+        if !state.has_north.contains(&true) || self.settings.field_iterations == 0 {
+            let mut solved = Solved::of(state, &plain, iterations);
+            if let (Ok(solved), Some(held)) = (&mut solved, held) {
+                held.widen(&self.segments, &mut solved.marginals);
+                solved.held = Some(held);
             }
-            drop(phase);
-            state = before;
-            let plain = run::<S, NARROW>(samples, problem, &mut state, 1)?;
-            state.has_north = has_north;
-            return Ok(self.plain(state, &plain, without_field, iterations));
+            return Ok(solved);
         }
-        Ok(self.plain(state, &plain, without_field, iterations))
-    }
-
-    fn plain(
-        &self,
-        state: State,
-        phase: &Phase<NARROW>,
-        outcome: Option<Outcome>,
-        iterations: [u64; 2],
-    ) -> Result<Solved, Failure> {
-        match phase.solver.as_ref().and_then(Solver::covariance) {
-            Some((covariance, marginals)) => Ok(Solved {
-                state,
-                covariance,
-                outcome: outcome.unwrap_or_else(|| settled(phase.unsettled(&marginals))),
-                marginals,
-                iterations,
-            }),
-            None => Err(Failure::NotFinite),
-        }
+        drop(plain);
+        let phase = run::<S, WIDE>(samples, problem, &mut state, self.settings.field_iterations)?;
+        iterations[1] = phase.iterations as u64;
+        Ok(match phase.failure {
+            Some(failure) => Err(failure),
+            None => Solved::of(state, &phase, iterations),
+        })
     }
 
     /// The real-time filter's attitudes; the forward pass's where even that has none.
@@ -304,7 +320,7 @@ impl Work {
                     covariances: vec![unknown; nodes.len()],
                     nodes,
                     bias: Vector3::zeros(),
-                    bias_sigma: Vector3::repeat(BIAS_SIGMA),
+                    bias_sigma: self.settings.bias_sigmas(),
                 }
             }
         };
@@ -315,7 +331,8 @@ impl Work {
             .map(|turn| Marginal { turn: *turn, bias })
             .collect();
         let trust = FieldTrust::new(self.settings.heading_reference, self.spacing);
-        let mut state = self.state(filter.nodes, filter.bias, &trust);
+        let nodes = filter.nodes.into_iter().map(|q| (q, filter.bias));
+        let mut state = self.state(nodes.collect(), &trust);
         let outcome = Outcome::Filter(failure);
         if self.survey.fields > 0 {
             let fields = self.fields(samples, &state.nodes)?;
@@ -334,6 +351,7 @@ impl Work {
             marginals,
             outcome,
             iterations: [0; 2],
+            held: None,
         };
         Ok(self.finish(solved, priors))
     }
@@ -362,6 +380,7 @@ impl Work {
             marginals,
             outcome,
             iterations,
+            held,
         } = solved;
         let stamp = |node: usize| {
             Nanos(
@@ -411,6 +430,7 @@ impl Work {
             sections,
             outcome,
             bound: state.bound.sigma,
+            held,
             counts,
         }
     }

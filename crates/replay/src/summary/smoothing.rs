@@ -5,7 +5,7 @@ use crate::finding::{Finding, Severity};
 use serde_json::{Value, json};
 use strapd_attitude::estimate::Recording;
 use strapd_attitude::setting::{NOISE, SAMPLE_KIND, SMOOTH};
-use strapd_attitude::smooth::{Bias, Calibration, Counts, Learned, Outcome, Sizes};
+use strapd_attitude::smooth::{Bias, Calibration, Counts, Held, Learned, Outcome, Sizes};
 
 /// A recording that was smoothed.
 #[derive(Clone, Debug)]
@@ -22,6 +22,8 @@ pub struct Smoothing {
     sections: usize,
     has_north: bool,
     bound: [f64; 2],
+    /// The bias that no motion told.
+    held: Option<Held>,
     is_taken_as_mean: bool,
     is_beyond_class: bool,
     spooled_bytes: u64,
@@ -109,6 +111,7 @@ impl Smoothing {
             sections: smoothed.sections().len(),
             has_north: smoothed.sections().iter().any(|section| section.has_north),
             bound: smoothed.bound(),
+            held: smoothed.held(),
             is_taken_as_mean: recording.is_taken_as_mean,
             is_beyond_class: recording.is_beyond_class,
             spooled_bytes: recording.spooled_bytes,
@@ -145,12 +148,9 @@ impl Smoothing {
     #[must_use]
     pub fn lines(&self) -> Vec<String> {
         let counts = &self.counts;
-        let mut did = match self.outcome {
-            Outcome::WithoutField(why) => format!(
-                "gravity, north by the mean field: with all of the field it did not converge ({why})"
-            ),
-            _ if self.has_north => "gravity and field, the whole recording at once".to_owned(),
-            _ => "gravity, the whole recording at once; heading of the first sample".to_owned(),
+        let mut did = match self.has_north {
+            true => "gravity and field, the whole recording at once".to_owned(),
+            false => "gravity, the whole recording at once; heading of the first sample".to_owned(),
         };
         did += &format!(
             ": at rest in {} of {} segments",
@@ -173,6 +173,17 @@ impl Smoothing {
             if n > 0 {
                 did += &format!(", {n} {what}");
             }
+        }
+        if let Some(held) = &self.held {
+            let [rate, sigma] = [held.rate, held.sigma].map(|v| significant(v.to_degrees(), 2));
+            did += &match held.is_by_rest {
+                true => format!(
+                    "; one axis stays vertical: the bias about it held at {rate} +- {sigma} deg/s, by rest"
+                ),
+                false => format!(
+                    "; one axis stays vertical and nothing rests: the bias is not observed about it, held at {rate} +- {sigma} deg/s"
+                ),
+            };
         }
         if self.spooled_bytes > 0 {
             let size = super::human_bytes(self.spooled_bytes);
@@ -324,16 +335,21 @@ impl Smoothing {
                 "prior": learned.prior.as_slice(), "observed": observed,
             })
         }
-        let (outcome, why) = match &self.outcome {
-            Outcome::WithoutField(why) => ("without_field", Some(why.to_string())),
-            Outcome::Unsettled(_) => ("unsettled", None),
-            _ => ("converged", None),
+        let outcome = match &self.outcome {
+            Outcome::Unsettled(_) => "unsettled",
+            _ => "converged",
         };
+        let held = self.held.map(|held| {
+            json!({
+                "axis": held.axis.as_slice(), "rate_deg_s": held.rate.to_degrees(),
+                "sigma_deg_s": held.sigma.to_degrees(), "by_rest": held.is_by_rest,
+            })
+        });
         let c = &self.calibration;
         let [force, field] = self.spreads();
         json!({
             "outcome": outcome,
-            "why": why,
+            "held_bias": held,
             "segments": self.counts.segments,
             "standstills": self.counts.standstills,
             "rejected": self.counts.rejected,
