@@ -1,6 +1,7 @@
 //! `--smooth`: a whole recording at once, through the command line.
 
 use crate::program::{strapd, strapd_fed};
+use crate::shared_data::shared;
 use std::path::Path;
 
 /// A sensor in a hand, at rest before and after, with errors of its class that the smoother is to find.
@@ -226,4 +227,26 @@ fn the_report_has_its_calibration() {
     let gravity = |when: &str| smooth["force_at_rest_m_s2"][when]["mean"].as_f64().unwrap();
     assert!((gravity("measured") - 9.81).abs() > 0.1, "{smooth}");
     assert!((gravity("calibrated") - 9.81).abs() < 0.02, "{smooth}");
+}
+
+/// A wheeled robot out of doors, 395 s, of which gravity does not show the bias about the vertical; the gyro alone is 45 degrees
+/// off at most. Against its own orientation.
+#[test]
+#[cfg_attr(not(has_shared), ignore = "needs ../shared")]
+fn a_wheeled_robot_is_not_turned_away() {
+    let Some(log) = shared("logs/real/husky_ros1_lz4.mcap") else {
+        return;
+    };
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let log = log.display();
+    let ran = strapd(dir, &format!("replay {log} --aid gravity --smooth -o husky.mcap --json"));
+    let smooth = ran.json()["topics"][0]["smooth"].clone();
+    assert!(smooth["held_bias"]["rate_deg_s"].is_number(), "{smooth}");
+    let ran = strapd(
+        dir,
+        &format!("compare husky.mcap {log} --align first-heading --json"),
+    );
+    let most = ran.json()["heading"]["max_deg"].as_f64().unwrap();
+    assert!(most <= 45.0, "{most}");
 }

@@ -326,3 +326,21 @@ fn half_a_second_is_enough_for_an_attitude() {
         assert!(seen.errors[2] < 2.0 && seen.inside > 0.97, "{seen:?}");
     }
 }
+
+#[test]
+fn a_field_that_leads_nowhere_leaves_the_filter() {
+    let mut log = super::logs::log(super::logs::Motion::Hand);
+    let mut noise = Noise(7);
+    let mut field = Vector3::zeros();
+    for (i, (sample, truth)) in log.samples.iter_mut().zip(&log.truth).enumerate() {
+        // Another direction every three seconds.
+        if i % 300 == 0 {
+            field = noise.vector(1.0).normalize() * 50.0;
+        }
+        let to_body = Q::assume_unit(*truth).to_dcm().as_matrix().transpose();
+        sample.field = Some(In::assume(to_body * field));
+    }
+    let (smoothed, _) = log.smoothed(&Settings::default());
+    let outcome = smoothed.outcome();
+    assert!(matches!(outcome, Outcome::Filter(_)), "{outcome:?}");
+}

@@ -54,6 +54,7 @@ fn place() -> Place {
         is_still: false,
         doubt: [0.0; 2],
         mean_rate: Vector3::zeros(),
+        mean_force: Vector3::zeros(),
         spread: [0.0; 2],
     };
     let mut place = Place {
