@@ -240,7 +240,10 @@ fn a_wheeled_robot_is_not_turned_away() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     let log = log.display();
-    let ran = strapd(dir, &format!("replay {log} --aid gravity --smooth -o husky.mcap --json"));
+    let ran = strapd(
+        dir,
+        &format!("replay {log} --aid gravity --smooth -o husky.mcap --json"),
+    );
     let smooth = ran.json()["topics"][0]["smooth"].clone();
     assert!(smooth["held_bias"]["rate_deg_s"].is_number(), "{smooth}");
     let ran = strapd(

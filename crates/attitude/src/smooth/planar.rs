@@ -146,7 +146,10 @@ impl Main {
     ) -> Held {
         let class = self.sigma(known);
         let by_leaning = match solved {
-            Some(solved) => self.by_leaning(segments, solved, class * class),
+            Some(solved) => {
+                self.anew(segments, solved.0)
+                    .by_leaning(segments, solved, class * class)
+            }
             None => self.held(0.0, f64::INFINITY, class * class, false),
         };
         let by_filter = filter.map(|filter| Held {
@@ -159,6 +162,12 @@ impl Main {
             held.sigma < by_leaning.sigma.min(RESTED) && held.rate.abs() < BEYOND_CLASS * class
         };
         by_filter.filter(is_known).unwrap_or(by_leaning)
+    }
+
+    /// By attitudes that are solved: those of the start lean by what is wrong with them.
+    fn anew(&self, segments: &[Segment], nodes: &[Node]) -> Main {
+        let attitudes: Vec<[f64; 4]> = nodes.iter().map(|node| node.q).collect();
+        Main::of(segments, &attitudes).unwrap_or(*self)
     }
 
     fn by_leaning(
@@ -179,7 +188,8 @@ impl Main {
         });
         let seen = own + BY_LEANING * BY_LEANING / self.rho;
         let rate = if secs > 0.0 { sum / secs } else { 0.0 };
-        if rate * rate > BEYOND_CLASS.powi(2) * (prior + seen) {
+        // Where the leaning shows it better than the class does.
+        if seen < prior && rate * rate > BEYOND_CLASS.powi(2) * (prior + seen) {
             prior = rate * rate - seen;
         }
         self.held(rate, seen, prior, false)
@@ -187,6 +197,11 @@ impl Main {
 }
 
 impl Held {
+    /// A bias with this along the axis.
+    pub(super) fn put_in(&self, bias: &Vector3<f64>) -> Vector3<f64> {
+        bias + self.axis * (self.rate - self.axis.dot(bias))
+    }
+
     /// What the first node's bias is held at.
     pub(super) fn along(&self) -> Along {
         Along {
@@ -208,7 +223,7 @@ impl Held {
             let off = self.rate - self.axis.dot(&node.bias);
             let turn = Vector3::z() * heading;
             let q = normalised(&turned_in_navigation(&turn, &node.q));
-            begun.push((q, node.bias + self.axis * off));
+            begun.push((q, self.put_in(&node.bias)));
             if let (Some(segment), Some(next)) = (segments.get(k), nodes.get(k + 1))
                 && !segment.is_break
             {

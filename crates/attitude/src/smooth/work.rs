@@ -205,7 +205,7 @@ impl Work {
             let found = main.by_motion(&self.segments, solved, filter.as_ref(), &known);
             let nodes = match (solved, &filter) {
                 (None, Some(filter)) => {
-                    let (_, bias) = found.along().put_in(&Matrix3::zeros(), &filter.bias);
+                    let bias = found.put_in(&filter.bias);
                     let headings = forward(samples, self.with(), &self.segments, &bias)?;
                     let nodes = headed(&filter.nodes, &headings).into_iter();
                     nodes.map(|q| (q, bias)).collect()

@@ -160,6 +160,11 @@ fn wanders(t: f64) -> f64 {
     0.5 * (0.83 * t).sin() + 0.4 * (0.31 * t + 1.0).sin() + 0.3 * (1.37 * t + 2.0).sin()
 }
 
+/// In rings.
+fn circles(t: f64) -> f64 {
+    0.25 + wanders(t)
+}
+
 /// From 0 to 1 between two times.
 fn ramp(t: f64, from: f64, to: f64) -> f64 {
     let x = ((t - from) / (to - from)).clamp(0.0, 1.0);
@@ -172,7 +177,7 @@ fn nothing_is_learned_of_a_bias_about_an_axis_that_stays_upright() {
         let body = Body {
             secs: 200.0,
             seed,
-            ..Body::new(wanders, |_| 1.0)
+            ..Body::new(circles, |_| 1.0)
         };
         let seen = body.smoothed();
         assert!(seen.off.abs() <= 0.1 && seen.stated >= 0.9, "{seen:?}");
@@ -196,7 +201,7 @@ fn what_leans_shows_its_bias() {
         secs: 200.0,
         lean: 0.2,
         bias: [0.1, 0.1, 0.3],
-        ..Body::new(wanders, |_| 1.0)
+        ..Body::new(circles, |_| 1.0)
     };
     let seen = body.smoothed();
     assert!(seen.stated < 0.5 && seen.off.abs() < 0.2, "{seen:?}");
@@ -311,7 +316,9 @@ fn an_accelerometers_bias_beyond_what_there_is_is_refused() {
         let force = sample.force.unwrap();
         sample.force = Some(In::assume(force.as_vector() + Vector3::new(0.9, 0.0, 0.0)));
     }
-    let (smoothed, _) = log.smoothed(&Settings::default());
+    let mut settings = Settings::default();
+    settings.looseness.force = 10.0;
+    let (smoothed, _) = log.smoothed(&settings);
     let outcome = smoothed.outcome();
     assert!(
         matches!(outcome, Outcome::Filter(Failure::ForceBias(_))),
