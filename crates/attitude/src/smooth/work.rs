@@ -197,25 +197,33 @@ impl Work {
         if let (Some(main), Some((problem, state, phase, held @ None))) = (main, &mut best)
             && !matches!(phase.failure, Some(Failure::Strays(_)))
         {
+            let mut iterations = phase.iterations;
+            let mut again = None;
+            if let (Some(_), Some(filter)) = (phase.failure, &filter) {
+                // The filter's heading may be any number of turns off: that of the gyro alone is not.
+                let found = main.by_motion(&self.segments, None, Some(filter), &known);
+                let bias = found.put_in(&filter.bias);
+                let headings = forward(samples, self.with(), &self.segments, &bias)?;
+                let nodes = headed(&filter.nodes, &headings).into_iter();
+                let nodes: Vec<_> = nodes.map(|q| (q, bias)).collect();
+                *state = self.state(nodes.clone(), &trust);
+                *phase = run::<S, NARROW>(samples, problem, state, self.settings.iterations)?;
+                iterations += phase.iterations;
+                again = Some(nodes);
+            }
             let solver = phase.solver.as_ref().filter(|_| phase.failure.is_none());
             let covariance = solver.and_then(Solver::covariance);
             let solved = covariance
                 .as_ref()
                 .map(|(_, left)| (&state.nodes[..], &left[..]));
             let found = main.by_motion(&self.segments, solved, filter.as_ref(), &known);
-            let nodes = match (solved, &filter) {
-                (None, Some(filter)) => {
-                    let bias = found.put_in(&filter.bias);
-                    let headings = forward(samples, self.with(), &self.segments, &bias)?;
-                    let nodes = headed(&filter.nodes, &headings).into_iter();
-                    nodes.map(|q| (q, bias)).collect()
-                }
+            let nodes = match (solved, again) {
+                (None, Some(nodes)) => nodes,
                 _ => found.begun(&self.segments, &state.nodes),
             };
             problem.along = Some(found.along());
             *held = Some(found);
             *state = self.state(nodes, &trust);
-            let iterations = phase.iterations;
             *phase = run::<S, NARROW>(samples, problem, state, self.settings.iterations)?;
             phase.iterations += iterations;
         }
