@@ -9,6 +9,7 @@
 //! attitude, rate, force, field -> sums over 0.1 s               interval
 //! sums -> covariance a step on                                  covariance
 //! force less gravity -> tilt, calibration                       gravity
+//! the vertical in the body -> what gravity can say of a bias    vertical
 //! rate at rest -> bias                                          rest
 //! heading of the field -> heading                               heading
 //! correction -> left of the attitude                            update
@@ -50,6 +51,7 @@ mod surroundings;
 #[cfg(test)]
 mod tests;
 mod update;
+mod vertical;
 
 pub use aided::{Aided, Start};
 pub(crate) use beside::Beside;

@@ -1,6 +1,6 @@
 //! Covariance of the error states: a step on, a scalar measurement, a restart. Pure.
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Error states: tilt x, y and heading (rad, earth axes), velocity x, y, position x, y, gyro bias, scale, cross,
 /// accelerometer bias, its lead, disturbance of the field's heading (nothing without a magnetometer).
@@ -36,6 +36,8 @@ const COLUMNS: [&[usize]; MOVING] = [
     &[TILT, VELOCITY + 1, 16, 17, 18, LEAD],
 ];
 const BY_GYRO: [usize; 9] = [7, 8, 9, 10, 11, 12, 13, 14, 15];
+/// States that a measurement may be kept from.
+const WITHHELD: [usize; 4] = [HEADING, BIAS, BIAS + 1, BIAS + 2];
 /// So many numbers of a row are summed up at once.
 const LANES: usize = 8;
 
@@ -198,6 +200,20 @@ impl Covariance {
         variance: f64,
         correction: &mut Correction,
     ) -> (f64, f64) {
+        let nothing = (&Vector3::zeros(), 0.0);
+        self.measure_withholding(h, innovation, variance, nothing, correction)
+    }
+
+    /// The same, but that of what it says of heading and of the bias along a unit vector (body axes) a share is taken
+    /// back, 0 none and 1 all: the partial update of Schmidt's filter. The covariance is at least that of the gain used.
+    pub(super) fn measure_withholding(
+        &mut self,
+        h: &[(usize, f64)],
+        innovation: f64,
+        variance: f64,
+        (along, share): (&Vector3<f64>, f64),
+        correction: &mut Correction,
+    ) -> (f64, f64) {
         let mut ph = [0.0; WIDTH];
         for (state, factor) in h {
             for (out, p) in ph.iter_mut().zip(&self.rows[*state]) {
@@ -217,6 +233,17 @@ impl Covariance {
             correction[state] += ph[state] * inverse * left;
             for (p, other) in self.rows[state].iter_mut().zip(&scaled) {
                 *p -= scaled[state] * other;
+            }
+        }
+        if share > 0.0 {
+            let bias = Vector3::new(scaled[BIAS], scaled[BIAS + 1], scaled[BIAS + 2]);
+            let back = along * along.dot(&bias);
+            let back = [scaled[HEADING], back.x, back.y, back.z];
+            for (a, one) in WITHHELD.into_iter().zip(back) {
+                correction[a] -= share * one * root * left;
+                for (b, other) in WITHHELD.into_iter().zip(back) {
+                    self.rows[a][b] += share * (one * other);
+                }
             }
         }
         (left, spread.sqrt())

@@ -9,6 +9,7 @@ use super::residuals::Residuals;
 use super::rest::Rest;
 use super::settings::Settings;
 use super::surroundings::Surroundings;
+use super::vertical::Vertical;
 use crate::frames::{Body, In, Nav};
 use crate::quaternion::Quaternion;
 use crate::record::Status;
@@ -112,6 +113,7 @@ pub struct Filter {
     pub(super) mean_acceleration: Vector3<f64>,
     /// The vertical in the interval before, body axes.
     pub(super) last_up: Option<Vector3<f64>>,
+    pub(super) vertical: Vertical,
     pub(super) surroundings: Surroundings,
     /// A gap has been too long for the tilt to be known.
     pub(super) wants_level: bool,
@@ -155,6 +157,7 @@ impl Filter {
             residuals: Residuals::new(&settings),
             mean_acceleration: Vector3::zeros(),
             last_up: None,
+            vertical: Vertical::default(),
             surroundings: Surroundings::default(),
             wants_level: false,
             nominal: 0.0,
@@ -277,6 +280,20 @@ impl Filter {
     /// What the rates that come now are to be corrected by.
     pub(crate) fn applied(&self) -> Applied {
         self.known
+    }
+
+    /// Whether nothing has told the gyro's bias about the vertical: the body has turned about its vertical axis only and
+    /// has not rested, so that its sigma is most of what it was at the start, and heading drifts by it.
+    #[must_use]
+    pub fn is_bias_unobserved(&self) -> bool {
+        let (main, withheld) = self.vertical.withheld();
+        let (now, first) = (self.calibration_covariance().0, &self.settings);
+        let prior = match &first.prior.bias {
+            Some(known) => main.dot(&(known * main)),
+            None => first.bias_prior.powi(2),
+        };
+        // Half of the prior's sigma.
+        withheld > 0.5 && main.dot(&(now * main)) > 0.25 * COLOURED * prior
     }
 
     /// Whether a magnetometer is to tell the heading.
@@ -504,6 +521,7 @@ impl Filter {
         self.wants_level |= self.covariance.variance(TILT) > self.settings.level_sigma.powi(2);
         self.restart_reference(1.0, 1.0);
         self.rest.interrupt();
+        self.vertical = Vertical::default();
     }
 
     pub(super) fn is_force(&self, force: &Vector3<f64>) -> bool {

@@ -83,9 +83,13 @@ impl Filter {
                 (VELOCITY + i, by_velocity),
                 (POSITION + i, by_position),
             ];
-            let (left, sigma) = self
-                .covariance
-                .measure(&h, -residual[i], variance, correction);
+            let (left, sigma) = self.covariance.measure_withholding(
+                &h,
+                -residual[i],
+                variance,
+                self.vertical.withheld(),
+                correction,
+            );
             let gravity = settings.gravity;
             self.innovation.gravity[i] = (left / gravity, sigma / gravity);
         }

@@ -12,6 +12,7 @@ use super::plausibility::Plausibility;
 use super::residuals::Residuals;
 use super::rest::Rest;
 use super::surroundings::Surroundings;
+use super::vertical::Vertical;
 use crate::propagate;
 use crate::quaternion::Quaternion;
 use crate::record::Nanos;
@@ -28,7 +29,7 @@ const LEAD: f64 = 1.0;
 pub(super) const LARGEST: f64 = 1e9;
 
 /// What an [`Aided`] knows at one moment; [`Aided::recall`] puts another there. Of a method without latency
-/// some 7 kB of text.
+/// some 8 kB of text, 4 more at rest.
 #[derive(Clone, PartialEq, Debug)]
 #[cfg_attr(
     feature = "serde",
@@ -49,6 +50,9 @@ pub struct Memory {
     residuals: Residuals,
     mean_acceleration: Vector3<f64>,
     last_up: Option<Vector3<f64>>,
+    /// Nothing has been seen in a file that was written before there was this.
+    #[cfg_attr(feature = "serde", serde(default))]
+    vertical: Vertical,
     surroundings: Surroundings,
     wants_level: bool,
     nominal: f64,
@@ -87,6 +91,7 @@ impl Aided {
             residuals: filter.residuals.clone(),
             mean_acceleration: filter.mean_acceleration,
             last_up: filter.last_up,
+            vertical: filter.vertical,
             surroundings: filter.surroundings.clone(),
             wants_level: filter.wants_level,
             nominal: filter.nominal,
@@ -130,6 +135,7 @@ impl Aided {
             residuals: memory.residuals,
             mean_acceleration: memory.mean_acceleration,
             last_up: memory.last_up,
+            vertical: memory.vertical,
             surroundings: memory.surroundings,
             wants_level: memory.wants_level,
             nominal: memory.nominal,
@@ -197,6 +203,7 @@ impl Memory {
             && self.plausibility.is_plausible()
             && self.given.len() <= MOST_GIVEN
             && self.rest.is_bounded()
+            && self.vertical.is_plausible()
             && beside.into_iter().all(Beside::is_bounded)
     }
 }
@@ -303,7 +310,8 @@ mod tests {
         } else {
             0
         };
-        let most = 8192 + iron + 700 * memory.given.len().saturating_sub(1);
+        // The last four hundred are those of the vertical, fourteen numbers.
+        let most = 8192 + 400 + iron + 700 * memory.given.len().saturating_sub(1);
         assert!(text.len() < most, "{} {}", text.len(), memory.given.len());
         serde_json::from_str(&text).unwrap()
     }
@@ -313,12 +321,29 @@ mod tests {
         memory.clone()
     }
 
+    #[cfg(feature = "serde")]
+    #[test]
+    fn a_memory_from_before_the_vertical_was_remembered_goes_on_with_nothing_seen() {
+        let mut whole = aided(Method::Auto);
+        let _ = fed(&mut whole, 0..500);
+        let (propagation, memory) = whole.memory().unwrap();
+        let mut text = serde_json::to_value(&memory).unwrap();
+        assert!(text.as_object_mut().unwrap().remove("vertical").is_some());
+        let rest = text["rest"].as_object_mut().unwrap();
+        assert!(rest.remove("is_certain").is_some());
+        let older: Memory = serde_json::from_value(text).unwrap();
+        assert_eq!(older.vertical, Vertical::default());
+        let mut other = aided(Method::Auto);
+        assert!(other.recall((&propagation, &older)));
+        assert_eq!(fed(&mut other, 500..600).len(), 100);
+    }
+
     #[test]
     fn what_no_filter_can_have_known_is_refused_and_changes_nothing() {
         let mut whole = aided(Method::Auto);
         let _ = fed(&mut whole, 0..500);
         let (propagation, good) = whole.memory().unwrap();
-        let spoil: [fn(&mut Memory); 8] = [
+        let spoil: [fn(&mut Memory); 9] = [
             |m| m.correction[0] = 2.0,
             |m| m.calibration.bias.x = 1e3,
             |m| m.covariance = Covariance::try_from(vec![-1.0; 231]).unwrap(),
@@ -327,6 +352,7 @@ mod tests {
             |m| m.calibration.hard_iron.y = f64::NAN,
             |m| m.velocity[1] = f64::NAN,
             |m| m.nominal = -1.0,
+            |m| m.vertical.take(&Vector3::z(), -50.0, 0.05),
             |m| m.forces = Some(Beside::default()),
         ];
         for (n, spoil) in spoil.into_iter().enumerate() {

@@ -1,14 +1,18 @@
-//! Rate and force -> whether the sensor is at rest. Pure.
+//! Rate and force -> whether the sensor is at rest, and what its gyro reads there. Pure.
 
 use super::memory::LARGEST;
 use super::settings::Settings;
 use nalgebra::Vector3;
 use std::collections::VecDeque;
 
-/// Intervals whose rest is not certain.
-const MOST_OPEN: usize = 64;
+/// Intervals of a quiet spell that are remembered.
+const MOST: usize = 50;
+/// Fewer of them do not tell how much they scatter.
+const FEW: usize = 8;
 /// Time constant of the means that deviations are from, s.
 const MEAN_SECS: f64 = 0.5;
+/// By how much the mean rate of a rest may change from its first half to its second, beside three sigmas, rad/s.
+const DRIFT: f64 = 0.002;
 
 /// Whether rate and force have been quiet for long enough.
 #[derive(Clone, PartialEq, Debug)]
@@ -18,8 +22,20 @@ pub(super) struct Rest {
     force: Vector3<f64>,
     /// How long all has been quiet, s.
     quiet: f64,
-    /// Mean rates (rad/s) and lengths (s) of the last intervals at rest, whose end is not known yet.
+    /// Mean rates (rad/s) and lengths (s) of the last intervals since all became quiet.
     open: VecDeque<(Vector3<f64>, f64)>,
+    /// Whether an interval of this spell has been taken for rest.
+    #[cfg_attr(feature = "serde", serde(default))]
+    is_certain: bool,
+}
+
+/// What the gyro reads of a rest.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(super) struct RestRate {
+    /// Mean rate, rad/s, body axes.
+    pub(super) mean: Vector3<f64>,
+    /// Its variance.
+    pub(super) variance: Vector3<f64>,
 }
 
 impl Rest {
@@ -29,6 +45,7 @@ impl Rest {
             force,
             quiet: 0.0,
             open: VecDeque::new(),
+            is_certain: false,
         }
     }
 
@@ -64,32 +81,101 @@ impl Rest {
     /// A pause: what was before it says nothing.
     pub(super) fn interrupt(&mut self) {
         self.quiet = 0.0;
-        self.open.clear();
+        self.forget();
     }
 
-    /// The mean rate over an interval at rest, and of the intervals before it that over which rest is certain by
-    /// now, with its length: the body has rested on for long enough since.
-    pub(super) fn certain(
+    fn forget(&mut self) {
+        self.open.clear();
+        self.is_certain = false;
+    }
+
+    /// Takes the mean rate over an interval. Returns what the gyro reads at rest, once the body has rested on for long
+    /// enough since: the mean of the whole spell the first time, then of one interval each.
+    pub(super) fn take_interval(
         &mut self,
         mean: Vector3<f64>,
         secs: f64,
+        is_at_rest: bool,
         settings: &Settings,
-    ) -> Option<(Vector3<f64>, f64)> {
+    ) -> Option<RestRate> {
+        if self.quiet < secs {
+            self.forget();
+            return None;
+        }
+        if self.open.len() >= MOST {
+            self.open.pop_front();
+        }
         self.open.push_back((mean, secs));
-        let waiting: f64 = self.open.iter().map(|(_, secs)| secs).sum();
-        (waiting > settings.rest_lag).then(|| self.open.pop_front())?
+        if !is_at_rest {
+            return None;
+        }
+        if !settings.rest_by_spell {
+            return Some(RestRate {
+                mean,
+                variance: Vector3::repeat(settings.rest_noise.powi(2) / secs),
+            });
+        }
+        // A motion that sets in slowly is quiet at first: the last of it is left open.
+        let mut open = 0.0;
+        let late = self.open.iter().rev().take_while(|(_, secs)| {
+            let is_open = open + 0.5 * secs < settings.rest_lag;
+            open += secs;
+            is_open
+        });
+        let certain = self.open.len() - late.count();
+        if certain < FEW {
+            return None;
+        }
+        let known = || self.open.iter().take(certain);
+        let count = certain as f64;
+        let whole = known().map(|(mean, _)| mean).sum::<Vector3<f64>>() / count;
+        let scatter = known()
+            .map(|(mean, _)| (mean - whole).map(|d| d * d))
+            .sum::<Vector3<f64>>()
+            / (count - 1.0);
+        if self.changes(&scatter) {
+            return None;
+        }
+        let one = scatter.map(|of| of.max(settings.rest_noise.powi(2) / secs));
+        if self.is_certain {
+            let (mean, _) = self.open.get(certain - 1)?;
+            return Some(RestRate {
+                mean: *mean,
+                variance: one,
+            });
+        }
+        self.is_certain = true;
+        Some(RestRate {
+            mean: whole,
+            variance: one / count,
+        })
     }
 
-    /// It moves: what was quiet just before may have been the beginning of it.
-    pub(super) fn moves(&mut self) {
-        self.open.clear();
+    /// Whether the rate changes from one half of the spell to the other, or scatters more than neighbours do: a slow turn
+    /// that sets in or ends, a swell, and no bias. Neighbours tell the noise, which a slow change is not in.
+    fn changes(&self, scatter: &Vector3<f64>) -> bool {
+        let half = self.open.len() / 2;
+        let sum = |from: usize| {
+            let part = self.open.iter().skip(from).take(half);
+            part.map(|(mean, _)| mean).sum::<Vector3<f64>>() / half as f64
+        };
+        let change = sum(0) - sum(self.open.len() - half);
+        let neighbours = self.open.iter().zip(self.open.iter().skip(1));
+        let squares = neighbours
+            .map(|((a, _), (b, _))| (b - a).map(|d| d * d))
+            .sum::<Vector3<f64>>();
+        let noise = squares / (2.0 * (self.open.len() - 1) as f64);
+        (0..3).any(|i| {
+            let sigma = (noise[i] * 2.0 / half as f64).sqrt();
+            change[i].abs() > DRIFT + 3.0 * sigma || scatter[i] > DRIFT * DRIFT + 9.0 * noise[i]
+        })
     }
 
     /// Whether it can have come about.
     pub(super) fn is_bounded(&self) -> bool {
         let is_small = |v: &Vector3<f64>| v.amax() <= LARGEST;
         let is_time = |secs: f64| (0.0..=LARGEST).contains(&secs);
-        self.open.len() <= MOST_OPEN
+        self.open.len() <= MOST
             && is_small(&self.rate)
             && is_small(&self.force)
             && is_time(self.quiet)

@@ -7,6 +7,7 @@ use super::interval::Interval;
 use super::residuals::Residuals;
 use super::rest::Rest;
 use super::surroundings::Surroundings;
+use super::vertical::Vertical;
 use crate::condition::stillness::level;
 use crate::frames::{Body, Dcm, In, Nav};
 use crate::quaternion::{Quaternion, RotationVector};
@@ -135,5 +136,6 @@ impl Filter {
         (self.calibration, self.covariance) = settings.prior.begin(&settings);
         self.known = Applied::of(&self.calibration);
         self.is_widened = false;
+        self.vertical = Vertical::default();
     }
 }

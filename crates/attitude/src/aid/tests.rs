@@ -2,4 +2,5 @@
 
 mod golden;
 mod iron;
+mod planar;
 mod probes;

@@ -18,7 +18,6 @@ impl Filter {
     /// Corrects by what has been added up.
     pub(super) fn update(&mut self) {
         let settings = self.settings;
-        let secs = self.interval.secs;
         if self.report.updates == 0 && settings.prior.lead_sigma.is_none() {
             self.covariance
                 .add(LEAD, (settings.lead_share * self.nominal).powi(2));
@@ -32,24 +31,7 @@ impl Filter {
         if let Some(force) = force.filter(|_| !is_levelled && !self.wants_level) {
             self.use_gravity(&force, &mut correction);
         }
-        if self.rests() {
-            // What the gyro reads of a world that turns is no bias.
-            let of_world = self.interval.attitude.transpose() * self.world_rate;
-            let mean = (self.interval.rate - of_world) / secs;
-            if let Some((mean, secs)) = self.rest.certain(mean, secs, &settings) {
-                for axis in 0..3 {
-                    let innovation = mean[axis] - self.calibration.bias[axis];
-                    self.covariance.measure(
-                        &[(BIAS + axis, 1.0)],
-                        innovation,
-                        settings.rest_noise.powi(2) / secs,
-                        &mut correction,
-                    );
-                }
-            }
-        } else {
-            self.rest.moves();
-        }
+        self.use_rest(&mut correction);
         if self.interval.fields > 0.0 {
             self.use_field(&mut correction);
         }
@@ -61,6 +43,28 @@ impl Filter {
             self.report.failures += 1;
             self.forget_calibration();
             self.reset();
+        }
+    }
+
+    /// The measurement of the gyro's bias, where the body rests.
+    fn use_rest(&mut self, correction: &mut Correction) {
+        let secs = self.interval.secs;
+        // What the gyro reads of a world that turns is no bias.
+        let of_world = self.interval.attitude.transpose() * self.world_rate;
+        let mean = (self.interval.rate - of_world) / secs;
+        let is_at_rest = self.rests();
+        let rest = &mut self.rest;
+        let Some(rate) = rest.take_interval(mean, secs, is_at_rest, &self.settings) else {
+            return;
+        };
+        for axis in 0..3 {
+            let innovation = rate.mean[axis] - self.calibration.bias[axis];
+            self.covariance.measure(
+                &[(BIAS + axis, 1.0)],
+                innovation,
+                rate.variance[axis],
+                correction,
+            );
         }
     }
 
@@ -119,6 +123,7 @@ impl Filter {
         let up = self.interval.attitude.row(2).transpose() / secs;
         let tilted = self.last_up.map_or(0.0, |last| (up - last).norm_squared());
         self.last_up = Some(up);
+        self.vertical.take(&up, secs, settings.lean_believed);
         let bias = settings.bias_walk.powi(2) * secs + settings.bias_by_tilt.powi(2) * tilted;
         for axis in 0..3 {
             self.covariance.add(BIAS + axis, bias);

@@ -23,6 +23,8 @@ pub(super) fn plain() -> Settings {
         force_instant: 0.4,
         rest_lag: 0.0,
         bias_by_tilt: 0.0,
+        rest_by_spell: false,
+        lean_believed: 0.0,
         ..Settings::default()
     }
 }
@@ -242,6 +244,8 @@ fn the_golden_case_with_coloured_residuals_comes_out_to_all_its_digits() {
             force_instant: 0.4,
             rest_lag: 0.0,
             bias_by_tilt: 0.0,
+            rest_by_spell: false,
+            lean_believed: 0.0,
             ..Settings::default()
         };
         let worst = compare("golden_colour.txt", which, settings, [0, 1, 2, 3]);

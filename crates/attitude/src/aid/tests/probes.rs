@@ -342,6 +342,7 @@ fn a_motion_that_sets_in_slowly_is_no_bias() {
     assert!(lagging < 2e-5, "{lagging}");
     let at_once = bias_after_a_slow_start(Settings {
         rest_lag: 0.0,
+        rest_by_spell: false,
         ..Settings::default()
     });
     assert!(at_once > 1e-3, "{at_once}");
