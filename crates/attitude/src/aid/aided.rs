@@ -19,6 +19,9 @@ const TILT_RESUMED: f64 = 0.02;
 pub enum Start {
     /// Nothing: it is levelled by the first specific force.
     Level,
+    /// Nothing but the mean specific force at the first sample (m/s^2), by which it is levelled: a single one may be of
+    /// a body that shakes. After a reset it is levelled by the first that comes.
+    LevelBy(In<Body>),
     /// That of the propagator's settings.
     Known {
         /// Standard deviation of its tilt, rad.
@@ -350,13 +353,21 @@ impl Aided {
                 }
                 None => {
                     self.filter.reset();
-                    self.begins = self.start;
+                    self.begins = match self.start {
+                        Start::LevelBy(_) => Start::Level,
+                        start => start,
+                    };
                 }
             }
         }
         if !self.filter.is_started() {
             match self.start_at(propagated) {
                 Start::Level => self.filter.begin(measured, attitude),
+                Start::LevelBy(force) => {
+                    let force = Some(*force.as_vector());
+                    self.filter
+                        .begin(&Measured { force, ..*measured }, attitude);
+                }
                 Start::Known { tilt, heading } => {
                     self.filter.begin_known(measured, tilt, heading);
                 }

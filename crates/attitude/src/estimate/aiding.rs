@@ -8,7 +8,7 @@ use super::plan::{Aid, BIAS_LEFT, Bias, Initial, Noise, Plan};
 use crate::aid::{self, Settings, Start};
 use crate::diagnostic::Diagnostic;
 use crate::digits::significant;
-use crate::frames::{Body, Nav};
+use crate::frames::{Body, In, Nav};
 use crate::quaternion::Quaternion;
 use crate::record::{Nanos, RawSample};
 use crate::setting::{ACCEL_TOPIC, AID, FIELD, SMOOTH};
@@ -24,6 +24,9 @@ const WITHOUT_GRAVITY: f64 = 0.5;
 /// Of an initial attitude that was given, or found at rest, rad.
 const TILT_GIVEN: f64 = 0.3;
 const TILT_AT_REST: f64 = 0.05;
+/// Over how long the mean force that levels is taken, and the least that tells one, s.
+const LEVELLED_SECS: f64 = 0.5;
+const LEAST_SECS: f64 = 0.2;
 /// Of a heading that was given where a field tells it too, rad.
 const HEADING_GIVEN: f64 = 0.5;
 
@@ -127,6 +130,20 @@ impl Aiding {
                 format!("{FIELD} accel=PATH or {ACCEL_TOPIC} NAME names another, {without}"),
             )),
         }
+    }
+
+    /// The same levelled by the mean force of the first half second instead of that of one sample, where it begins level
+    /// and these samples are known before the first attitude is wanted.
+    pub(super) fn levelled_by_mean(mut self, resolved: &Meaning, first: &[RawSample]) -> Aiding {
+        let is_level = self.start == Start::Level && self.forces == Forces::WithRates;
+        if is_level && let Some((sum, secs)) = force_at_first(resolved, first, LEVELLED_SECS) {
+            let mean = sum * (self.force_scale / secs);
+            // One that is no gravity levels no better than one sample.
+            if (0.5..1.5).contains(&(mean.norm() / STANDARD_GRAVITY)) {
+                self.start = Start::LevelBy(In::assume(mean));
+            }
+        }
+        self
     }
 
     fn by_force(
@@ -297,9 +314,20 @@ pub(super) fn force_scale(resolved: &Meaning, length: f64) -> f64 {
     }
 }
 
-/// Length of the mean specific force in a frame that does not turn, and over how many seconds: gravity and what
-/// the velocity changed by, however the body shakes. By sums, which over a second is good enough.
+/// Length of the mean specific force in a frame that does not turn, and over how many seconds.
 fn not_turning(resolved: &Meaning, first: &[RawSample]) -> Option<(f64, f64)> {
+    let (sum, secs) = force_at_first(resolved, first, f64::INFINITY)?;
+    Some((sum.norm() / secs, secs))
+}
+
+/// Integral of the specific force over at most `longest` seconds in the body axes of the first sample, and over how many
+/// seconds: gravity and what the velocity changed by, however the body shakes and turns. By sums, which over a second is
+/// good enough.
+fn force_at_first(
+    resolved: &Meaning,
+    first: &[RawSample],
+    longest: f64,
+) -> Option<(Vector3<f64>, f64)> {
     let mut attitude: Quaternion<Nav, Body> = Quaternion::identity();
     let (mut sum, mut secs) = (Vector3::zeros(), 0.0);
     let mut last: Option<Nanos> = None;
@@ -313,6 +341,9 @@ fn not_turning(resolved: &Meaning, first: &[RawSample]) -> Option<(f64, f64)> {
         if !(0.0..1.0).contains(&step) {
             return None;
         }
+        if secs + step > longest {
+            break;
+        }
         let turn = resolved.turned(gyro, step);
         let force = resolved.force(force);
         let mut numbers = turn.0.iter().chain(force.as_vector().iter());
@@ -323,20 +354,69 @@ fn not_turning(resolved: &Meaning, first: &[RawSample]) -> Option<(f64, f64)> {
         sum += (attitude.to_dcm() * force).as_vector() * step;
         secs += step;
     }
-    (secs > 0.2).then(|| (sum.norm() / secs, secs))
+    (secs > LEAST_SECS).then_some((sum, secs))
 }
 
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::estimate::NOISE_PRESETS;
+    use crate::estimate::{Estimator, NOISE_PRESETS, Patience, Preparation};
+    use crate::propagate::Sequential;
+    use crate::record::Declared;
 
     fn told(name: &str) -> Settings {
         let class = NOISE_PRESETS.iter().find(|class| class.name == name);
         let mut settings = Settings::default();
         of_class(&mut settings, &Noise::preset(class.unwrap()));
         settings
+    }
+
+    /// Tilt of the first attitude of a body that turns about y and is shaken by `shaken` m/s^2, degrees off the truth.
+    fn first_tilt_error(rate: f64, shaken: f64) -> f64 {
+        let samples: Vec<RawSample> = (0..300)
+            .map(|k| {
+                let t = f64::from(k) * 0.01;
+                let (sin, cos) = (rate * t).sin_cos();
+                // Eleven shakes a second, the first sample at the crest of one.
+                let shake = shaken * (2.0 * std::f64::consts::PI * 11.0 * t).cos();
+                let force = Vector3::new(-STANDARD_GRAVITY * sin, shake, STANDARD_GRAVITY * cos);
+                RawSample {
+                    header: Some(Nanos(i64::from(k) * 10_000_000)),
+                    gyro: Some([0.0, rate, 0.0]),
+                    accel: Some(force.into()),
+                    ..RawSample::default()
+                }
+            })
+            .collect();
+        let plan = Plan {
+            aid: Aid::Gravity,
+            ..Plan::default()
+        };
+        let meaning = Meaning::new(&plan, &Declared::default());
+        let mut preparation = Preparation::new(&plan, &meaning, Patience::WholeLog);
+        for sample in &samples {
+            preparation.take(sample).unwrap();
+        }
+        let prepared = preparation.decide().unwrap();
+        let mut estimator = Estimator::new(&plan, &meaning, &prepared).unwrap();
+        for sample in &samples {
+            estimator.take(sample);
+        }
+        let out = estimator.finish(&Sequential);
+        let up = out[0].q_nb.to_dcm().as_matrix().transpose() * Vector3::z();
+        up.angle(&Vector3::z()).to_degrees()
+    }
+
+    #[test]
+    fn a_shaken_first_sample_does_not_level_a_file() {
+        assert!(first_tilt_error(0.0, 0.0) < 1e-6);
+        // By the first sample alone: 45 degrees.
+        let shaken = first_tilt_error(0.0, 9.8);
+        assert!(shaken < 5.0, "{shaken}");
+        // Half a second at 90 deg/s is turned back: the mean of the readings would be 22 degrees off.
+        let turning = first_tilt_error(1.57, 0.0);
+        assert!(turning < 1.0, "{turning}");
     }
 
     #[test]

@@ -182,7 +182,7 @@ impl Estimator {
                 };
                 if plan.smooth {
                     let heading = match aiding.start {
-                        aid::Start::Level => None,
+                        aid::Start::Level | aid::Start::LevelBy(_) => None,
                         aid::Start::Known { .. } => Some(prepared.initial.yaw_pitch_roll().yaw),
                     };
                     let usual = aid::Settings::default();

@@ -211,6 +211,18 @@ impl Preparation {
             ..plan
         };
         let aiding = Aiding::decide(&plan, &resolved, looked_at, &mut warnings)?;
+        // A run that begins later, and a method that waits for nothing, has the first sample alone.
+        let is_read_ahead = !matches!(
+            plan.method,
+            Method::Live { .. } | Method::CommitProvisional { .. }
+        );
+        let aiding = aiding.map(|aiding| {
+            if is_read_ahead && plan.start.is_none() {
+                aiding.levelled_by_mean(&resolved, &first)
+            } else {
+                aiding
+            }
+        });
         let (initial, initial_origin, world) = decide_initial(
             (&plan, aiding.as_ref()),
             &resolved,
