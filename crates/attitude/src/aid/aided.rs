@@ -19,7 +19,7 @@ const TILT_RESUMED: f64 = 0.02;
 pub enum Start {
     /// Nothing: it is levelled by the first specific force.
     Level,
-    /// Nothing but the mean specific force at the first sample (m/s^2), by which it is levelled: a single one may be of
+    /// The mean specific force at the first sample (m/s^2), by which it is levelled: a single one may be of
     /// a body that shakes. After a reset it is levelled by the first that comes.
     LevelBy(In<Body>),
     /// That of the propagator's settings.

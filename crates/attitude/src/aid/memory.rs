@@ -50,7 +50,7 @@ pub struct Memory {
     residuals: Residuals,
     mean_acceleration: Vector3<f64>,
     last_up: Option<Vector3<f64>>,
-    /// Nothing has been seen in a file that was written before there was this.
+    /// The vertical; as if nothing had been seen in a file that is older than this field.
     #[cfg_attr(feature = "serde", serde(default))]
     vertical: Vertical,
     surroundings: Surroundings,

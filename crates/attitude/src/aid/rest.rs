@@ -7,11 +7,11 @@ use std::collections::VecDeque;
 
 /// Intervals of a quiet spell that are remembered.
 const MOST: usize = 50;
-/// Fewer of them do not tell how much they scatter.
+/// Least intervals that tell how much they scatter.
 const FEW: usize = 8;
 /// Time constant of the means that deviations are from, s.
 const MEAN_SECS: f64 = 0.5;
-/// By how much the mean rate of a rest may change from its first half to its second, beside three sigmas, rad/s.
+/// Largest change of the mean rate of a rest from its first half to its second, beside three sigmas, rad/s.
 const DRIFT: f64 = 0.002;
 
 /// Whether rate and force have been quiet for long enough.
@@ -29,12 +29,12 @@ pub(super) struct Rest {
     is_certain: bool,
 }
 
-/// What the gyro reads of a rest.
+/// The gyro's reading of a rest.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct RestRate {
     /// Mean rate, rad/s, body axes.
     pub(super) mean: Vector3<f64>,
-    /// Its variance.
+    /// Variance of the mean, (rad/s)^2.
     pub(super) variance: Vector3<f64>,
 }
 

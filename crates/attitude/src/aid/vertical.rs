@@ -11,13 +11,13 @@ const MEMORY_SECS: f64 = 20.0;
 /// Steps of the power iteration an update: the mean moves little in a tenth of a second.
 const STEPS: usize = 4;
 
-/// What has been seen of the vertical. Body axes.
+/// The vertical as it was seen. Body axes.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Vertical {
     /// Mean of `u u^T`, `u` the unit vector upwards.
     mean: Matrix3<f64>,
-    /// Its largest eigenvector.
+    /// Largest eigenvector of the mean.
     main: Vector3<f64>,
     /// Time it has been seen for, s; no more than what is remembered.
     secs: f64,
@@ -26,7 +26,7 @@ pub(super) struct Vertical {
 }
 
 impl Default for Vertical {
-    /// Nothing seen, and nothing withheld.
+    /// The vertical of a body of which nothing has been seen; nothing is withheld.
     fn default() -> Vertical {
         Vertical {
             mean: Matrix3::zeros(),

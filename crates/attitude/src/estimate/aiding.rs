@@ -24,7 +24,7 @@ const WITHOUT_GRAVITY: f64 = 0.5;
 /// Of an initial attitude that was given, or found at rest, rad.
 const TILT_GIVEN: f64 = 0.3;
 const TILT_AT_REST: f64 = 0.05;
-/// Over how long the mean force that levels is taken, and the least that tells one, s.
+/// Time over which the mean force that levels is taken, and the least that tells one, s.
 const LEVELLED_SECS: f64 = 0.5;
 const LEAST_SECS: f64 = 0.2;
 /// Of a heading that was given where a field tells it too, rad.

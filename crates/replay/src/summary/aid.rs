@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use serde_json::{Value, json};
 use strapd_attitude::aid::{Calibration, Filter, Report};
 use strapd_attitude::record::Nanos;
-use strapd_attitude::setting::{AID, NOISE};
+use strapd_attitude::setting::{AID, BIAS, NOISE};
 
 /// The filter at the end of a run.
 #[derive(Clone, Copy, Debug)]
@@ -15,6 +15,7 @@ pub struct Aided {
     has_field: bool,
     is_implausible: bool,
     is_beyond_class: bool,
+    is_bias_unobserved: bool,
     report: Report,
     calibration: Calibration,
     sigma: Calibration,
@@ -41,6 +42,7 @@ impl Aided {
             has_field: filter.has_field(),
             is_implausible: filter.is_force_implausible(),
             is_beyond_class: filter.is_beyond_class(),
+            is_bias_unobserved: filter.is_bias_unobserved(),
             report: filter.report(),
             calibration: *filter.calibration(),
             sigma: filter.calibration_sigma(),
@@ -114,6 +116,11 @@ impl Aided {
                 significant(self.calibration.lead * 1e3, 2)
             ),
         ];
+        if self.is_bias_unobserved {
+            lines.push(format!(
+                "the bias is not observed: the body turns about its vertical axis only and does not rest, so its heading drifts as the gyro's ({BIAS} x,y,z gives the bias)"
+            ));
+        }
         if self.has_iron() {
             lines.push(format!(
                 "hard iron {} +- {}, in the unit of the field",
@@ -244,6 +251,7 @@ impl Aided {
             "by": if self.has_field { "gravity+mag" } else { "gravity" },
             "force_implausible": self.is_implausible,
             "beyond_class": self.is_beyond_class,
+            "bias_unobserved": self.is_bias_unobserved,
             "fields": self.report.fields,
             "fields_doubted": self.report.fields_rejected,
             "fields_unpaired": self.report.fields_unpaired,

@@ -114,6 +114,7 @@ fn an_upright_body_says_nothing_of_the_bias_about_the_vertical() {
         let (error, sigma) = about_z(&aided, bias);
         assert!(sigma >= 0.8 * prior, "{seed}: {error} +- {sigma}");
         assert!(error.abs() <= 3.0 * sigma, "{seed}: {error} +- {sigma}");
+        assert!(aided.filter().is_bias_unobserved());
         // Not moved from where it was by more than a tenth: what is not seen stays.
         assert!((error + about).abs() < 0.12, "{seed}: {error} +- {sigma}");
     }
@@ -128,6 +129,7 @@ fn a_body_that_leans_tells_the_bias_about_its_vertical() {
         let (error, sigma) = about_z(&aided, bias);
         // A third of what it is without: 0.27 and 0.31 were found.
         assert!(sigma < prior / 3.0, "{seed}: {error} +- {sigma}");
+        assert!(!aided.filter().is_bias_unobserved());
         assert!(error.abs() <= 3.0 * sigma, "{seed}: {error} +- {sigma}");
     }
 }
@@ -146,6 +148,7 @@ fn a_short_rest_tells_the_bias_as_well_as_it_was_measured() {
         let aided = fed(2.6, bias, 5.2e-4, seed, &rest);
         let (error, sigma) = about_z(&aided, bias);
         assert!(sigma < 0.06, "{sigma}");
+        assert!(!aided.filter().is_bias_unobserved());
         assert!(error.abs() < 4.5 * sigma, "{seed}: {error} +- {sigma}");
         within += u32::from(error.abs() <= 2.0 * sigma);
     }
