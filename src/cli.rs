@@ -37,6 +37,12 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::io::{IsTerminal, Write};
 use std::process::ExitCode;
 
+/// Help of an argument that takes recordings: the subject, the formats that are read, what else it takes.
+fn recordings(subject: &str, besides: &str) -> String {
+    let formats = strapd_recording::format::Format::names();
+    format!("{subject}: {formats}{besides}; - is standard input")
+}
+
 /// Gyro samples in, attitude you can trust out.
 #[derive(Parser, Debug)]
 #[command(

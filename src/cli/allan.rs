@@ -35,8 +35,7 @@ use strapd_recording::pool::Pool;
 Record for at least nine times the longest time that matters, the sensor fixed and warm.
 At most 8 million angles are held (200 MB); a longer record is thinned, which is said.")]
 pub struct Allan {
-    /// A recording: MCAP, NDJSON or CSV; - is standard input
-    #[arg(value_name = "FILE")]
+    #[arg(value_name = "FILE", help = super::recordings("Recording", ""))]
     pub file: PathBuf,
     /// IMU topic; needed only when a log has several
     #[arg(long, value_name = "NAME")]

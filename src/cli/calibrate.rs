@@ -34,8 +34,7 @@ use strapd_recording::pool::Pool;
 
 What it could not tell is listed with the motion that would show it.")]
 pub struct Calibrate {
-    /// Recordings of one sensor: MCAP, ULog, a bag of ROS 1 or 2, NDJSON or a table
-    #[arg(required = true, value_name = "LOG")]
+    #[arg(required = true, value_name = "LOG", help = super::recordings("Recordings of one sensor", ", or folders of one"))]
     pub logs: Vec<String>,
     /// The calibration, for --calibration
     #[arg(short, long, value_name = "FILE.toml")]

@@ -32,8 +32,10 @@ use strapd_recording::recording::topic_reading::TopicReading;
   strapd cat ws://127.0.0.1:8765 --id imu0 --rate-hz 10 -x 60 --format csv
   strapd cat udp-listen://127.0.0.1:9870                   attitudes that somebody sends here")]
 pub struct Cat {
-    /// A recording (MCAP, NDJSON or CSV; - is standard input); or a daemon: tcp://HOST:PORT, ws://HOST:PORT, unix:///PATH, udp-listen://HOST:PORT
-    #[arg(value_name = "SOURCE")]
+    #[arg(value_name = "SOURCE", help = super::recordings(
+        "Recording",
+        "; or a daemon: tcp://HOST:PORT, ws://HOST:PORT, unix:///PATH, udp-listen://HOST:PORT",
+    ))]
     pub source: PathBuf,
     /// Topic; the IMU topic by default
     #[arg(long, value_name = "NAME")]

@@ -28,8 +28,7 @@ use strapd_replay::inspection::Checked;
 It judges the attitude that replay makes with the same flags, and marks what a flag deals with.
 Exit codes: 0 nothing found; 3 errors or warnings found. Notes alone are no finding, nor is what a flag deals with.")]
 pub struct Check {
-    /// Recordings: MCAP, ULog, bags of ROS 1 and 2, videos of a GoPro, NDJSON, tables, or folders of one; - is standard input
-    #[arg(value_name = "FILE", required = true)]
+    #[arg(value_name = "FILE", required = true, help = super::recordings("Recordings", ", or folders of one"))]
     pub files: Vec<PathBuf>,
     #[command(flatten)]
     #[allow(missing_docs)]

@@ -35,8 +35,7 @@ use strapd_recording::pool::Pool;
 
 Exit code 4 when --max-angle is exceeded.")]
 pub struct Compare {
-    /// The attitude under test: MCAP, NDJSON or CSV; - is standard input
-    #[arg(value_name = "EST")]
+    #[arg(value_name = "EST", help = super::recordings("The attitude under test", ""))]
     pub estimate: PathBuf,
     /// The attitude it is held against: the same
     #[arg(value_name = "REF")]

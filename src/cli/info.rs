@@ -24,8 +24,7 @@ use strapd_replay::info::Overview;
   strapd info *.mcap                               (one behind the other)
   strapd info flight.mcap --json | jq '.imu[0].rate_hz'")]
 pub struct Info {
-    /// Recordings: MCAP, ULog, bags of ROS 1 and 2, videos of a GoPro, NDJSON, tables, or folders of one; - is standard input
-    #[arg(value_name = "FILE", required = true)]
+    #[arg(value_name = "FILE", required = true, help = super::recordings("Recordings", ", or folders of one"))]
     pub files: Vec<PathBuf>,
     /// Look at this topic too, though it is not obviously an IMU's
     #[arg(long, value_name = "NAME")]

@@ -36,8 +36,7 @@ use strapd_recording::pool::Pool;
   strapd replay flight.mcap --page                          in a browser, with play, pause and seek
   strapd replay flight.mcap --speed 1 -o udp://127.0.0.1:9870?profile=plotjuggler")]
 pub struct Replay {
-    /// Logs: MCAP, ULog, a bag of ROS 1 or 2, a video of a GoPro, NDJSON, or - for one of these on standard input
-    #[arg(required = true, value_name = "SOURCE")]
+    #[arg(required = true, value_name = "SOURCE", help = super::recordings("Recordings", ", or folders of one"))]
     pub sources: Vec<String>,
     /// Where the attitude goes: a .mcap, .ndjson, .csv, .tum (evo) or .parquet file, a directory, - (NDJSON on stdout),
     /// null: (nowhere); tcp-listen://HOST:PORT, unix-listen:///PATH, ws-listen://HOST:PORT (whoever

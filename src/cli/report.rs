@@ -38,8 +38,7 @@ const ENOUGH: f64 = 600.0;
 The page needs no network, and no script but to look into its charts; it opens from a file, prints, and is at most 2 MB for any log.
 Exit codes: 0 done; 3 done, but an error was found (the verdict is `bad`): samples were lost, or the attitude will be wrong.")]
 pub struct Report {
-    /// Recordings: MCAP, ULog, bags of ROS 1 and 2, videos of a GoPro, NDJSON, tables, or folders of one; - is standard input
-    #[arg(value_name = "FILE", required = true)]
+    #[arg(value_name = "FILE", required = true, help = super::recordings("Recordings", ", or folders of one"))]
     pub files: Vec<PathBuf>,
     /// The page; - is standard output
     #[arg(short, long, value_name = "FILE.html")]

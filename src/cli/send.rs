@@ -43,8 +43,7 @@ const CHUNK: usize = 32 << 10;
   strapd send flight.ulg ws://127.0.0.1:8765 --id left     under another name
   zstd -dc log.mcap.zst | strapd send - unix:///run/strapd.sock   a pipe, which is read to its end first")]
 pub struct Send {
-    /// A recording (any format that replay reads; - is standard input)
-    #[arg(value_name = "LOG")]
+    #[arg(value_name = "LOG", help = super::recordings("Recording", ""))]
     pub source: PathBuf,
     /// To whom: tcp://HOST:PORT, ws://HOST:PORT, unix:///PATH
     #[arg(value_name = "ADDRESS", default_value = "tcp://127.0.0.1:4550")]

@@ -83,7 +83,26 @@ const ENDINGS: [(&str, Format); 12] = [
 pub(crate) const HEAD: usize = 4096;
 
 impl Format {
-    /// What people call it.
+    /// The formats that are read, in the order in which texts list them.
+    pub const ALL: [Format; 9] = [
+        Format::Mcap,
+        Format::Ulog,
+        Format::Bag,
+        Format::Rosbag2,
+        Format::Gpmf,
+        Format::Tlog,
+        Format::Lines,
+        Format::Table,
+        Format::Parquet,
+    ];
+
+    /// The names of [`Format::ALL`], separated by commas: the list of every help text and message.
+    #[must_use]
+    pub fn names() -> String {
+        Format::ALL.map(Format::name).join(", ")
+    }
+
+    /// Name of the format, as people call it.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {

@@ -146,3 +146,31 @@ fn help_of_every_command_has_an_example_that_the_parser_knows() {
         format!("strapd {}\n", env!("CARGO_PKG_VERSION"))
     );
 }
+
+#[test]
+fn the_help_of_every_command_that_reads_recordings_names_every_format() {
+    use strapd_recording::format::Format;
+    let dir = tempfile::tempdir().unwrap();
+    for command in [
+        "allan",
+        "calibrate",
+        "cat",
+        "check",
+        "compare",
+        "info",
+        "replay",
+        "report",
+        "send",
+    ] {
+        let ran = strapd(dir.path(), &format!("{command} --help"));
+        ran.done();
+        let help = ran.out.split_whitespace().collect::<Vec<_>>().join(" ");
+        for format in Format::ALL {
+            assert!(
+                help.contains(format.name()),
+                "{command} --help does not name {}",
+                format.name()
+            );
+        }
+    }
+}
