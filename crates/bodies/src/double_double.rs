@@ -29,7 +29,7 @@ fn two_sum(a: f64, b: f64) -> (f64, f64) {
     (s, (a - (s - bb)) + (b - bb))
 }
 
-/// As [`two_sum`], for `|a| >= |b|` or `a == 0`.
+/// Same as [`two_sum`], for `|a| >= |b|` or `a == 0`.
 fn quick_two_sum(a: f64, b: f64) -> (f64, f64) {
     let s = a + b;
     (s, b - (s - a))
@@ -73,7 +73,7 @@ impl DoubleDouble {
         self.hi
     }
 
-    /// What is left without the whole number below it, in `[0, 1]`.
+    /// Fractional part: the number less the whole number below it, in `[0, 1]`.
     pub(crate) fn fraction(self) -> f64 {
         let rest = self - Self::from(self.hi.floor());
         // The low part may lie below a whole high one.

@@ -16,15 +16,15 @@ pub struct Field {
 /// A field that comes within a second, stays, and goes within a second.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Disturbance {
-    /// When it begins, s since the start.
+    /// Beginning, s since the start.
     pub from: f64,
-    /// When it is gone.
+    /// End, s since the start.
     pub to: f64,
-    /// What it adds in between, tesla, navigation axes.
+    /// Field added in between, tesla, navigation axes.
     pub added_n: Vector3<f64>,
 }
 
-/// What a disturbance takes to come, and to go, s.
+/// Rise and fall time of a disturbance, s.
 const EDGE: f64 = 1.0;
 
 impl Field {

@@ -70,7 +70,7 @@ pub struct RigidBody {
 }
 
 impl RigidBody {
-    /// From mass in kg, centre of gravity in m and the inertia tensor about it in kg m^2.
+    /// Makes it from mass in kg, centre of gravity in m and the inertia tensor about it in kg m^2.
     ///
     /// # Errors
     /// [`InertiaError`] with the reason and its numbers. Asymmetry up to 1e-12 of the largest entry
@@ -88,7 +88,7 @@ impl RigidBody {
         })
     }
 
-    /// From the tensor about the origin O instead of the centre of gravity.
+    /// Makes it from the tensor about the origin O instead of the centre of gravity.
     ///
     /// # Accuracy
     /// Loses `m r^2 / I_cg` of relative precision: a small body far out has no digits left.
@@ -107,7 +107,7 @@ impl RigidBody {
         )
     }
 
-    /// From moments `[Ixx, Iyy, Izz]` and products of inertia with the plus sign (`+∫xy dm`),
+    /// Makes it from moments `[Ixx, Iyy, Izz]` and products of inertia with the plus sign (`+∫xy dm`),
     /// about the centre of gravity.
     ///
     /// # Errors
@@ -127,7 +127,7 @@ impl RigidBody {
         )
     }
 
-    /// From the entries of the tensor as URDF, MuJoCo and pinocchio store them (`ixy = -∫xy dm`),
+    /// Makes it from the entries of the tensor as URDF, MuJoCo and pinocchio store them (`ixy = -∫xy dm`),
     /// about the centre of gravity.
     ///
     /// # Errors
@@ -174,7 +174,7 @@ impl RigidBody {
         self.mass
     }
 
-    /// From O to the centre of gravity, m, body axes.
+    /// Vector from O to the centre of gravity, m, body axes.
     #[must_use]
     pub fn r_og_b(&self) -> Vector3<f64> {
         self.r_og_b

@@ -1,9 +1,9 @@
-//! What a sensor on a moving body feels at an instant, whatever moves the body.
+//! Kinematics at a sensor on a moving body at an instant, whatever moves the body.
 
 use crate::rigid_body::Spin;
 use nalgebra::Vector3;
 
-/// What a sensor at the origin of the body axes feels at an instant.
+/// Kinematics at a sensor in the origin of the body axes at an instant.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Kinematics {
     /// Attitude and body rate.

@@ -7,9 +7,9 @@ use std::fmt;
 /// A motion can not have this parameter.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct MotionError {
-    /// Which parameter.
+    /// Name of the parameter.
     pub what: &'static str,
-    /// As given.
+    /// Value as given.
     pub value: f64,
 }
 

@@ -53,7 +53,7 @@ pub struct Rotor {
 }
 
 impl Rotor {
-    /// From a symmetric positive definite tensor in kg m^2. Physical tensors come from
+    /// Makes it from a symmetric positive definite tensor in kg m^2. Physical tensors come from
     /// [`super::inertia::RigidBody`]; this constructor also takes the idealised ones of text books.
     ///
     /// # Errors
@@ -82,7 +82,7 @@ impl Rotor {
         &self.inertia
     }
 
-    /// Its inverse.
+    /// Inverse of the inertia tensor.
     #[must_use]
     pub fn inverse(&self) -> &Matrix3<f64> {
         &self.inverse

@@ -31,13 +31,13 @@ use strapd_attitude::quaternion::{Quaternion, RotationVector};
 use strapd_attitude::record::{Nanos, RawSample, SampleKind};
 use strapd_attitude::setting::{RATE_HZ, START_STAMP};
 
-/// What a reading of the accelerometer is.
+/// Meaning of a reading of the accelerometer.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum ForceSampling {
     /// The specific force at the instant, whatever the gyro's sample is.
     #[default]
     Instant,
-    /// As the gyro's: of the instant beside a rate; else its mean over the interval, m/s^2.
+    /// Same as the gyro: of the instant for a rate; else the mean over the interval, m/s^2.
     AsGyro,
 }
 
@@ -46,26 +46,26 @@ pub enum ForceSampling {
 pub struct Magnetometer {
     /// Readings a second: each goes with the first sample that is due by then.
     pub rate_hz: f64,
-    /// What it is in.
+    /// Field around the sensor.
     pub field: Field,
 }
 
-/// How a motion is sampled.
+/// Settings by which a motion is sampled.
 #[derive(Clone, Debug)]
 pub struct Sampling {
     /// Samples a second.
     pub rate_hz: f64,
     /// Seconds from the first instant to the last.
     pub duration_secs: f64,
-    /// What a sample is.
+    /// Meaning of a sample.
     pub kind: SampleKind,
     /// Stamp of the first instant.
     pub start: Nanos,
     /// Gravity, m/s^2, downwards.
     pub gravity: f64,
-    /// Where the accelerometer sits: from the origin of the body axes, m, body axes.
+    /// Position of the accelerometer: from the origin of the body axes, m, body axes.
     pub lever_b: Vector3<f64>,
-    /// What its readings are.
+    /// Meaning of its readings.
     pub force: ForceSampling,
     /// A magnetometer, where there is one; its axes are the body's.
     pub magnetometer: Option<Magnetometer>,
@@ -88,16 +88,16 @@ const LONGEST_SECS: f64 = 1e9;
 pub enum SamplingError {
     /// A number out of its range.
     OutOfRange {
-        /// Which, with its unit.
+        /// Name of the parameter, with its unit.
         what: &'static str,
-        /// As given.
+        /// Value as given.
         value: f64,
-        /// What it may be.
+        /// Range that is allowed.
         allowed: &'static str,
     },
     /// The motion turns half a turn or more from sample to sample at its start.
     UnderSampled {
-        /// As given, Hz.
+        /// Rate as given, Hz.
         rate_hz: f64,
         /// The rate that must be exceeded, Hz.
         needed_hz: f64,
@@ -149,10 +149,10 @@ impl From<ImuErrorFault> for SamplingError {
     }
 }
 
-/// What truly was at an instant.
+/// Truth at an instant.
 #[derive(Clone, Copy, Debug)]
 pub struct Truth {
-    /// When.
+    /// Stamp.
     pub stamp: Nanos,
     /// Attitude and body rate; the quaternion's sign is continuous with the one before.
     pub spin: Spin,
@@ -163,12 +163,12 @@ pub struct Truth {
 pub struct Stretch {
     /// Every instant.
     pub truth: Vec<Truth>,
-    /// What the sensor put out and was not lost. `orientation` holds the true one at the sample's
+    /// Samples that the sensor put out and that were not lost. `orientation` holds the true one at the sample's
     /// instant, `log` that instant.
     pub samples: Vec<RawSample>,
 }
 
-/// What was noticed on the way.
+/// Observations made on the way.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Noticed {
     /// Instants so far.
@@ -189,7 +189,7 @@ pub struct Noticed {
     pub fastest: f64,
 }
 
-/// What the sensor reads at an instant: rate or delta angle, and specific force.
+/// Reading of the sensor at an instant: rate or delta angle, and specific force.
 struct Reading {
     gyro: Vector3<f64>,
     force_b: Vector3<f64>,
@@ -324,7 +324,7 @@ impl Synthetic {
         })
     }
 
-    /// What this unit of the sensor drew of its constant errors, when it has errors.
+    /// Constant errors drawn for this unit of the sensor, when it has errors.
     #[must_use]
     pub fn sensor(&self) -> Option<&GyroModel> {
         self.sensor.as_ref()
@@ -336,13 +336,13 @@ impl Synthetic {
         self.compass.as_ref().map(|c| &c.sensor)
     }
 
-    /// How many instants there are, past ones included.
+    /// Number of instants, past ones included.
     #[must_use]
     pub fn count(&self) -> u64 {
         self.count
     }
 
-    /// What was noticed so far.
+    /// Observations so far.
     #[must_use]
     pub fn noticed(&self) -> Noticed {
         self.noticed
@@ -418,7 +418,7 @@ impl Synthetic {
         Ok(())
     }
 
-    /// What the magnetometer reads at `now`, when it is due.
+    /// Reading of the magnetometer at `now`, when it is due.
     fn field(&mut self, now: u64, spin: &Spin) -> Option<Vector3<f64>> {
         let compass = self.compass.as_mut()?;
         let ratio = compass.stated.rate_hz / self.sampling.rate_hz;
@@ -431,7 +431,7 @@ impl Synthetic {
         Some(compass.sensor.measure(&field_b))
     }
 
-    /// What the sensor reads at `now`, `turned` since the instant before. `None` for the
+    /// Reading of the sensor at `now`, `turned` since the instant before. `None` for the
     /// interval before the start.
     fn measured(
         &mut self,

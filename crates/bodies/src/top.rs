@@ -98,7 +98,7 @@ impl SymmetricTop {
         }
     }
 
-    /// From a rigid body whose origin is the pivot and whose z is the axis of symmetry.
+    /// Makes it from a rigid body whose origin is the pivot and whose z is the axis of symmetry.
     ///
     /// # Errors
     /// [`TopError::NotATop`] when it is not, beyond 1e-9 of its largest moment.
@@ -196,7 +196,7 @@ impl SymmetricTop {
         2.0 * (self.transverse * self.largest_torque()).sqrt() / self.axial
     }
 
-    /// Its inertia about the pivot.
+    /// Inertia about the pivot.
     ///
     /// # Errors
     /// [`InertiaError`] for moments so far apart that their matrix can not be inverted.

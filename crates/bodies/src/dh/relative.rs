@@ -10,7 +10,7 @@ use std::fmt;
 use std::ops::Mul;
 use strapd_attitude::frames::{Dcm, In, tag};
 
-/// How `Of` lies and moves as an observer riding on `RelativeTo` sees it.
+/// Motion of `Of` as an observer riding on `RelativeTo` sees it.
 ///
 /// # Convention
 /// Velocity is that of the origin of `Of`, its rate of change in `RelativeTo` axes; rate is that of
@@ -49,7 +49,7 @@ impl<A, B> fmt::Debug for RelativeMotion<A, B> {
 }
 
 impl<A, B> RelativeMotion<A, B> {
-    /// From the pose of B in A, the velocity of B's origin in m/s and the rate of B in rad/s, both
+    /// Makes it from the pose of B in A, the velocity of B's origin in m/s and the rate of B in rad/s, both
     /// relative to A and resolved in A.
     #[must_use]
     pub fn new(pose: Transform<A, B>, v: In<A>, w: In<A>) -> Self {
@@ -96,7 +96,7 @@ impl<A, B> RelativeMotion<A, B> {
         c_fa * self.w
     }
 
-    /// How A moves, seen from B. Not just the negative: B may turn.
+    /// Motion of A as seen from B. Not just the negative: B may rotate.
     #[must_use]
     pub fn inverse(&self) -> RelativeMotion<B, A> {
         let back = self.pose.inverse();

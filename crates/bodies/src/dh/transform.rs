@@ -36,7 +36,7 @@ impl<To, From> fmt::Debug for Transform<To, From> {
 }
 
 impl<To, From> Transform<To, From> {
-    /// From a rotation and the place of the origin of `From`, m.
+    /// Makes it from a rotation and the position of the origin of `From`, m.
     #[must_use]
     pub fn new(c: Dcm<To, From>, r: In<To>) -> Self {
         Self { c, r }
@@ -48,7 +48,7 @@ impl<To, From> Transform<To, From> {
         Self::new(Dcm::identity(), In::assume(Vector3::zeros()))
     }
 
-    /// From a 4x4 matrix of outside; the direction is the human's word.
+    /// Checks a 4x4 matrix from outside; the direction is the caller's word.
     ///
     /// # Errors
     /// [`TransformError`] when the rotation is none, a length is not finite, or the last row is not
@@ -81,7 +81,7 @@ impl<To, From> Transform<To, From> {
         self.c
     }
 
-    /// From the origin of `To` to that of `From`, m.
+    /// Vector from the origin of `To` to that of `From`, m.
     #[must_use]
     pub fn translation(&self) -> In<To> {
         self.r

@@ -21,14 +21,14 @@ pub enum Child {}
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Asked {}
 
-/// What is asked: the three names a velocity needs.
+/// Question for a velocity: the three names it needs.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Question<'a> {
-    /// Whose velocity.
+    /// Name of the frame whose velocity is asked for.
     pub of: &'a str,
-    /// As seen by an observer riding on this frame.
+    /// Name of the frame on which the observer rides.
     pub relative_to: &'a str,
-    /// In whose axes the components are.
+    /// Name of the frame in whose axes the components are.
     pub resolved_in: &'a str,
 }
 
@@ -106,16 +106,16 @@ fn as_parent(m: &RelativeMotion<Root, Child>) -> RelativeMotion<Root, Parent> {
 #[derive(Clone, PartialEq, Eq, Debug)]
 #[non_exhaustive]
 pub enum FrameTreeError {
-    /// No such frame.
+    /// Unknown frame.
     Unknown {
-        /// As asked.
+        /// Name that was asked for.
         name: String,
-        /// Those that are there.
+        /// Names of the frames that exist.
         known: String,
     },
-    /// There is one of this name.
+    /// Second frame of the same name.
     Twice {
-        /// As given.
+        /// Name that was given twice.
         name: String,
     },
 }

@@ -27,7 +27,7 @@ impl RigidBody {
         Self::new(mass, r, tensor)
     }
 
-    /// With a payload welded on.
+    /// Returns the body with a payload welded on.
     ///
     /// # Errors
     /// As [`RigidBody::combined`].
@@ -35,7 +35,7 @@ impl RigidBody {
         Self::combined(&[*self, *payload])
     }
 
-    /// With a point mass in kg at `r_op_b` (from O, m): not a body by itself, but part of one.
+    /// Returns the body with a point mass in kg at `r_op_b` (from O, m): not a body by itself, but part of one.
     ///
     /// # Errors
     /// [`InertiaError::MassNotPositive`] unless the point mass is above zero.
@@ -54,7 +54,7 @@ impl RigidBody {
         )
     }
 
-    /// With a payload, once part of this body, taken away.
+    /// Returns the body without a payload that was part of it.
     ///
     /// # Errors
     /// What is left must be physical: [`InertiaError::MassNotPositive`],

@@ -7,7 +7,7 @@ use super::validity::{self, SLACK};
 use super::{InertiaError, RigidBody, skew};
 use nalgebra::{Cholesky, Matrix3, Matrix6, SymmetricEigen, Vector3, Vector6};
 
-/// Which of the equivalent matrices C(nu).
+/// Form of the matrix C(nu), of several equivalent ones.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum CoriolisForm {
     /// `[0, -S(p); -S(p), -S(h)]` with `[p; h] = M nu` (Fossen, theorem 3.2; Kirchhoff). The only

@@ -55,7 +55,7 @@ pub fn rotated_mass_matrix(
     Ok(both * m * both.transpose())
 }
 
-/// What [`RigidBody::from_mass_matrix`] found.
+/// Result of [`RigidBody::from_mass_matrix`].
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Decomposition {
     /// The body whose mass matrix it is.

@@ -12,12 +12,12 @@ pub(super) const SLACK: f64 = 1e-12;
 pub enum InertiaError {
     /// NaN, infinity, or numbers so large that their products are.
     NotFinite {
-        /// Which quantity.
+        /// Name of the quantity.
         what: &'static str,
     },
     /// Mass zero or below.
     MassNotPositive {
-        /// As given, kg.
+        /// Mass as given, kg.
         mass: f64,
     },
     /// The tensor differs from its transpose.
@@ -48,9 +48,9 @@ pub enum InertiaError {
     },
     /// A 6x6 matrix is not of the form `[m 1, -m S(r); m S(r), I_O]`.
     NotRigidMassMatrix {
-        /// Which block, and what of it.
+        /// Name of the block, and the property it lacks.
         what: &'static str,
-        /// By how much.
+        /// Size of the defect.
         defect: f64,
         /// Largest defect taken for rounding.
         allowed: f64,

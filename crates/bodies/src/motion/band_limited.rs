@@ -38,7 +38,7 @@ impl BandLimited {
     /// Most sines an axis takes.
     pub const MOST_SINES: usize = 1000;
 
-    /// From an attitude at zero and the sines about x, y and z.
+    /// Makes it from an attitude at zero and the sines about x, y and z.
     ///
     /// # Errors
     /// [`MotionError`] for numbers that are not, frequencies or summed amplitudes above 1e5 rad/s,
@@ -147,7 +147,7 @@ impl BandLimited {
 pub(super) struct SplitMix(pub(super) u64);
 
 impl SplitMix {
-    /// In `[0, 1)`, 53 bits.
+    /// Random number in `[0, 1)`, 53 bits.
     pub(super) fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;

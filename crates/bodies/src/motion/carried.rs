@@ -14,12 +14,12 @@ use std::f64::consts::TAU;
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::quaternion::kernel as quat;
 
-/// How the place follows from the courses.
+/// Rule by which the position follows from the courses.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum Place {
     /// Along the heading at `speed`, with `sway` (m; ahead, left, up) about that way.
     Way,
-    /// At the end of an arm: heading turns its base, `sway[0]` and `sway[1]` are the angles of
+    /// End of an arm: heading turns its base, `sway[0]` and `sway[1]` are the angles of
     /// shoulder and elbow from the vertical (rad), the links are as long as said (m).
     Arm([f64; 2]),
     /// Carried by a thrust along the body's z axis alone, against this gravity (m/s^2); `sway` comes

@@ -8,7 +8,7 @@ use super::carried::{Carried, Place};
 use super::course::{Course, Harmonic, Rhythm, Step, Steps, Wave};
 use std::f64::consts::TAU;
 
-/// Who or what carries the sensor.
+/// Carrier of the sensor.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Hash)]
 pub enum Carrier {
     /// A person who walks, turns off every ten seconds or so, and stops now and then.
@@ -31,14 +31,14 @@ pub enum Carrier {
     Boat,
 }
 
-/// Where a person wears it.
+/// Place where a person wears the sensor.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Hash)]
 pub enum Worn {
-    /// On the waist.
+    /// Waist.
     Waist,
-    /// In the hand of a swinging arm.
+    /// Hand of a swinging arm.
     Hand,
-    /// On the foot.
+    /// Foot.
     Foot,
 }
 
@@ -48,7 +48,7 @@ const FIRST_REST: f64 = 3.0;
 const CYCLE: f64 = 120.0;
 
 impl Carrier {
-    /// Its motion. The same seed is the same motion; gravity (m/s^2) matters to a drone alone.
+    /// Motion of the carrier. The same seed gives the same motion; gravity (m/s^2) matters to a drone alone.
     #[must_use]
     pub fn motion(self, seed: u64, gravity: f64) -> Carried {
         let mut made = Maker(SplitMix(seed));
@@ -66,7 +66,7 @@ impl Carrier {
     }
 }
 
-/// How a person goes.
+/// Gait of a person.
 struct Gait {
     stride_hz: f64,
     /// m/s.

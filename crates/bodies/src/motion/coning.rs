@@ -25,7 +25,7 @@ pub struct ConstantRate {
 }
 
 impl ConstantRate {
-    /// From an attitude at zero and a body rate in rad/s.
+    /// Makes it from an attitude at zero and a body rate in rad/s.
     ///
     /// # Errors
     /// [`MotionError`] for a rate that is not a number or above 1e5 rad/s.

@@ -29,12 +29,12 @@ impl Instant {
     }
 }
 
-/// What a step changes.
+/// Effect of a step.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum Change {
     /// The value, by so much.
     Value(f64),
-    /// Its rate of change, by so much a second.
+    /// Change of the rate, by so much a second.
     Rate(f64),
 }
 
@@ -68,7 +68,7 @@ impl Step {
         self.at + self.over
     }
 
-    /// What is left of it when it is over, but for what a rate goes on to add.
+    /// Value that remains when the step is over, without what a rate goes on to add.
     fn gain(&self) -> f64 {
         match self.change {
             Change::Value(by) => by,
@@ -109,7 +109,7 @@ fn nanos(secs: f64) -> u64 {
 pub(super) struct Steps {
     start: f64,
     period: u64,
-    /// What a period adds.
+    /// Gain of a period.
     gain: f64,
     steps: Vec<Step>,
 }
@@ -126,7 +126,7 @@ impl Steps {
         Self::once(start, Vec::new())
     }
 
-    /// From `start` on, each step once.
+    /// Course from `start` on that takes each step once.
     pub(super) fn once(start: f64, steps: Vec<Step>) -> Self {
         Self {
             start,
@@ -205,11 +205,11 @@ pub(super) struct Harmonic {
     pub(super) phase: f64,
 }
 
-/// What everything of a motion that comes and goes is made with, at an instant.
+/// Clock of all that comes and goes in a motion, at an instant.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Beat {
     pub(super) t: Instant,
-    /// How much of waves and harmonics there is, of one.
+    /// Envelope of waves and harmonics, of one.
     pub(super) envelope: Jet,
     /// Strides made, less whole ones.
     pub(super) strides: Jet,
@@ -261,7 +261,7 @@ pub(super) struct Rhythm {
     pub(super) envelope: Steps,
     /// Strides a second.
     pub(super) stride_hz: f64,
-    /// What makes them uneven, strides.
+    /// Waves that make strides uneven.
     pub(super) unsteady: Vec<Wave>,
 }
 

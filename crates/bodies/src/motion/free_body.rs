@@ -39,7 +39,7 @@ pub struct FreeBody {
 /// runs round, either the largest or the smallest moment; 2 is the middle one.
 #[derive(Clone, Copy, Debug)]
 struct Tumbling {
-    /// Which body axis is sorted axis 1, 2, 3.
+    /// Body axis of sorted axis 1, 2, 3.
     axis: [usize; 3],
     /// Amplitudes of cn, sn, dn, with their signs.
     amplitude: [f64; 3],
@@ -61,7 +61,7 @@ struct Tumbling {
 }
 
 impl FreeBody {
-    /// From principal moments in kg m^2 about x, y, z and the attitude and rate at zero.
+    /// Makes it from principal moments in kg m^2 about x, y, z and the attitude and rate at zero.
     ///
     /// # Errors
     /// [`MotionError`] for moments that are not positive or more than 1e6 apart, for a rate that is

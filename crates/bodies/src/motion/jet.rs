@@ -30,7 +30,7 @@ impl Jet {
         }
     }
 
-    /// Of an angle in rad.
+    /// Sine and cosine of an angle in rad.
     pub(super) fn sin_cos(self) -> (Self, Self) {
         let (s, c) = self.value.sin_cos();
         let square = self.rate * self.rate;

@@ -8,17 +8,17 @@ use crate::gauss::gauss;
 use nalgebra::Vector3;
 use strapd_attitude::frames::{In, Nav};
 
-/// Where the accelerometer sits, and what pulls at it.
+/// Accelerometer: where it sits, and the gravity that acts on it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Accelerometer {
-    /// From the origin of the body axes, m, body axes.
+    /// Vector from the origin of the body axes, m, body axes.
     pub lever_b: Vector3<f64>,
     /// m/s^2, downwards.
     pub gravity: f64,
 }
 
 impl Accelerometer {
-    /// What is to be known of the motion at `nanos` for [`Self::read`]: without a lever arm nothing of how
+    /// Kinematics of the motion at `nanos` for [`Self::read`]: without a lever arm nothing of how
     /// the rate changes, which costs a random motion as much as all the rest.
     pub fn felt(&self, motion: &mut Motion, nanos: u64) -> Kinematics {
         match motion {
@@ -31,7 +31,7 @@ impl Accelerometer {
         }
     }
 
-    /// What it reads, m/s^2, body axes.
+    /// Reading of the accelerometer, m/s^2, body axes.
     #[must_use]
     pub fn read(&self, k: &Kinematics) -> Vector3<f64> {
         let held_n = In::<Nav>::assume(k.acceleration_n + Vector3::new(0.0, 0.0, self.gravity));
@@ -43,7 +43,7 @@ impl Accelerometer {
         f_b + k.rate_change.cross(r) + w.cross(&w.cross(r))
     }
 
-    /// Its mean over `from..to` in nanoseconds, `to` after `from`, m/s^2: body axes as they turn, as a
+    /// Mean reading over `from..to` in nanoseconds, `to` after `from`, m/s^2: body axes as they rotate, as a
     /// sensor takes it.
     ///
     /// # Accuracy

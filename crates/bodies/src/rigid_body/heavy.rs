@@ -92,7 +92,7 @@ impl HeavyBody {
             .delta_angle(DoubleDouble::from_nanos(from), DoubleDouble::from_nanos(to))
     }
 
-    /// Its inertia about the fixed point.
+    /// Rotor: the inertia about the fixed point.
     #[must_use]
     pub fn rotor(&self) -> &Rotor {
         &self.rotor

@@ -3,14 +3,14 @@
 use nalgebra::Vector3;
 use std::fmt;
 
-/// Which rate stands for a whole step in a direction cosine recursion.
+/// Rate that stands for a whole step in a direction cosine recursion.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum HeldRate {
     /// `w(t_i)`
     Left,
     /// `w(t_i+1)`, the source document's choice
     Right,
-    /// Their mean
+    /// Mean of both
     Mean,
 }
 
@@ -26,7 +26,7 @@ impl HeldRate {
     }
 }
 
-/// How a step is taken.
+/// Method of a step.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Method {
     /// The source document's: torque held over the step, RK4 on the rate, one rotation by a held rate.
@@ -44,7 +44,7 @@ pub enum Method {
 pub struct NotConverged {
     /// Length of the step, s.
     pub step_secs: f64,
-    /// What the last iteration still changed, relative to the state.
+    /// Last change of the iteration, relative to the state.
     pub remaining: f64,
 }
 

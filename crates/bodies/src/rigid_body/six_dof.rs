@@ -14,7 +14,7 @@ use strapd_attitude::quaternion::kernel as quat;
 /// Force in N and moment about O in N m, both in body axes: `[f; n]`.
 pub type Wrench = Vector6<f64>;
 
-/// Where the origin O is, how the body is turned, and how both change.
+/// Position of the origin O, attitude of the body, and how both change.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Pose {
     /// Position of O, m, navigation axes.

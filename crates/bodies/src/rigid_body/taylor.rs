@@ -29,7 +29,7 @@ pub(crate) struct Sine {
     pub(crate) phase: f64,
 }
 
-/// Where the rates come from.
+/// Source of the rates.
 #[derive(Clone, Debug)]
 pub(crate) enum Rates {
     /// Euler's equations in uniform gravity.
@@ -64,7 +64,7 @@ impl Heavy {
     }
 }
 
-/// By cofactors, in 32 digits: an inverse rounded to `f64` would be another body.
+/// Inverse by cofactors, in 32 digits: an inverse rounded to `f64` would be another body.
 fn inverse(m: &[[f64; 3]; 3]) -> [[DoubleDouble; 3]; 3] {
     let e = |i: usize, j: usize| DoubleDouble::from(m[i % 3][j % 3]);
     let cofactor =
@@ -92,7 +92,7 @@ struct Segment {
 }
 
 impl Segment {
-    /// In the memory of a segment that is no longer needed, where there is one: every coefficient
+    /// Makes a segment in the memory of one that is no longer needed, if there is one: every coefficient
     /// that is read is written first, and which these are depends on the kind of rates alone.
     fn new(rates: &Rates, start: State, spent: Option<Segment>) -> Self {
         let (mut low, mut all) = match spent {
@@ -281,7 +281,7 @@ pub(crate) struct Trajectory {
 }
 
 impl Trajectory {
-    /// From attitude and (for [`Rates::Heavy`]) rate at t = 0.
+    /// Makes it from attitude and (for [`Rates::Heavy`]) rate at t = 0.
     pub(crate) fn new(rates: Rates, q: &[f64; 4], w: &Vector3<f64>) -> Self {
         let q = q.map(DoubleDouble::from);
         let norm = q.iter().fold(DoubleDouble::ZERO, |s, x| s + *x * *x).sqrt();

@@ -52,7 +52,7 @@ impl Case {
         }
     }
 
-    /// By name.
+    /// Finds a case by its name.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|c| c.name() == name)

@@ -57,7 +57,7 @@ impl Pole {
 }
 
 impl ClosedForm {
-    /// From a top and its start.
+    /// Makes it from a top and its start.
     ///
     /// # Errors
     /// [`TopError::Singular`] when the axis passes within 1e-3 rad of the vertical, where the

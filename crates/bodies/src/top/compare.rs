@@ -9,7 +9,7 @@ use strapd_attitude::frames::{Body, Nav};
 use strapd_attitude::quaternion::Quaternion;
 use strapd_attitude::quaternion::kernel as quat;
 
-/// How the attitude of the top is found.
+/// Method by which the attitude of the top is found.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum TopMethod {
     /// A: Euler's equations with the torque held over the step, and one rotation a step.
@@ -46,7 +46,7 @@ impl TopMethod {
         }
     }
 
-    /// By name.
+    /// Finds a method by its name.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|m| m.name() == name)
@@ -196,7 +196,7 @@ impl TopRun {
 /// The worst of one method over a run.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct MethodError {
-    /// Which.
+    /// Method.
     pub method: TopMethod,
     /// Largest angle between the axes of symmetry, rad.
     pub axis_max: f64,

@@ -5,15 +5,15 @@ use crate::motion_error::MotionError;
 use crate::rigid_body::NotConverged;
 use std::fmt;
 
-/// What a top, a case or a method refuses.
+/// Reason why a top, a case or a method is refused.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
 pub enum TopError {
     /// A quantity that must be above zero (or at least a number) is not.
     OutOfRange {
-        /// Which.
+        /// Name of the parameter.
         what: &'static str,
-        /// As given.
+        /// Value as given.
         value: f64,
     },
     /// The body has no axis of symmetry along z through the origin.
@@ -32,12 +32,12 @@ pub enum TopError {
     Singular {
         /// Nutation, rad.
         nutation: f64,
-        /// When, s.
+        /// Time, s.
         t: f64,
     },
     /// The top turns more than half a turn from sample to sample.
     RateTooLow {
-        /// As given.
+        /// Rate as given, Hz.
         rate_hz: f64,
         /// The least that follows the rotation.
         needed_hz: f64,

@@ -41,7 +41,7 @@ impl How {
             .collect()
     }
 
-    /// By name.
+    /// Finds methods by their names.
     ///
     /// # Errors
     /// An unknown one; says which there are.
@@ -66,16 +66,16 @@ impl How {
 /// Largest angles between a method's attitude and the truth, rad.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Worst {
-    /// Between the axes of symmetry.
+    /// Angle between the axes of symmetry.
     pub axis: f64,
-    /// Of the whole rotation.
+    /// Angle of the whole rotation.
     pub attitude: f64,
 }
 
-/// What was found over a course.
+/// Errors found over a course.
 #[derive(Clone, Debug)]
 pub struct MethodErrors {
-    /// By method, in the order asked for.
+    /// Worst error of each method, in the order asked for.
     pub errors: Vec<(How, Worst)>,
     /// Largest change of the exact motion's energy, as a part of it.
     pub energy_drift: f64,
@@ -86,9 +86,9 @@ pub struct MethodErrors {
 /// A top, its start, and how long and how often it is looked at.
 #[derive(Clone, Copy, Debug)]
 pub struct Course {
-    /// Which top.
+    /// Top.
     pub top: SymmetricTop,
-    /// Its start.
+    /// Start of the top.
     pub start: EulerState,
     /// Samples a second.
     pub rate_hz: f64,
@@ -191,23 +191,23 @@ impl Course {
     }
 }
 
-/// Where a course leads, at few enough instants to be drawn.
+/// Paths over a course, at few enough instants to be drawn.
 #[derive(Clone, Debug)]
 pub struct Paths {
     /// Seconds since the start, rising.
     pub times: Vec<f64>,
     /// The exact motion then.
     pub truth: Vec<Spin>,
-    /// By method, in the order asked for.
+    /// Path of each method, in the order asked for.
     pub methods: Vec<MethodPath>,
 }
 
-/// What one method makes of it.
+/// Path that one method gives.
 #[derive(Clone, Debug)]
 pub struct MethodPath {
-    /// Which.
+    /// Method.
     pub how: How,
-    /// Its attitudes at the instants of [`Paths::times`].
+    /// Attitudes at the instants of [`Paths::times`].
     pub attitudes: Vec<Quaternion<Nav, Body>>,
     /// Largest angle from the truth since the instant before, rad: no peak is lost.
     pub errors: Vec<f64>,

@@ -8,7 +8,7 @@ use crate::inertia::RigidBody;
 use nalgebra::{Matrix3, SMatrix, Vector3};
 use strapd_attitude::frames::In;
 
-/// What the tool does to the world: force in N and moment about the tool point in N m, tool axes.
+/// Wrench of the tool on the world: force in N and moment about the tool point in N m, tool axes.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Wrench {
     force: In<Tool>,
@@ -34,13 +34,13 @@ impl Wrench {
 /// Energy of the arm, J; potential from the height of the base frame's origin.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Energy {
-    /// Of motion.
+    /// Kinetic energy.
     pub kinetic: f64,
-    /// In the field of gravity.
+    /// Potential energy in the field of gravity.
     pub potential: f64,
 }
 
-/// What a motor and gear add to a joint: `I_a qdd + f_v qd + f_c sign(qd) + offset`.
+/// Torque that a motor and gear add to a joint: `I_a qdd + f_v qd + f_c sign(qd) + offset`.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Actuator {
     /// Rotor inertia seen through the gear, kg m^2.
@@ -74,14 +74,14 @@ pub struct Dynamics {
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Mass {
     m: f64,
-    /// From the link frame's origin to the centre of mass, and from the frame before; link axes.
+    /// Vectors from the link frame's origin to the centre of mass, and from the frame before; link axes.
     c: Vector3<f64>,
     from_joint: Vector3<f64>,
     inertia: Matrix3<f64>,
 }
 
 impl Dynamics {
-    /// From an arm, its five links and gravity in m/s^2, base axes: (0, 0, -9.81) on a level floor.
+    /// Makes it from an arm, its five links and gravity in m/s^2, base axes: (0, 0, -9.81) on a level floor.
     /// Each link's origin and axes are those of its link frame, its inertia about its centre of mass.
     ///
     /// # Errors
@@ -133,7 +133,7 @@ impl Dynamics {
         self.newton_euler(motion, &zero, &zero)
     }
 
-    /// As [`Dynamics::torques`], while the tool presses on the world.
+    /// Same as [`Dynamics::torques`], while the tool presses on the world.
     #[must_use]
     pub fn torques_with_tip(&self, motion: &TableMotion, tip: &Wrench) -> SeedTorques {
         self.newton_euler(motion, tip.force.as_vector(), tip.moment.as_vector())
@@ -165,7 +165,7 @@ impl Dynamics {
         SeedTorques(self.backward(&rotations, &forces, &moments, force, moment))
     }
 
-    /// From the tool inwards: what each joint passes on.
+    /// Backward recursion from the tool inwards: the wrench that each joint passes on.
     fn backward(
         &self,
         rotations: &[Matrix3<f64>; JOINTS],

@@ -5,7 +5,7 @@ use crate::inertia::InertiaError;
 use std::fmt;
 use strapd_attitude::frames::NotARotation;
 
-/// How far the wrist would be from the shoulder, and how far it can be; m.
+/// Distance that the wrist would have from the shoulder, and the range it can have; m.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Reach {
     /// Wanted, for theta1 and for theta1 + pi.
@@ -17,7 +17,7 @@ pub struct Reach {
 }
 
 impl Reach {
-    /// By how much each side misses, m; zero where it reaches.
+    /// Excess on each side, m; zero where it reaches.
     #[must_use]
     pub fn excess(&self) -> [f64; 2] {
         self.wanted
@@ -31,23 +31,23 @@ impl Reach {
 pub enum ArmError {
     /// NaN or infinity.
     NotFinite {
-        /// Which number.
+        /// Name of the number.
         what: &'static str,
     },
     /// Finite, but beyond anything that can be meant (and near overflow).
     TooLarge {
-        /// Which number.
+        /// Name of the number.
         what: &'static str,
-        /// As given.
+        /// Value as given.
         value: f64,
         /// The largest taken.
         limit: f64,
     },
     /// Lengths, ranges or settings no arm of this kind can have.
     Impossible {
-        /// Which, and what it must be.
+        /// Name of the number, and the condition it must meet.
         what: &'static str,
-        /// As given.
+        /// Value as given.
         value: f64,
     },
     /// The target's rotation is none.
@@ -92,13 +92,13 @@ pub enum ArmError {
         /// Why.
         why: Box<ArmError>,
     },
-    /// Between two instants of a path the arm would have to jump to another branch.
+    /// Jump to another branch between two instants of a path.
     BranchChange {
         /// Joint that jumps most, from 1.
         joint: usize,
-        /// By how much, rad.
+        /// Size of the jump, rad.
         jump: f64,
-        /// What its rates account for, rad.
+        /// Change that its rates account for, rad.
         expected: f64,
     },
     /// A link or payload is no physical body.
@@ -106,7 +106,7 @@ pub enum ArmError {
 }
 
 impl ArmError {
-    /// Its kind as one word, for machines.
+    /// Kind of the error as one word, for machines.
     #[must_use]
     pub fn code(&self) -> &'static str {
         match self {

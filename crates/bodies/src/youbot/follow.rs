@@ -126,7 +126,7 @@ fn no_jump(last: &TableMotion, now: &TableMotion, secs: f64) -> Result<(), ArmEr
 /// One coordinate of a gripper path: value, first and second derivative.
 type Coordinate = [f64; 3];
 
-/// How the gripper moves through space: tool point x, y, z (m, base axes), pitch
+/// Motion of the gripper through space: tool point x, y, z (m, base axes), pitch
 /// `P = theta2 + theta3 + theta4` (rad; 0 points down, 90 degrees forward) and roll theta5 (rad) as functions of time.
 /// Theta1 follows from x and y, so every pose lies in the arm's plane.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -265,7 +265,7 @@ pub struct ToolTrack {
 }
 
 impl ToolTrack {
-    /// On the branch nearest to `start` at time zero.
+    /// Starts on the branch nearest to `start` at time zero.
     ///
     /// # Errors
     /// As [`ToolTrack::at`] at time zero.
@@ -349,7 +349,7 @@ impl ToolTrack {
         JointPath::knots(step, knots?)
     }
 
-    /// By how much the path must be slowed between `from` and `to` so that no joint exceeds its
+    /// Factor by which the path must be slowed between `from` and `to` so that no joint exceeds its
     /// fastest rate, looked at in `steps` steps.
     ///
     /// # Errors

@@ -9,7 +9,7 @@ use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::{FRAC_PI_2, TAU};
 use strapd_attitude::frames::{Dcm, In};
 
-/// What one arm of this build differs in from another. Lengths in m, angles in rad.
+/// Parameters in which one arm of this build differs from another. Lengths in m, angles in rad.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Parameters {
     /// Shoulder axis from the base axis.
@@ -18,7 +18,7 @@ pub struct Parameters {
     pub a2: f64,
     /// Forearm.
     pub a3: f64,
-    /// By how much the axis of joint 5 misses that of joint 4; the seed and every peer leave it out.
+    /// Distance by which the axis of joint 5 misses that of joint 4; the seed and every peer leave it out.
     pub a4: f64,
     /// Shoulder axis above the base frame.
     pub d1: f64,
@@ -75,7 +75,7 @@ pub struct Arm {
 }
 
 impl Arm {
-    /// From its parameters.
+    /// Makes it from its parameters.
     ///
     /// # Errors
     /// Not finite, lengths beyond 1 km, `a2` or `a3` not above zero, offsets beyond two turns, rates not
@@ -129,7 +129,7 @@ impl Arm {
         Self::of(Parameters::urdf())
     }
 
-    /// What it was made from.
+    /// Parameters it was made from.
     #[must_use]
     pub fn parameters(&self) -> &Parameters {
         &self.p
@@ -159,14 +159,14 @@ impl Arm {
         q.to_driver(&self.p.driver_zero)
     }
 
-    /// Where the base frame sits on the URDF's `arm_link_0`: 24 mm forward; preset `seed` 32 mm below.
+    /// Pose of the base frame on the URDF's `arm_link_0`: 24 mm forward; preset `seed` 32 mm below.
     #[must_use]
     pub fn t_armlink0_base(&self) -> Transform<ArmLink0, Base> {
         let r = Vector3::new(0.024, 0.0, 0.115 - self.p.d1);
         Transform::new(Dcm::identity(), In::assume(r))
     }
 
-    /// Where the tool frame sits on the URDF's `arm_link_5`: half a turn about z, which is why the
+    /// Pose of the tool frame on the URDF's `arm_link_5`: half a turn about z, which is why the
     /// upright arm has a yaw of 180 degrees; preset `seed` 88 mm further out.
     #[must_use]
     pub fn t_armlink5_tool(&self) -> Transform<ArmLink5, Tool> {

@@ -13,14 +13,14 @@ use nalgebra::Vector3;
 use strapd_attitude::frames::{Dcm, In, NotARotation, Sensor};
 use strapd_attitude::quaternion::{BodyRate, DeltaAngle, Quaternion};
 
-/// How an IMU sits on the gripper: its axes and its place in the tool frame.
+/// Mounting of an IMU on the gripper: its axes and its position in the tool frame.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ImuMount {
     t_tool_imu: Transform<Tool, Sensor>,
 }
 
 impl ImuMount {
-    /// At the tool point, axes along the tool's.
+    /// Mounting at the tool point, axes along the tool's.
     #[must_use]
     pub fn at_tool() -> Self {
         Self {
@@ -47,7 +47,7 @@ impl ImuMount {
         Ok(Self { t_tool_imu })
     }
 
-    /// What it reads during `motion`, under gravity `g_b` (m/s^2, base axes), with its pose.
+    /// Reading during `motion`, under gravity `g_b` (m/s^2, base axes), with its pose.
     #[must_use]
     pub fn read(&self, arm: &Arm, motion: &TableMotion, g_b: &In<Base>) -> ImuReading {
         let t_base_tool = arm.forward(motion.q());
@@ -66,7 +66,7 @@ impl ImuMount {
         }
     }
 
-    /// Its angular rate alone, in closed form: sensor axes, rad/s.
+    /// Angular rate alone, in closed form: sensor axes, rad/s.
     ///
     /// `w = (c5 s qd1 + s5 Pd, c5 Pd - s5 s qd1, qd5 - c qd1)` in tool axes, `Pd = qd2 + qd3 + qd4`.
     #[must_use]
@@ -91,7 +91,7 @@ pub struct ImuReading {
     pub t_base_imu: Transform<Base, Sensor>,
     /// Angular rate, sensor axes, rad/s.
     pub rate: BodyRate,
-    /// What the accelerometer reads, `C (a - g)`, m/s^2.
+    /// Reading of the accelerometer, `C (a - g)`, m/s^2.
     pub specific_force: In<Sensor>,
 }
 

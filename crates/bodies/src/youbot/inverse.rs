@@ -16,12 +16,12 @@ use strapd_attitude::frames::Dcm;
 /// Elbow angles nearer than this to straight or folded are taken for exactly that, rad: both branches
 /// have met, and the pose changes by less than 1e-15 m.
 const MERGED: f64 = 1e-7;
-/// How far beyond its reach the wrist may be wanted where the policy states no tolerance, m.
+/// Distance beyond its reach that the wrist may be asked for where the policy states no tolerance, m.
 const REACH_SLACK: f64 = 1e-9;
 /// The farthest target taken, m: squares of it stay finite.
 const FARTHEST: f64 = 1e9;
 
-/// Which way joint 1 is turned.
+/// Direction in which joint 1 is turned.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum BaseTurn {
     /// Towards the wrist.
@@ -30,14 +30,14 @@ pub enum BaseTurn {
     Back,
 }
 
-/// Which way the elbow is bent.
+/// Direction in which the elbow is bent.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Elbow {
     /// Above the line from shoulder to wrist (`sin q3 < 0` in front, `> 0` to the back).
     Up,
     /// Below it.
     Down,
-    /// On it, straight or folded: up and down are one solution.
+    /// Straight or folded, on the boundary: up and down are one solution.
     Straight,
 }
 
@@ -46,9 +46,9 @@ pub enum Elbow {
 pub struct Solution {
     /// The joints, each within half a turn of the middle of its range.
     pub q: TableJoints,
-    /// Which way joint 1 is turned.
+    /// Direction in which joint 1 is turned.
     pub base: BaseTurn,
-    /// Which way the elbow is bent.
+    /// Direction in which the elbow is bent.
     pub elbow: Elbow,
     /// Whether every joint is between its stops.
     pub within_limits: bool,
@@ -70,7 +70,7 @@ pub struct Solutions {
     pub plane_position: f64,
     /// Angle of the target's approach out of the arm's plane, rad, signed likewise.
     pub plane_angle: f64,
-    /// By how much the wrist misses its reach, m, for theta1 and its opposite; zero where it reaches.
+    /// Distance by which the wrist misses its reach, m, for theta1 and its opposite; zero where it reaches.
     pub reach_excess: [f64; 2],
     /// Joint 1 turns about the approach: only its sum or difference with joint 5 is determined, and it
     /// was left at the current joints (or zero).
@@ -107,7 +107,7 @@ impl Solutions {
         self.nearest_weighted(q_current, &[1.0; JOINTS])
     }
 
-    /// As [`Solutions::nearest`], joint by joint weighted: least largest `w_i |q_i - q_current,i|`, ties
+    /// Same as [`Solutions::nearest`], with a weight for each joint: least largest `w_i |q_i - q_current,i|`, ties
     /// by the sum of squares. Plain differences: no joint can pass its stop.
     ///
     /// # Errors
@@ -143,7 +143,7 @@ impl Solutions {
         }
     }
 
-    /// When solutions of one turn of the base are wanted and only the other has any.
+    /// Error for solutions wanted with one turn of the base when only the other has any.
     pub(super) fn other_side_out_of_reach(&self) -> ArmError {
         let [a, b] = self.reach.excess();
         let [ra, rb] = self.reach.wanted;

@@ -12,7 +12,7 @@ use strapd_attitude::frames::In;
 /// rates are not computed: a velocity of 1 mm/s would ask for a million rad/s.
 const SINGULAR: f64 = 1e-9;
 
-/// Where the five joints lose a direction. The first two are all there are,
+/// Configurations in which the five joints lose a direction. The first two are all there are,
 /// `det(J^T J) = (a2 a3 sin th3)^2 (rho^2 + a_r^2)`; the third is a path's own.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
@@ -94,7 +94,7 @@ impl Arm {
         j
     }
 
-    /// How near the two singularities are: `|sin theta3|` of the elbow, and the base's distance of the
+    /// Distance from the two singularities: `|sin theta3|` of the elbow, and the base's distance of the
     /// tool point from the axis (m) and sine of the approach's tilt as one length. Zero is singular.
     #[must_use]
     pub fn singularity_measures(&self, q: &TableJoints) -> [f64; 2] {

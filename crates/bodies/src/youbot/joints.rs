@@ -55,7 +55,7 @@ impl TableJoints {
     /// All joints at zero: the document's figure 2.1a.
     pub const ZERO: Self = Self([0.0; JOINTS]);
 
-    /// From angles in rad.
+    /// Makes them from angles in rad.
     ///
     /// # Errors
     /// [`ArmError::NotFinite`]; [`ArmError::TooLarge`] beyond 1e6 rad. Limits are not looked at here.
@@ -63,7 +63,7 @@ impl TableJoints {
         bounded("joint angle (rad)", q, LARGEST_ANGLE).map(Self)
     }
 
-    /// From angles in degrees.
+    /// Makes them from angles in degrees.
     ///
     /// # Errors
     /// As [`TableJoints::new`].
@@ -94,7 +94,7 @@ impl TableJoints {
 }
 
 impl DriverJoints {
-    /// From angles in rad.
+    /// Makes them from angles in rad.
     ///
     /// # Errors
     /// As [`TableJoints::new`].
@@ -102,7 +102,7 @@ impl DriverJoints {
         bounded("joint angle (rad)", u, LARGEST_ANGLE).map(Self)
     }
 
-    /// From angles in degrees.
+    /// Makes them from angles in degrees.
     ///
     /// # Errors
     /// As [`TableJoints::new`].
@@ -132,7 +132,7 @@ impl TableJoints {
 }
 
 impl TableMotion {
-    /// From angles, rates in rad/s and accelerations in rad/s^2.
+    /// Makes it from angles, rates in rad/s and accelerations in rad/s^2.
     ///
     /// # Errors
     /// [`ArmError::NotFinite`]; [`ArmError::TooLarge`] beyond 1e5 rad/s or 1e9 rad/s^2.
@@ -183,7 +183,7 @@ impl TableMotion {
 }
 
 impl DriverMotion {
-    /// From angles, rates in rad/s and accelerations in rad/s^2.
+    /// Makes it from angles, rates in rad/s and accelerations in rad/s^2.
     ///
     /// # Errors
     /// As [`TableMotion::new`].

@@ -4,7 +4,7 @@ use super::joints::{JOINTS, TableJoints};
 use super::{ArmError, error::bounded};
 use std::f64::consts::{PI, TAU};
 
-/// What rounding may add to an angle at its stop, rad.
+/// Rounding allowed to an angle at its stop, rad.
 const SLACK: f64 = 1e-9;
 
 /// Range of every joint, rad, seed convention.
@@ -16,7 +16,7 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// From lower and upper stops, rad.
+    /// Makes them from lower and upper stops, rad.
     ///
     /// # Errors
     /// Not finite, not in order, or a range of a full turn or more: a pose would then have more
@@ -117,7 +117,7 @@ impl Limits {
         }
     }
 
-    /// How far each joint is past a stop, rad; negative inside.
+    /// Distance of each joint past a stop, rad; negative inside.
     pub(super) fn excess(&self, q: &[f64; JOINTS]) -> [f64; JOINTS] {
         let mut out = [0.0; JOINTS];
         for (joint, o) in out.iter_mut().enumerate() {

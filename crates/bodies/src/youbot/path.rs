@@ -60,9 +60,9 @@ const BETWEEN: usize = 16;
 /// One leg of a path: to these joints in so many seconds.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Leg {
-    /// Where it ends.
+    /// End of the leg.
     pub to: TableJoints,
-    /// How long it takes, s.
+    /// Duration, s.
     pub duration: f64,
 }
 
@@ -71,11 +71,11 @@ pub struct Leg {
 pub enum JointPath {
     /// Each joint by itself.
     Sinusoids([Sinusoid; JOINTS]),
-    /// From rest to rest; it stays at the last.
+    /// Legs from rest to rest; the arm stays at the last.
     Legs {
-        /// Where it starts.
+        /// Start of the path.
         from: TableJoints,
-        /// In order.
+        /// Legs in order.
         legs: Vec<Leg>,
     },
     /// Joints, rates and accelerations at equal intervals; polynomials of fifth degree between.
@@ -198,7 +198,7 @@ impl JointPath {
         )
     }
 
-    /// As [`JointPath::at`] for a finite time, without a look at the size of the numbers.
+    /// Same as [`JointPath::at`] for a finite time, without a look at the size of the numbers.
     pub(super) fn motion(&self, secs: f64) -> TableMotion {
         match self {
             Self::Sinusoids(joints) => {

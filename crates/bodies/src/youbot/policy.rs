@@ -1,6 +1,6 @@
 //! A pose five joints can not take -> which nearby pose is meant. Pure.
 
-/// What to keep of a target that is off every plane through the base axis. The residual is always
+/// Part to keep of a target that is off every plane through the base axis. The residual is always
 /// returned; poses in a plane are the same under every policy.
 ///
 /// Of random poses in space none can be taken exactly: the reachable set has five dimensions.

@@ -5,12 +5,12 @@ use super::{Arm, Link};
 use nalgebra::{Matrix3, Vector3};
 use strapd_attitude::frames::In;
 
-/// How one link moves relative to the base, resolved in its own axes.
+/// Motion of one link relative to the base, resolved in its own axes.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct LinkMotion {
     /// Angular rate, rad/s.
     pub rate: In<Link>,
-    /// Its rate of change, rad/s^2.
+    /// Rate of change, rad/s^2.
     pub rate_change: In<Link>,
     /// Velocity of the frame's origin, m/s.
     pub velocity: In<Link>,
@@ -51,7 +51,7 @@ impl Arm {
         out
     }
 
-    /// From link i-1 to link i.
+    /// Step from link i-1 to link i.
     #[inline]
     pub(super) fn step(
         &self,

@@ -14,7 +14,7 @@ const REMAINDER: f64 = 1e-21;
 /// A body at rest has no time scale of its own, s.
 const LONGEST: f64 = 1.0;
 
-/// What a recurrence needs of a number.
+/// Operations that a recurrence needs of a number.
 pub(super) trait Number:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
 {
@@ -66,7 +66,7 @@ impl<T: Number> Series<T> {
         sum
     }
 
-    /// From coefficients up to k, coefficient k + 1 of the quaternion.
+    /// Adds coefficient k + 1 of the quaternion, given coefficients up to k.
     pub(super) fn extend_attitude(&mut self, k: usize) {
         let mut sum = [T::ZERO; 4];
         for j in 0..=k {
@@ -82,7 +82,7 @@ impl<T: Number> Series<T> {
         }
     }
 
-    /// From coefficients up to k, coefficient k + 1 of the rates and of gravity in body axes.
+    /// Adds coefficient k + 1 of the rates and of gravity in body axes, given coefficients up to k.
     pub(super) fn extend_heavy(
         &mut self,
         k: usize,
@@ -132,7 +132,7 @@ impl Series<f64> {
         }
     }
 
-    /// How far the series may be trusted: where its last two terms, whatever their ratio to the
+    /// Length over which the series may be trusted: where its last two terms, whatever their ratio to the
     /// ones before, have fallen to [`REMAINDER`] of the first.
     pub(super) fn converged_length(&self) -> f64 {
         let largest =

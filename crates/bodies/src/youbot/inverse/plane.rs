@@ -105,7 +105,7 @@ impl Plane {
         along(0).atan2(along(1))
     }
 
-    /// After theta1 was changed where it is free.
+    /// Recomputes what follows from theta1 after it was changed where it is free.
     pub(super) fn retake(&mut self) {
         (self.sin, self.cos) = self.theta1.sin_cos();
     }
