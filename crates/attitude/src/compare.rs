@@ -37,7 +37,7 @@ use statistics::DriftFit;
 /// An attitude at an instant.
 pub type Stamped = (Nanos, Quaternion<Nav, Body>);
 
-/// How far an estimate is from a reference. All angles in rad.
+/// Comparison of an estimate with a reference. All angles in rad.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Comparison {
     /// Reference samples that found an estimate.
@@ -54,7 +54,7 @@ pub struct Comparison {
     pub drift: Option<Drift>,
     /// Error of the rotation over 1 s; `None` when no two reference samples are 1 s apart.
     pub relative_1s: Option<RelativeError>,
-    /// What was left out.
+    /// Rows that were left out.
     pub left_out: LeftOut,
 }
 
@@ -63,7 +63,7 @@ pub struct Comparison {
 pub struct Errors {
     /// Angle of the rotation between the two attitudes.
     pub total: ErrorStats,
-    /// Its part about the vertical (z of the world), as an absolute value.
+    /// Part about the vertical (z of the world), as an absolute value.
     pub heading: ErrorStats,
     /// The rest: the angle between the two verticals.
     pub inclination: ErrorStats,
@@ -85,11 +85,11 @@ pub struct LeftOut {
 /// The error at one reference sample, for plots. Angles in rad.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ErrorAt {
-    /// When.
+    /// Stamp.
     pub stamp: Nanos,
     /// Angle of the rotation between the two attitudes, 0..=pi.
     pub total: f64,
-    /// Its part about the vertical, signed, -pi..=pi: positive when the estimate is ahead, turned
+    /// Part about the vertical, signed, -pi..=pi: positive when the estimate is ahead, turned
     /// too far about z.
     pub heading: f64,
     /// Angle between the two verticals, 0..=pi.

@@ -171,7 +171,7 @@ impl Conditioner {
         self.report.coarse_nanos = self.timing.coarse();
     }
 
-    /// What became of the samples so far; those held back have no verdict yet.
+    /// Outcome of the samples so far; those held back have no verdict yet.
     #[must_use]
     pub fn report(&self) -> &Report {
         &self.report

@@ -14,8 +14,8 @@
 
 use std::fmt;
 
-/// What can not be done, where and why; and what helps. To make one is marked as what seldom happens, so that the code
-/// around it is made for what does.
+/// Message: what cannot be done, where and why; and what helps. To make one is marked as what seldom happens, so that
+/// the code around it is made for what does.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Diagnostic {
     what: String,
@@ -24,7 +24,7 @@ pub struct Diagnostic {
 }
 
 impl Diagnostic {
-    /// Without help, until [`Diagnostic::help`] gives some.
+    /// Makes one without help, until [`Diagnostic::help`] gives some.
     #[cold]
     #[inline(never)]
     #[must_use]
@@ -39,7 +39,7 @@ impl Diagnostic {
         }
     }
 
-    /// What helps: settings with their values, or what else can be done.
+    /// Adds what helps: settings with their values, or what else can be done.
     #[cold]
     #[inline(never)]
     #[must_use]
@@ -67,7 +67,7 @@ impl Diagnostic {
         &self.what
     }
 
-    /// What helps; `None` where nothing is known to.
+    /// Text of what helps; `None` where nothing is known to.
     #[must_use]
     pub fn helping(&self) -> Option<&str> {
         Some(self.help.as_str()).filter(|help| !help.is_empty())
@@ -104,7 +104,7 @@ impl Diagnostic {
     }
 }
 
-/// On two lines, the second for the help.
+/// Two lines, the second for the help.
 impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.what)?;

@@ -123,7 +123,7 @@ impl<F> fmt::Debug for In<F> {
     }
 }
 
-/// Its components x, y, z, for what writes them.
+/// Components x, y, z, for what writes them.
 impl<F> From<In<F>> for [f64; 3] {
     fn from(vector: In<F>) -> [f64; 3] {
         vector.v.into()
@@ -191,7 +191,7 @@ impl<To, From> Dcm<To, From> {
         Ok(Self::assume(m))
     }
 
-    /// No rotation: both frames coincide.
+    /// Identity: both frames coincide.
     #[must_use]
     pub fn identity() -> Self {
         Self::assume(Matrix3::identity())
@@ -244,17 +244,17 @@ impl<A, B> Mul<In<B>> for Dcm<A, B> {
 pub enum NotARotation {
     /// `max |C C^T - I|` is beyond 1e-6, or NaN.
     NotOrthonormal {
-        /// How far off.
+        /// Size of the defect.
         defect: f64,
     },
-    /// It turns right-handed axes into left-handed ones.
+    /// Matrix that turns right-handed axes into left-handed ones.
     Mirrors {
         /// About -1.
         determinant: f64,
     },
     /// A quaternion whose norm is outside 0.5 to 2, or NaN.
     Norm {
-        /// What it is.
+        /// Norm as given.
         norm: f64,
     },
 }

@@ -56,7 +56,7 @@ impl<To, From> fmt::Debug for Quaternion<To, From> {
 }
 
 impl<To, From> Quaternion<To, From> {
-    /// No rotation: both frames coincide.
+    /// Identity: both frames coincide.
     #[must_use]
     pub fn identity() -> Self {
         Self::assume_unit([1.0, 0.0, 0.0, 0.0])

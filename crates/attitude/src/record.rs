@@ -1,4 +1,4 @@
-//! What crosses the borders between stages. Pure.
+//! Records that cross the borders between stages. Pure.
 //!
 //! ```text
 //! source -> bytes -> decode -> RawSample -> condition -> RateSample -> propagate -> AttitudeSample -> sink
@@ -38,7 +38,7 @@ impl Nanos {
         self.since(earlier) as f64 * 1e-9
     }
 
-    /// From the seconds and nanoseconds of a ROS stamp; `nanosec >= 1e9` carries over.
+    /// Makes it from the seconds and nanoseconds of a ROS stamp; `nanosec >= 1e9` carries over.
     #[must_use]
     pub fn from_sec_nanosec(sec: i64, nanosec: u32) -> Nanos {
         Nanos(
@@ -57,7 +57,7 @@ impl Nanos {
     }
 }
 
-/// What a gyro sample means in time. It matters more than the order of the integrator
+/// Meaning of a gyro sample in time. It matters more than the order of the integrator
 /// (`docs/accuracy.md`), so it is explicit everywhere.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Hash)]
 pub enum SampleKind {
@@ -106,9 +106,9 @@ pub struct RawSample {
     /// The stamp inside the message. `None` when the message has no such field;
     /// a field that holds zero is `Some(Nanos(0))`.
     pub header: Option<Nanos>,
-    /// When the recorder received it.
+    /// Time at which the recorder received it.
     pub log: Nanos,
-    /// When the publisher sent it.
+    /// Time at which the publisher sent it.
     pub publish: Nanos,
     /// Rate (or delta angle, see [`SampleKind`]) about the sensor's axes, in the source's unit.
     /// `None` when the message marks it as absent or has none.
@@ -123,12 +123,12 @@ pub struct RawSample {
     pub orientation_resets: Option<u8>,
     /// The message's own integration interval in nanoseconds (PX4 `gyro_integral_dt`, `delta_angle_dt`).
     pub interval_nanos: Option<i64>,
-    /// Of another sensor of the body than the gyro, with a stamp and a rate of its own: it corrects attitudes, and is
-    /// no sample that lacks its rate.
+    /// Whether it is of another sensor of the body than the gyro, with a stamp and a rate of its own: it corrects
+    /// attitudes, and is no sample that lacks its rate.
     pub is_beside: bool,
 }
 
-/// How a sample connects to the one before it in the same stream.
+/// Connection of a sample to the one before it in the same stream.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Join {
@@ -146,7 +146,7 @@ pub enum Join {
     Reset,
 }
 
-/// What the gyro says of one sample, in body axes: a rate, or what was turned in an interval.
+/// Measurement of the gyro in one sample, in body axes: a rate, or the angle turned in an interval.
 ///
 /// # Convention
 /// [`SampleKind::Rate`] gives the first, all others the second: conditioning has multiplied means by their intervals. A
@@ -162,7 +162,7 @@ pub enum Join {
 pub enum Measured {
     /// The rate at the sample's instant.
     Rate(BodyRate),
-    /// Its integral over the sample's interval, from [`RateSample::start`] to [`RateSample::stamp`].
+    /// Integral over the sample's interval, from [`RateSample::start`] to [`RateSample::stamp`].
     Increment(DeltaAngle),
 }
 
@@ -212,16 +212,16 @@ pub struct RateSample {
     pub gyro: Measured,
     /// Specific force, m/s^2.
     pub accel: Option<In<Body>>,
-    /// How it connects to its predecessor.
+    /// Connection to its predecessor.
     pub join: Join,
-    /// What was noticed about it.
+    /// Observations about it.
     pub status: Status,
-    /// When the recorder received it; outputs are logged at the same instant.
+    /// Time at which the recorder received it; outputs are logged at the same instant.
     pub log: Nanos,
 }
 
 impl RateSample {
-    /// What [`RateSample::gyro`] is over to be a rate: the sample's own interval, s; 1 of a rate.
+    /// Time that [`RateSample::gyro`] is divided by to be a rate: the sample's own interval, s; 1 of a rate.
     pub(crate) fn own_secs(&self) -> f64 {
         match self.gyro {
             Measured::Rate(_) => 1.0,
@@ -327,18 +327,18 @@ pub struct AttitudeSample {
     pub rate: BodyRate,
     /// Specific force, m/s^2, copied through.
     pub accel: Option<In<Body>>,
-    /// Of its error, rad^2, body axes: see [`AttitudeCovariance::sigma`] for three numbers.
+    /// Covariance of its error, rad^2, body axes: see [`AttitudeCovariance::sigma`] for three numbers.
     pub covariance: AttitudeCovariance,
-    /// What was noticed.
+    /// Observations about it.
     pub status: Status,
-    /// How often the attitude has been reset or held so far; a reader that sees it change must not
+    /// Number of times the attitude has been reset or held so far; a reader that sees it change must not
     /// difference across.
     pub reset_count: u32,
-    /// When the recorder received the sample this belongs to.
+    /// Time at which the recorder received the sample this belongs to.
     pub log: Nanos,
 }
 
-/// What became of one sample. Exactly one verdict per sample.
+/// Outcome of one sample. Exactly one verdict per sample.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Hash)]
 pub enum Verdict {
     /// Integrated.
@@ -366,7 +366,7 @@ pub enum Verdict {
     /// Integrated at a stamp of its own inside a longer step beside it, because it shared its
     /// recorded stamp with another sample.
     Restamped,
-    /// Its stamp leaps far ahead, and its successors carry on from its predecessors.
+    /// Stamp that leaps far ahead, while its successors carry on from its predecessors.
     StrayStamp,
     /// Its stamp is more than 146 years from the epoch.
     FarStamp,
@@ -429,7 +429,7 @@ impl Verdict {
     }
 }
 
-/// How many samples got which verdict.
+/// Number of samples by verdict.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Counts([u64; Verdict::ALL.len()]);
 
@@ -446,7 +446,7 @@ impl Counts {
         }
     }
 
-    /// How many so far.
+    /// Number of samples with a verdict so far.
     #[must_use]
     pub fn get(&self, verdict: Verdict) -> u64 {
         self.0.get(verdict as usize).copied().unwrap_or(0)

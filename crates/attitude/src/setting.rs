@@ -1,4 +1,4 @@
-//! What can be set for a run -> what it is called where a person reads of it. Pure.
+//! Settings of a run -> their names where a person reads of them. Pure.
 //!
 //! A stage of its own because a refusal or a warning of a library says which setting helps, and a library does not know how
 //! that is set: by a flag of a command, an argument in Python, a field of [`Plan`](crate::estimate::Plan). So its texts hold a
@@ -22,13 +22,13 @@ use std::sync::OnceLock;
 pub struct Setting(&'static str);
 
 impl Setting {
-    /// Its name as that of a field: `gyro_unit`.
+    /// Name as that of a field: `gyro_unit`.
     #[must_use]
     pub const fn name(self) -> &'static str {
         self.0
     }
 
-    /// It with a value, as advice: `GYRO_UNIT.to("deg")`.
+    /// Returns it with a value, as advice: `GYRO_UNIT.to("deg")`.
     #[must_use]
     pub fn to(self, value: impl fmt::Display) -> Choice {
         Choice {
@@ -60,9 +60,9 @@ impl fmt::Display for Setting {
 /// A setting with the value that helps.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Choice {
-    /// What is set.
+    /// Setting that is set.
     pub setting: Setting,
-    /// To what, or what is to be filled in (`NAME`); empty of one that is on or off.
+    /// Value, or a placeholder to be filled in (`NAME`); empty for one that is on or off.
     pub value: String,
 }
 

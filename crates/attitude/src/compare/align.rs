@@ -12,10 +12,10 @@ use std::fmt;
 use std::ops::ControlFlow;
 use std::str::FromStr;
 
-/// Which constant rotation of the world is taken out before absolute errors are measured (`--align`).
+/// Constant rotation of the world that is removed before absolute errors are measured (`--align`).
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Hash)]
 pub enum Align {
-    /// None: both worlds are claimed to be the same.
+    /// Nothing: both worlds are claimed to be the same.
     None,
     /// The one that makes the first matched sample agree: what a dead reckoner may ask for.
     First,
@@ -112,7 +112,7 @@ impl fmt::Display for ParseAlignError {
 
 impl std::error::Error for ParseAlignError {}
 
-/// At the first match; the identity when there is none.
+/// Alignment at the first match; the identity when there is none.
 fn first(estimate: &Track<'_>, reference: &Track<'_>) -> Quaternion<Nav, Nav> {
     let mut first = Quaternion::identity();
     for_each_match(estimate, reference, |_, q_ref_est, _| {

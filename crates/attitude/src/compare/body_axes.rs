@@ -23,7 +23,7 @@ const ENOUGH: usize = 20_000;
 /// about it open.
 const EXCITED: f64 = 0.02;
 
-/// How the axes of a recorded orientation lie to those of the estimate.
+/// Axes of a recorded orientation relative to those of the estimate.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct BodyAxesFit {
     /// Rotations over 1 s that were judged.

@@ -20,7 +20,7 @@ use std::ops::ControlFlow;
 /// An attitude with what is known of its error.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Known {
-    /// When.
+    /// Stamp.
     pub stamp: Nanos,
     /// The estimate.
     pub q_nb: Quaternion<Nav, Body>,
@@ -52,10 +52,10 @@ pub struct Consistency {
     pub heading: WithinSigma,
     /// Noise of the reference itself, one sigma an axis, rad.
     pub reference_noise: f64,
-    /// How the worlds were laid on each other.
+    /// Alignment of the two worlds.
     pub align: Align,
-    /// By how much the reference's vertical leans against the estimate's, rad, where that was taken out: then the reference's
-    /// world is not level.
+    /// Angle by which the reference's vertical leans against the estimate's, rad, if that was removed: then the
+    /// reference's world is not level.
     pub leaning: Option<f64>,
 }
 
@@ -73,7 +73,7 @@ impl Consistency {
 /// An error with its three sigma, for plots. Angles in rad.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct BoundedError {
-    /// When.
+    /// Stamp.
     pub stamp: Nanos,
     /// Angle about level axes, and three sigma in its direction.
     pub tilt: [f64; 2],
@@ -234,7 +234,7 @@ impl Sums {
 /// Noise of the reference about one axis, rad: how far its turns over one step scatter about those of the estimate,
 /// whose own noise over a step is far less. By medians, so that jumps do not count. `None` of fewer than three.
 fn scatter_of_a_step(estimate: &Track<'_>, reference: &Track<'_>) -> Option<f64> {
-    /// Of a normal distribution's median deviation its sigma.
+    /// Ratio of sigma to the median deviation of a normal distribution.
     const SIGMA_OF_MEDIAN: f64 = 1.4826;
     let mut axes: [Vec<f64>; 3] = Default::default();
     let mut before: Option<(Nanos, Quaternion<Nav, Nav>)> = None;

@@ -34,17 +34,17 @@ const LONG: usize = 30;
 /// A bias is known when it is so many sigmas from nothing, and worth a word from so much on, rad/s (10 deg/h).
 const SIGMAS: f64 = 5.0;
 const SMALLEST: f64 = 10.0 / 3600.0 * std::f64::consts::PI / 180.0;
-/// No gyro that is whole has more, rad/s (10 deg/s).
+/// Largest bias that is believed, rad/s (10 deg/s): a larger one is a broken gyro.
 const LARGEST: f64 = 10.0 * std::f64::consts::PI / 180.0;
-/// It helps when it leaves less than this share of the error.
+/// Share of the error below which what is left must be for the bias to help.
 const HELPS: f64 = 0.7;
 
 /// A constant bias that explains how an estimate leaves a reference.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct BiasFit {
-    /// What is left of the bias in the estimate, rad/s, body axes: to be added to what was removed.
+    /// Bias left in the estimate, rad/s, body axes: to be added to what was removed.
     pub bias: Vector3<f64>,
-    /// Its uncertainty, by how parts of the recording agree, rad/s.
+    /// Uncertainty by how parts of the recording agree, rad/s.
     pub sigma: Vector3<f64>,
     /// Windows of a second it is from.
     pub windows: usize,
@@ -174,7 +174,7 @@ struct Window {
     rows: std::ops::Range<usize>,
 }
 
-/// What a window says of the bias.
+/// Equation for the bias that a window gives.
 struct Row {
     delta: Vector3<f64>,
     by_bias: Matrix3<f64>,

@@ -9,7 +9,7 @@ use crate::record::Nanos;
 use std::borrow::Cow;
 use std::ops::ControlFlow;
 
-/// Between estimates further apart than this many median spacings nothing is interpolated.
+/// Longest bridge, in median spacings: estimates further apart are not interpolated.
 const LONGEST_BRIDGE: i64 = 4;
 
 /// A track in time order, attitudes only.

@@ -19,11 +19,11 @@ pub struct RelativeError {
     pub median: f64,
     /// 95 % are below.
     pub p95: f64,
-    /// How many pairs of reference samples.
+    /// Number of pairs of reference samples.
     pub count: usize,
 }
 
-/// For every reference sample at t with another at t + 1 s (the nearest, within half the median
+/// Error over one second: for every reference sample at t with another at t + 1 s (the nearest, within half the median
 /// spacing): the angle of `(q_ref(t)* q_ref(t+1))* (q_est(t)* q_est(t+1))`, estimates nearest to
 /// the stamps of the two reference samples and not further than one median spacing.
 ///

@@ -6,7 +6,7 @@ use crate::quaternion::RotationVector;
 use nalgebra::Vector3;
 use std::f64::consts::{PI, TAU};
 
-/// What is said of a set of absolute errors, in rad.
+/// Statistics of a set of absolute errors, in rad.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ErrorStats {
     /// Root of the mean square.
@@ -62,7 +62,7 @@ impl Drift {
         self.rate_n.norm().to_degrees() * 3600.0
     }
 
-    /// Its part about the vertical, signed, degrees per hour.
+    /// Part about the vertical, signed, degrees per hour.
     #[must_use]
     pub fn heading_deg_per_hour(&self) -> f64 {
         self.rate_n.z.to_degrees() * 3600.0

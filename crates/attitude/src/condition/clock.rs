@@ -7,17 +7,17 @@ use crate::diagnostic::Diagnostic;
 use crate::record::{Nanos, RawSample};
 use crate::setting::{RATE_HZ, TIME};
 
-/// Which of a sample's clocks is believed (`--time`).
+/// Clock of a sample that is believed (`--time`).
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub enum Clock {
     /// The stamp inside the message.
     #[default]
     Header,
-    /// When the recorder received it.
+    /// Time at which the recorder received it.
     Log,
-    /// When the publisher sent it.
+    /// Time at which the publisher sent it.
     Publish,
-    /// None of them: the n-th sample is n periods after the first one's log time.
+    /// No clock: the n-th sample is n periods after the first one's log time.
     Index {
         /// Samples per second.
         rate_hz: f64,
@@ -36,7 +36,7 @@ impl Clock {
         }
     }
 
-    /// This clock's stamp, or `None` where the message has none. [`Clock::Index`] reads no stamp.
+    /// Stamp of this clock, or `None` where the message has none. [`Clock::Index`] reads no stamp.
     #[must_use]
     pub fn read(self, raw: &RawSample) -> Option<Nanos> {
         match self {
@@ -53,23 +53,23 @@ impl Clock {
 pub enum ClockWarning {
     /// The messages carry no such stamp.
     Absent {
-        /// Whose stamps: `header` or `publish`.
+        /// Name of the clock: `header` or `publish`.
         clock: &'static str,
     },
     /// All stamps are zero.
     Zero {
-        /// Whose stamps.
+        /// Name of the clock.
         clock: &'static str,
-        /// How many samples were looked at.
+        /// Number of samples looked at.
         looked_at: usize,
     },
     /// All stamps are the same, and not zero.
     StandsStill {
-        /// Whose stamps.
+        /// Name of the clock.
         clock: &'static str,
         /// The value they all have.
         at: Nanos,
-        /// How many samples were looked at.
+        /// Number of samples looked at.
         looked_at: usize,
     },
     /// Neither the clock asked for nor the log time advances: only `--time index` can work.
@@ -185,7 +185,7 @@ impl IndexClock {
         }
     }
 
-    /// When the first sample was received.
+    /// Time at which the first sample was received.
     pub(super) fn base(&self) -> Option<Nanos> {
         self.base
     }

@@ -8,9 +8,9 @@ use super::truncation::undone;
 use crate::record::{Nanos, RawSample, SampleKind, Status, Verdict};
 use nalgebra::{Matrix3, Vector3};
 
-/// No gyro turns faster, rad/s: 570,000 deg/s, a hundred times the widest range sold.
+/// Largest rate that is believed, rad/s: 570,000 deg/s, a hundred times the widest range sold.
 pub(super) const HUGE_RATE: f64 = 1e4;
-/// No sample integrates to more, rad.
+/// Largest angle of one sample that is believed, rad.
 const HUGE_ANGLE: f64 = 1e3;
 /// Longest integration interval believed of a message, nanoseconds.
 const MAX_INTERVAL_NANOS: i64 = 10_000_000_000;

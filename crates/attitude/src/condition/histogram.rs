@@ -53,7 +53,7 @@ impl Histogram {
         self.max
     }
 
-    /// How many values lie in `from..to` nanoseconds, octave by octave, from the first that holds one
+    /// Counts of values in `from..to` nanoseconds, octave by octave, from the first that holds one
     /// to the last. The first octave is 0 alone, the second 1 alone.
     pub(super) fn octaves(&self) -> Vec<(f64, f64, u64)> {
         let mut counts = [0_u64; 70];
@@ -96,7 +96,7 @@ fn bin(nanos: i64) -> usize {
     (octave - PER_OCTAVE_BITS + 1) as usize * PER_OCTAVE + within
 }
 
-/// Which octave a bin belongs to: 0 = the value 0, k = `2^(k-1)..2^k`.
+/// Octave that a bin belongs to: 0 = the value 0, k = `2^(k-1)..2^k`.
 fn octave(bin: usize) -> usize {
     if bin < 2 * PER_OCTAVE {
         return (usize::BITS - bin.leading_zeros()) as usize;

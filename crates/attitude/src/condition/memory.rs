@@ -81,7 +81,7 @@ impl Memory {
 }
 
 impl Conditioner {
-    /// What it knows; `None` before the first sample, and while more of them wait than is worth keeping.
+    /// Returns the state; `None` before the first sample, and while more of them wait than is worth keeping.
     #[must_use]
     pub fn memory(&self) -> Option<Memory> {
         let untimed = self.order.untimed();

@@ -18,7 +18,7 @@ const COMPACT_AT: usize = 1024;
 /// The same where nothing waits to be put in order: live, perhaps one of many sensors. A line of eight, and of those
 /// that leave it stamp and digest are kept.
 const COMPACT_LIVE_AT: usize = 7;
-/// Of so many that were kept the first are forgotten.
+/// Number of kept entries at which the first are forgotten.
 const FORGET_AT: usize = 96;
 /// Samples with one and the same stamp that are told apart: a second of the fastest gyros, on a clock
 /// that counts whole seconds. A stuck clock makes no more.
@@ -36,7 +36,7 @@ const MAX_RUN: usize = 8;
 /// Longest run of stray stamps that is recognised.
 const MAX_STRAYS: usize = 3;
 
-/// What is still known of an entry that has left the line.
+/// Entry that has left the line, as far as it is still known.
 #[derive(Clone, Copy, Debug)]
 struct Past {
     stamp: Nanos,
@@ -51,7 +51,7 @@ pub(super) struct Order {
     /// Sorted by (epoch, stamp), equal stamps in order of arrival. `..cursor` has been timed.
     pub(super) line: Vec<Entry>,
     pub(super) cursor: usize,
-    /// Where the current epoch begins in `line`.
+    /// Index in `line` where the current epoch begins.
     pub(super) epoch_from: usize,
     epoch: u32,
     /// Newest stamp of the current epoch.
@@ -223,7 +223,7 @@ impl Order {
         }
     }
 
-    /// No more entries will come.
+    /// Ends the stream: no more entries come.
     pub(super) fn finish(&mut self, spacing: Option<i64>, report: &mut Report) {
         let misfits = self.misfits(spacing);
         if misfits >= MIN_RUN && misfits == self.suspects.len() {
@@ -311,7 +311,7 @@ impl Order {
             && off(suspect.stamp) <= off(high)
     }
 
-    /// So many suspects in a row that the line is not coming back: the clock was set back, or
+    /// Handles so many suspects in a row that the line is not coming back: the clock was set back, or
     /// what led the line astray was a few stray stamps at its end.
     fn resolve_long_run(&mut self, spacing: Option<i64>, report: &mut Report) {
         if let Some(strays) = self.strays_at_end() {
@@ -330,7 +330,7 @@ impl Order {
         }
     }
 
-    /// How many entries at the end of the line, none of them timed yet, leap ahead so that the
+    /// Number of entries at the end of the line, none of them timed yet, that leap ahead so that the
     /// suspects carry on from the entry before them.
     fn strays_at_end(&self) -> Option<usize> {
         let first = self.suspects.first()?.stamp;
@@ -410,7 +410,7 @@ mod tests {
     /// Index, stamp, epoch, status.
     type Released = (u64, i64, u32, u16);
 
-    /// What leaves, as a live stream takes it: each as soon as it stands in the line; what was counted; and the
+    /// Releases as a live stream takes them: each as soon as it stands in the line; then the counts; and the
     /// most bytes it held.
     fn released(mut order: Order, entries: &[Entry]) -> (Vec<Released>, String, usize) {
         let (mut out, mut report, mut most) = (Vec::new(), Report::default(), 0);

@@ -41,7 +41,7 @@ pub struct Quality {
     spacing: Histogram,
     jitter: Histogram,
     duplicates: u64,
-    /// Of these, with other data.
+    /// Number of these with other data.
     collisions: u64,
     /// Different samples on the newest stamp.
     sharing: i64,
@@ -54,7 +54,7 @@ pub struct Quality {
     no_gyro: u64,
     not_finite: u64,
     zero_rows: u64,
-    /// Of these, between two that are not.
+    /// Number of these between two that are not.
     lone_zero_rows: u64,
     last_row_lone_zero: bool,
     repeated_rows: u64,
@@ -64,7 +64,7 @@ pub struct Quality {
     previous: Option<[f64; 3]>,
     accel_count: u64,
     accel_not_finite: u64,
-    /// Of so many its length is near 1, and near 1000.
+    /// Number of lengths near 1, and near 1000.
     near_one: u64,
     near_thousand: u64,
     orientations: u64,
@@ -318,7 +318,7 @@ impl Quality {
         }
     }
 
-    /// How many samples are missing in this step, as far as is known.
+    /// Adds a step; returns how many samples are missing in it, as far as is known.
     fn push_step(&mut self, step: i64) -> u64 {
         if self.nominal.is_some() {
             return self.measure_step(step);
@@ -433,7 +433,7 @@ impl Quality {
         }
     }
 
-    /// What has been seen so far.
+    /// Summary of what has been seen so far.
     #[must_use]
     pub fn summary(&self) -> QualitySummary {
         if self.nominal.is_none() && !self.primer.is_empty() {

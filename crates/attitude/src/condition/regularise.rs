@@ -53,7 +53,7 @@ const ENOUGH: u64 = 64;
 const SETTLED: u32 = 16;
 const LOST: u32 = 8;
 
-/// What a sample's value means when its interval changes.
+/// Meaning of a sample's value when its interval changes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Value {
     /// A rate at an instant: it has no interval.
@@ -65,7 +65,7 @@ pub enum Value {
 }
 
 impl Value {
-    /// For samples of a kind; `states_interval` = the messages say how long they integrated.
+    /// Meaning for samples of a kind; `states_interval` = the messages say how long they integrated.
     #[must_use]
     pub fn of(kind: SampleKind, states_interval: bool) -> Value {
         match kind {
@@ -160,7 +160,7 @@ pub struct Lines {
 }
 
 impl Lines {
-    /// How many.
+    /// Number of lines.
     #[must_use]
     pub fn len(&self) -> usize {
         self.lines.len()
@@ -206,11 +206,11 @@ pub enum Uneven {
         /// Steps per sample.
         steps: f64,
     },
-    /// No rate holds for long.
+    /// Refusal: no rate holds for long.
     Restless {
         /// Segments found.
         segments: usize,
-        /// In so many samples.
+        /// Number of samples in which they lie.
         samples: u64,
     },
 }
@@ -248,7 +248,7 @@ impl std::error::Error for Uneven {}
 /// A stretch of constant rate, as regularised.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Segment {
-    /// Its first new stamp.
+    /// First new stamp.
     pub start: Nanos,
     /// Samples in it.
     pub samples: u64,
@@ -256,7 +256,7 @@ pub struct Segment {
     pub rate_hz: Option<f64>,
 }
 
-/// What was done.
+/// Report of what was done.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Report {
     /// Samples that went through.
@@ -267,7 +267,7 @@ pub struct Report {
     pub kept: Vec<Segment>,
     /// Jitter removed (recorded minus new stamp), rms, ns.
     pub rms_nanos: f64,
-    /// Its 99th percentile, ns (3 %).
+    /// 99th percentile of the moves, ns (3 %).
     pub p99_nanos: f64,
     /// The largest, ns.
     pub max_nanos: i64,
@@ -316,7 +316,7 @@ enum How {
 }
 
 impl Regulariser {
-    /// By the lines a [`Survey`] of the very same samples found.
+    /// Makes one that uses the lines a [`Survey`] of the very same samples found.
     #[must_use]
     pub fn by_lines(lines: Arc<Lines>, value: Value) -> Regulariser {
         Regulariser::new(
@@ -330,7 +330,7 @@ impl Regulariser {
         )
     }
 
-    /// As they come: what a stamp becomes depends on those before it alone, and nothing waits.
+    /// Makes one for stamps as they come: a new stamp depends on those before it alone, and nothing waits.
     #[must_use]
     pub fn causal(value: Value) -> Regulariser {
         Regulariser::new(
@@ -382,7 +382,7 @@ impl Regulariser {
         }
     }
 
-    /// What was done so far.
+    /// Report of what was done so far.
     #[must_use]
     pub fn report(&self) -> Report {
         let n = self.report.samples.max(1) as f64;

@@ -1,11 +1,11 @@
-//! What happened to a stream, counted. Pure.
+//! Counts of what happened to a stream. Pure.
 //!
 //! A stage of its own because bad data never ends a run: this is where it is accounted for, in
 //! bounded memory, with the first case of each kind kept so that a message can point at it.
 
 use crate::record::{Counts, Join, Nanos, Verdict};
 
-/// How many gaps are kept one by one; all are counted.
+/// Number of gaps kept one by one; all are counted.
 pub const GAPS_KEPT: usize = 1000;
 
 /// One place where samples are missing.
@@ -15,9 +15,9 @@ pub struct Gap {
     pub start: Nanos,
     /// Nanoseconds not covered. Negative where a clock jumped back: the time lost is unknown.
     pub length_nanos: i64,
-    /// What was done: [`Join::Bridge`], [`Join::Hold`] or [`Join::Reset`].
+    /// Treatment: [`Join::Bridge`], [`Join::Hold`] or [`Join::Reset`].
     pub join: Join,
-    /// How many samples are missing, from the ordinary spacing; 0 where that is unknown.
+    /// Number of missing samples, from the ordinary spacing; 0 where that is unknown.
     pub missing: u64,
     /// Rotation that can have happened unseen, rad: the larger of the rates on both edges times
     /// the length (0 where the clock jumped back). A bound as long as the motion in the gap was
@@ -28,11 +28,11 @@ pub struct Gap {
 /// Every gap of a stream.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Gaps {
-    /// How many.
+    /// Number of gaps.
     pub count: u64,
-    /// How many of these were held or reset, not bridged.
+    /// Number of these that were held or reset, not bridged.
     pub not_bridged: u64,
-    /// How many times the clock jumped back (each counted in `count` and `not_bridged` too).
+    /// Number of times the clock jumped back (each counted in `count` and `not_bridged` too).
     pub jumps_back: u64,
     /// Samples missing in all gaps together.
     pub missing: u64,
@@ -75,13 +75,13 @@ impl Gaps {
 /// The first sample that got a verdict other than accepted.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct FirstBad {
-    /// How many samples came before it in the stream.
+    /// Number of samples before it in the stream.
     pub index: u64,
-    /// Its stamp, where it had one.
+    /// Stamp, if it had one.
     pub stamp: Option<Nanos>,
 }
 
-/// What became of a stream.
+/// Outcome of a stream.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Report {
     /// Exactly one verdict per sample.

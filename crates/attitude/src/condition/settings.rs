@@ -1,4 +1,4 @@
-//! What the user says about the gyro. Pure.
+//! Settings of the gyro that the user states. Pure.
 //!
 //! A stage of its own so that everything outside can be wrong about a sensor is checked once,
 //! before the first sample, and the hot path needs no checks.
@@ -13,7 +13,7 @@ use crate::setting::{
 use nalgebra::{Matrix3, Vector3};
 use std::fmt;
 
-/// What happens at a gap longer than [`Settings::max_gap_secs`], and at a clock that jumped back.
+/// Treatment of a gap longer than [`Settings::max_gap_secs`], and of a clock that jumped back.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Hash)]
 pub enum OnGap {
     /// Keep the attitude, add no rotation.
@@ -38,14 +38,14 @@ impl OnGap {
     }
 }
 
-/// How a stream is conditioned.
+/// Settings by which a stream is conditioned.
 ///
 /// # Convention
 /// A raw vector v_s in the sensor's own axes and unit becomes `w_b = mount * axes * gyro_matrix * unit * v_s - bias`, an
 /// acceleration `mount * axes * (accel_matrix * accel_scale * a_s - accel_bias)`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// What a sample means in time.
+    /// Meaning of a sample in time.
     pub kind: SampleKind,
     /// Unit of the recorded rates.
     pub unit: GyroUnit,
@@ -56,18 +56,18 @@ pub struct Settings {
     pub gyro_matrix: Matrix3<f64>,
     /// The same for the accelerometer; no rotation either.
     pub accel_matrix: Matrix3<f64>,
-    /// What is left of its bias after that, m/s^2, sensor axes before `axes`.
+    /// Bias left after that, m/s^2, sensor axes before `axes`.
     pub accel_bias: Vector3<f64>,
     /// Sensor axes from the columns of the source. A map that mirrors is allowed: recordings
     /// with columns in z,y,x order exist, and naming the columns right is not a reflection.
     pub axes: AxisMap,
     /// Sensor-to-body rotation C_bs, applied after `axes`.
     pub mount: Dcm<Body, Sensor>,
-    /// Which stamp counts. See [`super::choose_clock`].
+    /// Clock whose stamps count. See [`super::choose_clock`].
     pub clock: Clock,
     /// Longest gap integrated across, seconds.
     pub max_gap_secs: f64,
-    /// What to do beyond it.
+    /// Treatment of a gap beyond it.
     pub on_gap: OnGap,
     /// Step in rad/s (or rad of a delta angle), sensor axes, to which a driver has cut the rates towards
     /// zero: half of it is put back. See [`truncation`](super::truncation).
@@ -80,7 +80,7 @@ pub struct Settings {
     pub start: Option<f64>,
     /// Leave out samples later than this, seconds after the first stamp.
     pub until: Option<f64>,
-    /// How many samples are held back so that a late one can be put in its place (and so that the
+    /// Number of samples held back so that a late one can be put in its place (and so that the
     /// first samples, colliding stamps and stamps that catch up are judged with their successors
     /// in view). 0 = live: every sample with a new stamp leaves at once, late ones are dropped.
     pub reorder_window: usize,
@@ -256,7 +256,7 @@ mod tests {
     use super::*;
     use nalgebra::Rotation3;
 
-    /// As they were printed when they held bare numbers, which saved estimators are told apart by.
+    /// Printed form of settings from when they held bare numbers, by which saved estimators are distinguished.
     mod bare {
         use super::*;
 

@@ -4,7 +4,7 @@
 //! ordinary step is, and that must be found while streaming, in bounded memory, unmoved by
 //! gaps, bursts and repeats.
 
-/// How many steps are looked at together.
+/// Number of steps looked at together.
 const BLOCK: usize = 64;
 
 /// The ordinary step of a stream, in nanoseconds: the mean of the steps within an eighth of their
@@ -73,12 +73,12 @@ impl Spacing {
         true
     }
 
-    /// No sum of excesses is larger.
+    /// Largest possible sum of excesses.
     fn most_excess(&self) -> i64 {
         self.tolerance.saturating_mul(BLOCK as i64)
     }
 
-    /// Until the ordinary step is known, `limit` nanoseconds count as ordinary.
+    /// Makes one that takes `limit` nanoseconds as ordinary until the ordinary step is known.
     pub(super) fn new(limit: i64) -> Self {
         Spacing {
             steps: [0; BLOCK],

@@ -17,10 +17,10 @@ use crate::quaternion::BodyRate;
 use crate::record::{Join, Nanos, RateSample};
 use nalgebra::Vector3;
 
-/// How many rests are kept; later ones are only counted.
+/// Number of rests kept; later ones are only counted.
 pub const RESTS_KEPT: usize = 1000;
 
-/// What counts as still. The defaults fit MEMS gyros from phone to industrial grade; measured on the
+/// Limits of stillness. The defaults fit MEMS gyros from phone to industrial grade; measured on the
 /// recordings of six devices, resting windows have a gyro deviation of 0.0015 to 0.02 rad/s, moving ones
 /// of 0.04 and more.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -64,9 +64,9 @@ const SLACK: f64 = 0.9;
 /// A stretch of time in which the body stood still.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Rest {
-    /// Its first sample.
+    /// Stamp of the first sample.
     pub start: Nanos,
-    /// Its last sample.
+    /// Stamp of the last sample.
     pub end: Nanos,
     /// Mean rate: the gyro's bias (what is left of it after `--bias`).
     pub mean_rate: BodyRate,
@@ -84,7 +84,7 @@ pub struct Rest {
 }
 
 impl Rest {
-    /// As if it were the only one.
+    /// Returns it as the only rest.
     #[must_use]
     pub fn alone(&self) -> Rests {
         Rests {
@@ -96,7 +96,7 @@ impl Rest {
         }
     }
 
-    /// How long it lasted, s.
+    /// Duration, s.
     #[must_use]
     pub fn secs(&self) -> f64 {
         self.end.secs_since(self.start)
@@ -108,7 +108,7 @@ impl Rest {
 pub struct Rests {
     /// The first [`RESTS_KEPT`], in order of time.
     pub kept: Vec<Rest>,
-    /// How many there were.
+    /// Number of rests.
     pub count: u64,
     /// Seconds of rest in all.
     pub secs: f64,
@@ -143,7 +143,7 @@ impl Moments {
         self.variance().max().max(0.0).sqrt()
     }
 
-    /// Of the mean's direction, rad; 0 of no mean.
+    /// Sigma of the mean's direction, rad; 0 if there is no mean.
     fn direction_sigma(&self) -> f64 {
         let sigma = self.deviation() / f64::from(self.n).sqrt() / self.mean.norm();
         if sigma.is_finite() { sigma } else { 0.0 }

@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 
 /// Interval of a lone increment that says nothing of its own: only its mean rate depends on it.
 const LONE_INTERVAL_NANOS: i64 = 10_000_000;
-/// How many steps a late stamp may take to catch up.
+/// Number of steps a late stamp may take to catch up.
 /// Beyond a dozen steps a few percent of error in the ordinary step look like a sample.
 const MAX_LOOK: usize = 12;
 
@@ -72,7 +72,7 @@ impl Timing {
         self.previous = previous;
     }
 
-    /// What is known of the ordinary step.
+    /// Ordinary steps, as far as they are known.
     pub(super) fn steps(&self) -> Steps {
         self.spacing.steps()
     }
@@ -231,7 +231,7 @@ impl Timing {
         (start, angle)
     }
 
-    /// How long one increment lasts when its predecessor does not say.
+    /// Duration of one increment when its predecessor does not state it.
     fn own_interval(&self, entry: &Entry) -> i64 {
         if entry.interval > 0 {
             entry.interval
@@ -420,7 +420,7 @@ impl Timing {
 /// Entries in a row that share one stamp.
 struct Group {
     n: i64,
-    /// To the next stamp, where one follows in the same epoch.
+    /// Step to the next stamp, where one follows in the same epoch.
     step: Option<i64>,
 }
 
@@ -449,7 +449,7 @@ fn is_coarse(entries: usize, stamps: usize) -> bool {
     entries > COARSE * stamps.saturating_sub(1).max(1)
 }
 
-/// Where samples that shared a stamp go: `from`, `from + step`, ...; the first `keep` of them.
+/// Places of samples that shared a stamp: `from`, `from + step`, ...; the first `keep` of them.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Placement {
     from: Nanos,

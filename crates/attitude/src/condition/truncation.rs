@@ -16,12 +16,12 @@ const SMALLEST_STEP: f64 = 5e-6;
 const RESOLUTION: f64 = 1e-6;
 /// Fewest differences that say something.
 const FEWEST: usize = 1000;
-/// So many samples before and after one tell whether it only passes through zero.
+/// Number of samples before and after one that tell whether it only passes through zero.
 const AROUND: usize = 8;
 /// A zero bin so many times as wide as the others is that of truncation: 2 is exact, 1 is rounding.
 const WIDE: f64 = 1.5;
 
-/// What was found out about recorded rates.
+/// Grid on which recorded rates lie.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Grid {
     /// The step they count in, rad/s.

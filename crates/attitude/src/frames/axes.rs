@@ -77,7 +77,7 @@ impl AxisMap {
         (!self.mirrors()).then(|| Dcm::assume(self.matrix()))
     }
 
-    /// Its signed permutation matrix, for kernels.
+    /// Signed permutation matrix, for kernels.
     pub(crate) fn matrix(self) -> Matrix3<f64> {
         let column = |unit: [f64; 3]| Vector3::from(self.apply(unit));
         Matrix3::from_columns(&[
@@ -162,12 +162,12 @@ impl fmt::Display for AxisMap {
 pub enum AxisMapError {
     /// Not the letters x, y, z, each once.
     NotAPermutation {
-        /// What was given, shortened and escaped.
+        /// Text as given, shortened and escaped.
         text: String,
     },
     /// A signed permutation with determinant -1.
     Mirrors {
-        /// What was given.
+        /// Map as given.
         map: AxisMap,
     },
 }
@@ -200,7 +200,7 @@ impl fmt::Display for AxisMapError {
 
 impl std::error::Error for AxisMapError {}
 
-/// Which axes the gyro's numbers are in (`--body`).
+/// Axes of the gyro's numbers (`--body`).
 ///
 /// # Convention
 /// strapd integrates in [`Flu`](super::Flu) body axes; this is the rotation from the numbers to those.

@@ -35,7 +35,7 @@ pub struct Point {
     pub tau: f64,
     /// Allan deviation, rad/s.
     pub sigma: f64,
-    /// Its relative standard error, 1 / sqrt(2 (N/m - 1)): conservative, that of N/m separate clusters.
+    /// Relative standard error, 1 / sqrt(2 (N/m - 1)): conservative, that of N/m separate clusters.
     pub error: f64,
 }
 
@@ -44,12 +44,12 @@ pub struct Point {
 pub enum AllanError {
     /// Fewer than nine intervals in a row.
     TooShort {
-        /// In the longest piece.
+        /// Number of intervals in the longest piece.
         intervals: usize,
     },
     /// The interval is no length of time.
     Interval {
-        /// As given, s.
+        /// Value as given, s.
         secs: f64,
     },
 }

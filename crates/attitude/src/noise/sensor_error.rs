@@ -69,7 +69,7 @@ use std::fmt;
 pub struct ImuError {
     /// Second-order low-pass of the rate: undamped natural frequency, Hz.
     pub bandwidth_hz: Option<f64>,
-    /// Its damping ratio.
+    /// Damping ratio.
     pub damping: f64,
     /// Scale-factor error, 1 sigma, of one.
     pub scale: f64,

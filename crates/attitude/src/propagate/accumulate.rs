@@ -11,12 +11,12 @@ use crate::quaternion::kernel;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Accumulator {
     q: [f64; 4],
-    /// What is in `q` too much.
+    /// Excess of `q` over what was accumulated.
     excess: [f64; 4],
 }
 
 impl Accumulator {
-    /// From a unit quaternion `[w, x, y, z]`.
+    /// Begins with a unit quaternion `[w, x, y, z]`.
     pub(crate) fn new(q: [f64; 4]) -> Self {
         Accumulator {
             q,
@@ -29,7 +29,7 @@ impl Accumulator {
         (self.q, self.excess)
     }
 
-    /// What [`parts`](Self::parts) said.
+    /// Restores what [`parts`](Self::parts) returned.
     pub(crate) fn from_parts(q: [f64; 4], excess: [f64; 4]) -> Self {
         Accumulator { q, excess }
     }

@@ -42,7 +42,7 @@ const OF_MEAN: [(f64, f64); 3] = [(-1.0, 5.0 / 18.0), (0.0, 4.0 / 9.0), (1.0, 5.
 pub(crate) struct Observation {
     /// The instant, or the middle of the interval, in ordinary steps from the middle of the gap.
     pub(crate) at: f64,
-    /// How far from the middle the outer two of the three instants lie whose mean stands for that of the interval
+    /// Distance from the middle of the outer two of the three instants whose mean stands for that of the interval
     /// (Gauss); 0 at an instant.
     pub(crate) spread: f64,
     /// Rate, rad/s.
@@ -70,7 +70,7 @@ pub(crate) struct Bridge {
     pub(crate) noiseless: bool,
 }
 
-/// Over a gap of `length` ordinary steps in which `missing` samples would have been, from `around` (at most
+/// Bridges a gap of `length` ordinary steps in which `missing` samples would have been, from `around` (at most
 /// [`NEIGHBOURS`]); `None` of fewer than two.
 pub(crate) fn across(
     around: &[Observation],
@@ -101,7 +101,7 @@ struct Model<'a> {
     around: &'a [Observation],
     /// Rates less the reference, by sample and axis.
     rates: [[f64; 3]; NEIGHBOURS],
-    /// What the motion is like under the scale tried last.
+    /// Process of the motion under the scale tried last.
     process: Process,
     /// Covariances of the samples then, of a motion of variance 1.
     covariance: Matrix,
@@ -114,7 +114,7 @@ struct Model<'a> {
     /// L^-1 times the rates less their mean.
     whitened: [[f64; 3]; NEIGHBOURS],
     mean: [f64; 3],
-    /// Of the motion, (rad/s)^2.
+    /// Variance of the motion, (rad/s)^2.
     variance: f64,
 }
 
@@ -326,12 +326,12 @@ impl<'a> Model<'a> {
     }
 }
 
-/// How the covariance of a motion falls with the distance in time.
+/// Shape of the motion's covariance over the distance in time.
 #[derive(Clone, Copy, Debug)]
 enum Shape {
     /// Matérn's of order 7/2: three times differentiable, as shaken and carried sensors are.
     Matern,
-    /// As smooth as can be: limited in band.
+    /// Smoothest shape: limited in band.
     Gaussian,
 }
 
@@ -339,7 +339,7 @@ enum Shape {
 #[derive(Clone, Copy, Debug)]
 struct Process {
     shape: Shape,
-    /// In ordinary steps.
+    /// Scale in ordinary steps.
     scale: f64,
 }
 

@@ -5,7 +5,7 @@
 
 use super::lanes::{Lanes, Triple};
 
-/// How a stretch without rotation data is told from clock rounding: part of the increment's own length.
+/// Share of the increment's own length that separates a stretch without rotation data from clock rounding.
 const HOLE: f64 = 0.05;
 
 #[derive(Clone, Debug, Default)]
@@ -20,9 +20,9 @@ pub(crate) struct Track {
     pub(crate) x: Vec<f64>,
     pub(crate) y: Vec<f64>,
     pub(crate) z: Vec<f64>,
-    /// How many spacings in a row, the last one ending here, are equal and without holes.
+    /// Number of spacings in a row, the last one ending here, that are equal and without holes.
     same: Vec<u8>,
-    /// How many increments in a row, the last one ending here, join without holes.
+    /// Number of increments in a row, the last one ending here, that join without holes.
     joined: Vec<u8>,
     /// Samples are missing before this one.
     pub(crate) bridged: Vec<bool>,

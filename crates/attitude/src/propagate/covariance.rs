@@ -78,19 +78,19 @@ pub struct Covariance {
     is_distorted: bool,
 }
 
-/// Which pieces move.
+/// Pieces that move.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Kind {
     /// Only what is alike about all axes.
     Alike,
-    /// That, and a bias that does not change.
+    /// Attitude, and a bias that does not change.
     ConstantBias,
     /// Everything.
     Wandering,
 }
 
 impl Covariance {
-    /// Before the first step: the initial attitude's own uncertainty, and that of the bias.
+    /// Makes it before the first step: the initial attitude's own uncertainty, and that of the bias.
     #[must_use]
     pub fn new(noise: Noise) -> Covariance {
         let wandering = Noise::differs(noise.initial)
@@ -130,7 +130,7 @@ impl Covariance {
         self.advance(exp_minus_one(&phi.0), secs);
     }
 
-    /// As [`step`](Self::step), by `[cos(a/2) - 1, sin(a/2) axis]`.
+    /// Same as [`step`](Self::step), by `[cos(a/2) - 1, sin(a/2) axis]`.
     #[inline(always)]
     pub(crate) fn advance(&mut self, turn: [f64; 4], secs: f64) {
         self.alike += self.alike_arw * secs;
@@ -157,7 +157,7 @@ impl Covariance {
         }
     }
 
-    /// What errors of scale and axes do to a turn.
+    /// Adds the effect of errors of scale and axes on a turn.
     fn distort(&mut self, Transition { back, mean }: &Transition, turn: [f64; 4]) {
         // The rotation vector: twice the sine of its half is 4 % short of it at a rad, which sigma does not show.
         let [_, x, y, z] = turn;
@@ -293,7 +293,7 @@ impl Covariance {
         }
     }
 
-    /// Of the attitude, in body axes. An axis about which more than half a turn is unknown is one about
+    /// Covariance of the attitude, in body axes. An axis about which more than half a turn is unknown is one about
     /// which nothing is: its variance ends at pi^2.
     #[must_use]
     #[inline(always)]
@@ -317,7 +317,7 @@ impl Covariance {
         AttitudeCovariance::from_upper(p)
     }
 
-    /// Of attitude error (rad, body axes) and bias (rad/s), in this order; not capped.
+    /// Covariance of attitude error (rad, body axes) and bias (rad/s), in this order; not capped.
     #[must_use]
     pub fn matrix(&self) -> Matrix6<f64> {
         let (p, cross) = match self.kind {
@@ -344,7 +344,7 @@ impl Covariance {
     }
 }
 
-/// What moves of a [`Covariance`], to go on from exactly.
+/// Moving part of a [`Covariance`], to go on from exactly.
 #[derive(Clone, PartialEq, Debug)]
 #[cfg_attr(
     feature = "serde",
@@ -391,7 +391,7 @@ impl Carried {
 }
 
 impl Covariance {
-    /// What [`carry`](Self::carry) needs.
+    /// Input of [`carry`](Self::carry).
     pub(crate) fn carried(&self) -> Carried {
         Carried {
             resumed: self.kind != Covariance::new(self.noise).kind,
@@ -431,12 +431,12 @@ fn capped(p: &mut Triangle) {
     }
 }
 
-/// What a bias does over one step of h seconds, for a driving noise of K^2 h.
+/// Change of a bias over one step of h seconds, for a driving noise of K^2 h.
 #[derive(Clone, Copy, Debug)]
 struct Wander {
-    /// What remains of it: exp(-h/tau).
+    /// Share that remains: exp(-h/tau).
     alpha: f64,
-    /// Its mean over the step, of what it was at the start.
+    /// Mean over the step, as a share of the bias at its start.
     held: f64,
     /// Variance of the angle from the noise of this step, times h^2.
     own_attitude: f64,

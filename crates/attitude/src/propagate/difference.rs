@@ -14,7 +14,7 @@
 use super::accumulate::Accumulator;
 use super::method::Order;
 
-/// How many samples fewer the window has that is compared with.
+/// Number of samples by which the window that is compared with is shorter.
 pub(crate) const FEWER: usize = 4;
 
 /// Rounding of rates or increments to `f64`, half a unit in the last place: what every angle may be off

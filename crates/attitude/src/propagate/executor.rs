@@ -8,7 +8,7 @@ pub trait Executor {
     /// The results, in the order of their arguments.
     fn map<T: Send, F: Fn(usize) -> T + Sync>(&self, n: usize, f: F) -> Vec<T>;
 
-    /// How many run at once.
+    /// Number of tasks that run at once.
     fn threads(&self) -> usize {
         1
     }

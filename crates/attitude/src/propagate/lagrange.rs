@@ -38,7 +38,7 @@ pub(crate) fn legendre(x: f64) -> ([f64; MOMENTS + 1], [f64; MOMENTS + 1]) {
 }
 
 impl Quadrature {
-    /// For polynomials through `points` points: exact for their moments up to nine points, and for
+    /// Makes them for polynomials through `points` points: exact for their moments up to nine points, and for
     /// b_0 .. b_2 up to sixteen; an odd number of nodes, so that one of them is the middle.
     pub(crate) fn new(points: usize) -> Self {
         let live = points.clamp(1, MOMENTS);

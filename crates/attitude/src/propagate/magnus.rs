@@ -13,7 +13,7 @@ use super::method::Order;
 use super::series;
 use super::turn::Turn;
 
-/// How many moments are carried: b_0 .. b_8.
+/// Number of moments carried: b_0 .. b_8.
 pub(crate) const MOMENTS: usize = 9;
 
 /// Moments of N neighbouring intervals, and how many of the nine can differ from zero.
@@ -21,7 +21,7 @@ pub(crate) const MOMENTS: usize = 9;
 pub(crate) struct Moments<const N: usize> {
     pub(crate) b: [Triple<N>; MOMENTS],
     pub(crate) live: usize,
-    /// What the outermost samples of the window have changed, rad, in the middle of the interval:
+    /// Change by the outermost samples of the window, rad, in the middle of the interval:
     /// of the delta angle from rates, of two thirds of the angle half-way from increments.
     pub(crate) outer: Triple<N>,
 }
@@ -226,7 +226,7 @@ const HALVED: [[f64; MOMENTS]; MOMENTS] = {
     rows
 };
 
-/// What truncation may cost, see [`exact`], rad.
+/// Largest cost of truncation, see [`exact`], rad.
 #[inline(always)]
 fn allowed<const N: usize>(m: &Moments<N>) -> Lanes<N> {
     m.b[MOMENTS - 1].size() * SHARE + m.b[0].size() * RELATIVE + Lanes::splat(UNNOTICED)
@@ -276,7 +276,7 @@ fn left_out<const N: usize>(m: &Moments<N>) -> Lanes<N> {
     }))
 }
 
-/// By number of moments in the bracket, from three.
+/// Limits by number of moments in the bracket, from three.
 const BRACKETS: [f64; 6] = [5e-3, 2e-3, 1.2e-3, 1e-3, 2e-4, 5e-5];
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use std::str::FromStr;
 /// Largest window: beyond 24 samples equidistant interpolation has nothing left to give in `f64`.
 pub const LARGEST_WINDOW: usize = 24;
 
-/// How samples become turns.
+/// Method by which samples become turns.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Hash)]
 pub enum Method {
     /// The best for a log: centred windows of 16 rates or 15 increments, [`Order::Exact`].
@@ -18,9 +18,9 @@ pub enum Method {
     Magnus {
         /// Samples in the window, 1 or 2 to [`LARGEST_WINDOW`]: fewer at the ends of a run and near gaps.
         window: usize,
-        /// How much of the non-commutativity is kept.
+        /// Order to which the non-commutativity is kept.
         order: Order,
-        /// Where the interval lies in its window.
+        /// Placement of the interval in its window.
         placement: Placement,
     },
     /// Zero latency with the drift of centred windows: what is committed comes from centred windows,
@@ -28,7 +28,7 @@ pub enum Method {
     CommitProvisional {
         /// Samples in the window.
         window: usize,
-        /// How much of the non-commutativity is kept.
+        /// Order to which the non-commutativity is kept.
         order: Order,
         /// Whether each committed attitude is output a second time, without
         /// [`Status::PROVISIONAL`](crate::record::Status::PROVISIONAL).
@@ -37,9 +37,9 @@ pub enum Method {
     /// The best for a stream: [`Method::CommitProvisional`] with 6 rates or 5 increments, whose errors are
     /// alike. [`Method::for_kind`] says which.
     Live {
-        /// As there.
+        /// Order, as of [`Method::Magnus`].
         order: Order,
-        /// As there.
+        /// Whether final attitudes follow, as of [`Method::Magnus`].
         finals: bool,
     },
     /// The rate at the start of the interval, held: the document's `w(t_i)`. First order.
@@ -61,7 +61,7 @@ pub enum Method {
     Rk4,
 }
 
-/// How much of the non-commutativity of rotation over one interval is kept.
+/// Order to which the non-commutativity of rotation over one interval is kept.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Hash)]
 pub enum Order {
     /// The delta angle taken for a rotation vector; local error of order 3 in the interval.
@@ -77,13 +77,13 @@ pub enum Order {
     Exact,
 }
 
-/// Where an interval lies in its window.
+/// Placement of an interval in its window.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Hash)]
 pub enum Placement {
-    /// In the middle: needs later samples, has by far the smaller error.
+    /// Middle: needs later samples, has by far the smaller error.
     #[default]
     Centred,
-    /// At the end: needs no later sample.
+    /// End: needs no later sample.
     Causal,
 }
 

@@ -28,7 +28,7 @@ const SEGMENT: usize = 1024;
 const BLOCK: usize = 32 * SEGMENT;
 /// Elements before the interval integrated next that a window may still hold.
 const LOOKED_BACK: usize = LARGEST_WINDOW + MARGIN;
-/// Beside the window itself.
+/// Number of samples kept beyond the window itself.
 const MARGIN: usize = classical::LOOK_BACK + 8;
 /// Elements that are forgotten at once: few, for who has many live streams.
 const FORGOTTEN: usize = 32;
@@ -85,7 +85,7 @@ pub struct Propagator {
     started: bool,
     /// The attitude is not that of this stream's beginning, but one that was saved.
     resumed: bool,
-    /// Where the next reset goes instead of the initial attitude.
+    /// Attitude of the next reset, if it is not the initial one.
     anew: Option<[f64; 4]>,
     last_rate: [f64; 3],
     last_stamp: i64,
@@ -93,7 +93,7 @@ pub struct Propagator {
     scratch: Vec<Step>,
 }
 
-/// How steps are computed.
+/// Engine that computes the steps.
 #[derive(Clone, Debug)]
 enum Engine {
     Sliding(Arc<Plan>),
@@ -101,7 +101,7 @@ enum Engine {
         plan: Arc<Plan>,
         /// Whether finals are wanted.
         finals: bool,
-        /// What has come out provisionally and is to come out for good.
+        /// Attitudes that have come out provisionally and are to come out for good.
         open: VecDeque<Waiting>,
     },
     Classical(Method),
@@ -223,7 +223,7 @@ impl Propagator {
         self.started = false;
     }
 
-    /// What has happened so far.
+    /// Report of what has happened so far.
     #[must_use]
     pub fn report(&self) -> Report {
         let report = &self.state.report;
@@ -354,7 +354,8 @@ impl Propagator {
         }
     }
 
-    /// What nobody announced: a rate is taken as held since the sample before, an increment as its mean rate.
+    /// Converts a sample of a kind that was not announced: a rate is taken as held since the sample before, an
+    /// increment as its mean rate.
     #[cold]
     fn converted(&self, sample: &RateSample, other: Measured) -> RateSample {
         let gyro = match other {

@@ -1,4 +1,4 @@
-//! What happened on the way -> numbers for the summary. Pure.
+//! Counts of a run for the summary. Pure.
 
 /// Counts and totals of one stream, from its first sample on.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]

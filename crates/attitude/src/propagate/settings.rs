@@ -1,4 +1,4 @@
-//! What a run of the propagator is to do -> checked once. Pure.
+//! Settings of a run of the propagator, checked once. Pure.
 
 use super::covariance::Noise;
 use super::method::Method;
@@ -10,12 +10,12 @@ use crate::setting::{EARTH_RATE, INIT, NOISE, WINDOW};
 use nalgebra::Vector3;
 use std::fmt;
 
-/// What a propagator is to do.
+/// Settings of a propagator.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
-    /// How samples become turns.
+    /// Method by which samples become turns.
     pub method: Method,
-    /// What the samples mean.
+    /// Meaning of the samples.
     pub kind: SampleKind,
     /// Attitude at the first sample, and after a reset.
     pub initial: Quaternion<Nav, Body>,
@@ -23,7 +23,7 @@ pub struct Settings {
     /// site ([`Convention::earth_rate`](crate::worlds::Convention::earth_rate)). Zero for a
     /// world that stands still, which changes no bit of the result.
     pub world_rate: In<Nav>,
-    /// For the uncertainty that goes with every attitude; zeros for none.
+    /// Noise, for the uncertainty that goes with every attitude; zeros for none.
     pub noise: Noise,
 }
 
@@ -33,16 +33,16 @@ pub struct Settings {
 pub enum SettingsError {
     /// The window is not in `smallest ..= largest` samples.
     Window {
-        /// What was asked for.
+        /// Number as given.
         given: usize,
-        /// What there is: two rates, one increment.
+        /// Smallest number possible: two rates, one increment.
         smallest: usize,
         /// [`LARGEST_WINDOW`](super::LARGEST_WINDOW).
         largest: usize,
     },
     /// The initial attitude is no rotation.
     Initial {
-        /// Its `[w, x, y, z]`.
+        /// Components `[w, x, y, z]`.
         wxyz: [f64; 4],
     },
     /// The world's rate is not finite, or faster than anything turns.
@@ -52,9 +52,9 @@ pub enum SettingsError {
     },
     /// A noise figure is negative, not finite, or absurd.
     Noise {
-        /// Which.
+        /// Name of the term.
         name: &'static str,
-        /// Its value.
+        /// Value of the term.
         value: f64,
     },
 }

@@ -79,7 +79,7 @@ impl Turn<1> {
         v: Triple::ZERO,
     };
 
-    /// From a quaternion of any norm, given as scalar and vector part.
+    /// Makes it from a quaternion of any norm, given as scalar and vector part.
     pub(crate) fn from_parts(w: f64, v: Triple<1>) -> Self {
         let scale = 1.0 / (w * w + v.norm_squared().0[0]).sqrt();
         let v = v * scale;
@@ -92,7 +92,7 @@ impl Turn<1> {
         Turn { c: Lanes([c]), v }
     }
 
-    /// From `[cos(a/2) - 1, x, y, z]`.
+    /// Makes it from `[cos(a/2) - 1, x, y, z]`.
     pub(crate) fn of([c, x, y, z]: [f64; 4]) -> Self {
         let v = Triple {
             x: Lanes([x]),
@@ -102,7 +102,7 @@ impl Turn<1> {
         Turn { c: Lanes([c]), v }
     }
 
-    /// This turn, then `next` about the axes it has turned to.
+    /// Composes this turn with `next` about the axes it has turned to.
     pub(crate) fn then(self, next: Self) -> Self {
         // (1 + a)(1 + b) - 1 = a + b + ab, so nothing small is lost against 1.
         let (a, b) = (self.c.0[0], next.c.0[0]);

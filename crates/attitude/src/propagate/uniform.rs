@@ -11,7 +11,7 @@ use super::magnus::{MOMENTS, Moments};
 const EVEN: usize = 5;
 const ODD: usize = 4;
 
-/// What each sample of a window contributes to each moment, in a run of 1s between equal spacings.
+/// Contribution of each sample of a window to each moment, in a run of 1s between equal spacings.
 fn response(window: usize, place: usize, increments: bool) -> (Vec<Moments<1>>, f64) {
     let mut noise_gain = 0.0;
     let inner = lagrange::inner(window, place, increments);
@@ -85,12 +85,12 @@ pub(crate) struct Centred {
 }
 
 impl Centred {
-    /// For instantaneous rates; `window` even, 2 or more.
+    /// Makes the table for instantaneous rates; `window` even, 2 or more.
     pub(crate) fn for_rates(window: usize) -> Self {
         Self::assemble(window, window / 2 - 1, window / 2, false)
     }
 
-    /// For increments; `window` odd.
+    /// Makes the table for increments; `window` odd.
     pub(crate) fn for_increments(window: usize) -> Self {
         Self::assemble(window, window / 2, window / 2, true)
     }
@@ -180,12 +180,12 @@ pub(crate) struct Skewed {
 }
 
 impl Skewed {
-    /// For instantaneous rates, the interval ending at sample `place` of the window, 1 or more.
+    /// Makes the table for instantaneous rates, the interval ending at sample `place` of the window, 1 or more.
     pub(crate) fn for_rates(window: usize, place: usize) -> Self {
         Self::assemble(window, place, false)
     }
 
-    /// For increments, of which `place` is the interval's own.
+    /// Makes the table for increments, of which `place` is the interval's own.
     pub(crate) fn for_increments(window: usize, place: usize) -> Self {
         Self::assemble(window, place, true)
     }
@@ -204,7 +204,7 @@ impl Skewed {
         }
     }
 
-    /// As [`Centred::moments`].
+    /// Same as [`Centred::moments`].
     #[inline(always)]
     pub(crate) fn moments<const N: usize>(
         &self,

@@ -1,4 +1,4 @@
-//! Which samples an interval is integrated from, and by which path -> its turn. Pure.
+//! Samples from which an interval is integrated, and the path -> its turn. Pure.
 //!
 //! Four paths, chosen interval by interval from the data alone: equal spacings (constant table),
 //! arbitrary stamps (general interpolation), a careful one where the window is one-sided, irregular or
@@ -18,7 +18,7 @@ use crate::record::Status;
 use std::collections::HashMap;
 use std::sync::{Arc, LazyLock, Mutex, PoisonError, Weak};
 
-/// How many neighbouring intervals go through the kernels together.
+/// Number of neighbouring intervals that go through the kernels together.
 const GROUP: usize = 4;
 
 /// Largest noise gain taken without asking the data: sum of squares of the interpolation's coefficients
@@ -35,13 +35,13 @@ pub(crate) struct Step {
     pub(crate) angle: f64,
     /// Variance to add for what was interpolated across a gap, rad^2.
     pub(crate) gap_variance: f64,
-    /// What the outermost samples of the window have changed, rad, in the body axes at the end.
+    /// Change by the outermost samples of the window, rad, in the body axes at the end.
     pub(crate) outer: [f64; 3],
-    /// What the careful path did.
+    /// Note of the careful path.
     pub(crate) note: Note,
 }
 
-/// What is to be counted about a step.
+/// Note to be counted about a step.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) enum Note {
     #[default]
@@ -67,7 +67,7 @@ impl Step {
         }
     }
 
-    /// What this step has to say in the output at its end.
+    /// Status of this step for the output at its end.
     #[inline(always)]
     pub(crate) fn status(&self) -> Status {
         let undersampled = if self.angle > std::f64::consts::PI {
@@ -82,7 +82,7 @@ impl Step {
         })
     }
 
-    /// With what the outermost samples have changed, unless that is no number.
+    /// Adds the change by the outermost samples, unless that is no number.
     pub(crate) fn with_outer(self, outer: Triple<1>) -> Self {
         let outer = [outer.x.0[0], outer.y.0[0], outer.z.0[0]];
         if outer.iter().all(|v| v.is_finite()) {
@@ -127,16 +127,16 @@ pub(crate) struct Plan {
     pub(crate) look_ahead: usize,
     order: Order,
     increments: bool,
-    /// By number of interpolation points.
+    /// Quadratures by number of interpolation points.
     quadratures: Vec<Quadrature>,
     centred: Option<Centred>,
-    /// By place of the interval in its window, where the method uses it on equal spacings.
+    /// Tables by place of the interval in its window, where the method uses it on equal spacings.
     skewed: Vec<Option<Skewed>>,
     /// Largest noise gain taken unasked: [`LOUD`], or that of the method's own window if larger.
     loud: f64,
 }
 
-/// What makes two plans the same.
+/// Key that makes two plans the same.
 type Key = (usize, Order, Placement, bool, bool);
 
 /// Plans in use: 40 kB each, which a thousand streams of one method share. No more than there are keys.
@@ -230,7 +230,7 @@ impl Plan {
         steps
     }
 
-    /// As [`steps`](Self::steps), appended.
+    /// Appends, otherwise as [`steps`](Self::steps).
     pub(crate) fn append_steps(
         &self,
         track: &Track,
@@ -335,7 +335,7 @@ impl Plan {
         }
     }
 
-    /// What the outermost samples have changed about the turn, rad, in the axes at its end: to first order
+    /// Change of the turn by the outermost samples, rad, in the axes at its end: to first order
     /// in the change and in half the turn.
     #[inline(always)]
     fn outer<const N: usize>(&self, moments: &Moments<N>) -> Triple<N> {

@@ -21,7 +21,7 @@ pub struct DeltaAngle(pub Vector3<f64>);
 pub struct RotationVector(pub Vector3<f64>);
 
 impl BodyRate {
-    /// No turning at all.
+    /// Rate of a body that does not rotate.
     pub const ZERO: BodyRate = BodyRate(Vector3::new(0.0, 0.0, 0.0));
 
     /// The integral of this rate held for `secs`.
@@ -31,7 +31,7 @@ impl BodyRate {
     }
 }
 
-/// Its components x, y, z, rad/s, for what writes them.
+/// Components x, y, z, rad/s, for what writes them.
 impl From<BodyRate> for [f64; 3] {
     fn from(rate: BodyRate) -> [f64; 3] {
         rate.0.into()

@@ -1,4 +1,4 @@
-//! How well an attitude is known: the 3x3 that travels with every output. Pure.
+//! Uncertainty of an attitude: the 3x3 that travels with every output. Pure.
 
 use crate::frames::{Body, Nav};
 use crate::quaternion::Quaternion;
@@ -13,13 +13,13 @@ use nalgebra::{Matrix3, Vector3};
 pub struct AttitudeCovariance {
     /// About x.
     pub xx: f64,
-    /// Between x and y.
+    /// Covariance of x and y.
     pub xy: f64,
-    /// Between x and z.
+    /// Covariance of x and z.
     pub xz: f64,
     /// About y.
     pub yy: f64,
-    /// Between y and z.
+    /// Covariance of y and z.
     pub yz: f64,
     /// About z.
     pub zz: f64,
@@ -38,7 +38,7 @@ impl AttitudeCovariance {
         }
     }
 
-    /// From the upper triangle, row by row: xx, xy, xz, yy, yz, zz.
+    /// Makes it from the upper triangle, row by row: xx, xy, xz, yy, yz, zz.
     #[must_use]
     #[inline(always)]
     pub fn from_upper([xx, xy, xz, yy, yz, zz]: [f64; 6]) -> AttitudeCovariance {
@@ -93,7 +93,8 @@ impl AttitudeCovariance {
         AttitudeCovariance::of(&p).matrix()
     }
 
-    /// Of an error resolved in navigation axes, the inverse of [`AttitudeCovariance::in_navigation_axes`].
+    /// Makes it from that of an error resolved in navigation axes, the inverse of
+    /// [`AttitudeCovariance::in_navigation_axes`].
     pub(crate) fn of_navigation_axes(
         p: &Matrix3<f64>,
         q_nb: &Quaternion<Nav, Body>,

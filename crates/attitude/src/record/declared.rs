@@ -1,4 +1,4 @@
-//! What a format says about its own numbers. Pure.
+//! Declarations of a format about its own numbers. Pure.
 //!
 //! Apart from the samples because it is decided once per channel, and because the user may know better: a
 //! setting given by hand wins over anything declared here.
@@ -50,10 +50,10 @@ pub enum AccelUnit {
     StandardGravity,
 }
 
-/// What a channel's type and schema declare. `None`: they do not say, and nothing was guessed.
+/// Declarations of a channel's type and schema. `None`: they do not say, and nothing was guessed.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Declared {
-    /// What a sample means in time.
+    /// Meaning of a sample in time.
     pub sample_kind: Option<SampleKind>,
     /// Unit of the body rate.
     pub gyro_unit: Option<GyroUnit>,
@@ -63,7 +63,7 @@ pub struct Declared {
     pub body: Option<BodyAxes>,
     /// World and body of recorded orientations.
     pub world: Option<Convention>,
-    /// Where the samples' own integration interval lies, and its unit; a path only where a schema says so.
+    /// Path of the samples' own integration interval, and its unit; a path only where a schema says so.
     pub interval: Option<(String, TimeUnit)>,
     /// Whether the user stated that unit: then it is believed, whatever the stamps say.
     pub interval_unit_given: bool,
@@ -110,7 +110,7 @@ impl TimeUnit {
         }
     }
 
-    /// Its name, as [`TimeUnit::named`] takes it.
+    /// Name, as [`TimeUnit::named`] takes it.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {

@@ -10,14 +10,14 @@ use crate::condition::regularise::{Lines, Uneven};
 /// Something to do about a recording: what was seen, with its numbers. Its words belong to whoever says it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Advice {
-    /// No gyro turns that fast in rad/s.
+    /// Rates too fast for rad/s.
     RatesLookLikeDegrees {
         /// Largest magnitude of any axis.
         peak: f64,
     },
     /// Gravity turns in the accelerometer by another factor than the gyro says.
     GravityTurnsOtherwise {
-        /// What was found.
+        /// Agreement that was found.
         found: GyroAgainstGravity,
         /// The value of `--gyro-unit` that it fits, if any.
         unit: Option<&'static str>,
@@ -31,7 +31,7 @@ pub enum Advice {
     },
     /// Most accelerations of a recording have the length of one g, but not in m/s^2.
     AccelMostlyOneG {
-        /// What part of them, 0 to 1.
+        /// Share of them, 0 to 1.
         share: f64,
         /// The unit they are plausible in.
         unit: &'static str,
@@ -40,7 +40,7 @@ pub enum Advice {
     LooksLikeFrd,
     /// Gravity lies on x or y: the sensor is mounted on its side.
     MountedOnSide {
-        /// Where it lies.
+        /// Direction of gravity.
         gravity: GravityAxis,
     },
     /// A gyro axis spends many samples at exactly its largest reading.
@@ -49,7 +49,7 @@ pub enum Advice {
         axis: usize,
         /// The reading.
         at: f64,
-        /// How many samples.
+        /// Number of samples.
         samples: u64,
     },
     /// A gyro axis repeats one value for long while others move.
@@ -70,7 +70,7 @@ pub enum Advice {
     StampsJitterEvenly {
         /// rms distance from the lines over the step.
         jitter: f64,
-        /// How many lines.
+        /// Number of lines.
         segments: usize,
     },
     /// Stamps jitter, and about no line.
@@ -85,7 +85,7 @@ pub enum Advice {
     },
     /// Samples are missing.
     SamplesMissing {
-        /// How many, by the ordinary step.
+        /// Number of missing samples, by the ordinary step.
         missing: u64,
         /// Longest gap, s.
         longest_secs: f64,
@@ -116,7 +116,7 @@ const MIN_CORRELATION: f64 = 0.7;
 const UNIT_FACTOR: f64 = 2.5;
 
 impl QualitySummary {
-    /// What lines through the stamps say, in place of what single steps do.
+    /// Judges by lines through the stamps instead of single steps.
     pub fn judge_lines(&mut self, found: &Result<Lines, Uneven>) {
         let says_its_intervals = self.with_interval > 0 && self.with_interval == self.count;
         let at = self

@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 /// Length of the windows that are compared, and fewest samples in one.
 const WINDOW_NANOS: i64 = 100_000_000;
 const WINDOW_SAMPLES: u32 = 3;
-/// How fast the running median follows, per window.
+/// Speed of the running median, per window.
 const MEDIAN_STEP: f64 = 0.005;
 /// A window whose magnitude is off by more, or varies by more, reads more than gravity.
 const MAX_EXCESS: f64 = 0.05;
@@ -41,7 +41,7 @@ pub(super) struct GravityTrack {
     seen: f64,
 }
 
-/// How the gyro agrees with the turning of gravity.
+/// Agreement of the gyro with the rotation of gravity.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct GyroAgainstGravity {
     /// Multiply the recorded rates by this to get what gravity says, rad/s.

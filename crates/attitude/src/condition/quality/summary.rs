@@ -36,7 +36,7 @@ pub struct OffsetStats {
     pub min_secs: f64,
     /// Largest, s.
     pub max_secs: f64,
-    /// How much faster the header's clock runs than the recorder's, parts per million (least squares).
+    /// Speed of the header's clock over the recorder's, parts per million (least squares).
     pub drift_ppm: f64,
 }
 
@@ -51,7 +51,7 @@ pub struct AxisStats {
     pub mean: f64,
     /// Root mean square.
     pub rms: f64,
-    /// How often the largest magnitude occurs.
+    /// Number of times the largest magnitude occurs.
     pub at_peak: u64,
     /// Longest run of samples at that magnitude while the other axes moved.
     pub longest_at_peak: u64,
@@ -59,7 +59,7 @@ pub struct AxisStats {
     pub longest_run: u64,
 }
 
-/// Where gravity is felt in the quietest half second.
+/// Direction of gravity in the quietest half second.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct GravityAxis {
     /// 0 = x, 1 = y, 2 = z.
@@ -100,7 +100,7 @@ pub struct QualitySummary {
     pub longest_gap_secs: f64,
     /// Samples with their predecessor's stamp.
     pub duplicates: u64,
-    /// Of these, with other data than it.
+    /// Number of these with other data than it.
     pub collisions: u64,
     /// Samples older than one before them.
     pub disorder: u64,
@@ -112,7 +112,7 @@ pub struct QualitySummary {
     pub not_finite: u64,
     /// Samples with a gyro of exactly (0, 0, 0).
     pub zero_rows: u64,
-    /// Of these, alone between two that are not.
+    /// Number of these, alone between two that are not.
     pub lone_zero_rows: u64,
     /// Samples with exactly their predecessor's gyro.
     pub repeated_rows: u64,
@@ -120,11 +120,11 @@ pub struct QualitySummary {
     pub axes: [AxisStats; 3],
     /// Samples with an acceleration.
     pub with_accel: u64,
-    /// Of these, with NaN or infinity in it.
+    /// Number of these with NaN or infinity.
     pub accel_not_finite: u64,
-    /// Of these, with a length of 0.8 to 1.25, as of gravity in g.
+    /// Number of these with a length of 0.8 to 1.25, as of gravity in g.
     pub accel_near_one: u64,
-    /// Of these, with a length of 800 to 1250, as of gravity in mg.
+    /// Number of these with a length of 800 to 1250, as of gravity in mg.
     pub accel_near_thousand: u64,
     /// Samples with an orientation.
     pub with_orientation: u64,
@@ -144,7 +144,7 @@ pub struct QualitySummary {
     pub gravity: Option<GravityAxis>,
     /// Whether the gyro's unit and signs agree with the turning of gravity; `None` where gravity turned too little.
     pub gyro_against_gravity: Option<GyroAgainstGravity>,
-    /// What to do about it.
+    /// Advice that follows.
     pub advice: Vec<Advice>,
 }
 

@@ -64,7 +64,7 @@ impl Counter {
         }
     }
 
-    /// No more samples, or none of this segment.
+    /// Closes the segment: no more samples, or none of this segment.
     pub(super) fn close(&mut self, out: &mut Vec<Counted>) {
         self.open(out);
         self.release(out);
@@ -154,7 +154,7 @@ impl Counter {
         });
     }
 
-    /// Those astray were: the ones after them are where they should be.
+    /// Releases those astray: the ones after them are where they should be.
     fn release(&mut self, out: &mut Vec<Counted>) {
         for (sample, ahead) in self.astray.drain(..) {
             self.index += ahead;

@@ -100,7 +100,7 @@ impl Moments {
 pub(super) struct Line {
     /// Samples before the first it holds for, in the whole stream.
     pub(super) from: u64,
-    /// Its index is counted from here.
+    /// Sample from which its index is counted.
     pub(super) first: i64,
     /// Whole nanoseconds its stamps are counted from.
     pub(super) origin: i64,
@@ -134,7 +134,7 @@ struct Segment {
 }
 
 impl Segment {
-    /// From its first block, which begins with sample `from` of the stream.
+    /// Begins a segment with its first block, which begins with sample `from` of the stream.
     fn new(from: u64, points: &[(u64, i64, i64)]) -> Option<Segment> {
         let (_, first, origin) = *points.first()?;
         let shifted: Vec<(i64, i64)> = points
@@ -197,7 +197,7 @@ pub(super) struct Fitter {
     segment: Option<Segment>,
     /// (number in the stream, index, stamp)
     block: Vec<(u64, i64, i64)>,
-    /// Where the segment that the block may begin would begin.
+    /// First sample of the segment that the block may begin.
     from: u64,
     seen: u64,
     pub(super) lines: Vec<Line>,

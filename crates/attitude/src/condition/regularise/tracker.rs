@@ -30,7 +30,7 @@ pub(super) struct Tracker {
 }
 
 impl Tracker {
-    /// At the first stamp of a segment; the step is learnt from the second.
+    /// Begins at the first stamp of a segment; the step is learnt from the second.
     pub(super) fn at(stamp: i64) -> Tracker {
         Tracker {
             origin: stamp,
@@ -40,7 +40,7 @@ impl Tracker {
         }
     }
 
-    /// On a line known from `seen` samples, at an instant `phase` after `origin`.
+    /// Begins on a line known from `seen` samples, at an instant `phase` after `origin`.
     pub(super) fn on_line(origin: i64, phase: f64, step: f64, seen: u32) -> Tracker {
         Tracker {
             origin,
@@ -65,12 +65,12 @@ impl Tracker {
         self.origin.saturating_add(nanos(self.phase))
     }
 
-    /// How many steps a stamp is after the newest sample.
+    /// Number of steps from the newest sample to a stamp.
     pub(super) fn steps_to(&self, stamp: i64) -> f64 {
         (self.since_origin(stamp) - self.phase) / self.step
     }
 
-    /// How far a stamp is off the instant `ahead` steps on, nanoseconds.
+    /// Deviation of a stamp from the instant `ahead` steps on, nanoseconds.
     pub(super) fn off(&self, stamp: i64, ahead: i64) -> f64 {
         self.since_origin(stamp) - self.phase - ahead as f64 * self.step
     }

@@ -13,11 +13,11 @@ use nalgebra::Vector3;
 /// A gyro bias from rests.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct BiasEstimate {
-    /// What the gyro reads at rest.
+    /// Reading of the gyro at rest.
     pub bias: BodyRate,
     /// One standard deviation, rad/s.
     pub sigma: Vector3<f64>,
-    /// From how many rests.
+    /// Number of rests used.
     pub rests: u64,
     /// Seconds of rest used.
     pub secs: f64,
@@ -30,7 +30,7 @@ pub enum NoRest {
     Moving {
         /// Smallest gyro deviation of any half second, rad/s.
         stillest: Option<f64>,
-        /// What counts as still, rad/s.
+        /// Limit of stillness, rad/s.
         limit: f64,
     },
     /// The rests contradict each other: at least one of them was a slow turn.
@@ -38,12 +38,12 @@ pub enum NoRest {
         /// Largest scatter of their mean rates, rad/s.
         scatter: f64,
     },
-    /// There is a rest, but not at the start, where the attitude is wanted.
+    /// Rest that is not at the start, where the attitude is wanted.
     NotAtStart {
-        /// When the first rest begins, s after the first sample.
+        /// Beginning of the first rest, s after the first sample.
         first_rest_secs: f64,
     },
-    /// There is a rest at the start, but no acceleration in it.
+    /// Rest at the start without an acceleration in it.
     NoAccel,
 }
 

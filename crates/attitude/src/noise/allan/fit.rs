@@ -18,7 +18,7 @@ use nalgebra::{DMatrix, DVector};
 
 /// Terms fitted: Q, N, B, K, R.
 const TERMS: usize = 5;
-/// In standard errors of a squared coefficient: below, it is not seen.
+/// Limit in standard errors of a squared coefficient: below, it is not seen.
 const SEEN: f64 = 3.0;
 /// Points beyond this many standard errors from the fit: the five terms do not explain the curve.
 pub const MAX_MISFIT: f64 = 5.0;
@@ -28,13 +28,13 @@ pub const MAX_MISFIT: f64 = 5.0;
 pub struct FittedTerm {
     /// The coefficient, SI; `None` = not seen in this record.
     pub value: Option<f64>,
-    /// Its standard error where it was seen.
+    /// Standard error where it was seen.
     pub error: f64,
-    /// What it would be at most (2 sigma) where it was not.
+    /// Upper bound (2 sigma) where it was not.
     pub at_most: f64,
 }
 
-/// What a curve is made of.
+/// Terms of which a curve is made.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct AllanFit {
     /// Angle quantisation Q, rad.

@@ -10,7 +10,7 @@ pub struct AngleRecord {
     /// Sampling intervals between two angles kept.
     stride: usize,
     angles: [Vec<f64>; 3],
-    /// Where each piece begins.
+    /// First index of each piece.
     begins: Vec<usize>,
     /// Subtracted from every increment: an Allan deviation does not see it, rounding does.
     level: Option<Vector3<f64>>,
@@ -24,7 +24,7 @@ pub struct AngleRecord {
 }
 
 impl AngleRecord {
-    /// For at most `capacity` angles (at least 64), 24 bytes each.
+    /// Makes one for at most `capacity` angles (at least 64), 24 bytes each.
     #[must_use]
     pub fn new(capacity: usize) -> AngleRecord {
         AngleRecord {

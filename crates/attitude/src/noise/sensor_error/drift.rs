@@ -103,7 +103,7 @@ impl Drift {
 struct Relaxation {
     sigma: f64,
     tau: f64,
-    /// Between knots, s; 0 = a knot at every sample.
+    /// Spacing of knots, s; 0 = a knot at every sample.
     spacing: f64,
     from: f64,
     to: f64,

@@ -25,7 +25,7 @@ pub struct Truth {
 }
 
 impl Default for Truth {
-    /// At rest, in free fall, at the temperature of calibration.
+    /// Rest, in free fall, at the temperature of calibration.
     fn default() -> Truth {
         Truth {
             rate: Vector3::zeros(),
@@ -55,16 +55,16 @@ pub struct Measured {
 pub enum MeasureError {
     /// The interval is empty or runs backwards.
     Interval {
-        /// Its beginning.
+        /// Beginning.
         from: Nanos,
-        /// Its end.
+        /// End.
         to: Nanos,
     },
     /// The interval begins before the end of the one before.
     Overlap {
-        /// Its beginning.
+        /// Beginning.
         from: Nanos,
-        /// Where the one before ended.
+        /// End of the one before.
         last: Nanos,
     },
     /// The truth is not finite, or beyond 1e9 in SI units.
@@ -111,7 +111,7 @@ pub struct GyroModel {
     seed: u64,
     white: [Stream; 3],
     acceleration: [Stream; 3],
-    /// From the first reading on.
+    /// State from the first reading on.
     running: Option<Running>,
 }
 
@@ -123,7 +123,7 @@ struct Running {
     low_pass: Option<LowPass>,
     drift: Drift,
     bias: Vector3<f64>,
-    /// What quantisation has not put out yet, rad.
+    /// Angle that quantisation has not put out yet, rad.
     remainder: Vector3<f64>,
 }
 
@@ -163,13 +163,13 @@ impl GyroModel {
         })
     }
 
-    /// What this unit drew.
+    /// Constant errors drawn for this unit.
     #[must_use]
     pub fn constants(&self) -> &ConstantErrors {
         &self.constants
     }
 
-    /// What is read over `from..to`, the interval since the last sampling instant. Time that is left
+    /// Reads over `from..to`, the interval since the last sampling instant. Time that is left
     /// out between two intervals passes for the drift, but is not integrated.
     ///
     /// # Errors
@@ -298,7 +298,7 @@ impl GyroModel {
     }
 }
 
-/// What the non-linear terms add.
+/// Contribution of the non-linear terms.
 fn bent(constants: &ConstantErrors, rate: &Vector3<f64>) -> Vector3<f64> {
     constants
         .nonlinear2

@@ -14,7 +14,7 @@ pub(super) struct Course {
 }
 
 impl Course {
-    /// In the middle of the interval.
+    /// Value in the middle of the interval.
     pub(super) fn middle(&self) -> Vector3<f64> {
         1.5 * self.mean - 0.25 * (self.start + self.end)
     }
@@ -41,7 +41,7 @@ pub(super) struct LowPass {
 }
 
 impl LowPass {
-    /// As if the first interval's line had been running for ever: without a transient.
+    /// Begins as if the first interval's line had been running for ever: without a transient.
     pub(super) fn new(hz: f64, zeta: f64, first: &Course, secs: f64) -> LowPass {
         let w = 2.0 * std::f64::consts::PI * hz;
         let slope = (first.end - first.start) / secs;

@@ -41,7 +41,7 @@ impl MagnetometerModel {
         })
     }
 
-    /// What it reads in a field, tesla, sensor axes.
+    /// Reading in a field, tesla, sensor axes.
     pub fn measure(&mut self, field: &Vector3<f64>) -> Vector3<f64> {
         let mut read = self.soft_iron * field + self.hard_iron;
         if self.noise > 0.0 {

@@ -15,7 +15,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use std::sync::LazyLock;
 
-/// Where the tail begins, for 256 layers.
+/// Beginning of the tail, for 256 layers.
 const TAIL: f64 = 3.654_152_885_361_009;
 
 /// Right edges of the layers and the density there, bottom layer first.
@@ -56,7 +56,7 @@ impl std::fmt::Debug for Stream {
     }
 }
 
-/// What a stream is for. The numbers are part of what a seed means: never renumber.
+/// Purpose of a stream. The numbers are part of what a seed means: never renumber.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Purpose {
     White = 1,

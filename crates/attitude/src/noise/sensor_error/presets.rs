@@ -4,16 +4,16 @@ use super::{ImuError, ImuErrorFault};
 /// A class of gyro.
 #[derive(Debug)]
 pub struct Preset {
-    /// As given to `--noise`.
+    /// Name as given to `--noise`.
     pub name: &'static str,
-    /// Its terms, as [`ImuError::parse`] takes them.
+    /// Terms, as [`ImuError::parse`] takes them.
     pub terms: &'static str,
-    /// Where the numbers come from, and which of them are filled in.
+    /// Origin of the numbers, and which of them are filled in.
     pub source: &'static str,
 }
 
 impl Preset {
-    /// Its sizes.
+    /// Sizes of the terms.
     ///
     /// # Errors
     /// Never for those in [`PRESETS`]; a test reads each.

@@ -7,11 +7,11 @@ use crate::record::Nanos;
 /// One sample's time.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Tick {
-    /// When it was really taken: where the truth is to be evaluated.
+    /// Instant at which it was really taken: where the truth is to be evaluated.
     pub instant: Nanos,
-    /// What its stamp says.
+    /// Stamp that it carries.
     pub stamp: Nanos,
-    /// It does not arrive.
+    /// Whether it does not arrive.
     pub dropped: bool,
 }
 

@@ -2,7 +2,7 @@
 
 use super::ImuErrorFault;
 
-/// When a sensor samples, what its stamps say, and which samples are lost. The default is perfect.
+/// Sampling instants, stamps, and lost samples of a sensor. The default is perfect.
 ///
 /// Two kinds of jitter that must not be confused: with `sampling_jitter` the samples really are
 /// taken at uneven instants and the stamps say so; with `stamp_jitter` the stamps are wrong.

@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 /// One key of `--noise`: its data-sheet unit, and where the value lies.
 #[derive(Debug)]
 pub struct Term {
-    /// As written; hyphens are as good as underscores.
+    /// Key as written; hyphens are as good as underscores.
     pub key: &'static str,
     /// Unit of the number.
     pub unit: &'static str,

@@ -12,7 +12,7 @@ pub(super) const ZERO: Rows = [[0.0; 3]; 3];
 /// Row and column of each number of a [`Triangle`].
 pub(super) const PLACES: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
 
-/// How one turn, `[cos(a/2) - 1, v]` with v = sin(a/2) axis, carries errors in body axes on.
+/// Transition of errors in body axes by one turn, `[cos(a/2) - 1, v]` with v = sin(a/2) axis.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Transition {
     /// `exp([phi x])^T`: from the body axes before to those after.

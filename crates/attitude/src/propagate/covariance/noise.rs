@@ -1,4 +1,4 @@
-//! What a gyro does not know -> numbers. Pure.
+//! Noise of a gyro as numbers. Pure.
 
 use std::fmt;
 
@@ -64,7 +64,7 @@ impl Noise {
 }
 
 impl fmt::Display for Noise {
-    /// As `--noise` takes it, in SI: three numbers joined by `/` where the axes differ.
+    /// Form that `--noise` takes, in SI: three numbers joined by `/` where the axes differ.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let axes = |[x, y, z]: [f64; 3]| {
             if Noise::differs([x, y, z]) {

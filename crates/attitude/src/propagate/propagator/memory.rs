@@ -17,7 +17,7 @@ use std::collections::VecDeque;
 /// Most samples that wait for their successors: no window looks further ahead.
 const MOST_WAITING: usize = 64;
 
-/// What a propagator knows at one moment; [`Propagator::recall`] puts another there.
+/// State of a propagator at one moment; [`Propagator::recall`] restores it.
 #[derive(Clone, PartialEq, Debug)]
 #[cfg_attr(
     feature = "serde",
@@ -30,7 +30,7 @@ pub struct Memory {
     /// Attitude accumulated, w, x, y, z: relative to the world, or to where that stood at
     /// `world_since`.
     attitude: [f64; 4],
-    /// What is in it too much.
+    /// Excess of the accumulated attitude.
     excess: [f64; 4],
     /// Sum of rotation vectors, rad, where the method sums those.
     sum: Option<[f64; 3]>,
@@ -41,13 +41,13 @@ pub struct Memory {
     /// Bits of the next output.
     added: u16,
     resets: u32,
-    /// Of the last output, and of the last sample, rad/s.
+    /// Rates of the last output, and of the last sample, rad/s.
     rates: [[f64; 3]; 2],
     /// Stamp of the last sample, ns: the others are counted back from it.
     last: i64,
     /// Samples of this run before those in `samples`.
     before: u64,
-    /// Of `samples`, the one that ends the next interval to be integrated.
+    /// Index in `samples` of the one that ends the next interval to be integrated.
     next: usize,
     samples: Vec<Element>,
     /// Not yet output, and output but not for good.
@@ -58,7 +58,7 @@ pub struct Memory {
 /// ns before the last, ns it was measured over, value x, y, z, whether samples are missing before it.
 type Element = (i64, i64, f64, f64, f64, bool);
 
-/// Of a sample that waits: ns before the last, specific force, status bits, log time, whether it turns.
+/// Sample that waits: ns before the last, specific force, status bits, log time, whether it turns.
 type Row = (i64, Option<[f64; 3]>, u16, i64, bool);
 
 impl Memory {
@@ -85,7 +85,7 @@ impl Memory {
 }
 
 impl Propagator {
-    /// What it knows; `None` before the first sample of a run.
+    /// Returns the state; `None` before the first sample of a run.
     #[must_use]
     pub fn memory(&self) -> Option<Memory> {
         let open = match &self.engine {

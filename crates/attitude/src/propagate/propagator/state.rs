@@ -24,13 +24,13 @@ pub(super) struct Waiting {
     pub(super) turns: bool,
 }
 
-/// What the outputs are made of.
+/// State of which the outputs are made.
 #[derive(Clone, Debug)]
 pub(super) struct State {
     pub(super) attitude: Accumulator,
     /// Sum of rotation vectors, for the method that wants it.
     pub(super) sum: Option<Triple<1>>,
-    /// What the attitude accumulated is relative to, where the world turns: then it is q_ib.
+    /// World to which the accumulated attitude is relative, where the world turns: then it is q_ib.
     pub(super) world: Option<TurningWorld>,
     /// Instant of the attitude accumulated, ns.
     pub(super) now: i64,

@@ -53,7 +53,7 @@ impl TurningWorld {
         self.since
     }
 
-    /// From now on the accumulated attitude is counted from `stamp`, where it is q_nb itself.
+    /// Counts the accumulated attitude from `stamp` on, where it is q_nb itself.
     pub(super) fn count_from(&mut self, stamp: i64) {
         self.since = stamp;
     }

@@ -117,7 +117,7 @@ impl Plan {
         }
     }
 
-    /// From where to where no sample tells what interval k was like, nanoseconds.
+    /// Beginning and end of the stretch of interval k of which no sample tells, nanoseconds.
     fn gap(&self, track: &Track, k: usize) -> (i64, i64) {
         let to = if self.increments {
             track.start[k]
@@ -137,7 +137,7 @@ impl Plan {
         (k - before, before + after)
     }
 
-    /// How many samples a polynomial over the gap in interval k is best laid through, and the square of what it
+    /// Number of samples through which a polynomial over the gap in interval k is best laid, and the square of what it
     /// leaves open, rad^2: where one more order changes less and less, and less than the noise of its samples.
     fn by_polynomial(&self, track: &Track, k: usize, step: f64) -> Option<(usize, f64)> {
         let cap = if self.increments {
@@ -188,7 +188,7 @@ impl Plan {
         Some((size, open(4.0)(&orders[size])))
     }
 
-    /// How many samples are missing in interval k, 0.5 or more, and the ordinary step, ns: the median around.
+    /// Number of samples missing in interval k, 0.5 or more, and the ordinary step, ns: the median around.
     fn missing(&self, track: &Track, k: usize) -> (f64, f64) {
         let (first, count) = self.neighbours(track, k);
         let mut around = [0; NEIGHBOURS];
@@ -357,6 +357,5 @@ fn gain(at: &[f64]) -> f64 {
     (0..at.len()).map(|i| coefficient(i).powi(2)).sum()
 }
 
-/// Among noise a polynomial bridges where what it leaves open is less than this part of what a random motion
-/// would.
+/// Limit below which a polynomial bridges among noise: what it leaves open, as a share of what a random motion would.
 const SMOOTH: f64 = 0.06;
