@@ -1,7 +1,7 @@
 //! `strapd send LOG ADDRESS`: a recording's samples to a daemon, as they were measured in time. I/O.
 //!
-//! Apart from `cat` because it has two ends: the log is read ahead by a thread of its own, so that a line leaves when it
-//! is due, and what the daemon answers is heard all the while.
+//! Apart from `cat` because it has two ends: the log is read ahead by a thread of its own, so that a line leaves when
+//! it is due, and what the daemon answers is heard all the while.
 
 use super::cat::line;
 use super::tables::Tables;

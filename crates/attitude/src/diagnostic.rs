@@ -1,7 +1,7 @@
 //! Why something can not be done, and apart from it what helps. Pure.
 //!
-//! Two fields and not one text, because who is told differs: a terminal shows the help on a line of its own, a page behind a
-//! semicolon, a program in Python reads it as `error.help`.
+//! Two fields and not one text, because who is told differs: a terminal shows the help on a line of its own, a page
+//! behind a semicolon, a program in Python reads it as `error.help`.
 //!
 //! ```
 //! use strapd_attitude::diagnostic::Diagnostic;

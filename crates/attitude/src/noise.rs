@@ -1,4 +1,5 @@
-//! Errors that a sensor adds to the truth: measured in a recording ([`allan`]), added on purpose ([`sensor_error`]). Pure.
+//! Errors that a sensor adds to the truth: measured in a recording ([`allan`]), added on purpose ([`sensor_error`]).
+//! Pure.
 //!
 //! A stage of its own because both speak of the same terms with the same sizes: what one puts in, the other
 //! has to find again.

@@ -68,8 +68,8 @@ pub enum SampleKind {
     Average,
     /// Integral of the rate over the interval that ends at the stamp, rad.
     DeltaAngle,
-    /// Rotation vector of the whole turn in the interval that ends at the stamp, rad: what the axis did meanwhile (coning)
-    /// is in it, so that turns are multiplied and nothing is added to them.
+    /// Rotation vector of the whole turn in the interval that ends at the stamp, rad: what the axis did meanwhile
+    /// (coning) is in it, so that turns are multiplied and nothing is added to them.
     Rotation,
 }
 

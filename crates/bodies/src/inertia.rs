@@ -15,7 +15,8 @@
 //!
 //! # Source
 //! Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control (2011), chapter 3. The seed
-//! document's product of inertia, parallel axes and `C_RB` are wrong where `crates/bodies/tests/bodies/inertia.rs` says so.
+//! document's product of inertia, parallel axes and `C_RB` are wrong where `crates/bodies/tests/bodies/inertia.rs`
+//! says so.
 
 mod composite;
 mod coriolis;

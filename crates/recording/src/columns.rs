@@ -1,4 +1,4 @@
-//! What the columns of a table are called, what stands between them, and what a user says of them. Pure.
+//! Names of a table's columns, the delimiter between them, and what a user states of them. Pure.
 //!
 //! Below the decoders, whose options hold it, and the tables, which are read by it.
 

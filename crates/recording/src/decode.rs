@@ -77,7 +77,7 @@ pub struct Channel<'a> {
     pub schema_data: &'a [u8],
 }
 
-/// What a channel's messages are read for.
+/// Purpose for which a channel's messages are read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
 pub enum Wanted {
     /// Body rates and what stands beside them, or orientations.
@@ -100,10 +100,10 @@ impl Wanted {
     }
 }
 
-/// What the user may say about messages.
+/// Options that the user may state about messages.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
-    /// What they are read for.
+    /// Purpose for which they are read.
     pub wanted: Wanted,
     /// `--field` paths.
     pub fields: Vec<FieldPath>,
@@ -113,9 +113,9 @@ pub struct Options {
     pub delimiter: Option<Delimiter>,
     /// Use data that its covariance (-1) marks as absent.
     pub ignore_covariance_flag: bool,
-    /// Of several transforms in a message, take the one to this child frame; else the first.
+    /// Child frame whose transform is taken when a message holds several; else the first.
     pub child_frame: Option<String>,
-    /// Of several stamps in a message, which to read: 0 is the message's own, then those of nested
+    /// Index of the stamp to read when a message has several: 0 is the message's own, then those of nested
     /// messages from the outside in ([`Decoder::stamps`]).
     pub nth_stamp: usize,
 }
@@ -136,12 +136,12 @@ impl Options {
     }
 }
 
-/// What became of one payload.
+/// Outcome of one payload.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Decoded {
     /// Samples pushed.
     pub samples: usize,
-    /// Of these, those whose body rate the message marks as absent (covariance -1, Imu.msg): their
+    /// Number of these whose body rate the message marks as absent (covariance -1, Imu.msg): their
     /// `gyro` is `None`, or kept where [`Options::ignore_covariance_flag`] says so.
     pub gyro_marked_absent: usize,
     /// Stamps whose nanoseconds were a second or more (or negative), carried into the seconds.
@@ -152,7 +152,7 @@ pub struct Decoded {
 #[derive(Debug, Clone)]
 pub struct Decoder {
     plan: Plan,
-    /// How registers become samples; of JSON the plan knows.
+    /// Form by which registers become samples; of JSON the plan knows.
     form: Form,
     /// Finds the frame in messages that have a schema.
     frame: Option<Plan>,
@@ -160,10 +160,10 @@ pub struct Decoder {
     found: Found,
     /// Stamps are numbers whose unit nothing states; of JSON before its first message: they may be.
     has_bare_stamps: bool,
-    /// Where stamps lie; the one that is read is [`Options::nth_stamp`].
+    /// Paths of stamps; the one that is read is [`Options::nth_stamp`].
     stamps: Vec<String>,
     options: Options,
-    /// For the messages about it: topic, type, encoding.
+    /// Label for the messages about it: topic, type, encoding.
     label: [String; 3],
 }
 
@@ -177,7 +177,7 @@ enum Plan {
     Samples,
 }
 
-/// What may be spent on the schemas of one log: a few kilobytes of schema can spell out to tens of thousands of
+/// Budget for the schemas of one log: a few kilobytes of schema can spell out to tens of thousands of
 /// fields, and a log can hold thousands of schemas. Those of a hundred recordings together spell out to fewer.
 #[derive(Debug, Clone)]
 pub(crate) struct Effort {
@@ -413,20 +413,20 @@ impl Decoder {
         other
     }
 
-    /// What type and schema state, and which fields were chosen.
+    /// Statements of type and schema, and the fields that were chosen.
     #[must_use]
     pub fn stated(&self) -> &Stated {
         &self.stated
     }
 
-    /// Where messages carry stamps, the message's own at first, then those of messages nested in it; one
+    /// Paths of the stamps that messages carry, the message's own first, then those of messages nested in it; one
     /// of them is read ([`Options::nth_stamp`]). Empty where `--field` names it.
     #[must_use]
     pub fn stamps(&self) -> &[String] {
         &self.stamps
     }
 
-    /// Which of [`Decoder::stamps`] is read.
+    /// Index of the stamp among [`Decoder::stamps`] that is read.
     #[must_use]
     pub fn nth_stamp(&self) -> usize {
         self.options
@@ -531,7 +531,7 @@ pub(crate) fn known_definition(type_name: &str) -> Option<String> {
     builtin::definition(&ros_name(type_name))
 }
 
-/// What the type of this name is everywhere.
+/// Schema of a type whose name means the same everywhere.
 fn well_known(channel: &Channel<'_>) -> Result<Schema, (String, String)> {
     let dialect = match channel.message_encoding {
         "cdr" => Dialect::Ros2,

@@ -1,8 +1,9 @@
 //! An address -> what is read there as a file is: its size, and its bytes by ranges. I/O, by whoever knows the way.
 //!
-//! Apart from the inputs because this crate knows no way itself: to ask a server takes a runtime and a client, which a reader
-//! of recordings has no other use for. A program that has them says so once, at its start ([`reach_by`]); without one an
-//! address is refused, with what helps.
+//! Apart from the inputs because this crate knows no way itself: to ask a server takes a runtime and a client, which
+//! a reader
+//! of recordings has no other use for. A program that has them says so once, at its start ([`reach_by`]); without one
+//! an address is refused, with what helps.
 
 use crate::address::Address;
 use std::fmt::Debug;
@@ -11,12 +12,12 @@ use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 use strapd_attitude::diagnostic::Diagnostic;
 
-/// What begins an address that is read.
+/// Schemes of addresses that are read.
 pub const SCHEMES: [&str; 5] = ["http", "https", "s3", "gs", "az"];
 
 /// Bytes that are somewhere else. All calls may come from any thread, and wait.
 pub trait Object: Debug + Send + Sync {
-    /// How many there are, for as long as this is read.
+    /// Number of bytes, for as long as this is read.
     fn size(&self) -> u64;
 
     /// Fills `into` from `offset` on; less only at the end.
@@ -25,12 +26,12 @@ pub trait Object: Debug + Send + Sync {
     /// They can not be had, or are others by now.
     fn read_at(&self, into: &mut [u8], offset: u64) -> io::Result<usize>;
 
-    /// Says what will be read from now on, in this order, so that it is fetched before it is asked for, and at most `ahead` bytes
-    /// before. What is read beside it is fetched by itself, and little more than that.
+    /// Says what will be read from now on, in this order, so that it is fetched before it is asked for, and at most
+    /// `ahead` bytes before. What is read beside it is fetched by itself, and little more than that.
     fn expect(&self, ranges: Vec<Range<u64>>, ahead: u64);
 }
 
-/// What is at an address.
+/// Object or listing at an address.
 pub enum Found {
     /// Something that can be read anywhere.
     Object(Arc<dyn Object>),
@@ -47,7 +48,7 @@ impl std::fmt::Debug for Found {
     }
 }
 
-/// How an address is reached: what is there, or why it can not be had. The text does not begin with the address, and holds no
+/// Way to an address: what is there, or why it cannot be had. The text does not begin with the address, and holds no
 /// part of it that is not printed.
 pub type Way = fn(&Address) -> Result<Found, Diagnostic>;
 
@@ -70,7 +71,7 @@ pub fn meant(text: &str) -> Option<Address> {
         .then_some(address)
 }
 
-/// What is at an address.
+/// Finds what is at an address.
 ///
 /// # Errors
 /// It names a user; nobody knows the way; whatever the way finds.
@@ -88,7 +89,7 @@ pub(crate) fn find(address: &Address) -> Result<Found, Diagnostic> {
     way(address)
 }
 
-/// How to read what is at an address without a way there.
+/// Refusal of an address without a way there.
 fn no_way(address: &Address) -> Diagnostic {
     let place = address.place();
     let pipe = match address.scheme().as_str() {
@@ -117,7 +118,7 @@ pub struct ObjectBytes {
 }
 
 impl ObjectBytes {
-    /// From its first byte.
+    /// Begins at the first byte.
     #[must_use]
     pub fn new(object: Arc<dyn Object>) -> ObjectBytes {
         ObjectBytes { object, at: 0 }

@@ -1,5 +1,5 @@
-//! Why a log can not be read, or not as a whole, or holds no samples that were meant. Bad samples are not here: they are counted verdicts
-//! ([`strapd_attitude::record::Verdict`]).
+//! Why a log can not be read, or not as a whole, or holds no samples that were meant. Bad samples are not here: they
+//! are counted verdicts ([`strapd_attitude::record::Verdict`]).
 
 use crate::decode::defining;
 use crate::recognise::Foreign;
@@ -14,31 +14,31 @@ use strapd_attitude::setting::{FIELD, TOPIC};
 pub enum Error {
     /// A file could not be opened.
     Open {
-        /// Which file.
+        /// Path of the file.
         path: PathBuf,
         /// Why.
         source: std::io::Error,
     },
     /// Reading failed part way.
     Read {
-        /// Which file.
+        /// Path of the file.
         path: PathBuf,
-        /// Where in it.
+        /// Offset in it.
         offset: u64,
         /// Why.
         source: std::io::Error,
     },
     /// The path is a directory.
     IsDirectory {
-        /// Which.
+        /// Path.
         path: PathBuf,
     },
     /// The file has no bytes.
     Empty {
-        /// Which file.
+        /// Path of the file.
         path: PathBuf,
     },
-    /// What is at an address can not be had.
+    /// Object at an address that cannot be had.
     Unreached {
         /// The address, as it is printed.
         path: PathBuf,
@@ -47,81 +47,81 @@ pub enum Error {
     },
     /// The first bytes are not the MCAP magic.
     NotMcap {
-        /// Which file.
+        /// Path of the file.
         path: PathBuf,
         /// The first bytes, escaped.
         found: String,
     },
     /// A table without the columns that are needed.
     NotTable {
-        /// Which file.
+        /// Path of the file.
         path: PathBuf,
-        /// What is missing, and what helps.
+        /// Description of what is missing, and what helps.
         why: Diagnostic,
     },
     /// The input is of a known format that is not read.
     NotRead {
-        /// Which input.
+        /// Path of the input.
         path: PathBuf,
-        /// What it is, and the way in.
+        /// Format that it is, and the way in.
         format: Foreign,
     },
     /// A stream of what is read in any order could not be put into a file first.
     NoRoom {
-        /// What it is called.
+        /// Name of the input.
         path: PathBuf,
         /// Why not.
         source: std::io::Error,
     },
-    /// What can be read once was to be looked at first.
+    /// Input that can be read once and was to be looked at first.
     NotTwice {
-        /// What it is called.
+        /// Name of the input.
         path: PathBuf,
     },
     /// The log holds nothing a rate can be read from.
     NoImuTopic {
-        /// Which file.
+        /// Path of the file.
         path: PathBuf,
-        /// What is there, one indented line each.
+        /// Topics that exist, one indented line each.
         topics: String,
         /// Messages of a type that nothing defines, so that no value in them has a name.
         undefined: Option<String>,
     },
     /// The log holds several IMU topics, or several publishers on one, and none was named.
     SeveralImuTopics {
-        /// Which file.
+        /// Path of the file.
         path: PathBuf,
         /// The candidates, one indented line each.
         topics: String,
     },
     /// The topic named is not in the log.
     NoSuchTopic {
-        /// Which file.
+        /// Path of the file.
         path: PathBuf,
         /// The topic asked for.
         topic: String,
-        /// What is there, one indented line each.
+        /// Topics that exist, one indented line each.
         topics: String,
     },
     /// A topic's messages can not be decoded.
     Unsupported {
-        /// Which file.
+        /// Path of the file.
         path: PathBuf,
         /// Topic, type, encoding, why, and what helps.
         what: Diagnostic,
     },
     /// A run over this input can not be carried out with these settings.
     Topic {
-        /// Which file.
+        /// Path of the file.
         path: PathBuf,
-        /// Which topic.
+        /// Name of the topic.
         topic: String,
-        /// What, why, and what helps.
+        /// Diagnostic: what, why, and what helps.
         what: Diagnostic,
     },
     /// The operating system gives no threads.
     Threads {
-        /// How many were asked for; 0 = one per core.
+        /// Number asked for; 0 = one per core.
         threads: usize,
         /// Why not.
         source: rayon::ThreadPoolBuildError,
@@ -129,7 +129,7 @@ pub enum Error {
 }
 
 impl Error {
-    /// What can not be read of this file.
+    /// Error for what cannot be read of this file.
     pub(crate) fn unsupported(path: &Path, what: impl Into<Diagnostic>) -> Error {
         Error::Unsupported {
             path: path.to_owned(),

@@ -57,7 +57,7 @@ const MAGICS: [(&[u8], Format); 6] = [
     (&parquet::MAGIC, Format::Parquet),
 ];
 
-/// How a video says so, behind four bytes.
+/// Mark of a video, behind four bytes.
 const VIDEO: &[u8] = b"ftyp";
 
 /// The longest of them.
@@ -244,7 +244,7 @@ impl Format {
         Ok(Format::of_name(path).or_else(|| Format::of_shape(&head)))
     }
 
-    /// What to say of a file whose name stands for another format than its bytes.
+    /// Warning about a file whose name stands for another format than its bytes.
     #[must_use]
     pub fn contradiction(self, path: &Path) -> Option<String> {
         let named = Format::of_name(path).filter(|named| *named != self)?;

@@ -34,20 +34,20 @@ pub struct Lines<R> {
     /// Files of the same recording with forces or fields, and what is next in this one.
     beside: Vec<Beside<R>>,
     next: Option<Next>,
-    /// How it begins, as far as that had come.
+    /// Beginning of the input, as far as it had come.
     head: Vec<u8>,
 }
 
 /// Bytes of the beginning that are kept.
 pub(crate) const HEAD_KEPT: usize = 4096;
 
-/// What a line held, and its samples; `None` at the end.
+/// Contents of a line, and its samples; `None` at the end.
 type Next = (
     Option<std::result::Result<Line, Undecodable>>,
     Vec<RawSample>,
 );
 
-/// How a line is read.
+/// Form in which a line is read.
 #[derive(Debug)]
 enum Form {
     /// Objects of JSON, and packed ones.
@@ -90,7 +90,7 @@ impl<R: Read> Lines<R> {
         Ok(lines)
     }
 
-    /// What the next line holds, of this file or of those beside it, in the order of their stamps; its samples are pushed.
+    /// Reads the next line, of this file or of those beside it, in the order of their stamps; its samples are pushed.
     /// What a line holds that is of no gyro is marked so ([`RawSample::is_beside`]). `None` at the end. Blank lines are
     /// passed over.
     ///
@@ -140,7 +140,7 @@ impl<R: Read> Lines<R> {
         self.format
     }
 
-    /// Its first bytes, as far as they had come when it was opened.
+    /// First bytes, as far as they had come when it was opened.
     #[must_use]
     pub(crate) fn head(&self) -> &[u8] {
         &self.head
@@ -184,7 +184,7 @@ impl<R: Read> Lines<R> {
         }
     }
 
-    /// What the reader of its tables should know.
+    /// Notes for the reader of its tables.
     #[must_use]
     pub fn notes(&self) -> Vec<String> {
         let own = self.table().map(Table::notes).unwrap_or_default();
@@ -192,7 +192,7 @@ impl<R: Read> Lines<R> {
         own.iter().cloned().chain(others).collect()
     }
 
-    /// What is said of all samples before the first: the names of a table may say units.
+    /// Meaning of all samples that is declared before the first: the names of a table may state units.
     #[must_use]
     pub fn declared(&self) -> Declared {
         let mut declared = self

@@ -1,7 +1,8 @@
 //! Errors and what was said of them beforehand -> does sigma hold? Pure.
 //!
 //! Apart from the errors because it asks of the estimate's honesty, not of its size: an attitude that is off by ten
-//! degrees under a sigma of five is a good one badly off, one that is off by a degree under a sigma of a tenth is a lie.
+//! degrees under a sigma of five is a good one badly off, one that is off by a degree under a sigma of a tenth is a
+//! lie.
 //!
 //! Tilt and heading are told apart, since what corrects one leaves the other alone: tilt is the part of the error about
 //! level axes, its sigma the one in the direction of the error; heading the part about the vertical. A reference has
@@ -85,8 +86,8 @@ pub struct BoundedError {
 const EXPLAINED: f64 = 0.5;
 
 /// Judges the sigma of `estimate`, row by row, by `reference`, the worlds laid on each other as `align` says; `None`
-/// without a common instant, or where no sigma is stated. Who claims to be level (an alignment of the heading alone) and
-/// leaves the reference's tilt by a constant is judged by what is left without it: `leaning` says so.
+/// without a common instant, or where no sigma is stated. Who claims to be level (an alignment of the heading alone)
+/// and leaves the reference's tilt by a constant is judged by what is left without it: `leaning` says so.
 #[must_use]
 pub fn consistency<'r>(
     estimate: &[Known],

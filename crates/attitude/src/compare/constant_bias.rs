@@ -1,11 +1,11 @@
 //! An integrated gyro and a recorded orientation -> the constant bias that explains how they part. Pure.
 //!
-//! Apart from the body's axes because it is another explanation of the same thing, and apart from the drift because that
-//! is a line in the world: a bias is constant in the body, and drifts about whatever the body's axes point at.
+//! Apart from the body's axes because it is another explanation of the same thing, and apart from the drift because
+//! that is a line in the world: a bias is constant in the body, and drifts about whatever the body's axes point at.
 //!
 //! Over windows of a second the rotation of the estimate is that of the reference and `delta`, with
-//! `delta = J b`, `J' = R^T J + h exp(-phi/2)` over each step of h seconds and rotation R. Least squares of `delta - J b`
-//! with weights that fall with the residual (Huber), since references jump; then the estimate is turned back
+//! `delta = J b`, `J' = R^T J + h exp(-phi/2)` over each step of h seconds and rotation R. Least squares of `delta -
+//! J b` with weights that fall with the residual (Huber), since references jump; then the estimate is turned back
 //! step by step by the bias found, and the rest is found (Gauss and Newton). How well it is known shows in how parts of
 //! the recording agree with each other: what no window knows of the others (a scale error, a bias that wanders, a
 //! reference that lags) is in it.
@@ -59,8 +59,8 @@ pub struct BiasFit {
 }
 
 impl BiasFit {
-    /// Whether it is a bias, and worth removing: far from nothing by its own uncertainty, not more than gyros have, and the
-    /// estimate follows the reference clearly better without it.
+    /// Whether it is a bias, and worth removing: far from nothing by its own uncertainty, not more than gyros have,
+    /// and the estimate follows the reference clearly better without it.
     #[must_use]
     pub fn is_worth_removing(&self) -> bool {
         let [before, after] = self.over_long;

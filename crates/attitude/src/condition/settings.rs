@@ -41,8 +41,8 @@ impl OnGap {
 /// Settings by which a stream is conditioned.
 ///
 /// # Convention
-/// A raw vector v_s in the sensor's own axes and unit becomes `w_b = mount * axes * gyro_matrix * unit * v_s - bias`, an
-/// acceleration `mount * axes * (accel_matrix * accel_scale * a_s - accel_bias)`.
+/// A raw vector v_s in the sensor's own axes and unit becomes `w_b = mount * axes * gyro_matrix * unit * v_s - bias`,
+/// an acceleration `mount * axes * (accel_matrix * accel_scale * a_s - accel_bias)`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
     /// Meaning of a sample in time.

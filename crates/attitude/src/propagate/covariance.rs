@@ -39,7 +39,8 @@ use nalgebra::{Matrix3, Matrix6};
 /// About an axis of which nothing is known: no error of an attitude is larger.
 const LOST: f64 = std::f64::consts::PI;
 
-/// Covariance of attitude error and bias: what [`Propagator`](crate::propagate::Propagator) carries along, for use on its own.
+/// Covariance of attitude error and bias: what [`Propagator`](crate::propagate::Propagator) carries along, for use on
+/// its own.
 ///
 /// # Example
 /// ```

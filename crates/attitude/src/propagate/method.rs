@@ -146,8 +146,8 @@ impl Method {
         }
     }
 
-    /// The method itself, [`Method::Live`] with the window that suits the samples. Of turns that are whole by themselves
-    /// the best is each alone, whether there are later ones or not.
+    /// The method itself, [`Method::Live`] with the window that suits the samples. Of turns that are whole by
+    /// themselves the best is each alone, whether there are later ones or not.
     #[must_use]
     pub fn for_kind(self, kind: SampleKind) -> Method {
         let alone = Method::Magnus {

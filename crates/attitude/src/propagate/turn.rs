@@ -19,8 +19,10 @@ pub(crate) struct Turn<const N: usize> {
 const SMALL: f64 = 0.0625;
 
 impl<const N: usize> Turn<N> {
-    /// exp of the rotation vector (docs/theory/attitude.md 2): [`exp_minus_one`](crate::quaternion::exp_minus_one) for neighbouring
-    /// intervals at once. Its sine has one term more and large angles go by other functions, so the two differ in last bits.
+    /// exp of the rotation vector (docs/theory/attitude.md 2): [`exp_minus_one`](crate::quaternion::exp_minus_one)
+    /// for neighbouring
+    /// intervals at once. Its sine has one term more and large angles go by other functions, so the two differ in
+    /// last bits.
     #[inline(always)]
     pub(crate) fn exp(phi: Triple<N>) -> Self {
         let z = phi.norm_squared() * 0.25;

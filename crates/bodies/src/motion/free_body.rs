@@ -25,7 +25,8 @@ use strapd_attitude::quaternion::kernel as quat;
 ///
 /// # Accuracy
 /// Attitude and delta angle within 5e-14 rad over 60 s at 5 rad/s, against the power series
-/// (`crates/bodies/tests/bodies/motions.rs`): everything that grows with time is kept in 32 digits. Loses digits towards the separatrix, as the motion itself does: there it is
+/// (`crates/bodies/tests/bodies/motions.rs`): everything that grows with time is kept in 32 digits. Loses digits
+/// towards the separatrix, as the motion itself does: there it is
 /// unstable, and 1e-16 of rate grows to 1 within 37 time constants.
 #[derive(Clone, Copy, Debug)]
 pub struct FreeBody {

@@ -19,8 +19,8 @@ use crate::elliptic::{
 /// A heavy symmetric top that stays clear of the vertical, in closed form.
 ///
 /// # Accuracy
-/// 1e-14 rad over 60 s at 20 turns a second (`crates/bodies/tests/bodies/top.rs`): everything that grows with time is kept
-/// in 32 digits. The method to use is still [`SymmetricTop::exact`], which has no case to refuse.
+/// 1e-14 rad over 60 s at 20 turns a second (`crates/bodies/tests/bodies/top.rs`): everything that grows with time is
+/// kept in 32 digits. The method to use is still [`SymmetricTop::exact`], which has no case to refuse.
 #[derive(Clone, Copy, Debug)]
 pub struct ClosedForm {
     /// Lowest u, and how far it rises.

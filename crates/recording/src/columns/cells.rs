@@ -3,10 +3,10 @@
 use std::borrow::Cow;
 use std::str::FromStr;
 
-/// What stands between two cells.
+/// Delimiter between two cells.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Delimiter {
-    /// This byte.
+    /// Single byte.
     Byte(u8),
     /// Any number of blanks and tabs.
     Blanks,
@@ -23,7 +23,7 @@ const NAMED: [(&str, Delimiter); 6] = [
 ];
 
 impl Delimiter {
-    /// Those that are looked for, in this order: what comes first may hold what comes later.
+    /// Delimiters that are tried, in this order: what comes first may hold what comes later.
     pub(crate) const TRIED: [Delimiter; 5] = [
         Delimiter::Byte(b'\t'),
         Delimiter::Byte(b';'),
@@ -32,7 +32,7 @@ impl Delimiter {
         Delimiter::Blanks,
     ];
 
-    /// Its name for `--delimiter`.
+    /// Name for `--delimiter`.
     #[must_use]
     pub fn name(self) -> String {
         let named = NAMED.iter().find(|(_, known)| *known == self);

@@ -4,7 +4,7 @@ use super::names::Kind;
 use super::units::{Quantity, Unit};
 use std::str::FromStr;
 
-/// What a column, or several, are to us.
+/// Role of a column, or of several.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Role {
     Of(Kind),
@@ -42,7 +42,7 @@ impl Role {
     }
 }
 
-/// What the user says of a role: columns by name, or by number from 1; none of no columns.
+/// Statement of the user about a role: columns by name, or by number from 1; none of no columns.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Given {
     pub(crate) role: Role,
@@ -69,7 +69,7 @@ pub struct Columns {
 }
 
 impl Columns {
-    /// What is said of this role.
+    /// Statement about this role.
     pub(crate) fn of(&self, role: Role) -> Option<&Given> {
         self.given.iter().find(|given| given.role == role)
     }

@@ -1,12 +1,14 @@
 //! Words of a name -> an increment of the turn or of the speed, or the step since the row before. Pure.
 //!
-//! Apart from the other names because what is derived from a measurement is none of the roles, and these are: sensors that
+//! Apart from the other names because what is derived from a measurement is none of the roles, and these are: sensors
+//! that
 //! integrate themselves (Xsens, Movella DOT) give nothing else, and loops of microcontrollers print the step alone.
 
 use super::names::Kind;
 use super::units::{Quantity, Unit};
 
-/// As makers call the quaternion of a turn, and the change of the velocity that belongs to it, without blanks.
+/// Names that makers give to the quaternion of a turn, and to the change of the velocity that belongs to it, without
+/// blanks.
 const TURN: &[&str] = &["dq", "deltaq", "delq", "oriinc"];
 const PUSH: &[&str] = &["dv", "deltav", "delv", "velinc"];
 const STEP: &[&str] = &["dt", "deltat", "deltatime", "timedelta", "timestep"];

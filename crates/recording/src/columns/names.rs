@@ -1,4 +1,4 @@
-//! What a column is called -> what it may hold. Pure.
+//! Name of a column -> what it may hold. Pure.
 //!
 //! Apart from the layout because a name alone tells only what may be: which of several is meant, and whether all axes
 //! are there, shows in the whole header.
@@ -15,7 +15,7 @@ pub(crate) enum Kind {
     Mag,
     /// Parts w, x, y, z.
     Orientation,
-    /// Of a rotation matrix, sensor to world, by rows.
+    /// Element of a rotation matrix, sensor to world, by rows.
     Matrix,
     /// The rotation since the sample before, of which it says all. Parts w, x, y, z.
     Turn,
@@ -24,7 +24,7 @@ pub(crate) enum Kind {
 }
 
 impl Kind {
-    /// How many columns it is made of.
+    /// Number of columns it is made of.
     pub(crate) fn parts(self) -> usize {
         match self {
             Kind::Gyro | Kind::Accel | Kind::Mag | Kind::Push => 3,
@@ -33,7 +33,7 @@ impl Kind {
         }
     }
 
-    /// Its name for people and for `--columns`.
+    /// Name for people and for `--columns`.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Kind::Gyro => "gyro",
@@ -46,7 +46,7 @@ impl Kind {
         }
     }
 
-    /// What its unit is one of.
+    /// Quantity of which its unit is one.
     pub(crate) fn quantity(self) -> Option<Quantity> {
         match self {
             Kind::Gyro => Some(Quantity::Rate),
@@ -57,7 +57,7 @@ impl Kind {
     }
 }
 
-/// What a column may be.
+/// Meaning that a column may have.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) enum Meant {
     /// Part of a vector; those of one vector have the same `of`.
@@ -70,18 +70,18 @@ pub(crate) enum Meant {
     Step,
     /// A running number.
     Counter,
-    /// Of no use.
+    /// No use.
     Nothing,
 }
 
 /// A column's name.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Name {
-    /// As it is, without the unit's brackets cut off; fit for a terminal.
+    /// Text as it is, without the unit's brackets cut off; fit for a terminal.
     pub(crate) text: String,
-    /// What it may be.
+    /// Meaning it may have.
     pub(crate) meant: Meant,
-    /// Its unit, as it is written; `Err` of one in brackets that is not known.
+    /// Unit as written; `Err` of one in brackets that is not known.
     pub(crate) unit: Option<Result<Unit, String>>,
 }
 
@@ -335,7 +335,7 @@ fn unit_at_end(words: &[String], quantity: Quantity) -> Option<(Unit, usize)> {
 }
 
 impl Name {
-    /// What a cell of a header says.
+    /// Reads a cell of a header.
     pub(crate) fn of(cell: &[u8]) -> Name {
         let text = String::from_utf8_lossy(cell);
         let text = text
@@ -366,7 +366,7 @@ impl Name {
         }
     }
 
-    /// What a name's words mean, what its unit is one of, and the unit that the words say.
+    /// Meaning of a name's words, the quantity of its unit, and the unit that the words state.
     fn meant(base: &str, all: &[String]) -> (Meant, Option<Quantity>, Option<Unit>) {
         let is_word = |known: &[&str], word: &String| known.contains(&word.as_str());
         let joined = all.concat();

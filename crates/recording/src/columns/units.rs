@@ -9,17 +9,17 @@ use strapd_attitude::record::AccelUnit;
 /// A unit of one role, and what a number in it must be multiplied by first.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum Unit {
-    /// Of a rate.
+    /// Unit of a rate.
     Rate(GyroUnit, f64),
-    /// Of a specific force.
+    /// Unit of a specific force.
     Force(AccelUnit, f64),
-    /// Of a magnetic field: tesla in one of it.
+    /// Unit of a magnetic field: tesla in one of it.
     Field(f64),
-    /// Of a stamp: nanoseconds in one of it.
+    /// Unit of a stamp: nanoseconds in one of it.
     Time(f64),
 }
 
-/// What is measured.
+/// Quantity that is measured.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Quantity {
     Rate,
@@ -28,7 +28,7 @@ pub(crate) enum Quantity {
     Time,
 }
 
-/// As they are left by [`plain`].
+/// Units of rates as [`plain`] leaves them.
 const RATES: [(&str, GyroUnit, f64); 21] = [
     ("rad/s", GyroUnit::Rad, 1.0),
     ("rads-1", GyroUnit::Rad, 1.0),
@@ -155,7 +155,7 @@ impl Unit {
         }
     }
 
-    /// What `--columns` calls it; `None` of one that has no name.
+    /// Name in `--columns`; `None` of one that has no name.
     pub(crate) fn name(self) -> Option<&'static str> {
         match self {
             Unit::Rate(unit, scale) => {

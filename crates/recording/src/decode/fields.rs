@@ -5,7 +5,7 @@
 use strapd_attitude::record::TimeUnit;
 use strapd_attitude::setting::{FIELD, GYRO_UNIT};
 
-/// What a field is to us.
+/// Role of a field.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Hash)]
 pub enum FieldRole {
     /// Body rate or delta angle: three numbers.
@@ -49,7 +49,7 @@ impl FieldRole {
         .find(|role| role.name() == name)
     }
 
-    /// How many scalars it is made of, when they are given one by one.
+    /// Number of scalars it is made of, when they are given one by one.
     fn scalars(self) -> usize {
         match self {
             FieldRole::Gyro | FieldRole::Accel | FieldRole::Mag => 3,
@@ -64,7 +64,7 @@ impl FieldRole {
 pub(crate) enum Segment {
     /// The field of this name.
     Name(String),
-    /// This element of an array.
+    /// Element of an array.
     At(u32),
     /// Every element of an array: a batch, one sample each.
     Each,
@@ -81,9 +81,9 @@ pub(crate) enum Segment {
 /// ```
 #[derive(Clone, PartialEq, Eq, Debug, Hash)]
 pub struct FieldPath {
-    /// What it fills.
+    /// Role that it fills.
     pub role: FieldRole,
-    /// As the user wrote it, for messages.
+    /// Text as the user wrote it, for messages.
     pub text: String,
     /// One path, or as many as the role has scalars.
     pub(crate) paths: Vec<Vec<Segment>>,
@@ -95,9 +95,9 @@ pub struct FieldPath {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{} {text}: {why}", FIELD)]
 pub struct BadFieldPath {
-    /// What was given.
+    /// Text as given.
     pub text: String,
-    /// What is wrong with it.
+    /// Reason why it is refused.
     pub why: String,
 }
 

@@ -11,7 +11,7 @@ use memchr::memchr;
 /// Bytes of an object that show its length.
 const SEEN: usize = 4;
 
-/// What was found in the bytes.
+/// Frame found in the bytes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Framed<'a> {
     /// A line with its number, from 1; without line end, not blank.
@@ -45,13 +45,13 @@ impl Default for Framer {
 }
 
 impl Framer {
-    /// At the start of a stream.
+    /// Makes one at the start of a stream.
     #[must_use]
     pub fn new() -> Framer {
         Framer::default()
     }
 
-    /// At the start of a stream of lines of at most so many bytes, line end not counted.
+    /// Makes one at the start of a stream of lines of at most so many bytes, line end not counted.
     #[must_use]
     pub fn with_limit(limit: usize) -> Framer {
         Framer {

@@ -27,7 +27,7 @@ use strapd_attitude::record::TimeUnit;
 use strapd_attitude::record::{Nanos, RawSample};
 use trie::Trie;
 
-/// What is looked for in the messages of a channel.
+/// Plan of what is looked for in the messages of a channel.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Plan {
     /// The paths of `--field`.
@@ -42,7 +42,7 @@ pub(crate) struct Plan {
     pub(crate) settled: Option<TimeUnit>,
     /// The sensor of messages that name none.
     pub(crate) sensor: Option<String>,
-    /// Of a message's stamp and a nested one, the nested is read.
+    /// Whether the nested stamp is read of a message's stamp and a nested one.
     pub(crate) nested_stamp: bool,
     /// Specific forces and fields that come by themselves are read, too ([`RawSample::is_beside`]).
     pub(crate) takes_besides: bool,
@@ -67,7 +67,7 @@ impl Plan {
         }
     }
 
-    /// Which stamp holds where a message and one nested in it both have one.
+    /// Rule by which a stamp is chosen if a message and one nested in it both have one.
     pub(crate) fn stamp_rule(&self) -> StampRule {
         match (self.trie.gives(FieldRole::Stamp), self.nested_stamp) {
             (true, _) => StampRule::Given,

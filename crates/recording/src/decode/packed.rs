@@ -34,7 +34,7 @@ pub const NO_SEQ: u64 = u64::MAX;
 const KIND_RATE: u8 = 1;
 const KIND_ATT: u8 = 2;
 
-/// How the objects of a stream are written.
+/// Form in which the objects of a stream are written.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Form {
     /// One line each.
@@ -60,7 +60,7 @@ pub enum Object {
     Att {
         /// Number of the stream.
         stream: u32,
-        /// What it says.
+        /// Attitude that it holds.
         attitude: Attitude,
     },
 }
@@ -80,7 +80,7 @@ pub struct Attitude {
     pub sigma_deg: [f64; 3],
     /// The bits of [`strapd_attitude::record::Status`].
     pub status: u32,
-    /// How often it has been reset or held.
+    /// Number of times it has been reset or held.
     pub reset: u32,
 }
 
@@ -102,11 +102,11 @@ impl Attitude {
 /// Why an object says nothing.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Unreadable {
-    /// It does not begin with the mark, or is not as long as it says.
+    /// Bytes that do not begin with the mark, or are not as long as they state.
     NoObject,
-    /// This kind is not known.
+    /// Unknown kind.
     Kind(u8),
-    /// It is shorter than its kind.
+    /// Object shorter than its kind.
     Short {
         /// Bytes it has.
         have: usize,
@@ -130,7 +130,7 @@ impl std::fmt::Display for Unreadable {
     }
 }
 
-/// How long an object is that begins so; `None` while that can not be seen, or where no object begins.
+/// Length of an object that begins so; `None` while that cannot be seen, or where no object begins.
 #[must_use]
 pub fn length(beginning: &[u8]) -> Option<usize> {
     match beginning {
@@ -261,7 +261,8 @@ fn put(object: &mut [u8], at: usize, bytes: [u8; 8]) {
     object[at..at + 8].copy_from_slice(&bytes);
 }
 
-/// What is not finite is `null` in a line, and NaN here: one NaN, so that equal attitudes are equal bytes.
+/// Writes numbers; one that is not finite is `null` in a line, and NaN here: one NaN, so that equal attitudes are
+/// equal bytes.
 fn put_floats<const N: usize>(object: &mut [u8], at: usize, values: [f64; N]) {
     for (n, value) in values.into_iter().enumerate() {
         let value = if value.is_finite() { value } else { f64::NAN };
@@ -293,7 +294,7 @@ fn some_time(nanos: i64) -> Option<i64> {
     Some(nanos).filter(|n| *n != NO_TIME)
 }
 
-/// As in a line: a vector with `null` in it is none.
+/// Reads a vector; one with `null` in it is none, as in a line.
 fn some_vector(vector: [f64; 3]) -> Option<[f64; 3]> {
     Some(vector).filter(|v| !v.iter().any(|c| c.is_nan()))
 }

@@ -19,16 +19,16 @@ use wire::{Broken, Reader, Value};
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Plan {
     nodes: Vec<Node>,
-    /// As compiled; what a message taught of it is the caller's.
+    /// Form as compiled; what a message taught of it is the caller's.
     form: Form,
     batched: bool,
     child: Option<Box<str>>,
 }
 
-/// What is wanted of one message.
+/// Node of the tree of fields wanted of one message.
 #[derive(Debug, Clone, Default)]
 struct Node {
-    /// By field number, few.
+    /// Actions by field number, few.
     fields: Vec<(u32, Action)>,
     /// Slots that are zero, not absent, when this message is present.
     zeros: u32,
@@ -98,7 +98,7 @@ impl Plan {
         result
     }
 
-    /// How registers become samples.
+    /// Form by which registers become samples.
     pub(crate) fn form(&self) -> Form {
         self.form
     }

@@ -11,13 +11,13 @@ use strapd_attitude::diagnostic::Diagnostic;
 pub struct Unsupported {
     /// Topic of the channel, control characters escaped.
     pub topic: String,
-    /// Its message type.
+    /// Message type.
     pub type_name: String,
-    /// Its message encoding, and its schema encoding after a slash where there is one.
+    /// Message encoding, and schema encoding after a slash if there is one.
     pub encoding: String,
     /// Why not.
     pub why: String,
-    /// What the user can do about it; empty when nothing.
+    /// Remedy; empty when there is none.
     pub help: String,
 }
 
@@ -122,7 +122,7 @@ pub enum Undecodable {
         "packed stream {number}: no line before says which sensor it is, like {{\"class\":\"PACKED\",\"stream\":{number},\"id\":\"imu0\"}}"
     )]
     UnknownStream {
-        /// Its number.
+        /// Number of the kind.
         number: u32,
     },
     /// A CDR encapsulation this crate does not read.
@@ -130,7 +130,7 @@ pub enum Undecodable {
     Encapsulation {
         /// The first two bytes.
         found: [u8; 2],
-        /// What they mean.
+        /// Meaning of the numbers.
         what: &'static str,
     },
     /// More samples in one message than a message may hold.
@@ -146,17 +146,17 @@ pub enum Undecodable {
         "`id` {near}: a sensor's name has at most 255 bytes, and no control or invisible characters"
     )]
     Name {
-        /// How it begins, fit for a terminal.
+        /// Beginning of the text, fit for a terminal.
         near: String,
     },
-    /// Of a file that is read beside the samples' own.
+    /// Fault of a file that is read beside the samples' own.
     #[error("{file}, line {line}: {why}")]
     Beside {
-        /// What the file is called, fit for a terminal.
+        /// Name of the file, fit for a terminal.
         file: String,
         /// Number of the line, from 1.
         line: u64,
-        /// What is wrong with it.
+        /// Fault in it.
         why: Box<Undecodable>,
     },
     /// A row that has not the cells of its table.
@@ -173,27 +173,27 @@ pub enum Undecodable {
     /// A cell that is not what its column holds.
     #[error("column `{column}`: `{near}` {why}")]
     Cell {
-        /// Which column.
+        /// Name of the column.
         column: String,
-        /// How the cell begins, fit for a terminal.
+        /// Beginning of the cell, fit for a terminal.
         near: String,
-        /// What is wrong with it.
+        /// Description of the fault.
         why: &'static str,
     },
     /// Not JSON.
     #[error("JSON, byte {offset}: {what}")]
     Json {
-        /// Where, from the start of the payload.
+        /// Offset from the start of the payload.
         offset: u64,
-        /// What was expected there.
+        /// Element that was expected there.
         what: &'static str,
     },
     /// Not the protobuf wire format.
     #[error("protobuf, byte {offset}: {what}")]
     Protobuf {
-        /// Where, from the start of the payload.
+        /// Offset from the start of the payload.
         offset: u64,
-        /// What is wrong there.
+        /// Description of the fault.
         what: &'static str,
     },
 }

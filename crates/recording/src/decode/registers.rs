@@ -1,4 +1,4 @@
-//! What a walk through a payload found -> [`RawSample`]. Pure.
+//! Registers that a walk through a payload fills -> [`RawSample`]. Pure.
 //!
 //! Every decoder fills the same registers, so that absence, covariance marks and stamps are read
 //! in one place and mean the same in every encoding.
@@ -8,7 +8,7 @@ use super::stamp::{from_count, from_float};
 use strapd_attitude::record::TimeUnit;
 use strapd_attitude::record::{Nanos, RawSample};
 
-/// Where a number of a message goes. Three, three and four in a row are vectors and a quaternion.
+/// Slot of a number of a message. Three, three and four in a row are vectors and a quaternion.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Hash)]
 pub(crate) struct Slot(pub(crate) u8);
 
@@ -135,7 +135,7 @@ impl Registers {
     }
 }
 
-/// How the numbers in the stamp's slots make an instant.
+/// Form by which the numbers in the stamp's slots make an instant.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) enum StampForm {
     /// The message has none.
@@ -149,7 +149,7 @@ pub(crate) enum StampForm {
     Float(TimeUnit),
 }
 
-/// How registers become a sample: the same for every message of a channel.
+/// Form by which registers become a sample: the same for every message of a channel.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub(crate) struct Form {
     pub(crate) stamp: StampForm,

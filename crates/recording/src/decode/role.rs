@@ -1,4 +1,4 @@
-//! Which channel is "the IMU topic". Pure.
+//! Choice of "the IMU topic" among channels. Pure.
 //!
 //! Apart from decoding because it is asked of every channel of a log before one is chosen, and must
 //! answer for those it can not decode as well.
@@ -8,7 +8,7 @@ use super::select::Found;
 use super::{Channel, Decoder, Options, Stated, Unsupported};
 use strapd_attitude::record::Nanos;
 
-/// How good a source of body rates a channel is; the best rank in a log is taken, and when two
+/// Quality of a channel as a source of body rates; the best rank in a log is taken, and when two
 /// channels share it the user is asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Rank {
@@ -24,14 +24,14 @@ pub enum Rank {
     ByNameOnly,
 }
 
-/// What a channel can serve as.
+/// Role in which a channel can serve.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Role {
-    /// It carries a body rate or delta angle.
+    /// Whether it carries a body rate or delta angle.
     pub has_rate: bool,
-    /// It carries an orientation, so it can be a reference.
+    /// Whether it carries an orientation, so that it can be a reference.
     pub has_orientation: bool,
-    /// How good a source of body rates; meaningless without [`Role::has_rate`].
+    /// Quality as a source of body rates; meaningless without [`Role::has_rate`].
     pub rank: Rank,
 }
 
@@ -43,7 +43,7 @@ impl Role {
     }
 }
 
-/// What `channel` can serve as. JSON without a schema shows only in a message: pass its first one.
+/// Role of `channel`. JSON without a schema shows it only in a message: pass its first one.
 /// A channel that can not be decoded serves as nothing.
 #[must_use]
 pub fn role(channel: &Channel<'_>, first: Option<(&[u8], Nanos)>) -> Role {

@@ -35,14 +35,14 @@ pub(crate) struct Plan {
     cdr: bool,
     /// The layout is that of `sensor_msgs/Imu`.
     imu: bool,
-    /// As compiled; what a message taught of it is the caller's.
+    /// Form as compiled; what a message taught of it is the caller's.
     form: Form,
     child: Option<Box<str>>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Op {
-    /// To the next multiple of 2, 4 or 8.
+    /// Advance to the next multiple of 2, 4 or 8.
     Align(usize),
     /// Bytes of fixed layout, and the numbers wanted of them (ranges in `reads` and `marks`).
     Block {
@@ -89,14 +89,14 @@ enum Emit {
     FirstMatch,
 }
 
-/// Where a field of a block ends, for the message about one that does not fit.
+/// End of a field in a block, for the message about one that does not fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Mark {
     end: usize,
     name: u32,
 }
 
-/// Where a walk ended that should not have.
+/// Fault at which a walk ended.
 #[derive(Clone, Copy)]
 enum Fault {
     /// Bytes that would have been needed, and for what.
@@ -159,7 +159,7 @@ impl Plan {
         Plan { imu, ..self }
     }
 
-    /// How registers become samples.
+    /// Form by which registers become samples.
     pub(crate) fn form(&self) -> Form {
         self.form
     }

@@ -27,24 +27,24 @@ pub(crate) struct Schema {
 pub(crate) struct Struct {
     /// Full name, as the schema writes it.
     pub(crate) name: String,
-    /// Its fields in wire order.
+    /// Fields in wire order.
     pub(crate) fields: Vec<Field>,
 }
 
 /// One field.
 #[derive(Debug, Clone)]
 pub(crate) struct Field {
-    /// Its name.
+    /// Name.
     pub(crate) name: String,
-    /// What it, or each of its elements, is.
+    /// Kind of it, or of each of its elements.
     pub(crate) kind: Kind,
-    /// How many of it.
+    /// Multiplicity.
     pub(crate) many: Many,
     /// Protobuf: the field number; elsewhere 0.
     pub(crate) number: u32,
 }
 
-/// What a field holds.
+/// Kind of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
     /// A number (or bool).
@@ -61,7 +61,7 @@ pub(crate) enum Kind {
     Undefined,
 }
 
-/// How many values a field holds.
+/// Number of values that a field holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Many {
     /// One.

@@ -20,7 +20,7 @@ use strapd_attitude::record::TimeUnit;
 pub(crate) enum Step {
     /// The field of this index.
     Field(usize),
-    /// This element.
+    /// Element of an array.
     At(u32),
     /// Every element, one sample each.
     Each,
@@ -37,7 +37,7 @@ pub(crate) struct Pick {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Selection {
     pub(crate) picks: Vec<Pick>,
-    /// How many of the picks, the first ones, the user gave.
+    /// Number of the picks, the first ones, that the user gave.
     pub(crate) given: usize,
     pub(crate) form: Form,
     /// The array whose elements are samples.
@@ -50,13 +50,13 @@ pub(crate) struct Selection {
     pub(crate) unit: Option<GyroUnit>,
     /// Type of the struct that holds the body rate.
     pub(crate) holder: String,
-    /// How the body rate was found; higher is weaker.
+    /// Way in which the body rate was found; higher is weaker.
     pub(crate) found: Found,
-    /// Where the interval lies.
+    /// Path of the interval.
     pub(crate) interval: String,
-    /// Where stamps lie, the one to be taken first at first.
+    /// Paths of stamps, the one to be taken first.
     pub(crate) stamps: Vec<String>,
-    /// In words, for the user.
+    /// Description in words, for the user.
     pub(crate) description: Vec<String>,
 }
 
@@ -69,10 +69,10 @@ pub(crate) struct Batch {
     pub(crate) element: Step,
 }
 
-/// How sure it is that the three numbers are an IMU's body rate.
+/// Certainty that the three numbers are an IMU's body rate.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Default)]
 pub(crate) enum Found {
-    /// No body rate.
+    /// Absence of a body rate.
     #[default]
     Nothing,
     /// The user said so.
@@ -206,7 +206,7 @@ fn take_stamp(
     Ok(())
 }
 
-/// What a path leads to: a field, or an element of one.
+/// End of a path: a field, or an element of one.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct End {
     pub(crate) kind: Kind,

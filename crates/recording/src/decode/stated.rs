@@ -1,4 +1,4 @@
-//! What a format says about its own numbers. Pure.
+//! Statements of a format about its own numbers. Pure.
 //!
 //! Apart from the samples because it is decided once per channel, and because the user may know
 //! better: a flag given by hand wins over anything stated here.
@@ -8,10 +8,10 @@ use strapd_attitude::frames::BodyAxes;
 use strapd_attitude::record::{AccelUnit, Declared};
 use strapd_attitude::worlds::Convention;
 
-/// What a channel's type and schema state.
+/// Statements of a channel's type and schema.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Stated {
-    /// What its numbers mean.
+    /// Meaning of its numbers.
     pub declared: Declared,
     /// Whether messages carry a body rate or delta angle.
     pub has_gyro: bool,
@@ -27,18 +27,18 @@ pub struct Stated {
     pub has_interval: bool,
     /// Whether one message may hold several samples.
     pub batched: bool,
-    /// Which fields were chosen, in words: `gyro angular_velocity, stamp header.stamp`.
+    /// Description of the chosen fields: `gyro angular_velocity, stamp header.stamp`.
     pub description: String,
 }
 
 impl Stated {
-    /// What ROS message types state: Imu.msg asks for rad/s and m/s^2; REP-103 and REP-145 for
+    /// Applies what ROS message types state: Imu.msg asks for rad/s and m/s^2; REP-103 and REP-145 for
     /// axes x forward, y left, z up and a world of east, north, up.
     pub(crate) fn ros(&mut self) {
         self.si(BodyAxes::Flu, Convention::EnuFlu);
     }
 
-    /// What PX4's messages state: SI, x forward, y right, z down, world north, east, down.
+    /// Applies what PX4's messages state: SI, x forward, y right, z down, world north, east, down.
     pub(crate) fn px4(&mut self) {
         self.si(BodyAxes::Frd, Convention::NedFrd);
     }

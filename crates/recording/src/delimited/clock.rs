@@ -1,12 +1,12 @@
-//! What a row says of its time -> its instant. Pure.
+//! Cells of a row that tell its time -> its instant. Pure.
 //!
-//! Apart from the rows because makers agree on nothing here: whole nanoseconds, decimal seconds, ticks that wrap, dates,
-//! a running number beside a rate, nothing.
+//! Apart from the rows because makers agree on nothing here: whole nanoseconds, decimal seconds, ticks that wrap,
+//! dates, a running number beside a rate, nothing.
 
 use crate::decode::{decimal_in_steps, instant_of_date};
 use strapd_attitude::record::Nanos;
 
-/// How the rows of a table are placed in time.
+/// Clock by which the rows of a table are placed in time.
 #[derive(Clone, PartialEq, Debug)]
 pub(super) enum Clock {
     /// A column of whole nanoseconds.

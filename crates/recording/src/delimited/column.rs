@@ -1,6 +1,6 @@
-//! What a column of a table holds, and which lines are no rows.
+//! Meaning of a column of a table, and lines that are no rows.
 
-/// What a column holds.
+/// Meaning of a column.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Column {
     Stamp,
@@ -12,9 +12,9 @@ pub(super) enum Column {
     Accel(usize),
     Mag(usize),
     Orientation(usize),
-    /// Of a rotation matrix, by rows.
+    /// Element of a rotation matrix, by rows.
     Matrix(usize),
-    /// Of the rotation since the sample before.
+    /// Element of the rotation since the sample before.
     Turn(usize),
 }
 

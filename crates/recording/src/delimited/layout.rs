@@ -1,7 +1,7 @@
 //! The first lines of a table -> what its columns hold. Pure.
 //!
-//! Apart from the rows because here, once, it is decided and said what numbers mean: nothing of it is guessed in silence,
-//! and what can not be told ends with the flag that tells it.
+//! Apart from the rows because here, once, it is decided and said what numbers mean: nothing of it is guessed in
+//! silence, and what can not be told ends with the flag that tells it.
 
 mod increments;
 mod instants;
@@ -83,7 +83,7 @@ fn names_in(line: &[u8], delimiter: Delimiter) -> Vec<Name> {
     names
 }
 
-/// By which delimiter a line is a header. `file` is what it is called, and what is looked for in it.
+/// Delimiter by which a line is a header. `file` is its name, and what is looked for in it.
 fn header_in(
     line: &[u8],
     delimiter: Option<Delimiter>,
@@ -144,7 +144,7 @@ fn number(column: &str) -> Option<usize> {
 pub(crate) struct Opening {
     given: Option<Columns>,
     delimiter: Option<Delimiter>,
-    /// What the file is called, without its ending.
+    /// Name of the file, without its ending.
     stem: String,
     wanted: Wanted,
     lines: Vec<Vec<u8>>,
@@ -164,10 +164,10 @@ pub(crate) struct Held {
     pub(crate) times: u64,
 }
 
-/// Where the header is.
+/// Header that was found.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 struct Found {
-    /// Its line; of a table without one, its first row.
+    /// Line of the header; of a table without one, its first row.
     at: usize,
     delimiter: Delimiter,
     is_header: bool,
@@ -332,7 +332,7 @@ impl Opening {
         Ok((table, numbered(behind, &self.repeated)))
     }
 
-    /// No header: what there is, and what would help.
+    /// Refusal of a text without a header: what there is, and what would help.
     fn nothing(&self) -> Diagnostic {
         let start = self.lines.first().map_or(&[][..], Vec::as_slice);
         if self.lines.iter().flatten().any(|b| *b == 0) {
@@ -489,7 +489,7 @@ fn check_lengths(
 }
 
 impl Name {
-    /// What its unit is one of.
+    /// Quantity of which its unit is one.
     fn quantity(&self) -> Option<Quantity> {
         match &self.meant {
             Meant::Part { kind, .. } => kind.quantity(),

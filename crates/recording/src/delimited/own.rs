@@ -8,9 +8,9 @@ pub(crate) fn is_own_column(name: &str) -> bool {
     COLUMNS.iter().any(|(known, _)| *known == name)
 }
 
-/// Those that are read, by name. Those of a rate behind an attitude, and a quaternion's without their `q`, are in
-/// tables of attitudes. Units and axes are those of `strapd cat`: rad/s (delta angles in rad), m/s^2, x forward, y left,
-/// z up.
+/// Columns that are read, by name. Those of a rate behind an attitude, and a quaternion's without their `q`, are in
+/// tables of attitudes. Units and axes are those of `strapd cat`: rad/s (delta angles in rad), m/s^2, x forward, y
+/// left, z up.
 pub(super) const COLUMNS: [(&str, Column); 26] = [
     ("stamp_ns", Column::Stamp),
     ("log_ns", Column::Log),

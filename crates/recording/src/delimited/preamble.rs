@@ -3,7 +3,7 @@
 //! Apart from the header because each maker has a head of its own: rates of exports without stamps, factors of
 //! `.gcsv`, whose file it is.
 
-/// What is known of the maker, and what its documents say of columns that state no unit.
+/// Maker as far as it is known, with the units that its documents give to columns that state none.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(super) enum Maker {
     #[default]
@@ -23,7 +23,7 @@ pub(super) struct Rate {
     pub(super) said: String,
 }
 
-/// What stands before the header.
+/// Lines before the header.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub(super) struct Preamble {
     pub(super) maker: Maker,
@@ -73,7 +73,7 @@ pub(super) fn rate(line: &[u8]) -> Option<Rate> {
 }
 
 impl Preamble {
-    /// What these lines say.
+    /// Reads these lines.
     pub(super) fn of<'l>(lines: impl Iterator<Item = &'l [u8]>) -> Preamble {
         let mut found = Preamble::default();
         for line in lines {

@@ -28,10 +28,10 @@ const ORIENTATION: [Column; 4] = [
     Column::Orientation(3),
 ];
 
-/// How a line begins that stands for a row that was lost before it was text; behind it, why.
+/// Mark of a line that stands for a row that was lost before it was text; the reason follows it.
 pub(crate) const LOST: &[u8] = b"\0lost ";
 
-/// What the numbers of a role are multiplied by before anything is made of them.
+/// Factors by which the numbers of a role are multiplied before anything is made of them.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Scales {
     pub(super) gyro: f64,
@@ -49,12 +49,12 @@ impl Default for Scales {
     }
 }
 
-/// Whose table it is.
+/// Origin of a table.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Whose {
-    /// Of samples, written by strapd.
+    /// Table of samples, written by strapd.
     Own,
-    /// Of attitudes, written by strapd.
+    /// Table of attitudes, written by strapd.
     OwnAttitudes,
     Others,
 }
@@ -63,24 +63,24 @@ enum Whose {
 #[derive(Clone, PartialEq, Debug)]
 pub struct Table {
     header: Vec<u8>,
-    /// What each cell of a row is, and what its column is called.
+    /// Meaning of each cell of a row, and the name of its column.
     columns: Vec<(Option<Column>, String)>,
     whose: Whose,
     pub(super) delimiter: Delimiter,
     pub(super) has_decimal_comma: bool,
     pub(super) clock: Clock,
     pub(super) scales: Scales,
-    /// Over how many nanoseconds its increments were taken.
+    /// Interval of its increments, ns.
     pub(super) interval: Option<i64>,
-    /// What its names say of its numbers.
+    /// Meaning of its numbers that its names declare.
     pub(super) declared: Declared,
     /// The `--columns` that say the same.
     pub(super) assumed: String,
-    /// What its reader should know.
+    /// Notes for its reader.
     pub(super) notes: Vec<String>,
     /// Rows so far.
     row: u64,
-    /// What the user said, to know another table's header by.
+    /// Columns that the user named, by which another table's header is recognised.
     pub(super) given: Option<Columns>,
     /// Another table has begun, whose rows are none of this.
     is_elsewhere: bool,
@@ -176,13 +176,13 @@ impl Table {
         &self.assumed
     }
 
-    /// What its reader should know: what was taken for granted, what is not used.
+    /// Notes for its reader: what was taken for granted, what is not used.
     #[must_use]
     pub fn notes(&self) -> &[String] {
         &self.notes
     }
 
-    /// What to say where nobody says the unit of its rates.
+    /// Warning to give if nobody states the unit of its rates.
     #[must_use]
     pub fn doubt_of_unit(&self) -> Option<String> {
         let is_open = !self.is_own() && self.has_rate() && self.declared.gyro_unit.is_none();
@@ -191,7 +191,7 @@ impl Table {
         })
     }
 
-    /// What its names say of its numbers.
+    /// Meaning of its numbers that its names declare.
     #[must_use]
     pub fn declared(&self) -> &Declared {
         &self.declared
@@ -231,9 +231,10 @@ impl Table {
         self.columns.iter().any(|(known, _)| *known == Some(column))
     }
 
-    /// Reads one row, without or with its line end, and pushes its sample. The first row once more, as where tables were
-    /// put one behind the other, is no row, and neither is a comment; what stands under another first row is not of this
-    /// table. A row without `log_ns` was received at its stamp.
+    /// Reads one row, without or with its line end, and pushes its sample. The first row once more, as where tables
+    /// were
+    /// put one behind the other, is no row, and neither is a comment; what stands under another first row is not of
+    /// this table. A row without `log_ns` was received at its stamp.
     ///
     /// # Errors
     /// A row with more or fewer cells than columns, or a cell that is no number where there must be one.
@@ -283,7 +284,7 @@ impl Table {
         })
     }
 
-    /// Of a row that is none, the step since the row before, where it is where it should be.
+    /// Passes over a row that is none: adds the step since the row before, if it is where it should be.
     fn pass(&mut self, row: &[u8], before: i64, why: &Undecodable) {
         let is_step = |(column, _): &(Option<Column>, String)| *column == Some(Column::Stamp);
         let place = self.columns.iter().position(is_step);
@@ -300,7 +301,7 @@ impl Table {
         }
     }
 
-    /// What is no row because another table begins with it.
+    /// Explains what is no row because another table begins with it.
     fn explained(&mut self, row: &[u8], why: Undecodable) -> Undecodable {
         // In a header nothing is a number, which tells most rows at once.
         let is_data = |cell: Cow<'_, [u8]>| {
@@ -462,7 +463,7 @@ fn rotation_vector(wxyz: [f64; 4]) -> [f64; 3] {
     turn.map_or([f64::NAN; 3], |turn| turn.rotation_vector().0.into())
 }
 
-/// What a row holds.
+/// Contents of a row.
 #[derive(Default)]
 struct Read {
     stamp: Option<Nanos>,

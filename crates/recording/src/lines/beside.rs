@@ -1,7 +1,7 @@
 //! Several tables of one recording -> their rows in the order of their stamps. I/O.
 //!
-//! Apart from the lines because phones write a file for each of their sensors: one has the rates, the others what belongs
-//! to them by its stamp.
+//! Apart from the lines because phones write a file for each of their sensors: one has the rates, the others what
+//! belongs to them by its stamp.
 
 use super::{Lines, Next};
 use crate::decode::Undecodable;
@@ -15,9 +15,9 @@ use strapd_attitude::record::{Declared, Nanos};
 #[derive(Debug)]
 pub(super) struct Beside<R> {
     lines: Box<Lines<R>>,
-    /// What errors call it.
+    /// Name of the file in errors.
     file: String,
-    /// With the number of its line.
+    /// Line that is next, with its number.
     next: (Next, u64),
 }
 
@@ -81,7 +81,7 @@ impl<R: Read> Beside<R> {
         all
     }
 
-    /// What was next; looks at what comes then.
+    /// Takes the line that was next; looks at what comes then.
     fn advance(&mut self) -> Result<Next> {
         let mut samples = Vec::new();
         let line = self.lines.next_own(&mut samples)?;
@@ -96,7 +96,7 @@ impl<R: Read> Beside<R> {
     }
 }
 
-/// When a line was measured; what says nothing of it does not wait.
+/// Instant at which a line was measured; what states none does not wait.
 fn instant((_, samples): &Next) -> Option<Nanos> {
     samples.first()?.header
 }

@@ -10,12 +10,12 @@ use strapd_attitude::record::{Nanos, RawSample};
 /// Numbers that are remembered: as many as a daemon may have sensors.
 const MOST: usize = 100_000;
 
-/// What the numbers of packed streams mean.
+/// Meaning of the numbers of packed streams.
 #[derive(Debug, Default)]
 pub(super) struct Numbers(BTreeMap<u32, Line>);
 
 impl Numbers {
-    /// From now on what a line that was read from these bytes says of a number holds.
+    /// Learns from a line that was read from these bytes what a number holds from now on.
     ///
     /// # Errors
     /// It is about one, and does not say which or what; there are too many.
@@ -32,7 +32,7 @@ impl Numbers {
         Ok(())
     }
 
-    /// What the line would hold that says the same.
+    /// Line that would hold the same.
     ///
     /// # Errors
     /// It is no packed object, or no line has said what its number means.

@@ -44,7 +44,7 @@ impl BareStamps {
         self.release(!are_open || self.waiting.len() >= MOST_HELD)
     }
 
-    /// There are no more: the unit is that of those there are.
+    /// Settles the unit, which is that of the stamps there are, at their end.
     ///
     /// # Errors
     /// Several units would do, or none.

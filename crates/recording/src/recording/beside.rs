@@ -26,12 +26,12 @@ use strapd_attitude::setting::{AID, FIELD, MAG_TOPIC, TIME};
 #[derive(Debug, Default)]
 pub struct Besides {
     channels: Vec<(Arc<Channel>, Decoder)>,
-    /// What was taken unnamed, in words.
+    /// Notes on what was taken unnamed.
     pub notes: Vec<String>,
 }
 
 impl Besides {
-    /// What is read of this channel beside the samples.
+    /// Decoder of this channel's messages beside the samples.
     pub fn decoder(&self, channel: &Channel) -> Option<&Decoder> {
         let mut channels = self.channels.iter();
         let (_, decoder) = channels.find(|(known, _)| is_same(known, channel))?;
@@ -51,7 +51,7 @@ impl Besides {
 /// A topic of vectors that could correct the samples of another.
 #[derive(Clone, Debug)]
 pub struct TopicOfVectors {
-    /// Its name.
+    /// Name.
     pub topic: String,
     /// Type and encoding.
     pub described: String,
@@ -61,7 +61,7 @@ pub struct TopicOfVectors {
     pub first: Option<f64>,
 }
 
-/// How messages are read that a topic named by a flag carries.
+/// Options by which messages are read that a topic named by a flag carries.
 pub fn options(wanted: Wanted, beside: Option<&TopicBeside>) -> Options {
     Options {
         wanted,
@@ -99,7 +99,7 @@ pub fn choose(
     Ok(besides)
 }
 
-/// Whose fields belong to the samples of `own`, where that can be told without being said; else why not.
+/// Topics whose fields belong to the samples of `own`, if that can be told without being stated; else why not.
 ///
 /// # Errors
 /// Several that may be meant, or none.

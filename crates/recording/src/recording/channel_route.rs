@@ -1,4 +1,4 @@
-//! What becomes of the messages of one channel, on the workers. Pure.
+//! Route of the messages of one channel, on the workers. Pure.
 
 use super::log_channel::nanos;
 use super::sources::{Publisher, Turns, digest};
@@ -10,12 +10,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use strapd_attitude::record::{Nanos, RawSample};
 
-/// What a channel's messages are used for.
+/// Uses of a channel's messages.
 #[derive(Debug)]
 pub struct Route {
     /// Reads the samples in them; `None` when there are none.
     pub decoder: Option<Decoder>,
-    /// Which of the run's streams they belong to; of several, the one of the frame that a message names.
+    /// Streams of the run to which they belong; of several, the one of the frame that a message names.
     takers: Vec<Taker>,
     /// The channel's number, where it is not known beforehand whether channels take turns.
     turn: Option<usize>,
@@ -30,13 +30,13 @@ pub struct Route {
 /// A stream, and what is noticed on its way there.
 #[derive(Clone, Debug)]
 pub struct Taker {
-    /// Which of the run's streams.
+    /// Index of the stream in the run.
     pub stream: usize,
     /// Notes for the summary.
     pub noticed: Arc<Noticed>,
 }
 
-/// What was noticed in payloads; sums, so that the order of the workers does not show.
+/// Observations in payloads; sums, so that the order of the workers does not show.
 #[derive(Debug, Default)]
 pub struct Noticed {
     /// Samples whose gyro the message marks as absent.
@@ -52,7 +52,7 @@ pub struct Noticed {
     pub others: Vec<String>,
     /// Messages left out because they name another frame, by its name; of many, the first few.
     left_out: Mutex<BTreeMap<String, u64>>,
-    /// How the channels of a stream followed each other, where that shows only in the run.
+    /// Order in which the channels of a stream followed each other, where that shows only in the run.
     turns: Mutex<Turns>,
 }
 
@@ -60,7 +60,7 @@ pub struct Noticed {
 const FOREIGN: usize = 16;
 
 impl Noticed {
-    /// For the samples of a source.
+    /// Makes it for the samples of a source.
     #[must_use]
     pub fn of(source: &Publisher) -> Noticed {
         Noticed {
@@ -101,7 +101,7 @@ impl Noticed {
     }
 }
 
-/// What a message became.
+/// Item that a message became.
 #[derive(Debug)]
 pub enum Item {
     /// A sample of a stream.
@@ -119,15 +119,15 @@ pub enum Item {
 /// A message, owned.
 #[derive(Debug)]
 pub struct Copied {
-    /// Its channel.
+    /// Channel.
     pub channel: Arc<Channel>,
-    /// Its sequence number.
+    /// Sequence number.
     pub sequence: u32,
-    /// When it was recorded, ns.
+    /// Time at which it was recorded, ns.
     pub log_time: u64,
-    /// When it was published, ns.
+    /// Time at which it was published, ns.
     pub publish_time: u64,
-    /// Its payload.
+    /// Payload.
     pub data: Vec<u8>,
 }
 

@@ -17,11 +17,11 @@ pub struct Decoders {
     options: Options,
     stamps: Stamps,
     effort: Effort,
-    /// By place in memory of the schema, which is kept, message encoding, and which stamp was asked for.
+    /// Decoders by place in memory of the schema, which is kept, message encoding, and which stamp was asked for.
     compiled: BTreeMap<(usize, String, Option<usize>), Compiled>,
 }
 
-/// What the stamps in messages are to their reader.
+/// Meaning of the stamps in messages for their reader.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 enum Stamps {
     /// The samples' time, and no flag says anything about them.
@@ -40,7 +40,7 @@ struct Compiled {
 }
 
 impl Decoders {
-    /// None yet.
+    /// Makes an empty set.
     #[must_use]
     pub fn new(options: &Options) -> Decoders {
         Decoders {
@@ -50,7 +50,7 @@ impl Decoders {
         }
     }
 
-    /// None yet, for a run of `plan`.
+    /// Makes an empty set for a run of `plan`.
     #[must_use]
     pub fn of_run(plan: &Plan, options: &Options) -> Decoders {
         Decoders {
@@ -62,7 +62,7 @@ impl Decoders {
         }
     }
 
-    /// What only the first messages of a channel tell. Nobody needs the unit of stamps that are not read.
+    /// Settles what only the first messages of a channel tell. Nobody needs the unit of stamps that are not read.
     ///
     /// # Errors
     /// As [`Decoder::settle_unit`].

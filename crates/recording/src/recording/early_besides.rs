@@ -6,7 +6,8 @@ use crate::decode::{Class, Line};
 use std::collections::VecDeque;
 use strapd_attitude::record::RawSample;
 
-/// What waits at most, in a log and in `serve`; of more the last, since the first attitude wants the latest force.
+/// Number that waits at most, in a log and in `serve`; of more the last, since the first attitude wants the latest
+/// force.
 pub const MOST: usize = 16;
 
 /// Lines that wait for the first rate of their sensor.
@@ -23,7 +24,7 @@ impl EarlyBesides {
         self.held.push_back((line, std::mem::take(samples)));
     }
 
-    /// Those of the sensor of this name, and those that name none.
+    /// Releases those of the sensor of this name, and those that name none.
     pub(super) fn release(&mut self, id: &str) -> Vec<(Line, Vec<RawSample>)> {
         let (own, others) = std::mem::take(&mut self.held)
             .into_iter()
@@ -33,7 +34,8 @@ impl EarlyBesides {
     }
 }
 
-/// Whether a line holds nothing but forces or fields of other sensors than the gyro. What says that it is of the gyro is.
+/// Whether a line holds nothing but forces or fields of other sensors than the gyro. What says that it is of the gyro
+/// is.
 pub(super) fn are_beside(line: &Line, samples: &mut [RawSample]) -> bool {
     if line.class == Class::Rate {
         for sample in samples.iter_mut() {

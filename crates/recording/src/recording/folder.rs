@@ -19,7 +19,7 @@ const MOST: usize = 1000;
 /// Names that an error repeats.
 const MOST_SAID: usize = 8;
 
-/// What a folder holds.
+/// Contents of a folder.
 #[derive(Debug)]
 pub(super) struct Folder {
     /// The file with the rates.
@@ -140,7 +140,7 @@ impl Tables {
         }
     }
 
-    /// Those that correct the rates of `main`; of several that may be meant none, which is said.
+    /// Files that correct the rates of `main`; of several that may be meant none, with a warning.
     fn beside(mut self, main: &Path, warn: &Warn) -> Vec<PathBuf> {
         // Sensor Logger's, of which `Accelerometer` is without gravity.
         for best in ["totalacceleration", "accelerometeruncalibrated"] {
@@ -175,7 +175,7 @@ impl Tables {
     }
 }
 
-/// Of several only recordings: attitudes that were made of one of them may lie beside it, which is said.
+/// Recordings among several files: attitudes that were made of one of them may lie beside it, with a warning.
 fn without_those_made_before(
     path: &Path,
     found: Vec<(PathBuf, Format)>,
@@ -208,7 +208,7 @@ fn split_by_rosbag2(path: &Path, files: &[(PathBuf, Format)]) -> Option<Format> 
     (is_of_ros && is_alike && path.join("metadata.yaml").is_file()).then_some(*format)
 }
 
-/// How a file is read as a table with what is wanted in it.
+/// Table that a file is read as, with what is wanted in it.
 fn table(file: &Path, wanted: Wanted) -> Option<Table> {
     let options = Options {
         wanted,

@@ -11,14 +11,14 @@ use crate::decode::{Decoder, Unsupported};
 use crate::mcap::{Channel, Message};
 use std::sync::Arc;
 
-/// Such a channel.
+/// Channel whose messages are held.
 #[derive(Debug)]
 pub struct Held {
     channel: Arc<Channel>,
-    /// As it will be read.
+    /// Decoder by which it will be read.
     decoder: Decoder,
     taker: Taker,
-    /// Its number among those of the topic.
+    /// Number among those of the topic.
     number: usize,
     copied: Option<Arc<Channel>>,
     waiting: Vec<Copied>,
@@ -28,7 +28,7 @@ pub struct Held {
 }
 
 impl Held {
-    /// Before its first message; `number` is its own among the channels of the topic.
+    /// Makes it before its first message; `number` is its own among the channels of the topic.
     #[must_use]
     pub fn new(
         channel: &Arc<Channel>,
@@ -49,7 +49,7 @@ impl Held {
         }
     }
 
-    /// Its messages come as copies, whoever they are for.
+    /// Route by which its messages come as copies, whoever they are for.
     #[must_use]
     pub fn route(&self) -> Route {
         Route::only_copied(self.channel.clone())
@@ -87,7 +87,7 @@ impl Held {
         Ok(())
     }
 
-    /// There are no more to wait for.
+    /// Releases what waits, since there are no more to wait for.
     ///
     /// # Errors
     /// As [`Decoder::settle_unit`].

@@ -14,7 +14,7 @@ use crate::recognise;
 use std::io::{BufReader, Cursor, Read};
 use std::path::Path;
 
-/// What comes, told by its first bytes.
+/// Stream, told by its first bytes.
 #[derive(Debug)]
 pub enum Incoming<R> {
     /// Messages on channels.

@@ -1,8 +1,9 @@
 //! A file, a pipe or standard input -> what can be read as often as is needed. I/O.
 //!
-//! Apart from the log because it comes before anything is known of one: where the bytes are, and what they are. What comes
-//! only once is put into a file of its own that has no name and goes with this process: who looks twice sees the same bytes,
-//! and what is said of a log does not depend on how it came.
+//! Apart from the log because it comes before anything is known of one: where the bytes are, and what they are. What
+//! comes
+//! only once is put into a file of its own that has no name and goes with this process: who looks twice sees the same
+//! bytes, and what is said of a log does not depend on how it came.
 
 use super::folder::{self, Folder};
 use super::line_input;
@@ -28,7 +29,7 @@ const MOST: u64 = 8 << 30;
 /// Bytes of a text elsewhere that are fetched before they are read.
 const TEXT_AHEAD: u64 = 32 << 20;
 
-/// Where a recording comes from.
+/// Source of a recording.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Source {
     /// A file: an MCAP, or NDJSON by its extension.
@@ -37,7 +38,7 @@ pub enum Source {
     Parts(Vec<PathBuf>),
     /// Standard input: MCAP or NDJSON, told apart by the first bytes.
     Stdin,
-    /// What is at an address.
+    /// Object at an address.
     Elsewhere(Address),
 }
 
@@ -64,7 +65,7 @@ impl Source {
         }
     }
 
-    /// For messages.
+    /// Name for messages.
     #[must_use]
     pub fn name(&self) -> PathBuf {
         match self {
@@ -76,19 +77,19 @@ impl Source {
     }
 }
 
-/// What is read again, beside files that have a name.
+/// Input that is read again, beside files that have a name.
 #[derive(Clone, Debug)]
 enum Kept {
-    /// What came only once.
+    /// Copy of what came only once.
     File(Arc<File>),
-    /// What is elsewhere.
+    /// Object elsewhere.
     Object(Arc<dyn Object>),
 }
 
 /// The bytes of an input, in any order.
 #[derive(Debug)]
 pub enum Bytes {
-    /// On this machine.
+    /// File on this machine.
     File(File),
     /// Elsewhere.
     Object(ObjectBytes),
@@ -131,11 +132,12 @@ pub struct Input {
 }
 
 impl Input {
-    /// Opens what a command line names: a file, a folder of one recording, a pipe, `-`, or an address. A stream is read to its end.
+    /// Opens what a command line names: a file, a folder of one recording, a pipe, `-`, or an address. A stream is
+    /// read to its end.
     ///
     /// # Errors
-    /// It can not be opened or read, or is empty; a folder of no recording or of several; there is no room for a stream; nothing at
-    /// an address, or no way there.
+    /// It can not be opened or read, or is empty; a folder of no recording or of several; there is no room for a
+    /// stream; nothing at an address, or no way there.
     pub fn open(path: &Path, warn: &Warn) -> Result<Input> {
         match Source::parse(&path.to_string_lossy()) {
             source @ Source::Stdin => Input::keep(source, std::io::stdin(), warn),
@@ -296,13 +298,13 @@ impl Input {
         })
     }
 
-    /// Where it came from.
+    /// Source it came from.
     #[must_use]
     pub fn source(&self) -> &Source {
         &self.source
     }
 
-    /// What it is called in messages.
+    /// Name in messages.
     #[must_use]
     pub fn name(&self) -> &Path {
         &self.name
@@ -314,18 +316,18 @@ impl Input {
         &self.parts
     }
 
-    /// Who is told what to know of it.
+    /// Receiver of warnings about it.
     pub(super) fn warn(&self) -> &Warn {
         &self.warn
     }
 
-    /// What it is.
+    /// Format.
     #[must_use]
     pub fn format(&self) -> Format {
         self.format
     }
 
-    /// Its bytes, from the first. Only one such reader of what came once is used at a time.
+    /// Bytes, from the first. Only one such reader of what came once is used at a time.
     ///
     /// # Errors
     /// It can not be opened.
@@ -348,7 +350,7 @@ impl Input {
         })
     }
 
-    /// Its lines or rows as text, from the first: of what is stored otherwise, made of it.
+    /// Lines or rows as text, from the first: of what is stored otherwise, made of it.
     ///
     /// # Errors
     /// As [`Input::bytes`]; it is no table that is read.
@@ -385,7 +387,7 @@ impl Input {
         }
     }
 
-    /// Its bytes as an MCAP.
+    /// Bytes as an MCAP.
     ///
     /// # Errors
     /// As [`Reader::open`].
@@ -410,7 +412,7 @@ impl Input {
         Ok(lines.table().is_some_and(Table::is_own))
     }
 
-    /// Its bytes as lines or rows.
+    /// Bytes as lines or rows.
     ///
     /// # Errors
     /// As `line_input::open`.
@@ -433,7 +435,7 @@ impl Input {
     }
 }
 
-/// What a file is, by its first bytes; where its name says otherwise, that is said. What nobody knows is taken for an
+/// Format of a file, by its first bytes; a name that stands for another is warned of. What nobody knows is taken for an
 /// MCAP, whose reader says what is wrong with it.
 ///
 /// # Errors
@@ -442,7 +444,7 @@ fn recognised(path: &Path, warn: &Warn) -> Result<Format> {
     Ok(checked(path, Format::of_file(path)?, warn))
 }
 
-/// What to take a file for of which the format is known, or not.
+/// Format to take a file for, whether its format is known or not.
 fn checked(path: &Path, format: Option<Format>, warn: &Warn) -> Format {
     let format = format.unwrap_or(Format::Mcap);
     if let Some(said) = format.contradiction(path) {

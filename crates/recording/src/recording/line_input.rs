@@ -84,8 +84,8 @@ pub(super) fn no_samples(path: &Path, lines: &Lines<impl Read>, why: &Undecodabl
     }
 }
 
-/// Rows that are none before the first that is one: beyond, none follows. Of a table that is stored by columns a page of
-/// lost rows.
+/// Rows that are none before the first that is one: beyond, none follows. Of a table that is stored by columns a page
+/// of lost rows.
 const MOST_EARLY: usize = 1000;
 const MOST_EARLY_BY_COLUMNS: usize = 1 << 18;
 
@@ -97,7 +97,8 @@ pub(super) fn is_sure(lines: &Lines<impl Read>, early: usize) -> bool {
     }
 }
 
-/// How a table is read, so that it can be pasted and changed, with the format's name; of anything else that alone.
+/// Text of how a table is read, so that it can be pasted and changed, with the format's name; of anything else that
+/// alone.
 pub(super) fn described(lines: &Lines<impl Read>) -> String {
     let name = lines.format().name();
     match lines.table().map(Table::assumed).unwrap_or_default() {

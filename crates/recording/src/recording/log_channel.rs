@@ -18,14 +18,14 @@ pub struct LogChannel {
     pub first: Option<(Nanos, Vec<u8>)>,
     /// Log times and payloads of its first messages, where one does not tell enough.
     pub openings: Vec<(Nanos, Vec<u8>)>,
-    /// What it can serve as.
+    /// Role in which it can serve.
     pub role: Role,
-    /// What its samples are, where they come as such.
+    /// Meaning of its samples, where they come as such.
     pub stated: Option<Stated>,
 }
 
 impl LogChannel {
-    /// For the choice of topics.
+    /// Candidate for the choice of topics.
     #[must_use]
     pub fn candidate(&self) -> Candidate {
         Candidate {

@@ -1,8 +1,9 @@
 //! A recording -> whether it holds nothing but attitudes that strapd made before. I/O.
 //!
-//! A stage of its own because such files lie beside the recordings they were made of, where a pattern of a shell takes both,
-//! and look like them: an IMU with rates. Those are the recording's, less the bias, and to integrate them again says less
-//! than the recording does.
+//! A stage of its own because such files lie beside the recordings they were made of, where a pattern of a shell
+//! takes both,
+//! and look like them: an IMU with rates. Those are the recording's, less the bias, and to integrate them again says
+//! less than the recording does.
 
 use crate::format::Format;
 use crate::lines::{HEAD_KEPT, Lines};
@@ -16,11 +17,11 @@ use std::path::Path;
 
 /// First bytes that tell whether to look closer.
 pub(super) const HEAD: u64 = HEAD_KEPT as u64;
-/// How a table of attitudes begins.
+/// Beginning of a table of attitudes.
 const TABLE: &[u8] = b"stamp_ns,qw,qx,qy,qz,roll_deg,";
 /// The same of one in Parquet, as text.
 const TABLE_BY_COLUMNS: &[u8] = b"stamp_ns,qw,qx,qy,qz,wx,wy,wz,sigma_x,";
-/// How a line with an attitude begins.
+/// Beginning of a line with an attitude.
 const LINE: &[u8] = b"{\"class\":\"ATT\",";
 /// The transforms beside the attitudes.
 const TRANSFORMS: &str = "/tf";
@@ -28,7 +29,7 @@ const TRANSFORMS: &str = "/tf";
 /// Attitudes of a run of strapd.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct MadeBefore {
-    /// What it was made of, as far as it says so.
+    /// Recording it was made of, as far as it states that.
     pub of: Option<String>,
 }
 
@@ -41,8 +42,8 @@ impl fmt::Display for MadeBefore {
 }
 
 impl MadeBefore {
-    /// What a file on this machine is, by its beginning and the summary at its end (one of ours without a summary is read
-    /// whole); of anything else, and where it can not be read, nothing is said.
+    /// Finds whether a file on this machine was made before, by its beginning and the summary at its end (one of ours
+    /// without a summary is read whole); of anything else, and where it can not be read, nothing is said.
     #[must_use]
     pub fn in_file(path: &Path) -> Option<MadeBefore> {
         if !path.is_file() {
@@ -66,14 +67,15 @@ impl MadeBefore {
         in_survey(&mcap::survey(&reader, &WalkOptions::default()).ok()?)
     }
 
-    /// What lines or rows are that are being read, from a file or a pipe: by what had come of them when they were opened.
+    /// Finds the same of lines or rows that are being read, from a file or a pipe: by what had come of them when they
+    /// were opened.
     #[must_use]
     pub fn in_lines(lines: &Lines<impl Read>) -> Option<MadeBefore> {
         in_text(lines.head())
     }
 }
 
-/// Its metadata name the topics it was written with, and there are no others.
+/// Finds the same in metadata that name the topics it was written with, if there are no others.
 pub(super) fn in_survey(survey: &Survey) -> Option<MadeBefore> {
     let said = &survey.facts.provenance;
     let outputs: BTreeSet<&str> = said

@@ -32,23 +32,23 @@ use strapd_attitude::record::Nanos;
 pub struct Recording {
     input: Input,
     body: Body,
-    /// What is in it.
+    /// Survey of its contents.
     pub survey: Survey,
-    /// Its channels, with what they can serve as.
+    /// Channels, with the roles in which they can serve.
     pub channels: Vec<LogChannel>,
-    /// Who speaks on its topics: one for each until `sources::tell_apart` has looked.
+    /// Publishers on its topics: one for each until `sources::tell_apart` has looked.
     pub sources: Vec<Publisher>,
-    /// What was wrong with it as far as it was read: all of it when it has no summary, otherwise up
+    /// Problems found as far as it was read: all of it when it has no summary, otherwise up
     /// to the first message of the last channel.
     pub problems: Vec<String>,
 }
 
-/// How a log is read again.
+/// Body of a log as it is read again.
 #[derive(Debug)]
 enum Body {
     Mcap(Reader),
     Text(Box<TextLog>),
-    /// In the order of their times.
+    /// Parts in the order of their times.
     Parts(Vec<(Recording, Same)>),
 }
 
@@ -263,13 +263,13 @@ impl Recording {
         made_before::in_text(&head)
     }
 
-    /// What it is called in messages.
+    /// Name in messages.
     #[must_use]
     pub fn name(&self) -> &Path {
         self.input.name()
     }
 
-    /// Where a payload lies, in words: of a line its number stands where others have a time.
+    /// Place of a payload, in words: a line has its number where others have a time.
     #[must_use]
     pub fn place_of(&self, at: Nanos) -> String {
         match &self.body {
@@ -298,7 +298,8 @@ impl Recording {
     }
 
     /// Reads it once. `select` says the way of a channel's messages, `take` gets what becomes of them in order, and may
-    /// take it out of the vector; what it fails with ends it. At most `ahead` bytes are on their way at once. What was met.
+    /// take it out of the vector; what it fails with ends it. At most `ahead` bytes are on their way at once. What
+    /// was met.
     ///
     /// # Errors
     /// It can not be read; as `take`.
@@ -381,7 +382,7 @@ impl Recording {
         Ok(report.survey)
     }
 
-    /// For the choice of topics: one for each source.
+    /// Candidates for the choice of topics: one for each source.
     #[must_use]
     pub fn candidates(&self) -> Vec<Candidate> {
         let provenance = self.survey.facts.provenance.iter();
@@ -567,7 +568,7 @@ fn first_messages(reader: Reader, survey: &Survey) -> Result<(Vec<First>, Vec<St
 /// Most of a file's problems that are written out.
 const PROBLEMS_SAID: usize = 5;
 
-/// What was wrong with the file, the first few in words.
+/// Problems of the file, the first few in words.
 #[must_use]
 pub fn problems(survey: &Survey) -> Vec<String> {
     let found = &survey.problems;

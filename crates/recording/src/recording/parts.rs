@@ -1,6 +1,7 @@
 //! Several files that continue each other -> the channels of one recording. Pure.
 //!
-//! Apart from the recording because a part is one itself: it is surveyed and read as if it were alone. What makes them one
+//! Apart from the recording because a part is one itself: it is surveyed and read as if it were alone. What makes
+//! them one
 //! is here: that the times of one follow those of the other, and which channel of a part is which of the whole.
 
 use super::log_channel::{LogChannel, described};
@@ -22,7 +23,7 @@ const OVERLAP_SECS: f64 = 1.0;
 /// A gap between two files that is worth a word, s.
 const GAP_SECS: f64 = 1.0;
 
-/// Which channel of the whole each channel of a part is.
+/// Index in the whole of each channel of a part.
 #[derive(Debug)]
 pub(super) struct Same {
     own: Vec<Arc<Channel>>,
@@ -38,7 +39,7 @@ impl Same {
     }
 }
 
-/// What is in all parts together.
+/// Contents of all parts together.
 #[derive(Debug)]
 pub(super) struct Whole {
     pub(super) channels: Vec<LogChannel>,

@@ -1,10 +1,10 @@
-//! Which samples of a recording are wanted, and how its messages are read. Pure.
+//! Selection of samples of a recording, and how its messages are read. Pure.
 //!
 //! Apart from the recording because it is asked for before there is one.
 
 use crate::decode::{self, FieldPath};
 
-/// Which samples of a recording, and how its messages are read.
+/// Selection of samples of a recording, and how its messages are read.
 #[derive(Clone, Debug, Default)]
 pub struct Selection {
     /// `--topic`.
@@ -20,8 +20,8 @@ pub struct Selection {
 /// A topic whose specific forces, or magnetic fields, belong to the samples of another.
 #[derive(Clone, Debug)]
 pub struct TopicBeside {
-    /// Its name.
+    /// Name.
     pub topic: String,
-    /// Where the vector lies: the `--field` of its role.
+    /// Path of the vector: the `--field` of its role.
     pub fields: Vec<FieldPath>,
 }

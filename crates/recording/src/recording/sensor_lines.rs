@@ -1,7 +1,7 @@
 //! The samples of one sensor from lines of JSON, or rows of a table, as they come -> whoever takes them. I/O.
 //!
-//! Apart from the log in a text because nothing is read twice: of a stream the first sensor is the one that is meant, and
-//! what is known goes on before the next line is waited for.
+//! Apart from the log in a text because nothing is read twice: of a stream the first sensor is the one that is meant,
+//! and what is known goes on before the next line is waited for.
 
 use super::bare_stamps::BareStamps;
 use super::channel_route::Item;
@@ -32,13 +32,13 @@ const PATIENCE: u64 = 1000;
 /// The sensor of a text, known by its first sample.
 #[derive(Debug)]
 pub struct Sensor {
-    /// What it is called.
+    /// Name.
     pub name: String,
-    /// How its lines are read, in words.
+    /// Text of how its lines are read.
     pub described: String,
-    /// What its format says of all its samples.
+    /// Meaning of all its samples that its format declares.
     pub declared: Declared,
-    /// What the reader of its tables should know.
+    /// Notes for the reader of its tables.
     pub notes: Vec<String>,
     /// Why the unit of its rates may be another one.
     pub doubt: Option<String>,
@@ -78,7 +78,8 @@ pub trait SensorTaker<E> {
 /// Reads lines to their end, or until nobody wants them.
 ///
 /// # Errors
-/// They can not be read; no samples, or without stamps where `clock` wants any; several sensors and none selected; as `taker`.
+/// They can not be read; no samples, or without stamps where `clock` wants any; several sensors and none selected; as
+/// `taker`.
 pub fn read<E: From<Error>>(
     (selection, clock): (&Selection, Clock),
     mut lines: Lines<impl Read>,

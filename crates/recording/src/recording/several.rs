@@ -1,7 +1,7 @@
 //! Files that are said to be one recording -> whether they can be. I/O: asks what they are.
 //!
-//! Apart from the parts because nothing is opened yet: what comes only once or was given twice is told before a second of
-//! reading.
+//! Apart from the parts because nothing is opened yet: what comes only once or was given twice is told before a
+//! second of reading.
 
 use crate::elsewhere;
 use crate::error::{Error, Result};
@@ -84,7 +84,7 @@ fn shown(path: &Path) -> PathBuf {
     }
 }
 
-/// What several files are called together.
+/// Name of several files together.
 pub(super) fn title(paths: &[PathBuf]) -> PathBuf {
     match paths {
         [] => PathBuf::new(),

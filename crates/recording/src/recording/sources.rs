@@ -22,17 +22,17 @@ use strapd_attitude::record::Nanos;
 /// One publisher's samples on a topic.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Publisher {
-    /// What `--topic` takes: the topic, unless it has several sources.
+    /// Name that `--topic` takes: the topic, unless it has several sources.
     pub name: String,
     /// The topic.
     pub topic: String,
-    /// Its channels, by their place in [`super::opened::Recording::channels`].
+    /// Channels, by their index in [`super::opened::Recording::channels`].
     pub channels: Vec<usize>,
     /// The frame its messages name; `None` = any: they name none, or what they name is no frame.
     pub frame: Option<String>,
     /// The frames that the topic's other sources name.
     pub others: Vec<String>,
-    /// What tells it from the others of its topic; empty where there is none.
+    /// Label that tells it from the others of its topic; empty where there is none.
     pub label: String,
 }
 
@@ -81,10 +81,10 @@ const MOST_FRAMES: usize = 8;
 /// Messages that make a frame: a damaged one, or one all of zeros, is no second body.
 const FEW: u64 = 3;
 
-/// Which channel of the recording is met in one of its files.
+/// Map from a channel met in one of the recording's files to the recording's own.
 pub(super) type Known<'k> = Box<dyn Fn(&Arc<Channel>) -> Arc<Channel> + 'k>;
 
-/// Who speaks on each topic, from the messages; `named` is looked at though it may carry no rate that is
+/// Publishers on each topic, from the messages; `named` is looked at though it may carry no rate that is
 /// found without [`Options`].
 ///
 /// # Errors
@@ -221,20 +221,20 @@ struct Looked {
     channel: Arc<Channel>,
     index: usize,
     decoder: Decoder,
-    /// They are kept.
+    /// Whether they are kept.
     is_opened: bool,
-    /// Its stamps are bare numbers.
+    /// Whether its stamps are bare numbers.
     is_bare: bool,
 }
 
 /// Why a topic is looked at.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Standing {
-    /// It is asked for.
+    /// Named by the user.
     Named,
-    /// It may be integrated.
+    /// Rate that may be integrated.
     Rate,
-    /// It has orientations to compare with: only its stamps matter.
+    /// Orientations to compare with: only its stamps matter.
     Shown,
 }
 
@@ -283,7 +283,7 @@ pub fn is_same(known: &Channel, met: &Channel) -> bool {
     known.id == met.id && known.topic == met.topic && known.schema_id == met.schema_id
 }
 
-/// What a channel says of its publisher: the keys that recorders and converters write.
+/// Publisher that a channel states: the keys that recorders and converters write.
 pub fn publisher(channel: &Channel) -> String {
     const KEYS: [&str; 10] = [
         "callerid",
@@ -323,7 +323,7 @@ pub(super) fn digest(payload: &[u8]) -> u64 {
     hasher.finish()
 }
 
-/// What is learnt about a topic.
+/// Speakers found on a topic.
 struct Speakers {
     /// Whether it has several channels.
     several: bool,

@@ -1,6 +1,7 @@
 //! A file of lines or rows -> the channels of a log, and its samples. I/O.
 //!
-//! Apart from the log because nothing in a text is defined before it comes: which sensors there are, and what their samples
+//! Apart from the log because nothing in a text is defined before it comes: which sensors there are, and what their
+//! samples
 //! mean, is known when all of it has been read once. A sensor is a channel, of the name its lines say; attitudes are
 //! another one than samples.
 
@@ -27,7 +28,7 @@ use strapd_attitude::record::{Declared, Nanos, RawSample};
 const MOST_SENSORS: usize = 1024;
 /// Items that go through the pipeline together.
 const BATCH: usize = 1024;
-/// What samples that name no sensor are called.
+/// Name of samples that name no sensor.
 const UNNAMED: &str = "imu";
 
 /// A text, read once.
@@ -42,7 +43,7 @@ pub(super) struct TextLog {
 /// A sensor, and whether these are attitudes.
 type Key = (String, bool);
 
-/// What is learnt of a channel.
+/// Channel as far as it was met.
 struct Met {
     stated: Stated,
     class: String,
@@ -77,7 +78,7 @@ impl Sensors {
 
 /// The next of a text.
 enum Read<'l> {
-    /// What a line says, and its samples, of the channel of this place; more may still wait for their stamps.
+    /// Line and its samples, of the channel of this place; more may still wait for their stamps.
     Samples(usize, &'l Key, &'l Line, &'l [RawSample]),
     /// A line that is none, of the channel before it, and its number.
     Undecodable(usize, u64, Undecodable),
@@ -156,7 +157,7 @@ impl TextLog {
         Ok((log, channels))
     }
 
-    /// What is in it.
+    /// Survey of its contents.
     pub(super) fn surveyed(&self) -> &Survey {
         &self.survey
     }

@@ -28,15 +28,15 @@ pub struct TopicReading<'l> {
     source: Publisher,
     /// Something to know about the choice.
     pub note: Option<String>,
-    /// Its channels, at least one, with their decoders.
+    /// Channels, at least one, with their decoders.
     pub channels: Vec<(&'l LogChannel, Decoder)>,
-    /// By id and schema id: the place among the channels.
+    /// Index among the channels, by id and schema id.
     places: BTreeMap<(u16, u16), usize>,
-    /// What has a topic of its own and belongs to these samples.
+    /// Topics that belong to these samples.
     besides: Besides,
 }
 
-/// What is read.
+/// Item that is read.
 #[derive(Debug)]
 pub enum Taken {
     /// A sample of the channel of this place.
@@ -131,7 +131,7 @@ impl<'l> TopicReading<'l> {
         place.filter(|_| met.topic == self.source.topic).copied()
     }
 
-    /// What `--topic` takes.
+    /// Name that `--topic` takes.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.source.name

@@ -10,10 +10,10 @@ use std::path::Path;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::setting::TOPIC;
 
-/// What the choice needs to know of one channel.
+/// Candidate: what the choice needs to know of one channel.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Candidate {
-    /// What `--topic` takes: the topic, or one of its sources.
+    /// Name that `--topic` takes: the topic, or one of its sources.
     pub topic: String,
     /// The topic.
     pub of: String,
@@ -21,7 +21,7 @@ pub struct Candidate {
     pub described: String,
     /// Messages, where known.
     pub messages: Option<u64>,
-    /// How likely this is "the IMU": 0 = carries no rate, 1 = could be told to, higher = better.
+    /// Likelihood that this is "the IMU": 0 = carries no rate, 1 = could be told to, higher = better.
     pub rank: u8,
 }
 
@@ -35,7 +35,7 @@ pub const MOST_TOPICS: usize = 256;
 /// The topics to estimate from, and what to say about the choice.
 #[derive(Clone, Debug, PartialEq, Eq, Default)]
 pub struct Choice {
-    /// In order of appearance.
+    /// Topics in order of appearance.
     pub topics: Vec<String>,
     /// A note for the user, when something else was there too.
     pub note: Option<String>,

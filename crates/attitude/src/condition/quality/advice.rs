@@ -275,8 +275,8 @@ pub(super) const NEAR_ONE: std::ops::RangeInclusive<f64> = 0.8..=1.25;
 /// Fewer accelerations tell nothing of their unit.
 const FEWEST: u64 = 20;
 
-/// Accelerations without gravity are as long, too, where somebody walks, but not for most of the time: lengths of a normal
-/// spread about nothing lie within [`NEAR_ONE`] in 38 of 100 cases at most.
+/// Accelerations without gravity are as long, too, where somebody walks, but not for most of the time: lengths of a
+/// normal spread about nothing lie within [`NEAR_ONE`] in 38 of 100 cases at most.
 fn mostly_one_g(summary: &QualitySummary) -> Option<Advice> {
     let finite = summary.with_accel.saturating_sub(summary.accel_not_finite);
     let units = [

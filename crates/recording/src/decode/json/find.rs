@@ -12,7 +12,7 @@ use std::borrow::Cow;
 use strapd_attitude::record::SampleKind;
 use strapd_attitude::record::TimeUnit;
 
-/// How deep an object may lie whose keys are looked at by name.
+/// Greatest depth of an object whose keys are looked at by name.
 pub(super) const MAX_SEARCH: u32 = 6;
 
 type Scan<T> = Result<T, Undecodable>;

@@ -1,4 +1,4 @@
-//! What one JSON object held, and how the finds of nested objects join. Pure.
+//! Contents of one JSON object, and how the finds of nested objects join. Pure.
 
 use super::super::registers::{Form, Registers, Slot};
 use super::super::stamp::{self, Bare, from_decimal, from_rfc3339};
@@ -18,7 +18,7 @@ pub(crate) enum Written<'a> {
     Pair(&'a str, &'a str),
 }
 
-/// When a sample was taken, as far as one message tells.
+/// Instant at which a sample was taken, as far as one message tells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Instant {
     /// Then.
@@ -27,7 +27,7 @@ pub(crate) enum Instant {
     Bare(Bare),
 }
 
-/// Which stamp holds where an object and one inside it both have one.
+/// Rule by which a stamp is chosen if an object and one inside it both have one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum StampRule {
     /// The one that `--field` names, wherever it lies.
@@ -38,7 +38,8 @@ pub(crate) enum StampRule {
     Nested,
 }
 
-/// What a phone's sensor of this name measures. An accelerometer only where gravity is in it, and in the direction of a
+/// Quantity that a phone's sensor of this name measures. An accelerometer only where gravity is in it, and in the
+/// direction of a
 /// specific force: Android's, and Sensor Logger's `totalacceleration` and `accelerometeruncalibrated` (what it calls
 /// `accelerometer` is without gravity).
 fn measured_by(sensor: &str) -> Option<Slot> {
@@ -53,7 +54,7 @@ fn measured_by(sensor: &str) -> Option<Slot> {
     }
 }
 
-/// What one object held.
+/// Contents of one object.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Found<'a> {
     pub(crate) registers: Registers,
@@ -77,7 +78,7 @@ pub(crate) struct Found<'a> {
     pub(crate) px4: bool,
     /// An object and one inside it both have a stamp.
     pub(crate) has_rival_stamps: bool,
-    /// What objects inside this one held; joined last, so that the order of keys does not matter.
+    /// Contents of objects inside this one; joined last, so that the order of keys does not matter.
     pub(crate) nested: Option<Box<Found<'a>>>,
     /// Samples of an array inside.
     pub(crate) batch: Vec<Found<'a>>,
@@ -129,7 +130,7 @@ impl<'a> Found<'a> {
         self.registers.has(Slot::GYRO, 3)
     }
 
-    /// Of an accelerometer or magnetometer that sends by itself.
+    /// Whether it is of an accelerometer or magnetometer that sends by itself.
     pub(crate) fn is_beside(&self) -> bool {
         let has = |slot| self.registers.has(slot, 3);
         !self.has_gyro()

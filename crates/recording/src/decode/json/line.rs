@@ -15,10 +15,10 @@ use strapd_attitude::record::{Nanos, RawSample, SampleKind};
 /// Longest line that is read.
 pub const MAX_LINE: usize = 64 << 10;
 
-/// What the `class` of a line says.
+/// Class that a line states.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum Class {
-    /// No class: a bare sample.
+    /// Bare sample without a class.
     #[default]
     None,
     /// Our own sample.
@@ -31,23 +31,23 @@ pub enum Class {
     Other(String),
 }
 
-/// What one line held besides its samples.
+/// Contents of one line besides its samples.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Line {
-    /// Its class.
+    /// Class.
     pub class: Class,
-    /// Which sensor, as it is: nothing in it needs to be escaped.
+    /// Sensor's id, as it is: nothing in it needs to be escaped.
     pub id: Option<String>,
-    /// Which of several sensors of one device, where a line says so (`android.sensor.gyroscope`);
+    /// Name of one of several sensors of one device, if a line states it (`android.sensor.gyroscope`);
     /// escaped for a terminal.
     pub sensor: Option<String>,
     /// The sender's sequence number.
     pub seq: Option<u64>,
-    /// What its samples mean in time, where it says so.
+    /// Meaning of its samples in time, if it states that.
     pub sample_kind: Option<SampleKind>,
     /// Unit of its body rate, where it says so.
     pub gyro_unit: Option<GyroUnit>,
-    /// How many samples, and what was noticed.
+    /// Number of samples, and what was noticed.
     pub decoded: Decoded,
     /// Stamps that are numbers without a unit, at the places of their samples, which have none until
     /// [`unit_of`](crate::decode::unit_of) some of them is known; shorter where no more follow.

@@ -9,9 +9,9 @@ use crate::decode::Undecodable;
 /// An object of a body.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Object<'a> {
-    /// Which one, from 1: the line, or the element of the array.
+    /// Number of the object, from 1: the line, or the element of the array.
     pub number: u64,
-    /// Its bytes; whether they are an object is not known of a line.
+    /// Bytes; whether they are an object is not known of a line.
     pub bytes: &'a [u8],
 }
 
@@ -33,7 +33,7 @@ enum Rest<'a> {
 }
 
 impl<'a> Objects<'a> {
-    /// Of lines.
+    /// Makes one of lines.
     #[must_use]
     pub fn lines(body: &'a [u8]) -> Objects<'a> {
         Objects {
@@ -42,7 +42,7 @@ impl<'a> Objects<'a> {
         }
     }
 
-    /// Of JSON: one object, or an array of them; several objects one after the other are lines.
+    /// Makes one of JSON: one object, or an array of them; several objects one after the other are lines.
     #[must_use]
     pub fn json(body: &'a [u8]) -> Objects<'a> {
         let rest = json(body).unwrap_or_else(Rest::Broken);

@@ -21,7 +21,7 @@ pub(crate) struct Scanner<'a> {
 type Scan<T> = Result<T, Undecodable>;
 
 impl<'a> Scanner<'a> {
-    /// At the start of `bytes`.
+    /// Begins at the start of `bytes`.
     pub(crate) fn new(bytes: &'a [u8]) -> Scan<Self> {
         match std::str::from_utf8(bytes) {
             Ok(text) => Ok(Scanner { text, pos: 0 }),
@@ -37,7 +37,7 @@ impl<'a> Scanner<'a> {
         self.pos
     }
 
-    /// What was gone over since `start`.
+    /// Bytes passed since `start`.
     pub(crate) fn since(&self, start: usize) -> &'a [u8] {
         let bytes = self.text.as_bytes();
         bytes.get(start..self.pos).unwrap_or_default()

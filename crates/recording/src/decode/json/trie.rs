@@ -17,7 +17,7 @@ struct Node {
     target: Option<Target>,
 }
 
-/// What the value at the end of a path is.
+/// Target of the value at the end of a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Target {
     /// A whole vector or quaternion.

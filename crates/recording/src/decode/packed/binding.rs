@@ -18,24 +18,24 @@ struct PackedObject {
 /// Why such a line binds nothing.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Unbound {
-    /// It is not the object it should be.
+    /// Object that is not the one it should be.
     #[error(
         "{what}; expected like {{\"class\":\"PACKED\",\"stream\":1,\"id\":\"imu0\",\"sample_kind\":\"rate\"}}"
     )]
     Object {
-        /// What is wrong there, fit for a terminal.
+        /// Description of the fault, fit for a terminal.
         what: String,
-        /// Where, in bytes from 1.
+        /// Column, in bytes from 1.
         column: u64,
     },
     /// A word in it is not known.
     #[error("there is no {field} `{word}`; there are: {known}")]
     Word {
-        /// Where it stands.
+        /// Name of the field.
         field: &'static str,
         /// The word, fit for a terminal.
         word: String,
-        /// Those there are.
+        /// Names that exist.
         known: String,
     },
     /// The name of its sensor is none.

@@ -20,7 +20,7 @@ pub(crate) enum Value<'a> {
     Group,
 }
 
-/// Where, from the start of what is read, and what is wrong.
+/// Fault: its position, from the start of what is read, and its description.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Broken {
     pub(crate) offset: usize,
@@ -37,7 +37,7 @@ pub(crate) struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    /// Over `bytes`, which begin at `base` of the payload.
+    /// Makes one over `bytes`, which begin at `base` of the payload.
     pub(crate) fn new(bytes: &'a [u8], base: usize) -> Self {
         Reader {
             bytes,

@@ -14,7 +14,7 @@ use crate::decode::select::{Batch, Selection, Step, path_text};
 const MAX_DEPTH: usize = 32;
 const MAX_FIELDS: usize = 50_000;
 
-/// How fields lie behind each other.
+/// Layout of fields one behind the other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Layout {
     /// Each number at a multiple of its size, up to 8.
@@ -82,9 +82,9 @@ enum What {
 
 /// Why compiling stopped.
 enum Halt {
-    /// Behind this field nothing can be found.
+    /// Position unknown: nothing can be found behind this field.
     Blind(String),
-    /// No plan.
+    /// Refusal: there is no plan.
     Refused(String),
 }
 
@@ -406,7 +406,7 @@ impl<'a> Compiler<'a> {
         self.residue = (self.residue + len) % self.modulus;
     }
 
-    /// After something of unknown length the position is unknown.
+    /// Forgets the position, which is unknown after something of unknown length.
     fn forget(&mut self) {
         self.modulus = 1;
         self.residue = 0;

@@ -8,7 +8,7 @@ use crate::decode::schema::{Field, Kind, Many, Number, Schema};
 use crate::decode::{Decoded, Undecodable};
 use strapd_attitude::record::{Nanos, RawSample};
 
-/// Where the fields lie.
+/// Positions of the fields.
 #[derive(Debug, Clone)]
 pub(crate) struct Fifo {
     /// `timestamp_sample`, us.
@@ -17,7 +17,7 @@ pub(crate) struct Fifo {
     dt: usize,
     /// rad/s of one count.
     scale: usize,
-    /// How many samples there are.
+    /// Number of samples.
     samples: usize,
     /// Counts about x, y, z.
     axes: [usize; 3],

@@ -67,7 +67,7 @@ struct Typed {
     many: Many,
 }
 
-/// What a scoped name stands for.
+/// Meaning of a scoped name.
 #[derive(Debug, Clone, Copy)]
 enum Meaning {
     Struct(usize),
@@ -418,7 +418,7 @@ impl<'a> Parser<'a> {
         Schema { structs, root: 0 }
     }
 
-    /// What a type is; `known` has what each use of a name was found to stand for.
+    /// Resolves a type; `known` has what each use of a name was found to stand for.
     fn resolve(
         &self,
         typed: Typed,
@@ -469,7 +469,7 @@ impl<'a> Parser<'a> {
         found
     }
 
-    /// What `name` stands for in `scope`: from the innermost module outwards.
+    /// Meaning of `name` in `scope`: from the innermost module outwards.
     fn meaning(&self, name: &str, mut scope: &str) -> Option<Meaning> {
         loop {
             let full = match scope {

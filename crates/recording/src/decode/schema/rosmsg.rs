@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 const MAX_TEXT: usize = 1 << 20;
 const MAX_FIELDS: usize = 20_000;
 
-/// Which ROS wrote the text: they differ in the names of primitives, and in what an empty message is.
+/// Dialect of the text: ROS 1 and 2 differ in the names of primitives, and in what an empty message is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Dialect {
     /// `time` and `duration` are primitive.

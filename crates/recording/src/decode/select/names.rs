@@ -6,7 +6,7 @@
 use strapd_attitude::condition::GyroUnit;
 use strapd_attitude::record::TimeUnit;
 
-/// What a name says about the value behind it; `rank` orders rivals, 0 first.
+/// Meaning that a name gives to the value behind it; `rank` orders rivals, 0 first.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Meaning {
     /// A body rate, x, y, z.
@@ -58,7 +58,7 @@ pub(crate) fn plain(name: &str, buffer: &mut [u8; 40]) -> usize {
     len
 }
 
-/// What `name` says.
+/// Meaning of `name`.
 pub(crate) fn meaning(name: &str) -> Option<Meaning> {
     let mut buffer = [0; 40];
     let len = plain(name, &mut buffer);
@@ -283,8 +283,8 @@ pub(crate) fn is_nanos(name: &str) -> bool {
 /// Types whose numbers are known by the type's name alone.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Px4 {
-    /// `gyro_rad` is the mean rate over `gyro_integral_dt`, with a part of the coning in it (`docs/formats.md`, "Coning in PX4's
-    /// numbers", says why it is no rotation).
+    /// `gyro_rad` is the mean rate over `gyro_integral_dt`, with a part of the coning in it (`docs/formats.md`,
+    /// "Coning in PX4's numbers", says why it is no rotation).
     SensorCombined,
     /// `delta_angle` over `delta_angle_dt`.
     VehicleImu,

@@ -1,4 +1,4 @@
-//! Which fields of a schema hold a body rate, and what belongs to it. Pure.
+//! Search for the fields of a schema that hold a body rate, and for what belongs to it. Pure.
 //!
 //! Breadth first: the shallowest body rate wins, then the better name. The stamp is the one nearest
 //! to it, from the inside out, because a nested message's own header is about its own sample.
@@ -95,14 +95,14 @@ pub(super) fn complete(
     }
 }
 
-/// Of `stamp.sec` only `stamp` is worth saying.
+/// Path of the stamp for the user: `stamp` instead of `stamp.sec`.
 fn stamp_text(schema: &Schema, stamp: &StampFields) -> Option<String> {
     let (path, _) = stamp.paths.first()?;
     let whole = path.len() - usize::from(stamp.paths.len() > 1);
     Some(path_text(schema, path.get(..whole).unwrap_or(path)))
 }
 
-/// What a walk can not do is refused here, before any payload.
+/// Refuses what a walk cannot do, before any payload.
 pub(super) fn check(schema: &Schema, selection: &mut Selection) -> Result<(), String> {
     let batch = selection.batch.clone();
     let mut outside = false;
@@ -290,7 +290,7 @@ fn gyros_in(schema: &Schema, site: &Site, structure: &Struct, px4: Option<Px4>) 
     list
 }
 
-/// What stands in the same struct as the body rate.
+/// Selects what stands in the same struct as the body rate.
 fn beside_gyro(schema: &Schema, gyro: &[Step], given: bool, selection: &mut Selection) {
     // The struct that names the body rate: of `imu.gyro.vec.x` the struct `imu`, the outermost in
     // which the rest of the path is still a vector.

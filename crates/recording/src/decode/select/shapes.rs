@@ -1,4 +1,4 @@
-//! What a field's type can serve as: a vector, a quaternion, a stamp, a name. Pure.
+//! Shapes that a field's type can have: a vector, a quaternion, a stamp, a name. Pure.
 //!
 //! Apart from the search, which asks by name where to look; here only shapes count.
 

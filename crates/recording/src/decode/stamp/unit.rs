@@ -63,7 +63,7 @@ impl Bare {
         self.0 as f64 * 1e-9
     }
 
-    /// Its instant read by its magnitude alone, where nobody has more than this one.
+    /// Instant read by its magnitude alone, if nobody has more than this one.
     #[must_use]
     pub fn by_magnitude(self) -> Nanos {
         self.in_unit(TimeUnit::of_magnitude(self.count()))
@@ -90,7 +90,7 @@ impl Bare {
     }
 }
 
-/// No unit, or more than one, fits.
+/// Refusal: no unit, or more than one, fits.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Ambiguous {
     /// The first number, and the ordinary step, in billionths.
@@ -100,7 +100,7 @@ pub struct Ambiguous {
 }
 
 impl Ambiguous {
-    /// What is known, without what helps.
+    /// Description of what is known, without what helps.
     #[must_use]
     pub fn what(&self) -> String {
         let number = |billionths: i128| billionths as f64 * 1e-9;
@@ -166,7 +166,7 @@ impl Opening {
         self.fits.iter().any(|(fits, _)| *fits == unit)
     }
 
-    /// Of those that fit, the one whose instants are of our time.
+    /// Unit among those that fit whose instants are of our time.
     fn of_our_time(&self) -> Option<TimeUnit> {
         let is_ours = |unit: &TimeUnit| Bare(self.first).is_of_our_time_in(*unit);
         let mut ours = self.fits.iter().map(|(unit, _)| *unit).filter(is_ours);
@@ -226,12 +226,12 @@ pub(crate) fn units_of_steps(
     units_that_fit(std::iter::once(Bare(0)).chain(ends))
 }
 
-/// What the first messages of a log tell.
+/// Result of the first messages of a log.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Told {
     /// The unit of their stamps.
     Unit(TimeUnit),
-    /// There are no two different stamps.
+    /// Nothing: there are no two different stamps.
     Nothing,
 }
 

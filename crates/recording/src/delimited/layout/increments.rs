@@ -1,7 +1,7 @@
 //! Columns of increments and of steps -> over how long they were taken, and where rows lie in time. Pure.
 //!
-//! Apart from stamps because a step says only how far a row is from the one before it, and an increment nothing at all of
-//! how long it took.
+//! Apart from stamps because a step says only how far a row is from the one before it, and an increment nothing at
+//! all of how long it took.
 
 use super::super::clock::Clock;
 use super::instants::Instants;
@@ -13,7 +13,7 @@ use strapd_attitude::record::TimeUnit;
 use strapd_attitude::setting::COLUMNS;
 
 impl Roles<'_> {
-    /// By the steps since the row before; `None` where there is no column of them.
+    /// Instants by the steps since the row before; `None` where there is no column of them.
     pub(super) fn stepped(&self) -> Result<Option<Instants>, Diagnostic> {
         let given = self.given_of(Role::Step);
         if given.is_some_and(|given| given.columns.is_empty()) {
@@ -61,8 +61,8 @@ impl Roles<'_> {
         }))
     }
 
-    /// Nanoseconds in one of a column of steps: its name's unit, if such steps are those of a gyro; else the one of ns, us,
-    /// ms and s in which they are.
+    /// Nanoseconds in one of a column of steps: its name's unit, if such steps are those of a gyro; else the one of
+    /// ns, us, ms and s in which they are.
     fn unit_of_steps(&self, at: usize) -> Result<f64, Diagnostic> {
         let numbers = self.numbers(at);
         let steps: Vec<Bare> = numbers.iter().filter_map(|n| bare_of_text(n)).collect();
@@ -111,7 +111,7 @@ impl Roles<'_> {
         }
     }
 
-    /// How far rows are apart, ns: by the rate in the head, else by the median step of the first stamps.
+    /// Period of the rows, ns: by the rate in the head, else by the median step of the first stamps.
     pub(super) fn period(&self, instants: &Instants) -> Option<i64> {
         if let Some(rate) = &self.preamble.rate {
             return Some((1e9 / rate.hz).round() as i64);

@@ -14,7 +14,7 @@ use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::record::TimeUnit;
 use strapd_attitude::setting::{COLUMNS, RATE_HZ, TIME};
 
-/// Where rows lie in time.
+/// Instants of the rows.
 pub(super) struct Instants {
     pub(super) clock: Clock,
     /// The column that says it, and what `--columns` calls it.
@@ -32,17 +32,18 @@ struct Stamp {
     note: Option<String>,
 }
 
-/// Steps by which the two kinds of `SampleTimeFine` are told apart: of 10 Hz and more in 0.1 ms, of 200 Hz and less in us.
+/// Steps by which the two kinds of `SampleTimeFine` are told apart: of 10 Hz and more in 0.1 ms, of 200 Hz and less
+/// in us.
 const FINE_TICKS: f64 = 1e3;
 const FINE_MICROS: f64 = 5e3;
 /// A counter of packets has 16 bits, a fine time 32.
 const COUNTER_WIDTH: i64 = 1 << 16;
 const FINE_WIDTH: i64 = 1 << 32;
-/// As few steps tell nothing of a unit that the name states.
+/// Number of steps that is too small to tell a unit against the one that the name states.
 const FEW: usize = 4;
 
 impl Roles<'_> {
-    /// How rows are placed in time.
+    /// Finds the rule by which rows are placed in time.
     pub(super) fn instants(&self) -> Result<Instants, Diagnostic> {
         let given = self.given_of(Role::Stamp);
         let is_refused = given.is_some_and(|given| given.columns.is_empty());
@@ -108,7 +109,7 @@ impl Roles<'_> {
         }
     }
 
-    /// By a running number, or none, and the rate of the file's head.
+    /// Instants by a running number, or none, and the rate of the file's head.
     fn counted(&self) -> Result<Instants, Diagnostic> {
         let given = self.given_of(Role::Counter);
         let column = match given.and_then(|given| given.columns.first()) {
@@ -308,7 +309,7 @@ impl Roles<'_> {
     }
 }
 
-/// What is whole but for its rounding is whole: stamps are exact then.
+/// Rounds what is whole but for its rounding: stamps are exact then.
 fn nearly_whole(nanos: f64) -> f64 {
     let whole = nanos.round();
     match (nanos - whole).abs() <= nanos * 1e-12 {

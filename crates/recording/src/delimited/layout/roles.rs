@@ -15,7 +15,7 @@ use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::record::{AccelUnit, SampleKind};
 use strapd_attitude::setting::{BODY, COLUMNS};
 
-/// What is known of a table before its roles.
+/// Table before its roles are known.
 pub(super) struct Roles<'l> {
     pub(super) names: &'l [Name],
     /// The first rows.
@@ -42,7 +42,7 @@ pub(super) struct Chosen {
 /// A role, the columns that fill it, and what each of them is.
 type Filled<'c> = (&'c Option<Chosen>, Kind, fn(usize) -> Column);
 
-/// Where a column is that the user names, or gives by its number from 1.
+/// Index of a column that the user names, or gives by its number from 1.
 pub(super) fn place(names: &[Name], column: &str) -> Result<usize, String> {
     let all = |is: &dyn Fn(&str) -> bool| -> Vec<usize> {
         let each = names.iter().enumerate();
@@ -356,7 +356,7 @@ impl Roles<'_> {
         })
     }
 
-    /// What the maker's documents say of a column that states no unit.
+    /// Unit that the maker's documents give to a column that states none.
     fn unit_of_maker(&self, kind: Kind, name: &Name) -> Option<Unit> {
         let head = self.preamble;
         let si = Unit::Force(AccelUnit::MetresPerSecondSquared, 1.0);
@@ -436,7 +436,7 @@ impl Roles<'_> {
         names.join(", ")
     }
 
-    /// What `--columns` calls a column: its name, or its number where that can not be written there.
+    /// Reference to a column in `--columns`: its name, or its number where the name cannot be written there.
     pub(super) fn reference(&self, at: usize) -> String {
         let name = self.names.get(at).map_or("", |name| name.text.as_str());
         let is_plain = !name.is_empty()
