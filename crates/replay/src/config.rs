@@ -34,8 +34,8 @@ pub fn parse_truncation(text: &str) -> Result<Truncation> {
     })
 }
 
-/// A class, or `arw=..` and any other of [`NOISE_FIGURES`], in the units of data sheets; each one number, or three joined by `/`
-/// for the body axes x, y, z.
+/// A class, or `arw=..` and any other of [`NOISE_FIGURES`], in the units of data sheets; each one number, or three
+/// joined by `/` for the body axes x, y, z.
 ///
 /// # Errors
 /// [`Error::Usage`] naming the part that is wrong.
@@ -169,9 +169,9 @@ pub fn selection(
 /// `--shard i/n`: this process takes inputs i, i + n, i + 2n, ... of the list, i from 0.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Shard {
-    /// Which share, from 0.
+    /// Index of the share, from 0.
     pub index: usize,
-    /// Of how many.
+    /// Number of shares.
     pub of: usize,
 }
 

@@ -16,44 +16,44 @@ pub enum Error {
     Recording(strapd_recording::Error),
     /// Writing failed (disk full, permission, ...).
     Write {
-        /// Which file.
+        /// Path of the file.
         path: PathBuf,
         /// Why.
         source: io::Error,
     },
-    /// There is no room for the samples of a recording that is smoothed.
+    /// Lack of room for the samples of a recording that is smoothed.
     Spool(SpoolError),
     /// The output is already there.
     OutputExists {
-        /// Which file.
+        /// Path of the file.
         path: PathBuf,
     },
     /// Output and input are the same file.
     OutputIsInput {
-        /// Which file.
+        /// Path of the file.
         path: PathBuf,
     },
     /// Standard output was closed by its reader; ends the run quietly.
     BrokenPipe,
     /// An address can not be listened on.
     Bind {
-        /// Where.
+        /// Address.
         address: Address,
         /// Why.
         source: io::Error,
     },
     /// Nobody takes what is sent there.
     Connect {
-        /// Where.
+        /// Address.
         address: Address,
         /// Why.
         source: io::Error,
     },
     /// A daemon can not be reached, or has gone.
     Remote {
-        /// Where.
+        /// Address.
         address: Address,
-        /// What, and what it said before.
+        /// Diagnostic: what, and what it said before.
         what: Diagnostic,
     },
     /// A combination of arguments that can not be.
@@ -103,7 +103,7 @@ impl From<&Error> for Diagnostic {
     }
 }
 
-/// What failed and why; where the cause is one of ours, with its help.
+/// Diagnostic of what failed and why; where the cause is one of ours, with its help.
 fn caused(what: fmt::Arguments<'_>, source: &io::Error) -> Diagnostic {
     let own = source.get_ref().and_then(|why| why.downcast_ref());
     let why = own.cloned();
@@ -111,7 +111,7 @@ fn caused(what: fmt::Arguments<'_>, source: &io::Error) -> Diagnostic {
         .at(what)
 }
 
-/// With its help on a line of its own.
+/// Text with the help on a line of its own.
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         Diagnostic::from(self).fmt(f)

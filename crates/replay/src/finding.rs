@@ -6,7 +6,7 @@ use serde_json::{Map, Value, json};
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::setting::Choice;
 
-/// How bad a finding is.
+/// Severity of a finding.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub enum Severity {
     /// Nothing is wrong; something to know, or to choose.
@@ -18,7 +18,7 @@ pub enum Severity {
 }
 
 impl Severity {
-    /// In text and JSON.
+    /// Name in text and JSON.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -32,17 +32,17 @@ impl Severity {
 /// One thing that was noticed.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Finding {
-    /// How bad it is.
+    /// Severity.
     pub severity: Severity,
-    /// Its stable name.
+    /// Stable name.
     pub code: &'static str,
     /// The topic, empty = the file.
     pub topic: String,
-    /// What was seen, with its numbers.
+    /// Observation with its numbers.
     pub what: String,
     /// The same numbers for machines.
     pub evidence: Map<String, Value>,
-    /// What to do about it.
+    /// Advice.
     pub advice: String,
     /// The settings that do it, where settings do: one of these, each of some that are set together.
     pub help: Vec<Vec<Choice>>,
@@ -61,7 +61,7 @@ impl Finding {
         }
     }
 
-    /// What a stage said, its help as the advice.
+    /// Makes one of a stage's diagnostic, its help as the advice.
     pub(crate) fn said(severity: Severity, code: &'static str, said: &Diagnostic) -> Finding {
         Finding::new(severity, code, said.what()).advise(said.helping().unwrap_or_default())
     }
@@ -109,7 +109,7 @@ impl Finding {
         self.help.iter().map(object).collect()
     }
 
-    /// What was seen and what helps, in one line.
+    /// Observation and advice, in one line.
     #[must_use]
     pub fn line(&self) -> String {
         let mut line = self.what.clone();
@@ -122,7 +122,7 @@ impl Finding {
         line
     }
 
-    /// For machines.
+    /// JSON for machines.
     #[must_use]
     pub fn json(&self) -> Value {
         json!({

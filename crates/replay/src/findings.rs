@@ -1,7 +1,7 @@
-//! What is known about a log, a run or a live sensor -> findings: how bad, on what evidence, what to do. Pure.
+//! Facts about a log, a run or a live sensor -> findings: how bad, on what evidence, what to do. Pure.
 //!
-//! The one vocabulary: `info`, `check`, `report`, a replay's warnings and the daemon's `STATUS` take their words from here.
-//! Thresholds are opinions; those about the samples themselves lie in [`strapd_attitude::condition::quality`],
+//! The one vocabulary: `info`, `check`, `report`, a replay's warnings and the daemon's `STATUS` take their words from
+//! here. Thresholds are opinions; those about the samples themselves lie in [`strapd_attitude::condition::quality`],
 //! those about the replay and the recorded orientation here. A finding's `code` is stable: scripts
 //! match on it.
 

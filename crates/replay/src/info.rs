@@ -34,22 +34,22 @@ const RESTS: usize = 100;
 pub struct Overview<'a> {
     /// The file, or standard input.
     pub input: &'a Input,
-    /// It is no recording, but attitudes made of one.
+    /// Origin of attitudes that are no recording.
     pub made_before: Option<MadeBefore>,
-    /// What is in it.
+    /// Survey of its contents.
     pub survey: &'a Survey,
-    /// What is wrong with it.
+    /// Problems with it.
     pub problems: Vec<String>,
-    /// Its channels.
+    /// Channels.
     pub channels: &'a [LogChannel],
-    /// Its topics of samples.
+    /// Topics of samples.
     pub looked: &'a [Inspection],
     /// Topics of samples that were too many to look at.
     pub left_out: &'a [String],
 }
 
 impl Overview<'_> {
-    /// How a table was read: the setting that says the same.
+    /// Setting that states how a table was read.
     #[must_use]
     pub fn tables(&self) -> Vec<&str> {
         let columns = COLUMNS.to_string();
@@ -129,7 +129,7 @@ impl Overview<'_> {
         format!("strapd replay {file} -o attitude.mcap{help}")
     }
 
-    /// For machines: one object.
+    /// JSON for machines: one object.
     #[must_use]
     pub fn json(&self) -> Value {
         let survey = self.survey;

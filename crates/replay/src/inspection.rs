@@ -1,4 +1,4 @@
-//! What looking at a log tells of its topics of samples, and what replaying them tells more.
+//! Results of looking at a log's topics of samples, and of replaying them.
 //!
 //! Below the pipeline, which finds it out, and the findings, which judge it.
 
@@ -15,7 +15,7 @@ use strapd_recording::recording::beside::TopicOfVectors;
 /// One topic of samples, looked at.
 #[derive(Debug)]
 pub struct Inspection {
-    /// Its name: the topic, or one of several sources on it.
+    /// Name: the topic, or one of several sources on it.
     pub topic: String,
     /// The topic.
     pub of: String,
@@ -23,7 +23,7 @@ pub struct Inspection {
     pub described: String,
     /// The frame its first message names.
     pub frame: String,
-    /// How its samples are understood by default.
+    /// Meaning of its samples by default.
     pub resolved: Meaning,
     /// Whether the format states the meaning of a sample.
     pub kind_stated: bool,
@@ -41,9 +41,9 @@ pub struct Inspection {
     pub undecodable: u64,
     /// The clock the statistics are on.
     pub clock: Clock,
-    /// What was noticed about the clock.
+    /// Warning about the clock.
     pub clock_warning: Option<Diagnostic>,
-    /// What may correct its attitude.
+    /// Auxiliary measurements that may correct its attitude.
     pub aid: Aids,
     /// Whether it is as likely the IMU as any: what is taken where nobody names another.
     pub is_likely: bool,
@@ -51,18 +51,18 @@ pub struct Inspection {
     pub has_reference: bool,
 }
 
-/// What of the samples themselves, or beside them, may correct an attitude.
+/// Measurements in the samples themselves, or on topics of their own, that may correct an attitude.
 #[derive(Clone, Debug, Default)]
 pub struct Aids {
     /// Whether the samples carry specific forces.
     pub has_force: bool,
     /// Mean length of the forces in the first samples, as recorded in the unit the format states (else its own).
     pub mean_force: Option<f64>,
-    /// What they are multiplied by to be m/s^2: 9.80665 of forces in g.
+    /// Factor that makes them m/s^2: 9.80665 of forces in g.
     pub force_scale: f64,
     /// Whether `--aid auto` takes gravity.
     pub gravity: bool,
-    /// What there is to say of the forces.
+    /// Notes about the forces.
     pub notes: Vec<String>,
     /// Length of the first field in the samples themselves.
     pub own_field: Option<f64>,
@@ -73,7 +73,7 @@ pub struct Aids {
 }
 
 impl Aids {
-    /// From the first samples of a topic.
+    /// Makes it from the first samples of a topic.
     pub(crate) fn of(
         plan: &Plan,
         resolved: &Meaning,
@@ -122,15 +122,15 @@ impl Aids {
 /// A log, examined.
 #[derive(Debug)]
 pub struct Checked {
-    /// What is wrong with the file itself, the first few in words.
+    /// Problems of the file itself, the first few in words.
     pub problems: Vec<String>,
-    /// How many of those lost data.
+    /// Number of these that lost data.
     pub file_losses: u64,
-    /// Its size in bytes, where that can be known.
+    /// Size in bytes, where that can be known.
     pub file_size: Option<u64>,
     /// The profile it names.
     pub profile: String,
-    /// It is none: it holds attitudes made of one.
+    /// Origin of attitudes that are no recording.
     pub made_before: Option<MadeBefore>,
     /// Topics that sound like an IMU's and can not be decoded: why.
     pub refused: Vec<Diagnostic>,

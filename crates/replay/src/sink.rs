@@ -64,7 +64,7 @@ const BATCH_SAMPLES: usize = 2048;
 /// Batches in flight: enough to keep every thread busy, few enough to bound memory (about 3 MB each).
 const MAX_BATCHES: usize = 16;
 
-/// How the output is made.
+/// Options by which the output is made.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Options {
     /// Replace an existing file (but never the input).
@@ -77,7 +77,7 @@ pub struct Options {
     pub precision: Precision,
 }
 
-/// What a finished sink has written.
+/// Account of what a finished sink has written.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Written {
     /// The file, if it is one.
@@ -93,7 +93,7 @@ pub struct Written {
     pub stamps_out_of_range: u64,
     /// Whether the reader hung up before the end.
     pub closed: bool,
-    /// It was a socket that broke before the end: what was said about it.
+    /// Whether it was a socket that broke before the end: what was logged about it.
     pub broken: bool,
 }
 
@@ -128,7 +128,7 @@ enum State {
     Failed,
 }
 
-/// What a stream has pending.
+/// Pending output of a stream.
 #[derive(Debug, Default)]
 struct Lane {
     batch: Batch,

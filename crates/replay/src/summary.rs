@@ -32,7 +32,7 @@ use strapd_attitude::record::{Counts, Nanos, SampleKind, Verdict};
 use strapd_attitude::setting::AID;
 use strapd_attitude::worlds::EARTH_RATE;
 
-/// What one topic of one log became.
+/// Summary of one topic of one log.
 #[derive(Clone, Debug, Default)]
 pub struct TopicSummary {
     /// Topic of the samples.
@@ -41,7 +41,7 @@ pub struct TopicSummary {
     pub output_topic: String,
     /// Message type and encoding, as found.
     pub decoded_as: String,
-    /// What became of every sample.
+    /// Outcome of every sample.
     pub counts: Counts,
     /// Messages of another body, by the frame they name, that nobody asked to leave out.
     pub left_out: u64,
@@ -57,9 +57,9 @@ pub struct TopicSummary {
     pub rate_hz: Option<f64>,
     /// The clock the samples were placed on.
     pub clock: String,
-    /// What became of the stamps, where `--regularise-stamps` asked for it.
+    /// Outcome of the stamps, if `--regularise-stamps` asked for it.
     pub stamps: Option<Regularised>,
-    /// What a sample was taken to mean.
+    /// Kind for which a sample was taken.
     pub kind: SampleKind,
     /// The integrator in words.
     pub method: String,
@@ -69,23 +69,23 @@ pub struct TopicSummary {
     pub body: String,
     /// World of the attitude.
     pub world: String,
-    /// Where the initial attitude came from.
+    /// Origin of the initial attitude.
     pub initial: String,
     /// Latitude for which the Earth's rotation was taken out, deg.
     pub latitude_deg: Option<f64>,
     /// Bias removed, rad/s, body axes.
     pub bias: [f64; 3],
-    /// Where the bias came from, with its sigma where it was estimated.
+    /// Origin of the bias, with its sigma if it was estimated.
     pub bias_origin: String,
-    /// What corrected the attitude, where something did.
+    /// Account of what corrected the attitude, if something did.
     pub aided: Option<Aided>,
-    /// What a smoother made of it, where one was asked for, or why nothing: then the attitude is that of `aided`.
+    /// Result of a smoother, if one was asked for, or why there is none: then the attitude is that of `aided`.
     pub smoothed: Option<Result<Smoothing, Diagnostic>>,
-    /// What is known of the sensor at the end.
+    /// Calibration of the sensor at the end.
     pub calibration: SensorCalibration,
     /// Noise behind sigma.
     pub noise: String,
-    /// What sigma is made of.
+    /// Terms of sigma.
     pub sigma_terms: Option<SigmaTerms>,
     /// Drift to be expected from what is not known of the bias, rad/s.
     pub drift: f64,
@@ -101,17 +101,17 @@ pub struct TopicSummary {
     pub undersampled: u64,
     /// Last attitude `[w, x, y, z]`.
     pub final_wxyz: [f64; 4],
-    /// Its yaw, pitch, roll, rad.
+    /// Final yaw, pitch, roll, rad.
     pub final_ypr: [f64; 3],
     /// One standard deviation about each body axis at the end, rad.
     pub final_sigma: [f64; 3],
-    /// Against the recorded orientation, one row per sample kind.
+    /// Comparisons with the recorded orientation, one row per sample kind.
     pub against: Vec<Against>,
-    /// What the recorded orientation itself is like, where one was compared with.
+    /// Description of the recorded orientation itself, if one was compared with.
     pub recorded: Option<Recorded>,
     /// Things to know, each with the flag that helps.
     pub findings: Vec<Finding>,
-    /// What is drawn of it, where a report asked for that.
+    /// Series to draw, if a report asked for them.
     pub drawn: Option<Box<Drawn>>,
 }
 
@@ -120,7 +120,7 @@ pub struct TopicSummary {
 pub struct Against {
     /// `rate`, `average` or `held`.
     pub kind: &'static str,
-    /// What that means.
+    /// Meaning of the kind.
     pub meaning: &'static str,
     /// Median of the error of the rotation over 1 s, deg.
     pub median_deg: f64,
@@ -139,7 +139,7 @@ pub struct Recorded {
     pub unusable: u64,
     /// All of them are one and the same.
     pub constant: bool,
-    /// How its body axes lie to the gyro's; `None` = the motion does not tell.
+    /// Axes of its body relative to the gyro's; `None` = the motion does not tell.
     pub axes: Option<BodyAxesFit>,
     /// Whether the run's errors lie within what it said of them; `None` = no instant in common, or no sigma.
     pub consistency: Option<Consistency>,
@@ -151,7 +151,7 @@ pub struct Recorded {
     pub resets: usize,
 }
 
-/// What one log became.
+/// Summary of one log.
 #[derive(Clone, Debug, Default)]
 pub struct RunSummary {
     /// The log.
@@ -160,13 +160,13 @@ pub struct RunSummary {
     pub topics: Vec<TopicSummary>,
     /// Outputs: name, bytes, messages.
     pub outputs: Vec<(String, u64, u64)>,
-    /// Where the calibration was saved.
+    /// Path of the saved calibration.
     pub calibration: Option<String>,
-    /// Where it was served to whoever connected.
+    /// Addresses at which it was served to whoever connected.
     pub served: Vec<String>,
-    /// What was wrong with the file itself.
+    /// Problems of the file itself.
     pub file_problems: Vec<String>,
-    /// How many of them lost data.
+    /// Number of these that lost data.
     pub file_losses: u64,
     /// Sockets that broke before the end.
     pub broken: Vec<String>,
@@ -192,7 +192,7 @@ impl RunSummary {
         self.topics.iter().map(|t| t.counts.total()).sum()
     }
 
-    /// For people.
+    /// Text for people.
     #[must_use]
     pub fn text(&self) -> String {
         let mut out = String::new();
@@ -237,7 +237,7 @@ impl RunSummary {
         out
     }
 
-    /// For machines: one object.
+    /// JSON for machines: one object.
     #[must_use]
     pub fn json(&self) -> Value {
         json!({
@@ -436,13 +436,13 @@ impl TopicSummary {
         }
     }
 
-    /// What a smoother made of it, where it made something of it.
+    /// Result of a smoother, if there is one.
     #[must_use]
     pub fn smoothing(&self) -> Option<&Smoothing> {
         self.smoothed.as_ref()?.as_ref().ok()
     }
 
-    /// That a smoother was asked for and made nothing of it.
+    /// Warning that a smoother was asked for and gave nothing.
     #[must_use]
     pub fn not_smoothed(&self) -> Option<String> {
         let why = self.smoothed.as_ref()?.as_ref().err()?;
@@ -452,13 +452,13 @@ impl TopicSummary {
         ))
     }
 
-    /// What was found, a line each.
+    /// Warnings, a line each.
     #[must_use]
     pub fn warnings(&self) -> Vec<String> {
         self.findings.iter().map(Finding::line).collect()
     }
 
-    /// What the sigma is of, where something corrects the attitude; else what it drifts by.
+    /// Text of what the sigma is of, if something corrects the attitude; else of the drift.
     #[must_use]
     pub fn drift_text(&self) -> String {
         if let Some(smoothing) = self.smoothing() {
@@ -506,7 +506,7 @@ impl TopicSummary {
         )
     }
 
-    /// For machines.
+    /// JSON for machines.
     #[must_use]
     pub fn json(&self) -> Value {
         let [w, x, y, z] = self.final_wxyz;

@@ -9,7 +9,7 @@ use strapd_attitude::estimate::{Known, SensorCalibration};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// What this release writes.
+/// Version that this release writes.
 const FORMAT: u32 = 1;
 /// A name, a date.
 const LONGEST_TEXT: usize = 4096;
@@ -18,7 +18,7 @@ const MOST_SOURCES: usize = 64;
 /// The keys there are.
 const KEYS: &str = "strapd_calibration, sensor, date, sources, bias, G, ba, A, lead, h, S, mag_lead, truncation_step, and in each of the last nine value, sigma, observed";
 
-/// What is said of a place in the text.
+/// Fault at a place in the text.
 struct Wrong {
     at: Range<usize>,
     what: Diagnostic,
@@ -301,7 +301,7 @@ fn nested(all: &[String]) -> String {
     }
 }
 
-/// To so many digits behind the first, and then as short as it reads the same.
+/// Rounds to so many digits behind the first, and then as short as it reads the same.
 fn rounded(number: f64, digits: usize) -> String {
     let short: f64 = format!("{number:.digits$e}").parse().unwrap_or(number);
     // What has neither point nor exponent is no float in TOML.

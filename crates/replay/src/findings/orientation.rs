@@ -17,11 +17,11 @@ const CLEARLY: f64 = 0.95;
 const EXPLAINED: f64 = 0.4;
 /// Errors over 1 s below this need no explanation, rad (2 degrees).
 const SMALL: f64 = 0.035;
-/// Where gaps take more than this share of the time, what was turned is not known.
+/// Share of the time in gaps above which the rotation is not known.
 const MOSTLY_THERE: f64 = 0.5;
 /// An orientation that misses the motion by this share of it does not follow the gyro.
 const ANOTHER_MOTION: f64 = 0.5;
-/// Of a motion about one axis other axes look like a bias; one below this share of the motion is believed.
+/// Share of the motion below which a bias is believed: of a motion about one axis other axes look like a bias.
 const SMALL_SHARE: f64 = 0.3;
 /// A heading that is off by more than this is worth a word though sigma allows it: 15 degrees in rad.
 const DRIFTED: f64 = 15.0 * std::f64::consts::PI / 180.0;
@@ -65,7 +65,7 @@ pub(super) fn find(topic: &CheckedTopic, out: &mut Vec<Finding>) {
     }
 }
 
-/// What a replay says of the orientation it was held against: nothing of its bias where that is no truth.
+/// Findings of a replay about the orientation it was compared with: nothing of its bias if that is no truth.
 pub(super) fn of_run(summary: &TopicSummary) -> Vec<Finding> {
     let mut found = Vec::new();
     if let Some(best) = best_meaning(&summary.against) {
@@ -205,7 +205,7 @@ fn best_meaning(rows: &[Against]) -> Option<&Against> {
         .min_by(|a, b| a.median_deg.total_cmp(&b.median_deg))
 }
 
-/// Which meaning of a sample fits, when it is clearly not the one used.
+/// Adds the meaning of a sample that fits, when it is clearly not the one used.
 fn meaning(rows: &[Against], best: &Against, used: &str, out: &mut Vec<Finding>) {
     let Some(current) = rows.iter().find(|r| r.kind == used) else {
         return;

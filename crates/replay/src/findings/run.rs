@@ -1,4 +1,4 @@
-//! What a run has counted -> findings, the same of a log and of a live sensor. Pure.
+//! Counts of a run -> findings, the same of a log and of a live sensor. Pure.
 
 use super::{Finding, Severity, orientation, samples};
 use crate::summary::aid::Frozen;
@@ -18,10 +18,10 @@ const LARGE_STEP_DEG: f64 = 30.0;
 /// can measure.
 const UNLIKELY_RATE: f64 = 200.0;
 
-/// What a run knows of its samples that its summary does not say.
+/// Facts that a run knows of its samples and its summary does not state.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Noted<'a> {
-    /// What was counted while conditioning.
+    /// Counts of conditioning.
     pub(crate) conditioning: &'a Report,
     /// Largest component of any rate, rad/s.
     pub(crate) largest_rate: f64,
@@ -120,7 +120,7 @@ pub(crate) fn of_run(summary: &TopicSummary, noted: &Noted<'_>) -> Vec<Finding> 
     out
 }
 
-/// What a live sensor's counts show, for `STATUS`. `clock`: of its stamps.
+/// Findings from a live sensor's counts, for `STATUS`. `clock`: of its stamps.
 #[must_use]
 pub fn of_sensor(report: &Report, propagation: &propagate::Report, clock: &str) -> Vec<Finding> {
     let held = Gaps::of(report, propagation);

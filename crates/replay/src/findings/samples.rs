@@ -24,7 +24,7 @@ const REPEATED_SHARE: f64 = 0.003;
 /// Longer runs of one value are no repeats of a sensor with noise.
 const LONG_RUN: u64 = 20;
 
-/// What the samples of a topic show as they were recorded.
+/// Findings from the samples of a topic as they were recorded.
 #[must_use]
 pub fn of_samples(looked: &Inspection) -> Vec<Finding> {
     of_counted(looked, &looked.counts)
@@ -330,7 +330,7 @@ fn level_turn(up: &Vector3<f64>) -> Vector4<f64> {
     half.try_normalize(1e-6).unwrap_or_else(Vector4::y)
 }
 
-/// No gyro turns that fast in rad/s.
+/// Finding for rates that no gyro reaches in rad/s.
 pub(super) fn rates_like_degrees(peak: f64) -> Finding {
     Finding::new(
         Severity::Error,

@@ -36,23 +36,23 @@ pub type Entry = (Nanos, [f64; 4]);
 pub struct Track {
     /// File and topic, for people.
     pub name: String,
-    /// In file order; ENU (or start) and FLU.
+    /// Entries in file order; ENU (or start) and FLU.
     pub entries: Vec<Entry>,
     /// Instants of its resets: from each on its world is another.
     pub cuts: Vec<Nanos>,
     /// What the file says of the error of each of them, in body axes (FLU); empty where it does not of all.
     pub covariances: Vec<AttitudeCovariance>,
-    /// What was wrong with the file.
+    /// Problems of the file.
     pub problems: Vec<String>,
 }
 
-/// What a track is read for: of several attitudes in a file, the truth is one's reference and never
+/// Side for which a track is read: of several attitudes in a file, the truth is one's reference and never
 /// one's estimate.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Side {
     /// The attitude under test.
     Estimate,
-    /// What it is held against.
+    /// Reference of the comparison.
     Reference,
 }
 
@@ -194,7 +194,7 @@ fn convention_of(world: &str) -> Convention {
         .unwrap_or(Convention::EnuFlu)
 }
 
-/// What is no rotation stays what it is, to be counted by the comparison.
+/// Converts to FLU. A row that is no rotation stays what it is, to be counted by the comparison.
 fn in_flu(recorded: Convention, wxyz: [f64; 4]) -> [f64; 4] {
     Quaternion::<Nav, Body>::try_from_wxyz(wxyz)
         .map_or(wxyz, |q| recorded.convert(Convention::EnuFlu, q).wxyz())
@@ -294,7 +294,8 @@ fn attitude_channel<'l>(
     }
 }
 
-/// The truth, for a reference, before all; an orientation of its own topic before one in an Imu, before poses of other things and `/tf`.
+/// The truth, for a reference, before all; an orientation of its own topic before one in an Imu, before poses of
+/// other things and `/tf`.
 fn goodness(role: &Role, side: Side, topic: &str) -> u8 {
     match rank(role) {
         _ if topic == TRUTH_TOPIC => match side {
@@ -399,7 +400,7 @@ fn from_ndjson(input: &Input, side: Side, id: Option<&str>) -> Result<Vec<(Entry
 #[derive(Deserialize)]
 struct Row {
     stamp_ns: i64,
-    /// Beside a synthetic sample whose stamp may be wrong: the instant the attitude is of.
+    /// Instant of the attitude beside a synthetic sample whose stamp may be wrong.
     true_ns: Option<i64>,
     // As they were called at first.
     #[serde(alias = "w")]

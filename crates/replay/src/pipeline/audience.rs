@@ -1,4 +1,4 @@
-//! Who is shown a run while it goes, and may stop and move it.
+//! Audience that is shown a run while it goes, and may stop and move it.
 //!
 //! The run knows them only by what they are shown and when: who they are, and over what, is the
 //! matter of `serve`, which is built on this and not below it.
@@ -8,16 +8,16 @@ use std::fmt::Debug;
 use strapd_attitude::estimate::Estimator;
 use strapd_attitude::record::{AttitudeSample, Nanos, RawSample};
 
-/// What to do with the next items of a run.
+/// Instruction for the next items of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Turn {
-    /// How many of them are due.
+    /// Number of items that are due.
     pub count: usize,
     /// Whether they are shown; those before a place that was sought are not.
     pub is_shown: bool,
 }
 
-/// Who is shown a run. Has its pace, where there is one.
+/// Audience of a run. Has its pace, where there is one.
 pub trait Audience: Debug + Send + Sync {
     /// A run with these streams begins.
     fn begin(&self, streams: &[Stream]);
@@ -35,7 +35,7 @@ pub trait Audience: Debug + Send + Sync {
     /// Samples of a stream.
     fn samples(&self, stream: usize, samples: &[RawSample], is_shown: bool);
 
-    /// What `estimator` of a stream has taken so far; what came of it was handed over.
+    /// Shows what `estimator` of a stream has taken so far; what came of it was handed over.
     fn known(&self, stream: usize, estimator: &Estimator) {
         let _ = (stream, estimator);
     }

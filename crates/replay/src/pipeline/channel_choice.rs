@@ -28,7 +28,7 @@ pub(super) struct Chosen {
     pub(super) found: Found,
     pub(super) stream: Stream,
     source: Publisher,
-    /// By id and schema id: the index of a channel met in a walk may differ from the survey's, since the
+    /// Decoders by id and schema id: the index of a channel met in a walk may differ from the survey's, since the
     /// summary lists them in another order.
     channels: BTreeMap<(u16, u16), Decoder>,
 }
@@ -145,7 +145,7 @@ fn choose_one(
     })
 }
 
-/// What is read beside the samples of the one topic chosen.
+/// Chooses what is read beside the samples of the one topic chosen.
 ///
 /// # Errors
 /// As [`beside::choose`]; several topics, of which it could belong to any.
@@ -178,7 +178,7 @@ pub(super) fn besides(
     Ok(besides)
 }
 
-/// Which of several stamps is read, in words.
+/// Description of which of several stamps is read.
 pub(super) fn which_stamp(decoder: &Decoder) -> Option<String> {
     let stamps = decoder.stamps();
     let read = stamps.get(decoder.nth_stamp())?;
@@ -209,7 +209,7 @@ fn plain_name(source: &Publisher) -> String {
 pub(super) struct Reference {
     channel: Arc<Channel>,
     decoder: Decoder,
-    /// How its orientations are understood.
+    /// Meaning of its orientations.
     pub(super) resolved: Meaning,
 }
 

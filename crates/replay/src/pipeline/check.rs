@@ -19,7 +19,7 @@ use strapd_recording::decode;
 use strapd_recording::pool::Pool;
 use strapd_recording::recording::opened::problems;
 
-/// What a report wants of the replays beside their summaries.
+/// Series that a report wants of the replays beside their summaries.
 #[derive(Clone, Copy, Debug)]
 pub struct Drawing<'a> {
     /// Stretches of time each series is drawn in.
@@ -28,16 +28,16 @@ pub struct Drawing<'a> {
     pub reference: Option<&'a Track>,
 }
 
-/// How a log is examined.
+/// Settings by which a log is examined.
 #[derive(Clone, Debug)]
 pub struct Examination<'a> {
-    /// Its topic is the only one looked at.
+    /// Selection; its topic is the only one looked at.
     pub selection: Selection,
-    /// How samples are understood and integrated.
+    /// Settings by which samples are understood and integrated.
     pub plan: Plan,
     /// The topic of the reference in the log, empty = found.
     pub reference_topic: String,
-    /// What is drawn of the replays.
+    /// Series to draw of the replays.
     pub drawing: Option<Drawing<'a>>,
     /// The command as typed.
     pub command: String,

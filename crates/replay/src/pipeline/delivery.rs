@@ -16,10 +16,10 @@ use strapd_attitude::record::{AttitudeSample, Nanos, RawSample};
 use strapd_recording::pool::Pool;
 use strapd_recording::recording::channel_route::Copied;
 
-/// What standard output is called in the summary.
+/// Name of standard output in the summary.
 const STDOUT: &str = "standard output";
 
-/// How items of a kind are handed over.
+/// Way by which items of a kind are handed over.
 struct Way<T> {
     due: fn(&T) -> Nanos,
     write: fn(&mut Sink, usize, &[T], &ThreadPool) -> Result<Flow>,
@@ -38,7 +38,7 @@ const SAMPLES: Way<RawSample> = Way {
     show: |audience, stream, samples, shown| audience.samples(stream, samples, shown),
 };
 
-/// What a target is called in the summary.
+/// Name of a target in the summary.
 fn name(target: &Target) -> String {
     match target {
         Target::File { path, .. } => path.display().to_string(),
@@ -65,14 +65,14 @@ pub(super) struct Outlet {
     closed: bool,
 }
 
-/// When items are handed over, and how many of them.
+/// Pacing: when items are handed over, and how many of them.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Delivery {
     /// `--out-rate`, Hz.
     pub out_rate: Option<f64>,
     /// `--speed`; `None` = as fast as possible.
     pub speed: Option<f64>,
-    /// Who is served where targets listen.
+    /// Audience that is served if targets listen.
     pub audience: Option<Arc<dyn Audience>>,
 }
 
@@ -247,7 +247,7 @@ impl Outlet {
         self.audience.is_some()
     }
 
-    /// How long the input is, about, for whoever is shown where the run is.
+    /// Tells the approximate length of the input to whoever is shown where the run is.
     pub(super) fn length(&self, secs: f64) {
         if let Some(audience) = &self.audience {
             audience.length(secs);

@@ -24,7 +24,7 @@ use strapd_recording::pool::Pool;
 use strapd_recording::recording::decoders::Decoders;
 use strapd_recording::recording::opened::AHEAD;
 
-/// What became of a topic, or why nothing did.
+/// Summary of a topic, or the reason why there is none.
 pub(super) type Told = std::result::Result<Box<TopicSummary>, Diagnostic>;
 
 /// Integrates the topics called `names`, without outputs; by name, in their order.

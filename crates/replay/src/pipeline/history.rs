@@ -12,7 +12,7 @@ use strapd_attitude::record::{AttitudeSample, Counts, Nanos, RawSample, Status, 
 /// Rejected samples that wait for the attitude after them to find their place.
 const WAITING: usize = 1 << 16;
 
-/// What is kept of a run to be drawn.
+/// Series of a run that are kept to be drawn.
 #[derive(Debug)]
 pub(super) struct History {
     clock: Clock,
@@ -24,7 +24,7 @@ pub(super) struct History {
 }
 
 impl History {
-    /// For stamps of `clock`, in at most `stretches` stretches of time.
+    /// Makes it for stamps of `clock`, in at most `stretches` stretches of time.
     #[must_use]
     pub(super) fn new(clock: Clock, stretches: usize) -> History {
         History {
@@ -146,7 +146,7 @@ impl History {
         }
     }
 
-    /// No more.
+    /// Ends it: no more samples.
     #[must_use]
     pub(super) fn finish(mut self) -> Drawn {
         let end = self.drawn.elapsed.x();

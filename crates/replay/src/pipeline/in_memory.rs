@@ -1,7 +1,7 @@
 //! A recording -> its attitudes, in memory: for programs, which have no file to name. I/O.
 //!
-//! The same run as into a file, with somebody who takes what it makes in the place of an output: the same samples, in the
-//! same order, to the bit.
+//! The same run as into a file, with somebody who takes what it makes in the place of an output: the same samples, in
+//! the same order, to the bit.
 
 use super::audience::{Audience, Turn};
 use super::replay::run;
@@ -19,9 +19,9 @@ use strapd_recording::pool::Pool;
 /// The attitudes of one topic.
 #[derive(Clone, Debug)]
 pub struct TopicAttitudes {
-    /// Its names: topic, frames, axes, what the quaternions rotate.
+    /// Names: topic, frames, axes, what the quaternions rotate.
     pub stream: Stream,
-    /// In time.
+    /// Attitudes in order of time.
     pub samples: Vec<AttitudeSample>,
 }
 

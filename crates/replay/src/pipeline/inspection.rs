@@ -27,14 +27,14 @@ use strapd_recording::recording::opened::AHEAD;
 use strapd_recording::recording::sources::Publisher;
 use strapd_recording::recording::topics::{MOST_TOPICS, PICKED_UNNAMED};
 
-/// What was looked at.
+/// Result of looking at a log.
 #[derive(Debug)]
 pub struct Looks {
     /// The topics of samples, in the order of the log.
     pub topics: Vec<Inspection>,
-    /// Those beyond [`MOST_TOPICS`], which were not looked at; the best are looked at first.
+    /// Topics beyond [`MOST_TOPICS`], which were not looked at; the best are looked at first.
     pub left_out: Vec<String>,
-    /// What is in the log.
+    /// Survey of the log.
     pub survey: Survey,
 }
 
@@ -61,8 +61,8 @@ struct Look {
     aid: Aids,
 }
 
-/// From the units that a format states to those that numbers are judged in. What it does not state stays as it is: then
-/// the numbers tell.
+/// Factors from the units that a format states to those that numbers are judged in. What it does not state stays as
+/// it is: then the numbers tell.
 struct Si {
     rate: f64,
     force: f64,
@@ -289,7 +289,7 @@ fn has_reference_beside(log: &Recording, of: &str, frame: &str) -> bool {
     matches!((others.next(), others.next()), (Some(one), None) if !one.role.has_rate)
 }
 
-/// What a channel of the survey and one met in a walk have in common; the index may differ.
+/// Identity that a channel of the survey and one met in a walk share; the index may differ.
 type Id<'c> = (u16, u16, &'c str);
 
 fn id(channel: &mcap::Channel) -> Id<'_> {

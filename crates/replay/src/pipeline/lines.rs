@@ -71,7 +71,7 @@ pub(super) fn prepare(run: &ReplayRequest, input: Lines<impl Read>) -> Result<Op
 /// A run.
 struct Running<'r, 'w> {
     run: &'r ReplayRequest,
-    /// That these are attitudes, and no recording.
+    /// Origin of attitudes that are no recording.
     made_before: Option<MadeBefore>,
     waiting: Waiting<'r>,
     pool: &'r Pool,

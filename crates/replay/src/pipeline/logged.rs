@@ -1,4 +1,4 @@
-//! What a command line names -> a recording that can be read again, its warnings logged. I/O.
+//! Source named on a command line -> a recording that can be read again, its warnings logged. I/O.
 //!
 //! Apart from the reader because that logs nothing itself: it hands out what is to be known as it comes.
 

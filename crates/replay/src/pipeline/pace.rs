@@ -31,7 +31,7 @@ impl Pace {
         })
     }
 
-    /// How many of the samples with these stamps may go together now: at least one.
+    /// Number of the samples with these stamps that may go together now: at least one.
     pub fn take(&self, stamps: impl Iterator<Item = Nanos>) -> usize {
         let slice = self.slice_nanos();
         let mut first = None;
@@ -50,13 +50,13 @@ impl Pace {
         }
     }
 
-    /// From the next sample on, as if it were the first.
+    /// Restarts at the next sample, as if it were the first.
     pub fn restart(&mut self) {
         self.origin = None;
         self.last = None;
     }
 
-    /// From `now` on so many times as fast as the data.
+    /// Sets the speed from `now` on, as a multiple of the data's.
     pub fn set_speed(&mut self, speed: f64, now: Instant) {
         self.origin = self.origin.map(|(start, begun)| {
             let elapsed = now.saturating_duration_since(begun).as_secs_f64() * self.speed * 1e9;
@@ -65,7 +65,7 @@ impl Pace {
         self.speed = speed;
     }
 
-    /// How long after `now` `stamp` is due. It may be asked for the same stamp again.
+    /// Time after `now` at which `stamp` is due. It may be asked for the same stamp again.
     pub fn until(&mut self, stamp: Nanos, now: Instant) -> Duration {
         // In data time: at a low speed an ordinary step is long on the wall.
         let longest = JUMP_NANOS.max(self.slice_nanos().saturating_mul(2));

@@ -1,6 +1,6 @@
-//! Where a run is, for whoever shows it. Pure.
+//! Position of a run, for whoever shows it. Pure.
 
-/// Where a run is.
+/// Position of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Position {
     /// Share of the input done, 0 to 1, where known.

@@ -1,4 +1,4 @@
-//! What a reader of the output must be able to find out later -> its metadata. I/O: reads the ends
+//! Origin of an output, for its reader -> its metadata. I/O: reads the ends
 //! of the input.
 
 use super::request::ReplayRequest;
@@ -13,7 +13,7 @@ use strapd_attitude::estimate::Prepared;
 use strapd_attitude::worlds::EARTH_RATE;
 use strapd_recording::Source;
 
-/// How much of each end of the input goes into its fingerprint.
+/// Number of bytes at each end of the input that go into its fingerprint.
 const END: u64 = 1 << 20;
 
 /// The metadata of a run's outputs.

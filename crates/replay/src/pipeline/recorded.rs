@@ -1,4 +1,5 @@
-//! Orientations recorded in the samples -> attitudes beside the estimated ones, for who is shown a run. Pure but for showing them.
+//! Orientations recorded in the samples -> attitudes beside the estimated ones, for who is shown a run. Pure but for
+//! showing them.
 //!
 //! Turned once for all so that the first agrees with what is estimated then: the world of a recording lies as it
 //! likes. A drift shows, a constant does not, as in `compare --align`.
@@ -47,7 +48,7 @@ fn recorded(of: &Stream, is_only: bool) -> Stream {
 }
 
 impl RecordedTrack {
-    /// Of what becomes stream `of`.
+    /// Makes it for what becomes stream `of`.
     pub(super) fn new(
         of: &Stream,
         is_only: bool,
@@ -125,7 +126,7 @@ impl RecordedTrack {
         }
     }
 
-    /// What turns the recorded world into the estimated one, at an instant of both.
+    /// Rotation of the recorded world into the estimated one, at an instant of both.
     fn turned(
         &self,
         own: Quaternion<Nav, Body>,

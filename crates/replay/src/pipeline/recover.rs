@@ -20,7 +20,7 @@ use strapd_recording::Source;
 use strapd_recording::mcap::{self, Channel, Message, Order, Reader, Record, Survey, WalkOptions};
 use strapd_recording::pool::Pool;
 
-/// What is to be recovered, and where to.
+/// Request: what is to be recovered, and where to.
 #[derive(Clone, Debug)]
 pub struct Recover {
     /// The damaged log.
@@ -31,12 +31,12 @@ pub struct Recover {
     pub options: Options,
 }
 
-/// What was recovered.
+/// Result of a recovery.
 #[derive(Clone, Debug)]
 pub struct Recovered {
     /// The output.
     pub written: Written,
-    /// What the input holds and what was wrong with it.
+    /// Survey of the input, with what was wrong with it.
     pub survey: Survey,
     /// Attachments copied.
     pub attachments: u64,
@@ -61,7 +61,7 @@ const PARCEL_BYTES: usize = 256 << 10;
 struct Parcel {
     heads: Vec<Head>,
     data: Vec<u8>,
-    /// Where in the input the last of them lies.
+    /// Offset in the input of the last of them.
     offset: u64,
 }
 
@@ -99,7 +99,7 @@ struct Copying<'r> {
     sink: Sink,
     /// The head, which has the input's profile, is written.
     begun: bool,
-    /// What ended it early.
+    /// Error that ended it early.
     ended: Option<Error>,
     attachments: u64,
     metadata: u64,

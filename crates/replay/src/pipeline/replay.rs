@@ -102,7 +102,7 @@ fn whole_text(
     lines::replay(run, text()?, prepared, pool, watch)
 }
 
-/// What is said where attitudes made before are taken for a recording.
+/// Warning for attitudes made before that are taken for a recording.
 pub(super) fn integrated_again(made: &MadeBefore) -> Diagnostic {
     Diagnostic::new(format!(
         "{made}: its rates are integrated again, less the bias that was taken out of them"
@@ -185,7 +185,7 @@ fn file(
     Ok(summarise::run(run, session.finish(run, pool)?, &survey))
 }
 
-/// How much of a log of this span lies before the last of `items`.
+/// Share of a log of this span that lies before the last of `items`.
 pub(super) fn done(items: &[Item], span: Option<(u64, u64)>) -> Option<f64> {
     let (now, (first, last)) = items.last().and_then(log_time).zip(span)?;
     Some(now.saturating_sub(first) as f64 / last.saturating_sub(first).max(1) as f64)

@@ -111,7 +111,7 @@ struct Picked {
     /// Channels of the topic whose first messages tell how to read them.
     held: Vec<Held>,
     others: BTreeSet<String>,
-    /// Where the magnetic field comes from, where no flag says it.
+    /// Topic of the magnetic field, where no flag names it.
     field_topic: Option<String>,
     refusals: Vec<Diagnostic>,
     /// Decoders with the run's options, and with none.
@@ -178,7 +178,7 @@ impl Picked {
         }
     }
 
-    /// What is read of a channel beside the samples: of the topics named, or of the first with a field.
+    /// Decoder for what is read of a channel beside the samples: of the topics named, or of the first with a field.
     fn beside(&mut self, run: &ReplayRequest, channel: &Arc<Channel>) -> Option<Decoder> {
         let of = |wanted, beside: Option<&TopicBeside>| {
             let options = beside::options(wanted, beside);
@@ -211,7 +211,7 @@ impl Picked {
         (!has_rate).then_some(decoder)
     }
 
-    /// How the topic is read is known: by the decoder of its first channel.
+    /// Settles how the topic is read: by the decoder of its first channel.
     fn meet(&mut self, run: &ReplayRequest, channel: &Channel, decoder: &Decoder) {
         if std::mem::replace(&mut self.is_met, true) {
             return;

@@ -1,4 +1,4 @@
-//! What a replay is: from where, to where, how. Pure.
+//! Request of a replay: from where, to where, how. Pure.
 
 use super::audience::Audience;
 use crate::error;
@@ -12,15 +12,15 @@ use strapd_recording::{Error, Selection, Source};
 /// A replay to be done.
 #[derive(Clone, Debug)]
 pub struct ReplayRequest {
-    /// From where.
+    /// Source.
     pub source: Source,
-    /// To where.
+    /// Targets.
     pub targets: Vec<Target>,
-    /// Which of them.
+    /// Selection of samples.
     pub selection: Selection,
-    /// How samples are understood and integrated.
+    /// Settings by which samples are understood and integrated.
     pub plan: Plan,
-    /// How outputs are made.
+    /// Options by which outputs are made.
     pub options: sink::Options,
     /// Whether every message of the input is copied to MCAP outputs.
     pub copy_input: bool,
@@ -28,7 +28,7 @@ pub struct ReplayRequest {
     pub out_rate: Option<f64>,
     /// `--speed`; `None` = as fast as possible.
     pub speed: Option<f64>,
-    /// Who serves it to whoever connects, where a target listens.
+    /// Audience that is served if a target listens.
     pub audience: Option<Arc<dyn Audience>>,
     /// `--against-recorded`: the reference's topic, empty = found.
     pub against: Option<String>,
@@ -58,7 +58,7 @@ impl ReplayRequest {
         }
     }
 
-    /// What else samples are taken for, to compare.
+    /// Other meanings for which samples are taken, to compare.
     pub(super) fn other_kinds(&self) -> impl Iterator<Item = strapd_attitude::record::SampleKind> {
         self.against
             .iter()

@@ -68,11 +68,11 @@ pub(super) struct AgainstRecorded {
     /// What the run itself put out, in the world it was asked for, with what it says of its error.
     own: Thinned<Known>,
     world: World,
-    /// How its world lies to the reference's, by what it claims of it.
+    /// Alignment of its world to the reference's, by what it claims of it.
     align: Align,
     /// The bias that was removed, rad/s.
     removed: [f64; 3],
-    /// When the sample of each recorded orientation was received, as they lie in `reference`; and where
+    /// Times at which the samples of the recorded orientations were received, as they lie in `reference`; and where
     /// samples that were given another stamp went.
     received: Vec<Nanos>,
     moved: HashMap<Nanos, Nanos>,
@@ -130,7 +130,7 @@ fn among_tried(kind: SampleKind, stated: SampleKind) -> SampleKind {
 }
 
 impl AgainstRecorded {
-    /// For samples understood as `resolved`, but for their meaning.
+    /// Makes it for samples understood as `resolved`, but for their meaning.
     ///
     /// # Errors
     /// In words: settings that can not be.
@@ -183,7 +183,7 @@ impl AgainstRecorded {
         })
     }
 
-    /// It is one of so many comparisons at once: together they hold no more than a few would.
+    /// Bounds its room as one of so many comparisons at once: together they hold no more than a few would.
     pub(super) fn share_room(&mut self, comparisons: usize) {
         let most = MOST.min(ROOMY * MOST / comparisons.max(1));
         let tracks = self.tracks.iter_mut();
@@ -308,7 +308,7 @@ impl AgainstRecorded {
         }
     }
 
-    /// No more samples.
+    /// Ends it: no more samples.
     pub(super) fn finish(&mut self, exec: &impl Executor) {
         for (estimator, track) in self.estimators.iter_mut().zip(&mut self.tracks) {
             for sample in estimator.finish(exec) {
@@ -335,7 +335,7 @@ impl AgainstRecorded {
         self.reference.entries.len()
     }
 
-    /// What the recorded orientation itself is like; `None` when there is none at all.
+    /// Description of the recorded orientation itself; `None` when there is none at all.
     #[must_use]
     pub(super) fn recorded(&self) -> Option<Recorded> {
         let entries = &self.reference.entries;

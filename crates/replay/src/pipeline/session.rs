@@ -25,23 +25,23 @@ use strapd_recording::recording::channel_route::{Item, Noticed};
 /// One estimated topic of a run.
 #[derive(Debug)]
 pub(super) struct Topic {
-    /// Where its samples come from.
+    /// Name of its source.
     pub name: String,
-    /// Where its attitude goes.
+    /// Topic of its attitude.
     pub output_topic: String,
     /// Type and encoding.
     pub described: String,
-    /// How its samples are understood.
+    /// Meaning of its samples.
     pub resolved: Meaning,
-    /// What was decided before the first was integrated.
+    /// Decisions made before the first was integrated.
     pub prepared: Prepared,
-    /// What was noticed in its payloads.
+    /// Observations in its payloads.
     pub noticed: Arc<Noticed>,
     /// Things to know, beside those of `prepared`.
     pub warnings: Vec<Diagnostic>,
-    /// Its estimator.
+    /// Estimator.
     pub estimator: Estimator,
-    /// What came out of it.
+    /// Output of the estimator.
     pub output: Output,
     /// Samples without any rate amid others.
     pub zeros: LoneZeros,
@@ -51,9 +51,9 @@ pub(super) struct Topic {
     pub field: Option<FieldWatch>,
     /// The first payload that could not be decoded.
     pub first_undecodable: Option<(Nanos, Undecodable)>,
-    /// Its comparison with the recorded orientation.
+    /// Comparison with the recorded orientation.
     pub against: Option<AgainstRecorded>,
-    /// What is kept to be drawn, for a report.
+    /// Series kept to be drawn, for a report.
     pub history: Option<History>,
     /// The recorded orientation, for who is shown it beside the estimate.
     pub recorded: Option<RecordedTrack>,
@@ -63,7 +63,7 @@ pub(super) struct Topic {
 /// rest is longer.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct LoneZeros {
-    /// How many.
+    /// Number.
     pub count: u64,
     previous: Option<[f64; 3]>,
     last_is_lone: bool,
@@ -86,7 +86,7 @@ pub(super) struct Output {
     pub first: Option<AttitudeSample>,
     /// Last attitude.
     pub last: Option<AttitudeSample>,
-    /// How many.
+    /// Number.
     pub count: u64,
     /// Largest component of any rate, rad/s.
     pub largest_rate: f64,
@@ -215,18 +215,18 @@ impl Topic {
     }
 }
 
-/// What is known of a topic before its first sample.
+/// Facts about a topic before its first sample.
 #[derive(Clone, Debug)]
 pub struct Found {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Where its attitude goes.
+    /// Topic of its attitude.
     pub output_topic: String,
     /// Type and encoding.
     pub described: String,
-    /// How its samples are understood.
+    /// Meaning of its samples.
     pub resolved: Meaning,
-    /// What is noticed in its payloads.
+    /// Observations in its payloads.
     pub noticed: Arc<Noticed>,
     /// Things to know.
     pub warnings: Vec<Diagnostic>,
@@ -369,12 +369,12 @@ impl Session {
         self.outlet.flush_to_readers(pool)
     }
 
-    /// How long the input is, about.
+    /// Tells the approximate length of the input.
     pub(super) fn length(&self, secs: f64) {
         self.outlet.length(secs);
     }
 
-    /// Where the run is.
+    /// Position of the run.
     #[must_use]
     pub(super) fn position(&self, fraction: Option<f64>) -> Position {
         let mut position = Position {
@@ -394,7 +394,7 @@ impl Session {
         position
     }
 
-    /// No more items: writes the rest and completes the outputs.
+    /// Ends the run: writes the rest and completes the outputs.
     ///
     /// # Errors
     /// As [`Outlet::write`] and [`Outlet::finish`]; something was asked for that could not be done.
@@ -481,8 +481,8 @@ impl Session {
 /// A run that is over.
 #[derive(Debug)]
 pub(super) struct Ended {
-    /// Its topics.
+    /// Topics.
     pub topics: Vec<Topic>,
-    /// Its outputs by name.
+    /// Outputs by name.
     pub outputs: Vec<(String, Written)>,
 }

@@ -1,4 +1,4 @@
-//! What was found and decided -> a session with its outputs open. I/O.
+//! Findings and decisions -> a session with its outputs open. I/O.
 //!
 //! Apart from the sources because a file, a stream and lines all begin the same way.
 

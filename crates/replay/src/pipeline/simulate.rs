@@ -20,7 +20,7 @@ pub const TOPIC: &str = "/imu/data_raw";
 pub(super) const TRUTH_TOPIC: &str = "/truth";
 /// The topic of the magnetic field.
 pub(super) const FIELD_TOPIC: &str = "/imu/mag";
-/// What lines call the samples.
+/// Id of the samples in lines.
 const ID: &str = "imu";
 
 /// Instants made and written together, when nobody waits for them.
@@ -35,17 +35,17 @@ pub struct Simulation {
     pub name: String,
     /// The samples.
     pub source: Synthetic,
-    /// What they are.
+    /// Kind of the samples.
     pub kind: SampleKind,
-    /// Their rate, Hz.
+    /// Rate, Hz.
     pub rate_hz: f64,
-    /// Their frame.
+    /// Frame.
     pub frame_id: String,
-    /// To where.
+    /// Targets.
     pub targets: Vec<Target>,
-    /// How outputs are made.
+    /// Options by which outputs are made.
     pub options: Options,
-    /// Who serves it to whoever connects, where a target listens.
+    /// Audience that is served if a target listens.
     pub audience: Option<Arc<dyn Audience>>,
     /// `--speed`; `None` = as fast as possible.
     pub speed: Option<f64>,

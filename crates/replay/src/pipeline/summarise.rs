@@ -1,4 +1,4 @@
-//! What the stages counted -> the summary of the run. Pure.
+//! Counts of the stages -> the summary of the run. Pure.
 
 use super::delivery::broken;
 use super::each::Told;
@@ -176,7 +176,7 @@ pub(super) fn of_topic(run: &ReplayRequest, topic: &mut Topic) -> TopicSummary {
     summary
 }
 
-/// What is known of the sensor at the end.
+/// Calibration of the sensor at the end.
 fn calibrated(run: &ReplayRequest, topic: &Topic) -> SensorCalibration {
     let filter = topic.estimator.filter();
     let recording = topic.estimator.smoothed().and_then(Result::ok);
@@ -205,7 +205,7 @@ fn parts_named(paths: &[PathBuf]) -> String {
     )
 }
 
-/// What was kept to be drawn, with the errors against the reference.
+/// Series kept to be drawn, with the errors against the reference.
 fn drawn(topic: &mut Topic) -> Option<Box<Drawn>> {
     let mut drawn = topic.history.take()?.finish();
     if let Some(against) = &topic.against {
@@ -218,7 +218,7 @@ fn drawn(topic: &mut Topic) -> Option<Box<Drawn>> {
     Some(Box::new(drawn))
 }
 
-/// What is not known of the bias at the end, about the worst axis, rad/s: what was not known at the start,
+/// Uncertainty of the bias at the end, about the worst axis, rad/s: what was not known at the start,
 /// and what it has wandered since.
 fn drift(run: &ReplayRequest, topic: &Topic, secs: f64) -> f64 {
     topic
@@ -290,7 +290,8 @@ fn first_losses(topic: &Topic, start: Nanos) -> Vec<String> {
     said
 }
 
-/// Whether it was read from lines or rows: their undecodable payloads carry the line's number where others carry a time.
+/// Whether it was read from lines or rows: their undecodable payloads carry the line's number where others carry a
+/// time.
 fn is_text(described: &str) -> bool {
     [Format::Lines, Format::Table, Format::Parquet]
         .iter()

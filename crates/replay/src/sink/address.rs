@@ -23,7 +23,7 @@ pub enum Listen {
     Passed(Transport, String),
 }
 
-/// What is spoken on a socket.
+/// Transport of a socket.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Transport {
     /// Lines over TCP.
@@ -57,7 +57,7 @@ impl Transport {
     }
 }
 
-/// What `strapd serve` listens on when nothing is said.
+/// Addresses on which `strapd serve` listens by default.
 pub const DEFAULTS: [&str; 2] = ["tcp-listen://127.0.0.1:4550", "ws-listen://127.0.0.1:8765"];
 
 const KNOWN: &str = "known: tcp-listen://HOST:PORT, udp-listen://HOST:PORT, ws-listen://HOST:PORT (and HTTP), unix-listen:///PATH; port 0 takes a free one; fd:NAME for HOST:PORT is a socket of that name (or number) from the service manager";

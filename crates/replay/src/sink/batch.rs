@@ -11,7 +11,7 @@ pub(super) struct Batch {
     /// Stamp of the sample before.
     pub(super) previous: Option<Nanos>,
     pub(super) samples: Vec<AttitudeSample>,
-    /// In their place for a stream of what a gyro puts out.
+    /// Raw samples in their place, for a stream of what a gyro puts out.
     pub(super) raw: Vec<RawSample>,
 }
 

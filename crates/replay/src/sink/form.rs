@@ -12,7 +12,7 @@ use super::mcap::chunk::{Chunk, Compression};
 use super::parquet::Table;
 use super::tum;
 
-/// How a batch becomes bytes.
+/// Form in which a batch becomes bytes.
 #[derive(Debug)]
 pub(super) enum Form {
     Mcap {
@@ -20,7 +20,7 @@ pub(super) enum Form {
         compression: Compression,
     },
     Ndjson(Vec<Objects>),
-    /// With what is in the last column of every row.
+    /// CSV, with what is in the last column of every row.
     Csv(String),
     Tum,
     /// Rows are gathered, and so packed where batches are written in order.

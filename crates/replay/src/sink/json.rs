@@ -25,7 +25,7 @@ enum Object {
 }
 
 impl Objects {
-    /// Those of `stream` in the form that `profile` reads.
+    /// Makes those of `stream` in the form that `profile` reads.
     #[must_use]
     pub fn new(stream: &Stream, profile: Profile) -> Objects {
         Objects(match (profile, stream.content) {

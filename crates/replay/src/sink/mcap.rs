@@ -23,13 +23,13 @@ use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::record::Nanos;
 use strapd_attitude::setting::{COPY_INPUT, ENCODING};
 
-/// What messages are made of.
+/// Encoding of messages.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Encoding {
     /// ROS 2: `sensor_msgs/msg/Imu` and `tf2_msgs/msg/TFMessage` in CDR, profile `ros2`.
     #[default]
     Cdr,
-    /// For readers without ROS: the `ATT` object (schema `strapd.Attitude`) and
+    /// JSON for readers without ROS: the `ATT` object (schema `strapd.Attitude`) and
     /// `foxglove.FrameTransform`, both JSON with a jsonschema, no profile.
     Json,
 }
@@ -65,45 +65,45 @@ const TF_TOPIC: &str = "/tf";
 /// A channel of another file, for `--copy-input`.
 #[derive(Clone, Copy, Debug)]
 pub struct InputChannel<'a> {
-    /// Its topic.
+    /// Topic.
     pub topic: &'a str,
     /// Encoding of its messages.
     pub message_encoding: &'a str,
     /// Name, encoding and bytes of its schema, if it has one.
     pub schema: Option<(&'a str, &'a str, &'a [u8])>,
-    /// Its metadata.
+    /// Metadata.
     pub metadata: &'a BTreeMap<String, String>,
 }
 
 /// A message of another file, for `--copy-input`.
 #[derive(Clone, Copy, Debug)]
 pub struct InputMessage<'a> {
-    /// Its sequence number.
+    /// Sequence number.
     pub sequence: u32,
-    /// When it was recorded, ns.
+    /// Time at which it was recorded, ns.
     pub log_time: u64,
-    /// When it was published, ns.
+    /// Time at which it was published, ns.
     pub publish_time: u64,
-    /// Its payload.
+    /// Payload.
     pub data: &'a [u8],
 }
 
 /// A file carried inside another log, for a copy of it.
 #[derive(Clone, Copy, Debug)]
 pub struct Attachment<'a> {
-    /// When it was recorded, ns.
+    /// Time at which it was recorded, ns.
     pub log_time: u64,
-    /// When it was made, ns.
+    /// Time at which it was made, ns.
     pub create_time: u64,
-    /// Its name.
+    /// Name.
     pub name: &'a str,
-    /// Its media type.
+    /// Media type.
     pub media_type: &'a str,
-    /// Its bytes.
+    /// Bytes.
     pub data: &'a [u8],
 }
 
-/// How each stream's samples become messages.
+/// Layout of each stream's messages.
 #[derive(Debug, Default)]
 pub(super) struct Layout {
     streams: Vec<Messages>,

@@ -15,7 +15,7 @@ use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use strapd_attitude::diagnostic::Diagnostic;
 
-/// What standard output is called in messages.
+/// Name of standard output in messages.
 pub(super) const STDOUT_NAME: &str = "standard output";
 
 /// Whether whoever reads the output still wants more.
@@ -35,7 +35,7 @@ pub(super) enum Output {
     Part(PartFile),
     /// Something that is not a regular file (a named pipe, a device): written in place.
     Direct {
-        /// Under which name.
+        /// Path under which it is written.
         path: PathBuf,
         /// Open for writing.
         file: File,
@@ -209,7 +209,7 @@ impl Output {
 pub(super) struct PartFile {
     file: File,
     part: PathBuf,
-    /// Where it will lie, links resolved.
+    /// Path at which it will lie, links resolved.
     place: PathBuf,
     /// The name the user gave, for messages.
     shown: PathBuf,

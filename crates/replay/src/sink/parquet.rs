@@ -1,7 +1,7 @@
 //! AttitudeSample (and, from a synthetic gyro, RawSample) -> a table in Parquet. Pure.
 //!
-//! A stage of its own because columns can not be written sample by sample: a row group is gathered, and packed column by
-//! column when it is full. What is read back is the numbers' own bits, unless single precision was asked for.
+//! A stage of its own because columns can not be written sample by sample: a row group is gathered, and packed column
+//! by column when it is full. What is read back is the numbers' own bits, unless single precision was asked for.
 //!
 //! The names of the columns are those that tables are read by.
 
@@ -27,7 +27,7 @@ const GROUP_ROWS: usize = 1 << 18;
 /// A stamp that can be a date: 2000-01-01 or later.
 const Y2000_NANOS: i64 = 946_684_800 * 1_000_000_000;
 
-/// What the rows are.
+/// Kind of the rows.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Rows {
     Attitudes,
@@ -43,7 +43,7 @@ pub(super) struct Table {
     about: Vec<KeyValue>,
     /// Rows that wait.
     waiting: usize,
-    /// From the first row on: what its stamp is decides the type of the column.
+    /// Writer from the first row on: what its stamp is decides the type of the column.
     writer: Option<SerializedFileWriter<Vec<u8>>>,
 }
 
@@ -240,7 +240,7 @@ fn sample_columns(precision: Precision) -> Vec<Column> {
     columns
 }
 
-/// What a reader must be able to find out later.
+/// Metadata that a reader must be able to find later.
 fn about(rows: Rows, streams: &[Stream], provenance: &Provenance) -> Vec<KeyValue> {
     let units = match rows {
         Rows::Attitudes => {

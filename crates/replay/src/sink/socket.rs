@@ -9,11 +9,11 @@ use std::net::{Shutdown, SocketAddr, TcpStream, ToSocketAddrs, UdpSocket};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
-/// How long a connection may take to come about.
+/// Time that a connection may take to come about.
 const CONNECT: Duration = Duration::from_secs(10);
 /// A reader that takes nothing for so long will never take anything.
 const STALLED: Duration = Duration::from_secs(30);
-/// How long the other side may take to read the rest and close.
+/// Time that the other side may take to read the rest and close.
 const CLOSE: Duration = Duration::from_secs(2);
 /// Longest answer that is looked at.
 const MAX_ANSWER: u64 = 64 << 10;

@@ -1,4 +1,4 @@
-//! What an output stream is called: topics, frames, labels. Pure.
+//! Names of an output stream: topics, frames, labels. Pure.
 
 use std::collections::{BTreeMap, BTreeSet};
 use strapd_attitude::record::SampleKind;
@@ -10,14 +10,14 @@ const MAX_NAME_BYTES: usize = 255;
 /// The frame a nameless sensor gets: tf2 refuses an empty child.
 const NAMELESS_FRAME: &str = "body";
 
-/// What the samples of a stream are, and so which messages they become.
+/// Content of a stream's samples, and so the messages they become.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Content {
     /// Estimated attitude ([`Sink::write`](super::Sink::write)): `sensor_msgs/msg/Imu` and `/tf`;
     /// `ATT` objects; rows.
     #[default]
     Attitude,
-    /// What a gyro puts out ([`Sink::write_raw`](super::Sink::write_raw)): `sensor_msgs/msg/Imu`
+    /// Samples of a gyro ([`Sink::write_raw`](super::Sink::write_raw)): `sensor_msgs/msg/Imu`
     /// whose orientation is marked absent; `RATE` objects; rows in which a recorded orientation
     /// stands beside the sample.
     Samples(SampleKind),
@@ -30,21 +30,21 @@ pub enum Content {
 /// One estimated topic and what its output is called.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Stream {
-    /// What its samples are.
+    /// Content of its samples.
     pub content: Content,
     /// `id` of the `ATT` object: the input topic, unless something shorter is unambiguous.
     pub id: String,
-    /// Where the samples came from.
+    /// Topic from which the samples came.
     pub input_topic: String,
-    /// Where the attitude goes ([`output_topic`]).
+    /// Topic of the attitude ([`output_topic`]).
     pub output_topic: String,
-    /// Where the magnetic field goes that samples carry; `None`: no channel is declared for it.
+    /// Topic of the magnetic field that samples carry; `None`: no channel is declared for it.
     pub field_topic: Option<String>,
     /// The frame whose attitude this is: `header.frame_id` of the Imu, child of the transform.
     pub frame_id: String,
     /// The frame it is given in: parent of the transform.
     pub world_frame: String,
-    /// What the quaternion does: `sensor_to_world`, or `body_to_world` when a mounting was applied.
+    /// Action of the quaternion: `sensor_to_world`, or `body_to_world` when a mounting was applied.
     pub rotates: String,
     /// Axes of the world: `start`, `enu`, `ned`, `nwu`.
     pub world_axes: String,
@@ -87,7 +87,7 @@ impl Stream {
     }
 }
 
-/// What is known about the run and goes into the file: version, command line, method, frames,
+/// Facts about the run that go into the file: version, command line, method, frames,
 /// initial attitude, input hash.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Provenance {
@@ -115,13 +115,13 @@ pub fn output_topic(input: &str, taken: &BTreeSet<String>) -> String {
         .unwrap_or(attitude)
 }
 
-/// The child frames of transforms: unique under their parent, not empty, without leading slash and not the world itself, all
-/// of which tf2 refuses or confuses. The first free of `NAME`, `NAME_2`, `NAME_3`, ...
+/// The child frames of transforms: unique under their parent, not empty, without leading slash and not the world
+/// itself, all of which tf2 refuses or confuses. The first free of `NAME`, `NAME_2`, `NAME_3`, ...
 #[derive(Clone, Debug, Default)]
 pub struct ChildFrames {
     /// Parent and child.
     used: BTreeSet<(String, String)>,
-    /// By parent and name: no number below this is free.
+    /// Next numbers by parent and name: no number below this is free.
     next: BTreeMap<(String, String), u64>,
 }
 
@@ -187,7 +187,7 @@ pub(super) fn parent_frame(stream: &Stream) -> String {
     }
 }
 
-/// At most [`MAX_NAME_BYTES`] bytes on a character boundary, and no NUL: CDR strings end at one.
+/// Shortens to at most [`MAX_NAME_BYTES`] bytes on a character boundary, and no NUL: CDR strings end at one.
 fn bounded(name: &str) -> String {
     let mut out = String::new();
     for c in name.chars().filter(|c| *c != '\0') {

@@ -9,7 +9,7 @@ use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::setting::{LISTEN, TOKEN_FILE};
 use strapd_recording::elsewhere::SCHEMES;
 
-/// What a file or pipe is filled with.
+/// Format of a file or pipe.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Format {
     /// An indexed MCAP file.
@@ -25,7 +25,7 @@ pub enum Format {
     Parquet,
 }
 
-/// How exactly the numbers of a table in Parquet are kept.
+/// Precision of the numbers of a table in Parquet.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Precision {
     /// Every bit.
@@ -35,21 +35,21 @@ pub enum Precision {
     Single,
 }
 
-/// Where the output goes.
+/// Target of the output.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Target {
     /// A file; the format follows its extension.
     File {
-        /// Which file.
+        /// Path of the file.
         path: PathBuf,
-        /// What it is filled with.
+        /// Format of its contents.
         format: Format,
     },
     /// An object in a store; the format follows its extension.
     Store {
-        /// Where.
+        /// Address.
         address: Address,
-        /// What it is filled with.
+        /// Format of its contents.
         format: Format,
     },
     /// NDJSON on standard output. The reader hanging up ends it quietly.
@@ -62,9 +62,9 @@ pub enum Target {
     Tcp(String),
     /// One object a datagram to `HOST:PORT`, whether or not somebody listens.
     Udp {
-        /// To where.
+        /// HOST:PORT of the receiver.
         address: String,
-        /// What the objects look like.
+        /// Form of the objects.
         profile: Profile,
     },
 }
@@ -72,13 +72,13 @@ pub enum Target {
 /// The list every message about an unknown sink ends with.
 const KNOWN: &str = "known sinks: FILE.mcap, FILE.ndjson (or .jsonl), FILE.csv, FILE.tum (for evo), FILE.parquet (with the feature parquet), s3://BUCKET/KEY, gs://BUCKET/KEY, az://CONTAINER/KEY with such an ending (with the feature object-store), - (NDJSON on standard output), null: (discard), tcp-listen://HOST:PORT, unix-listen:///PATH, ws-listen://HOST:PORT (whoever connects), tcp://HOST:PORT, udp://HOST:PORT[?profile=plotjuggler] (somebody who listens)";
 
-/// What the objects sent to somebody look like.
+/// Form of the objects sent to somebody.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Profile {
     /// The lines of NDJSON.
     #[default]
     Lines,
-    /// What PlotJuggler's UDP server reads with its JSON protocol.
+    /// Form that PlotJuggler's UDP server reads with its JSON protocol.
     PlotJuggler,
 }
 
@@ -182,7 +182,7 @@ impl Target {
         }
     }
 
-    /// Where it listens, if it does.
+    /// Address on which it listens, if it does.
     #[must_use]
     pub fn listens(&self) -> Option<&Listen> {
         match self {
@@ -245,7 +245,7 @@ impl Target {
         })
     }
 
-    /// What it is filled with; `None` for [`Target::Null`] and for what listens: that is not a
+    /// Format of its contents; `None` for [`Target::Null`] and for what listens: that is not a
     /// [`Sink`](super::Sink).
     #[must_use]
     pub fn format(&self) -> Option<Format> {

@@ -1,8 +1,9 @@
 //! Finished bytes -> an object in a store, whole or not at all. I/O, by whoever knows the way.
 //!
-//! Apart from the other outputs because a store takes an object as a whole: what is written goes into a file without a name, and
-//! is brought there when it is complete. A run that ends before leaves nothing in the store. This crate knows no way itself; a
-//! program that does says so once ([`upload_by`]).
+//! Apart from the other outputs because a store takes an object as a whole: what is written goes into a file without
+//! a name, and
+//! is brought there when it is complete. A run that ends before leaves nothing in the store. This crate knows no way
+//! itself; a program that does says so once ([`upload_by`]).
 
 use crate::address::Address;
 use crate::error::{Error, Result};
@@ -12,11 +13,11 @@ use std::path::PathBuf;
 use std::sync::OnceLock;
 use strapd_attitude::diagnostic::Diagnostic;
 
-/// What begins an address that is written to.
+/// Schemes of addresses that are written to.
 pub(super) const SCHEMES: [&str; 3] = ["s3", "gs", "az"];
 
-/// How objects are put into stores. What it fails with does not begin with the address, and holds no part of it that is not
-/// printed.
+/// Way by which objects are put into stores. What it fails with does not begin with the address, and holds no part of
+/// it that is not printed.
 #[derive(Clone, Copy, Debug)]
 pub struct Way {
     /// Whether an object is there already, or none can be written.
@@ -45,7 +46,7 @@ pub(super) fn is_possible() -> bool {
 pub(super) struct Upload {
     file: File,
     address: Address,
-    /// For messages.
+    /// Name in messages.
     pub(super) shown: PathBuf,
     force: bool,
 }

@@ -1,4 +1,4 @@
-//! What a recorded orientation says of sigma and of the gyro's bias -> words, JSON. Pure.
+//! Comparison of a recorded orientation with sigma and with the gyro's bias -> words, JSON. Pure.
 //!
 //! Apart from the summary because `compare`, `check` and the page say the same.
 
@@ -17,7 +17,7 @@ fn deg(radians: f64) -> String {
     significant(radians.to_degrees(), 2)
 }
 
-/// Which share lies within three sigma, in one line.
+/// Share that lies within three sigma, in one line.
 #[must_use]
 pub fn within_sigma(found: &Consistency) -> String {
     let part = |name: &str, part: &WithinSigma| {
@@ -64,7 +64,7 @@ pub fn beyond_sigma(found: &Consistency) -> Option<String> {
     })
 }
 
-/// What the bias does, in words: "the gyro" (`who`) leaves "the recorded orientation" (`whom`).
+/// Text of the bias: "the gyro" (`who`) leaves "the recorded orientation" (`whom`).
 #[must_use]
 pub fn bias_words(fit: &BiasFit, who: &str, whom: &str) -> String {
     let per_hour = |v: f64| significant(v.to_degrees() * 3600.0, 3);
@@ -77,7 +77,7 @@ pub fn bias_words(fit: &BiasFit, who: &str, whom: &str) -> String {
     )
 }
 
-/// What removes it, beside what was removed already.
+/// Setting that removes it, beside what was removed already.
 #[must_use]
 pub fn removing(fit: &BiasFit, removed: [f64; 3]) -> Choice {
     let all = nalgebra::Vector3::from(removed) + fit.bias;
@@ -86,7 +86,7 @@ pub fn removing(fit: &BiasFit, removed: [f64; 3]) -> Choice {
     BIAS.to(format!("{x:.6},{y:.6},{z:.6}"))
 }
 
-/// For machines.
+/// JSON for machines.
 #[must_use]
 pub fn consistency_json(found: &Consistency) -> Value {
     let part = |part: &WithinSigma| {
@@ -108,7 +108,7 @@ pub fn consistency_json(found: &Consistency) -> Value {
     })
 }
 
-/// For machines.
+/// JSON for machines.
 #[must_use]
 pub fn bias_json(fit: &BiasFit) -> Value {
     let vector = |v: &nalgebra::Vector3<f64>| json!({ "x": v.x, "y": v.y, "z": v.z });
@@ -124,7 +124,7 @@ pub fn bias_json(fit: &BiasFit) -> Value {
 }
 
 impl Recorded {
-    /// For machines.
+    /// JSON for machines.
     #[must_use]
     pub fn json(&self) -> Value {
         json!({

@@ -1,4 +1,4 @@
-//! What corrected the attitude and what it learned -> words, JSON. Pure.
+//! Account of what corrected the attitude and what it learned -> words, JSON. Pure.
 
 use super::significant;
 use crate::finding::{Finding, Severity};
@@ -34,7 +34,7 @@ pub(crate) struct Frozen {
 const PPM: f64 = 1e6;
 
 impl Aided {
-    /// As `filter` is now.
+    /// Makes it of `filter` as it is now.
     #[must_use]
     pub fn of(filter: &Filter) -> Aided {
         Aided {
@@ -49,7 +49,7 @@ impl Aided {
         }
     }
 
-    /// For people: what it did, then what it learned.
+    /// Lines for people: what it did, then what it learned.
     #[must_use]
     pub fn lines(&self) -> Vec<String> {
         if !self.started {
@@ -142,7 +142,7 @@ impl Aided {
         self.calibration.bias
     }
 
-    /// What was learned, a row each: what and in which unit, about x, y, z, and one sigma of each; `None` where no
+    /// Rows of what was learned: what and in which unit, about x, y, z, and one sigma of each; `None` where no
     /// force came.
     #[must_use]
     pub fn learned(&self) -> Option<Vec<Vec<String>>> {
@@ -223,7 +223,7 @@ impl Aided {
         })
     }
 
-    /// What the sigma of the attitude is of.
+    /// Text of what the sigma of the attitude is of.
     #[must_use]
     pub fn sigma_text(&self) -> &'static str {
         if self.has_field {
@@ -233,7 +233,7 @@ impl Aided {
         }
     }
 
-    /// For machines.
+    /// JSON for machines.
     #[must_use]
     pub fn json(&self) -> Value {
         let list = |v: &Vector3<f64>| json!([v.x, v.y, v.z]);

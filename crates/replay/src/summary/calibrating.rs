@@ -1,4 +1,4 @@
-//! What recordings have told of a sensor -> words, JSON, and the motions that are missing. Pure.
+//! Facts that recordings have told of a sensor -> words, JSON, and the motions that are missing. Pure.
 
 use super::calibration;
 use super::{TopicSummary, significant};
@@ -16,14 +16,14 @@ pub struct Recorded {
     secs: f64,
     /// Why the smoother made nothing of it: what is known of the sensor is the real-time filter's then.
     not_smoothed: Option<String>,
-    /// What is to be said aloud of it.
+    /// Doubts about it.
     doubts: Vec<String>,
-    /// Which numbers it told.
+    /// Names of the numbers that were estimated.
     told: Vec<String>,
 }
 
 impl Recorded {
-    /// Of a run that began with nothing known.
+    /// Makes it of a run that began with nothing known.
     #[must_use]
     pub fn of(log: &str, topic: &TopicSummary) -> Recorded {
         let smoothing = topic.smoothing();
@@ -42,7 +42,7 @@ impl Recorded {
     }
 }
 
-/// What `calibrate` has made.
+/// Result of `calibrate`.
 #[derive(Clone, Debug)]
 pub struct Calibrating {
     /// The recordings, in order.
@@ -51,15 +51,15 @@ pub struct Calibrating {
     pub pooled: Pooled,
     /// Whether a magnetometer was asked for.
     pub has_magnetometer: bool,
-    /// Where it was written.
+    /// Path at which it was written.
     pub file: Option<String>,
 }
 
-/// From here on recordings do not describe the same sensor within what they claim to know.
+/// Limit above which recordings do not describe the same sensor within what they claim to know.
 const DISAGREEING: f64 = 2.0;
 
 impl Calibrating {
-    /// For people.
+    /// Text for people.
     #[must_use]
     pub fn text(&self) -> String {
         let mut out = String::new();
@@ -130,7 +130,7 @@ impl Calibrating {
         out
     }
 
-    /// What would show what is not known yet.
+    /// Motions that would show what is not known yet.
     #[must_use]
     pub fn missing(&self) -> Vec<String> {
         fn unknown<const N: usize>(known: &Option<Known<N>>) -> Vec<usize> {
@@ -186,7 +186,7 @@ impl Calibrating {
         missing
     }
 
-    /// For machines.
+    /// JSON for machines.
     #[must_use]
     pub fn json(&self) -> Value {
         let recorded: Vec<Value> = self
@@ -233,7 +233,7 @@ struct Row {
 }
 
 impl Row {
-    /// What of it data have not told.
+    /// Name of the part that data have not told.
     fn part(&self) -> &'static str {
         match self.observed.iter().filter(|o| **o).count() {
             0 => ", not observed",

@@ -1,4 +1,4 @@
-//! What is known of a sensor at the end of a run -> its calibration as it is saved, and words. Pure.
+//! Facts about a sensor at the end of a run -> its calibration as it is saved, and words. Pure.
 
 use super::calendar::date;
 use strapd_attitude::estimate::{Known, SensorCalibration};
@@ -7,7 +7,7 @@ use strapd_attitude::record::AttitudeSample;
 /// Recordings that are named.
 const MOST_SOURCES: usize = 16;
 
-/// With whose it is, from where, and when: by the clock of the samples, where that knows the day.
+/// Adds whose it is, from where, and when: by the clock of the samples, where that knows the day.
 #[must_use]
 pub fn described(
     known: SensorCalibration,
@@ -41,7 +41,7 @@ pub fn latest(sources: Vec<String>) -> Vec<String> {
     kept
 }
 
-/// Which of its numbers data have told.
+/// Text of the numbers that data have told.
 #[must_use]
 pub fn observed(known: &SensorCalibration) -> String {
     match names(known).as_slice() {

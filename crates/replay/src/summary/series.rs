@@ -1,4 +1,4 @@
-//! What is drawn of a run: series over time, marks, errors against a reference. Pure.
+//! Series of a run to draw: curves over time, marks, errors against a reference. Pure.
 //!
 //! Filled by the pipeline while it runs, drawn by the page; bounded whatever the length of the run.
 
@@ -6,7 +6,7 @@ use super::trace::Traces;
 use strapd_attitude::compare::{Comparison, Consistency};
 use strapd_attitude::record::Nanos;
 
-/// What is drawn of one topic.
+/// Series of one topic to draw.
 #[derive(Clone, Debug)]
 pub struct Drawn {
     /// Stretches each series was given.
@@ -20,7 +20,7 @@ pub struct Drawn {
     pub marks: Vec<Traces<1>>,
     /// Stamps to the axis of time.
     pub elapsed: Elapsed,
-    /// Against the reference; `None` where none was sought.
+    /// Errors against the reference; `None` if none was sought.
     pub errors: Option<Errors>,
 }
 
@@ -55,7 +55,7 @@ impl Mark {
         Mark::Moved,
     ];
 
-    /// For machines.
+    /// Name for machines.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -69,7 +69,7 @@ impl Mark {
         }
     }
 
-    /// In words.
+    /// Name in words.
     #[must_use]
     pub fn words(self) -> &'static str {
         match self {
@@ -91,9 +91,10 @@ pub struct Errors {
     pub stride: u64,
     /// Reference attitudes that could be used.
     pub usable: usize,
-    /// Those that are no rotation.
+    /// Number of those that are no rotation.
     pub unusable: u64,
-    /// Whether the run's own sigma holds, with tilt, three sigma of it, heading (signed), three sigma of it over time, deg.
+    /// Whether the run's own sigma holds, with tilt, three sigma of it, heading (signed), three sigma of it over
+    /// time, deg.
     pub bounds: Option<(Consistency, Traces<4>)>,
     /// One per meaning of a sample that found a reference.
     pub traces: Vec<ErrorTrace>,
@@ -102,9 +103,9 @@ pub struct Errors {
 /// Errors over time for one meaning of a sample.
 #[derive(Clone, Debug)]
 pub struct ErrorTrace {
-    /// Its name.
+    /// Name.
     pub kind: &'static str,
-    /// In words.
+    /// Meaning in words.
     pub meaning: &'static str,
     /// Whether it is the one the run took.
     pub is_used: bool,
@@ -127,7 +128,7 @@ pub struct Elapsed {
     first: Option<Nanos>,
     last: Option<Nanos>,
     x: i64,
-    /// How often it was cut.
+    /// Number of times it was cut.
     pub cuts: u64,
     /// The first cuts: where on the axis, and by how many ns the clock jumped.
     pub kept: Vec<(i64, i64)>,
@@ -157,7 +158,7 @@ impl Elapsed {
         self.x
     }
 
-    /// Where a stamp lies, as far as that is certain: on the last piece that begins before it.
+    /// Place of a stamp, as far as that is certain: on the last piece that begins before it.
     #[must_use]
     pub fn at(&self, stamp: Nanos) -> i64 {
         let begun = |(from, _): &&(Nanos, i64)| *from <= stamp;
@@ -167,7 +168,7 @@ impl Elapsed {
         }
     }
 
-    /// How far the axis reaches, ns.
+    /// End of the axis, ns.
     #[must_use]
     pub fn x(&self) -> i64 {
         self.x

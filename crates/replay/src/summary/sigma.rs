@@ -1,4 +1,4 @@
-//! What a run's sigma is made of -> words, JSON. Pure.
+//! Terms of a run's sigma -> words, JSON. Pure.
 //!
 //! Apart from the summary because a sigma is worth what is in it: each term by its name, with its size, and the flag
 //! that says another.
@@ -13,17 +13,17 @@ use strapd_attitude::setting::{BIAS, CALIBRATION, INIT, NOISE};
 /// One thing that is not known.
 #[derive(Clone, PartialEq, Debug)]
 struct Term {
-    /// For machines, stable.
+    /// Stable name for machines.
     name: &'static str,
     words: &'static str,
     /// About the body's axes; the same thrice where it is one.
     value: [f64; 3],
     unit: &'static str,
-    /// Said behind it.
+    /// Note that follows it.
     note: String,
 }
 
-/// What sigma holds.
+/// Terms that sigma holds.
 #[derive(Clone, PartialEq, Debug)]
 pub struct SigmaTerms {
     is_filtered: bool,
@@ -37,7 +37,7 @@ fn per_hour(v: f64) -> f64 {
 }
 
 impl SigmaTerms {
-    /// Of a run as planned and prepared; `bridged` gaps were integrated across.
+    /// Makes them of a run as planned and prepared; `bridged` gaps were integrated across.
     #[must_use]
     pub fn of(plan: &Plan, prepared: &Prepared, bridged: u64) -> SigmaTerms {
         let noise = &plan.noise;
@@ -59,7 +59,7 @@ impl SigmaTerms {
         }
     }
 
-    /// In one line: what is in it, and the flag for another class.
+    /// Text in one line: what is in it, and the flag for another class.
     #[must_use]
     pub fn text(&self) -> String {
         let said = self.terms.iter().filter(|t| t.value != [0.0; 3]);
@@ -75,7 +75,7 @@ impl SigmaTerms {
         format!("of ({by}, {NOISE}): {}", said.join(", "))
     }
 
-    /// For machines: every term by its name, those that are nothing with 0.
+    /// JSON for machines: every term by its name, those that are nothing with 0.
     #[must_use]
     pub fn json(&self) -> Value {
         json!({
@@ -88,7 +88,7 @@ impl SigmaTerms {
     }
 }
 
-/// Of the gyro alone.
+/// Terms of the gyro alone.
 fn alone(plan: &Plan, bias_sigma: [f64; 3], tilt_sigma: f64) -> Vec<Term> {
     let known = plan.calibration.as_deref();
     let noise = &known.map_or_else(|| plan.noise.clone(), |known| known.narrowed(&plan.noise));
@@ -167,7 +167,7 @@ fn alone(plan: &Plan, bias_sigma: [f64; 3], tilt_sigma: f64) -> Vec<Term> {
     ]
 }
 
-/// Of the filter: what it began with, and learned since.
+/// Terms of the filter: what it began with, and learned since.
 fn filtered(settings: &Settings) -> Vec<Term> {
     let one = |name, words, value: f64, unit, note: &str| Term {
         name,

@@ -7,14 +7,14 @@ use strapd_attitude::record::SampleKind;
 use strapd_attitude::setting::{NOISE, RATE_HZ, START_STAMP};
 use strapd_bodies::synthetic::Noticed;
 
-/// What a simulation did.
+/// Summary of a simulation.
 #[derive(Clone, Debug)]
 pub struct SimulationSummary {
     /// The motion.
     pub name: String,
     /// Counts.
     pub noticed: Noticed,
-    /// What a sample is.
+    /// Kind of a sample.
     pub kind: SampleKind,
     /// Samples a second.
     pub rate_hz: f64,
@@ -35,7 +35,7 @@ pub struct SimulationSummary {
 }
 
 impl SimulationSummary {
-    /// What the user should know, each with the flag that helps.
+    /// Warnings for the user, each with the flag that helps.
     #[must_use]
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = self.notes.clone();
@@ -73,7 +73,7 @@ impl SimulationSummary {
         self.noticed.samples as f64 / self.elapsed_secs.max(1e-9)
     }
 
-    /// For people.
+    /// Text for people.
     #[must_use]
     pub fn text(&self) -> String {
         let mut out = format!("simulated {}\n", self.name);
@@ -116,7 +116,7 @@ impl SimulationSummary {
         out
     }
 
-    /// For machines.
+    /// JSON for machines.
     #[must_use]
     pub fn json(&self) -> Value {
         let n = self.noticed;

@@ -1,4 +1,4 @@
-//! What a smoother learned of a recording -> words, rows, JSON. Pure.
+//! Account of what a smoother learned of a recording -> words, rows, JSON. Pure.
 
 use super::significant;
 use crate::finding::{Finding, Severity};
@@ -13,7 +13,7 @@ pub struct Smoothing {
     outcome: Outcome,
     counts: Counts,
     calibration: Calibration,
-    /// Of the gyro, in the middle of the recording: bias and one sigma, deg/s.
+    /// Gyro, in the middle of the recording: bias and one sigma, deg/s.
     bias: ([f64; 3], [f64; 3]),
     /// The same at its end.
     last_bias: ([f64; 3], [f64; 3]),
@@ -83,7 +83,7 @@ impl Spread {
 const FEWEST: usize = 4;
 
 impl Smoothing {
-    /// As it is at the end of a run.
+    /// Makes it as it is at the end of a run.
     #[must_use]
     pub fn of(recording: &Recording) -> Smoothing {
         let smoothed = &recording.smoothed;
@@ -119,13 +119,13 @@ impl Smoothing {
         }
     }
 
-    /// How large forces at rest and fields were, over time.
+    /// Sizes of forces at rest and of fields, over time.
     #[must_use]
     pub fn sizes(&self) -> &[Sizes] {
         &self.sizes
     }
 
-    /// Of the force at rest, m/s^2, and of the field, uT.
+    /// Spreads of the force at rest, m/s^2, and of the field, uT.
     fn spreads(&self) -> [Option<Spread>; 2] {
         [
             Spread::of(self.sizes.iter().filter_map(|sizes| sizes.force)),
@@ -133,7 +133,7 @@ impl Smoothing {
         ]
     }
 
-    /// What integrated, and what it took a sample for where nobody said that.
+    /// Text of what integrated, and for what it took a sample if nobody stated that.
     #[must_use]
     pub fn method(&self) -> String {
         match self.is_taken_as_mean {
@@ -144,7 +144,7 @@ impl Smoothing {
         }
     }
 
-    /// For people: what was done, then what was learned.
+    /// Lines for people: what was done, then what was learned.
     #[must_use]
     pub fn lines(&self) -> Vec<String> {
         let counts = &self.counts;
@@ -218,7 +218,7 @@ impl Smoothing {
         lines
     }
 
-    /// What the recording told nothing of.
+    /// Text of what the recording told nothing of.
     fn unobserved(&self) -> String {
         let c = &self.calibration;
         let m = c.magnetometer.as_ref();
@@ -239,7 +239,7 @@ impl Smoothing {
         }
     }
 
-    /// What the sigma of the attitude is of.
+    /// Text of what the sigma of the attitude is of.
     #[must_use]
     pub fn sigma_text(&self) -> &'static str {
         if self.has_north {
@@ -249,7 +249,7 @@ impl Smoothing {
         }
     }
 
-    /// What was learned, a row each, under [`Smoothing::HEAD`].
+    /// Rows of what was learned, under [`Smoothing::HEAD`].
     #[must_use]
     pub fn learned(&self) -> Vec<Vec<String>> {
         let c = &self.calibration;
@@ -284,8 +284,8 @@ impl Smoothing {
         rows
     }
 
-    /// What the columns of [`Smoothing::learned`] are: numbers, one sigma of each, one sigma beforehand, and whether the
-    /// recording showed them.
+    /// Heads of the columns of [`Smoothing::learned`]: numbers, one sigma of each, one sigma beforehand, and whether
+    /// the recording showed them.
     pub const HEAD: [&str; 9] = [
         "",
         "x",
@@ -298,7 +298,7 @@ impl Smoothing {
         "observed",
     ];
 
-    /// What is to be said aloud, each with the flag that helps; `noise` is the class the sensor was taken for.
+    /// Findings, each with the flag that helps; `noise` is the class the sensor was taken for.
     #[must_use]
     pub fn doubts(&self, noise: &str) -> Vec<Finding> {
         let mut found = Vec::new();
@@ -325,7 +325,7 @@ impl Smoothing {
         found
     }
 
-    /// For machines.
+    /// JSON for machines.
     #[must_use]
     pub fn json(&self) -> Value {
         fn numbers<const N: usize>(learned: &Learned<N>) -> Value {

@@ -1,4 +1,4 @@
-//! What `--regularise-stamps` did -> text or JSON. Pure.
+//! Account of what `--regularise-stamps` did -> text or JSON. Pure.
 
 use super::significant;
 use serde_json::{Value, json};
@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 /// Segments written out for people.
 const SAID: usize = 5;
 
-/// What became of the stamps.
+/// Outcome of the stamps.
 #[derive(Clone, Debug, Default)]
 pub struct Regularised {
     /// Whether each stamp was filtered by those before it alone (a stream), and not by all (a file).
@@ -32,7 +32,7 @@ pub struct Regularised {
 /// A stretch of constant rate.
 #[derive(Clone, Copy, Debug)]
 pub struct Segment {
-    /// Its first stamp, seconds after the first of all.
+    /// First stamp, seconds after the first of all.
     pub from_secs: f64,
     /// Samples in it.
     pub samples: u64,
@@ -41,7 +41,7 @@ pub struct Segment {
 }
 
 impl Regularised {
-    /// For people.
+    /// Text for people.
     #[must_use]
     pub fn text(&self) -> String {
         let how = if self.causal {
@@ -78,7 +78,7 @@ impl Regularised {
         text
     }
 
-    /// For machines.
+    /// JSON for machines.
     #[must_use]
     pub fn json(&self) -> Value {
         json!({

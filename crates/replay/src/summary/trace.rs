@@ -34,7 +34,7 @@ impl Extremes {
         self.last = later.last;
     }
 
-    /// In order of time, each once.
+    /// Points in order of time, each once.
     fn points(&self) -> impl Iterator<Item = (i64, f64)> {
         let mut all = [self.first, self.min, self.max, self.last];
         all.sort_by_key(|(at, _)| *at);
@@ -78,7 +78,7 @@ pub struct Traces<const N: usize> {
 }
 
 impl<const N: usize> Traces<N> {
-    /// At most `most` stretches (at least 2), as short as they can be.
+    /// Makes them for at most `most` stretches (at least 2), as short as they can be.
     #[must_use]
     pub fn new(most: usize) -> Traces<N> {
         Traces {
@@ -110,7 +110,7 @@ impl<const N: usize> Traces<N> {
         }
     }
 
-    /// What comes next is not joined to what came before.
+    /// Interrupts: what comes next is not joined to what came before.
     pub fn interrupt(&mut self) {
         self.interrupted = true;
     }

@@ -1,5 +1,5 @@
-//! Samples -> `sensor_msgs/msg/Imu`, `sensor_msgs/msg/MagneticField`, `tf2_msgs/msg/TFMessage`, `geometry_msgs/msg/QuaternionStamped` and
-//! `geometry_msgs/msg/Vector3Stamped` message records in CDR. Pure.
+//! Samples -> `sensor_msgs/msg/Imu`, `sensor_msgs/msg/MagneticField`, `tf2_msgs/msg/TFMessage`,
+//! `geometry_msgs/msg/QuaternionStamped` and `geometry_msgs/msg/Vector3Stamped` message records in CDR. Pure.
 //!
 //! Within a stream only numbers change from message to message, always at the same places. So each
 //! stream lays its record out once and then copies and patches it: about 30 ns a message.
@@ -7,13 +7,13 @@
 use super::record::{MESSAGE_HEAD, message_head};
 use strapd_attitude::record::{AttitudeSample, Nanos, RawSample};
 
-/// Where the numbers of a message record begin, and the record with zeros in their places.
+/// Template: where the numbers of a message record begin, and the record with zeros in their places.
 #[derive(Debug)]
 struct Template {
     record: Vec<u8>,
-    /// Of the stamp.
+    /// Offset of the stamp.
     stamp: usize,
-    /// Of the first f64.
+    /// Offset of the first f64.
     numbers: usize,
 }
 

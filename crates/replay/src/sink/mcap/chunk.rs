@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::io::{self, Write};
 use strapd_attitude::diagnostic::Diagnostic;
 
-/// How chunks are packed.
+/// Compression of chunks.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Compression {
     /// Not at all.
@@ -55,7 +55,7 @@ impl std::str::FromStr for Compression {
 /// The level of zstd: see [`Compression::Zstd`].
 const ZSTD_LEVEL: i32 = 1;
 
-/// Where the messages of one channel are within the chunk.
+/// Place of the messages of one channel within the chunk.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lane(usize);
 
@@ -72,7 +72,7 @@ pub(in crate::sink) struct Chunk {
     sealed: Sealed,
 }
 
-/// What a sealed chunk puts into the file.
+/// Bytes that a sealed chunk puts into the file.
 #[derive(Default)]
 pub(super) struct Sealed {
     /// The chunk record up to its data.

@@ -32,7 +32,7 @@ pub struct LiveMcap {
     chunk: Chunk,
     /// The head, and declarations that have to stand before the next chunk.
     declared: Vec<u8>,
-    /// What [`LiveMcap::seal`] made.
+    /// Bytes that [`LiveMcap::seal`] made.
     sealed: Vec<u8>,
     has_chunk: bool,
 }
@@ -48,7 +48,7 @@ struct Layout {
 }
 
 impl LiveMcap {
-    /// With a head that says what `provenance` says, and no stream yet.
+    /// Makes one with a head that states `provenance`, and no stream yet.
     ///
     /// # Errors
     /// None that can happen: the first channel always has a number.
@@ -203,7 +203,7 @@ impl LiveMcap {
         self.has_chunk = false;
     }
 
-    /// What ends the file: first the whole closing, then, for a disk that has no room for it, the
+    /// Endings of the file: first the whole closing, then, for a disk that has no room for it, the
     /// shortest there is, without summary or index.
     #[must_use]
     pub fn closings(&self) -> [Vec<u8>; 2] {

@@ -11,7 +11,7 @@ use strapd_attitude::record::{AttitudeSample, RawSample};
 /// A topic and the type of its messages, all `cdr` described as `ros2msg`.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Topic {
-    /// Its name.
+    /// Name.
     pub name: String,
     /// The type's name.
     pub schema_name: &'static str,
@@ -43,7 +43,7 @@ pub struct Payloads(Encoders);
 enum Encoders {
     /// Attitudes, and transforms for [`Topic::transforms`].
     Attitude { imu: cdr::Imu, tf: cdr::Tf },
-    /// What a sensor put out.
+    /// Samples of a sensor.
     Samples { imu: cdr::Imu },
     /// True attitude and rate.
     Truth {
@@ -53,7 +53,7 @@ enum Encoders {
 }
 
 impl Payloads {
-    /// Of `stream`, whose transform has this child.
+    /// Makes those of `stream`, whose transform has this child.
     #[must_use]
     pub fn new(stream: &Stream, child: &str) -> Payloads {
         let stream = stream.bounded();

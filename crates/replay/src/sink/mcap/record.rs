@@ -70,7 +70,7 @@ impl<'a> Body<'a> {
     }
 }
 
-/// What a channel is.
+/// Fields of a channel.
 #[derive(Clone, Debug)]
 pub(super) struct Channel {
     pub(super) id: u16,
@@ -93,7 +93,7 @@ impl Channel {
     }
 }
 
-/// What a schema is.
+/// Fields of a schema.
 #[derive(Clone, Debug)]
 pub(super) struct Schema {
     pub(super) id: u16,

@@ -3,7 +3,7 @@
 //! Field names and types are those of the public ROS 2 interfaces (sensor_msgs, geometry_msgs,
 //! std_msgs, tf2_msgs, builtin_interfaces) and of Foxglove's FrameTransform; concatenated as rosbag2 does.
 
-/// Between two message definitions: 80 equal signs on a line of their own, then the next one's name.
+/// Separator of two message definitions: 80 equal signs on a line of their own, then the next one's name.
 macro_rules! next {
     ($name:literal) => {
         concat!(

@@ -1,7 +1,7 @@
 //! Values of one column of a row group -> its pages. Pure.
 //!
-//! Apart from the table because how numbers are packed is decided here, and what they mean is not known here. Floats of a
-//! motion are packed best byte by byte (the first bytes of neighbours are alike), stamps as differences.
+//! Apart from the table because how numbers are packed is decided here, and what they mean is not known here. Floats
+//! of a motion are packed best byte by byte (the first bytes of neighbours are alike), stamps as differences.
 
 use parquet::basic::{Encoding, LogicalType, Repetition, TimeUnit, Type as Physical};
 use parquet::column::writer::ColumnWriter;
@@ -11,7 +11,7 @@ use parquet::file::properties::{EnabledStatistics, WriterPropertiesBuilder};
 use parquet::schema::types::{ColumnPath, Type, TypePtr};
 use std::sync::Arc;
 
-/// What a stamp counts from.
+/// Origin from which a stamp counts.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Clock {
     /// 1970: readers show dates.
@@ -20,7 +20,7 @@ pub(super) enum Clock {
     Own,
 }
 
-/// What is waiting to be written.
+/// Values that wait to be written.
 #[derive(Debug)]
 pub(super) enum Values {
     /// Nanoseconds of a clock.
@@ -38,7 +38,7 @@ pub(super) enum Values {
 pub(super) struct Column {
     pub(super) name: &'static str,
     values: Values,
-    /// Of each row whether it has a value; `None`: all have.
+    /// Presence of a value in each row; `None`: all have one.
     present: Option<Vec<i16>>,
 }
 
@@ -145,7 +145,7 @@ impl Column {
             .map(Arc::new)
     }
 
-    /// How its pages are packed.
+    /// Compression of its pages.
     pub(super) fn packed(&self, properties: WriterPropertiesBuilder) -> WriterPropertiesBuilder {
         let path = ColumnPath::from(self.name);
         let without_statistics = |properties: WriterPropertiesBuilder| {
