@@ -1,4 +1,4 @@
-//! What a run says about itself, drawn. Pure.
+//! Facts of a run about itself, drawn. Pure.
 
 pub mod page;
 pub mod plot;

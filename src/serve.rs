@@ -87,45 +87,46 @@ use std::sync::Arc;
 use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::estimate::Plan;
 
-/// What a daemon is to do.
+/// Settings of a daemon.
 #[derive(Debug, Default)]
 pub struct Settings {
-    /// How lines are read, for every sensor: that is done before it is known whose they are.
+    /// Options by which lines are read, for every sensor: that is done before it is known whose they are.
     pub decode: strapd_recording::decode::Options,
-    /// How samples are understood and integrated.
+    /// Settings by which samples are understood and integrated.
     pub plan: Plan,
-    /// For sensors that are understood in another way, by `id`.
+    /// Settings for sensors that are understood in another way, by `id`.
     pub plans: BTreeMap<String, Plan>,
-    /// Where to listen.
+    /// Addresses to listen on.
     pub listen: Vec<Listen>,
-    /// Where to connect for samples.
+    /// Addresses to connect to for samples.
     pub sources: Vec<Endpoint>,
     /// The bounds.
     pub limits: Limits,
-    /// What clients must show.
+    /// Token that clients must show.
     pub token: Option<Token>,
     /// Listen beyond loopback without a token all the same.
     pub allow_insecure_remote: bool,
-    /// Which names and pages may use HTTP.
+    /// Names and pages that may use HTTP.
     pub web: Web,
-    /// Who records everything that goes through.
+    /// Recorder of everything that goes through.
     pub recorder: Option<recorder::Handle>,
     /// The attitudes sensors had before the daemon was restarted.
     pub saved: state::Sensors,
     /// Sockets a service manager has opened.
     #[cfg(unix)]
     pub passed: listen::Passed,
-    /// Whom to call and send every attitude to ([`Target::Tcp`], [`Target::Udp`]).
+    /// Receivers to call and send every attitude to ([`Target::Tcp`], [`Target::Udp`]).
     pub outputs: Vec<Target>,
-    /// Where in NATS every attitude goes.
+    /// Places in NATS where every attitude goes.
     #[cfg(feature = "nats")]
     pub nats: Vec<nats::address::NatsAddress>,
-    /// Where in zenoh every attitude goes.
+    /// Places in zenoh where every attitude goes.
     #[cfg(feature = "zenoh")]
     pub zenoh: Vec<zenoh::address::ZenohAddress>,
     /// The replay that is served; no samples are taken then.
     pub timeline: Option<Arc<dyn Timeline>>,
-    /// What is served brings samples beside attitudes: clients may ask for them before the first stream is there.
+    /// Whether what is served brings samples beside attitudes: clients may ask for them before the first stream is
+    /// there.
     pub brings_samples: bool,
 }
 
@@ -205,13 +206,13 @@ impl Server {
         })
     }
 
-    /// Where it listens, with real ports.
+    /// Addresses on which it listens, with real ports.
     #[must_use]
     pub fn addresses(&self) -> &[Listen] {
         &self.bound
     }
 
-    /// Its middle.
+    /// Hub.
     #[must_use]
     pub fn hub(&self) -> &Arc<Hub> {
         &self.hub
@@ -285,12 +286,12 @@ async fn end_waits(hub: Arc<Hub>) {
     }
 }
 
-/// Who may reach us.
+/// Reach of an address: who may connect to us.
 #[derive(Clone, Copy, Debug)]
 struct Reach {
     has_token: bool,
     allow_insecure_remote: bool,
-    /// How an address is given.
+    /// Flag by which an address is given.
     flag: &'static str,
 }
 

@@ -1,11 +1,13 @@
 //! An address -> what is there, read as a file is. I/O.
 //!
 //! A room of its own because servers fail in ways of their own: they are slow, cut a body, say "later", or have another
-//! object by now. Behind it is what the reader of recordings knows, an [`Object`](strapd_recording::elsewhere::Object); what was
+//! object by now. Behind it is what the reader of recordings knows, an
+//! [`Object`](strapd_recording::elsewhere::Object); what was
 //! fetched is in a file without a name, so that it is fetched once, however often it is read.
 //!
 //! ```text
-//! address -> place (web: http, https; cloud: s3, gs, az) -> download -> kept (ranges: which bytes are there) -> read_at
+//! address -> place (web: http, https; cloud: s3, gs, az) -> download -> kept (ranges: which bytes are there) ->
+//! read_at
 //!                                                        -> once, where a server knows no ranges
 //! ```
 //!
@@ -51,7 +53,7 @@ use tokio::runtime::{Builder, Runtime};
 /// Bytes that are asked for first: enough to tell a format.
 const FIRST: u64 = 64 << 10;
 
-/// What is at an address.
+/// Reaches what is at an address.
 ///
 /// # Errors
 /// It is none, nobody answers, or the answer is no.
@@ -88,7 +90,7 @@ pub fn reach_with(address: &Address, patience: Patience) -> Result<Found, Diagno
     })
 }
 
-/// Where requests run, for as long as the process does.
+/// Runtime of requests, for as long as the process runs.
 fn runtime() -> io::Result<&'static Runtime> {
     static RUNTIME: OnceLock<Runtime> = OnceLock::new();
     if let Some(runtime) = RUNTIME.get() {

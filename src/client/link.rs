@@ -14,11 +14,11 @@ use tokio_tungstenite::tungstenite::http::HeaderValue;
 use tokio_tungstenite::tungstenite::protocol::WebSocketConfig;
 use tokio_tungstenite::tungstenite::{self, Message};
 
-/// By when a connection must stand, name look-up and handshake included.
+/// Time by which a connection must stand, name look-up and handshake included.
 pub const CONNECT: Duration = Duration::from_secs(10);
-/// By when a line must have been taken.
+/// Time by which a line must have been taken.
 const SEND: Duration = Duration::from_secs(10);
-/// Between two pings over a WebSocket.
+/// Time between two pings over a WebSocket.
 const PING: Duration = Duration::from_secs(15);
 /// A WebSocket that says nothing for so long, not even in answer to two pings, has gone.
 const SILENCE: Duration = Duration::from_secs(35);
@@ -39,7 +39,7 @@ pub(crate) const VANISHED: Duration =
 #[derive(Debug)]
 pub struct Link {
     wire: Wire,
-    /// Who is at the other end.
+    /// Peer at the other end.
     peer: String,
 }
 
@@ -59,7 +59,7 @@ struct Web {
     pinged: Instant,
 }
 
-/// What was read into the buffer.
+/// Outcome of a read into the buffer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Heard {
     /// Bytes of a stream: a line may end anywhere.
@@ -87,7 +87,7 @@ impl Link {
         }
     }
 
-    /// Who is at the other end, by number.
+    /// Peer at the other end, by number.
     #[must_use]
     pub fn peer(&self) -> &str {
         &self.peer

@@ -12,7 +12,7 @@ use strapd_recording::text::printable;
 /// Numbers that are remembered: as many as a daemon may have sensors.
 const MOST: usize = 100_000;
 
-/// What the numbers of a daemon's packed attitudes mean.
+/// Labels of the numbers in a daemon's packed attitudes.
 #[derive(Debug, Default)]
 pub(super) struct Numbers(BTreeMap<u32, Labels>);
 
@@ -28,7 +28,7 @@ struct Labels {
 }
 
 impl Numbers {
-    /// From now on what this line says of a number holds.
+    /// Learns from this line what a number holds from now on.
     ///
     /// # Errors
     /// In words: it says nothing of one, or there are too many.

@@ -8,7 +8,7 @@ use std::fmt;
 use std::path::PathBuf;
 use strapd_attitude::diagnostic::Diagnostic;
 
-/// Where to connect.
+/// Address to connect to.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Remote {
     /// Lines over TCP.
@@ -17,7 +17,7 @@ pub enum Remote {
     WebSocket {
         /// The machine.
         place: Place,
-        /// What is asked for there: path and query, beginning with `/`.
+        /// Resource there: path and query, beginning with `/`.
         resource: Address,
     },
     /// Lines over a Unix socket.
@@ -29,9 +29,9 @@ pub enum Remote {
 /// A host, by name or number, and a port.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {
-    /// Without brackets.
+    /// Host, without brackets.
     pub host: String,
-    /// From 1, but for what is listened on.
+    /// Port from 1, but for what is listened on.
     pub port: u16,
 }
 

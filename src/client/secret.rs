@@ -74,7 +74,7 @@ impl Secret {
         Ok(Secret(token.to_owned()))
     }
 
-    /// What only its receiver may see.
+    /// Text that only its receiver may see.
     #[must_use]
     pub fn reveal(&self) -> &str {
         &self.0

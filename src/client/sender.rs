@@ -8,9 +8,9 @@ use super::watcher::{Said, Watcher};
 use std::time::Duration;
 use tokio::time::{Instant, timeout_at};
 
-/// How long the other end may take to say why it has gone.
+/// Time that the other end may take to say why it has gone.
 const REASON: Duration = Duration::from_secs(2);
-/// How long it may take to read the rest and close.
+/// Time that it may take to read the rest and close.
 const CLOSE: Duration = Duration::from_secs(10);
 /// Complaints that are said.
 const MOST_SAID: u64 = 8;

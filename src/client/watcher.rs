@@ -1,4 +1,4 @@
-//! What a daemon says -> attitudes, state, complaints. I/O.
+//! Lines of a daemon -> attitudes, state, complaints. I/O.
 
 use super::link::{Heard, Link};
 use super::numbers::Numbers;
@@ -14,7 +14,7 @@ use strapd_recording::text::printable;
 /// Longest line that is read: the `STATUS` of a thousand sensors.
 const MAX_LINE: usize = 4 << 20;
 
-/// What one line said.
+/// Meaning of one line.
 #[derive(Debug, PartialEq)]
 pub enum Said<'a> {
     /// An attitude: the line as it came.
@@ -23,9 +23,9 @@ pub enum Said<'a> {
     Packed(Attitude),
     /// We were too slow for so many attitudes of a sensor.
     Gap {
-        /// Which sensor.
+        /// Id of the sensor.
         id: String,
-        /// How many.
+        /// Number dropped.
         dropped: u64,
     },
     /// The answer to `POLL`: the line as it came.
@@ -41,7 +41,7 @@ pub struct Watcher {
     framer: Framer,
     buffer: Vec<u8>,
     numbers: Numbers,
-    /// What the daemon complained of last: why it closes, if it does.
+    /// Last complaint of the daemon: why it closes, if it does.
     complaint: Option<String>,
 }
 
@@ -126,7 +126,7 @@ impl Watcher {
         &mut self.link
     }
 
-    /// Who is at the other end.
+    /// Peer at the other end.
     #[must_use]
     pub fn peer(&self) -> &str {
         self.link.peer()
@@ -197,7 +197,7 @@ impl Watcher {
         Ok(goes_on)
     }
 
-    /// How it ended, with what the daemon complained of last.
+    /// Text of how it ended, with the daemon's last complaint.
     pub(super) fn ended(&self, how: &str) -> String {
         match &self.complaint {
             Some(complaint) => format!("{how}; it said {complaint}"),
@@ -206,7 +206,7 @@ impl Watcher {
     }
 }
 
-/// What a line says; `None` for what is of no use to a watcher.
+/// Meaning of a line; `None` for what is of no use to a watcher.
 fn understood<'a>(line: &'a [u8], numbers: &mut Numbers) -> Option<Said<'a>> {
     let object: Object<'_> = match serde_json::from_slice(line) {
         Ok(object) => object,

@@ -1,7 +1,8 @@
 //! A log, examined -> one self-contained HTML page, and the same as JSON. Pure.
 //!
 //! No script, no font, no picture from anywhere else: the page is to be mailed, printed and opened
-//! ten years on. Its own script is named by its hash, and may ask nobody. What can not be said is said to be so, with the reason.
+//! ten years on. Its own script is named by its hash, and may ask nobody. What can not be said is said to be so, with
+//! the reason.
 
 mod charts;
 mod findings;
@@ -65,7 +66,7 @@ pub enum Noise {
         /// The same for machines.
         json: Value,
     },
-    /// What is missing.
+    /// Text of what is missing.
     Missing(String),
 }
 
@@ -78,13 +79,13 @@ pub struct Page<'a> {
     pub sha256: String,
     /// The command as typed.
     pub command: String,
-    /// What is held against, in words; empty = what the log holds.
+    /// Name of the reference; empty = what the log holds.
     pub reference: String,
-    /// What was found out.
+    /// Results of checking it.
     pub checked: &'a Checked,
-    /// What `check` says about it.
+    /// Findings of `check` about it.
     pub findings: Vec<Told>,
-    /// By topic.
+    /// Noise by topic.
     pub noise: Vec<Noise>,
 }
 
@@ -137,7 +138,7 @@ impl Page<'_> {
         format!("{} {}", verdict.level.word(), verdict.text)
     }
 
-    /// For machines: one object, the one in the page.
+    /// JSON for machines: one object, the one in the page.
     #[must_use]
     pub fn json(&self) -> Value {
         let verdict = self.verdict();

@@ -13,7 +13,7 @@ use std::fmt;
 pub struct Chart {
     /// Above the chart.
     pub title: String,
-    /// To the right.
+    /// Axis to the right.
     pub x: Axis,
     /// Upwards.
     pub y: Axis,
@@ -30,7 +30,7 @@ pub struct Chart {
 /// One axis of a [`Chart`].
 #[derive(Clone, Debug, Default)]
 pub struct Axis {
-    /// What it measures, with its unit.
+    /// Quantity that it measures, with its unit.
     pub label: String,
     /// Logarithmic; values that are not positive are then left out.
     pub log: bool,
@@ -61,17 +61,17 @@ impl Axis {
 /// One row of the legend.
 #[derive(Clone, Debug, Default)]
 pub struct Series {
-    /// In the legend; empty = not in it.
+    /// Name in the legend; empty = not in it.
     pub name: String,
     /// `[x, y]`; a point that is not finite (or not positive on a logarithmic axis) interrupts the line.
     pub points: Vec<[f64; 2]>,
-    /// How it is drawn.
+    /// Look.
     pub look: Look,
     /// Place in the palette; `None` = the next one. For series that belong together.
     pub color: Option<usize>,
 }
 
-/// How a [`Series`] is drawn.
+/// Look of a [`Series`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Look {
     /// A line through the points.
@@ -99,8 +99,8 @@ impl fmt::Display for PlotError {
 
 impl std::error::Error for PlotError {}
 
-/// Told apart by people with any colour vision (Okabe and Ito 2008), black first, grey for yellow. The three after black
-/// are those of x, y and z everywhere: red, green, blue.
+/// Colours that people with any colour vision tell apart (Okabe and Ito 2008), black first, grey for yellow. The
+/// three after black are those of x, y and z everywhere: red, green, blue.
 const PALETTE: [RGBColor; 8] = [
     RGBColor(0, 0, 0),
     RGBColor(213, 94, 0),
@@ -112,7 +112,7 @@ const PALETTE: [RGBColor; 8] = [
     RGBColor(140, 140, 140),
 ];
 
-/// Of the legend: width of a letter and height of a row, pixels.
+/// Size of the legend: width of a letter and height of a row, pixels.
 const LETTER: f64 = 7.2;
 const ROW: i32 = 20;
 

@@ -1,4 +1,4 @@
-//! Who may listen where, who may connect, who may speak. Pure but for reading the token file.
+//! Rules of who may listen where, who may connect, who may speak. Pure but for reading the token file.
 //!
 //! A gyro stream looks harmless, but a page in any browser can reach loopback: so names and
 //! origins are checked, and beyond loopback a token is needed.
@@ -27,7 +27,7 @@ impl std::fmt::Debug for Token {
 }
 
 impl Token {
-    /// From text.
+    /// Makes one from text.
     #[must_use]
     pub fn new(token: &str) -> Token {
         Token {
@@ -73,9 +73,9 @@ impl Token {
 /// The answer to a wrong token.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Denied {
-    /// What is said.
+    /// Fault that is answered.
     pub fault: Fault,
-    /// How long it is held back, so that nobody tries fast.
+    /// Delay before the answer, so that nobody tries fast.
     pub delay: Duration,
 }
 
@@ -93,16 +93,16 @@ pub fn is_loopback(ip: IpAddr) -> bool {
 /// Why a request is not answered.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Foreign {
-    /// It does not say whom it is for.
+    /// Request without a Host.
     NoHost,
-    /// It is for a name that is none of ours: another's name may have been made to lead here.
+    /// Host that is none of ours: another's name may have been made to lead here.
     Host,
-    /// It comes from a page of somebody else.
+    /// Origin of somebody else's page.
     Origin,
 }
 
 impl Foreign {
-    /// In words, with the flag that helps.
+    /// Reason in words, with the flag that helps.
     #[must_use]
     pub fn reason(self) -> &'static str {
         match self {

@@ -1,4 +1,4 @@
-//! What all brokers have in common: an address with a query, messages to a session, attitudes by sensor.
+//! Parts that all brokers share: an address with a query, messages to a session, attitudes by sensor.
 //!
 //! | file | arrow | |
 //! |---|---|---|
@@ -47,7 +47,7 @@ pub(super) fn complaint(said: &VecDeque<Bytes>) -> Option<(&Bytes, String)> {
     }
 }
 
-/// What one sensor has to publish.
+/// Attitudes that one sensor has to publish.
 pub(super) type Batch = (Arc<str>, Bytes);
 
 /// The attitudes of each sensor in one piece, in their order.

@@ -30,7 +30,7 @@ pub struct Channel {
     stream: Stream,
     lines: Objects,
     plot: Objects,
-    /// Its number in packed objects, and the line that says so.
+    /// Number in packed objects, and the line that announces it.
     label: (u32, Bytes),
     /// Number of its first channel for viewers.
     number: u32,
@@ -40,16 +40,16 @@ pub struct Channel {
     /// Number of the attitude handed out last, and itself.
     last: Mutex<Option<(u64, AttitudeSample)>>,
     sent: AtomicU64,
-    /// Of a stream that something estimates here, and that is no sensor's.
+    /// Health of a stream that something estimates here, and that is no sensor's.
     health: Mutex<Option<Box<Health>>>,
 }
 
-/// Which of an item's times a message is given.
+/// Clock whose time a message is given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Clock {
-    /// When it was logged or received.
+    /// Time at which it was logged or received.
     Log,
-    /// Its stamp: what a playback shows and is moved by.
+    /// Stamp: what a playback shows and is moved by.
     Stamp,
 }
 
@@ -58,12 +58,12 @@ pub enum Clock {
 pub enum Items<'a> {
     /// Attitudes.
     Attitudes(&'a [AttitudeSample]),
-    /// What a sensor put out.
+    /// Samples of a sensor.
     Samples(&'a [RawSample]),
 }
 
 impl Items<'_> {
-    /// How many.
+    /// Number of items.
     #[must_use]
     pub fn count(&self) -> usize {
         match self {
@@ -110,25 +110,25 @@ impl Channel {
         &self.child
     }
 
-    /// Its number.
+    /// Number.
     #[must_use]
     pub fn number(&self) -> u32 {
         self.label.0
     }
 
-    /// Its name.
+    /// Name.
     #[must_use]
     pub fn id(&self) -> &Arc<str> {
         &self.id
     }
 
-    /// Its labels.
+    /// Labels.
     #[must_use]
     pub fn stream(&self) -> &Stream {
         &self.stream
     }
 
-    /// What its lines are.
+    /// Class of its lines.
     #[must_use]
     pub fn class(&self) -> Class {
         match self.stream.content {
@@ -166,7 +166,7 @@ impl Channel {
         self.health.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// How its samples are up to now.
+    /// Sets the health of its samples up to now.
     pub(super) fn known(&self, health: Health) {
         *self.health() = Some(Box::new(health));
     }
@@ -252,7 +252,7 @@ impl Channel {
         chunks
     }
 
-    /// Its line in `STATUS`.
+    /// Line in `STATUS`.
     pub(super) fn status(&self) -> serde_json::Value {
         let status = serde_json::json!({
             "id": &*self.id, "class": self.class().name(), "sent": self.sent.load(Ordering::Relaxed),

@@ -1,4 +1,4 @@
-//! What waits in an outbox: attitudes of one stream as bytes, and what is said of those that gave way.
+//! Content of an outbox: attitudes of one stream as bytes, and notices of those that were dropped.
 
 use bytes::Bytes;
 use std::sync::Arc;
@@ -13,11 +13,11 @@ pub(super) const NOTE: &str = "";
 /// Attitudes of one stream, encoded once and shared by every client that takes them all.
 #[derive(Clone, Debug)]
 pub struct Chunk {
-    /// Whose.
+    /// Id of the stream.
     pub id: Arc<str>,
     /// Number of the first in its stream.
     pub first_seq: u64,
-    /// How many.
+    /// Number of attitudes.
     pub count: u64,
     /// Whole lines, or whole packed objects.
     pub bytes: Bytes,
@@ -39,7 +39,7 @@ impl Chunk {
 /// Attitudes that were dropped, to be said.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Dropped {
-    /// How many.
+    /// Number of attitudes.
     pub count: u64,
     /// Number of the first.
     pub first_seq: u64,

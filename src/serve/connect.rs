@@ -39,7 +39,7 @@ const RATES: &str = r#"{"class":"WATCH","streams":["RATE"],"packed":true}"#;
 /// The last one of each is no sample.
 const ATTITUDES: &str = r#"{"class":"WATCH","streams":["ATT"],"last":false,"packed":true}"#;
 
-/// How long to wait before another attempt: ever longer, and never in step with others who lost the
+/// Wait before another attempt: ever longer, and never in step with others who lost the
 /// same peer at the same time.
 #[derive(Debug, Default)]
 pub(super) struct Redial {

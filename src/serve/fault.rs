@@ -1,6 +1,6 @@
-//! What is wrong with a line, as its sender is answered. Pure: below all that reads or answers.
+//! Fault of a line, as its sender is answered. Pure: below all that reads or answers.
 
-/// What is wrong with a line.
+/// Fault of a line.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Fault {
     /// A name for programs.
@@ -9,7 +9,7 @@ pub struct Fault {
     pub message: String,
     /// Byte of the line, from 1.
     pub column: Option<u64>,
-    /// Which sensor, where one is concerned.
+    /// Id of the sensor, if one is concerned.
     pub id: Option<String>,
 }
 

@@ -1,19 +1,19 @@
-//! What a client watches: which classes of objects, of which streams, how often, in which form.
+//! Filter of a client: which classes of objects, of which streams, how often, in which form.
 
 use std::collections::BTreeSet;
 use strapd_recording::decode::packed::Form;
 
-/// What the objects of a stream are.
+/// Class of a stream's objects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Class {
     /// Attitudes.
     Att,
-    /// What a sensor put out.
+    /// Samples of a sensor.
     Rate,
 }
 
 impl Class {
-    /// Its name on the wire.
+    /// Name on the wire.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -23,16 +23,16 @@ impl Class {
     }
 }
 
-/// What a client asked for with `WATCH`.
+/// Request of a client with `WATCH`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Filter {
     /// Classes; `None` = all there are.
     pub classes: Option<BTreeSet<Class>>,
     /// Sensors; `None` = all.
     pub ids: Option<BTreeSet<String>>,
-    /// At most this many attitudes a second of each.
+    /// Largest number of attitudes a second of each.
     pub rate_hz: Option<f64>,
-    /// How they are written.
+    /// Form in which they are written.
     pub form: Form,
     /// Whether the last attitude of each stream that was not watched before is wanted first.
     pub last: bool,

@@ -19,9 +19,9 @@ use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::{TcpStream, UdpSocket};
 use tokio::time::{sleep, timeout};
 
-/// Between two calls.
+/// Time between two calls.
 const AGAIN: Duration = Duration::from_secs(1);
-/// How long a call may ring.
+/// Time that a call may ring.
 const CONNECT: Duration = Duration::from_secs(10);
 /// Bytes taken from the outbox at once.
 const TAKE: usize = 64 << 10;
@@ -66,7 +66,7 @@ fn begin(hub: &Hub, client: &Client) {
     hub.watch(client, Some(filter));
 }
 
-/// What there is to send next; `None`: the daemon ends and all was sent.
+/// Next piece to send; `None`: the daemon ends and all was sent.
 async fn next(
     client: &Client,
     running: &mut Running,

@@ -23,12 +23,12 @@ pub const SUBPROTOCOLS: [&str; 2] = ["foxglove.sdk.v1", "foxglove.websocket.v1"]
 pub const MAX_SUBSCRIPTIONS: usize = 4096;
 /// Longest name of a request that is repeated.
 const MAX_REQUEST_ID: usize = 256;
-/// What a viewer asks for.
+/// Request of a viewer.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Request {
     /// Messages of channels: subscription and channel.
     Subscribe(Vec<(u32, u32)>),
-    /// No more messages.
+    /// Request for no more messages.
     Unsubscribe(Vec<u32>),
     /// Playback, and the request's name.
     Playback(Vec<Action>, String),
@@ -130,7 +130,7 @@ fn text(value: &Value) -> Bytes {
     framed(TEXT, text.as_bytes())
 }
 
-/// Who we are and what can be done. `place`: where the replay is; `controls`: whether the viewer is one
+/// Message of who we are and what can be done. `place`: where the replay is; `controls`: whether the viewer is one
 /// that can move it.
 #[must_use]
 pub fn server_info(session: &str, place: Option<&Position>, controls: bool) -> Bytes {
@@ -152,7 +152,7 @@ pub fn server_info(session: &str, place: Option<&Position>, controls: bool) -> B
     text(&info)
 }
 
-/// These channels can be subscribed to.
+/// Message that these channels can be subscribed to.
 pub(crate) fn advertise(channels: impl Iterator<Item = (u32, Topic)>) -> Bytes {
     let channels: Vec<Value> = channels
         .map(|(id, topic)| {
@@ -174,13 +174,13 @@ pub(crate) fn channels<'a>(
     advertise(first.into_iter().chain(streams.flat_map(Channel::topics)))
 }
 
-/// These channels are no more.
+/// Message that these channels are no more.
 #[must_use]
 pub fn withdrawn(channels: &[u32]) -> Bytes {
     text(&json!({"op": "unadvertise", "channelIds": channels}))
 }
 
-/// How bad it is.
+/// Severity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Level {
     /// Good to know.
@@ -205,7 +205,7 @@ pub fn gap(id: &str, dropped: &Dropped) -> Bytes {
     }))
 }
 
-/// Where a replay is; `request`: the one that is answered.
+/// Message of where a replay is; `request`: the one that is answered.
 #[must_use]
 pub fn playback_state(place: &Position, did_seek: bool, request: &str) -> Bytes {
     let mut message = vec![

@@ -71,7 +71,7 @@ pub struct Hub {
     limits: Limits,
     token: Option<Token>,
     recorder: Option<Handle>,
-    /// That of the replay it serves, which is then its only source.
+    /// Timeline of the replay it serves, which is then its only source.
     timeline: Option<Arc<dyn Timeline>>,
     /// Samples can be watched, too.
     brings_samples: bool,
@@ -92,15 +92,15 @@ pub struct Hub {
     heard: AtomicU64,
     /// Counts the calls of [`Hub::forget_silent`].
     tick: AtomicU64,
-    /// How saving attitudes went the last time; `None` when they are not saved.
+    /// Outcome of saving attitudes the last time; `None` when they are not saved.
     state: Mutex<Option<StateStatus>>,
-    /// By number.
+    /// Channels by number.
     channels: RwLock<BTreeMap<u32, Arc<Channel>>>,
     next_channel: AtomicU32,
-    /// Of the transforms of all channels.
+    /// Child frames of the transforms of all channels.
     child_frames: Mutex<ChildFrames>,
     polling: Polling,
-    /// What a simulation says the attitude truly is.
+    /// True attitude by a simulation.
     truth: Mutex<Option<referring::Truth>>,
     next_client: AtomicU64,
     /// Some sensor's samples wait for the unit of their stamps.
@@ -117,15 +117,15 @@ pub struct Sensor {
     stream: SensorStream,
     /// Only one may send a sensor's samples at a time: two gyros in one attitude are no attitude.
     owner: Option<u64>,
-    /// Which number of all that was heard of sensors its last was.
+    /// Number, among all that was heard of sensors, of its last.
     heard: u64,
-    /// At which tick that was.
+    /// Tick at which that was.
     heard_at: u64,
     /// Another one has its place.
     gave_way: bool,
 }
 
-/// What a client is told, and how.
+/// Protocol of a client: what it is told, and how.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ClientProtocol {
     /// Lines.
@@ -143,27 +143,27 @@ pub enum ClientProtocol {
 /// One connection.
 #[derive(Debug)]
 pub struct Client {
-    /// Its number.
+    /// Number.
     pub number: u64,
-    /// Who it is.
+    /// Peer.
     pub peer: Peer,
-    /// What waits for it.
+    /// Outbox: what waits for it.
     pub outbox: Outbox,
-    /// What it is told, and how.
+    /// Protocol: what it is told, and how.
     shape: ClientProtocol,
     since: Instant,
-    /// How many sensors it sends.
+    /// Number of sensors that it sends.
     sensors: AtomicUsize,
-    /// It speaks for many: as many as there may be are its share.
+    /// Whether it speaks for many: as many as there may be are its share.
     is_broker: AtomicBool,
 }
 
-/// What a sender should hear of its samples.
+/// Answers to a sender about its samples.
 #[derive(Clone, Debug, Default)]
 pub struct Feedback {
-    /// No fault: a new run has begun.
+    /// Notice that is no fault: a new run has begun.
     pub note: Option<Fault>,
-    /// What was not used, the first time.
+    /// Faults of what was not used, the first time.
     pub faults: Vec<Fault>,
     /// None of the samples was used: why, and how many.
     pub lost: Option<(Fault, u64)>,
@@ -175,25 +175,25 @@ impl Client {
         matches!(self.shape, ClientProtocol::Foxglove { .. })
     }
 
-    /// It speaks for many: as many sensors as there may be are its share.
+    /// Marks it as speaking for many: as many sensors as there may be are its share.
     pub fn speaks_for_many(&self) {
         self.is_broker.store(true, Ordering::Relaxed);
     }
 
-    /// It sends a sensor less.
+    /// Counts a sensor less that it sends.
     pub fn let_go(&self) {
         self.sensors.fetch_sub(1, Ordering::Relaxed);
     }
 }
 
-/// How many of these are of the gyro.
+/// Number of these that are of the gyro.
 #[must_use]
 pub fn rates_in(samples: &[RawSample]) -> usize {
     samples.iter().filter(|s| !s.is_beside).count()
 }
 
 impl Hub {
-    /// With nobody connected.
+    /// Makes one with nobody connected.
     ///
     /// # Errors
     /// [`Error::Usage`] when the plan is none for live streams.
@@ -268,13 +268,13 @@ impl Hub {
         self.token.as_ref()
     }
 
-    /// What reads the lines.
+    /// Decoder of the lines.
     #[must_use]
     pub fn decoder(&self) -> &LineDecoder {
         &self.decoder
     }
 
-    /// How lines are read.
+    /// Options by which lines are read.
     #[must_use]
     pub fn decode_options(&self) -> &decode::Options {
         &self.decode_options
@@ -295,7 +295,7 @@ impl Hub {
         }
     }
 
-    /// From now on it is shutting down.
+    /// Begins to shut down.
     pub fn stop(&self) {
         self.stopping.store(true, Ordering::Relaxed);
     }
@@ -311,7 +311,7 @@ impl Hub {
         self.join_as(peer, ClientProtocol::Lines(Profile::Lines))
     }
 
-    /// As [`Hub::join`], for somebody who is told things in another way. A viewer is told at once who
+    /// Joins as [`Hub::join`], for somebody who is told things in another way. A viewer is told at once who
     /// we are and what there is.
     pub fn join_as(&self, peer: impl Into<Peer>, shape: ClientProtocol) -> Arc<Client> {
         let outbox = match shape {
@@ -343,7 +343,7 @@ impl Hub {
         client
     }
 
-    /// It has gone; its sensors may be sent by others.
+    /// Removes a client that has gone; its sensors may be sent by others.
     pub fn leave(&self, client: &Client, owned: &[Arc<Mutex<Sensor>>]) {
         write(&self.clients).remove(&client.number);
         if client.outbox.level().watching {
@@ -383,7 +383,7 @@ impl Hub {
             .collect();
     }
 
-    /// How many are connected.
+    /// Number of connected clients.
     #[must_use]
     pub fn connected(&self) -> usize {
         read(&self.clients).len()
@@ -532,7 +532,7 @@ impl Hub {
         }
     }
 
-    /// To be called again and again: nobody waits for long for the unit of a stamp
+    /// Ends waits. To be called again and again: nobody waits for long for the unit of a stamp
     /// ([`stream::stamps::LONGEST_WAIT`](super::stream::stamps::LONGEST_WAIT)).
     pub fn end_waits(&self, now: Nanos) {
         if !self.stamps_wait.swap(false, Ordering::Relaxed) {

@@ -10,18 +10,18 @@ use std::sync::Arc;
 use strapd_attitude::record::{AttitudeSample, Status};
 use strapd_recording::decode::packed::Form;
 
-/// How somebody wants it.
+/// Form in which somebody wants it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wanted {
-    /// As a line, or packed.
+    /// Line, or packed object.
     Object(Form),
-    /// As a message of one channel.
+    /// Message of one channel.
     Message {
         /// The channel.
         channel: u32,
         /// The subscription to it.
         subscription: u32,
-        /// Which time it has.
+        /// Clock of its time.
         clock: Clock,
     },
 }
@@ -50,7 +50,7 @@ impl Last {
         }
     }
 
-    /// Whose.
+    /// Id of the stream.
     #[must_use]
     pub fn id(&self) -> &Arc<str> {
         self.channel.id()

@@ -17,22 +17,22 @@ pub struct Limits {
     pub sensors_of_client: usize,
     /// Consecutive bad lines after which a connection is closed.
     pub errors_in_a_row: u32,
-    /// By when the first line (or the head of the first HTTP request) must have come.
+    /// Time by which the first line (or the head of the first HTTP request) must have come.
     pub first_line: Duration,
-    /// How long a client may take nothing while something waits for it.
+    /// Time that a client may take nothing while something waits for it.
     pub no_progress: Duration,
-    /// How long who sends and watches nothing keeps its place when places are short.
+    /// Time for which a client that sends and watches nothing keeps its place when places are short.
     pub idle: Duration,
     /// Between WebSocket pings (a client that answers none of two is closed), and how long nothing is sent to a watcher
     /// that has ended its side before it is asked whether it is still there.
     pub ping: Duration,
-    /// How long a sensor sent by datagrams stays its sender's after the last.
+    /// Time for which a sensor sent by datagrams stays its sender's after the last.
     pub sender_silence: Duration,
-    /// How long a sensor may be silent and keep its place (`--forget-after`); none: until another needs it.
+    /// Time for which a sensor may be silent and keep its place (`--forget-after`); none: until another needs it.
     pub forget_after: Option<Duration>,
-    /// By when a shutdown has drained.
+    /// Time by which a shutdown has drained.
     pub drain: Duration,
-    /// How far back a new connection may send again what a sensor has sent before.
+    /// Time by which a new connection may go back and send again what a sensor has sent before.
     pub state_window: Duration,
 }
 
@@ -58,7 +58,7 @@ impl Default for Limits {
 }
 
 impl Limits {
-    /// For so many sensors: a quarter of them from one connection, and no fewer than ever.
+    /// Limits for so many sensors: a quarter of them from one connection, and no fewer than ever.
     #[must_use]
     pub fn of_sensors(sensors: usize) -> Limits {
         let few = Limits::default();
@@ -86,7 +86,7 @@ impl Limits {
         (self.sensors / 2).max(self.sensors_of_client)
     }
 
-    /// How often a connection looks at its clocks.
+    /// Interval at which a connection looks at its clocks.
     #[must_use]
     pub fn tick(&self) -> Duration {
         let shortest = self.first_line.min(self.no_progress).min(self.ping);
@@ -94,7 +94,7 @@ impl Limits {
     }
 }
 
-/// How long to wait after an `accept` that failed: 10 ms, doubled up to 1 s; from the start again
+/// Wait after an `accept` that failed: 10 ms, doubled up to 1 s; from the start again
 /// after one that did not.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Backoff {
@@ -102,20 +102,20 @@ pub struct Backoff {
 }
 
 impl Backoff {
-    /// It failed again: wait this long.
+    /// Counts a failure; returns how long to wait.
     pub fn failed(&mut self) -> Duration {
         let wait = Duration::from_millis(10 << self.failures.min(7));
         self.failures += 1;
         wait.min(Duration::from_secs(1))
     }
 
-    /// It worked.
+    /// Counts a success.
     pub fn worked(&mut self) {
         self.failures = 0;
     }
 }
 
-/// At most `burst` at once and one a second after that; the others are counted.
+/// Allowance of at most `burst` at once and one a second after that; the others are counted.
 #[derive(Clone, Copy, Debug)]
 pub struct Allowance {
     burst: u32,

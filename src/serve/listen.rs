@@ -59,12 +59,12 @@ pub enum Listener {
     Unix(unix::Bound),
 }
 
-/// What every listener needs.
+/// Context that every listener needs.
 #[derive(Clone, Debug)]
 pub struct Context {
     /// The hub.
     pub hub: Arc<Hub>,
-    /// Who may connect over HTTP.
+    /// Names and pages that may connect over HTTP.
     pub web: Arc<Web>,
     /// A place for each connection.
     pub places: Arc<Places>,
@@ -214,7 +214,7 @@ fn prepare(stream: &tokio::net::TcpStream) {
     tcp::expect_notice(stream, link::VANISHED);
 }
 
-/// Of what kind a connection of lines is before it has said anything.
+/// Kind of a connection of lines before it has said anything.
 fn unheard(hub: &Hub) -> Kind {
     match hub.token() {
         None => Kind::Served,

@@ -17,7 +17,7 @@ use strapd_attitude::record::{AttitudeSample, Nanos};
 use strapd_recording::decode::packed::Form;
 use tokio::sync::Notify;
 
-/// With more than this waiting, senders that can wait do.
+/// Number of waiting pieces above which senders that can wait do.
 const CROWDED: usize = MAX_QUEUED / 2;
 /// Most replies waiting for one client.
 pub const MAX_CONTROL: usize = 64;
@@ -25,12 +25,12 @@ pub const MAX_CONTROL: usize = 64;
 const MAX_CONTROL_BYTES: usize = 1 << 20;
 /// Most bytes of announcements waiting for one client.
 const MAX_ANNOUNCED: usize = 8 << 20;
-/// With so many replies that have not left, or so many bytes of them waiting, no more is taken from a
+/// Number of replies that have not left, or bytes of them, above which no more is taken from a
 /// client.
 const CROWDED_REPLIES: usize = MAX_CONTROL / 4;
 const CROWDED_BYTES: usize = MAX_CONTROL_BYTES / 4;
 
-/// Between two notices of the time in the data, ns of it.
+/// Time between two notices of the time in the data, ns of it.
 const BETWEEN_TIMES: i64 = 20_000_000;
 
 /// Why a client was told nothing more.
@@ -51,11 +51,11 @@ impl Default for Outbox {
 pub struct Outbox {
     state: Mutex<State>,
     wake: Notify,
-    /// Told when replies have left.
+    /// Signal when replies have left.
     answered: Notify,
-    /// Told when there is room again.
+    /// Signal when there is room again.
     room: Arc<Notify>,
-    /// How it is said that attitudes were dropped; empty: not at all.
+    /// Notice that attitudes were dropped; empty: none is given.
     gap: fn(&str, &Dropped) -> Bytes,
 }
 
@@ -68,7 +68,7 @@ struct State {
     /// The answer to `POLL`: one at most, which may be larger than all others and is shared by all.
     status: Asked,
     data: VecDeque<Chunk>,
-    /// How many have ever left `data`.
+    /// Number of pieces that have ever left `data`.
     left: u64,
     /// Bytes of `data` and of what was taken and is not yet written.
     queued: usize,
@@ -76,19 +76,19 @@ struct State {
     /// apart from `data`, as there may be more of them than may wait there. No more than streams.
     lasts: VecDeque<(u64, Last)>,
     gaps: BTreeMap<Arc<str>, Dropped>,
-    /// How many of `data` are notes.
+    /// Number of notes in `data`.
     notes: usize,
     /// A note the data around which was dropped.
     stray: Option<Bytes>,
     watch: Option<Filter>,
-    /// Of a viewer: subscription by channel, and the other way.
+    /// Subscriptions of a viewer by channel, and the other way.
     subscriptions: BTreeMap<u32, u32>,
     channels: BTreeMap<u32, u32>,
-    /// What time it was told last.
+    /// Time it was told last.
     told: Option<Nanos>,
     decimators: HashMap<Arc<str>, Option<Decimator>>,
     full: Option<Full>,
-    /// It took nothing while it was waited for.
+    /// Whether it took nothing while it was waited for.
     is_stalled: bool,
     /// Labels of packed streams that wait, and announcements; apart from the replies, which may be too
     /// many.
@@ -100,21 +100,21 @@ struct State {
     sent: u64,
 }
 
-/// How an answer that is made for all who ask stands.
+/// State of an answer that is made for all who ask.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 enum Asked {
     /// Nobody has asked.
     #[default]
     Not,
-    /// It is to come.
+    /// Requested.
     For,
-    /// It waits.
+    /// Built, and waiting.
     Made(Bytes),
-    /// It was taken and has not left.
+    /// Taken, and not left yet.
     Taken,
 }
 
-/// What a client's outbox holds, for `STATUS`.
+/// Contents of a client's outbox, for `STATUS`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Level {
     /// Whether attitudes are sent to it.
@@ -153,7 +153,7 @@ impl Outbox {
         self
     }
 
-    /// Told whenever there is room again.
+    /// Signal whenever there is room again.
     #[cfg(feature = "nats")]
     #[must_use]
     pub fn room(&self) -> &Arc<Notify> {
@@ -174,7 +174,7 @@ impl Outbox {
         std::mem::replace(&mut state.watch, filter)
     }
 
-    /// How many chunks of attitudes were ever queued.
+    /// Number of chunks of attitudes that were ever queued.
     #[must_use]
     pub fn queued_so_far(&self) -> u64 {
         self.state().queued_so_far()
@@ -246,7 +246,7 @@ impl Outbox {
             || state.control_bytes >= CROWDED_BYTES
     }
 
-    /// Until replies have left, since this was called last.
+    /// Waits until replies have left, since this was called last.
     pub async fn answered(&self) {
         self.answered.notified().await;
     }
@@ -500,7 +500,7 @@ impl Outbox {
         state.queued > CROWDED && !state.is_stalled
     }
 
-    /// It was waited for in vain: not again until it takes something.
+    /// Gives up waiting for it until it takes something.
     pub fn lose_patience(&self) {
         let mut state = self.state();
         state.is_stalled = state.queued > CROWDED;
@@ -525,7 +525,7 @@ impl Outbox {
         self.state().full
     }
 
-    /// What it holds.
+    /// Contents.
     #[must_use]
     pub fn level(&self) -> Level {
         let state = self.state();
@@ -542,7 +542,7 @@ impl Outbox {
         self.wake.notify_one();
     }
 
-    /// Until something is queued.
+    /// Waits until something is queued.
     pub async fn filled(&self) {
         self.wake.notified().await;
     }

@@ -15,9 +15,9 @@ pub struct Outgoing {
 
 #[derive(Debug)]
 struct State {
-    /// Who answered, while connected.
+    /// Peer that answered, while connected.
     peer: Option<String>,
-    /// When it was connected or lost.
+    /// Time at which it was connected or lost.
     since: Instant,
     attempts: u64,
     connections: u64,
@@ -28,21 +28,21 @@ struct State {
     keys: KeysSeen,
 }
 
-/// How far a stream of a broker has been read, and whether we may.
+/// Place up to which a stream of a broker has been read, and whether we may read it.
 #[cfg(feature = "nats")]
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct StreamPlace {
     /// Number of the last message that was taken.
     pub(super) sequence: Option<u64>,
-    /// How many messages it has behind that.
+    /// Number of messages behind that.
     pub(super) lag: Option<u64>,
     /// Whether the partition is ours, where there is a lease of it.
     pub(super) is_held: Option<bool>,
-    /// How often it has become ours.
+    /// Number of times it has become ours.
     pub(super) turns: u64,
 }
 
-/// What was met under the keys of a router.
+/// Keys met at a router.
 #[cfg(feature = "zenoh")]
 #[derive(Clone, Debug, Default)]
 struct KeysSeen {
@@ -62,9 +62,9 @@ struct KeysSeen {
 pub(super) struct TopicSeen {
     /// The topic.
     pub(super) topic: String,
-    /// Whose it is.
+    /// Node to which it belongs.
     pub(super) node: String,
-    /// In which domain.
+    /// Domain.
     pub(super) domain: String,
 }
 
@@ -102,7 +102,7 @@ impl Outgoing {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// How it stands, for `STATUS`.
+    /// State for `STATUS`.
     #[must_use]
     pub fn status(&self) -> serde_json::Value {
         let state = self.state();
@@ -133,17 +133,17 @@ impl Outgoing {
         status
     }
 
-    /// Where it is.
+    /// Endpoint.
     pub(super) fn endpoint(&self) -> &Endpoint {
         &self.endpoint
     }
 
-    /// Its address, for people.
+    /// Address, for people.
     pub(super) fn name(&self) -> &str {
         self.endpoint.name()
     }
 
-    /// How far it has been read changes.
+    /// Changes the place up to which it has been read.
     #[cfg(feature = "nats")]
     pub(super) fn place(&self, change: impl FnOnce(&mut StreamPlace)) {
         change(&mut self.state().stream);
@@ -198,7 +198,7 @@ impl Outgoing {
         self.state().attempts += 1;
     }
 
-    /// This peer has answered.
+    /// Notes that this peer has answered.
     pub(super) fn connected(&self, peer: &str) {
         let mut state = self.state();
         state.peer = Some(peer.to_owned());

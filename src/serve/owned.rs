@@ -8,14 +8,14 @@ use super::stream::run::SampleRun;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, Weak};
 
-/// With more than this it is looked now and then which are there still.
+/// Number above which it is looked now and then which are there still.
 const MANY: usize = 64;
 
 /// The sensors of one client.
 #[derive(Debug, Default)]
 pub struct Owned {
     sensors: BTreeMap<String, Weak<Mutex<Sensor>>>,
-    /// How many there were when it was looked last.
+    /// Number at the last look.
     looked: usize,
     /// The one that was sent last.
     last: Option<Weak<Mutex<Sensor>>>,
@@ -80,7 +80,7 @@ impl Owned {
         }
     }
 
-    /// Who sends ever new sensors keeps no names of those that were put away.
+    /// Drops the names of those that were put away, so that a client that sends ever new sensors keeps none.
     fn drop_absent(&mut self, client: &Client) {
         if self.sensors.len() < MANY.max(2 * self.looked) {
             return;
@@ -109,7 +109,7 @@ impl Owned {
         }
     }
 
-    /// What they are called.
+    /// Ids.
     #[cfg(feature = "nats")]
     pub fn ids(&self) -> impl Iterator<Item = &String> {
         self.sensors.keys()

@@ -26,7 +26,7 @@ fn kind(name: &str) -> &'static str {
     }
 }
 
-/// What the pages are made of.
+/// Router of the pages.
 pub(super) fn router() -> Router {
     Router::new()
         .route("/page/{name}", get(asset))

@@ -1,18 +1,18 @@
-//! Who is at the other end. Pure.
+//! Peer at the other end. Pure.
 
 use std::fmt;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 
-/// Who is at the other end of a connection.
+/// Peer at the other end of a connection.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Peer {
-    /// For people.
+    /// Name for people.
     pub name: String,
-    /// Whose connections count together.
+    /// Origin, whose connections count together.
     pub origin: Origin,
 }
 
-/// Where somebody comes from.
+/// Origin of a peer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Origin {
     /// An address.
@@ -33,7 +33,7 @@ impl Peer {
         }
     }
 
-    /// Its address; of those on this machine without one, the unspecified one.
+    /// Address; of those on this machine without one, the unspecified one.
     #[must_use]
     pub fn address(&self) -> IpAddr {
         match self.origin {

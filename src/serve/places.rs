@@ -1,4 +1,4 @@
-//! Who has a place, and who gives it up when places are short. Locks; reads the clock.
+//! Places of connections, and who gives one up when they are short. Locks; reads the clock.
 //!
 //! Every connection needs one. Plain HTTP, and whoever has not shown the token that is asked for, have
 //! places of their own: however many come, they take none from those who converse. Where places are
@@ -20,11 +20,11 @@ const MINUTE: Duration = Duration::from_secs(60);
 /// What a connection is, as far as places go.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Kind {
-    /// It speaks plain HTTP, as a WebSocket does until it is one.
+    /// Plain HTTP, as a WebSocket is until it is one.
     Http,
-    /// It has not shown the token that is asked for.
+    /// Connection that has not shown the token that is asked for.
     Unproven,
-    /// It converses.
+    /// Conversation.
     Served,
 }
 
@@ -46,17 +46,17 @@ struct Taken {
 #[derive(Debug)]
 struct Seat {
     kind: Kind,
-    /// It has shown the token that is asked for.
+    /// Whether it has shown the token that is asked for.
     has_token: bool,
-    /// Who converses there: it may be watching.
+    /// Client that converses there: it may be watching.
     client: Option<Arc<Client>>,
     signs: Arc<Signs>,
 }
 
-/// What a connection and those who look for a place tell each other.
+/// Signs that a connection and those who look for a place give each other.
 #[derive(Debug, Default)]
 struct Signs {
-    /// When it was heard last, in ms since the start.
+    /// Time at which it was heard last, in ms since the start.
     heard: AtomicU64,
     is_http: AtomicBool,
     /// Whether it has ended its side, and watches.
@@ -92,7 +92,7 @@ impl Places {
         u64::try_from(self.began.elapsed().as_millis()).unwrap_or(u64::MAX)
     }
 
-    /// How many of a kind there are.
+    /// Number of places for a kind.
     fn room(&self, kind: Kind) -> usize {
         match kind {
             Kind::Http => self.limits.http,
@@ -125,7 +125,7 @@ impl Places {
         })
     }
 
-    /// What somebody is told who finds none.
+    /// Fault that somebody is told who finds none.
     #[must_use]
     pub fn refusal(&self, kind: Kind) -> Fault {
         let whose = match kind {
@@ -187,7 +187,7 @@ impl Seat {
 }
 
 impl Place {
-    /// It has sent something.
+    /// Notes that it has sent something.
     pub fn heard(&self) {
         self.signs.heard.store(self.places.now(), Ordering::Relaxed);
     }
@@ -212,14 +212,14 @@ impl Place {
         }
     }
 
-    /// With an HTTP request the token was shown.
+    /// Notes that the token was shown with an HTTP request.
     pub fn has_shown_token(&self) {
         if let Some(seat) = self.places.taken().seats.get_mut(&self.number) {
             seat.has_token = true;
         }
     }
 
-    /// From now on it is of another kind, if that has room.
+    /// Makes it another kind from now on, if that has room.
     ///
     /// # Errors
     /// What it is told: there is no place.
@@ -241,12 +241,12 @@ impl Place {
         Ok(())
     }
 
-    /// Until somebody else has its place.
+    /// Waits until somebody else has its place.
     pub async fn lost(&self) {
         self.signs.leave.notified().await;
     }
 
-    /// What it is told then.
+    /// Fault that it is told then.
     #[must_use]
     pub fn made_room(&self) -> Fault {
         let secs = self.places.limits.idle.as_secs();

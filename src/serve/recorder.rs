@@ -30,12 +30,12 @@ use strapd_attitude::diagnostic::Diagnostic;
 use strapd_attitude::record::{AttitudeSample, RawSample};
 use worker::Worker;
 
-/// When a recording goes on in a new file. The files are numbered: `name_0000.mcap`, `name_0001.mcap`.
+/// Condition on which a recording goes on in a new file. The files are numbered: `name_0000.mcap`, `name_0001.mcap`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Split {
-    /// After so many bytes.
+    /// Size in bytes.
     Bytes(u64),
-    /// After so long.
+    /// Duration.
     Every(Duration),
 }
 
@@ -73,7 +73,7 @@ impl std::str::FromStr for Split {
     }
 }
 
-/// How to record.
+/// Settings of a recording.
 #[derive(Clone, Debug)]
 pub struct Settings {
     /// The file; with a [`Split`], the pattern its numbered files are named after.
@@ -83,7 +83,7 @@ pub struct Settings {
     pub force: bool,
     /// Chunks.
     pub compression: Compression,
-    /// When to go on in a new file.
+    /// Condition on which to go on in a new file.
     pub split: Option<Split>,
     /// Stop recording when the file system has less than this free, bytes.
     pub min_free: u64,
@@ -93,12 +93,12 @@ pub struct Settings {
     pub sync_every: Duration,
     /// Batches that may wait for the disk; more are dropped and counted.
     pub queue: usize,
-    /// What is known about the run, for the head of each file.
+    /// Facts about the run, for the head of each file.
     pub provenance: Provenance,
 }
 
 impl Settings {
-    /// With every default: zstd, 200 ms, 1 s, 256 MiB free, no split, nothing replaced.
+    /// Makes them with every default: zstd, 200 ms, 1 s, 256 MiB free, no split, nothing replaced.
     #[must_use]
     pub fn new(path: impl Into<PathBuf>) -> Settings {
         Settings {
@@ -115,7 +115,7 @@ impl Settings {
     }
 }
 
-/// How a recording stands.
+/// State of a recording.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Status {
     /// Files so far, the one being written last.
@@ -148,7 +148,7 @@ impl Status {
     }
 }
 
-/// What the worker is told.
+/// Message to the worker.
 enum Entry {
     Declare(Box<Stream>),
     Samples(Arc<str>, Vec<RawSample>),
@@ -158,7 +158,7 @@ enum Entry {
     Finish,
 }
 
-/// What worker, sync thread and handles share.
+/// State that worker, sync thread and handles share.
 #[derive(Debug, Default)]
 struct Shared {
     status: Mutex<Status>,
@@ -216,7 +216,7 @@ impl Handle {
         self.send(Entry::Reopen);
     }
 
-    /// How it stands, as of the last chunk.
+    /// State as of the last chunk.
     #[must_use]
     pub fn status(&self) -> Status {
         self.shared.snapshot()
@@ -279,7 +279,7 @@ impl Recorder {
         })
     }
 
-    /// For those who feed it.
+    /// Handle for those who feed it.
     #[must_use]
     pub fn handle(&self) -> Handle {
         self.handle.clone()

@@ -25,7 +25,7 @@ use tokio::time::timeout;
 /// Longest body.
 const MAX_BODY: usize = 1 << 20;
 
-/// What the address may say.
+/// Query that the address may have.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Asked {
@@ -33,7 +33,7 @@ pub(super) struct Asked {
     id: Option<String>,
 }
 
-/// How a body holds its objects.
+/// Form in which a body holds its objects.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Form {
     Json,
@@ -157,7 +157,7 @@ fn no_page(headers: &HeaderMap) -> Result<(), String> {
     }
 }
 
-/// What the body is said to be.
+/// Form that the headers state of the body.
 fn form(headers: &HeaderMap) -> Result<Form, String> {
     let mut types = headers.get_all(header::CONTENT_TYPE).iter();
     let said = match (types.next(), types.next()) {

@@ -42,7 +42,7 @@ const MAX_TOLD: usize = 32;
 #[derive(Debug, Default)]
 pub struct Scratch {
     samples: Vec<RawSample>,
-    /// Their stamps that are bare numbers, at their places.
+    /// Stamps that are bare numbers, at their places.
     bare: Vec<Option<Bare>>,
     lines: Vec<(Option<u64>, usize)>,
     head: Option<Line>,
@@ -56,14 +56,14 @@ pub struct Scratch {
 pub enum End {
     /// Too many bad lines in a row.
     TooManyErrors,
-    /// No token, or a wrong one.
+    /// Absent or wrong token.
     Unauthorised,
-    /// It did not begin with an object: somebody who speaks something else.
+    /// Beginning that is no object: somebody who speaks something else.
     NoObject,
 }
 
 impl End {
-    /// In words, for the log.
+    /// Reason in words, for the log.
     #[must_use]
     pub fn reason(self) -> &'static str {
         match self {
@@ -86,7 +86,7 @@ impl End {
     }
 }
 
-/// Which of the two has connected, and what follows from it.
+/// Side that has connected, and what follows from it.
 #[derive(Debug)]
 pub enum Side {
     /// A client of ours, who need not show a token when trusted.
@@ -94,23 +94,23 @@ pub enum Side {
         /// Whether it has shown the token, or need not.
         trusted: bool,
     },
-    /// Who sends and is told nothing: what it asks for is passed over.
+    /// Sender that is told nothing: what it asks for is passed over.
     Deaf {
-        /// As above.
+        /// Whether it is trusted.
         trusted: bool,
     },
     /// A source we connected to: nobody who asks anything of us.
     Source(Box<Naming>),
 }
 
-/// How the lines of a source are read and its sensor is called.
+/// Naming: how the lines of a source are read and its sensor is called.
 #[derive(Debug)]
 pub struct Naming {
     id: Option<String>,
-    /// What a sensor is called that does not say: the subject of its message does.
+    /// Name of a sensor that does not state one: the subject of its message does.
     subject: Option<String>,
     decoder: Option<LineDecoder>,
-    /// What the lines call the sensor that is called `id` here, or that has no other name.
+    /// Name in the lines of the sensor that is called `id` here, or that has no other name.
     called: Option<Origin>,
     events: Vec<Event>,
 }
@@ -198,7 +198,7 @@ pub struct Session {
     framer: Framer,
     side: Side,
     authorised: bool,
-    /// Its pages are our own.
+    /// Whether its pages are our own.
     is_own_page: bool,
     opening: Opening,
     errors_in_a_row: u32,
@@ -208,12 +208,12 @@ pub struct Session {
     has_sent: bool,
     /// The sensors it sends.
     owned: Owned,
-    /// What packed samples with a number say, as lines would.
+    /// Meaning of packed samples by number, as lines would state it.
     bound: BTreeMap<u32, Result<Line, Box<Fault>>>,
     step: Step,
-    /// What waits for the next step.
+    /// Bytes that wait for the next step.
     held: Option<Held>,
-    /// What it is told at the end, after a while.
+    /// Words it is told at the end, after a while.
     last_words: Option<(Duration, Bytes)>,
     end: Option<End>,
 }
@@ -225,7 +225,7 @@ impl Session {
         Session::with(hub, peer, Side::Client { trusted })
     }
 
-    /// With somebody who has connected, or to whom we have. Greets.
+    /// Begins with somebody who has connected, or to whom we have. Greets.
     #[must_use]
     pub fn with(hub: &Arc<Hub>, peer: impl Into<Peer>, side: Side) -> Session {
         let client = hub.join(peer);
@@ -311,7 +311,7 @@ impl Session {
         self.authorised
     }
 
-    /// What is still to be said to it, and how long to wait before.
+    /// Words still to be sent to it, and how long to wait before.
     pub fn last_words(&mut self) -> Option<(Duration, Bytes)> {
         self.last_words.take()
     }
@@ -322,7 +322,7 @@ impl Session {
         self.opening == Opening::Over
     }
 
-    /// What a source has said of itself since this was asked last.
+    /// Events that a source has reported of itself since this was called last.
     pub fn events(&mut self) -> Vec<Event> {
         match &mut self.side {
             Side::Source(naming) => std::mem::take(&mut naming.events),

@@ -43,7 +43,7 @@ impl Default for Shutdown {
 }
 
 impl Shutdown {
-    /// For a task that starts.
+    /// Guard for a task that starts.
     #[must_use]
     pub fn running(&self) -> Running {
         Running {
@@ -71,7 +71,7 @@ impl Shutdown {
 }
 
 impl Running {
-    /// Until it is time to end: then read what is there and call [`Running::has_read`].
+    /// Waits until it is time to end: then read what is there and call [`Running::has_read`].
     pub async fn asked(&mut self) {
         self.reached(Step::Read).await;
     }
@@ -81,7 +81,7 @@ impl Running {
         self.reading = None;
     }
 
-    /// Until everybody has read: then send what waits and end.
+    /// Waits until everybody has read: then send what waits and end.
     pub async fn asked_to_send(&mut self) {
         self.reached(Step::Send).await;
     }
@@ -98,19 +98,19 @@ impl Running {
     }
 }
 
-/// What ended the daemon.
+/// Signal that ended the daemon.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Signal {
     /// Ctrl-C.
     Interrupt,
-    /// From a service manager.
+    /// Request of a service manager.
     Terminate,
     /// The terminal has gone.
     HangUp,
 }
 
 impl Signal {
-    /// Its name.
+    /// Name.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -241,7 +241,7 @@ impl Heard {
     }
 }
 
-/// Where there is only Ctrl-C.
+/// Signals where there is only Ctrl-C.
 #[cfg(not(unix))]
 struct Heard;
 

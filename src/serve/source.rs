@@ -30,19 +30,19 @@ const OURS: [&str; 3] = ["id", "proto", "token-file"];
 /// Something to connect to for samples.
 #[derive(Clone, Debug)]
 pub struct Source {
-    /// Where.
+    /// Remote address.
     pub remote: Remote,
-    /// What its sensor is called here, whatever it calls itself.
+    /// Id of its sensor here, whatever it calls itself.
     pub id: Option<String>,
-    /// How to speak with it.
+    /// Protocol to speak with it.
     pub protocol: Protocol,
-    /// What it wants to see first.
+    /// Token that it wants to see first.
     pub token: Option<Secret>,
-    /// Its address, for people: of the query the names, and the values that are ours and no secret.
+    /// Address for people: of the query the names, and the values that are ours and no secret.
     pub name: String,
 }
 
-/// Where samples are fetched.
+/// Place from which samples are fetched.
 #[derive(Clone, Debug)]
 pub enum Endpoint {
     /// Somebody who listens.
@@ -78,7 +78,7 @@ impl Endpoint {
         Source::parse(text).map(|source| Endpoint::Source(Box::new(source)))
     }
 
-    /// Its address, for people.
+    /// Address, for people.
     #[must_use]
     pub fn name(&self) -> &str {
         match self {
@@ -90,7 +90,7 @@ impl Endpoint {
         }
     }
 
-    /// What its sensor is called here, where that was said.
+    /// Id of its sensor here, if one was given.
     #[must_use]
     pub fn id(&self) -> Option<&str> {
         match self {
@@ -171,7 +171,7 @@ pub fn without_zenoh(before: &str, text: &str) -> Error {
     )
 }
 
-/// How to speak with a source.
+/// Protocol to speak with a source.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Protocol {
     /// Nothing is said, unless it greets like a daemon: then it is asked to send what it has.
@@ -269,7 +269,7 @@ impl Source {
         })
     }
 
-    /// What reads its lines, where that is not what reads everybody's.
+    /// Decoder of its lines, if it is not the one of everybody's.
     #[must_use]
     pub fn decoder(&self, options: &Options) -> Option<LineDecoder> {
         match &self.protocol {

@@ -19,7 +19,7 @@ use strapd_attitude::record::TimeUnit;
 use strapd_attitude::record::{AttitudeCovariance, AttitudeSample, Nanos, Status};
 use strapd_recording::text::printable;
 
-/// What this release writes. 1 had neither the run nor the memory.
+/// Version that this release writes. 1 had neither the run nor the memory.
 pub(super) const FORMAT: u32 = 2;
 /// A larger file is none of ours: a sensor takes no more than 10 KiB.
 const MAX_BYTES: u64 = 64 << 20;
@@ -55,7 +55,7 @@ pub struct Saved {
     /// Number of the next attitude.
     #[serde(default)]
     seq: u64,
-    /// What the estimator needs to go on exactly.
+    /// Memory of the estimator, to go on exactly.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     memory: Option<Box<Memory>>,
 }
@@ -70,7 +70,7 @@ struct Document<S> {
 }
 
 impl Saved {
-    /// Of a stream with these labels.
+    /// Makes it of a stream with these labels.
     #[must_use]
     pub fn new(last: &AttitudeSample, labels: &sink::Stream) -> Saved {
         Saved {
@@ -89,7 +89,7 @@ impl Saved {
         }
     }
 
-    /// In a run that began with this stamp, before the attitude with number `seq`.
+    /// Adds the run, which began with this stamp, before the attitude with number `seq`.
     #[must_use]
     pub fn in_run(
         self,
@@ -110,7 +110,7 @@ impl Saved {
         }
     }
 
-    /// From where to where the run went.
+    /// Span of the run.
     pub(super) fn span(&self) -> Span {
         Span {
             first: self.first_ns.map(Nanos),
@@ -131,13 +131,13 @@ impl Saved {
         TimeUnit::named(self.unit.as_deref()?)
     }
 
-    /// How often it has been reset.
+    /// Number of times it has been reset.
     #[must_use]
     pub fn resets(&self) -> u32 {
         self.reset
     }
 
-    /// What the estimator knew.
+    /// Memory of the estimator.
     #[must_use]
     pub fn memory(&self) -> Option<&Memory> {
         self.memory.as_deref()

@@ -9,14 +9,14 @@ use std::time::{Duration, Instant};
 
 /// The first wrong token of an address waits so long for its answer, each further one twice as long.
 const FIRST: Duration = Duration::from_millis(100);
-/// No answer waits longer.
+/// Longest wait of an answer.
 const LONGEST: Duration = Duration::from_secs(5);
 /// An address that tried nothing for so long begins anew.
 const FORGOTTEN: Duration = Duration::from_secs(60);
 /// Addresses remembered; the one silent longest makes room for another.
 const MOST: usize = 1024;
 
-/// Who has shown wrong tokens.
+/// Peers that have shown wrong tokens.
 #[derive(Debug, Default)]
 pub(super) struct Strangers {
     known: HashMap<IpAddr, Failures>,

@@ -43,7 +43,7 @@ use strapd_attitude::record::{Declared, TimeUnit};
 use strapd_recording::decode::{Ambiguous, Bare, Line};
 use strapd_recording::recording::early_besides;
 
-/// That forces are not used was said; the bits below are verdicts.
+/// Bit that says that unused forces were logged; the bits below are verdicts.
 const FORCES: u32 = 1 << 31;
 
 /// Numbers a sample may come behind its turn. Further back, the sender counts anew.
@@ -60,13 +60,13 @@ pub struct SensorStream {
     channel: Arc<Channel>,
     resolved: Meaning,
     prepared: Prepared,
-    /// Who sends it has just come, and its first stamp is still to decide where it stands.
+    /// Progress of a sender that has just come, whose first stamp is still to decide where it stands.
     joining: Joining,
-    /// What to go on from, until a stamp has decided that.
+    /// State to go on from, until a stamp has decided that.
     saved: Option<Saved>,
     /// The unit of stamps that do not say theirs.
     stamps: Stamps,
-    /// What is to be said of them.
+    /// Fault to report of them.
     ambiguous: Option<Fault>,
     /// Why there is no unit.
     why_no_stamp: Option<String>,
@@ -100,14 +100,14 @@ pub struct SensorStream {
     early: VecDeque<RawSample>,
 }
 
-/// How far it is known where a sender stands.
+/// Progress in finding where a sender stands.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Joining {
-    /// No stamp of it has come yet.
+    /// Undecided: no stamp of it has come yet.
     Undecided,
-    /// It sends again what was taken, up to this.
+    /// Repetition: it sends again what was taken, up to this.
     Again(Nanos),
-    /// It is where the run is.
+    /// Joined: it is where the run is.
     Joined,
 }
 
@@ -138,7 +138,7 @@ pub fn live_plan(plan: &Plan) -> Result<Plan, Diagnostic> {
 }
 
 impl SensorStream {
-    /// For the sensor `id`, whose first line says `stated` and brings `together`. `plan` is a
+    /// Makes one for the sensor `id`, whose first line states `stated` and brings `together`. `plan` is a
     /// [`live_plan`]. It goes on from `saved`, where there is such and the stamps do; `declare` makes its
     /// labels known to clients.
     ///
@@ -209,13 +209,13 @@ impl SensorStream {
         })
     }
 
-    /// As clients know it.
+    /// Channel as clients know it.
     #[must_use]
     pub fn channel(&self) -> &Arc<Channel> {
         &self.channel
     }
 
-    /// Its name.
+    /// Name.
     #[must_use]
     pub fn id(&self) -> &Arc<str> {
         &self.id
@@ -229,13 +229,13 @@ impl SensorStream {
             && plan.unit.or(line.gyro_unit).unwrap_or(unit) == unit
     }
 
-    /// What a recording calls it.
+    /// Labels in a recording.
     #[must_use]
     pub fn recorded(&self) -> crate::sink::Stream {
         self.channel.stream().clone()
     }
 
-    /// What a daemon after this one needs to go on; `None` before the first attitude.
+    /// State that a daemon after this one needs to go on; `None` before the first attitude.
     #[must_use]
     pub fn saved(&self) -> Option<Saved> {
         if let Some(saved) = &self.saved {
@@ -250,7 +250,7 @@ impl SensorStream {
         ))
     }
 
-    /// What is known of the sensor by now. `plan` is that of [`SensorStream::new`].
+    /// Calibration of the sensor by now. `plan` is that of [`SensorStream::new`].
     #[must_use]
     pub fn calibration(&self, plan: &Plan) -> SensorCalibration {
         // What a rest would have told was learned on the way.
@@ -304,7 +304,7 @@ impl SensorStream {
         self.stamps.is_overdue(now)
     }
 
-    /// Those that wait for the unit of their stamps, when nobody is to wait any longer.
+    /// Takes those that wait for the unit of their stamps, when nobody is to wait any longer.
     pub fn overdue(&mut self) -> Taken {
         let (taken, why) = self.stamps.release(true);
         self.doubt(why);
@@ -342,7 +342,7 @@ impl SensorStream {
         }
     }
 
-    /// Before samples are taken: decides by the first stamp of who sends it whether the run goes on.
+    /// Decides by the first stamp of a sender whether the run goes on, before samples are taken.
     /// `plan` is that of [`SensorStream::new`]. What is to be known of a run that has begun comes back.
     ///
     /// # Errors
@@ -551,12 +551,12 @@ impl SensorStream {
         (first, attitudes, &self.channel)
     }
 
-    /// Its attitudes are handed out: it waits for its next samples.
+    /// Frees memory when its attitudes are handed out and it waits for its next samples.
     pub(crate) fn trim(&mut self) {
         self.estimator.trim();
     }
 
-    /// What has been found wrong, and the kinds of loss that have happened, for the first time to who sends it, since
+    /// Faults found, and the kinds of loss that have happened, for the first time to who sends it, since
     /// this was asked last.
     pub fn news(&mut self) -> Vec<Fault> {
         let counts = self.estimator.conditioning().counts;
@@ -590,18 +590,18 @@ impl SensorStream {
         news
     }
 
-    /// What conditioning did.
+    /// Report of conditioning.
     #[must_use]
     pub fn conditioning(&self) -> &Report {
         self.estimator.conditioning()
     }
 
-    /// What a replay's streams say of themselves, too.
+    /// Health, which a replay's streams report of themselves, too.
     pub(super) fn health(&self) -> Health {
         Health::of(&self.estimator)
     }
 
-    /// What is known of it, for `STATUS`.
+    /// State for `STATUS`.
     #[must_use]
     pub fn status(&self) -> serde_json::Value {
         let report = self.conditioning();

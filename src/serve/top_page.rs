@@ -30,10 +30,10 @@ const MOST_POINTS: usize = 2000;
 const POINTS: usize = 1000;
 /// Requests worked on at once, over all listeners.
 static AT_ONCE: LazyLock<Semaphore> = LazyLock::new(|| Semaphore::new(2));
-/// How long one waits for its turn.
+/// Time for which one waits for its turn.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// What may be asked; what is left out is the source document's top.
+/// Query that may be asked; what is left out is the source document's top.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Request {
@@ -44,7 +44,7 @@ pub(super) struct Request {
     duration: Option<f64>,
     spin_hz: Option<f64>,
     tilt_deg: Option<f64>,
-    /// Of `free` alone, degrees a second.
+    /// Precession of `free` alone, degrees a second.
     precession_dps: Option<f64>,
     nutation_dps: Option<f64>,
     mass: Option<f64>,
@@ -221,7 +221,7 @@ fn path(path: &MethodPath) -> Value {
     json!({"name": path.how.name(), "q": q, "error_deg": errors})
 }
 
-/// For pictures: errors are taken before.
+/// Quaternion in short for pictures: errors are taken before.
 fn short(q: &Quaternion<Nav, Body>) -> [f64; 4] {
     q.wxyz().map(|v| rounded(v, 1e7))
 }

@@ -1,4 +1,4 @@
-//! What a daemon we are connected to says of itself. Pure.
+//! Messages of a daemon we are connected to about itself. Pure.
 
 use serde::Deserialize;
 use strapd_recording::text::printable;
@@ -6,9 +6,9 @@ use strapd_recording::text::printable;
 /// Something to know of.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Event {
-    /// It is a daemon: its greeting, with the name of its run.
+    /// Greeting of a daemon, with the name of its run.
     Greeted(String),
-    /// It complains.
+    /// Complaint.
     Complained(String),
     /// We were too slow for so many of what it has.
     Dropped(u64),

@@ -33,7 +33,7 @@ pub const MAX_ID: usize = 255;
 /// Most sensors one `WATCH` can name: as many as there are, unless more are allowed.
 pub const MAX_WATCHED: usize = 1024;
 
-/// What a line asks for.
+/// Request of a line.
 #[derive(Debug, PartialEq)]
 pub enum Message {
     /// Samples of one sensor: they are in the buffer given.
@@ -48,7 +48,7 @@ pub enum Message {
     Playback(Action),
     /// Begin a sensor's attitude anew; or why that can not be, which is no fault of samples.
     Reset(Result<Reset, Fault>),
-    /// What the sensors are held against.
+    /// Reference against which the sensors are compared.
     Reference(Box<Reference>),
     /// Here is the token.
     Auth(String),
@@ -419,7 +419,7 @@ pub fn gap(id: &str, dropped: &Dropped) -> Bytes {
     }))
 }
 
-/// Where a replay is.
+/// Line of where a replay is.
 #[must_use]
 pub fn playback(place: &Position, session: &str) -> Bytes {
     let stamp = |at: Option<Nanos>| {
@@ -445,7 +445,7 @@ pub fn status(fields: Value) -> Bytes {
     line(&fields)
 }
 
-/// What was wrong: with line `number` (0 = none), which begins like `near`; `suppressed` more were
+/// Line of a fault: of line `number` (0 = none), which begins like `near`; `suppressed` more were
 /// not said since the last.
 #[must_use]
 pub fn error(fault: &Fault, number: u64, near: &[u8], suppressed: u64) -> Bytes {

@@ -1,7 +1,7 @@
-//! Who asks servers: TLS by `ring`, redirects within bounds, nothing waited for without end. I/O.
+//! Client that asks servers: TLS by `ring`, redirects within bounds, nothing waited for without end. I/O.
 //!
-//! Apart from the requests because what must not happen is said here once: no credentials to another host, no step down from
-//! https to http, no address handed on to whom a redirect leads.
+//! Apart from the requests because what must not happen is said here once: no credentials to another host, no step
+//! down from https to http, no address handed on to whom a redirect leads.
 
 use super::fault::Fault;
 use super::patience::Patience;
@@ -13,7 +13,8 @@ use strapd_attitude::diagnostic::Diagnostic;
 /// Redirects that are followed.
 const MOST_REDIRECTS: usize = 5;
 
-/// For addresses, which hold all there is to be known. Where the system has no certificates, plain http is spoken all the same.
+/// Makes one for addresses, which hold all there is to be known. Where the system has no certificates, plain http is
+/// spoken all the same.
 pub(super) fn of_web(is_plain: bool, patience: &Patience) -> Result<Client, Diagnostic> {
     let client = || plain(patience).redirect(Policy::custom(followed));
     built(client()).or_else(|why| match is_plain {
@@ -22,7 +23,7 @@ pub(super) fn of_web(is_plain: bool, patience: &Patience) -> Result<Client, Diag
     })
 }
 
-/// For signed requests, which are for one host alone.
+/// Makes one for signed requests, which are for one host alone.
 pub(super) fn of_cloud(patience: &Patience) -> Result<Client, Diagnostic> {
     built(plain(patience).redirect(Policy::none()))
 }
@@ -56,7 +57,7 @@ fn followed(attempt: Attempt<'_>) -> Action {
     attempt.follow()
 }
 
-/// What a request failed with.
+/// Fault with which a request failed.
 pub(super) fn fault(why: &reqwest::Error, patience: &Patience) -> Fault {
     if why.is_redirect() {
         return Diagnostic::new(innermost(why)).into();

@@ -1,7 +1,7 @@
 //! A range of an object in a store: `s3`, `gs`, `az`. I/O, by `object_store`.
 //!
-//! Credentials are those of the environment, as each cloud's own tools take them. Requests go by our own client, which follows no
-//! redirect: a signature is for one host.
+//! Credentials are those of the environment, as each cloud's own tools take them. Requests go by our own client,
+//! which follows no redirect: a signature is for one host.
 
 use super::answer::{Part, Reply, Version};
 use super::client::{self, innermost};
@@ -34,12 +34,12 @@ use strapd_attitude::diagnostic::Diagnostic;
 use strapd_recording::address::Address;
 use strapd_recording::text::snippet;
 
-/// What a cloud's own tools read.
+/// Variables that a cloud's own tools read.
 const S3: &str = "AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY, AWS_SESSION_TOKEN, AWS_REGION and AWS_ENDPOINT_URL are looked at; AWS_SKIP_SIGNATURE=true reads what is public";
 const GS: &str = "GOOGLE_SERVICE_ACCOUNT (a file) and GOOGLE_APPLICATION_CREDENTIALS are looked at; GOOGLE_SKIP_SIGNATURE=true reads what is public";
 const AZ: &str = "AZURE_STORAGE_ACCOUNT_NAME, AZURE_STORAGE_ACCOUNT_KEY, AZURE_STORAGE_SAS_KEY and AZURE_CLIENT_ID are looked at; AZURE_SKIP_SIGNATURE=true reads what is public";
 
-/// Who gives credentials to machines of a cloud, and answers at once or never.
+/// Servers that give credentials to machines of a cloud, and answer at once or never.
 const METADATA: [&str; 3] = [
     "169.254.169.254",
     "fd00:ec2::254",
@@ -86,7 +86,7 @@ fn both<S: ObjectStore + MultipartStore>(store: S) -> Both {
     (store.clone(), store)
 }
 
-/// What was answered to one request, beside what `object_store` tells of it.
+/// Answer to one request, beside what `object_store` tells of it.
 #[derive(Debug, Default)]
 struct Answered {
     status: AtomicU16,
@@ -100,7 +100,7 @@ impl Cloud {
         Cloud::at(address, patience, false)
     }
 
-    /// What is in a folder, to be listed; without one all that there is.
+    /// Makes one of a folder, to be listed; without one of all that there is.
     pub(super) fn in_folder(address: &Address, patience: Patience) -> Result<Cloud, Diagnostic> {
         Cloud::at(address, patience, true)
     }
@@ -233,7 +233,7 @@ impl Cloud {
         Ok(keys)
     }
 
-    /// How many bytes the object has; `None` where there is none.
+    /// Size of the object in bytes; `None` where there is none.
     pub(super) async fn size(&self) -> Result<Option<u64>, Fault> {
         self.ask_anew();
         match self.store.head(&self.key).await {
@@ -284,7 +284,7 @@ impl Cloud {
         given_up.map_err(|why| self.fault(&why, self.latest()))
     }
 
-    /// What was answered to the last request; requests to write follow each other.
+    /// Answer to the last request; requests to write follow each other.
     fn latest(&self) -> &Answered {
         &self.speaker.latest
     }
@@ -295,7 +295,7 @@ impl Cloud {
         self.latest().asked_millis.store(0, Ordering::Relaxed);
     }
 
-    /// What is there though it has no byte in `range`.
+    /// Reply for an object that has no byte in `range`.
     async fn beyond(&self, range: Range<u64>) -> Result<Reply, Fault> {
         let found = self.store.head(&self.key).await;
         let found = found.map_err(|why| self.fault(&why, &Answered::default()))?;
@@ -359,7 +359,7 @@ impl Cloud {
         }
     }
 
-    /// What helps where the store says this.
+    /// Help for an answer with this status.
     pub(super) fn help(&self, status: u16) -> String {
         match status {
             401 | 403 => variables(&self.scheme).to_owned(),
@@ -373,7 +373,7 @@ impl Cloud {
     }
 }
 
-/// What a body was cut by.
+/// Reason why a body was cut.
 fn broken(why: &Error) -> String {
     own_words(why).unwrap_or_else(|| "a body was cut".to_owned())
 }

@@ -1,6 +1,7 @@
-//! What a request failed with -> whether to try again, and the words for it. Pure.
+//! Failure of a request -> whether to try again, and the words for it. Pure.
 //!
-//! Words are our own throughout: what a server or a client says of a request repeats its address, and what is secret in it.
+//! Words are our own throughout: what a server or a client says of a request repeats its address, and what is secret
+//! in it.
 
 use reqwest::StatusCode;
 use std::time::Duration;
@@ -9,18 +10,18 @@ use strapd_attitude::diagnostic::Diagnostic;
 /// A request that brought nothing, or less than it should have.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(super) enum Fault {
-    /// It may go another time; the server may have said when.
+    /// Failure that may pass; the server may have stated when.
     Passing {
         what: String,
         asked: Option<Duration>,
     },
     /// The server said no.
     Refused(u16),
-    /// It is no use trying again.
+    /// Failure that stays.
     Lasting(Diagnostic),
 }
 
-/// Said when an object is another than at first.
+/// Text for an object that is another than at first.
 const CHANGED: &str = "the object changed while it was read";
 
 impl Fault {
@@ -51,7 +52,7 @@ impl Fault {
         }
     }
 
-    /// For whoever asked; `help` says what helps where the server says a status.
+    /// Diagnostic for whoever asked; `help` has what helps where the server states a status.
     pub(super) fn told(self, help: impl Fn(u16) -> String) -> Diagnostic {
         match self {
             Fault::Passing { what, .. } => Diagnostic::new(what),

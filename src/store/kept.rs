@@ -1,7 +1,7 @@
 //! An object -> its bytes as they are asked for, each fetched once. I/O.
 //!
-//! What was fetched is in a file without a name that goes with this process; in memory is only what has just come. So a second
-//! pass over a recording costs no second download, and who reads in no order at all is served, too.
+//! What was fetched is in a file without a name that goes with this process; in memory is only what has just come. So
+//! a second pass over a recording costs no second download, and who reads in no order at all is served, too.
 
 use super::answer::{Part, Version};
 use super::download;
@@ -21,7 +21,7 @@ use tokio::runtime::Handle;
 
 /// Requests on their way at once.
 const ON_THE_WAY: usize = 8;
-/// What is fetched of bytes that nobody said would be read.
+/// Number of bytes fetched where nobody announced what would be read.
 const LOOK: u64 = 64 << 10;
 /// Bytes that are kept at most, as of a pipe.
 const MOST: u64 = 8 << 30;
@@ -55,9 +55,9 @@ struct State {
     asked: Ranges,
     on_the_way: usize,
     bytes: u64,
-    /// What to fetch at a time, in the order in which it will be read.
+    /// Plan of what to fetch at a time, in the order in which it will be read.
     plan: Vec<Range<u64>>,
-    /// Before this one of the plan, all are read; and how far ahead of it is fetched.
+    /// Index in the plan before which all are read; and how far ahead of it is fetched.
     at: usize,
     ahead: u64,
     failed: Option<Diagnostic>,

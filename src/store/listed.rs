@@ -1,7 +1,7 @@
 //! An address with `*` in its key -> the addresses that it means. I/O.
 //!
-//! Apart from the reading because nothing is read yet, and because only stores can say what they have: a web server is asked
-//! for what one knows.
+//! Apart from the reading because nothing is read yet, and because only stores can say what they have: a web server
+//! is asked for what one knows.
 
 use super::cloud::{Cloud, Keys};
 use super::download::given_up;
@@ -16,7 +16,7 @@ use strapd_recording::address::Address;
 const MOST_KEYS: usize = 1_000_000;
 const MOST_MEANT: usize = 10_000;
 
-/// What an address means that may be a pattern, in the order of their names; `None` of one that is none.
+/// Objects that an address means which may be a pattern, in the order of their names; `None` of one that is none.
 ///
 /// # Errors
 /// Nobody lists what is there, nothing is meant, or too much is; what the store says.

@@ -1,8 +1,8 @@
-//! How often and how long is waited for a server. Pure.
+//! Number and length of the waits for a server. Pure.
 
 use std::time::Duration;
 
-/// What a server is given before it is given up.
+/// Patience with a server before it is given up.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Patience {
     /// Requests in a row that bring next to nothing.
@@ -13,9 +13,9 @@ pub struct Patience {
     pub longest_pause: Duration,
     /// The longest pause that a server may ask for.
     pub longest_asked: Duration,
-    /// Until a connection is there.
+    /// Time until a connection is there.
     pub connect: Duration,
-    /// Until the next byte is there.
+    /// Time until the next byte is there.
     pub silence: Duration,
     /// Within this much time ...
     pub spell: Duration,

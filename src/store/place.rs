@@ -1,6 +1,7 @@
 //! An address -> requests for ranges of what is there. I/O.
 //!
-//! Apart from who speaks to which store because whoever downloads sees one thing: a range, what it is of, and its bytes.
+//! Apart from who speaks to which store because whoever downloads sees one thing: a range, what it is of, and its
+//! bytes.
 
 use super::answer::Reply;
 use super::cloud::Cloud;
@@ -29,7 +30,7 @@ pub(super) enum Place {
 }
 
 impl Place {
-    /// Who is to be asked for what is at an address.
+    /// Finds the place of what is at an address.
     pub(super) fn of(address: &Address, patience: &Patience) -> Result<Place, Diagnostic> {
         Ok(match address.scheme().as_str() {
             "http" | "https" => Place::Web(Web::of(address, *patience)?),
@@ -52,7 +53,7 @@ impl Place {
         }
     }
 
-    /// What helps where the server says this.
+    /// Help for an answer with this status.
     pub(super) fn help(&self, status: u16) -> String {
         match self {
             Place::Web(_) => match status {

@@ -1,4 +1,4 @@
-//! Which bytes are there, and which to fetch together. Pure.
+//! Ranges of bytes that are there, and which to fetch together. Pure.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -42,20 +42,20 @@ impl Ranges {
         (at < range.end).then_some(at)
     }
 
-    /// From `at`, which is not there, to the next byte that is, or to `end`.
+    /// Range from `at`, which is not there, to the next byte that is, or to `end`.
     pub(super) fn gap(&self, at: u64, end: u64) -> Range<u64> {
         let next = self.by_start.range(at..).next();
         at..next.map_or(end, |(&start, _)| start.min(end))
     }
 
-    /// Where the last stretch before `at` ends.
+    /// End of the last stretch before `at`.
     pub(super) fn end_before(&self, at: u64) -> u64 {
         let before = self.by_start.range(..=at).next_back();
         before.map_or(0, |(_, &end)| end.min(at))
     }
 }
 
-/// What is to be read, in that order -> what to fetch at a time.
+/// Pieces to fetch at a time, for what is to be read in that order.
 pub(super) fn pieces(ranges: &[Range<u64>], size: u64) -> Vec<Range<u64>> {
     let mut joined: Vec<Range<u64>> = Vec::new();
     for range in ranges {

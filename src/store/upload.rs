@@ -1,7 +1,7 @@
 //! A file -> an object in a store, whole or not at all. I/O.
 //!
-//! Apart from what is read because of what may go wrong: an object of several parts is there when it is completed, and not
-//! before; where that fails, or somebody interrupts, the parts are given up, and nothing of them can be read.
+//! Apart from what is read because of what may go wrong: an object of several parts is there when it is completed,
+//! and not before; where that fails, or somebody interrupts, the parts are given up, and nothing of them can be read.
 
 use super::cloud::Cloud;
 use super::fault::Fault;
@@ -21,10 +21,10 @@ use strapd_replay::sink::upload::Way;
 /// Bytes of a part; at most 10,000 are taken, which makes 78 GiB.
 const PART: u64 = 8 << 20;
 const MOST_PARTS: u64 = 10_000;
-/// For a part, from its first byte to the answer.
+/// Time for a part, from its first byte to the answer.
 const SILENCE: Duration = Duration::from_secs(300);
 
-/// How objects are put into stores.
+/// Way by which objects are put into stores.
 pub const WAY: Way = Way { exists, put };
 
 fn exists(address: &Address) -> Result<bool, Diagnostic> {
@@ -112,7 +112,7 @@ fn read(file: &mut File, count: u64) -> Result<Bytes, Fault> {
     Ok(bytes.into())
 }
 
-/// In one piece, which a store takes as a whole.
+/// Puts it in one piece, which a store takes as a whole.
 async fn whole(
     cloud: &Cloud,
     mut file: File,

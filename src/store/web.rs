@@ -1,6 +1,7 @@
 //! A range of what is at an `http` or `https` address. I/O.
 //!
-//! By requests of our own and not by those of `object_store`, whose store for HTTP is one for WebDAV: it asks for the size by HEAD, which an
+//! By requests of our own and not by those of `object_store`, whose store for HTTP is one for WebDAV: it asks for the
+//! size by HEAD, which an
 //! address signed for GET refuses, and takes the query from an address, which is where the signature is.
 
 use super::answer::{Body, Part, Reply, Version};
@@ -24,7 +25,7 @@ pub(super) struct Web {
     patience: Patience,
 }
 
-/// Without what is secret in the address.
+/// Debug text without what is secret in the address.
 impl std::fmt::Debug for Web {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "Web({})", Address::from(self.url.as_str()))
@@ -114,7 +115,7 @@ fn is_plain(headers: &HeaderMap) -> Result<(), Fault> {
     }
 }
 
-/// Where a part begins, and how much there is of `bytes 0-99/1000`.
+/// Beginning of a part, and its size, of `bytes 0-99/1000`.
 fn content_range(text: &str) -> Option<(u64, u64)> {
     let (part, size) = text.strip_prefix("bytes ")?.split_once('/')?;
     let (start, end) = part.split_once('-')?;

@@ -1,4 +1,4 @@
-//! What was kept of a run -> charts over time. Pure.
+//! Series kept of a run -> charts over time. Pure.
 
 use super::looking;
 use crate::report::plot::{Axis, Chart, Look, Series};
@@ -27,7 +27,7 @@ pub(super) struct Time {
     /// ns of the unit.
     pub(super) nanos: f64,
     pub(super) unit: &'static str,
-    /// Where it ends, in the unit.
+    /// End, in the unit.
     pub(super) end: f64,
 }
 
@@ -215,7 +215,7 @@ pub(super) fn bounds(trace: &Traces<4>, time: Time, part: Bounded) -> Result<Str
     over_time(time, title, "deg", lines)
 }
 
-/// What corrected the attitude was off by, between three sigma of what was expected: gravity, and heading where a field
+/// Innovations between three sigma of what was expected: gravity, and heading where a field
 /// told it.
 pub(super) fn innovations(traces: &Traces<5>, time: Time) -> Vec<Result<String, String>> {
     let of_gravity = (
@@ -251,7 +251,7 @@ pub(super) fn innovations(traces: &Traces<5>, time: Time) -> Vec<Result<String, 
     charts
 }
 
-/// Which part of an error.
+/// Part of an error.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Bounded {
     Tilt,

@@ -13,7 +13,7 @@ const SHOWN: usize = 200;
 /// A finding, and the flag of this run that deals with it already.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Told {
-    /// What was found.
+    /// Finding.
     pub finding: Finding,
     /// The flag; `None` = nothing was done about it.
     pub answered: Option<&'static str>,
@@ -36,7 +36,7 @@ impl Told {
         self.answered.is_none() && self.finding.severity == severity
     }
 
-    /// For machines.
+    /// JSON for machines.
     #[must_use]
     pub fn json(&self) -> Value {
         let mut value = self.finding.json();

@@ -1,7 +1,7 @@
 //! Charts that can be looked into: their numbers beside the picture, and the script that draws them. Pure.
 //!
-//! The plots of the live page, joined to one script. The page says its hash and allows no other, and no connection; without
-//! scripts the pictures stand.
+//! The plots of the live page, joined to one script. The page says its hash and allows no other, and no connection;
+//! without scripts the pictures stand.
 
 use super::charts::Time;
 use crate::report::plot::{Look, Series};
@@ -11,7 +11,7 @@ use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 use sha2::{Digest as _, Sha256};
 
-/// In the order in which they need each other.
+/// Parts in the order in which they need each other.
 const PARTS: [&str; 8] = [
     "numbers.js",
     "clock.js",
@@ -61,8 +61,8 @@ fn rounded(value: f64, digits: usize) -> Value {
     text.parse::<f64>().map_or(Value::Null, Value::from)
 }
 
-/// JSON that can stand in an element of HTML. The only character that could end it, or begin a comment, is written as an
-/// escape; so are those that end a line of a script.
+/// JSON that can stand in an element of HTML. The only character that could end it, or begin a comment, is written as
+/// an escape; so are those that end a line of a script.
 pub(super) fn inert(data: &Value) -> String {
     let text = data.to_string();
     text.replace('<', "\\u003c")
@@ -87,7 +87,7 @@ pub(super) fn script() -> String {
     script
 }
 
-/// What a policy calls it by.
+/// Hash by which a policy names it.
 pub(super) fn hash(script: &str) -> String {
     format!(
         "'sha256-{}'",

@@ -1,4 +1,4 @@
-//! What was found out about a topic -> JSON. Pure.
+//! Results about a topic -> JSON. Pure.
 
 use super::Noise;
 use crate::report::series::{Drawn, Errors, Mark};
@@ -53,7 +53,7 @@ pub(super) fn topic(topic: &CheckedTopic, noise: Option<&Noise>) -> Value {
     })
 }
 
-/// Where the longest rest begins, seconds after the first sample, and how long it is.
+/// Beginning of the longest rest, seconds after the first sample, and its length.
 #[must_use]
 pub fn longest_rest(topic: &CheckedTopic) -> Option<(f64, f64)> {
     let rests = &topic.looked.rests;

@@ -11,7 +11,7 @@ use std::fmt::Write as _;
 
 /// Bytes of the page that are no log's: style, script, the words above.
 const OWN: usize = 60_000;
-/// Of a log, in the table.
+/// Size of a log's row in the table.
 const ROW: usize = 3_000;
 /// Fewest stretches of time a chart has, beside those of other logs.
 const COARSEST: usize = 24;
@@ -43,7 +43,7 @@ pub struct Several {
 }
 
 impl Several {
-    /// For so many logs.
+    /// Makes it for so many logs.
     #[must_use]
     pub fn of(count: usize) -> Several {
         Several {
@@ -129,7 +129,7 @@ impl Several {
         );
     }
 
-    /// How many are good, usable, wrong.
+    /// Sentence of how many are good, usable, wrong.
     #[must_use]
     pub fn sentence(&self) -> String {
         let [good, warning, bad] = self.levels;
@@ -176,7 +176,7 @@ impl Several {
     }
 }
 
-/// What is said of a log in so many bytes: drawn more coarsely, or not at all, where it would be more.
+/// Body of a log in so many bytes: drawn more coarsely, or not at all, where it would be more.
 fn body(page: &Page<'_>, room: usize) -> Option<String> {
     let mut stretches = STRETCHES / page.checked.topics.len().clamp(1, DRAWN);
     while stretches > COARSEST {

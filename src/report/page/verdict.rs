@@ -10,7 +10,7 @@ use strapd_replay::inspection::Checked;
 /// Topics of a log that are compared with those of others.
 const TOPICS: usize = 6;
 
-/// How good it is.
+/// Level of quality.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Level {
     Good,
@@ -109,7 +109,8 @@ impl Verdict {
     }
 }
 
-/// Of each topic that was integrated: duration, rate, lost samples, gaps, turned, error, and that of the gyro over 1 s.
+/// Figures of each topic that was integrated: duration, rate, lost samples, gaps, turned, error, and that of the gyro
+/// over 1 s.
 pub(super) fn figures(checked: &Checked) -> Vec<(String, [String; 7])> {
     let of = |s: &TopicSummary| {
         [
@@ -136,7 +137,7 @@ fn whole_error(s: &TopicSummary) -> Option<[String; 2]> {
     Some([found.tilt.rms, found.heading.rms].map(|rms| significant(rms.to_degrees(), 2)))
 }
 
-/// What the gyro alone misses over 1 s, the median, deg.
+/// Error of the gyro alone over 1 s, the median, deg.
 fn over_one_second(s: &TopicSummary) -> Option<String> {
     let row = s.against.iter().find(|row| row.kind == s.kind.name())?;
     Some(significant(row.median_deg, 3))

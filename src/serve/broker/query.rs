@@ -1,4 +1,4 @@
-//! What stands behind the `?` of a broker's address -> values. Pure but for reading secrets from files.
+//! Query of a broker's address -> values. Pure but for reading secrets from files.
 
 use crate::address::Address;
 use crate::client::remote::{Parameter, Place, parameters};
@@ -12,14 +12,14 @@ use strapd_recording::text::printable;
 /// Longer than any address.
 const MAX_BYTES: usize = 2048;
 
-/// How an address is refused: where it stands, what it is, and what would do.
+/// Words in which an address is refused: where it stands, what it is, and what would do.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::serve) struct Refusal<'a> {
     /// `serve` or `-o`.
     pub(in crate::serve) before: &'a str,
     /// The address as it was given.
     pub(in crate::serve) text: &'a str,
-    /// What there is.
+    /// Keys that exist.
     pub(in crate::serve) known: &'a str,
 }
 
@@ -53,7 +53,7 @@ pub(in crate::serve) struct Query<'a> {
 }
 
 impl<'a> Query<'a> {
-    /// What stands between `scheme` and the `?`, and what behind it, of which `ours` are known.
+    /// Splits an address into what stands between `scheme` and the `?`, and the query, of which `ours` are known.
     pub(in crate::serve) fn split(
         refusal: Refusal<'a>,
         scheme: &str,

@@ -1,4 +1,4 @@
-//! What an estimator of a replay has taken so far -> its fields of `STATUS`. Pure.
+//! State of a replay's estimator so far -> its fields of `STATUS`. Pure.
 //!
 //! A copy: the run itself may be waiting for its time, or for somebody to go on.
 
@@ -10,13 +10,13 @@ use strapd_attitude::estimate::Estimator;
 use strapd_attitude::propagate::Method;
 use strapd_attitude::record::{AttitudeSample, Counts, Verdict};
 
-/// How samples and attitude of a stream are.
+/// Health of a stream's samples and attitude.
 #[derive(Clone, Debug)]
 pub(in crate::serve) struct Health {
     counts: Counts,
     gaps: u64,
     not_bridged: u64,
-    /// By the ordinary step: the numbers of a sender are in no recording.
+    /// Missing samples by the ordinary step: the numbers of a sender are in no recording.
     missing: u64,
     spacing_nanos: Option<i64>,
     method: Method,
@@ -59,7 +59,7 @@ impl Health {
     }
 }
 
-/// What became of samples, by the names of the verdicts that there were.
+/// Outcomes of samples, by the names of the verdicts that there were.
 fn counted(counts: &Counts) -> Map<String, Value> {
     Verdict::ALL
         .into_iter()

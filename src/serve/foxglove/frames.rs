@@ -55,7 +55,7 @@ pub fn close(out: &mut [u8], from: usize) {
     }
 }
 
-/// What time it is in the data.
+/// Message of the time in the data.
 #[must_use]
 pub fn time(at: Nanos) -> Bytes {
     let mut message = vec![2];

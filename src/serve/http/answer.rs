@@ -1,4 +1,4 @@
-//! What is answered -> a response with the headers that all of them have. Pure.
+//! Answer -> a response with the headers that all of them have. Pure.
 
 use axum::body::Body;
 use axum::http::{HeaderValue, Response, StatusCode, header};

@@ -13,7 +13,7 @@ use std::sync::Arc;
 pub(crate) struct Connection {
     pub(crate) hub: Arc<Hub>,
     pub(crate) peer: Peer,
-    /// Its address, without the port.
+    /// Address, without the port.
     pub(crate) from: IpAddr,
     pub(crate) posters: Arc<Posters>,
     /// The client has shown the token with the request.

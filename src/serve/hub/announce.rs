@@ -1,4 +1,4 @@
-//! What clients are told beside attitudes: which streams there are, and where a replay is. Pure but for locks.
+//! Announcements beside attitudes: which streams there are, and where a replay is. Pure but for locks.
 
 use super::{ClientProtocol, Hub, lock, read, write};
 use crate::serve::channel::Channel;
@@ -20,7 +20,7 @@ impl Hub {
         self.timeline.is_none()
     }
 
-    /// What can be watched.
+    /// Classes that can be watched.
     #[must_use]
     pub fn classes(&self) -> Vec<Class> {
         let mut classes: Vec<Class> = read(&self.channels).values().map(|c| c.class()).collect();
@@ -58,7 +58,7 @@ impl Hub {
                 .is_some_and(|c| c.has(number))
     }
 
-    /// Where the replay is; `None` where there is none to be controlled.
+    /// Position of the replay; `None` where there is none to be controlled.
     #[must_use]
     pub fn where_it_is(&self) -> Option<Position> {
         self.timeline.as_ref()?.position()

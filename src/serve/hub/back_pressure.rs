@@ -15,10 +15,10 @@ use tokio::time::{Instant, timeout_at};
 
 /// Longest wait for room, before one read.
 const PATIENCE: Duration = Duration::from_millis(5);
-/// How often a thread looks.
+/// Interval at which a thread looks.
 const LOOK: Duration = Duration::from_micros(200);
-/// Who is not asked how much there is to read floods when so many messages have come that none was
-/// waited for, or so many bytes.
+/// Number of messages without a wait from which a sender floods whose reader is not told how much there is to read; the
+/// other limit is in bytes.
 const MESSAGES: u32 = 32;
 const MESSAGE_BYTES: usize = 4 << 10;
 
@@ -26,10 +26,10 @@ const MESSAGE_BYTES: usize = 4 << 10;
 #[derive(Debug, Default)]
 pub struct Flood {
     messages: u32,
-    /// Of those messages.
+    /// Bytes of those messages.
     bytes: usize,
     until: Option<Instant>,
-    /// It waited in vain, and does not wait before this.
+    /// Time before which it does not wait, having waited in vain.
     free: Option<Instant>,
     /// Longest wait for room; `None`: [`PATIENCE`].
     patience: Option<Duration>,
@@ -38,7 +38,7 @@ pub struct Flood {
 }
 
 impl Flood {
-    /// Who waits costs its sender nothing: what comes meanwhile waits elsewhere.
+    /// Makes one for a reader whose wait costs its sender nothing: what comes meanwhile waits elsewhere.
     #[cfg(feature = "zenoh")]
     #[must_use]
     pub fn with_patience(patience: Duration) -> Flood {
@@ -48,7 +48,7 @@ impl Flood {
         }
     }
 
-    /// How many bytes to read at once, where there is room for `room`.
+    /// Number of bytes to read at once, where there is room for `room`.
     #[must_use]
     pub fn most(&self, room: usize) -> usize {
         if self.is_watched { room / 4 } else { room }
@@ -77,7 +77,7 @@ impl Flood {
         }
     }
 
-    /// It is to wait before it goes on; while it is free, only until others have had their turn.
+    /// Makes it wait before it goes on; while it is free, only until others have had their turn.
     pub fn hold(&mut self) {
         let now = Instant::now();
         self.free = self.free.filter(|free| now < *free);
@@ -118,14 +118,14 @@ impl Flood {
     }
 }
 
-/// What came of a wait.
+/// Outcome of a wait.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Waited {
     /// Nobody watches.
     Nobody,
-    /// There is room.
+    /// Room.
     Room,
-    /// There is none yet.
+    /// No room yet.
     InVain,
 }
 
@@ -159,7 +159,7 @@ impl Hub {
         Waited::Room
     }
 
-    /// Until every watcher that takes anything has room for more, or `until`.
+    /// Waits until every watcher that takes anything has room for more, or `until`.
     async fn room(&self, until: Instant) -> Waited {
         let watchers = self.watchers();
         if watchers.is_empty() {
@@ -217,7 +217,7 @@ mod tests {
         flood
     }
 
-    /// How long the wait takes.
+    /// Duration of the wait.
     async fn wait(hub: &Hub) -> Duration {
         let begin = Instant::now();
         let mut flood = flooding();

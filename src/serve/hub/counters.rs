@@ -1,4 +1,4 @@
-//! What happened since the start, in numbers. Pure.
+//! Counts since the start. Pure.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -31,7 +31,7 @@ pub struct Counters {
     pub forgotten: AtomicU64,
     /// Attitudes begun anew because somebody asked.
     pub resets: AtomicU64,
-    /// Such requests that were refused.
+    /// Number of such requests that were refused.
     pub refused_resets: AtomicU64,
     /// Attitudes made.
     pub attitudes: AtomicU64,
@@ -125,11 +125,11 @@ impl Counters {
 /// A total as it is told.
 #[derive(Clone, Copy, Debug)]
 pub struct Counter {
-    /// Its name.
+    /// Name.
     pub name: &'static str,
-    /// What is counted, in a sentence.
+    /// Description of what is counted, a sentence.
     pub counts: &'static str,
-    /// How many.
+    /// Count.
     pub value: u64,
 }
 

@@ -1,4 +1,4 @@
-//! Who comes late -> the last attitude of every stream it was not told of. Pure but for locks.
+//! Late subscribers -> the last attitude of every stream they were not told of. Pure but for locks.
 
 use super::{Client, ClientProtocol, Hub, read};
 use crate::serve::channel::{Channel, Clock};
@@ -51,7 +51,7 @@ impl Hub {
         }
     }
 
-    /// Which time the messages for viewers have.
+    /// Clock of the messages for viewers.
     pub(super) fn clock(&self) -> Clock {
         match &self.timeline {
             None => Clock::Log,

@@ -29,7 +29,7 @@ pub(super) struct Absent {
 }
 
 impl Absent {
-    /// Those of before the start.
+    /// Makes it of the sensors from before the start.
     pub(super) fn new(sensors: Sensors) -> Absent {
         Absent {
             order: sensors.keys().cloned().collect(),
@@ -41,7 +41,7 @@ impl Absent {
         self.sensors.get(id)
     }
 
-    /// It is there again.
+    /// Removes a sensor that is there again.
     pub(super) fn remove(&mut self, id: &str) {
         if self.sensors.remove(id).is_some() {
             self.order.retain(|known| known != id);
@@ -245,7 +245,7 @@ impl Hub {
         }
     }
 
-    /// These sensors are another worker's: nothing of them stays.
+    /// Forgets these sensors, which are another worker's.
     #[cfg(feature = "nats")]
     pub fn forget(&self, ids: &std::collections::BTreeSet<String>) {
         let mut sensors = write(&self.sensors);
@@ -277,7 +277,7 @@ impl Hub {
         }
     }
 
-    /// How the places for sensors are taken, for `STATUS`.
+    /// Places for sensors, for `STATUS`.
     pub(super) fn places(&self) -> serde_json::Value {
         serde_json::json!({
             "sensors": self.limits.sensors,
@@ -295,7 +295,7 @@ fn ticks(time: Duration) -> u64 {
 }
 
 impl Origin {
-    /// In words; `None`: somebody we chose ourselves.
+    /// Name in words; `None`: somebody we chose ourselves.
     fn named(self) -> Option<String> {
         match self {
             Origin::Own => None,

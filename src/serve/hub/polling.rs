@@ -10,10 +10,10 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use tokio::sync::{Mutex as Turns, MutexGuard, Notify};
 
-/// Between two of them.
+/// Time between two of them.
 const BETWEEN: Duration = Duration::from_millis(100);
 
-/// Who waits to be told.
+/// Clients that wait to be told.
 #[derive(Debug, Default)]
 pub(super) struct Polling {
     waiting: Mutex<Vec<Arc<Client>>>,

@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 use std::time::Instant;
 use strapd_attitude::estimate::SensorCalibration;
 
-/// How the attitudes were saved last.
+/// Outcome of the last saving of attitudes.
 #[derive(Debug)]
 pub(super) struct StateStatus {
     saved: Option<Instant>,
@@ -83,7 +83,7 @@ impl Hub {
         all
     }
 
-    /// What is known by now of every sensor that is there, by name.
+    /// Calibrations of all sensors that are there, by name.
     #[must_use]
     pub fn calibrations(&self) -> Vec<(String, SensorCalibration)> {
         let mut all = Vec::new();

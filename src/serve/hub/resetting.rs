@@ -6,7 +6,7 @@ use crate::serve::log_throttle;
 use crate::serve::wire::Reset;
 use strapd_recording::text::printable;
 
-/// Who asks for something of a sensor.
+/// Client that asks for something of a sensor.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Asker {
     /// A connection: of the sensors it sends, or that nobody sends.
@@ -20,8 +20,8 @@ impl Hub {
     /// begin.
     ///
     /// # Errors
-    /// The fault to answer with: nothing was asked that can be, there is no such sensor, another connection sends it, it can not begin so, or
-    /// this is a replay.
+    /// The fault to answer with: nothing was asked that can be, there is no such sensor, another connection sends it,
+    /// it can not begin so, or this is a replay.
     pub fn reset(
         &self,
         asked: Result<Reset, Fault>,

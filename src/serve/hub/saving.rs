@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 use tokio::time::MissedTickBehavior;
 
-/// How often it is written.
+/// Interval at which it is written.
 const EVERY: Duration = Duration::from_millis(500);
 
 impl Hub {

@@ -25,9 +25,9 @@ use tokio::time::{Instant, MissedTickBehavior, interval, sleep, timeout};
 
 /// A stream socket of tokio.
 pub(super) trait Duplex: Send + Sync + 'static {
-    /// Until there may be something to read.
+    /// Waits until there may be something to read.
     fn readable(&self) -> impl Future<Output = io::Result<()>> + Send;
-    /// Until there may be room to write.
+    /// Waits until there may be room to write.
     fn writable(&self) -> impl Future<Output = io::Result<()>> + Send;
     /// Reads what is there.
     fn try_read(&self, buffer: &mut [u8]) -> io::Result<usize>;
@@ -55,10 +55,10 @@ const TAKE: usize = 64 << 10;
 const TURNS: usize = 16;
 /// Chunks one system call takes.
 const PARTS: usize = 64;
-/// What is still read of a client that is being closed, so that our last words are not lost with a
+/// Time for which a client that is being closed is still read, so that our last words are not lost with a
 /// reset.
 const LINGER: Duration = Duration::from_millis(250);
-/// What arrived before the end shows by then.
+/// Time by which what arrived before the end shows.
 const SETTLE: Duration = Duration::from_millis(20);
 /// Bytes read from a client at the end of the daemon: more than a socket's buffer holds.
 const LAST_READ: usize = 16 << 20;
@@ -66,7 +66,7 @@ const LAST_READ: usize = 16 << 20;
 /// Why one was ended whose place another needed.
 const MADE_ROOM: &str = "others needed its place";
 
-/// What is on its way to one client.
+/// Bytes on their way to one client.
 #[derive(Debug, Default)]
 struct Pending {
     parts: VecDeque<Bytes>,
@@ -356,7 +356,7 @@ pub(super) fn spawn<D: Duplex>(io: D, peer: Peer, context: Context, place: Place
     tokio::spawn(converse(io, peer, context, place));
 }
 
-/// As [`spawn`] for one without a place.
+/// Spawns, as [`spawn`], for one without a place.
 pub(super) fn spawn_dismissal<D: Duplex>(io: D, context: &Context, words: Bytes) {
     let running = context.running.clone();
     tokio::spawn(async move {

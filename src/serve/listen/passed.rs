@@ -10,7 +10,7 @@ use std::net::{TcpListener, UdpSocket};
 use std::os::unix::net::UnixListener;
 use strapd_attitude::diagnostic::Diagnostic;
 
-/// What was passed, until it is taken.
+/// Samples that were passed, until they are taken.
 pub struct Passed {
     sockets: ListenFd,
     names: Vec<String>,

@@ -34,7 +34,7 @@ pub(crate) const READ_BUFFER: usize = 4 << 10;
 pub(crate) const WRITE_BUFFER: usize = 16 << 10;
 /// Most bytes waiting for one write.
 pub(crate) const MAX_WRITE_BUFFER: usize = 512 << 10;
-/// How long somebody who lost its place may take to hear it.
+/// Time that somebody who lost its place may take to hear it.
 const LAST_WORDS: Duration = Duration::from_millis(250);
 /// Attitudes taken from the outbox at once.
 const TAKE: usize = 64 << 10;
@@ -217,7 +217,7 @@ pub(crate) async fn converse(socket: WebSocket, connection: Connection, foxglove
     }
 }
 
-/// Who is talked to.
+/// Conversation with a client.
 enum Talk {
     Lines(Box<Session>),
     Foxglove(Viewer),
@@ -297,7 +297,7 @@ impl Talk {
     }
 }
 
-/// What a message says, and whether as text.
+/// Payload of a message, and whether it is text.
 fn payload(message: &Message) -> Option<(&[u8], bool)> {
     match message {
         Message::Text(text) => Some((text.as_bytes(), true)),

@@ -19,45 +19,45 @@ const KNOWN_OUT: &str = "nats://HOST:PORT/SUBJECT (att.{id}) with ?stream=NAME (
 pub struct NatsAddress {
     /// The server.
     pub place: Place,
-    /// What is subscribed to, wildcards and all; or where to publish, with `{id}` in it.
+    /// Subject to subscribe to, wildcards and all; or to publish to, with `{id}` in it.
     pub subject: String,
-    /// Who we are there.
+    /// Login.
     pub login: Login,
-    /// Whose certificates are believed; TLS is asked for then.
+    /// Path of the certificates that are believed; TLS is asked for then.
     pub ca_file: Option<PathBuf>,
     /// The stream of JetStream that holds the subject; else what is missed is gone.
     pub stream: Option<String>,
-    /// Where in the stream to begin.
+    /// Place in the stream to begin at.
     pub from: From,
-    /// What the one sensor is called here, whatever its subject.
+    /// Id of the one sensor here, whatever its subject.
     pub id: Option<String>,
-    /// Where the state is kept, so that one worker at a time has these sensors.
+    /// Key under which the state is kept, so that one worker at a time has these sensors.
     pub lease: Option<LeaseKey>,
     /// The address, for people.
     pub name: String,
 }
 
-/// Who we are at a server.
+/// Login at a server.
 #[derive(Clone, Debug, Default)]
 pub enum Login {
     /// Nobody.
     #[default]
     Nobody,
-    /// By name and password.
+    /// Name and password.
     User(String, Secret),
-    /// By a token.
+    /// Token.
     Token(Secret),
 }
 
-/// Where in a stream to begin, where nothing is known of what was read before.
+/// Place in a stream to begin at, where nothing is known of what was read before.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum From {
-    /// At what comes next.
+    /// Next message.
     #[default]
     New,
-    /// At the first message there is.
+    /// First message there is.
     All,
-    /// At the message with this number.
+    /// Message with this number.
     Sequence(u64),
 }
 
@@ -70,7 +70,7 @@ pub struct LeaseKey {
     pub key: String,
 }
 
-/// Which way samples or attitudes go.
+/// Direction of samples or attitudes.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Way {
     In,
@@ -78,7 +78,7 @@ enum Way {
 }
 
 impl NatsAddress {
-    /// Where samples come from.
+    /// Reads an address from which samples come.
     ///
     /// # Errors
     /// [`Error::Usage`](crate::error::Error::Usage) with what is known; a file of a secret can not be read.
@@ -86,7 +86,7 @@ impl NatsAddress {
         NatsAddress::parse(text, Way::In)
     }
 
-    /// Where attitudes go.
+    /// Reads an address to which attitudes go.
     ///
     /// # Errors
     /// As [`NatsAddress::source`].

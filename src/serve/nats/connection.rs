@@ -7,7 +7,7 @@ use async_nats::{Client, ConnectOptions, Event};
 use std::time::Duration;
 use tokio::time::sleep;
 
-/// How long a connection may take, and a request.
+/// Time that a connection may take, and a request.
 const PATIENCE: Duration = Duration::from_secs(5);
 /// The first wait before a connection that was lost is tried again, and the longest.
 const FIRST_WAIT: Duration = Duration::from_millis(100);

@@ -17,27 +17,27 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 use tokio::time::{MissedTickBehavior, interval, sleep, timeout};
 
-/// How often the document is written.
+/// Interval at which the document is written.
 const EVERY: Duration = Duration::from_millis(500);
-/// How long after a write attitudes may be published.
+/// Time after a write for which attitudes may be published.
 const HELD: Duration = Duration::from_millis(1800);
-/// How long nobody must have written before another takes over.
+/// Time for which nobody must have written before another takes over.
 const LAPSED: Duration = Duration::from_millis(2500);
-/// How often who waits looks.
+/// Interval at which a waiting worker looks.
 const LOOK: Duration = Duration::from_millis(200);
-/// How long one write may take.
+/// Time that one write may take.
 const PATIENCE: Duration = Duration::from_millis(1000);
 /// A larger document is packed.
 const PACKED_FROM: usize = 64 << 10;
 /// One that unpacks to more is none of ours.
 const MAX_BYTES: usize = 64 << 20;
 
-/// What a worker leaves to the next.
+/// Document that a worker leaves to the next.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct Document {
     strapd_state: u32,
     worker: String,
-    /// It has ended in order: nobody needs to wait.
+    /// Whether it has ended in order: nobody needs to wait.
     #[serde(default)]
     released: bool,
     /// Number of the last message of the stream that is in the state.
@@ -141,7 +141,7 @@ impl Lease {
         self.saved.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// From now on this is the state that is written.
+    /// Sets the state that is written from now on.
     pub(super) fn save(&self, sequence: Option<u64>, sensors: Sensors) {
         let document = &mut self.saved().0;
         document.sequence = sequence;
@@ -223,7 +223,7 @@ impl Lease {
 /// Why a write did not succeed.
 #[derive(Debug)]
 enum Refused {
-    /// It may the next time.
+    /// Failure that may pass the next time.
     Now(String),
     /// Somebody else has it.
     Other(String),
@@ -240,7 +240,7 @@ impl Document {
         }
     }
 
-    /// As it is stored: JSON, packed where it is large.
+    /// Bytes as stored: JSON, packed where it is large.
     fn bytes(&self) -> Result<Bytes, String> {
         let text = serde_json::to_vec(self).map_err(|e| e.to_string())?;
         if text.len() < PACKED_FROM {
@@ -311,7 +311,7 @@ mod tests {
         assert_ne!(worker_name("a"), worker_name("a"));
     }
 
-    /// Who may publish has written within [`HELD`]; who takes over has seen nothing new for longer.
+    /// Checks that whoever may publish has written within [`HELD`]; who takes over has seen nothing new for longer.
     #[test]
     fn nobody_takes_over_while_the_other_may_publish() {
         const { assert!(HELD.as_millis() + 2 * LOOK.as_millis() < LAPSED.as_millis()) };

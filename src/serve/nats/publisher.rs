@@ -22,13 +22,13 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tokio::time::{sleep, timeout};
 
-/// How long a server may take for them.
+/// Time that a server may take for them.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// Between two attempts to store what could not be.
+/// Time between two attempts to store what could not be.
 const AGAIN: Duration = Duration::from_millis(100);
 /// Most sensors whose last message is remembered; what is forgotten is looked up again.
 const MOST: usize = 200_000;
-/// How often is looked whether attitudes may leave.
+/// Interval of looking whether attitudes may leave.
 const LOOK: Duration = Duration::from_millis(5);
 
 /// Publishes every attitude until the daemon ends.
@@ -76,13 +76,13 @@ struct Publisher {
     jetstream: Option<JetStream>,
     hub: Arc<Hub>,
     tenancy: Arc<Tenancy>,
-    /// Of which tenure `lasts` is.
+    /// Number of the tenure to which `lasts` belongs.
     number: u64,
     /// The last message of each subject, as far as it is known.
     lasts: BTreeMap<Arc<str>, Stored>,
 }
 
-/// What is stored under a subject.
+/// Message stored under a subject.
 #[derive(Clone, Copy, Debug, Default)]
 struct Stored {
     /// Number of the message in its stream.
@@ -91,7 +91,7 @@ struct Stored {
     last: Option<Place>,
 }
 
-/// Which attitude of a sensor it is.
+/// Place of an attitude of a sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 struct Place {
     seq: u64,
@@ -178,7 +178,7 @@ impl Publisher {
         }
     }
 
-    /// By core NATS: who listens gets them, once at most.
+    /// Sends by core NATS: who listens gets them, once at most.
     async fn send(&self, batches: &[Batch]) -> Result<(), String> {
         for (id, bytes) in batches {
             let subject = self.address.subject_of(id);
@@ -259,7 +259,7 @@ impl Publisher {
         Ok(left)
     }
 
-    /// What is stored under the subject of a sensor.
+    /// Reads what is stored under the subject of a sensor.
     async fn stored(&self, jetstream: &JetStream, name: &str, id: &str) -> Result<Stored, String> {
         let stream = jetstream.get_stream_no_info(name).await;
         let stream = stream.map_err(|e| format!("stream {name}: {}", in_words(&e)))?;

@@ -29,13 +29,13 @@ use strapd_recording::text::printable;
 use tokio::task::yield_now;
 use tokio::time::{MissedTickBehavior, interval, sleep, timeout};
 
-/// How often the state is handed to the lease.
+/// Interval at which the state is handed to the lease.
 const EVERY: Duration = Duration::from_millis(400);
-/// How long the attitudes of before may take to be stored, so that the state can be.
+/// Time that the attitudes of before may take to be stored, so that the state can be.
 const PATIENCE: Duration = Duration::from_millis(300);
-/// At most one error is sent back in this time.
+/// Time in which at most one error is sent back.
 const BETWEEN_ERRORS: Duration = Duration::from_secs(1);
-/// Where errors go, behind the subject of the message.
+/// Suffix of the message's subject to which errors go.
 const ERRORS: &str = ".err";
 
 /// Why reading has ended.
@@ -44,11 +44,11 @@ enum Ended {
     Asked,
     /// Somebody else has the sensors.
     Lost,
-    /// For now: it is tried again.
+    /// Failure for now: it is tried again.
     Failed(String),
 }
 
-/// What one subscription works with.
+/// Parts of one subscription.
 struct Reader {
     address: NatsAddress,
     outgoing: Arc<Outgoing>,
@@ -99,7 +99,7 @@ pub(in crate::serve) async fn keep(
     }
 }
 
-/// What the connection says of itself.
+/// Hears an event of the connection.
 fn hear(event: &Event, outgoing: &Outgoing, peer: &str) {
     match event {
         Event::Connected => {
@@ -417,9 +417,9 @@ impl Reader {
 struct Message {
     subject: async_nats::Subject,
     payload: Bytes,
-    /// Its number in the stream.
+    /// Number in the stream.
     sequence: Option<u64>,
-    /// How many more the stream has.
+    /// Number of further messages in the stream.
     lag: Option<u64>,
 }
 

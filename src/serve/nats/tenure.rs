@@ -7,25 +7,25 @@ use std::time::{Duration, Instant};
 use tokio::sync::watch;
 use tokio::time::timeout_at;
 
-/// With more than this waiting for a server, no more samples are taken.
+/// Number of waiting pieces above which no more samples are taken.
 const CROWDED: usize = MAX_QUEUED / 2;
 
-/// Which sensors are ours, and until when.
+/// State of the lease: which sensors are ours, and until when.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Tenure {
-    /// No lease is needed.
+    /// No lease needed.
     #[default]
     Free,
     /// Others may have them.
     None {
-        /// How many leases came before.
+        /// Number of leases before.
         number: u64,
     },
     /// Ours.
     Held {
-        /// How many leases came before this one.
+        /// Number of leases before this one.
         number: u64,
-        /// From when on others may take it, unless it is renewed.
+        /// Time from which others may take it, unless it is renewed.
         until: Instant,
     },
 }
@@ -51,7 +51,7 @@ impl Tenure {
     }
 }
 
-/// What the subscription and the outputs of one daemon know of each other.
+/// Knowledge that the subscription and the outputs of one daemon share.
 #[derive(Debug, Default)]
 pub struct Tenancy {
     tenure: watch::Sender<Tenure>,
@@ -59,19 +59,19 @@ pub struct Tenancy {
 }
 
 impl Tenancy {
-    /// As it is now.
+    /// State of the lease now.
     #[must_use]
     pub fn now(&self) -> Tenure {
         *self.tenure.borrow()
     }
 
-    /// Told of every change.
+    /// Receiver of every change.
     #[must_use]
     pub fn changes(&self) -> watch::Receiver<Tenure> {
         self.tenure.subscribe()
     }
 
-    /// It changes.
+    /// Changes the state.
     pub fn set(&self, tenure: Tenure) {
         self.tenure.send_replace(tenure);
     }
@@ -101,12 +101,12 @@ impl Tenancy {
         self.most_queued() > CROWDED
     }
 
-    /// Until there is room; `false`: not in this time.
+    /// Waits until there is room; `false`: not in this time.
     pub async fn has_room(&self, within: Duration) -> bool {
         self.has_fewer(CROWDED, within).await
     }
 
-    /// Until every attitude has left and was stored; `false`: not in this time.
+    /// Waits until every attitude has left and was stored; `false`: not in this time.
     pub async fn has_published(&self, within: Duration) -> bool {
         self.has_fewer(0, within).await
     }
@@ -127,7 +127,7 @@ impl Tenancy {
         }
     }
 
-    /// What waits is dropped: the sensors are somebody else's.
+    /// Drops what waits: the sensors are somebody else's.
     pub fn forget(&self) {
         for client in self.outputs().iter() {
             client.outbox.forget();

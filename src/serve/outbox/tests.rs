@@ -1,4 +1,4 @@
-//! What a client gets, what gives way, and what it is told of that.
+//! Tests of what a client gets, what gives way, and what it is told of that.
 
 use super::*;
 use crate::serve::channel::Channel;

@@ -1,4 +1,4 @@
-//! Where a replay is, and who tells it to stop, go on, or be elsewhere. Pure but for locks and the clock.
+//! Position of a replay, and who makes it stop, go on, or be elsewhere. Pure but for locks and the clock.
 //!
 //! One thread runs the replay and asks before it hands anything on ([`Playback::grant`]); clients ask
 //! for changes from the tasks that serve them. A seek changes no bit of any attitude: forward, the run
@@ -11,31 +11,31 @@ use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use strapd_attitude::record::Nanos;
 
-/// Between two notices of where it is.
+/// Time between two notices of where it is.
 const TICK: Duration = Duration::from_millis(500);
 
 /// Fastest and slowest a client may ask for.
 const SPEEDS: std::ops::RangeInclusive<f64> = 1e-3..=1e4;
 
-/// What may go on now.
+/// Permission to go on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Grant {
-    /// So many items, to everybody.
+    /// Number of items to everybody.
     Show(usize),
-    /// So many items, to nobody who watches: a seek is under way.
+    /// Number of items to nobody who watches: a seek is under way.
     Mute(usize),
     /// Nothing more in this run.
     End,
 }
 
-/// What watchers should be told.
+/// Notice for watchers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Notice {
     /// Nothing.
     Nothing,
-    /// It goes on.
+    /// Progress.
     Tick,
-    /// It is in another state.
+    /// Change of state.
     Changed,
 }
 
@@ -56,13 +56,13 @@ struct State {
     at: Option<Nanos>,
     start: Option<Nanos>,
     end: Option<Nanos>,
-    /// From the start to the end, about.
+    /// Length from the start to the end, about.
     length: Option<Nanos>,
     /// Nothing before it is shown.
     until: Option<Nanos>,
     /// One item is shown although it is paused: where a seek has led.
     glimpse: bool,
-    /// This run is to end, for another to begin.
+    /// Whether this run is to end, for another to begin.
     restart: bool,
     /// Why it can not go back, if it can not.
     forward_only: Option<&'static str>,
@@ -72,7 +72,7 @@ struct State {
 }
 
 impl Playback {
-    /// Of `file`; `speed` `None` = as fast as possible, and not to be controlled.
+    /// Makes one of `file`; `speed` `None` = as fast as possible, and not to be controlled.
     #[must_use]
     pub fn new(file: &str, speed: Option<f64>, paused: bool) -> Playback {
         Playback {
@@ -112,12 +112,12 @@ impl Playback {
         self.state().pace.is_some()
     }
 
-    /// It can not go back, for this reason (`None`: it can).
+    /// Forbids going back, for this reason (`None`: it can).
     pub fn forward_only(&self, why: Option<&'static str>) {
         self.state().forward_only = why;
     }
 
-    /// How long the data is, about; what is known better stays.
+    /// Sets the approximate length of the data; what is known better stays.
     pub fn length(&self, secs: f64) {
         self.state().length = Some(Nanos((secs * 1e9) as i64));
     }
@@ -195,7 +195,7 @@ impl Playback {
         }
     }
 
-    /// From now on nothing is handed on.
+    /// Stops handing on.
     pub fn stop(&self) {
         self.state().stopped = true;
         self.changed.notify_all();
@@ -359,7 +359,7 @@ impl Timeline for Playback {
 }
 
 impl State {
-    /// To run again from the start, unseen up to `to`.
+    /// Runs again from the start, unseen up to `to`.
     fn rewind(&mut self, to: Option<Nanos>) -> Result<(), Fault> {
         if let Some(why) = self.forward_only {
             return Err(Fault::new("forward_only", why));

@@ -13,10 +13,10 @@ use strapd_recording::decode::Line;
 /// The estimate of one stream of samples.
 #[derive(Debug, Default)]
 pub(super) struct Estimated {
-    /// As clients know it, over all runs.
+    /// Channel as clients know it, over all runs.
     channel: Option<Arc<Channel>>,
     run: Option<(Plan, SensorStream)>,
-    /// It can not be: said once, and not tried again.
+    /// Whether it failed: logged once, and not tried again.
     failed: bool,
 }
 

@@ -1,4 +1,4 @@
-//! Where a replay is, and what a client may ask of it. Pure: what the protocols and the hub know of a playback.
+//! Position of a replay, and what a client may ask of it. Pure: what the protocols and the hub know of a playback.
 
 use crate::serve::fault::Fault;
 use strapd_attitude::record::Nanos;
@@ -6,16 +6,16 @@ use strapd_attitude::record::Nanos;
 /// Whether it moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
-    /// It does.
+    /// Playing.
     Playing,
-    /// It waits for a client.
+    /// Waiting for a client.
     Paused,
-    /// There is nothing more.
+    /// At its end.
     Ended,
 }
 
 impl Mode {
-    /// Its name on the wire.
+    /// Name on the wire.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -26,7 +26,7 @@ impl Mode {
     }
 }
 
-/// What a client asks for.
+/// Action that a client asks for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Action {
     /// Go on; after the end, from the start.
@@ -39,7 +39,7 @@ pub enum Action {
     Speed(f64),
 }
 
-/// Where it is.
+/// Position.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Position {
     /// Whether it moves.
@@ -50,20 +50,20 @@ pub struct Position {
     pub start: Option<Nanos>,
     /// Last stamp, as far as it is known.
     pub end: Option<Nanos>,
-    /// How many times as fast as the data.
+    /// Speed as a multiple of the data's.
     pub speed: f64,
-    /// What is played.
+    /// File that is played.
     pub file: String,
-    /// How often it was begun anew: attitudes before and after a change do not belong together.
+    /// Number of times it was begun anew: attitudes before and after a change do not belong together.
     pub run: u64,
 }
 
 /// A replay that is served, as the hub sees it.
 pub trait Timeline: std::fmt::Debug + Send + Sync {
-    /// Where it is; `None`: it can not be controlled.
+    /// Position; `None`: it cannot be controlled.
     fn position(&self) -> Option<Position>;
 
-    /// How often it was begun anew.
+    /// Number of times it was begun anew.
     fn run(&self) -> u64;
 
     /// A client asks for something. `stale` is called where what waits for the watchers is out of date

@@ -34,7 +34,7 @@ pub struct Cast {
     streams: Mutex<Vec<Lane>>,
     /// Recorded orientations, by the stream they are beside; there is one from the first of them on.
     recorded: Mutex<BTreeMap<usize, Lane>>,
-    /// What is estimated of the samples of a simulation, for its page.
+    /// Estimate from the samples of a simulation, for its page.
     estimated: Mutex<Estimated>,
     text: Mutex<Vec<u8>>,
     server: Mutex<Option<Serving>>,
@@ -53,7 +53,7 @@ struct Lane {
     channel: Arc<Channel>,
     /// Number of the next item.
     next: u64,
-    /// Of a run without a pace.
+    /// Flood control of a run without a pace.
     flood: Flood,
     /// Added to the reset counts: those of the runs before this one.
     resets: u32,
@@ -73,12 +73,12 @@ impl Lane {
     }
 }
 
-/// What becomes of a run that has ended.
+/// Fate of a run that has ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Next {
-    /// It begins anew.
+    /// Another run.
     Again,
-    /// That was it.
+    /// End.
     Done,
 }
 
@@ -131,19 +131,19 @@ impl Cast {
         })
     }
 
-    /// Where it listens, with real ports.
+    /// Addresses on which it listens, with real ports.
     #[must_use]
     pub fn addresses(&self) -> &[Listen] {
         &self.addresses
     }
 
-    /// Its middle.
+    /// Hub.
     #[must_use]
     pub fn hub(&self) -> &Arc<Hub> {
         &self.hub
     }
 
-    /// Where the run is.
+    /// Position and controls of the run.
     #[must_use]
     pub fn playback(&self) -> &Arc<Playback> {
         &self.playback

@@ -18,7 +18,7 @@ pub(super) struct RecordingFile {
     pub(super) live: LiveMcap,
     /// Bytes of it, to the end of the last chunk.
     pub(super) bytes: u64,
-    /// To the end of the one before.
+    /// Offset of the end of the one before.
     before: u64,
     /// The last chunk had to make room for the end of the file.
     pub(super) last_left_out: bool,

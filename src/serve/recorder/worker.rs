@@ -19,7 +19,7 @@ use strapd_attitude::record::{AttitudeSample, RawSample};
 /// A chunk is closed early at this size, so that a flood costs memory in the queue alone.
 const CHUNK_BYTES: usize = 1 << 20;
 
-/// What a full queue dropped is said at most this often.
+/// Time in which what a full queue dropped is logged at most once.
 const SAY_EVERY: Duration = Duration::from_secs(10);
 
 /// The recorder's thread.
@@ -37,7 +37,7 @@ pub(super) struct Worker {
     opened: Instant,
     synced: Instant,
     said: Option<(Instant, u64)>,
-    /// In the chunk being filled, and in the last one written.
+    /// Counts in the chunk being filled, and in the last one written.
     pending: Taken,
     last: Taken,
 }
@@ -108,7 +108,7 @@ impl Worker {
         Ok(())
     }
 
-    /// Until it is told to finish, or nobody is left to tell it.
+    /// Runs until it is told to finish, or nobody is left to tell it.
     pub(super) fn run(mut self, entries: &Receiver<Entry>) {
         let mut next = Instant::now() + self.settings.flush_every;
         loop {
@@ -155,7 +155,7 @@ impl Worker {
         }
     }
 
-    /// Where the stream is in the present file; declared there at its first entry.
+    /// Place of the stream in the present file; declared there at its first entry.
     fn place(&mut self, id: &Arc<str>) -> Option<LiveStream> {
         let file = self.file.as_mut()?;
         let recorded = self.streams.entry(id.clone()).or_insert_with(|| Recorded {

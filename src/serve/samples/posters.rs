@@ -26,7 +26,7 @@ use tokio::time::{Instant, sleep};
 const AT_ONCE: usize = 256;
 /// Addresses that post, at once.
 pub(super) const MAX_POSTERS: usize = 256;
-/// Who posts, by address. A sensor stays its poster's for a while, as a datagram's its sender's:
+/// Posters by address. A sensor stays its poster's for a while, as a datagram's its sender's:
 /// requests are no connections, and two gyros in one attitude are no attitude.
 #[derive(Debug, Default)]
 pub(crate) struct Posters {
@@ -49,7 +49,7 @@ pub(super) struct Poster {
     has_sent: bool,
 }
 
-/// What became of a body.
+/// Outcome of a body.
 #[derive(Debug, Default)]
 pub(super) struct Taken {
     objects: u64,
@@ -57,11 +57,11 @@ pub(super) struct Taken {
     resets: u64,
     errors: u64,
     first: Option<Value>,
-    /// Which sensor's run began anew, and why.
+    /// Notes of sensors whose run began anew, and why.
     notes: Vec<String>,
 }
 
-/// What an object asks for.
+/// Request of an object.
 enum Posted {
     Samples(Line),
     Reset(Result<wire::Reset, Fault>),
@@ -72,7 +72,7 @@ enum Posted {
 struct Gathered {
     head: Option<Line>,
     samples: Vec<RawSample>,
-    /// Their stamps that are bare numbers, at their places.
+    /// Stamps that are bare numbers, at their places.
     bare: Vec<Option<Bare>>,
     /// The sender's number of each object, and where its samples end.
     lines: Vec<(Option<u64>, usize)>,

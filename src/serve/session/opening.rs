@@ -1,4 +1,4 @@
-//! How a client begins -> whether the rest of what it sends is read. Pure.
+//! Beginning of a client -> whether the rest of what it sends is read. Pure.
 //!
 //! Apart from the lines because it must be judged before there is one: a browser can be made to send a
 //! request to any port, and what follows in its body would otherwise be lines like any others.
@@ -8,7 +8,7 @@ use crate::serve::fault::Fault;
 use crate::serve::wire;
 use strapd_recording::decode::packed::MARK;
 
-/// How far a conversation has come. Until its first object was seen nothing else is read: what a
+/// Stage of a conversation. Until its first object was seen nothing else is read: what a
 /// browser can be made to send (HTTP) begins otherwise, and so is refused before anything of it counts.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Opening {
@@ -16,7 +16,7 @@ pub(super) enum Opening {
     Blank,
     /// A line has begun as an object, or as a packed one.
     Begun,
-    /// It was one.
+    /// Conversation that was accepted.
     Over,
 }
 
@@ -39,7 +39,7 @@ impl Session {
         }
     }
 
-    /// It does not begin with an object: nothing of it, and nothing behind it, is read.
+    /// Refuses one that does not begin with an object: nothing of it, and nothing behind it, is read.
     pub(super) fn refuse_opening(&mut self, number: u64, near: &[u8]) {
         let fault = wire::no_object(near, self.hub.takes_samples());
         if !self.authorised {

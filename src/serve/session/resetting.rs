@@ -6,7 +6,7 @@ use crate::serve::hub::Asker;
 use crate::serve::wire::{self, Reset};
 
 impl Session {
-    /// It is the WebSocket of a page of the daemon itself, and may begin any sensor's attitude anew.
+    /// Marks it as the WebSocket of a page of the daemon itself, which may begin any sensor's attitude anew.
     #[must_use]
     pub fn of_own_page(mut self, is_own: bool) -> Session {
         self.is_own_page = is_own;

@@ -1,4 +1,4 @@
-//! What one client sent -> steps short enough for others to have theirs. Pure but for the clock.
+//! Bytes that one client sent -> steps short enough for others to have theirs. Pure but for the clock.
 //!
 //! A step ends after a request, after an answer, or after [`SLICE`] of work, whatever the bytes: a line
 //! of twenty can ask for more than a thousand samples do. What is behind is held until the next, and
@@ -23,11 +23,11 @@ const LONGEST_RUN: usize = 64;
 pub(super) struct Held {
     bytes: Bytes,
     received: Nanos,
-    /// Their end ends the last line.
+    /// Whether their end ends the last line.
     whole: bool,
 }
 
-/// How far a step has come.
+/// Progress of a step.
 #[derive(Debug, Default)]
 pub(super) struct Step {
     /// Something was asked for in it.

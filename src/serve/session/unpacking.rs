@@ -9,7 +9,7 @@ use strapd_recording::decode::Line;
 use strapd_recording::decode::packed::{self, Object};
 
 impl Session {
-    /// From now on packed samples with this number say what a line with this head would, or are refused.
+    /// Binds this number of packed samples to what a line with this head would state, or refuses it.
     /// `said`: the line that says so, and its number.
     pub(super) fn bind_or_say(
         &mut self,
@@ -47,7 +47,7 @@ impl Session {
             && self.bound.len() >= self.hub.limits().sensors_of_client
     }
 
-    /// What samples with this number say; by default what their subject does, within its message.
+    /// Meaning of samples with this number; by default that of their subject, within its message.
     fn bound_or_of_subject(&mut self, stream: u32) -> Option<&Result<Line, Box<Fault>>> {
         if self.side.is_broker()
             && !self.bound.contains_key(&stream)

@@ -1,11 +1,11 @@
-//! How well the last attitude is known, and by what -> `STATUS`. Pure.
+//! Uncertainty of the last attitude, and what it comes from -> `STATUS`. Pure.
 
 use serde_json::{Value, json};
 use strapd_attitude::aid::Filter;
 use strapd_attitude::record::AttitudeSample;
 
-/// What corrects an attitude now and how well it is known; null before there is one, and of a gyro alone, whose
-/// world has no vertical.
+/// Fields of what corrects an attitude now and how well it is known; null before there is one, and of a gyro alone,
+/// whose world has no vertical.
 pub(in crate::serve) fn attitude_now(
     filter: Option<&Filter>,
     last: Option<&AttitudeSample>,

@@ -11,15 +11,15 @@ use strapd_attitude::record::{RawSample, SampleKind};
 /// Intervals after which those that agree are not looked at any longer.
 const ENOUGH: usize = 512;
 
-/// How far it is known whether they agree.
+/// Verdict on whether they agree, as far as it is known.
 #[derive(Debug, Default)]
 enum Verdict {
     /// Not yet.
     #[default]
     Open,
-    /// They do.
+    /// Agreement.
     Agreeing,
-    /// They do not.
+    /// Disagreement.
     Wrong(Mismatch),
 }
 
@@ -29,7 +29,7 @@ pub(super) struct Intervals {
     /// Interval and stamp, ns.
     first: Vec<(i64, i64)>,
     verdict: Verdict,
-    /// What is still to be said.
+    /// Mismatch still to be reported.
     unsaid: Option<Mismatch>,
     /// Times they were found to disagree.
     found: u64,
@@ -76,7 +76,7 @@ impl Intervals {
         }
     }
 
-    /// What is to be said to who sends them, once.
+    /// Fault to report once to who sends them.
     pub(super) fn news(&mut self, id: &str) -> Option<Fault> {
         let mismatch = self.unsaid.take()?;
         Some(Fault {
@@ -85,7 +85,7 @@ impl Intervals {
         })
     }
 
-    /// What is wrong, for `STATUS`.
+    /// Warning for `STATUS`.
     pub(super) fn warning(&self) -> Option<String> {
         match &self.verdict {
             Verdict::Wrong(mismatch) => Some(said(mismatch)),

@@ -4,7 +4,7 @@ use super::SensorStream;
 use strapd_attitude::estimate::{Anew, Initial, Plan};
 use strapd_attitude::record::RawSample;
 
-/// What was asked of a sensor, and how often.
+/// Reset that was asked of a sensor, and how often.
 #[derive(Debug, Default)]
 pub(super) struct Resetting {
     /// The next sample begins the attitude anew, so. Of several requests before it the last counts.
@@ -36,7 +36,7 @@ impl SensorStream {
         Ok(from)
     }
 
-    /// Before the sample `next` is integrated.
+    /// Resets, if asked, before the sample `next` is integrated.
     pub(super) fn reset_if_asked(&mut self, plan: &Plan, next: &RawSample) {
         let Some(asked) = self.resetting.pending.take() else {
             return;

@@ -14,7 +14,7 @@ pub const NAMELESS: &str = "imu";
 /// Whether a sender's samples have a place of their own beside their stamps.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Placed {
-    /// No: the first stamp of a connection tells where it goes on.
+    /// Place by stamp: the first stamp of a connection tells where it goes on.
     #[default]
     ByStamp,
     /// Yes, as of a stream that a broker keeps: what was taken is not taken again, and a stamp
@@ -25,19 +25,19 @@ pub enum Placed {
 /// Samples of one sensor from one client that came together.
 #[derive(Debug)]
 pub struct SampleRun<'a> {
-    /// From whom.
+    /// Number of the client they come from.
     pub client: u64,
-    /// What the first of their lines said.
+    /// Contents of the first of their lines.
     pub head: &'a Line,
-    /// When they were received.
+    /// Time at which they were received.
     pub received: Nanos,
-    /// What tells where they stand in their stream.
+    /// Place in their stream.
     pub placed: Placed,
     /// The sender's number of each line, and where its samples end.
     pub lines: &'a [(Option<u64>, usize)],
     /// The samples.
     pub samples: &'a [RawSample],
-    /// Their stamps that are numbers without a unit, at their places; shorter where no more follow.
+    /// Stamps that are numbers without a unit, at their places; shorter where no more follow.
     pub bare: &'a [Option<Bare>],
     /// The number of the first line, 0 where it has none, and its beginning.
     pub first: (u64, &'a [u8]),
@@ -52,28 +52,28 @@ impl<'a> SampleRun<'a> {
     }
 }
 
-/// Where a connection's first sample stands.
+/// Place of a connection's first sample.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Standing {
-    /// Behind everything that was taken.
+    /// Continuation behind everything that was taken.
     GoesOn,
-    /// Among what was taken: that is sent again.
+    /// Repetition among what was taken.
     Again,
-    /// At the beginning of a run.
+    /// Beginning of a run.
     Anew,
 }
 
 /// A run as far as it has come.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(in crate::serve) struct Span {
-    /// Its first stamp, where that is known.
+    /// First stamp, where that is known.
     pub(in crate::serve) first: Option<Nanos>,
-    /// Its last.
+    /// Last stamp.
     pub(in crate::serve) last: Nanos,
 }
 
 impl Span {
-    /// Where a connection stands whose first stamp is this. Further back than `window` nobody sends
+    /// Place of a connection whose first stamp is this. Further back than `window` nobody sends
     /// again.
     pub(super) fn standing(self, stamp: Nanos, window: Duration, placed: Placed) -> Standing {
         let window = i64::try_from(window.as_nanos()).unwrap_or(i64::MAX);

@@ -8,15 +8,15 @@ use strapd_attitude::record::TimeUnit;
 use strapd_attitude::record::{Nanos, RawSample};
 use strapd_recording::decode::{Ambiguous, Bare, MOST_WAITING, unit_of};
 
-/// How long samples wait for others that tell their unit.
+/// Time for which samples wait for others that tell their unit.
 pub const LONGEST_WAIT: Duration = Duration::from_secs(2);
 
-/// How far the unit is known.
+/// Unit, as far as it is known.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Unit {
     Open,
     Settled(TimeUnit),
-    /// It could not be told: such stamps are none.
+    /// Ambiguous: such stamps are none.
     Ambiguous,
 }
 
@@ -25,7 +25,7 @@ enum Unit {
 pub(super) struct Stamps {
     unit: Unit,
     waiting: Vec<(Option<u64>, RawSample, Option<Bare>)>,
-    /// When the first of them came.
+    /// Time at which the first of them came.
     since: Nanos,
 }
 
@@ -54,7 +54,7 @@ impl Stamps {
         }
     }
 
-    /// From here on the unit is open again.
+    /// Reopens the question of the unit.
     pub(super) fn reopen(&mut self) {
         self.unit = Unit::Open;
     }
@@ -97,7 +97,7 @@ impl Stamps {
         (Some(taken), why)
     }
 
-    /// Those whose stamps are known by now; all of them when nobody is to wait any longer.
+    /// Releases those whose stamps are known by now; all of them when nobody is to wait any longer.
     pub(super) fn release(&mut self, at_last: bool) -> (Taken, Option<Ambiguous>) {
         let mut why = None;
         if self.unit == Unit::Open {

@@ -34,7 +34,7 @@ pub fn broken_packed() -> Fault {
     )
 }
 
-/// What packed objects with the number `number` are: the labels of the stream.
+/// Line of the labels of the stream whose packed objects have the number `number`.
 #[must_use]
 pub fn packed_stream(number: u32, stream: &Stream) -> Bytes {
     let labels = match stream.content {

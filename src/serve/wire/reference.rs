@@ -12,15 +12,15 @@ use strapd_attitude::worlds::World;
 /// The only `id` it may have.
 pub const TRUTH: &str = "truth";
 
-/// What is expected, in words.
+/// Example of what is expected.
 const EXPECTED: &str = "{\"class\":\"ATT\",\"id\":\"truth\",\"stamp\":{\"sec\":1,\"nsec\":0},\"q\":{\"w\":1,\"x\":0,\"y\":0,\"z\":0},\"world\":\"enu\",\"body\":\"flu\"}";
 
 /// One attitude, and what it is of.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reference {
-    /// From which axes.
+    /// World from whose axes it comes.
     pub world: World,
-    /// To which.
+    /// Body axes to which it leads.
     pub body: &'static str,
     /// The attitude.
     pub sample: AttitudeSample,
@@ -29,7 +29,7 @@ pub struct Reference {
 #[derive(Deserialize)]
 struct ReferenceObject {
     stamp: StampObject,
-    /// By name: a bare array does not say which is the scalar.
+    /// Components by name: a bare array does not state which is the scalar.
     q: BTreeMap<String, f64>,
     rate: Option<[f64; 3]>,
     #[serde(default)]

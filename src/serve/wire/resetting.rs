@@ -15,9 +15,9 @@ const MAX_INIT: usize = 256;
 /// A sensor's attitude is to begin anew.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Reset {
-    /// Which sensor; `None` = the one without a name.
+    /// Id of the sensor; `None` = the one without a name.
     pub id: Option<String>,
-    /// Where it begins; `None` = as the daemon's `--init` says.
+    /// Attitude at which it begins; `None` = as the daemon's `--init` states.
     pub initial: Option<Initial>,
 }
 
@@ -35,7 +35,7 @@ impl Reset {
     }
 }
 
-/// What a `RESET` line asks for.
+/// Reads what a `RESET` line asks for.
 pub(super) fn read(text: &[u8]) -> Result<Reset, Fault> {
     let asked: ResetObject = object(
         text,

@@ -23,23 +23,23 @@ pub struct ZenohAddress {
     pub protocol: &'static str,
     /// The router.
     pub place: Place,
-    /// What is subscribed to, wildcards and all; or where to publish, with `{id}` in it.
+    /// Key to subscribe to, wildcards and all; or to publish to, with `{id}` in it.
     pub key: String,
     /// Messages are those of ROS 2.
     pub is_ros: bool,
     /// Others are looked for, and spoken with, too.
     pub scouts: bool,
-    /// Who we are there.
+    /// Login.
     pub login: Option<(String, Secret)>,
-    /// Whose certificates are believed.
+    /// Path of the certificates that are believed.
     pub ca_file: Option<PathBuf>,
-    /// What the one sensor is called here, whatever its key.
+    /// Id of the one sensor here, whatever its key.
     pub id: Option<String>,
     /// The address, for people.
     pub name: String,
 }
 
-/// Which way samples or attitudes go.
+/// Direction of samples or attitudes.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Way {
     In,
@@ -47,7 +47,7 @@ enum Way {
 }
 
 impl ZenohAddress {
-    /// Where samples come from.
+    /// Reads an address from which samples come.
     ///
     /// # Errors
     /// [`Error::Usage`](crate::error::Error::Usage) with what is known; a file of a secret can not be read.
@@ -55,7 +55,7 @@ impl ZenohAddress {
         ZenohAddress::parse(text, Way::In)
     }
 
-    /// Where attitudes go.
+    /// Reads an address to which attitudes go.
     ///
     /// # Errors
     /// As [`ZenohAddress::source`].

@@ -7,17 +7,17 @@ use std::time::Duration;
 use tokio::net::TcpStream;
 use tokio::time::{sleep, timeout};
 
-/// How long a connection may take, and its end.
+/// Time that a connection may take, and its end.
 const PATIENCE: Duration = Duration::from_secs(5);
 const END: Duration = Duration::from_secs(1);
-/// Who hears nothing of us for so long gives us up.
+/// Time without a word of us after which we are given up.
 const LEASE: Duration = Duration::from_millis(500);
 /// Bytes that zenoh puts together to a message; of a longer one nothing comes, and its number is missing.
 const MAX_MESSAGE: usize = 8 << 20;
-/// How often is looked whether the router is still there.
+/// Interval of looking whether the router is still there.
 const LOOK: Duration = Duration::from_millis(100);
 
-/// What zenoh is told: this endpoint, nothing is listened on and nobody looked for, unless that is asked for.
+/// Configuration for zenoh: this endpoint, nothing is listened on and nobody looked for, unless that is asked for.
 fn config(address: &ZenohAddress) -> Value {
     let endpoint = format!("{}/{}", address.protocol, address.place);
     let mut config = json!({
@@ -86,7 +86,7 @@ async fn why_not(address: &ZenohAddress) -> String {
     }
 }
 
-/// Until the router has gone. Where others are looked for, zenoh itself sees to it that some are there.
+/// Waits until the router has gone. Where others are looked for, zenoh itself sees to it that some are there.
 pub(super) async fn lost(session: &Session, scouts: bool) {
     let mut misses = 0;
     loop {

@@ -23,7 +23,7 @@ use tokio::time::sleep;
 
 /// Sensors whose publishers are kept; beyond, all are declared anew.
 const MOST: usize = 10_000;
-/// What was published last gets this long to leave before the connection is ended.
+/// Time that the last message gets to leave before the connection is ended.
 const LAST: Duration = Duration::from_millis(100);
 
 /// Publishes every attitude until the daemon ends.
@@ -113,7 +113,7 @@ async fn publish(
     }
 }
 
-/// What is published over one connection.
+/// Topics published over one connection.
 struct Topics<'a> {
     address: &'a ZenohAddress,
     link: &'a Session,
@@ -122,7 +122,7 @@ struct Topics<'a> {
     /// Says that our node is there.
     node: Option<LivelinessToken>,
     known: HashMap<Arc<str>, Option<Topic>>,
-    /// Whose key it is.
+    /// Sensors by key.
     keys: HashMap<String, Arc<str>>,
     declared: u32,
 }

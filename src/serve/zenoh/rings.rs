@@ -11,9 +11,9 @@ use tokio::sync::Notify;
 const RING: usize = 4 << 20;
 /// Most bytes that wait in all.
 const ALL: usize = 64 << 20;
-/// What a message takes beside its bytes, about.
+/// Size of a message beside its bytes, about.
 const BESIDE: usize = 64;
-/// What a key takes beside its name, about.
+/// Size of a key beside its name, about.
 const BESIDE_KEY: usize = 192;
 /// Most messages of a key in one turn, and most bytes but for the first.
 const TURN: usize = 64;
@@ -22,9 +22,9 @@ const TURN_BYTES: usize = 64 << 10;
 /// One message.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Message {
-    /// What it says.
+    /// Payload.
     pub payload: Box<[u8]>,
-    /// What goes with it.
+    /// Attachment.
     pub attachment: Option<Box<[u8]>>,
 }
 
@@ -39,7 +39,7 @@ impl Message {
 pub struct Turn {
     /// The key.
     pub key: Arc<str>,
-    /// How many before them were lost, since the last turn of this key; with those of keys there was no room for.
+    /// Number lost before them, since the last turn of this key; with those of keys there was no room for.
     pub lost: u64,
     /// The messages, oldest first.
     pub messages: Vec<Message>,
@@ -54,16 +54,16 @@ struct Ring {
 
 #[derive(Debug, Default)]
 struct State {
-    /// Of keys something waits of.
+    /// Rings of keys of which something waits.
     rings: HashMap<Arc<str>, Ring>,
-    /// Whose turn it is.
+    /// Keys in the order of their turns.
     turns: VecDeque<Arc<str>>,
     bytes: usize,
     /// Messages of keys there was no room for.
     lost: u64,
 }
 
-/// What a key takes while something waits of it.
+/// Size of a key while something waits of it.
 fn taken_by(key: &str) -> usize {
     key.len() + BESIDE_KEY
 }

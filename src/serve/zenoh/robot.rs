@@ -15,7 +15,7 @@ const HEARD: Duration = Duration::from_secs(1);
 /// Topics that are remembered; beyond, all are met anew.
 const MOST: usize = 100_000;
 
-/// Who publishes a topic.
+/// Publisher of a topic.
 #[derive(Debug)]
 struct Topic {
     domain: String,
@@ -24,16 +24,16 @@ struct Topic {
     heard: Instant,
 }
 
-/// What came of a message.
+/// Outcome of a message.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Read {
     /// Samples, and the number of the message where it has one; what is wrong beside them.
     Samples(Option<u64>, Option<String>),
-    /// It is a strapd's, and passed over.
+    /// Message of a strapd, passed over.
     Ours,
-    /// It can not be read.
+    /// Message that cannot be read.
     Undecodable(String),
-    /// It would be mixed with another publisher's.
+    /// Message that would be mixed with another publisher's.
     Others(String),
 }
 
@@ -89,7 +89,7 @@ impl Robots {
         }
     }
 
-    /// Who does not say who it is, is believed.
+    /// Checks the publisher; one that does not name itself is believed.
     fn check_publisher(
         &mut self,
         key: &Key<'_>,
@@ -161,7 +161,7 @@ mod tests {
         }
     }
 
-    /// What comes of messages, each with its domain and so many milliseconds after the first.
+    /// Reads messages, each with its domain and so many milliseconds after the first.
     fn read(messages: &[(&str, u64, Message)]) -> (Vec<Read>, Vec<RawSample>) {
         let mut robots = Robots::new(&Options::default()).unwrap();
         let (began, mut samples) = (Instant::now(), Vec::new());

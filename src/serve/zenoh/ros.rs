@@ -9,24 +9,24 @@ use strapd_recording::text::printable;
 
 /// `sensor_msgs/msg/Imu`, as it stands in keys.
 pub const IMU: &str = "sensor_msgs::msg::dds_::Imu_";
-/// Its type hash (REP-2016); a subscriber needs none.
+/// Type hash of Imu (REP-2016); a subscriber needs none.
 const IMU_HASH: &str = "RIHS01_7d9a00ff131080897a5ec7e26e315954b8eae3353c3f995c55faf71574000b5b";
-/// Where tokens stand.
+/// Prefix of tokens.
 const TOKENS: &str = "@ros2_lv";
 /// Our node, as others see it.
 const NODE: &str = "strapd";
 /// Reliable, volatile, the last ten.
 const QOS: &str = "1:2:1,10:,:,:,,";
-/// What the identity of each of our publishers begins with: what we say is not to be heard by us, nor by
+/// Beginning of the identity of each of our publishers: what we publish is not to be heard by us, nor by
 /// another of us, which would say it again.
 const OURS: &[u8; 6] = b"strapd";
 /// Bytes of an attachment: a number, a time, the length of an identity, the identity.
 const ATTACHMENT: usize = 33;
 
-/// What tells one publisher from another.
+/// Identity of a publisher.
 pub type Gid = [u8; 16];
 
-/// What to subscribe to for every Imu of these topics.
+/// Key to subscribe to for every Imu of these topics.
 #[must_use]
 pub fn subscription(key: &str) -> String {
     match key.contains("::dds_::") {
@@ -96,14 +96,14 @@ pub fn topic_of(id: &str) -> String {
     }
 }
 
-/// What goes with each message.
+/// Attachment of each message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Attachment {
-    /// Its number; that of the next is one more.
+    /// Number; that of the next is one more.
     pub sequence: i64,
-    /// When it was sent, on the sender's clock.
+    /// Time at which it was sent, on the sender's clock.
     pub sent: Nanos,
-    /// By whom.
+    /// Publisher.
     pub gid: Gid,
 }
 
@@ -132,7 +132,7 @@ impl Attachment {
         })
     }
 
-    /// Its bytes.
+    /// Bytes.
     #[must_use]
     pub fn to_bytes(self) -> [u8; ATTACHMENT] {
         let mut bytes = [0; ATTACHMENT];

@@ -29,7 +29,7 @@ use tokio::time::sleep;
 
 /// A connection that stood so long was a good one: the waits begin anew.
 const STEADY: Duration = Duration::from_secs(1);
-/// How long the watchers may take to make room: meanwhile the rings fill, and nobody waits for us.
+/// Time that the watchers may take to make room: meanwhile the rings fill, and nobody waits for us.
 const PATIENCE: Duration = Duration::from_millis(300);
 
 /// Reads until the daemon ends.
